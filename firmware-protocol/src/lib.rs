@@ -1,0 +1,2 @@
+//! Wire protocol.
+#![no_std]

@@ -1,0 +1,2 @@
+//! sonard
+fn main(){}
