@@ -1,1 +1,33 @@
-//! sonard.
+//! Model, protocol shell and records of an ultrasonic ranger on a stepper.
+//!
+//! The data flow, in the order of the modules:
+//!
+//! a [`scene`] (walls and cylinders of some material) and the [`acoustics`] of air, transducer
+//! and receiver go into a [`model`], which predicts what the ranger reads at each azimuth of a
+//! [`scan`]; the same scan record holds measured readings, and [`compare`] sets the two side
+//! by side. [`plot`] draws all of it.
+//!
+//! Those modules are pure: no clock, no file, no socket, and random numbers are passed in. They
+//! build without the feature `daemon`. Behind it, [`link`] opens serial lines, [`ranger`]
+//! drives the protocol, [`mock`] plays the device from the model, and [`store`] keeps logs.
+#![cfg_attr(docsrs, feature(doc_cfg))]
+
+pub mod acoustics;
+pub mod compare;
+pub mod geometry;
+pub mod model;
+#[cfg(feature = "plot")]
+pub mod plot;
+pub mod scan;
+pub mod scene;
+
+#[cfg(feature = "daemon")]
+pub mod cli;
+#[cfg(feature = "daemon")]
+pub mod link;
+#[cfg(feature = "daemon")]
+pub mod mock;
+#[cfg(feature = "daemon")]
+pub mod ranger;
+#[cfg(feature = "daemon")]
+pub mod store;

@@ -1,2 +1,7 @@
-//! sonard
-fn main(){}
+//! The `sonard` program.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    sonard::cli::main()
+}

@@ -1,0 +1,11 @@
+//! `sonard mock`.
+
+use super::{Failure, Outcome};
+
+/// Options of `sonard mock`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {}
+
+pub(super) fn run(_args: Args) -> Outcome {
+    Err(Failure::Found(None))
+}

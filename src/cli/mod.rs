@@ -1,0 +1,62 @@
+//! The command line: one file a verb.
+
+mod compare;
+mod failure;
+mod log;
+mod mock;
+mod plot;
+mod scan;
+mod scene;
+mod simulate;
+
+pub use failure::{Failure, Outcome};
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Drives an ultrasonic ranger on a stepper, and predicts what it reads.
+#[derive(Debug, Parser)]
+#[command(version, about, after_help = EXIT_CODES, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 done, 1 ran and found a failure, 2 wrong usage or input, \
+3 device or link.";
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Take one or more scans and log each reading beside the model's prediction
+    Scan(scan::Args),
+    /// Play a ranger on a pty, with sound from the model
+    Mock(mock::Args),
+    /// Predict a scan with the model alone
+    Simulate(simulate::Args),
+    /// Compare a log's readings with the predictions beside them
+    Compare(compare::Args),
+    /// Draw scans: floor plan, polar, residuals
+    Plot(plot::Args),
+    /// Check, repair or show a log
+    #[command(subcommand)]
+    Log(log::Verb),
+    /// Check or draw a scene file, or print its JSON Schema
+    #[command(subcommand)]
+    Scene(scene::Verb),
+}
+
+/// Runs the command line of this process.
+#[must_use]
+pub fn main() -> ExitCode {
+    let outcome = match Cli::parse().verb {
+        Verb::Scan(args) => scan::run(args),
+        Verb::Mock(args) => mock::run(args),
+        Verb::Simulate(args) => simulate::run(args),
+        Verb::Compare(args) => compare::run(args),
+        Verb::Plot(args) => plot::run(args),
+        Verb::Log(verb) => log::run(verb),
+        Verb::Scene(verb) => scene::run(verb),
+    };
+    failure::report(outcome)
+}

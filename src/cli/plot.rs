@@ -1,0 +1,11 @@
+//! `sonard plot`.
+
+use super::{Failure, Outcome};
+
+/// Options of `sonard plot`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {}
+
+pub(super) fn run(_args: Args) -> Outcome {
+    Err(Failure::Found(None))
+}

@@ -1,0 +1,11 @@
+//! `sonard scan`.
+
+use super::{Failure, Outcome};
+
+/// Options of `sonard scan`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {}
+
+pub(super) fn run(_args: Args) -> Outcome {
+    Err(Failure::Found(None))
+}

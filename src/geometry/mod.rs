@@ -1,0 +1,78 @@
+//! Points, poses and angles. The world frame has x to the right and y up, in metres.
+
+pub use glam::DVec2;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Where the ranger's rotation axis stands and where azimuth 0 points.
+///
+/// On the command line a pose is written `X,Y,DEG`, in records `{"x_m","y_m","heading_deg"}`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Pose {
+    /// World x of the rotation axis, metres.
+    pub x_m: f64,
+    /// World y of the rotation axis, metres.
+    pub y_m: f64,
+    /// Direction of azimuth 0, degrees counter-clockwise from world +x.
+    #[serde(default)]
+    pub heading_deg: f64,
+}
+
+impl Pose {
+    /// The position of the rotation axis.
+    #[must_use]
+    pub const fn position(&self) -> DVec2 {
+        DVec2::new(self.x_m, self.y_m)
+    }
+
+    /// World direction (radians counter-clockwise from +x) of an azimuth in degrees.
+    #[must_use]
+    pub fn direction_rad(&self, azimuth_deg: f64) -> f64 {
+        (self.heading_deg + azimuth_deg).to_radians()
+    }
+
+    /// The point at `range_m` along `azimuth_deg`.
+    #[must_use]
+    pub fn point_at(&self, azimuth_deg: f64, range_m: f64) -> DVec2 {
+        self.position() + range_m * DVec2::from_angle(self.direction_rad(azimuth_deg))
+    }
+}
+
+/// An angle in degrees brought into [0, 360).
+#[must_use]
+pub fn wrap_360(angle_deg: f64) -> f64 {
+    let wrapped = angle_deg.rem_euclid(360.0);
+    // rem_euclid of a tiny negative number rounds up to the modulus itself.
+    if wrapped >= 360.0 { 0.0 } else { wrapped }
+}
+
+/// An angle in radians brought into (-pi, pi].
+#[must_use]
+pub fn wrap_pi(angle_rad: f64) -> f64 {
+    use std::f64::consts::{PI, TAU};
+    let wrapped = angle_rad.rem_euclid(TAU);
+    if wrapped > PI { wrapped - TAU } else { wrapped }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrap_360_stays_below_the_modulus() {
+        for (angle_deg, expected) in [(-0.9, 359.1), (360.0, 0.0), (-1e-17, 0.0), (725.0, 5.0)] {
+            assert!((wrap_360(angle_deg) - expected).abs() < 1e-9, "{angle_deg}");
+            assert!(wrap_360(angle_deg) < 360.0, "{angle_deg}");
+        }
+    }
+
+    #[test]
+    fn point_at_turns_counter_clockwise_from_the_heading() {
+        let pose = Pose { x_m: 1.0, y_m: 2.0, heading_deg: 90.0 };
+        let ahead = pose.point_at(0.0, 2.0);
+        let left = pose.point_at(90.0, 2.0);
+        assert!((ahead - DVec2::new(1.0, 4.0)).length() < 1e-12);
+        assert!((left - DVec2::new(-1.0, 2.0)).length() < 1e-12);
+    }
+}

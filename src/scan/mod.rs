@@ -1,0 +1,10 @@
+//! Scans: the plan, the readings, and the records they are logged as.
+
+mod plan;
+mod record;
+
+pub use plan::{PlanError, ScanPlan};
+pub use record::{
+    AirRecord, Device, Event, EventKind, LOG_FORMAT, ModelRecord, PathKind, PathRecord, Ping,
+    PingStatus, Provenance, Record, ScanEnd, ScanStart, SceneRef, Session, SimRecord,
+};
