@@ -3,6 +3,8 @@
 //! An [`Engine`] finds the echoes that reach the transducer's face; the receiver decides which
 //! of them is detected. [`Simulator`] joins the two.
 
+pub mod paths;
+
 use smallvec::SmallVec;
 
 use crate::{
