@@ -91,6 +91,12 @@ impl World {
         self.step += steps - if missed { steps.signum() } else { 0 };
     }
 
+    /// How far the motor really is from the index, steps.
+    #[must_use]
+    pub const fn steps_from_index(&self) -> i32 {
+        self.step
+    }
+
     /// Turns to the index and returns how far that was, steps.
     pub fn seek_index(&mut self) -> i32 {
         std::mem::take(&mut self.step)
