@@ -1,8 +1,12 @@
 //! The only place where the host machine meets a line and a clock.
 
-use std::time::Duration;
+use std::{ops::ControlFlow, time::Duration};
 
-use firmware_protocol::host::{Command, Host, HostConfig, HostError, HostEvent, Outcome};
+use firmware_protocol::{
+    host::{Command, Host, HostConfig, HostError, HostEvent, Outcome, StartError},
+    messages::{Identity, SweepState},
+};
+use thiserror::Error;
 use tokio::{
     io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _},
     time::{Instant, sleep_until},
@@ -16,6 +20,36 @@ pub struct Driver<L> {
     epoch: Instant,
     hung_up: bool,
     outgoing: Vec<u8>,
+}
+
+/// How a command ended well.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// An Identify.
+    Identified(Identity),
+    /// A sweep: so many readings were delivered.
+    Swept {
+        /// Readings delivered.
+        delivered: u16,
+        /// Complete or stopped.
+        end: SweepState,
+    },
+    /// Any other command.
+    Done(Outcome),
+}
+
+/// Why a command did not end well.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum DriveError {
+    /// It was not begun.
+    #[error("{0}")]
+    NotStarted(StartError),
+    /// It failed.
+    #[error("{0}")]
+    Host(HostError),
+    /// Whoever takes the events wanted no more of them; the command is still under way.
+    #[error("given up by the receiver of its readings")]
+    Abandoned,
 }
 
 impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
@@ -40,47 +74,64 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
         u64::try_from(self.epoch.elapsed().as_micros()).unwrap_or(u64::MAX)
     }
 
-    /// Carries out one command and hands every event on the way to `on_event`.
-    ///
-    /// Cancel-safe: what was received stays in the machine, and the command goes on when driven
-    /// again with [`Self::finish`].
+    /// Begins a command; [`Self::finish`] carries it out.
     ///
     /// # Errors
-    /// The machine's own, which name the cause.
+    /// When another one is under way or something must come first.
+    pub fn start(&mut self, command: Command) -> Result<(), DriveError> {
+        let now_us = self.now_us();
+        self.host.start(now_us, command).map_err(DriveError::NotStarted)
+    }
+
+    /// Carries out one command and hands every event on the way to `on_event`, which may break
+    /// off.
+    ///
+    /// # Errors
+    /// As [`Self::start`] and [`Self::finish`].
     pub async fn perform(
         &mut self,
         command: Command,
-        on_event: impl FnMut(HostEvent),
-    ) -> Result<Outcome, HostError> {
-        let now_us = self.now_us();
-        self.host.start(now_us, command).map_err(|_busy| HostError::Busy)?;
+        on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
+    ) -> Result<Ended, DriveError> {
+        self.start(command)?;
         self.finish(on_event).await
     }
 
-    /// Waits for the end of the command under way.
+    /// Waits for the end of the command under way, handing every other event to `on_event`.
+    ///
+    /// Cancel-safe: what was received stays in the machine, and a later call goes on with it.
     ///
     /// # Errors
     /// The machine's own, which name the cause.
     pub async fn finish(
         &mut self,
-        mut on_event: impl FnMut(HostEvent),
-    ) -> Result<Outcome, HostError> {
+        mut on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
+    ) -> Result<Ended, DriveError> {
         loop {
             match self.next_event().await {
-                HostEvent::Done(outcome) => return Ok(outcome),
-                HostEvent::Failed(error) => return Err(error),
-                event => on_event(event),
+                HostEvent::Identified(identity) => return Ok(Ended::Identified(identity)),
+                HostEvent::SweepDone { delivered, end, .. } => {
+                    return Ok(Ended::Swept { delivered, end });
+                }
+                HostEvent::Done(outcome) => return Ok(Ended::Done(outcome)),
+                HostEvent::Failed(error) => return Err(DriveError::Host(error)),
+                event => {
+                    if on_event(event).is_break() {
+                        return Err(DriveError::Abandoned);
+                    }
+                }
             }
         }
     }
 
-    /// The machine's next event. Cancel-safe.
+    /// The machine's next event.
     async fn next_event(&mut self) -> HostEvent {
         loop {
             if let Some(event) = self.host.poll_event() {
                 return event;
             }
-            while let Some(frame) = self.host.poll_transmit() {
+            let now_us = self.now_us();
+            while let Some(frame) = self.host.poll_transmit(now_us) {
                 self.outgoing.extend_from_slice(&frame);
             }
             self.wait().await;
@@ -89,10 +140,8 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
 
     /// Waits for bytes, room for bytes, or the machine's next deadline, and tells the machine.
     async fn wait(&mut self) {
-        let deadline = self
-            .host
-            .poll_timeout()
-            .map(|(_, at_us)| self.epoch + Duration::from_micros(at_us));
+        let deadline = self.host.poll_timeout();
+        let deadline = deadline.map(|(_, at_us)| self.epoch + Duration::from_micros(at_us));
         let timer = async {
             match deadline {
                 Some(at) => sleep_until(at).await,
@@ -101,31 +150,35 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
         };
         let mut buffer = [0; 1024];
         // After a hangup the line would answer at once, for ever: it is not asked again.
-        tokio::select! {
-            read = self.line.read(&mut buffer), if !self.hung_up => match read {
-                Ok(count) if count > 0 => {
-                    let now_us = self.now_us();
-                    self.host.handle_bytes(now_us, buffer.get(..count).unwrap_or_default());
-                }
-                _ => self.hang_up(),
-            },
-            written = self.line.write(&self.outgoing), if !self.hung_up && !self.outgoing.is_empty() => {
-                match written {
-                    Ok(count) if count > 0 => drop(self.outgoing.drain(..count)),
-                    _ => self.hang_up(),
-                }
+        let (listening, speaking) = (!self.hung_up, !self.hung_up && !self.outgoing.is_empty());
+        let (mut reader, mut writer) = tokio::io::split(&mut self.line);
+        let happened = tokio::select! {
+            read = reader.read(&mut buffer), if listening => Happened::Read(read.unwrap_or(0)),
+            written = writer.write(&self.outgoing), if speaking => {
+                Happened::Written(written.unwrap_or(0))
             }
-            () = timer => {
-                let now_us = self.now_us();
-                self.host.handle_timeout(now_us);
+            () = timer => Happened::Timeout,
+        };
+        let now_us = self.now_us();
+        match happened {
+            Happened::Read(0) | Happened::Written(0) => {
+                self.hung_up = true;
+                self.outgoing.clear();
+                self.host.handle_hangup(now_us);
             }
+            Happened::Read(count) => {
+                self.host.handle_bytes(now_us, buffer.get(..count).unwrap_or_default());
+            }
+            Happened::Written(count) => drop(self.outgoing.drain(..count)),
+            Happened::Timeout => self.host.handle_timeout(now_us),
         }
     }
+}
 
-    fn hang_up(&mut self) {
-        self.hung_up = true;
-        self.outgoing.clear();
-        let now_us = self.now_us();
-        self.host.handle_hangup(now_us);
-    }
+enum Happened {
+    /// So many bytes came; 0 at the end of the line.
+    Read(usize),
+    /// So many bytes went; 0 at the end of the line.
+    Written(usize),
+    Timeout,
 }
