@@ -1,1 +1,5 @@
-//! ranger.
+//! Drives a ranger over its protocol.
+
+mod clock;
+
+pub use clock::{ClockFit, HostTime, TickExtender};
