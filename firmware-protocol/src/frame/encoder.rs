@@ -8,12 +8,14 @@ use super::{CRC_LEN, DELIMITER, FRAME_MAX, HEADER_LEN, Header, PAYLOAD_MAX, crc3
 
 /// A frame ready to be written to the line.
 ///
-/// Reads as a byte slice; [`Frame::with_leading_delimiter`] includes one more delimiter in front.
+/// Reads as a byte slice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Frame {
     /// A delimiter, the code byte, the payload, a delimiter.
     bytes: [u8; FRAME_MAX + 1],
-    len: u8,
+    /// Where reading begins: 0 with the leading delimiter, else 1.
+    start: u8,
+    end: u8,
     crc: u32,
 }
 
@@ -34,22 +36,34 @@ impl Frame {
         let mut bytes = [DELIMITER; FRAME_MAX + 1];
         let [boot_low, boot_high] = header.boot.to_le_bytes();
         let [seq_low, seq_high] = header.seq.to_le_bytes();
-        put(&mut bytes, PAYLOAD_AT, [boot_low, boot_high, seq_low, seq_high])?;
+        put(
+            &mut bytes,
+            PAYLOAD_AT,
+            [boot_low, boot_high, seq_low, seq_high],
+        )?;
         let room = PAYLOAD_AT + HEADER_LEN..PAYLOAD_AT + PAYLOAD_MAX - CRC_LEN;
         let body = bytes.get_mut(room).ok_or(TooLong)?;
-        let body_len = postcard::to_slice(message, body).map_err(|_| TooLong)?.len();
+        let body_len = postcard::to_slice(message, body)
+            .map_err(|_| TooLong)?
+            .len();
         let covered = HEADER_LEN + body_len;
         let crc = crc32(bytes.get(PAYLOAD_AT..PAYLOAD_AT + covered).ok_or(TooLong)?);
         put(&mut bytes, PAYLOAD_AT + covered, crc.to_le_bytes())?;
         let payload_len = covered + CRC_LEN;
         stuff(bytes.get_mut(1..PAYLOAD_AT + payload_len).ok_or(TooLong)?);
-        Ok(Self { bytes, len: u8::try_from(payload_len + 2).map_err(|_| TooLong)?, crc })
+        let end = u8::try_from(PAYLOAD_AT + payload_len + 1).map_err(|_| TooLong)?;
+        Ok(Self {
+            bytes,
+            start: 1,
+            end,
+            crc,
+        })
     }
 
-    /// The bytes with a delimiter in front as well, which ends whatever noise came before.
+    /// The same with a delimiter in front as well, which ends whatever noise came before.
     #[must_use]
-    pub fn with_leading_delimiter(&self) -> &[u8] {
-        self.bytes.get(..usize::from(self.len) + 1).unwrap_or_default()
+    pub const fn with_leading_delimiter(self) -> Self {
+        Self { start: 0, ..self }
     }
 
     /// The CRC the frame carries.
@@ -63,12 +77,17 @@ impl Deref for Frame {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
-        self.bytes.get(1..usize::from(self.len) + 1).unwrap_or_default()
+        self.bytes
+            .get(usize::from(self.start)..usize::from(self.end))
+            .unwrap_or_default()
     }
 }
 
 fn put(bytes: &mut [u8], at: usize, value: [u8; 4]) -> Result<(), TooLong> {
-    bytes.get_mut(at..at + 4).ok_or(TooLong)?.copy_from_slice(&value);
+    bytes
+        .get_mut(at..at + 4)
+        .ok_or(TooLong)?
+        .copy_from_slice(&value);
     Ok(())
 }
 
@@ -76,7 +95,9 @@ fn put(bytes: &mut [u8], at: usize, value: [u8; 4]) -> Result<(), TooLong> {
 /// distance to the next. Right for blocks under 254 bytes.
 fn stuff(block: &mut [u8]) {
     let mut distance: u8 = 1;
-    let Some((code, payload)) = block.split_first_mut() else { return };
+    let Some((code, payload)) = block.split_first_mut() else {
+        return;
+    };
     for byte in payload.iter_mut().rev() {
         if *byte == DELIMITER {
             *byte = distance;

@@ -12,8 +12,8 @@ pub(crate) mod table;
 pub use codes::{DeviceState, FaultKind, NakReason, ReadingStatus, ResetCause, SweepState};
 pub use echoes::Echoes;
 pub use records::{
-    Alive, Blanking, Capabilities, FirmwareVersion, Identity, ProtocolId, Reading, Settings, Status,
-    Sweep, SweepDone,
+    Alive, Blanking, Capabilities, FirmwareVersion, Identity, ProtocolId, Reading, Settings,
+    Status, Sweep, SweepDone,
 };
 pub use table::{Field, Variant};
 
@@ -24,7 +24,10 @@ use table::wire_enum;
 pub const PROTOCOL_VERSION: u8 = 1;
 
 /// The protocol this crate speaks.
-pub const PROTOCOL: ProtocolId = ProtocolId { version: PROTOCOL_VERSION, schema: SCHEMA_HASH };
+pub const PROTOCOL: ProtocolId = ProtocolId {
+    version: PROTOCOL_VERSION,
+    schema: SCHEMA_HASH,
+};
 
 /// Hash of all names, codes, fields and types below: two builds with the same hash encode alike.
 pub const SCHEMA_HASH: u32 = schema_hash();
@@ -116,6 +119,14 @@ wire_enum! {
 /// A body that is no message of this version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Undecodable;
+
+impl core::fmt::Display for Undecodable {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        formatter.write_str("no message of this protocol version")
+    }
+}
+
+impl core::error::Error for Undecodable {}
 
 impl Request {
     /// Decodes a request that fills `body` exactly.
