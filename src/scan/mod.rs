@@ -3,6 +3,7 @@
 mod codec;
 mod plan;
 mod record;
+mod view;
 
 pub use codec::{EncodeError, FaultKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};
 pub use plan::{PlanError, ScanPlan};
@@ -10,3 +11,4 @@ pub use record::{
     AirRecord, Device, Event, EventKind, LOG_FORMAT, ModelRecord, PathKind, PathRecord, Ping,
     PingStatus, Provenance, Record, ScanEnd, ScanStart, SceneRef, Session, SimRecord,
 };
+pub use view::ScanView;
