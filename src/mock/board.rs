@@ -3,6 +3,8 @@
 //! A discrete-event simulation without I/O. Events happen at their exact device times, however
 //! late the real clock gets round to them, so that timing does not depend on the machine.
 
+use std::fmt;
+
 use firmware_protocol::{
     device::{Action, Board, Device, DeviceTimer, EchoReport},
     frame::Frame,
@@ -34,6 +36,17 @@ pub struct BoardSettings {
     pub faults: FaultPlan,
     /// Seed of the faults.
     pub seed: u64,
+    /// How its clock passes; a virtual one is announced to the host.
+    pub pace: Pace,
+}
+
+/// How device time passes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pace {
+    /// As on a wall clock.
+    RealTime,
+    /// Jumps to whatever happens next; only the host's patience is measured in real time.
+    Virtual,
 }
 
 /// Why the board wants to be woken.
@@ -69,6 +82,20 @@ pub enum Note {
     CoilsReleased,
     /// A fault was played.
     Fault(DeviceFault),
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Booted(boot) => write!(f, "booted, nonce {boot:04x}"),
+            Self::Homed(0) => f.write_str("homed"),
+            Self::Homed(drift) => write!(f, "homed, the index was {drift} steps off"),
+            Self::Fired(count) => write!(f, "{count} firings"),
+            Self::Stopped(step) => write!(f, "motor stopped at step {step}"),
+            Self::CoilsReleased => f.write_str("coils released"),
+            Self::Fault(fault) => write!(f, "fault: {fault}"),
+        }
+    }
 }
 
 /// The device machine, its board, and the world around it.
@@ -192,10 +219,12 @@ impl MockBoard {
         }
         let mut buffer = [0; 128];
         let mut said = Vec::new();
-        while let Some(bytes) =
-            buffer.get(..self.device.poll_transmit(&mut buffer)).filter(|bytes| !bytes.is_empty())
-        {
-            said.extend_from_slice(bytes);
+        loop {
+            let count = self.device.poll_transmit(&mut buffer);
+            if count == 0 {
+                break;
+            }
+            said.extend_from_slice(buffer.get(..count).unwrap_or_default());
         }
         match self.settings.faults.version {
             Some(version) => self.faults.garble(&with_version(&said, version), out),
@@ -203,6 +232,12 @@ impl MockBoard {
         }
         // A restart waits until its acknowledgement is out.
         self.act();
+    }
+
+    /// How its clock passes.
+    #[must_use]
+    pub const fn pace(&self) -> Pace {
+        self.settings.pace
     }
 
     /// How long the next chunk of bytes is held back on the line, milliseconds.
@@ -346,6 +381,10 @@ impl MockBoard {
 }
 
 fn identity(settings: &BoardSettings, boot: u16, reset_cause: ResetCause) -> Board {
+    let clock = match settings.pace {
+        Pace::RealTime => Capabilities::default(),
+        Pace::Virtual => Capabilities::VIRTUAL_CLOCK,
+    };
     Board {
         boot,
         firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
@@ -355,7 +394,8 @@ fn identity(settings: &BoardSettings, boot: u16, reset_cause: ResetCause) -> Boa
             .with(Capabilities::SHORT_BLANKING)
             .with(Capabilities::MULTIPLE_ECHOES)
             .with(Capabilities::COIL_RELEASE)
-            .with(Capabilities::SIMULATED),
+            .with(Capabilities::SIMULATED)
+            .with(clock),
         reset_cause,
     }
 }

@@ -11,10 +11,10 @@ mod pty;
 mod serve;
 mod world;
 
-pub use board::{BoardSettings, MockBoard, Note, Wake, WakeKind};
+pub use board::{BoardSettings, MockBoard, Note, Pace, Wake, WakeKind};
 pub use faults::{DeviceFault, FAULT_HELP, FaultPlan, FaultSpecError, Faults};
 pub use motion::Trapezoid;
 pub use noise::Noise;
 pub use pty::Pty;
-pub use serve::{MockPort, Pace};
+pub use serve::MockPort;
 pub use world::{Soundings, World};

@@ -13,18 +13,9 @@ use tokio::{
 };
 
 use super::{
-    board::{MockBoard, Note, WakeKind},
+    board::{MockBoard, Note, Pace, WakeKind},
     pty::Pty,
 };
-
-/// How device time passes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pace {
-    /// As on a wall clock.
-    RealTime,
-    /// Jumps to whatever happens next; only the host's patience is measured in real time.
-    Virtual,
-}
 
 /// How often a lock left behind by a killed host is lifted.
 const LOCK_CHECK: Duration = Duration::from_millis(200);
@@ -38,7 +29,6 @@ pub struct MockPort {
     board: MockBoard,
     pty: AsyncFd<Pty>,
     link: Option<PathBuf>,
-    pace: Pace,
     epoch: Instant,
     epoch_ticks: u64,
     to_host: Line,
@@ -74,14 +64,13 @@ impl MockPort {
     ///
     /// # Errors
     /// What the system says; `AlreadyExists` if `link` is something else than a symbolic link.
-    pub fn open(board: MockBoard, link: Option<&Path>, pace: Pace) -> io::Result<Self> {
+    pub fn open(board: MockBoard, link: Option<&Path>) -> io::Result<Self> {
         Ok(Self {
             epoch: Instant::now(),
             epoch_ticks: board.now(),
-            pty: AsyncFd::new(Pty::open(link)?)?,
+            pty: open_watched(link)?,
             link: link.map(Path::to_path_buf),
             board,
-            pace,
             to_host: Line::default(),
             to_board: Line::default(),
         })
@@ -104,7 +93,8 @@ impl MockPort {
     ) -> io::Result<()> {
         tokio::pin!(shutdown);
         loop {
-            self.board.advance(self.due());
+            let due = self.due();
+            self.board.advance(due);
             while !self.board.stalled()
                 && let Some(bytes) = self.to_board.pop_due()
             {
@@ -127,7 +117,7 @@ impl MockPort {
     fn due(&mut self) -> u64 {
         let real = self.epoch_ticks + ticks(self.epoch.elapsed());
         let Some(wake) = self.board.next_wake() else { return real };
-        if self.pace == Pace::Virtual && wake.kind == WakeKind::Work && wake.at > real {
+        if self.board.pace() == Pace::Virtual && wake.kind == WakeKind::Work && wake.at > real {
             // From the jump on, the host's patience is measured from here.
             self.epoch = Instant::now();
             self.epoch_ticks = wake.at;
@@ -139,7 +129,7 @@ impl MockPort {
     /// Waits for bytes from the host or for the next thing to happen.
     async fn wait(&mut self) -> io::Result<()> {
         let wake = self.board.next_wake();
-        let jump = self.pace == Pace::Virtual && wake.is_some_and(|w| w.kind == WakeKind::Work);
+        let jump = self.board.pace() == Pace::Virtual && wake.is_some_and(|w| w.kind == WakeKind::Work);
         let at = if jump { Some(Instant::now()) } else { wake.map(|wake| self.real_time(wake.at)) };
         let lines = [self.to_host.next_due(), self.to_board.next_due()];
         let stalled_lines = if self.board.stalled() { None } else { lines.into_iter().flatten().min() };
@@ -194,11 +184,11 @@ impl MockPort {
         self.to_host.chunks.clear();
         self.to_board.chunks.clear();
         // The old pty has to be gone before its link can be made anew.
-        let parked = AsyncFd::new(Pty::open(None)?)?;
+        let parked = open_watched(None)?;
         drop(std::mem::replace(&mut self.pty, parked));
         tokio::time::sleep(HANGUP).await;
         if let Some(link) = self.link.as_deref() {
-            self.pty = AsyncFd::new(Pty::open(Some(link))?)?;
+            self.pty = open_watched(Some(link))?;
         }
         Ok(())
     }
@@ -209,6 +199,13 @@ impl MockPort {
         tokio::time::sleep(Duration::from_millis(20)).await;
         Ok(())
     }
+}
+
+#[expect(unsafe_code, reason = "tokio offers no safe way to watch a descriptor of one's own")]
+fn open_watched(link: Option<&Path>) -> io::Result<AsyncFd<Pty>> {
+    let pty = Pty::open(link)?;
+    // SAFETY: `Pty` owns its master descriptor from `open` to `drop` and never replaces it.
+    Ok(unsafe { AsyncFd::register(pty) }?)
 }
 
 async fn read_some(pty: &AsyncFd<Pty>, buffer: &mut [u8]) -> io::Result<usize> {

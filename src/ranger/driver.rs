@@ -52,6 +52,46 @@ pub enum DriveError {
     Abandoned,
 }
 
+impl DriveError {
+    /// What a person can do about it.
+    #[must_use]
+    pub const fn help(&self) -> &'static str {
+        match self {
+            Self::NotStarted(_) | Self::Abandoned => "this is a fault of the program: report it",
+            Self::Host(error) => host_help(error),
+        }
+    }
+}
+
+const fn host_help(error: &HostError) -> &'static str {
+    match error {
+        HostError::NoAnswer { .. } => {
+            "check that the port is the ranger's, that the board has power, and the cable; a board \
+             that never ran the firmware does not answer either"
+        }
+        HostError::NotADevice { .. } => {
+            "check that the port is the ranger's; a modem, a GPS or another firmware speaks \
+             something else"
+        }
+        HostError::WrongVersion { .. } => {
+            "flash the firmware of this version of sonard, or install the sonard of the firmware's"
+        }
+        HostError::Refused(_) => "change the setting that the device names",
+        HostError::Rebooted => {
+            "the board restarts again and again: look at its supply (the module draws 2 A while \
+             firing; it needs 1000 uF beside it)"
+        }
+        HostError::Hangup => "the cable was pulled or the board lost power: plug it in, scan again",
+        HostError::LeaseExpired => "this computer was away too long: stop what loads it, scan again",
+        HostError::EmergencyStop => "release the emergency stop, then scan again",
+        HostError::MotionFault => "free the motor, check its supply and current, then scan again",
+        HostError::Stopped => "another program stopped it: make sure that only one uses the port",
+        HostError::Stalled { .. } | HostError::SweepLost | HostError::WrongReading { .. } => {
+            "reset the board and scan again; if it happens again, report it with the log"
+        }
+    }
+}
+
 impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
     /// A driver on an open line.
     pub fn new(line: L, config: HostConfig) -> Self {
@@ -130,8 +170,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
             if let Some(event) = self.host.poll_event() {
                 return event;
             }
-            let now_us = self.now_us();
-            while let Some(frame) = self.host.poll_transmit(now_us) {
+            while let Some(frame) = self.host.poll_transmit() {
                 self.outgoing.extend_from_slice(&frame);
             }
             self.wait().await;

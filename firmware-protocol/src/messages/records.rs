@@ -67,6 +67,12 @@ impl Capabilities {
     pub const EMERGENCY_STOP: Self = Self(1 << 3);
     /// Can release the motor's coils.
     pub const COIL_RELEASE: Self = Self(1 << 4);
+    /// Its clock jumps: good for intervals between firings, not for the time of day.
+    pub const VIRTUAL_CLOCK: Self = Self(1 << 13);
+    /// The firmware's machine code, but in an emulator.
+    pub const EMULATED: Self = Self(1 << 14);
+    /// No hardware: the echoes come from a model.
+    pub const SIMULATED: Self = Self(1 << 15);
 
     /// Whether all of `wanted` are there.
     #[must_use]
