@@ -111,8 +111,22 @@ impl Layer {
         self.with("stroke", colour).with("stroke-width", width_px).with("fill", "none")
     }
 
+    /// Texts with a white rim, to be read over marks and lines.
+    pub(super) fn haloed(self) -> Self {
+        self.with("stroke", theme::PAPER)
+            .with("stroke-width", 3.0)
+            .with("stroke-linejoin", "round")
+            .with("paint-order", "stroke")
+    }
+
     pub(super) fn add(&mut self, layer: Self) {
         self.node(layer.group);
+    }
+
+    pub(super) fn extend(&mut self, layers: impl IntoIterator<Item = Self>) {
+        for layer in layers {
+            self.add(layer);
+        }
     }
 
     pub(super) fn into_group(self) -> Group {

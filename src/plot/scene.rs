@@ -2,10 +2,9 @@
 
 use super::{
     canvas::{Anchor, Layer, Px, Rect},
-    caption,
+    caption, keys,
     labels::Labels,
-    legend::{self, Entry, Sample},
-    materials::Materials,
+    legend,
     picture::Picture,
     plan::{Bounds, Plan},
     theme,
@@ -16,13 +15,12 @@ use crate::{geometry::DVec2, scene::Scene};
 /// the named poses with their headings, and a scale bar.
 #[must_use]
 pub fn draw_scene(scene: &Scene) -> Picture {
-    let (heading, top) = caption::draw(&scene.name, &notes(scene));
+    let (heading, top) = caption::draw(&scene.name, None, &notes(scene));
     let region = region(scene);
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
     let height = Plan::height_for(&region, right - left, [220.0, 640.0]);
-    let plan = Plan::fit(region, Rect::new(left, top + 4.0, right - left, height));
+    let plan = Plan::fit(region, Rect::new(left, top + 16.0, right - left, height));
     let mut labels = Labels::new(plan.panel);
-    labels.keep_free(plan.scale_bar_rect());
 
     let mut page = Layer::new("scene");
     page.add(heading);
@@ -32,7 +30,7 @@ pub fn draw_scene(scene: &Scene) -> Picture {
     page.add(plan.names(scene, &mut labels));
     page.add(plan.scale_bar());
     let below = Px::new(left, plan.panel.bottom + 24.0);
-    let (entries, legend_height) = legend::draw(&materials(scene), below, right - left);
+    let (entries, legend_height) = legend::draw(&keys::materials(scene), below, right - left);
     page.add(entries);
     Picture::new(theme::PAGE_PX, below.y + legend_height + theme::MARGIN_PX / 2.0, page)
 }
@@ -85,14 +83,4 @@ fn poses(plan: &Plan, scene: &Scene, labels: &mut Labels) -> Layer {
         }
     }
     layer
-}
-
-fn materials(scene: &Scene) -> Vec<Entry> {
-    Materials::of(scene)
-        .styles()
-        .map(|(dash, material)| {
-            let sample = Sample::Line { colour: theme::WALL, width_px: theme::WALL_PX, dash };
-            Entry::new(sample, Materials::describe(&material))
-        })
-        .collect()
 }
