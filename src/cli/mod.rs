@@ -4,6 +4,7 @@ mod compare;
 mod failure;
 mod log;
 mod mock;
+mod options;
 mod plot;
 mod scan;
 mod scene;
