@@ -4,9 +4,11 @@ mod compare;
 mod failure;
 mod log;
 mod mock;
+mod options;
 mod plot;
 mod scan;
 mod scene;
+mod scene_file;
 mod simulate;
 
 pub use failure::{Failure, Outcome};

@@ -39,10 +39,8 @@ impl Soundings {
         mounting_offset_deg: f64,
     ) -> Self {
         let mounted = Pose { heading_deg: pose.heading_deg + mounting_offset_deg, ..*pose };
-        let turn = ScanPlan {
-            step_deg: 360.0 / f64::from(steps_per_revolution),
-            ..ScanPlan::default()
-        };
+        let turn =
+            ScanPlan { step_deg: 360.0 / f64::from(steps_per_revolution), ..ScanPlan::default() };
         Self::from_predictions(&simulator.predict(&mounted, &turn))
     }
 
@@ -91,6 +89,12 @@ impl World {
         self.step += steps - if missed { steps.signum() } else { 0 };
     }
 
+    /// How far the motor really is from the index, steps.
+    #[must_use]
+    pub const fn steps_from_index(&self) -> i32 {
+        self.step
+    }
+
     /// Turns to the index and returns how far that was, steps.
     pub fn seek_index(&mut self) -> i32 {
         std::mem::take(&mut self.step)
@@ -127,7 +131,11 @@ mod tests {
             first_is_blanking,
         };
         Soundings {
-            rows: vec![row(&[3000.0, 5000.0], false), row(&[2380.0, 6000.0], true), row(&[], false)],
+            rows: vec![
+                row(&[3000.0, 5000.0], false),
+                row(&[2380.0, 6000.0], true),
+                row(&[], false),
+            ],
         }
     }
 

@@ -1,1 +1,31 @@
-//! plot.
+//! Pictures of scenes and scans, as SVG and PNG.
+//!
+//! Everything here is a pure function from data to a [`Picture`]; writing it to a file is the
+//! caller's business.
+
+mod canvas;
+mod caption;
+mod floor;
+mod keys;
+mod labels;
+mod legend;
+mod materials;
+mod picture;
+mod plan;
+mod polar;
+mod readings;
+mod region;
+mod residuals;
+mod scan;
+mod scene;
+mod strip;
+mod strips;
+mod theme;
+mod ticks;
+mod words;
+
+pub use picture::{MAX_WIDTH_PX, Picture, PlotError};
+pub use polar::draw_polar;
+pub use residuals::draw_residuals;
+pub use scan::{draw_scan, draw_scans};
+pub use scene::draw_scene;

@@ -197,7 +197,7 @@ impl SceneProblem {
                 )
             }
             Self::DuplicateKey(_) => "keep one of the two; only one could count".to_owned(),
-            Self::UnknownField { field, known } => suggestion(field, known, "fields here"),
+            Self::UnknownField { field, known } => suggest(field, known, "fields here"),
             Self::MissingField(field) => format!("add \"{field}\" to this object"),
             Self::Type(_) => {
                 "`sonard scene schema` prints what each field holds; numbers stand without quotes"
@@ -208,7 +208,7 @@ impl SceneProblem {
                 "leave the comma out: on the command line X,Y,DEG is a pose by its numbers"
                     .to_owned()
             }
-            Self::UnknownMaterial { name, known } => suggestion(name, known, "materials"),
+            Self::UnknownMaterial { name, known } => suggest(name, known, "materials"),
             Self::DuplicateId { .. } => {
                 "give each wall, cylinder and body a name of its own: records refer to them by it \
                  (segments of a polyline are `id.0`, `id.1`, ...)"
@@ -263,8 +263,10 @@ fn syntax_help(found: &str) -> String {
     }
 }
 
-/// Which of the names may have been meant, or all of them.
-pub(super) fn suggestion(given: &str, known: &[String], what: &str) -> String {
+/// Which of the known names may have been meant, and all of them; `what` says what they are
+/// ("poses").
+#[must_use]
+pub fn suggest(given: &str, known: &[String], what: &str) -> String {
     let near = known
         .iter()
         .map(|name| (strsim::jaro_winkler(&given.to_lowercase(), &name.to_lowercase()), name))

@@ -17,7 +17,7 @@ pub mod shipped;
 #[cfg(test)]
 mod tests;
 
-pub use error::{SceneError, SceneProblem};
+pub use error::{SceneError, SceneProblem, suggest};
 pub use pose::PoseError;
 pub use robot::{Robot, RobotShape};
 pub use schema::json_schema;

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::{
     Scene,
-    error::{MAX_COORDINATE_M, suggestion},
+    error::{MAX_COORDINATE_M, suggest},
     outline::{Outlines, distance_to_segment},
 };
 use crate::geometry::{DVec2, Pose};
@@ -101,7 +101,7 @@ impl PoseError {
     pub fn help(&self) -> String {
         match self {
             Self::Unknown { name, known, .. } => {
-                format!("{}; or give X,Y,DEG (metres, degrees)", suggestion(name, known, "poses"))
+                format!("{}; or give X,Y,DEG (metres, degrees)", suggest(name, known, "poses"))
             }
             Self::Malformed(_) | Self::BadNumber { .. } => {
                 "give X,Y,DEG (metres, degrees counter-clockwise; without DEG the heading is 0), as \

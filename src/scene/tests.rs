@@ -69,7 +69,7 @@ fn line_and_column_count_from_one_and_in_characters() {
 fn syntax_errors_point_at_the_place() {
     check(r#"[4, 0], "material""#, r#"[4, 0, "material""#, ":", "this is not JSON: expected `,` or `]`", "brackets");
     check("0.5}}\n}", "0.5", "{", "this `{` is never closed", "`}`");
-    check("[0, 0]]", "[0, 0]", ":", "this is not JSON: expected `,` or `]` (the `[` at 6:29 is still open)", "brackets");
+    check("[0, 0]]", "[0, 0]", ":", "this is not JSON: expected `,` or `]` (the `[` at 6:32 is still open)", "brackets");
     check(r#"[0, 0], "to""#, r#"[NaN, 0], "to""#, "N", "this is not JSON: expected value", "no NaN");
     check(r#"[0, 0], "to""#, r#"[1e999, 0], "to""#, "9", "this is not JSON: number out of range", "finite");
     check(r#""t","#, r#""t", // comment"#, "/", "this is not JSON: key must be a string", "");

@@ -1,1 +1,23 @@
-//! store.
+//! Logs on disk: written so that a crash at any moment costs at most what was not yet synced,
+//! and read so that damage is named by its line.
+//!
+//! [`LogWriter`] appends one record with one write. [`read_log`] gives every line of a log with
+//! its record or with what is wrong. [`check`] looks at a whole log, [`repair`] leaves out what
+//! can't be read.
+
+mod check;
+mod error;
+mod medium;
+mod open;
+mod reader;
+mod repair;
+mod writer;
+
+pub use check::{Checker, Finding, FindingKind, Severity, Totals, check};
+pub use error::StoreError;
+pub use medium::{FileMedium, Medium, Pipe};
+pub use open::{Recovered, is_being_written};
+pub(crate) use reader::open_for_reading;
+pub use reader::{Line, LineError, Lines, Loaded, load, read_log};
+pub use repair::{LeftOut, Repair, repair};
+pub use writer::{LogWriter, SYNC_INTERVAL};

@@ -1,0 +1,91 @@
+//! Legends: samples of what is drawn, with words, in rows.
+
+use super::{
+    canvas::{Anchor, Layer, Px, Shape, text_width_px},
+    theme,
+};
+
+/// One entry.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Entry {
+    pub(super) sample: Sample,
+    pub(super) text: String,
+}
+
+/// What stands before the words.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Sample {
+    Mark { shape: Shape, colour: &'static str },
+    Ring { colour: &'static str },
+    Line { colour: &'static str, width_px: f64, dash: &'static str },
+    Tick { colour: &'static str },
+    Outward,
+}
+
+impl Entry {
+    pub(super) fn new(sample: Sample, text: impl Into<String>) -> Self {
+        Self { sample, text: text.into() }
+    }
+}
+
+const ROW_PX: f64 = 21.0;
+const SAMPLE_PX: f64 = 30.0;
+const GAP_PX: f64 = 20.0;
+
+/// Draws the entries from `at` (upper left) in rows of at most `width_px`; returns the layer
+/// and its height.
+pub(super) fn draw(entries: &[Entry], at: Px, width_px: f64) -> (Layer, f64) {
+    let mut layer = Layer::new("legend");
+    let (mut x, mut row) = (0.0, 0.0);
+    for entry in entries {
+        let width = SAMPLE_PX + text_width_px(&entry.text, theme::TEXT_PX);
+        if x > 0.0 && x + width > width_px {
+            (x, row) = (0.0, row + 1.0);
+        }
+        let middle = at + Px::new(x, (row + 0.5) * ROW_PX);
+        layer.add(sample(&entry.sample, middle));
+        let text_at = middle + Px::new(SAMPLE_PX, 4.5);
+        layer.text(text_at, Anchor::Start, theme::TEXT_PX, &entry.text);
+        x += width + GAP_PX;
+    }
+    let rows = if entries.is_empty() { 0.0 } else { row + 1.0 };
+    (layer, rows * ROW_PX)
+}
+
+fn sample(sample: &Sample, at: Px) -> Layer {
+    let middle = at + Px::new(SAMPLE_PX / 2.0 - 3.0, 0.0);
+    let left = at + Px::new(1.0, 0.0);
+    let right = at + Px::new(SAMPLE_PX - 6.0, 0.0);
+    match sample {
+        Sample::Mark { shape, colour } => {
+            let mut layer = Layer::new("sample").with("fill", *colour);
+            layer.mark(*shape, middle, 4.0, None);
+            layer
+        }
+        Sample::Ring { colour } => {
+            let mut layer = Layer::new("sample").stroked(colour, 1.0);
+            layer.line(left, middle - Px::new(3.5, 0.0));
+            layer.circle(middle, 3.5);
+            layer
+        }
+        Sample::Line { colour, width_px, dash } => {
+            let mut layer =
+                Layer::new("sample").stroked(colour, *width_px).with("stroke-dasharray", *dash);
+            layer.line(left, right);
+            layer
+        }
+        Sample::Tick { colour } => {
+            let mut layer = Layer::new("sample").stroked(colour, 1.3);
+            for shift in [-5.0, 0.0, 5.0] {
+                layer.line(middle + Px::new(shift, -4.0), middle + Px::new(shift, 4.0));
+            }
+            layer
+        }
+        Sample::Outward => {
+            let mut layer = Layer::new("sample").with("fill", theme::INK);
+            let [nose, tail] = [Px::new(6.0, 0.0), Px::new(-4.0, 5.0)];
+            layer.polygon(&[middle + nose, middle + tail, middle + Px::new(tail.x, -tail.y)]);
+            layer
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! A finished picture and the formats it can be had in.
+
+use std::sync::{Arc, LazyLock};
+
+use resvg::{
+    tiny_skia,
+    usvg::{self, fontdb},
+};
+use thiserror::Error;
+
+use super::{canvas::Layer, theme};
+
+/// The widest PNG that is made, pixels.
+pub const MAX_WIDTH_PX: u32 = 16_384;
+
+/// A drawing, ready to be written as SVG or PNG.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    document: svg::Document,
+}
+
+/// Why a picture could not be turned into a PNG.
+#[derive(Debug, Error)]
+pub enum PlotError {
+    /// Zero, or more than memory should be spent on.
+    #[error("a width of {0} pixels cannot be drawn: choose 1 to {MAX_WIDTH_PX}")]
+    Width(u32),
+    /// At this width the picture's height is more than memory should be spent on, or nothing.
+    #[error("at {width_px} pixels wide the picture would be {height_px} pixels high")]
+    Height {
+        /// The width asked for, pixels.
+        width_px: u32,
+        /// The height that follows, pixels.
+        height_px: f64,
+    },
+    /// The rasteriser does not read the document.
+    #[error("the rasteriser refused the drawing: {0}")]
+    Drawing(#[from] usvg::Error),
+    /// The image could not be encoded.
+    #[error("the image could not be encoded as PNG: {0}")]
+    Encoding(String),
+}
+
+impl Picture {
+    /// A page of this height with the layer on it.
+    pub(super) fn new(width_px: f64, height_px: f64, content: Layer) -> Self {
+        let page = svg::node::element::Rectangle::new()
+            .set("width", width_px)
+            .set("height", height_px)
+            .set("fill", theme::PAPER);
+        let document = svg::Document::new()
+            .set("viewBox", (0.0, 0.0, width_px, height_px))
+            .set("width", width_px)
+            .set("height", height_px)
+            .set("font-family", theme::FONT_FAMILY)
+            .set("font-size", theme::TEXT_PX)
+            .set("fill", theme::INK)
+            .add(page)
+            .add(content.into_group());
+        Self { document }
+    }
+
+    /// The picture as an SVG document.
+    #[must_use]
+    pub fn to_svg(&self) -> String {
+        format!("{}\n", self.document)
+    }
+
+    /// The picture as a PNG file, `width_px` wide and as high as its shape asks for.
+    ///
+    /// # Errors
+    /// When the size is out of bounds, or the rasteriser fails.
+    pub fn to_png(&self, width_px: u32) -> Result<Vec<u8>, PlotError> {
+        if !(1..=MAX_WIDTH_PX).contains(&width_px) {
+            return Err(PlotError::Width(width_px));
+        }
+        let options = usvg::Options { fontdb: FONTS.clone(), ..usvg::Options::default() };
+        let tree = usvg::Tree::from_str(&self.to_svg(), &options)?;
+        let scale = width_px as f32 / tree.size().width();
+        let height_px = (scale * tree.size().height()).round();
+        let mut pixels = Some(height_px)
+            .filter(|height| (1.0..=MAX_WIDTH_PX as f32).contains(height))
+            .and_then(|height| tiny_skia::Pixmap::new(width_px, height as u32))
+            .ok_or(PlotError::Height { width_px, height_px: f64::from(height_px) })?;
+        let transform = tiny_skia::Transform::from_scale(scale, scale);
+        resvg::render(&tree, transform, &mut pixels.as_mut());
+        pixels.encode_png().map_err(|error| PlotError::Encoding(error.to_string()))
+    }
+}
+
+/// The bundled font, under its own name and as every generic family, so that a PNG looks the
+/// same on every machine.
+static FONTS: LazyLock<Arc<fontdb::Database>> = LazyLock::new(|| {
+    let mut fonts = fontdb::Database::new();
+    fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
+    let family = fonts
+        .faces()
+        .find_map(|face| face.families.first().map(|(name, _)| name.clone()))
+        .unwrap_or_default();
+    fonts.set_sans_serif_family(family.clone());
+    fonts.set_serif_family(family.clone());
+    fonts.set_monospace_family(family);
+    Arc::new(fonts)
+});

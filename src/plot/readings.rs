@@ -1,0 +1,204 @@
+//! Readings as they are drawn: what each one is, whatever kind of log it came from.
+
+use super::{canvas::Shape, theme};
+use crate::scan::{PathKind, PathRecord, Ping, PingStatus, ScanView};
+
+/// What a beam gave, as far as the model explains it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) enum Kind {
+    /// An echo with no model beside it.
+    Echo,
+    /// One mirror reflection.
+    Direct,
+    /// Two or more.
+    Multiple,
+    /// Bent at an edge.
+    Edge,
+    /// Sound was there when the receiver opened.
+    MinRange,
+    /// An echo that the model does not give at this range.
+    Unexplained,
+    /// No echo.
+    Silent,
+    /// No echo although the model gives one.
+    SilentUnexplained,
+    /// No reading, or none to be relied on.
+    Lost,
+}
+
+impl Kind {
+    /// Kinds that have a place on the floor plan.
+    pub(super) const HEARD: [Self; 6] =
+        [Self::Echo, Self::Direct, Self::Multiple, Self::Edge, Self::MinRange, Self::Unexplained];
+    /// Kinds that have a direction only.
+    pub(super) const UNHEARD: [Self; 3] = [Self::Silent, Self::SilentUnexplained, Self::Lost];
+
+    pub(super) const fn colour(self) -> &'static str {
+        match self {
+            Self::Echo | Self::Direct => theme::BLUE,
+            Self::Multiple => theme::VERMILLION,
+            Self::Edge => theme::GREEN,
+            Self::MinRange => theme::PURPLE,
+            Self::Unexplained | Self::SilentUnexplained => theme::INK,
+            Self::Silent => theme::SILENT,
+            Self::Lost => theme::ORANGE,
+        }
+    }
+
+    pub(super) const fn shape(self) -> Shape {
+        match self {
+            Self::Multiple => Shape::Square,
+            Self::Edge => Shape::Triangle,
+            Self::MinRange => Shape::Diamond,
+            Self::Unexplained => Shape::Cross,
+            _ => Shape::Dot,
+        }
+    }
+
+    pub(super) const fn words(self) -> &'static str {
+        match self {
+            Self::Echo => "echo",
+            Self::Direct => "direct echo",
+            Self::Multiple => "multiple reflection",
+            Self::Edge => "edge",
+            Self::MinRange => "minimum range",
+            Self::Unexplained => "unexplained echo",
+            Self::Silent => "silent",
+            Self::SilentUnexplained => "silent, model hears",
+            Self::Lost => "no valid reading",
+        }
+    }
+}
+
+/// One beam.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Reading {
+    pub(super) azimuth_deg: f64,
+    pub(super) kind: Kind,
+    /// Finite, not negative, and there exactly for the kinds that were heard.
+    pub(super) range_m: Option<f64>,
+    /// The prediction beside a measured reading, if it is a range.
+    pub(super) model_range_m: Option<f64>,
+    pub(super) residual_m: Option<f64>,
+    /// Amplitude above the threshold, decibels, of a reading that the model made.
+    pub(super) margin_db: Option<f64>,
+    /// The reading in words.
+    pub(super) hint: String,
+}
+
+/// The beams of a scan with what is common to them.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Readings {
+    pub(super) beams: Vec<Reading>,
+    /// Range of the end of blanking, metres.
+    pub(super) min_range_m: Option<f64>,
+    /// Whether predictions stand beside the readings.
+    pub(super) has_model: bool,
+}
+
+impl Readings {
+    /// Every beam with a direction, by azimuth.
+    pub(super) fn of(view: &ScanView) -> Self {
+        let min_range_m = view.session.as_ref().and_then(|session| {
+            length(Some(session.air.sound_speed_m_s * session.sensor.blanking_us * 1e-6 / 2.0))
+        });
+        let mut beams: Vec<_> = view
+            .pings
+            .iter()
+            .filter(|ping| ping.azimuth_deg.is_finite())
+            .map(|ping| reading(ping, min_range_m))
+            .collect();
+        beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
+        let has_model = view.pings.iter().any(|ping| ping.sim.is_some());
+        Self { beams, min_range_m, has_model }
+    }
+
+    pub(super) fn count(&self, kind: Kind) -> usize {
+        self.beams.iter().filter(|beam| beam.kind == kind).count()
+    }
+
+    /// Residuals that exist, with their azimuths.
+    pub(super) fn residuals(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.beams.iter().filter_map(|beam| beam.residual_m.map(|r| (beam.azimuth_deg, r)))
+    }
+}
+
+fn reading(ping: &Ping, min_range_m: Option<f64>) -> Reading {
+    let sim = ping.sim.as_ref();
+    let measured_m = length(ping.range_m);
+    let model_range_m = sim.and_then(|sim| match sim.status {
+        PingStatus::MinRange => length(sim.range_m).or(min_range_m),
+        status if status.has_range() => length(sim.range_m),
+        _ => None,
+    });
+    let residual_m = ping
+        .residual_m
+        .filter(|residual| residual.is_finite())
+        .or_else(|| Some(measured_m? - model_range_m?));
+    let (kind, range_m) = match (ping.status, measured_m) {
+        (PingStatus::Echo, Some(range)) => (echo_kind(ping, range), Some(range)),
+        (PingStatus::MinRange, range) => (Kind::MinRange, range.or(min_range_m)),
+        (PingStatus::NoEcho, _) if sim.is_some_and(|sim| sim.status.has_range()) => {
+            (Kind::SilentUnexplained, None)
+        }
+        (PingStatus::NoEcho, _) => (Kind::Silent, None),
+        (PingStatus::Echo | PingStatus::LinkLost | PingStatus::StepDoubtful, _) => {
+            (Kind::Lost, None)
+        }
+    };
+    // A minimum range that nobody knows has no place on the plan.
+    let kind = if kind == Kind::MinRange && range_m.is_none() { Kind::Lost } else { kind };
+    Reading {
+        azimuth_deg: ping.azimuth_deg,
+        kind,
+        range_m,
+        model_range_m,
+        residual_m: residual_m.filter(|_| range_m.is_some()),
+        margin_db: ping.margin_db.filter(|margin| margin.is_finite()),
+        hint: hint(ping, kind, range_m, model_range_m),
+    }
+}
+
+/// What made an echo at `range_m`.
+fn echo_kind(ping: &Ping, range_m: f64) -> Kind {
+    match &ping.sim {
+        None => ping.path.as_ref().map_or(Kind::Echo, path_kind),
+        Some(sim) => {
+            let explained = sim.range_m.is_some_and(|model_m| agree(range_m, model_m));
+            let path = sim.path.as_ref().filter(|_| explained && sim.status.has_range());
+            path.map_or(if explained { Kind::Echo } else { Kind::Unexplained }, path_kind)
+        }
+    }
+}
+
+/// Whether two ranges are the same reading: within 1 % of the range, or 10 mm.
+fn agree(measured_m: f64, model_m: f64) -> bool {
+    (measured_m - model_m).abs() <= (0.01 * measured_m).max(0.010)
+}
+
+fn path_kind(path: &PathRecord) -> Kind {
+    match (path.kind, path.order) {
+        (PathKind::Diffracted, _) => Kind::Edge,
+        (PathKind::Specular, 0 | 1) => Kind::Direct,
+        (PathKind::Specular, _) => Kind::Multiple,
+    }
+}
+
+fn length(range_m: Option<f64>) -> Option<f64> {
+    range_m.filter(|range| range.is_finite() && *range >= 0.0)
+}
+
+fn hint(ping: &Ping, kind: Kind, range_m: Option<f64>, model_m: Option<f64>) -> String {
+    let mut words = format!("{:.1}\u{b0} {}", ping.azimuth_deg, kind.words());
+    if let Some(range) = range_m {
+        words += &format!(" {range:.3} m");
+    }
+    if let Some(model) = model_m {
+        words += &format!(", model {model:.3} m");
+    }
+    let path = ping.path.as_ref().or_else(|| ping.sim.as_ref().and_then(|sim| sim.path.as_ref()));
+    if let Some(path) = path.filter(|path| !path.walls.is_empty()) {
+        words += &format!(" by {}", path.walls.join(", "));
+    }
+    words
+}

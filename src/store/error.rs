@@ -1,0 +1,123 @@
+//! What can go wrong with a log, and what to do about it.
+
+use std::{io, path::PathBuf};
+
+use thiserror::Error;
+
+use crate::scan::EncodeError;
+
+/// Why a log can't be opened, written, synced or repaired.
+#[derive(Debug, Error)]
+pub enum StoreError {
+    /// The file can't be opened or created.
+    #[error("cannot open {}: {source}", path.display())]
+    Open {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Reading failed.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Somebody else holds the log.
+    #[error("{} is being written by another process", path.display())]
+    Busy {
+        /// Which file.
+        path: PathBuf,
+    },
+    /// A record could not be written; nothing of it is in the log, and the log can still be
+    /// written to.
+    #[error("cannot write to {}: {source}", path.display())]
+    Write {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Part of a record was written and could not be taken back; the log ends in a torn line and
+    /// takes no more records until it is opened again.
+    #[error("cannot write to {}: {source}; its last line is torn", path.display())]
+    Torn {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// What was written since the last sync may not be on the disk; the log takes no more
+    /// records until it is opened again.
+    #[error(
+        "cannot sync {}: {source}; {unsynced} record(s) may not be on the disk",
+        path.display()
+    )]
+    Sync {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+        /// Records appended since the last sync that succeeded.
+        unsynced: u64,
+    },
+    /// An earlier failure left the log in doubt.
+    #[error("{} takes no more records after an earlier failure", path.display())]
+    Failed {
+        /// Which file.
+        path: PathBuf,
+    },
+    /// The record itself can't be written down.
+    #[error("{}: {source}", path.display())]
+    Record {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong with the record.
+        source: EncodeError,
+    },
+}
+
+impl StoreError {
+    /// What the user can do.
+    #[must_use]
+    pub fn help(&self) -> String {
+        match self {
+            Self::Open { source, .. }
+            | Self::Read { source, .. }
+            | Self::Write { source, .. }
+            | Self::Sync { source, .. } => help_for(source),
+            Self::Busy { .. } => "wait until it is done, stop it, or choose another file".into(),
+            Self::Torn { source, path } => {
+                format!("{}; then `sonard log repair {}`", help_for(source), path.display())
+            }
+            Self::Failed { .. } => "open it again: that repairs its end".into(),
+            Self::Record { .. } => "this is a fault of the program: please report it".into(),
+        }
+    }
+
+    /// Whether the reader of a pipe went away, which is no failure of the program's.
+    #[must_use]
+    pub fn is_broken_pipe(&self) -> bool {
+        matches!(self, Self::Write { source, .. } | Self::Torn { source, .. } | Self::Sync { source, .. }
+            if source.kind() == io::ErrorKind::BrokenPipe)
+    }
+}
+
+fn help_for(error: &io::Error) -> String {
+    use io::ErrorKind as Kind;
+    match error.kind() {
+        Kind::StorageFull | Kind::QuotaExceeded | Kind::FileTooLarge => {
+            "make room on that disk (or raise the quota or file-size limit) and start again: \
+             every record before this one is in the log"
+        }
+        Kind::NotFound => "check the path; its folder must exist",
+        Kind::PermissionDenied | Kind::ReadOnlyFilesystem => {
+            "choose a place where you may write, or change its permissions"
+        }
+        Kind::IsADirectory => "name a file in that folder",
+        _ => "check the disk; every record synced before is in the log",
+    }
+    .into()
+}
