@@ -7,6 +7,7 @@ mod mock;
 mod plot;
 mod scan;
 mod scene;
+mod scene_file;
 mod simulate;
 
 pub use failure::{Failure, Outcome};
