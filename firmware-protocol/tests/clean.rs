@@ -76,7 +76,10 @@ fn check_costs(before: &LinkStats, after: &LinkStats) {
     println!("400 beams: {received} bytes to the host, {sent} bytes to the device");
     assert!(received < 400 * 36, "{received} bytes received");
     assert!(sent < 400 * 4, "{sent} bytes sent");
-    assert_eq!(after.retries, before.retries, "nothing needs repeating on a clean line");
+    assert_eq!(
+        after.retries, before.retries,
+        "nothing needs repeating on a clean line"
+    );
     assert_eq!(after.duplicates, 0);
     assert_eq!(after.repaired, 0);
 }
