@@ -34,6 +34,7 @@ pub(super) fn room() -> Scene {
         name: "simple-room".into(),
         source: Some("Dudek, Jenkin, Milios and Wilkes, figures 7 to 9".into()),
         approximate: vec!["The reflectance is chosen.".into()],
+        materials: BTreeMap::from([("shelving".into(), SHELVING)]),
         walls: walls.collect(),
         cylinders: Vec::new(),
         floor_z_m: None,

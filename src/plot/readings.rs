@@ -142,9 +142,13 @@ fn reading(ping: &Ping, min_range_m: Option<f64>) -> Reading {
             (Kind::SilentUnexplained, None)
         }
         (PingStatus::NoEcho, _) => (Kind::Silent, None),
-        (PingStatus::Echo | PingStatus::LinkLost | PingStatus::StepDoubtful, _) => {
-            (Kind::Lost, None)
-        }
+        (
+            PingStatus::Echo
+            | PingStatus::LinkLost
+            | PingStatus::StepDoubtful
+            | PingStatus::ModuleFault,
+            _,
+        ) => (Kind::Lost, None),
     };
     // A minimum range that nobody knows has no place on the plan.
     let kind = if kind == Kind::MinRange && range_m.is_none() { Kind::Lost } else { kind };

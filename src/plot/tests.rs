@@ -266,6 +266,7 @@ fn any_status() -> impl Strategy<Value = PingStatus> {
         PingStatus::MinRange,
         PingStatus::LinkLost,
         PingStatus::StepDoubtful,
+        PingStatus::ModuleFault,
     ])
 }
 
