@@ -4,7 +4,13 @@ mod compare;
 mod failure;
 mod log;
 mod mock;
+<<<<<<< HEAD
 mod options;
+=======
+mod mock_world;
+mod options;
+mod runtime;
+>>>>>>> main
 mod plot;
 mod scan;
 mod scene;
@@ -55,7 +61,7 @@ pub fn main() -> ExitCode {
         Verb::Scan(args) => scan::run(args),
         Verb::Mock(args) => mock::run(args),
         Verb::Simulate(args) => simulate::run(args),
-        Verb::Compare(args) => compare::run(args),
+        Verb::Compare(args) => compare::run(&args),
         Verb::Plot(args) => plot::run(args),
         Verb::Log(verb) => log::run(verb),
         Verb::Scene(verb) => scene::run(verb),

@@ -10,7 +10,7 @@ use super::{
     strips::top_m,
     theme, ticks, words,
 };
-use crate::scan::ScanView;
+use crate::{scan::ScanView, scene::Scene};
 
 const RADIUS_PX: f64 = 310.0;
 const RING_PX: f64 = 3.4;
@@ -19,12 +19,13 @@ const DOT_PX: f64 = 2.6;
 /// Draws scans around the ranger: the heading is up, azimuths run counter-clockwise, circles
 /// stand for ranges.
 ///
-/// Silent beams are ticks on the rim, readings farther than the rim arrows.
+/// Silent beams are ticks on the rim, readings farther than the rim arrows. The scene only gives
+/// its name and that of the pose.
 #[must_use]
-pub fn draw_polar(scans: &[ScanView]) -> Picture {
+pub fn draw_polar(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     let readings: Vec<Readings> = scans.iter().map(Readings::of).collect();
     let (heading, top) = caption::draw(
-        &words::title(scans, None),
+        &words::title(scans, scene),
         words::badge(scans),
         &words::lines(scans, &readings),
     );

@@ -34,8 +34,11 @@ pub fn draw_scan(scan: &ScanView, scene: Option<&Scene>) -> Picture {
 #[must_use]
 pub fn draw_scans(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     let readings: Vec<Readings> = scans.iter().map(Readings::of).collect();
-    let placed: Vec<(Pose, &Readings)> =
-        scans.iter().zip(&readings).filter_map(|(view, r)| Some((view.pose()?, r))).collect();
+    let placed: Vec<(Pose, &Readings)> = scans
+        .iter()
+        .zip(&readings)
+        .filter_map(|(view, r)| Some((words::pose_of(view)?, r)))
+        .collect();
     let title = words::title(scans, scene);
     let (heading, top) =
         caption::draw(&title, words::badge(scans), &words::lines(scans, &readings));
@@ -118,6 +121,7 @@ fn floor_plan(plan: &Plan, scans: &[(Pose, &Readings)], scene: Option<&Scene>) -
     }
     inside.extend(scene.map(|scene| plan.walls(scene)));
     for floor in &firsts {
+        inside.extend(scene.map(|scene| plan.body(scene, &floor.pose)));
         inside.add(floor.min_range());
     }
     let opacity = if floors.len() > 1 { 0.6 } else { 1.0 };

@@ -1,12 +1,13 @@
 //! What a log holds, scan by scan.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, mem};
 
 use jiff::Timestamp;
 use serde::Serialize;
 use uuid::Uuid;
 
 use crate::{
+    compare::quantile,
     geometry::Pose,
     scan::{Event, Ping, PingStatus, Record, ScanEnd, ScanStart, Session},
     store::Loaded,
@@ -57,7 +58,7 @@ impl<'a> Summary<'a> {
         }
         for item in &mut summary.items {
             if let Item::Scan(scan) = item {
-                scan.median_abs_residual_m = median(&mut scan.residuals_m);
+                scan.median_abs_residual_m = quantile(mem::take(&mut scan.residuals_m), 0.5);
             }
         }
         for error in &loaded.damaged {
@@ -108,9 +109,4 @@ impl Scan {
         } += 1;
         self.residuals_m.extend(ping.residual_m.filter(|m| m.is_finite()).map(f64::abs));
     }
-}
-
-fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len().checked_sub(1)? / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -116,7 +116,7 @@ fn print_scans(
 
 fn scan_table(scans: &[&Scan]) -> Table {
     let mut table = Table::new();
-    table.load_preset(UTF8_HORIZONTAL_ONLY).set_header([
+    table.load_style(UTF8_HORIZONTAL_ONLY).set_header([
         "scan",
         "began",
         "pose",
