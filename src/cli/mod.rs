@@ -4,13 +4,9 @@ mod compare;
 mod failure;
 mod log;
 mod mock;
-<<<<<<< HEAD
-mod options;
-=======
 mod mock_world;
 mod options;
 mod runtime;
->>>>>>> main
 mod plot;
 mod scan;
 mod scene;

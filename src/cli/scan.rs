@@ -156,7 +156,8 @@ async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
     let mut missing = 0;
     for turn in 1..=args.repeat {
         output.begin_scan(turn, args.repeat, job.plan.beams());
-        let summary = ranger.scan(&job, output, runtime::interrupted()).await.map_err(scan_failure);
+        let summary =
+            ranger.scan(&job, output, runtime::interrupted()).await.map_err(scan_failure);
         output.end_scan();
         let summary = summary?;
         summary::print(setup, &summary, ranger.identity(), ranger.link_stats(), output);

@@ -31,7 +31,13 @@ pub(super) struct Ring {
 
 impl Ring {
     pub(super) const fn new() -> Self {
-        Self { bytes: [0; CAPACITY], oldest: 0, used: 0, first: 0, count: 0 }
+        Self {
+            bytes: [0; CAPACITY],
+            oldest: 0,
+            used: 0,
+            first: 0,
+            count: 0,
+        }
     }
 
     /// Forgets everything; the next reading has index 0.
@@ -82,7 +88,9 @@ impl Ring {
 
     /// The reading of beam `index`, if it is kept.
     pub(super) fn get(&self, index: u16) -> Option<Kept> {
-        let behind = index.checked_sub(self.first).filter(|&behind| behind < self.count)?;
+        let behind = index
+            .checked_sub(self.first)
+            .filter(|&behind| behind < self.count)?;
         let mut cursor = self.oldest;
         for _ in 0..behind {
             cursor = cursor.wrapping_add(low_byte(kept_bytes(self.echo_count_at(cursor))));
@@ -103,7 +111,11 @@ impl Ring {
             // Fits: it came out of such a list.
             let _ = echoes.push(u32::from_le_bytes([next(), next(), next(), 0]));
         }
-        Kept { fired_ticks, status, echoes }
+        Kept {
+            fired_ticks,
+            status,
+            echoes,
+        }
     }
 
     fn echo_count_at(&self, start: u8) -> u8 {
@@ -133,7 +145,14 @@ const fn unpack(byte: u8) -> (ReadingStatus, u8) {
         _ => ReadingStatus::StepDoubtful,
     };
     let echo_count = byte & 0x0f;
-    (status, if echo_count > MAX_ECHOES { MAX_ECHOES } else { echo_count })
+    (
+        status,
+        if echo_count > MAX_ECHOES {
+            MAX_ECHOES
+        } else {
+            echo_count
+        },
+    )
 }
 
 /// Offsets count modulo 256.
@@ -141,7 +160,10 @@ const fn low_byte(value: u16) -> u8 {
     value as u8
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "a list of echoes has at most eight")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a list of echoes has at most eight"
+)]
 /// A list of echoes has at most eight.
 const fn low_byte_of_len(len: usize) -> u8 {
     len as u8

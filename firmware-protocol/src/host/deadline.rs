@@ -81,6 +81,8 @@ impl Margin {
             Some((mean, deviation)) => mean + (4 * deviation).max(self.min_us),
         };
         let doublings = u32::from(attempt.saturating_sub(1)).min(16);
-        base.clamp(self.min_us, self.max_us).saturating_mul(1 << doublings).min(self.max_us)
+        base.clamp(self.min_us, self.max_us)
+            .saturating_mul(1 << doublings)
+            .min(self.max_us)
     }
 }
