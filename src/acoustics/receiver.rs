@@ -122,7 +122,7 @@ impl Receiver {
     }
 }
 
-/// The status of a measured reading from its first time of flight, microseconds.
+/// The status of a measured reading from its first time of flight, microseconds, if any.
 ///
 /// ECHO within one carrier cycle (20 us) of the end of blanking was raised by sound already
 /// there: a real echo that begins in that span can't be told from it.
