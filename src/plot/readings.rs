@@ -113,6 +113,18 @@ impl Readings {
         Self { beams, min_range_m, has_model }
     }
 
+    /// The beams of several scans as one.
+    pub(super) fn merged<'a>(scans: impl IntoIterator<Item = &'a Self>) -> Self {
+        let mut all = Self { beams: Vec::new(), min_range_m: None, has_model: false };
+        for scan in scans {
+            all.beams.extend_from_slice(&scan.beams);
+            all.min_range_m = all.min_range_m.or(scan.min_range_m);
+            all.has_model |= scan.has_model;
+        }
+        all.beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
+        all
+    }
+
     pub(super) fn count(&self, kind: Kind) -> usize {
         self.beams.iter().filter(|beam| beam.kind == kind).count()
     }
