@@ -54,7 +54,7 @@ pub fn main() -> ExitCode {
         Verb::Scan(args) => scan::run(args),
         Verb::Mock(args) => mock::run(args),
         Verb::Simulate(args) => simulate::run(args),
-        Verb::Compare(args) => compare::run(args),
+        Verb::Compare(args) => compare::run(&args),
         Verb::Plot(args) => plot::run(args),
         Verb::Log(verb) => log::run(verb),
         Verb::Scene(verb) => scene::run(verb),

@@ -25,6 +25,8 @@ pub enum FaultKind {
     UnknownType,
     /// A record with a field missing or of the wrong kind.
     BadField,
+    /// A session of a log format later than this program knows.
+    NewerFormat,
     /// The last line, cut off in the middle of the record.
     Torn,
 }
@@ -180,6 +182,7 @@ fn decode_session(text: &str) -> Result<Record, RecordError> {
     fields_of(text).map(Record::Session).map_err(|error| {
         match serde_json::from_str::<Format>(text) {
             Ok(Format { format }) if format > LOG_FORMAT => RecordError {
+                kind: FaultKind::NewerFormat,
                 field: Some("format".into()),
                 message: format!(
                     "the log is of format {format} and this program reads up to {LOG_FORMAT}: \

@@ -5,15 +5,19 @@
 //! its record or with what is wrong. [`check`] looks at a whole log, [`repair`] leaves out what
 //! can't be read.
 
+mod check;
 mod error;
 mod medium;
 mod open;
 mod reader;
-
+mod repair;
 mod writer;
 
+pub use check::{Checker, Finding, FindingKind, Severity, Totals, check};
 pub use error::StoreError;
 pub use medium::{FileMedium, Medium, Pipe};
-pub use open::Recovered;
+pub use open::{Recovered, is_being_written};
+pub(crate) use reader::open_for_reading;
 pub use reader::{Line, LineError, Lines, Loaded, load, read_log};
+pub use repair::{LeftOut, Repair, repair};
 pub use writer::{LogWriter, SYNC_INTERVAL};

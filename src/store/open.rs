@@ -91,7 +91,8 @@ pub(super) fn lock(file: &File, path: &Path) -> Result<(), StoreError> {
 }
 
 /// Whether some process is writing (or repairing) the log now.
-pub(super) fn is_locked(file: &File) -> bool {
+#[must_use]
+pub fn is_being_written(file: &File) -> bool {
     let busy = flock(file, FlockOperation::NonBlockingLockShared);
     if busy.is_ok() {
         // Held for no longer than this look takes.

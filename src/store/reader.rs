@@ -125,13 +125,13 @@ pub(super) fn decode(bytes: &[u8], number: u64, ended: bool) -> Result<Record, R
         1 => bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes),
         _ => bytes,
     };
-    decode_line(bytes).map_err(|fault| if ended { fault } else { torn_fault(bytes.len()) })
+    decode_line(bytes).map_err(|fault| if ended { fault } else { torn_fault(bytes.len() as u64) })
 }
 
-fn torn_fault(length: usize) -> RecordError {
+fn torn_fault(length: u64) -> RecordError {
     RecordError {
         kind: FaultKind::Torn,
-        column: Some(length + 1),
+        column: None,
         field: None,
         message: format!("the last line is torn: it ends after {length} byte(s), in mid-record"),
     }

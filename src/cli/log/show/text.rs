@@ -1,0 +1,201 @@
+//! A log's contents for people.
+
+use std::io::{self, Write};
+
+use comfy_table::{CellAlignment, Table, presets::UTF8_HORIZONTAL_ONLY};
+use uuid::Uuid;
+
+use super::summary::{Item, Scan, Summary};
+use crate::{
+    scan::{Ping, PingStatus, Record, Session},
+    store::{Line, Loaded},
+};
+
+/// Prints sessions with a table of their scans and events; with `pings`, every reading after it.
+pub(super) fn print(
+    out: &mut impl Write,
+    summary: &Summary<'_>,
+    pings: Option<&Loaded>,
+) -> io::Result<()> {
+    if summary.items.is_empty() {
+        writeln!(out, "the log is empty")?;
+    }
+    let mut scans = Vec::new();
+    for item in &summary.items {
+        if let Item::Scan(scan) = item {
+            scans.push(&**scan);
+            continue;
+        }
+        print_scans(out, &mut scans, pings)?;
+        match item {
+            Item::Session(session) => print_session(out, session)?,
+            Item::Event(event) => print_event(out, event)?,
+            Item::Damaged { line, fault } => writeln!(out, "damaged   line {line}: {fault}")?,
+            Item::Scan(_) => {}
+        }
+    }
+    print_scans(out, &mut scans, pings)
+}
+
+/// Prints one line of a log as it comes.
+pub(super) fn print_line(out: &mut impl Write, line: &Line, pings: bool) -> io::Result<()> {
+    match &line.record {
+        Ok(Record::Session(session)) => print_session(out, session),
+        Ok(Record::ScanStart(start)) => {
+            let pose = pose_text(start.pose);
+            let beams = start.plan.check().map_or(0, |()| start.plan.beams());
+            let (time, id) = (seconds(start.time), short(start.scan));
+            writeln!(out, "scan      {time}  {id} begins at {pose}, {beams} beams")
+        }
+        Ok(Record::Ping(ping)) if pings => writeln!(out, "{}", ping_text(ping)),
+        Ok(Record::Ping(_)) => Ok(()),
+        Ok(Record::ScanEnd(end)) => {
+            let (time, id, beams) = (seconds(end.time), short(end.scan), end.beams);
+            let (missing, repaired, took_s) = (end.missing, end.repaired, end.duration_s);
+            writeln!(
+                out,
+                "scan      {time}  {id} ends after {took_s:.1} s: {beams} beams, {missing} \
+                 missing, {repaired} repaired"
+            )
+        }
+        Ok(Record::Event(event)) => print_event(out, event),
+        Err(error) => writeln!(out, "damaged   {error}"),
+    }
+}
+
+fn print_session(out: &mut impl Write, session: &Session) -> io::Result<()> {
+    let Session { started, sonard, provenance, device, sensor, air, scene, model, .. } = session;
+    let provenance = format!("{provenance:?}").to_lowercase();
+    writeln!(out, "session   {}  {provenance}, sonard {sonard}", seconds(*started))?;
+    if let Some(device) = device {
+        let (serial, firmware, boot) = (&device.serial, &device.firmware, &device.boot);
+        let steps = device.steps_per_revolution;
+        writeln!(
+            out,
+            "  device  {serial}, firmware {firmware}, boot {boot}, {steps} steps a turn"
+        )?;
+    }
+    let (celsius, humidity, speed) = (air.temperature_c, air.humidity_percent, air.sound_speed_m_s);
+    writeln!(out, "  sensor  {}; air {celsius} C, {humidity} %, {speed:.2} m/s", sensor.name)?;
+    let scene = scene.as_ref().map_or("no scene", |scene| &scene.name);
+    let model = model.as_ref().map_or("none", |model| &model.engine);
+    writeln!(out, "  scene   {scene}; model {model}")
+}
+
+fn print_event(out: &mut impl Write, event: &crate::scan::Event) -> io::Result<()> {
+    let kind = match serde_json::to_value(event.kind) {
+        Ok(serde_json::Value::String(name)) => name,
+        _ => String::new(),
+    };
+    writeln!(out, "event     {}  {kind}: {}", seconds(event.time), event.detail)
+}
+
+/// Prints the scans gathered so far and empties the list.
+fn print_scans(
+    out: &mut impl Write,
+    scans: &mut Vec<&Scan>,
+    pings: Option<&Loaded>,
+) -> io::Result<()> {
+    if scans.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "{}", scan_table(scans))?;
+    for scan in scans.drain(..).filter(|_| pings.is_some()) {
+        writeln!(out, "scan {}", scan.scan)?;
+        writeln!(out, "{PING_HEADER}")?;
+        for record in pings.iter().flat_map(|loaded| &loaded.records) {
+            if let Record::Ping(ping) = record
+                && ping.scan == scan.scan
+            {
+                writeln!(out, "{}", ping_text(ping))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn scan_table(scans: &[&Scan]) -> Table {
+    let mut table = Table::new();
+    table.load_style(UTF8_HORIZONTAL_ONLY).set_header([
+        "scan",
+        "began",
+        "pose",
+        "beams",
+        "echo",
+        "min",
+        "none",
+        "lost",
+        "doubt",
+        "repaired",
+        "|res| mm",
+        "time/limit s",
+    ]);
+    for scan in scans {
+        let planned = scan.planned.map_or("?".into(), |planned| planned.to_string());
+        let took = match &scan.end {
+            Some(end) => format!("{:.1}/{:.1}", end.duration_s, end.acoustic_limit_s),
+            None => "not ended".into(),
+        };
+        table.add_row([
+            short(scan.scan),
+            scan.time.map_or("?".into(), seconds),
+            scan.pose.map_or("?".into(), pose_text),
+            format!("{}/{planned}", scan.pings),
+            scan.echo.to_string(),
+            scan.min_range.to_string(),
+            scan.no_echo.to_string(),
+            scan.link_lost.to_string(),
+            scan.step_doubtful.to_string(),
+            scan.end.as_ref().map_or("?".into(), |end| end.repaired.to_string()),
+            scan.median_abs_residual_m.map_or("-".into(), |m| format!("{:.1}", m * 1e3)),
+            took,
+        ]);
+    }
+    for column in table.column_iter_mut().skip(3) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+const PING_HEADER: &str =
+    " beam  azimuth  status     range m    sim m   res mm  margin dB  path of the prediction";
+
+/// One reading on one line, under [`PING_HEADER`].
+fn ping_text(ping: &Ping) -> String {
+    let number = |value: Option<f64>, scale: f64, digits: usize| match value {
+        Some(value) => format!("{:.digits$}", value * scale),
+        None => "-".into(),
+    };
+    let status = match ping.status {
+        PingStatus::Echo => "echo",
+        PingStatus::NoEcho => "no echo",
+        PingStatus::MinRange => "min range",
+        PingStatus::LinkLost => "link lost",
+        PingStatus::StepDoubtful => "doubtful",
+    };
+    let sim = ping.sim.as_ref();
+    let path = sim.and_then(|sim| sim.path.as_ref()).or(ping.path.as_ref());
+    let path = path.map_or(String::new(), crate::cli::compare::path_text);
+    format!(
+        "{:5}  {:7.1}  {status:9}  {:>7}  {:>7}  {:>7}  {:>9}  {path}{}",
+        ping.index,
+        ping.azimuth_deg,
+        number(ping.range_m, 1.0, 4),
+        number(sim.and_then(|sim| sim.range_m), 1.0, 4),
+        number(ping.residual_m, 1e3, 1),
+        number(sim.and_then(|sim| sim.margin_db).or(ping.margin_db), 1.0, 1),
+        if ping.repaired { "  (repaired)" } else { "" },
+    )
+}
+
+fn short(scan: Uuid) -> String {
+    scan.to_string()[..8].to_owned()
+}
+
+fn seconds(time: jiff::Timestamp) -> String {
+    format!("{time:.0}")
+}
+
+fn pose_text(pose: crate::geometry::Pose) -> String {
+    format!("{},{},{}", pose.x_m, pose.y_m, pose.heading_deg)
+}

@@ -1,0 +1,145 @@
+//! `sonard log verify`.
+
+use std::{
+    fs::File,
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use serde::Serialize;
+
+use super::{Failure, Outcome};
+use crate::store::{
+    Finding, FindingKind, Severity, StoreError, Totals, check, is_being_written, open_for_reading,
+};
+
+/// Findings printed for one log unless all are asked for.
+const SHOWN: u64 = 40;
+
+/// Options of `sonard log verify`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(in crate::cli) struct Args {
+    /// Logs to check; - for standard input
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// Warnings count too: exit code 1 also for a scan without an end, or time going backwards
+    #[arg(long)]
+    strict: bool,
+    /// Print every finding, however many
+    #[arg(long)]
+    all: bool,
+    /// One JSON object a finding, and one with the totals for each log
+    #[arg(long)]
+    json: bool,
+}
+
+const HELP: &str = "\
+Problems: a torn last line, damaged lines, readings outside a scan or before any session, a beam \
+twice, counts that disagree with scan_end, a scan that another follows without an end or an event \
+saying why, status, range and residual that contradict each other, an azimuth that is not the plan's.
+Warnings: the last scan has no end (it may be running), time goes backwards.
+
+Exit codes: 0 clean, 1 not clean, 2 a file can't be opened.";
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let mut clean = true;
+    for log in &args.logs {
+        let totals = verify(log, args)?;
+        clean &= totals.problems == 0 && !(args.strict && totals.warnings > 0);
+    }
+    if clean { Ok(()) } else { Err(Failure::Found(None)) }
+}
+
+fn verify(log: &Path, args: &Args) -> Result<Totals, Failure> {
+    let reader = open_for_reading(log)?;
+    let mut out = io::stdout().lock();
+    let mut printed = Ok(());
+    let (mut shown, mut hidden, mut torn) = (0, 0, false);
+    let totals = check(reader, |finding| {
+        torn |= matches!(finding.kind, FindingKind::TornTail | FindingKind::NoNewline);
+        if !args.all && !args.json && shown == SHOWN {
+            hidden += 1;
+        } else if printed.is_ok() {
+            shown += 1;
+            printed = print_finding(&mut out, log, &finding, args.json);
+        }
+    })
+    .map_err(|source| StoreError::Read { path: log.into(), source })?;
+    let printed = printed.and_then(|()| match args.json {
+        true => print_totals_json(&mut out, log, totals),
+        false => print_totals(&mut out, log, totals, hidden, torn),
+    });
+    match printed {
+        Ok(()) => Ok(totals),
+        Err(error) => Failure::from_write("standard output", &error).map(|()| totals),
+    }
+}
+
+fn print_finding(
+    out: &mut impl Write,
+    log: &Path,
+    finding: &Finding,
+    json: bool,
+) -> io::Result<()> {
+    if json {
+        #[derive(Serialize)]
+        struct InLog<'a> {
+            log: &'a Path,
+            #[serde(flatten)]
+            finding: &'a Finding,
+        }
+        serde_json::to_writer(&mut *out, &InLog { log, finding })?;
+        return writeln!(out);
+    }
+    let severity = match finding.severity {
+        Severity::Problem => "problem",
+        Severity::Warning => "warning",
+    };
+    writeln!(out, "{}:{}: {severity}: {}", log.display(), finding.line, finding.detail)
+}
+
+fn print_totals_json(out: &mut impl Write, log: &Path, totals: Totals) -> io::Result<()> {
+    #[derive(Serialize)]
+    struct OfLog<'a> {
+        log: &'a Path,
+        clean: bool,
+        #[serde(flatten)]
+        totals: Totals,
+    }
+    serde_json::to_writer(&mut *out, &OfLog { log, clean: totals.problems == 0, totals })?;
+    writeln!(out)
+}
+
+fn print_totals(
+    out: &mut impl Write,
+    log: &Path,
+    totals: Totals,
+    hidden: u64,
+    torn: bool,
+) -> io::Result<()> {
+    let log = log.display();
+    if hidden > 0 {
+        writeln!(out, "{log}: {hidden} more; --all prints them")?;
+    }
+    let Totals { lines, sessions, scans, pings, events, problems, warnings } = totals;
+    let verdict = match (problems, warnings) {
+        (0, 0) => "clean".into(),
+        (0, warnings) => format!("clean, {warnings} warning(s)"),
+        (problems, 0) => format!("not clean: {problems} problem(s)"),
+        (problems, warnings) => format!("not clean: {problems} problem(s), {warnings} warning(s)"),
+    };
+    writeln!(
+        out,
+        "{log}: {verdict} ({lines} lines: {sessions} session(s), {scans} scan(s), {pings} \
+         readings, {events} event(s))"
+    )?;
+    let written_now = torn && File::open(log.to_string()).is_ok_and(|file| is_being_written(&file));
+    match (torn, written_now) {
+        (true, true) => {
+            writeln!(out, "{log}: it is being written now; look again when that is over")
+        }
+        (true, false) => writeln!(out, "{log}: `sonard log repair {log}` sets its end right"),
+        _ => Ok(()),
+    }
+}

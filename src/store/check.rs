@@ -1,0 +1,431 @@
+//! Looks at a whole log and says, line by line, what does not hold.
+
+use std::{
+    collections::{HashMap, HashSet},
+    fmt,
+    io::{self, BufRead},
+    mem,
+};
+
+use jiff::{SignedDuration, Timestamp};
+use serde::Serialize;
+use uuid::Uuid;
+
+use crate::scan::{
+    Event, FaultKind, LOG_FORMAT, Ping, PingStatus, Record, ScanEnd, ScanPlan, ScanStart, Session,
+};
+
+use super::{Line, read_log};
+
+/// Azimuths are multiples of a motor step; a record may have rounded them, degrees.
+const AZIMUTH_TOLERANCE_DEG: f64 = 1e-3;
+/// A residual may have been rounded to the millimetre, metres.
+const RESIDUAL_TOLERANCE_M: f64 = 1e-3;
+/// Records of the host and of the device's fitted clock interleave within this.
+const TIME_TOLERANCE: SignedDuration = SignedDuration::from_secs(1);
+
+/// How bad a finding is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// Data is damaged, missing or contradicts itself.
+    Problem,
+    /// Worth knowing; the data is consistent.
+    Warning,
+}
+
+/// What kind of thing was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FindingKind {
+    /// The file holds no line.
+    EmptyLog,
+    /// The last line is cut off in mid-record.
+    TornTail,
+    /// The last record is whole but its newline is missing.
+    NoNewline,
+    /// A line that is not a record.
+    Damaged,
+    /// The log is of a later format than this program knows.
+    NewerFormat,
+    /// A scan before any session.
+    NoSession,
+    /// A ping, or an end, of a scan that was not begun or is over.
+    OutsideScan,
+    /// A scan's identifier begun twice.
+    ScanTwice,
+    /// The plan can't be carried out.
+    BadPlan,
+    /// A beam with two readings.
+    DuplicateBeam,
+    /// A beam that the plan does not have.
+    NoSuchBeam,
+    /// `scan_end` counts otherwise than the lines do.
+    WrongCount,
+    /// A scan without `scan_end`.
+    NotEnded,
+    /// Status, range, prediction and residual of a reading contradict each other.
+    Contradiction,
+    /// A reading's azimuth is not the plan's.
+    WrongAzimuth,
+    /// A record older than the one before it.
+    TimeBackwards,
+}
+
+/// Something found in a log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// Number of the line, from 1 (for what is missing at the end: of the last line).
+    pub line: u64,
+    /// How bad it is.
+    pub severity: Severity,
+    /// What kind of thing.
+    pub kind: FindingKind,
+    /// In words.
+    pub detail: String,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let warning = if self.severity == Severity::Warning { "warning: " } else { "" };
+        write!(f, "line {}: {warning}{}", self.line, self.detail)
+    }
+}
+
+/// What a log holds, in numbers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Totals {
+    /// Lines, damaged ones included.
+    pub lines: u64,
+    /// Sessions.
+    pub sessions: u64,
+    /// Scans begun.
+    pub scans: u64,
+    /// Readings.
+    pub pings: u64,
+    /// Events.
+    pub events: u64,
+    /// Findings that make the log not clean.
+    pub problems: u64,
+    /// Findings that do not.
+    pub warnings: u64,
+}
+
+/// Checks a log and hands each finding to `tell`, in the order of the lines.
+///
+/// # Errors
+/// When reading fails.
+pub fn check<R: BufRead>(reader: R, mut tell: impl FnMut(Finding)) -> io::Result<Totals> {
+    let mut checker = Checker::default();
+    for line in read_log(reader) {
+        checker.line(&line?);
+        checker.take_findings().for_each(&mut tell);
+    }
+    checker.end();
+    checker.take_findings().for_each(&mut tell);
+    Ok(checker.totals)
+}
+
+/// Checks a log line by line; what [`check`] does, for callers with lines of their own.
+#[derive(Debug, Default)]
+pub struct Checker {
+    totals: Totals,
+    findings: Vec<Finding>,
+    /// The line now looked at.
+    at: u64,
+    session: bool,
+    scan: Option<OpenScan>,
+    scans: HashSet<Uuid>,
+    latest: Option<Timestamp>,
+}
+
+/// A scan that has begun and not ended.
+#[derive(Debug)]
+struct OpenScan {
+    id: Uuid,
+    line: u64,
+    /// `None` when its `scan_start` is missing.
+    plan: Option<ScanPlan>,
+    /// By beam index: the line of its reading, and whether that came through.
+    beams: HashMap<u32, (u64, bool)>,
+    /// Whether an event in the log accounts for an early end.
+    interrupted: bool,
+}
+
+impl Checker {
+    /// Looks at the next line.
+    pub fn line(&mut self, line: &Line) {
+        self.at = line.number;
+        self.totals.lines += 1;
+        match &line.record {
+            Err(error) if error.fault.kind == FaultKind::Torn => {
+                self.problem(FindingKind::TornTail, error.fault.to_string());
+            }
+            Err(error) if error.fault.kind == FaultKind::NewerFormat => {
+                self.session = true;
+                self.problem(FindingKind::NewerFormat, error.fault.to_string());
+            }
+            Err(error) => self.problem(FindingKind::Damaged, error.fault.to_string()),
+            Ok(record) => {
+                self.record(record);
+                if !line.ended {
+                    let detail = "the newline after the last record is missing";
+                    self.problem(FindingKind::NoNewline, detail.into());
+                }
+            }
+        }
+    }
+
+    /// Looks at what the log lacks at its end.
+    pub fn end(&mut self) {
+        if self.totals.lines == 0 {
+            self.problem(FindingKind::EmptyLog, "the log is empty".into());
+        }
+        if let Some(scan) = self.scan.take() {
+            // The scan may be running; and a log that was cut off and repaired is consistent.
+            self.warn(FindingKind::NotEnded, scan.not_ended("at the end of the log"));
+        }
+    }
+
+    /// What was found since the last call.
+    pub fn take_findings(&mut self) -> impl Iterator<Item = Finding> + use<> {
+        mem::take(&mut self.findings).into_iter()
+    }
+
+    /// What the lines so far hold.
+    #[must_use]
+    pub fn totals(&self) -> Totals {
+        self.totals
+    }
+
+    fn record(&mut self, record: &Record) {
+        match record {
+            Record::Session(session) => self.session(session),
+            Record::ScanStart(start) => self.scan_start(start),
+            Record::Ping(ping) => self.ping(ping),
+            Record::ScanEnd(end) => self.scan_end(end),
+            Record::Event(event) => self.event(event),
+        }
+    }
+
+    fn session(&mut self, session: &Session) {
+        self.totals.sessions += 1;
+        self.leave_scan("when another session begins");
+        self.session = true;
+        if session.format > LOG_FORMAT {
+            let format = session.format;
+            let detail = format!("format {format}, and this program reads up to {LOG_FORMAT}");
+            self.problem(FindingKind::NewerFormat, detail);
+        }
+        self.time(session.started);
+    }
+
+    fn scan_start(&mut self, start: &ScanStart) {
+        self.totals.scans += 1;
+        self.leave_scan("when another scan begins");
+        self.need_session();
+        let id = start.scan;
+        if !self.scans.insert(id) {
+            self.problem(FindingKind::ScanTwice, format!("scan {id} begins a second time"));
+        }
+        let plan = start.plan.check();
+        if let Err(error) = &plan {
+            self.problem(FindingKind::BadPlan, format!("plan: {error}"));
+        }
+        self.scan = Some(OpenScan::new(id, self.at, plan.is_ok().then_some(start.plan)));
+        self.time(start.time);
+    }
+
+    fn ping(&mut self, ping: &Ping) {
+        self.totals.pings += 1;
+        self.enter_scan(ping.scan, "ping");
+        for detail in contradictions(ping) {
+            self.problem(FindingKind::Contradiction, format!("beam {}: {detail}", ping.index));
+        }
+        if let Some(plan) = self.scan.as_ref().and_then(|scan| scan.plan) {
+            self.place(ping, &plan);
+        }
+        self.count_beam(ping);
+        // A reading fetched again fired before those that came through at once.
+        if let (Some(time), false) = (ping.time, ping.repaired) {
+            self.time(time);
+        }
+    }
+
+    fn scan_end(&mut self, end: &ScanEnd) {
+        self.enter_scan(end.scan, "scan_end");
+        if let Some(scan) = self.scan.take() {
+            for detail in scan.wrong_counts(end) {
+                self.problem(FindingKind::WrongCount, detail);
+            }
+        }
+        self.time(end.time);
+    }
+
+    fn event(&mut self, event: &Event) {
+        self.totals.events += 1;
+        if let Some(scan) = &mut self.scan {
+            scan.interrupted = true;
+        }
+        self.time(event.time);
+    }
+
+    /// A record belongs to the scan that is open; if not, that is found once a scan.
+    fn enter_scan(&mut self, id: Uuid, what: &str) {
+        if self.scan.as_ref().is_some_and(|scan| scan.id == id) {
+            return;
+        }
+        self.leave_scan("when records of another scan follow");
+        let why = if self.scans.insert(id) { "its scan_start is missing" } else { "it is over" };
+        self.problem(FindingKind::OutsideScan, format!("{what} outside of scan {id}: {why}"));
+        self.need_session();
+        self.scan = Some(OpenScan::new(id, self.at, None));
+    }
+
+    fn leave_scan(&mut self, when: &str) {
+        let Some(scan) = self.scan.take() else { return };
+        let detail = scan.not_ended(when);
+        if scan.interrupted {
+            self.warn(FindingKind::NotEnded, detail);
+        } else {
+            self.problem(FindingKind::NotEnded, detail);
+        }
+    }
+
+    fn need_session(&mut self) {
+        if !mem::replace(&mut self.session, true) {
+            let detail =
+                "no session before the first scan: device, sensor, air and scene are unknown";
+            self.problem(FindingKind::NoSession, detail.into());
+        }
+    }
+
+    /// Whether the plan has this beam, there.
+    fn place(&mut self, ping: &Ping, plan: &ScanPlan) {
+        let index = ping.index;
+        if index >= plan.beams() {
+            let detail = format!("beam {index}: the plan has beams 0 to {}", plan.beams() - 1);
+            return self.problem(FindingKind::NoSuchBeam, detail);
+        }
+        let planned_deg = plan.azimuth_deg(index / plan.pings_per_stop);
+        let apart_deg = (ping.azimuth_deg - planned_deg + 180.0).rem_euclid(360.0) - 180.0;
+        if apart_deg.abs() > AZIMUTH_TOLERANCE_DEG && ping.status != PingStatus::StepDoubtful {
+            let is_deg = ping.azimuth_deg;
+            let detail =
+                format!("beam {index}: azimuth_deg is {is_deg}; the plan says {planned_deg}");
+            self.problem(FindingKind::WrongAzimuth, detail);
+        }
+    }
+
+    fn count_beam(&mut self, ping: &Ping) {
+        let (at, index) = (self.at, ping.index);
+        let came_through = ping.status != PingStatus::LinkLost;
+        let Some(scan) = &mut self.scan else { return };
+        // A lost reading that was fetched later stands in the log twice, and may.
+        if let Some((first, true)) = scan.beams.insert(index, (at, came_through)) {
+            let detail = format!("beam {index} has a reading already, on line {first}");
+            self.problem(FindingKind::DuplicateBeam, detail);
+        }
+    }
+
+    fn time(&mut self, time: Timestamp) {
+        if let Some(latest) = self.latest
+            && latest.duration_since(time) > TIME_TOLERANCE
+        {
+            let detail = format!("time goes backwards, from {latest} to {time}");
+            self.warn(FindingKind::TimeBackwards, detail);
+            self.latest = Some(time);
+        }
+        self.latest = self.latest.max(Some(time));
+    }
+
+    fn problem(&mut self, kind: FindingKind, detail: String) {
+        self.totals.problems += 1;
+        self.findings.push(Finding { line: self.at, severity: Severity::Problem, kind, detail });
+    }
+
+    fn warn(&mut self, kind: FindingKind, detail: String) {
+        self.totals.warnings += 1;
+        self.findings.push(Finding { line: self.at, severity: Severity::Warning, kind, detail });
+    }
+}
+
+impl OpenScan {
+    fn new(id: Uuid, line: u64, plan: Option<ScanPlan>) -> Self {
+        Self { id, line, plan, beams: HashMap::new(), interrupted: false }
+    }
+
+    fn not_ended(&self, when: &str) -> String {
+        let Self { id, line, beams, .. } = self;
+        let planned = self.plan.map_or(String::new(), |plan| format!(" of {}", plan.beams()));
+        let count = beams.len();
+        format!("scan {id} (line {line}) has no scan_end {when}: {count}{planned} beams are there")
+    }
+
+    /// A beam whose reading was lost has a line and no reading: both ways of counting it are
+    /// taken, as long as beams and missing ones count it the same way.
+    fn wrong_counts(&self, end: &ScanEnd) -> Vec<String> {
+        let logged = self.beams.len() as u32;
+        let lost = self.beams.values().filter(|(_, came_through)| !came_through).count() as u32;
+        let mut wrong = Vec::new();
+        if ![logged, logged - lost].contains(&end.beams) {
+            wrong.push(format!("scan_end counts {} beams; the log has {logged}", end.beams));
+        }
+        let Some(plan) = self.plan else { return wrong };
+        let absent: Vec<u32> = (0..plan.beams()).filter(|i| !self.beams.contains_key(i)).collect();
+        let missing = absent.len() as u32;
+        if ![missing, missing + lost].contains(&end.missing) {
+            let counts = end.missing;
+            let which = ranges(&absent);
+            wrong.push(format!("scan_end counts {counts} missing; absent are {missing}{which}"));
+        }
+        wrong
+    }
+}
+
+/// What in a reading contradicts itself.
+fn contradictions(ping: &Ping) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut side = |what: &str, status: PingStatus, range_m: Option<f64>| match range_m {
+        Some(range_m) if !status.has_range() => {
+            found.push(format!("{what}range_m is {range_m} although status is {status:?}"));
+        }
+        Some(range_m) if range_m < 0.0 => found.push(format!("{what}range_m is {range_m}")),
+        None if status.has_range() => {
+            found.push(format!("{what}range_m is null although status is {status:?}"));
+        }
+        _ => {}
+    };
+    side("", ping.status, ping.range_m);
+    if let Some(sim) = &ping.sim {
+        side("sim.", sim.status, sim.range_m);
+    }
+    let predicted_m = ping.sim.as_ref().and_then(|sim| sim.range_m);
+    let difference_m = ping.range_m.zip(predicted_m).map(|(measured, sim)| measured - sim);
+    match (ping.residual_m, difference_m) {
+        (Some(residual_m), Some(m)) if (residual_m - m).abs() > RESIDUAL_TOLERANCE_M => {
+            found.push(format!("residual_m is {residual_m}; the ranges differ by {m:.6}"));
+        }
+        (Some(residual_m), None) => {
+            found.push(format!("residual_m is {residual_m} although a range is missing"));
+        }
+        _ => {}
+    }
+    found
+}
+
+/// Beam numbers for people: `: 3-7, 12`, cut short after eight runs.
+fn ranges(indices: &[u32]) -> String {
+    let runs: Vec<String> = indices
+        .chunk_by(|a, b| a + 1 == *b)
+        .map(|run| match run {
+            [one] => one.to_string(),
+            _ => format!("{}-{}", run[0], run[run.len() - 1]),
+        })
+        .collect();
+    match runs.len() {
+        0 => String::new(),
+        1..=8 => format!(": {}", runs.join(", ")),
+        more => format!(": {} and {} more runs", runs[..8].join(", "), more - 8),
+    }
+}

@@ -1,0 +1,182 @@
+//! Leaves out of a log what can't be read, and keeps the original.
+
+use std::{
+    fs::{self, File, OpenOptions},
+    io::{self, BufReader, BufWriter, Write},
+    path::{Path, PathBuf},
+};
+
+use crate::scan::{FaultKind, RecordError};
+
+use super::{
+    Line, StoreError,
+    open::{lock, sync_folder_of, with_suffix},
+    read_log,
+};
+
+/// A line that a repair left out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LeftOut {
+    /// Number of the line in the original, from 1.
+    pub line: u64,
+    /// Where it begins in the original, bytes.
+    pub offset: u64,
+    /// How long it is, bytes.
+    pub length: u64,
+    /// What is wrong with it.
+    pub fault: RecordError,
+}
+
+/// What a repair did.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Repair {
+    /// Records kept, byte for byte.
+    pub kept: u64,
+    /// The torn last line, if there was one.
+    pub torn: Option<LeftOut>,
+    /// The last record was whole and got the newline it lacked.
+    pub newline_added: bool,
+    /// Other lines left out.
+    pub left_out: Vec<LeftOut>,
+    /// Whole JSON objects kept although this program can't read them, because the log is of a
+    /// later format.
+    pub kept_unread: u64,
+    /// Where the original is; `None` if nothing had to be done.
+    pub original: Option<PathBuf>,
+}
+
+/// Repairs the log at `path`: every whole record is kept byte for byte, all else left out, the
+/// original stays beside it as `<log>.orig` (or `.orig-2`, ...).
+///
+/// The new file takes the log's place in one step, so that a crash leaves either the old log or
+/// the repaired one. A log that needs nothing is not touched.
+///
+/// # Errors
+/// When another process holds the log, or reading or writing fails; the log is then as it was.
+pub fn repair(path: &Path) -> Result<Repair, StoreError> {
+    // A link to a log is repaired where the log is.
+    let path =
+        &fs::canonicalize(path).map_err(|source| StoreError::Open { path: path.into(), source })?;
+    let open = |source| StoreError::Open { path: path.clone(), source };
+    let file = File::open(path).map_err(open)?;
+    if file.metadata().map_err(open)?.is_dir() {
+        return Err(open(io::ErrorKind::IsADirectory.into()));
+    }
+    lock(&file, path)?;
+    let draft = Draft::create(path)?;
+    let mut repair = Repair::default();
+    let mut out = BufWriter::with_capacity(1 << 16, &draft.file);
+    for line in read_log(BufReader::with_capacity(1 << 16, &file)) {
+        let line = line.map_err(|source| StoreError::Read { path: path.clone(), source })?;
+        repair.take(&line, &mut out).map_err(|source| draft.fail(source))?;
+    }
+    out.flush().map_err(|source| draft.fail(source))?;
+    drop(out);
+    if repair.changes_something() {
+        repair.original = Some(draft.replace(&file, path)?);
+    }
+    Ok(repair)
+}
+
+impl Repair {
+    fn take(&mut self, line: &Line, out: &mut impl Write) -> io::Result<()> {
+        let fault = match &line.record {
+            Ok(_) => {
+                self.kept += 1;
+                self.newline_added = !line.ended;
+                return keep(line, out);
+            }
+            Err(error) => error.fault.clone(),
+        };
+        if self.kept_unread > 0 && is_whole_object(fault.kind)
+            || fault.kind == FaultKind::NewerFormat
+        {
+            self.kept_unread += 1;
+            return keep(line, out);
+        }
+        let torn = fault.kind == FaultKind::Torn;
+        let Line { number, offset, length, .. } = *line;
+        let left_out = LeftOut { line: number, offset, length, fault };
+        if torn {
+            self.torn = Some(left_out);
+        } else {
+            self.left_out.push(left_out);
+        }
+        Ok(())
+    }
+
+    fn changes_something(&self) -> bool {
+        self.torn.is_some() || self.newline_added || !self.left_out.is_empty()
+    }
+}
+
+fn keep(line: &Line, out: &mut impl Write) -> io::Result<()> {
+    out.write_all(&line.bytes)?;
+    out.write_all(b"\n")
+}
+
+/// Whether a later program may well read the line that this one can't.
+fn is_whole_object(kind: FaultKind) -> bool {
+    matches!(kind, FaultKind::UnknownType | FaultKind::BadField)
+}
+
+/// The repaired log while it is being written; removed unless it takes the log's place.
+struct Draft {
+    file: File,
+    path: PathBuf,
+}
+
+impl Draft {
+    fn create(log: &Path) -> Result<Self, StoreError> {
+        let path = with_suffix(log, &format!(".repair-{}", std::process::id()));
+        match OpenOptions::new().write(true).create_new(true).open(&path) {
+            Ok(file) => Ok(Self { file, path }),
+            Err(source) => Err(StoreError::Open { path, source }),
+        }
+    }
+
+    fn fail(&self, source: io::Error) -> StoreError {
+        StoreError::Write { path: self.path.clone(), source }
+    }
+
+    /// Keeps `original` under another name and puts the draft in its place.
+    fn replace(&self, original: &File, log: &Path) -> Result<PathBuf, StoreError> {
+        let swap = || {
+            self.file.set_permissions(original.metadata()?.permissions())?;
+            self.file.sync_all()?;
+            let kept = keep_original(log)?;
+            sync_folder_of(log)?;
+            fs::rename(&self.path, log)?;
+            sync_folder_of(log)?;
+            Ok(kept)
+        };
+        swap().map_err(|source| self.fail(source))
+    }
+}
+
+impl Drop for Draft {
+    fn drop(&mut self) {
+        // After the rename there is nothing of that name.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+/// Gives the log a second name, the first of `.orig`, `.orig-2`, ... that is free.
+fn keep_original(log: &Path) -> io::Result<PathBuf> {
+    let mut n = 1;
+    loop {
+        let name = if n == 1 { ".orig".into() } else { format!(".orig-{n}") };
+        let kept = with_suffix(log, &name);
+        match fs::hard_link(log, &kept) {
+            Ok(()) => return Ok(kept),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => n += 1,
+            // Some file systems have no second names: copy instead.
+            Err(_) => {
+                let mut copy = OpenOptions::new().write(true).create_new(true).open(&kept)?;
+                io::copy(&mut File::open(log)?, &mut copy)?;
+                copy.sync_all()?;
+                return Ok(kept);
+            }
+        }
+    }
+}
