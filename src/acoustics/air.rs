@@ -108,14 +108,12 @@ impl Air {
         let pressure = self.pressure_kpa / 101.325;
         let temperature_k = self.temperature_c + ZERO_CELSIUS_K;
         let relative_k = temperature_k / 293.15;
-        let saturation =
-            10f64.powf(-6.8346 * (273.16 / temperature_k).powf(1.261) + 4.6151);
+        let saturation = 10f64.powf(-6.8346 * (273.16 / temperature_k).powf(1.261) + 4.6151);
         let vapour_percent = self.humidity_percent * saturation / pressure;
         let oxygen_hz = pressure
             * (24.0 + 4.04e4 * vapour_percent * (0.02 + vapour_percent) / (0.391 + vapour_percent));
         let nitrogen_hz = pressure / relative_k.sqrt()
-            * (9.0
-                + 280.0 * vapour_percent * (-4.170 * (relative_k.powf(-1.0 / 3.0) - 1.0)).exp());
+            * (9.0 + 280.0 * vapour_percent * (-4.170 * (relative_k.powf(-1.0 / 3.0) - 1.0)).exp());
         let square = frequency_hz * frequency_hz;
         let classical = 1.84e-11 / pressure * relative_k.sqrt();
         let relaxation = 0.01275 * (-2239.1 / temperature_k).exp()

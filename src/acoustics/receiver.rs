@@ -181,18 +181,21 @@ mod tests {
 
     #[test]
     fn the_first_loud_sound_wins_over_louder_later_ones() {
-        let echo =
-            check(&[(3000.0, 0.019), (4000.0, 0.02), (5000.0, 0.9)], PingStatus::Echo, &[
-                4000.0, 5000.0,
-            ]);
+        let echo = check(
+            &[(3000.0, 0.019), (4000.0, 0.02), (5000.0, 0.9)],
+            PingStatus::Echo,
+            &[4000.0, 5000.0],
+        );
         assert_eq!(echo.sound.map(|sound| sound.index), Some(1));
     }
 
     #[test]
     fn silence_names_its_best_candidate_in_the_window() {
-        let silence =
-            check(&[(1000.0, 1.0), (3000.0, 0.01), (4000.0, 0.015), (25_000.0, 1.0)],
-                PingStatus::NoEcho, &[]);
+        let silence = check(
+            &[(1000.0, 1.0), (3000.0, 0.01), (4000.0, 0.015), (25_000.0, 1.0)],
+            PingStatus::NoEcho,
+            &[],
+        );
         assert_eq!(silence.sound.map(|sound| sound.index), Some(2));
         assert_eq!(check(&[], PingStatus::NoEcho, &[]).sound, None);
     }
@@ -201,8 +204,7 @@ mod tests {
     fn held_detector_skips_sounds_that_end_and_catches_those_that_last() {
         check(&[(3000.0, 1.0), (3100.0, 1.0)], PingStatus::Echo, &[3000.0]);
         check(&[(3000.0, 1.0), (3200.0, 1.0)], PingStatus::Echo, &[3000.0, 3440.0]);
-        let many: Vec<(f64, f64)> =
-            (0..20).map(|i| (3000.0 + 500.0 * f64::from(i), 1.0)).collect();
+        let many: Vec<(f64, f64)> = (0..20).map(|i| (3000.0 + 500.0 * f64::from(i), 1.0)).collect();
         let first_eight: Vec<f64> = many.iter().take(8).map(|&(tof_us, _)| tof_us).collect();
         check(&many, PingStatus::Echo, &first_eight);
     }

@@ -185,7 +185,6 @@ impl Sensor {
         positive("threshold", self.threshold)
     }
 
-
     /// How long the pulse lasts, seconds (a Gaussian one: three sigma to each side).
     #[must_use]
     pub fn pulse_s(&self) -> f64 {

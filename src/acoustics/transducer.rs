@@ -39,8 +39,7 @@ impl BeamPattern {
                     envelope: Envelope::new(sensor),
                 };
                 let step_rad = FRAC_PI_2 / TABLE_INTERVALS as f64;
-                let table =
-                    (0..=TABLE_INTERVALS).map(|i| disc.peak(i as f64 * step_rad)).collect();
+                let table = (0..=TABLE_INTERVALS).map(|i| disc.peak(i as f64 * step_rad)).collect();
                 Shape::Disc(table)
             }
             Aperture::Line { half_length_m } => Shape::Line { ka: wave_number * half_length_m },
@@ -284,10 +283,8 @@ mod tests {
 
     #[test]
     fn a_long_pulse_sees_the_piston_times_the_cosine() {
-        let sensor = Sensor {
-            pulse: Pulse::Gaussian { sigma_us: 5000.0 },
-            ..preset("senscomp-6500")
-        };
+        let sensor =
+            Sensor { pulse: Pulse::Gaussian { sigma_us: 5000.0 }, ..preset("senscomp-6500") };
         let beam = BeamPattern::new(&sensor, SPEED_M_S);
         for i in 0..89 {
             let theta_rad = f64::from(i).to_radians();
@@ -325,8 +322,7 @@ mod tests {
                 }
                 f64::hypot(re, im)
             };
-            let expected =
-                (-200..500).map(|t| magnitude(f64::from(t) * 1e-6)).fold(0.0, f64::max);
+            let expected = (-200..500).map(|t| magnitude(f64::from(t) * 1e-6)).fold(0.0, f64::max);
             let found = beam.one_way(theta_rad);
             assert!((found - expected).abs() < 2e-4, "{degrees}: {found} for {expected}");
         }

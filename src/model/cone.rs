@@ -69,11 +69,7 @@ impl ConeSurvey<'_> {
             amplitude: 1.0,
             departure_rad: ray_rad,
             arrival_rad: ray_rad,
-            path: Path {
-                kind: PathKind::Specular,
-                walls: smallvec![hit.reflector],
-                edge: None,
-            },
+            path: Path { kind: PathKind::Specular, walls: smallvec![hit.reflector], edge: None },
         })
     }
 }

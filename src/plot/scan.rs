@@ -40,8 +40,7 @@ pub fn draw_scans(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
         .filter_map(|(view, r)| Some((words::pose_of(view)?, r)))
         .collect();
     let title = words::title(scans, scene);
-    let (heading, top) =
-        caption::draw(&title, words::badge(scans), &words::lines(scans, &readings));
+    let (heading, top) = caption::draw(&title, words::badge(scans), &words::lines(scans));
 
     let region = region::region(&placed, scene);
     let layout = Layout::choose(&region, top + 22.0);

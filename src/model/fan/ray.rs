@@ -140,8 +140,7 @@ impl Ray {
         if !matters || !fan.reflectors.sees(position, point) {
             return None;
         }
-        let path =
-            Path { kind: PathKind::Diffracted, walls: self.walls.clone(), edge: Some(edge) };
+        let path = Path { kind: PathKind::Diffracted, walls: self.walls.clone(), edge: Some(edge) };
         Some(Candidate {
             length_m,
             gain,
