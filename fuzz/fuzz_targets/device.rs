@@ -23,13 +23,20 @@ struct Watched {
 fuzz_target!(|bytes: &[u8]| {
     let mut device = Device::new(Board {
         boot: BOOT,
-        firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
+        firmware: FirmwareVersion {
+            major: 0,
+            minor: 1,
+            patch: 0,
+        },
         serial: *b"FUZZED0001",
         steps_per_revolution: 400,
         capabilities: Capabilities(u16::MAX),
         reset_cause: ResetCause::Unknown,
     });
-    let mut watched = Watched { now: u32::MAX - 1_000, ..Watched::default() };
+    let mut watched = Watched {
+        now: u32::MAX - 1_000,
+        ..Watched::default()
+    };
     let mut line = FrameDecoder::new();
     for chunk in bytes.chunks(12) {
         if let Some((&what, rest)) = chunk.split_first() {
@@ -44,7 +51,9 @@ fuzz_target!(|bytes: &[u8]| {
 });
 
 fn disturb(device: &mut Device, watched: &mut Watched, what: u8, rest: &[u8]) {
-    let number = rest.iter().fold(0_u32, |sum, &byte| sum << 8 | u32::from(byte));
+    let number = rest
+        .iter()
+        .fold(0_u32, |sum, &byte| sum << 8 | u32::from(byte));
     let now = watched.now;
     match what & 0x0f {
         0..=4 => send(device, watched, rest),
@@ -69,7 +78,14 @@ fn disturb(device: &mut Device, watched: &mut Watched, what: u8, rest: &[u8]) {
             watched.listening = false;
             let echoes = Echoes::from_ticks(&[number; 8][..usize::from(what >> 5)]);
             let status = ReadingStatus::Echo;
-            device.handle_echoes(now, &EchoReport { fired_ticks: now, status, echoes });
+            device.handle_echoes(
+                now,
+                &EchoReport {
+                    fired_ticks: now,
+                    status,
+                    echoes,
+                },
+            );
         }
         13 => device.handle_emergency_stop(now),
         14 => device.handle_motion_fault(now),
@@ -79,9 +95,14 @@ fn disturb(device: &mut Device, watched: &mut Watched, what: u8, rest: &[u8]) {
 
 /// A right frame around any body, mostly with the next number.
 fn send(device: &mut Device, watched: &mut Watched, body: &[u8]) {
-    let Ok(request) = Request::decode(body) else { return };
+    let Ok(request) = Request::decode(body) else {
+        return;
+    };
     watched.seq = watched.seq.wrapping_add(u16::from(body.len() % 3 != 0));
-    let header = Header { boot: BOOT, seq: watched.seq };
+    let header = Header {
+        boot: BOOT,
+        seq: watched.seq,
+    };
     let frame = Frame::encode(header, &request).expect("every request fits");
     device.handle_bytes(watched.now, &frame);
 }

@@ -27,7 +27,11 @@ fn panic(_: &PanicInfo<'_>) -> ! {
 pub extern "C" fn _start() -> ! {
     let mut device = Device::new(black_box(Board {
         boot: 1,
-        firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
+        firmware: FirmwareVersion {
+            major: 0,
+            minor: 1,
+            patch: 0,
+        },
         serial: *b"NOPANIC001",
         steps_per_revolution: 400,
         capabilities: Capabilities(0),
@@ -43,11 +47,14 @@ pub extern "C" fn _start() -> ! {
         device.handle_homed(now, black_box(Err(HomeError::IndexNotFound)));
         device.handle_emergency_stop(now);
         device.handle_motion_fault(now);
-        device.handle_echoes(now, &EchoReport {
-            fired_ticks: now,
-            status: black_box(ReadingStatus::Echo),
-            echoes: Echoes::from_ticks(black_box(&[1, 2, 3])),
-        });
+        device.handle_echoes(
+            now,
+            &EchoReport {
+                fired_ticks: now,
+                status: black_box(ReadingStatus::Echo),
+                echoes: Echoes::from_ticks(black_box(&[1, 2, 3])),
+            },
+        );
         black_box(device.poll_action());
         black_box(device.poll_timeout());
         let mut buffer = [0; 16];
