@@ -11,10 +11,7 @@ use firmware_protocol::messages::{
     ResetCause, Settings, Sweep,
 };
 
-const HEADER: Header = Header {
-    boot: 0x1234,
-    seq: 0x42,
-};
+const HEADER: Header = Header { boot: 0x1234, seq: 0x42 };
 const BEAMS: u16 = 1_000;
 
 fn reading(index: u16) -> Reading {
@@ -65,11 +62,7 @@ const SETTINGS: Settings = Settings {
 fn device() -> Device {
     Device::new(Board {
         boot: 1,
-        firmware: FirmwareVersion {
-            major: 0,
-            minor: 1,
-            patch: 0,
-        },
+        firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
         serial: *b"BENCH00001",
         steps_per_revolution: 400,
         capabilities: Capabilities::INDEX_SENSOR,
@@ -137,12 +130,7 @@ fn machines(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("machines");
     group.throughput(Throughput::Elements(u64::from(BEAMS)));
     let host = Host::new(HostConfig::new(115_200, 1));
-    let mut pair = Pair {
-        host,
-        device: device(),
-        ticks: 0,
-        readings: 0,
-    };
+    let mut pair = Pair { host, device: device(), ticks: 0, readings: 0 };
     pair.run(Command::Identify);
     pair.run(Command::Configure(SETTINGS));
     pair.run(Command::Home);
@@ -182,8 +170,7 @@ fn machines(criterion: &mut Criterion) {
 /// A host that has begun a sweep, and all the frames that it will get.
 fn prepared_sweep(pair: &Pair, plan: Sweep) -> (Host, Vec<Frame>) {
     let mut host = pair.host.clone();
-    host.start(pair.now_us(), Command::Sweep(plan))
-        .expect("free");
+    host.start(pair.now_us(), Command::Sweep(plan)).expect("free");
     let frame = host.poll_transmit().expect("a request");
     let mut decoder = FrameDecoder::new();
     let mut sent = None;
@@ -192,14 +179,9 @@ fn prepared_sweep(pair: &Pair, plan: Sweep) -> (Host, Vec<Frame>) {
             sent = Some((raw.header, Request::decode(raw.body)));
         }
     }
-    let Some((header, Ok(Request::Sweep(sweep)))) = sent else {
-        panic!("no Sweep was sent")
-    };
+    let Some((header, Ok(Request::Sweep(sweep)))) = sent else { panic!("no Sweep was sent") };
     let frames = (0..BEAMS).map(|index| {
-        let reading = Reading {
-            sweep: sweep.sweep,
-            ..reading(index)
-        };
+        let reading = Reading { sweep: sweep.sweep, ..reading(index) };
         Frame::encode(header, &Reply::Reading(reading)).expect("fits")
     });
     (host, frames.collect())

@@ -46,18 +46,9 @@ fn check_variants(title: &str, variants: &[Variant], with_fields: bool) {
         assert_eq!(row[0], variant.code.to_string(), "{title}");
         assert_eq!(row[1], variant.name, "{title}");
         if with_fields {
-            assert_eq!(
-                row[2],
-                fields_text(variant.fields),
-                "{title} {}",
-                variant.name
-            );
+            assert_eq!(row[2], fields_text(variant.fields), "{title} {}", variant.name);
         } else {
-            assert!(
-                variant.fields.is_empty(),
-                "{title} {} has fields",
-                variant.name
-            );
+            assert!(variant.fields.is_empty(), "{title} {} has fields", variant.name);
         }
     }
 }
@@ -92,14 +83,10 @@ fn records_are_as_documented() {
         ("SweepDone", SweepDone::FIELDS),
         ("Status", Status::FIELDS),
     ] {
-        let documented: Vec<_> = table(title)
-            .iter()
-            .map(|row| format!("{}: {}", row[0], row[1]))
-            .collect();
-        let coded: Vec<_> = fields
-            .iter()
-            .map(|field| format!("{}: {}", field.name, field.kind))
-            .collect();
+        let documented: Vec<_> =
+            table(title).iter().map(|row| format!("{}: {}", row[0], row[1])).collect();
+        let coded: Vec<_> =
+            fields.iter().map(|field| format!("{}: {}", field.name, field.kind)).collect();
         assert_eq!(documented, coded, "{title}");
     }
 }
@@ -114,14 +101,8 @@ fn limits_are_as_documented() {
         ("INTERVAL_TICKS_MAX", i64::from(limits::INTERVAL_TICKS_MAX)),
         ("SETTLE_TICKS_MAX", i64::from(limits::SETTLE_TICKS_MAX)),
         ("MAX_ECHOES", i64::from(limits::MAX_ECHOES)),
-        (
-            "SHORT_BLANKING_TICKS_MIN",
-            i64::from(limits::SHORT_BLANKING_TICKS_MIN),
-        ),
-        (
-            "SHORT_BLANKING_TICKS_MAX",
-            i64::from(limits::SHORT_BLANKING_TICKS_MAX),
-        ),
+        ("SHORT_BLANKING_TICKS_MIN", i64::from(limits::SHORT_BLANKING_TICKS_MIN)),
+        ("SHORT_BLANKING_TICKS_MAX", i64::from(limits::SHORT_BLANKING_TICKS_MAX)),
         ("SPEED_MAX", i64::from(limits::SPEED_MAX)),
         ("ACCELERATION_MAX", i64::from(limits::ACCELERATION_MAX)),
         ("HOLD_S_MAX", i64::from(limits::HOLD_S_MAX)),
@@ -140,27 +121,16 @@ fn limits_are_as_documented() {
 
 #[test]
 fn timers_are_as_documented() {
-    let device = [
-        DeviceTimer::Settle,
-        DeviceTimer::MinInterval,
-        DeviceTimer::Lease,
-        DeviceTimer::Hold,
-    ];
-    let host = [
-        HostTimer::Reply,
-        HostTimer::Completion,
-        HostTimer::KeepAlive,
-        HostTimer::Progress,
-    ];
+    let device =
+        [DeviceTimer::Settle, DeviceTimer::MinInterval, DeviceTimer::Lease, DeviceTimer::Hold];
+    let host = [HostTimer::Reply, HostTimer::Completion, HostTimer::KeepAlive, HostTimer::Progress];
     let coded: Vec<_> = device
         .iter()
         .map(|timer| (format!("{timer:?}"), "device"))
         .chain(host.iter().map(|timer| (format!("{timer:?}"), "host")))
         .collect();
-    let documented: Vec<_> = table("## Timers")
-        .iter()
-        .map(|row| (row[0].to_string(), row[1]))
-        .collect();
+    let documented: Vec<_> =
+        table("## Timers").iter().map(|row| (row[0].to_string(), row[1])).collect();
     assert_eq!(documented, coded);
 }
 
@@ -193,14 +163,9 @@ fn examples_are_as_documented() {
 
 fn example(title: &str) -> String {
     let words: Vec<_> = title.split(' ').collect();
-    let [kind, name, "boot", boot, "seq", seq] = words[..] else {
-        panic!("odd title: {title}")
-    };
+    let [kind, name, "boot", boot, "seq", seq] = words[..] else { panic!("odd title: {title}") };
     let number = |text| u16::from_str_radix(text, 16).expect("four hex digits");
-    let header = Header {
-        boot: number(boot),
-        seq: number(seq),
-    };
+    let header = Header { boot: number(boot), seq: number(seq) };
     let frame = match kind {
         "request" => encode(header, &samples::requests(), name),
         "reply" => encode(header, &samples::replies(), name),
@@ -211,9 +176,6 @@ fn example(title: &str) -> String {
 }
 
 fn encode<M: serde::Serialize>(header: Header, samples: &[(&str, M)], name: &str) -> Frame {
-    let (_, message) = samples
-        .iter()
-        .find(|(sample, _)| *sample == name)
-        .expect("a sample");
+    let (_, message) = samples.iter().find(|(sample, _)| *sample == name).expect("a sample");
     Frame::encode(header, message).expect("fits")
 }

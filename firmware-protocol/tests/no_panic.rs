@@ -9,10 +9,7 @@ fn the_device_machine_links_without_a_panic_handler() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("no-panic");
     let output = Command::new("sh")
         .arg(folder.join("check.sh"))
-        .env(
-            "CARGO_TARGET_DIR",
-            Path::new(env!("CARGO_TARGET_TMPDIR")).join("no-panic"),
-        )
+        .env("CARGO_TARGET_DIR", Path::new(env!("CARGO_TARGET_TMPDIR")).join("no-panic"))
         // The flags of the program under test are its own.
         .env_remove("CARGO_ENCODED_RUSTFLAGS")
         .output()

@@ -56,7 +56,7 @@ pub fn main() -> ExitCode {
     let outcome = match Cli::parse().verb {
         Verb::Scan(args) => scan::run(&args),
         Verb::Mock(args) => mock::run(&args),
-        Verb::Simulate(args) => simulate::run(args),
+        Verb::Simulate(args) => simulate::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Plot(args) => plot::run(args),
         Verb::Log(verb) => log::run(verb),

@@ -161,14 +161,9 @@ mod tests {
     use crate::messages::{Echoes, ReadingStatus};
 
     fn kept(fired_ticks: u32, echo_count: u8) -> Kept {
-        let ticks: Vec<u32> = (0..u32::from(echo_count))
-            .map(|echo| fired_ticks / 7 % 1_000 + echo)
-            .collect();
-        Kept {
-            fired_ticks,
-            status: ReadingStatus::Echo,
-            echoes: Echoes::from_ticks(&ticks),
-        }
+        let ticks: Vec<u32> =
+            (0..u32::from(echo_count)).map(|echo| fired_ticks / 7 % 1_000 + echo).collect();
+        Kept { fired_ticks, status: ReadingStatus::Echo, echoes: Echoes::from_ticks(&ticks) }
     }
 
     proptest! {

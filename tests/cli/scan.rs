@@ -1,10 +1,8 @@
 //! One scan, end to end: real bytes over a real pty, a log, a comparison, a picture.
 
-mod common;
-
 use std::fs;
 
-use common::{Log, mock_scan, run, sonard, stderr};
+use crate::common::{Log, mock_scan, run, sonard, stderr};
 use serde_json::Value;
 
 fn number(value: &Value) -> f64 {
@@ -18,7 +16,8 @@ fn the_false_lower_wall_of_figure_9_is_seen() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let log = Log::read(&folder.path().join("scan.jsonl"));
     log.assert_each_beam_once(400);
-    let near_270 = log.pings().into_iter().filter(|p| (number(&p["azimuth_deg"]) - 270.0).abs() < 5.0);
+    let near_270 =
+        log.pings().into_iter().filter(|p| (number(&p["azimuth_deg"]) - 270.0).abs() < 5.0);
     let mut seen = 0;
     for ping in near_270 {
         assert_eq!(ping["status"], "echo", "{ping}");
@@ -51,7 +50,7 @@ fn sound_that_still_bounces_when_the_receiver_opens_gives_the_minimum_range() {
 #[test]
 fn a_mock_is_logged_as_a_mock_however_its_port_was_opened() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mock = common::MockProcess::start(folder.path(), &[]);
+    let mock = crate::common::MockProcess::start(folder.path(), &[]);
     let port = mock.port().to_owned();
     let output = run(&["scan", "--port", &port, "--scene", "simple-room", "--pose", "fig9"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -69,8 +68,22 @@ fn a_mock_is_logged_as_a_mock_however_its_port_was_opened() {
 #[test]
 fn records_flow_through_a_pipe_into_a_comparison() {
     let scan = run(&[
-        "scan", "--mock", "--scene", "simple-room", "--pose", "fig9", "--from-deg", "-45", "--to-deg",
-        "45", "--pings-per-stop", "2", "--repeat", "2", "--max-range", "4",
+        "scan",
+        "--mock",
+        "--scene",
+        "simple-room",
+        "--pose",
+        "fig9",
+        "--from-deg",
+        "-45",
+        "--to-deg",
+        "45",
+        "--pings-per-stop",
+        "2",
+        "--repeat",
+        "2",
+        "--max-range",
+        "4",
     ]);
     assert_eq!(scan.status.code(), Some(0), "{}", stderr(&scan));
     let log = Log::parse(std::str::from_utf8(&scan.stdout).expect("text"));

@@ -1,7 +1,5 @@
 //! Wrong input: each gives one clear message that says what to do, and the right exit code.
 
-mod common;
-
 use std::{
     fs,
     io::Write as _,
@@ -10,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-use common::{MockProcess, mock_scan, run, sonard, stderr};
+use crate::common::{MockProcess, mock_scan, run, sonard, stderr};
 use sonard::mock::Pty;
 
 /// Runs `arguments` and checks exit code and what the message must contain.
@@ -20,7 +18,7 @@ fn check(arguments: &[&str], code: i32, parts: &[&str]) {
     let message = stderr(&output);
     assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
     // Wrapped lines are one message.
-    let message = message.replace('\n', " ").replace('│', " ");
+    let message = message.replace(['\n', '│'], " ");
     let message = message.split_whitespace().collect::<Vec<_>>().join(" ");
     for part in parts {
         assert!(message.contains(part), "{arguments:?}: {part:?} is not in: {message}");
@@ -45,7 +43,7 @@ fn ports() {
 #[test]
 fn a_port_without_permission() {
     let pty = Pty::open(None).expect("a pty");
-    fs::set_permissions(pty.path(), fs::Permissions::from_mode(0)).expect("it is ours");
+    fs::set_permissions(pty.path(), fs::Permissions::from_mode(0o000)).expect("it is ours");
     let path = pty.path().to_str().expect("plain path");
     let mut scan = sonard(&["scan", "--port", path, "--scene", "simple-room", "--pose", "fig9"]);
     if rustix::process::geteuid().is_root() {
@@ -114,7 +112,7 @@ fn scenes_and_poses() {
         fs::write(&path, text).expect("writes");
         path.to_str().expect("plain path").to_owned()
     };
-    let good = include_str!("../scenes/simple-room.json");
+    let good = include_str!("../../scenes/simple-room.json");
     let unknown = scene(&good.replacen("\"reflectance\"", "\"reflectence\"", 1));
     check(&scan_of(&unknown, "fig9", &[]), 2, &["room.json", "reflectence", "reflectance"]);
     let last = good.rfind('}').expect("an object");
@@ -141,7 +139,18 @@ fn plans_and_settings() {
 #[test]
 fn output_folders() {
     let scan = |out| {
-        ["scan", "--mock", "--scene", "simple-room", "--pose", "fig9", "--to-deg", "9", "--out", out]
+        [
+            "scan",
+            "--mock",
+            "--scene",
+            "simple-room",
+            "--pose",
+            "fig9",
+            "--to-deg",
+            "9",
+            "--out",
+            out,
+        ]
     };
     check(&scan("/proc/sonard-out"), 2, &["/proc/sonard-out", "may write"]);
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,7 +1,5 @@
 //! End of file and unplugging never make anything spin.
 
-mod common;
-
 use std::{ops::ControlFlow, time::Duration};
 
 use firmware_protocol::host::{Command, HostConfig, HostError};
@@ -43,13 +41,13 @@ async fn a_driver_whose_line_closed_says_so_once_and_then_rests() {
 #[test]
 fn a_mock_rests_when_its_host_has_gone() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mock = common::MockProcess::start(folder.path(), &["--realtime"]);
+    let mock = crate::common::MockProcess::start(folder.path(), &["--realtime"]);
     let scan = ["scan", "--port", mock.port(), "--scene", "simple-room", "--pose", "fig9"];
     let few = ["--max-range", "3", "--to-deg", "9"];
-    assert_eq!(common::run(&[&scan[..], &few[..]].concat()).status.code(), Some(0));
+    assert_eq!(crate::common::run(&[&scan[..], &few[..]].concat()).status.code(), Some(0));
     std::thread::sleep(Duration::from_millis(200));
-    let before = common::cpu_s(mock.id());
+    let before = crate::common::cpu_s(mock.id());
     std::thread::sleep(Duration::from_secs(2));
-    let used = common::cpu_s(mock.id()) - before;
+    let used = crate::common::cpu_s(mock.id()) - before;
     assert!(used < 0.1, "{used} s of CPU in two seconds without a host");
 }

@@ -1,5 +1,4 @@
 //! `sonard scene`, as a user meets it.
-#![cfg(feature = "daemon")]
 
 use std::{fs, path::Path};
 
@@ -97,7 +96,7 @@ fn draw_writes_svg_and_png() {
 
 #[test]
 fn schema_prints_the_committed_one() {
-    scene(&["schema"]).success().stdout(include_str!("../scenes/scene.schema.json"));
+    scene(&["schema"]).success().stdout(include_str!("../../scenes/scene.schema.json"));
 }
 
 #[test]

@@ -1,13 +1,11 @@
 //! What a scan does when the line or the device misbehaves.
 
-mod common;
-
 use std::{
     process::Stdio,
     time::{Duration, Instant},
 };
 
-use common::{Log, MockProcess, interrupt, mock_scan, run, sonard, stderr, wait_until};
+use crate::common::{Log, MockProcess, interrupt, mock_scan, run, sonard, stderr, wait_until};
 
 #[test]
 fn a_noisy_line_costs_time_and_never_data() {
@@ -123,8 +121,19 @@ fn a_killed_host_stops_the_firing_within_the_lease_and_leaves_the_port_usable() 
     let killed = Instant::now();
     // The lease is two seconds; a second scan finds a device that answers.
     std::thread::sleep(Duration::from_millis(2_500));
-    let again = run(&["scan", "--port", mock.port(), "--scene", "simple-room", "--pose", "fig9",
-        "--max-range", "4", "--to-deg", "9"]);
+    let again = run(&[
+        "scan",
+        "--port",
+        mock.port(),
+        "--scene",
+        "simple-room",
+        "--pose",
+        "fig9",
+        "--max-range",
+        "4",
+        "--to-deg",
+        "9",
+    ]);
     assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
     let (_, said) = mock.stop();
     assert!(said.contains("coils released"), "after {:?}: {said}", killed.elapsed());
