@@ -122,16 +122,16 @@ impl Receiver {
     }
 }
 
-/// The status of a measured reading with an echo, from its first time of flight, microseconds.
+/// The status of a measured reading from its first time of flight, microseconds, if any.
 ///
 /// ECHO within one carrier cycle (20 us) of the end of blanking was raised by sound already
 /// there: a real echo that begins in that span can't be told from it.
 #[must_use]
-pub fn classify_tof(tof_us: f64, blanking_us: f64) -> PingStatus {
-    if tof_us <= blanking_us + BLANKING_TOLERANCE_US {
-        PingStatus::MinRange
-    } else {
-        PingStatus::Echo
+pub fn classify_tof(tof_us: Option<f64>, blanking_us: f64) -> PingStatus {
+    match tof_us {
+        None => PingStatus::NoEcho,
+        Some(tof_us) if tof_us <= blanking_us + BLANKING_TOLERANCE_US => PingStatus::MinRange,
+        Some(_) => PingStatus::Echo,
     }
 }
 
@@ -212,11 +212,12 @@ mod tests {
     #[test]
     fn measured_times_at_the_end_of_blanking_are_minimum_range() {
         for (tof_us, status) in [
-            (2380.0, PingStatus::MinRange),
-            (2395.0, PingStatus::MinRange),
-            (2401.0, PingStatus::Echo),
+            (None, PingStatus::NoEcho),
+            (Some(2380.0), PingStatus::MinRange),
+            (Some(2395.0), PingStatus::MinRange),
+            (Some(2401.0), PingStatus::Echo),
         ] {
-            assert_eq!(classify_tof(tof_us, 2380.0), status, "{tof_us}");
+            assert_eq!(classify_tof(tof_us, 2380.0), status, "{tof_us:?}");
         }
     }
 }

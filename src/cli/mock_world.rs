@@ -70,8 +70,13 @@ impl MockWorldArgs {
         let sound_speed_m_s = air.sound_speed_m_s();
         // The mock hears to the end of whatever window it is told; the model must reach as far.
         let options = Options { max_range_m: None, ..*belief.options };
-        let simulator = Simulator::new(scene, belief.sensor.clone(), air, options)
-            .map_err(|error| Failure::input(error, "see `sonard mock --help`"))?;
+        let simulator = Simulator::new(
+            Arc::new(scene.with_robot_at(belief.pose)),
+            belief.sensor.clone(),
+            air,
+            options,
+        )
+        .map_err(|error| Failure::input(error, "see `sonard mock --help`"))?;
         let steps = self.steps_per_revolution;
         let soundings = Soundings::of(&simulator, belief.pose, steps, self.mounting_offset_deg);
         let noise = Noise::of_range_mm(self.noise_mm, sound_speed_m_s);
@@ -91,7 +96,8 @@ impl MockWorldArgs {
 
     fn truth_air(&self, believed: &Air) -> Result<Air, Failure> {
         let Some(temperature_c) = self.truth_temperature_c else { return Ok(*believed) };
-        Air::new(temperature_c, believed.humidity_percent(), believed.pressure_kpa()).map_err(|error| Failure::input(error, "give --truth-temperature-c in degrees Celsius"))
+        Air::new(temperature_c, believed.humidity_percent(), believed.pressure_kpa())
+            .map_err(|error| Failure::input(error, "give --truth-temperature-c in degrees Celsius"))
     }
 }
 

@@ -130,10 +130,10 @@ impl PlanArgs {
     }
 }
 
-pub(super) fn run(args: Args) -> Outcome {
-    let setup = Setup::new(&args)?;
+pub(super) fn run(args: &Args) -> Outcome {
+    let setup = Setup::new(args)?;
     let mut output = Output::open(args.out.as_deref(), &setup)?;
-    let measured = runtime::new()?.block_on(measure(&args, &setup, &mut output));
+    let measured = runtime::new()?.block_on(measure(args, &setup, &mut output));
     // Whatever happened, what was measured is closed properly and drawn.
     let closed = output.close(&setup);
     measured?;
@@ -198,8 +198,8 @@ impl Mock {
 
     async fn stop(self) {
         // A mock that is gone already has nothing left to say.
-        drop(self.stop.send(()));
-        drop(self.playing.await);
+        let _ = self.stop.send(());
+        let _ = self.playing.await;
     }
 }
 

@@ -1,10 +1,15 @@
 //! `sonard scene`.
 
-use std::io::{self, Write as _};
+use std::{
+    fs,
+    io::{self, Write as _},
+    path::{Path, PathBuf},
+};
 
 use super::{Failure, Outcome, scene_file};
 use crate::{
     geometry::DVec2,
+    plot::draw_scene,
     scene::{Scene, json_schema, shipped},
 };
 
@@ -14,7 +19,10 @@ pub(super) enum Verb {
     /// Check a scene file and say in a line what it holds
     #[command(long_about = CHECK_ABOUT, after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
-    /// List the scenes that come with sonard
+    /// Draw a scene's floor plan as SVG or PNG
+    #[command(long_about = DRAW_ABOUT, after_help = DRAW_EXAMPLES)]
+    Draw(DrawArgs),
+    /// List the scenes that come with sonard, with their poses
     List,
     /// Print the JSON Schema of scene files
     #[command(long_about = SCHEMA_ABOUT, after_help = SCHEMA_EXAMPLES)]
@@ -30,6 +38,23 @@ pub(super) struct CheckArgs {
     /// Also check that a ranger can stand at this pose: X,Y,DEG (metres, degrees) or a name
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
+}
+
+/// Options of `sonard scene draw`.
+#[derive(Debug, clap::Args)]
+pub(super) struct DrawArgs {
+    /// Scene file, or the name of a shipped scene (`sonard scene list`)
+    #[arg(value_name = "FILE")]
+    scene: String,
+    /// Draw this pose only: X,Y,DEG (metres, degrees) or a name [default: all named poses]
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    pose: Option<String>,
+    /// Where to write the picture, as .svg or .png [default: SVG to standard output]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Width of a PNG, pixels
+    #[arg(long, value_name = "PIXELS", default_value_t = 1200)]
+    width: u32,
 }
 
 const CHECK_ABOUT: &str = "\
@@ -52,6 +77,19 @@ The smallest useful scene:
               "material": "plaster"}],
    "poses": {"middle": {"x_m": 2, "y_m": 1.5, "heading_deg": 0}}}"#;
 
+const DRAW_ABOUT: &str = "\
+Draw a scene's floor plan as SVG or PNG.
+
+Shows the walls by material with their ids, cylinders, the poses with an arrow along azimuth 0, \
+the robot's body where the scene has one, a scale in metres, and what the scene says of its \
+source and of what is approximate.";
+
+const DRAW_EXAMPLES: &str = "\
+Examples:
+  sonard scene draw simple-room -o simple-room.png
+  sonard scene draw my-room.json --pose 1.2,0.8,90 -o my-room.svg
+  sonard scene draw my-room.json > my-room.svg";
+
 const SCHEMA_ABOUT: &str = "\
 Print the JSON Schema of scene files.
 
@@ -66,6 +104,7 @@ const SCHEMA_EXAMPLES: &str = r#"Examples:
 pub(super) fn run(verb: Verb) -> Outcome {
     match verb {
         Verb::Check(args) => check(&args),
+        Verb::Draw(args) => draw(&args),
         Verb::List => list(),
         Verb::Schema => schema(),
     }
@@ -77,6 +116,48 @@ fn check(args: &CheckArgs) -> Outcome {
         scene_file::pose(&scene, pose)?;
     }
     print(&summary(&scene))
+}
+
+fn draw(args: &DrawArgs) -> Outcome {
+    let scene = scene_file::load(&args.scene)?;
+    let picture = draw_scene(&drawn(scene, args.pose.as_deref())?);
+    let Some(path) = &args.output else { return print(picture.to_svg().trim_end()) };
+    let bytes = match path.extension().and_then(|extension| extension.to_str()) {
+        Some("svg") => picture.to_svg().into_bytes(),
+        Some("png") => picture
+            .to_png(args.width)
+            .map_err(|error| Failure::input(error, "choose another --width"))?,
+        _ => {
+            return Err(Failure::input(
+                format!("{} is neither .svg nor .png", path.display()),
+                "end the name of the picture with .svg or .png",
+            ));
+        }
+    };
+    write_file(path, &bytes)
+}
+
+/// The scene with the poses to draw, and the robot's body at each of them.
+fn drawn(mut scene: Scene, pose: Option<&str>) -> Result<Scene, Failure> {
+    if let Some(spec) = pose {
+        let pose = scene_file::pose(&scene, spec)?;
+        scene.poses = [(spec.to_owned(), pose)].into();
+    }
+    let robot = scene.robot.clone();
+    for pose in scene.poses.clone().values() {
+        scene.robot.clone_from(&robot);
+        scene = scene.with_robot_at(pose);
+    }
+    Ok(scene)
+}
+
+fn write_file(path: &Path, bytes: &[u8]) -> Outcome {
+    fs::write(path, bytes).map_err(|error| {
+        Failure::device(
+            format!("cannot write {}: {error}", path.display()),
+            "check that the folder exists, may be written to and has space",
+        )
+    })
 }
 
 fn list() -> Outcome {

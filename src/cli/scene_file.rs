@@ -19,6 +19,15 @@ pub(super) fn load(path_or_name: &str) -> Result<Scene, Failure> {
     Scene::from_json(&text).map_err(|error| Failure::Input(report(path_or_name, text, &error)))
 }
 
+/// Reads and checks a shipped scene, whatever files there are.
+///
+/// # Errors
+/// No shipped scene of that name.
+pub(super) fn shipped(name: &str) -> Result<Scene, Failure> {
+    let text = shipped::text(name).ok_or_else(|| no_such_scene(name))?;
+    Scene::from_json(text).map_err(|error| Failure::Input(report(name, text.to_owned(), &error)))
+}
+
 /// The pose meant by `X,Y,DEG` or a name, if a ranger can stand there.
 ///
 /// # Errors

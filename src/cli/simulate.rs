@@ -73,7 +73,7 @@ Examples:
 
 Exit codes: 0 done, 2 wrong usage or input, 3 a disk that gave up.";
 
-pub(super) fn run(args: Args) -> Outcome {
+pub(super) fn run(args: &Args) -> Outcome {
     let scene = scene_file::load(&args.scene)?;
     let pose = scene_file::pose(&scene, &args.pose)?;
     let plan = ScanPlan {
@@ -83,10 +83,10 @@ pub(super) fn run(args: Args) -> Outcome {
         pings_per_stop: 1,
     };
     plan.check().map_err(|error| Failure::input(error, "see `sonard simulate --help`"))?;
-    let simulator = simulator(&args, &scene, &pose)?;
+    let simulator = simulator(args, &scene, &pose)?;
     let what =
         args.out.as_ref().map_or("to standard output".into(), |path| path.display().to_string());
-    write(&args, &simulator, &pose, &plan).or_else(|error| Failure::from_write(&what, &error))
+    write(args, &simulator, &pose, &plan).or_else(|error| Failure::from_write(&what, &error))
 }
 
 /// The simulator for this pose: a robot's body stands among the reflectors.

@@ -40,14 +40,19 @@ pub(super) fn heard(scans: &[Readings]) -> Vec<Entry> {
         .collect()
 }
 
-/// The line styles of walls.
+/// The line styles of walls, and the robot's body.
 pub(super) fn materials(scene: &Scene) -> Vec<Entry> {
+    let body = scene.robot.as_ref().map(|robot| {
+        let sample = Sample::Line { colour: theme::FRAME, width_px: 1.6, dash: "none" };
+        Entry::new(sample, format!("robot {}", robot.id))
+    });
     Materials::of(scene)
         .styles()
         .map(|(dash, material)| {
             let sample = Sample::Line { colour: theme::WALL, width_px: theme::WALL_PX, dash };
             Entry::new(sample, Materials::describe(&material))
         })
+        .chain(body)
         .collect()
 }
 

@@ -24,6 +24,11 @@ mod theme;
 mod ticks;
 mod words;
 
+#[cfg(test)]
+mod fixtures;
+#[cfg(test)]
+mod tests;
+
 pub use picture::{MAX_WIDTH_PX, Picture, PlotError};
 pub use polar::draw_polar;
 pub use residuals::draw_residuals;

@@ -136,6 +136,19 @@ impl Plan {
         layer
     }
 
+    /// The robot's body, if the scene has one, where it is with the ranger at `pose`.
+    pub(super) fn body(&self, scene: &Scene, pose: &Pose) -> Layer {
+        let mut layer = Layer::new("robot").stroked(theme::FRAME, 1.6);
+        let whole = scene.with_robot_at(pose);
+        for side in whole.walls.iter().skip(scene.walls.len()) {
+            layer.line(self.px(side.a), self.px(side.b));
+        }
+        for round in whole.cylinders.iter().skip(scene.cylinders.len()) {
+            layer.circle(self.px(round.center), self.length_px(round.radius_m));
+        }
+        layer
+    }
+
     /// Names of walls and cylinders, where there is room for them.
     pub(super) fn names(&self, scene: &Scene, labels: &mut Labels) -> Layer {
         let mut layer = Layer::new("names").with("fill", theme::QUIET).haloed();
@@ -167,7 +180,7 @@ impl Plan {
         for (name, bounds) in groups.into_iter().chain(discs) {
             let corner = self.px(DVec2::new(bounds.max.x, bounds.max.y));
             let low = self.px(DVec2::new(bounds.max.x, bounds.min.y));
-            for at in [corner + Px::new(5.0, -3.0), low + Px::new(5.0, 12.0)] {
+            for at in [low + Px::new(5.0, 12.0), corner + Px::new(5.0, -3.0)] {
                 if labels.place(at, Anchor::Start, theme::SMALL_PX, name) {
                     layer.text(at, Anchor::Start, theme::SMALL_PX, name);
                     break;

@@ -9,7 +9,7 @@ use super::{
     strip::{AzimuthAxis, Strip},
     strips, theme, words,
 };
-use crate::scan::ScanView;
+use crate::{scan::ScanView, scene::Scene};
 
 const RESIDUAL_PX: f64 = 300.0;
 const RANGE_PX: f64 = 190.0;
@@ -18,15 +18,16 @@ const HISTOGRAM_PX: f64 = 110.0;
 /// Draws measured minus predicted range against azimuth, their histogram beside it on the same
 /// scale, and range against azimuth below.
 ///
-/// A log without predictions beside the readings has no residuals; the picture says so.
+/// A log without predictions beside the readings has no residuals; the picture says so. The
+/// scene only gives its name and that of the pose.
 #[must_use]
-pub fn draw_residuals(scans: &[ScanView]) -> Picture {
+pub fn draw_residuals(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     let readings: Vec<Readings> = scans.iter().map(Readings::of).collect();
-    let mut lines = words::lines(scans, &readings);
+    let mut lines = words::lines(scans);
     if readings.iter().all(|scan| scan.residuals().next().is_none()) {
         lines.push("No beam has both a measured and a predicted range: no residuals.".into());
     }
-    let (heading, top) = caption::draw(&words::title(scans, None), words::badge(scans), &lines);
+    let (heading, top) = caption::draw(&words::title(scans, scene), words::badge(scans), &lines);
     let azimuths = AzimuthAxis::of(scans.first().and_then(|s| Some(&s.start.as_ref()?.plan)));
     let left = theme::MARGIN_PX + 50.0;
     let width = theme::PAGE_PX - theme::MARGIN_PX - left - HISTOGRAM_PX - 14.0;

@@ -19,7 +19,7 @@ pub fn draw_scene(scene: &Scene) -> Picture {
     let region = region(scene);
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
     let height = Plan::height_for(&region, right - left, [220.0, 640.0]);
-    let plan = Plan::fit(region, Rect::new(left, top + 16.0, right - left, height));
+    let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
     let mut labels = Labels::new(plan.panel);
 
     let mut page = Layer::new("scene");
@@ -53,7 +53,10 @@ fn notes(scene: &Scene) -> Vec<String> {
 
 /// Everything drawn, with room around it; a metre square when there is nothing.
 fn region(scene: &Scene) -> Bounds {
-    let poses = scene.poses.values().map(|pose| pose.position());
+    let poses = scene.poses.values().flat_map(|pose| {
+        let body = Bounds::of_scene(&scene.with_robot_at(pose)).map(|b| [b.min, b.max]);
+        body.into_iter().flatten().chain([pose.position()])
+    });
     let all = match Bounds::of_scene(scene) {
         Some(walls) => Some(walls.including(poses)),
         None => Bounds::around(poses),
@@ -66,6 +69,7 @@ fn region(scene: &Scene) -> Bounds {
 fn poses(plan: &Plan, scene: &Scene, labels: &mut Labels) -> Layer {
     let mut layer = Layer::new("poses");
     for (name, pose) in &scene.poses {
+        layer.add(plan.body(scene, pose));
         layer.add(plan.pose(pose));
         let at = plan.px(pose.position());
         labels.keep_free(Rect::new(at.x - 6.0, at.y - 6.0, 12.0, 12.0));

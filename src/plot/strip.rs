@@ -171,7 +171,7 @@ impl Strip {
             Some(up) => {
                 let tip = Px::new(x, y + up);
                 let wing = |side: f64| Px::new(x + 3.2 * side, y + 8.0 * up);
-                layer.polygon(&[tip, wing(1.0), wing(-1.0)]);
+                layer.polygon_with_hint(&[tip, wing(1.0), wing(-1.0)], hint);
             }
         }
     }

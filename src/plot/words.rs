@@ -1,9 +1,9 @@
 //! What stands above a picture of scans: scene, pose, sensor, air, engine, provenance, counts.
 
-use super::readings::Readings;
 use crate::{
+    compare::compare,
     geometry::Pose,
-    scan::{Provenance, ScanView, Session},
+    scan::{EventKind, Provenance, ScanView, Session},
     scene::Scene,
 };
 
@@ -37,23 +37,23 @@ pub(super) fn badge(views: &[ScanView]) -> Option<&'static str> {
 }
 
 /// The lines under the title.
-pub(super) fn lines(views: &[ScanView], readings: &[Readings]) -> Vec<String> {
+pub(super) fn lines(views: &[ScanView]) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(view) = views.first() {
         let session = view.session.as_deref();
-        let mut parts: Vec<String> = view.pose().iter().map(pose).collect();
+        let mut parts: Vec<String> = pose_of(view).iter().map(pose).collect();
         parts.extend(session.map(sensor));
         parts.extend(session.map(air));
         parts.extend(session.and_then(engine));
         lines.push(parts.join(" \u{b7} "));
     }
     lines.push(counts(views));
-    lines.extend(agreement(readings));
+    lines.extend(agreement(views));
     let events: Vec<String> = views
         .iter()
         .flat_map(|view| &view.events)
         .take(3)
-        .map(|event| format!("{:?}: {}", event.kind, event.detail))
+        .map(|event| format!("{} {}", kind(event.kind), event.detail))
         .collect();
     if !events.is_empty() {
         lines.push(format!("Events: {}", events.join("; ")));
@@ -61,15 +61,31 @@ pub(super) fn lines(views: &[ScanView], readings: &[Readings]) -> Vec<String> {
     lines
 }
 
+/// Where the ranger stood, if the log says so in numbers.
+pub(super) fn pose_of(view: &ScanView) -> Option<Pose> {
+    view.pose().filter(|pose| pose.position().is_finite() && pose.heading_deg.is_finite())
+}
+
 /// Poses of the scans, each once.
-pub(super) fn distinct_poses(views: &[ScanView]) -> Vec<Pose> {
+fn distinct_poses(views: &[ScanView]) -> Vec<Pose> {
     let mut poses: Vec<Pose> = Vec::new();
-    for pose in views.iter().filter_map(ScanView::pose) {
+    for pose in views.iter().filter_map(pose_of) {
         if !poses.contains(&pose) {
             poses.push(pose);
         }
     }
     poses
+}
+
+const fn kind(kind: EventKind) -> &'static str {
+    match kind {
+        EventKind::LinkLost => "link lost",
+        EventKind::Reconnected => "reconnected",
+        EventKind::Reboot => "reboot",
+        EventKind::Fault => "fault",
+        EventKind::Gap => "gap",
+        EventKind::Stopped => "stopped",
+    }
 }
 
 fn named<'a>(pose: &Pose, scene: Option<&'a Scene>) -> Option<&'a str> {
@@ -123,15 +139,24 @@ fn counts(views: &[ScanView]) -> String {
 }
 
 /// How measured and predicted ranges agree, where both are there.
-pub(super) fn agreement(readings: &[Readings]) -> Option<String> {
-    let mut sizes_m: Vec<f64> =
-        readings.iter().flat_map(Readings::residuals).map(|(_, r)| r.abs()).collect();
-    sizes_m.sort_by(f64::total_cmp);
-    let median_mm = 1e3 * sizes_m.get(sizes_m.len() / 2)?;
-    let p90_mm = 1e3 * sizes_m.get(sizes_m.len() * 9 / 10)?;
+fn agreement(views: &[ScanView]) -> Option<String> {
+    let (found, _) = compare(views);
+    let percent = 100.0 * found.agree_fraction?;
     Some(format!(
-        "Measured \u{2212} model over {} beams heard by both: median {median_mm:.1} mm, \
-         nine in ten within {p90_mm:.1} mm",
-        sizes_m.len()
+        "{} of {} echoes heard by both agree with the model ({percent:.1} %) \u{b7} distance: \
+         median {}, nine in ten within {}",
+        found.agree,
+        found.both_echo,
+        length(found.median_abs_residual_m?),
+        length(found.p90_abs_residual_m?)
     ))
+}
+
+/// A length in the unit that suits it.
+fn length(length_m: f64) -> String {
+    match length_m {
+        m if m < 0.1 => format!("{:.1} mm", 1e3 * m),
+        m if m < 1e4 => format!("{m:.2} m"),
+        m => format!("{m:.1e} m"),
+    }
 }

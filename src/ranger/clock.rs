@@ -21,8 +21,7 @@ impl TickExtender {
     /// The extended count. Values may come out of order by up to half a wrap (18 minutes).
     pub fn extend(&mut self, ticks: u32) -> u64 {
         let Some(last) = self.last else {
-            // A first full wrap below leaves room for a value from before the first one.
-            let first = (1 << 32) + u64::from(ticks);
+            let first = u64::from(ticks);
             self.last = Some(first);
             return first;
         };

@@ -206,8 +206,7 @@ impl<'a> Progress<'a> {
         let status = match (reading.status, tof_us) {
             (ReadingStatus::ModuleFault, _) => PingStatus::ModuleFault,
             (ReadingStatus::StepDoubtful, _) => PingStatus::StepDoubtful,
-            (_, Some(tof_us)) => classify_tof(tof_us, self.job.blanking_us),
-            (_, None) => PingStatus::NoEcho,
+            (_, tof_us) => classify_tof(tof_us, self.job.blanking_us),
         };
         let range_m = tof_us
             .filter(|_| status.has_range())

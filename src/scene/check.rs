@@ -12,8 +12,8 @@ use super::{
     error::MAX_COORDINATE_M,
     file::{CircleFile, CylinderFile, Point, RobotFile, SceneFile, WallFile},
     locate::{JsonPath, Part},
-    outline::{contains, distance_to_segment},
-    pose::CLEARANCE_M,
+    outline::{Outlines, contains, distance_to_segment},
+    pose::{CLEARANCE_M, MAX_HEADING_DEG},
 };
 use crate::geometry::{DVec2, Pose};
 
@@ -33,7 +33,7 @@ pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
     not_empty(&file.name, &root.key("name"))?;
     let mut rules = Rules::new(file.materials)?;
     let mut walls = Vec::new();
-    for (index, wall) in file.walls.into_iter().enumerate() {
+    for (index, wall) in file.walls.iter().enumerate() {
         walls.extend(rules.walls(wall, &root.key("walls").index(index))?);
     }
     let mut cylinders = Vec::new();
@@ -46,6 +46,7 @@ pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
         name: file.name,
         source: file.source,
         approximate: file.approximate,
+        materials: rules.materials,
         walls,
         cylinders,
         floor_z_m: file.floor_z_m,
@@ -75,10 +76,10 @@ impl Rules {
         Ok(Self { materials, ids: HashMap::new() })
     }
 
-    fn walls(&mut self, file: WallFile, path: &JsonPath) -> Result<Vec<Wall>, Fault> {
+    fn walls(&mut self, file: &WallFile, path: &JsonPath) -> Result<Vec<Wall>, Fault> {
         let material = self.material(&file.material, path)?;
         let z_m = heights(file.z_m, path)?;
-        let corners = corners(&file, path)?;
+        let corners = corners(file, path)?;
         not_empty(&file.id, &path.key("id"))?;
         let single = file.polyline.is_none();
         corners
@@ -207,6 +208,7 @@ fn flat_body(outline: &[Point], path: &JsonPath) -> Result<RobotShape, Fault> {
 }
 
 fn check_poses(scene: &Scene, path: &JsonPath) -> Result<(), Fault> {
+    let outlines = Outlines::of(scene);
     for (name, pose) in &scene.poses {
         let path = path.key(name);
         let bad_name = |problem| Fault { path: path.clone(), part: Part::Key, problem };
@@ -219,10 +221,10 @@ fn check_poses(scene: &Scene, path: &JsonPath) -> Result<(), Fault> {
         let Pose { x_m, y_m, heading_deg } = *pose;
         length(x_m, &path.key("x_m"))?;
         length(y_m, &path.key("y_m"))?;
-        if heading_deg.is_nan() || heading_deg.abs() > 360.0 {
+        if heading_deg.is_nan() || heading_deg.abs() > MAX_HEADING_DEG {
             return fault(&path.key("heading_deg"), SceneProblem::Heading(heading_deg));
         }
-        scene.check_pose(pose).or_else(|error| fault(&path, error.into()))?;
+        scene.check_pose_among(&outlines, pose).or_else(|error| fault(&path, error.into()))?;
     }
     Ok(())
 }

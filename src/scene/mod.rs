@@ -38,6 +38,8 @@ pub struct Scene {
     pub source: Option<String>,
     /// What in it is approximate, one sentence each.
     pub approximate: Vec<String>,
+    /// Surfaces by name, also those that nothing is made of.
+    pub materials: BTreeMap<String, Material>,
     /// Flat reflectors, one segment each.
     pub walls: Vec<Wall>,
     /// Upright circular reflectors.

@@ -1,54 +1,12 @@
 //! Closed outlines among the walls: the room, and bodies one can't stand in.
 
+use std::collections::HashMap;
+
 use super::Scene;
 use crate::geometry::DVec2;
 
-/// Ends closer than this are one corner, metres.
+/// Ends that agree to this are one corner, metres.
 const SAME_POINT_M: f64 = 1e-6;
-
-/// A ring of walls, each ending where the next begins.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Outline {
-    /// Indices into `scene.walls`, in order round the ring.
-    pub(super) walls: Vec<usize>,
-}
-
-impl Outline {
-    /// Whether a point lies inside.
-    pub(super) fn contains(&self, scene: &Scene, point: DVec2) -> bool {
-        contains(&self.sides(scene), point)
-    }
-
-    /// Whether a point lies inside or on a side.
-    fn holds(&self, scene: &Scene, point: DVec2) -> bool {
-        let sides = self.sides(scene);
-        sides.iter().any(|&(a, b)| distance_to_segment(point, a, b) <= SAME_POINT_M)
-            || contains(&sides, point)
-    }
-
-    fn sides(&self, scene: &Scene) -> Vec<(DVec2, DVec2)> {
-        self.walls.iter().map(|&wall| (scene.walls[wall].a, scene.walls[wall].b)).collect()
-    }
-
-    /// The polyline's id if it is one, else the ids of all its walls.
-    pub(super) fn name(&self, scene: &Scene) -> String {
-        let ids: Vec<&str> = self.walls.iter().map(|&wall| &*scene.walls[wall].id).collect();
-        let stem = |id: &str| id.rsplit_once('.').map(|(stem, _)| stem.to_owned());
-        match stem(ids[0]) {
-            Some(polyline) if ids.iter().all(|id| stem(id).as_ref() == Some(&polyline)) => polyline,
-            _ => ids.join(", "),
-        }
-    }
-
-    /// Lower left and upper right corner of the box around it.
-    pub(super) fn extent(&self, scene: &Scene) -> (DVec2, DVec2) {
-        self.sides(scene)
-            .iter()
-            .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), (a, _)| {
-                (low.min(*a), high.max(*a))
-            })
-    }
-}
 
 /// The closed outlines of a scene, told apart.
 #[derive(Debug, Default)]
@@ -72,17 +30,57 @@ impl Outlines {
     }
 }
 
+/// A ring of walls, each ending where the next begins.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Outline {
+    /// Indices into `scene.walls`, in order round the ring.
+    walls: Vec<usize>,
+    /// Their ends, metres.
+    sides: Vec<(DVec2, DVec2)>,
+}
+
+impl Outline {
+    /// Whether a point lies inside.
+    pub(super) fn contains(&self, point: DVec2) -> bool {
+        contains(&self.sides, point)
+    }
+
+    /// The polyline's id if it is one, else the ids of all its walls.
+    pub(super) fn name(&self, scene: &Scene) -> String {
+        let ids: Vec<&str> = self.walls.iter().map(|&wall| &*scene.walls[wall].id).collect();
+        let stem = |id: &str| id.rsplit_once('.').map(|(stem, _)| stem.to_owned());
+        match stem(ids[0]) {
+            Some(polyline) if ids.iter().all(|id| stem(id).as_ref() == Some(&polyline)) => polyline,
+            _ => ids.join(", "),
+        }
+    }
+
+    /// Lower left and upper right corner of the box around it, metres.
+    pub(super) fn extent(&self) -> [[f64; 2]; 2] {
+        let start = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        let (low, high) = self
+            .sides
+            .iter()
+            .fold(start, |(low, high), &(a, b)| (low.min(a).min(b), high.max(a).max(b)));
+        [low.to_array(), high.to_array()]
+    }
+
+    /// Whether a point lies inside or on a side.
+    fn holds(&self, point: DVec2) -> bool {
+        self.contains(point)
+            || self.sides.iter().any(|&(a, b)| distance_to_segment(point, a, b) <= SAME_POINT_M)
+    }
+}
+
 fn is_room(ring: &Outline, scene: &Scene) -> bool {
-    let holds_all = scene
-        .walls
-        .iter()
-        .enumerate()
-        .filter(|(index, _)| !ring.walls.contains(index))
-        .all(|(_, wall)| ring.holds(scene, wall.a) && ring.holds(scene, wall.b))
-        && scene.cylinders.iter().all(|cylinder| ring.contains(scene, cylinder.center));
+    let mut own = vec![false; scene.walls.len()];
+    ring.walls.iter().for_each(|&wall| own[wall] = true);
+    let mut others = scene.walls.iter().zip(&own).filter(|(_, own)| !**own);
+    let holds_all = others.all(|(wall, _)| ring.holds(wall.a) && ring.holds(wall.b))
+        && scene.cylinders.iter().all(|cylinder| ring.contains(cylinder.center));
     let alone = ring.walls.len() == scene.walls.len() && scene.cylinders.is_empty();
-    let stands_outside = !scene.poses.is_empty()
-        && scene.poses.values().all(|pose| !ring.contains(scene, pose.position()));
+    let stands_outside =
+        !scene.poses.is_empty() && scene.poses.values().all(|pose| !ring.contains(pose.position()));
     holds_all && !(alone && stands_outside)
 }
 
@@ -92,56 +90,88 @@ fn is_room(ring: &Outline, scene: &Scene) -> bool {
 /// more than two walls meet, a ring goes on with the next wall of the file, so that a closed
 /// polyline is a ring of its own even if it touches another.
 fn rings(scene: &Scene) -> Vec<Outline> {
-    let mut free = without_loose_ends(scene);
+    let corners = Corners::of(scene);
+    let mut free = corners.without_loose_ends();
     let mut rings = Vec::new();
-    while let Some(first) = free.iter().position(|&is_free| is_free) {
-        let mut walls = vec![first];
+    for first in 0..free.len() {
+        if !free[first] {
+            continue;
+        }
         free[first] = false;
-        let start = scene.walls[first].a;
-        let mut end = scene.walls[first].b;
-        while !same(end, start) {
-            let Some(next) = following(scene, &free, walls[walls.len() - 1], end) else { break };
-            let wall = &scene.walls[next];
-            end = if same(wall.a, end) { wall.b } else { wall.a };
+        let mut walls = vec![first];
+        let [start, mut end] = corners.ends[first];
+        while end != start {
+            let Some(next) = corners.next(&free, walls[walls.len() - 1], end) else { break };
             free[next] = false;
             walls.push(next);
+            end = corners.far_end(next, end);
         }
-        if same(end, start) && walls.len() >= 3 {
-            rings.push(Outline { walls });
+        if end == start && walls.len() >= 3 {
+            let sides = walls.iter().map(|&wall| (scene.walls[wall].a, scene.walls[wall].b));
+            rings.push(Outline { sides: sides.collect(), walls });
         }
     }
     rings
 }
 
-fn following(scene: &Scene, free: &[bool], last: usize, end: DVec2) -> Option<usize> {
-    let count = scene.walls.len();
-    (1..count).map(|ahead| (last + ahead) % count).find(|&index| {
-        free[index] && (same(scene.walls[index].a, end) || same(scene.walls[index].b, end))
-    })
+/// A place where walls end, to the micrometre.
+type Corner = [i64; 2];
+
+/// Which walls meet where.
+struct Corners {
+    /// Both ends of each wall.
+    ends: Vec<[Corner; 2]>,
+    /// The walls at each corner.
+    walls: HashMap<Corner, Vec<usize>>,
 }
 
-fn without_loose_ends(scene: &Scene) -> Vec<bool> {
-    let mut kept = vec![true; scene.walls.len()];
-    loop {
-        let loose = (0..kept.len()).filter(|&index| kept[index]).find(|&index| {
-            let wall = &scene.walls[index];
-            [wall.a, wall.b].iter().any(|&end| {
-                !(0..kept.len()).any(|other| {
-                    other != index
-                        && kept[other]
-                        && (same(scene.walls[other].a, end) || same(scene.walls[other].b, end))
-                })
-            })
-        });
-        match loose {
-            Some(index) => kept[index] = false,
-            None => return kept,
+impl Corners {
+    fn of(scene: &Scene) -> Self {
+        let corner = |point: DVec2| point.to_array().map(|m| (m / SAME_POINT_M).round() as i64);
+        let ends: Vec<_> =
+            scene.walls.iter().map(|wall| [corner(wall.a), corner(wall.b)]).collect();
+        let mut walls: HashMap<Corner, Vec<usize>> = HashMap::new();
+        for (index, corners) in ends.iter().enumerate() {
+            corners.iter().for_each(|corner| walls.entry(*corner).or_default().push(index));
         }
+        Self { ends, walls }
     }
-}
 
-fn same(a: DVec2, b: DVec2) -> bool {
-    a.distance_squared(b) <= SAME_POINT_M * SAME_POINT_M
+    /// Which walls may be part of a ring: those left when walls with a free end are taken away
+    /// until there are none.
+    fn without_loose_ends(&self) -> Vec<bool> {
+        let mut kept = vec![true; self.ends.len()];
+        let mut degree: HashMap<Corner, usize> =
+            self.walls.iter().map(|(corner, walls)| (*corner, walls.len())).collect();
+        let mut loose: Vec<Corner> =
+            degree.iter().filter(|(_, count)| **count == 1).map(|(corner, _)| *corner).collect();
+        while let Some(corner) = loose.pop() {
+            let Some(&wall) = self.walls[&corner].iter().find(|wall| kept[**wall]) else {
+                continue;
+            };
+            kept[wall] = false;
+            for end in self.ends[wall] {
+                let count = degree.entry(end).or_default();
+                *count = count.saturating_sub(1);
+                if *count == 1 {
+                    loose.push(end);
+                }
+            }
+        }
+        kept
+    }
+
+    /// The wall to go on with after wall `last` at `corner`.
+    fn next(&self, free: &[bool], last: usize, corner: Corner) -> Option<usize> {
+        let count = self.ends.len();
+        let here = self.walls[&corner].iter().copied().filter(|wall| free[*wall]);
+        here.min_by_key(|wall| (wall + count - last) % count)
+    }
+
+    fn far_end(&self, wall: usize, near: Corner) -> Corner {
+        let [a, b] = self.ends[wall];
+        if a == near { b } else { a }
+    }
 }
 
 /// Whether a point lies inside closed sides (even-odd rule; on a side: either answer).

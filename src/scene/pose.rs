@@ -5,12 +5,15 @@ use thiserror::Error;
 use super::{
     Scene,
     error::{MAX_COORDINATE_M, suggest},
-    outline::{Outlines, distance_to_segment},
+    outline::{Outline, Outlines, distance_to_segment},
 };
 use crate::geometry::{DVec2, Pose};
 
 /// A ranger closer to a surface than this is taken to be inside it, metres.
 pub(super) const CLEARANCE_M: f64 = 1e-3;
+
+/// Largest magnitude of a heading, degrees.
+pub(super) const MAX_HEADING_DEG: f64 = 360.0;
 
 /// A pose that can't be used.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -156,7 +159,7 @@ impl Scene {
         Ok(Pose {
             x_m: number("X", x, MAX_COORDINATE_M)?,
             y_m: number("Y", y, MAX_COORDINATE_M)?,
-            heading_deg: number("DEG", heading, 360.0)?,
+            heading_deg: number("DEG", heading, MAX_HEADING_DEG)?,
         })
     }
 
@@ -167,25 +170,33 @@ impl Scene {
     /// # Errors
     /// Which of these fails, and the room's extent.
     pub fn check_pose(&self, pose: &Pose) -> Result<(), PoseError> {
-        let position = pose.position();
-        let (x_m, y_m) = (pose.x_m, pose.y_m);
-        let outlines = Outlines::of(self);
-        let room = outlines.room.as_ref().map(|room| {
-            let (low, high) = room.extent(self);
-            [low.to_array(), high.to_array()]
-        });
+        self.check_pose_among(&Outlines::of(self), pose)
+    }
+
+    /// The same with the outlines found before.
+    pub(super) fn check_pose_among(
+        &self,
+        outlines: &Outlines,
+        pose: &Pose,
+    ) -> Result<(), PoseError> {
+        let (position, Pose { x_m, y_m, heading_deg }) = (pose.position(), *pose);
+        within("X", x_m, MAX_COORDINATE_M)?;
+        within("Y", y_m, MAX_COORDINATE_M)?;
+        within("DEG", heading_deg, MAX_HEADING_DEG)?;
+        let room = outlines.room.as_ref().map(Outline::extent);
         if let Some((reflector, distance_m)) = self.nearest_surface(position)
             && distance_m < CLEARANCE_M
         {
             let reflector = reflector.to_owned();
             return Err(PoseError::TooClose { x_m, y_m, reflector, distance_m, room });
         }
-        if let (Some(outline), Some([low, high])) = (&outlines.room, room)
-            && !outline.contains(self, position)
+        if let Some(outline) = &outlines.room
+            && !outline.contains(position)
         {
+            let [low, high] = outline.extent();
             return Err(PoseError::OutsideRoom { x_m, y_m, low, high });
         }
-        if let Some(body) = self.body_around(&outlines, position) {
+        if let Some(body) = self.body_around(outlines, position) {
             return Err(PoseError::InsideBody { x_m, y_m, body, room });
         }
         self.check_robot(pose)
@@ -211,15 +222,23 @@ impl Scene {
             .find(|cylinder| position.distance(cylinder.center) < cylinder.radius_m)
             .map(|cylinder| cylinder.id.to_string());
         cylinder.or_else(|| {
-            let solid = outlines.solids.iter().find(|solid| solid.contains(self, position))?;
+            let solid = outlines.solids.iter().find(|solid| solid.contains(position))?;
             Some(solid.name(self))
         })
     }
 }
 
 fn number(field: &'static str, text: &str, limit: f64) -> Result<f64, PoseError> {
-    match text.parse::<f64>() {
-        Ok(value) if value.abs() <= limit => Ok(value),
-        _ => Err(PoseError::BadNumber { field, text: text.to_owned(), limit }),
+    let refused = || PoseError::BadNumber { field, text: text.to_owned(), limit };
+    let value = text.parse().map_err(|_| refused())?;
+    within(field, value, limit).map_err(|_| refused())?;
+    Ok(value)
+}
+
+/// Written so that NaN is refused too.
+fn within(field: &'static str, value: f64, limit: f64) -> Result<(), PoseError> {
+    if value.abs() <= limit {
+        return Ok(());
     }
+    Err(PoseError::BadNumber { field, text: value.to_string(), limit })
 }

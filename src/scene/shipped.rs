@@ -1,8 +1,17 @@
 //! The scenes that come with the program, so that an installed binary knows them by name.
 
 /// A shipped scene: its name and the text of its file.
-pub const SCENES: &[(&str, &str)] =
-    &[("simple-room", include_str!("../../scenes/simple-room.json"))];
+pub const SCENES: &[(&str, &str)] = &[
+    ("simple-room", include_str!("../../scenes/simple-room.json")),
+    ("simple-room-robot", include_str!("../../scenes/simple-room-robot.json")),
+    ("echo-traces", include_str!("../../scenes/echo-traces.json")),
+    ("mcgill-lab", include_str!("../../scenes/mcgill-lab.json")),
+    ("oblique-corner", include_str!("../../scenes/oblique-corner.json")),
+    ("right-angle-corner", include_str!("../../scenes/right-angle-corner.json")),
+    ("two-surface-room", include_str!("../../scenes/two-surface-room.json")),
+    ("corridor", include_str!("../../scenes/corridor.json")),
+    ("plane-corner-edge", include_str!("../../scenes/plane-corner-edge.json")),
+];
 
 /// The text of a shipped scene.
 #[must_use]

@@ -233,7 +233,12 @@ fn a_lone_ring_is_a_room_unless_the_poses_stand_outside() {
 fn walls_that_do_not_close_enclose_nothing() {
     let open = GOOD.replace(", [0, 0]], \"material\"", "], \"material\"");
     let scene = Scene::from_json(&open).expect("an open room");
-    assert_eq!(scene.check_pose(&Pose { x_m: -1.0, y_m: 1.0, heading_deg: 0.0 }), Ok(()));
+    let outside = Pose { x_m: -1.0, y_m: 1.0, heading_deg: 0.0 };
+    assert_eq!(scene.check_pose(&outside), Ok(()));
+    for pose in [Pose { x_m: f64::NAN, ..outside }, Pose { heading_deg: f64::INFINITY, ..outside }]
+    {
+        assert!(matches!(scene.check_pose(&pose), Err(PoseError::BadNumber { .. })), "{pose:?}");
+    }
 }
 
 #[test]
@@ -245,4 +250,25 @@ fn shipped_scenes_pass_their_check() {
         assert!(!scene.approximate.is_empty(), "{name} does not say what is approximate");
         assert!(!scene.poses.is_empty(), "{name} has no pose");
     }
+}
+
+#[test]
+fn the_committed_schema_is_current() {
+    let current = format!("{:#}\n", json_schema());
+    let committed = include_str!("../../scenes/scene.schema.json");
+    assert!(current == committed, "write it again: sonard scene schema > scenes/scene.schema.json");
+}
+
+#[test]
+fn each_scene_file_is_shipped_under_its_name() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes");
+    let mut files: Vec<String> = std::fs::read_dir(folder)
+        .expect("the scenes")
+        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+        .filter(|file| file != "scene.schema.json")
+        .collect();
+    let mut shipped: Vec<String> = shipped::names().map(|name| format!("{name}.json")).collect();
+    files.sort();
+    shipped.sort();
+    assert_eq!(files, shipped);
 }

@@ -11,7 +11,7 @@ use crate::store::{Repair, repair};
 /// Options of `sonard log repair`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
-pub(super) struct Args {
+pub(in crate::cli) struct Args {
     /// The log
     log: PathBuf,
 }

@@ -16,7 +16,7 @@ use summary::Summary;
 /// Options of `sonard log show`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
-pub(super) struct Args {
+pub(in crate::cli) struct Args {
     /// The log; - for standard input
     log: PathBuf,
     /// List every reading too

@@ -19,7 +19,7 @@ const SHOWN: u64 = 40;
 /// Options of `sonard log verify`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
-pub(super) struct Args {
+pub(in crate::cli) struct Args {
     /// Logs to check; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,

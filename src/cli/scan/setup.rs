@@ -45,8 +45,9 @@ impl Setup {
         plan.check().map_err(|error| Failure::input(error, "see `sonard scan --help`"))?;
         let (sensor, air, options) =
             (args.sensor.sensor()?, args.air.air()?, args.engine.options()?);
-        let simulator = Simulator::new(Arc::clone(&scene), sensor.clone(), air, options)
-            .map_err(|error| Failure::input(error, "see `sonard scan --help`"))?;
+        let simulator =
+            Simulator::new(Arc::new(scene.with_robot_at(&pose)), sensor.clone(), air, options)
+                .map_err(|error| Failure::input(error, "see `sonard scan --help`"))?;
         // All firings at a stop have the same prediction.
         let stops = ScanPlan { pings_per_stop: 1, ..plan };
         let predictions = simulator

@@ -21,7 +21,7 @@ pub(super) fn print(
     for line in [
         Some(headline(setup, identity)),
         Some(beams(summary, views.last())),
-        Some(agreement(&compare(&views), setup)),
+        Some(agreement(&compare(&views).0, setup)),
         Some(time(summary)),
         Some(traffic(link)),
         warnings(summary),

@@ -1,12 +1,13 @@
 //! What a log holds, scan by scan.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, mem};
 
 use jiff::Timestamp;
 use serde::Serialize;
 use uuid::Uuid;
 
 use crate::{
+    compare::quantile,
     geometry::Pose,
     scan::{Event, Ping, PingStatus, Record, ScanEnd, ScanStart, Session},
     store::Loaded,
@@ -43,6 +44,7 @@ pub(super) struct Scan {
     pub(super) no_echo: u32,
     pub(super) link_lost: u32,
     pub(super) step_doubtful: u32,
+    pub(super) module_fault: u32,
     pub(super) median_abs_residual_m: Option<f64>,
     pub(super) end: Option<ScanEnd>,
     #[serde(skip)]
@@ -57,7 +59,7 @@ impl<'a> Summary<'a> {
         }
         for item in &mut summary.items {
             if let Item::Scan(scan) = item {
-                scan.median_abs_residual_m = median(&mut scan.residuals_m);
+                scan.median_abs_residual_m = quantile(mem::take(&mut scan.residuals_m), 0.5);
             }
         }
         for error in &loaded.damaged {
@@ -105,12 +107,8 @@ impl Scan {
             PingStatus::NoEcho => &mut self.no_echo,
             PingStatus::LinkLost => &mut self.link_lost,
             PingStatus::StepDoubtful => &mut self.step_doubtful,
+            PingStatus::ModuleFault => &mut self.module_fault,
         } += 1;
         self.residuals_m.extend(ping.residual_m.filter(|m| m.is_finite()).map(f64::abs));
     }
-}
-
-fn median(values: &mut [f64]) -> Option<f64> {
-    let middle = values.len().checked_sub(1)? / 2;
-    Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -1,0 +1,171 @@
+//! A comparison for people.
+
+use std::io::{self, Write};
+
+use comfy_table::{CellAlignment, Table, presets::UTF8_HORIZONTAL_ONLY};
+
+use crate::{
+    compare::{Comparison, Judged, Verdict},
+    scan::{PathKind, PathRecord, PingStatus},
+};
+
+/// Prints the numbers and the beams that fit worst.
+pub(super) fn print(
+    out: &mut impl Write,
+    comparison: &Comparison,
+    judged: &[Judged<'_>],
+    worst: usize,
+) -> io::Result<()> {
+    print_numbers(out, comparison)?;
+    if comparison.beams > 0 {
+        writeln!(out, "{}", verdict_table(comparison))?;
+    }
+    let apart = worst_residuals(judged, worst);
+    if !apart.is_empty() {
+        writeln!(out, "Largest residuals:\n{}", beam_table(&apart))?;
+    }
+    let one_sided = one_sided(judged, worst);
+    if !one_sided.is_empty() {
+        writeln!(out, "Heard on one side only, or near on one only:\n{}", beam_table(&one_sided))?;
+    }
+    Ok(())
+}
+
+fn print_numbers(out: &mut impl Write, comparison: &Comparison) -> io::Result<()> {
+    let Comparison { beams, both_echo, agree, scans, duplicates, .. } = *comparison;
+    writeln!(out, "{beams} beams compared, in {scans} scan(s)")?;
+    let skipped = comparison.not_compared;
+    for (count, why) in [
+        (skipped.link_lost, "not compared: the reading was lost"),
+        (skipped.step_doubtful, "not compared: the motor may have lost steps"),
+        (skipped.module_fault, "not compared: the module could not be fired"),
+        (skipped.no_prediction, "not compared: no prediction"),
+        (skipped.no_range, "not compared: an echo without a range"),
+        (duplicates, "readings passed over: their beam has a later one"),
+    ] {
+        if count > 0 {
+            writeln!(out, "{count} {why}")?;
+        }
+    }
+    let Some(share) = comparison.agree_fraction else {
+        return writeln!(out, "no beam has an echo on both sides");
+    };
+    let percent = 100.0 * share;
+    writeln!(
+        out,
+        "{both_echo} have an echo on both sides; {agree} of them agree ({percent:.1} %)"
+    )?;
+    writeln!(
+        out,
+        "residual: median of |r| {}, 90 % within {}, bias {} (measured minus predicted)",
+        millimetres(comparison.median_abs_residual_m),
+        millimetres(comparison.p90_abs_residual_m),
+        millimetres(comparison.median_residual_m),
+    )
+}
+
+fn verdict_table(comparison: &Comparison) -> Table {
+    let (counts, medians) = (comparison.verdicts, comparison.median_abs_residual_by_verdict_m);
+    let mut table = Table::new();
+    table.load_style(UTF8_HORIZONTAL_ONLY).set_header(["verdict", "beams", "%", "median |r|"]);
+    for (name, count, median_m) in [
+        ("direct", counts.direct, medians.direct),
+        ("multiple", counts.multiple, medians.multiple),
+        ("edge", counts.edge, medians.edge),
+        ("min range", counts.min_range, None),
+        ("silent", counts.silent, None),
+        ("unexplained", counts.unexplained, medians.unexplained),
+    ] {
+        let percent = 100.0 * f64::from(count) / f64::from(comparison.beams);
+        let row = [name.into(), count.to_string(), format!("{percent:.1}"), millimetres(median_m)];
+        table.add_row(row);
+    }
+    right_align(&mut table, 1);
+    table
+}
+
+fn beam_table(beams: &[&Judged<'_>]) -> Table {
+    let mut table = Table::new();
+    table.load_style(UTF8_HORIZONTAL_ONLY).set_header([
+        "beam",
+        "azimuth",
+        "measured",
+        "predicted",
+        "residual",
+        "margin",
+        "predicted path",
+    ]);
+    for Judged { ping, residual_m, .. } in beams {
+        let sim = ping.sim.as_ref();
+        let margin_db = sim.and_then(|sim| sim.margin_db);
+        table.add_row([
+            ping.index.to_string(),
+            format!("{:.1}", ping.azimuth_deg),
+            reading(ping.status, ping.range_m),
+            sim.map_or("-".into(), |sim| reading(sim.status, sim.range_m)),
+            millimetres(*residual_m),
+            margin_db.map_or("-".into(), |db| format!("{db:+.1} dB")),
+            sim.and_then(|sim| sim.path.as_ref()).map_or(String::new(), path_text),
+        ]);
+    }
+    for column in table.column_iter_mut().take(6) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+/// The pairs of echoes farthest apart, and only those that disagree.
+fn worst_residuals<'a, 'b>(judged: &'a [Judged<'b>], count: usize) -> Vec<&'a Judged<'b>> {
+    let size = |beam: &Judged<'_>| beam.residual_m.map_or(0.0, f64::abs);
+    let mut beams: Vec<_> = judged
+        .iter()
+        .filter(|beam| beam.verdict == Ok(Verdict::Unexplained) && beam.residual_m.is_some())
+        .collect();
+    beams.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    beams.truncate(count);
+    beams
+}
+
+/// Some unexplained beams without a residual, spread over the scan.
+fn one_sided<'a, 'b>(judged: &'a [Judged<'b>], count: usize) -> Vec<&'a Judged<'b>> {
+    let beams: Vec<_> = judged
+        .iter()
+        .filter(|beam| beam.verdict == Ok(Verdict::Unexplained) && beam.residual_m.is_none())
+        .collect();
+    let stride = beams.len().div_ceil(count.max(1)).max(1);
+    beams.into_iter().step_by(stride).take(count).collect()
+}
+
+fn right_align(table: &mut Table, from: usize) {
+    for column in table.column_iter_mut().skip(from) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+}
+
+fn reading(status: PingStatus, range_m: Option<f64>) -> String {
+    match (status, range_m) {
+        (PingStatus::Echo, Some(range_m)) => format!("{range_m:.3} m"),
+        (PingStatus::MinRange, Some(range_m)) => format!("near ({range_m:.3} m)"),
+        (PingStatus::MinRange, None) => "near".into(),
+        (PingStatus::NoEcho, _) => "silent".into(),
+        _ => "-".into(),
+    }
+}
+
+fn millimetres(value_m: Option<f64>) -> String {
+    value_m.map_or("-".into(), |value_m| format!("{:.1} mm", value_m * 1e3))
+}
+
+/// A path in words: `3 reflections: south north south`.
+pub(in crate::cli) fn path_text(path: &PathRecord) -> String {
+    let walls = path.walls.join(" ");
+    match (path.kind, &path.edge) {
+        (PathKind::Diffracted, Some(edge)) if walls.is_empty() => format!("edge {edge}"),
+        (PathKind::Diffracted, Some(edge)) => format!("edge {edge}, by {walls}"),
+        (PathKind::Diffracted, None) => format!("edge, by {walls}"),
+        (PathKind::Specular, _) => match path.order {
+            1 => format!("1 reflection: {walls}"),
+            order => format!("{order} reflections: {walls}"),
+        },
+    }
+}
