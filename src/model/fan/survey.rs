@@ -56,6 +56,7 @@ impl Survey for FanSurvey<'_> {
             (amplitude >= self.fan.settings.weakest).then_some(Sound {
                 length_m: candidate.length_m,
                 amplitude,
+                phase_rad: 0.0,
                 index,
             })
         }));

@@ -60,9 +60,12 @@ mod edges;
 mod mesh;
 mod rounds;
 
+mod survey;
 #[cfg(test)]
 mod tests;
 mod trace;
+
+pub use survey::PathEngine;
 
 use smallvec::SmallVec;
 

@@ -27,6 +27,7 @@ fn scene(walls: &[[f64; 4]]) -> Scene {
         name: "test".to_owned(),
         source: None,
         approximate: Vec::new(),
+        materials: Default::default(),
         walls: walls.iter().enumerate().map(wall).collect(),
         cylinders: Vec::new(),
         floor_z_m: None,
