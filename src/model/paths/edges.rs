@@ -7,7 +7,8 @@ use smallvec::SmallVec;
 
 use super::{
     Echo, Settings, Via, SAME_RAD, drop_repeats,
-    trace::{Ray, Tree},
+    beam::Ray,
+    trace::Tree,
 };
 use crate::{
     acoustics::edge::{Aspect, EdgeLaw, Wedge},
@@ -52,7 +53,7 @@ struct Bending<'a> {
 
 /// A ray to an edge as the edge sees it.
 #[derive(Clone, Copy)]
-struct Leg<'a> {
+struct Arm<'a> {
     ray: &'a Ray,
     length_m: f64,
     sector: usize,
@@ -113,8 +114,8 @@ impl Edges {
 
 impl Corner {
     fn echoes(&self, point: u32, rays: &[(u32, Ray)], bending: &Bending, echoes: &mut Vec<Echo>) {
-        let mut legs: Vec<Leg> = rays.iter().filter_map(|(_, ray)| self.leg(ray)).collect();
-        drop_repeats(&mut legs, |leg| leg.length_m, Leg::is_same);
+        let mut legs: Vec<Arm> = rays.iter().filter_map(|(_, ray)| self.leg(ray)).collect();
+        drop_repeats(&mut legs, |leg| leg.length_m, Arm::is_same);
         for (i, out) in legs.iter().enumerate() {
             for (j, back) in legs.iter().enumerate().skip(i) {
                 let length_m = out.length_m + back.length_m;
@@ -128,7 +129,7 @@ impl Corner {
                     phase_rad: field.arg(),
                     departure: out.ray.departure,
                     arrival: back.ray.departure,
-                    via: Via::Edge { point, out: out.ray.node, back: back.ray.node },
+                    via: Via::Edge { point, out: out.ray.into(), back: back.ray.into() },
                 };
                 if i != j {
                     echoes.push(echo.reversed());
@@ -138,14 +139,14 @@ impl Corner {
         }
     }
 
-    fn leg<'a>(&self, ray: &'a Ray) -> Option<Leg<'a>> {
+    fn leg<'a>(&self, ray: &'a Ray) -> Option<Arm<'a>> {
         let direction = (-ray.run).to_angle();
         let last = self.sectors.len() - 1;
         let sector = self.sectors.iter().rposition(|s| s.from_rad <= direction).unwrap_or(last);
         let from_rad = (direction - self.sectors[sector].from_rad).rem_euclid(TAU);
         let opening_rad = self.sectors[sector].wedge.opening_rad;
         let in_air = from_rad > GRAZING_RAD && from_rad < opening_rad - GRAZING_RAD;
-        (in_air && self.sectors[sector].answers).then(|| Leg {
+        (in_air && self.sectors[sector].answers).then(|| Arm {
             ray,
             length_m: ray.run.length(),
             sector,
@@ -156,7 +157,7 @@ impl Corner {
 
 impl Bending<'_> {
     /// Relative field of the echo out and back on two legs, `None` below the floor.
-    fn field(&self, corner: &Corner, out: &Leg, back: &Leg) -> Option<Complex64> {
+    fn field(&self, corner: &Corner, out: &Arm, back: &Arm) -> Option<Complex64> {
         let Self { law, settings } = self;
         if out.sector != back.sector || !settings.allows(out.ray.order + back.ray.order) {
             return None;
@@ -182,7 +183,7 @@ impl Bending<'_> {
     }
 }
 
-impl Leg<'_> {
+impl Arm<'_> {
     /// Whether two legs are one that touches a corner on its way and was found on both sides.
     fn is_same(&self, other: &Self) -> bool {
         self.ray.departure.distance_squared(other.ray.departure) < SAME_RAD * SAME_RAD

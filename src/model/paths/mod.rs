@@ -11,7 +11,9 @@
 //! triangle's far corner it splits in two, at a wall it turns into a beam from the next image.
 //! So visibility needs no search: what a beam walks through is what its rays see, a step costs
 //! the same in a plan of ten walls and of ten thousand, and each ray from the source is in exactly
-//! one beam at each order. An echo is a beam that holds the source itself ([`trace`]).
+//! one beam at each order. An echo is a beam that holds the source itself. Beams that a corner
+//! split but that stand side by side before the same image and wall later are joined again
+//! ([`trace`]).
 //!
 //! A beam ends when no echo of it can be both short and strong enough: the shortest way from the
 //! image through the beam's part of the wall back to the source bounds the length from below, and
@@ -56,6 +58,7 @@
 //! For a transducer off the rotation axis, or a robot body that turns with it, each azimuth is a
 //! place of its own: survey from where the face is, in the scene as it then stands.
 
+mod beam;
 mod edges;
 mod mesh;
 mod rounds;
@@ -69,7 +72,7 @@ pub use survey::PathEngine;
 
 use smallvec::SmallVec;
 
-use self::{edges::Edges, mesh::Mesh, rounds::Rounds, trace::Tree};
+use self::{beam::Ray, edges::Edges, mesh::Mesh, rounds::Rounds, trace::Tree};
 use crate::{
     acoustics::edge::EdgeLaw,
     geometry::{Arrangement, DVec2, Mirror},
@@ -104,6 +107,20 @@ impl Settings {
         self.max_order.is_none_or(|most| order <= most)
     }
 
+    /// The length of air that leaves a share `gain` of the amplitude; 0 without absorption.
+    fn same_loss_m(&self, gain: f64) -> f64 {
+        if self.absorption_np_per_m > 0.0 { -gain.ln() / self.absorption_np_per_m } else { 0.0 }
+    }
+
+    /// The longest path over perfect walls that is strong enough.
+    fn audible_m(&self) -> f64 {
+        if self.absorption_np_per_m > 0.0 {
+            self.same_loss_m(self.floor)
+        } else {
+            self.max_path_m
+        }
+    }
+
     fn air_gain(&self, length_m: f64) -> f64 {
         (-self.absorption_np_per_m * length_m).exp()
     }
@@ -125,7 +142,11 @@ pub struct Paths {
 #[derive(Debug, Clone, Copy)]
 struct Face {
     mirror: Mirror,
+    /// [`Mirror::rotor`].
+    rotor: DVec2,
     gain: f64,
+    /// The length of air that weakens as much, metres; 0 without absorption.
+    loss_m: f64,
 }
 
 /// An echo path, before the beam pattern.
@@ -159,9 +180,10 @@ impl Paths {
             .collect();
         // From outside the box no echo is short enough.
         let mesh = Mesh::new(&plan, &extra, 0.5 * settings.max_path_m + 1.0);
-        let face = |(&(a, b), gain): (&(DVec2, DVec2), &f64)| Face {
-            mirror: Mirror::through(a, b),
-            gain: *gain,
+        let face = |(&(a, b), &gain): (&(DVec2, DVec2), &f64)| {
+            let mirror = Mirror::through(a, b);
+            let loss_m = settings.same_loss_m(gain);
+            Face { mirror, rotor: mirror.rotor(), gain, loss_m }
         };
         let gains: Vec<_> = scene.walls.iter().map(|wall| mirror_gain(&wall.material)).collect();
         let round: Vec<_> = scene.cylinders.iter().map(|c| mirror_gain(&c.material)).collect();
@@ -195,7 +217,7 @@ impl Paths {
                 phase_rad: 0.0,
                 departure: ray.departure,
                 arrival: -ray.run.normalize_or_zero(),
-                via: Via::Walls { node: ray.node },
+                via: Via::Walls(ray.into()),
             })
             .filter(|echo| echo.amplitude >= self.settings.floor)
             .collect();
@@ -213,35 +235,29 @@ impl Paths {
 
     /// Whether a cylinder stands in an echo's way.
     fn is_hidden(&self, tree: &Tree, echo: &Echo, position: DVec2) -> bool {
-        let hides = |node, end| self.hides_ray(tree, node, position, end);
-        match echo.via {
-            Via::Walls { node } => hides(node, position),
-            Via::Edge { point, out, back } => self.edges.place(point).is_some_and(|place| {
-                hides(out, place) || hides(back, place)
-            }),
-            Via::Cylinder { hit, out, back, .. } => hides(out, hit) || hides(back, hit),
+        let hides = |leg: &Leg, end| self.hides_leg(tree, leg, position, end);
+        match &echo.via {
+            Via::Walls(leg) => hides(leg, position),
+            Via::Edge { point, out, back } => self
+                .edges
+                .place(*point)
+                .is_some_and(|place| hides(out, place) || hides(back, place)),
+            Via::Cylinder { hit, out, back, .. } => hides(out, *hit) || hides(back, *hit),
         }
     }
 
-    /// Whether a cylinder stands in the way from `start` over a node's walls to `end`.
-    fn hides_ray(&self, tree: &Tree, node: u32, start: DVec2, end: DVec2) -> bool {
-        let walls: SmallVec<[u32; 8]> = tree.walls_back(node).collect();
-        let mirrors = || walls.iter().map(|&wall| self.faces[wall as usize].mirror);
-        // Images of the start behind each wall, the last wall's first.
-        let mut images: SmallVec<[DVec2; 8]> = SmallVec::new();
-        let mut image = start;
-        for mirror in mirrors().rev() {
-            image = mirror.image(image);
-            images.push(image);
-        }
-        let mut to = end;
-        for (mirror, image) in mirrors().zip(images.iter().rev()) {
-            let run = to - *image;
-            let hit = *image - mirror.height_m(*image) / mirror.normal.dot(run) * run;
+    /// Whether a cylinder stands in the way from `start` along a leg to `end`.
+    fn hides_leg(&self, tree: &Tree, leg: &Leg, start: DVec2, end: DVec2) -> bool {
+        let (mut to, mut run) = (end, leg.run);
+        for wall in tree.walls_back(&self.faces, leg) {
+            // Back to the wall; the image behind it is as far as the run is long.
+            let mirror = &self.faces[wall as usize].mirror;
+            let back = mirror.height_m(to) / mirror.normal.dot(run);
+            let hit = to - back * run;
             if self.rounds.hide(hit, to) {
                 return true;
             }
-            to = hit;
+            (to, run) = (hit, mirror.turn(run));
         }
         self.rounds.hide(start, to)
     }
@@ -259,28 +275,27 @@ impl Paths {
 
     /// The reflectors of an echo, in order.
     fn way(&self, tree: &Tree, via: &Via) -> Path {
-        let there = |node| {
-            let mut walls: SmallVec<[Reflector; 4]> =
-                tree.walls_back(node).map(Reflector::Wall).collect();
+        let back = |leg| tree.walls_back(&self.faces, leg).map(Reflector::Wall);
+        let there = |leg| {
+            let mut walls: SmallVec<[Reflector; 4]> = back(leg).collect();
             walls.reverse();
             walls
         };
-        match *via {
-            Via::Walls { node } => {
-                Path { kind: PathKind::Specular, walls: there(node), edge: None }
-            }
-            Via::Edge { point, out, back } => {
+        let (kind, walls, edge) = match via {
+            Via::Walls(leg) => (PathKind::Specular, there(leg), None),
+            Via::Edge { point, out, back: home } => {
                 let mut walls = there(out);
-                walls.extend(tree.walls_back(back).map(Reflector::Wall));
-                Path { kind: PathKind::Diffracted, walls, edge: self.edges.edge(point) }
+                walls.extend(back(home));
+                (PathKind::Diffracted, walls, self.edges.edge(*point))
             }
-            Via::Cylinder { cylinder, out, back, .. } => {
+            Via::Cylinder { cylinder, out, back: home, .. } => {
                 let mut walls = there(out);
-                walls.push(Reflector::Cylinder(cylinder));
-                walls.extend(tree.walls_back(back).map(Reflector::Wall));
-                Path { kind: PathKind::Specular, walls, edge: None }
+                walls.push(Reflector::Cylinder(*cylinder));
+                walls.extend(back(home));
+                (PathKind::Specular, walls, None)
             }
-        }
+        };
+        Path { kind, walls, edge }
     }
 }
 
@@ -303,19 +318,32 @@ struct Echo {
     via: Via,
 }
 
-/// The way of an echo. `out` and `back` are nodes of rays from the start.
+/// The way of an echo. `out` and `back` both lead away from the start.
 #[derive(Debug, Clone, Copy)]
 enum Via {
-    Walls { node: u32 },
-    Edge { point: u32, out: u32, back: u32 },
-    Cylinder { cylinder: u32, hit: DVec2, out: u32, back: u32 },
+    Walls(Leg),
+    Edge { point: u32, out: Leg, back: Leg },
+    Cylinder { cylinder: u32, hit: DVec2, out: Leg, back: Leg },
+}
+
+/// A ray by what its walls follow from.
+#[derive(Debug, Clone, Copy)]
+struct Leg {
+    node: u32,
+    run: DVec2,
+}
+
+impl From<&Ray> for Leg {
+    fn from(ray: &Ray) -> Self {
+        Self { node: ray.node, run: ray.run }
+    }
 }
 
 impl Echo {
     /// The same way run through backwards.
     fn reversed(&self) -> Self {
         let via = match self.via {
-            Via::Walls { .. } => self.via,
+            Via::Walls(_) => self.via,
             Via::Edge { point, out, back } => Via::Edge { point, out: back, back: out },
             Via::Cylinder { cylinder, hit, out, back } => {
                 Via::Cylinder { cylinder, hit, out: back, back: out }

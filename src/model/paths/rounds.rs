@@ -5,7 +5,8 @@ use smallvec::SmallVec;
 use super::{
     Echo, Settings, Via,
     mesh::Mesh,
-    trace::{Ray, TIE_M, Tree, View},
+    beam::{Ray, TIE_M},
+    trace::{Tree, View},
 };
 use crate::{geometry::DVec2, scene::Cylinder};
 
@@ -105,8 +106,8 @@ impl Rounds {
             via: Via::Cylinder {
                 cylinder: out.cylinder,
                 hit,
-                out: there.node,
-                back: here.node,
+                out: (&there).into(),
+                back: (&here).into(),
             },
         })
     }

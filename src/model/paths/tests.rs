@@ -1,4 +1,9 @@
-use std::{f64::consts::{FRAC_PI_2, PI, TAU}, sync::Arc};
+mod closed_forms;
+mod full_wave;
+mod laws;
+mod peers;
+
+use std::{f64::consts::TAU, sync::Arc};
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -89,20 +94,4 @@ fn in_rectangles_the_echoes_are_the_image_lattice() {
             expected.swap_remove(place);
         }
     }
-}
-
-#[test]
-fn a_right_angled_corner_answers_once_from_its_vertex() {
-    for turn in [0.0, 0.3, 1.234, 4.0] {
-        let side = |angle: f64| 3.0 * DVec2::from_angle(turn + angle);
-        let (u, v) = (side(0.0), side(FRAC_PI_2));
-        let corner = scene(&[[0.0, 0.0, u.x, u.y], [v.x, v.y, 0.0, 0.0]]);
-        let at = 0.8 * DVec2::from_angle(turn + 0.61);
-        let echoes = Paths::new(&corner, LOSSLESS).enumerate(at);
-        let double: Vec<_> = echoes.iter().filter(|e| e.path.walls.len() == 2).collect();
-        assert_eq!((echoes.len(), double.len()), (3, 1));
-        assert!((double[0].length_m - 1.6).abs() < 1e-12);
-        assert!((double[0].departure_rad - double[0].arrival_rad).abs() < 1e-12);
-    }
-    let _ = PI;
 }
