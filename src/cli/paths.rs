@@ -140,7 +140,12 @@ fn write_json(lines: impl Iterator<Item = PathLine>) -> io::Result<()> {
 fn write_table(lines: impl Iterator<Item = PathLine>, count: usize) -> io::Result<()> {
     let mut table = Table::new();
     table.load_style(UTF8_HORIZONTAL_ONLY).set_header([
-        "length m", "range m", "leaves", "comes from", "amplitude", "way",
+        "length m",
+        "range m",
+        "leaves",
+        "comes from",
+        "amplitude",
+        "way",
     ]);
     for index in 0..5 {
         if let Some(column) = table.column_mut(index) {

@@ -118,10 +118,10 @@ fn cuts(parts: &[Part]) -> Vec<Vec<DVec2>> {
             let other = &parts[near.data];
             let before = cuts[i].len();
             cuts[i].extend([other.a, other.b].into_iter().filter(|&end| part.has_inside(end)));
-            let ends_meet = cuts[i].len() > before
-                || other.has_inside(part.a)
-                || other.has_inside(part.b);
-            if near.data > i && !ends_meet
+            let ends_meet =
+                cuts[i].len() > before || other.has_inside(part.a) || other.has_inside(part.b);
+            if near.data > i
+                && !ends_meet
                 && let Some(point) = part.crossing(other)
             {
                 cuts[i].push(point);

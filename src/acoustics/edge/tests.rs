@@ -160,6 +160,10 @@ fn transition_function_is_its_integral() {
             })
             .sum();
         let expected = 2.0 * root * Complex64::cis(FRAC_PI_4) * (h / 3.0) * sum;
-        assert!((transition(x) - expected).norm() < 1e-7, "F({x}) = {} not {expected}", transition(x));
+        assert!(
+            (transition(x) - expected).norm() < 1e-7,
+            "F({x}) = {} not {expected}",
+            transition(x)
+        );
     }
 }

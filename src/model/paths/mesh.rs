@@ -79,8 +79,7 @@ impl Mesh {
                 return None;
             }
         }
-        (0..self.triangles.len() as u32)
-            .find(|&triangle| self.holds(triangle, point))
+        (0..self.triangles.len() as u32).find(|&triangle| self.holds(triangle, point))
     }
 
     /// Whether a point is in a triangle, sides included.
@@ -159,10 +158,7 @@ fn triangles(cdt: &Cdt, plan: &Arrangement) -> Vec<Triangle> {
         let Some(face) = edge.rev().face().as_inner() else { return Side::Outside };
         let back = edge.rev().fix();
         let slot = face.adjacent_edges().iter().position(|other| other.fix() == back);
-        Side::Open {
-            triangle: behind(edge),
-            side: slot.map_or(0, |slot| slot as u8),
-        }
+        Side::Open { triangle: behind(edge), side: slot.map_or(0, |slot| slot as u8) }
     };
     cdt.inner_faces()
         .map(|face| {

@@ -151,11 +151,8 @@ impl Wheel {
         let bins = BINS as i64;
         let (middle, reach) =
             (bin(direction_rad) as i64, (self.reach_rad / TAU * BINS as f64).ceil() as i64);
-        let (from, to) = if 2 * reach + 1 >= bins {
-            (0, bins)
-        } else {
-            (middle - reach, middle + reach + 1)
-        };
+        let (from, to) =
+            if 2 * reach + 1 >= bins { (0, bins) } else { (middle - reach, middle + reach + 1) };
         let part = move |from: i64, to: i64| {
             let at = |bin: i64| self.bins[bin.clamp(0, bins) as usize] as usize;
             &self.spokes[at(from)..at(to)]

@@ -71,7 +71,8 @@ fn in_rectangles_the_echoes_are_the_image_lattice() {
     let mut random = Pcg64::seed_from_u64(3);
     for case in 0..1000 {
         let size = DVec2::new(random.random_range(0.5..6.0), random.random_range(0.5..6.0));
-        let at = size * DVec2::new(random.random_range(0.01..0.99), random.random_range(0.01..0.99));
+        let at =
+            size * DVec2::new(random.random_range(0.01..0.99), random.random_range(0.01..0.99));
         let frame = DVec2::from_angle(random.random_range(0.0..TAU));
         let origin = DVec2::new(random.random_range(-9.0..9.0), random.random_range(-9.0..9.0));
         let world = |p: DVec2| origin + frame.rotate(p);

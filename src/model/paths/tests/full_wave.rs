@@ -77,7 +77,8 @@ impl Chain {
     /// to every point of it. Far away that is `sin(x)/x` twice; at these ranges the front's
     /// curvature still fills the pattern's nulls (Fresnel's approximation).
     fn beam(&self, f: f64, echo: &EchoPath, azimuth_rad: f64) -> Complex64 {
-        let (leaving, arriving) = (echo.departure_rad - azimuth_rad, echo.arrival_rad - azimuth_rad);
+        let (leaving, arriving) =
+            (echo.departure_rad - azimuth_rad, echo.arrival_rad - azimuth_rad);
         let taper = taper(leaving) * taper(arriving);
         if taper == 0.0 {
             return Complex64::ZERO;
@@ -125,7 +126,9 @@ impl Chain {
         let place = |i: usize| first - 0.05 + STEP_M * i as f64;
         let near = |length: f64| lengths.iter().any(|other| (other - length).abs() < 0.05);
         let heights: Vec<f64> = (0..=count)
-            .map(|i| if near(place(i)) { self.envelope(&spectrum, &lengths, place(i)) } else { 0.0 })
+            .map(
+                |i| if near(place(i)) { self.envelope(&spectrum, &lengths, place(i)) } else { 0.0 },
+            )
             .collect();
         (1..count)
             .filter(|&i| heights[i] > heights[i - 1] && heights[i] >= heights[i + 1])
@@ -200,7 +203,11 @@ impl Errors {
         println!(
             "{what}: {} arrivals, amplitude off by {:.3} dB (median), {:.3} dB (95 %), range by \
              {:.2} mm, {:.2} mm",
-            self.range_mm.len(), figures[0], figures[1], figures[2], figures[3]
+            self.range_mm.len(),
+            figures[0],
+            figures[1],
+            figures[2],
+            figures[3]
         );
         figures
     }
@@ -226,7 +233,11 @@ fn compare(reference: &Reference, name: &str) -> [Errors; 2] {
             };
             let db = 20.0 * (height / amplitude).log10();
             if std::env::var_os("SONARD_VERBOSE").is_some() {
-                println!("{name} {} {amplitude} {height:.4} {db:.2} {:.2} {bent}", beam.azimuth, 500.0 * (at - length_m));
+                println!(
+                    "{name} {} {amplitude} {height:.4} {db:.2} {:.2} {bent}",
+                    beam.azimuth,
+                    500.0 * (at - length_m)
+                );
             }
             errors[usize::from(bent)].amplitude_db.push(db);
             errors[usize::from(bent)].range_mm.push(500.0 * (at - length_m));

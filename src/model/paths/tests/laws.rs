@@ -98,7 +98,8 @@ fn each_echo_of_a_seen_wall_turns_with_the_world() {
     let there = Paths::new(&scene(&walls), settings()).enumerate(AT.rotate(rotor));
     for one in &here {
         let found = there.iter().any(|other| {
-            other.path == one.path && wrap(other.departure_rad - one.departure_rad - turn).abs() < 1e-9
+            other.path == one.path
+                && wrap(other.departure_rad - one.departure_rad - turn).abs() < 1e-9
         });
         assert!(found, "{one:?}");
     }
@@ -156,7 +157,10 @@ fn a_corner_that_opens_changes_its_echo_gradually() {
         let of_corner = echoes.iter().filter(|echo| echo.length_m > 1.5);
         of_corner
             .map(|echo| {
-                Complex64::from_polar(echo.amplitude, echo.phase_rad + k * (2.0 * range - echo.length_m))
+                Complex64::from_polar(
+                    echo.amplitude,
+                    echo.phase_rad + k * (2.0 * range - echo.length_m),
+                )
             })
             .sum::<Complex64>()
     };
