@@ -2,12 +2,14 @@
 
 mod arrangement;
 mod mirror;
+mod square;
 
 pub use arrangement::{Arrangement, Piece, SNAP_M};
 pub use glam::DVec2;
 pub use mirror::Mirror;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+pub use square::square_up;
 
 /// Where the ranger's rotation axis stands and where azimuth 0 points.
 ///

@@ -10,7 +10,6 @@ use crate::{
     acoustics::edge::{Aspect, EdgeLaw, Wedge},
     geometry::{Arrangement, DVec2, SNAP_M},
     model::Edge,
-    scene::Wall,
 };
 
 /// Legs along a wall's face belong to the wall's near end, radians.
@@ -36,6 +35,8 @@ struct Corner {
 struct Sector {
     /// World direction of the wall it starts at, radians.
     from_rad: f64,
+    /// Directions of its walls.
+    faces: [DVec2; 2],
     wedge: Wedge,
     /// Whether it sends anything back.
     answers: bool,
@@ -60,14 +61,19 @@ struct Arm<'a> {
 }
 
 impl Edges {
-    /// Sorts the walls around each point. `gains` are the walls' reflectances.
-    pub(super) fn new(plan: &Arrangement, walls: &[Wall], gains: &[f64], law: EdgeLaw) -> Self {
+    /// Sorts the walls around each point. `walls` are their ends, `gains` their reflectances.
+    pub(super) fn new(
+        plan: &Arrangement,
+        walls: &[(DVec2, DVec2)],
+        gains: &[f64],
+        law: EdgeLaw,
+    ) -> Self {
         let mut around: Vec<SmallVec<[(f64, u32); 4]>> = vec![SmallVec::new(); plan.points.len()];
         for piece in &plan.pieces {
             let [a, b] = piece.ends.map(|end| plan.points[end as usize]);
             // The wall's own direction: snapping and cutting may have bent the piece a little.
-            let wall = &walls[piece.segment as usize];
-            let along = (wall.b - wall.a) * (b - a).dot(wall.b - wall.a).signum();
+            let (from, to) = walls[piece.segment as usize];
+            let along = (to - from) * (b - a).dot(to - from).signum();
             around[piece.ends[0] as usize].push((along.to_angle(), piece.segment));
             around[piece.ends[1] as usize].push(((-along).to_angle(), piece.segment));
         }
@@ -81,8 +87,10 @@ impl Edges {
         Self { points: plan.points.iter().copied().zip(around).map(corner).collect() }
     }
 
-    pub(super) fn is_edge(&self, point: u32) -> bool {
-        matches!(self.points.get(point as usize), Some(Some(_)))
+    /// Whether sound that comes to a point along `run` finds an edge there.
+    pub(super) fn answers(&self, point: u32, run: DVec2) -> bool {
+        let corner = self.points.get(point as usize).and_then(Option::as_ref);
+        corner.is_some_and(|corner| corner.sectors.iter().any(|sector| sector.sees(-run)))
     }
 
     /// What an edge is called.
@@ -109,6 +117,23 @@ impl Edges {
             first += rays.len() as u32;
         }
         echoes
+    }
+}
+
+impl Sector {
+    /// Whether it sends sound back that comes from a direction. Without an arc tangent, for all
+    /// the beams that pass a room's corner.
+    fn sees(&self, from: DVec2) -> bool {
+        let [first, second] = self.faces;
+        let from_first = first.perp_dot(from) >= 0.0;
+        let from_second = from.perp_dot(second) >= 0.0;
+        // In more than half a turn, to be on either wall's side is enough.
+        let is_in = if self.wedge.is_convex() {
+            from_first || from_second
+        } else {
+            from_first && from_second
+        };
+        self.answers && is_in
     }
 }
 
@@ -200,10 +225,10 @@ impl Arm<'_> {
     }
 }
 
-fn end_at(walls: &[Wall], index: u32, place: DVec2) -> Option<Edge> {
-    let wall = &walls[index as usize];
+fn end_at(walls: &[(DVec2, DVec2)], index: u32, place: DVec2) -> Option<Edge> {
+    let (a, b) = walls[index as usize];
     let is_at = |end: DVec2| end.distance(place) < 2.0 * SNAP_M;
-    (is_at(wall.a) || is_at(wall.b)).then(|| Edge { wall: index, at_b: !is_at(wall.a) })
+    (is_at(a) || is_at(b)).then(|| Edge { wall: index, at_b: !is_at(a) })
 }
 
 /// The air between each wall of a point and the next one; `faces` by direction.
@@ -216,7 +241,8 @@ fn sectors(faces: &[(f64, u32)], gains: &[f64], law: EdgeLaw) -> SmallVec<[Secto
             opening_rad: if turn == 0.0 { TAU } else { turn },
             reflectance: [gains[wall as usize], gains[next as usize]],
         };
-        Sector { from_rad, wedge, answers: law.answers(&wedge) }
+        let faces = [from_rad, to_rad].map(DVec2::from_angle);
+        Sector { from_rad, faces, wedge, answers: law.answers(&wedge) }
     };
     faces.iter().zip(next).map(sector).collect()
 }

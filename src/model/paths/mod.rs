@@ -27,7 +27,8 @@
 //! length, departure and arrival. But only one ray leaves in a given direction, so two echoes
 //! that agree in all three are one, and one is kept. The same rule covers joints of collinear
 //! walls and all corners of `pi / m`. An echo on the very end of a wall counts as seen, and the
-//! edge's echo, which is minus half of it there, knows that.
+//! edge's echo, which is minus half of it there, knows that. Corners that are right-angled but for
+//! the rounding of their coordinates are made so first ([`square_up`]).
 //!
 //! # Pairs
 //!
@@ -75,7 +76,7 @@ use smallvec::SmallVec;
 use self::{beam::Ray, edges::Edges, mesh::Mesh, rounds::Rounds, trace::Tree};
 use crate::{
     acoustics::edge::EdgeLaw,
-    geometry::{Arrangement, DVec2, Mirror},
+    geometry::{Arrangement, DVec2, Mirror, square_up},
     model::{Path, Reflector},
     scan::PathKind,
     scene::{Material, Scene},
@@ -167,7 +168,8 @@ impl Paths {
     /// Prepares a scene.
     #[must_use]
     pub fn new(scene: &Scene, settings: Settings) -> Self {
-        let segments: Vec<_> = scene.walls.iter().map(|wall| (wall.a, wall.b)).collect();
+        let mut segments: Vec<_> = scene.walls.iter().map(|wall| (wall.a, wall.b)).collect();
+        square_up(&mut segments);
         let plan = Arrangement::of(&segments);
         let extra: Vec<_> = scene
             .cylinders
@@ -187,7 +189,7 @@ impl Paths {
             faces: segments.iter().zip(&gains).map(face).collect(),
             edges: settings
                 .edge_law
-                .map(|law| Edges::new(&plan, &scene.walls, &gains, law))
+                .map(|law| Edges::new(&plan, &segments, &gains, law))
                 .unwrap_or_default(),
             rounds: Rounds::new(&scene.cylinders, &round, mesh.as_ref()),
             settings,

@@ -1,4 +1,5 @@
 mod closed_forms;
+mod fan;
 mod full_wave;
 mod laws;
 mod peers;

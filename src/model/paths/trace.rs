@@ -317,8 +317,9 @@ impl Grower<'_> {
     }
 
     fn meet_edge(&mut self, beam: &Beam, point: u32) {
-        if self.paths.edges.is_edge(point) {
-            self.tree.to_edges.push((point, beam.ray_to(self.mesh.points[point as usize])));
+        let place = self.mesh.points[point as usize];
+        if self.paths.edges.answers(point, place - beam.image) {
+            self.tree.to_edges.push((point, beam.ray_to(place)));
         }
     }
 

@@ -1,0 +1,97 @@
+//! The fan of rays finds the same echoes as its spacing shrinks.
+
+use super::*;
+use crate::{
+    acoustics::{Air, Sensor},
+    geometry::{Pose, wrap_pi},
+    model::{Arrival, EngineKind, Options, Simulator},
+    scene::shipped,
+};
+
+/// Engines of the same ranger in a scene.
+fn simulator(scene: &Arc<Scene>, engine: EngineKind, ray_spacing_deg: f64) -> Simulator {
+    let options = Options { engine, ray_spacing_deg, max_range_m: Some(2.5), ..Options::default() };
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    Simulator::new(scene.clone(), sensor, Air::default(), options).expect("valid options")
+}
+
+/// Mirror echoes over the threshold; `paths` has one reflection at a cylinder at most.
+fn mirrored(simulator: &Simulator, pose: &Pose, azimuth_deg: f64) -> Vec<Arrival> {
+    let is_round = |r: &&crate::model::Reflector| matches!(r, crate::model::Reflector::Cylinder(_));
+    let direction = pose.direction_rad(azimuth_deg);
+    let mut arrivals = simulator.station(pose.position()).arrivals(direction);
+    arrivals.retain(|arrival| {
+        arrival.path.kind == PathKind::Specular
+            && arrival.amplitude > 0.02
+            && arrival.path.walls.iter().filter(is_round).count() < 2
+    });
+    arrivals
+}
+
+fn is_same(one: &Arrival, other: &Arrival) -> bool {
+    (one.length_m - other.length_m).abs() < 1e-3
+        && wrap_pi(one.departure_rad - other.departure_rad).abs() < 0.01
+        && (one.amplitude / other.amplitude - 1.0).abs() < 0.05
+}
+
+/// Of the echoes of `paths`, how many the fan finds; and of the fan's, how many `paths` has not.
+fn agreement(scene: &Arc<Scene>, pose: &Pose, ray_spacing_deg: f64) -> (usize, usize, usize) {
+    let exact = simulator(scene, EngineKind::Paths, 1.0);
+    let fan = simulator(scene, EngineKind::Fan, ray_spacing_deg);
+    let (mut all, mut found, mut extra) = (0, 0, 0);
+    for azimuth in 0..12 {
+        let azimuth_deg = 30.0 * f64::from(azimuth) + 1.0;
+        let (exact, fan) = (mirrored(&exact, pose, azimuth_deg), mirrored(&fan, pose, azimuth_deg));
+        all += exact.len();
+        found += exact.iter().filter(|e| fan.iter().any(|f| is_same(f, e))).count();
+        if std::env::var_os("SONARD_VERBOSE").is_some() && ray_spacing_deg < 0.02 {
+            for e in exact.iter().filter(|e| !fan.iter().any(|f| is_same(f, e))) {
+                println!(
+                    "  only exact {azimuth_deg} {} {:.4} {:.2} {:.2} {:?}",
+                    e.length_m, e.amplitude, e.departure_rad, e.arrival_rad, e.path.walls
+                );
+            }
+            for e in fan.iter().filter(|e| !exact.iter().any(|f| is_same(f, e))) {
+                let d = simulator(scene, EngineKind::Paths, 1.0);
+                for n in d
+                    .station(pose.position())
+                    .arrivals(pose.direction_rad(azimuth_deg))
+                    .iter()
+                    .filter(|n| n.path.walls == e.path.walls)
+                {
+                    println!(
+                        "    near {} {:.4} {:.2} {:.2}",
+                        n.length_m, n.amplitude, n.departure_rad, n.arrival_rad
+                    );
+                }
+                println!(
+                    "  only fan {azimuth_deg} {} {:.4} {:.2} {:.2} {:?}",
+                    e.length_m, e.amplitude, e.departure_rad, e.arrival_rad, e.path.walls
+                );
+            }
+        }
+        extra += fan.iter().filter(|f| !exact.iter().any(|e| is_same(f, e))).count();
+    }
+    (all, found, extra)
+}
+
+#[test]
+fn the_fan_converges_to_the_exact_paths_in_every_shipped_scene() {
+    let (mut all, mut finest, mut strangers) = (0, 0, 0);
+    for name in shipped::names() {
+        let scene = Scene::from_json(shipped::text(name).expect("shipped")).expect("valid");
+        for (pose_name, pose) in &scene.poses {
+            let plan = Arc::new(scene.with_robot_at(pose));
+            let small_deg = if scene.robot.is_some() { 0.01 } else { 0.1 };
+            let steps = [2.0, 0.5, small_deg].map(|spacing| agreement(&plan, pose, spacing));
+            println!("{name}, {pose_name}: (echoes, found, more) {steps:?}");
+            assert!(steps[0].1 <= steps[2].1, "{name}, {pose_name}: finer finds less");
+            all += steps[2].0;
+            finest += steps[2].1;
+            strangers += steps[2].2;
+        }
+    }
+    assert!(all > 100);
+    assert!(finest as f64 >= 0.98 * all as f64, "{finest} of {all}");
+    assert!(strangers as f64 <= 0.02 * all as f64, "{strangers} beside {all}");
+}
