@@ -41,12 +41,12 @@ pub fn square_up(segments: &mut [(DVec2, DVec2)]) {
 /// Ends are numbered: `2 i` and `2 i + 1` for segment `i`.
 fn end(segments: &[(DVec2, DVec2)], number: usize) -> DVec2 {
     let (a, b) = segments[number / 2];
-    if number % 2 == 0 { a } else { b }
+    if number.is_multiple_of(2) { a } else { b }
 }
 
 fn end_mut(segments: &mut [(DVec2, DVec2)], number: usize) -> &mut DVec2 {
     let (a, b) = &mut segments[number / 2];
-    if number % 2 == 0 { a } else { b }
+    if number.is_multiple_of(2) { a } else { b }
 }
 
 /// Pairs of ends at the same point, where no third segment ends.

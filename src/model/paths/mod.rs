@@ -7,13 +7,13 @@
 //! many images there are grows without bounds, but few are seen from where one listens. Beams
 //! find those alone (Heckbert and Hanrahan 1984; Funkhouser et al., JASA 115, 2004): a beam is
 //! all rays from an image that met the same walls. The plan is triangulated once, with the walls
-//! as sides of triangles ([`mesh`]). A beam walks from triangle to triangle; at the
+//! as sides of triangles (`mesh`). A beam walks from triangle to triangle; at the
 //! triangle's far corner it splits in two, at a wall it turns into a beam from the next image.
 //! So visibility needs no search: what a beam walks through is what its rays see, a step costs
 //! the same in a plan of ten walls and of ten thousand, and each ray from the source is in exactly
 //! one beam at each order. An echo is a beam that holds the source itself. Beams that a corner
 //! split but that stand side by side before the same image and wall later are joined again
-//! ([`trace`]).
+//! (`trace`).
 //!
 //! A beam ends when no echo of it can be both short and strong enough: the shortest way from the
 //! image through the beam's part of the wall back to the source bounds the length from below, and
@@ -42,20 +42,20 @@
 //! Sound bends at free ends and at corners that are not `pi / m`. By reciprocity the ways back
 //! from an edge are the ways to it, so the one-way rays to each edge, from the same tree,
 //! give all echoes with one diffraction and any reflections before and after: every pair of a way
-//! out and a way back ([`edges`]). How much comes back says [`crate::acoustics::edge`].
+//! out and a way back (`edges`). How much comes back says [`crate::acoustics::edge`].
 //!
 //! # Cylinders
 //!
 //! Cylinders hide what is behind them and reflect. Echoes with one reflection at a cylinder, and
 //! any at walls before and after, are exact: pairs of beams that meet the cylinder, joined where
-//! the way is shortest ([`rounds`]), with the spreading of a curved mirror. Echoes that touch
+//! the way is shortest (`rounds`), with the spreading of a curved mirror. Echoes that touch
 //! cylinders twice, or a cylinder and an edge, and the sound that creeps around a cylinder are
 //! left out; cylinders thinner than a wavelength reflect less than they would here.
 //!
 //! # Scans
 //!
 //! Paths depend on the place alone. [`Paths::survey`](crate::model::Engine::survey) finds them,
-//! and each azimuth weighs them with the beam pattern on departure and arrival ([`survey`]).
+//! and each azimuth weighs them with the beam pattern on departure and arrival (`survey`).
 //! For a transducer off the rotation axis, or a robot body that turns with it, each azimuth is a
 //! place of its own: survey from where the face is, in the scene as it then stands.
 

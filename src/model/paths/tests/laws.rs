@@ -1,6 +1,6 @@
 //! What holds in any scene.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
@@ -185,5 +185,4 @@ fn places_on_walls_joints_and_outside_are_harmless() {
         assert!(echoes.iter().all(|echo| echo.length_m.is_finite() && echo.amplitude.is_finite()));
     }
     assert!(Paths::new(&scene(&[]), settings()).enumerate(AT).is_empty());
-    let _ = TAU;
 }
