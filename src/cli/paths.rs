@@ -5,7 +5,7 @@ use std::{
     sync::Arc,
 };
 
-use comfy_table::{CellAlignment, Table, presets::UTF8_HORIZONTAL_ONLY};
+use comfy_table::{CellAlignment, Table, presets::NOTHING};
 use serde::Serialize;
 
 use super::{
@@ -121,11 +121,16 @@ fn line(simulator: &Simulator, path: &EchoPath) -> PathLine {
         order: record.order,
         walls: record.walls,
         edge: record.edge,
-        departure_deg: wrap_360(path.departure_rad.to_degrees()),
-        arrival_deg: wrap_360(path.arrival_rad.to_degrees()),
+        departure_deg: degrees(path.departure_rad),
+        arrival_deg: degrees(path.arrival_rad),
         amplitude: path.amplitude,
         phase_deg: path.phase_rad.to_degrees(),
     }
+}
+
+/// From 0 to 360, and never a negative zero.
+fn degrees(angle_rad: f64) -> f64 {
+    wrap_360(angle_rad.to_degrees()) + 0.0
 }
 
 fn write_json(lines: impl Iterator<Item = PathLine>) -> io::Result<()> {
@@ -139,7 +144,7 @@ fn write_json(lines: impl Iterator<Item = PathLine>) -> io::Result<()> {
 
 fn write_table(lines: impl Iterator<Item = PathLine>, count: usize) -> io::Result<()> {
     let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY).set_header([
+    table.load_style(NOTHING).set_header([
         "length m",
         "range m",
         "leaves",

@@ -54,7 +54,7 @@
 //!
 //! # Scans
 //!
-//! Paths depend on the place alone. [`Paths::survey`](crate::model::Engine::survey) finds them,
+//! Paths depend on the place alone. A survey by [`PathEngine`] finds them,
 //! and each azimuth weighs them with the beam pattern on departure and arrival (`survey`).
 //! For a transducer off the rotation axis, or a robot body that turns with it, each azimuth is a
 //! place of its own: survey from where the face is, in the scene as it then stands.
