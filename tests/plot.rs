@@ -4,6 +4,7 @@ use std::{fs, path::Path};
 
 use assert_cmd::Command;
 use predicates::{prelude::*, str::contains};
+use sonard::acoustics::{Air, Sensor};
 use tempfile::TempDir;
 
 const SCAN: [&str; 2] =
@@ -11,10 +12,14 @@ const SCAN: [&str; 2] =
 
 /// A log of two short scans in the shipped scene `simple-room`.
 fn log() -> String {
-    let mut log = String::from(
-        r#"{"type":"session","format":1,"started":"2026-01-01T00:00:00Z","sonard":"0.1.0","provenance":"mock","device":null,"sensor":{"name":"senscomp-6500","description":"","frequency_hz":49400.0,"aperture":{"shape":"piston","radius_m":0.0193},"pulse":{"shape":"burst","cycles":16.0},"blanking_us":2380.0,"max_range_m":10.7,"threshold":0.02,"sources":{}},"air":{"temperature_c":20.0,"humidity_percent":50.0,"pressure_kpa":101.325,"sound_speed_m_s":343.99},"scene":{"name":"simple-room","sha256":"0"},"model":{"engine":"fan"}}
-"#,
-    );
+    let air = Air::new(20.0, 50.0, 101.325).expect("ordinary air");
+    let session = serde_json::json!({
+        "type": "session", "format": 1, "started": "2026-01-01T00:00:00Z", "sonard": "0.1.0",
+        "provenance": "mock", "device": null, "air": air.to_record(),
+        "sensor": Sensor::preset("senscomp-6500").expect("a preset"),
+        "scene": {"name": "simple-room", "sha256": "0"}, "model": {"engine": "fan"}
+    });
+    let mut log = format!("{session}\n");
     for scan in SCAN {
         log += &format!(
             r#"{{"type":"scan_start","scan":"{scan}","time":"2026-01-01T00:00:00Z","pose":{{"x_m":0.774,"y_m":0.085,"heading_deg":0.0}},"plan":{{"from_deg":0.0,"to_deg":360.0,"step_deg":90.0,"pings_per_stop":1}}}}

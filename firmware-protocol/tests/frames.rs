@@ -43,11 +43,7 @@ fn frame_of(payload: &[u8]) -> Vec<u8> {
 }
 
 fn any_reading() -> impl Strategy<Value = Reading> {
-    let step = prop_oneof![
-        Just(-POSITION_MAX),
-        Just(POSITION_MAX),
-        -POSITION_MAX..=POSITION_MAX
-    ];
+    let step = prop_oneof![Just(-POSITION_MAX), Just(POSITION_MAX), -POSITION_MAX..=POSITION_MAX];
     let echo = prop_oneof![Just(WINDOW_TICKS_MAX), 0..=WINDOW_TICKS_MAX];
     let echoes = prop::collection::vec(echo, 0..=8);
     let ticks = prop_oneof![Just(u32::MAX), any::<u32>()];
@@ -220,10 +216,7 @@ fn extremes_fit() {
         status: ReadingStatus::StepDoubtful,
         echoes: Echoes::from_ticks(&[WINDOW_TICKS_MAX]),
     };
-    let header = Header {
-        boot: u16::MAX,
-        seq: u16::MAX,
-    };
+    let header = Header { boot: u16::MAX, seq: u16::MAX };
     let one = Frame::encode(header, &Reply::Reading(worst)).expect("fits");
     println!("worst reading with one echo: {} bytes", one.len());
     assert!(one.len() <= 32);
@@ -245,10 +238,7 @@ fn no_message_can_be_too_long() {
         Status::FIELDS,
     ] {
         let longest: usize = fields.iter().map(|field| longest_of(field.kind)).sum();
-        assert!(
-            4 + 1 + longest + 4 <= PAYLOAD_MAX,
-            "{fields:?} takes up to {longest} bytes"
-        );
+        assert!(4 + 1 + longest + 4 <= PAYLOAD_MAX, "{fields:?} takes up to {longest} bytes");
     }
 }
 
@@ -274,10 +264,7 @@ fn further_bytes_are_an_error_but_for_an_identity_of_another_version() {
     for (name, request) in samples::requests() {
         let mut body = postcard_body(&request);
         body.push(0);
-        assert!(
-            Request::decode(&body).is_err(),
-            "{name} with a further byte"
-        );
+        assert!(Request::decode(&body).is_err(), "{name} with a further byte");
     }
     let mut body = postcard_body(&Reply::Identity(samples::identity()));
     body.extend([1, 2, 3]);
@@ -285,18 +272,12 @@ fn further_bytes_are_an_error_but_for_an_identity_of_another_version() {
     let firmware = samples::identity().firmware;
     assert_eq!(ProtocolId::peek(&body), Some((PROTOCOL, firmware)));
     body.truncate(10);
-    assert_eq!(
-        ProtocolId::peek(&body),
-        Some((PROTOCOL, firmware)),
-        "a shorter Identity"
-    );
+    assert_eq!(ProtocolId::peek(&body), Some((PROTOCOL, firmware)), "a shorter Identity");
 }
 
 fn postcard_body<M: serde::Serialize>(message: &M) -> Vec<u8> {
     let mut body = [0; 64];
-    postcard::to_slice(message, &mut body)
-        .expect("fits")
-        .to_vec()
+    postcard::to_slice(message, &mut body).expect("fits").to_vec()
 }
 
 #[test]

@@ -43,26 +43,17 @@ fn vector(direction: &str, message: &str, frame: &Frame) -> String {
 }
 
 fn all() -> Vec<(String, String)> {
-    let header = Header {
-        boot: BOOT,
-        seq: SEQ,
-    };
+    let header = Header { boot: BOOT, seq: SEQ };
     let mut vectors = Vec::new();
     for (name, request) in requests() {
         let frame = Frame::encode(header, &request).expect("fits");
         let message = format!("{request:?}");
-        vectors.push((
-            format!("request-{name}"),
-            vector("host to device", &message, &frame),
-        ));
+        vectors.push((format!("request-{name}"), vector("host to device", &message, &frame)));
     }
     for (name, reply) in replies() {
         let frame = Frame::encode(header, &reply).expect("fits");
         let message = format!("{reply:?}");
-        vectors.push((
-            format!("reply-{name}"),
-            vector("device to host", &message, &frame),
-        ));
+        vectors.push((format!("reply-{name}"), vector("device to host", &message, &frame)));
     }
     vectors
 }
@@ -85,18 +76,9 @@ fn frames_are_as_they_were() {
 fn no_vector_is_left_over() {
     let mut files: Vec<_> = std::fs::read_dir(folder())
         .expect("the folder is there")
-        .map(|entry| {
-            entry
-                .expect("readable")
-                .file_name()
-                .into_string()
-                .expect("a name")
-        })
+        .map(|entry| entry.expect("readable").file_name().into_string().expect("a name"))
         .collect();
-    let mut names: Vec<_> = all()
-        .into_iter()
-        .map(|(name, _)| format!("{name}.txt"))
-        .collect();
+    let mut names: Vec<_> = all().into_iter().map(|(name, _)| format!("{name}.txt")).collect();
     files.sort();
     names.sort();
     assert_eq!(files, names);
@@ -104,24 +86,13 @@ fn no_vector_is_left_over() {
 
 #[test]
 fn every_message_has_a_vector() {
-    let request_codes: Vec<u8> = requests()
-        .iter()
-        .map(|(_, request)| code(request))
-        .collect();
+    let request_codes: Vec<u8> = requests().iter().map(|(_, request)| code(request)).collect();
     for variant in Request::VARIANTS {
-        assert!(
-            request_codes.contains(&variant.code),
-            "no sample of {}",
-            variant.name
-        );
+        assert!(request_codes.contains(&variant.code), "no sample of {}", variant.name);
     }
     let reply_codes: Vec<u8> = replies().iter().map(|(_, reply)| code(reply)).collect();
     for variant in Reply::VARIANTS {
-        assert!(
-            reply_codes.contains(&variant.code),
-            "no sample of {}",
-            variant.name
-        );
+        assert!(reply_codes.contains(&variant.code), "no sample of {}", variant.name);
     }
 }
 

@@ -52,7 +52,7 @@ Examples:
   sonard mock --scene simple-room --pose fig9 --link /tmp/ranger --seed 7 \\
       --faults flip=0.001,drop=0.001,double=0.001,reset=0.005";
 
-pub(super) fn run(args: Args) -> Outcome {
+pub(super) fn run(args: &Args) -> Outcome {
     let scene = Arc::new(scene_file::load(&args.scene)?);
     let pose = scene_file::pose(&scene, &args.pose)?;
     let (sensor, air, options) = (args.sensor.sensor()?, args.air.air()?, args.engine.options()?);

@@ -91,7 +91,8 @@ impl MockWorldArgs {
 
     fn truth_air(&self, believed: &Air) -> Result<Air, Failure> {
         let Some(temperature_c) = self.truth_temperature_c else { return Ok(*believed) };
-        Air::new(temperature_c, believed.humidity_percent(), believed.pressure_kpa()).map_err(|error| Failure::input(error, "give --truth-temperature-c in degrees Celsius"))
+        Air::new(temperature_c, believed.humidity_percent(), believed.pressure_kpa())
+            .map_err(|error| Failure::input(error, "give --truth-temperature-c in degrees Celsius"))
     }
 }
 

@@ -6,8 +6,8 @@ mod log;
 mod mock;
 mod mock_world;
 mod options;
-mod runtime;
 mod plot;
+mod runtime;
 mod scan;
 mod scene;
 mod scene_file;
@@ -54,8 +54,8 @@ enum Verb {
 #[must_use]
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().verb {
-        Verb::Scan(args) => scan::run(args),
-        Verb::Mock(args) => mock::run(args),
+        Verb::Scan(args) => scan::run(&args),
+        Verb::Mock(args) => mock::run(&args),
         Verb::Simulate(args) => simulate::run(args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Plot(args) => plot::run(args),

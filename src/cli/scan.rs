@@ -130,10 +130,10 @@ impl PlanArgs {
     }
 }
 
-pub(super) fn run(args: Args) -> Outcome {
-    let setup = Setup::new(&args)?;
+pub(super) fn run(args: &Args) -> Outcome {
+    let setup = Setup::new(args)?;
     let mut output = Output::open(args.out.as_deref(), &setup)?;
-    let measured = runtime::new()?.block_on(measure(&args, &setup, &mut output));
+    let measured = runtime::new()?.block_on(measure(args, &setup, &mut output));
     // Whatever happened, what was measured is closed properly and drawn.
     let closed = output.close(&setup);
     measured?;
@@ -156,8 +156,7 @@ async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
     let mut missing = 0;
     for turn in 1..=args.repeat {
         output.begin_scan(turn, args.repeat, job.plan.beams());
-        let summary =
-            ranger.scan(&job, output, runtime::interrupted()).await.map_err(scan_failure);
+        let summary = ranger.scan(&job, output, runtime::interrupted()).await.map_err(scan_failure);
         output.end_scan();
         let summary = summary?;
         summary::print(setup, &summary, ranger.identity(), ranger.link_stats(), output);

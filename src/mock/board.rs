@@ -326,7 +326,8 @@ impl MockBoard {
     fn brake(&mut self) {
         let (step, until) = match self.activity {
             Activity::Moving { motion, from, since, .. } => {
-                let (gone, stands_s) = motion.braked_at((self.now - since) as f64 / f64::from(TICK_HZ));
+                let (gone, stands_s) =
+                    motion.braked_at((self.now - since) as f64 / f64::from(TICK_HZ));
                 self.world.turn(gone);
                 (from + gone, since + ticks(stands_s))
             }

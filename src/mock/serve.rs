@@ -129,11 +129,14 @@ impl MockPort {
     /// Waits for bytes from the host or for the next thing to happen.
     async fn wait(&mut self) -> io::Result<()> {
         let wake = self.board.next_wake();
-        let jump = self.board.pace() == Pace::Virtual && wake.is_some_and(|w| w.kind == WakeKind::Work);
+        let jump =
+            self.board.pace() == Pace::Virtual && wake.is_some_and(|w| w.kind == WakeKind::Work);
         let at = if jump { Some(Instant::now()) } else { wake.map(|wake| self.real_time(wake.at)) };
         let lines = [self.to_host.next_due(), self.to_board.next_due()];
-        let stalled_lines = if self.board.stalled() { None } else { lines.into_iter().flatten().min() };
-        let wake_at = [at, stalled_lines, Some(Instant::now() + LOCK_CHECK)].into_iter().flatten().min();
+        let stalled_lines =
+            if self.board.stalled() { None } else { lines.into_iter().flatten().min() };
+        let wake_at =
+            [at, stalled_lines, Some(Instant::now() + LOCK_CHECK)].into_iter().flatten().min();
         let timer = async {
             match wake_at {
                 // A jump still gives the host's bytes their turn.

@@ -39,10 +39,8 @@ impl Soundings {
         mounting_offset_deg: f64,
     ) -> Self {
         let mounted = Pose { heading_deg: pose.heading_deg + mounting_offset_deg, ..*pose };
-        let turn = ScanPlan {
-            step_deg: 360.0 / f64::from(steps_per_revolution),
-            ..ScanPlan::default()
-        };
+        let turn =
+            ScanPlan { step_deg: 360.0 / f64::from(steps_per_revolution), ..ScanPlan::default() };
         Self::from_predictions(&simulator.predict(&mounted, &turn))
     }
 
@@ -133,7 +131,11 @@ mod tests {
             first_is_blanking,
         };
         Soundings {
-            rows: vec![row(&[3000.0, 5000.0], false), row(&[2380.0, 6000.0], true), row(&[], false)],
+            rows: vec![
+                row(&[3000.0, 5000.0], false),
+                row(&[2380.0, 6000.0], true),
+                row(&[], false),
+            ],
         }
     }
 

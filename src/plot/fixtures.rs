@@ -7,10 +7,11 @@ use rand_distr::{Distribution, Normal};
 use uuid::Uuid;
 
 use crate::{
+    acoustics::{Air, Sensor},
     geometry::{DVec2, Pose, wrap_pi},
     scan::{
-        PathKind, PathRecord, Ping, PingStatus, Provenance, Record, ScanEnd, ScanPlan, ScanStart,
-        ScanView, Session, SimRecord,
+        LOG_FORMAT, ModelRecord, PathKind, PathRecord, Ping, PingStatus, Provenance, Record,
+        ScanEnd, ScanPlan, ScanStart, ScanView, SceneRef, Session, SimRecord,
     },
     scene::{Cylinder, Material, Scene, Wall},
 };
@@ -34,6 +35,7 @@ pub(super) fn room() -> Scene {
         name: "simple-room".into(),
         source: Some("Dudek, Jenkin, Milios and Wilkes, figures 7 to 9".into()),
         approximate: vec!["The reflectance is chosen.".into()],
+        materials: BTreeMap::from([("shelving".into(), SHELVING)]),
         walls: walls.collect(),
         cylinders: Vec::new(),
         floor_z_m: None,
@@ -116,21 +118,20 @@ pub(super) fn simulated(mut view: ScanView) -> ScanView {
     view
 }
 
-/// A session whose sensor stands for the Polaroid ranger.
+/// A session of the default ranger in ordinary air.
 pub(super) fn session() -> Session {
-    let json = serde_json::json!({
-        "format": 1, "started": "2026-01-01T00:00:00Z", "sonard": "0.1.0", "provenance": "mock",
-        "device": {"serial": "mock", "firmware": "0.1.0", "protocol": 1, "boot": "1",
-                   "tick_hz": 2_000_000, "steps_per_revolution": 400},
-        "sensor": {"name": "senscomp-6500", "description": "Ranging module",
-                   "frequency_hz": 49400.0, "aperture": {"shape": "piston", "radius_m": 0.0193},
-                   "pulse": {"shape": "burst", "cycles": 16.0}, "blanking_us": 2380.0,
-                   "max_range_m": 10.7, "threshold": 0.02, "sources": {}},
-        "air": {"temperature_c": 20.0, "humidity_percent": 50.0, "pressure_kpa": 101.325,
-                "sound_speed_m_s": 343.99},
-        "scene": {"name": "simple-room", "sha256": ""}, "model": {"engine": "fan"}
-    });
-    serde_json::from_value(json).expect("the session above has every field")
+    let air = Air::new(20.0, 50.0, 101.325).expect("ordinary air");
+    Session {
+        format: LOG_FORMAT,
+        started: jiff::Timestamp::UNIX_EPOCH,
+        sonard: "0.1.0".into(),
+        provenance: Provenance::Mock,
+        device: None,
+        sensor: Sensor::preset("senscomp-6500").expect("a preset"),
+        air: air.to_record(),
+        scene: Some(SceneRef { name: "simple-room".into(), sha256: String::new() }),
+        model: Some(ModelRecord { engine: "fan".into(), settings: serde_json::Map::new() }),
+    }
 }
 
 /// First image of the ranger whose echo is loud enough, in the order of distance.

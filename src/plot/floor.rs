@@ -156,23 +156,19 @@ impl Floor<'_> {
         Some((from + distance * outward, outward))
     }
 
-    /// Neighbouring beams whose readings are beyond the view, gathered.
+    /// Readings beyond the view, gathered by direction.
     fn clusters_beyond(&self) -> Vec<Cluster> {
         let mut clusters: Vec<Cluster> = Vec::new();
-        let mut last_beam = None;
-        for (i, beam) in self.scan.beams.iter().enumerate() {
+        for beam in &self.scan.beams {
             let Some(range_m) = beam.range_m else { continue };
             if self.plan.panel.contains(self.at(beam, range_m)) {
                 continue;
             }
-            let neighbour = last_beam.is_some_and(|last| i - last <= 2);
-            last_beam = Some(i);
-            match clusters
-                .last_mut()
-                .filter(|cluster| neighbour && beam.azimuth_deg - cluster.from_deg < CLUSTER_DEG)
-            {
-                Some(cluster) => cluster.take(beam, range_m),
-                None => clusters.push(Cluster::new(beam, range_m)),
+            match clusters.last_mut() {
+                Some(last) if beam.azimuth_deg - last.from_deg < CLUSTER_DEG => {
+                    last.take(beam, range_m);
+                }
+                _ => clusters.push(Cluster::new(beam, range_m)),
             }
         }
         clusters

@@ -180,7 +180,7 @@ impl Plan {
         for (name, bounds) in groups.into_iter().chain(discs) {
             let corner = self.px(DVec2::new(bounds.max.x, bounds.max.y));
             let low = self.px(DVec2::new(bounds.max.x, bounds.min.y));
-            for at in [corner + Px::new(5.0, -3.0), low + Px::new(5.0, 12.0)] {
+            for at in [low + Px::new(5.0, 12.0), corner + Px::new(5.0, -3.0)] {
                 if labels.place(at, Anchor::Start, theme::SMALL_PX, name) {
                     layer.text(at, Anchor::Start, theme::SMALL_PX, name);
                     break;

@@ -24,11 +24,8 @@ const DOT_PX: f64 = 2.6;
 #[must_use]
 pub fn draw_polar(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     let readings: Vec<Readings> = scans.iter().map(Readings::of).collect();
-    let (heading, top) = caption::draw(
-        &words::title(scans, scene),
-        words::badge(scans),
-        &words::lines(scans, &readings),
-    );
+    let (heading, top) =
+        caption::draw(&words::title(scans, scene), words::badge(scans), &words::lines(scans));
     let center = Px::new(theme::PAGE_PX / 2.0, top + 34.0 + RADIUS_PX);
     let polar = Polar { center, rim_m: top_m(&readings) };
     let beyond = readings.iter().map(|scan| polar.beyond(scan).count()).sum();
@@ -36,6 +33,7 @@ pub fn draw_polar(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     let mut page = Layer::new("polar");
     page.add(heading);
     page.add(polar.frame());
+    page.add(polar.numbers());
     for scan in readings.iter().take(1) {
         page.add(polar.predictions(scan));
     }
@@ -44,7 +42,6 @@ pub fn draw_polar(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
         page.add(polar.marks(scan, opacity));
         page.add(polar.rim(scan));
     }
-    page.add(polar.numbers());
     let below = Px::new(theme::MARGIN_PX, center.y + RADIUS_PX + 40.0);
     let width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
     let (key, height) = legend::draw(&keys::all(&readings, None, beyond), below, width);
@@ -96,7 +93,7 @@ impl Polar {
         layer
     }
 
-    /// Ranges of the circles, between two spokes and over the marks.
+    /// Ranges of the circles, between two spokes.
     fn numbers(&self) -> Layer {
         let mut layer = Layer::new("ranges").with("fill", theme::QUIET).haloed();
         let mut labels = Labels::new(super::canvas::Rect::new(

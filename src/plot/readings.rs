@@ -1,7 +1,12 @@
-//! Readings as they are drawn: what each one is, whatever kind of log it came from.
+//! Readings as they are drawn: what each one is, whatever kind of log it came from. Where a
+//! prediction stands beside a reading, [`crate::compare`] says what explains it, so that pictures
+//! and tables agree.
 
 use super::{canvas::Shape, theme};
-use crate::scan::{PathKind, PathRecord, Ping, PingStatus, ScanView};
+use crate::{
+    compare::{Judged, Verdict, compare},
+    scan::{PathKind, PathRecord, Ping, PingStatus, ScanView, Session},
+};
 
 /// What a beam gave, as far as the model explains it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -16,7 +21,7 @@ pub(super) enum Kind {
     Edge,
     /// Sound was there when the receiver opened.
     MinRange,
-    /// An echo that the model does not give at this range.
+    /// Heard, but not by the model at this range.
     Unexplained,
     /// No echo.
     Silent,
@@ -62,7 +67,7 @@ impl Kind {
             Self::Multiple => "multiple reflection",
             Self::Edge => "edge",
             Self::MinRange => "minimum range",
-            Self::Unexplained => "unexplained echo",
+            Self::Unexplained => "unexplained",
             Self::Silent => "silent",
             Self::SilentUnexplained => "silent, model hears",
             Self::Lost => "no valid reading",
@@ -97,20 +102,30 @@ pub(super) struct Readings {
 }
 
 impl Readings {
-    /// Every beam with a direction, by azimuth.
+    /// Every beam with a direction, by azimuth; of a beam logged twice the reading that counts.
     pub(super) fn of(view: &ScanView) -> Self {
-        let min_range_m = view.session.as_ref().and_then(|session| {
-            length(Some(session.air.sound_speed_m_s * session.sensor.blanking_us * 1e-6 / 2.0))
-        });
-        let mut beams: Vec<_> = view
-            .pings
+        let min_range_m = view.session.as_deref().and_then(min_range_m);
+        let (_, judged) = compare(std::slice::from_ref(view));
+        let mut beams: Vec<_> = judged
             .iter()
-            .filter(|ping| ping.azimuth_deg.is_finite())
-            .map(|ping| reading(ping, min_range_m))
+            .filter(|judged| judged.ping.azimuth_deg.is_finite())
+            .map(|judged| reading(judged, min_range_m))
             .collect();
         beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
         let has_model = view.pings.iter().any(|ping| ping.sim.is_some());
         Self { beams, min_range_m, has_model }
+    }
+
+    /// The beams of several scans as one.
+    pub(super) fn merged<'a>(scans: impl IntoIterator<Item = &'a Self>) -> Self {
+        let mut all = Self { beams: Vec::new(), min_range_m: None, has_model: false };
+        for scan in scans {
+            all.beams.extend_from_slice(&scan.beams);
+            all.min_range_m = all.min_range_m.or(scan.min_range_m);
+            all.has_model |= scan.has_model;
+        }
+        all.beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
+        all
     }
 
     pub(super) fn count(&self, kind: Kind) -> usize {
@@ -123,57 +138,58 @@ impl Readings {
     }
 }
 
-fn reading(ping: &Ping, min_range_m: Option<f64>) -> Reading {
-    let sim = ping.sim.as_ref();
-    let measured_m = length(ping.range_m);
-    let model_range_m = sim.and_then(|sim| match sim.status {
-        PingStatus::MinRange => length(sim.range_m).or(min_range_m),
-        status if status.has_range() => length(sim.range_m),
+/// Range at which the receiver opens; the model's setting goes before the sensor's.
+fn min_range_m(session: &Session) -> Option<f64> {
+    let settings = session.model.as_ref().map(|model| &model.settings);
+    let blanking_us = settings
+        .and_then(|settings| settings.get("blanking_us")?.as_f64())
+        .unwrap_or(session.sensor.blanking_us);
+    length(Some(session.air.sound_speed_m_s * blanking_us * 1e-6 / 2.0))
+}
+
+fn reading(judged: &Judged<'_>, min_range_m: Option<f64>) -> Reading {
+    let ping = judged.ping;
+    let or_min_range = |status: PingStatus, range_m: Option<f64>| match status {
+        PingStatus::Echo => length(range_m),
+        PingStatus::MinRange => length(range_m).or(min_range_m),
         _ => None,
-    });
-    let residual_m = ping
-        .residual_m
-        .filter(|residual| residual.is_finite())
-        .or_else(|| Some(measured_m? - model_range_m?));
-    let (kind, range_m) = match (ping.status, measured_m) {
-        (PingStatus::Echo, Some(range)) => (echo_kind(ping, range), Some(range)),
-        (PingStatus::MinRange, range) => (Kind::MinRange, range.or(min_range_m)),
-        (PingStatus::NoEcho, _) if sim.is_some_and(|sim| sim.status.has_range()) => {
-            (Kind::SilentUnexplained, None)
-        }
-        (PingStatus::NoEcho, _) => (Kind::Silent, None),
-        (PingStatus::Echo | PingStatus::LinkLost | PingStatus::StepDoubtful, _) => {
-            (Kind::Lost, None)
-        }
     };
-    // A minimum range that nobody knows has no place on the plan.
-    let kind = if kind == Kind::MinRange && range_m.is_none() { Kind::Lost } else { kind };
+    let range_m = or_min_range(ping.status, ping.range_m);
+    let model_range_m = ping.sim.as_ref().and_then(|sim| or_min_range(sim.status, sim.range_m));
+    let kind = match range_m {
+        Some(_) => heard_kind(judged),
+        None => unheard_kind(judged),
+    };
     Reading {
         azimuth_deg: ping.azimuth_deg,
         kind,
         range_m,
         model_range_m,
-        residual_m: residual_m.filter(|_| range_m.is_some()),
+        residual_m: judged.residual_m.filter(|_| range_m.is_some() && model_range_m.is_some()),
         margin_db: ping.margin_db.filter(|margin| margin.is_finite()),
         hint: hint(ping, kind, range_m, model_range_m),
     }
 }
 
-/// What made an echo at `range_m`.
-fn echo_kind(ping: &Ping, range_m: f64) -> Kind {
-    match &ping.sim {
-        None => ping.path.as_ref().map_or(Kind::Echo, path_kind),
-        Some(sim) => {
-            let explained = sim.range_m.is_some_and(|model_m| agree(range_m, model_m));
-            let path = sim.path.as_ref().filter(|_| explained && sim.status.has_range());
-            path.map_or(if explained { Kind::Echo } else { Kind::Unexplained }, path_kind)
-        }
+fn heard_kind(judged: &Judged<'_>) -> Kind {
+    match (judged.verdict, judged.ping.status) {
+        (Ok(Verdict::Direct), _) => Kind::Direct,
+        (Ok(Verdict::Multiple), _) => Kind::Multiple,
+        (Ok(Verdict::Edge), _) => Kind::Edge,
+        (Ok(Verdict::MinRange), _) | (Err(_), PingStatus::MinRange) => Kind::MinRange,
+        (Ok(Verdict::Unexplained | Verdict::Silent), _) => Kind::Unexplained,
+        // Nothing to compare with: what the model itself made has its path.
+        (Err(_), _) => judged.ping.path.as_ref().map_or(Kind::Echo, path_kind),
     }
 }
 
-/// Whether two ranges are the same reading: within 1 % of the range, or 10 mm.
-fn agree(measured_m: f64, model_m: f64) -> bool {
-    (measured_m - model_m).abs() <= (0.01 * measured_m).max(0.010)
+fn unheard_kind(judged: &Judged<'_>) -> Kind {
+    match (judged.ping.status, judged.verdict) {
+        (PingStatus::NoEcho, Ok(Verdict::Unexplained)) => Kind::SilentUnexplained,
+        (PingStatus::NoEcho, _) => Kind::Silent,
+        // A range that is missing, or no reading at all.
+        _ => Kind::Lost,
+    }
 }
 
 fn path_kind(path: &PathRecord) -> Kind {

@@ -6,9 +6,12 @@ use crate::{
     scene::Scene,
 };
 
-/// How far the view may reach past the walls on each side, as a share of the room's longer
-/// side. The false wall of Dudek and others, figure 9, stands a room's depth outside.
-const MARGIN: f64 = 0.82;
+/// How far the view may reach past the walls on each side, as a share of the room's size in that
+/// direction: the room's mirror image behind each wall still fits, and with it false walls such
+/// as in Dudek and others, figure 9.
+const MARGIN: f64 = 1.05;
+/// The same as a share of the longer side, for rooms that are long or a single wall.
+const LEAST_MARGIN: f64 = 0.3;
 /// Share of the readings that may be left beyond the view to keep the room large.
 const LEFT_OUT: f64 = 0.01;
 
@@ -53,17 +56,19 @@ fn near(walls: &Bounds, at: DVec2) -> bool {
 
 /// Moves each side out to the readings beyond it, but for the last few and the far ones.
 fn reach_out(room: Bounds, points: &[DVec2]) -> Bounds {
-    let limit = MARGIN * room.size().max_element();
+    let size = room.size();
+    let limit = (MARGIN * size).max(DVec2::splat(LEAST_MARGIN * size.max_element()));
     let spare = (LEFT_OUT * points.len() as f64).ceil() as usize;
-    let side = |excess: &dyn Fn(&DVec2) -> f64| {
+    let side = |limit: f64, excess: &dyn Fn(&DVec2) -> f64| {
         let mut beyond: Vec<f64> =
             points.iter().map(excess).filter(|by| (0.0..=limit).contains(by)).collect();
         beyond.sort_by(|a, b| b.total_cmp(a));
         beyond.get(spare).copied().unwrap_or(0.0)
     };
+    let (low, high) = (room.min, room.max);
     Bounds {
-        min: room.min - DVec2::new(side(&|p| room.min.x - p.x), side(&|p| room.min.y - p.y)),
-        max: room.max + DVec2::new(side(&|p| p.x - room.max.x), side(&|p| p.y - room.max.y)),
+        min: low - DVec2::new(side(limit.x, &|p| low.x - p.x), side(limit.y, &|p| low.y - p.y)),
+        max: high + DVec2::new(side(limit.x, &|p| p.x - high.x), side(limit.y, &|p| p.y - high.y)),
     }
 }
 

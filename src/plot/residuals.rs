@@ -23,7 +23,7 @@ const HISTOGRAM_PX: f64 = 110.0;
 #[must_use]
 pub fn draw_residuals(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     let readings: Vec<Readings> = scans.iter().map(Readings::of).collect();
-    let mut lines = words::lines(scans, &readings);
+    let mut lines = words::lines(scans);
     if readings.iter().all(|scan| scan.residuals().next().is_none()) {
         lines.push("No beam has both a measured and a predicted range: no residuals.".into());
     }

@@ -40,11 +40,10 @@ pub fn draw_scans(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
         .filter_map(|(view, r)| Some((words::pose_of(view)?, r)))
         .collect();
     let title = words::title(scans, scene);
-    let (heading, top) =
-        caption::draw(&title, words::badge(scans), &words::lines(scans, &readings));
+    let (heading, top) = caption::draw(&title, words::badge(scans), &words::lines(scans));
 
     let region = region::region(&placed, scene);
-    let layout = Layout::choose(&region, top + 16.0);
+    let layout = Layout::choose(&region, top + 22.0);
     let plan = Plan::fit(region, layout.plan);
     let azimuths = AzimuthAxis::of(scans.first().and_then(|s| Some(&s.start.as_ref()?.plan)));
 
@@ -103,44 +102,63 @@ impl Layout {
     }
 }
 
+/// What was read at one pose.
+struct Stand<'a> {
+    pose: Pose,
+    /// The scan whose predictions are shown.
+    first: &'a Readings,
+    /// The beams of all scans here.
+    all: Readings,
+}
+
+impl<'a> Stand<'a> {
+    /// The scans by pose, in the order of the log.
+    fn gather(scans: &[(Pose, &'a Readings)]) -> Vec<Self> {
+        let mut stands: Vec<Self> = Vec::new();
+        for &(pose, first) in scans {
+            if stands.iter().all(|stand| stand.pose != pose) {
+                let here = scans.iter().filter(|(other, _)| *other == pose);
+                let all = Readings::merged(here.map(|(_, scan)| *scan));
+                stands.push(Self { pose, first, all });
+            }
+        }
+        stands
+    }
+
+    fn predicted(&self, plan: &'a Plan) -> Floor<'_> {
+        Floor { plan, pose: self.pose, scan: self.first }
+    }
+
+    fn measured(&self, plan: &'a Plan) -> Floor<'_> {
+        Floor { plan, pose: self.pose, scan: &self.all }
+    }
+}
+
 /// The floor plan, and how many readings lie beyond it.
 fn floor_plan(plan: &Plan, scans: &[(Pose, &Readings)], scene: Option<&Scene>) -> (Layer, usize) {
-    let floors: Vec<Floor<'_>> =
-        scans.iter().map(|&(pose, scan)| Floor { plan, pose, scan }).collect();
-    let firsts: Vec<&Floor<'_>> = floors
-        .iter()
-        .enumerate()
-        .filter(|(i, floor)| floors[..*i].iter().all(|other| other.pose != floor.pose))
-        .map(|(_, floor)| floor)
-        .collect();
-    let mut labels = Labels::new(plan.panel);
-
+    let stands = Stand::gather(scans);
     let mut inside = Layer::new("inside").clipped("plan-window", plan.panel);
-    for floor in &firsts {
-        inside.add(floor.model());
-    }
+    inside.extend(stands.iter().map(|stand| stand.predicted(plan).model()));
     inside.extend(scene.map(|scene| plan.walls(scene)));
-    for floor in &firsts {
-        inside.extend(scene.map(|scene| plan.body(scene, &floor.pose)));
-        inside.add(floor.min_range());
+    for stand in &stands {
+        inside.extend(scene.map(|scene| plan.body(scene, &stand.pose)));
+        inside.add(stand.predicted(plan).min_range());
     }
-    let opacity = if floors.len() > 1 { 0.6 } else { 1.0 };
-    for floor in &floors {
-        inside.add(floor.marks(opacity));
-    }
-    for floor in &firsts {
-        inside.add(plan.pose(&floor.pose));
-    }
+    let opacity = if scans.len() > 1 { 0.6 } else { 1.0 };
+    inside.extend(stands.iter().map(|stand| stand.measured(plan).marks(opacity)));
+    inside.extend(stands.iter().map(|stand| plan.pose(&stand.pose)));
+
+    let mut labels = Labels::new(plan.panel);
     let mut layer = Layer::new("floor-plan");
     layer.add(plan.frame());
     layer.add(inside);
-    for floor in &floors {
+    for floor in stands.iter().map(|stand| stand.measured(plan)) {
         layer.add(floor.silent_ticks());
         layer.add(floor.beyond(&mut labels));
     }
     layer.extend(scene.map(|scene| plan.names(scene, &mut labels)));
     layer.add(plan.scale_bar());
-    (layer, floors.iter().map(Floor::count_beyond).sum())
+    (layer, stands.iter().map(|stand| stand.measured(plan).count_beyond()).sum())
 }
 
 fn strips_beside(panels: &[Rect; 2], azimuths: AzimuthAxis, scans: &[Readings]) -> Layer {

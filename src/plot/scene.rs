@@ -19,7 +19,7 @@ pub fn draw_scene(scene: &Scene) -> Picture {
     let region = region(scene);
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
     let height = Plan::height_for(&region, right - left, [220.0, 640.0]);
-    let plan = Plan::fit(region, Rect::new(left, top + 16.0, right - left, height));
+    let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
     let mut labels = Labels::new(plan.panel);
 
     let mut page = Layer::new("scene");

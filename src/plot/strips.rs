@@ -68,7 +68,13 @@ pub(super) fn margin(panel: Rect, azimuths: AzimuthAxis, scans: &[Readings], las
 }
 
 fn marks(strip: &Strip, scans: &[Readings], value: impl Fn(&Reading) -> Option<f64>) -> Layer {
-    let mut layer = Layer::new("readings");
+    // Where many scans lie over each other, what they have in common shows through.
+    let opacity = match scans.len() {
+        0 | 1 => 1.0,
+        2..=5 => 0.6,
+        _ => 0.3,
+    };
+    let mut layer = Layer::new("readings").with("fill-opacity", opacity);
     for kind in Kind::HEARD.into_iter().chain(Kind::UNHEARD) {
         let mut marks = Layer::new(kind.words()).with("fill", kind.colour());
         let beams = scans.iter().flat_map(|scan| &scan.beams).filter(|beam| beam.kind == kind);

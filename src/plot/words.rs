@@ -1,7 +1,7 @@
 //! What stands above a picture of scans: scene, pose, sensor, air, engine, provenance, counts.
 
-use super::readings::Readings;
 use crate::{
+    compare::compare,
     geometry::Pose,
     scan::{EventKind, Provenance, ScanView, Session},
     scene::Scene,
@@ -37,7 +37,7 @@ pub(super) fn badge(views: &[ScanView]) -> Option<&'static str> {
 }
 
 /// The lines under the title.
-pub(super) fn lines(views: &[ScanView], readings: &[Readings]) -> Vec<String> {
+pub(super) fn lines(views: &[ScanView]) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(view) = views.first() {
         let session = view.session.as_deref();
@@ -48,7 +48,7 @@ pub(super) fn lines(views: &[ScanView], readings: &[Readings]) -> Vec<String> {
         lines.push(parts.join(" \u{b7} "));
     }
     lines.push(counts(views));
-    lines.extend(agreement(readings));
+    lines.extend(agreement(views));
     let events: Vec<String> = views
         .iter()
         .flat_map(|view| &view.events)
@@ -139,17 +139,16 @@ fn counts(views: &[ScanView]) -> String {
 }
 
 /// How measured and predicted ranges agree, where both are there.
-pub(super) fn agreement(readings: &[Readings]) -> Option<String> {
-    let mut sizes_m: Vec<f64> =
-        readings.iter().flat_map(Readings::residuals).map(|(_, r)| r.abs()).collect();
-    sizes_m.sort_by(f64::total_cmp);
-    let median_m = *sizes_m.get(sizes_m.len() / 2)?;
-    let p90_m = *sizes_m.get(sizes_m.len() * 9 / 10)?;
+fn agreement(views: &[ScanView]) -> Option<String> {
+    let (found, _) = compare(views);
+    let percent = 100.0 * found.agree_fraction?;
     Some(format!(
-        "Measured \u{2212} model over {} beams heard by both: median {}, nine in ten within {}",
-        sizes_m.len(),
-        length(median_m),
-        length(p90_m)
+        "{} of {} echoes heard by both agree with the model ({percent:.1} %) \u{b7} distance: \
+         median {}, nine in ten within {}",
+        found.agree,
+        found.both_echo,
+        length(found.median_abs_residual_m?),
+        length(found.p90_abs_residual_m?)
     ))
 }
 

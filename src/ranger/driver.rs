@@ -82,7 +82,9 @@ const fn host_help(error: &HostError) -> &'static str {
              firing; it needs 1000 uF beside it)"
         }
         HostError::Hangup => "the cable was pulled or the board lost power: plug it in, scan again",
-        HostError::LeaseExpired => "this computer was away too long: stop what loads it, scan again",
+        HostError::LeaseExpired => {
+            "this computer was away too long: stop what loads it, scan again"
+        }
         HostError::EmergencyStop => "release the emergency stop, then scan again",
         HostError::MotionFault => "free the motor, check its supply and current, then scan again",
         HostError::Stopped => "another program stopped it: make sure that only one uses the port",

@@ -266,7 +266,8 @@ impl<'a> Progress<'a> {
     }
 
     fn span_ticks(&self) -> u64 {
-        self.span.map_or(0, |span| span.last - span.first + u64::from(self.job.settings.window_ticks))
+        self.span
+            .map_or(0, |span| span.last - span.first + u64::from(self.job.settings.window_ticks))
     }
 
     fn write(&mut self, record: &Record) {

@@ -33,7 +33,7 @@ pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
     not_empty(&file.name, &root.key("name"))?;
     let mut rules = Rules::new(file.materials)?;
     let mut walls = Vec::new();
-    for (index, wall) in file.walls.into_iter().enumerate() {
+    for (index, wall) in file.walls.iter().enumerate() {
         walls.extend(rules.walls(wall, &root.key("walls").index(index))?);
     }
     let mut cylinders = Vec::new();
@@ -76,10 +76,10 @@ impl Rules {
         Ok(Self { materials, ids: HashMap::new() })
     }
 
-    fn walls(&mut self, file: WallFile, path: &JsonPath) -> Result<Vec<Wall>, Fault> {
+    fn walls(&mut self, file: &WallFile, path: &JsonPath) -> Result<Vec<Wall>, Fault> {
         let material = self.material(&file.material, path)?;
         let z_m = heights(file.z_m, path)?;
-        let corners = corners(&file, path)?;
+        let corners = corners(file, path)?;
         not_empty(&file.id, &path.key("id"))?;
         let single = file.polyline.is_none();
         corners

@@ -18,7 +18,7 @@ pub struct SceneError {
     /// The way to the value in the document, as `walls[2].to`; empty for the document itself.
     pub path: String,
     /// What is wrong.
-    pub problem: SceneProblem,
+    pub problem: Box<SceneProblem>,
 }
 
 impl SceneError {
@@ -29,7 +29,7 @@ impl SceneError {
         problem: SceneProblem,
     ) -> Self {
         let (line, column) = line_and_column(text, span.start);
-        Self { line, column, span, path: path.to_string(), problem }
+        Self { line, column, span, path: path.to_string(), problem: Box::new(problem) }
     }
 
     /// What is wrong, with the offending text.

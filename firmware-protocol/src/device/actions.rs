@@ -51,15 +51,10 @@ impl Device {
         let settings = self.settings?;
         let (speed, acceleration) = (settings.speed, settings.acceleration);
         match self.phase {
-            Phase::Homing => Some(Action::Home {
-                speed,
-                acceleration,
-            }),
-            Phase::Moving { target } | Phase::Beam(Beam::Moving { target }) => Some(Action::Move {
-                target,
-                speed,
-                acceleration,
-            }),
+            Phase::Homing => Some(Action::Home { speed, acceleration }),
+            Phase::Moving { target } | Phase::Beam(Beam::Moving { target }) => {
+                Some(Action::Move { target, speed, acceleration })
+            }
             Phase::Beam(Beam::Listening) => Some(Action::Fire {
                 window_ticks: settings.window_ticks,
                 max_echoes: settings.max_echoes,

@@ -127,10 +127,7 @@ impl Device {
     /// A device that has just booted. It announces itself with an Identity.
     #[must_use]
     pub fn new(board: Board) -> Self {
-        let board = Board {
-            boot: board.boot.max(1),
-            ..board
-        };
+        let board = Board { boot: board.boot.max(1), ..board };
         Self {
             board,
             now: 0,
@@ -161,9 +158,7 @@ impl Device {
             Received::Nothing => {}
             Received::Empty => self.counters.empty = self.counters.empty.saturating_add(1),
             Received::Dropped(reason) => self.counters.count(reason),
-            Received::Frame(RawFrame {
-                header, body, crc, ..
-            }) => {
+            Received::Frame(RawFrame { header, body, crc, .. }) => {
                 let request = Request::decode(body).ok();
                 self.handle_frame(header, crc, request);
             }

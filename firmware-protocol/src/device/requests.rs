@@ -19,8 +19,7 @@ impl Device {
     pub(super) fn handle_frame(&mut self, header: Header, crc: u32, request: Option<Request>) {
         let Some(request) = request else {
             self.counters.undecodable = self.counters.undecodable.saturating_add(1);
-            self.outbox
-                .answer(header.seq, Answer::Nak(NakReason::UnknownRequest));
+            self.outbox.answer(header.seq, Answer::Nak(NakReason::UnknownRequest));
             return;
         };
         let addressed = header.boot == self.board.boot;
@@ -32,8 +31,7 @@ impl Device {
             Request::Stop if !addressed => self.stop_for_stranger(header.seq),
             _ if !addressed => {
                 self.counters.stale = self.counters.stale.saturating_add(1);
-                self.outbox
-                    .answer(header.seq, Answer::Nak(NakReason::WrongBoot));
+                self.outbox.answer(header.seq, Answer::Nak(NakReason::WrongBoot));
             }
             _ => self.handle_numbered(header.seq, crc, &request),
         }
@@ -46,8 +44,7 @@ impl Device {
         };
         match seq.wrapping_sub(last.seq) {
             0 if crc != last.crc => {
-                self.outbox
-                    .answer(seq, Answer::Nak(NakReason::SequenceReused));
+                self.outbox.answer(seq, Answer::Nak(NakReason::SequenceReused));
             }
             0 => self.repeat(last, request),
             1..0x8000 => self.accept(seq, crc, request),
@@ -62,18 +59,12 @@ impl Device {
             None if self.phase != Phase::Idle && self.phase_seq == last.seq => {
                 self.outbox.answer(last.seq, Answer::Started);
             }
-            None => self
-                .outbox
-                .answer(last.seq, Answer::Nak(NakReason::Stopped)),
+            None => self.outbox.answer(last.seq, Answer::Nak(NakReason::Stopped)),
         }
     }
 
     fn accept(&mut self, seq: u16, crc: u32, request: &Request) {
-        self.last = Some(Accepted {
-            seq,
-            crc,
-            answer: None,
-        });
+        self.last = Some(Accepted { seq, crc, answer: None });
         match self.perform(seq, request) {
             Ok(Outcome::Done(answer)) => self.conclude(seq, answer),
             Ok(Outcome::Told(answer)) => self.outbox.answer(seq, answer),
@@ -97,11 +88,7 @@ impl Device {
             Request::Identify => Ok(Outcome::Told(Answer::Identity)),
             Request::Stop => Ok(self.stop(seq)),
             Request::Reset => Ok(self.reset()),
-            Request::Resend {
-                sweep,
-                first,
-                count,
-            } => Ok(self.resend(sweep, first, count)),
+            Request::Resend { sweep, first, count } => Ok(self.resend(sweep, first, count)),
             Request::KeepAlive { sweep, next } => Ok(self.keep_alive(sweep, next)),
             Request::Status => Ok(Outcome::Told(Answer::Status { ticks: self.now })),
             _ if self.phase != Phase::Idle => Err(NakReason::Busy),
@@ -207,11 +194,7 @@ impl Device {
     }
 
     fn at_home(&self) -> Result<(), NakReason> {
-        if self.homed {
-            Ok(())
-        } else {
-            Err(NakReason::NotHomed)
-        }
+        if self.homed { Ok(()) } else { Err(NakReason::NotHomed) }
     }
 
     /// Begins a phase that serves request `seq`.

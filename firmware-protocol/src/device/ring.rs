@@ -31,13 +31,7 @@ pub(super) struct Ring {
 
 impl Ring {
     pub(super) const fn new() -> Self {
-        Self {
-            bytes: [0; CAPACITY],
-            oldest: 0,
-            used: 0,
-            first: 0,
-            count: 0,
-        }
+        Self { bytes: [0; CAPACITY], oldest: 0, used: 0, first: 0, count: 0 }
     }
 
     /// Forgets everything; the next reading has index 0.
@@ -88,9 +82,7 @@ impl Ring {
 
     /// The reading of beam `index`, if it is kept.
     pub(super) fn get(&self, index: u16) -> Option<Kept> {
-        let behind = index
-            .checked_sub(self.first)
-            .filter(|&behind| behind < self.count)?;
+        let behind = index.checked_sub(self.first).filter(|&behind| behind < self.count)?;
         let mut cursor = self.oldest;
         for _ in 0..behind {
             cursor = cursor.wrapping_add(low_byte(kept_bytes(self.echo_count_at(cursor))));
@@ -111,11 +103,7 @@ impl Ring {
             // Fits: it came out of such a list.
             let _ = echoes.push(u32::from_le_bytes([next(), next(), next(), 0]));
         }
-        Kept {
-            fired_ticks,
-            status,
-            echoes,
-        }
+        Kept { fired_ticks, status, echoes }
     }
 
     fn echo_count_at(&self, start: u8) -> u8 {
@@ -145,14 +133,7 @@ const fn unpack(byte: u8) -> (ReadingStatus, u8) {
         _ => ReadingStatus::StepDoubtful,
     };
     let echo_count = byte & 0x0f;
-    (
-        status,
-        if echo_count > MAX_ECHOES {
-            MAX_ECHOES
-        } else {
-            echo_count
-        },
-    )
+    (status, if echo_count > MAX_ECHOES { MAX_ECHOES } else { echo_count })
 }
 
 /// Offsets count modulo 256.
@@ -160,11 +141,77 @@ const fn low_byte(value: u16) -> u8 {
     value as u8
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a list of echoes has at most eight"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "a list of echoes has at most eight")]
 /// A list of echoes has at most eight.
 const fn low_byte_of_len(len: usize) -> u8 {
     len as u8
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::collections::VecDeque;
+    use std::vec::Vec;
+
+    use proptest::prelude::*;
+
+    use super::{Kept, Ring};
+    use crate::messages::limits::{MAX_ECHOES, readings_in};
+    use crate::messages::{Echoes, ReadingStatus};
+
+    fn kept(fired_ticks: u32, echo_count: u8) -> Kept {
+        let ticks: Vec<u32> = (0..u32::from(echo_count))
+            .map(|echo| fired_ticks / 7 % 1_000 + echo)
+            .collect();
+        Kept {
+            fired_ticks,
+            status: ReadingStatus::Echo,
+            echoes: Echoes::from_ticks(&ticks),
+        }
+    }
+
+    proptest! {
+        /// The ring against a queue that is never short of room.
+        #[test]
+        fn keeps_what_a_queue_keeps(
+            operations in prop::collection::vec((any::<bool>(), any::<u32>(), 0..=MAX_ECHOES), 1..400),
+        ) {
+            let mut ring = Ring::new();
+            let mut queue = VecDeque::new();
+            let mut first = 0_u16;
+            for (push, number, echo_count) in operations {
+                if push && ring.has_room(echo_count) {
+                    ring.push(&kept(number, echo_count));
+                    queue.push_back(kept(number, echo_count));
+                } else if !push {
+                    let next = first + u16::try_from(number % 4).expect("small");
+                    ring.acknowledge(next);
+                    while first < next && queue.pop_front().is_some() {
+                        first += 1;
+                    }
+                }
+                prop_assert_eq!(ring.first(), first);
+                for (index, expected) in (first..).zip(&queue) {
+                    prop_assert_eq!(ring.get(index), Some(*expected));
+                }
+                let end = first + u16::try_from(queue.len()).expect("small");
+                prop_assert_eq!(ring.get(end), None);
+            }
+        }
+    }
+
+    #[test]
+    fn holds_as_many_as_the_host_reckons_with() {
+        for echo_count in 0..=MAX_ECHOES {
+            let mut ring = Ring::new();
+            let mut count = 0;
+            while ring.has_room(echo_count) {
+                ring.push(&kept(count, echo_count));
+                count += 1;
+            }
+            assert_eq!(count, u32::from(readings_in(256, echo_count)));
+            assert!(count <= 64, "the host remembers 64 beams out of order");
+        }
+    }
 }

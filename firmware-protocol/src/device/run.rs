@@ -11,21 +11,9 @@ const TICKS_PER_MS: u32 = TICK_HZ / 1_000;
 
 impl Run {
     pub(super) const fn none() -> Self {
-        let plan = Sweep {
-            sweep: 0,
-            first_step: 0,
-            stride: 0,
-            stops: 0,
-            pings_per_stop: 1,
-            lease_ms: 0,
-        };
-        Self {
-            plan,
-            seq: 0,
-            beams: 0,
-            fired: 0,
-            state: SweepState::None,
-        }
+        let plan =
+            Sweep { sweep: 0, first_step: 0, stride: 0, stops: 0, pings_per_stop: 1, lease_ms: 0 };
+        Self { plan, seq: 0, beams: 0, fired: 0, state: SweepState::None }
     }
 
     pub(super) const fn ping(seq: u16, step: i32) -> Self {
@@ -37,23 +25,11 @@ impl Run {
             pings_per_stop: 1,
             lease_ms: 0,
         };
-        Self {
-            plan,
-            seq,
-            beams: 1,
-            fired: 0,
-            state: SweepState::Running,
-        }
+        Self { plan, seq, beams: 1, fired: 0, state: SweepState::Running }
     }
 
     pub(super) const fn sweep(seq: u16, plan: Sweep, beams: u16) -> Self {
-        Self {
-            plan,
-            seq,
-            beams,
-            fired: 0,
-            state: SweepState::Running,
-        }
+        Self { plan, seq, beams, fired: 0, state: SweepState::Running }
     }
 
     pub(super) const fn is_ping(&self) -> bool {
@@ -133,11 +109,7 @@ impl Device {
             ReadingStatus::Echo if echoes.is_empty() => ReadingStatus::NoEcho,
             status => status,
         };
-        self.ring.push(&Kept {
-            fired_ticks: report.fired_ticks,
-            status,
-            echoes,
-        });
+        self.ring.push(&Kept { fired_ticks: report.fired_ticks, status, echoes });
         self.run.fired = self.run.fired.wrapping_add(1);
         self.next_beam();
     }
@@ -186,9 +158,8 @@ impl Device {
 
     fn moved_to(&mut self, step: i32) {
         self.step = step;
-        self.timers.settle = self
-            .settings
-            .and_then(|settings| armed(self.now, settings.settle_ticks));
+        self.timers.settle =
+            self.settings.and_then(|settings| armed(self.now, settings.settle_ticks));
     }
 
     /// Everything stops at once, the coils are let go, and the position is not known any more.
@@ -267,9 +238,5 @@ impl Device {
 
 /// A deadline `ticks` from now; none if that is at once.
 const fn armed(now: u32, ticks: u32) -> Option<u32> {
-    if ticks == 0 {
-        None
-    } else {
-        Some(now.wrapping_add(ticks))
-    }
+    if ticks == 0 { None } else { Some(now.wrapping_add(ticks)) }
 }

@@ -12,45 +12,24 @@ pub(super) fn check_settings(
     settings: &Settings,
     capabilities: Capabilities,
 ) -> Result<(), NakReason> {
-    let max_echoes = if capabilities.has(Capabilities::MULTIPLE_ECHOES) {
-        MAX_ECHOES
-    } else {
-        1
-    };
+    let max_echoes = if capabilities.has(Capabilities::MULTIPLE_ECHOES) { MAX_ECHOES } else { 1 };
     let checks = [
         (
             (WINDOW_TICKS_MIN..=WINDOW_TICKS_MAX).contains(&settings.window_ticks),
             NakReason::WindowOutOfRange,
         ),
-        (
-            settings.min_interval_ticks <= INTERVAL_TICKS_MAX,
-            NakReason::IntervalOutOfRange,
-        ),
-        (
-            settings.settle_ticks <= SETTLE_TICKS_MAX,
-            NakReason::SettleOutOfRange,
-        ),
-        (
-            (1..=max_echoes).contains(&settings.max_echoes),
-            NakReason::EchoesOutOfRange,
-        ),
-        (
-            blanking_is_right(settings, capabilities),
-            NakReason::BlankingOutOfRange,
-        ),
-        (
-            (1..=SPEED_MAX).contains(&settings.speed),
-            NakReason::SpeedOutOfRange,
-        ),
+        (settings.min_interval_ticks <= INTERVAL_TICKS_MAX, NakReason::IntervalOutOfRange),
+        (settings.settle_ticks <= SETTLE_TICKS_MAX, NakReason::SettleOutOfRange),
+        ((1..=max_echoes).contains(&settings.max_echoes), NakReason::EchoesOutOfRange),
+        (blanking_is_right(settings, capabilities), NakReason::BlankingOutOfRange),
+        ((1..=SPEED_MAX).contains(&settings.speed), NakReason::SpeedOutOfRange),
         (
             (1..=ACCELERATION_MAX).contains(&settings.acceleration),
             NakReason::AccelerationOutOfRange,
         ),
         (settings.hold_s <= HOLD_S_MAX, NakReason::HoldOutOfRange),
     ];
-    checks
-        .into_iter()
-        .try_for_each(|(right, reason)| if right { Ok(()) } else { Err(reason) })
+    checks.into_iter().try_for_each(|(right, reason)| if right { Ok(()) } else { Err(reason) })
 }
 
 fn blanking_is_right(settings: &Settings, capabilities: Capabilities) -> bool {
@@ -75,17 +54,12 @@ pub(super) fn check_step(step: i32) -> Result<(), NakReason> {
 
 /// Checks a plan; gives its number of beams.
 pub(super) fn check_plan(plan: &Sweep) -> Result<u16, NakReason> {
-    let beams = plan
-        .beams()
-        .filter(|_| plan.sweep != 0)
-        .ok_or(NakReason::SweepOutOfRange)?;
+    let beams = plan.beams().filter(|_| plan.sweep != 0).ok_or(NakReason::SweepOutOfRange)?;
     if plan.lease_ms < LEASE_MS_MIN {
         return Err(NakReason::LeaseOutOfRange);
     }
     check_step(plan.first_step)?;
-    let last = plan
-        .step_of(beams.wrapping_sub(1))
-        .ok_or(NakReason::PositionOutOfRange)?;
+    let last = plan.step_of(beams.wrapping_sub(1)).ok_or(NakReason::PositionOutOfRange)?;
     check_step(last)?;
     Ok(beams)
 }

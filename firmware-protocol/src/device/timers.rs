@@ -52,10 +52,7 @@ pub(super) fn expire(slot: &mut Option<u32>, now: u32) -> bool {
 }
 
 /// Ticks from `now` to `at`; negative if `at` has passed.
-#[expect(
-    clippy::cast_possible_wrap,
-    reason = "serial arithmetic on a clock that wraps"
-)]
+#[expect(clippy::cast_possible_wrap, reason = "serial arithmetic on a clock that wraps")]
 pub(super) const fn ticks_until(now: u32, at: u32) -> i32 {
     at.wrapping_sub(now) as i32
 }

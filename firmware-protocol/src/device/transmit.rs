@@ -78,9 +78,7 @@ impl Device {
             let Some(frame) = &self.outbox.frame else {
                 break;
             };
-            let rest = frame
-                .get(usize::from(self.outbox.frame_at)..)
-                .unwrap_or_default();
+            let rest = frame.get(usize::from(self.outbox.frame_at)..).unwrap_or_default();
             let count = rest.len().min(room.len());
             for (slot, byte) in room.iter_mut().zip(rest) {
                 *slot = *byte;
@@ -149,14 +147,7 @@ impl Device {
     }
 
     fn frame(&self, seq: u16, reply: &Reply) -> Option<Frame> {
-        Frame::encode(
-            Header {
-                boot: self.board.boot,
-                seq,
-            },
-            reply,
-        )
-        .ok()
+        Frame::encode(Header { boot: self.board.boot, seq }, reply).ok()
     }
 
     fn reply(&self, answer: Answer) -> Option<Reply> {
@@ -205,18 +196,8 @@ impl Device {
 
     const fn alive(&self, ticks: u32) -> Alive {
         let run = &self.run;
-        let state = if run.is_ping() {
-            SweepState::None
-        } else {
-            run.state
-        };
-        Alive {
-            ticks,
-            sweep: run.plan.sweep,
-            fired: run.fired,
-            sent: self.outbox.sent,
-            state,
-        }
+        let state = if run.is_ping() { SweepState::None } else { run.state };
+        Alive { ticks, sweep: run.plan.sweep, fired: run.fired, sent: self.outbox.sent, state }
     }
 
     fn status(&self, ticks: u32) -> Status {
@@ -245,20 +226,13 @@ impl Device {
             Phase::Moving { .. } => DeviceState::Moving,
             Phase::Stopping => DeviceState::Stopping,
             Phase::Beam(Beam::Moving { .. } | Beam::Waiting | Beam::Listening) => {
-                if self.run.is_ping() {
-                    DeviceState::Pinging
-                } else {
-                    DeviceState::Sweeping
-                }
+                if self.run.is_ping() { DeviceState::Pinging } else { DeviceState::Sweeping }
             }
         }
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a frame has at most 66 bytes"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "a frame has at most 66 bytes")]
 /// A frame has at most 66 bytes.
 const fn low_byte(len: usize) -> u8 {
     len as u8

@@ -106,12 +106,7 @@ impl FrameDecoder {
     /// A decoder between frames.
     #[must_use]
     pub const fn new() -> Self {
-        Self {
-            payload: [0; PAYLOAD_MAX],
-            len: 0,
-            run: 0,
-            state: State::Between,
-        }
+        Self { payload: [0; PAYLOAD_MAX], len: 0, run: 0, state: State::Between }
     }
 
     /// Takes the next byte from the line.

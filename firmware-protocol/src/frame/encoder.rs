@@ -36,28 +36,17 @@ impl Frame {
         let mut bytes = [DELIMITER; FRAME_MAX + 1];
         let [boot_low, boot_high] = header.boot.to_le_bytes();
         let [seq_low, seq_high] = header.seq.to_le_bytes();
-        put(
-            &mut bytes,
-            PAYLOAD_AT,
-            [boot_low, boot_high, seq_low, seq_high],
-        )?;
+        put(&mut bytes, PAYLOAD_AT, [boot_low, boot_high, seq_low, seq_high])?;
         let room = PAYLOAD_AT + HEADER_LEN..PAYLOAD_AT + PAYLOAD_MAX - CRC_LEN;
         let body = bytes.get_mut(room).ok_or(TooLong)?;
-        let body_len = postcard::to_slice(message, body)
-            .map_err(|_| TooLong)?
-            .len();
+        let body_len = postcard::to_slice(message, body).map_err(|_| TooLong)?.len();
         let covered = HEADER_LEN + body_len;
         let crc = crc32(bytes.get(PAYLOAD_AT..PAYLOAD_AT + covered).ok_or(TooLong)?);
         put(&mut bytes, PAYLOAD_AT + covered, crc.to_le_bytes())?;
         let payload_len = covered + CRC_LEN;
         stuff(bytes.get_mut(1..PAYLOAD_AT + payload_len).ok_or(TooLong)?);
         let end = u8::try_from(PAYLOAD_AT + payload_len + 1).map_err(|_| TooLong)?;
-        Ok(Self {
-            bytes,
-            start: 1,
-            end,
-            crc,
-        })
+        Ok(Self { bytes, start: 1, end, crc })
     }
 
     /// The same with a delimiter in front as well, which ends whatever noise came before.
@@ -77,17 +66,12 @@ impl Deref for Frame {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
-        self.bytes
-            .get(usize::from(self.start)..usize::from(self.end))
-            .unwrap_or_default()
+        self.bytes.get(usize::from(self.start)..usize::from(self.end)).unwrap_or_default()
     }
 }
 
 fn put(bytes: &mut [u8], at: usize, value: [u8; 4]) -> Result<(), TooLong> {
-    bytes
-        .get_mut(at..at + 4)
-        .ok_or(TooLong)?
-        .copy_from_slice(&value);
+    bytes.get_mut(at..at + 4).ok_or(TooLong)?.copy_from_slice(&value);
     Ok(())
 }
 

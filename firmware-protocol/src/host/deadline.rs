@@ -81,8 +81,58 @@ impl Margin {
             Some((mean, deviation)) => mean + (4 * deviation).max(self.min_us),
         };
         let doublings = u32::from(attempt.saturating_sub(1)).min(16);
-        base.clamp(self.min_us, self.max_us)
-            .saturating_mul(1 << doublings)
-            .min(self.max_us)
+        base.clamp(self.min_us, self.max_us).saturating_mul(1 << doublings).min(self.max_us)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{HostConfig, Margin, slew_us, wire_us};
+    use crate::messages::{Blanking, Settings};
+
+    fn settings(speed: u16, acceleration: u32) -> Settings {
+        Settings {
+            window_ticks: 48_000,
+            min_interval_ticks: 0,
+            settle_ticks: 0,
+            max_echoes: 1,
+            blanking: Blanking::Internal,
+            speed,
+            acceleration,
+            hold_s: 0,
+        }
+    }
+
+    #[test]
+    fn bytes_take_ten_bits() {
+        assert_eq!(wire_us(1, 1_000_000), 10);
+        assert_eq!(wire_us(66, 115_200), 5_730);
+    }
+
+    #[test]
+    fn slewing_follows_the_trapezoid() {
+        // 100 steps at 1000 steps/s^2 never reach 1000 steps/s: 2 sqrt(0.1) s.
+        assert_eq!(slew_us(100, &settings(1_000, 1_000)), 632_456);
+        // 3000 steps do: 3 s at speed, and 1 s more for both ramps.
+        assert_eq!(slew_us(3_000, &settings(1_000, 1_000)), 4_000_000);
+        // Both forms agree where the speed is just reached.
+        assert!(slew_us(1_000, &settings(1_000, 1_000)).abs_diff(2_000_000) <= 2);
+        assert!(slew_us(u32::MAX, &settings(1, 200_000)) > 4_000_000_000_000_000);
+    }
+
+    #[test]
+    fn margins_follow_what_replies_take() {
+        let config = HostConfig::new(115_200, 1);
+        let mut margin = Margin::new(&config);
+        assert_eq!(margin.us(1), 200_000);
+        assert_eq!(margin.us(2), 400_000);
+        assert_eq!(margin.us(200), 2_000_000);
+        margin.sample(16_000);
+        // RFC 6298: mean R, deviation R/2, so R + 4 R/2.
+        assert_eq!(margin.us(1), 48_000);
+        for _ in 0..100 {
+            margin.sample(16_000);
+        }
+        assert!(margin.us(1).abs_diff(36_000) < 100, "{}", margin.us(1));
     }
 }

@@ -144,11 +144,7 @@ impl fmt::Display for HostError {
                 formatter,
                 "{bytes} bytes came back but no frame: wrong baud rate, or not a sonard device"
             ),
-            Self::WrongVersion {
-                ours,
-                theirs,
-                firmware,
-            } => write!(
+            Self::WrongVersion { ours, theirs, firmware } => write!(
                 formatter,
                 "wrong version: the device (firmware {}.{}.{}) speaks protocol {} ({:08x}), this sonard speaks {} ({:08x})",
                 firmware.major,
@@ -167,17 +163,10 @@ impl fmt::Display for HostError {
             Self::MotionFault => write!(formatter, "{}", FaultKind::MotionFault),
             Self::Stopped => formatter.write_str("it was stopped"),
             Self::Stalled { fired } => {
-                write!(
-                    formatter,
-                    "the device answers but makes no progress after {fired} beams"
-                )
+                write!(formatter, "the device answers but makes no progress after {fired} beams")
             }
             Self::SweepLost => formatter.write_str("the device does not know the sweep any more"),
-            Self::WrongReading {
-                index,
-                step,
-                planned,
-            } => match planned {
+            Self::WrongReading { index, step, planned } => match planned {
                 Some(planned) => write!(
                     formatter,
                     "reading {index} was taken at step {step} instead of {planned}"

@@ -28,11 +28,7 @@ pub(super) struct Numbers {
 
 impl Numbers {
     pub(super) fn new(seed: u32) -> Self {
-        let mut numbers = Self {
-            seq: 0,
-            sweep: 0,
-            random: seed | 1,
-        };
+        let mut numbers = Self { seq: 0, sweep: 0, random: seed | 1 };
         numbers.seq = numbers.random();
         numbers.sweep = numbers.random();
         numbers
@@ -70,20 +66,13 @@ impl Host {
     /// Sends a new request.
     pub(super) fn send(&mut self, now_us: u64, request: Request) {
         let seq = self.numbers.next_seq();
-        let boot = self
-            .identity
-            .as_ref()
-            .map_or(Header::BOOT_UNKNOWN, |identity| identity.boot);
+        let boot = self.identity.as_ref().map_or(Header::BOOT_UNKNOWN, |identity| identity.boot);
         // Every request fits a frame; there is a test.
         let Ok(frame) = Frame::encode(Header { boot, seq }, &request) else {
             return;
         };
         let first = self.stats.frames_sent == 0 || matches!(request, Request::Identify);
-        let frame = if first {
-            frame.with_leading_delimiter()
-        } else {
-            frame
-        };
+        let frame = if first { frame.with_leading_delimiter() } else { frame };
         let exchange = Exchange {
             request,
             seq,
@@ -141,15 +130,11 @@ impl Host {
         let (bytes, frames) = self.received_before;
         let bytes = self.stats.bytes_received - bytes;
         if exchange.started {
-            HostError::Stalled {
-                fired: self.track.as_ref().map_or(0, |track| track.fired),
-            }
+            HostError::Stalled { fired: self.track.as_ref().map_or(0, |track| track.fired) }
         } else if bytes > 0 && self.stats.frames_received == frames {
             HostError::NotADevice { bytes }
         } else {
-            HostError::NoAnswer {
-                attempts: exchange.attempts,
-            }
+            HostError::NoAnswer { attempts: exchange.attempts }
         }
     }
 
@@ -189,10 +174,7 @@ impl Host {
         let Some(settings) = &self.settings else {
             return 0;
         };
-        let revolution = self
-            .identity
-            .as_ref()
-            .map_or(0, |id| u32::from(id.steps_per_revolution));
+        let revolution = self.identity.as_ref().map_or(0, |id| u32::from(id.steps_per_revolution));
         match *request {
             Request::Home => slew_us(2 * revolution, settings),
             Request::MoveTo { step } => {
@@ -224,10 +206,7 @@ impl Host {
 
     /// The open request, if `seq` is its number.
     pub(super) fn request_with(&self, seq: u16) -> Option<Request> {
-        self.exchange
-            .as_ref()
-            .filter(|exchange| exchange.seq == seq)
-            .map(|open| open.request)
+        self.exchange.as_ref().filter(|exchange| exchange.seq == seq).map(|open| open.request)
     }
 
     pub(super) fn is_stopping(&self) -> bool {

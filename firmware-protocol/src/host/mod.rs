@@ -147,10 +147,8 @@ impl Host {
         if self.identity.is_none() {
             return Err(StartError::NotIdentified);
         }
-        let needs_settings = !matches!(
-            command,
-            Command::Configure(_) | Command::Status | Command::Reset
-        );
+        let needs_settings =
+            !matches!(command, Command::Configure(_) | Command::Status | Command::Reset);
         if needs_settings && self.settings.is_none() {
             return Err(StartError::NotConfigured);
         }
@@ -192,11 +190,7 @@ impl Host {
 
     /// Time has passed. Call at [`Host::poll_timeout`], or at any other time.
     pub fn handle_timeout(&mut self, now_us: u64) {
-        if self
-            .exchange
-            .as_ref()
-            .is_some_and(|exchange| exchange.deadline_us <= now_us)
-        {
+        if self.exchange.as_ref().is_some_and(|exchange| exchange.deadline_us <= now_us) {
             self.retry(now_us);
         }
         self.continue_sweep(now_us);
@@ -215,11 +209,7 @@ impl Host {
     #[must_use]
     pub fn poll_timeout(&self) -> Option<(HostTimer, u64)> {
         if let Some(exchange) = &self.exchange {
-            let timer = if exchange.started {
-                HostTimer::Completion
-            } else {
-                HostTimer::Reply
-            };
+            let timer = if exchange.started { HostTimer::Completion } else { HostTimer::Reply };
             return Some((timer, exchange.deadline_us));
         }
         let track = self.track.as_ref()?;

@@ -22,10 +22,7 @@ impl Host {
             self.time_reply(now_us, wire_len);
             return self.identified(identity);
         }
-        let identifying = self
-            .exchange
-            .as_ref()
-            .filter(|open| open.request == Request::Identify);
+        let identifying = self.exchange.as_ref().filter(|open| open.request == Request::Identify);
         if identifying.is_some() {
             // It has just booted, so it may have missed the question.
             if let Some(open) = &mut self.exchange {
@@ -59,10 +56,8 @@ impl Host {
     /// A right frame that is no message of this version.
     pub(super) fn handle_undecodable(&mut self, stranger: Option<(ProtocolId, FirmwareVersion)>) {
         self.stats.dropped.undecodable = self.stats.dropped.undecodable.saturating_add(1);
-        let identifying = self
-            .exchange
-            .as_ref()
-            .is_some_and(|open| open.request == Request::Identify);
+        let identifying =
+            self.exchange.as_ref().is_some_and(|open| open.request == Request::Identify);
         if let Some((theirs, firmware)) = stranger
             && identifying
         {
@@ -71,11 +66,7 @@ impl Host {
     }
 
     fn wrong_version(&mut self, theirs: ProtocolId, firmware: FirmwareVersion) {
-        self.fail(HostError::WrongVersion {
-            ours: PROTOCOL,
-            theirs,
-            firmware,
-        });
+        self.fail(HostError::WrongVersion { ours: PROTOCOL, theirs, firmware });
     }
 
     pub(super) fn handle_reply(
@@ -124,9 +115,7 @@ impl Host {
     }
 
     fn is_new_boot(&self, boot: u16) -> bool {
-        self.identity
-            .as_ref()
-            .is_some_and(|identity| identity.boot != boot)
+        self.identity.as_ref().is_some_and(|identity| identity.boot != boot)
             && self.previous_boot != Some(boot)
     }
 
@@ -163,12 +152,7 @@ impl Host {
     /// A reply that carries the number of the open request.
     fn handle_answer(&mut self, now_us: u64, request: &Request, reply: &Reply, wire_len: u8) {
         match (*reply, *request) {
-            (
-                Reply::Nak {
-                    reason: NakReason::SequenceReused,
-                },
-                _,
-            ) => self.renumber(now_us),
+            (Reply::Nak { reason: NakReason::SequenceReused }, _) => self.renumber(now_us),
             (Reply::Nak { reason }, _) => self.fail(HostError::Refused(reason)),
             (Reply::Started, _) => {
                 self.time_reply(now_us, wire_len);
@@ -221,10 +205,7 @@ impl Host {
         if self.has_room_for_reading() {
             self.stats.readings += 1;
             let reading = *reading;
-            self.report(HostEvent::Reading {
-                reading,
-                repaired: false,
-            });
+            self.report(HostEvent::Reading { reading, repaired: false });
             self.finish(Outcome::Pinged);
         }
     }
@@ -241,12 +222,7 @@ impl Host {
         let (sent_us, retried) = (open.sent_us, open.attempts > 1);
         if self.has_room_for_reading() {
             let received_us = now_us;
-            self.report(HostEvent::ClockSample {
-                sent_us,
-                received_us,
-                device_ticks,
-                retried,
-            });
+            self.report(HostEvent::ClockSample { sent_us, received_us, device_ticks, retried });
         }
     }
 }

@@ -12,10 +12,7 @@ impl Host {
         let settings = self.settings.as_ref().ok_or(StartError::NotConfigured)?;
         let identity = self.identity.as_ref().ok_or(StartError::NotIdentified)?;
         let kept = readings_in(identity.ring_bytes, settings.max_echoes);
-        let plan = Sweep {
-            sweep: self.numbers.next_sweep(),
-            ..plan
-        };
+        let plan = Sweep { sweep: self.numbers.next_sweep(), ..plan };
         self.job = Some(Command::Sweep(plan));
         self.received_before = (self.stats.bytes_received, self.stats.frames_received);
         self.track = Some(Track::new(plan, beams, kept / 4, now_us));
@@ -26,10 +23,7 @@ impl Host {
 
     /// A reading of a sweep came in.
     pub(super) fn handle_beam(&mut self, now_us: u64, reading: &Reading) {
-        let Some(track) = self
-            .track
-            .as_ref()
-            .filter(|track| track.plan.sweep == reading.sweep)
+        let Some(track) = self.track.as_ref().filter(|track| track.plan.sweep == reading.sweep)
         else {
             self.stats.duplicates += 1;
             return;
@@ -52,27 +46,16 @@ impl Host {
         self.step = Some(reading.step);
         self.stats.readings += 1;
         self.stats.repaired += u64::from(repaired);
-        self.report(HostEvent::Reading {
-            reading: *reading,
-            repaired,
-        });
+        self.report(HostEvent::Reading { reading: *reading, repaired });
         self.expect_progress(now_us);
         // A reading proves that the plan was accepted, whatever became of the Ack.
-        if self
-            .exchange
-            .as_ref()
-            .is_some_and(|open| matches!(open.request, Request::Sweep(_)))
-        {
+        if self.exchange.as_ref().is_some_and(|open| matches!(open.request, Request::Sweep(_))) {
             self.exchange = None;
         }
     }
 
     pub(super) fn handle_sweep_done(&mut self, now_us: u64, done: &SweepDone) {
-        let Some(track) = self
-            .track
-            .as_mut()
-            .filter(|track| track.plan.sweep == done.sweep)
-        else {
+        let Some(track) = self.track.as_mut().filter(|track| track.plan.sweep == done.sweep) else {
             return;
         };
         track.learn(done.fired, done.fired);
@@ -141,14 +124,7 @@ impl Host {
             || track.progress_at_us <= now_us;
         let next = track.next;
         if let Some((first, count)) = track.missing() {
-            self.send(
-                now_us,
-                Request::Resend {
-                    sweep,
-                    first,
-                    count,
-                },
-            );
+            self.send(now_us, Request::Resend { sweep, first, count });
         } else if due {
             self.send(now_us, Request::KeepAlive { sweep, next });
         }
@@ -166,17 +142,9 @@ impl Host {
         let track = self.track.take();
         self.step = None;
         if let Some(track) = track {
-            let end = if track.is_complete() {
-                SweepState::Complete
-            } else {
-                SweepState::Stopped
-            };
+            let end = if track.is_complete() { SweepState::Complete } else { SweepState::Stopped };
             let (sweep, delivered) = (track.plan.sweep, track.delivered);
-            self.report(HostEvent::SweepDone {
-                sweep,
-                delivered,
-                end,
-            });
+            self.report(HostEvent::SweepDone { sweep, delivered, end });
         }
         self.finish(super::Outcome::Stopped);
     }
@@ -186,10 +154,7 @@ impl Host {
         let (Some(track), Some(settings)) = (&self.track, &self.settings) else {
             return;
         };
-        let target = track
-            .plan
-            .step_of(track.fired)
-            .unwrap_or(track.plan.first_step);
+        let target = track.plan.step_of(track.fired).unwrap_or(track.plan.first_step);
         let distance = match self.step {
             Some(from) => target.abs_diff(from),
             None => target.unsigned_abs(),

@@ -73,32 +73,22 @@ impl Track {
         let index = reading.index;
         let planned = self.plan.step_of(index).filter(|_| index < self.beams);
         if planned != Some(reading.step) {
-            return Err(HostError::WrongReading {
-                index,
-                step: reading.step,
-                planned,
-            });
+            return Err(HostError::WrongReading { index, step: reading.step, planned });
         }
         Ok(match index.checked_sub(self.next) {
             None => Place::Duplicate,
             Some(ahead) if ahead >= WINDOW => Place::Beyond,
             Some(ahead) if self.seen >> ahead & 1 == 1 => Place::Duplicate,
-            Some(_) => Place::New {
-                repaired: index < self.sent,
-            },
+            Some(_) => Place::New { repaired: index < self.sent },
         })
     }
 
     /// Marks beam `index` as delivered.
     pub(super) fn deliver(&mut self, index: u16) {
-        self.seen |= 1_u64
-            .checked_shl(u32::from(index.wrapping_sub(self.next)))
-            .unwrap_or(0);
+        self.seen |= 1_u64.checked_shl(u32::from(index.wrapping_sub(self.next))).unwrap_or(0);
         let complete = self.seen.trailing_ones();
         self.seen = self.seen.checked_shr(complete).unwrap_or(0);
-        self.next = self
-            .next
-            .saturating_add(u16::try_from(complete).unwrap_or(0));
+        self.next = self.next.saturating_add(u16::try_from(complete).unwrap_or(0));
         self.delivered = self.delivered.saturating_add(1);
         self.unacknowledged = self.unacknowledged.saturating_add(1);
         self.learn(index.saturating_add(1), index.saturating_add(1));
@@ -121,10 +111,7 @@ impl Track {
 
     /// The first beams that were sent but are not there: index of the first, and how many.
     pub(super) fn missing(&self) -> Option<(u16, u8)> {
-        let known = self
-            .sent
-            .checked_sub(self.next)
-            .filter(|&known| known > 0)?;
+        let known = self.sent.checked_sub(self.next).filter(|&known| known > 0)?;
         let hole = self.seen.trailing_zeros();
         let count = u32::from(known.min(WINDOW)).min(hole);
         Some((self.next, u8::try_from(count).unwrap_or(u8::MAX)))

@@ -22,10 +22,7 @@ impl Echoes {
     /// No echoes.
     #[must_use]
     pub const fn new() -> Self {
-        Self {
-            len: 0,
-            ticks: [0; MAX_ECHOES as usize],
-        }
+        Self { len: 0, ticks: [0; MAX_ECHOES as usize] }
     }
 
     /// The first [`MAX_ECHOES`] of `ticks` that are within range.
@@ -111,9 +108,7 @@ impl<'de> Visitor<'de> for EchoesVisitor {
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Echoes, A::Error> {
         let mut echoes = Echoes::new();
         while let Some(ticks) = list.next_element()? {
-            echoes
-                .push(ticks)
-                .map_err(|_| A::Error::custom("too many echoes, or too late"))?;
+            echoes.push(ticks).map_err(|_| A::Error::custom("too many echoes, or too late"))?;
         }
         Ok(echoes)
     }

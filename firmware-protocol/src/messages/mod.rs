@@ -24,10 +24,7 @@ use table::wire_enum;
 pub const PROTOCOL_VERSION: u8 = 1;
 
 /// The protocol this crate speaks.
-pub const PROTOCOL: ProtocolId = ProtocolId {
-    version: PROTOCOL_VERSION,
-    schema: SCHEMA_HASH,
-};
+pub const PROTOCOL: ProtocolId = ProtocolId { version: PROTOCOL_VERSION, schema: SCHEMA_HASH };
 
 /// Hash of all names, codes, fields and types below: two builds with the same hash encode alike.
 pub const SCHEMA_HASH: u32 = schema_hash();

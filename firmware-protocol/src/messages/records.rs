@@ -145,18 +145,14 @@ impl Sweep {
     /// Number of beams; `None` if none or more than a sweep may have.
     #[must_use]
     pub fn beams(&self) -> Option<u16> {
-        self.stops
-            .checked_mul(u16::from(self.pings_per_stop))
-            .filter(|&beams| beams > 0)
+        self.stops.checked_mul(u16::from(self.pings_per_stop)).filter(|&beams| beams > 0)
     }
 
     /// Position of beam `index`, steps; `None` if out of the range of `i32` or without pings.
     #[must_use]
     pub fn step_of(&self, index: u16) -> Option<i32> {
         let stop = index.checked_div(u16::from(self.pings_per_stop))?;
-        i32::from(self.stride)
-            .checked_mul(i32::from(stop))?
-            .checked_add(self.first_step)
+        i32::from(self.stride).checked_mul(i32::from(stop))?.checked_add(self.first_step)
     }
 }
 

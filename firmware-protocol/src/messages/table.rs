@@ -99,10 +99,7 @@ pub(crate) use {wire_enum, wire_struct};
 pub(crate) const fn assert_codes(variants: &[Variant]) {
     let mut index = 0;
     while index < variants.len() {
-        assert!(
-            variants[index].code as usize == index,
-            "codes must count up from 0"
-        );
+        assert!(variants[index].code as usize == index, "codes must count up from 0");
         index += 1;
     }
 }

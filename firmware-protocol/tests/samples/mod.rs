@@ -23,10 +23,7 @@ pub fn requests() -> Vec<(&'static str, Request)> {
         acceleration: 40_000,
         hold_s: 60,
     };
-    let short = Settings {
-        blanking: Blanking::Short { ticks: 1_200 },
-        ..settings
-    };
+    let short = Settings { blanking: Blanking::Short { ticks: 1_200 }, ..settings };
     let plan = Sweep {
         sweep: 7,
         first_step: -200,
@@ -45,21 +42,8 @@ pub fn requests() -> Vec<(&'static str, Request)> {
         ("move-to", Request::MoveTo { step: -1_000_000 }),
         ("ping", Request::Ping),
         ("sweep", Request::Sweep(plan)),
-        (
-            "resend",
-            Request::Resend {
-                sweep: 7,
-                first: 300,
-                count: 5,
-            },
-        ),
-        (
-            "keep-alive",
-            Request::KeepAlive {
-                sweep: 7,
-                next: 128,
-            },
-        ),
+        ("resend", Request::Resend { sweep: 7, first: 300, count: 5 }),
+        ("keep-alive", Request::KeepAlive { sweep: 7, next: 128 }),
         ("status", Request::Status),
     ]
 }
@@ -68,26 +52,12 @@ pub fn replies() -> Vec<(&'static str, Reply)> {
     vec![
         ("identity", Reply::Identity(identity())),
         ("ack", Reply::Ack),
-        (
-            "nak",
-            Reply::Nak {
-                reason: NakReason::NotHomed,
-            },
-        ),
+        ("nak", Reply::Nak { reason: NakReason::NotHomed }),
         ("started", Reply::Started),
         ("homed", Reply::Homed { drift_steps: -3 }),
-        (
-            "reading-one-echo",
-            Reply::Reading(reading(ReadingStatus::Echo, &[9_652])),
-        ),
-        (
-            "reading-no-echo",
-            Reply::Reading(reading(ReadingStatus::NoEcho, &[])),
-        ),
-        (
-            "reading-eight-echoes",
-            Reply::Reading(reading(ReadingStatus::Echo, &EIGHT)),
-        ),
+        ("reading-one-echo", Reply::Reading(reading(ReadingStatus::Echo, &[9_652]))),
+        ("reading-no-echo", Reply::Reading(reading(ReadingStatus::NoEcho, &[]))),
+        ("reading-eight-echoes", Reply::Reading(reading(ReadingStatus::Echo, &EIGHT))),
         (
             "alive",
             Reply::Alive(Alive {
@@ -100,37 +70,19 @@ pub fn replies() -> Vec<(&'static str, Reply)> {
         ),
         (
             "sweep-done",
-            Reply::SweepDone(SweepDone {
-                sweep: 7,
-                fired: 400,
-                end: SweepState::Complete,
-            }),
+            Reply::SweepDone(SweepDone { sweep: 7, fired: 400, end: SweepState::Complete }),
         ),
         ("status-report", Reply::StatusReport(status())),
-        (
-            "fault",
-            Reply::Fault {
-                kind: FaultKind::EmergencyStop,
-            },
-        ),
+        ("fault", Reply::Fault { kind: FaultKind::EmergencyStop }),
     ]
 }
 
-const EIGHT: [u32; 8] = [
-    5_000, 10_000, 20_000, 40_000, 80_000, 160_000, 320_000, 640_000,
-];
+const EIGHT: [u32; 8] = [5_000, 10_000, 20_000, 40_000, 80_000, 160_000, 320_000, 640_000];
 
 pub fn identity() -> Identity {
     Identity {
-        protocol: ProtocolId {
-            version: 1,
-            schema: firmware_protocol::messages::SCHEMA_HASH,
-        },
-        firmware: FirmwareVersion {
-            major: 0,
-            minor: 1,
-            patch: 0,
-        },
+        protocol: ProtocolId { version: 1, schema: firmware_protocol::messages::SCHEMA_HASH },
+        firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
         serial: *b"MOCK000001",
         boot: BOOT,
         last_seq: Some(0x41),
@@ -144,14 +96,7 @@ pub fn identity() -> Identity {
 
 pub fn reading(status: ReadingStatus, echoes: &[u32]) -> Reading {
     let echoes = Echoes::from_ticks(echoes);
-    Reading {
-        sweep: 7,
-        index: 129,
-        step: -71,
-        fired_ticks: 123_400_000,
-        status,
-        echoes,
-    }
+    Reading { sweep: 7, index: 129, step: -71, fired_ticks: 123_400_000, status, echoes }
 }
 
 fn status() -> Status {

@@ -152,9 +152,8 @@ impl Line {
             out.push(byte);
         }
         let between = out.last().is_none_or(|&byte| byte == 0);
-        let (due, later): (Vec<_>, Vec<_>) = std::mem::take(&mut self.late)
-            .into_iter()
-            .partition(|(at, _)| *at <= now_ns);
+        let (due, later): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.late).into_iter().partition(|(at, _)| *at <= now_ns);
         self.late = later;
         for (_, frame) in due {
             if !between {

@@ -53,11 +53,7 @@ pub struct World {
 pub fn board(boot: u16) -> Board {
     Board {
         boot,
-        firmware: FirmwareVersion {
-            major: 0,
-            minor: 1,
-            patch: 0,
-        },
+        firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
         serial: *b"MOCK000001",
         steps_per_revolution: 400,
         capabilities: Capabilities::INDEX_SENSOR
@@ -85,11 +81,8 @@ pub fn settings() -> Settings {
 /// Echoes that nobody else has: the number of the firing and its position are in them.
 pub fn echoes_of(number: usize, step: i32, max_echoes: u8) -> Vec<u32> {
     let number = number as u32;
-    let all = [
-        2_000 + number % 40_000,
-        2_000 + step.rem_euclid(40_000) as u32,
-        46_000 + number / 40_000,
-    ];
+    let all =
+        [2_000 + number % 40_000, 2_000 + step.rem_euclid(40_000) as u32, 46_000 + number / 40_000];
     all[..usize::from(max_echoes).min(number as usize % 4).min(3)].to_vec()
 }
 
@@ -146,18 +139,10 @@ impl World {
 
     /// Carries out what is due and what the device asks for.
     pub fn settle(&mut self) {
-        if self
-            .motion
-            .as_ref()
-            .is_some_and(|(_, at, _)| *at <= self.clock)
-        {
+        if self.motion.as_ref().is_some_and(|(_, at, _)| *at <= self.clock) {
             self.motion_ends();
         }
-        if self
-            .ranger
-            .as_ref()
-            .is_some_and(|(_, at, _)| *at <= self.clock)
-        {
+        if self.ranger.as_ref().is_some_and(|(_, at, _)| *at <= self.clock) {
             self.listening_ends();
         }
         if self.device.poll_timeout().is_some() {
@@ -190,11 +175,7 @@ impl World {
                 self.coils_released += 1;
                 self.motion = None;
             }
-            Action::Fire {
-                window_ticks,
-                max_echoes,
-                ..
-            } => {
+            Action::Fire { window_ticks, max_echoes, .. } => {
                 assert!(self.ranger.is_none(), "fires while listening");
                 assert!(self.motion.is_none(), "fires while turning");
                 let end = self.clock + u64::from(window_ticks);
@@ -204,14 +185,7 @@ impl World {
                     fired_ticks: self.ticks(),
                     echoes: echoes_of(number, self.step, max_echoes),
                 });
-                self.ranger = Some((
-                    self.clock,
-                    end,
-                    Job::Fire {
-                        window_ticks,
-                        max_echoes,
-                    },
-                ));
+                self.ranger = Some((self.clock, end, Job::Fire { window_ticks, max_echoes }));
             }
             Action::AbortFire => {
                 self.aborted += 1;
@@ -236,11 +210,7 @@ impl World {
             self.step += done as i32;
         }
         // Braking takes 1 ms here.
-        self.motion = Some((
-            self.clock,
-            self.clock + 2_000,
-            Job::Move { target: self.step },
-        ));
+        self.motion = Some((self.clock, self.clock + 2_000, Job::Move { target: self.step }));
     }
 
     fn motion_ends(&mut self) {
@@ -258,8 +228,7 @@ impl World {
             }
             Job::Home => {
                 self.step = 0;
-                self.device
-                    .handle_homed(now, Ok(if self.homings > 1 { 2 } else { 0 }));
+                self.device.handle_homed(now, Ok(if self.homings > 1 { 2 } else { 0 }));
             }
             Job::Fire { .. } => unreachable!("the motor does not fire"),
         }

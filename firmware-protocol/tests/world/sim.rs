@@ -68,10 +68,7 @@ impl Sim {
         let first = self.events.len();
         self.start(command);
         self.run_while(|sim| sim.host.is_busy())?;
-        Ok(self.events[first..]
-            .iter()
-            .map(|(_, event)| *event)
-            .collect())
+        Ok(self.events[first..].iter().map(|(_, event)| *event).collect())
     }
 
     /// Lets time pass.
@@ -84,11 +81,7 @@ impl Sim {
         // Half an hour is far more than any test takes.
         let end = self.now_ns + 1_800_000_000_000;
         self.run_while_until(busy, end)?;
-        if self.now_ns >= end {
-            Err(Hang)
-        } else {
-            Ok(())
-        }
+        if self.now_ns >= end { Err(Hang) } else { Ok(()) }
     }
 
     fn run_while_until(&mut self, busy: impl Fn(&Self) -> bool, end: u64) -> Result<(), Hang> {
@@ -118,9 +111,7 @@ impl Sim {
         self.happen();
         let to_device = self.up.arrived(self.now_ns);
         if self.now_ns >= self.deaf_until_ns {
-            self.world
-                .device
-                .handle_bytes(self.world.ticks(), &to_device);
+            self.world.device.handle_bytes(self.world.ticks(), &to_device);
         }
         self.world.settle();
         self.device_sends();

@@ -73,9 +73,9 @@ impl Output {
     /// Closes the log and draws the pictures.
     pub(super) fn close(mut self, setup: &Setup) -> Outcome {
         if let Some(log) = self.log.take() {
-            log.close().or_else(|error| {
-                if error.is_broken_pipe() { Ok(()) } else { Err(error) }
-            }).map_err(|error| Failure::device(&error, error.help()))?;
+            log.close()
+                .or_else(|error| if error.is_broken_pipe() { Ok(()) } else { Err(error) })
+                .map_err(|error| Failure::device(&error, error.help()))?;
         }
         let Some(folder) = &self.folder else { return Ok(()) };
         let views = self.views();
