@@ -7,6 +7,8 @@ mod cone;
 mod fan;
 mod raycast;
 mod simulator;
+#[cfg(test)]
+mod tests;
 
 pub use cone::Cone;
 pub use fan::{Fan, FanSettings};

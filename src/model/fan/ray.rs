@@ -183,13 +183,16 @@ impl Ray {
         // Radius of curvature of the wave front; its centre is the image of the source.
         let radius_m = width_m / self.growth;
         let slack_m = radius_m.signum() * radius_m.hypot(offset_m) - radius_m;
-        let length_m = self.travelled_m + foot_m + slack_m;
-        Aim { length_m, offset_m, width_m, radius_m }
+        let ray_m = self.travelled_m + foot_m;
+        Aim { length_m: ray_m + slack_m, ray_m, offset_m, width_m, radius_m }
     }
 }
 
 struct Aim {
+    /// From the source to the point, metres.
     length_m: f64,
+    /// From the source along the ray itself, as far as abreast of the point, metres.
+    ray_m: f64,
     /// Of the point from the ray, positive to the left, metres.
     offset_m: f64,
     width_m: f64,
@@ -198,9 +201,9 @@ struct Aim {
 
 impl Aim {
     /// Amplitude relative to a wave that met flat walls only: in the plane it spreads over
-    /// `width_m` where that one spreads over `length_m`.
+    /// `width_m` where that one spreads over `ray_m`.
     fn tube_gain(&self) -> f64 {
-        (self.length_m / self.width_m.abs().max(1e-3)).sqrt()
+        (self.ray_m / self.width_m.abs().max(1e-3)).sqrt()
     }
 
     fn departure_turn_rad(&self) -> f64 {
