@@ -316,7 +316,7 @@ mod tests {
         check(r#"{"type":"pong"}"#, FaultKind::UnknownType, None, "type");
         check(format!("{ping} {ping}"), FaultKind::NotJson, Some(ping.len() + 2), "");
         let wrong = ping.replace("\"order\":1", "\"order\":-1");
-        let column = wrong.find("-1").expect("just put there") + 2;
+        let column = wrong.find(":-1").expect("just put there") + 3;
         check(&wrong, FaultKind::BadField, Some(column), "sim.path.order");
         let later = line_of("session").replace("\"format\":1", "\"format\":9");
         assert!(decode_line(later.as_bytes()).is_ok(), "added fields do no harm");

@@ -61,7 +61,7 @@ fn each_problem_is_found_on_its_line() {
         (with_line(2, |_| None), vec![(2, OutsideScan)]),
         (
             with_line(2, |_| Some(LOG.lines().nth(9).map(String::from)?)),
-            vec![(2, OutsideScan), (3, OutsideScan)],
+            vec![(2, OutsideScan), (2, WrongCount), (3, OutsideScan)],
         ),
         (format!("{LOG}{LOG}"), vec![(13, ScanTwice)]),
         (replaced(2, "\"step_deg\":0.9", "\"step_deg\":-1"), vec![(2, BadPlan)]),

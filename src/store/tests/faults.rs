@@ -16,7 +16,7 @@ use crate::{
 
 /// A file in memory with room for so many bytes, which may take each write in pieces and may be
 /// unable to give bytes back.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Disk {
     bytes: Vec<u8>,
     room: usize,
@@ -170,7 +170,7 @@ proptest! {
         let whole = lines(&appended).concat();
         prop_assert_eq!(torn, disk.bytes.len() > whole.len());
         prop_assert!(disk.bytes.starts_with(&whole));
-        let (_folder, log) = folder();
+        let (_folder, log) = fast_folder();
         written(&log, &disk.bytes);
         drop(LogWriter::open(&log).expect("a torn line is mended"));
         prop_assert!(read(&log).starts_with(&whole));

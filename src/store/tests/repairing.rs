@@ -5,7 +5,7 @@ use crate::store::{Repair, load, repair};
 
 #[test]
 fn cut_anywhere_every_whole_line_is_kept() {
-    let (folder, log) = folder();
+    let (folder, log) = fast_folder();
     for cut in 0..=LOG.len() {
         written(&log, &LOG[..cut]);
         let done = repair(&log).expect("it can be repaired");
