@@ -1,5 +1,11 @@
 //! The physics of the sound: air, transducer, pulse and receiver.
 
+mod air;
+mod receiver;
 mod sensor;
+mod transducer;
 
-pub use sensor::{Aperture, Pulse, Sensor};
+pub use air::{Air, AirError};
+pub use receiver::{Detection, Receiver, Sound, classify_tof};
+pub use sensor::{Aperture, Pulse, Sensor, SensorError};
+pub use transducer::{BeamPattern, kuc_siegel_response, piston_directivity};

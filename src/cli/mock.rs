@@ -1,11 +1,83 @@
 //! `sonard mock`.
 
-use super::{Failure, Outcome};
+use std::{path::PathBuf, sync::Arc};
+
+use super::{
+    Failure, Outcome,
+    mock_world::{Belief, MockWorldArgs},
+    options::{AirArgs, EngineArgs, SensorArgs},
+    runtime, scene_file,
+};
+use crate::mock::{MockPort, Note};
+
+/// Firings between two lines of output.
+const FIRINGS_A_LINE: u64 = 100;
 
 /// Options of `sonard mock`.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {}
+#[command(long_about = ABOUT, after_help = EXAMPLES)]
+pub(super) struct Args {
+    /// Scene file, or the name of a shipped scene (`sonard scene list`)
+    #[arg(long, value_name = "SCENE")]
+    scene: String,
+    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    pose: String,
+    /// Make this symbolic link to the pty
+    #[arg(long, value_name = "PATH")]
+    link: Option<PathBuf>,
+    #[command(flatten)]
+    world: MockWorldArgs,
+    #[command(flatten)]
+    sensor: SensorArgs,
+    #[command(flatten)]
+    air: AirArgs,
+    #[command(flatten)]
+    engine: EngineArgs,
+}
 
-pub(super) fn run(_args: Args) -> Outcome {
-    Err(Failure::Found(None))
+const ABOUT: &str = "\
+Play a ranger on a pty, with sound from the model.
+
+The device's own protocol code runs on a pseudo-terminal, in a world made of a scene and the \
+model. Whatever speaks the protocol can open the port, `sonard scan --port` first of all. It \
+plays until it is interrupted. The device says of itself that it is simulated, so every log \
+taken from it does too.";
+
+const EXAMPLES: &str = "\
+Examples:
+  sonard mock --scene simple-room --pose fig9 --link /tmp/ranger --realtime
+  sonard scan --port /tmp/ranger --scene simple-room --pose fig9 --out out
+
+  sonard mock --scene simple-room --pose fig9 --link /tmp/ranger --seed 7 \\
+      --faults flip=0.001,drop=0.001,double=0.001,reset=0.005";
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let scene = Arc::new(scene_file::load(&args.scene)?);
+    let pose = scene_file::pose(&scene, &args.pose)?;
+    let (sensor, air, options) = (args.sensor.sensor()?, args.air.air()?, args.engine.options()?);
+    let belief =
+        Belief { scene: &scene, pose: &pose, sensor: &sensor, air: &air, options: &options };
+    let board = args.world.board(&belief)?;
+    runtime::new()?.block_on(async {
+        let port = MockPort::open(board, args.link.as_deref()).map_err(|error| {
+            Failure::input(
+                format!("cannot make the port: {error}"),
+                "give --link a path that does not exist yet, in a folder that you may write to",
+            )
+        })?;
+        anstream::println!("listening on {} (interrupt to stop)", port.path().display());
+        let played = port.run(runtime::interrupted(), |note| print(&note)).await;
+        anstream::println!("stopped");
+        played.map_err(|error| {
+            Failure::device(format!("the pty failed: {error}"), "start the mock again")
+        })
+    })
+}
+
+fn print(note: &Note) {
+    match note {
+        Note::Fired(count) if count % FIRINGS_A_LINE != 0 => {}
+        note => anstream::println!("{note}"),
+    }
 }

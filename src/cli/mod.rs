@@ -4,9 +4,13 @@ mod compare;
 mod failure;
 mod log;
 mod mock;
+mod mock_world;
+mod options;
 mod plot;
+mod runtime;
 mod scan;
 mod scene;
+mod scene_file;
 mod simulate;
 
 pub use failure::{Failure, Outcome};
@@ -50,9 +54,9 @@ enum Verb {
 #[must_use]
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().verb {
-        Verb::Scan(args) => scan::run(args),
-        Verb::Mock(args) => mock::run(args),
-        Verb::Simulate(args) => simulate::run(args),
+        Verb::Scan(args) => scan::run(&args),
+        Verb::Mock(args) => mock::run(&args),
+        Verb::Simulate(args) => simulate::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Plot(args) => plot::run(args),
         Verb::Log(verb) => log::run(verb),

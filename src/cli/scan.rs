@@ -1,11 +1,227 @@
 //! `sonard scan`.
 
-use super::{Failure, Outcome};
+mod output;
+mod setup;
+mod summary;
+
+use std::path::PathBuf;
+
+use firmware_protocol::host::HostConfig;
+use tokio::sync::oneshot;
+
+use super::{
+    Failure, Outcome,
+    mock_world::MockWorldArgs,
+    options::{AirArgs, EngineArgs, SensorArgs},
+    runtime,
+};
+use crate::{
+    link::{self, BAUD},
+    mock::{MockBoard, MockPort},
+    ranger::{DriveError, Driver, Ranger, ScanError, ScanSummary},
+    scan::{Record, ScanPlan},
+};
+use output::Output;
+use setup::Setup;
 
 /// Options of `sonard scan`.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {}
+#[command(long_about = ABOUT, after_help = EXAMPLES)]
+#[command(group(clap::ArgGroup::new("device").required(true).args(["port", "mock"])))]
+pub(super) struct Args {
+    /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number
+    #[arg(long, value_name = "PATH|ID")]
+    port: Option<String>,
+    /// Use a mock ranger instead of a real one
+    #[arg(long)]
+    mock: bool,
+    /// Scene file, or the name of a shipped scene (`sonard scene list`)
+    #[arg(long, value_name = "SCENE")]
+    scene: String,
+    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    pose: String,
+    /// Write scan.jsonl, scan.svg and scan.png to this folder instead of records to standard output
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// How often to take the scan
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    repeat: u32,
+    #[command(flatten)]
+    plan: PlanArgs,
+    #[command(flatten)]
+    motion: MotionArgs,
+    #[command(flatten)]
+    sensor: SensorArgs,
+    #[command(flatten)]
+    air: AirArgs,
+    #[command(flatten)]
+    engine: EngineArgs,
+    #[command(flatten)]
+    world: MockWorldArgs,
+}
 
-pub(super) fn run(_args: Args) -> Outcome {
-    Err(Failure::Found(None))
+/// Which azimuths to scan.
+#[derive(Debug, Clone, Copy, clap::Args)]
+struct PlanArgs {
+    /// First azimuth, degrees counter-clockwise from the heading
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
+    from_deg: f64,
+    /// End of the azimuths, degrees; not itself measured
+    #[arg(long, value_name = "DEG", default_value_t = 360.0, allow_negative_numbers = true)]
+    to_deg: f64,
+    /// From stop to stop, degrees; a multiple of the motor's step
+    #[arg(long, value_name = "DEG", default_value_t = 0.9)]
+    step_deg: f64,
+    /// Firings at each stop
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pings_per_stop: u32,
+}
+
+/// How the motor turns and the ranger listens.
+#[derive(Debug, Clone, Copy, clap::Args)]
+#[command(next_help_heading = "Motion and listening")]
+struct MotionArgs {
+    /// Listening window after each firing, milliseconds, instead of the time to the maximum range
+    #[arg(long, value_name = "MS", value_parser = positive)]
+    window_ms: Option<f64>,
+    /// Rest between the end of a step and firing, milliseconds
+    #[arg(long, value_name = "MS", default_value_t = 5.0, value_parser = positive)]
+    settle_ms: f64,
+    /// Least time from firing to firing, milliseconds, to protect the module
+    #[arg(long, value_name = "MS", default_value_t = 20.0, value_parser = positive)]
+    min_interval_ms: f64,
+    /// Echoes to record for each firing, at most
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=8))]
+    max_echoes: u8,
+    /// Largest motor speed, steps a second
+    #[arg(long, value_name = "STEPS/S", default_value_t = 800, value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    speed: u16,
+    /// Motor acceleration, steps a second squared
+    #[arg(long, value_name = "STEPS/S2", default_value_t = 40_000, value_parser = clap::value_parser!(u32).range(1..=200_000))]
+    acceleration: u32,
+}
+
+const ABOUT: &str = "\
+Take one or more scans and log each reading beside the model's prediction.
+
+The device goes home, then steps, fires and listens by itself along the plan; readings that the \
+line lost are fetched again. Records go to standard output, or with --out to a folder that also \
+gets a picture. An interrupt stops the motor and closes the log.";
+
+const EXAMPLES: &str = "\
+Examples:
+  sonard scan --mock --scene simple-room --pose fig9 --out out/fig9
+  sonard scan --port /dev/ttyACM0 --scene my-room.json --pose 1.2,0.8,90 --max-range 4 --out out
+  sonard scan --mock --scene corridor --pose start --from-deg -45 --to-deg 45 | sonard compare -
+  sonard scan --mock --scene simple-room --pose fig9 --faults flip=0.001,reset=0.005 --out noisy
+
+Exit codes: 0 every beam measured, 1 stopped on request or beams are missing, 2 wrong usage or \
+input, 3 device or link.";
+
+impl PlanArgs {
+    const fn plan(&self) -> ScanPlan {
+        ScanPlan {
+            from_deg: self.from_deg,
+            to_deg: self.to_deg,
+            step_deg: self.step_deg,
+            pings_per_stop: self.pings_per_stop,
+        }
+    }
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let setup = Setup::new(args)?;
+    let mut output = Output::open(args.out.as_deref(), &setup)?;
+    let measured = runtime::new()?.block_on(measure(args, &setup, &mut output));
+    // Whatever happened, what was measured is closed properly and drawn.
+    let closed = output.close(&setup);
+    measured?;
+    closed
+}
+
+/// Opens the port, meets the device, and takes the scans.
+async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
+    let mock = match args.mock {
+        true => Some(start_mock(args.world.board(&setup.belief())?)?),
+        false => None,
+    };
+    let port = mock.as_ref().map_or_else(|| args.port.clone().unwrap_or_default(), Mock::port);
+    let line = link::open(&port).map_err(|error| Failure::device(&error, error.help()))?;
+    let seed = rand::random();
+    let driver = Driver::new(line, HostConfig { max_attempts: 7, ..HostConfig::new(BAUD, seed) });
+    let mut ranger = Ranger::meet(driver).await.map_err(|error| device_failure(&error))?;
+    let job = setup.job(ranger.identity())?;
+    output.record(&Record::Session(Box::new(setup.session(ranger.identity()))))?;
+    let mut missing = 0;
+    for turn in 1..=args.repeat {
+        output.begin_scan(turn, args.repeat, job.plan.beams());
+        let summary = ranger.scan(&job, output, runtime::interrupted()).await.map_err(scan_failure);
+        output.end_scan();
+        let summary = summary?;
+        summary::print(setup, &summary, ranger.identity(), ranger.link_stats(), output);
+        missing += summary.end.missing;
+        if summary.stopped {
+            return Err(stopped(&summary));
+        }
+    }
+    if let Some(mock) = mock {
+        mock.stop().await;
+    }
+    if missing > 0 {
+        return Err(Failure::Found(Some(format!("{missing} beams are missing"))));
+    }
+    Ok(())
+}
+
+/// A mock playing beside the scan.
+struct Mock {
+    port: PathBuf,
+    stop: oneshot::Sender<()>,
+    playing: tokio::task::JoinHandle<std::io::Result<()>>,
+}
+
+fn start_mock(board: MockBoard) -> Result<Mock, Failure> {
+    let port = MockPort::open(board, None).map_err(|error| {
+        Failure::device(format!("cannot make a pty for the mock: {error}"), "is /dev/pts mounted?")
+    })?;
+    let path = port.path().to_path_buf();
+    let (stop, stopped) = oneshot::channel::<()>();
+    let playing = tokio::spawn(port.run(async move { drop(stopped.await) }, |_note| {}));
+    Ok(Mock { port: path, stop, playing })
+}
+
+impl Mock {
+    fn port(&self) -> String {
+        self.port.display().to_string()
+    }
+
+    async fn stop(self) {
+        // A mock that is gone already has nothing left to say.
+        let _ = self.stop.send(());
+        let _ = self.playing.await;
+    }
+}
+
+fn stopped(summary: &ScanSummary) -> Failure {
+    let planned = summary.end.beams + summary.end.missing;
+    Failure::Found(Some(format!("stopped after {} of {planned} beams", summary.end.beams)))
+}
+
+fn scan_failure(error: ScanError) -> Failure {
+    match error {
+        ScanError::Plan(error) => Failure::input(error, "see `sonard scan --help`"),
+        ScanError::Device(error) => device_failure(&error),
+        ScanError::Store(error) if error.is_broken_pipe() => Failure::Found(None),
+        ScanError::Store(error) => Failure::device(&error, error.help()),
+    }
+}
+
+fn device_failure(error: &DriveError) -> Failure {
+    Failure::device(error, error.help())
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "a number of milliseconds".to_owned())?;
+    if (0.0..=8_000.0).contains(&value) { Ok(value) } else { Err("0 to 8000 milliseconds".into()) }
 }

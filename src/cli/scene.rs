@@ -1,14 +1,214 @@
 //! `sonard scene`.
 
-use super::{Failure, Outcome};
+use std::{
+    fs,
+    io::{self, Write as _},
+    path::{Path, PathBuf},
+};
+
+use super::{Failure, Outcome, scene_file};
+use crate::{
+    geometry::DVec2,
+    plot::draw_scene,
+    scene::{Scene, json_schema, shipped},
+};
 
 /// Verbs of `sonard scene`.
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum Verb {
-    /// Check a file
-    Check,
+    /// Check a scene file and say in a line what it holds
+    #[command(long_about = CHECK_ABOUT, after_help = CHECK_EXAMPLES)]
+    Check(CheckArgs),
+    /// Draw a scene's floor plan as SVG or PNG
+    #[command(long_about = DRAW_ABOUT, after_help = DRAW_EXAMPLES)]
+    Draw(DrawArgs),
+    /// List the scenes that come with sonard, with their poses
+    List,
+    /// Print the JSON Schema of scene files
+    #[command(long_about = SCHEMA_ABOUT, after_help = SCHEMA_EXAMPLES)]
+    Schema,
 }
 
-pub(super) fn run(_verb: Verb) -> Outcome {
-    Err(Failure::Found(None))
+/// Options of `sonard scene check`.
+#[derive(Debug, clap::Args)]
+pub(super) struct CheckArgs {
+    /// Scene file, or the name of a shipped scene (`sonard scene list`)
+    #[arg(value_name = "FILE")]
+    scene: String,
+    /// Also check that a ranger can stand at this pose: X,Y,DEG (metres, degrees) or a name
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    pose: Option<String>,
+}
+
+/// Options of `sonard scene draw`.
+#[derive(Debug, clap::Args)]
+pub(super) struct DrawArgs {
+    /// Scene file, or the name of a shipped scene (`sonard scene list`)
+    #[arg(value_name = "FILE")]
+    scene: String,
+    /// Draw this pose only: X,Y,DEG (metres, degrees) or a name [default: all named poses]
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    pose: Option<String>,
+    /// Where to write the picture, as .svg or .png [default: SVG to standard output]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Width of a PNG, pixels
+    #[arg(long, value_name = "PIXELS", default_value_t = 1200)]
+    width: u32,
+}
+
+const CHECK_ABOUT: &str = "\
+Check a scene file and say in a line what it holds.
+
+A scene is a floor plan in JSON: materials with their reflectance, walls (from one point to \
+another, or a polyline), cylinders, and named poses of the ranger. Lengths are metres, angles \
+degrees counter-clockwise from +x. A fault is shown at its line and column, with what would be \
+right, and the exit code is 2.";
+
+const CHECK_EXAMPLES: &str = r#"Examples:
+  sonard scene check my-room.json
+  sonard scene check simple-room        a shipped scene, by name
+  sonard scene check simple-room --pose 0.4,0.3,90
+
+The smallest useful scene:
+  {"name": "my-room",
+   "materials": {"plaster": {"reflectance": 0.95}},
+   "walls": [{"id": "room", "polyline": [[0,0],[4,0],[4,3],[0,3]], "closed": true,
+              "material": "plaster"}],
+   "poses": {"middle": {"x_m": 2, "y_m": 1.5, "heading_deg": 0}}}"#;
+
+const DRAW_ABOUT: &str = "\
+Draw a scene's floor plan as SVG or PNG.
+
+Shows the walls by material with their ids, cylinders, the poses with an arrow along azimuth 0, \
+the robot's body where the scene has one, a scale in metres, and what the scene says of its \
+source and of what is approximate.";
+
+const DRAW_EXAMPLES: &str = "\
+Examples:
+  sonard scene draw simple-room -o simple-room.png
+  sonard scene draw my-room.json --pose 1.2,0.8,90 -o my-room.svg
+  sonard scene draw my-room.json > my-room.svg";
+
+const SCHEMA_ABOUT: &str = "\
+Print the JSON Schema of scene files.
+
+Editors that know JSON Schema complete fields and mark mistakes while you type. The schema \
+describes every field with its unit; rules that go beyond shapes (materials that exist, walls \
+that have a length) are checked by `sonard scene check`.";
+
+const SCHEMA_EXAMPLES: &str = r#"Examples:
+  sonard scene schema > scene.schema.json
+  and in a scene file:  "$schema": "./scene.schema.json""#;
+
+pub(super) fn run(verb: Verb) -> Outcome {
+    match verb {
+        Verb::Check(args) => check(&args),
+        Verb::Draw(args) => draw(&args),
+        Verb::List => list(),
+        Verb::Schema => schema(),
+    }
+}
+
+fn check(args: &CheckArgs) -> Outcome {
+    let scene = scene_file::load(&args.scene)?;
+    if let Some(pose) = &args.pose {
+        scene_file::pose(&scene, pose)?;
+    }
+    print(&summary(&scene))
+}
+
+fn draw(args: &DrawArgs) -> Outcome {
+    let scene = scene_file::load(&args.scene)?;
+    let picture = draw_scene(&drawn(scene, args.pose.as_deref())?);
+    let Some(path) = &args.output else { return print(picture.to_svg().trim_end()) };
+    let bytes = match path.extension().and_then(|extension| extension.to_str()) {
+        Some("svg") => picture.to_svg().into_bytes(),
+        Some("png") => picture
+            .to_png(args.width)
+            .map_err(|error| Failure::input(error, "choose another --width"))?,
+        _ => {
+            return Err(Failure::input(
+                format!("{} is neither .svg nor .png", path.display()),
+                "end the name of the picture with .svg or .png",
+            ));
+        }
+    };
+    write_file(path, &bytes)
+}
+
+/// The scene with the poses to draw, and the robot's body at each of them.
+fn drawn(mut scene: Scene, pose: Option<&str>) -> Result<Scene, Failure> {
+    if let Some(spec) = pose {
+        let pose = scene_file::pose(&scene, spec)?;
+        scene.poses = [(spec.to_owned(), pose)].into();
+    }
+    let robot = scene.robot.clone();
+    for pose in scene.poses.clone().values() {
+        scene.robot.clone_from(&robot);
+        scene = scene.with_robot_at(pose);
+    }
+    Ok(scene)
+}
+
+fn write_file(path: &Path, bytes: &[u8]) -> Outcome {
+    fs::write(path, bytes).map_err(|error| {
+        Failure::device(
+            format!("cannot write {}: {error}", path.display()),
+            "check that the folder exists, may be written to and has space",
+        )
+    })
+}
+
+fn list() -> Outcome {
+    let mut lines = String::new();
+    let width = shipped::names().map(str::len).max().unwrap_or_default();
+    for name in shipped::names() {
+        let scene = scene_file::load(name)?;
+        let poses = scene.poses.keys().cloned().collect::<Vec<_>>().join(", ");
+        lines.push_str(&format!("{name:width$}  poses: {poses}\n"));
+    }
+    print(lines.trim_end())
+}
+
+fn schema() -> Outcome {
+    print(&format!("{:#}", json_schema()))
+}
+
+fn print(text: &str) -> Outcome {
+    writeln!(io::stdout(), "{text}")
+        .or_else(|error| Failure::from_write("to standard output", &error))
+}
+
+/// One line: what the scene holds and how large it is.
+fn summary(scene: &Scene) -> String {
+    let mut parts =
+        vec![count(scene.walls.len(), "wall"), count(scene.cylinders.len(), "cylinder")];
+    let poses: Vec<&str> = scene.poses.keys().map(String::as_str).collect();
+    parts.push(match poses.len() {
+        0 => "no poses".to_owned(),
+        number => format!("{} ({})", count(number, "pose"), poses.join(", ")),
+    });
+    if let Some(robot) = &scene.robot {
+        parts.push(format!("robot {}", robot.id));
+    }
+    if let Some((low, high)) = extent(scene) {
+        let size = high - low;
+        parts.push(format!("{:.3} x {:.3} m", size.x, size.y));
+    }
+    format!("{}: {}", scene.name, parts.join(", "))
+}
+
+fn count(number: usize, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}
+
+/// Lower left and upper right corner of everything that reflects, metres.
+fn extent(scene: &Scene) -> Option<(DVec2, DVec2)> {
+    let walls = scene.walls.iter().map(|wall| (wall.a.min(wall.b), wall.a.max(wall.b)));
+    let cylinders = scene.cylinders.iter().map(|cylinder| {
+        let reach = DVec2::splat(cylinder.radius_m);
+        (cylinder.center - reach, cylinder.center + reach)
+    });
+    walls.chain(cylinders).reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)))
 }

@@ -1,11 +1,201 @@
 //! `sonard simulate`.
 
-use super::{Failure, Outcome};
+use std::{
+    fs::File,
+    io::{self, BufWriter, Write},
+    path::PathBuf,
+    sync::Arc,
+    time::Duration,
+};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use jiff::Timestamp;
+use uuid::Uuid;
+
+use super::{
+    Failure, Outcome,
+    options::{AirArgs, EngineArgs, SensorArgs},
+    scene_file,
+};
+use crate::{
+    geometry::Pose,
+    model::{Prediction, Simulator},
+    scan::{LOG_FORMAT, Ping, Provenance, Record, ScanEnd, ScanPlan, ScanStart, SceneRef, Session},
+    scene::Scene,
+};
+
+/// Motor steps a revolution that `step` counts in.
+const STEPS_PER_REVOLUTION: u32 = 400;
 
 /// Options of `sonard simulate`.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {}
+#[command(long_about = ABOUT, after_help = EXAMPLES)]
+pub(super) struct Args {
+    /// Scene file, or the name of a shipped scene (`sonard scene list`)
+    #[arg(long, value_name = "SCENE")]
+    scene: String,
+    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    pose: String,
+    /// First azimuth, degrees counter-clockwise from the heading
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
+    from_deg: f64,
+    /// End of the azimuths, degrees; not itself fired at
+    #[arg(long, value_name = "DEG", default_value_t = 360.0, allow_negative_numbers = true)]
+    to_deg: f64,
+    /// From stop to stop, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.9)]
+    step_deg: f64,
+    /// Write the records to this file instead of standard output
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    engine: EngineArgs,
+    #[command(flatten)]
+    sensor: SensorArgs,
+    #[command(flatten)]
+    air: AirArgs,
+}
 
-pub(super) fn run(_args: Args) -> Outcome {
-    Err(Failure::Found(None))
+const ABOUT: &str = "\
+Predict a scan with the model alone.
+
+Writes the records of a log, one JSON object a line, with provenance `simulated`: each reading \
+carries the path its sound took, its amplitude and its margin over the threshold. A silence \
+carries the candidate that came closest, with a negative margin.";
+
+const EXAMPLES: &str = "\
+Examples:
+  sonard simulate --scene simple-room --pose fig9 --out fig9.jsonl
+  sonard simulate --scene simple-room --pose fig9 --from-deg 270 --to-deg 270.9 | tail -n 2
+  sonard simulate --scene corridor --pose 1,0.4,0 --engine cone --max-range 4 | sonard plot -
+  sonard simulate --scene my-room.json --pose 1.2,0.8,90 --temperature-c 5 --lossless
+
+Exit codes: 0 done, 2 wrong usage or input, 3 a disk that gave up.";
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let scene = scene_file::load(&args.scene)?;
+    let pose = scene_file::pose(&scene, &args.pose)?;
+    let plan = ScanPlan {
+        from_deg: args.from_deg,
+        to_deg: args.to_deg,
+        step_deg: args.step_deg,
+        pings_per_stop: 1,
+    };
+    plan.check().map_err(|error| Failure::input(error, "see `sonard simulate --help`"))?;
+    let simulator = simulator(args, &scene, &pose)?;
+    let what =
+        args.out.as_ref().map_or("to standard output".into(), |path| path.display().to_string());
+    write(args, &simulator, &pose, &plan).or_else(|error| Failure::from_write(&what, &error))
+}
+
+/// The simulator for this pose: a robot's body stands among the reflectors.
+fn simulator(args: &Args, scene: &Scene, pose: &Pose) -> Result<Simulator, Failure> {
+    let (sensor, air) = (args.sensor.sensor()?, args.air.air()?);
+    let options = args.engine.options()?;
+    Simulator::new(Arc::new(scene.with_robot_at(pose)), sensor, air, options)
+        .map_err(|error| Failure::input(error, "see `sonard simulate --help`"))
+}
+
+fn write(args: &Args, simulator: &Simulator, pose: &Pose, plan: &ScanPlan) -> io::Result<()> {
+    let mut out: Box<dyn Write> = match &args.out {
+        Some(path) => Box::new(BufWriter::new(File::create(path)?)),
+        None => Box::new(BufWriter::new(io::stdout().lock())),
+    };
+    let scan = Uuid::new_v4();
+    let mut put = |record: &Record| {
+        serde_json::to_writer(&mut out, record)?;
+        out.write_all(b"\n")
+    };
+    put(&session(simulator))?;
+    put(&Record::ScanStart(ScanStart { scan, time: Timestamp::now(), pose: *pose, plan: *plan }))?;
+    let progress = progress(plan.stops());
+    let station = simulator.station(pose.position());
+    for index in 0..plan.stops() {
+        let azimuth_deg = plan.azimuth_deg(index);
+        let prediction = station.ping(pose.direction_rad(azimuth_deg));
+        put(&ping(simulator, scan, index, azimuth_deg, &prediction))?;
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    put(&end(simulator, scan, plan.stops()))?;
+    out.flush()
+}
+
+/// A bar on the terminal, drawn from the first second on.
+fn progress(stops: u32) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} beams, {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    // Draw calls come a few times a second; the first second is left without any.
+    let bar = ProgressBar::with_draw_target(Some(stops.into()), ProgressDrawTarget::hidden())
+        .with_style(style);
+    let shown = bar.clone();
+    std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_secs(1));
+        if !shown.is_finished() {
+            shown.set_draw_target(ProgressDrawTarget::stderr());
+        }
+    });
+    bar
+}
+
+fn session(simulator: &Simulator) -> Record {
+    let scene = simulator.scene();
+    Record::Session(Box::new(Session {
+        format: LOG_FORMAT,
+        started: Timestamp::now(),
+        sonard: env!("CARGO_PKG_VERSION").to_owned(),
+        provenance: Provenance::Simulated,
+        device: None,
+        sensor: simulator.sensor().clone(),
+        air: simulator.air().to_record(),
+        scene: Some(SceneRef { name: scene.name.clone(), sha256: scene.sha256.clone() }),
+        model: Some(simulator.model_record()),
+    }))
+}
+
+fn ping(
+    simulator: &Simulator,
+    scan: Uuid,
+    index: u32,
+    azimuth_deg: f64,
+    prediction: &Prediction,
+) -> Record {
+    let said = simulator.record(prediction);
+    let steps = azimuth_deg / 360.0 * f64::from(STEPS_PER_REVOLUTION);
+    Record::Ping(Box::new(Ping {
+        scan,
+        index,
+        step: steps.round() as i32,
+        azimuth_deg,
+        time: None,
+        time_sigma_us: None,
+        status: said.status,
+        fired_ticks: None,
+        echo_ticks: Vec::new(),
+        tof_us: prediction.echoes_us.first().copied(),
+        range_m: said.range_m,
+        repaired: false,
+        amplitude: said.amplitude,
+        margin_db: said.margin_db,
+        path: said.path,
+        sim: None,
+        residual_m: None,
+    }))
+}
+
+/// The model has no motor: a scan lasts as long as its listening windows.
+fn end(simulator: &Simulator, scan: Uuid, beams: u32) -> Record {
+    let window_s = 2.0 * simulator.receiver().max_range_m / simulator.sound_speed_m_s();
+    let listening_s = f64::from(beams) * window_s;
+    Record::ScanEnd(ScanEnd {
+        scan,
+        time: Timestamp::now(),
+        beams,
+        missing: 0,
+        repaired: 0,
+        duration_s: listening_s,
+        acoustic_limit_s: listening_s,
+        home_drift_steps: None,
+    })
 }

@@ -60,6 +60,8 @@ pub enum NotCompared {
     LinkLost,
     /// The motor, or the model's idea of it, may not have been where the step says.
     StepDoubtful,
+    /// The module could not be fired.
+    ModuleFault,
     /// The log holds no prediction for it.
     NoPrediction,
     /// An echo without a finite range on one of the sides.
@@ -151,6 +153,8 @@ pub struct NotComparedCounts {
     pub link_lost: u32,
     /// [`NotCompared::StepDoubtful`].
     pub step_doubtful: u32,
+    /// [`NotCompared::ModuleFault`].
+    pub module_fault: u32,
     /// [`NotCompared::NoPrediction`].
     pub no_prediction: u32,
     /// [`NotCompared::NoRange`].
@@ -161,7 +165,7 @@ impl NotComparedCounts {
     /// All of them.
     #[must_use]
     pub fn total(&self) -> u32 {
-        self.link_lost + self.step_doubtful + self.no_prediction + self.no_range
+        self.link_lost + self.step_doubtful + self.module_fault + self.no_prediction + self.no_range
     }
 }
 
@@ -227,6 +231,7 @@ fn side(status: PingStatus, range_m: Option<f64>) -> Result<Side, NotCompared> {
         PingStatus::Echo => range_m.map(Side::Echo).ok_or(NotCompared::NoRange),
         PingStatus::LinkLost => Err(NotCompared::LinkLost),
         PingStatus::StepDoubtful => Err(NotCompared::StepDoubtful),
+        PingStatus::ModuleFault => Err(NotCompared::ModuleFault),
     }
 }
 
@@ -335,6 +340,7 @@ impl NotComparedCounts {
         match why {
             NotCompared::LinkLost => &mut self.link_lost,
             NotCompared::StepDoubtful => &mut self.step_doubtful,
+            NotCompared::ModuleFault => &mut self.module_fault,
             NotCompared::NoPrediction => &mut self.no_prediction,
             NotCompared::NoRange => &mut self.no_range,
         }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// On the command line a pose is written `X,Y,DEG`, in records `{"x_m","y_m","heading_deg"}`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object { ... }")]
 pub struct Pose {
     /// World x of the rotation axis, metres.
     pub x_m: f64,

@@ -1,1 +1,20 @@
-//! mock.
+//! A mock ranger: the device machine on a pty, with sound from the model.
+//!
+//! [`World`] and [`MockBoard`] are a simulation without I/O; [`MockPort`] plays it on a [`Pty`].
+//! It is only ever used when asked for by name, and it says of itself that it is simulated.
+
+mod board;
+mod faults;
+mod motion;
+mod noise;
+mod pty;
+mod serve;
+mod world;
+
+pub use board::{BoardSettings, MockBoard, Note, Pace, Wake, WakeKind};
+pub use faults::{DeviceFault, FAULT_HELP, FaultPlan, FaultSpecError, Faults};
+pub use motion::Trapezoid;
+pub use noise::Noise;
+pub use pty::Pty;
+pub use serve::MockPort;
+pub use world::{Soundings, World};

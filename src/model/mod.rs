@@ -3,9 +3,19 @@
 //! An [`Engine`] finds the echoes that reach the transducer's face; the receiver decides which
 //! of them is detected. [`Simulator`] joins the two.
 
+mod cone;
+mod fan;
+mod raycast;
+mod simulator;
+
+pub use cone::Cone;
+pub use fan::{Fan, FanSettings};
+pub use simulator::{EngineKind, ModelError, Options, Simulator, Station};
+
 use smallvec::SmallVec;
 
 use crate::{
+    acoustics::Sound,
     geometry::DVec2,
     scan::{PathKind, PingStatus},
 };
@@ -62,10 +72,23 @@ pub trait Engine: Send + Sync {
 }
 
 /// The echoes of one place.
-pub trait Survey {
-    /// Echoes of a firing in world direction `direction_rad`, shortest path first, weighted with
-    /// the beam pattern; also those too weak to be detected, as far as the engine knows them.
-    fn arrivals(&self, direction_rad: f64) -> Vec<Arrival>;
+///
+/// The paths depend on the place only, so one survey serves all directions.
+pub trait Survey: Send + Sync {
+    /// Replaces `sounds` with what a firing in world direction `direction_rad` brings back,
+    /// shortest path first, weighted with the beam pattern; also sounds too weak to be detected,
+    /// as far as the engine knows them.
+    fn listen(&self, direction_rad: f64, sounds: &mut Vec<Sound>);
+
+    /// The full account of a sound that [`listen`](Self::listen) gave for the same direction.
+    fn arrival(&self, direction_rad: f64, sound: &Sound) -> Arrival;
+
+    /// Every arrival of a firing, shortest path first.
+    fn arrivals(&self, direction_rad: f64) -> Vec<Arrival> {
+        let mut sounds = Vec::new();
+        self.listen(direction_rad, &mut sounds);
+        sounds.iter().map(|sound| self.arrival(direction_rad, sound)).collect()
+    }
 }
 
 /// What the model says a firing gives.

@@ -59,15 +59,6 @@ impl Rect {
             && self.top < other.bottom
             && other.top < self.bottom
     }
-
-    pub(super) fn shrunk(&self, by: f64) -> Self {
-        Self {
-            left: self.left + by,
-            top: self.top + by,
-            right: self.right - by,
-            bottom: self.bottom - by,
-        }
-    }
 }
 
 /// Which part of a text stands at the point given.
@@ -111,8 +102,22 @@ impl Layer {
         self.with("stroke", colour).with("stroke-width", width_px).with("fill", "none")
     }
 
+    /// Texts with a white rim, to be read over marks and lines.
+    pub(super) fn haloed(self) -> Self {
+        self.with("stroke", theme::PAPER)
+            .with("stroke-width", 3.0)
+            .with("stroke-linejoin", "round")
+            .with("paint-order", "stroke")
+    }
+
     pub(super) fn add(&mut self, layer: Self) {
         self.node(layer.group);
+    }
+
+    pub(super) fn extend(&mut self, layers: impl IntoIterator<Item = Self>) {
+        for layer in layers {
+            self.add(layer);
+        }
     }
 
     pub(super) fn into_group(self) -> Group {
@@ -166,10 +171,12 @@ impl Layer {
 
     /// A closed shape.
     pub(super) fn polygon(&mut self, points: &[Px]) {
-        let mut data = String::new();
-        trace(&mut data, points);
-        data.push('Z');
-        self.node(Path::new().set("d", data));
+        self.node(closed(points));
+    }
+
+    /// A closed shape with a text that a viewer shows when it is pointed at.
+    pub(super) fn polygon_with_hint(&mut self, points: &[Px], hint: &str) {
+        self.node(with_hint(closed(points).into(), hint));
     }
 
     /// A mark of about this radius, with a text that a viewer shows when it is pointed at.
@@ -209,11 +216,8 @@ impl Layer {
 
 fn mark(shape: Shape, at: Px, r: f64) -> Element {
     let polygon = |corners: &[(f64, f64)]| {
-        let mut data = String::new();
         let points: Vec<Px> = corners.iter().map(|(x, y)| at + r * Px::new(*x, *y)).collect();
-        trace(&mut data, &points);
-        data.push('Z');
-        Path::new().set("d", data).into()
+        closed(&points).into()
     };
     match shape {
         Shape::Dot => {
@@ -241,6 +245,13 @@ fn mark(shape: Shape, at: Px, r: f64) -> Element {
             ])
         }
     }
+}
+
+fn closed(points: &[Px]) -> Path {
+    let mut data = String::new();
+    trace(&mut data, points);
+    data.push('Z');
+    Path::new().set("d", data)
 }
 
 fn with_hint(mut node: Element, hint: &str) -> Element {

@@ -33,9 +33,10 @@ impl Materials {
 
     /// The legend's words for a material.
     pub(super) fn describe(material: &Material) -> String {
-        let roughness = match material.roughness {
-            r if r == 0.0 => String::new(),
-            r => format!(", roughness {r}"),
+        let roughness = if material.roughness > 0.0 {
+            format!(", roughness {}", material.roughness)
+        } else {
+            String::new()
         };
         format!("wall, reflectance {}{roughness}", material.reflectance)
     }

@@ -5,14 +5,32 @@
 
 mod canvas;
 mod caption;
+mod floor;
+mod keys;
 mod labels;
 mod legend;
 mod materials;
 mod picture;
 mod plan;
+mod polar;
+mod readings;
+mod region;
+mod residuals;
+mod scan;
 mod scene;
+mod strip;
+mod strips;
 mod theme;
 mod ticks;
+mod words;
+
+#[cfg(test)]
+mod fixtures;
+#[cfg(test)]
+mod tests;
 
 pub use picture::{MAX_WIDTH_PX, Picture, PlotError};
+pub use polar::draw_polar;
+pub use residuals::draw_residuals;
+pub use scan::{draw_scan, draw_scans};
 pub use scene::draw_scene;

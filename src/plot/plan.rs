@@ -90,7 +90,7 @@ impl Plan {
     /// Frame, grid and the coordinates along the left and lower side.
     pub(super) fn frame(&self) -> Layer {
         let mut layer = Layer::new("frame");
-        let step = ticks::nice_step(self.panel.width() / self.px_per_m, self.panel.width() / 70.0);
+        let step = ticks::nice_step(self.panel.width() / self.px_per_m, self.panel.width() / 100.0);
         let xs: Vec<f64> = ticks::multiples(self.view.min.x, self.view.max.x, step).collect();
         let ys: Vec<f64> = ticks::multiples(self.view.min.y, self.view.max.y, step).collect();
         let mut grid = Layer::new("grid").stroked(theme::GRID, theme::HAIRLINE_PX);
@@ -136,9 +136,22 @@ impl Plan {
         layer
     }
 
+    /// The robot's body, if the scene has one, where it is with the ranger at `pose`.
+    pub(super) fn body(&self, scene: &Scene, pose: &Pose) -> Layer {
+        let mut layer = Layer::new("robot").stroked(theme::FRAME, 1.6);
+        let whole = scene.with_robot_at(pose);
+        for side in whole.walls.iter().skip(scene.walls.len()) {
+            layer.line(self.px(side.a), self.px(side.b));
+        }
+        for round in whole.cylinders.iter().skip(scene.cylinders.len()) {
+            layer.circle(self.px(round.center), self.length_px(round.radius_m));
+        }
+        layer
+    }
+
     /// Names of walls and cylinders, where there is room for them.
     pub(super) fn names(&self, scene: &Scene, labels: &mut Labels) -> Layer {
-        let mut layer = Layer::new("names").with("fill", theme::QUIET);
+        let mut layer = Layer::new("names").with("fill", theme::QUIET).haloed();
         let middle = Bounds::of_scene(scene).map_or(DVec2::ZERO, |b| (b.min + b.max) / 2.0);
         let mut groups: Vec<(&str, Bounds)> = Vec::new();
         for wall in &scene.walls {
@@ -167,7 +180,7 @@ impl Plan {
         for (name, bounds) in groups.into_iter().chain(discs) {
             let corner = self.px(DVec2::new(bounds.max.x, bounds.max.y));
             let low = self.px(DVec2::new(bounds.max.x, bounds.min.y));
-            for at in [corner + Px::new(5.0, -3.0), low + Px::new(5.0, 12.0)] {
+            for at in [low + Px::new(5.0, 12.0), corner + Px::new(5.0, -3.0)] {
                 if labels.place(at, Anchor::Start, theme::SMALL_PX, name) {
                     layer.text(at, Anchor::Start, theme::SMALL_PX, name);
                     break;
@@ -194,30 +207,19 @@ impl Plan {
         layer
     }
 
-    /// A bar of a round length, in the lower right corner of the panel.
+    /// A bar of a round length, above the panel's right end where it covers nothing.
     pub(super) fn scale_bar(&self) -> Layer {
-        let length_m = ticks::nice_step(self.panel.width() / self.px_per_m, 5.0);
-        let length_px = self.length_px(length_m);
-        let end = Px::new(self.panel.right - 12.0, self.panel.bottom - 12.0);
-        let start = end - Px::new(length_px, 0.0);
+        let length_m = ticks::nice_step(self.panel.width() / self.px_per_m, 9.0);
+        let end = Px::new(self.panel.right, self.panel.top - 6.0);
+        let start = end - Px::new(self.length_px(length_m), 0.0);
+        let rise = Px::new(0.0, 6.0);
         let mut layer = Layer::new("scale-bar");
-        let mut back = Layer::new("back").with("fill", theme::PAPER).with("fill-opacity", 0.85);
-        back.rect(Rect::new(start.x - 6.0, start.y - 20.0, length_px + 12.0, 27.0), 2.0);
         let mut bar = Layer::new("bar").stroked(theme::INK, 1.6);
-        let rise = Px::new(0.0, 5.0);
         bar.runs([[start - rise, start, end, end - rise]]);
-        layer.add(back);
         layer.add(bar);
         let text = format!("{} m", ticks::label(length_m, length_m));
-        layer.text((start + end) / 2.0 - Px::new(0.0, 6.0), Anchor::Middle, theme::SMALL_PX, &text);
+        layer.text(start - Px::new(6.0, -1.0), Anchor::End, theme::TEXT_PX, &text);
         layer
-    }
-
-    /// What the scale bar covers.
-    pub(super) fn scale_bar_rect(&self) -> Rect {
-        let length_m = ticks::nice_step(self.panel.width() / self.px_per_m, 5.0);
-        let width = self.length_px(length_m) + 24.0;
-        Rect::new(self.panel.right - width, self.panel.bottom - 34.0, width, 34.0)
     }
 }
 

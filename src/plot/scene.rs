@@ -2,10 +2,9 @@
 
 use super::{
     canvas::{Anchor, Layer, Px, Rect},
-    caption,
+    caption, keys,
     labels::Labels,
-    legend::{self, Entry, Sample},
-    materials::Materials,
+    legend,
     picture::Picture,
     plan::{Bounds, Plan},
     theme,
@@ -16,13 +15,12 @@ use crate::{geometry::DVec2, scene::Scene};
 /// the named poses with their headings, and a scale bar.
 #[must_use]
 pub fn draw_scene(scene: &Scene) -> Picture {
-    let (heading, top) = caption::draw(&scene.name, &notes(scene));
+    let (heading, top) = caption::draw(&scene.name, None, &notes(scene));
     let region = region(scene);
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
     let height = Plan::height_for(&region, right - left, [220.0, 640.0]);
-    let plan = Plan::fit(region, Rect::new(left, top + 4.0, right - left, height));
+    let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
     let mut labels = Labels::new(plan.panel);
-    labels.keep_free(plan.scale_bar_rect());
 
     let mut page = Layer::new("scene");
     page.add(heading);
@@ -32,7 +30,7 @@ pub fn draw_scene(scene: &Scene) -> Picture {
     page.add(plan.names(scene, &mut labels));
     page.add(plan.scale_bar());
     let below = Px::new(left, plan.panel.bottom + 24.0);
-    let (entries, legend_height) = legend::draw(&materials(scene), below, right - left);
+    let (entries, legend_height) = legend::draw(&keys::materials(scene), below, right - left);
     page.add(entries);
     Picture::new(theme::PAGE_PX, below.y + legend_height + theme::MARGIN_PX / 2.0, page)
 }
@@ -55,7 +53,10 @@ fn notes(scene: &Scene) -> Vec<String> {
 
 /// Everything drawn, with room around it; a metre square when there is nothing.
 fn region(scene: &Scene) -> Bounds {
-    let poses = scene.poses.values().map(|pose| pose.position());
+    let poses = scene.poses.values().flat_map(|pose| {
+        let body = Bounds::of_scene(&scene.with_robot_at(pose)).map(|b| [b.min, b.max]);
+        body.into_iter().flatten().chain([pose.position()])
+    });
     let all = match Bounds::of_scene(scene) {
         Some(walls) => Some(walls.including(poses)),
         None => Bounds::around(poses),
@@ -68,6 +69,7 @@ fn region(scene: &Scene) -> Bounds {
 fn poses(plan: &Plan, scene: &Scene, labels: &mut Labels) -> Layer {
     let mut layer = Layer::new("poses");
     for (name, pose) in &scene.poses {
+        layer.add(plan.body(scene, pose));
         layer.add(plan.pose(pose));
         let at = plan.px(pose.position());
         labels.keep_free(Rect::new(at.x - 6.0, at.y - 6.0, 12.0, 12.0));
@@ -85,14 +87,4 @@ fn poses(plan: &Plan, scene: &Scene, labels: &mut Labels) -> Layer {
         }
     }
     layer
-}
-
-fn materials(scene: &Scene) -> Vec<Entry> {
-    Materials::of(scene)
-        .styles()
-        .map(|(dash, material)| {
-            let sample = Sample::Line { colour: theme::WALL, width_px: theme::WALL_PX, dash };
-            Entry::new(sample, Materials::describe(&material))
-        })
-        .collect()
 }

@@ -7,7 +7,7 @@
 /// Text and pose markers.
 pub(super) const INK: &str = "#1a1a1a";
 /// Secondary text: axis labels, sources.
-pub(super) const QUIET: &str = "#595959";
+pub(super) const QUIET: &str = "#404040";
 /// Frames of the panels.
 pub(super) const FRAME: &str = "#8c8c8c";
 /// Grid lines.
@@ -21,6 +21,7 @@ pub(super) const PAPER: &str = "#ffffff";
 
 pub(super) const BLUE: &str = "#0072b2";
 pub(super) const SKY: &str = "#56b4e9";
+pub(super) const ORANGE: &str = "#e69f00";
 pub(super) const VERMILLION: &str = "#d55e00";
 pub(super) const GREEN: &str = "#009e73";
 pub(super) const PURPLE: &str = "#b8578f";

@@ -1,1 +1,14 @@
-//! ranger.
+//! Drives a ranger over its protocol: [`Driver`] pumps the host machine on a line, [`Ranger`]
+//! takes scans with it.
+
+mod clock;
+mod driver;
+mod progress;
+mod scanner;
+mod timing;
+
+pub use clock::{ClockFit, HostTime, TickExtender};
+pub use driver::{DriveError, Driver, Ended};
+pub use progress::Sink;
+pub use scanner::{Ranger, ScanError, ScanJob, ScanSummary};
+pub use timing::limit_s;

@@ -3,6 +3,7 @@
 mod codec;
 mod plan;
 mod record;
+mod remaining;
 mod view;
 
 pub use codec::{EncodeError, FaultKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};
@@ -11,4 +12,5 @@ pub use record::{
     AirRecord, Device, Event, EventKind, LOG_FORMAT, ModelRecord, PathKind, PathRecord, Ping,
     PingStatus, Provenance, Record, ScanEnd, ScanStart, SceneRef, Session, SimRecord,
 };
+pub use remaining::Segment;
 pub use view::ScanView;

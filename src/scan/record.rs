@@ -142,6 +142,8 @@ pub enum PingStatus {
     LinkLost,
     /// Measured, but the motor may not have been where the step says.
     StepDoubtful,
+    /// The module could not be fired: its ECHO line was stuck.
+    ModuleFault,
 }
 
 impl PingStatus {

@@ -1,4 +1,26 @@
 //! Scenes: walls and cylinders of some material, and named poses.
+//!
+//! [`Scene::from_json`] reads a scene file and checks it; what is wrong comes back as a
+//! [`SceneError`] with line, column and what would be right. [`shipped`] holds the scenes that
+//! come with the program.
+
+mod check;
+mod error;
+mod file;
+mod locate;
+mod outline;
+mod parse;
+mod pose;
+mod robot;
+mod schema;
+pub mod shipped;
+#[cfg(test)]
+mod tests;
+
+pub use error::{SceneError, SceneProblem, suggest};
+pub use pose::PoseError;
+pub use robot::{Robot, RobotShape};
+pub use schema::json_schema;
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -16,6 +38,8 @@ pub struct Scene {
     pub source: Option<String>,
     /// What in it is approximate, one sentence each.
     pub approximate: Vec<String>,
+    /// Surfaces by name, also those that nothing is made of.
+    pub materials: BTreeMap<String, Material>,
     /// Flat reflectors, one segment each.
     pub walls: Vec<Wall>,
     /// Upright circular reflectors.
@@ -26,13 +50,27 @@ pub struct Scene {
     pub ceiling_z_m: Option<f64>,
     /// Named poses of the ranger.
     pub poses: BTreeMap<String, Pose>,
+    /// Body of the robot that carries the ranger; see [`Scene::with_robot_at`].
+    pub robot: Option<Robot>,
     /// SHA-256 of the text it was read from, hexadecimal.
     pub sha256: String,
 }
 
+impl Scene {
+    /// Reads the text of a scene file and checks it.
+    ///
+    /// # Errors
+    /// The first fault: syntax, an unknown or missing field, a wrong type, or a rule of scenes
+    /// that is broken (a material that is not there, a wall without length, ...). No input
+    /// makes it panic.
+    pub fn from_json(text: &str) -> Result<Self, SceneError> {
+        parse::scene_from_json(text)
+    }
+}
+
 /// How a surface treats sound.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object { ... }")]
 pub struct Material {
     /// Amplitude of the mirror reflection relative to the incident wave, 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0))]

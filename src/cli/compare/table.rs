@@ -44,6 +44,7 @@ fn print_numbers(out: &mut impl Write, comparison: &Comparison) -> io::Result<()
     for (count, why) in [
         (skipped.link_lost, "not compared: the reading was lost"),
         (skipped.step_doubtful, "not compared: the motor may have lost steps"),
+        (skipped.module_fault, "not compared: the module could not be fired"),
         (skipped.no_prediction, "not compared: no prediction"),
         (skipped.no_range, "not compared: an echo without a range"),
         (duplicates, "readings passed over: their beam has a later one"),

@@ -173,6 +173,7 @@ fn ping_text(ping: &Ping) -> String {
         PingStatus::MinRange => "min range",
         PingStatus::LinkLost => "link lost",
         PingStatus::StepDoubtful => "doubtful",
+        PingStatus::ModuleFault => "no firing",
     };
     let sim = ping.sim.as_ref();
     let path = sim.and_then(|sim| sim.path.as_ref()).or(ping.path.as_ref());

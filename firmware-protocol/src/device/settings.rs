@@ -1,0 +1,65 @@
+//! Which settings, positions and plans the device accepts.
+
+use crate::messages::limits::{
+    ACCELERATION_MAX, HOLD_S_MAX, INTERVAL_TICKS_MAX, LEASE_MS_MIN, MAX_ECHOES, POSITION_MAX,
+    SETTLE_TICKS_MAX, SHORT_BLANKING_TICKS_MAX, SHORT_BLANKING_TICKS_MIN, SPEED_MAX,
+    WINDOW_TICKS_MAX, WINDOW_TICKS_MIN,
+};
+use crate::messages::{Blanking, Capabilities, NakReason, Settings, Sweep};
+
+/// Checks settings against the limits and the board's capabilities.
+pub(super) fn check_settings(
+    settings: &Settings,
+    capabilities: Capabilities,
+) -> Result<(), NakReason> {
+    let max_echoes = if capabilities.has(Capabilities::MULTIPLE_ECHOES) { MAX_ECHOES } else { 1 };
+    let checks = [
+        (
+            (WINDOW_TICKS_MIN..=WINDOW_TICKS_MAX).contains(&settings.window_ticks),
+            NakReason::WindowOutOfRange,
+        ),
+        (settings.min_interval_ticks <= INTERVAL_TICKS_MAX, NakReason::IntervalOutOfRange),
+        (settings.settle_ticks <= SETTLE_TICKS_MAX, NakReason::SettleOutOfRange),
+        ((1..=max_echoes).contains(&settings.max_echoes), NakReason::EchoesOutOfRange),
+        (blanking_is_right(settings, capabilities), NakReason::BlankingOutOfRange),
+        ((1..=SPEED_MAX).contains(&settings.speed), NakReason::SpeedOutOfRange),
+        (
+            (1..=ACCELERATION_MAX).contains(&settings.acceleration),
+            NakReason::AccelerationOutOfRange,
+        ),
+        (settings.hold_s <= HOLD_S_MAX, NakReason::HoldOutOfRange),
+    ];
+    checks.into_iter().try_for_each(|(right, reason)| if right { Ok(()) } else { Err(reason) })
+}
+
+fn blanking_is_right(settings: &Settings, capabilities: Capabilities) -> bool {
+    match settings.blanking {
+        Blanking::Internal => true,
+        Blanking::Short { ticks } => {
+            capabilities.has(Capabilities::SHORT_BLANKING)
+                && (SHORT_BLANKING_TICKS_MIN..=SHORT_BLANKING_TICKS_MAX).contains(&ticks)
+                && u32::from(ticks) < settings.window_ticks
+        }
+    }
+}
+
+/// Checks a position.
+pub(super) fn check_step(step: i32) -> Result<(), NakReason> {
+    if (-POSITION_MAX..=POSITION_MAX).contains(&step) {
+        Ok(())
+    } else {
+        Err(NakReason::PositionOutOfRange)
+    }
+}
+
+/// Checks a plan; gives its number of beams.
+pub(super) fn check_plan(plan: &Sweep) -> Result<u16, NakReason> {
+    let beams = plan.beams().filter(|_| plan.sweep != 0).ok_or(NakReason::SweepOutOfRange)?;
+    if plan.lease_ms < LEASE_MS_MIN {
+        return Err(NakReason::LeaseOutOfRange);
+    }
+    check_step(plan.first_step)?;
+    let last = plan.step_of(beams.wrapping_sub(1)).ok_or(NakReason::PositionOutOfRange)?;
+    check_step(last)?;
+    Ok(beams)
+}

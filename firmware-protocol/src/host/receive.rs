@@ -1,0 +1,228 @@
+//! What replies and events mean.
+
+use super::{Host, HostError, HostEvent, Outcome};
+use crate::frame::Header;
+use crate::messages::{
+    FirmwareVersion, Identity, NakReason, PROTOCOL, ProtocolId, Reading, Reply, Request, Status,
+};
+
+impl Host {
+    /// An Identity: the answer to Identify, or a device that announces its restart.
+    pub(super) fn handle_identity(
+        &mut self,
+        now_us: u64,
+        header: Header,
+        identity: &Identity,
+        wire_len: u8,
+    ) {
+        if self.request_with(header.seq) == Some(Request::Identify) {
+            if identity.protocol != PROTOCOL {
+                return self.wrong_version(identity.protocol, identity.firmware);
+            }
+            self.time_reply(now_us, wire_len);
+            return self.identified(identity);
+        }
+        let identifying = self.exchange.as_ref().filter(|open| open.request == Request::Identify);
+        if identifying.is_some() {
+            // It has just booted, so it may have missed the question.
+            if let Some(open) = &mut self.exchange {
+                open.deadline_us = now_us;
+            }
+        } else if self.is_new_boot(header.boot) {
+            self.rebooted(header.boot);
+        }
+    }
+
+    fn identified(&mut self, identity: &Identity) {
+        let new = identity.boot;
+        if let Some(old) = self.boot
+            && old != new
+        {
+            self.forget_boot(old);
+            self.report(HostEvent::Rebooted { old, new });
+        }
+        if self.previous_boot == Some(new) {
+            self.previous_boot = None;
+        }
+        self.boot = Some(new);
+        self.identity = Some(*identity);
+        if let Some(last_seq) = identity.last_seq {
+            self.numbers.follow(last_seq);
+        }
+        self.end_job();
+        self.report(HostEvent::Identified(*identity));
+    }
+
+    /// A right frame that is no message of this version.
+    pub(super) fn handle_undecodable(&mut self, stranger: Option<(ProtocolId, FirmwareVersion)>) {
+        self.stats.dropped.undecodable = self.stats.dropped.undecodable.saturating_add(1);
+        let identifying =
+            self.exchange.as_ref().is_some_and(|open| open.request == Request::Identify);
+        if let Some((theirs, firmware)) = stranger
+            && identifying
+        {
+            self.wrong_version(theirs, firmware);
+        }
+    }
+
+    fn wrong_version(&mut self, theirs: ProtocolId, firmware: FirmwareVersion) {
+        self.fail(HostError::WrongVersion { ours: PROTOCOL, theirs, firmware });
+    }
+
+    pub(super) fn handle_reply(
+        &mut self,
+        now_us: u64,
+        header: Header,
+        reply: &Reply,
+        wire_len: u8,
+    ) {
+        let request = self.request_with(header.seq);
+        if !self.is_present_boot(header, reply, request) {
+            return;
+        }
+        match *reply {
+            Reply::Reading(reading) if reading.sweep != 0 => self.handle_beam(now_us, &reading),
+            Reply::SweepDone(done) => self.handle_sweep_done(now_us, &done),
+            Reply::Fault { kind } => {
+                self.step = None;
+                self.report(HostEvent::Fault(kind));
+                self.ask_soon(now_us);
+            }
+            _ => match request {
+                Some(request) => self.handle_answer(now_us, &request, reply, wire_len),
+                None => self.count_stale(),
+            },
+        }
+    }
+
+    /// Tells frames of the present boot from late copies, and notices a restart.
+    fn is_present_boot(&mut self, header: Header, reply: &Reply, request: Option<Request>) -> bool {
+        let present = match &self.identity {
+            Some(identity) => identity.boot == header.boot,
+            // A Stop before Identify.
+            None => request == Some(Request::Stop),
+        };
+        if present {
+            return true;
+        }
+        let answers = request.is_some() && !matches!(reply, Reply::Reading(_));
+        if answers && self.is_new_boot(header.boot) {
+            self.rebooted(header.boot);
+        } else {
+            self.count_stale();
+        }
+        false
+    }
+
+    fn is_new_boot(&self, boot: u16) -> bool {
+        self.identity.as_ref().is_some_and(|identity| identity.boot != boot)
+            && self.previous_boot != Some(boot)
+    }
+
+    fn rebooted(&mut self, new: u16) {
+        let Some(old) = self.boot else { return };
+        self.forget_boot(old);
+        self.boot = Some(new);
+        let stopped = self.is_stopping();
+        let reset = matches!(self.job, Some(super::Command::Reset));
+        if reset {
+            return self.finish(Outcome::Reset);
+        }
+        self.report(HostEvent::Rebooted { old, new });
+        if stopped {
+            // Nothing turns after a restart.
+            self.finish(Outcome::Stopped);
+        } else if self.job.is_some() {
+            self.fail(HostError::Rebooted);
+        }
+    }
+
+    fn forget_boot(&mut self, old: u16) {
+        self.previous_boot = Some(old);
+        self.boot = None;
+        self.identity = None;
+        self.settings = None;
+        self.step = None;
+    }
+
+    fn count_stale(&mut self) {
+        self.stats.dropped.stale = self.stats.dropped.stale.saturating_add(1);
+    }
+
+    /// A reply that carries the number of the open request.
+    fn handle_answer(&mut self, now_us: u64, request: &Request, reply: &Reply, wire_len: u8) {
+        match (*reply, *request) {
+            (Reply::Nak { reason: NakReason::SequenceReused }, _) => self.renumber(now_us),
+            (Reply::Nak { reason }, _) => self.fail(HostError::Refused(reason)),
+            (Reply::Started, _) => {
+                self.time_reply(now_us, wire_len);
+                self.started(now_us);
+            }
+            (Reply::Ack, _) => self.handle_ack(now_us, request, wire_len),
+            (Reply::Homed { drift_steps }, Request::Home) => {
+                self.step = Some(0);
+                self.finish(Outcome::Homed { drift_steps });
+            }
+            (Reply::Reading(reading), Request::Ping) => self.handle_ping(&reading),
+            (Reply::StatusReport(status), Request::Status) => {
+                self.handle_status(now_us, &status, wire_len);
+            }
+            (Reply::Alive(alive), Request::KeepAlive { .. } | Request::Resend { .. }) => {
+                self.handle_alive(now_us, &alive, wire_len);
+            }
+            _ => self.count_stale(),
+        }
+    }
+
+    fn handle_ack(&mut self, now_us: u64, request: &Request, wire_len: u8) {
+        match *request {
+            Request::Configure(settings) => {
+                self.time_reply(now_us, wire_len);
+                self.settings = Some(settings);
+                self.finish(Outcome::Configured);
+            }
+            Request::MoveTo { step } => {
+                self.step = Some(step);
+                self.finish(Outcome::Moved { step });
+            }
+            Request::Sweep(_) => {
+                self.time_reply(now_us, wire_len);
+                self.exchange = None;
+            }
+            Request::Stop => self.stopped(),
+            Request::Reset => {
+                if let Some(old) = self.boot {
+                    self.forget_boot(old);
+                }
+                self.finish(Outcome::Reset);
+            }
+            _ => self.count_stale(),
+        }
+    }
+
+    fn handle_ping(&mut self, reading: &Reading) {
+        // Without a place for it, the request is repeated and the device answers from memory.
+        if self.has_room_for_reading() {
+            self.stats.readings += 1;
+            let reading = *reading;
+            self.report(HostEvent::Reading { reading, repaired: false });
+            self.finish(Outcome::Pinged);
+        }
+    }
+
+    fn handle_status(&mut self, now_us: u64, status: &Status, wire_len: u8) {
+        self.time_reply(now_us, wire_len);
+        self.step = status.homed.then_some(status.step);
+        self.report_clock(now_us, status.ticks);
+        self.finish(Outcome::Status(*status));
+    }
+
+    pub(super) fn report_clock(&mut self, now_us: u64, device_ticks: u32) {
+        let Some(open) = &self.exchange else { return };
+        let (sent_us, retried) = (open.sent_us, open.attempts > 1);
+        if self.has_room_for_reading() {
+            let received_us = now_us;
+            self.report(HostEvent::ClockSample { sent_us, received_us, device_ticks, retried });
+        }
+    }
+}

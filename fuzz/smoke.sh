@@ -1,0 +1,21 @@
+#!/bin/sh
+# Runs every fuzz target for a bounded time: fuzz/smoke.sh [seconds each] [target...]
+# Needs no cargo-fuzz and no nightly: the coverage that libFuzzer steers by comes from LLVM
+# options that a stable compiler takes as well. For longer hunts with the address sanitizer:
+# RUSTC_BOOTSTRAP=1 cargo fuzz run <target>.
+set -eu
+cd "$(dirname "$0")"
+seconds=${1:-20}
+[ $# -eq 0 ] || shift
+targets=${*:-$(sed -n 's/^name = "\([a-z_]*\)"$/\1/p' Cargo.toml)}
+triple=$(rustc -vV | sed -n 's/^host: //p')
+coverage="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4
+  -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table
+  -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1 -Cdebug-assertions -Coverflow-checks"
+RUSTFLAGS=$(echo $coverage) cargo build --release --target "$triple"
+binaries=${CARGO_TARGET_DIR:-target}/$triple/release
+for target in $targets; do
+  mkdir -p "corpus/$target" "artifacts/$target"
+  "$binaries/$target" "corpus/$target" -max_total_time="$seconds" -max_len=4096 -timeout=10 \
+    -artifact_prefix="artifacts/$target/" -print_final_stats=1
+done

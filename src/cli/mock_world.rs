@@ -1,0 +1,112 @@
+//! The mock's world as options: shared by `mock` and `scan --mock`.
+
+use std::sync::Arc;
+
+use rand::RngExt as _;
+
+use super::{Failure, scene_file};
+use crate::{
+    acoustics::{Air, Sensor},
+    geometry::Pose,
+    mock::{BoardSettings, FAULT_HELP, FaultPlan, MockBoard, Noise, Pace, Soundings, World},
+    model::{Options, Simulator},
+    scene::Scene,
+};
+
+/// Options of the mock's world.
+#[derive(Debug, Clone, clap::Args)]
+#[command(next_help_heading = "Mock")]
+pub(super) struct MockWorldArgs {
+    /// Scene the mock's sound comes from, if it is to differ from --scene
+    #[arg(long, value_name = "SCENE")]
+    truth: Option<String>,
+    /// Air temperature of the mock's world, degrees Celsius, if it is to differ
+    #[arg(long, value_name = "C", allow_negative_numbers = true)]
+    truth_temperature_c: Option<f64>,
+    /// Pace the mock by the wall clock instead of as fast as possible
+    #[arg(long)]
+    realtime: bool,
+    /// Seed of noise, missed steps and faults
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Faults to play
+    #[arg(long, value_name = "SPEC", long_help = FAULT_HELP)]
+    faults: Option<FaultPlan>,
+    /// Standard deviation of the range noise, millimetres (the far tail is longer)
+    #[arg(long, value_name = "MM", default_value_t = 0.5, value_parser = not_negative)]
+    noise_mm: f64,
+    /// Probability for each move that the motor falls a step short
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
+    missed_steps: f64,
+    /// How far the transducer is turned on the motor's shaft, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
+    mounting_offset_deg: f64,
+    /// Motor steps a revolution
+    #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u16).range(4..=12800))]
+    steps_per_revolution: u16,
+}
+
+/// What the host believes, from which the truth differs only where it is told to.
+pub(super) struct Belief<'a> {
+    pub(super) scene: &'a Arc<Scene>,
+    pub(super) pose: &'a Pose,
+    pub(super) sensor: &'a Sensor,
+    pub(super) air: &'a Air,
+    pub(super) options: &'a Options,
+}
+
+impl MockWorldArgs {
+    pub(super) const fn pace(&self) -> Pace {
+        if self.realtime { Pace::RealTime } else { Pace::Virtual }
+    }
+
+    /// The board, powered up in its world.
+    pub(super) fn board(&self, belief: &Belief<'_>) -> Result<MockBoard, Failure> {
+        let scene = match &self.truth {
+            Some(name) => Arc::new(scene_file::load(name)?),
+            None => Arc::clone(belief.scene),
+        };
+        let air = self.truth_air(belief.air)?;
+        let sound_speed_m_s = air.sound_speed_m_s();
+        // The mock hears to the end of whatever window it is told; the model must reach as far.
+        let options = Options { max_range_m: None, ..*belief.options };
+        let simulator = Simulator::new(
+            Arc::new(scene.with_robot_at(belief.pose)),
+            belief.sensor.clone(),
+            air,
+            options,
+        )
+        .map_err(|error| Failure::input(error, "see `sonard mock --help`"))?;
+        let steps = self.steps_per_revolution;
+        let soundings = Soundings::of(&simulator, belief.pose, steps, self.mounting_offset_deg);
+        let noise = Noise::of_range_mm(self.noise_mm, sound_speed_m_s);
+        let world = World::new(soundings, noise, self.missed_steps, self.seed);
+        // Two mocks in a row are two boots: a nonce from the seed would repeat.
+        let boot = rand::rng().random_range(1..=u16::MAX);
+        let settings = BoardSettings {
+            boot,
+            clock: 0,
+            steps_per_revolution: steps,
+            faults: self.faults.unwrap_or_default(),
+            seed: self.seed,
+            pace: self.pace(),
+        };
+        Ok(MockBoard::new(settings, world))
+    }
+
+    fn truth_air(&self, believed: &Air) -> Result<Air, Failure> {
+        let Some(temperature_c) = self.truth_temperature_c else { return Ok(*believed) };
+        Air::new(temperature_c, believed.humidity_percent(), believed.pressure_kpa())
+            .map_err(|error| Failure::input(error, "give --truth-temperature-c in degrees Celsius"))
+    }
+}
+
+fn probability(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "a probability, 0 to 1".to_owned())?;
+    if (0.0..=1.0).contains(&value) { Ok(value) } else { Err("a probability, 0 to 1".into()) }
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "a number, 0 or greater".to_owned())?;
+    if value >= 0.0 && value.is_finite() { Ok(value) } else { Err("a number, 0 or greater".into()) }
+}

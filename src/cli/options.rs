@@ -1,0 +1,173 @@
+//! Options that several verbs share: sensor, air and engine.
+
+use std::{fs, io};
+
+use super::Failure;
+use crate::{
+    acoustics::{Air, Sensor, SensorError},
+    model::{EngineKind, Options},
+    scene::suggest,
+};
+
+/// Which ranger.
+#[derive(Debug, Clone, clap::Args)]
+#[command(next_help_heading = "Sensor and air")]
+pub(super) struct SensorArgs {
+    /// Sensor preset (senscomp-6500, bozma-kuc-60khz), or a file with a sensor's data
+    #[arg(long, value_name = "NAME|FILE", default_value = "senscomp-6500")]
+    sensor: String,
+}
+
+/// The air between ranger and walls.
+#[derive(Debug, Clone, Copy, clap::Args)]
+#[command(next_help_heading = "Sensor and air")]
+pub(super) struct AirArgs {
+    /// Air temperature, degrees Celsius
+    #[arg(long, value_name = "C", default_value_t = 20.0, allow_negative_numbers = true)]
+    temperature_c: f64,
+    /// Relative humidity, percent
+    #[arg(long, value_name = "PERCENT", default_value_t = 50.0)]
+    humidity_percent: f64,
+    /// Static pressure, kilopascals
+    #[arg(long, value_name = "KPA", default_value_t = 101.325)]
+    pressure_kpa: f64,
+    /// Speed of sound, metres a second, instead of the one that follows from the air
+    #[arg(long, value_name = "M/S")]
+    sound_speed: Option<f64>,
+}
+
+/// How echoes are predicted.
+#[derive(Debug, Clone, Copy, clap::Args)]
+#[command(next_help_heading = "Model")]
+pub(super) struct EngineArgs {
+    /// How echoes are found
+    #[arg(long, value_enum, default_value_t = EngineName::Fan)]
+    engine: EngineName,
+    /// Listen up to this range, metres [default: the sensor's]
+    #[arg(long, value_name = "M")]
+    max_range: Option<f64>,
+    /// Least amplitude detected; a head-on, perfect wall gives 1 [default: the sensor's]
+    #[arg(long, value_name = "T")]
+    threshold: Option<f64>,
+    /// Leave out the absorption of the air
+    #[arg(long)]
+    lossless: bool,
+    /// Most mirror reflections on a path [default: as many as can matter]
+    #[arg(long, value_name = "N")]
+    max_order: Option<u32>,
+    /// How edges diffract
+    #[arg(long, value_enum, default_value_t = EdgeLaw::KucSiegel)]
+    edge_law: EdgeLaw,
+    /// Angle between the rays of `fan`, degrees
+    #[arg(long, value_name = "DEG", default_value_t = Options::default().ray_spacing_deg)]
+    ray_spacing_deg: f64,
+    /// Full aperture of `cone`, degrees [default: the sensor's two-way -6 dB width]
+    #[arg(long, value_name = "DEG")]
+    aperture_deg: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum EngineName {
+    /// Exact echo paths (not in this version)
+    Paths,
+    /// Rays with mirror reflections and diffraction, after Dudek, Jenkin, Milios and Wilkes
+    Fan,
+    /// Nearest hit of one ray a degree
+    Cone,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum EdgeLaw {
+    /// Uniform coefficients for the wedge's angle and aspect (not in this version)
+    Utd,
+    /// One ratio to a plane at the same range, whatever the aspect
+    KucSiegel,
+    /// One scattering strength (not in this version)
+    BozmaKuc,
+}
+
+impl SensorArgs {
+    /// The sensor named: a file if there is one of that name, else a preset.
+    pub(super) fn sensor(&self) -> Result<Sensor, Failure> {
+        match fs::read_to_string(&self.sensor) {
+            Ok(text) => Sensor::from_json(&text).map_err(|error| self.refuse(&error)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                Sensor::preset(&self.sensor).map_err(|error| self.refuse(&error))
+            }
+            Err(error) => Err(Failure::input(
+                format!("cannot read the sensor {}: {error}", self.sensor),
+                "give a text file that you may read, or the name of a preset",
+            )),
+        }
+    }
+
+    fn refuse(&self, error: &SensorError) -> Failure {
+        let name = &self.sensor;
+        match error {
+            SensorError::UnknownPreset { .. } => {
+                let known: Vec<String> = Sensor::preset_names().map(str::to_owned).collect();
+                Failure::input(
+                    format!("there is no sensor file `{name}` and no preset of that name"),
+                    suggest(name, &known, "presets"),
+                )
+            }
+            SensorError::Form { line, column, field, message } => Failure::input(
+                format!("{name}:{line}:{column}: {field}: {message}"),
+                "start from a preset in the folder sensors/ of the source",
+            ),
+            SensorError::Figure { .. } => {
+                Failure::input(format!("{name}: {error}"), "correct that figure in the file")
+            }
+        }
+    }
+}
+
+impl AirArgs {
+    /// The air described.
+    pub(super) fn air(&self) -> Result<Air, Failure> {
+        Air::new(self.temperature_c, self.humidity_percent, self.pressure_kpa)
+            .and_then(|air| self.sound_speed.map_or(Ok(air), |speed| air.with_sound_speed(speed)))
+            .map_err(|error| {
+                let option = match error.field {
+                    "sound_speed_m_s" => "sound-speed".to_owned(),
+                    field => field.replace('_', "-"),
+                };
+                Failure::input(
+                    format!("--{option} is {}", error.value),
+                    format!("give a number from {} to {}", error.min, error.max),
+                )
+            })
+    }
+}
+
+impl EngineArgs {
+    /// The model's options; what no engine can do yet is refused.
+    pub(super) fn options(&self) -> Result<Options, Failure> {
+        let engine = match self.engine {
+            EngineName::Fan => EngineKind::Fan,
+            EngineName::Cone => EngineKind::Cone,
+            EngineName::Paths => {
+                return Err(Failure::input(
+                    "--engine paths: the exact engine is not in this version",
+                    "use --engine fan, the same physics by a fan of rays",
+                ));
+            }
+        };
+        if self.edge_law != EdgeLaw::KucSiegel {
+            return Err(Failure::input(
+                "--edge-law: only kuc-siegel is in this version",
+                "leave --edge-law out",
+            ));
+        }
+        Ok(Options {
+            engine,
+            max_range_m: self.max_range,
+            threshold: self.threshold,
+            lossless: self.lossless,
+            max_order: self.max_order,
+            ray_spacing_deg: self.ray_spacing_deg,
+            aperture_deg: self.aperture_deg,
+            ..Options::default()
+        })
+    }
+}

@@ -1,0 +1,85 @@
+//! Scenes and poses named on the command line.
+
+use std::{fs, io, path::Path};
+
+use miette::{LabeledSpan, MietteDiagnostic, NamedSource, Report};
+
+use super::Failure;
+use crate::{
+    geometry::Pose,
+    scene::{PoseError, Scene, SceneError, shipped, suggest},
+};
+
+/// Reads and checks a scene: a file, or a shipped scene by its name. A file of that name wins.
+///
+/// # Errors
+/// No such file or name, a file that can't be read, or a fault in it, shown at its line.
+pub(super) fn load(path_or_name: &str) -> Result<Scene, Failure> {
+    let text = read(path_or_name)?;
+    Scene::from_json(&text).map_err(|error| Failure::Input(report(path_or_name, text, &error)))
+}
+
+/// Reads and checks a shipped scene, whatever files there are.
+///
+/// # Errors
+/// No shipped scene of that name.
+pub(super) fn shipped(name: &str) -> Result<Scene, Failure> {
+    let text = shipped::text(name).ok_or_else(|| no_such_scene(name))?;
+    Scene::from_json(text).map_err(|error| Failure::Input(report(name, text.to_owned(), &error)))
+}
+
+/// The pose meant by `X,Y,DEG` or a name, if a ranger can stand there.
+///
+/// # Errors
+/// No such pose, or one outside the room, in a body or on a wall.
+pub(super) fn pose(scene: &Scene, spec: &str) -> Result<Pose, Failure> {
+    let refuse = |error: PoseError| Failure::input(&error, error.help());
+    let pose = scene.pose(spec).map_err(refuse)?;
+    scene.check_pose(&pose).map_err(refuse)?;
+    Ok(pose)
+}
+
+fn read(path_or_name: &str) -> Result<String, Failure> {
+    let bytes = match fs::read(path_or_name) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return shipped::text(path_or_name)
+                .map(str::to_owned)
+                .ok_or_else(|| no_such_scene(path_or_name));
+        }
+        Err(error) => {
+            return Err(Failure::input(
+                format!("cannot read the scene {path_or_name}: {error}"),
+                "give a scene file that you may read, or the name of a shipped scene",
+            ));
+        }
+    };
+    String::from_utf8(bytes).map_err(|error| {
+        Failure::input(
+            format!(
+                "the scene {path_or_name} is not UTF-8 text: byte {} is wrong",
+                error.utf8_error().valid_up_to()
+            ),
+            "a scene is a JSON text file; `sonard scene schema` describes it",
+        )
+    })
+}
+
+fn no_such_scene(path_or_name: &str) -> Failure {
+    let names: Vec<String> = shipped::names().map(str::to_owned).collect();
+    let stem = Path::new(path_or_name).file_stem().unwrap_or_default().to_string_lossy();
+    Failure::input(
+        format!("there is no scene file `{path_or_name}` and no shipped scene of that name"),
+        suggest(&stem, &names, "shipped scenes"),
+    )
+}
+
+/// Shows the line of the file that is wrong. The headline alone says `file:line:column` too,
+/// for whoever greps.
+fn report(name: &str, text: String, error: &SceneError) -> Report {
+    let label = if error.path.is_empty() { "here".to_owned() } else { error.path.clone() };
+    let diagnostic = MietteDiagnostic::new(format!("{name}:{error}"))
+        .with_help(error.help())
+        .with_label(LabeledSpan::at(error.span.clone(), label));
+    Report::new(diagnostic).with_source_code(NamedSource::new(name, text).with_language("json"))
+}

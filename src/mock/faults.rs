@@ -1,0 +1,233 @@
+//! Faults of the line and of the device, chosen by a seed.
+
+use std::{fmt, str::FromStr};
+
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64;
+use thiserror::Error;
+
+/// How often what goes wrong. Written `flip=0.001,drop=0.001,reset=0.002,version=9`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FaultPlan {
+    /// Probability that a byte has one bit flipped.
+    pub flip: f64,
+    /// Probability that a byte is lost.
+    pub drop: f64,
+    /// Probability that a byte comes twice.
+    pub double: f64,
+    /// Probability that a chunk of bytes is held back for `delay_ms`.
+    pub delay: f64,
+    /// How long a chunk is held back, milliseconds.
+    pub delay_ms: u32,
+    /// Probability for each firing that the device hangs for `stall_ms`.
+    pub stall: f64,
+    /// How long the device hangs, milliseconds.
+    pub stall_ms: u32,
+    /// Probability for each firing that the device restarts.
+    pub reset: f64,
+    /// Probability for each firing that the line hangs up and comes back.
+    pub hangup: f64,
+    /// Protocol version to claim instead of the true one.
+    pub version: Option<u8>,
+}
+
+/// The keys of a fault specification, with what their value means.
+pub const FAULT_HELP: &str = "comma-separated KEY=VALUE: flip, drop, double (probability a byte), \
+delay (probability a chunk; delay_ms, default 20), stall (probability a firing; stall_ms, default \
+500), reset, hangup (probability a firing), version (protocol version to claim)";
+
+/// Why a fault specification can't be read.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum FaultSpecError {
+    /// No `=` in a part.
+    #[error("{0:?} is not KEY=VALUE")]
+    NotAPair(String),
+    /// A key that is not known.
+    #[error("{0:?} is not a fault")]
+    UnknownKey(String),
+    /// A value that does not fit its key.
+    #[error("{key}={value} does not fit: {wanted}")]
+    BadValue {
+        /// The key.
+        key: String,
+        /// The value.
+        value: String,
+        /// What would be right.
+        wanted: &'static str,
+    },
+}
+
+impl FromStr for FaultPlan {
+    type Err = FaultSpecError;
+
+    fn from_str(spec: &str) -> Result<Self, Self::Err> {
+        let mut plan = Self { delay_ms: 20, stall_ms: 500, ..Self::default() };
+        for part in spec.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+            let (key, value) =
+                part.split_once('=').ok_or_else(|| FaultSpecError::NotAPair(part.into()))?;
+            plan.set(key.trim(), value.trim())?;
+        }
+        Ok(plan)
+    }
+}
+
+impl FaultPlan {
+    fn set(&mut self, key: &str, value: &str) -> Result<(), FaultSpecError> {
+        match key {
+            "flip" => self.flip = probability(key, value)?,
+            "drop" => self.drop = probability(key, value)?,
+            "double" => self.double = probability(key, value)?,
+            "delay" => self.delay = probability(key, value)?,
+            "stall" => self.stall = probability(key, value)?,
+            "reset" => self.reset = probability(key, value)?,
+            "hangup" => self.hangup = probability(key, value)?,
+            "delay_ms" => self.delay_ms = whole(key, value, "milliseconds, 0 to 60000")?,
+            "stall_ms" => self.stall_ms = whole(key, value, "milliseconds, 0 to 60000")?,
+            "version" => self.version = Some(whole(key, value, "a protocol version, 0 to 255")?),
+            _ => return Err(FaultSpecError::UnknownKey(key.into())),
+        }
+        if self.delay_ms > 60_000 || self.stall_ms > 60_000 {
+            return Err(bad(key, value, "milliseconds, 0 to 60000"));
+        }
+        Ok(())
+    }
+}
+
+fn probability(key: &str, value: &str) -> Result<f64, FaultSpecError> {
+    value
+        .parse()
+        .ok()
+        .filter(|p| (0.0..=1.0).contains(p))
+        .ok_or_else(|| bad(key, value, "a probability, 0 to 1"))
+}
+
+fn whole<T: FromStr>(key: &str, value: &str, wanted: &'static str) -> Result<T, FaultSpecError> {
+    value.parse().map_err(|_| bad(key, value, wanted))
+}
+
+fn bad(key: &str, value: &str, wanted: &'static str) -> FaultSpecError {
+    FaultSpecError::BadValue { key: key.into(), value: value.into(), wanted }
+}
+
+/// A fault of the device at a firing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DeviceFault {
+    /// It does nothing for so many milliseconds.
+    Stall(u32),
+    /// It restarts.
+    Reset,
+    /// The line hangs up.
+    Hangup,
+}
+
+impl fmt::Display for DeviceFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Stall(ms) => write!(f, "device stalls for {ms} ms"),
+            Self::Reset => f.write_str("device resets"),
+            Self::Hangup => f.write_str("line hangs up"),
+        }
+    }
+}
+
+/// Draws faults; the same seed and the same calls give the same faults.
+#[derive(Debug)]
+pub struct Faults {
+    plan: FaultPlan,
+    rng: Pcg64,
+}
+
+impl Faults {
+    /// Faults of a plan from a seed.
+    #[must_use]
+    pub fn new(plan: FaultPlan, seed: u64) -> Self {
+        Self { plan, rng: Pcg64::seed_from_u64(seed) }
+    }
+
+    /// What the other end of the line gets of `bytes`.
+    pub fn garble(&mut self, bytes: &[u8], out: &mut Vec<u8>) {
+        for &byte in bytes {
+            if self.happens(self.plan.drop) {
+                continue;
+            }
+            let flipped = if self.happens(self.plan.flip) {
+                byte ^ (1 << self.rng.random_range(0..8))
+            } else {
+                byte
+            };
+            out.push(flipped);
+            if self.happens(self.plan.double) {
+                out.push(flipped);
+            }
+        }
+    }
+
+    /// How long a chunk of bytes is held back, milliseconds.
+    pub fn delay_ms(&mut self) -> u32 {
+        if self.happens(self.plan.delay) { self.plan.delay_ms } else { 0 }
+    }
+
+    /// What befalls the device at a firing, if anything.
+    pub fn at_firing(&mut self) -> Option<DeviceFault> {
+        let FaultPlan { stall, stall_ms, reset, hangup, .. } = self.plan;
+        // All three are drawn each time, so that one rate does not shift another's sequence.
+        let draws = [self.happens(reset), self.happens(hangup), self.happens(stall)];
+        [DeviceFault::Reset, DeviceFault::Hangup, DeviceFault::Stall(stall_ms)]
+            .into_iter()
+            .zip(draws)
+            .find_map(|(fault, happens)| happens.then_some(fault))
+    }
+
+    fn happens(&mut self, probability: f64) -> bool {
+        probability > 0.0 && self.rng.random_bool(probability)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn specifications_are_read_and_wrong_ones_say_what_would_be_right() {
+        let plan: FaultPlan = "flip=0.25, reset=1,version=9".parse().expect("reads");
+        assert_eq!((plan.flip, plan.reset, plan.version), (0.25, 1.0, Some(9)));
+        for (spec, part) in [
+            ("flip", "KEY=VALUE"),
+            ("flop=1", "not a fault"),
+            ("flip=2", "0 to 1"),
+            ("flip=NaN", "0 to 1"),
+            ("stall_ms=70000", "60000"),
+            ("version=300", "0 to 255"),
+        ] {
+            let error = spec.parse::<FaultPlan>().expect_err(spec);
+            assert!(error.to_string().contains(part), "{spec}: {error}");
+        }
+    }
+
+    #[test]
+    fn rates_are_met_and_a_seed_repeats() {
+        let plan: FaultPlan = "drop=0.1,double=0.1,flip=0.1".parse().expect("reads");
+        let sent = vec![0x55; 100_000];
+        let run = |seed| {
+            let mut got = Vec::new();
+            Faults::new(plan, seed).garble(&sent, &mut got);
+            got
+        };
+        let got = run(1);
+        assert_eq!(got, run(1));
+        assert_ne!(got, run(2));
+        // 0.9 survive, a tenth of those twice: 99,000 with a deviation of about 130.
+        assert!((98_300..99_700).contains(&got.len()), "{}", got.len());
+        let flipped = got.iter().filter(|&&byte| byte != 0x55).count();
+        assert!((9_200..10_600).contains(&flipped), "{flipped}");
+    }
+
+    #[test]
+    fn no_plan_changes_nothing() {
+        let mut faults = Faults::new(FaultPlan::default(), 7);
+        let mut got = Vec::new();
+        faults.garble(&[1, 2, 3], &mut got);
+        assert_eq!(got, [1, 2, 3]);
+        assert_eq!((faults.delay_ms(), faults.at_firing()), (0, None));
+    }
+}

@@ -1,0 +1,89 @@
+//! A move of the stepper: speed up, run, slow down.
+
+/// A move with constant acceleration up to a largest speed, and the same back to rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trapezoid {
+    steps: i32,
+    /// Peak speed, steps/s.
+    peak: f64,
+    acceleration: f64,
+}
+
+impl Trapezoid {
+    /// A move by `steps` with at most `speed` steps/s and `acceleration` steps/s^2.
+    #[must_use]
+    pub fn new(steps: i32, speed: u16, acceleration: u32) -> Self {
+        let acceleration = f64::from(acceleration.max(1));
+        let distance = f64::from(steps.unsigned_abs());
+        // The speed at which half the way is used up by speeding up.
+        let reachable = (distance * acceleration).sqrt();
+        Self { steps, peak: f64::from(speed.max(1)).min(reachable), acceleration }
+    }
+
+    /// How long the whole move takes, seconds.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        if self.steps == 0 {
+            return 0.0;
+        }
+        let distance = f64::from(self.steps.unsigned_abs());
+        distance / self.peak + self.peak / self.acceleration
+    }
+
+    /// Where a motor that begins to brake after `time_s` comes to a stand, steps from the start,
+    /// and when, seconds after the start.
+    #[must_use]
+    pub fn braked_at(&self, time_s: f64) -> (i32, f64) {
+        let (gone, speed) = self.state_at(time_s);
+        let distance = f64::from(self.steps.unsigned_abs());
+        let stand = (gone + speed * speed / (2.0 * self.acceleration)).round().min(distance);
+        (stand as i32 * self.steps.signum(), time_s + speed / self.acceleration)
+    }
+
+    /// Distance gone, steps, and speed, steps/s, after `time_s`.
+    fn state_at(&self, time_s: f64) -> (f64, f64) {
+        let distance = f64::from(self.steps.unsigned_abs());
+        let (ramp_s, end_s) = (self.peak / self.acceleration, self.duration_s());
+        if time_s >= end_s {
+            return (distance, 0.0);
+        }
+        if time_s < ramp_s {
+            return (self.acceleration * time_s * time_s / 2.0, self.acceleration * time_s);
+        }
+        let left_s = end_s - time_s;
+        if left_s < ramp_s {
+            let left = self.acceleration * left_s * left_s / 2.0;
+            return (distance - left, self.acceleration * left_s);
+        }
+        (self.peak * (time_s - ramp_s / 2.0), self.peak)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_are_those_of_the_closed_form() {
+        // 1000 steps at 500 steps/s, 1000 steps/s^2: 0.5 s up, 1.5 s at speed, 0.5 s down.
+        assert!((Trapezoid::new(1000, 500, 1000).duration_s() - 2.5).abs() < 1e-12);
+        // One step never reaches the speed: twice sqrt(1 / a).
+        assert!((Trapezoid::new(-1, 500, 40_000).duration_s() - 0.01).abs() < 1e-12);
+        assert_eq!(Trapezoid::new(0, 500, 1000).duration_s(), 0.0);
+    }
+
+    #[test]
+    fn a_braked_motor_ends_between_where_it_was_and_where_it_was_going() {
+        let motion = Trapezoid::new(-1000, 500, 1000);
+        let mut last = 0;
+        for tenth in 0..=30 {
+            let (stand, at_s) = motion.braked_at(f64::from(tenth) / 10.0);
+            assert!((-1000..=last).contains(&stand), "{tenth}: {stand} after {last}");
+            assert!(at_s >= f64::from(tenth) / 10.0);
+            last = stand;
+        }
+        assert_eq!(last, -1000);
+        // At full speed it needs v^2 / 2a = 125 steps more.
+        assert_eq!(motion.braked_at(1.0).0, -(375 + 125));
+    }
+}

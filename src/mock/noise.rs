@@ -1,0 +1,63 @@
+//! Noise of a time of flight: normal, with a longer tail towards far ranges.
+
+use rand::{Rng, RngExt as _};
+use rand_distr::{Distribution as _, Exp1, StandardNormal};
+
+/// Spread of the readings of one and the same echo.
+///
+/// Dudek, Jenkin, Milios and Wilkes (section 1) describe the error of a single echo as normal
+/// with a far tail slightly longer than the near one; here some readings, at random, come later
+/// by an exponentially distributed time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Standard deviation of the normal part, microseconds.
+    pub sigma_us: f64,
+    /// Share of readings in the far tail, 0 to 1.
+    pub tail_share: f64,
+    /// Mean extra time of a reading in the tail, microseconds.
+    pub tail_us: f64,
+}
+
+impl Noise {
+    /// No noise at all.
+    pub const NONE: Self = Self { sigma_us: 0.0, tail_share: 0.0, tail_us: 0.0 };
+
+    /// Noise whose normal part has a standard deviation of so many millimetres of range, with
+    /// one reading in ten in a tail of twice that mean.
+    #[must_use]
+    pub fn of_range_mm(sigma_mm: f64, sound_speed_m_s: f64) -> Self {
+        let sigma_us = 2.0 * sigma_mm * 1e3 / sound_speed_m_s;
+        Self { sigma_us, tail_share: 0.1, tail_us: 2.0 * sigma_us }
+    }
+
+    /// One error, microseconds.
+    pub fn sample_us(&self, rng: &mut impl Rng) -> f64 {
+        let normal: f64 = StandardNormal.sample(rng);
+        // The tail is drawn whether or not it is used: the sequence stays the same for any share.
+        let tail: f64 = Exp1.sample(rng);
+        let late = rng.random_bool(self.tail_share.clamp(0.0, 1.0));
+        self.sigma_us * normal + if late { self.tail_us * tail } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng as _;
+    use rand_pcg::Pcg64;
+
+    #[test]
+    fn the_far_tail_is_longer() {
+        let noise = Noise::of_range_mm(1.0, 343.0);
+        let mut rng = Pcg64::seed_from_u64(5);
+        let errors: Vec<f64> = (0..200_000).map(|_| noise.sample_us(&mut rng)).collect();
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        // The tail alone shifts the mean, by its share times its mean.
+        let expected = noise.tail_share * noise.tail_us;
+        assert!((mean - expected).abs() < 0.05 * noise.sigma_us, "{mean} {expected}");
+        let beyond = |sign: f64| {
+            errors.iter().filter(|&&e| sign * (e - mean) > 3.0 * noise.sigma_us).count()
+        };
+        assert!(beyond(1.0) > 3 * beyond(-1.0), "{} {}", beyond(1.0), beyond(-1.0));
+    }
+}

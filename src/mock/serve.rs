@@ -1,0 +1,226 @@
+//! Plays the board on a pty, in real time or as fast as the host keeps up.
+
+use std::{
+    collections::VecDeque,
+    io,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use tokio::{
+    io::unix::AsyncFd,
+    time::{Instant, sleep_until},
+};
+
+use super::{
+    board::{MockBoard, Note, Pace, WakeKind},
+    pty::Pty,
+};
+
+/// How often a lock left behind by a killed host is lifted.
+const LOCK_CHECK: Duration = Duration::from_millis(200);
+/// How long the port is away after a hangup.
+const HANGUP: Duration = Duration::from_millis(300);
+const TICK_HZ: u64 = firmware_protocol::messages::limits::TICK_HZ as u64;
+
+/// A board on a pty.
+#[derive(Debug)]
+pub struct MockPort {
+    board: MockBoard,
+    pty: AsyncFd<Pty>,
+    link: Option<PathBuf>,
+    epoch: Instant,
+    epoch_ticks: u64,
+    to_host: Line,
+    to_board: Line,
+}
+
+/// One direction of the line, with bytes that are held back.
+#[derive(Debug, Default)]
+struct Line {
+    chunks: VecDeque<(Instant, Vec<u8>)>,
+}
+
+impl Line {
+    /// Bytes never overtake bytes.
+    fn push(&mut self, bytes: Vec<u8>, delay: Duration) {
+        let earliest = self.chunks.back().map(|(at, _)| *at);
+        let at = Instant::now() + delay;
+        self.chunks.push_back((earliest.map_or(at, |earliest| at.max(earliest)), bytes));
+    }
+
+    fn pop_due(&mut self) -> Option<Vec<u8>> {
+        let due = self.chunks.front().is_some_and(|(at, _)| *at <= Instant::now());
+        due.then(|| self.chunks.pop_front()).flatten().map(|(_, bytes)| bytes)
+    }
+
+    fn next_due(&self) -> Option<Instant> {
+        self.chunks.front().map(|(at, _)| *at)
+    }
+}
+
+impl MockPort {
+    /// Opens the pty. Must be called within a tokio runtime.
+    ///
+    /// # Errors
+    /// What the system says; `AlreadyExists` if `link` is something else than a symbolic link.
+    pub fn open(board: MockBoard, link: Option<&Path>) -> io::Result<Self> {
+        Ok(Self {
+            epoch: Instant::now(),
+            epoch_ticks: board.now(),
+            pty: open_watched(link)?,
+            link: link.map(Path::to_path_buf),
+            board,
+            to_host: Line::default(),
+            to_board: Line::default(),
+        })
+    }
+
+    /// Where a host opens it.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.pty.get_ref().path()
+    }
+
+    /// Plays until `shutdown` is ready, handing what happens to `on_note`.
+    ///
+    /// # Errors
+    /// When the pty fails.
+    pub async fn run(
+        mut self,
+        shutdown: impl Future<Output = ()>,
+        mut on_note: impl FnMut(Note),
+    ) -> io::Result<()> {
+        tokio::pin!(shutdown);
+        loop {
+            let due = self.due();
+            self.board.advance(due);
+            while !self.board.stalled()
+                && let Some(bytes) = self.to_board.pop_due()
+            {
+                self.board.handle_bytes(&bytes);
+            }
+            self.speak()?;
+            self.board.take_notes().into_iter().for_each(&mut on_note);
+            if self.board.take_hangup() {
+                self.hang_up().await?;
+            }
+            tokio::select! {
+                biased;
+                () = &mut shutdown => return self.drain().await,
+                heard = self.wait() => heard?,
+            }
+        }
+    }
+
+    /// The device time that has come.
+    fn due(&mut self) -> u64 {
+        let real = self.epoch_ticks + ticks(self.epoch.elapsed());
+        let Some(wake) = self.board.next_wake() else { return real };
+        if self.board.pace() == Pace::Virtual && wake.kind == WakeKind::Work && wake.at > real {
+            // From the jump on, the host's patience is measured from here.
+            self.epoch = Instant::now();
+            self.epoch_ticks = wake.at;
+            return wake.at;
+        }
+        real
+    }
+
+    /// Waits for bytes from the host or for the next thing to happen.
+    async fn wait(&mut self) -> io::Result<()> {
+        let wake = self.board.next_wake();
+        let jump =
+            self.board.pace() == Pace::Virtual && wake.is_some_and(|w| w.kind == WakeKind::Work);
+        let at = if jump { Some(Instant::now()) } else { wake.map(|wake| self.real_time(wake.at)) };
+        let lines = [self.to_host.next_due(), self.to_board.next_due()];
+        let stalled_lines =
+            if self.board.stalled() { None } else { lines.into_iter().flatten().min() };
+        let wake_at =
+            [at, stalled_lines, Some(Instant::now() + LOCK_CHECK)].into_iter().flatten().min();
+        let timer = async {
+            match wake_at {
+                // A jump still gives the host's bytes their turn.
+                Some(at) if at <= Instant::now() => tokio::task::yield_now().await,
+                Some(at) => sleep_until(at).await,
+                None => std::future::pending().await,
+            }
+        };
+        let mut buffer = [0; 1024];
+        let count = tokio::select! {
+            biased;
+            read = read_some(&self.pty, &mut buffer) => read?,
+            () = timer => {
+                self.pty.get_ref().clear_exclusive();
+                return Ok(());
+            }
+        };
+        let delay = Duration::from_millis(self.board.line_delay_ms().into());
+        self.to_board.push(buffer.get(..count).unwrap_or_default().to_vec(), delay);
+        Ok(())
+    }
+
+    fn real_time(&self, at_ticks: u64) -> Instant {
+        let ahead = at_ticks.saturating_sub(self.epoch_ticks);
+        self.epoch + Duration::from_nanos(ahead * (1_000_000_000 / TICK_HZ))
+    }
+
+    fn speak(&mut self) -> io::Result<()> {
+        let mut said = Vec::new();
+        self.board.poll_transmit(&mut said);
+        if !said.is_empty() {
+            let delay = Duration::from_millis(self.board.line_delay_ms().into());
+            self.to_host.push(said, delay);
+        }
+        while let Some(bytes) = self.to_host.pop_due() {
+            match self.pty.get_ref().write(&bytes) {
+                // A serial line loses what nobody reads; so does a full pty.
+                Ok(_) => {}
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+
+    /// The port goes away and comes back under the same link, as after an unplug.
+    async fn hang_up(&mut self) -> io::Result<()> {
+        self.to_host.chunks.clear();
+        self.to_board.chunks.clear();
+        // The old pty has to be gone before its link can be made anew.
+        let parked = open_watched(None)?;
+        drop(std::mem::replace(&mut self.pty, parked));
+        tokio::time::sleep(HANGUP).await;
+        if let Some(link) = self.link.as_deref() {
+            self.pty = open_watched(Some(link))?;
+        }
+        Ok(())
+    }
+
+    /// What is queued when the master closes is lost: lets the host read it first.
+    async fn drain(&mut self) -> io::Result<()> {
+        self.speak()?;
+        tokio::time::sleep(Duration::from_millis(20)).await;
+        Ok(())
+    }
+}
+
+#[expect(unsafe_code, reason = "tokio offers no safe way to watch a descriptor of one's own")]
+fn open_watched(link: Option<&Path>) -> io::Result<AsyncFd<Pty>> {
+    let pty = Pty::open(link)?;
+    // SAFETY: `Pty` owns its master descriptor from `open` to `drop` and never replaces it.
+    Ok(unsafe { AsyncFd::register(pty) }?)
+}
+
+async fn read_some(pty: &AsyncFd<Pty>, buffer: &mut [u8]) -> io::Result<usize> {
+    loop {
+        let mut ready = pty.readable().await?;
+        match ready.try_io(|pty| pty.get_ref().read(buffer)) {
+            Ok(read) => return read,
+            Err(_would_block) => {}
+        }
+    }
+}
+
+fn ticks(elapsed: Duration) -> u64 {
+    u64::try_from(elapsed.as_nanos() * u128::from(TICK_HZ) / 1_000_000_000).unwrap_or(u64::MAX)
+}

@@ -1,0 +1,233 @@
+//! The ray model of Dudek, Jenkin, Milios and Wilkes: a fan of rays, mirror reflections and
+//! diffraction at the ends of walls.
+//!
+//! Their appendix A fires a fan of rays for one direction, keeps the rays' next intersections in
+//! a heap ordered by distance, and stops at the first that is detected. Where the rays go does
+//! not depend on the direction, though: it only weights them. So [`Engine::survey`] traces one
+//! fan over the full circle for a place and weights it per direction; that gives every arrival,
+//! not just the first, and as all are wanted no heap is needed. [`Fan::first_echo`] is the
+//! appendix as printed, heap included, and a test holds the two together.
+//!
+//! Choices where the paper leaves room:
+//! - The ranger is transparent: a ray that meets the receiver too early or too weak, or from
+//!   behind, goes on. (The paper's false lower wall needs sound to pass the ranger, and its
+//!   authors say that their simulated body is smaller than the real one.)
+//! - A ray that meets the receiver beside its centre stands for its neighbour that meets the
+//!   centre: length and both angles are those of the neighbour, found from the curvature of the
+//!   wave front (for flat walls: from the image of the source, exactly).
+//! - Edges diffract wherever a wall ends, also where it joins another. The ray goes from the edge
+//!   straight to the receiver; the same path backwards (straight out, back over walls) is left
+//!   out, as in the paper.
+//! - Cylinders widen the ray tube by geometric optics; the paper has flat walls only.
+//! - Everything happens in the plane: heights in the scene are ignored.
+
+mod ray;
+mod survey;
+
+use std::{
+    cmp::Ordering,
+    collections::{BinaryHeap, HashMap},
+    f64::consts::TAU,
+};
+
+use ray::Ray;
+use survey::FanSurvey;
+
+use super::{Arrival, Edge, Engine, Reflector, Survey, raycast::Reflectors};
+use crate::{acoustics::BeamPattern, geometry::DVec2, scene::Scene};
+
+/// The ray model.
+#[derive(Debug)]
+pub struct Fan {
+    reflectors: Reflectors,
+    joints: Joints,
+    beam: BeamPattern,
+    settings: FanSettings,
+}
+
+/// How the fan is traced.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FanSettings {
+    /// Angle between rays, radians; made a little smaller to divide the circle.
+    pub spacing_rad: f64,
+    /// Half the width of the transducer's face, metres.
+    pub half_face_m: f64,
+    /// Wavelength, metres.
+    pub wavelength_m: f64,
+    /// Absorption of the air, decibels a metre.
+    pub absorption_db_per_m: f64,
+    /// Longest path there and back, metres.
+    pub longest_m: f64,
+    /// Amplitude below which a path is given up.
+    pub weakest: f64,
+    /// Most mirror reflections.
+    pub max_order: u32,
+}
+
+impl FanSettings {
+    /// Number of rays in the full circle, and the angle between them in radians.
+    fn rays(&self) -> (u32, f64) {
+        let count = (TAU / self.spacing_rad).ceil();
+        (count as u32, TAU / count)
+    }
+
+    /// Amplitude left after `length_m` of air.
+    fn through_air(&self, length_m: f64) -> f64 {
+        10f64.powf(-self.absorption_db_per_m * length_m / 20.0)
+    }
+
+    /// Amplitude of an edge's echo relative to a plane's, for legs of so many metres to the edge
+    /// and back.
+    ///
+    /// Kuc and Siegel's `1 / (2 pi sqrt(z / lambda))` for both legs of length z; for unequal
+    /// legs z is their harmonic mean, as the cylindrical wave of the edge spreads over the way
+    /// back while the gain makes up for the sum of both.
+    fn edge_ratio(&self, out_m: f64, back_m: f64) -> f64 {
+        let mean_m = 2.0 * out_m * back_m / (out_m + back_m);
+        // The ratio holds well beyond a wavelength; an edge never returns more than a plane.
+        (1.0 / (TAU * (mean_m / self.wavelength_m).sqrt())).min(1.0)
+    }
+}
+
+/// Ends of walls, each place once.
+#[derive(Debug)]
+struct Joints {
+    /// For each wall, the edges its ends are known by.
+    known: Vec<[Edge; 2]>,
+    /// Greatest mirrored amplitude of the walls that end there.
+    mirror: HashMap<Edge, f64>,
+}
+
+impl Joints {
+    fn new(reflectors: &Reflectors) -> Self {
+        let mut first_at: HashMap<(i64, i64), Edge> = HashMap::new();
+        let mut mirror: HashMap<Edge, f64> = HashMap::new();
+        let mut known: Vec<[Edge; 2]> = Vec::new();
+        for edge in reflectors.edges() {
+            let point = (reflectors.edge_point(edge) * 1e9).round();
+            let name = *first_at.entry((point.x as i64, point.y as i64)).or_insert(edge);
+            let strength = mirror.entry(name).or_default();
+            *strength = strength.max(reflectors.mirror(Reflector::Wall(edge.wall)));
+            if edge.at_b {
+                if let Some([_, at_b]) = known.last_mut() {
+                    *at_b = name;
+                }
+            } else {
+                known.push([name, name]);
+            }
+        }
+        Self { known, mirror }
+    }
+}
+
+impl Fan {
+    /// For a scene, a beam pattern and settings.
+    #[must_use]
+    pub fn new(scene: &Scene, beam: BeamPattern, settings: FanSettings) -> Self {
+        let reflectors = Reflectors::new(scene);
+        let joints = Joints::new(&reflectors);
+        Self { reflectors, joints, beam, settings }
+    }
+
+    /// The first arrival of at least `threshold` from a path of at least `shortest_m`: appendix
+    /// A step by step, for one direction.
+    ///
+    /// The appendix returns half its length, or the maximum range where this returns `None`.
+    #[must_use]
+    pub fn first_echo(
+        &self,
+        position: DVec2,
+        direction_rad: f64,
+        shortest_m: f64,
+        threshold: f64,
+    ) -> Option<Arrival> {
+        let mut rays = self.fan(position);
+        let mut heap = BinaryHeap::new();
+        for (ray, index) in rays.iter_mut().zip(0..) {
+            self.push_next(ray, index, position, &mut heap);
+        }
+        while let Some(event) = heap.pop() {
+            if event.distance_m > self.settings.longest_m {
+                return None;
+            }
+            match event.kind {
+                EventKind::Arrival(candidate) => {
+                    let amplitude = candidate.amplitude(&self.beam, direction_rad);
+                    if amplitude >= threshold && candidate.length_m >= shortest_m {
+                        return Some(candidate.arrival(amplitude));
+                    }
+                }
+                EventKind::Wall(index, hit) => {
+                    let ray = &mut rays[index as usize];
+                    for candidate in ray.diffract(&hit, self, position) {
+                        heap.push(Event::arrival(candidate));
+                    }
+                    if ray.reflect(&hit, self) {
+                        self.push_next(ray, index, position, &mut heap);
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    /// Rays over the full circle, in a grid fixed in the world.
+    fn fan(&self, position: DVec2) -> Vec<Ray> {
+        // Off any symmetry of usual scenes, so that no ray aims exactly at a corner.
+        const PHASE: f64 = 0.381_966;
+        let (count, spacing_rad) = self.settings.rays();
+        (0..count).map(|i| Ray::new(position, (f64::from(i) + PHASE) * spacing_rad)).collect()
+    }
+
+    fn push_next(&self, ray: &mut Ray, index: u32, position: DVec2, heap: &mut BinaryHeap<Event>) {
+        let (candidate, hit) = ray.advance(self, position);
+        heap.extend(candidate.map(Event::arrival));
+        heap.extend(hit.map(|hit| Event {
+            distance_m: ray.travelled_m() + hit.distance_m,
+            kind: EventKind::Wall(index, hit),
+        }));
+    }
+}
+
+impl Engine for Fan {
+    fn survey<'a>(&'a self, position: DVec2) -> Box<dyn Survey + 'a> {
+        Box::new(FanSurvey::trace(self, position))
+    }
+}
+
+/// An entry of the heap; the one closest along its path is the greatest.
+struct Event {
+    distance_m: f64,
+    kind: EventKind,
+}
+
+enum EventKind {
+    Wall(u32, super::raycast::Hit),
+    Arrival(Box<ray::Candidate>),
+}
+
+impl Event {
+    fn arrival(candidate: ray::Candidate) -> Self {
+        Self { distance_m: candidate.length_m, kind: EventKind::Arrival(Box::new(candidate)) }
+    }
+}
+
+impl Ord for Event {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.distance_m.total_cmp(&self.distance_m)
+    }
+}
+
+impl PartialOrd for Event {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Event {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Event {}

@@ -1,0 +1,87 @@
+//! All arrivals of the fan at one place.
+
+use std::collections::{HashMap, hash_map::Entry};
+
+use super::{Fan, ray::Candidate};
+use crate::{
+    acoustics::Sound,
+    geometry::DVec2,
+    model::{Arrival, Path, Survey},
+};
+
+pub(super) struct FanSurvey<'a> {
+    fan: &'a Fan,
+    /// Shortest first, each path once.
+    candidates: Vec<Candidate>,
+}
+
+impl<'a> FanSurvey<'a> {
+    pub(super) fn trace(fan: &'a Fan, position: DVec2) -> Self {
+        let mut closest = Closest::default();
+        for mut ray in fan.fan(position) {
+            loop {
+                let (candidate, hit) = ray.advance(fan, position);
+                candidate.into_iter().for_each(|candidate| closest.offer(candidate));
+                let Some(hit) = hit else { break };
+                if ray.travelled_m() + hit.distance_m > fan.settings.longest_m {
+                    break;
+                }
+                for candidate in ray.diffract(&hit, fan, position) {
+                    closest.offer(candidate);
+                }
+                if !ray.reflect(&hit, fan) {
+                    break;
+                }
+            }
+        }
+        let mut candidates: Vec<Candidate> = closest.0.into_values().collect();
+        // Ties (a corner's two orders) are broken by the path, so that results do not depend on
+        // the order of a hash table.
+        candidates.sort_by(|one, other| {
+            let by_path = || one.path.walls.cmp(&other.path.walls);
+            one.length_m
+                .total_cmp(&other.length_m)
+                .then_with(by_path)
+                .then_with(|| one.path.edge.cmp(&other.path.edge))
+        });
+        Self { fan, candidates }
+    }
+}
+
+impl Survey for FanSurvey<'_> {
+    fn listen(&self, direction_rad: f64, sounds: &mut Vec<Sound>) {
+        sounds.clear();
+        sounds.extend(self.candidates.iter().zip(0..).filter_map(|(candidate, index)| {
+            let amplitude = candidate.amplitude(&self.fan.beam, direction_rad);
+            (amplitude >= self.fan.settings.weakest).then_some(Sound {
+                length_m: candidate.length_m,
+                amplitude,
+                index,
+            })
+        }));
+    }
+
+    fn arrival(&self, _direction_rad: f64, sound: &Sound) -> Arrival {
+        let candidate = &self.candidates[sound.index as usize];
+        candidate.arrival(sound.amplitude)
+    }
+}
+
+/// Of the rays that took the same path, the one that passed closest.
+#[derive(Default)]
+struct Closest(HashMap<Path, Candidate>);
+
+impl Closest {
+    fn offer(&mut self, candidate: Candidate) {
+        match self.0.entry(candidate.path.clone()) {
+            Entry::Vacant(place) => {
+                place.insert(candidate);
+            }
+            Entry::Occupied(mut known) => {
+                if candidate.miss_m < known.get().miss_m {
+                    known.insert(candidate);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,316 @@
+//! Engine and receiver joined: what the ranger reads.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::{Cone, Edge, Engine, Fan, FanSettings, Path, Prediction, Reflector, Survey};
+use crate::{
+    acoustics::{Air, BeamPattern, Receiver, Sensor, SensorError},
+    geometry::{DVec2, Pose},
+    scan::{ModelRecord, PathRecord, ScanPlan, SimRecord},
+    scene::Scene,
+};
+
+/// Paths this far below the threshold are given up, decibels: a silence is still explained by
+/// what came within that.
+const MARGIN_KEPT_DB: f64 = 40.0;
+
+/// How echoes are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EngineKind {
+    /// [`Fan`]: the ray model with reflections and diffraction.
+    #[default]
+    Fan,
+    /// [`Cone`]: nearest hit within an aperture.
+    Cone,
+}
+
+impl EngineKind {
+    /// Its name in records and on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Fan => "fan",
+            Self::Cone => "cone",
+        }
+    }
+}
+
+/// Settings of the model; what is `None` comes from the sensor or the engine.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Options {
+    /// How echoes are found.
+    pub engine: EngineKind,
+    /// Half the longest path listened for, metres.
+    pub max_range_m: Option<f64>,
+    /// Least amplitude detected, relative to a head-on, perfectly reflecting wall.
+    pub threshold: Option<f64>,
+    /// From firing until the receiver listens, microseconds.
+    pub blanking_us: Option<f64>,
+    /// Leave out the absorption of the air.
+    pub lossless: bool,
+    /// Most mirror reflections on a path (`fan`); without it, as many as can matter.
+    pub max_order: Option<u32>,
+    /// Angle between the rays of `fan`, degrees.
+    pub ray_spacing_deg: f64,
+    /// Full aperture of `cone`, degrees; without it, the sensor's two-way -6 dB width.
+    pub aperture_deg: Option<f64>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            engine: EngineKind::default(),
+            max_range_m: None,
+            threshold: None,
+            blanking_us: None,
+            lossless: false,
+            max_order: None,
+            ray_spacing_deg: 0.1,
+            aperture_deg: None,
+        }
+    }
+}
+
+/// Why a simulator can't be made.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ModelError {
+    /// The sensor's data make no sense.
+    #[error("sensor: {0}")]
+    Sensor(#[from] SensorError),
+    /// An option out of range.
+    #[error("{option} is {value}: it must be {expected}")]
+    Option {
+        /// Which option.
+        option: &'static str,
+        /// What it holds.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+}
+
+/// Predicts readings in a scene.
+pub struct Simulator {
+    scene: Arc<Scene>,
+    sensor: Sensor,
+    air: Air,
+    options: Options,
+    receiver: Receiver,
+    engine: Box<dyn Engine>,
+}
+
+impl Simulator {
+    /// For a scene, a sensor in some air, and options.
+    ///
+    /// # Errors
+    /// When the sensor's data or an option are out of range.
+    pub fn new(
+        scene: Arc<Scene>,
+        sensor: Sensor,
+        air: Air,
+        options: Options,
+    ) -> Result<Self, ModelError> {
+        sensor.check()?;
+        options.check()?;
+        let receiver = Receiver {
+            blanking_us: options.blanking_us.unwrap_or(sensor.blanking_us),
+            pulse_us: sensor.pulse_s() * 1e6,
+            rearm_us: sensor.rearm_us,
+            threshold: options.threshold.unwrap_or(sensor.threshold),
+            sound_speed_m_s: air.sound_speed_m_s(),
+            max_range_m: options.max_range_m.unwrap_or(sensor.max_range_m),
+        };
+        let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
+        let engine: Box<dyn Engine> = match options.engine {
+            EngineKind::Fan => {
+                Box::new(Fan::new(&scene, beam, fan_settings(&sensor, &air, &options, &receiver)))
+            }
+            EngineKind::Cone => {
+                let two_way_deg = || 2.0 * beam.angle_at(0.5_f64.sqrt()).to_degrees();
+                Box::new(Cone::new(&scene, options.aperture_deg.unwrap_or_else(two_way_deg)))
+            }
+        };
+        Ok(Self { scene, sensor, air, options, receiver, engine })
+    }
+
+    /// Prepares for firing from `position` (world, metres); the costly part, worth keeping.
+    #[must_use]
+    pub fn station(&self, position: DVec2) -> Station<'_> {
+        Station { simulator: self, survey: self.engine.survey(position) }
+    }
+
+    /// A reading for each firing of a checked plan, in the order of its indices.
+    #[must_use]
+    pub fn predict(&self, pose: &Pose, plan: &ScanPlan) -> Vec<Prediction> {
+        let station = self.station(pose.position());
+        (0..plan.stops())
+            .flat_map(|stop| {
+                let prediction = station.ping(pose.direction_rad(plan.azimuth_deg(stop)));
+                vec![prediction; plan.pings_per_stop as usize]
+            })
+            .collect()
+    }
+
+    /// A prediction as it stands in a log.
+    #[must_use]
+    pub fn record(&self, prediction: &Prediction) -> SimRecord {
+        let arrival = prediction.arrival.as_ref();
+        SimRecord {
+            status: prediction.status,
+            range_m: prediction.range_m,
+            amplitude: arrival.map(|arrival| arrival.amplitude),
+            margin_db: prediction.margin_db,
+            path: arrival.map(|arrival| self.path_record(&arrival.path, arrival.length_m)),
+        }
+    }
+
+    /// A path with the names of its walls.
+    #[must_use]
+    pub fn path_record(&self, path: &Path, length_m: f64) -> PathRecord {
+        PathRecord {
+            kind: path.kind,
+            order: path.walls.len() as u32,
+            walls: path.walls.iter().map(|wall| self.reflector_name(*wall)).collect(),
+            edge: path.edge.map(|edge| self.edge_name(edge)),
+            length_m,
+        }
+    }
+
+    /// Engine and settings as they stand in a log.
+    #[must_use]
+    pub fn model_record(&self) -> ModelRecord {
+        let mut settings = serde_json::Map::new();
+        let values = serde_json::to_value(self.options);
+        if let Ok(serde_json::Value::Object(values)) = values {
+            settings.extend(values.into_iter().filter(|(_, value)| !value.is_null()));
+        }
+        settings.remove("engine");
+        ModelRecord { engine: self.options.engine.name().to_owned(), settings }
+    }
+
+    /// Speed of sound, metres a second.
+    #[must_use]
+    pub fn sound_speed_m_s(&self) -> f64 {
+        self.receiver.sound_speed_m_s
+    }
+
+    /// The receiver in force: the sensor's, with the options applied.
+    #[must_use]
+    pub const fn receiver(&self) -> &Receiver {
+        &self.receiver
+    }
+
+    /// The sensor.
+    #[must_use]
+    pub const fn sensor(&self) -> &Sensor {
+        &self.sensor
+    }
+
+    /// The air.
+    #[must_use]
+    pub const fn air(&self) -> &Air {
+        &self.air
+    }
+
+    /// The scene.
+    #[must_use]
+    pub const fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// The options.
+    #[must_use]
+    pub const fn options(&self) -> &Options {
+        &self.options
+    }
+
+    fn reflector_name(&self, reflector: Reflector) -> String {
+        match reflector {
+            Reflector::Wall(index) => self.scene.walls[index as usize].id.to_string(),
+            Reflector::Cylinder(index) => self.scene.cylinders[index as usize].id.to_string(),
+        }
+    }
+
+    fn edge_name(&self, edge: Edge) -> String {
+        let end = if edge.at_b { "b" } else { "a" };
+        format!("{}.{end}", self.scene.walls[edge.wall as usize].id)
+    }
+}
+
+/// A place from which firings are predicted.
+pub struct Station<'a> {
+    simulator: &'a Simulator,
+    survey: Box<dyn Survey + 'a>,
+}
+
+impl Station<'_> {
+    /// The reading of a firing in a world direction, radians counter-clockwise from +x.
+    #[must_use]
+    pub fn ping(&self, direction_rad: f64) -> Prediction {
+        let mut sounds = Vec::new();
+        self.survey.listen(direction_rad, &mut sounds);
+        let receiver = &self.simulator.receiver;
+        let detection = receiver.detect(&sounds);
+        let margin_db =
+            detection.sound.map(|sound| 20.0 * (sound.amplitude / receiver.threshold).log10());
+        Prediction {
+            status: detection.status,
+            range_m: detection.range_m,
+            arrival: detection.sound.map(|sound| self.survey.arrival(direction_rad, &sound)),
+            margin_db,
+            echoes_us: detection.echoes_us,
+        }
+    }
+
+    /// Every echo of a firing in a world direction, detected or not, shortest path first.
+    #[must_use]
+    pub fn arrivals(&self, direction_rad: f64) -> Vec<super::Arrival> {
+        self.survey.arrivals(direction_rad)
+    }
+}
+
+impl Options {
+    fn check(&self) -> Result<(), ModelError> {
+        let within = |option, value: f64, min: f64, max: f64, expected| {
+            if (min..=max).contains(&value) {
+                Ok(())
+            } else {
+                Err(ModelError::Option { option, value, expected })
+            }
+        };
+        if let Some(range_m) = self.max_range_m {
+            within("max_range_m", range_m, 0.01, 100.0, "from 0.01 to 100 metres")?;
+        }
+        if let Some(threshold) = self.threshold {
+            within("threshold", threshold, 1e-6, 1.0, "from 0.000001 to 1")?;
+        }
+        if let Some(blanking_us) = self.blanking_us {
+            within("blanking_us", blanking_us, 0.0, 1e5, "from 0 to 100000 microseconds")?;
+        }
+        if let Some(aperture_deg) = self.aperture_deg {
+            within("aperture_deg", aperture_deg, 0.0, 180.0, "from 0 to 180 degrees")?;
+        }
+        within("ray_spacing_deg", self.ray_spacing_deg, 1e-4, 5.0, "from 0.0001 to 5 degrees")
+    }
+}
+
+fn fan_settings(sensor: &Sensor, air: &Air, options: &Options, receiver: &Receiver) -> FanSettings {
+    FanSettings {
+        spacing_rad: options.ray_spacing_deg.to_radians(),
+        half_face_m: sensor.half_width_m(),
+        wavelength_m: receiver.sound_speed_m_s / sensor.frequency_hz,
+        absorption_db_per_m: if options.lossless {
+            0.0
+        } else {
+            air.absorption_db_per_m(sensor.frequency_hz)
+        },
+        longest_m: 2.0 * receiver.max_range_m,
+        weakest: receiver.threshold * 10f64.powf(-MARGIN_KEPT_DB / 20.0),
+        max_order: options.max_order.unwrap_or(u32::MAX),
+    }
+}

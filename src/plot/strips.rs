@@ -1,0 +1,105 @@
+//! The strips beside a scan: range, residual, margin.
+
+use super::{
+    canvas::{Layer, Rect},
+    readings::{Kind, Reading, Readings},
+    strip::{AzimuthAxis, Scale, Strip},
+    theme,
+};
+
+const MARK_PX: f64 = 2.1;
+/// Residuals up to this are on the linear part of the scale: the band in which a measured and
+/// a predicted reading always count as the same, millimetres.
+const RESIDUAL_LINEAR_MM: f64 = 10.0;
+
+/// Range against azimuth: measured marks over the model's line.
+pub(super) fn range(panel: Rect, azimuths: AzimuthAxis, scans: &[Readings], last: bool) -> Layer {
+    let strip = Strip { panel, azimuths, scale: Scale::Linear { min: 0.0, max: top_m(scans) } };
+    let mut layer = Layer::new("range-strip");
+    layer.add(strip.frame("range, m", last));
+    for scan in scans.iter().filter(|scan| scan.has_model) {
+        let predicted = scan.beams.iter().filter_map(|b| Some((b.azimuth_deg, b.model_range_m?)));
+        let mut line = Layer::new("model").stroked(theme::SKY, 7.0).with("stroke-opacity", 0.7);
+        strip.line(&mut line, &strip.sorted(predicted));
+        layer.add(line);
+    }
+    layer.add(marks(&strip, scans, |beam| beam.range_m));
+    layer
+}
+
+/// Measured minus predicted range against azimuth, on a scale that shows millimetres and metres.
+pub(super) fn residual(
+    panel: Rect,
+    azimuths: AzimuthAxis,
+    scans: &[Readings],
+    last: bool,
+) -> Layer {
+    let strip = Strip { panel, azimuths, scale: residual_scale(scans) };
+    let mut layer = Layer::new("residual-strip");
+    layer.add(strip.band(-RESIDUAL_LINEAR_MM, RESIDUAL_LINEAR_MM));
+    layer.add(strip.frame("measured \u{2212} model, mm", last));
+    layer.add(marks(&strip, scans, |beam| beam.residual_m.map(|r| 1e3 * r)));
+    layer
+}
+
+/// Wide enough for every residual up to 10 m; beyond there is an arrow.
+pub(super) fn residual_scale(scans: &[Readings]) -> Scale {
+    let largest_mm = scans
+        .iter()
+        .flat_map(Readings::residuals)
+        .map(|(_, residual_m)| 1e3 * residual_m.abs())
+        .fold(0.0, f64::max);
+    let decades = (1.2 * largest_mm / RESIDUAL_LINEAR_MM).log10().clamp(0.3, 3.0);
+    Scale::SymLog { threshold: RESIDUAL_LINEAR_MM, decades }
+}
+
+/// Amplitude above the threshold against azimuth, of readings that the model made.
+pub(super) fn margin(panel: Rect, azimuths: AzimuthAxis, scans: &[Readings], last: bool) -> Layer {
+    let margins = scans.iter().flat_map(|scan| &scan.beams).filter_map(|beam| beam.margin_db);
+    let (low, high) = margins
+        .fold((-6.0, 12.0), |(low, high): (f64, f64), margin| (low.min(margin), high.max(margin)));
+    // The pattern's nulls go down without end; 40 dB below the threshold tell as much.
+    let scale = Scale::Linear { min: low.max(-40.0), max: 1.05 * high.min(120.0) };
+    let strip = Strip { panel, azimuths, scale };
+    let mut layer = Layer::new("margin-strip");
+    layer.add(strip.frame("amplitude above the threshold, dB", last));
+    layer.add(marks(&strip, scans, |beam| beam.margin_db));
+    layer
+}
+
+fn marks(strip: &Strip, scans: &[Readings], value: impl Fn(&Reading) -> Option<f64>) -> Layer {
+    // Where many scans lie over each other, what they have in common shows through.
+    let opacity = match scans.len() {
+        0 | 1 => 1.0,
+        2..=5 => 0.6,
+        _ => 0.3,
+    };
+    let mut layer = Layer::new("readings").with("fill-opacity", opacity);
+    for kind in Kind::HEARD.into_iter().chain(Kind::UNHEARD) {
+        let mut marks = Layer::new(kind.words()).with("fill", kind.colour());
+        let beams = scans.iter().flat_map(|scan| &scan.beams).filter(|beam| beam.kind == kind);
+        for beam in beams {
+            if let Some(value) = value(beam) {
+                let at = (beam.azimuth_deg, value);
+                strip.mark(&mut marks, at, (kind.shape(), MARK_PX), &beam.hint);
+            }
+        }
+        layer.add(marks);
+    }
+    layer
+}
+
+/// Upper end of the range axis: a few far readings must not flatten the rest.
+pub(super) fn top_m(scans: &[Readings]) -> f64 {
+    let mut ranges: Vec<f64> = scans
+        .iter()
+        .flat_map(|scan| &scan.beams)
+        .flat_map(|beam| [beam.range_m, beam.model_range_m])
+        .flatten()
+        .collect();
+    ranges.sort_by(f64::total_cmp);
+    let most = ranges.get(ranges.len() * 95 / 100).copied().unwrap_or(1.0);
+    let farthest = ranges.last().copied().unwrap_or(1.0);
+    let top = if farthest <= 1.6 * most { farthest } else { 1.4 * most };
+    if top > 0.0 { 1.06 * top } else { 1.0 }
+}

@@ -1,0 +1,225 @@
+//! The only place where the host machine meets a line and a clock.
+
+use std::{ops::ControlFlow, time::Duration};
+
+use firmware_protocol::{
+    host::{Command, Host, HostConfig, HostError, HostEvent, Outcome, StartError},
+    messages::{Identity, SweepState},
+};
+use thiserror::Error;
+use tokio::{
+    io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _},
+    time::{Instant, sleep_until},
+};
+
+/// A host machine on a line. It owns both; whoever wants something of the device asks it.
+#[derive(Debug)]
+pub struct Driver<L> {
+    line: L,
+    host: Host,
+    epoch: Instant,
+    hung_up: bool,
+    outgoing: Vec<u8>,
+}
+
+/// How a command ended well.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// An Identify.
+    Identified(Identity),
+    /// A sweep: so many readings were delivered.
+    Swept {
+        /// Readings delivered.
+        delivered: u16,
+        /// Complete or stopped.
+        end: SweepState,
+    },
+    /// Any other command.
+    Done(Outcome),
+}
+
+/// Why a command did not end well.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum DriveError {
+    /// It was not begun.
+    #[error("{0}")]
+    NotStarted(StartError),
+    /// It failed.
+    #[error("{0}")]
+    Host(HostError),
+    /// Whoever takes the events wanted no more of them; the command is still under way.
+    #[error("given up by the receiver of its readings")]
+    Abandoned,
+}
+
+impl DriveError {
+    /// What a person can do about it.
+    #[must_use]
+    pub const fn help(&self) -> &'static str {
+        match self {
+            Self::NotStarted(_) | Self::Abandoned => "this is a fault of the program: report it",
+            Self::Host(error) => host_help(error),
+        }
+    }
+}
+
+const fn host_help(error: &HostError) -> &'static str {
+    match error {
+        HostError::NoAnswer { .. } => {
+            "check that the port is the ranger's, that the board has power, and the cable; a board \
+             that never ran the firmware does not answer either"
+        }
+        HostError::NotADevice { .. } => {
+            "check that the port is the ranger's; a modem, a GPS or another firmware speaks \
+             something else"
+        }
+        HostError::WrongVersion { .. } => {
+            "flash the firmware of this version of sonard, or install the sonard of the firmware's"
+        }
+        HostError::Refused(_) => "change the setting that the device names",
+        HostError::Rebooted => {
+            "the board restarts again and again: look at its supply (the module draws 2 A while \
+             firing; it needs 1000 uF beside it)"
+        }
+        HostError::Hangup => "the cable was pulled or the board lost power: plug it in, scan again",
+        HostError::LeaseExpired => {
+            "this computer was away too long: stop what loads it, scan again"
+        }
+        HostError::EmergencyStop => "release the emergency stop, then scan again",
+        HostError::MotionFault => "free the motor, check its supply and current, then scan again",
+        HostError::Stopped => "another program stopped it: make sure that only one uses the port",
+        HostError::Stalled { .. } | HostError::SweepLost | HostError::WrongReading { .. } => {
+            "reset the board and scan again; if it happens again, report it with the log"
+        }
+    }
+}
+
+impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
+    /// A driver on an open line.
+    pub fn new(line: L, config: HostConfig) -> Self {
+        Self {
+            line,
+            host: Host::new(config),
+            epoch: Instant::now(),
+            hung_up: false,
+            outgoing: Vec::new(),
+        }
+    }
+
+    /// The machine, for its statistics.
+    pub const fn host(&self) -> &Host {
+        &self.host
+    }
+
+    /// Microseconds since the driver was made: the time line of the machine's events.
+    pub fn now_us(&self) -> u64 {
+        u64::try_from(self.epoch.elapsed().as_micros()).unwrap_or(u64::MAX)
+    }
+
+    /// Begins a command; [`Self::finish`] carries it out.
+    ///
+    /// # Errors
+    /// When another one is under way or something must come first.
+    pub fn start(&mut self, command: Command) -> Result<(), DriveError> {
+        let now_us = self.now_us();
+        self.host.start(now_us, command).map_err(DriveError::NotStarted)
+    }
+
+    /// Carries out one command and hands every event on the way to `on_event`, which may break
+    /// off.
+    ///
+    /// # Errors
+    /// As [`Self::start`] and [`Self::finish`].
+    pub async fn perform(
+        &mut self,
+        command: Command,
+        on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
+    ) -> Result<Ended, DriveError> {
+        self.start(command)?;
+        self.finish(on_event).await
+    }
+
+    /// Waits for the end of the command under way, handing every other event to `on_event`.
+    ///
+    /// Cancel-safe: what was received stays in the machine, and a later call goes on with it.
+    ///
+    /// # Errors
+    /// The machine's own, which name the cause.
+    pub async fn finish(
+        &mut self,
+        mut on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
+    ) -> Result<Ended, DriveError> {
+        loop {
+            match self.next_event().await {
+                HostEvent::Identified(identity) => return Ok(Ended::Identified(identity)),
+                HostEvent::SweepDone { delivered, end, .. } => {
+                    return Ok(Ended::Swept { delivered, end });
+                }
+                HostEvent::Done(outcome) => return Ok(Ended::Done(outcome)),
+                HostEvent::Failed(error) => return Err(DriveError::Host(error)),
+                event => {
+                    if on_event(event).is_break() {
+                        return Err(DriveError::Abandoned);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The machine's next event.
+    async fn next_event(&mut self) -> HostEvent {
+        loop {
+            if let Some(event) = self.host.poll_event() {
+                return event;
+            }
+            while let Some(frame) = self.host.poll_transmit() {
+                self.outgoing.extend_from_slice(&frame);
+            }
+            self.wait().await;
+        }
+    }
+
+    /// Waits for bytes, room for bytes, or the machine's next deadline, and tells the machine.
+    async fn wait(&mut self) {
+        let deadline = self.host.poll_timeout();
+        let deadline = deadline.map(|(_, at_us)| self.epoch + Duration::from_micros(at_us));
+        let timer = async {
+            match deadline {
+                Some(at) => sleep_until(at).await,
+                None => std::future::pending().await,
+            }
+        };
+        let mut buffer = [0; 1024];
+        // After a hangup the line would answer at once, for ever: it is not asked again.
+        let (listening, speaking) = (!self.hung_up, !self.hung_up && !self.outgoing.is_empty());
+        let (mut reader, mut writer) = tokio::io::split(&mut self.line);
+        let happened = tokio::select! {
+            read = reader.read(&mut buffer), if listening => Happened::Read(read.unwrap_or(0)),
+            written = writer.write(&self.outgoing), if speaking => {
+                Happened::Written(written.unwrap_or(0))
+            }
+            () = timer => Happened::Timeout,
+        };
+        let now_us = self.now_us();
+        match happened {
+            Happened::Read(0) | Happened::Written(0) => {
+                self.hung_up = true;
+                self.outgoing.clear();
+                self.host.handle_hangup(now_us);
+            }
+            Happened::Read(count) => {
+                self.host.handle_bytes(now_us, buffer.get(..count).unwrap_or_default());
+            }
+            Happened::Written(count) => drop(self.outgoing.drain(..count)),
+            Happened::Timeout => self.host.handle_timeout(now_us),
+        }
+    }
+}
+
+enum Happened {
+    /// So many bytes came; 0 at the end of the line.
+    Read(usize),
+    /// So many bytes went; 0 at the end of the line.
+    Written(usize),
+    Timeout,
+}

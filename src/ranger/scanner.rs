@@ -1,0 +1,266 @@
+//! Takes a scan: sends the plan to the device and turns what comes back into records.
+
+use firmware_protocol::{
+    host::{Command, HostError, HostEvent, LinkStats, Outcome},
+    messages::{Capabilities, Identity, Settings, Sweep},
+};
+use jiff::Timestamp;
+use std::ops::ControlFlow;
+use thiserror::Error;
+use tokio::io::{AsyncRead, AsyncWrite};
+use uuid::Uuid;
+
+use super::{
+    driver::{DriveError, Driver, Ended},
+    progress::{Progress, Sink},
+    timing,
+};
+use crate::{
+    geometry::Pose,
+    scan::{EventKind, PlanError, Record, ScanEnd, ScanPlan, ScanStart, Segment, SimRecord},
+    store::StoreError,
+};
+
+/// Restarts of the device without a single new reading after which a scan is given up.
+const FRUITLESS_RESTARTS: u32 = 3;
+/// Exchanges before a scan that give the clock fit its first points.
+const CLOCK_EXCHANGES: u32 = 4;
+
+/// What is to be scanned, and what the model says about it.
+#[derive(Debug, Clone)]
+pub struct ScanJob {
+    /// Where the ranger stands.
+    pub pose: Pose,
+    /// Which azimuths.
+    pub plan: ScanPlan,
+    /// How the device moves and listens.
+    pub settings: Settings,
+    /// For ranges, metres a second.
+    pub sound_speed_m_s: f64,
+    /// When the receiver opens, microseconds after firing.
+    pub blanking_us: f64,
+    /// For each stop of the plan, what the model predicts; empty without a model.
+    pub predictions: Vec<SimRecord>,
+}
+
+/// How a scan went.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanSummary {
+    /// Its last record.
+    pub end: ScanEnd,
+    /// Whether it was stopped on request.
+    pub stopped: bool,
+    /// Restarts of the device that it survived.
+    pub restarts: u32,
+}
+
+/// Why a scan ended early. Its records up to there are written, `scan_end` included.
+#[derive(Debug, Error)]
+pub enum ScanError {
+    /// The plan does not fit the device's motor.
+    #[error("{0}")]
+    Plan(#[from] PlanError),
+    /// The device or the line failed.
+    #[error("{0}")]
+    Device(#[from] DriveError),
+    /// The log can't be written.
+    #[error("{0}")]
+    Store(#[from] StoreError),
+}
+
+/// A ranger that has told its identity.
+#[derive(Debug)]
+pub struct Ranger<L> {
+    driver: Driver<L>,
+    identity: Identity,
+    /// Wall clock at microsecond 0 of the driver.
+    wall_epoch: Timestamp,
+}
+
+impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
+    /// Meets the device on a line.
+    ///
+    /// # Errors
+    /// When nothing or something else answers.
+    pub async fn meet(mut driver: Driver<L>) -> Result<Self, DriveError> {
+        let since_us = i64::try_from(driver.now_us()).unwrap_or(0);
+        let wall_epoch = Timestamp::now() - jiff::SignedDuration::from_micros(since_us);
+        let identity = identify(&mut driver).await?;
+        Ok(Self { driver, identity, wall_epoch })
+    }
+
+    /// What the device said of itself.
+    pub const fn identity(&self) -> &Identity {
+        &self.identity
+    }
+
+    /// Numbers about the line.
+    pub const fn link_stats(&self) -> &LinkStats {
+        self.driver.host().stats()
+    }
+
+    /// Takes one scan, from `scan_start` to `scan_end`, handing each record to `sink`.
+    ///
+    /// Goes home first and, if there is an index sensor, afterwards. A device that restarts
+    /// meanwhile is homed and goes on with what is left. When `stop` is ready, the motor is
+    /// stopped and the scan closed.
+    ///
+    /// # Errors
+    /// The device's, the line's and the log's; what was measured is written all the same.
+    pub async fn scan(
+        &mut self,
+        job: &ScanJob,
+        sink: &mut dyn Sink,
+        stop: impl Future<Output = ()>,
+    ) -> Result<ScanSummary, ScanError> {
+        tokio::pin!(stop);
+        job.plan.check()?;
+        let steps_per_revolution = u32::from(self.identity.steps_per_revolution);
+        let motor = job.plan.motor_steps(steps_per_revolution)?;
+        let scan = Uuid::new_v4();
+        let time = Timestamp::now();
+        let start = ScanStart { scan, time, pose: job.pose, plan: job.plan };
+        sink.record(&Record::ScanStart(start))?;
+        let mut progress = Progress::new(job, scan, self.wall_epoch, &self.identity, sink);
+        let outcome = self.measure(job, motor, &mut progress, stop).await;
+        let stopped = matches!(outcome, Ok(Stopped(true)));
+        if let Err(ScanError::Device(error)) = &outcome {
+            progress.give_up(error);
+        }
+        let drift = match outcome {
+            Ok(Stopped(false)) => self.home_check(&mut progress).await,
+            _ => None,
+        };
+        let summary = progress.finish(timing::limit_s(&job.plan, &job.settings, motor.1), drift);
+        let (end, restarts) = summary?;
+        outcome.map(|_| ScanSummary { end, stopped, restarts })
+    }
+
+    /// Sweeps until nothing is left of the plan.
+    async fn measure(
+        &mut self,
+        job: &ScanJob,
+        motor: (i32, i32),
+        progress: &mut Progress<'_>,
+        mut stop: std::pin::Pin<&mut impl Future<Output = ()>>,
+    ) -> Result<Stopped, ScanError> {
+        let mut fruitless = 0;
+        loop {
+            let before = progress.measured();
+            let outcome = tokio::select! {
+                biased;
+                () = &mut stop => None,
+                outcome = self.sweep_rest(job, motor, progress) => Some(outcome),
+            };
+            match outcome {
+                None => {
+                    self.halt(progress).await?;
+                    progress.note(EventKind::Stopped, "stopped on request".into());
+                    return Ok(Stopped(true));
+                }
+                Some(Err(ScanError::Device(DriveError::Abandoned))) => {
+                    self.halt(progress).await?;
+                    return progress.check_sink().map(|()| Stopped(true)).map_err(ScanError::Store);
+                }
+                Some(Err(ScanError::Device(DriveError::Host(HostError::Rebooted)))) => {
+                    fruitless = if progress.measured() > before { 0 } else { fruitless + 1 };
+                    if fruitless >= FRUITLESS_RESTARTS {
+                        return Err(DriveError::Host(HostError::Rebooted).into());
+                    }
+                    self.identity = identify(&mut self.driver).await?;
+                    progress.restarted(&self.identity);
+                }
+                Some(done) => {
+                    done?;
+                    progress.check_sink()?;
+                    return Ok(Stopped(false));
+                }
+            }
+        }
+    }
+
+    async fn sweep_rest(
+        &mut self,
+        job: &ScanJob,
+        (from_step, stride): (i32, i32),
+        progress: &mut Progress<'_>,
+    ) -> Result<(), ScanError> {
+        self.command(Command::Configure(job.settings), progress).await?;
+        self.command(Command::Home, progress).await?;
+        for _ in 0..CLOCK_EXCHANGES {
+            self.command(Command::Status, progress).await?;
+        }
+        while let Some(segment) = progress.next_segment() {
+            let sweep = sweep_of(&segment, from_step, stride, &job.settings);
+            progress.begin(segment);
+            self.command(Command::Sweep(sweep), progress).await?;
+            progress.check_sink()?;
+        }
+        Ok(())
+    }
+
+    /// Brings the motor to a stand, and takes in what was measured until then.
+    async fn halt(&mut self, progress: &mut Progress<'_>) -> Result<(), DriveError> {
+        self.driver.start(Command::Stop)?;
+        loop {
+            // The end of what was stopped may come first.
+            match self.driver.finish(|event| progress.handle(event)).await {
+                Ok(Ended::Done(Outcome::Stopped)) => return Ok(()),
+                Ok(_) | Err(DriveError::Host(HostError::Stopped) | DriveError::Abandoned) => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Goes home and reports by how much the index was off.
+    async fn home_check(&mut self, progress: &mut Progress<'_>) -> Option<i32> {
+        if !self.identity.capabilities.has(Capabilities::INDEX_SENSOR) {
+            return None;
+        }
+        match self.command(Command::Home, progress).await {
+            Ok(Ended::Done(Outcome::Homed { drift_steps })) => Some(drift_steps),
+            Ok(_) => None,
+            Err(error) => {
+                progress.note(EventKind::Fault, format!("could not go home after it: {error}"));
+                None
+            }
+        }
+    }
+
+    async fn command(
+        &mut self,
+        command: Command,
+        progress: &mut Progress<'_>,
+    ) -> Result<Ended, DriveError> {
+        self.driver.perform(command, |event| progress.handle(event)).await
+    }
+}
+
+struct Stopped(bool);
+
+async fn identify<L: AsyncRead + AsyncWrite + Unpin>(
+    driver: &mut Driver<L>,
+) -> Result<Identity, DriveError> {
+    loop {
+        if let Ended::Identified(identity) = driver.perform(Command::Identify, ignore).await? {
+            return Ok(identity);
+        }
+    }
+}
+
+fn ignore(_event: HostEvent) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+fn sweep_of(segment: &Segment, from_step: i32, stride: i32, settings: &Settings) -> Sweep {
+    let first_stop = i32::try_from(segment.first_stop).unwrap_or(i32::MAX);
+    Sweep {
+        // The machine fills in a number of its own.
+        sweep: 0,
+        first_step: from_step.saturating_add(first_stop.saturating_mul(stride)),
+        stride: i16::try_from(stride).unwrap_or(i16::MAX),
+        stops: u16::try_from(segment.stops).unwrap_or(u16::MAX),
+        pings_per_stop: u8::try_from(segment.pings).unwrap_or(u8::MAX),
+        lease_ms: timing::lease_ms(settings),
+    }
+}

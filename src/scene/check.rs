@@ -1,0 +1,303 @@
+//! The rules of a scene: names that exist and differ, numbers that make sense, poses that fit.
+
+use std::{
+    collections::{BTreeMap, HashMap},
+    sync::Arc,
+};
+
+use sha2::{Digest, Sha256};
+
+use super::{
+    Cylinder, Material, Robot, RobotShape, Scene, SceneProblem, Wall,
+    error::MAX_COORDINATE_M,
+    file::{CircleFile, CylinderFile, Point, RobotFile, SceneFile, WallFile},
+    locate::{JsonPath, Part},
+    outline::{Outlines, contains, distance_to_segment},
+    pose::{CLEARANCE_M, MAX_HEADING_DEG},
+};
+use crate::geometry::{DVec2, Pose};
+
+/// Shortest wall, metres: far below the wavelength, far above rounding.
+const MIN_WALL_M: f64 = 1e-4;
+
+/// A rule that is broken, and the member of the file that breaks it.
+pub(super) struct Fault {
+    pub(super) path: JsonPath,
+    pub(super) part: Part,
+    pub(super) problem: SceneProblem,
+}
+
+/// Turns a well-formed file into a scene; `text` is what it was read from.
+pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
+    let root = JsonPath::root();
+    not_empty(&file.name, &root.key("name"))?;
+    let mut rules = Rules::new(file.materials)?;
+    let mut walls = Vec::new();
+    for (index, wall) in file.walls.iter().enumerate() {
+        walls.extend(rules.walls(wall, &root.key("walls").index(index))?);
+    }
+    let mut cylinders = Vec::new();
+    for (index, cylinder) in file.cylinders.into_iter().enumerate() {
+        cylinders.push(rules.cylinder(cylinder, &root.key("cylinders").index(index))?);
+    }
+    let robot = file.robot.map(|robot| rules.robot(robot, &root.key("robot"))).transpose()?;
+    floor_below_ceiling(file.floor_z_m, file.ceiling_z_m, &root)?;
+    let scene = Scene {
+        name: file.name,
+        source: file.source,
+        approximate: file.approximate,
+        materials: rules.materials,
+        walls,
+        cylinders,
+        floor_z_m: file.floor_z_m,
+        ceiling_z_m: file.ceiling_z_m,
+        poses: file.poses,
+        robot,
+        sha256: Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect(),
+    };
+    check_poses(&scene, &root.key("poses"))?;
+    Ok(scene)
+}
+
+/// What the parts of a scene share: the materials there are, and the ids taken so far.
+struct Rules {
+    materials: BTreeMap<String, Material>,
+    ids: HashMap<String, String>,
+}
+
+impl Rules {
+    fn new(materials: BTreeMap<String, Material>) -> Result<Self, Fault> {
+        for (name, material) in &materials {
+            let path = JsonPath::root().key("materials").key(name);
+            not_empty(name, &path).map_err(|fault| Fault { part: Part::Key, ..fault })?;
+            share("reflectance", material.reflectance, &path)?;
+            share("roughness", material.roughness, &path)?;
+        }
+        Ok(Self { materials, ids: HashMap::new() })
+    }
+
+    fn walls(&mut self, file: &WallFile, path: &JsonPath) -> Result<Vec<Wall>, Fault> {
+        let material = self.material(&file.material, path)?;
+        let z_m = heights(file.z_m, path)?;
+        let corners = corners(file, path)?;
+        not_empty(&file.id, &path.key("id"))?;
+        let single = file.polyline.is_none();
+        corners
+            .into_iter()
+            .enumerate()
+            .map(|(index, (a, b))| {
+                let id = if single { file.id.clone() } else { format!("{}.{index}", file.id) };
+                Ok(Wall { id: self.take_id(id, path)?, a, b, material, z_m })
+            })
+            .collect()
+    }
+
+    fn cylinder(&mut self, file: CylinderFile, path: &JsonPath) -> Result<Cylinder, Fault> {
+        Ok(Cylinder {
+            center: point(file.center, &path.key("center"))?,
+            radius_m: radius(file.radius_m, &path.key("radius_m"))?,
+            material: self.material(&file.material, path)?,
+            z_m: heights(file.z_m, path)?,
+            id: self.take_id(file.id, path)?,
+        })
+    }
+
+    fn robot(&mut self, file: RobotFile, path: &JsonPath) -> Result<Robot, Fault> {
+        let shape = match (file.circle, file.outline) {
+            (Some(circle), None) => round_body(&circle, &path.key("circle"))?,
+            (None, Some(outline)) => flat_body(&outline, &path.key("outline"))?,
+            _ => return fault(path, SceneProblem::RobotShape),
+        };
+        Ok(Robot {
+            shape,
+            material: self.material(&file.material, path)?,
+            z_m: heights(file.z_m, path)?,
+            id: self.take_id(file.id, path)?,
+        })
+    }
+
+    fn material(&self, name: &str, path: &JsonPath) -> Result<Material, Fault> {
+        self.materials.get(name).copied().ok_or_else(|| Fault {
+            path: path.key("material"),
+            part: Part::Value,
+            problem: SceneProblem::UnknownMaterial {
+                name: name.to_owned(),
+                known: self.materials.keys().cloned().collect(),
+            },
+        })
+    }
+
+    fn take_id(&mut self, id: String, path: &JsonPath) -> Result<Arc<str>, Fault> {
+        not_empty(&id, &path.key("id"))?;
+        if let Some(first) = self.ids.get(&id) {
+            let first = first.clone();
+            return fault(&path.key("id"), SceneProblem::DuplicateId { id, first });
+        }
+        self.ids.insert(id.clone(), path.to_string());
+        Ok(id.into())
+    }
+}
+
+/// The segments of a wall, each from and to where.
+fn corners(file: &WallFile, path: &JsonPath) -> Result<Vec<(DVec2, DVec2)>, Fault> {
+    match (file.from, file.to, &file.polyline) {
+        (Some(from), Some(to), None) if !file.closed => {
+            let from = point(from, &path.key("from"))?;
+            let to_path = path.key("to");
+            Ok(vec![side(from, point(to, &to_path)?, &to_path)?])
+        }
+        (Some(_), Some(_), None) => {
+            fault(&path.key("closed"), SceneProblem::WallShape("only a polyline can be closed"))
+        }
+        (None, None, Some(points)) => sides(points, file.closed, &path.key("polyline")),
+        (None, None, None) => {
+            fault(path, SceneProblem::WallShape("this wall has neither ends nor a polyline"))
+        }
+        (_, _, Some(_)) => fault(
+            path,
+            SceneProblem::WallShape("this wall has a polyline and beside it `from` or `to`"),
+        ),
+        (None, Some(_), None) => fault(path, SceneProblem::MissingField("from".to_owned())),
+        (Some(_), None, None) => fault(path, SceneProblem::MissingField("to".to_owned())),
+    }
+}
+
+fn sides(points: &[Point], closed: bool, path: &JsonPath) -> Result<Vec<(DVec2, DVec2)>, Fault> {
+    let needed = if closed { 3 } else { 2 };
+    if points.len() < needed {
+        return fault(path, SceneProblem::TooFewPoints { points: points.len(), needed });
+    }
+    let mut corners = points
+        .iter()
+        .enumerate()
+        .map(|(index, &corner)| point(corner, &path.index(index)))
+        .collect::<Result<Vec<_>, _>>()?;
+    if closed {
+        corners.push(corners[0]);
+    }
+    corners
+        .windows(2)
+        .enumerate()
+        .map(|(index, ends)| side(ends[0], ends[1], &path.index((index + 1).min(points.len() - 1))))
+        .collect()
+}
+
+fn side(from: DVec2, to: DVec2, path: &JsonPath) -> Result<(DVec2, DVec2), Fault> {
+    if from.distance(to) >= MIN_WALL_M {
+        return Ok((from, to));
+    }
+    fault(path, SceneProblem::NoLength { from: from.to_array(), to: to.to_array() })
+}
+
+fn round_body(circle: &CircleFile, path: &JsonPath) -> Result<RobotShape, Fault> {
+    let center = point(circle.center, &path.key("center"))?;
+    let radius_m = radius(circle.radius_m, &path.key("radius_m"))?;
+    if center.length() - radius_m < CLEARANCE_M {
+        return fault(path, SceneProblem::RangerInBody);
+    }
+    Ok(RobotShape::Circle { center, radius_m })
+}
+
+fn flat_body(outline: &[Point], path: &JsonPath) -> Result<RobotShape, Fault> {
+    let sides = sides(outline, true, path)?;
+    let touches = sides.iter().any(|&(a, b)| distance_to_segment(DVec2::ZERO, a, b) < CLEARANCE_M);
+    if touches || contains(&sides, DVec2::ZERO) {
+        return fault(path, SceneProblem::RangerInBody);
+    }
+    Ok(RobotShape::Outline(sides.into_iter().map(|(a, _)| a).collect()))
+}
+
+fn check_poses(scene: &Scene, path: &JsonPath) -> Result<(), Fault> {
+    let outlines = Outlines::of(scene);
+    for (name, pose) in &scene.poses {
+        let path = path.key(name);
+        let bad_name = |problem| Fault { path: path.clone(), part: Part::Key, problem };
+        if name.trim().is_empty() {
+            return Err(bad_name(SceneProblem::EmptyName));
+        }
+        if name.contains(',') {
+            return Err(bad_name(SceneProblem::CommaInName(name.clone())));
+        }
+        let Pose { x_m, y_m, heading_deg } = *pose;
+        length(x_m, &path.key("x_m"))?;
+        length(y_m, &path.key("y_m"))?;
+        if heading_deg.is_nan() || heading_deg.abs() > MAX_HEADING_DEG {
+            return fault(&path.key("heading_deg"), SceneProblem::Heading(heading_deg));
+        }
+        scene.check_pose_among(&outlines, pose).or_else(|error| fault(&path, error.into()))?;
+    }
+    Ok(())
+}
+
+fn floor_below_ceiling(
+    floor_z_m: Option<f64>,
+    ceiling_z_m: Option<f64>,
+    root: &JsonPath,
+) -> Result<(), Fault> {
+    let ceiling_path = root.key("ceiling_z_m");
+    floor_z_m.map(|height_m| length(height_m, &root.key("floor_z_m"))).transpose()?;
+    ceiling_z_m.map(|height_m| length(height_m, &ceiling_path)).transpose()?;
+    match (floor_z_m, ceiling_z_m) {
+        (Some(lower), Some(upper)) => {
+            rising(("floor_z_m", lower), ("ceiling_z_m", upper), &ceiling_path)
+        }
+        _ => Ok(()),
+    }
+}
+
+fn heights(z_m: Option<[f64; 2]>, path: &JsonPath) -> Result<Option<[f64; 2]>, Fault> {
+    let path = path.key("z_m");
+    if let Some([lower, upper]) = z_m {
+        length(lower, &path.index(0))?;
+        length(upper, &path.index(1))?;
+        rising(("the lower height", lower), ("the upper height", upper), &path)?;
+    }
+    Ok(z_m)
+}
+
+fn rising(
+    (lower_name, lower): (&'static str, f64),
+    (upper_name, upper): (&'static str, f64),
+    path: &JsonPath,
+) -> Result<(), Fault> {
+    if lower < upper {
+        return Ok(());
+    }
+    fault(path, SceneProblem::HeightsReversed { lower_name, lower, upper_name, upper })
+}
+
+fn point([x, y]: Point, path: &JsonPath) -> Result<DVec2, Fault> {
+    length(x, &path.index(0))?;
+    length(y, &path.index(1))?;
+    Ok(DVec2::new(x, y))
+}
+
+fn length(value: f64, path: &JsonPath) -> Result<(), Fault> {
+    // Written so that NaN fails too.
+    if value.abs() <= MAX_COORDINATE_M {
+        return Ok(());
+    }
+    fault(path, SceneProblem::OutOfBounds { value })
+}
+
+fn radius(radius_m: f64, path: &JsonPath) -> Result<f64, Fault> {
+    if radius_m > 0.0 && radius_m <= MAX_COORDINATE_M {
+        return Ok(radius_m);
+    }
+    fault(path, SceneProblem::Radius(radius_m))
+}
+
+fn share(field: &'static str, value: f64, path: &JsonPath) -> Result<(), Fault> {
+    if (0.0..=1.0).contains(&value) {
+        return Ok(());
+    }
+    fault(&path.key(field), SceneProblem::Share { field, value })
+}
+
+fn not_empty(name: &str, path: &JsonPath) -> Result<(), Fault> {
+    if name.trim().is_empty() { fault(path, SceneProblem::EmptyName) } else { Ok(()) }
+}
+
+fn fault<T>(path: &JsonPath, problem: SceneProblem) -> Result<T, Fault> {
+    Err(Fault { path: path.clone(), part: Part::Value, problem })
+}

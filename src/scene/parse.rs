@@ -1,0 +1,123 @@
+//! From the text of a scene file to a checked [`Scene`], with each fault in its place.
+
+use super::{
+    Scene, SceneError, SceneProblem,
+    check::checked,
+    error::{floor_char_boundary, line_and_column},
+    file::SceneFile,
+    locate::{JsonPath, Located, Part},
+};
+
+pub(super) fn scene_from_json(text: &str) -> Result<Scene, SceneError> {
+    let value: serde_json::Value =
+        serde_json::from_str(text).map_err(|error| syntax_error(text, &error))?;
+    let located = Located::new(text);
+    let at = |path: &JsonPath, part: Part| {
+        located.as_ref().map_or(0..text.len(), |located| located.find(path, part))
+    };
+    if let Some(located) = &located {
+        refuse_ambiguous(text, located)?;
+    }
+    let file: SceneFile = serde_path_to_error::deserialize(value).map_err(|error| {
+        let path = JsonPath::from(error.path());
+        let problem = shape_problem(error.inner());
+        let part = match problem {
+            SceneProblem::UnknownField { .. } => Part::Key,
+            _ => Part::Value,
+        };
+        SceneError::new(text, at(&path, part), &path, problem)
+    })?;
+    checked(file, text).map_err(|fault| {
+        SceneError::new(text, at(&fault.path, fault.part), &fault.path, fault.problem)
+    })
+}
+
+/// What the parser accepts and a reader would misunderstand.
+fn refuse_ambiguous(text: &str, located: &Located<'_>) -> Result<(), SceneError> {
+    if let Some((path, span)) = located.duplicate_key() {
+        let name = path.last_key().unwrap_or_default().to_owned();
+        return Err(SceneError::new(text, span, &path, SceneProblem::DuplicateKey(name)));
+    }
+    if let Some((path, span)) = located.array_for_object() {
+        let problem =
+            SceneProblem::Type("found an array where an object { ... } belongs".to_owned());
+        return Err(SceneError::new(text, span, &path, problem));
+    }
+    Ok(())
+}
+
+/// A fault of the syntax; an unclosed bracket is shown where it opens, not where the text ends.
+fn syntax_error(text: &str, error: &serde_json::Error) -> SceneError {
+    if error.is_eof()
+        && let Some((offset, open)) = innermost_open_bracket(text)
+    {
+        let span = offset..offset + 1;
+        return SceneError::new(text, span, &"", SceneProblem::Unclosed(open));
+    }
+    let offset = offset_of(text, error.line(), error.column());
+    let end = text[offset..].chars().next().map_or(offset, |found| offset + found.len_utf8());
+    let mut message = without_place(error);
+    if message.starts_with("expected `,`")
+        && let Some((opens, open)) = innermost_open_bracket(&text[..offset])
+    {
+        // The bracket that should have been closed is often lines before the place.
+        let (line, column) = line_and_column(text, opens);
+        message.push_str(&format!(" (the `{open}` at {line}:{column} is still open)"));
+    }
+    SceneError::new(text, offset..end, &"", SceneProblem::Syntax(message))
+}
+
+/// Byte offset of a line and column as serde_json counts them: columns in bytes, from 1.
+fn offset_of(text: &str, line: usize, column: usize) -> usize {
+    let line_start = match line {
+        0 | 1 => 0,
+        _ => text.match_indices('\n').nth(line - 2).map_or(text.len(), |(newline, _)| newline + 1),
+    };
+    floor_char_boundary(text, line_start + column.saturating_sub(1))
+}
+
+/// The last bracket of a cut-off text that has no partner, if the text does not end in a string.
+fn innermost_open_bracket(text: &str) -> Option<(usize, char)> {
+    let mut open = Vec::new();
+    let mut in_string = false;
+    let mut escaped = false;
+    for (offset, found) in text.char_indices() {
+        match found {
+            _ if escaped => escaped = false,
+            '\\' if in_string => escaped = true,
+            '"' => in_string = !in_string,
+            '[' | '{' if !in_string => open.push((offset, found)),
+            ']' | '}' if !in_string => drop(open.pop()),
+            _ => {}
+        }
+    }
+    open.pop().filter(|_| !in_string)
+}
+
+/// Serde's message without the place, which is reported apart from it.
+fn without_place(error: &serde_json::Error) -> String {
+    let message = error.to_string();
+    message.rsplit_once(" at line ").map_or(message.clone(), |(message, _)| message.to_owned())
+}
+
+/// What serde's derived code says about the shape, as a problem of its own kind.
+fn shape_problem(error: &serde_json::Error) -> SceneProblem {
+    let message = without_place(error);
+    let quoted = || message.split('`').skip(1).step_by(2).map(str::to_owned);
+    if message.starts_with("unknown field `") {
+        let field = quoted().next().unwrap_or_default();
+        return SceneProblem::UnknownField { field, known: quoted().skip(1).collect() };
+    }
+    if message.starts_with("missing field `") {
+        return SceneProblem::MissingField(quoted().next().unwrap_or_default());
+    }
+    let message = message
+        .replace("expected f64", "expected a number")
+        .replace("fewer elements in array", "fewer of them")
+        .replace("a sequence", "an array [ ... ]")
+        .replace("a map", "an object { ... }");
+    SceneProblem::Type(match message.strip_prefix("invalid type: ") {
+        Some(found) => format!("found {found}"),
+        None => message,
+    })
+}

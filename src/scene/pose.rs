@@ -1,0 +1,244 @@
+//! Poses: named or in numbers, and whether a ranger can stand there.
+
+use thiserror::Error;
+
+use super::{
+    Scene,
+    error::{MAX_COORDINATE_M, suggest},
+    outline::{Outline, Outlines, distance_to_segment},
+};
+use crate::geometry::{DVec2, Pose};
+
+/// A ranger closer to a surface than this is taken to be inside it, metres.
+pub(super) const CLEARANCE_M: f64 = 1e-3;
+
+/// Largest magnitude of a heading, degrees.
+pub(super) const MAX_HEADING_DEG: f64 = 360.0;
+
+/// A pose that can't be used.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum PoseError {
+    /// Not the name of a pose.
+    #[error("the scene `{scene}` has no pose `{name}`")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The scene.
+        scene: String,
+        /// The poses it has.
+        known: Vec<String>,
+    },
+    /// Numbers, but not two or three.
+    #[error("`{0}` is not a pose")]
+    Malformed(String),
+    /// A part that is not a number within bounds.
+    #[error("{field} `{text}` is not a number from -{limit} to {limit}")]
+    BadNumber {
+        /// X, Y or DEG.
+        field: &'static str,
+        /// What was written.
+        text: String,
+        /// Largest magnitude.
+        limit: f64,
+    },
+    /// Beyond the walls.
+    #[error("the pose ({x_m}, {y_m}) m is outside the room")]
+    OutsideRoom {
+        /// World x, metres.
+        x_m: f64,
+        /// World y, metres.
+        y_m: f64,
+        /// Lower left corner of the room's extent, metres.
+        low: [f64; 2],
+        /// Upper right corner of the room's extent, metres.
+        high: [f64; 2],
+    },
+    /// In a body that sound does not enter.
+    #[error("the pose ({x_m}, {y_m}) m is inside `{body}`")]
+    InsideBody {
+        /// World x, metres.
+        x_m: f64,
+        /// World y, metres.
+        y_m: f64,
+        /// Name of the cylinder or of the ring of walls.
+        body: String,
+        /// The room's extent, if there is a room, lower left and upper right corner, metres.
+        room: Option<[[f64; 2]; 2]>,
+    },
+    /// On a surface.
+    #[error("the pose ({x_m}, {y_m}) m is {:.2} mm from `{reflector}`", distance_m * 1e3)]
+    TooClose {
+        /// World x, metres.
+        x_m: f64,
+        /// World y, metres.
+        y_m: f64,
+        /// Name of the wall or cylinder.
+        reflector: String,
+        /// Distance, metres.
+        distance_m: f64,
+        /// The room's extent, if there is a room, lower left and upper right corner, metres.
+        room: Option<[[f64; 2]; 2]>,
+    },
+    /// The robot's body does not fit there.
+    #[error(
+        "at the pose ({x_m}, {y_m}) m, heading {heading_deg} degrees, the body `{robot}` runs into `{reflector}`"
+    )]
+    BodyCollides {
+        /// World x, metres.
+        x_m: f64,
+        /// World y, metres.
+        y_m: f64,
+        /// Heading, degrees.
+        heading_deg: f64,
+        /// Name of the robot.
+        robot: String,
+        /// Name of what it runs into.
+        reflector: String,
+    },
+}
+
+impl PoseError {
+    /// What would be right.
+    #[must_use]
+    pub fn help(&self) -> String {
+        match self {
+            Self::Unknown { name, known, .. } => {
+                format!("{}; or give X,Y,DEG (metres, degrees)", suggest(name, known, "poses"))
+            }
+            Self::Malformed(_) | Self::BadNumber { .. } => {
+                "give X,Y,DEG (metres, degrees counter-clockwise; without DEG the heading is 0), as \
+                 in 0.774,0.085,90, or the name of a pose in the scene"
+                    .to_owned()
+            }
+            Self::OutsideRoom { low, high, .. } => extent(low, high),
+            Self::InsideBody { room, .. } => match room {
+                Some([low, high]) => extent(low, high),
+                None => "stand outside it".to_owned(),
+            },
+            Self::TooClose { room, .. } => match room {
+                Some([low, high]) => format!("keep 1 mm away from surfaces; {}", extent(low, high)),
+                None => "keep 1 mm away from surfaces".to_owned(),
+            },
+            Self::BodyCollides { .. } => {
+                "move or turn the pose; the body stands as `robot` in the scene says, relative to \
+                 position and heading"
+                    .to_owned()
+            }
+        }
+    }
+}
+
+fn extent(low: &[f64; 2], high: &[f64; 2]) -> String {
+    format!("the room spans x {} to {} m and y {} to {} m", low[0], high[0], low[1], high[1])
+}
+
+impl Scene {
+    /// The pose meant by `X,Y,DEG`, `X,Y`, or the name of a pose of this scene. Whether a
+    /// ranger can stand there is for [`Scene::check_pose`] to say.
+    ///
+    /// # Errors
+    /// A name the scene does not have, or numbers that make no pose.
+    pub fn pose(&self, spec: &str) -> Result<Pose, PoseError> {
+        if let Some(pose) = self.poses.get(spec) {
+            return Ok(*pose);
+        }
+        if !spec.contains(',') {
+            return Err(PoseError::Unknown {
+                name: spec.to_owned(),
+                scene: self.name.clone(),
+                known: self.poses.keys().cloned().collect(),
+            });
+        }
+        let parts: Vec<&str> = spec.split(',').map(str::trim).collect();
+        let (x, y, heading) = match parts[..] {
+            [x, y] => (x, y, "0"),
+            [x, y, heading] => (x, y, heading),
+            _ => return Err(PoseError::Malformed(spec.to_owned())),
+        };
+        Ok(Pose {
+            x_m: number("X", x, MAX_COORDINATE_M)?,
+            y_m: number("Y", y, MAX_COORDINATE_M)?,
+            heading_deg: number("DEG", heading, MAX_HEADING_DEG)?,
+        })
+    }
+
+    /// Whether a ranger can stand at a pose: inside the room (if the walls close one round
+    /// everything else), in no closed body, a millimetre from every surface, and the robot's
+    /// body, if there is one, in nothing's way.
+    ///
+    /// # Errors
+    /// Which of these fails, and the room's extent.
+    pub fn check_pose(&self, pose: &Pose) -> Result<(), PoseError> {
+        self.check_pose_among(&Outlines::of(self), pose)
+    }
+
+    /// The same with the outlines found before.
+    pub(super) fn check_pose_among(
+        &self,
+        outlines: &Outlines,
+        pose: &Pose,
+    ) -> Result<(), PoseError> {
+        let (position, Pose { x_m, y_m, heading_deg }) = (pose.position(), *pose);
+        within("X", x_m, MAX_COORDINATE_M)?;
+        within("Y", y_m, MAX_COORDINATE_M)?;
+        within("DEG", heading_deg, MAX_HEADING_DEG)?;
+        let room = outlines.room.as_ref().map(Outline::extent);
+        if let Some((reflector, distance_m)) = self.nearest_surface(position)
+            && distance_m < CLEARANCE_M
+        {
+            let reflector = reflector.to_owned();
+            return Err(PoseError::TooClose { x_m, y_m, reflector, distance_m, room });
+        }
+        if let Some(outline) = &outlines.room
+            && !outline.contains(position)
+        {
+            let [low, high] = outline.extent();
+            return Err(PoseError::OutsideRoom { x_m, y_m, low, high });
+        }
+        if let Some(body) = self.body_around(outlines, position) {
+            return Err(PoseError::InsideBody { x_m, y_m, body, room });
+        }
+        self.check_robot(pose)
+    }
+
+    /// Name and distance (metres) of the nearest surface.
+    fn nearest_surface(&self, position: DVec2) -> Option<(&str, f64)> {
+        let walls = self
+            .walls
+            .iter()
+            .map(|wall| (&*wall.id, distance_to_segment(position, wall.a, wall.b)));
+        let cylinders = self.cylinders.iter().map(|cylinder| {
+            (&*cylinder.id, (position.distance(cylinder.center) - cylinder.radius_m).abs())
+        });
+        walls.chain(cylinders).min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Name of the body that a point is in.
+    fn body_around(&self, outlines: &Outlines, position: DVec2) -> Option<String> {
+        let cylinder = self
+            .cylinders
+            .iter()
+            .find(|cylinder| position.distance(cylinder.center) < cylinder.radius_m)
+            .map(|cylinder| cylinder.id.to_string());
+        cylinder.or_else(|| {
+            let solid = outlines.solids.iter().find(|solid| solid.contains(position))?;
+            Some(solid.name(self))
+        })
+    }
+}
+
+fn number(field: &'static str, text: &str, limit: f64) -> Result<f64, PoseError> {
+    let refused = || PoseError::BadNumber { field, text: text.to_owned(), limit };
+    let value = text.parse().map_err(|_| refused())?;
+    within(field, value, limit).map_err(|_| refused())?;
+    Ok(value)
+}
+
+/// Written so that NaN is refused too.
+fn within(field: &'static str, value: f64, limit: f64) -> Result<(), PoseError> {
+    if value.abs() <= limit {
+        return Ok(());
+    }
+    Err(PoseError::BadNumber { field, text: value.to_string(), limit })
+}

@@ -1,0 +1,140 @@
+//! What a scan does when the line or the device misbehaves.
+
+use std::{
+    process::Stdio,
+    time::{Duration, Instant},
+};
+
+use crate::common::{Log, MockProcess, interrupt, mock_scan, run, sonard, stderr, wait_until};
+
+#[test]
+fn a_noisy_line_costs_time_and_never_data() {
+    for (seed, faults) in [
+        ("1", "flip=0.003"),
+        ("2", "drop=0.003"),
+        ("3", "double=0.003"),
+        ("4", "flip=0.001,drop=0.001,double=0.001,delay=0.02,delay_ms=15"),
+        ("5", "stall=0.005,stall_ms=200"),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let further = ["--faults", faults, "--seed", seed, "--max-range", "3", "--noise-mm", "0"];
+        let output = mock_scan("fig9", folder.path(), &further);
+        assert_eq!(output.status.code(), Some(0), "{faults}: {}", stderr(&output));
+        let log = Log::read(&folder.path().join("scan.jsonl"));
+        log.assert_each_beam_once(400);
+        for ping in log.pings() {
+            let residual_m = ping["residual_m"].as_f64().unwrap_or(0.0);
+            assert!(residual_m.abs() < 0.001, "{faults}: a wrong reading: {ping}");
+        }
+    }
+}
+
+#[test]
+fn a_restart_is_survived_and_marked() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = mock_scan("fig9", folder.path(), &["--faults", "reset=0.01", "--seed", "3"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let log = Log::read(&folder.path().join("scan.jsonl"));
+    log.assert_each_beam_once(400);
+    let reboots = log.events().iter().filter(|event| event.contains("reboot")).count();
+    assert!(reboots >= 2, "{:?}", log.events());
+    assert!(stderr(&output).contains("restarted"));
+}
+
+#[test]
+fn a_device_that_only_restarts_is_given_up() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = mock_scan("fig9", folder.path(), &["--faults", "reset=1"]);
+    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+    assert!(stderr(&output).contains("supply"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_hangup_ends_the_scan_with_every_beam_accounted_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = mock_scan("fig9", folder.path(), &["--faults", "hangup=0.02", "--seed", "1"]);
+    assert_eq!(output.status.code(), Some(3));
+    assert!(stderr(&output).contains("closed"), "{}", stderr(&output));
+    let log = Log::read(&folder.path().join("scan.jsonl"));
+    log.assert_each_beam_once(400);
+    let lost = log.pings().iter().filter(|ping| ping["status"] == "link_lost").count();
+    assert_eq!(log.end()["missing"], lost);
+    assert_eq!(log.end()["beams"], 400 - lost);
+    assert!(lost > 0);
+}
+
+#[test]
+fn another_protocol_version_is_refused_by_name() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = mock_scan("fig9", folder.path(), &["--faults", "version=9"]);
+    assert_eq!(output.status.code(), Some(3));
+    assert!(stderr(&output).contains("protocol 9"), "{}", stderr(&output));
+}
+
+#[test]
+fn an_interrupt_stops_the_motor_and_closes_the_log() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mock = MockProcess::start(folder.path(), &["--realtime"]);
+    let out = folder.path().join("out");
+    let scan = sonard(&["scan", "--port", mock.port(), "--scene", "simple-room", "--pose", "fig9"])
+        .args(["--max-range", "4", "--out"])
+        .arg(&out)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("starts");
+    let log_path = out.join("scan.jsonl");
+    wait_until("some readings", || {
+        std::fs::read_to_string(&log_path).is_ok_and(|log| log.matches("\"ping\"").count() >= 20)
+    });
+    interrupt(scan.id());
+    let output = scan.wait_with_output().expect("ends");
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    let log = Log::read(&log_path);
+    assert!(log.events().iter().any(|event| event.contains("stopped")), "{:?}", log.events());
+    let beams = log.pings().len();
+    assert_eq!(log.end()["beams"], beams);
+    assert_eq!(log.end()["missing"], 400 - beams);
+    assert!(out.join("scan.png").exists(), "what was measured is drawn");
+    let verified = run(&["log", "verify", log_path.to_str().expect("plain path")]);
+    assert!(!stderr(&verified).contains("torn"));
+    let (_, said) = mock.stop();
+    // The device stopped on request: it neither went on nor waited for its lease to end.
+    assert!(!said.contains("400 firings") && !said.contains("coils released"), "{said}");
+}
+
+#[test]
+fn a_killed_host_stops_the_firing_within_the_lease_and_leaves_the_port_usable() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mock = MockProcess::start(folder.path(), &["--realtime"]);
+    let log_path = folder.path().join("out/scan.jsonl");
+    let mut scan = sonard(&["scan", "--port", mock.port(), "--scene", "simple-room"])
+        .args(["--pose", "fig9", "--max-range", "4", "--out"])
+        .arg(folder.path().join("out"))
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("starts");
+    wait_until("some readings", || {
+        std::fs::read_to_string(&log_path).is_ok_and(|log| log.matches("\"ping\"").count() >= 20)
+    });
+    scan.kill().expect("it runs");
+    scan.wait().expect("it ends");
+    let killed = Instant::now();
+    // The lease is two seconds; a second scan finds a device that answers.
+    std::thread::sleep(Duration::from_millis(2_500));
+    let again = run(&[
+        "scan",
+        "--port",
+        mock.port(),
+        "--scene",
+        "simple-room",
+        "--pose",
+        "fig9",
+        "--max-range",
+        "4",
+        "--to-deg",
+        "9",
+    ]);
+    assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
+    let (_, said) = mock.stop();
+    assert!(said.contains("coils released"), "after {:?}: {said}", killed.elapsed());
+}

@@ -1,0 +1,10 @@
+//! The program as a user meets it. One test binary, because each would link all of it.
+#![cfg(feature = "daemon")]
+
+mod common;
+mod faults;
+mod hangup;
+mod plot;
+mod scan;
+mod scene;
+mod wrong_input;

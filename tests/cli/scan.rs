@@ -1,0 +1,166 @@
+//! One scan, end to end: real bytes over a real pty, a log, a comparison, a picture.
+
+use std::fs;
+
+use crate::common::{Log, mock_scan, run, sonard, stderr};
+use serde_json::Value;
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+#[test]
+fn the_false_lower_wall_of_figure_9_is_seen() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = mock_scan("fig9", folder.path(), &[]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let log = Log::read(&folder.path().join("scan.jsonl"));
+    log.assert_each_beam_once(400);
+    let near_270 =
+        log.pings().into_iter().filter(|p| (number(&p["azimuth_deg"]) - 270.0).abs() < 5.0);
+    let mut seen = 0;
+    for ping in near_270 {
+        assert_eq!(ping["status"], "echo", "{ping}");
+        // The wall is 85 mm away; the echo comes from near, far and near wall again.
+        assert!((number(&ping["range_m"]) - 0.827).abs() < 0.010, "{ping}");
+        assert_eq!(ping["sim"]["path"]["walls"], serde_json::json!(["south", "north", "south"]));
+        seen += 1;
+    }
+    assert_eq!(seen, 11);
+    let end = log.end();
+    assert_eq!((&end["beams"], &end["missing"]), (&400.into(), &0.into()));
+    let svg = fs::read_to_string(folder.path().join("scan.svg")).expect("a picture");
+    assert!(svg.contains("simple-room"));
+    assert!(fs::read(folder.path().join("scan.png")).expect("a picture").starts_with(b"\x89PNG"));
+}
+
+#[test]
+fn sound_that_still_bounces_when_the_receiver_opens_gives_the_minimum_range() {
+    let folder = tempfile::tempdir().expect("a folder");
+    assert_eq!(mock_scan("fig7", folder.path(), &[]).status.code(), Some(0));
+    let log = Log::read(&folder.path().join("scan.jsonl"));
+    let near: Vec<_> = log.pings().into_iter().filter(|p| p["status"] == "min_range").collect();
+    assert!(near.len() >= 10, "{} readings at the minimum range", near.len());
+    for ping in near {
+        // 2.38 ms of blanking at 343.99 m/s.
+        assert!((number(&ping["range_m"]) - 0.4093).abs() < 0.001, "{ping}");
+    }
+}
+
+#[test]
+fn a_mock_is_logged_as_a_mock_however_its_port_was_opened() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mock = crate::common::MockProcess::start(folder.path(), &[]);
+    let port = mock.port().to_owned();
+    let output = run(&["scan", "--port", &port, "--scene", "simple-room", "--pose", "fig9"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let log = Log::parse(&String::from_utf8(output.stdout).expect("text"));
+    let session = log.of_type("session").next().expect("a session");
+    assert_eq!(session["provenance"], "mock");
+    assert_eq!(session["device"]["tick_hz"], 2_000_000);
+    log.assert_each_beam_once(400);
+    let (code, said) = mock.stop();
+    assert_eq!(code, Some(0));
+    assert!(said.contains("400 firings") && said.contains("stopped"), "{said}");
+    assert!(!folder.path().join("ranger").exists(), "the link goes with the mock");
+}
+
+#[test]
+fn records_flow_through_a_pipe_into_a_comparison() {
+    let scan = run(&[
+        "scan",
+        "--mock",
+        "--scene",
+        "simple-room",
+        "--pose",
+        "fig9",
+        "--from-deg",
+        "-45",
+        "--to-deg",
+        "45",
+        "--pings-per-stop",
+        "2",
+        "--repeat",
+        "2",
+        "--max-range",
+        "4",
+    ]);
+    assert_eq!(scan.status.code(), Some(0), "{}", stderr(&scan));
+    let log = Log::parse(std::str::from_utf8(&scan.stdout).expect("text"));
+    assert_eq!(log.of_type("scan_start").count(), 2);
+    assert_eq!(log.pings().len(), 400);
+    let first = log.pings()[0];
+    assert_eq!((&first["azimuth_deg"], &first["step"]), (&315.0.into(), &(-50).into()));
+
+    let mut compare = sonard(&["compare", "-", "--json"]);
+    compare.stdin(std::process::Stdio::piped()).stdout(std::process::Stdio::piped());
+    let mut compare = compare.spawn().expect("starts");
+    std::io::Write::write_all(&mut compare.stdin.take().expect("piped"), &scan.stdout)
+        .expect("it reads");
+    let output = compare.wait_with_output().expect("ends");
+    let comparison: Value = serde_json::from_slice(&output.stdout).expect("one object");
+    assert_eq!(comparison["beams"], 400);
+    assert!(number(&comparison["agree_fraction"]) > 0.99, "{comparison}");
+}
+
+#[test]
+fn a_warmer_truth_shows_as_a_bias_that_grows_with_range() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let further = ["--truth-temperature-c", "25", "--noise-mm", "0"];
+    assert_eq!(mock_scan("fig9", folder.path(), &further).status.code(), Some(0));
+    let log = Log::read(&folder.path().join("scan.jsonl"));
+    let ratios: Vec<f64> = log
+        .pings()
+        .iter()
+        .filter(|ping| ping["status"] == "echo" && ping["sim"]["status"] == "echo")
+        .map(|ping| number(&ping["range_m"]) / number(&ping["sim"]["range_m"]))
+        .collect();
+    // Sound is faster by 0.6 m/s a degree, so echoes come early by 0.9 %.
+    let right = ratios.iter().filter(|&&ratio| (ratio - 0.9912).abs() < 0.002).count();
+    assert!(right * 10 > ratios.len() * 9, "{right} of {}", ratios.len());
+}
+
+#[test]
+fn missed_steps_are_found_when_the_motor_goes_home() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = mock_scan("fig9", folder.path(), &["--missed-steps", "0.02", "--max-range", "3"]);
+    assert_eq!(output.status.code(), Some(0));
+    let log = Log::read(&folder.path().join("scan.jsonl"));
+    let drift = log.end()["home_drift_steps"].as_i64().expect("a drift");
+    // Some 8 of 399 moves fall a step short.
+    assert!((2..=20).contains(&drift), "{drift}");
+    assert!(log.events().iter().any(|event| event.contains("azimuths are doubtful")));
+    assert!(stderr(&output).contains("warning"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_second_run_into_the_same_folder_keeps_the_first() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let few = ["--to-deg", "9"];
+    assert_eq!(mock_scan("fig9", folder.path(), &few).status.code(), Some(0));
+    let before = fs::read(folder.path().join("scan.jsonl")).expect("a log");
+    assert_eq!(mock_scan("fig7", folder.path(), &few).status.code(), Some(0));
+    let after = fs::read(folder.path().join("scan.jsonl")).expect("a log");
+    assert!(after.starts_with(&before) && after.len() > before.len());
+    assert_eq!(Log::read(&folder.path().join("scan.jsonl")).of_type("session").count(), 2);
+}
+
+#[test]
+fn in_real_time_nothing_but_acoustics_and_motor_takes_time() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = mock_scan("fig9", folder.path(), &["--realtime", "--max-range", "4"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let log = Log::read(&folder.path().join("scan.jsonl"));
+    let end = log.end();
+    let ratio = number(&end["duration_s"]) / number(&end["acoustic_limit_s"]);
+    assert!((1.0..1.02).contains(&ratio), "{ratio}");
+    // Wall-clock times of the readings follow the device's clock.
+    let pings = log.pings();
+    let time = |ping: &Value| -> jiff::Timestamp {
+        ping["time"].as_str().expect("a time").parse().expect("RFC 3339")
+    };
+    let wall_s = time(pings[399]).duration_since(time(pings[0])).as_secs_f64();
+    let ticks = number(&pings[399]["fired_ticks"]) - number(&pings[0]["fired_ticks"]);
+    assert!((wall_s - ticks / 2e6).abs() < 0.02, "{wall_s} s for {ticks} ticks");
+    assert!(number(&pings[200]["time_sigma_us"]) < 20_000.0);
+}

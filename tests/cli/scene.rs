@@ -1,0 +1,109 @@
+//! `sonard scene`, as a user meets it.
+
+use std::{fs, path::Path};
+
+use assert_cmd::{Command, assert::Assert};
+use predicates::{prelude::PredicateBooleanExt, str::contains};
+use tempfile::tempdir;
+
+fn program() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_sonard"))
+}
+
+fn scene(args: &[&str]) -> Assert {
+    program().arg("scene").args(args).assert()
+}
+
+fn written(folder: &Path, text: &str) -> String {
+    let path = folder.join("room.json");
+    fs::write(&path, text).expect("a scene file");
+    path.to_str().expect("UTF-8").to_owned()
+}
+
+#[test]
+fn check_says_in_a_line_what_a_scene_holds() {
+    scene(&["check", "simple-room"])
+        .success()
+        .stdout("simple-room: 4 walls, 0 cylinders, 2 poses (fig7, fig9), 0.928 x 0.742 m\n");
+}
+
+#[test]
+fn check_points_at_the_line_and_exits_with_2() {
+    let folder = tempdir().expect("a folder");
+    let path = written(folder.path(), "{\"name\": \"r\",\n \"materials\": {},\n \"wals\": []}");
+    scene(&["check", &path])
+        .code(2)
+        .stdout("")
+        .stderr(contains("room.json:3:2").and(contains("did you mean `walls`?")));
+    let path = written(folder.path(), "{\"name\": \"r\",\n \"materials\": {\"a\": {");
+    scene(&["check", &path])
+        .code(2)
+        .stderr(contains("room.json:2:21").and(contains("never closed")));
+}
+
+#[test]
+fn check_refuses_a_pose_outside_the_room() {
+    scene(&["check", "simple-room", "--pose", "2,0.3"])
+        .code(2)
+        .stderr(contains("outside the room").and(contains("x 0 to 0.928 m")));
+    scene(&["check", "simple-room", "--pose", "fig8"]).code(2).stderr(contains("did you mean"));
+    scene(&["check", "simple-room", "--pose", "-0.1,0.3,-90"]).code(2);
+    scene(&["check", "simple-room", "--pose", "0.1,0.3,-90"]).success();
+}
+
+#[test]
+fn a_scene_that_is_not_there_is_said_so() {
+    scene(&["check", "simple-rom"]).code(2).stderr(contains("did you mean `simple-room`?"));
+    let folder = tempdir().expect("a folder");
+    scene(&["check", folder.path().to_str().expect("UTF-8")]).code(2);
+    let binary = folder.path().join("binary");
+    fs::write(&binary, [0xff, 0xfe]).expect("a file");
+    scene(&["check", binary.to_str().expect("UTF-8")]).code(2).stderr(contains("not UTF-8"));
+}
+
+#[test]
+fn a_file_wins_over_a_shipped_scene_of_that_name() {
+    let folder = tempdir().expect("a folder");
+    fs::write(folder.path().join("simple-room"), r#"{"name": "mine", "materials": {}}"#)
+        .expect("a scene file");
+    program()
+        .current_dir(folder.path())
+        .args(["scene", "check", "simple-room"])
+        .assert()
+        .success()
+        .stdout(contains("mine: 0 walls"));
+}
+
+#[test]
+fn draw_writes_svg_and_png() {
+    let folder = tempdir().expect("a folder");
+    let svg = folder.path().join("room.svg");
+    let png = folder.path().join("room.png");
+    scene(&["draw", "simple-room-robot", "-o", svg.to_str().expect("UTF-8")]).success();
+    let text = fs::read_to_string(svg).expect("an SVG");
+    for part in ["<svg", "south", "b12", "fig9", "Dudek"] {
+        assert!(text.contains(part), "the picture lacks {part}");
+    }
+    scene(&["draw", "simple-room", "--pose", "fig7", "-o", png.to_str().expect("UTF-8")]).success();
+    assert!(fs::read(&png).expect("a PNG").starts_with(b"\x89PNG"));
+    let shown = scene(&["draw", "simple-room", "--pose", "fig7"]).success();
+    shown.stdout(contains("</svg>").and(contains("fig7")).and(contains("fig9").not()));
+    scene(&["draw", "simple-room", "-o", "room.gif"]).code(2).stderr(contains(".svg or .png"));
+    scene(&["draw", "simple-room", "-o", "no/such/folder/room.svg"])
+        .code(3)
+        .stderr(contains("folder exists"));
+}
+
+#[test]
+fn schema_prints_the_committed_one() {
+    scene(&["schema"]).success().stdout(include_str!("../../scenes/scene.schema.json"));
+}
+
+#[test]
+fn list_names_every_shipped_scene() {
+    let shown = scene(&["list"]).success().get_output().stdout.clone();
+    let shown = String::from_utf8(shown).expect("UTF-8");
+    for name in sonard::scene::shipped::names() {
+        assert!(shown.contains(name), "{name} is not listed");
+    }
+}
