@@ -16,7 +16,7 @@ use crate::{
     store::load,
 };
 
-pub(super) use table::path_text;
+pub(super) use table::{RULED, path_text};
 
 /// Options of `sonard compare`.
 #[derive(Debug, clap::Args)]
