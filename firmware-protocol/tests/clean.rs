@@ -15,36 +15,19 @@ const BAUD: u32 = 115_200;
 
 fn ready(settings: Settings) -> Sim {
     let mut sim = Sim::new(7, BAUD, Faults::default());
-    for command in [
-        Command::Identify,
-        Command::Configure(settings),
-        Command::Home,
-    ] {
+    for command in [Command::Identify, Command::Configure(settings), Command::Home] {
         let events = sim.run(command).expect("ends");
-        assert!(
-            !matches!(events.last(), Some(HostEvent::Failed(_))),
-            "{events:?}"
-        );
+        assert!(!matches!(events.last(), Some(HostEvent::Failed(_))), "{events:?}");
     }
     sim
 }
 
 fn plan(stops: u16, pings_per_stop: u8) -> Sweep {
-    Sweep {
-        sweep: 0,
-        first_step: 0,
-        stride: 1,
-        stops,
-        pings_per_stop,
-        lease_ms: 1_000,
-    }
+    Sweep { sweep: 0, first_step: 0, stride: 1, stops, pings_per_stop, lease_ms: 1_000 }
 }
 
 fn delivered(events: &[HostEvent]) -> usize {
-    events
-        .iter()
-        .filter(|event| matches!(event, HostEvent::Reading { .. }))
-        .count()
+    events.iter().filter(|event| matches!(event, HostEvent::Reading { .. })).count()
 }
 
 #[test]
@@ -61,11 +44,7 @@ fn the_link_is_never_on_the_critical_path() {
     let step_ticks = 2_000_000 / u32::from(settings.speed);
     let each = settings.window_ticks + settings.settle_ticks + step_ticks;
     let taken = last.wrapping_sub(first);
-    assert!(
-        taken.abs_diff(399 * each) <= 4,
-        "{taken} ticks instead of {}",
-        399 * each
-    );
+    assert!(taken.abs_diff(399 * each) <= 4, "{taken} ticks instead of {}", 399 * each);
     check_costs(&before, sim.host.stats());
 }
 
@@ -76,36 +55,18 @@ fn check_costs(before: &LinkStats, after: &LinkStats) {
     println!("400 beams: {received} bytes to the host, {sent} bytes to the device");
     assert!(received < 400 * 36, "{received} bytes received");
     assert!(sent < 400 * 4, "{sent} bytes sent");
-    assert_eq!(
-        after.retries, before.retries,
-        "nothing needs repeating on a clean line"
-    );
+    assert_eq!(after.retries, before.retries, "nothing needs repeating on a clean line");
     assert_eq!(after.duplicates, 0);
     assert_eq!(after.repaired, 0);
 }
 
 #[test]
 fn eight_echoes_and_short_windows_do_not_fill_the_ring() {
-    let settings = Settings {
-        max_echoes: 8,
-        window_ticks: 20_000,
-        settle_ticks: 0,
-        ..settings()
-    };
+    let settings = Settings { max_echoes: 8, window_ticks: 20_000, settle_ticks: 0, ..settings() };
     let mut sim = ready(settings);
-    let events = sim
-        .run(Command::Sweep(Sweep {
-            stride: 0,
-            ..plan(1, 200)
-        }))
-        .expect("ends");
+    let events = sim.run(Command::Sweep(Sweep { stride: 0, ..plan(1, 200) })).expect("ends");
     assert_eq!(delivered(&events), 200);
-    let fired: Vec<_> = sim
-        .world
-        .firings
-        .iter()
-        .map(|firing| firing.fired_ticks)
-        .collect();
+    let fired: Vec<_> = sim.world.firings.iter().map(|firing| firing.fired_ticks).collect();
     for pair in fired.windows(2) {
         let apart = pair[1].wrapping_sub(pair[0]);
         assert!(apart <= settings.window_ticks + 2, "held for {apart} ticks");
@@ -114,19 +75,11 @@ fn eight_echoes_and_short_windows_do_not_fill_the_ring() {
 
 #[test]
 fn the_interval_between_firings_is_kept() {
-    let settings = Settings {
-        min_interval_ticks: 100_000,
-        ..settings()
-    };
+    let settings = Settings { min_interval_ticks: 100_000, ..settings() };
     let mut sim = ready(settings);
     sim.run(Command::Sweep(plan(5, 3))).expect("ends");
     sim.run(Command::Ping).expect("ends");
-    let fired: Vec<_> = sim
-        .world
-        .firings
-        .iter()
-        .map(|firing| firing.fired_ticks)
-        .collect();
+    let fired: Vec<_> = sim.world.firings.iter().map(|firing| firing.fired_ticks).collect();
     assert_eq!(fired.len(), 16);
     for pair in fired.windows(2) {
         assert!(pair[1].wrapping_sub(pair[0]) >= 100_000);
@@ -139,22 +92,13 @@ fn clock_samples_tell_the_device_clock() {
     let events = sim.run(Command::Sweep(plan(100, 1))).expect("ends");
     let mut samples = 0;
     for event in &events {
-        let HostEvent::ClockSample {
-            sent_us,
-            received_us,
-            device_ticks,
-            retried,
-        } = event
-        else {
+        let HostEvent::ClockSample { sent_us, received_us, device_ticks, retried } = event else {
             continue;
         };
         samples += 1;
         assert!(!retried);
         let at = u64::from(device_ticks.wrapping_sub(sim.world.clock_offset)) / 2;
-        assert!(
-            (*sent_us..=*received_us).contains(&at),
-            "{sent_us} {at} {received_us}"
-        );
+        assert!((*sent_us..=*received_us).contains(&at), "{sent_us} {at} {received_us}");
     }
     assert!(samples > 5, "{samples} samples");
 }
@@ -165,61 +109,30 @@ fn a_closed_line_fails_at_once_and_the_device_is_met_again() {
     sim.start(Command::MoveTo { step: 300 });
     let now = sim.now_us();
     sim.host.handle_hangup(now);
-    assert_eq!(
-        sim.host.poll_event(),
-        Some(HostEvent::Failed(HostError::Hangup))
-    );
+    assert_eq!(sim.host.poll_event(), Some(HostEvent::Failed(HostError::Hangup)));
     assert_eq!(sim.host.poll_timeout(), None);
-    assert_eq!(
-        sim.host.start(now, Command::Ping),
-        Err(StartError::NotIdentified)
-    );
+    assert_eq!(sim.host.start(now, Command::Ping), Err(StartError::NotIdentified));
     let events = sim.run(Command::Identify).expect("ends");
     assert!(matches!(events.last(), Some(HostEvent::Identified(_))));
-    assert!(
-        !events
-            .iter()
-            .any(|event| matches!(event, HostEvent::Rebooted { .. }))
-    );
+    assert!(!events.iter().any(|event| matches!(event, HostEvent::Rebooted { .. })));
 }
 
 #[test]
 fn a_dead_line_fails_without_an_answer() {
-    let mut sim = Sim::new(
-        3,
-        BAUD,
-        Faults {
-            frame_lost_one_in: 1,
-            ..Faults::default()
-        },
-    );
+    let mut sim = Sim::new(3, BAUD, Faults { frame_lost_one_in: 1, ..Faults::default() });
     let events = sim.run(Command::Identify).expect("ends");
-    assert_eq!(
-        events,
-        [HostEvent::Failed(HostError::NoAnswer { attempts: 10 })]
-    );
+    assert_eq!(events, [HostEvent::Failed(HostError::NoAnswer { attempts: 10 })]);
 }
 
 #[test]
 fn a_device_that_speaks_something_else_is_told_apart() {
-    let mut sim = Sim::new(
-        3,
-        BAUD,
-        Faults {
-            frame_lost_one_in: 1,
-            ..Faults::default()
-        },
-    );
+    let mut sim = Sim::new(3, BAUD, Faults { frame_lost_one_in: 1, ..Faults::default() });
     sim.start(Command::Identify);
     let now = sim.now_us();
-    sim.host
-        .handle_bytes(now, b"$GPGGA,123519,4807.038,N,01131.000,E*47\r\n");
+    sim.host.handle_bytes(now, b"$GPGGA,123519,4807.038,N,01131.000,E*47\r\n");
     sim.run_while(|sim| sim.host.is_busy()).expect("ends");
     let (_, last) = sim.events.last().expect("an event");
-    assert!(
-        matches!(last, HostEvent::Failed(HostError::NotADevice { bytes: 41 })),
-        "{last:?}"
-    );
+    assert!(matches!(last, HostEvent::Failed(HostError::NotADevice { bytes: 41 })), "{last:?}");
 }
 
 /// Retries are idempotent: the same bytes, three times, execute once.
@@ -227,15 +140,8 @@ fn a_device_that_speaks_something_else_is_told_apart() {
 fn repeated_requests_execute_once() {
     let mut sim = ready(settings());
     sim.run(Command::Sweep(plan(1, 1))).expect("ends");
-    let header = |seq| Header {
-        boot: sim.world.boot,
-        seq,
-    };
-    let last = sim
-        .host
-        .identity()
-        .and_then(|identity| identity.last_seq)
-        .unwrap_or(0);
+    let header = |seq| Header { boot: sim.world.boot, seq };
+    let last = sim.host.identity().and_then(|identity| identity.last_seq).unwrap_or(0);
     let seq = last.wrapping_add(20_000);
     let frames = [
         Frame::encode(header(seq), &Request::Home),
@@ -243,17 +149,10 @@ fn repeated_requests_execute_once() {
         Frame::encode(header(seq.wrapping_add(2)), &Request::Ping),
         Frame::encode(
             header(seq.wrapping_add(3)),
-            &Request::Sweep(Sweep {
-                sweep: 9,
-                ..plan(3, 1)
-            }),
+            &Request::Sweep(Sweep { sweep: 9, ..plan(3, 1) }),
         ),
     ];
-    let before = (
-        sim.world.homings,
-        sim.world.moves.len(),
-        sim.world.firings.len(),
-    );
+    let before = (sim.world.homings, sim.world.moves.len(), sim.world.firings.len());
     for frame in frames {
         let frame = frame.expect("fits");
         for pause_us in [0, 3_000, 500_000] {
@@ -262,11 +161,7 @@ fn repeated_requests_execute_once() {
             sim.idle(pause_us).expect("no hang");
         }
     }
-    let after = (
-        sim.world.homings,
-        sim.world.moves.len(),
-        sim.world.firings.len(),
-    );
+    let after = (sim.world.homings, sim.world.moves.len(), sim.world.firings.len());
     // The sweep turns back from step 40, then to steps 1 and 2.
     assert_eq!(after, (before.0 + 1, before.1 + 1 + 3, before.2 + 1 + 3));
 }

@@ -47,17 +47,8 @@ fn every_sweep_ends_whole_or_with_its_cause() {
     println!("{tally:#?}");
     assert!(tally.sweeps_complete > runs / 3, "too few sweeps got through: {tally:?}");
     assert!(tally.repaired > runs / 3, "nothing was repaired: {tally:?}");
-    for cause in [
-        "Stalled",
-        "SweepLost",
-        "WrongReading",
-        "WrongVersion",
-        "Refused(Busy)",
-    ] {
-        assert!(
-            !tally.failures.contains_key(cause),
-            "nothing here may cause {cause}: {tally:?}"
-        );
+    for cause in ["Stalled", "SweepLost", "WrongReading", "WrongVersion", "Refused(Busy)"] {
+        assert!(!tally.failures.contains_key(cause), "nothing here may cause {cause}: {tally:?}");
     }
     for cause in ["Rebooted", "Hangup", "NoAnswer", "EmergencyStop"] {
         assert!(tally.failures.contains_key(cause), "never failed by {cause}: {tally:?}");
