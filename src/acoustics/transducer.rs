@@ -4,8 +4,9 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI, TAU};
 
 use super::{Aperture, Pulse, Sensor};
 
-/// Table spacing: 0.05 degrees. With it and the search for the peak, the pattern of a 19 mm face at
-/// 50 kHz errs by less than 1e-4 (there is a test).
+/// Table spacing: 0.05 degrees. For a 19 mm face at 50 kHz a straight line between entries errs by
+/// less than 2e-5 in the main lobe, and by less than 4e-4 where a side lobe's steady part overtakes
+/// the transient and the pattern has a kink (there is a test).
 const TABLE_INTERVALS: usize = 1800;
 
 /// One-way amplitude against the angle from the axis, 1 on the axis and 0 behind the face.
@@ -143,11 +144,14 @@ impl Disc {
         let quadrature = self.quadrature(theta_rad);
         let at = |time_s: f64| self.magnitude(time_s.min(last_s), &quadrature);
         let step_s = (last_s - first_s) / steps as f64;
-        let (top_s, top) = (0..=steps)
-            .map(|i| first_s + i as f64 * step_s)
-            .map(|time_s| (time_s, at(time_s)))
-            .fold((last_s, 0.0), |top, here| if here.1 > top.1 { here } else { top });
-        let peak = top.max(highest(at, top_s - step_s, top_s + step_s));
+        let times: Vec<f64> = (0..=steps).map(|i| first_s + i as f64 * step_s).collect();
+        let samples: Vec<f64> = times.iter().map(|&time_s| at(time_s)).collect();
+        // Several humps can be nearly as high: each is climbed.
+        let humps = (1..steps).filter(|&i| {
+            samples[i] >= samples[i - 1].max(samples[i + 1]) && samples[i] > samples[0]
+        });
+        let peak =
+            humps.map(|i| highest(at, times[i - 1], times[i + 1])).fold(samples[steps], f64::max);
         // Rounding must not let any direction beat the axis.
         (peak / self.envelope.peak()).min(1.0)
     }
@@ -343,7 +347,8 @@ mod tests {
         for i in 0..1800 {
             let theta_rad = (f64::from(i) * 0.05 + 0.025).to_radians();
             let error = (beam.one_way(theta_rad) - disc.peak(theta_rad)).abs();
-            assert!(error < 1e-4, "{theta_rad}: {error}");
+            let bound = if theta_rad < 0.19 { 2e-5 } else { 4e-4 };
+            assert!(error < bound, "{theta_rad}: {error}");
         }
     }
 

@@ -3,7 +3,7 @@
 use std::{
     fs::File,
     io::{self, BufWriter, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::Arc,
     time::Duration,
 };
@@ -84,9 +84,22 @@ pub(super) fn run(args: &Args) -> Outcome {
     };
     plan.check().map_err(|error| Failure::input(error, "see `sonard simulate --help`"))?;
     let simulator = simulator(args, &scene, &pose)?;
-    let what =
-        args.out.as_ref().map_or("to standard output".into(), |path| path.display().to_string());
-    write(args, &simulator, &pose, &plan).or_else(|error| Failure::from_write(&what, &error))
+    let (what, mut out) = open(args.out.as_deref())?;
+    write(&mut out, &simulator, &pose, &plan).or_else(|error| Failure::from_write(&what, &error))
+}
+
+/// Where the records go, and its name.
+fn open(path: Option<&Path>) -> Result<(String, Box<dyn Write>), Failure> {
+    let Some(path) = path else {
+        return Ok(("to standard output".into(), Box::new(BufWriter::new(io::stdout().lock()))));
+    };
+    let file = File::create(path).map_err(|error| {
+        Failure::input(
+            format!("cannot write {}: {error}", path.display()),
+            "give a file in a folder that exists and that you may write to",
+        )
+    })?;
+    Ok((path.display().to_string(), Box::new(BufWriter::new(file))))
 }
 
 /// The simulator for this pose: a robot's body stands among the reflectors.
@@ -97,14 +110,15 @@ fn simulator(args: &Args, scene: &Scene, pose: &Pose) -> Result<Simulator, Failu
         .map_err(|error| Failure::input(error, "see `sonard simulate --help`"))
 }
 
-fn write(args: &Args, simulator: &Simulator, pose: &Pose, plan: &ScanPlan) -> io::Result<()> {
-    let mut out: Box<dyn Write> = match &args.out {
-        Some(path) => Box::new(BufWriter::new(File::create(path)?)),
-        None => Box::new(BufWriter::new(io::stdout().lock())),
-    };
+fn write(
+    out: &mut dyn Write,
+    simulator: &Simulator,
+    pose: &Pose,
+    plan: &ScanPlan,
+) -> io::Result<()> {
     let scan = Uuid::new_v4();
     let mut put = |record: &Record| {
-        serde_json::to_writer(&mut out, record)?;
+        serde_json::to_writer(&mut *out, record)?;
         out.write_all(b"\n")
     };
     put(&session(simulator))?;

@@ -55,7 +55,8 @@ pub struct Options {
     pub lossless: bool,
     /// Most mirror reflections on a path (`fan`); without it, as many as can matter.
     pub max_order: Option<u32>,
-    /// Angle between the rays of `fan`, degrees.
+    /// Angle between the rays of `fan`, degrees. The default gives the same readings as a finer
+    /// fan in every shipped scene (there is a test).
     pub ray_spacing_deg: f64,
     /// Full aperture of `cone`, degrees; without it, the sensor's two-way -6 dB width.
     pub aperture_deg: Option<f64>,
@@ -70,7 +71,7 @@ impl Default for Options {
             blanking_us: None,
             lossless: false,
             max_order: None,
-            ray_spacing_deg: 0.1,
+            ray_spacing_deg: 0.05,
             aperture_deg: None,
         }
     }

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::model::Path;
+use crate::{model::Path, scan::ScanPlan};
 
 /// A room with a slanted partition and a post, and a place in it.
 fn room() -> (Scene, DVec2) {
@@ -117,6 +117,29 @@ fn paths_are_heard_in_the_same_order_as_the_appendix_says() {
                     close(first.length_m, of_all.length_m, 2e-3, &format!("{direction_deg}"));
                 }
                 _ => panic!("{direction_deg}: {first:?} but {of_all:?}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn a_finer_fan_reads_the_same_in_every_shipped_scene() {
+    let plan = ScanPlan { step_deg: 1.8, ..ScanPlan::default() };
+    for name in shipped::names() {
+        let scene = shipped_scene(name);
+        for (pose_name, pose) in &scene.poses {
+            let read = |ray_spacing_deg: f64| {
+                let options =
+                    Options { ray_spacing_deg, max_range_m: Some(6.0), ..Options::default() };
+                simulator(scene.with_robot_at(pose), options).predict(pose, &plan)
+            };
+            let default = read(Options::default().ray_spacing_deg);
+            for (one, other) in default.iter().zip(read(0.021)) {
+                let what = format!("{name} {pose_name}: {one:?} {other:?}");
+                assert_eq!(one.status, other.status, "{what}");
+                if let (Some(one_m), Some(other_m)) = (one.range_m, other.range_m) {
+                    close(one_m, other_m, 1e-4, &what);
+                }
             }
         }
     }
