@@ -16,6 +16,7 @@ pub mod acoustics;
 pub mod compare;
 pub mod geometry;
 pub mod model;
+pub mod motion;
 #[cfg(feature = "plot")]
 pub mod plot;
 pub mod scan;

@@ -3,21 +3,18 @@
 //! A discrete-event simulation without I/O. Events happen at their exact device times, however
 //! late the real clock gets round to them, so that timing does not depend on the machine.
 
-use std::fmt;
-
 use firmware_protocol::{
-    device::{Action, Board, Device, DeviceTimer, EchoReport},
-    frame::Frame,
-    messages::{
-        Capabilities, Echoes, FirmwareVersion, ProtocolId, ReadingStatus, Reply, ResetCause, limits,
-    },
+    device::{Action, Device, DeviceTimer, EchoReport},
+    messages::{Echoes, ReadingStatus, ResetCause, limits},
 };
 
 use super::{
     faults::{DeviceFault, FaultPlan, Faults},
-    motion::Trapezoid,
+    identity::{identity, with_version},
+    note::Note,
     world::World,
 };
+use crate::motion::Trapezoid;
 
 const TICK_HZ: u32 = limits::TICK_HZ;
 /// Time from the machine's wish to fire until INIT rises, ticks: the compare unit's lead.
@@ -65,37 +62,6 @@ pub struct Wake {
     pub at: u64,
     /// Why.
     pub kind: WakeKind,
-}
-
-/// Something a person watching the mock wants to see.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Note {
-    /// The device booted with this nonce.
-    Booted(u16),
-    /// The motor went home; the index was off by so many steps.
-    Homed(i32),
-    /// So many firings since boot.
-    Fired(u64),
-    /// The motor stopped on request, at this step.
-    Stopped(i32),
-    /// The coils were let go.
-    CoilsReleased,
-    /// A fault was played.
-    Fault(DeviceFault),
-}
-
-impl fmt::Display for Note {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Booted(boot) => write!(f, "booted, nonce {boot:04x}"),
-            Self::Homed(0) => f.write_str("homed"),
-            Self::Homed(drift) => write!(f, "homed, the index was {drift} steps off"),
-            Self::Fired(count) => write!(f, "{count} firings"),
-            Self::Stopped(step) => write!(f, "motor stopped at step {step}"),
-            Self::CoilsReleased => f.write_str("coils released"),
-            Self::Fault(fault) => write!(f, "fault: {fault}"),
-        }
-    }
 }
 
 /// The device machine, its board, and the world around it.
@@ -379,48 +345,6 @@ impl MockBoard {
         self.device = Device::new(identity(&self.settings, self.boot, cause));
         self.notes.push(Note::Booted(self.boot));
     }
-}
-
-fn identity(settings: &BoardSettings, boot: u16, reset_cause: ResetCause) -> Board {
-    let clock = match settings.pace {
-        Pace::RealTime => Capabilities::default(),
-        Pace::Virtual => Capabilities::VIRTUAL_CLOCK,
-    };
-    Board {
-        boot,
-        firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
-        serial: *b"MOCK-00001",
-        steps_per_revolution: settings.steps_per_revolution,
-        capabilities: Capabilities::INDEX_SENSOR
-            .with(Capabilities::SHORT_BLANKING)
-            .with(Capabilities::MULTIPLE_ECHOES)
-            .with(Capabilities::COIL_RELEASE)
-            .with(Capabilities::SIMULATED)
-            .with(clock),
-        reset_cause,
-    }
-}
-
-/// The same frames, but every Identity claims another protocol version.
-fn with_version(bytes: &[u8], version: u8) -> Vec<u8> {
-    use firmware_protocol::frame::{FrameDecoder, Received};
-    let mut decoder = FrameDecoder::new();
-    let mut out = Vec::with_capacity(bytes.len());
-    for &byte in bytes {
-        let Received::Frame(frame) = decoder.push(byte) else { continue };
-        let Ok(reply) = Reply::decode(frame.body) else { continue };
-        let claimed = match reply {
-            Reply::Identity(mut identity) => {
-                identity.protocol = ProtocolId { version, ..identity.protocol };
-                Reply::Identity(identity)
-            }
-            other => other,
-        };
-        if let Ok(frame) = Frame::encode(frame.header, &claimed) {
-            out.extend_from_slice(&frame);
-        }
-    }
-    out
 }
 
 fn ticks(seconds: f64) -> u64 {

@@ -5,16 +5,17 @@
 
 mod board;
 mod faults;
-mod motion;
+mod identity;
 mod noise;
+mod note;
 mod pty;
 mod serve;
 mod world;
 
-pub use board::{BoardSettings, MockBoard, Note, Pace, Wake, WakeKind};
+pub use board::{BoardSettings, MockBoard, Pace, Wake, WakeKind};
 pub use faults::{DeviceFault, FAULT_HELP, FaultPlan, FaultSpecError, Faults};
-pub use motion::Trapezoid;
 pub use noise::Noise;
+pub use note::Note;
 pub use pty::Pty;
 pub use serve::MockPort;
 pub use world::{Soundings, World};

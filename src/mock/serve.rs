@@ -13,7 +13,8 @@ use tokio::{
 };
 
 use super::{
-    board::{MockBoard, Note, Pace, WakeKind},
+    board::{MockBoard, Pace, WakeKind},
+    note::Note,
     pty::Pty,
 };
 
