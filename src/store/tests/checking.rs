@@ -60,7 +60,7 @@ fn each_problem_is_found_on_its_line() {
         (with_line(1, |_| None), vec![(1, NoSession)]),
         (with_line(2, |_| None), vec![(2, OutsideScan)]),
         (
-            with_line(2, |_| Some(LOG.lines().nth(9).map(String::from)?)),
+            with_line(2, |_| LOG.lines().nth(9).map(String::from)),
             vec![(2, OutsideScan), (2, WrongCount), (3, OutsideScan)],
         ),
         (format!("{LOG}{LOG}"), vec![(13, ScanTwice)]),
