@@ -108,7 +108,7 @@ fn killed_at_any_moment_every_synced_record_is_there() {
 
 /// Runs the writer under a limit on the file's size, with what that limit's signal does.
 fn limited(log: &Path, on_signal: &str) -> std::process::Output {
-    let limit = format!("{on_signal} ulimit -f 16; exec \"$0\" \"$@\"");
+    let limit = format!("{on_signal} ulimit -f 64; exec \"$0\" \"$@\"");
     let inner = child(log);
     let mut shell = Command::new("sh");
     shell.arg("-c").arg(limit).arg(inner.get_program()).args(inner.get_args()).env(CHILD, log);
