@@ -30,7 +30,7 @@ fn ping(
 #[test]
 fn each_pair_of_outcomes_has_its_verdict() {
     use PathKind::{Diffracted, Specular};
-    use PingStatus::{Echo, LinkLost, MinRange, NoEcho, StepDoubtful};
+    use PingStatus::{Echo, LinkLost, MinRange, ModuleFault, NoEcho, StepDoubtful};
     use Verdict::{Direct, Edge, MinRange as Near, Multiple, Silent, Unexplained};
     let (echo, silent) = ((Echo, Some(1.0)), (NoEcho, None));
     let near = (MinRange, Some(0.41));
@@ -57,6 +57,7 @@ fn each_pair_of_outcomes_has_its_verdict() {
         ((Echo, Some(f64::NAN)), Some(echo), Specular, 1, Err(NotCompared::NoRange)),
         (echo, Some((Echo, None)), Specular, 1, Err(NotCompared::NoRange)),
         ((LinkLost, None), Some(echo), Specular, 1, Err(NotCompared::LinkLost)),
+        ((ModuleFault, None), Some(echo), Specular, 1, Err(NotCompared::ModuleFault)),
         ((StepDoubtful, None), Some(echo), Specular, 1, Err(NotCompared::StepDoubtful)),
     ] {
         let ping = ping(measured, simulated, kind, order);

@@ -21,7 +21,9 @@ pub enum FaultKind {
     NotText,
     /// Not a JSON object.
     NotJson,
-    /// A JSON object whose `type` is missing or unknown.
+    /// A JSON object without a `type` that is a string.
+    NoType,
+    /// A JSON object of a `type` that this program does not know.
     UnknownType,
     /// A record with a field missing or of the wrong kind.
     BadField,
@@ -53,6 +55,16 @@ impl fmt::Display for RecordError {
             write!(f, "{field}: ")?;
         }
         f.write_str(&self.message)
+    }
+}
+
+impl RecordError {
+    /// Whether the line is a whole record all the same, which another version of the program may
+    /// read: a JSON object with a `type`.
+    #[must_use]
+    pub fn is_whole_record(&self) -> bool {
+        use FaultKind as Kind;
+        matches!(self.kind, Kind::UnknownType | Kind::BadField | Kind::NewerFormat)
     }
 }
 
@@ -161,7 +173,7 @@ fn text_of(bytes: &[u8]) -> Result<&str, RecordError> {
 fn tag_fault(text: &str, error: &serde_json::Error) -> RecordError {
     if serde_json::from_str::<serde::de::IgnoredAny>(text).is_ok() {
         return RecordError {
-            kind: FaultKind::UnknownType,
+            kind: FaultKind::NoType,
             column: None,
             field: Some("type".into()),
             message: format!("{}: expected \"type\":\"ping\" or another record", plain(error)),
@@ -311,8 +323,8 @@ mod tests {
         check(&ping[..40], FaultKind::NotJson, Some(40), "");
         check(b"\0\0\0\0", FaultKind::NotText, Some(1), "");
         check(b"{\"type\":\"ev\xffnt\"}", FaultKind::NotText, Some(12), "");
-        check("{}", FaultKind::UnknownType, None, "type");
-        check(r#"{"type":7}"#, FaultKind::UnknownType, None, "type");
+        check("{}", FaultKind::NoType, None, "type");
+        check(r#"{"type":7}"#, FaultKind::NoType, None, "type");
         check(r#"{"type":"pong"}"#, FaultKind::UnknownType, None, "type");
         check(format!("{ping} {ping}"), FaultKind::NotJson, Some(ping.len() + 2), "");
         let wrong = ping.replace("\"order\":1", "\"order\":-1");
@@ -323,9 +335,9 @@ mod tests {
         let later = later.replace("\"started\"", "\"begun\"");
         check(&later, FaultKind::NewerFormat, Some(later.len()), "format");
         check("[".repeat(100_000), FaultKind::NotJson, Some(1), "");
-        let deep =
-            line_of("session").replace("\"max_order\":8", &format!("\"x\":{}", "[".repeat(9999)));
-        check(&deep, FaultKind::NotJson, Some(deep.len()), "");
+        let deep = line_of("session")
+            .replace("\"lossless\":false", &format!("\"x\":{}", "[".repeat(9999)));
+        check(&deep, FaultKind::NotJson, Some(deep.len() - 1), "");
         let deep = deep.replace("[}", &format!("[{}}}", "]".repeat(9999)));
         assert_eq!(decode_line(deep.as_bytes()).expect_err("too deep").kind, FaultKind::BadField);
     }

@@ -33,6 +33,6 @@ fn written(log: &Path, bytes: impl AsRef<[u8]>) {
     std::fs::write(log, bytes).expect("a temporary file");
 }
 
-fn read(log: impl AsRef<Path>) -> Vec<u8> {
-    std::fs::read(log).expect("it is there")
+fn read(log: impl AsRef<Path>) -> String {
+    std::fs::read_to_string(log).expect("it is there")
 }
