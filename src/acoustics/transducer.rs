@@ -160,12 +160,14 @@ impl Disc {
     /// the pulse. Gauss-Chebyshev quadrature of the second kind has the response's own weight
     /// `sqrt(1 - s^2)`.
     fn quadrature(&self, theta_rad: f64) -> Vec<(f64, f64, f64)> {
-        const NODES: usize = 32;
         let sine = theta_rad.sin();
-        (1..=NODES)
+        // The phase runs over +-ka sin(theta); from half of that on, more nodes gain nothing
+        // but the digits of the rest.
+        let nodes = (0.5 * self.ka * sine).ceil() as usize + 14;
+        (1..=nodes)
             .map(|i| {
-                let angle = PI * i as f64 / (NODES + 1) as f64;
-                let weight = 2.0 * theta_rad.cos() * angle.sin().powi(2) / (NODES + 1) as f64;
+                let angle = PI * i as f64 / (nodes + 1) as f64;
+                let weight = 2.0 * theta_rad.cos() * angle.sin().powi(2) / (nodes + 1) as f64;
                 let phase = self.ka * sine * angle.cos();
                 let delay_s = self.crossing_s * sine * angle.cos();
                 (delay_s, weight * phase.cos(), -weight * phase.sin())
@@ -187,14 +189,21 @@ impl Disc {
 /// Maximum of a curve with one hump between two places, by golden section.
 fn highest(curve: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     const PART: f64 = 0.618_033_988_749_895;
-    let mut best: f64 = 0.0;
-    for _ in 0..14 {
-        let (left, right) = (high - PART * (high - low), low + PART * (high - low));
-        let (at_left, at_right) = (curve(left), curve(right));
-        best = best.max(at_left).max(at_right);
-        if at_left < at_right { low = left } else { high = right }
+    let mut left = high - PART * (high - low);
+    let mut right = low + PART * (high - low);
+    let (mut at_left, mut at_right) = (curve(left), curve(right));
+    for _ in 0..8 {
+        if at_left < at_right {
+            (low, left, at_left) = (left, right, at_right);
+            right = low + PART * (high - low);
+            at_right = curve(right);
+        } else {
+            (high, right, at_right) = (right, left, at_left);
+            left = high - PART * (high - low);
+            at_left = curve(left);
+        }
     }
-    best
+    at_left.max(at_right)
 }
 
 /// A pulse's envelope, tabulated.

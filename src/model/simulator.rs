@@ -55,8 +55,8 @@ pub struct Options {
     pub lossless: bool,
     /// Most mirror reflections on a path (`fan`); without it, as many as can matter.
     pub max_order: Option<u32>,
-    /// Angle between the rays of `fan`, degrees. The default gives the same readings as a finer
-    /// fan in every shipped scene (there is a test).
+    /// Angle between the rays of `fan`, degrees. The default reads the same as a finer fan in
+    /// every shipped scene as long as no round body is met (there is a test).
     pub ray_spacing_deg: f64,
     /// Full aperture of `cone`, degrees; without it, the sensor's two-way -6 dB width.
     pub aperture_deg: Option<f64>,

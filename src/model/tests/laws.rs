@@ -3,7 +3,10 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::{model::Path, scan::ScanPlan};
+use crate::{
+    model::{Path, Prediction, Reflector},
+    scan::ScanPlan,
+};
 
 /// A room with a slanted partition and a post, and a place in it.
 fn room() -> (Scene, DVec2) {
@@ -122,6 +125,8 @@ fn paths_are_heard_in_the_same_order_as_the_appendix_says() {
     }
 }
 
+/// Flat walls only: exactly. Sound that meets a round body spreads so much that two rays which
+/// leave side by side soon meet different walls, and a fan of any spacing misses some paths.
 #[test]
 fn a_finer_fan_reads_the_same_in_every_shipped_scene() {
     let plan = ScanPlan { step_deg: 1.8, ..ScanPlan::default() };
@@ -134,14 +139,30 @@ fn a_finer_fan_reads_the_same_in_every_shipped_scene() {
                 simulator(scene.with_robot_at(pose), options).predict(pose, &plan)
             };
             let default = read(Options::default().ray_spacing_deg);
+            let mut other_path = 0;
             for (one, other) in default.iter().zip(read(0.021)) {
-                let what = format!("{name} {pose_name}: {one:?} {other:?}");
-                assert_eq!(one.status, other.status, "{what}");
-                if let (Some(one_m), Some(other_m)) = (one.range_m, other.range_m) {
-                    close(one_m, other_m, 1e-4, &what);
+                if met_round_body(one) || met_round_body(&other) {
+                    other_path += usize::from(range_differs(one, &other, 1e-3));
+                } else {
+                    let what = format!("{name} {pose_name}: {one:?} {other:?}");
+                    assert_eq!(one.status, other.status, "{what}");
+                    assert!(!range_differs(one, &other, 1e-9), "{what}");
                 }
             }
+            assert!(other_path * 10 < default.len(), "{name} {pose_name}: {other_path} beams");
         }
+    }
+}
+
+fn met_round_body(prediction: &Prediction) -> bool {
+    let walls = prediction.arrival.iter().flat_map(|arrival| &arrival.path.walls);
+    walls.into_iter().any(|wall| matches!(wall, Reflector::Cylinder(_)))
+}
+
+fn range_differs(one: &Prediction, other: &Prediction, tolerance_m: f64) -> bool {
+    match (one.range_m, other.range_m) {
+        (Some(one_m), Some(other_m)) => (one_m - other_m).abs() > tolerance_m,
+        (one, other) => one.is_some() != other.is_some(),
     }
 }
 
