@@ -30,5 +30,5 @@ pub mod link;
 pub mod mock;
 #[cfg(feature = "daemon")]
 pub mod ranger;
-#[cfg(feature = "daemon")]
+#[cfg(feature = "store")]
 pub mod store;
