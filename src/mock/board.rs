@@ -78,6 +78,8 @@ pub struct MockBoard {
     known: bool,
     activity: Activity,
     stalled_until: u64,
+    /// Half of the lease that was left when the host was last heard, ticks.
+    patience: u64,
     hung_up: bool,
     fired: u64,
     notes: Vec<Note>,
@@ -119,6 +121,7 @@ impl MockBoard {
             known: false,
             activity: Activity::Nothing,
             stalled_until: 0,
+            patience: 0,
             hung_up: false,
             fired: 0,
             notes: vec![Note::Booted(settings.boot)],
@@ -148,10 +151,26 @@ impl MockBoard {
             };
             Wake { at: self.now + u64::from(ahead.unsigned_abs()), kind }
         });
-        match (work, timer) {
+        let wake = match (work, timer) {
             (Some(work), Some(timer)) => Some(if timer.at < work.at { timer } else { work }),
             (work, timer) => work.or(timer),
-        }
+        }?;
+        let jumps = wake.kind == WakeKind::Work && self.leaves_patience(wake.at);
+        Some(Wake { kind: if jumps { WakeKind::Work } else { WakeKind::Patience }, ..wake })
+    }
+
+    /// Whether a jump to `at` leaves the host at least half of its lease in real time.
+    ///
+    /// Without that, a host that the computer keeps waiting for some milliseconds would find its
+    /// lease used up by jumps.
+    fn leaves_patience(&self, at: u64) -> bool {
+        self.lease_left().is_none_or(|left| at + self.patience <= self.now + left)
+    }
+
+    /// Ticks until the sweep's lease ends.
+    fn lease_left(&self) -> Option<u64> {
+        let ends = self.device.lease_ends()?;
+        Some(u64::from(ends.wrapping_sub(self.now as u32).cast_signed().max(0).unsigned_abs()))
     }
 
     /// Lets device time pass up to `to`; everything due happens at its own time.
@@ -176,6 +195,7 @@ impl MockBoard {
             // Between two bytes a real board's main loop comes round many times.
             self.act();
         }
+        self.patience = self.lease_left().unwrap_or(0) / 2;
     }
 
     /// Appends what the device has to say, as the host will get it.

@@ -10,6 +10,8 @@ mod noise;
 mod note;
 mod pty;
 mod serve;
+#[cfg(test)]
+mod tests;
 mod world;
 
 pub use board::{BoardSettings, MockBoard, Pace, Wake, WakeKind};
