@@ -1,6 +1,7 @@
 //! The physics of the sound: air, transducer, pulse and receiver.
 
 mod air;
+pub mod edge;
 mod receiver;
 mod sensor;
 mod transducer;

@@ -19,6 +19,8 @@ pub struct Sound {
     /// Strength after gain compensation and the beam pattern on both ways; a head-on, perfectly
     /// reflecting wall without absorption gives 1.
     pub amplitude: f64,
+    /// Phase of the carrier beside that of the way, for `exp(+i omega t)`, radians.
+    pub phase_rad: f64,
     /// Which of the sender's paths it took; meaningless to the receiver.
     pub index: u32,
 }
@@ -155,6 +157,7 @@ mod tests {
             .iter()
             .zip(0..)
             .map(|(&(tof_us, amplitude), index)| Sound {
+                phase_rad: 0.0,
                 length_m: tof_us * 340e-6,
                 amplitude,
                 index,

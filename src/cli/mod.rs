@@ -6,6 +6,7 @@ mod log;
 mod mock;
 mod mock_world;
 mod options;
+mod paths;
 mod plot;
 mod runtime;
 mod scan;
@@ -38,6 +39,8 @@ enum Verb {
     Mock(mock::Args),
     /// Predict a scan with the model alone
     Simulate(simulate::Args),
+    /// List the ways that echoes take from a place
+    Paths(paths::Args),
     /// Compare a log's readings with the predictions beside them
     Compare(compare::Args),
     /// Draw scans: floor plan, polar, residuals
@@ -57,6 +60,7 @@ pub fn main() -> ExitCode {
         Verb::Scan(args) => scan::run(&args),
         Verb::Mock(args) => mock::run(&args),
         Verb::Simulate(args) => simulate::run(&args),
+        Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Plot(args) => plot::run(args),
         Verb::Log(verb) => log::run(verb),

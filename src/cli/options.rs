@@ -5,7 +5,7 @@ use std::{fs, io};
 use super::Failure;
 use crate::{
     acoustics::{Air, Sensor, SensorError},
-    model::{EngineKind, Options},
+    model::{EdgeLawKind, EngineKind, Options},
     scene::suggest,
 };
 
@@ -55,9 +55,9 @@ pub(super) struct EngineArgs {
     /// Most mirror reflections on a path [default: as many as can matter]
     #[arg(long, value_name = "N")]
     max_order: Option<u32>,
-    /// How edges diffract
-    #[arg(long, value_enum, default_value_t = EdgeLaw::KucSiegel)]
-    edge_law: EdgeLaw,
+    /// How edges diffract [default: utd; `fan` has kuc-siegel only]
+    #[arg(long, value_enum)]
+    edge_law: Option<EdgeLaw>,
     /// Angle between the rays of `fan`, degrees
     #[arg(long, value_name = "DEG", default_value_t = Options::default().ray_spacing_deg)]
     ray_spacing_deg: f64,
@@ -68,7 +68,7 @@ pub(super) struct EngineArgs {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum EngineName {
-    /// Exact echo paths (not in this version)
+    /// Exact echo paths, all of them
     Paths,
     /// Rays with mirror reflections and diffraction, after Dudek, Jenkin, Milios and Wilkes
     Fan,
@@ -77,13 +77,24 @@ enum EngineName {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum EdgeLaw {
-    /// Uniform coefficients for the wedge's angle and aspect (not in this version)
+pub(super) enum EdgeLaw {
+    /// Uniform coefficients for the wedge's angle and aspect (Kouyoumjian and Pathak)
     Utd,
     /// One ratio to a plane at the same range, whatever the aspect
     KucSiegel,
-    /// One scattering strength (not in this version)
+    /// One scattering strength, whatever the aspect, level with planes at the face
     BozmaKuc,
+}
+
+impl EdgeLaw {
+    /// The same for the model.
+    pub(super) const fn kind(self) -> EdgeLawKind {
+        match self {
+            Self::Utd => EdgeLawKind::Utd,
+            Self::KucSiegel => EdgeLawKind::KucSiegel,
+            Self::BozmaKuc => EdgeLawKind::BozmaKuc,
+        }
+    }
 }
 
 impl SensorArgs {
@@ -141,22 +152,18 @@ impl AirArgs {
 }
 
 impl EngineArgs {
-    /// The model's options; what no engine can do yet is refused.
+    /// The model's options; a law that the engine has not is refused.
     pub(super) fn options(&self) -> Result<Options, Failure> {
         let engine = match self.engine {
+            EngineName::Paths => EngineKind::Paths,
             EngineName::Fan => EngineKind::Fan,
             EngineName::Cone => EngineKind::Cone,
-            EngineName::Paths => {
-                return Err(Failure::input(
-                    "--engine paths: the exact engine is not in this version",
-                    "use --engine fan, the same physics by a fan of rays",
-                ));
-            }
         };
-        if self.edge_law != EdgeLaw::KucSiegel {
+        let of_paths = self.edge_law.is_some_and(|law| law != EdgeLaw::KucSiegel);
+        if engine == EngineKind::Fan && of_paths {
             return Err(Failure::input(
-                "--edge-law: only kuc-siegel is in this version",
-                "leave --edge-law out",
+                "--edge-law: `fan` has kuc-siegel only",
+                "leave --edge-law out, or use --engine paths",
             ));
         }
         Ok(Options {
@@ -165,6 +172,7 @@ impl EngineArgs {
             threshold: self.threshold,
             lossless: self.lossless,
             max_order: self.max_order,
+            edge_law: self.edge_law.map(EdgeLaw::kind),
             ray_spacing_deg: self.ray_spacing_deg,
             aperture_deg: self.aperture_deg,
             ..Options::default()

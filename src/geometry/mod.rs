@@ -1,6 +1,11 @@
 //! Points, poses and angles. The world frame has x to the right and y up, in metres.
 
+mod arrangement;
+mod mirror;
+
+pub use arrangement::{Arrangement, Piece, SNAP_M};
 pub use glam::DVec2;
+pub use mirror::Mirror;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -67,6 +67,7 @@ impl ConeSurvey<'_> {
         Some(Arrival {
             length_m: 2.0 * hit.distance_m,
             amplitude: 1.0,
+            phase_rad: 0.0,
             departure_rad: ray_rad,
             arrival_rad: ray_rad,
             path: Path { kind: PathKind::Specular, walls: smallvec![hit.reflector], edge: None },
@@ -80,6 +81,7 @@ impl Survey for ConeSurvey<'_> {
         sounds.extend(self.nearest(direction_rad).map(|arrival| Sound {
             length_m: arrival.length_m,
             amplitude: arrival.amplitude,
+            phase_rad: arrival.phase_rad,
             index: 0,
         }));
     }

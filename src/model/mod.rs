@@ -5,6 +5,7 @@
 
 mod cone;
 mod fan;
+pub mod paths;
 mod raycast;
 mod simulator;
 #[cfg(test)]
@@ -12,7 +13,7 @@ mod tests;
 
 pub use cone::Cone;
 pub use fan::{Fan, FanSettings};
-pub use simulator::{EngineKind, ModelError, Options, Simulator, Station};
+pub use simulator::{EdgeLawKind, EngineKind, ModelError, Options, Simulator, Station};
 
 use smallvec::SmallVec;
 
@@ -30,6 +31,9 @@ pub struct Arrival {
     /// Strength after gain compensation and the beam pattern on both ways; a head-on, perfectly
     /// reflecting wall without absorption gives 1.
     pub amplitude: f64,
+    /// Phase of the carrier beside that of the way, for `exp(+i omega t)`, radians: what an edge
+    /// adds. Mirror reflections add none.
+    pub phase_rad: f64,
     /// World direction in which the sound leaves, radians counter-clockwise from +x.
     pub departure_rad: f64,
     /// World direction from the ranger towards where the sound comes from, radians.

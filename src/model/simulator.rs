@@ -1,13 +1,19 @@
 //! Engine and receiver joined: what the ranger reads.
 
-use std::sync::Arc;
+use std::{
+    f64::consts::{LOG10_E, TAU},
+    sync::Arc,
+};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Cone, Edge, Engine, Fan, FanSettings, Path, Prediction, Reflector, Survey};
+use super::{
+    Cone, Edge, Engine, Fan, FanSettings, Path, Prediction, Reflector, Survey,
+    paths::{self, PathEngine},
+};
 use crate::{
-    acoustics::{Air, BeamPattern, Receiver, Sensor, SensorError},
+    acoustics::{Air, BeamPattern, Receiver, Sensor, SensorError, edge::EdgeLaw},
     geometry::{DVec2, Pose},
     scan::{ModelRecord, PathRecord, ScanPlan, SimRecord},
     scene::Scene,
@@ -17,11 +23,20 @@ use crate::{
 /// what came within that.
 const MARGIN_KEPT_DB: f64 = 40.0;
 
+/// The same for `paths`, which would find a great many more down there.
+const PATHS_KEPT_DB: f64 = 20.0;
+
+/// Bozma and Kuc's scattering strength of the right-angled edge that they scanned.
+const SIGMA_E: f64 = 0.095;
+
 /// How echoes are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EngineKind {
-    /// [`Fan`]: the ray model with reflections and diffraction.
+    /// [`PathEngine`]: all echo paths, exactly.
+    Paths,
+    /// [`Fan`]: the ray model with reflections and diffraction. The default as long as `paths`
+    /// needs minutes in a scene with a round body between walls.
     #[default]
     Fan,
     /// [`Cone`]: nearest hit within an aperture.
@@ -33,10 +48,23 @@ impl EngineKind {
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Paths => "paths",
             Self::Fan => "fan",
             Self::Cone => "cone",
         }
     }
+}
+
+/// What edges send back; see [`EdgeLaw`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EdgeLawKind {
+    /// [`EdgeLaw::Utd`].
+    Utd,
+    /// [`EdgeLaw::KucSiegel`].
+    KucSiegel,
+    /// [`EdgeLaw::BozmaKuc`] with their 0.095 and the sensor's far field.
+    BozmaKuc,
 }
 
 /// Settings of the model; what is `None` comes from the sensor or the engine.
@@ -53,8 +81,10 @@ pub struct Options {
     pub blanking_us: Option<f64>,
     /// Leave out the absorption of the air.
     pub lossless: bool,
-    /// Most mirror reflections on a path (`fan`); without it, as many as can matter.
+    /// Most mirror reflections on a path (`paths`, `fan`); without it, as many as can matter.
     pub max_order: Option<u32>,
+    /// What edges send back (`paths`; without it, `utd`). `fan` has Kuc and Siegel's law only.
+    pub edge_law: Option<EdgeLawKind>,
     /// Angle between the rays of `fan`, degrees. The default reads the same as a finer fan in
     /// every shipped scene as long as no round body is met (there is a test).
     pub ray_spacing_deg: f64,
@@ -71,6 +101,7 @@ impl Default for Options {
             blanking_us: None,
             lossless: false,
             max_order: None,
+            edge_law: None,
             ray_spacing_deg: 0.05,
             aperture_deg: None,
         }
@@ -128,6 +159,10 @@ impl Simulator {
         };
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
         let engine: Box<dyn Engine> = match options.engine {
+            EngineKind::Paths => {
+                let settings = path_settings(&sensor, &air, &options, &receiver);
+                Box::new(PathEngine::new(&scene, beam, settings))
+            }
             EngineKind::Fan => {
                 Box::new(Fan::new(&scene, beam, fan_settings(&sensor, &air, &options, &receiver)))
             }
@@ -218,6 +253,12 @@ impl Simulator {
         &self.air
     }
 
+    /// What [`paths::Paths`] needs for this sensor, air and options.
+    #[must_use]
+    pub fn path_settings(&self) -> paths::Settings {
+        path_settings(&self.sensor, &self.air, &self.options, &self.receiver)
+    }
+
     /// The scene.
     #[must_use]
     pub const fn scene(&self) -> &Arc<Scene> {
@@ -300,16 +341,41 @@ impl Options {
     }
 }
 
+fn path_settings(
+    sensor: &Sensor,
+    air: &Air,
+    options: &Options,
+    receiver: &Receiver,
+) -> paths::Settings {
+    let wave_number_per_m = TAU * sensor.frequency_hz / receiver.sound_speed_m_s;
+    let law = match options.edge_law {
+        None | Some(EdgeLawKind::Utd) => EdgeLaw::Utd,
+        Some(EdgeLawKind::KucSiegel) => EdgeLaw::KucSiegel,
+        Some(EdgeLawKind::BozmaKuc) => EdgeLaw::BozmaKuc {
+            sigma: SIGMA_E,
+            far_field_m: sensor.half_width_m().powi(2) * wave_number_per_m / TAU,
+        },
+    };
+    paths::Settings {
+        max_path_m: 2.0 * receiver.max_range_m,
+        max_order: options.max_order.map(|order| order.try_into().unwrap_or(u16::MAX)),
+        floor: receiver.threshold * 10f64.powf(-PATHS_KEPT_DB / 20.0),
+        edge_law: Some(law),
+        absorption_np_per_m: absorption_db_per_m(sensor, air, options) / (20.0 * LOG10_E),
+        wave_number_per_m,
+    }
+}
+
+fn absorption_db_per_m(sensor: &Sensor, air: &Air, options: &Options) -> f64 {
+    if options.lossless { 0.0 } else { air.absorption_db_per_m(sensor.frequency_hz) }
+}
+
 fn fan_settings(sensor: &Sensor, air: &Air, options: &Options, receiver: &Receiver) -> FanSettings {
     FanSettings {
         spacing_rad: options.ray_spacing_deg.to_radians(),
         half_face_m: sensor.half_width_m(),
         wavelength_m: receiver.sound_speed_m_s / sensor.frequency_hz,
-        absorption_db_per_m: if options.lossless {
-            0.0
-        } else {
-            air.absorption_db_per_m(sensor.frequency_hz)
-        },
+        absorption_db_per_m: absorption_db_per_m(sensor, air, options),
         longest_m: 2.0 * receiver.max_range_m,
         weakest: receiver.threshold * 10f64.powf(-MARGIN_KEPT_DB / 20.0),
         max_order: options.max_order.unwrap_or(u32::MAX),

@@ -22,6 +22,7 @@ const BARE: Options = Options {
     blanking_us: Some(0.0),
     lossless: true,
     max_order: None,
+    edge_law: None,
     ray_spacing_deg: 0.1,
     aperture_deg: None,
 };

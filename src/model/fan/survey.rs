@@ -61,7 +61,8 @@ impl Survey for FanSurvey<'_> {
         sounds.extend(self.weighings.iter().zip(0..).filter_map(|(weighing, index)| {
             let amplitude = weighing.amplitude(&self.fan.beam, facing);
             let length_m = weighing.length_m;
-            (amplitude >= self.fan.settings.weakest).then_some(Sound { length_m, amplitude, index })
+            let sound = Sound { length_m, amplitude, phase_rad: 0.0, index };
+            (amplitude >= self.fan.settings.weakest).then_some(sound)
         }));
     }
 

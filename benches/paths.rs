@@ -1,0 +1,237 @@
+//! The exact engine beside what it replaces, as ratios in one run: `cargo bench --bench paths`.
+
+use std::{
+    f64::consts::TAU,
+    hint::black_box,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use parry2d_f64::{
+    math::Vector,
+    query::{Ray, RayCast},
+    shape::Polyline,
+};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use sonard::{
+    acoustics::{Air, Sensor},
+    geometry::{DVec2, Pose},
+    model::{EngineKind, Options, Simulator, paths::Paths},
+    scan::ScanPlan,
+    scene::{Material, Scene, Wall, shipped},
+};
+
+const FULL_SCAN: ScanPlan =
+    ScanPlan { from_deg: 0.0, to_deg: 360.0, step_deg: 0.9, pings_per_stop: 1 };
+
+fn main() {
+    small_room();
+    l_room();
+    building_plans();
+}
+
+fn simulator(scene: Arc<Scene>, options: Options) -> Simulator {
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    Simulator::new(scene, sensor, Air::default(), options).expect("valid options")
+}
+
+/// A scan of 400 azimuths to 10.7 m in the paper's room.
+fn small_room() {
+    let text = shipped::text("simple-room").expect("a shipped scene");
+    let scene = Arc::new(Scene::from_json(text).expect("a valid scene"));
+    let pose = scene.poses["fig9"];
+    let range = Options { max_range_m: Some(10.7), ..Options::default() };
+    let paths = simulator(scene.clone(), range);
+    println!("simple-room, fig9, 400 azimuths to 10.7 m");
+    let survey = median(|| drop(black_box(paths.station(pose.position()))));
+    report("paths, the survey alone", survey, None);
+    let exact = median(|| drop(black_box(paths.predict(&pose, &FULL_SCAN))));
+    report("paths, the whole scan", exact, None);
+    for ray_spacing_deg in [0.1, 0.02] {
+        let options = Options { engine: EngineKind::Fan, ray_spacing_deg, ..range };
+        let fan = simulator(scene.clone(), options);
+        let time = median(|| drop(black_box(fan.predict(&pose, &FULL_SCAN))));
+        let error_mm = 1e3 * range_error_m(&fan, &paths, &pose);
+        report(
+            &format!("fan at {ray_spacing_deg} degrees, off by up to {error_mm:.2} mm"),
+            time,
+            Some(exact),
+        );
+    }
+}
+
+/// Largest difference of ranges where both have read the same path.
+fn range_error_m(one: &Simulator, other: &Simulator, pose: &Pose) -> f64 {
+    let readings = one.predict(pose, &FULL_SCAN).into_iter().zip(other.predict(pose, &FULL_SCAN));
+    readings
+        .filter_map(|(one, other)| {
+            let same = one.arrival?.path.walls == other.arrival?.path.walls;
+            same.then_some((one.range_m? - other.range_m?).abs())
+        })
+        .fold(0.0, f64::max)
+}
+
+/// All echo paths of a six-walled room to order 8, without loss: `benches/peers/` times the same
+/// with pyroomacoustics.
+fn l_room() {
+    let corners = [[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [2.5, 2.0], [2.5, 5.0], [0.0, 5.0]];
+    let corners = corners.map(DVec2::from_array);
+    let walls = corners.iter().zip(corners.iter().cycle().skip(1)).map(|(&a, &b)| (a, b));
+    let room = plan_scene(walls.collect());
+    let settings = sonard::model::paths::Settings {
+        max_path_m: 200.0,
+        max_order: Some(8),
+        floor: 1e-6,
+        edge_law: None,
+        absorption_np_per_m: 0.0,
+        wave_number_per_m: TAU * 49_400.0 / 343.2,
+    };
+    let paths = Paths::new(&room, settings);
+    let at = DVec2::new(1.13, 0.87);
+    println!("\nL-room, order 8: {} echoes", paths.enumerate(at).len());
+    report("paths", median(|| drop(black_box(paths.enumerate(at)))), None);
+}
+
+/// Offices along corridors: a ping beside ray casts, and growth with the number of walls.
+fn building_plans() {
+    for count in [100, 1_000, 10_000] {
+        let walls = offices(count);
+        let middle = 0.5 * walls.iter().map(|wall| wall.1).fold(DVec2::ZERO, DVec2::max);
+        let poses = standing_places(middle, 16);
+        let rays = median(|| {
+            let mesh = polyline(&walls);
+            drop(black_box(mesh));
+        });
+        let mesh = polyline(&walls);
+        let cast = median(|| {
+            for at in &poses {
+                black_box(fifteen_casts(&mesh, *at));
+            }
+        }) / poses.len() as u32;
+        let scene = Arc::new(plan_scene(walls));
+        println!("\nbuilding plan, {} walls", scene.walls.len());
+        report("parry: build", rays, None);
+        report(
+            "paths: build",
+            median(|| drop(black_box(simulator(scene.clone(), Options::default())))),
+            None,
+        );
+        let model = simulator(scene.clone(), Options::default());
+        let scan = median(|| {
+            for at in &poses {
+                let pose = Pose { x_m: at.x, y_m: at.y, heading_deg: 0.0 };
+                black_box(model.predict(&pose, &FULL_SCAN));
+            }
+        }) / poses.len() as u32;
+        let survey = median(|| {
+            for at in &poses {
+                black_box(model.station(*at));
+            }
+        }) / poses.len() as u32;
+        report("paths: survey of a pose", survey, None);
+        report("paths: scan of 400 azimuths", scan, None);
+        report("paths: a ping's share of it", scan / 400, None);
+        report("parry: 15 ray casts", cast, Some(scan / 400));
+        let station = model.station(poses[0]);
+        let heard: usize =
+            (0..400).map(|i| station.arrivals(f64::from(i) * TAU / 400.0).len()).sum();
+        println!("  {:.1} sounds a ping", heard as f64 / 400.0);
+    }
+}
+
+fn fifteen_casts(mesh: &Polyline, at: DVec2) -> f64 {
+    let origin = Vector::new(at.x, at.y);
+    (0..15)
+        .map(|i| {
+            let direction = DVec2::from_angle(f64::from(i).to_radians());
+            let ray = Ray::new(origin, Vector::new(direction.x, direction.y));
+            mesh.cast_local_ray(&ray, 10.7, false).unwrap_or(10.7)
+        })
+        .sum()
+}
+
+fn polyline(walls: &[(DVec2, DVec2)]) -> Polyline {
+    let points = walls.iter().flat_map(|(a, b)| [*a, *b]).map(|p| Vector::new(p.x, p.y)).collect();
+    let ends = (0..walls.len() as u32).map(|i| [2 * i, 2 * i + 1]).collect();
+    Polyline::new(points, Some(ends))
+}
+
+/// Rooms of 4 m by 3 m with a door in each wall and a cupboard in every other room: about
+/// `count` walls.
+fn offices(count: usize) -> Vec<(DVec2, DVec2)> {
+    let mut random = Pcg64::seed_from_u64(7);
+    let mut walls = Vec::new();
+    // Four pieces of wall a room and two for half a cupboard.
+    let side = ((count as f64 / 6.0).sqrt().round() as u32).max(2);
+    let size = DVec2::new(4.0, 3.0);
+    for row in 0..side {
+        for column in 0..side {
+            let corner = size * DVec2::new(f64::from(column), f64::from(row));
+            for along in [DVec2::new(size.x, 0.0), DVec2::new(0.0, size.y)] {
+                let door = random.random_range(0.5..along.length() - 1.4);
+                let unit = along.normalize();
+                walls.push((corner, corner + door * unit));
+                walls.push((corner + (door + 0.9) * unit, corner + along));
+            }
+            if (row + column) % 2 == 0 {
+                let low = corner + DVec2::new(random.random_range(1.0..2.0), 1.2);
+                let box_size = DVec2::new(0.8, 0.4);
+                let (right, up) = (DVec2::new(box_size.x, 0.0), DVec2::new(0.0, box_size.y));
+                let corners = [low, low + right, low + box_size, low + up];
+                walls.extend((0..4).map(|i| (corners[i], corners[(i + 1) % 4])));
+            }
+        }
+    }
+    walls
+}
+
+/// Places near the middle of a building.
+fn standing_places(middle: DVec2, count: usize) -> Vec<DVec2> {
+    let mut random = Pcg64::seed_from_u64(11);
+    let cell = DVec2::new(4.0, 3.0);
+    let room = (middle / cell).floor() * cell;
+    (0..count)
+        .map(|_| room + DVec2::new(random.random_range(0.2..3.8), random.random_range(0.2..1.1)))
+        .collect()
+}
+
+fn plan_scene(walls: Vec<(DVec2, DVec2)>) -> Scene {
+    let material = Material { reflectance: 0.97, roughness: 0.0 };
+    let wall = |(i, (a, b)): (usize, (DVec2, DVec2))| Wall {
+        id: Arc::from(format!("w{i}")),
+        a,
+        b,
+        material,
+        z_m: None,
+    };
+    let text = r#"{"name":"plan","materials":{},"walls":[]}"#;
+    let mut scene = Scene::from_json(text).expect("an empty scene");
+    scene.walls = walls.into_iter().enumerate().map(wall).collect();
+    scene
+}
+
+/// Median time of a run, over at least 9 runs and half a second.
+fn median(mut run: impl FnMut()) -> Duration {
+    run();
+    let mut times = Vec::new();
+    let start = Instant::now();
+    while times.len() < 9 || (start.elapsed() < Duration::from_millis(500) && times.len() < 2000) {
+        let before = Instant::now();
+        run();
+        times.push(before.elapsed());
+    }
+    times.sort();
+    times[times.len() / 2]
+}
+
+fn report(what: &str, time: Duration, beside: Option<Duration>) {
+    let micros = time.as_secs_f64() * 1e6;
+    match beside {
+        Some(other) => {
+            let ratio = time.as_secs_f64() / other.as_secs_f64();
+            println!("  {what:48} {micros:12.1} us  {ratio:10.2} times");
+        }
+        None => println!("  {what:48} {micros:12.1} us"),
+    }
+}

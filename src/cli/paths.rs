@@ -1,0 +1,179 @@
+//! `sonard paths`.
+
+use std::{
+    io::{self, Write},
+    sync::Arc,
+};
+
+use comfy_table::{CellAlignment, Table, presets::UTF8_HORIZONTAL_ONLY};
+use serde::Serialize;
+
+use super::{
+    Failure, Outcome,
+    options::{AirArgs, EdgeLaw, SensorArgs},
+    scene_file,
+};
+use crate::{
+    geometry::wrap_360,
+    model::{
+        Options, Simulator,
+        paths::{EchoPath, Paths},
+    },
+    scan::PathKind,
+};
+
+/// Options of `sonard paths`.
+#[derive(Debug, clap::Args)]
+#[command(long_about = ABOUT, after_help = EXAMPLES)]
+pub(super) struct Args {
+    /// Scene file, or the name of a shipped scene (`sonard scene list`)
+    #[arg(long, value_name = "SCENE")]
+    scene: String,
+    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    pose: String,
+    /// Half the longest path, metres [default: the sensor's range]
+    #[arg(long, value_name = "M")]
+    max_range: Option<f64>,
+    /// Most mirror reflections on a path [default: as many as can matter]
+    #[arg(long, value_name = "N")]
+    max_order: Option<u32>,
+    /// Leave out paths weaker than this; a head-on, perfect wall gives 1
+    #[arg(long, value_name = "A", default_value_t = 0.001)]
+    weakest: f64,
+    /// How edges diffract
+    #[arg(long, value_enum, default_value_t = EdgeLaw::Utd)]
+    edge_law: EdgeLaw,
+    /// Leave out the absorption of the air
+    #[arg(long)]
+    lossless: bool,
+    /// One JSON object a line instead of a table
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    sensor: SensorArgs,
+    #[command(flatten)]
+    air: AirArgs,
+}
+
+const ABOUT: &str = "\
+List the ways that echoes take from a place, shortest first.
+
+All mirror reflections, and one diffraction with any reflections before and after. The amplitude \
+counts reflectances, edges, curvature and absorption but no beam pattern: what the echo would be \
+if the ranger faced it both on leaving and on arriving. A path that can be run through in both \
+directions is listed twice, with departure and arrival swapped.";
+
+const EXAMPLES: &str = "\
+Examples:
+  sonard paths --scene simple-room --pose fig9 --max-range 1
+  sonard paths --scene mcgill-lab --pose 1,1,0 --max-order 2 --json | jq .walls
+  sonard paths --scene my-room.json --pose 1.2,0.8,90 --lossless --weakest 0.05
+
+Exit codes: 0 done, 2 wrong usage or input, 3 a disk that gave up.";
+
+/// A path as `--json` prints it.
+#[derive(Debug, Serialize)]
+struct PathLine {
+    length_m: f64,
+    kind: PathKind,
+    order: u32,
+    walls: Vec<String>,
+    edge: Option<String>,
+    departure_deg: f64,
+    arrival_deg: f64,
+    amplitude: f64,
+    phase_deg: f64,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    if !(1e-6..=1.0).contains(&args.weakest) {
+        return Err(Failure::input(
+            format!("--weakest is {}", args.weakest),
+            "give a number from 0.000001 to 1",
+        ));
+    }
+    let scene = scene_file::load(&args.scene)?;
+    let pose = scene_file::pose(&scene, &args.pose)?;
+    let options = Options {
+        max_range_m: args.max_range,
+        max_order: args.max_order,
+        edge_law: Some(args.edge_law.kind()),
+        lossless: args.lossless,
+        ..Options::default()
+    };
+    let scene = Arc::new(scene.with_robot_at(&pose));
+    let simulator = Simulator::new(scene, args.sensor.sensor()?, args.air.air()?, options)
+        .map_err(|error| Failure::input(error, "see `sonard paths --help`"))?;
+    let settings =
+        crate::model::paths::Settings { floor: args.weakest, ..simulator.path_settings() };
+    let paths = Paths::new(simulator.scene(), settings).enumerate(pose.position());
+    let lines = paths.iter().map(|path| line(&simulator, path));
+    let written = if args.json { write_json(lines) } else { write_table(lines, paths.len()) };
+    written.or_else(|error| Failure::from_write("to standard output", &error))
+}
+
+fn line(simulator: &Simulator, path: &EchoPath) -> PathLine {
+    let record = simulator.path_record(&path.path, path.length_m);
+    PathLine {
+        length_m: path.length_m,
+        kind: record.kind,
+        order: record.order,
+        walls: record.walls,
+        edge: record.edge,
+        departure_deg: wrap_360(path.departure_rad.to_degrees()),
+        arrival_deg: wrap_360(path.arrival_rad.to_degrees()),
+        amplitude: path.amplitude,
+        phase_deg: path.phase_rad.to_degrees(),
+    }
+}
+
+fn write_json(lines: impl Iterator<Item = PathLine>) -> io::Result<()> {
+    let mut out = io::BufWriter::new(io::stdout().lock());
+    for line in lines {
+        serde_json::to_writer(&mut out, &line)?;
+        out.write_all(b"\n")?;
+    }
+    out.flush()
+}
+
+fn write_table(lines: impl Iterator<Item = PathLine>, count: usize) -> io::Result<()> {
+    let mut table = Table::new();
+    table.load_style(UTF8_HORIZONTAL_ONLY).set_header([
+        "length m",
+        "range m",
+        "leaves",
+        "comes from",
+        "amplitude",
+        "way",
+    ]);
+    for index in 0..5 {
+        if let Some(column) = table.column_mut(index) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    for line in lines {
+        table.add_row([
+            format!("{:.4}", line.length_m),
+            format!("{:.4}", line.length_m / 2.0),
+            format!("{:.1}°", line.departure_deg),
+            format!("{:.1}°", line.arrival_deg),
+            format!("{:.4}", line.amplitude),
+            way(&line),
+        ]);
+    }
+    let mut out = io::BufWriter::new(io::stdout().lock());
+    writeln!(out, "{table}")?;
+    writeln!(out, "{count} paths")?;
+    out.flush()
+}
+
+/// The walls in order; for a bent path the edge in front.
+fn way(line: &PathLine) -> String {
+    let walls = line.walls.join(", ");
+    match &line.edge {
+        Some(edge) if walls.is_empty() => format!("edge {edge}"),
+        Some(edge) => format!("edge {edge} by {walls}"),
+        None => walls,
+    }
+}

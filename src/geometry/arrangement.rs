@@ -1,0 +1,217 @@
+//! Segments cut where they meet, so that they touch at their ends only.
+
+use std::collections::HashMap;
+
+use rstar::{
+    AABB, RTree,
+    primitives::{GeomWithData, Rectangle},
+};
+
+use super::DVec2;
+
+/// Points closer than this are one point, metres. Far above rounding, far below a wavelength.
+pub const SNAP_M: f64 = 1e-7;
+
+/// Cutting once can bring pieces into contact by rounding; it settles in one or two rounds.
+const ROUNDS: usize = 4;
+
+/// Segments that touch at their ends only.
+#[derive(Debug, Clone, Default)]
+pub struct Arrangement {
+    /// Ends of pieces, no two closer than [`SNAP_M`].
+    pub points: Vec<DVec2>,
+    /// What is left of the segments; no two between the same points.
+    pub pieces: Vec<Piece>,
+}
+
+/// A part of a segment between two points of an [`Arrangement`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Piece {
+    /// Indices of its ends, in the segment's direction.
+    pub ends: [u32; 2],
+    /// Index of the segment.
+    pub segment: u32,
+}
+
+impl Arrangement {
+    /// Cuts segments where they cross or touch. Where two lie on each other, the one given first
+    /// stays. Time grows like n log n for segments that meet few others.
+    #[must_use]
+    pub fn of(segments: &[(DVec2, DVec2)]) -> Self {
+        let mut parts: Vec<Part> =
+            segments.iter().zip(0..).map(|(&(a, b), segment)| Part { a, b, segment }).collect();
+        for _ in 0..ROUNDS {
+            let cuts = cuts(&parts);
+            if cuts.iter().all(Vec::is_empty) {
+                break;
+            }
+            parts = parts.iter().zip(cuts).flat_map(|(part, cuts)| part.cut(cuts)).collect();
+        }
+        join(&parts)
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    a: DVec2,
+    b: DVec2,
+    segment: u32,
+}
+
+impl Part {
+    /// This part in pieces, cut at `points` near it.
+    fn cut(self, mut points: Vec<DVec2>) -> Vec<Self> {
+        let along = self.b - self.a;
+        points.sort_by(|p, q| (*p - self.a).dot(along).total_cmp(&(*q - self.a).dot(along)));
+        points.push(self.b);
+        let mut pieces = Vec::with_capacity(points.len());
+        let mut from = self.a;
+        for to in points {
+            if from.distance(to) > SNAP_M {
+                pieces.push(Self { a: from, b: to, ..self });
+                from = to;
+            }
+        }
+        pieces
+    }
+
+    fn bounds(&self) -> AABB<[f64; 2]> {
+        let (low, high) = (self.a.min(self.b) - SNAP_M, self.a.max(self.b) + SNAP_M);
+        AABB::from_corners(low.to_array(), high.to_array())
+    }
+
+    /// Whether `point` lies on this part but at neither end.
+    fn has_inside(&self, point: DVec2) -> bool {
+        let along = self.b - self.a;
+        let length = along.length();
+        let place = (point - self.a).dot(along) / length;
+        let height = along.perp_dot(point - self.a) / length;
+        height.abs() < SNAP_M
+            && (0.0..length).contains(&place)
+            && point.distance(self.a) > SNAP_M
+            && point.distance(self.b) > SNAP_M
+    }
+
+    /// Where two parts cross, both away from their ends.
+    fn crossing(&self, other: &Self) -> Option<DVec2> {
+        let (u, v) = (self.b - self.a, other.b - other.a);
+        let parallel = u.perp_dot(v);
+        if parallel == 0.0 {
+            return None;
+        }
+        let place = (other.a - self.a).perp_dot(v) / parallel;
+        let point = self.a + place * u;
+        (self.has_inside(point) && other.has_inside(point)).then_some(point)
+    }
+}
+
+/// For each part, the points inside it where another part ends or crosses it.
+fn cuts(parts: &[Part]) -> Vec<Vec<DVec2>> {
+    let boxes = parts.iter().enumerate().map(|(index, part)| {
+        let bounds = part.bounds();
+        GeomWithData::new(Rectangle::from_corners(bounds.lower(), bounds.upper()), index)
+    });
+    let tree = RTree::bulk_load(boxes.collect());
+    let mut cuts = vec![Vec::new(); parts.len()];
+    for (i, part) in parts.iter().enumerate() {
+        for near in tree.locate_in_envelope_intersecting(part.bounds()) {
+            let other = &parts[near.data];
+            let before = cuts[i].len();
+            cuts[i].extend([other.a, other.b].into_iter().filter(|&end| part.has_inside(end)));
+            let ends_meet =
+                cuts[i].len() > before || other.has_inside(part.a) || other.has_inside(part.b);
+            if near.data > i
+                && !ends_meet
+                && let Some(point) = part.crossing(other)
+            {
+                cuts[i].push(point);
+                cuts[near.data].push(point);
+            }
+        }
+    }
+    cuts
+}
+
+/// Makes ends that are closer than [`SNAP_M`] one point, and drops pieces that lie on others.
+fn join(parts: &[Part]) -> Arrangement {
+    let ends: Vec<DVec2> = parts.iter().flat_map(|part| [part.a, part.b]).collect();
+    let tree = RTree::bulk_load(
+        ends.iter().enumerate().map(|(i, end)| GeomWithData::new(end.to_array(), i)).collect(),
+    );
+    let mut result = Arrangement::default();
+    let mut point_of = vec![u32::MAX; ends.len()];
+    for (i, &end) in ends.iter().enumerate() {
+        if point_of[i] != u32::MAX {
+            continue;
+        }
+        let point = result.points.len() as u32;
+        result.points.push(end);
+        for same in tree.locate_within_distance(end.to_array(), SNAP_M * SNAP_M) {
+            if point_of[same.data] == u32::MAX {
+                point_of[same.data] = point;
+            }
+        }
+    }
+    let mut seen = HashMap::new();
+    for (i, part) in parts.iter().enumerate() {
+        let [a, b] = [point_of[2 * i], point_of[2 * i + 1]];
+        if a != b && seen.insert((a.min(b), a.max(b)), ()).is_none() {
+            result.pieces.push(Piece { ends: [a, b], segment: part.segment });
+        }
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn segment(ax: f64, ay: f64, bx: f64, by: f64) -> (DVec2, DVec2) {
+        (DVec2::new(ax, ay), DVec2::new(bx, by))
+    }
+
+    #[test]
+    fn meetings_cut_segments() {
+        let line = segment(0.0, 0.0, 2.0, 0.0);
+        let cases = [
+            ("apart", vec![line, segment(0.0, 1.0, 2.0, 1.0)], 4, 2),
+            ("cross", vec![line, segment(1.0, -1.0, 1.0, 1.0)], 5, 4),
+            ("end on the middle", vec![line, segment(1.0, 0.0, 1.0, 1.0)], 4, 3),
+            ("end on the middle, nearly", vec![line, segment(1.0, 3e-9, 1.0, 1.0)], 4, 3),
+            ("common end", vec![line, segment(2.0, 0.0, 2.0, 1.0)], 3, 2),
+            ("common end, nearly", vec![line, segment(2.0, 3e-9, 2.0, 1.0)], 3, 2),
+            ("overlap", vec![line, segment(1.0, 0.0, 3.0, 0.0)], 4, 3),
+            ("twice", vec![line, segment(2.0, 0.0, 0.0, 0.0)], 2, 1),
+            ("a gap that counts", vec![line, segment(1.0, 1e-4, 1.0, 1.0)], 4, 2),
+        ];
+        for (name, segments, points, pieces) in cases {
+            let made = Arrangement::of(&segments);
+            assert_eq!((made.points.len(), made.pieces.len()), (points, pieces), "{name}");
+        }
+    }
+
+    #[test]
+    fn pieces_keep_the_length_and_the_segment() {
+        let grid: Vec<_> = (0..5)
+            .flat_map(|i| {
+                let x = f64::from(i) + 0.1;
+                [segment(x, -0.3, x + 0.2, 5.0), segment(-0.2, x, 5.3, x - 0.1)]
+            })
+            .collect();
+        let made = Arrangement::of(&grid);
+        for (index, &(a, b)) in grid.iter().enumerate() {
+            let length: f64 = made
+                .pieces
+                .iter()
+                .filter(|piece| piece.segment == index as u32)
+                .map(|piece| {
+                    let [p, q] = piece.ends.map(|end| made.points[end as usize]);
+                    assert!((q - p).dot(b - a) > 0.0);
+                    p.distance(q)
+                })
+                .sum();
+            assert!((length - a.distance(b)).abs() < 1e-9);
+        }
+        assert_eq!(made.points.len(), 2 * 10 + 25);
+    }
+}

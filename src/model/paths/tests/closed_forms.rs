@@ -1,0 +1,176 @@
+//! Scenes whose echoes are known in closed form.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use super::*;
+use crate::{model::Reflector, scene::Cylinder};
+
+fn cylinder(x: f64, y: f64, radius_m: f64) -> Cylinder {
+    Cylinder {
+        id: Arc::from("round"),
+        center: DVec2::new(x, y),
+        radius_m,
+        material: Material { reflectance: 1.0, roughness: 0.0 },
+        z_m: None,
+    }
+}
+
+/// Two walls from the origin, `opening_rad` apart, long enough to have no ends.
+fn dihedral(opening_rad: f64, turn_rad: f64) -> Scene {
+    let end = |angle: f64| 60.0 * DVec2::from_angle(turn_rad + angle);
+    let (a, b) = (end(0.0), end(opening_rad));
+    scene(&[[0.0, 0.0, a.x, a.y], [b.x, b.y, 0.0, 0.0]])
+}
+
+#[test]
+fn a_wall_answers_over_twice_its_distance_with_its_reflectance() {
+    let mut wall = scene(&[[-1.0, 0.5, 4.0, 0.5]]);
+    wall.walls[0].material = Material { reflectance: 0.9, roughness: 0.19 };
+    let settings = Settings { absorption_np_per_m: 0.2, ..LOSSLESS };
+    for side in [-1.0, 1.0] {
+        let at = DVec2::new(0.3, 0.5 + side * 0.7);
+        let echoes = Paths::new(&wall, settings.clone()).enumerate(at);
+        assert_eq!(echoes.len(), 1);
+        assert!((echoes[0].length_m - 1.4).abs() < 1e-12);
+        assert!((echoes[0].departure_rad + side * FRAC_PI_2).abs() < 1e-12);
+        // Roughness takes a share of the energy, so 0.9 times 0.9 of the amplitude is left.
+        assert!((echoes[0].amplitude - 0.81 * f64::exp(-0.28)).abs() < 1e-12);
+    }
+    // Beside the wall, nothing answers but its end.
+    assert!(Paths::new(&wall, settings).enumerate(DVec2::new(-1.2, 0.0)).is_empty());
+}
+
+#[test]
+fn a_right_angled_corner_answers_once_from_its_vertex() {
+    for turn in [0.0, 0.3, 1.234, 4.0] {
+        let at = 0.8 * DVec2::from_angle(turn + 0.61);
+        let settings = Settings { max_path_m: 10.0, edge_law: Some(EdgeLaw::Utd), ..LOSSLESS };
+        let echoes = Paths::new(&dihedral(FRAC_PI_2, turn), settings).enumerate(at);
+        let double: Vec<_> = echoes.iter().filter(|e| e.path.walls.len() == 2).collect();
+        assert_eq!((echoes.len(), double.len()), (3, 1));
+        assert!((double[0].length_m - 1.6).abs() < 1e-12);
+        assert!((double[0].departure_rad - double[0].arrival_rad).abs() < 1e-12);
+        assert!((double[0].amplitude - 1.0).abs() < 1e-12);
+    }
+}
+
+/// In a dihedral of `opening` the images of a source at `angle` stand at `2 N opening +- angle`;
+/// those less than half a turn away are seen, and one exactly half a turn away through the vertex.
+#[test]
+fn dihedrals_have_their_circle_of_images() {
+    for opening_deg in [22.5, 30.0, 36.0, 45.0, 50.0, 60.0, 72.0, 80.0, 90.0, 100.0, 135.0, 170.0] {
+        let opening = f64::to_radians(opening_deg);
+        for share in [0.21, 0.37, 0.83] {
+            let (angle, turn) = (share * opening, 0.7);
+            let at = 1.3 * DVec2::from_angle(turn + angle);
+            let settings = Settings { max_path_m: 4.0, ..LOSSLESS };
+            let echoes = Paths::new(&dihedral(opening, turn), settings).enumerate(at);
+            let mut expected: Vec<f64> = (-20..=20)
+                .flat_map(|n| {
+                    let shift = 2.0 * f64::from(n) * opening;
+                    [shift, shift - 2.0 * angle]
+                })
+                .filter(|apart| apart.abs() > 1e-12 && apart.abs() < PI + 1e-9)
+                .map(|apart| 2.6 * (apart.abs() / 2.0).sin())
+                .collect();
+            if (PI / opening) % 2.0 == 0.0 {
+                // Plus and minus half a turn are the same image.
+                expected.sort_by(f64::total_cmp);
+                expected.pop();
+            }
+            expected.sort_by(f64::total_cmp);
+            assert_eq!(echoes.len(), expected.len(), "{opening_deg} degrees at {share}");
+            for (echo, length_m) in echoes.iter().zip(expected) {
+                assert!((echo.length_m - length_m).abs() < 1e-11, "{opening_deg} at {share}");
+            }
+        }
+    }
+}
+
+#[test]
+fn joints_of_a_straight_wall_neither_hide_nor_double_nor_bend() {
+    // The foot of the normal is exactly on a joint.
+    let wall = scene(&[[-3.0, 0.0, 0.25, 0.0], [0.25, 0.0, 0.3, 0.0], [0.3, 0.0, 4.0, 0.0]]);
+    let settings = Settings { edge_law: Some(EdgeLaw::Utd), max_path_m: 4.0, ..LOSSLESS };
+    for x in [0.25, 0.26, 0.3] {
+        let echoes = Paths::new(&wall, settings.clone()).enumerate(DVec2::new(x, 0.9));
+        assert_eq!(echoes.len(), 1, "{x}: {echoes:?}");
+        assert!((echoes[0].length_m - 1.8).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn on_the_foot_of_its_normal_the_end_of_a_wall_is_half_a_wall() {
+    let wall = scene(&[[0.0, 0.0, 9.0, 0.0]]);
+    let settings = Settings { edge_law: Some(EdgeLaw::Utd), max_path_m: 4.0, ..LOSSLESS };
+    let echoes = Paths::new(&wall, settings).enumerate(DVec2::new(0.0, 0.5));
+    assert_eq!(echoes.len(), 2);
+    let total: f64 = echoes.iter().map(|echo| echo.amplitude * echo.phase_rad.cos()).sum();
+    assert!((total - 0.5).abs() < 0.02, "{total}");
+}
+
+#[test]
+fn an_edge_seen_along_its_wall_answers() {
+    // Face on to the end of a plate: only the near end is seen.
+    let wall = scene(&[[0.0, 0.0, 1.0, 0.0]]);
+    let settings = Settings { edge_law: Some(EdgeLaw::KucSiegel), ..LOSSLESS };
+    let echoes = Paths::new(&wall, settings).enumerate(DVec2::new(-0.5, 0.0));
+    assert_eq!(echoes.len(), 1);
+    assert_eq!(echoes[0].path.edge, Some(crate::model::Edge { wall: 0, at_b: false }));
+    assert!((echoes[0].length_m - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_cylinder_answers_from_its_nearest_point_and_spreads() {
+    let mut plan = scene(&[]);
+    plan.cylinders = vec![cylinder(1.0, 2.0, 0.3)];
+    let at = DVec2::new(2.5, 0.0);
+    let echoes = Paths::new(&plan, LOSSLESS).enumerate(at);
+    assert_eq!(echoes.len(), 1);
+    let distance = 2.5 - 0.3;
+    assert!((echoes[0].length_m - 2.0 * distance).abs() < 1e-12);
+    assert!((echoes[0].amplitude - (0.3_f64 / (0.3 + distance)).sqrt()).abs() < 1e-12);
+    assert_eq!(echoes[0].path.walls[..], [Reflector::Cylinder(0)]);
+}
+
+#[test]
+fn a_cylinder_hides_the_wall_behind_it() {
+    let mut plan = scene(&[[-5.0, 3.0, 5.0, 3.0]]);
+    plan.cylinders = vec![cylinder(0.0, 1.5, 0.2)];
+    let settings = Settings { max_order: Some(1), ..LOSSLESS };
+    let paths = Paths::new(&plan, settings);
+    let kinds = |x: f64| {
+        let echoes = paths.enumerate(DVec2::new(x, 0.0));
+        echoes.iter().map(|echo| echo.path.walls[0]).collect::<Vec<_>>()
+    };
+    assert_eq!(kinds(0.1), [Reflector::Cylinder(0)]);
+    assert_eq!(kinds(0.3), [Reflector::Cylinder(0), Reflector::Wall(0)]);
+}
+
+/// Ways from wall to cylinder and back: the reflected way is the shortest one over points of
+/// both, found here by searching.
+#[test]
+fn echoes_between_cylinder_and_walls_take_the_shortest_way() {
+    let mut plan = scene(&[[-5.0, 0.0, 5.0, 0.0]]);
+    plan.cylinders = vec![cylinder(0.9, 0.8, 0.25)];
+    let at = DVec2::new(-0.4, 0.5);
+    let settings = Settings { max_path_m: 6.0, ..LOSSLESS };
+    let echoes = Paths::new(&plan, settings).enumerate(at);
+    let below = DVec2::new(at.x, -at.y);
+    let over = |p: DVec2, q: DVec2| {
+        (0..200_000)
+            .map(|i| {
+                let normal = DVec2::from_angle(TAU * f64::from(i) / 200_000.0);
+                let hit = plan.cylinders[0].center + 0.25 * normal;
+                let lit = normal.dot(p - hit) > 0.0 && normal.dot(q - hit) > 0.0;
+                if lit { p.distance(hit) + hit.distance(q) } else { f64::INFINITY }
+            })
+            .fold(f64::INFINITY, f64::min)
+    };
+    for (p, q, count) in [(at, at, 1), (at, below, 2), (below, below, 1)] {
+        let length_m = over(p, q);
+        let same = echoes.iter().filter(|echo| (echo.length_m - length_m).abs() < 1e-8).count();
+        assert_eq!(same, count, "{length_m} m");
+    }
+    assert_eq!(echoes.len(), 5);
+}
