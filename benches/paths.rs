@@ -15,9 +15,12 @@ use parry2d_f64::{
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use sonard::{
-    acoustics::{Air, Sensor},
+    acoustics::{Air, BeamPattern, Sensor},
     geometry::{DVec2, Pose},
-    model::{EngineKind, Options, Simulator, paths::Paths},
+    model::{
+        Engine, EngineKind, Options, Simulator,
+        paths::{PathEngine, Paths},
+    },
     scan::ScanPlan,
     scene::{Material, Scene, Wall, shipped},
 };
@@ -48,7 +51,25 @@ fn small_room() {
     report("paths, the survey alone", survey, None);
     let exact = median(|| drop(black_box(paths.predict(&pose, &FULL_SCAN))));
     report("paths, the whole scan", exact, None);
-    for ray_spacing_deg in [0.1, 0.02] {
+    let engine = PathEngine::new(
+        &scene,
+        BeamPattern::new(paths.sensor(), paths.sound_speed_m_s()),
+        paths.path_settings(),
+    );
+    let echoes = Paths::new(&scene, paths.path_settings()).enumerate(pose.position());
+    let place = engine.survey(pose.position());
+    let mut sounds = Vec::new();
+    let mut heard = 0;
+    let listen = median(|| {
+        heard = 0;
+        for i in 0..400 {
+            place.listen(f64::from(i) * TAU / 400.0, &mut sounds);
+            heard += sounds.len();
+        }
+    });
+    report("paths, listening 400 times", listen, None);
+    println!("  {} echo paths, {:.1} sounds a ping", echoes.len(), heard as f64 / 400.0);
+    for ray_spacing_deg in [1.0, 0.1, 0.02] {
         let options = Options { engine: EngineKind::Fan, ray_spacing_deg, ..range };
         let fan = simulator(scene.clone(), options);
         let time = median(|| drop(black_box(fan.predict(&pose, &FULL_SCAN))));

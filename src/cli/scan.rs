@@ -113,7 +113,7 @@ const EXAMPLES: &str = "\
 Examples:
   sonard scan --mock --scene simple-room --pose fig9 --out out/fig9
   sonard scan --port /dev/ttyACM0 --scene my-room.json --pose 1.2,0.8,90 --max-range 4 --out out
-  sonard scan --mock --scene corridor --pose start --from-deg -45 --to-deg 45 | sonard compare -
+  sonard scan --mock --scene corridor --pose beside-wall --from-deg -45 --to-deg 45 | sonard compare -
   sonard scan --mock --scene simple-room --pose fig9 --faults flip=0.001,reset=0.005 --out noisy
 
 Exit codes: 0 every beam measured, 1 stopped on request or beams are missing, 2 wrong usage or \

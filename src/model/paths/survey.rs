@@ -67,62 +67,90 @@ impl Envelope {
     }
 }
 
-/// Directions are sorted into this many bins.
-const BINS: usize = 360;
-
-/// The echo paths of a place, by the direction in which they leave.
+/// The echo paths of a place.
 struct PathSurvey<'a> {
     engine: &'a PathEngine,
     tree: Tree,
     /// Shortest first.
     echoes: Vec<Echo>,
+    /// From narrow to wide reach: the many weak echoes are heard in few directions only.
+    wheels: [Wheel; REACHES_DEG.len()],
+}
+
+/// Widest reach of each wheel, degrees.
+const REACHES_DEG: [f64; 5] = [6.0, 10.0, 16.0, 30.0, 180.0];
+
+/// Directions are sorted into this many bins.
+const BINS: usize = 360;
+
+/// Echoes by the direction in which they are heard best.
+#[derive(Debug, Default)]
+struct Wheel {
     /// Bin by bin.
     spokes: Vec<Spoke>,
     /// Where each bin begins in `spokes`, and the end of the last.
     bins: Vec<u32>,
-    /// The widest reach of all.
+    /// The widest reach of its spokes.
     reach_rad: f64,
 }
 
 /// What an azimuth needs to know of an echo.
 #[derive(Debug, Clone, Copy)]
 struct Spoke {
-    departure_rad: f64,
-    arrival_rad: f64,
+    /// Half way between departure and arrival.
+    middle_rad: f64,
+    /// Departure is this far on one side of the middle, arrival on the other.
+    half_rad: f64,
     amplitude: f64,
-    /// Farther off the axis, at either end, it is too weak.
+    /// Farther off the middle it is too weak.
     reach_rad: f64,
     echo: u32,
 }
 
-impl<'a> PathSurvey<'a> {
-    fn new(engine: &'a PathEngine, position: DVec2) -> Self {
-        let (tree, echoes) = engine.paths.echoes(position);
-        let floor = engine.paths.settings.floor;
-        let mut spokes: Vec<Spoke> = echoes
-            .iter()
-            .zip(0..)
-            .map(|(echo, index)| Spoke {
-                departure_rad: echo.departure.to_angle(),
-                arrival_rad: echo.arrival.to_angle(),
-                amplitude: echo.amplitude,
-                reach_rad: engine.envelope.reach_rad(floor / echo.amplitude),
-                echo: index,
-            })
-            .collect();
-        spokes.sort_unstable_by_key(|spoke| (bin(spoke.departure_rad), spoke.echo));
-        let bins = (0..=BINS)
-            .map(|edge| spokes.partition_point(|spoke| bin(spoke.departure_rad) < edge) as u32)
-            .collect();
+impl Spoke {
+    /// `None` if it is too weak in all directions.
+    ///
+    /// `y` off the middle, the axis is `|y| + h` off one end and at least `||y| - h|` off the
+    /// other. The pattern's product reaches a level only if its smaller factor does, and its
+    /// larger one reaches the root of it.
+    fn of(echo: &Echo, index: u32, envelope: &Envelope, floor: f64) -> Option<Self> {
+        let half_rad = 0.5 * echo.departure.angle_to(echo.arrival);
+        let level = floor / echo.amplitude;
+        let wide = envelope.reach_rad(level) - half_rad.abs();
+        if wide < 0.0 {
+            return None;
+        }
+        let reach_rad = wide.min(envelope.reach_rad(level.sqrt()) + half_rad.abs());
+        let middle_rad = wrap_pi(echo.departure.to_angle() + half_rad);
+        Some(Self { middle_rad, half_rad, amplitude: echo.amplitude, reach_rad, echo: index })
+    }
+}
+
+impl Wheel {
+    fn new(spokes: &[Spoke]) -> Self {
+        let mut bins = vec![0_u32; BINS + 1];
+        for spoke in spokes {
+            bins[bin(spoke.middle_rad) + 1] += 1;
+        }
+        for i in 0..BINS {
+            bins[i + 1] += bins[i];
+        }
+        let mut next = bins.clone();
+        let mut sorted = spokes.to_vec();
+        for spoke in spokes {
+            let place = &mut next[bin(spoke.middle_rad)];
+            sorted[*place as usize] = *spoke;
+            *place += 1;
+        }
         let reach_rad = spokes.iter().map(|spoke| spoke.reach_rad).fold(0.0, f64::max);
-        Self { engine, tree, echoes, spokes, bins, reach_rad }
+        Self { spokes: sorted, bins, reach_rad }
     }
 
-    /// The spokes that leave within the widest reach of a direction, and a few more.
-    fn near(&self, direction_rad: f64) -> impl Iterator<Item = &Spoke> {
-        let middle = bin(wrap_pi(direction_rad)) as i64;
-        let reach = (self.reach_rad / TAU * BINS as f64).ceil() as i64;
+    /// The spokes within their reach of a direction in (-pi, pi].
+    fn near(&self, direction_rad: f64) -> impl Iterator<Item = (&Spoke, f64)> {
         let bins = BINS as i64;
+        let (middle, reach) =
+            (bin(direction_rad) as i64, (self.reach_rad / TAU * BINS as f64).ceil() as i64);
         let (from, to) =
             if 2 * reach + 1 >= bins { (0, bins) } else { (middle - reach, middle + reach + 1) };
         let part = move |from: i64, to: i64| {
@@ -131,18 +159,27 @@ impl<'a> PathSurvey<'a> {
         };
         // What leaves the circle on one side comes in on the other.
         let wrapped = [part(from + bins, bins), part(from, to), part(0, to - bins)];
-        wrapped.into_iter().flatten()
+        wrapped.into_iter().flatten().filter_map(move |spoke| {
+            let off_rad = wrap_once(direction_rad - spoke.middle_rad);
+            (off_rad.abs() <= spoke.reach_rad).then_some((spoke, off_rad))
+        })
     }
+}
 
-    fn weight(&self, spoke: &Spoke, direction_rad: f64) -> Option<f64> {
-        let leaving = wrap_once(spoke.departure_rad - direction_rad).abs();
-        let arriving = wrap_once(spoke.arrival_rad - direction_rad).abs();
-        if leaving.max(arriving) > spoke.reach_rad {
-            return None;
+impl<'a> PathSurvey<'a> {
+    fn new(engine: &'a PathEngine, position: DVec2) -> Self {
+        let (tree, echoes) = engine.paths.echoes(position);
+        let floor = engine.paths.settings.floor;
+        let mut spokes: [Vec<Spoke>; REACHES_DEG.len()] = Default::default();
+        for (echo, index) in echoes.iter().zip(0..) {
+            if let Some(spoke) = Spoke::of(echo, index, &engine.envelope, floor) {
+                let reach_deg = spoke.reach_rad.to_degrees();
+                let wheel = REACHES_DEG.iter().position(|most| reach_deg <= *most);
+                spokes[wheel.unwrap_or(REACHES_DEG.len() - 1)].push(spoke);
+            }
         }
-        let beam = &self.engine.beam;
-        let amplitude = spoke.amplitude * beam.one_way(leaving) * beam.one_way(arriving);
-        (amplitude >= self.engine.paths.settings.floor).then_some(amplitude)
+        let wheels = spokes.map(|spokes| Wheel::new(&spokes));
+        Self { engine, tree, echoes, wheels }
     }
 }
 
@@ -150,15 +187,21 @@ impl Survey for PathSurvey<'_> {
     fn listen(&self, direction_rad: f64, sounds: &mut Vec<Sound>) {
         sounds.clear();
         let direction_rad = wrap_pi(direction_rad);
-        for spoke in self.near(direction_rad) {
-            if let Some(amplitude) = self.weight(spoke, direction_rad) {
-                let echo = &self.echoes[spoke.echo as usize];
-                sounds.push(Sound {
-                    length_m: echo.length_m,
-                    amplitude,
-                    phase_rad: echo.phase_rad,
-                    index: spoke.echo,
-                });
+        let (beam, floor) = (&self.engine.beam, self.engine.paths.settings.floor);
+        for wheel in &self.wheels {
+            for (spoke, off_rad) in wheel.near(direction_rad) {
+                let ends = [off_rad + spoke.half_rad, off_rad - spoke.half_rad];
+                let [leaving, arriving] = ends.map(|angle| beam.one_way(angle));
+                let amplitude = spoke.amplitude * leaving * arriving;
+                if amplitude >= floor {
+                    let echo = &self.echoes[spoke.echo as usize];
+                    sounds.push(Sound {
+                        length_m: echo.length_m,
+                        amplitude,
+                        phase_rad: echo.phase_rad,
+                        index: spoke.echo,
+                    });
+                }
             }
         }
         // Echoes are numbered by length.

@@ -36,8 +36,11 @@ const BAND_SIGMA_HZ: f64 = 7000.0;
 const BAND_HZ: f64 = 20_000.0;
 
 /// Grids of frequency and of path length.
-const STEP_HZ: f64 = 500.0;
+const STEP_HZ: f64 = 1000.0;
 const STEP_M: f64 = 0.0007;
+
+/// Points of the aperture.
+const POINTS: i32 = 16;
 
 /// The paths at each of the band's frequencies, from a place.
 struct Chain {
@@ -70,24 +73,41 @@ impl Chain {
         Self { c, f0, half_width_m: reference.piston_half_width_m, echoes }
     }
 
-    /// One way: `sin(x)/x` within 75 degrees, a cosine taper to nothing at 105.
-    fn pattern(&self, f: f64, off_rad: f64) -> f64 {
-        let off = crate::geometry::wrap_pi(off_rad).abs().to_degrees();
-        let taper = match off {
-            0.0..75.0 => 1.0,
-            75.0..105.0 => 0.5 * (1.0 + (TAU / 2.0 * (off - 75.0) / 30.0).cos()),
-            _ => 0.0,
-        };
-        let x = TAU * f / self.c * self.half_width_m * off_rad.sin();
-        taper * if x.abs() < 1e-9 { 1.0 } else { x.sin() / x }
+    /// The beam of the line aperture on both ways, facing `azimuth_rad`: every point of it sends
+    /// to every point of it. Far away that is `sin(x)/x` twice; at these ranges the front's
+    /// curvature still fills the pattern's nulls (Fresnel's approximation).
+    fn beam(&self, f: f64, echo: &EchoPath, azimuth_rad: f64) -> Complex64 {
+        let (leaving, arriving) =
+            (echo.departure_rad - azimuth_rad, echo.arrival_rad - azimuth_rad);
+        let taper = taper(leaving) * taper(arriving);
+        if taper == 0.0 {
+            return Complex64::ZERO;
+        }
+        let k = TAU * f / self.c;
+        // Seen through an odd number of mirrors the aperture is mirrored; an edge forgets where
+        // on the aperture the sound left.
+        let bent = echo.path.kind == PathKind::Diffracted;
+        let side = if echo.path.walls.len() % 2 == 1 { -1.0 } else { 1.0 };
+        let point = |i: i32| self.half_width_m * (f64::from(2 * i + 1) / f64::from(POINTS) - 1.0);
+        let mut sum = Complex64::ZERO;
+        for u in (0..POINTS).map(point) {
+            for v in (0..POINTS).map(point) {
+                let (x, y) = (u * leaving.cos(), v * arriving.cos());
+                let curved = if bent {
+                    (x * x + y * y) / echo.length_m
+                } else {
+                    (x + side * y).powi(2) / (2.0 * echo.length_m)
+                };
+                sum += Complex64::cis(k * (u * leaving.sin() + v * arriving.sin() - curved));
+            }
+        }
+        sum * taper / f64::from(POINTS * POINTS)
     }
 
     /// Field of each echo at each frequency, as the aperture facing `azimuth_rad` weighs it.
     fn spectrum(&self, azimuth_rad: f64) -> Vec<(f64, Vec<Complex64>)> {
         let weighed = |f: f64, echo: &EchoPath| {
-            let beam = self.pattern(f, echo.departure_rad - azimuth_rad)
-                * self.pattern(f, echo.arrival_rad - azimuth_rad);
-            Complex64::from_polar(1.0, echo.phase_rad) * (echo.amplitude * beam)
+            Complex64::from_polar(echo.amplitude, echo.phase_rad) * self.beam(f, echo, azimuth_rad)
         };
         let at = |(f, echoes): &(f64, Vec<EchoPath>)| {
             (*f, echoes.iter().map(|echo| weighed(*f, echo)).collect())
@@ -137,6 +157,16 @@ impl Chain {
             }
         }
         sum.norm() / whole
+    }
+}
+
+/// No radiation to the rear: full within 75 degrees of the axis, nothing beyond 105.
+fn taper(off_rad: f64) -> f64 {
+    let off_deg = crate::geometry::wrap_pi(off_rad).abs().to_degrees();
+    match off_deg {
+        0.0..75.0 => 1.0,
+        75.0..105.0 => 0.5 * (1.0 + (TAU / 2.0 * (off_deg - 75.0) / 30.0).cos()),
+        _ => 0.0,
     }
 }
 
