@@ -15,7 +15,7 @@ const FIRINGS_A_LINE: u64 = 100;
 
 /// Options of `sonard mock`.
 #[derive(Debug, clap::Args)]
-#[command(long_about = ABOUT, after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(long, value_name = "SCENE")]
@@ -36,7 +36,7 @@ pub(super) struct Args {
     engine: EngineArgs,
 }
 
-const ABOUT: &str = "\
+pub(super) const ABOUT: &str = "\
 Play a ranger on a pty, with sound from the model.
 
 The device's own protocol code runs on a pseudo-terminal, in a world made of a scene and the \

@@ -24,7 +24,7 @@ use crate::{
 
 /// Options of `sonard paths`.
 #[derive(Debug, clap::Args)]
-#[command(long_about = ABOUT, after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(long, value_name = "SCENE")]
@@ -56,7 +56,7 @@ pub(super) struct Args {
     air: AirArgs,
 }
 
-const ABOUT: &str = "\
+pub(super) const ABOUT: &str = "\
 List the ways that echoes take from a place, shortest first.
 
 All mirror reflections, and one diffraction with any reflections before and after. The amplitude \

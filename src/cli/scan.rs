@@ -26,7 +26,7 @@ use setup::Setup;
 
 /// Options of `sonard scan`.
 #[derive(Debug, clap::Args)]
-#[command(long_about = ABOUT, after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES)]
 #[command(group(clap::ArgGroup::new("device").required(true).args(["port", "mock"])))]
 pub(super) struct Args {
     /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number
@@ -102,7 +102,7 @@ struct MotionArgs {
     acceleration: u32,
 }
 
-const ABOUT: &str = "\
+pub(super) const ABOUT: &str = "\
 Take one or more scans and log each reading beside the model's prediction.
 
 The device goes home, then steps, fires and listens by itself along the plan; readings that the \
@@ -113,7 +113,7 @@ const EXAMPLES: &str = "\
 Examples:
   sonard scan --mock --scene simple-room --pose fig9 --out out/fig9
   sonard scan --port /dev/ttyACM0 --scene my-room.json --pose 1.2,0.8,90 --max-range 4 --out out
-  sonard scan --mock --scene corridor --pose beside-wall --from-deg -45 --to-deg 45 | sonard compare -
+  sonard scan --mock --scene corridor --pose beside-wall --to-deg 45 | sonard compare -
   sonard scan --mock --scene simple-room --pose fig9 --faults flip=0.001,reset=0.005 --out noisy
 
 Exit codes: 0 every beam measured, 1 stopped on request or beams are missing, 2 wrong usage or \

@@ -29,7 +29,7 @@ const STEPS_PER_REVOLUTION: u32 = 400;
 
 /// Options of `sonard simulate`.
 #[derive(Debug, clap::Args)]
-#[command(long_about = ABOUT, after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(long, value_name = "SCENE")]
@@ -57,7 +57,7 @@ pub(super) struct Args {
     air: AirArgs,
 }
 
-const ABOUT: &str = "\
+pub(super) const ABOUT: &str = "\
 Predict a scan with the model alone.
 
 Writes the records of a log, one JSON object a line, with provenance `simulated`: each reading \
