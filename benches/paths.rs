@@ -29,6 +29,7 @@ const FULL_SCAN: ScanPlan =
     ScanPlan { from_deg: 0.0, to_deg: 360.0, step_deg: 0.9, pings_per_stop: 1 };
 
 fn main() {
+    println!("{:72} {:>9}", "", "median, and best; ratios of the best");
     small_room();
     l_room();
     building_plans();
@@ -47,9 +48,9 @@ fn small_room() {
     let range = Options { max_range_m: Some(10.7), ..Options::default() };
     let paths = simulator(scene.clone(), range);
     println!("simple-room, fig9, 400 azimuths to 10.7 m");
-    let survey = median(|| drop(black_box(paths.station(pose.position()))));
+    let survey = time(|| drop(black_box(paths.station(pose.position()))));
     report("paths, the survey alone", survey, None);
-    let exact = median(|| drop(black_box(paths.predict(&pose, &FULL_SCAN))));
+    let exact = time(|| drop(black_box(paths.predict(&pose, &FULL_SCAN))));
     report("paths, the whole scan", exact, None);
     let engine = PathEngine::new(
         &scene,
@@ -60,7 +61,7 @@ fn small_room() {
     let place = engine.survey(pose.position());
     let mut sounds = Vec::new();
     let mut heard = 0;
-    let listen = median(|| {
+    let listen = time(|| {
         heard = 0;
         for i in 0..400 {
             place.listen(f64::from(i) * TAU / 400.0, &mut sounds);
@@ -72,7 +73,7 @@ fn small_room() {
     for ray_spacing_deg in [1.0, 0.1, 0.02] {
         let options = Options { engine: EngineKind::Fan, ray_spacing_deg, ..range };
         let fan = simulator(scene.clone(), options);
-        let time = median(|| drop(black_box(fan.predict(&pose, &FULL_SCAN))));
+        let time = time(|| drop(black_box(fan.predict(&pose, &FULL_SCAN))));
         let error_mm = 1e3 * range_error_m(&fan, &paths, &pose);
         report(
             &format!("fan at {ray_spacing_deg} degrees, off by up to {error_mm:.2} mm"),
@@ -111,7 +112,7 @@ fn l_room() {
     let paths = Paths::new(&room, settings);
     let at = DVec2::new(1.13, 0.87);
     println!("\nL-room, order 8: {} echoes", paths.enumerate(at).len());
-    report("paths", median(|| drop(black_box(paths.enumerate(at)))), None);
+    report("paths", time(|| drop(black_box(paths.enumerate(at)))), None);
 }
 
 /// Offices along corridors: a ping beside ray casts, and growth with the number of walls.
@@ -120,40 +121,43 @@ fn building_plans() {
         let walls = offices(count);
         let middle = 0.5 * walls.iter().map(|wall| wall.1).fold(DVec2::ZERO, DVec2::max);
         let poses = standing_places(middle, 16);
-        let rays = median(|| {
+        let rays = time(|| {
             let mesh = polyline(&walls);
             drop(black_box(mesh));
         });
         let mesh = polyline(&walls);
-        let cast = median(|| {
+        let cast = time(|| {
             for at in &poses {
                 black_box(fifteen_casts(&mesh, *at));
             }
-        }) / poses.len() as u32;
+        })
+        .each_of(poses.len());
         let scene = Arc::new(plan_scene(walls));
         println!("\nbuilding plan, {} walls", scene.walls.len());
         report("parry: build", rays, None);
         report(
             "paths: build",
-            median(|| drop(black_box(simulator(scene.clone(), Options::default())))),
+            time(|| drop(black_box(simulator(scene.clone(), Options::default())))),
             None,
         );
         let model = simulator(scene.clone(), Options::default());
-        let scan = median(|| {
+        let scan = time(|| {
             for at in &poses {
                 let pose = Pose { x_m: at.x, y_m: at.y, heading_deg: 0.0 };
                 black_box(model.predict(&pose, &FULL_SCAN));
             }
-        }) / poses.len() as u32;
-        let survey = median(|| {
+        })
+        .each_of(poses.len());
+        let survey = time(|| {
             for at in &poses {
                 black_box(model.station(*at));
             }
-        }) / poses.len() as u32;
+        })
+        .each_of(poses.len());
         report("paths: survey of a pose", survey, None);
         report("paths: scan of 400 azimuths", scan, None);
-        report("paths: a ping's share of it", scan / 400, None);
-        report("parry: 15 ray casts", cast, Some(scan / 400));
+        report("paths: a ping's share of it", scan.each_of(400), None);
+        report("parry: 15 ray casts", cast, Some(scan.each_of(400)));
         let station = model.station(poses[0]);
         let heard: usize =
             (0..400).map(|i| station.arrivals(f64::from(i) * TAU / 400.0).len()).sum();
@@ -232,8 +236,21 @@ fn plan_scene(walls: Vec<(DVec2, DVec2)>) -> Scene {
     scene
 }
 
-/// Median time of a run, over at least 9 runs and half a second.
-fn median(mut run: impl FnMut()) -> Duration {
+/// Median time of a run, over at least 9 runs and half a second, and the shortest: what it takes
+/// when nothing else is at work.
+#[derive(Clone, Copy)]
+struct Time {
+    median: Duration,
+    best: Duration,
+}
+
+impl Time {
+    fn each_of(self, count: usize) -> Self {
+        Self { median: self.median / count as u32, best: self.best / count as u32 }
+    }
+}
+
+fn time(mut run: impl FnMut()) -> Time {
     run();
     let mut times = Vec::new();
     let start = Instant::now();
@@ -243,16 +260,14 @@ fn median(mut run: impl FnMut()) -> Duration {
         times.push(before.elapsed());
     }
     times.sort();
-    times[times.len() / 2]
+    Time { median: times[times.len() / 2], best: times[0] }
 }
 
-fn report(what: &str, time: Duration, beside: Option<Duration>) {
-    let micros = time.as_secs_f64() * 1e6;
+fn report(what: &str, time: Time, beside: Option<Time>) {
+    let micros = |time: Duration| time.as_secs_f64() * 1e6;
+    print!("  {what:48} {:12.1} us {:12.1} us", micros(time.median), micros(time.best));
     match beside {
-        Some(other) => {
-            let ratio = time.as_secs_f64() / other.as_secs_f64();
-            println!("  {what:48} {micros:12.1} us  {ratio:10.2} times");
-        }
-        None => println!("  {what:48} {micros:12.1} us"),
+        Some(other) => println!(" {:10.2} times", micros(time.best) / micros(other.best)),
+        None => println!(),
     }
 }

@@ -51,6 +51,8 @@ struct Bending<'a> {
 #[derive(Clone, Copy)]
 struct Arm<'a> {
     ray: &'a Ray,
+    /// Its place in [`Tree::to_edges`].
+    number: u32,
     length_m: f64,
     sector: usize,
     /// Direction from the edge towards the source, from the sector's first wall, radians.
@@ -98,22 +100,33 @@ impl Edges {
             p.cmp(q).then(r.run.length_squared().total_cmp(&s.run.length_squared()))
         });
         let mut echoes = Vec::new();
+        let mut first = 0;
         for rays in tree.to_edges.chunk_by(|a, b| a.0 == b.0) {
             let point = rays[0].0;
             if let Some(Some(corner)) = self.points.get(point as usize) {
-                corner.echoes(point, rays, &Bending { law, settings }, &mut echoes);
+                corner.echoes(point, first, rays, &Bending { law, settings }, &mut echoes);
             }
+            first += rays.len() as u32;
         }
         echoes
     }
 }
 
 impl Corner {
-    fn echoes(&self, point: u32, rays: &[(u32, Ray)], bending: &Bending, echoes: &mut Vec<Echo>) {
-        let mut legs: Vec<Arm> = rays.iter().filter_map(|(_, ray)| self.leg(ray)).collect();
-        drop_repeats(&mut legs, |leg| leg.length_m, Arm::is_same);
-        for (i, out) in legs.iter().enumerate() {
-            for (j, back) in legs.iter().enumerate().skip(i) {
+    /// Of the rays to this point, the first of which is number `first` in the tree.
+    fn echoes(
+        &self,
+        point: u32,
+        first: u32,
+        rays: &[(u32, Ray)],
+        bending: &Bending,
+        echoes: &mut Vec<Echo>,
+    ) {
+        let mut arms: Vec<Arm> =
+            (first..).zip(rays).filter_map(|(number, (_, ray))| self.arm(ray, number)).collect();
+        drop_repeats(&mut arms, |leg| leg.length_m, Arm::is_same);
+        for (i, out) in arms.iter().enumerate() {
+            for (j, back) in arms.iter().enumerate().skip(i) {
                 let length_m = out.length_m + back.length_m;
                 if length_m > bending.settings.max_path_m {
                     break;
@@ -125,7 +138,7 @@ impl Corner {
                     phase_rad: field.arg(),
                     departure: out.ray.departure,
                     arrival: back.ray.departure,
-                    via: Via::Edge { point, out: out.ray.into(), back: back.ray.into() },
+                    via: Via::Edge { point, out: out.number, back: back.number },
                 };
                 if i != j {
                     echoes.push(echo.reversed());
@@ -135,7 +148,7 @@ impl Corner {
         }
     }
 
-    fn leg<'a>(&self, ray: &'a Ray) -> Option<Arm<'a>> {
+    fn arm<'a>(&self, ray: &'a Ray, number: u32) -> Option<Arm<'a>> {
         let direction = (-ray.run).to_angle();
         let last = self.sectors.len() - 1;
         let sector = self.sectors.iter().rposition(|s| s.from_rad <= direction).unwrap_or(last);
@@ -144,6 +157,7 @@ impl Corner {
         let in_air = from_rad > GRAZING_RAD && from_rad < opening_rad - GRAZING_RAD;
         (in_air && self.sectors[sector].answers).then(|| Arm {
             ray,
+            number,
             length_m: ray.run.length(),
             sector,
             from_rad,
@@ -152,7 +166,7 @@ impl Corner {
 }
 
 impl Bending<'_> {
-    /// Relative field of the echo out and back on two legs, `None` below the floor.
+    /// Relative field of the echo out and back on two arms, `None` below the floor.
     fn field(&self, corner: &Corner, out: &Arm, back: &Arm) -> Option<Complex64> {
         let Self { law, settings } = self;
         if out.sector != back.sector || !settings.allows(out.ray.order + back.ray.order) {
@@ -180,7 +194,7 @@ impl Bending<'_> {
 }
 
 impl Arm<'_> {
-    /// Whether two legs are one that touches a corner on its way and was found on both sides.
+    /// Whether two arms are one that touches a corner on its way and was found on both sides.
     fn is_same(&self, other: &Self) -> bool {
         self.ray.departure.distance_squared(other.ray.departure) < SAME_RAD * SAME_RAD
     }

@@ -213,7 +213,7 @@ impl Paths {
                 phase_rad: 0.0,
                 departure: ray.departure,
                 arrival: -ray.run.normalize_or_zero(),
-                via: Via::Walls(ray.into()),
+                via: Via::Walls { node: ray.node },
             })
             .filter(|echo| echo.amplitude >= self.settings.floor)
             .collect();
@@ -224,32 +224,31 @@ impl Paths {
             echoes.extend(self.rounds.echoes(&mut tree, mesh, &self.settings));
             echoes.retain(|echo| !self.is_hidden(&tree, echo, position));
         }
-        echoes.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
-        drop_repeats(&mut echoes, |echo| echo.length_m, Echo::is_same);
-        (tree, echoes)
+        (tree, sorted(&echoes))
     }
 
     /// Whether a cylinder stands in an echo's way.
     fn is_hidden(&self, tree: &Tree, echo: &Echo, position: DVec2) -> bool {
-        let hides = |leg: &Leg, end| self.hides_leg(tree, leg, position, end);
-        match &echo.via {
-            Via::Walls(leg) => hides(leg, position),
-            Via::Edge { point, out, back } => self
-                .edges
-                .place(*point)
-                .is_some_and(|place| hides(out, place) || hides(back, place)),
-            Via::Cylinder { hit, out, back, .. } => hides(out, *hit) || hides(back, *hit),
+        let hides = |leg: Leg, end| self.hides_leg(tree, leg, position, end);
+        match tree.legs(echo) {
+            (out, None) => hides(out, position),
+            (out, Some(back)) => {
+                let end = match echo.via {
+                    Via::Edge { point, .. } => self.edges.place(point),
+                    Via::Cylinder { bounce, .. } => Some(tree.bounces[bounce as usize].hit),
+                    Via::Walls { .. } => None,
+                };
+                end.is_some_and(|end| hides(out, end) || hides(back, end))
+            }
         }
     }
 
     /// Whether a cylinder stands in the way from `start` along a leg to `end`.
-    fn hides_leg(&self, tree: &Tree, leg: &Leg, start: DVec2, end: DVec2) -> bool {
+    fn hides_leg(&self, tree: &Tree, leg: Leg, start: DVec2, end: DVec2) -> bool {
         let (mut to, mut run) = (end, leg.run);
         for wall in tree.walls_back(&self.faces, leg) {
-            // Back to the wall; the image behind it is as far as the run is long.
             let mirror = &self.faces[wall as usize].mirror;
-            let back = mirror.height_m(to) / mirror.normal.dot(run);
-            let hit = to - back * run;
+            let hit = to - mirror.height_m(to) / mirror.normal.dot(run) * run;
             if self.rounds.hide(hit, to) {
                 return true;
             }
@@ -265,32 +264,25 @@ impl Paths {
             phase_rad: echo.phase_rad,
             departure_rad: echo.departure.to_angle(),
             arrival_rad: echo.arrival.to_angle(),
-            path: self.way(tree, &echo.via),
+            path: self.way(tree, echo),
         }
     }
 
     /// The reflectors of an echo, in order.
-    fn way(&self, tree: &Tree, via: &Via) -> Path {
-        let back = |leg| tree.walls_back(&self.faces, leg).map(Reflector::Wall);
-        let there = |leg| {
-            let mut walls: SmallVec<[Reflector; 4]> = back(leg).collect();
-            walls.reverse();
-            walls
-        };
-        let (kind, walls, edge) = match via {
-            Via::Walls(leg) => (PathKind::Specular, there(leg), None),
-            Via::Edge { point, out, back: home } => {
-                let mut walls = there(out);
-                walls.extend(back(home));
-                (PathKind::Diffracted, walls, self.edges.edge(*point))
-            }
-            Via::Cylinder { cylinder, out, back: home, .. } => {
-                let mut walls = there(out);
-                walls.push(Reflector::Cylinder(*cylinder));
-                walls.extend(back(home));
-                (PathKind::Specular, walls, None)
+    fn way(&self, tree: &Tree, echo: &Echo) -> Path {
+        let back_to = |leg| tree.walls_back(&self.faces, leg).map(Reflector::Wall);
+        let (out, back) = tree.legs(echo);
+        let mut walls: SmallVec<[Reflector; 4]> = back_to(out).collect();
+        walls.reverse();
+        let (kind, edge) = match echo.via {
+            Via::Walls { .. } => (PathKind::Specular, None),
+            Via::Edge { point, .. } => (PathKind::Diffracted, self.edges.edge(point)),
+            Via::Cylinder { bounce, .. } => {
+                walls.push(Reflector::Cylinder(tree.bounces[bounce as usize].cylinder));
+                (PathKind::Specular, None)
             }
         };
+        walls.extend(back.into_iter().flat_map(back_to));
         Path { kind, walls, edge }
     }
 }
@@ -314,15 +306,25 @@ struct Echo {
     via: Via,
 }
 
-/// The way of an echo. `out` and `back` both lead away from the start.
+/// The way of an echo; see [`Tree::legs`].
 #[derive(Debug, Clone, Copy)]
 enum Via {
-    Walls(Leg),
-    Edge { point: u32, out: Leg, back: Leg },
-    Cylinder { cylinder: u32, hit: DVec2, out: Leg, back: Leg },
+    Walls {
+        node: u32,
+    },
+    /// `out` and `back` are rays to the edge.
+    Edge {
+        point: u32,
+        out: u32,
+        back: u32,
+    },
+    Cylinder {
+        bounce: u32,
+        backwards: bool,
+    },
 }
 
-/// A ray by what its walls follow from.
+/// A ray from the start by what its walls follow from.
 #[derive(Debug, Clone, Copy)]
 struct Leg {
     node: u32,
@@ -339,11 +341,9 @@ impl Echo {
     /// The same way run through backwards.
     fn reversed(&self) -> Self {
         let via = match self.via {
-            Via::Walls(_) => self.via,
+            Via::Walls { .. } => self.via,
             Via::Edge { point, out, back } => Via::Edge { point, out: back, back: out },
-            Via::Cylinder { cylinder, hit, out, back } => {
-                Via::Cylinder { cylinder, hit, out: back, back: out }
-            }
+            Via::Cylinder { bounce, backwards } => Via::Cylinder { bounce, backwards: !backwards },
         };
         Self { departure: self.arrival, arrival: self.departure, via, ..*self }
     }
@@ -354,6 +354,17 @@ impl Echo {
             && self.arrival.distance_squared(other.arrival) < SAME_RAD * SAME_RAD
             && std::mem::discriminant(&self.via) == std::mem::discriminant(&other.via)
     }
+}
+
+/// Echoes by length, each once.
+fn sorted(echoes: &[Echo]) -> Vec<Echo> {
+    // Lengths are positive, so their bits sort like the numbers; places make it stable.
+    let mut order: Vec<(u64, u32)> =
+        echoes.iter().zip(0..).map(|(echo, place)| (echo.length_m.to_bits(), place)).collect();
+    order.sort_unstable();
+    let mut sorted: Vec<Echo> = order.iter().map(|&(_, place)| echoes[place as usize]).collect();
+    drop_repeats(&mut sorted, |echo| echo.length_m, Echo::is_same);
+    sorted
 }
 
 /// Keeps the first of items that are the same and within [`SAME_M`] in length. Sorted by length.

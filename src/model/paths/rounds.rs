@@ -6,7 +6,7 @@ use super::{
     Echo, Settings, Via,
     beam::{Ray, TIE_M},
     mesh::Mesh,
-    trace::{Tree, View},
+    trace::{Bounce, Tree, View},
 };
 use crate::{geometry::DVec2, scene::Cylinder};
 
@@ -68,19 +68,29 @@ impl Rounds {
         for views in tree.to_cylinders.chunk_by(|a, b| place(a) == place(b)) {
             for (i, out) in views.iter().enumerate() {
                 for (j, back) in views.iter().enumerate().skip(i) {
-                    if let Some(echo) = self.echo(out, back, mesh, settings) {
-                        if i != j {
-                            echoes.push(echo.reversed());
-                        }
-                        echoes.push(echo);
+                    let Some((mut echo, bounce)) = self.echo(out, back, mesh, settings) else {
+                        continue;
+                    };
+                    let number = tree.bounces.len() as u32;
+                    tree.bounces.push(bounce);
+                    echo.via = Via::Cylinder { bounce: number, backwards: false };
+                    if i != j {
+                        echoes.push(echo.reversed());
                     }
+                    echoes.push(echo);
                 }
             }
         }
         echoes
     }
 
-    fn echo(&self, out: &View, back: &View, mesh: &Mesh, settings: &Settings) -> Option<Echo> {
+    fn echo(
+        &self,
+        out: &View,
+        back: &View,
+        mesh: &Mesh,
+        settings: &Settings,
+    ) -> Option<(Echo, Bounce)> {
         let circle = &self.circles[out.cylinder as usize];
         let gain = out.beam.gain * back.beam.gain * circle.gain;
         if gain < settings.floor || !settings.allows(out.beam.order + back.beam.order + 1) {
@@ -97,19 +107,17 @@ impl Rounds {
         let cosine = -(hit - circle.center).dot(there.run) / (circle.radius_m * s);
         let spread = length_m + 2.0 * s * t / (circle.radius_m * cosine);
         let amplitude = gain * settings.air_gain(length_m) * (length_m / spread).sqrt();
-        (amplitude >= settings.floor).then_some(Echo {
+        let echo = Echo {
             length_m,
             amplitude,
             phase_rad: 0.0,
             departure: there.departure,
             arrival: here.departure,
-            via: Via::Cylinder {
-                cylinder: out.cylinder,
-                hit,
-                out: (&there).into(),
-                back: (&here).into(),
-            },
-        })
+            via: Via::Cylinder { bounce: 0, backwards: false },
+        };
+        let (out_leg, back_leg) = ((&there).into(), (&here).into());
+        let bounce = Bounce { cylinder: out.cylinder, hit, out: out_leg, back: back_leg };
+        (amplitude >= settings.floor).then_some((echo, bounce))
     }
 }
 

@@ -1,7 +1,7 @@
 //! The tree of beams from one place.
 
 use super::{
-    Face, Leg, Paths,
+    Echo, Face, Leg, Paths, Via,
     beam::{Beam, Ray, TIE_M, reaches, reaches_well},
     mesh::{Mesh, Side},
 };
@@ -23,6 +23,8 @@ pub(super) struct Tree {
     pub(super) to_edges: Vec<(u32, Ray)>,
     /// Beams that meet a cylinder.
     pub(super) to_cylinders: Vec<View>,
+    /// Reflections at cylinders.
+    pub(super) bounces: Vec<Bounce>,
 }
 
 /// Where beams have been.
@@ -41,6 +43,15 @@ pub(super) struct View {
     pub(super) beam: Beam,
 }
 
+/// A reflection at a cylinder, between two rays from the start.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bounce {
+    pub(super) cylinder: u32,
+    pub(super) hit: DVec2,
+    pub(super) out: Leg,
+    pub(super) back: Leg,
+}
+
 impl Tree {
     /// All beams from `start` that can still give an echo.
     pub(super) fn grow(paths: &Paths, start: DVec2) -> Self {
@@ -55,11 +66,25 @@ impl Tree {
         grower.tree
     }
 
+    /// The rays that an echo consists of, both seen from the start: out to where it turns back
+    /// and home from there, or the one ray of walls alone.
+    pub(super) fn legs(&self, echo: &Echo) -> (Leg, Option<Leg>) {
+        let to_edge = |ray: u32| Leg::from(&self.to_edges[ray as usize].1);
+        match echo.via {
+            Via::Walls { node } => (Leg { node, run: -echo.arrival }, None),
+            Via::Edge { out, back, .. } => (to_edge(out), Some(to_edge(back))),
+            Via::Cylinder { bounce, backwards } => {
+                let Bounce { out, back, .. } = self.bounces[bounce as usize];
+                if backwards { (back, Some(out)) } else { (out, Some(back)) }
+            }
+        }
+    }
+
     /// The walls that a ray met, last one first.
     pub(super) fn walls_back<'a>(
         &'a self,
         faces: &'a [Face],
-        leg: &Leg,
+        leg: Leg,
     ) -> impl Iterator<Item = u32> + 'a {
         let (mut at, mut run) = (leg.node, leg.run);
         std::iter::from_fn(move || {
