@@ -6,7 +6,8 @@ use super::{
     Failure, Outcome,
     mock_world::{Belief, MockWorldArgs},
     options::{AirArgs, EngineArgs, SensorArgs},
-    runtime, scene_file,
+    place::PlaceArgs,
+    runtime,
 };
 use crate::mock::{MockPort, Note};
 
@@ -17,12 +18,8 @@ const FIRINGS_A_LINE: u64 = 100;
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
-    /// Scene file, or the name of a shipped scene (`sonard scene list`)
-    #[arg(long, value_name = "SCENE")]
-    scene: String,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
-    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
-    pose: String,
+    #[command(flatten)]
+    place: PlaceArgs,
     /// Make this symbolic link to the pty
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
@@ -53,8 +50,8 @@ Examples:
       --faults flip=0.001,drop=0.001,double=0.001,reset=0.005";
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let scene = Arc::new(scene_file::load(&args.scene)?);
-    let pose = scene_file::pose(&scene, &args.pose)?;
+    let (scene, pose) = args.place.load()?;
+    let scene = Arc::new(scene);
     let (sensor, air, options) = (args.sensor.sensor()?, args.air.air()?, args.engine.options()?);
     let belief =
         Belief { scene: &scene, pose: &pose, sensor: &sensor, air: &air, options: &options };

@@ -7,6 +7,7 @@ mod mock;
 mod mock_world;
 mod options;
 mod paths;
+mod place;
 mod plot;
 mod runtime;
 mod scan;

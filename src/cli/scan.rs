@@ -13,13 +13,14 @@ use super::{
     Failure, Outcome,
     mock_world::MockWorldArgs,
     options::{AirArgs, EngineArgs, SensorArgs},
+    place::{AzimuthArgs, PlaceArgs},
     runtime,
 };
 use crate::{
     link::{self, BAUD},
     mock::{MockBoard, MockPort},
     ranger::{DriveError, Driver, Ranger, ScanError, ScanSummary},
-    scan::{Record, ScanPlan},
+    scan::Record,
 };
 use output::Output;
 use setup::Setup;
@@ -35,12 +36,8 @@ pub(super) struct Args {
     /// Use a mock ranger instead of a real one
     #[arg(long)]
     mock: bool,
-    /// Scene file, or the name of a shipped scene (`sonard scene list`)
-    #[arg(long, value_name = "SCENE")]
-    scene: String,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
-    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
-    pose: String,
+    #[command(flatten)]
+    place: PlaceArgs,
     /// Write scan.jsonl, scan.svg and scan.png to this folder instead of records to standard output
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -48,7 +45,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     repeat: u32,
     #[command(flatten)]
-    plan: PlanArgs,
+    azimuths: AzimuthArgs,
+    /// Firings at each stop
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pings_per_stop: u32,
     #[command(flatten)]
     motion: MotionArgs,
     #[command(flatten)]
@@ -59,23 +59,6 @@ pub(super) struct Args {
     engine: EngineArgs,
     #[command(flatten)]
     world: MockWorldArgs,
-}
-
-/// Which azimuths to scan.
-#[derive(Debug, Clone, Copy, clap::Args)]
-struct PlanArgs {
-    /// First azimuth, degrees counter-clockwise from the heading
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
-    from_deg: f64,
-    /// End of the azimuths, degrees; not itself measured
-    #[arg(long, value_name = "DEG", default_value_t = 360.0, allow_negative_numbers = true)]
-    to_deg: f64,
-    /// From stop to stop, degrees; a multiple of the motor's step
-    #[arg(long, value_name = "DEG", default_value_t = 0.9)]
-    step_deg: f64,
-    /// Firings at each stop
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pings_per_stop: u32,
 }
 
 /// How the motor turns and the ranger listens.
@@ -118,17 +101,6 @@ Examples:
 
 Exit codes: 0 every beam measured, 1 stopped on request or beams are missing, 2 wrong usage or \
 input, 3 device or link.";
-
-impl PlanArgs {
-    const fn plan(&self) -> ScanPlan {
-        ScanPlan {
-            from_deg: self.from_deg,
-            to_deg: self.to_deg,
-            step_deg: self.step_deg,
-            pings_per_stop: self.pings_per_stop,
-        }
-    }
-}
 
 pub(super) fn run(args: &Args) -> Outcome {
     let setup = Setup::new(args)?;

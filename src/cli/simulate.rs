@@ -15,7 +15,7 @@ use uuid::Uuid;
 use super::{
     Failure, Outcome,
     options::{AirArgs, EngineArgs, SensorArgs},
-    scene_file,
+    place::{AzimuthArgs, PlaceArgs},
 };
 use crate::{
     geometry::Pose,
@@ -31,21 +31,10 @@ const STEPS_PER_REVOLUTION: u32 = 400;
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
-    /// Scene file, or the name of a shipped scene (`sonard scene list`)
-    #[arg(long, value_name = "SCENE")]
-    scene: String,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
-    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
-    pose: String,
-    /// First azimuth, degrees counter-clockwise from the heading
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
-    from_deg: f64,
-    /// End of the azimuths, degrees; not itself fired at
-    #[arg(long, value_name = "DEG", default_value_t = 360.0, allow_negative_numbers = true)]
-    to_deg: f64,
-    /// From stop to stop, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 0.9)]
-    step_deg: f64,
+    #[command(flatten)]
+    place: PlaceArgs,
+    #[command(flatten)]
+    azimuths: AzimuthArgs,
     /// Write the records to this file instead of standard output
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -74,15 +63,8 @@ Examples:
 Exit codes: 0 done, 2 wrong usage or input, 3 a disk that gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let scene = scene_file::load(&args.scene)?;
-    let pose = scene_file::pose(&scene, &args.pose)?;
-    let plan = ScanPlan {
-        from_deg: args.from_deg,
-        to_deg: args.to_deg,
-        step_deg: args.step_deg,
-        pings_per_stop: 1,
-    };
-    plan.check().map_err(|error| Failure::input(error, "see `sonard simulate --help`"))?;
+    let (scene, pose) = args.place.load()?;
+    let plan = args.azimuths.plan(1)?;
     let simulator = simulator(args, &scene, &pose)?;
     let (what, mut out) = open(args.out.as_deref())?;
     write(&mut out, &simulator, &pose, &plan).or_else(|error| Failure::from_write(&what, &error))

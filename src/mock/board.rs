@@ -9,8 +9,8 @@ use firmware_protocol::{
 };
 
 use super::{
-    faults::{DeviceFault, FaultPlan, Faults},
-    identity::{identity, with_version},
+    faults::{DeviceFault, Faults},
+    identity::{BoardSettings, Pace, identity, with_version},
     note::Note,
     world::World,
 };
@@ -19,32 +19,6 @@ use crate::motion::Trapezoid;
 const TICK_HZ: u32 = limits::TICK_HZ;
 /// Time from the machine's wish to fire until INIT rises, ticks: the compare unit's lead.
 const FIRE_LEAD_TICKS: u64 = 32;
-
-/// What the mock claims to be.
-#[derive(Debug, Clone, Copy)]
-pub struct BoardSettings {
-    /// Boot nonce of the first boot.
-    pub boot: u16,
-    /// Device clock at the first boot, ticks.
-    pub clock: u32,
-    /// Steps a revolution.
-    pub steps_per_revolution: u16,
-    /// What goes wrong.
-    pub faults: FaultPlan,
-    /// Seed of the faults.
-    pub seed: u64,
-    /// How its clock passes; a virtual one is announced to the host.
-    pub pace: Pace,
-}
-
-/// How device time passes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pace {
-    /// As on a wall clock.
-    RealTime,
-    /// Jumps to whatever happens next; only the host's patience is measured in real time.
-    Virtual,
-}
 
 /// Why the board wants to be woken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,7 +6,33 @@ use firmware_protocol::{
     messages::{Capabilities, FirmwareVersion, ProtocolId, Reply, ResetCause},
 };
 
-use super::board::{BoardSettings, Pace};
+use super::faults::FaultPlan;
+
+/// What the mock claims to be.
+#[derive(Debug, Clone, Copy)]
+pub struct BoardSettings {
+    /// Boot nonce of the first boot.
+    pub boot: u16,
+    /// Device clock at the first boot, ticks.
+    pub clock: u32,
+    /// Steps a revolution.
+    pub steps_per_revolution: u16,
+    /// What goes wrong.
+    pub faults: FaultPlan,
+    /// Seed of the faults.
+    pub seed: u64,
+    /// How its clock passes; a virtual one is announced to the host.
+    pub pace: Pace,
+}
+
+/// How device time passes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pace {
+    /// As on a wall clock.
+    RealTime,
+    /// Jumps to whatever happens next; only the host's patience is measured in real time.
+    Virtual,
+}
 
 /// The board as it introduces itself: never as hardware.
 pub(super) fn identity(settings: &BoardSettings, boot: u16, reset_cause: ResetCause) -> Board {

@@ -14,8 +14,9 @@ mod serve;
 mod tests;
 mod world;
 
-pub use board::{BoardSettings, MockBoard, Pace, Wake, WakeKind};
+pub use board::{MockBoard, Wake, WakeKind};
 pub use faults::{DeviceFault, FAULT_HELP, FaultPlan, FaultSpecError, Faults};
+pub use identity::{BoardSettings, Pace};
 pub use noise::Noise;
 pub use note::Note;
 pub use pty::Pty;

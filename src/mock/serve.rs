@@ -13,7 +13,8 @@ use tokio::{
 };
 
 use super::{
-    board::{MockBoard, Pace, WakeKind},
+    board::{MockBoard, WakeKind},
+    identity::Pace,
     note::Note,
     pty::Pty,
 };

@@ -11,7 +11,7 @@ use uuid::Uuid;
 use super::{
     clock::{ClockFit, TickExtender},
     driver::DriveError,
-    scanner::ScanJob,
+    job::ScanJob,
 };
 use crate::{
     acoustics::classify_tof,
