@@ -64,7 +64,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             )
         })?;
         anstream::println!("listening on {} (interrupt to stop)", port.path().display());
-        let played = port.run(runtime::interrupted(), |note| print(&note)).await;
+        let played = port.run(runtime::Interrupts::listen().wait(), |note| print(&note)).await;
         anstream::println!("stopped");
         played.map_err(|error| {
             Failure::device(format!("the pty failed: {error}"), "start the mock again")

@@ -8,13 +8,14 @@ use std::path::PathBuf;
 
 use firmware_protocol::host::HostConfig;
 use tokio::sync::oneshot;
+use tokio_serial::SerialStream;
 
 use super::{
     Failure, Outcome,
     mock_world::MockWorldArgs,
     options::{AirArgs, EngineArgs, SensorArgs},
     place::{AzimuthArgs, PlaceArgs},
-    runtime,
+    runtime::{self, Interrupts},
 };
 use crate::{
     link::{self, BAUD},
@@ -24,6 +25,10 @@ use crate::{
 };
 use output::Output;
 use setup::Setup;
+
+/// How often a request is sent before the device counts as gone: some nine seconds, in which a
+/// board that the opening of its port has reset is long awake.
+const ATTEMPTS: u8 = 7;
 
 /// Options of `sonard scan`.
 #[derive(Debug, clap::Args)]
@@ -114,28 +119,26 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 /// Opens the port, meets the device, and takes the scans.
 async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
+    let interrupts = Interrupts::listen();
     let mock = match args.mock {
         true => Some(start_mock(args.world.board(&setup.belief())?)?),
         false => None,
     };
     let port = mock.as_ref().map_or_else(|| args.port.clone().unwrap_or_default(), Mock::port);
-    let line = link::open(&port).map_err(|error| Failure::device(&error, error.help()))?;
-    let seed = rand::random();
-    let driver = Driver::new(line, HostConfig { max_attempts: 7, ..HostConfig::new(BAUD, seed) });
-    let mut ranger = Ranger::meet(driver).await.map_err(|error| device_failure(&error))?;
+    let mut ranger = meet(&port, &interrupts).await?;
     let job = setup.job(ranger.identity())?;
     output.record(&Record::Session(Box::new(setup.session(ranger.identity()))))?;
     let mut missing = 0;
     for turn in 1..=args.repeat {
         output.begin_scan(turn, args.repeat, job.plan.beams());
-        let summary = ranger.scan(&job, output, runtime::interrupted()).await.map_err(scan_failure);
+        let summary = ranger.scan(&job, output, interrupts.clone().wait()).await;
         output.end_scan();
-        let summary = summary?;
+        let summary = summary.map_err(scan_failure)?;
         summary::print(setup, &summary, ranger.identity(), ranger.link_stats(), output);
-        missing += summary.end.missing;
-        if summary.stopped {
+        if interrupts.happened() {
             return Err(stopped(&summary));
         }
+        missing += summary.end.missing;
     }
     if let Some(mock) = mock {
         mock.stop().await;
@@ -144,6 +147,17 @@ async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
         return Err(Failure::Found(Some(format!("{missing} beams are missing"))));
     }
     Ok(())
+}
+
+async fn meet(port: &str, interrupts: &Interrupts) -> Result<Ranger<SerialStream>, Failure> {
+    let line = link::open(port).map_err(|error| Failure::device(&error, error.help()))?;
+    let config = HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, rand::random()) };
+    tokio::select! {
+        met = Ranger::meet(Driver::new(line, config)) => met.map_err(|error| device_failure(&error)),
+        () = interrupts.clone().wait() => {
+            Err(Failure::Found(Some("stopped before the device answered".into())))
+        }
+    }
 }
 
 /// A mock playing beside the scan.
