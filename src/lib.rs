@@ -16,6 +16,7 @@ pub mod acoustics;
 pub mod compare;
 pub mod geometry;
 pub mod model;
+pub mod motion;
 #[cfg(feature = "plot")]
 pub mod plot;
 pub mod scan;
@@ -29,5 +30,5 @@ pub mod link;
 pub mod mock;
 #[cfg(feature = "daemon")]
 pub mod ranger;
-#[cfg(feature = "daemon")]
+#[cfg(feature = "store")]
 pub mod store;

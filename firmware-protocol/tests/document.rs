@@ -7,9 +7,9 @@ use firmware_protocol::device::DeviceTimer;
 use firmware_protocol::frame::{Frame, Header};
 use firmware_protocol::host::HostTimer;
 use firmware_protocol::messages::{
-    Alive, Blanking, DeviceState, FaultKind, Field, FirmwareVersion, Identity, NakReason,
-    PROTOCOL_VERSION, ProtocolId, Reading, ReadingStatus, Reply, Request, ResetCause, SCHEMA_HASH,
-    Settings, Status, Sweep, SweepDone, SweepState, Variant, limits,
+    Alive, Blanking, Capabilities, DeviceState, FaultKind, Field, FirmwareVersion, Identity,
+    NakReason, PROTOCOL_VERSION, ProtocolId, Reading, ReadingStatus, Reply, Request, ResetCause,
+    SCHEMA_HASH, Settings, Status, Sweep, SweepDone, SweepState, Variant, limits,
 };
 
 const DOCUMENT: &str = include_str!("../PROTOCOL.md");
@@ -89,6 +89,16 @@ fn records_are_as_documented() {
             fields.iter().map(|field| format!("{}: {}", field.name, field.kind)).collect();
         assert_eq!(documented, coded, "{title}");
     }
+}
+
+#[test]
+fn capabilities_are_as_documented() {
+    let documented: Vec<_> = table("### Capabilities")
+        .iter()
+        .map(|row| (row[0].parse::<u16>().expect("a number"), row[1]))
+        .collect();
+    let coded: Vec<_> = Capabilities::NAMES.iter().map(|(bit, name)| (bit.0, *name)).collect();
+    assert_eq!(documented, coded);
 }
 
 #[test]

@@ -23,20 +23,13 @@ struct Watched {
 fuzz_target!(|bytes: &[u8]| {
     let mut device = Device::new(Board {
         boot: BOOT,
-        firmware: FirmwareVersion {
-            major: 0,
-            minor: 1,
-            patch: 0,
-        },
+        firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
         serial: *b"FUZZED0001",
         steps_per_revolution: 400,
         capabilities: Capabilities(u16::MAX),
         reset_cause: ResetCause::Unknown,
     });
-    let mut watched = Watched {
-        now: u32::MAX - 1_000,
-        ..Watched::default()
-    };
+    let mut watched = Watched { now: u32::MAX - 1_000, ..Watched::default() };
     let mut line = FrameDecoder::new();
     for chunk in bytes.chunks(12) {
         if let Some((&what, rest)) = chunk.split_first() {
@@ -51,9 +44,7 @@ fuzz_target!(|bytes: &[u8]| {
 });
 
 fn disturb(device: &mut Device, watched: &mut Watched, what: u8, rest: &[u8]) {
-    let number = rest
-        .iter()
-        .fold(0_u32, |sum, &byte| sum << 8 | u32::from(byte));
+    let number = rest.iter().fold(0_u32, |sum, &byte| sum << 8 | u32::from(byte));
     let now = watched.now;
     match what & 0x0f {
         0..=4 => send(device, watched, rest),
@@ -78,14 +69,7 @@ fn disturb(device: &mut Device, watched: &mut Watched, what: u8, rest: &[u8]) {
             watched.listening = false;
             let echoes = Echoes::from_ticks(&[number; 8][..usize::from(what >> 5)]);
             let status = ReadingStatus::Echo;
-            device.handle_echoes(
-                now,
-                &EchoReport {
-                    fired_ticks: now,
-                    status,
-                    echoes,
-                },
-            );
+            device.handle_echoes(now, &EchoReport { fired_ticks: now, status, echoes });
         }
         13 => device.handle_emergency_stop(now),
         14 => device.handle_motion_fault(now),
@@ -99,10 +83,7 @@ fn send(device: &mut Device, watched: &mut Watched, body: &[u8]) {
         return;
     };
     watched.seq = watched.seq.wrapping_add(u16::from(body.len() % 3 != 0));
-    let header = Header {
-        boot: BOOT,
-        seq: watched.seq,
-    };
+    let header = Header { boot: BOOT, seq: watched.seq };
     let frame = Frame::encode(header, &request).expect("every request fits");
     device.handle_bytes(watched.now, &frame);
 }

@@ -50,9 +50,7 @@ fn disturb(line: &mut Line, what: u8, rest: &[u8]) {
         4 => line.host.handle_bytes(line.now_us, rest),
         5 => {
             // Up to an hour.
-            let ahead = rest
-                .iter()
-                .fold(0_u64, |sum, &byte| sum << 3 ^ u64::from(byte));
+            let ahead = rest.iter().fold(0_u64, |sum, &byte| sum << 3 ^ u64::from(byte));
             line.now_us += ahead % 3_600_000_000;
             line.host.handle_timeout(line.now_us);
         }
@@ -82,9 +80,7 @@ fn reply(line: &mut Line, what: u8, rest: &[u8]) {
 
 /// The longest front of `bytes` that is a reply.
 fn decode_front(bytes: &[u8]) -> Option<Reply> {
-    (1..=bytes.len())
-        .rev()
-        .find_map(|len| Reply::decode(&bytes[..len]).ok())
+    (1..=bytes.len()).rev().find_map(|len| Reply::decode(&bytes[..len]).ok())
 }
 
 fn command(what: u8, rest: &[u8]) -> Command {
@@ -93,9 +89,7 @@ fn command(what: u8, rest: &[u8]) -> Command {
         0..=2 => Command::Identify,
         3..=5 => Command::Configure(SETTINGS),
         6 => Command::Home,
-        7 => Command::MoveTo {
-            step: i32::from(number),
-        },
+        7 => Command::MoveTo { step: i32::from(number) },
         8 => Command::Ping,
         9 => Command::Status,
         10 => Command::Stop,
@@ -124,10 +118,7 @@ fn poll(line: &mut Line) {
         if let HostEvent::Reading { reading, .. } = event
             && reading.sweep != 0
         {
-            assert!(
-                line.beams.insert((reading.sweep, reading.index)),
-                "delivered twice"
-            );
+            assert!(line.beams.insert((reading.sweep, reading.index)), "delivered twice");
         }
     }
 }

@@ -1,5 +1,6 @@
 //! `sonard compare`.
 
+mod predict;
 mod table;
 
 use std::{
@@ -9,14 +10,14 @@ use std::{
 
 use serde::Serialize;
 
-use super::{Failure, Outcome};
+use super::{Failure, Outcome, scene_file};
 use crate::{
     compare::{Comparison, compare},
     scan::{Provenance, ScanView},
     store::load,
 };
 
-pub(super) use table::path_text;
+pub(super) use table::{RULED, path_text};
 
 /// Options of `sonard compare`.
 #[derive(Debug, clap::Args)]
@@ -25,6 +26,10 @@ pub(super) struct Args {
     /// Logs to compare; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
+    /// Scene file or name of a shipped scene: predict again in it, with the log's sensor, air and
+    /// model, instead of taking the predictions in the log
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<String>,
     /// How many of the beams that fit worst to list
     #[arg(long, default_value_t = 5)]
     worst: usize,
@@ -40,11 +45,16 @@ edge), min_range (closer than can be measured, on both sides or with ranges that
 both sides), unexplained (all else). They add up to the beams compared; beams whose reading was \
 lost, whose step is in doubt or that have no prediction are counted under not_compared.
 
-Exit codes: 0 it ran, whatever the result, 2 a log can't be opened or holds no record.";
+Exit codes: 0 it ran, whatever the result, 2 a log can't be opened or \
+holds no record, or the scene is wrong.";
 
 pub(super) fn run(args: &Args) -> Outcome {
+    let scene = args.scene.as_deref().map(scene_file::load).transpose()?;
     for log in &args.logs {
-        let scans = scans_of(log)?;
+        let mut scans = scans_of(log)?;
+        if let Some(scene) = &scene {
+            predict::predict(log, &mut scans, scene)?;
+        }
         let (comparison, judged) = compare(&scans);
         let mut out = io::stdout().lock();
         let printed = if args.json {
@@ -101,8 +111,10 @@ fn hint(log: &Path, scans: &[ScanView], comparison: &Comparison) {
     } else if comparison.not_compared.no_prediction == 0 {
         anstream::eprintln!("{log}: no reading came through");
     } else if scans.iter().all(simulated) {
-        anstream::eprintln!("{log}: simulated readings have no prediction beside them");
+        anstream::eprintln!(
+            "{log}: simulated readings have no prediction beside them; --scene makes one"
+        );
     } else {
-        anstream::eprintln!("{log}: there are no predictions in it");
+        anstream::eprintln!("{log}: there are no predictions in it; --scene makes them");
     }
 }

@@ -6,7 +6,8 @@ use super::{
     Failure, Outcome,
     mock_world::{Belief, MockWorldArgs},
     options::{AirArgs, EngineArgs, SensorArgs},
-    runtime, scene_file,
+    place::PlaceArgs,
+    runtime,
 };
 use crate::mock::{MockPort, Note};
 
@@ -15,14 +16,10 @@ const FIRINGS_A_LINE: u64 = 100;
 
 /// Options of `sonard mock`.
 #[derive(Debug, clap::Args)]
-#[command(long_about = ABOUT, after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
-    /// Scene file, or the name of a shipped scene (`sonard scene list`)
-    #[arg(long, value_name = "SCENE")]
-    scene: String,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
-    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
-    pose: String,
+    #[command(flatten)]
+    place: PlaceArgs,
     /// Make this symbolic link to the pty
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
@@ -36,7 +33,7 @@ pub(super) struct Args {
     engine: EngineArgs,
 }
 
-const ABOUT: &str = "\
+pub(super) const ABOUT: &str = "\
 Play a ranger on a pty, with sound from the model.
 
 The device's own protocol code runs on a pseudo-terminal, in a world made of a scene and the \
@@ -53,8 +50,8 @@ Examples:
       --faults flip=0.001,drop=0.001,double=0.001,reset=0.005";
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let scene = Arc::new(scene_file::load(&args.scene)?);
-    let pose = scene_file::pose(&scene, &args.pose)?;
+    let (scene, pose) = args.place.load()?;
+    let scene = Arc::new(scene);
     let (sensor, air, options) = (args.sensor.sensor()?, args.air.air()?, args.engine.options()?);
     let belief =
         Belief { scene: &scene, pose: &pose, sensor: &sensor, air: &air, options: &options };
@@ -67,7 +64,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             )
         })?;
         anstream::println!("listening on {} (interrupt to stop)", port.path().display());
-        let played = port.run(runtime::interrupted(), |note| print(&note)).await;
+        let played = port.run(runtime::Interrupts::listen().wait(), |note| print(&note)).await;
         anstream::println!("stopped");
         played.map_err(|error| {
             Failure::device(format!("the pty failed: {error}"), "start the mock again")

@@ -7,6 +7,7 @@ mod mock;
 mod mock_world;
 mod options;
 mod paths;
+mod place;
 mod plot;
 mod runtime;
 mod scan;
@@ -34,16 +35,21 @@ const EXIT_CODES: &str = "Exit codes: 0 done, 1 ran and found a failure, 2 wrong
 #[derive(Debug, Subcommand)]
 enum Verb {
     /// Take one or more scans and log each reading beside the model's prediction
+    #[command(long_about = scan::ABOUT)]
     Scan(scan::Args),
     /// Play a ranger on a pty, with sound from the model
+    #[command(long_about = mock::ABOUT)]
     Mock(mock::Args),
     /// Predict a scan with the model alone
+    #[command(long_about = simulate::ABOUT)]
     Simulate(simulate::Args),
     /// List the ways that echoes take from a place
+    #[command(long_about = paths::ABOUT)]
     Paths(paths::Args),
     /// Compare a log's readings with the predictions beside them
     Compare(compare::Args),
     /// Draw scans: floor plan, polar, residuals
+    #[command(long_about = plot::ABOUT)]
     Plot(plot::Args),
     /// Check, repair or show a log
     #[command(subcommand)]

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::{
     Failure, Outcome,
     options::{AirArgs, EdgeLaw, SensorArgs},
-    scene_file,
+    place::PlaceArgs,
 };
 use crate::{
     geometry::wrap_360,
@@ -24,14 +24,10 @@ use crate::{
 
 /// Options of `sonard paths`.
 #[derive(Debug, clap::Args)]
-#[command(long_about = ABOUT, after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
-    /// Scene file, or the name of a shipped scene (`sonard scene list`)
-    #[arg(long, value_name = "SCENE")]
-    scene: String,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
-    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
-    pose: String,
+    #[command(flatten)]
+    place: PlaceArgs,
     /// Half the longest path, metres [default: the sensor's range]
     #[arg(long, value_name = "M")]
     max_range: Option<f64>,
@@ -56,7 +52,7 @@ pub(super) struct Args {
     air: AirArgs,
 }
 
-const ABOUT: &str = "\
+pub(super) const ABOUT: &str = "\
 List the ways that echoes take from a place, shortest first.
 
 All mirror reflections, and one diffraction with any reflections before and after. The amplitude \
@@ -93,8 +89,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             "give a number from 0.000001 to 1",
         ));
     }
-    let scene = scene_file::load(&args.scene)?;
-    let pose = scene_file::pose(&scene, &args.pose)?;
+    let (scene, pose) = args.place.load()?;
     let options = Options {
         max_range_m: args.max_range,
         max_order: args.max_order,

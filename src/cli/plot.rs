@@ -16,7 +16,7 @@ use crate::{
 
 /// Options of `sonard plot`.
 #[derive(Debug, clap::Args)]
-#[command(long_about = ABOUT, after_help = HELP)]
+#[command(after_help = HELP)]
 pub(super) struct Args {
     /// The log; - for standard input
     log: PathBuf,
@@ -49,7 +49,7 @@ enum Kind {
     Residuals,
 }
 
-const ABOUT: &str = "\
+pub(super) const ABOUT: &str = "\
 Draw the scans of a log as SVG or PNG.
 
 Filled marks are readings; shape and colour say what made them: a direct echo, multiple \

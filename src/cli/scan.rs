@@ -8,25 +8,31 @@ use std::path::PathBuf;
 
 use firmware_protocol::host::HostConfig;
 use tokio::sync::oneshot;
+use tokio_serial::SerialStream;
 
 use super::{
     Failure, Outcome,
     mock_world::MockWorldArgs,
     options::{AirArgs, EngineArgs, SensorArgs},
-    runtime,
+    place::{AzimuthArgs, PlaceArgs},
+    runtime::{self, Interrupts},
 };
 use crate::{
     link::{self, BAUD},
     mock::{MockBoard, MockPort},
     ranger::{DriveError, Driver, Ranger, ScanError, ScanSummary},
-    scan::{Record, ScanPlan},
+    scan::Record,
 };
 use output::Output;
 use setup::Setup;
 
+/// How often a request is sent before the device counts as gone: some nine seconds, in which a
+/// board that the opening of its port has reset is long awake.
+const ATTEMPTS: u8 = 7;
+
 /// Options of `sonard scan`.
 #[derive(Debug, clap::Args)]
-#[command(long_about = ABOUT, after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES)]
 #[command(group(clap::ArgGroup::new("device").required(true).args(["port", "mock"])))]
 pub(super) struct Args {
     /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number
@@ -35,12 +41,8 @@ pub(super) struct Args {
     /// Use a mock ranger instead of a real one
     #[arg(long)]
     mock: bool,
-    /// Scene file, or the name of a shipped scene (`sonard scene list`)
-    #[arg(long, value_name = "SCENE")]
-    scene: String,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
-    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
-    pose: String,
+    #[command(flatten)]
+    place: PlaceArgs,
     /// Write scan.jsonl, scan.svg and scan.png to this folder instead of records to standard output
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -48,7 +50,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     repeat: u32,
     #[command(flatten)]
-    plan: PlanArgs,
+    azimuths: AzimuthArgs,
+    /// Firings at each stop
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pings_per_stop: u32,
     #[command(flatten)]
     motion: MotionArgs,
     #[command(flatten)]
@@ -59,23 +64,6 @@ pub(super) struct Args {
     engine: EngineArgs,
     #[command(flatten)]
     world: MockWorldArgs,
-}
-
-/// Which azimuths to scan.
-#[derive(Debug, Clone, Copy, clap::Args)]
-struct PlanArgs {
-    /// First azimuth, degrees counter-clockwise from the heading
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
-    from_deg: f64,
-    /// End of the azimuths, degrees; not itself measured
-    #[arg(long, value_name = "DEG", default_value_t = 360.0, allow_negative_numbers = true)]
-    to_deg: f64,
-    /// From stop to stop, degrees; a multiple of the motor's step
-    #[arg(long, value_name = "DEG", default_value_t = 0.9)]
-    step_deg: f64,
-    /// Firings at each stop
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pings_per_stop: u32,
 }
 
 /// How the motor turns and the ranger listens.
@@ -102,7 +90,7 @@ struct MotionArgs {
     acceleration: u32,
 }
 
-const ABOUT: &str = "\
+pub(super) const ABOUT: &str = "\
 Take one or more scans and log each reading beside the model's prediction.
 
 The device goes home, then steps, fires and listens by itself along the plan; readings that the \
@@ -113,22 +101,11 @@ const EXAMPLES: &str = "\
 Examples:
   sonard scan --mock --scene simple-room --pose fig9 --out out/fig9
   sonard scan --port /dev/ttyACM0 --scene my-room.json --pose 1.2,0.8,90 --max-range 4 --out out
-  sonard scan --mock --scene corridor --pose start --from-deg -45 --to-deg 45 | sonard compare -
+  sonard scan --mock --scene corridor --pose beside-wall --to-deg 45 | sonard compare -
   sonard scan --mock --scene simple-room --pose fig9 --faults flip=0.001,reset=0.005 --out noisy
 
 Exit codes: 0 every beam measured, 1 stopped on request or beams are missing, 2 wrong usage or \
 input, 3 device or link.";
-
-impl PlanArgs {
-    const fn plan(&self) -> ScanPlan {
-        ScanPlan {
-            from_deg: self.from_deg,
-            to_deg: self.to_deg,
-            step_deg: self.step_deg,
-            pings_per_stop: self.pings_per_stop,
-        }
-    }
-}
 
 pub(super) fn run(args: &Args) -> Outcome {
     let setup = Setup::new(args)?;
@@ -142,28 +119,26 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 /// Opens the port, meets the device, and takes the scans.
 async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
+    let interrupts = Interrupts::listen();
     let mock = match args.mock {
         true => Some(start_mock(args.world.board(&setup.belief())?)?),
         false => None,
     };
     let port = mock.as_ref().map_or_else(|| args.port.clone().unwrap_or_default(), Mock::port);
-    let line = link::open(&port).map_err(|error| Failure::device(&error, error.help()))?;
-    let seed = rand::random();
-    let driver = Driver::new(line, HostConfig { max_attempts: 7, ..HostConfig::new(BAUD, seed) });
-    let mut ranger = Ranger::meet(driver).await.map_err(|error| device_failure(&error))?;
+    let mut ranger = meet(&port, &interrupts).await?;
     let job = setup.job(ranger.identity())?;
     output.record(&Record::Session(Box::new(setup.session(ranger.identity()))))?;
     let mut missing = 0;
     for turn in 1..=args.repeat {
         output.begin_scan(turn, args.repeat, job.plan.beams());
-        let summary = ranger.scan(&job, output, runtime::interrupted()).await.map_err(scan_failure);
+        let summary = ranger.scan(&job, output, interrupts.clone().wait()).await;
         output.end_scan();
-        let summary = summary?;
+        let summary = summary.map_err(scan_failure)?;
         summary::print(setup, &summary, ranger.identity(), ranger.link_stats(), output);
-        missing += summary.end.missing;
-        if summary.stopped {
+        if interrupts.happened() {
             return Err(stopped(&summary));
         }
+        missing += summary.end.missing;
     }
     if let Some(mock) = mock {
         mock.stop().await;
@@ -172,6 +147,17 @@ async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
         return Err(Failure::Found(Some(format!("{missing} beams are missing"))));
     }
     Ok(())
+}
+
+async fn meet(port: &str, interrupts: &Interrupts) -> Result<Ranger<SerialStream>, Failure> {
+    let line = link::open(port).map_err(|error| Failure::device(&error, error.help()))?;
+    let config = HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, rand::random()) };
+    tokio::select! {
+        met = Ranger::meet(Driver::new(line, config)) => met.map_err(|error| device_failure(&error)),
+        () = interrupts.clone().wait() => {
+            Err(Failure::Found(Some("stopped before the device answered".into())))
+        }
+    }
 }
 
 /// A mock playing beside the scan.

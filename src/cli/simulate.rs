@@ -3,7 +3,7 @@
 use std::{
     fs::File,
     io::{self, BufWriter, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::Arc,
     time::Duration,
 };
@@ -15,7 +15,7 @@ use uuid::Uuid;
 use super::{
     Failure, Outcome,
     options::{AirArgs, EngineArgs, SensorArgs},
-    scene_file,
+    place::{AzimuthArgs, PlaceArgs},
 };
 use crate::{
     geometry::Pose,
@@ -29,23 +29,12 @@ const STEPS_PER_REVOLUTION: u32 = 400;
 
 /// Options of `sonard simulate`.
 #[derive(Debug, clap::Args)]
-#[command(long_about = ABOUT, after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct Args {
-    /// Scene file, or the name of a shipped scene (`sonard scene list`)
-    #[arg(long, value_name = "SCENE")]
-    scene: String,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
-    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
-    pose: String,
-    /// First azimuth, degrees counter-clockwise from the heading
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
-    from_deg: f64,
-    /// End of the azimuths, degrees; not itself fired at
-    #[arg(long, value_name = "DEG", default_value_t = 360.0, allow_negative_numbers = true)]
-    to_deg: f64,
-    /// From stop to stop, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 0.9)]
-    step_deg: f64,
+    #[command(flatten)]
+    place: PlaceArgs,
+    #[command(flatten)]
+    azimuths: AzimuthArgs,
     /// Write the records to this file instead of standard output
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -57,7 +46,7 @@ pub(super) struct Args {
     air: AirArgs,
 }
 
-const ABOUT: &str = "\
+pub(super) const ABOUT: &str = "\
 Predict a scan with the model alone.
 
 Writes the records of a log, one JSON object a line, with provenance `simulated`: each reading \
@@ -74,19 +63,25 @@ Examples:
 Exit codes: 0 done, 2 wrong usage or input, 3 a disk that gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let scene = scene_file::load(&args.scene)?;
-    let pose = scene_file::pose(&scene, &args.pose)?;
-    let plan = ScanPlan {
-        from_deg: args.from_deg,
-        to_deg: args.to_deg,
-        step_deg: args.step_deg,
-        pings_per_stop: 1,
-    };
-    plan.check().map_err(|error| Failure::input(error, "see `sonard simulate --help`"))?;
+    let (scene, pose) = args.place.load()?;
+    let plan = args.azimuths.plan(1)?;
     let simulator = simulator(args, &scene, &pose)?;
-    let what =
-        args.out.as_ref().map_or("to standard output".into(), |path| path.display().to_string());
-    write(args, &simulator, &pose, &plan).or_else(|error| Failure::from_write(&what, &error))
+    let (what, mut out) = open(args.out.as_deref())?;
+    write(&mut out, &simulator, &pose, &plan).or_else(|error| Failure::from_write(&what, &error))
+}
+
+/// Where the records go, and its name.
+fn open(path: Option<&Path>) -> Result<(String, Box<dyn Write>), Failure> {
+    let Some(path) = path else {
+        return Ok(("to standard output".into(), Box::new(BufWriter::new(io::stdout().lock()))));
+    };
+    let file = File::create(path).map_err(|error| {
+        Failure::input(
+            format!("cannot write {}: {error}", path.display()),
+            "give a file in a folder that exists and that you may write to",
+        )
+    })?;
+    Ok((path.display().to_string(), Box::new(BufWriter::new(file))))
 }
 
 /// The simulator for this pose: a robot's body stands among the reflectors.
@@ -97,14 +92,15 @@ fn simulator(args: &Args, scene: &Scene, pose: &Pose) -> Result<Simulator, Failu
         .map_err(|error| Failure::input(error, "see `sonard simulate --help`"))
 }
 
-fn write(args: &Args, simulator: &Simulator, pose: &Pose, plan: &ScanPlan) -> io::Result<()> {
-    let mut out: Box<dyn Write> = match &args.out {
-        Some(path) => Box::new(BufWriter::new(File::create(path)?)),
-        None => Box::new(BufWriter::new(io::stdout().lock())),
-    };
+fn write(
+    out: &mut dyn Write,
+    simulator: &Simulator,
+    pose: &Pose,
+    plan: &ScanPlan,
+) -> io::Result<()> {
     let scan = Uuid::new_v4();
     let mut put = |record: &Record| {
-        serde_json::to_writer(&mut out, record)?;
+        serde_json::to_writer(&mut *out, record)?;
         out.write_all(b"\n")
     };
     put(&session(simulator))?;

@@ -3,51 +3,22 @@
 //! A discrete-event simulation without I/O. Events happen at their exact device times, however
 //! late the real clock gets round to them, so that timing does not depend on the machine.
 
-use std::fmt;
-
 use firmware_protocol::{
-    device::{Action, Board, Device, DeviceTimer, EchoReport},
-    frame::Frame,
-    messages::{
-        Capabilities, Echoes, FirmwareVersion, ProtocolId, ReadingStatus, Reply, ResetCause, limits,
-    },
+    device::{Action, Device, DeviceTimer, EchoReport},
+    messages::{Echoes, ReadingStatus, ResetCause, limits},
 };
 
 use super::{
-    faults::{DeviceFault, FaultPlan, Faults},
-    motion::Trapezoid,
+    faults::{DeviceFault, Faults},
+    identity::{BoardSettings, Pace, identity, with_version},
+    note::Note,
     world::World,
 };
+use crate::motion::Trapezoid;
 
 const TICK_HZ: u32 = limits::TICK_HZ;
 /// Time from the machine's wish to fire until INIT rises, ticks: the compare unit's lead.
 const FIRE_LEAD_TICKS: u64 = 32;
-
-/// What the mock claims to be.
-#[derive(Debug, Clone, Copy)]
-pub struct BoardSettings {
-    /// Boot nonce of the first boot.
-    pub boot: u16,
-    /// Device clock at the first boot, ticks.
-    pub clock: u32,
-    /// Steps a revolution.
-    pub steps_per_revolution: u16,
-    /// What goes wrong.
-    pub faults: FaultPlan,
-    /// Seed of the faults.
-    pub seed: u64,
-    /// How its clock passes; a virtual one is announced to the host.
-    pub pace: Pace,
-}
-
-/// How device time passes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pace {
-    /// As on a wall clock.
-    RealTime,
-    /// Jumps to whatever happens next; only the host's patience is measured in real time.
-    Virtual,
-}
 
 /// Why the board wants to be woken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,37 +38,6 @@ pub struct Wake {
     pub kind: WakeKind,
 }
 
-/// Something a person watching the mock wants to see.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Note {
-    /// The device booted with this nonce.
-    Booted(u16),
-    /// The motor went home; the index was off by so many steps.
-    Homed(i32),
-    /// So many firings since boot.
-    Fired(u64),
-    /// The motor stopped on request, at this step.
-    Stopped(i32),
-    /// The coils were let go.
-    CoilsReleased,
-    /// A fault was played.
-    Fault(DeviceFault),
-}
-
-impl fmt::Display for Note {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Booted(boot) => write!(f, "booted, nonce {boot:04x}"),
-            Self::Homed(0) => f.write_str("homed"),
-            Self::Homed(drift) => write!(f, "homed, the index was {drift} steps off"),
-            Self::Fired(count) => write!(f, "{count} firings"),
-            Self::Stopped(step) => write!(f, "motor stopped at step {step}"),
-            Self::CoilsReleased => f.write_str("coils released"),
-            Self::Fault(fault) => write!(f, "fault: {fault}"),
-        }
-    }
-}
-
 /// The device machine, its board, and the world around it.
 #[derive(Debug)]
 pub struct MockBoard {
@@ -112,6 +52,8 @@ pub struct MockBoard {
     known: bool,
     activity: Activity,
     stalled_until: u64,
+    /// Half of the lease that was left when the host was last heard, ticks.
+    patience: u64,
     hung_up: bool,
     fired: u64,
     notes: Vec<Note>,
@@ -153,6 +95,7 @@ impl MockBoard {
             known: false,
             activity: Activity::Nothing,
             stalled_until: 0,
+            patience: 0,
             hung_up: false,
             fired: 0,
             notes: vec![Note::Booted(settings.boot)],
@@ -182,10 +125,26 @@ impl MockBoard {
             };
             Wake { at: self.now + u64::from(ahead.unsigned_abs()), kind }
         });
-        match (work, timer) {
+        let wake = match (work, timer) {
             (Some(work), Some(timer)) => Some(if timer.at < work.at { timer } else { work }),
             (work, timer) => work.or(timer),
-        }
+        }?;
+        let jumps = wake.kind == WakeKind::Work && self.leaves_patience(wake.at);
+        Some(Wake { kind: if jumps { WakeKind::Work } else { WakeKind::Patience }, ..wake })
+    }
+
+    /// Whether a jump to `at` leaves the host at least half of its lease in real time.
+    ///
+    /// Without that, a host that the computer keeps waiting for some milliseconds would find its
+    /// lease used up by jumps.
+    fn leaves_patience(&self, at: u64) -> bool {
+        self.lease_left().is_none_or(|left| at + self.patience <= self.now + left)
+    }
+
+    /// Ticks until the sweep's lease ends.
+    fn lease_left(&self) -> Option<u64> {
+        let ends = self.device.lease_ends()?;
+        Some(u64::from(ends.wrapping_sub(self.now as u32).cast_signed().max(0).unsigned_abs()))
     }
 
     /// Lets device time pass up to `to`; everything due happens at its own time.
@@ -210,6 +169,7 @@ impl MockBoard {
             // Between two bytes a real board's main loop comes round many times.
             self.act();
         }
+        self.patience = self.lease_left().unwrap_or(0) / 2;
     }
 
     /// Appends what the device has to say, as the host will get it.
@@ -379,48 +339,6 @@ impl MockBoard {
         self.device = Device::new(identity(&self.settings, self.boot, cause));
         self.notes.push(Note::Booted(self.boot));
     }
-}
-
-fn identity(settings: &BoardSettings, boot: u16, reset_cause: ResetCause) -> Board {
-    let clock = match settings.pace {
-        Pace::RealTime => Capabilities::default(),
-        Pace::Virtual => Capabilities::VIRTUAL_CLOCK,
-    };
-    Board {
-        boot,
-        firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
-        serial: *b"MOCK-00001",
-        steps_per_revolution: settings.steps_per_revolution,
-        capabilities: Capabilities::INDEX_SENSOR
-            .with(Capabilities::SHORT_BLANKING)
-            .with(Capabilities::MULTIPLE_ECHOES)
-            .with(Capabilities::COIL_RELEASE)
-            .with(Capabilities::SIMULATED)
-            .with(clock),
-        reset_cause,
-    }
-}
-
-/// The same frames, but every Identity claims another protocol version.
-fn with_version(bytes: &[u8], version: u8) -> Vec<u8> {
-    use firmware_protocol::frame::{FrameDecoder, Received};
-    let mut decoder = FrameDecoder::new();
-    let mut out = Vec::with_capacity(bytes.len());
-    for &byte in bytes {
-        let Received::Frame(frame) = decoder.push(byte) else { continue };
-        let Ok(reply) = Reply::decode(frame.body) else { continue };
-        let claimed = match reply {
-            Reply::Identity(mut identity) => {
-                identity.protocol = ProtocolId { version, ..identity.protocol };
-                Reply::Identity(identity)
-            }
-            other => other,
-        };
-        if let Ok(frame) = Frame::encode(frame.header, &claimed) {
-            out.extend_from_slice(&frame);
-        }
-    }
-    out
 }
 
 fn ticks(seconds: f64) -> u64 {

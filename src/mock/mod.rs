@@ -5,16 +5,20 @@
 
 mod board;
 mod faults;
-mod motion;
+mod identity;
 mod noise;
+mod note;
 mod pty;
 mod serve;
+#[cfg(test)]
+mod tests;
 mod world;
 
-pub use board::{BoardSettings, MockBoard, Note, Pace, Wake, WakeKind};
+pub use board::{MockBoard, Wake, WakeKind};
 pub use faults::{DeviceFault, FAULT_HELP, FaultPlan, FaultSpecError, Faults};
-pub use motion::Trapezoid;
+pub use identity::{BoardSettings, Pace};
 pub use noise::Noise;
+pub use note::Note;
 pub use pty::Pty;
 pub use serve::MockPort;
 pub use world::{Soundings, World};

@@ -13,7 +13,9 @@ use tokio::{
 };
 
 use super::{
-    board::{MockBoard, Note, Pace, WakeKind},
+    board::{MockBoard, WakeKind},
+    identity::Pace,
+    note::Note,
     pty::Pty,
 };
 

@@ -8,6 +8,8 @@ mod fan;
 pub mod paths;
 mod raycast;
 mod simulator;
+#[cfg(test)]
+mod tests;
 
 pub use cone::Cone;
 pub use fan::{Fan, FanSettings};

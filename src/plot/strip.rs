@@ -180,6 +180,7 @@ impl Strip {
     /// `points` by azimuth on this axis.
     pub(super) fn line(&self, layer: &mut Layer, points: &[(f64, f64)]) {
         let half = Px::new(self.beam_px() / 2.0, 0.0);
+        let within = |at: Px| Px::new(at.x.clamp(self.panel.left, self.panel.right), at.y);
         let mut runs: Vec<Vec<Px>> = Vec::new();
         let mut last: Option<(f64, f64)> = None;
         for &(azimuth_deg, value) in points {
@@ -191,12 +192,12 @@ impl Strip {
             });
             match runs.last_mut().filter(|_| joined) {
                 Some(run) => run.push(at),
-                None => runs.push(vec![at - half, at]),
+                None => runs.push(vec![within(at - half), at]),
             }
             last = Some((azimuth_deg, value));
         }
         for run in &mut runs {
-            let end = run.last().map(|at| *at + half);
+            let end = run.last().map(|at| within(*at + half));
             run.extend(end);
         }
         layer.runs(runs);

@@ -105,6 +105,7 @@ fn provenance_is_said_unless_it_is_hardware() {
         pictures(std::slice::from_ref(scan), Some(&room())).iter().all(shown)
     };
     assert!(has(&scan, "MOCK, not hardware"));
+    assert!(has(&ScanView { session: None, ..scan.clone() }, "PROVENANCE UNKNOWN"));
     assert!(has(&simulated(scan.clone()), "SIMULATED, nothing measured"));
     let mut session = session();
     session.provenance = crate::scan::Provenance::Hardware;

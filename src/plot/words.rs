@@ -25,14 +25,15 @@ pub(super) fn title(views: &[ScanView], scene: Option<&Scene>) -> String {
 
 /// What the readings are, in a few words; `None` for readings of a real ranger.
 pub(super) fn badge(views: &[ScanView]) -> Option<&'static str> {
-    let provenance = views.iter().find_map(|view| view.session.as_ref())?.provenance;
-    match provenance {
-        Provenance::Hardware => None,
-        Provenance::Emulator => Some("EMULATOR, not hardware"),
-        Provenance::Mock => Some("MOCK, not hardware"),
-        Provenance::Simulated => Some("SIMULATED, nothing measured"),
-        Provenance::Imported => Some("IMPORTED data"),
-        Provenance::Replay => Some("REPLAY of an earlier log"),
+    let session = views.iter().find_map(|view| view.session.as_ref());
+    match session.map(|session| session.provenance) {
+        Some(Provenance::Hardware) => None,
+        Some(Provenance::Emulator) => Some("EMULATOR, not hardware"),
+        Some(Provenance::Mock) => Some("MOCK, not hardware"),
+        Some(Provenance::Simulated) => Some("SIMULATED, nothing measured"),
+        Some(Provenance::Imported) => Some("IMPORTED data"),
+        Some(Provenance::Replay) => Some("REPLAY of an earlier log"),
+        None => Some("PROVENANCE UNKNOWN"),
     }
 }
 

@@ -11,7 +11,7 @@ use uuid::Uuid;
 use super::{
     clock::{ClockFit, TickExtender},
     driver::DriveError,
-    scanner::ScanJob,
+    job::ScanJob,
 };
 use crate::{
     acoustics::classify_tof,
@@ -190,14 +190,19 @@ impl<'a> Progress<'a> {
     fn reading(&mut self, reading: &Reading, repaired: bool) {
         let Some(segment) = self.segment else { return };
         let index = segment.index(u32::from(reading.index), self.job.plan.pings_per_stop);
-        let Some(done) = self.done.get_mut(index as usize).filter(|done| !**done) else { return };
-        *done = true;
-        self.repaired += u32::from(repaired);
+        if self.done.get(index as usize) != Some(&false) {
+            return;
+        }
         let fired = self.extender.extend(reading.fired_ticks);
         let span = self.span.get_or_insert(Span { first: fired, last: fired });
         *span = Span { first: span.first.min(fired), last: span.last.max(fired) };
         let ping = self.ping(index, reading, fired, repaired);
         self.write(&Record::Ping(Box::new(ping)));
+        // What is not in the log counts as missing.
+        if let Some(done) = self.done.get_mut(index as usize).filter(|_| self.failed.is_none()) {
+            *done = true;
+            self.repaired += u32::from(repaired);
+        }
     }
 
     fn ping(&self, index: u32, reading: &Reading, fired: u64, repaired: bool) -> Ping {

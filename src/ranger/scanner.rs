@@ -12,12 +12,12 @@ use uuid::Uuid;
 
 use super::{
     driver::{DriveError, Driver, Ended},
+    job::ScanJob,
     progress::{Progress, Sink},
     timing,
 };
 use crate::{
-    geometry::Pose,
-    scan::{EventKind, PlanError, Record, ScanEnd, ScanPlan, ScanStart, Segment, SimRecord},
+    scan::{EventKind, PlanError, Record, ScanEnd, ScanStart, Segment},
     store::StoreError,
 };
 
@@ -25,23 +25,6 @@ use crate::{
 const FRUITLESS_RESTARTS: u32 = 3;
 /// Exchanges before a scan that give the clock fit its first points.
 const CLOCK_EXCHANGES: u32 = 4;
-
-/// What is to be scanned, and what the model says about it.
-#[derive(Debug, Clone)]
-pub struct ScanJob {
-    /// Where the ranger stands.
-    pub pose: Pose,
-    /// Which azimuths.
-    pub plan: ScanPlan,
-    /// How the device moves and listens.
-    pub settings: Settings,
-    /// For ranges, metres a second.
-    pub sound_speed_m_s: f64,
-    /// When the receiver opens, microseconds after firing.
-    pub blanking_us: f64,
-    /// For each stop of the plan, what the model predicts; empty without a model.
-    pub predictions: Vec<SimRecord>,
-}
 
 /// How a scan went.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 
 use firmware_protocol::messages::{Settings, limits::TICK_HZ};
 
-use crate::{mock::Trapezoid, scan::ScanPlan};
+use crate::{motion::Trapezoid, scan::ScanPlan};
 
 /// What no ordering could avoid between the first firing and the end of the last listening
 /// window, seconds: every window whole, and between stops the step and the rest after it.

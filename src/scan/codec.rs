@@ -21,7 +21,9 @@ pub enum FaultKind {
     NotText,
     /// Not a JSON object.
     NotJson,
-    /// A JSON object whose `type` is missing or unknown.
+    /// A JSON object without a `type` that is a string.
+    NoType,
+    /// A JSON object of a `type` that this program does not know.
     UnknownType,
     /// A record with a field missing or of the wrong kind.
     BadField,
@@ -53,6 +55,16 @@ impl fmt::Display for RecordError {
             write!(f, "{field}: ")?;
         }
         f.write_str(&self.message)
+    }
+}
+
+impl RecordError {
+    /// Whether the line is a whole record all the same, which another version of the program may
+    /// read: a JSON object with a `type`.
+    #[must_use]
+    pub fn is_whole_record(&self) -> bool {
+        use FaultKind as Kind;
+        matches!(self.kind, Kind::UnknownType | Kind::BadField | Kind::NewerFormat)
     }
 }
 
@@ -144,6 +156,10 @@ fn text_of(bytes: &[u8]) -> Result<&str, RecordError> {
         return fault(FaultKind::NotText, Some(at + 1), message);
     }
     match std::str::from_utf8(bytes) {
+        // serde would take an array for a struct.
+        Ok(text) if !text.trim_start().starts_with('{') => {
+            fault(FaultKind::NotJson, Some(1), "expected a JSON object, { ... }".into())
+        }
         Ok(text) => Ok(text),
         Err(error) => {
             let at = error.valid_up_to();
@@ -155,18 +171,15 @@ fn text_of(bytes: &[u8]) -> Result<&str, RecordError> {
 
 /// Tells damaged JSON from a whole object without a usable `type`.
 fn tag_fault(text: &str, error: &serde_json::Error) -> RecordError {
-    let whole_object = text.trim_start().starts_with('{')
-        && serde_json::from_str::<serde::de::IgnoredAny>(text).is_ok();
-    if whole_object {
+    if serde_json::from_str::<serde::de::IgnoredAny>(text).is_ok() {
         return RecordError {
-            kind: FaultKind::UnknownType,
+            kind: FaultKind::NoType,
             column: None,
             field: Some("type".into()),
             message: format!("{}: expected \"type\":\"ping\" or another record", plain(error)),
         };
     }
     let message = match error.classify() {
-        serde_json::error::Category::Data => "expected one JSON object".into(),
         serde_json::error::Category::Eof => "the JSON object is not closed".into(),
         _ => plain(error),
     };
@@ -258,4 +271,140 @@ fn first_not_finite(record: &Record) -> Option<(&'static str, f64)> {
         Record::Event(_) => &[],
     };
     numbers.iter().copied().find(|(_, value)| !value.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const LOG: &str = include_str!("../../tests/fixtures/small.jsonl");
+
+    fn line_of(kind: &str) -> &'static str {
+        let tag = format!("{{\"type\":\"{kind}\"");
+        LOG.lines().find(|line| line.starts_with(&tag)).expect("the fixture has every kind")
+    }
+
+    #[test]
+    fn every_record_of_the_fixture_comes_back_as_the_same_json() {
+        for line in LOG.lines() {
+            let record = decode_line(line.as_bytes()).expect("the fixture is clean");
+            let mut written = Vec::new();
+            encode_line(&record, &mut written).expect("it was read, so it can be written");
+            assert_eq!(written.pop(), Some(b'\n'));
+            let (was, is): (serde_json::Value, serde_json::Value) = (
+                serde_json::from_str(line).expect("JSON"),
+                serde_json::from_slice(&written).expect("JSON"),
+            );
+            assert_eq!(was, is);
+        }
+    }
+
+    /// Kind, column and field of the fault on a line.
+    fn check(line: impl AsRef<[u8]>, kind: FaultKind, column: Option<usize>, field: &str) {
+        let shown = String::from_utf8_lossy(line.as_ref()).into_owned();
+        let fault = decode_line(line.as_ref()).expect_err(&shown);
+        assert_eq!(
+            (fault.kind, fault.column, fault.field.as_deref().unwrap_or("")),
+            (kind, column, field),
+            "{shown}: {fault}"
+        );
+        assert!(!fault.message.contains("at line 1"), "{fault}");
+    }
+
+    #[test]
+    fn damage_is_named_with_its_place() {
+        let ping = line_of("ping");
+        check("", FaultKind::Empty, None, "");
+        check(" \r", FaultKind::Empty, None, "");
+        check("garbage", FaultKind::NotJson, Some(1), "");
+        check("[1]", FaultKind::NotJson, Some(1), "");
+        check(&ping[..40], FaultKind::NotJson, Some(40), "");
+        check(b"\0\0\0\0", FaultKind::NotText, Some(1), "");
+        check(b"{\"type\":\"ev\xffnt\"}", FaultKind::NotText, Some(12), "");
+        check("{}", FaultKind::NoType, None, "type");
+        check(r#"{"type":7}"#, FaultKind::NoType, None, "type");
+        check(r#"{"type":"pong"}"#, FaultKind::UnknownType, None, "type");
+        check(format!("{ping} {ping}"), FaultKind::NotJson, Some(ping.len() + 2), "");
+        let wrong = ping.replace("\"order\":1", "\"order\":-1");
+        let column = wrong.find(":-1").expect("just put there") + 3;
+        check(&wrong, FaultKind::BadField, Some(column), "sim.path.order");
+        let later = line_of("session").replace("\"format\":1", "\"format\":9");
+        assert!(decode_line(later.as_bytes()).is_ok(), "added fields do no harm");
+        let later = later.replace("\"started\"", "\"begun\"");
+        check(&later, FaultKind::NewerFormat, Some(later.len()), "format");
+        check("[".repeat(100_000), FaultKind::NotJson, Some(1), "");
+        let deep = line_of("session")
+            .replace("\"lossless\":false", &format!("\"x\":{}", "[".repeat(9999)));
+        check(&deep, FaultKind::NotJson, Some(deep.len() - 1), "");
+        let deep = deep.replace("[}", &format!("[{}}}", "]".repeat(9999)));
+        assert_eq!(decode_line(deep.as_bytes()).expect_err("too deep").kind, FaultKind::BadField);
+    }
+
+    #[test]
+    fn unknown_fields_and_carriage_returns_do_no_harm() {
+        let ping = line_of("ping");
+        let more = ping.replace("\"index\"", "\"note\":{\"a\":[1,2]},\"index\"") + "\r";
+        assert_eq!(decode_line(more.as_bytes()), decode_line(ping.as_bytes()));
+    }
+
+    #[test]
+    fn what_no_reader_would_take_is_not_written() {
+        let Ok(Record::Ping(ping)) = decode_line(line_of("ping").as_bytes()) else {
+            panic!("the fixture is clean")
+        };
+        let mut line = b"before".to_vec();
+        let mut bad = ping.clone();
+        bad.azimuth_deg = f64::NAN;
+        let error = encode_line(&Record::Ping(bad), &mut line).expect_err("not a number");
+        assert!(error.to_string().starts_with("azimuth_deg is NaN"), "{error}");
+        let mut long = ping.clone();
+        long.echo_ticks = vec![u32::MAX; 100_000];
+        let error = encode_line(&Record::Ping(long), &mut line).expect_err("too long");
+        assert!(matches!(error, EncodeError::TooLong(_)), "{error}");
+        assert_eq!(line, b"before");
+        // What may be unknown is written as unknown.
+        let mut unknown = ping;
+        unknown.range_m = Some(f64::INFINITY);
+        encode_line(&Record::Ping(unknown), &mut line).expect("null is a value");
+        let text = String::from_utf8(line).expect("JSON is UTF-8");
+        assert!(text.contains("\"range_m\":null"), "{text}");
+    }
+
+    proptest! {
+        #[test]
+        fn every_finite_number_comes_back_bit_for_bit(
+            range_m in proptest::num::f64::NORMAL | proptest::num::f64::SUBNORMAL,
+            azimuth_deg in 0.0..360.0_f64,
+            ticks in any::<u64>(),
+        ) {
+            let Ok(Record::Ping(mut ping)) = decode_line(line_of("ping").as_bytes()) else {
+                panic!("the fixture is clean")
+            };
+            ping.range_m = Some(range_m);
+            ping.azimuth_deg = azimuth_deg;
+            ping.fired_ticks = Some(ticks);
+            let record = Record::Ping(ping);
+            let mut line = Vec::new();
+            encode_line(&record, &mut line).expect("finite");
+            prop_assert_eq!(decode_line(line.trim_ascii_end()), Ok(record));
+        }
+
+        #[test]
+        fn no_bytes_make_it_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+            let _ = decode_line(&bytes);
+        }
+
+        /// Nearly right lines reach deeper than noise.
+        #[test]
+        fn no_change_of_a_record_makes_it_panic(
+            line in 0..11_usize, at in 0..2000_usize, byte in any::<u8>(), cut in any::<bool>(),
+        ) {
+            let mut bytes = LOG.lines().nth(line).expect("11 lines").as_bytes().to_vec();
+            let at = at % bytes.len();
+            if cut { bytes.truncate(at) } else { bytes[at] = byte }
+            let _ = decode_line(&bytes);
+        }
+    }
 }

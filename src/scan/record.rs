@@ -247,13 +247,15 @@ pub struct ScanEnd {
     pub scan: Uuid,
     /// Wall clock.
     pub time: Timestamp,
-    /// Readings in the log.
+    /// Beams of the plan that were measured.
     pub beams: u32,
-    /// Beams of the plan that have no reading.
+    /// Beams of the plan that were not: a scan that was given up logs them as `link_lost`, one
+    /// that was stopped on request leaves them out.
     pub missing: u32,
     /// Readings that the line lost at first.
     pub repaired: u32,
-    /// Device time from the first firing to the end of the last listening window, seconds.
+    /// Device time from the first firing to the end of the last listening window, seconds; after a
+    /// restart of the device without the time in between, which its clock did not see.
     pub duration_s: f64,
     /// What no ordering could avoid in that span: every listening window, and between stops the
     /// step and its settling, seconds.

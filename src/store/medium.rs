@@ -1,12 +1,13 @@
 //! What a log is written to: a file, or a pipe that can't be taken back.
 
 use std::{
+    fmt,
     fs::File,
     io::{self, Write},
 };
 
 /// The few things that [`super::LogWriter`] does to a file. Tests put faults in between.
-pub trait Medium {
+pub trait Medium: fmt::Debug {
     /// Writes at the end, once: may take fewer bytes than offered.
     ///
     /// # Errors
@@ -65,7 +66,7 @@ impl Medium for FileMedium {
 #[derive(Debug)]
 pub struct Pipe<W>(pub W);
 
-impl<W: Write> Medium for Pipe<W> {
+impl<W: Write + fmt::Debug> Medium for Pipe<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.0.write(bytes)
     }

@@ -21,3 +21,6 @@ pub(crate) use reader::open_for_reading;
 pub use reader::{Line, LineError, Lines, Loaded, load, read_log};
 pub use repair::{LeftOut, Repair, repair};
 pub use writer::{LogWriter, SYNC_INTERVAL};
+
+#[cfg(test)]
+mod tests;

@@ -3,7 +3,7 @@
 use std::{
     ffi::OsString,
     fs::{self, File, OpenOptions},
-    io::{self, Read, Seek, SeekFrom},
+    io::{self, Seek, SeekFrom},
     os::unix::fs::{FileExt, MetadataExt},
     path::{Path, PathBuf},
 };
@@ -144,8 +144,12 @@ fn last_line_offset(file: &File, length: u64) -> io::Result<u64> {
 fn keep_torn(mut file: &File, offset: u64, path: &Path) -> io::Result<PathBuf> {
     let (mut kept, name) = create_next(|n| with_suffix(path, &format!(".torn-{n}")))?;
     file.seek(SeekFrom::Start(offset))?;
-    io::copy(&mut file.take(u64::MAX), &mut kept)?;
-    kept.sync_all()?;
+    let copied = io::copy(&mut file, &mut kept).and_then(|_| kept.sync_all());
+    if let Err(error) = copied {
+        // The log still has the bytes; half a copy would only confuse.
+        let _ = fs::remove_file(&name);
+        return Err(error);
+    }
     sync_folder_of(path)?;
     Ok(name)
 }

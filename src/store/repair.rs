@@ -9,7 +9,7 @@ use std::{
 use crate::scan::{FaultKind, RecordError};
 
 use super::{
-    Line, StoreError,
+    Line, LineError, StoreError,
     open::{lock, sync_folder_of, with_suffix},
     read_log,
 };
@@ -38,9 +38,9 @@ pub struct Repair {
     pub newline_added: bool,
     /// Other lines left out.
     pub left_out: Vec<LeftOut>,
-    /// Whole JSON objects kept although this program can't read them, because the log is of a
-    /// later format.
-    pub kept_unread: u64,
+    /// Whole records kept, byte for byte too, although this program can't read them: another
+    /// version may.
+    pub kept_unread: Vec<LineError>,
     /// Where the original is; `None` if nothing had to be done.
     pub original: Option<PathBuf>,
 }
@@ -86,14 +86,12 @@ impl Repair {
                 self.newline_added = !line.ended;
                 return keep(line, out);
             }
+            Err(error) if error.fault.is_whole_record() => {
+                self.kept_unread.push(error.clone());
+                return keep(line, out);
+            }
             Err(error) => error.fault.clone(),
         };
-        if self.kept_unread > 0 && is_whole_object(fault.kind)
-            || fault.kind == FaultKind::NewerFormat
-        {
-            self.kept_unread += 1;
-            return keep(line, out);
-        }
         let torn = fault.kind == FaultKind::Torn;
         let Line { number, offset, length, .. } = *line;
         let left_out = LeftOut { line: number, offset, length, fault };
@@ -113,11 +111,6 @@ impl Repair {
 fn keep(line: &Line, out: &mut impl Write) -> io::Result<()> {
     out.write_all(&line.bytes)?;
     out.write_all(b"\n")
-}
-
-/// Whether a later program may well read the line that this one can't.
-fn is_whole_object(kind: FaultKind) -> bool {
-    matches!(kind, FaultKind::UnknownType | FaultKind::BadField)
 }
 
 /// The repaired log while it is being written; removed unless it takes the log's place.

@@ -138,3 +138,27 @@ fn a_killed_host_stops_the_firing_within_the_lease_and_leaves_the_port_usable() 
     let (_, said) = mock.stop();
     assert!(said.contains("coils released"), "after {:?}: {said}", killed.elapsed());
 }
+
+#[test]
+fn a_full_disk_stops_the_scan_and_what_is_in_the_log_is_counted_right() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // A limit on the file's size fails writes as a full disk does, and needs no disk.
+    let limited = "ulimit -f 100; trap '' XFSZ; exec \"$0\" \"$@\"";
+    let output = std::process::Command::new("sh")
+        .args(["-c", limited, env!("CARGO_BIN_EXE_sonard"), "scan", "--mock"])
+        .args(["--scene", "simple-room", "--pose", "fig9", "--out"])
+        .arg(folder.path())
+        .env("NO_COLOR", "1")
+        .output()
+        .expect("starts");
+    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+    assert!(stderr(&output).contains("make room"), "{}", stderr(&output));
+    let log = Log::read(&folder.path().join("scan.jsonl"));
+    let logged = log.pings().len();
+    assert!((20..400).contains(&logged), "{logged} readings");
+    // The end itself may not have found room.
+    for end in log.of_type("scan_end") {
+        assert_eq!(end["beams"], logged);
+        assert_eq!(end["missing"], 400 - logged);
+    }
+}

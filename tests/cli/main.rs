@@ -4,6 +4,7 @@
 mod common;
 mod faults;
 mod hangup;
+mod log;
 mod plot;
 mod scan;
 mod scene;

@@ -229,6 +229,13 @@ impl Device {
         self.timers.earliest(self.now)
     }
 
+    /// When the running sweep's lease ends, ticks; `None` without one. For a simulation that must
+    /// not let time jump past the host's patience.
+    #[must_use]
+    pub const fn lease_ends(&self) -> Option<u32> {
+        self.timers.lease
+    }
+
     /// What is to be done now. Call until `None`.
     pub fn poll_action(&mut self) -> Option<Action> {
         self.next_action()

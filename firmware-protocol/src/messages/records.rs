@@ -74,6 +74,18 @@ impl Capabilities {
     /// No hardware: the echoes come from a model.
     pub const SIMULATED: Self = Self(1 << 15);
 
+    /// All of them, by name.
+    pub const NAMES: [(Self, &str); 8] = [
+        (Self::INDEX_SENSOR, "INDEX_SENSOR"),
+        (Self::SHORT_BLANKING, "SHORT_BLANKING"),
+        (Self::MULTIPLE_ECHOES, "MULTIPLE_ECHOES"),
+        (Self::EMERGENCY_STOP, "EMERGENCY_STOP"),
+        (Self::COIL_RELEASE, "COIL_RELEASE"),
+        (Self::VIRTUAL_CLOCK, "VIRTUAL_CLOCK"),
+        (Self::EMULATED, "EMULATED"),
+        (Self::SIMULATED, "SIMULATED"),
+    ];
+
     /// Whether all of `wanted` are there.
     #[must_use]
     pub const fn has(self, wanted: Self) -> bool {

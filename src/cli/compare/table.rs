@@ -2,12 +2,18 @@
 
 use std::io::{self, Write};
 
-use comfy_table::{CellAlignment, Table, presets::UTF8_HORIZONTAL_ONLY};
+use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 
 use crate::{
     compare::{Comparison, Judged, Verdict},
     scan::{PathKind, PathRecord, PingStatus},
 };
+
+/// A rule above, below and under the header.
+pub(in crate::cli) const RULED: TableStyle = TableStyle::new()
+    .top_border(LineStyle::none().fill('─').junction('─'))
+    .header_separator(LineStyle::none().fill('─').junction('─'))
+    .bottom_border(LineStyle::none().fill('─').junction('─'));
 
 /// Prints the numbers and the beams that fit worst.
 pub(super) fn print(
@@ -67,7 +73,7 @@ fn print_numbers(out: &mut impl Write, comparison: &Comparison) -> io::Result<()
 fn verdict_table(comparison: &Comparison) -> Table {
     let (counts, medians) = (comparison.verdicts, comparison.median_abs_residual_by_verdict_m);
     let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY).set_header(["verdict", "beams", "%", "median |r|"]);
+    table.load_style(RULED).set_header(["verdict", "beams", "%", "median |r|"]);
     for (name, count, median_m) in [
         ("direct", counts.direct, medians.direct),
         ("multiple", counts.multiple, medians.multiple),
@@ -86,7 +92,7 @@ fn verdict_table(comparison: &Comparison) -> Table {
 
 fn beam_table(beams: &[&Judged<'_>]) -> Table {
     let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY).set_header([
+    table.load_style(RULED).set_header([
         "beam",
         "azimuth",
         "measured",

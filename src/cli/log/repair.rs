@@ -18,7 +18,7 @@ pub(in crate::cli) struct Args {
 
 const HELP: &str = "\
 Every whole record is kept byte for byte, in order; a torn last line and lines that are no records \
-are left out. The log as it was stays beside it as LOG.orig (or LOG.orig-2, ...). The repaired \
+are left out; a whole JSON object with a type is kept even if this version can't read it. The log as it was stays beside it as LOG.orig (or LOG.orig-2, ...). The repaired \
 file takes the log's place in one step; a log that needs nothing is not touched.
 
 Exit codes: 0 every whole record is kept (at most a torn last line was left out), 1 something else \
@@ -51,14 +51,11 @@ fn print(out: &mut impl Write, log: &Path, done: &Repair) -> io::Result<()> {
     if done.newline_added {
         writeln!(out, "{name}: the last record was whole; its newline is added")?;
     }
-    if done.kept_unread > 0 {
-        let count = done.kept_unread;
-        writeln!(
-            out,
-            "{name}: {count} record(s) of a later log format kept unread; use a newer sonard"
-        )?;
+    for error in &done.kept_unread {
+        let (line, fault) = (error.line, &error.fault);
+        writeln!(out, "{name}:{line}: kept, though this version can't read it: {fault}")?;
     }
-    let kept = done.kept + done.kept_unread;
+    let kept = done.kept + done.kept_unread.len() as u64;
     match &done.original {
         Some(original) => {
             writeln!(out, "{name}: {kept} record(s) kept; the original is {}", original.display())

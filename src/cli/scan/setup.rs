@@ -11,7 +11,7 @@ use jiff::Timestamp;
 use super::{super::mock_world::Belief, Args, MotionArgs};
 use crate::{
     acoustics::{Air, Sensor},
-    cli::{Failure, scene_file},
+    cli::Failure,
     geometry::Pose,
     model::{Options, Simulator},
     ranger::ScanJob,
@@ -39,10 +39,9 @@ pub(super) struct Setup {
 
 impl Setup {
     pub(super) fn new(args: &Args) -> Result<Self, Failure> {
-        let scene = Arc::new(scene_file::load(&args.scene)?);
-        let pose = scene_file::pose(&scene, &args.pose)?;
-        let plan = args.plan.plan();
-        plan.check().map_err(|error| Failure::input(error, "see `sonard scan --help`"))?;
+        let (scene, pose) = args.place.load()?;
+        let scene = Arc::new(scene);
+        let plan = args.azimuths.plan(args.pings_per_stop)?;
         let (sensor, air, options) =
             (args.sensor.sensor()?, args.air.air()?, args.engine.options()?);
         let simulator =
@@ -57,7 +56,7 @@ impl Setup {
             .collect();
         Ok(Self {
             pose,
-            pose_text: args.pose.clone(),
+            pose_text: args.place.pose.clone(),
             plan,
             motion: args.motion,
             max_range_m: options.max_range_m.unwrap_or(sensor.max_range_m),

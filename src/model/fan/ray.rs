@@ -183,13 +183,16 @@ impl Ray {
         // Radius of curvature of the wave front; its centre is the image of the source.
         let radius_m = width_m / self.growth;
         let slack_m = radius_m.signum() * radius_m.hypot(offset_m) - radius_m;
-        let length_m = self.travelled_m + foot_m + slack_m;
-        Aim { length_m, offset_m, width_m, radius_m }
+        let ray_m = self.travelled_m + foot_m;
+        Aim { length_m: ray_m + slack_m, ray_m, offset_m, width_m, radius_m }
     }
 }
 
 struct Aim {
+    /// From the source to the point, metres.
     length_m: f64,
+    /// From the source along the ray itself, as far as abreast of the point, metres.
+    ray_m: f64,
     /// Of the point from the ray, positive to the left, metres.
     offset_m: f64,
     width_m: f64,
@@ -198,9 +201,9 @@ struct Aim {
 
 impl Aim {
     /// Amplitude relative to a wave that met flat walls only: in the plane it spreads over
-    /// `width_m` where that one spreads over `length_m`.
+    /// `width_m` where that one spreads over `ray_m`.
     fn tube_gain(&self) -> f64 {
-        (self.length_m / self.width_m.abs().max(1e-3)).sqrt()
+        (self.ray_m / self.width_m.abs().max(1e-3)).sqrt()
     }
 
     fn departure_turn_rad(&self) -> f64 {
@@ -225,14 +228,37 @@ impl Candidate {
         }
     }
 
-    /// Amplitude at a transducer that faces `direction_rad`; 0 if the ray does not meet its face.
-    pub(super) fn amplitude(&self, beam: &BeamPattern, direction_rad: f64) -> f64 {
-        let arriving_rad = wrap_pi(self.arrival_rad - direction_rad);
-        // The segment turns with the transducer: seen at an angle it is shorter.
-        if self.share > arriving_rad.cos() {
+    pub(super) fn weighing(&self) -> Weighing {
+        Weighing {
+            length_m: self.length_m,
+            gain: self.gain,
+            share: self.share,
+            departure: DVec2::from_angle(self.departure_rad),
+            arrival: DVec2::from_angle(self.arrival_rad),
+        }
+    }
+}
+
+/// What it takes to weight a candidate with the beam pattern.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Weighing {
+    pub(super) length_m: f64,
+    gain: f64,
+    share: f64,
+    departure: DVec2,
+    arrival: DVec2,
+}
+
+impl Weighing {
+    /// Amplitude at a transducer that faces this way; 0 if the ray does not meet its face.
+    pub(super) fn amplitude(&self, beam: &BeamPattern, facing: DVec2) -> f64 {
+        let arriving = facing.dot(self.arrival);
+        // The segment turns with the transducer: seen at an angle it is shorter. Nothing leaves
+        // or arrives behind it.
+        if arriving <= self.share || facing.dot(self.departure) <= 0.0 {
             return 0.0;
         }
-        let leaving_rad = wrap_pi(self.departure_rad - direction_rad);
-        self.gain * beam.one_way(leaving_rad) * beam.one_way(arriving_rad)
+        let one_way = |way: DVec2| beam.one_way(facing.perp_dot(way).atan2(facing.dot(way)));
+        self.gain * one_way(self.departure) * one_way(self.arrival)
     }
 }

@@ -1,8 +1,11 @@
 //! All arrivals of the fan at one place.
 
-use std::collections::{HashMap, hash_map::Entry};
+use std::collections::HashMap;
 
-use super::{Fan, ray::Candidate};
+use super::{
+    Fan,
+    ray::{Candidate, Weighing},
+};
 use crate::{
     acoustics::Sound,
     geometry::DVec2,
@@ -13,6 +16,8 @@ pub(super) struct FanSurvey<'a> {
     fan: &'a Fan,
     /// Shortest first, each path once.
     candidates: Vec<Candidate>,
+    /// What weighting them takes, close together in memory.
+    weighings: Vec<Weighing>,
 }
 
 impl<'a> FanSurvey<'a> {
@@ -44,21 +49,20 @@ impl<'a> FanSurvey<'a> {
                 .then_with(by_path)
                 .then_with(|| one.path.edge.cmp(&other.path.edge))
         });
-        Self { fan, candidates }
+        let weighings = candidates.iter().map(Candidate::weighing).collect();
+        Self { fan, candidates, weighings }
     }
 }
 
 impl Survey for FanSurvey<'_> {
     fn listen(&self, direction_rad: f64, sounds: &mut Vec<Sound>) {
         sounds.clear();
-        sounds.extend(self.candidates.iter().zip(0..).filter_map(|(candidate, index)| {
-            let amplitude = candidate.amplitude(&self.fan.beam, direction_rad);
-            (amplitude >= self.fan.settings.weakest).then_some(Sound {
-                length_m: candidate.length_m,
-                amplitude,
-                phase_rad: 0.0,
-                index,
-            })
+        let facing = DVec2::from_angle(direction_rad);
+        sounds.extend(self.weighings.iter().zip(0..).filter_map(|(weighing, index)| {
+            let amplitude = weighing.amplitude(&self.fan.beam, facing);
+            let length_m = weighing.length_m;
+            let sound = Sound { length_m, amplitude, phase_rad: 0.0, index };
+            (amplitude >= self.fan.settings.weakest).then_some(sound)
         }));
     }
 
@@ -74,14 +78,11 @@ struct Closest(HashMap<Path, Candidate>);
 
 impl Closest {
     fn offer(&mut self, candidate: Candidate) {
-        match self.0.entry(candidate.path.clone()) {
-            Entry::Vacant(place) => {
-                place.insert(candidate);
-            }
-            Entry::Occupied(mut known) => {
-                if candidate.miss_m < known.get().miss_m {
-                    known.insert(candidate);
-                }
+        match self.0.get_mut(&candidate.path) {
+            Some(known) if candidate.miss_m < known.miss_m => *known = candidate,
+            Some(_) => {}
+            None => {
+                self.0.insert(candidate.path.clone(), candidate);
             }
         }
     }

@@ -2,11 +2,12 @@
 
 use std::io::{self, Write};
 
-use comfy_table::{CellAlignment, Table, presets::UTF8_HORIZONTAL_ONLY};
+use comfy_table::{CellAlignment, Table};
 use uuid::Uuid;
 
 use super::summary::{Item, Scan, Summary};
 use crate::{
+    cli::compare::{RULED, path_text},
     scan::{Ping, PingStatus, Record, Session},
     store::{Line, Loaded},
 };
@@ -116,7 +117,7 @@ fn print_scans(
 
 fn scan_table(scans: &[&Scan]) -> Table {
     let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY).set_header([
+    table.load_style(RULED).set_header([
         "scan",
         "began",
         "pose",
@@ -176,7 +177,7 @@ fn ping_text(ping: &Ping) -> String {
     };
     let sim = ping.sim.as_ref();
     let path = sim.and_then(|sim| sim.path.as_ref()).or(ping.path.as_ref());
-    let path = path.map_or(String::new(), crate::cli::compare::path_text);
+    let path = path.map_or(String::new(), path_text);
     format!(
         "{:5}  {:7.1}  {status:9}  {:>7}  {:>7}  {:>7}  {:>9}  {path}{}",
         ping.index,

@@ -1,0 +1,165 @@
+//! What ends or holds motion and firing: Stop, Reset, leases, the emergency stop, a full ring.
+
+mod world;
+
+use firmware_protocol::frame::{Frame, Header};
+use firmware_protocol::host::{Command, HostError, HostEvent, Outcome};
+use firmware_protocol::messages::{FaultKind, NakReason, Request, Settings, Sweep, SweepState};
+use world::line::Faults;
+use world::settings;
+use world::sim::Sim;
+
+const BAUD: u32 = 115_200;
+
+fn ready(settings: Settings) -> Sim {
+    let mut sim = Sim::new(7, BAUD, Faults::default());
+    for command in [Command::Identify, Command::Configure(settings), Command::Home] {
+        let events = sim.run(command).expect("ends");
+        assert!(!matches!(events.last(), Some(HostEvent::Failed(_))), "{events:?}");
+    }
+    sim
+}
+
+fn plan(stops: u16, pings_per_stop: u8) -> Sweep {
+    Sweep { sweep: 0, first_step: 0, stride: 1, stops, pings_per_stop, lease_ms: 1_000 }
+}
+
+fn delivered(events: &[HostEvent]) -> usize {
+    events.iter().filter(|event| matches!(event, HostEvent::Reading { .. })).count()
+}
+
+#[test]
+fn a_silent_host_ends_the_sweep() {
+    let mut sim = ready(settings());
+    sim.start(Command::Sweep(plan(400, 1)));
+    sim.idle(300_000).expect("no hang");
+    let cut_at = sim.now_ns;
+    // From here on nothing from the host arrives.
+    sim.up = world::line::Line::new(
+        u64::from(BAUD),
+        Faults { frame_lost_one_in: 1, ..Faults::default() },
+        world::line::Random::new(1),
+    );
+    while sim.world.coils_released == 0 {
+        sim.idle(1_000).expect("no hang");
+        assert!(sim.now_ns < cut_at + 3_000_000_000, "the lease never ended");
+    }
+    assert!(sim.now_ns >= cut_at + 600_000_000, "ended long before the lease");
+    assert!(sim.now_ns <= cut_at + 1_010_000_000, "ended long after the lease");
+    let fired = sim.world.firings.len();
+    sim.idle(2_000_000).expect("no hang");
+    assert_eq!(sim.world.firings.len(), fired, "fired after the lease");
+    assert_eq!(sim.world.device.step(), None, "the position is unknown now");
+    let faults = sim
+        .events
+        .iter()
+        .filter(|(_, event)| matches!(event, HostEvent::Fault(FaultKind::LeaseExpired)));
+    assert_eq!(faults.count(), 1);
+    let failed = sim
+        .events
+        .iter()
+        .any(|(_, event)| matches!(event, HostEvent::Failed(HostError::LeaseExpired)));
+    assert!(failed, "the host must learn why");
+}
+
+#[test]
+fn idle_coils_are_released_when_the_host_is_gone() {
+    let mut sim = ready(Settings { hold_s: 3, ..settings() });
+    sim.idle(2_900_000).expect("no hang");
+    assert_eq!(sim.world.coils_released, 0);
+    sim.run(Command::Status).expect("ends");
+    sim.idle(2_900_000).expect("no hang");
+    assert_eq!(sim.world.coils_released, 0);
+    sim.idle(200_000).expect("no hang");
+    assert_eq!(sim.world.coils_released, 1);
+    let events = sim.run(Command::MoveTo { step: 3 }).expect("ends");
+    assert_eq!(events.last(), Some(&HostEvent::Failed(HostError::Refused(NakReason::NotHomed))));
+}
+
+#[test]
+fn stop_ends_a_sweep_and_keeps_the_position() {
+    let mut sim = ready(settings());
+    sim.start(Command::Sweep(plan(400, 1)));
+    sim.idle(500_000).expect("no hang");
+    let first = sim.events.len();
+    let firing = sim.world.firings.len();
+    sim.start(Command::Stop);
+    sim.run_while(|sim| sim.host.is_busy()).expect("ends");
+    let ends: Vec<_> = sim.events[first..].iter().map(|(_, event)| *event).collect();
+    assert!(
+        ends.iter()
+            .any(|event| matches!(event, HostEvent::SweepDone { end: SweepState::Stopped, .. }))
+    );
+    assert_eq!(ends.last(), Some(&HostEvent::Done(Outcome::Stopped)));
+    sim.idle(1_000_000).expect("no hang");
+    assert!(sim.world.firings.len() <= firing + 1, "fired after Stop");
+    assert_eq!(sim.world.device.step(), Some(sim.world.step));
+    let events = sim.run(Command::MoveTo { step: 20 }).expect("ends");
+    assert_eq!(events.last(), Some(&HostEvent::Done(Outcome::Moved { step: 20 })));
+}
+
+#[test]
+fn stop_in_mid_move_keeps_the_position() {
+    let mut sim = ready(settings());
+    sim.start(Command::MoveTo { step: 4_000 });
+    sim.idle(700_000).expect("no hang");
+    let events = sim.run(Command::Stop).expect("ends");
+    assert_eq!(events.last(), Some(&HostEvent::Done(Outcome::Stopped)));
+    assert!((1_000..2_000).contains(&sim.world.step), "stopped at {}", sim.world.step);
+    assert_eq!(sim.world.device.step(), Some(sim.world.step));
+}
+
+#[test]
+fn the_emergency_stop_names_itself_and_home_clears_it() {
+    let mut sim = ready(settings());
+    sim.emergency_at_ns = Some(sim.now_ns + 400_000_000);
+    let events = sim.run(Command::Sweep(plan(400, 1))).expect("ends");
+    assert_eq!(events.last(), Some(&HostEvent::Failed(HostError::EmergencyStop)));
+    assert_eq!(sim.world.coils_released, 1);
+    let events = sim.run(Command::Sweep(plan(2, 1))).expect("ends");
+    assert_eq!(events.last(), Some(&HostEvent::Failed(HostError::Refused(NakReason::NotHomed))));
+    let events = sim.run(Command::Home).expect("ends");
+    assert_eq!(events.last(), Some(&HostEvent::Done(Outcome::Homed { drift_steps: 2 })));
+    assert_eq!(delivered(&sim.run(Command::Sweep(plan(2, 1))).expect("ends")), 2);
+}
+
+#[test]
+fn reset_restarts_the_device_once() {
+    let mut sim = ready(settings());
+    let boot = sim.world.boot;
+    let events = sim.run(Command::Reset).expect("ends");
+    assert_eq!(events.last(), Some(&HostEvent::Done(Outcome::Reset)));
+    sim.idle(100_000).expect("no hang");
+    assert_eq!((sim.world.resets, sim.world.boot), (1, boot.wrapping_add(1)));
+    let events = sim.run(Command::Identify).expect("ends");
+    assert!(matches!(events.last(), Some(HostEvent::Identified(_))));
+}
+
+#[test]
+fn the_device_holds_when_nobody_acknowledges_and_goes_on_when_somebody_does() {
+    let mut sim = ready(Settings { max_echoes: 8, ..settings() });
+    let seq = 30_000_u16
+        .wrapping_add(sim.host.identity().and_then(|identity| identity.last_seq).unwrap_or(0));
+    let plan = Sweep {
+        sweep: 5,
+        first_step: 0,
+        stride: 0,
+        stops: 1,
+        pings_per_stop: 100,
+        lease_ms: 60_000,
+    };
+    let header = |seq| Header { boot: sim.world.boot, seq };
+    let start = Frame::encode(header(seq), &Request::Sweep(plan)).expect("fits");
+    let next = Request::KeepAlive { sweep: 5, next: 100 };
+    let go_on = Frame::encode(header(seq.wrapping_add(1)), &next).expect("fits");
+    let before = sim.world.firings.len();
+    let ticks = sim.world.ticks();
+    sim.world.device.handle_bytes(ticks, &start);
+    sim.idle(20_000_000).expect("no hang");
+    let held = sim.world.firings.len() - before;
+    assert!((8..60).contains(&held), "held after {held} beams");
+    let ticks = sim.world.ticks();
+    sim.world.device.handle_bytes(ticks, &go_on);
+    sim.idle(1_000_000).expect("no hang");
+    assert!(sim.world.firings.len() - before > held, "did not go on");
+}

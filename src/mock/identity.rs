@@ -1,0 +1,77 @@
+//! What the mock says it is.
+
+use firmware_protocol::{
+    device::Board,
+    frame::{Frame, FrameDecoder, Received},
+    messages::{Capabilities, FirmwareVersion, ProtocolId, Reply, ResetCause},
+};
+
+use super::faults::FaultPlan;
+
+/// What the mock claims to be.
+#[derive(Debug, Clone, Copy)]
+pub struct BoardSettings {
+    /// Boot nonce of the first boot.
+    pub boot: u16,
+    /// Device clock at the first boot, ticks.
+    pub clock: u32,
+    /// Steps a revolution.
+    pub steps_per_revolution: u16,
+    /// What goes wrong.
+    pub faults: FaultPlan,
+    /// Seed of the faults.
+    pub seed: u64,
+    /// How its clock passes; a virtual one is announced to the host.
+    pub pace: Pace,
+}
+
+/// How device time passes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pace {
+    /// As on a wall clock.
+    RealTime,
+    /// Jumps to whatever happens next; only the host's patience is measured in real time.
+    Virtual,
+}
+
+/// The board as it introduces itself: never as hardware.
+pub(super) fn identity(settings: &BoardSettings, boot: u16, reset_cause: ResetCause) -> Board {
+    let clock = match settings.pace {
+        Pace::RealTime => Capabilities::default(),
+        Pace::Virtual => Capabilities::VIRTUAL_CLOCK,
+    };
+    Board {
+        boot,
+        firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
+        serial: *b"MOCK-00001",
+        steps_per_revolution: settings.steps_per_revolution,
+        capabilities: Capabilities::INDEX_SENSOR
+            .with(Capabilities::SHORT_BLANKING)
+            .with(Capabilities::MULTIPLE_ECHOES)
+            .with(Capabilities::COIL_RELEASE)
+            .with(Capabilities::SIMULATED)
+            .with(clock),
+        reset_cause,
+    }
+}
+
+/// The same frames, but every Identity claims another protocol version.
+pub(super) fn with_version(bytes: &[u8], version: u8) -> Vec<u8> {
+    let mut decoder = FrameDecoder::new();
+    let mut out = Vec::with_capacity(bytes.len());
+    for &byte in bytes {
+        let Received::Frame(frame) = decoder.push(byte) else { continue };
+        let Ok(reply) = Reply::decode(frame.body) else { continue };
+        let claimed = match reply {
+            Reply::Identity(mut identity) => {
+                identity.protocol = ProtocolId { version, ..identity.protocol };
+                Reply::Identity(identity)
+            }
+            other => other,
+        };
+        if let Ok(frame) = Frame::encode(frame.header, &claimed) {
+            out.extend_from_slice(&frame);
+        }
+    }
+    out
+}

@@ -1,0 +1,96 @@
+//! What the paper saw: the false lower wall, the minimum range, corners, a corridor.
+
+use super::*;
+use crate::{
+    model::Prediction,
+    scan::{PingStatus, ScanPlan},
+};
+
+fn scan(scene_name: &str, pose_name: &str, step_deg: f64) -> (Simulator, Vec<(f64, Prediction)>) {
+    let scene = shipped_scene(scene_name);
+    let pose = pose(&scene, pose_name);
+    let plan = ScanPlan { step_deg, ..ScanPlan::default() };
+    let simulator = simulator(scene, Options::default());
+    let predictions = simulator.predict(&pose, &plan);
+    let readings = (0..).map(|stop| plan.azimuth_deg(stop)).zip(predictions).collect::<Vec<_>>();
+    (simulator, readings)
+}
+
+fn echo_m(readings: &[(f64, Prediction)], azimuth_deg: f64) -> Option<f64> {
+    let (_, prediction) = readings.iter().find(|(at, _)| (at - azimuth_deg).abs() < 1e-6)?;
+    prediction.range_m.filter(|_| prediction.status == PingStatus::Echo)
+}
+
+/// Figure 9: sound from the near wall passes the ranger, and the wall seems 827 mm away.
+#[test]
+fn a_false_lower_wall_appears_at_827_mm() {
+    let (simulator, readings) = scan("simple-room", "fig9", 0.9);
+    for azimuth_deg in [262.8, 266.4, 270.0, 273.6, 277.2] {
+        let range_m = echo_m(&readings, azimuth_deg).expect("an echo");
+        close(range_m, 0.827, 0.01, &format!("range at {azimuth_deg}"));
+    }
+    let (_, straight) = readings.iter().find(|(at, _)| *at == 270.0).expect("a reading");
+    let record = simulator.record(straight).path.expect("a path");
+    assert_eq!(record.walls, ["south", "north", "south"]);
+    close(record.length_m, 1.654, 1e-6, "length");
+    // The corridor the robot believes in is twice as wide as the room is deep.
+    let upper_m = echo_m(&readings, 90.0).expect("the upper wall");
+    close(upper_m + 0.827, 2.0 * 0.742, 1e-3, "width");
+}
+
+/// Figure 7: the top wall's echo (794 mm of path) still sounds when the receiver opens.
+#[test]
+fn the_top_wall_is_read_as_minimum_range() {
+    let (simulator, readings) = scan("simple-room", "fig7", 0.9);
+    let (_, up) = readings.iter().find(|(at, _)| *at == 90.0).expect("a reading");
+    assert_eq!(up.status, PingStatus::MinRange);
+    let speed_m_s = simulator.sound_speed_m_s();
+    close(up.range_m.expect("a range"), speed_m_s * 2.38e-3 / 2.0, 1e-9, "minimum range");
+    let path = simulator.record(up).path.expect("a path");
+    assert_eq!(path.walls, ["north"]);
+    close(path.length_m, 0.794, 1e-6, "length");
+    let circle = readings.iter().filter(|(_, p)| p.status == PingStatus::MinRange).count();
+    assert!((10..200).contains(&circle), "{circle}");
+    close(echo_m(&readings, 180.0).expect("the far wall"), 0.834, 1e-3, "far wall");
+}
+
+/// Figure 12: an arc around the corner's vertex, and a hole on each side of it.
+#[test]
+fn a_corner_becomes_an_arc_between_holes() {
+    let (_, readings) = scan("right-angle-corner", "robot", 0.9);
+    let vertex = DVec2::new(-0.8, -0.65);
+    let bearing_deg = vertex.to_angle().to_degrees() + 360.0;
+    let near =
+        |deg: f64, within: f64| readings.iter().filter(move |(at, _)| (at - deg).abs() < within);
+    for (at, prediction) in near(bearing_deg, 7.0) {
+        assert_eq!(prediction.status, PingStatus::Echo, "{at}");
+        close(prediction.range_m.expect("a range"), vertex.length(), 1e-6, "arc");
+    }
+    for wall_deg in [180.0, 270.0] {
+        let hole_deg = (wall_deg + bearing_deg) / 2.0;
+        for (at, prediction) in near(hole_deg, 4.0) {
+            assert_eq!(prediction.status, PingStatus::NoEcho, "{at}: {prediction:?}");
+            assert!(prediction.margin_db.is_none_or(|margin_db| margin_db < 0.0), "{at}");
+        }
+    }
+    close(echo_m(&readings, 180.0).expect("west"), 0.8, 1e-6, "west wall");
+    close(echo_m(&readings, 270.0).expect("south"), 0.65, 1e-6, "south wall");
+}
+
+/// A corridor, the ranger beside one wall: side walls right at the perpendicular, silence or
+/// phantoms ahead and behind, never the wall the beam points at.
+#[test]
+fn a_corridor_is_right_at_the_perpendicular_only() {
+    let (_, readings) = scan("corridor", "beside-wall", 0.9);
+    close(echo_m(&readings, 90.0).expect("north"), 1.3, 1e-6, "north wall");
+    close(echo_m(&readings, 270.0).expect("south"), 0.5, 1e-6, "south wall");
+    let slanting = readings.iter().filter(|(at, _)| (205.0..240.0).contains(at));
+    let mut wrong = 0;
+    for (at, prediction) in slanting {
+        let wall_m = 0.5 / (at - 270.0_f64).to_radians().cos();
+        if prediction.range_m.is_none_or(|range_m| (range_m - wall_m).abs() > 0.05) {
+            wrong += 1;
+        }
+    }
+    assert!(wrong > 30, "{wrong}");
+}

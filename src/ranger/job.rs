@@ -1,0 +1,25 @@
+//! What is to be scanned.
+
+use firmware_protocol::messages::Settings;
+
+use crate::{
+    geometry::Pose,
+    scan::{ScanPlan, SimRecord},
+};
+
+/// What is to be scanned, and what the model says about it.
+#[derive(Debug, Clone)]
+pub struct ScanJob {
+    /// Where the ranger stands.
+    pub pose: Pose,
+    /// Which azimuths.
+    pub plan: ScanPlan,
+    /// How the device moves and listens.
+    pub settings: Settings,
+    /// For ranges, metres a second.
+    pub sound_speed_m_s: f64,
+    /// When the receiver opens, microseconds after firing.
+    pub blanking_us: f64,
+    /// For each stop of the plan, what the model predicts; empty without a model.
+    pub predictions: Vec<SimRecord>,
+}

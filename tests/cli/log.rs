@@ -1,0 +1,159 @@
+//! `sonard log` and `sonard compare` as a user meets them.
+
+use std::{fs, path::Path};
+
+use serde_json::Value;
+
+use crate::common::{run, sonard, stderr};
+
+const LOG: &str = include_str!("../fixtures/small.jsonl");
+
+/// Runs the verb and checks its exit code; gives standard output and standard error together.
+#[track_caller]
+fn check(arguments: &[&str], code: i32) -> String {
+    let output = run(arguments);
+    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &stderr(&output);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
+    assert!(!said.contains("panicked"), "{said}");
+    said
+}
+
+fn log_of(folder: &Path, bytes: impl AsRef<[u8]>) -> String {
+    let path = folder.join("scan.jsonl");
+    fs::write(&path, bytes).expect("a temporary file");
+    path.to_str().expect("plain path").to_owned()
+}
+
+#[test]
+fn a_torn_log_is_found_repaired_and_then_clean() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let torn = &LOG[..LOG.len() - 200];
+    let log = &log_of(folder.path(), torn);
+    let said = check(&["log", "verify", log], 1);
+    assert!(said.contains(":10: problem: the last line is torn"), "{said}");
+    assert!(said.contains("sonard log repair"), "{said}");
+    let said = check(&["log", "repair", log], 0);
+    assert!(said.contains("9 record(s) kept") && said.contains(".orig"), "{said}");
+    let whole = torn.rfind('\n').expect("many lines") + 1;
+    assert_eq!(fs::read_to_string(log).expect("it is there"), torn[..whole]);
+    let original = fs::read_to_string(format!("{log}.orig")).expect("it is kept");
+    assert_eq!(original, torn);
+    let said = check(&["log", "verify", log], 0);
+    assert!(said.contains("warning: scan") && said.contains("no scan_end"), "{said}");
+    check(&["log", "verify", "--strict", log], 1);
+    assert!(check(&["log", "repair", log], 0).contains("nothing to repair"));
+}
+
+#[test]
+fn damage_in_the_middle_is_listed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = &log_of(folder.path(), LOG.replacen("\"ping\"", "\"ping", 1));
+    let said = check(&["log", "verify", log], 1);
+    assert!(said.contains("scan.jsonl:3: problem: column "), "{said}");
+    let said = check(&["log", "repair", log], 1);
+    let length = LOG.lines().nth(2).expect("a reading").len() - 1;
+    assert!(said.contains(&format!("scan.jsonl:3: left out {length} byte(s)")), "{said}");
+    let json = check(&["log", "verify", "--json", log], 1);
+    let lines: Vec<Value> =
+        json.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    assert_eq!(lines[0]["kind"], "wrong_count");
+    assert_eq!(lines[lines.len() - 1]["clean"], false);
+}
+
+#[test]
+fn what_cannot_be_opened_is_wrong_input() {
+    for verb in [&["log", "verify"][..], &["log", "repair"], &["log", "show"], &["compare"]] {
+        for path in ["/no/such/log.jsonl", "/tmp"] {
+            let said = check(&[verb, &[path]].concat(), 2);
+            assert!(said.contains(path) && said.contains("help:"), "{said}");
+        }
+    }
+    check(&["log", "repair", "-"], 2);
+}
+
+#[test]
+fn a_log_is_shown() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = &log_of(folder.path(), format!("{LOG}rubbish\n"));
+    let said = check(&["log", "show", "--pings", log], 0);
+    for part in [
+        "senscomp-6500",
+        "simple-room",
+        "5a0e7f5e",
+        "7/7",
+        "0.774,0.085,0",
+        "3 reflections: south north south",
+        "(repaired)",
+        "stopped: on request",
+        "line 12",
+    ] {
+        assert!(said.contains(part), "{part} is not in:\n{said}");
+    }
+    let json = check(&["log", "show", "--json", log], 0);
+    let types: Vec<Value> = json
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).expect("JSON")["type"].clone())
+        .collect();
+    assert_eq!(types, ["session", "scan", "event", "damaged"]);
+    let mut follow = sonard(&["log", "show", "--follow", "-"]);
+    let output = follow.stdin(fs::File::open(log).expect("it is there")).output().expect("runs");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("ends after 0.4 s: 7 beams") && said.contains("line 12"), "{said}");
+}
+
+#[test]
+fn a_comparison_is_one_object_and_always_ends_well() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = &log_of(folder.path(), LOG);
+    let said = check(&["compare", "--json", log], 0);
+    let json: Value = serde_json::from_str(&said).expect("one object");
+    for (field, expected) in [("beams", 6), ("both_echo", 4), ("agree", 3), ("measured_only", 0)] {
+        assert_eq!(json[field], expected, "{field}");
+    }
+    assert_eq!(json["verdicts"]["multiple"], 1);
+    let said = check(&["compare", log], 0);
+    assert!(said.contains("Largest residuals") && said.contains("300.0 mm"), "{said}");
+    // In another scene the predictions are others, and it still runs.
+    let said = check(&["compare", "--json", "--scene", "simple-room", log], 0);
+    let again: Value = serde_json::from_str(&said).expect("one object and no complaint");
+    assert_eq!(again["beams"], 6);
+    assert_ne!(again["median_abs_residual_m"], json["median_abs_residual_m"]);
+}
+
+#[test]
+fn a_simulated_scan_agrees_with_itself() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = folder.path().join("sim.jsonl");
+    let log = log.to_str().expect("plain path");
+    let pose = ["--scene", "simple-room", "--pose", "fig9"];
+    check(&[&["simulate"][..], &pose, &["--step-deg", "9", "--out", log]].concat(), 0);
+    check(&["log", "verify", "--strict", log], 0);
+    let said = check(&["compare", log], 0);
+    assert!(said.contains("--scene makes one"), "{said}");
+    let said = check(&["compare", "--json", "--scene", "simple-room", log], 0);
+    let json: Value = serde_json::from_str(&said).expect("one object");
+    assert_eq!(json["beams"], 40);
+    assert_eq!(json["agree"], json["both_echo"]);
+    assert_eq!(json["verdicts"]["unexplained"], 0);
+    assert_eq!(json["p90_abs_residual_m"], 0.0);
+}
+
+#[test]
+fn degenerate_logs_have_clear_answers() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let session_only = LOG.lines().next().expect("a session").to_owned() + "\n";
+    for (bytes, code, part) in [
+        ("", 2, "holds no record"),
+        ("rubbish\n", 2, "holds no record"),
+        (&session_only, 0, "no reading in it"),
+    ] {
+        let log = &log_of(folder.path(), bytes);
+        let said = check(&["compare", log], code);
+        assert!(said.contains(part), "{said}");
+    }
+    let one: String = LOG.lines().take(3).map(|line| format!("{line}\n")).collect();
+    let log = &log_of(folder.path(), one);
+    let json: Value =
+        serde_json::from_str(&check(&["compare", "--json", log], 0)).expect("one object");
+    assert_eq!((&json["beams"], &json["agree_fraction"]), (&1.into(), &1.0.into()));
+}
