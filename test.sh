@@ -47,5 +47,8 @@ if [ "$fuzz_seconds" != 0 ]; then
   printf 'no finding\n'
 fi
 
+step "examples in the documentation"
+cargo test --workspace --doc --quiet
+
 step "tests"
-cargo test --workspace --quiet
+cargo test --workspace --lib --bins --tests --quiet
