@@ -5,6 +5,7 @@ mod common;
 mod faults;
 mod hangup;
 mod log;
+mod paths;
 mod plot;
 mod scan;
 mod scene;

@@ -1,0 +1,50 @@
+//! `sonard paths`, as a user meets it.
+
+use assert_cmd::Command;
+use predicates::{prelude::PredicateBooleanExt, str::contains};
+use serde_json::Value;
+
+fn paths(args: &[&str]) -> assert_cmd::assert::Assert {
+    Command::new(env!("CARGO_BIN_EXE_sonard")).arg("paths").args(args).assert()
+}
+
+fn lines(args: &[&str]) -> Vec<Value> {
+    let output = paths(args).success().get_output().stdout.clone();
+    let text = String::from_utf8(output).expect("UTF-8");
+    text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
+}
+
+#[test]
+fn json_lists_the_false_wall_of_figure_9_with_its_way() {
+    let lines = lines(&["--scene", "simple-room", "--pose", "fig9", "--max-range", "1", "--json"]);
+    let length = |line: &Value| line["length_m"].as_f64().expect("a number");
+    assert!(lines.windows(2).all(|pair| length(&pair[0]) <= length(&pair[1])));
+    let false_wall: Vec<_> =
+        lines.iter().filter(|line| (length(line) - 1.654).abs() < 1e-9).collect();
+    assert_eq!(false_wall.len(), 1);
+    let line = false_wall[0];
+    assert_eq!(line["walls"], serde_json::json!(["south", "north", "south"]));
+    assert_eq!((&line["kind"], &line["order"]), (&"specular".into(), &3.into()));
+    assert_eq!(line["edge"], Value::Null);
+    for end in ["departure_deg", "arrival_deg"] {
+        assert!((line[end].as_f64().expect("a number") - 270.0).abs() < 1e-9);
+    }
+    // Three reflections at 0.98 and 1.654 m of air.
+    let amplitude = line["amplitude"].as_f64().expect("a number");
+    assert!((amplitude - 0.98_f64.powi(3) * f64::exp(-0.189 * 1.654)).abs() < 1e-3);
+}
+
+#[test]
+fn the_table_names_ways_and_max_order_limits_them() {
+    paths(&["--scene", "simple-room", "--pose", "fig9", "--max-range", "1", "--max-order", "1"])
+        .success()
+        .stdout(contains("south").and(contains("4 paths")).and(contains("south, east").not()));
+}
+
+#[test]
+fn wrong_input_is_refused_with_what_would_be_right() {
+    paths(&["--scene", "simple-room", "--pose", "fig9", "--weakest", "0"])
+        .code(2)
+        .stderr(contains("from 0.000001 to 1"));
+    paths(&["--scene", "simple-room", "--pose", "nowhere"]).code(2).stderr(contains("fig7"));
+}
