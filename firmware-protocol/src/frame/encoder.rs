@@ -2,9 +2,8 @@
 
 use core::ops::Deref;
 
-use serde::Serialize;
-
 use super::{CRC_LEN, DELIMITER, FRAME_MAX, HEADER_LEN, Header, PAYLOAD_MAX, crc32};
+use crate::messages::{Wire, Writer};
 
 /// A frame ready to be written to the line.
 ///
@@ -32,14 +31,16 @@ impl Frame {
     /// # Errors
     ///
     /// [`TooLong`] if the encoded message does not fit.
-    pub fn encode<M: Serialize>(header: Header, message: &M) -> Result<Self, TooLong> {
+    pub fn encode<M: Wire>(header: Header, message: &M) -> Result<Self, TooLong> {
         let mut bytes = [DELIMITER; FRAME_MAX + 1];
         let [boot_low, boot_high] = header.boot.to_le_bytes();
         let [seq_low, seq_high] = header.seq.to_le_bytes();
         put(&mut bytes, PAYLOAD_AT, [boot_low, boot_high, seq_low, seq_high])?;
         let room = PAYLOAD_AT + HEADER_LEN..PAYLOAD_AT + PAYLOAD_MAX - CRC_LEN;
         let body = bytes.get_mut(room).ok_or(TooLong)?;
-        let body_len = postcard::to_slice(message, body).map_err(|_| TooLong)?.len();
+        let mut writer = Writer::new(body);
+        message.put(&mut writer);
+        let body_len = usize::from(writer.finish().ok_or(TooLong)?);
         let covered = HEADER_LEN + body_len;
         let crc = crc32(bytes.get(PAYLOAD_AT..PAYLOAD_AT + covered).ok_or(TooLong)?);
         put(&mut bytes, PAYLOAD_AT + covered, crc.to_le_bytes())?;
