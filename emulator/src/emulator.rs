@@ -95,6 +95,8 @@ struct Rig {
     to_chip: VecDeque<u8>,
     sending: bool,
     from_chip: Vec<u8>,
+    /// When the heartbeat came last.
+    beat: u64,
 }
 
 impl fmt::Debug for Emulator {
@@ -166,6 +168,7 @@ impl Emulator {
                 to_chip: VecDeque::new(),
                 sending: false,
                 from_chip: Vec::new(),
+                beat: 0,
             });
             let user = (&raw mut *rig).cast::<c_void>();
             let hook = |pin, handler| sys::avr_irq_register_notify(pin, Some(handler), user);
@@ -260,6 +263,10 @@ impl Emulator {
         if stack > 0x100 {
             self.lowest_stack = self.lowest_stack.min(stack);
         }
+        if self.cycle() > self.rig.beat + 4 * HEARTBEAT {
+            self.rig.start_again();
+        }
+        let data = self.rig.data();
         if self.rig.init && data[DDRB] & INIT_BIT == 0 {
             // A reset lets go of the pins without a word; the resistor pulls INIT low.
             self.rig.set_init(false);
@@ -277,7 +284,7 @@ impl Emulator {
         unsafe { sys::avr_reset(self.rig.avr.as_ptr()) };
         self.rig.data_mut()[MCUSR] = cause as u8;
         self.rig.set_init(false);
-        self.rig.to_chip.clear();
+        self.rig.start_again();
     }
 
     /// Makes the firmware hang with interrupts on: an instruction that jumps to itself.
@@ -399,6 +406,22 @@ impl Rig {
         self.show_echo();
     }
 
+    /// A reset has taken every timer out of simavr. Bytes on their way are lost.
+    #[expect(unsafe_code, reason = "simavr is C")]
+    fn start_again(&mut self) {
+        self.to_chip.clear();
+        self.sending = false;
+        self.beat = self.now();
+        let user = (&raw mut *self).cast::<c_void>();
+        // SAFETY: the rig is in its box and outlives the timer.
+        unsafe {
+            let avr = self.avr.as_ptr();
+            sys::avr_cycle_timer_cancel(avr, Some(heartbeat), user);
+            sys::avr_cycle_timer_cancel(avr, Some(feed), user);
+            sys::avr_cycle_timer_register(avr, HEARTBEAT, Some(heartbeat), user);
+        }
+    }
+
     /// Puts ECHO on its pin, and looks again when something may change.
     #[expect(unsafe_code, reason = "simavr is C")]
     fn show_echo(&mut self) {
@@ -424,8 +447,13 @@ impl Rig {
             [(self.index_pin, from_index >= INDEX_WIDTH), (self.emergency_pin, self.emergency)];
         for (bit, (pin, level)) in levels.into_iter().enumerate() {
             if (self.data()[PINC] >> bit & 1 != 0) != level {
+                // There and back, because after a reset simavr's pin and its register differ, and
+                // it passes on only what changes the pin.
                 // SAFETY: a pin of the chip.
-                unsafe { sys::avr_raise_irq(pin, level.into()) };
+                unsafe {
+                    sys::avr_raise_irq(pin, (!level).into());
+                    sys::avr_raise_irq(pin, level.into());
+                }
             }
         }
     }
@@ -510,7 +538,9 @@ unsafe extern "C" fn feed(_: *mut sys::avr_t, when: u64, user: *mut c_void) -> u
 #[expect(unsafe_code, reason = "simavr is C")]
 unsafe extern "C" fn heartbeat(_: *mut sys::avr_t, when: u64, user: *mut c_void) -> u64 {
     // SAFETY: registered with the rig.
-    unsafe { rig(user) }.refresh_inputs();
+    let rig = unsafe { rig(user) };
+    rig.refresh_inputs();
+    rig.beat = when;
     when + HEARTBEAT
 }
 

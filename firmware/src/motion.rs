@@ -5,8 +5,10 @@
 //! pause after pulse `k` is `(sqrt(2k + 1) - sqrt(2k - 1)) * sqrt(1 / a)`, and slowing down mirrors it,
 //! with `sqrt(1 / a)` from the last pulse to the stand. A single step takes `2 sqrt(1 / a)`.
 //!
-//! From one pause to the next: `d(k) = d(k - 1) * (4k - 3) / (4k - 1)`, right to 1 % of the way from
-//! the third pulse on (the ratio of the roots is `sqrt(1 - 1 / k)` but for terms of `1 / k^3`).
+//! From one pause to the next: `d(k) = d(k - 1) * (4k - 3) / (4k - 1)`, right to 0.2 % from
+//! the fourth on (the ratio of the roots is `sqrt(1 - 1 / k)` but for terms of `1 / k^3`).
+
+use core::arch::asm;
 
 use crate::clock::{self, Purpose};
 use crate::hardware::{Alone, Shared, alone};
@@ -192,10 +194,9 @@ impl Motion {
             return self.slower();
         }
         if self.left > ramp && self.ramp < RAMP_MAX {
-            let pause = if self.ramp == 0 {
-                second(self.first)
-            } else {
-                self.pause - divide(2 * self.pause, 4 * ramp + 3)
+            let pause = match early(self.first, self.ramp + 1) {
+                Some(pause) => pause,
+                None => self.pause - divide(2 * self.pause, 4 * ramp + 3),
             };
             if pause > self.cruise {
                 self.pause = pause;
@@ -214,19 +215,26 @@ impl Motion {
 
     fn slower(&mut self) -> u32 {
         self.ramp -= 1;
-        self.pause = match self.ramp {
-            0 => self.first,
-            1 => second(self.first),
-            ramp => self.pause + divide(2 * self.pause, 4 * u32::from(ramp) + 1),
+        let ramp = u32::from(self.ramp);
+        self.pause = match early(self.first, self.ramp) {
+            Some(pause) => pause,
+            None => self.pause + divide(2 * self.pause, 4 * ramp + 1),
         };
         self.pause
     }
 }
 
-/// The pause after the first pulse: `(sqrt(3) - 1) * first`.
-fn second(first: u32) -> u32 {
-    // 0.7320508 * 256 = 187.4; first has 24 bits.
-    (first >> 4) * 1499 >> 7
+/// The first pauses, which the recurrence does not give: `sqrt(2k + 1) - sqrt(2k - 1)` in 2048ths.
+fn early(first: u32, ramp: u16) -> Option<u32> {
+    let share = match ramp {
+        0 => return Some(first),
+        1 => 1_499,
+        2 => 1_032,
+        3 => 839,
+        _ => return None,
+    };
+    // `first` has 24 bits.
+    Some((first >> 4) * share >> 7)
 }
 
 /// The integer part of the square root.
@@ -243,18 +251,34 @@ fn root(value: u32) -> u16 {
     root
 }
 
-/// `value / by`, bit by bit: the compiler's own division takes a kilobyte. 60 us.
+/// `value / by`, bit by bit: the compiler's own division takes a kilobyte. 40 us.
 #[inline(never)]
 fn divide(value: u32, by: u32) -> u32 {
-    let (mut quotient, mut rest) = (value, 0_u32);
-    for _ in 0..32 {
-        // The quotient comes in below as the value goes out above.
-        rest = rest << 1 | quotient >> 31;
-        quotient <<= 1;
-        if rest >= by {
-            rest -= by;
-            quotient |= 1;
-        }
+    let halves = |value: u32| (value as u16, (value >> 16) as u16);
+    let ((mut low, mut high), (by_low, by_high)) = (halves(value), halves(by));
+    // SAFETY: arithmetic on its own registers. The quotient comes in below as the value goes
+    // out above, into the rest.
+    unsafe {
+        asm!(
+            "ldi {count}, 32",
+            "1: lsl {low:l}", "rol {low:h}", "rol {high:l}", "rol {high:h}",
+            "rol {rest:l}", "rol {rest:h}", "rol {rest_high:l}", "rol {rest_high:h}",
+            "cp {rest:l}, {by:l}", "cpc {rest:h}, {by:h}",
+            "cpc {rest_high:l}, {by_high:l}", "cpc {rest_high:h}, {by_high:h}",
+            "brcs 2f",
+            "sub {rest:l}, {by:l}", "sbc {rest:h}, {by:h}",
+            "sbc {rest_high:l}, {by_high:l}", "sbc {rest_high:h}, {by_high:h}",
+            "inc {low:l}",
+            "2: dec {count}",
+            "brne 1b",
+            count = out(reg_upper) _,
+            low = inout(reg_pair) low,
+            high = inout(reg_pair) high,
+            rest = inout(reg_pair) 0_u16 => _,
+            rest_high = inout(reg_pair) 0_u16 => _,
+            by = in(reg_pair) by_low,
+            by_high = in(reg_pair) by_high,
+        );
     }
-    quotient
+    u32::from(high) << 16 | u32::from(low)
 }

@@ -34,7 +34,7 @@ pub fn config() -> Config {
     }
 }
 
-pub fn settings() -> Settings {
+pub const fn settings() -> Settings {
     Settings {
         window_ticks: 48_000,
         min_interval_ticks: 0,

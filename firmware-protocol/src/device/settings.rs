@@ -7,6 +7,7 @@ use crate::messages::limits::{
 };
 use crate::messages::{Blanking, Capabilities, NakReason, Settings, Sweep};
 
+#[expect(clippy::manual_range_contains, reason = "twice the code on a microcontroller")]
 /// Checks settings against the limits and the board's capabilities.
 pub(super) fn check_settings(
     settings: &Settings,
@@ -14,7 +15,7 @@ pub(super) fn check_settings(
 ) -> Result<(), NakReason> {
     let max_echoes = if capabilities.has(Capabilities::MULTIPLE_ECHOES) { MAX_ECHOES } else { 1 };
     // One after the other: as a table this is larger than a microcontroller can afford.
-    if !(WINDOW_TICKS_MIN..=WINDOW_TICKS_MAX).contains(&settings.window_ticks) {
+    if settings.window_ticks < WINDOW_TICKS_MIN || settings.window_ticks > WINDOW_TICKS_MAX {
         return Err(NakReason::WindowOutOfRange);
     }
     if settings.min_interval_ticks > INTERVAL_TICKS_MAX {
@@ -23,16 +24,16 @@ pub(super) fn check_settings(
     if settings.settle_ticks > SETTLE_TICKS_MAX {
         return Err(NakReason::SettleOutOfRange);
     }
-    if !(1..=max_echoes).contains(&settings.max_echoes) {
+    if settings.max_echoes == 0 || settings.max_echoes > max_echoes {
         return Err(NakReason::EchoesOutOfRange);
     }
     if !blanking_is_right(settings, capabilities) {
         return Err(NakReason::BlankingOutOfRange);
     }
-    if !(1..=SPEED_MAX).contains(&settings.speed) {
+    if settings.speed == 0 || settings.speed > SPEED_MAX {
         return Err(NakReason::SpeedOutOfRange);
     }
-    if !(1..=ACCELERATION_MAX).contains(&settings.acceleration) {
+    if settings.acceleration == 0 || settings.acceleration > ACCELERATION_MAX {
         return Err(NakReason::AccelerationOutOfRange);
     }
     if settings.hold_s > HOLD_S_MAX {

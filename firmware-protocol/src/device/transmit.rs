@@ -18,7 +18,8 @@ pub(super) struct Outbox {
     sent: u16,
     resend_next: u16,
     resend_left: u8,
-    frame: Option<Frame>,
+    /// On its way, or empty.
+    frame: Frame,
     frame_at: u8,
 }
 
@@ -32,7 +33,7 @@ impl Outbox {
             sent: 0,
             resend_next: 0,
             resend_left: 0,
-            frame: None,
+            frame: Frame::EMPTY,
             frame_at: 0,
         }
     }
@@ -63,7 +64,7 @@ impl Outbox {
 
     /// Whether nothing of importance is left to send.
     pub(super) fn is_empty(&self) -> bool {
-        self.frame.is_none() && self.answer.is_none() && !self.announce
+        self.frame.is_empty() && self.answer.is_none() && !self.announce
     }
 }
 
@@ -71,21 +72,21 @@ impl Device {
     pub(super) fn transmit(&mut self, buffer: &mut [u8]) -> usize {
         let mut written = 0;
         while let Some(room) = buffer.get_mut(written..).filter(|room| !room.is_empty()) {
-            if self.outbox.frame.is_none() {
-                self.outbox.frame = self.next_frame();
+            if self.outbox.frame.is_empty() {
                 self.outbox.frame_at = 0;
+                if !self.next_frame() {
+                    break;
+                }
             }
-            let Some(frame) = &self.outbox.frame else {
-                break;
-            };
-            let rest = frame.get(usize::from(self.outbox.frame_at)..).unwrap_or_default();
+            let at = usize::from(self.outbox.frame_at);
+            let rest = self.outbox.frame.get(at..).unwrap_or_default();
             let count = rest.len().min(room.len());
             for (slot, byte) in room.iter_mut().zip(rest) {
                 *slot = *byte;
             }
             written = written.wrapping_add(count);
             if count == rest.len() {
-                self.outbox.frame = None;
+                self.outbox.frame.clear();
             } else {
                 self.outbox.frame_at = self.outbox.frame_at.wrapping_add(low_byte(count));
             }
@@ -93,13 +94,14 @@ impl Device {
         written
     }
 
-    /// Answers first, so that requests are quick; then readings in order; the end after the last.
-    fn next_frame(&mut self) -> Option<Frame> {
+    /// Builds the next frame, if there is one. Answers first, so that requests are quick; then
+    /// readings in order; the end after the last.
+    fn next_frame(&mut self) -> bool {
         if let Some((seq, answer)) = self.outbox.answer
             && !self.must_wait_for_resend(answer)
         {
             self.outbox.answer = None;
-            return self.frame(seq, &self.reply(answer)?);
+            return self.answer(seq, answer);
         }
         if core::mem::take(&mut self.outbox.announce) {
             return self.frame(0, &Reply::Identity(self.identity()));
@@ -114,7 +116,7 @@ impl Device {
         matches!(answer, Answer::Alive { .. }) && self.outbox.resend_left > 0
     }
 
-    fn next_event(&mut self) -> Option<Frame> {
+    fn next_event(&mut self) -> bool {
         while self.outbox.resend_left > 0 {
             let index = self.outbox.resend_next;
             self.outbox.resend_left = self.outbox.resend_left.wrapping_sub(1);
@@ -127,12 +129,14 @@ impl Device {
             }
         }
         if let Some((seq, answer)) = self.outbox.answer.take() {
-            return self.frame(seq, &self.reply(answer)?);
+            return self.answer(seq, answer);
         }
         let index = self.outbox.sent.max(self.ring.first());
         if !self.run.is_ping() && index < self.run.fired {
             self.outbox.sent = index.wrapping_add(1);
-            let reading = self.reading(index)?;
+            let Some(reading) = self.reading(index) else {
+                return false;
+            };
             return self.frame(self.run.seq, &Reply::Reading(reading));
         }
         if core::mem::take(&mut self.outbox.sweep_done) {
@@ -143,11 +147,15 @@ impl Device {
             };
             return self.frame(self.run.seq, &Reply::SweepDone(done));
         }
-        None
+        false
     }
 
-    fn frame(&self, seq: u16, reply: &Reply) -> Option<Frame> {
-        Frame::encode(Header { boot: self.board.boot, seq }, reply).ok()
+    fn answer(&mut self, seq: u16, answer: Answer) -> bool {
+        self.reply(answer).is_some_and(|reply| self.frame(seq, &reply))
+    }
+
+    fn frame(&mut self, seq: u16, reply: &Reply) -> bool {
+        self.outbox.frame.fill(Header { boot: self.board.boot, seq }, reply).is_ok()
     }
 
     fn reply(&self, answer: Answer) -> Option<Reply> {
