@@ -29,8 +29,9 @@ const HEARTBEAT: u64 = HZ / 10_000;
 /// Steps for which the index sensor is on.
 const INDEX_WIDTH: i32 = 4;
 
-const SREG_AND_STACK: usize = 0x5d;
-const RAM_END: u16 = 0x08ff;
+const RAM_START: usize = 0x100;
+/// What memory holds before anything is written to it.
+const PAINT: u8 = 0xa5;
 const PINC: usize = 0x26;
 const DDRB: usize = 0x24;
 const DDRD: usize = 0x2a;
@@ -73,7 +74,6 @@ impl std::error::Error for Crash {}
 /// An ATmega328P that runs the firmware, with everything wired to it.
 pub struct Emulator {
     rig: Box<Rig>,
-    lowest_stack: u16,
 }
 
 /// What simavr's callbacks touch; in a box, because they keep its address.
@@ -179,7 +179,10 @@ impl Emulator {
             hook(pin(UART, 1), on_sent);
             sys::avr_raise_irq(rig.echo_pin, 0);
             sys::avr_cycle_timer_register(avr.as_ptr(), HEARTBEAT, Some(heartbeat), user);
-            Ok(Self { rig, lowest_stack: RAM_END })
+            for byte in &mut rig.data_mut()[RAM_START..] {
+                *byte = PAINT;
+            }
+            Ok(Self { rig })
         }
     }
 
@@ -257,12 +260,6 @@ impl Emulator {
     fn instruction(&mut self) -> Result<(), Crash> {
         // SAFETY: the chip was initialised.
         let state = unsafe { sys::avr_run(self.rig.avr.as_ptr()) };
-        let data = self.rig.data();
-        let stack = u16::from_le_bytes([data[SREG_AND_STACK], data[SREG_AND_STACK + 1]]);
-        // Zero until the first instructions have set it.
-        if stack > 0x100 {
-            self.lowest_stack = self.lowest_stack.min(stack);
-        }
         if self.cycle() > self.rig.beat + 4 * HEARTBEAT {
             self.rig.start_again();
         }
@@ -340,10 +337,20 @@ impl Emulator {
         self.rig.holds_coils()
     }
 
-    /// The deepest the stack has been, bytes.
+    /// The deepest the stack has been since power came on, bytes: what is no longer painted above
+    /// the longest stretch of memory that still is. (The pointer itself can't be watched: a
+    /// function changes it one byte after the other.)
     #[must_use]
-    pub const fn stack_bytes(&self) -> u16 {
-        RAM_END - self.lowest_stack
+    pub fn stack_bytes(&self) -> usize {
+        let memory = &self.rig.data()[RAM_START..];
+        let (mut longest, mut end, mut run) = (0, 0, 0);
+        for (at, byte) in memory.iter().enumerate() {
+            run = if *byte == PAINT { run + 1 } else { 0 };
+            if run > longest {
+                (longest, end) = (run, at + 1);
+            }
+        }
+        memory.len() - end
     }
 
     /// What is outside, if it is a `T`: for tests that change it on the way.

@@ -3,7 +3,7 @@
 use core::mem::MaybeUninit;
 
 use board_config::{Config, OPTION_INDEX_HIGH};
-use firmware_protocol::device::{Action, Board, Device, EchoReport};
+use firmware_protocol::device::{Action, Board, Device};
 use firmware_protocol::messages::{Capabilities, FirmwareVersion};
 
 use crate::clock::{self, Purpose};
@@ -38,18 +38,9 @@ struct Rig {
 }
 
 pub fn run() -> ! {
-    let config = store::config();
-    let board = Board {
-        boot: store::next_boot(),
-        firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
-        serial: config.serial,
-        steps_per_revolution: config.steps_per_revolution,
-        capabilities: config.capabilities,
-        reset_cause: boot::reset_cause(),
-    };
-    // SAFETY: this function runs once, and nobody else knows it.
-    let device = unsafe { (*(&raw mut DEVICE)).write(Device::new(board)) };
-    let mut rig = Rig::new(&config);
+    let mut rig = start();
+    // SAFETY: `start` has written it, and nobody else holds it.
+    let device = unsafe { (*(&raw mut DEVICE)).assume_init_mut() };
     boot::start_watchdog();
     enable_interrupts();
     loop {
@@ -60,6 +51,23 @@ pub fn run() -> ! {
             clock::rest();
         }
     }
+}
+
+/// Reads the EEPROM and makes the machine. Apart from the loop, whose stack this would burden.
+#[inline(never)]
+fn start() -> Rig {
+    let config = store::config();
+    let board = Board {
+        boot: store::next_boot(),
+        firmware: FirmwareVersion { major: 0, minor: 1, patch: 0 },
+        serial: config.serial,
+        steps_per_revolution: config.steps_per_revolution,
+        capabilities: config.capabilities,
+        reset_cause: boot::reset_cause(),
+    };
+    // SAFETY: before the loop that uses it.
+    unsafe { (*(&raw mut DEVICE)).write(Device::new(board)) };
+    Rig::new(&config)
 }
 
 impl Rig {
@@ -79,14 +87,13 @@ impl Rig {
         }
     }
 
+    #[inline(never)]
     /// Everything that may have happened, once.
     fn round(&mut self, device: &mut Device) {
         // The lease first: a beam that ends after it must not be followed by another.
         on_time(device);
         self.watch_emergency(device);
-        if let Some(report) = ranger::take_report() {
-            heard(device, &report);
-        }
+        listen(device);
         if let Some(arrival) = motion::take_arrival() {
             self.arrived(device, &arrival);
         }
@@ -113,6 +120,7 @@ impl Rig {
         self.pressed = pressed;
     }
 
+    #[inline(never)]
     fn arrived(&mut self, device: &mut Device, arrival: &motion::Arrival) {
         let Some(homing) = &mut self.homing else {
             return moved(device, arrival.position);
@@ -197,6 +205,7 @@ fn near(steps: i32, revolution: i32) -> i32 {
     near
 }
 
+#[inline(never)]
 /// Whether the machine's next deadline will wake the chip; if not, it has come already.
 fn clock_is_set(device: &Device) -> bool {
     let Some((_, at)) = device.poll_timeout() else { return true };
@@ -211,6 +220,7 @@ fn clock_is_set(device: &Device) -> bool {
     true
 }
 
+#[inline(never)]
 fn speak(device: &mut Device) {
     while serial::room() >= CHUNK {
         let mut chunk = [0; CHUNK];
@@ -245,8 +255,10 @@ fn homed(device: &mut Device, outcome: Result<i32, firmware_protocol::device::Ho
 }
 
 #[inline(never)]
-fn heard(device: &mut Device, report: &EchoReport) {
-    device.handle_echoes(clock::now(), report);
+fn listen(device: &mut Device) {
+    if let Some(report) = ranger::take_report() {
+        device.handle_echoes(clock::now(), &report);
+    }
 }
 
 #[inline(never)]

@@ -101,13 +101,13 @@ impl Device {
             && !self.must_wait_for_resend(answer)
         {
             self.outbox.answer = None;
-            return self.answer(seq, answer);
+            return self.say(seq, answer);
         }
         if core::mem::take(&mut self.outbox.announce) {
-            return self.frame(0, &Reply::Identity(self.identity()));
+            return self.say(0, Answer::Identity);
         }
         if let Some(kind) = self.outbox.fault.take() {
-            return self.frame(0, &Reply::Fault { kind });
+            return self.say(0, Answer::Fault(kind));
         }
         self.next_event()
     }
@@ -122,40 +122,33 @@ impl Device {
             self.outbox.resend_left = self.outbox.resend_left.wrapping_sub(1);
             self.outbox.resend_next = index.wrapping_add(1);
             // What was never sent comes in its turn.
-            if index < self.outbox.sent
-                && let Some(reading) = self.reading(index)
-            {
-                return self.frame(self.run.seq, &Reply::Reading(reading));
+            if index < self.outbox.sent && self.say(self.run.seq, Answer::Beam(index)) {
+                return true;
             }
         }
         if let Some((seq, answer)) = self.outbox.answer.take() {
-            return self.answer(seq, answer);
+            return self.say(seq, answer);
         }
         let index = self.outbox.sent.max(self.ring.first());
         if !self.run.is_ping() && index < self.run.fired {
             self.outbox.sent = index.wrapping_add(1);
-            let Some(reading) = self.reading(index) else {
-                return false;
-            };
-            return self.frame(self.run.seq, &Reply::Reading(reading));
+            return self.say(self.run.seq, Answer::Beam(index));
         }
         if core::mem::take(&mut self.outbox.sweep_done) {
-            let done = SweepDone {
-                sweep: self.run.plan.sweep,
-                fired: self.run.fired,
-                end: self.run.state,
-            };
-            return self.frame(self.run.seq, &Reply::SweepDone(done));
+            return self.say(self.run.seq, Answer::SweepDone);
         }
         false
     }
 
-    fn answer(&mut self, seq: u16, answer: Answer) -> bool {
-        self.reply(answer).is_some_and(|reply| self.frame(seq, &reply))
-    }
-
-    fn frame(&mut self, seq: u16, reply: &Reply) -> bool {
-        self.outbox.frame.fill(Header { boot: self.board.boot, seq }, reply).is_ok()
+    /// Builds a frame; false if there is nothing to say it about any more.
+    // Not inlined: all frames are built in one place, with one message on the stack.
+    #[inline(never)]
+    fn say(&mut self, seq: u16, answer: Answer) -> bool {
+        let header = Header { boot: self.board.boot, seq };
+        let Some(reply) = self.reply(answer) else {
+            return false;
+        };
+        self.outbox.frame.fill(header, &reply).is_ok()
     }
 
     fn reply(&self, answer: Answer) -> Option<Reply> {
@@ -166,6 +159,13 @@ impl Device {
             Answer::Started => Reply::Started,
             Answer::Homed { drift_steps } => Reply::Homed { drift_steps },
             Answer::Ping => Reply::Reading(self.reading(0)?),
+            Answer::Beam(index) => Reply::Reading(self.reading(index)?),
+            Answer::Fault(kind) => Reply::Fault { kind },
+            Answer::SweepDone => Reply::SweepDone(SweepDone {
+                sweep: self.run.plan.sweep,
+                fired: self.run.fired,
+                end: self.run.state,
+            }),
             Answer::Alive { ticks } => Reply::Alive(self.alive(ticks)),
             Answer::Status { ticks } => Reply::StatusReport(self.status(ticks)),
         })

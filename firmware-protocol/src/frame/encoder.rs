@@ -43,6 +43,7 @@ impl Frame {
 
     /// Becomes what [`Self::encode`] makes, in place: a copy is a lot for a microcontroller's
     /// stack. Empty if the message is too long.
+    #[inline(never)]
     pub(crate) fn fill<M: Wire>(&mut self, header: Header, message: &M) -> Result<(), TooLong> {
         *self = Self::EMPTY;
         let bytes = &mut self.bytes;
