@@ -9,7 +9,7 @@ use firmware_protocol::host::HostTimer;
 use firmware_protocol::messages::{
     Alive, Blanking, Capabilities, DeviceState, FaultKind, Field, FirmwareVersion, Identity,
     NakReason, PROTOCOL_VERSION, ProtocolId, Reading, ReadingStatus, Reply, Request, ResetCause,
-    SCHEMA_HASH, Settings, Status, Sweep, SweepDone, SweepState, Variant, limits,
+    SCHEMA_HASH, Settings, Status, Sweep, SweepDone, SweepState, Variant, Wire, limits,
 };
 
 const DOCUMENT: &str = include_str!("../PROTOCOL.md");
@@ -185,7 +185,7 @@ fn example(title: &str) -> String {
     bytes.join(" ")
 }
 
-fn encode<M: serde::Serialize>(header: Header, samples: &[(&str, M)], name: &str) -> Frame {
+fn encode<M: Wire>(header: Header, samples: &[(&str, M)], name: &str) -> Frame {
     let (_, message) = samples.iter().find(|(sample, _)| *sample == name).expect("a sample");
     Frame::encode(header, message).expect("fits")
 }

@@ -84,6 +84,12 @@ enum Answer {
     Status {
         ticks: u32,
     },
+    /// Unasked: the reading of a beam.
+    Beam(u16),
+    /// Unasked.
+    Fault(FaultKind),
+    /// Unasked.
+    SweepDone,
 }
 
 /// What the device is doing.

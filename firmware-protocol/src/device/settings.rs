@@ -13,23 +13,32 @@ pub(super) fn check_settings(
     capabilities: Capabilities,
 ) -> Result<(), NakReason> {
     let max_echoes = if capabilities.has(Capabilities::MULTIPLE_ECHOES) { MAX_ECHOES } else { 1 };
-    let checks = [
-        (
-            (WINDOW_TICKS_MIN..=WINDOW_TICKS_MAX).contains(&settings.window_ticks),
-            NakReason::WindowOutOfRange,
-        ),
-        (settings.min_interval_ticks <= INTERVAL_TICKS_MAX, NakReason::IntervalOutOfRange),
-        (settings.settle_ticks <= SETTLE_TICKS_MAX, NakReason::SettleOutOfRange),
-        ((1..=max_echoes).contains(&settings.max_echoes), NakReason::EchoesOutOfRange),
-        (blanking_is_right(settings, capabilities), NakReason::BlankingOutOfRange),
-        ((1..=SPEED_MAX).contains(&settings.speed), NakReason::SpeedOutOfRange),
-        (
-            (1..=ACCELERATION_MAX).contains(&settings.acceleration),
-            NakReason::AccelerationOutOfRange,
-        ),
-        (settings.hold_s <= HOLD_S_MAX, NakReason::HoldOutOfRange),
-    ];
-    checks.into_iter().try_for_each(|(right, reason)| if right { Ok(()) } else { Err(reason) })
+    // One after the other: as a table this is larger than a microcontroller can afford.
+    if settings.window_ticks < WINDOW_TICKS_MIN || settings.window_ticks > WINDOW_TICKS_MAX {
+        return Err(NakReason::WindowOutOfRange);
+    }
+    if settings.min_interval_ticks > INTERVAL_TICKS_MAX {
+        return Err(NakReason::IntervalOutOfRange);
+    }
+    if settings.settle_ticks > SETTLE_TICKS_MAX {
+        return Err(NakReason::SettleOutOfRange);
+    }
+    if settings.max_echoes == 0 || settings.max_echoes > max_echoes {
+        return Err(NakReason::EchoesOutOfRange);
+    }
+    if !blanking_is_right(settings, capabilities) {
+        return Err(NakReason::BlankingOutOfRange);
+    }
+    if settings.speed == 0 || settings.speed > SPEED_MAX {
+        return Err(NakReason::SpeedOutOfRange);
+    }
+    if settings.acceleration == 0 || settings.acceleration > ACCELERATION_MAX {
+        return Err(NakReason::AccelerationOutOfRange);
+    }
+    if settings.hold_s > HOLD_S_MAX {
+        return Err(NakReason::HoldOutOfRange);
+    }
+    Ok(())
 }
 
 fn blanking_is_right(settings: &Settings, capabilities: Capabilities) -> bool {

@@ -18,7 +18,8 @@ pub(super) struct Outbox {
     sent: u16,
     resend_next: u16,
     resend_left: u8,
-    frame: Option<Frame>,
+    /// On its way, or empty.
+    frame: Frame,
     frame_at: u8,
 }
 
@@ -32,7 +33,7 @@ impl Outbox {
             sent: 0,
             resend_next: 0,
             resend_left: 0,
-            frame: None,
+            frame: Frame::EMPTY,
             frame_at: 0,
         }
     }
@@ -63,7 +64,7 @@ impl Outbox {
 
     /// Whether nothing of importance is left to send.
     pub(super) fn is_empty(&self) -> bool {
-        self.frame.is_none() && self.answer.is_none() && !self.announce
+        self.frame.is_empty() && self.answer.is_none() && !self.announce
     }
 }
 
@@ -71,21 +72,21 @@ impl Device {
     pub(super) fn transmit(&mut self, buffer: &mut [u8]) -> usize {
         let mut written = 0;
         while let Some(room) = buffer.get_mut(written..).filter(|room| !room.is_empty()) {
-            if self.outbox.frame.is_none() {
-                self.outbox.frame = self.next_frame();
+            if self.outbox.frame.is_empty() {
                 self.outbox.frame_at = 0;
+                if !self.next_frame() {
+                    break;
+                }
             }
-            let Some(frame) = &self.outbox.frame else {
-                break;
-            };
-            let rest = frame.get(usize::from(self.outbox.frame_at)..).unwrap_or_default();
+            let at = usize::from(self.outbox.frame_at);
+            let rest = self.outbox.frame.get(at..).unwrap_or_default();
             let count = rest.len().min(room.len());
             for (slot, byte) in room.iter_mut().zip(rest) {
                 *slot = *byte;
             }
             written = written.wrapping_add(count);
             if count == rest.len() {
-                self.outbox.frame = None;
+                self.outbox.frame.clear();
             } else {
                 self.outbox.frame_at = self.outbox.frame_at.wrapping_add(low_byte(count));
             }
@@ -93,19 +94,20 @@ impl Device {
         written
     }
 
-    /// Answers first, so that requests are quick; then readings in order; the end after the last.
-    fn next_frame(&mut self) -> Option<Frame> {
+    /// Builds the next frame, if there is one. Answers first, so that requests are quick; then
+    /// readings in order; the end after the last.
+    fn next_frame(&mut self) -> bool {
         if let Some((seq, answer)) = self.outbox.answer
             && !self.must_wait_for_resend(answer)
         {
             self.outbox.answer = None;
-            return self.frame(seq, &self.reply(answer)?);
+            return self.say(seq, answer);
         }
         if core::mem::take(&mut self.outbox.announce) {
-            return self.frame(0, &Reply::Identity(self.identity()));
+            return self.say(0, Answer::Identity);
         }
         if let Some(kind) = self.outbox.fault.take() {
-            return self.frame(0, &Reply::Fault { kind });
+            return self.say(0, Answer::Fault(kind));
         }
         self.next_event()
     }
@@ -114,40 +116,39 @@ impl Device {
         matches!(answer, Answer::Alive { .. }) && self.outbox.resend_left > 0
     }
 
-    fn next_event(&mut self) -> Option<Frame> {
+    fn next_event(&mut self) -> bool {
         while self.outbox.resend_left > 0 {
             let index = self.outbox.resend_next;
             self.outbox.resend_left = self.outbox.resend_left.wrapping_sub(1);
             self.outbox.resend_next = index.wrapping_add(1);
             // What was never sent comes in its turn.
-            if index < self.outbox.sent
-                && let Some(reading) = self.reading(index)
-            {
-                return self.frame(self.run.seq, &Reply::Reading(reading));
+            if index < self.outbox.sent && self.say(self.run.seq, Answer::Beam(index)) {
+                return true;
             }
         }
         if let Some((seq, answer)) = self.outbox.answer.take() {
-            return self.frame(seq, &self.reply(answer)?);
+            return self.say(seq, answer);
         }
         let index = self.outbox.sent.max(self.ring.first());
         if !self.run.is_ping() && index < self.run.fired {
             self.outbox.sent = index.wrapping_add(1);
-            let reading = self.reading(index)?;
-            return self.frame(self.run.seq, &Reply::Reading(reading));
+            return self.say(self.run.seq, Answer::Beam(index));
         }
         if core::mem::take(&mut self.outbox.sweep_done) {
-            let done = SweepDone {
-                sweep: self.run.plan.sweep,
-                fired: self.run.fired,
-                end: self.run.state,
-            };
-            return self.frame(self.run.seq, &Reply::SweepDone(done));
+            return self.say(self.run.seq, Answer::SweepDone);
         }
-        None
+        false
     }
 
-    fn frame(&self, seq: u16, reply: &Reply) -> Option<Frame> {
-        Frame::encode(Header { boot: self.board.boot, seq }, reply).ok()
+    /// Builds a frame; false if there is nothing to say it about any more.
+    // Not inlined: all frames are built in one place, with one message on the stack.
+    #[inline(never)]
+    fn say(&mut self, seq: u16, answer: Answer) -> bool {
+        let header = Header { boot: self.board.boot, seq };
+        let Some(reply) = self.reply(answer) else {
+            return false;
+        };
+        self.outbox.frame.fill(header, &reply).is_ok()
     }
 
     fn reply(&self, answer: Answer) -> Option<Reply> {
@@ -158,6 +159,13 @@ impl Device {
             Answer::Started => Reply::Started,
             Answer::Homed { drift_steps } => Reply::Homed { drift_steps },
             Answer::Ping => Reply::Reading(self.reading(0)?),
+            Answer::Beam(index) => Reply::Reading(self.reading(index)?),
+            Answer::Fault(kind) => Reply::Fault { kind },
+            Answer::SweepDone => Reply::SweepDone(SweepDone {
+                sweep: self.run.plan.sweep,
+                fired: self.run.fired,
+                end: self.run.state,
+            }),
             Answer::Alive { ticks } => Reply::Alive(self.alive(ticks)),
             Answer::Status { ticks } => Reply::StatusReport(self.status(ticks)),
         })

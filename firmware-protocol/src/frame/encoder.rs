@@ -2,9 +2,8 @@
 
 use core::ops::Deref;
 
-use serde::Serialize;
-
 use super::{CRC_LEN, DELIMITER, FRAME_MAX, HEADER_LEN, Header, PAYLOAD_MAX, crc32};
+use crate::messages::{Wire, Writer};
 
 /// A frame ready to be written to the line.
 ///
@@ -32,21 +31,42 @@ impl Frame {
     /// # Errors
     ///
     /// [`TooLong`] if the encoded message does not fit.
-    pub fn encode<M: Serialize>(header: Header, message: &M) -> Result<Self, TooLong> {
-        let mut bytes = [DELIMITER; FRAME_MAX + 1];
+    pub fn encode<M: Wire>(header: Header, message: &M) -> Result<Self, TooLong> {
+        let mut frame = Self::EMPTY;
+        frame.fill(header, message)?;
+        Ok(frame)
+    }
+
+    /// No bytes at all.
+    pub(crate) const EMPTY: Self =
+        Self { bytes: [DELIMITER; FRAME_MAX + 1], start: 0, end: 0, crc: 0 };
+
+    /// Becomes what [`Self::encode`] makes, in place: a copy is a lot for a microcontroller's
+    /// stack. Empty if the message is too long.
+    #[inline(never)]
+    pub(crate) fn fill<M: Wire>(&mut self, header: Header, message: &M) -> Result<(), TooLong> {
+        *self = Self::EMPTY;
+        let bytes = &mut self.bytes;
         let [boot_low, boot_high] = header.boot.to_le_bytes();
         let [seq_low, seq_high] = header.seq.to_le_bytes();
-        put(&mut bytes, PAYLOAD_AT, [boot_low, boot_high, seq_low, seq_high])?;
+        put(bytes, PAYLOAD_AT, [boot_low, boot_high, seq_low, seq_high])?;
         let room = PAYLOAD_AT + HEADER_LEN..PAYLOAD_AT + PAYLOAD_MAX - CRC_LEN;
-        let body = bytes.get_mut(room).ok_or(TooLong)?;
-        let body_len = postcard::to_slice(message, body).map_err(|_| TooLong)?.len();
+        let mut writer = Writer::new(bytes.get_mut(room).ok_or(TooLong)?);
+        message.put(&mut writer);
+        let body_len = usize::from(writer.finish().ok_or(TooLong)?);
         let covered = HEADER_LEN + body_len;
         let crc = crc32(bytes.get(PAYLOAD_AT..PAYLOAD_AT + covered).ok_or(TooLong)?);
-        put(&mut bytes, PAYLOAD_AT + covered, crc.to_le_bytes())?;
+        put(bytes, PAYLOAD_AT + covered, crc.to_le_bytes())?;
         let payload_len = covered + CRC_LEN;
         stuff(bytes.get_mut(1..PAYLOAD_AT + payload_len).ok_or(TooLong)?);
         let end = u8::try_from(PAYLOAD_AT + payload_len + 1).map_err(|_| TooLong)?;
-        Ok(Self { bytes, start: 1, end, crc })
+        (self.start, self.end, self.crc) = (1, end, crc);
+        Ok(())
+    }
+
+    /// Forgets the bytes.
+    pub(crate) const fn clear(&mut self) {
+        self.end = self.start;
     }
 
     /// The same with a delimiter in front as well, which ends whatever noise came before.

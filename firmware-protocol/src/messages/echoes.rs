@@ -8,6 +8,7 @@ use serde::ser::SerializeSeq;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::limits::{MAX_ECHOES, WINDOW_TICKS_MAX};
+use super::wire::{Reader, Wire, Writer};
 
 /// Up to [`MAX_ECHOES`] echo times, ticks after firing, each at most [`WINDOW_TICKS_MAX`].
 ///
@@ -77,6 +78,26 @@ impl Eq for Echoes {}
 impl fmt::Debug for Echoes {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.debug_list().entries(self.iter()).finish()
+    }
+}
+
+impl Wire for Echoes {
+    fn put(&self, out: &mut Writer<'_>) {
+        out.byte(self.len);
+        for ticks in self.iter() {
+            ticks.put(out);
+        }
+    }
+
+    fn take(input: &mut Reader<'_>) -> Self {
+        let mut echoes = Self::new();
+        for _ in 0..input.code() {
+            if !input.is_right() || echoes.push(u32::take(input)).is_err() {
+                input.fail();
+                break;
+            }
+        }
+        echoes
     }
 }
 

@@ -8,6 +8,7 @@ mod echoes;
 pub mod limits;
 mod records;
 pub(crate) mod table;
+mod wire;
 
 pub use codes::{DeviceState, FaultKind, NakReason, ReadingStatus, ResetCause, SweepState};
 pub use echoes::Echoes;
@@ -16,8 +17,8 @@ pub use records::{
     Status, Sweep, SweepDone,
 };
 pub use table::{Field, Variant};
+pub use wire::{Reader, Wire, Writer};
 
-use serde::{Deserialize, Serialize};
 use table::wire_enum;
 
 /// Version of the protocol: counts up with every change that is not only an addition.
@@ -154,27 +155,20 @@ impl Reply {
     }
 }
 
-fn decode_exactly<'a, M: Deserialize<'a>>(body: &'a [u8]) -> Result<M, Undecodable> {
-    match postcard::take_from_bytes(body) {
-        Ok((message, [])) => Ok(message),
-        _ => Err(Undecodable),
-    }
-}
-
-/// The part of an Identity that every version shares.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-struct FrozenIdentity {
-    code: u8,
-    protocol: ProtocolId,
-    firmware: FirmwareVersion,
+fn decode_exactly<M: Wire>(body: &[u8]) -> Result<M, Undecodable> {
+    let mut input = Reader::new(body);
+    let message = M::take(&mut input);
+    if input.is_done() { Ok(message) } else { Err(Undecodable) }
 }
 
 impl ProtocolId {
     /// Reads the frozen front of an Identity of any version; `None` if `body` is none.
     #[must_use]
     pub fn peek(body: &[u8]) -> Option<(Self, FirmwareVersion)> {
-        let (frozen, _) = postcard::take_from_bytes::<FrozenIdentity>(body).ok()?;
-        (frozen.code == 0).then_some((frozen.protocol, frozen.firmware))
+        let mut input = Reader::new(body);
+        let code = input.byte();
+        let front = (Self::take(&mut input), FirmwareVersion::take(&mut input));
+        (code == 0 && input.is_right()).then_some(front)
     }
 }
 

@@ -3,6 +3,7 @@
 use super::codes::{DeviceState, FaultKind, ReadingStatus, ResetCause, SweepState};
 use super::echoes::Echoes;
 use super::table::{wire_enum, wire_struct};
+use super::wire::{Reader, Wire, Writer};
 
 wire_struct! {
     /// Which protocol a device speaks. The front of every Identity, frozen.
@@ -55,6 +56,16 @@ wire_struct! {
 /// What a board can do, as bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Capabilities(pub u16);
+
+impl Wire for Capabilities {
+    fn put(&self, out: &mut Writer<'_>) {
+        self.0.put(out);
+    }
+
+    fn take(input: &mut Reader<'_>) -> Self {
+        Self(Wire::take(input))
+    }
+}
 
 impl Capabilities {
     /// Homes on an index sensor; without it, Home takes the present position for zero.

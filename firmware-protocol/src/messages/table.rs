@@ -1,6 +1,6 @@
 //! The macros behind the message tables, and the hash over them.
 //!
-//! Each message is written once. From that one text come the Rust type, its postcard encoding,
+//! Each message is written once. From that one text come the Rust type, its encoding,
 //! a description that the protocol document is compared with, and the schema hash.
 
 /// One variant of a message or code enum: its code, its name, and its fields as
@@ -63,6 +63,44 @@ macro_rules! wire_enum {
             ];
         }
 
+        impl $crate::messages::Wire for $name {
+            fn put(&self, out: &mut $crate::messages::Writer<'_>) {
+                match self {
+                    $(
+                        Self::$variant
+                            $(($crate::messages::table::bind!(record $record)))?
+                            $({ $($field),+ })?
+                        => {
+                            out.byte($code);
+                            $(<$record as $crate::messages::Wire>::put(
+                                $crate::messages::table::bind!(record $record), out);)?
+                            $($($crate::messages::Wire::put($field, out);)+)?
+                        }
+                    ),+
+                }
+            }
+
+            fn take(input: &mut $crate::messages::Reader<'_>) -> Self {
+                match input.code() {
+                    $(
+                        $code => Self::$variant
+                            $((<$record as $crate::messages::Wire>::take(input)))?
+                            $({ $($field: $crate::messages::Wire::take(input)),+ })?,
+                    )+
+                    _ => {
+                        input.fail();
+                        $name::FALLBACK
+                    }
+                }
+            }
+        }
+
+        impl $name {
+            /// What a failed reader gives.
+            const FALLBACK: Self = $crate::messages::table::first_unit!(
+                $($variant $(($record))? $({ $($field)+ })?),+);
+        }
+
         const _: () = $crate::messages::table::assert_codes($name::VARIANTS);
     };
 }
@@ -90,10 +128,35 @@ macro_rules! wire_struct {
                 }),+
             ];
         }
+
+        impl $crate::messages::Wire for $name {
+            fn put(&self, out: &mut $crate::messages::Writer<'_>) {
+                $($crate::messages::Wire::put(&self.$field, out);)+
+            }
+
+            fn take(input: &mut $crate::messages::Reader<'_>) -> Self {
+                // In the order written, which is that of the wire.
+                Self { $($field: $crate::messages::Wire::take(input)),+ }
+            }
+        }
     };
 }
 
-pub(crate) use {wire_enum, wire_struct};
+/// Names the record of a variant in a pattern and in an expression alike.
+macro_rules! bind {
+    ($name:ident $record:ty) => {
+        $name
+    };
+}
+
+/// The first variant without fields.
+macro_rules! first_unit {
+    ($variant:ident $(, $($rest:tt)*)?) => { Self::$variant };
+    ($variant:ident ($($fields:tt)*), $($rest:tt)*) => { $crate::messages::table::first_unit!($($rest)*) };
+    ($variant:ident {$($fields:tt)*}, $($rest:tt)*) => { $crate::messages::table::first_unit!($($rest)*) };
+}
+
+pub(crate) use {bind, first_unit, wire_enum, wire_struct};
 
 /// Codes must count up from 0, because postcard numbers variants so.
 pub(crate) const fn assert_codes(variants: &[Variant]) {

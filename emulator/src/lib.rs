@@ -1,0 +1,29 @@
+//! The firmware's machine code in an emulated ATmega328P, wired to a ranging module, a stepper
+//! and a serial line.
+//!
+//! [`Emulator`] is deterministic: its clock is the chip's, and nothing happens unless it is run.
+//! [`Bench`] sets the host's machine on the other end of its line. The program `sonard-emulator`
+//! plays it on a pty at the pace of the wall clock.
+//!
+//! What it models: every instruction with its cycles, both timers' units that the firmware
+//! uses, the UART (a byte takes 11 bits, as simavr has it), the EEPROM, the watchdog; the module's
+//! blanking, latch and re-arming ([`Module`]). What it does not: voltages, and simavr's own limits:
+//! interrupts begin at instruction boundaries, so an echo may be seen up to two cycles late.
+
+mod bench;
+mod emulator;
+mod module;
+mod surroundings;
+mod sys;
+
+pub use bench::{Bench, BenchError};
+pub use emulator::{Crash, Emulator, Reset};
+pub use module::Module;
+pub use surroundings::{Commanded, Surroundings};
+
+/// Clock of the chip.
+pub const HZ: u64 = 16_000_000;
+/// Cycles of a device tick.
+pub const CYCLES_PER_TICK: u64 = HZ / firmware_protocol::messages::limits::TICK_HZ as u64;
+/// Cycles of a microsecond.
+pub const CYCLES_PER_US: u64 = HZ / 1_000_000;
