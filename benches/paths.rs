@@ -45,7 +45,8 @@ fn small_room() {
     let text = shipped::text("simple-room").expect("a shipped scene");
     let scene = Arc::new(Scene::from_json(text).expect("a valid scene"));
     let pose = scene.poses["fig9"];
-    let range = Options { max_range_m: Some(10.7), ..Options::default() };
+    let range =
+        Options { engine: EngineKind::Paths, max_range_m: Some(10.7), ..Options::default() };
     let paths = simulator(scene.clone(), range);
     println!("simple-room, fig9, 400 azimuths to 10.7 m");
     let survey = time(|| drop(black_box(paths.station(pose.position()))));
