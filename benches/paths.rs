@@ -31,6 +31,7 @@ const FULL_SCAN: ScanPlan =
 fn main() {
     println!("{:72} {:>9}", "", "median, and best; ratios of the best");
     small_room();
+    robot_room();
     l_room();
     building_plans();
 }
@@ -45,7 +46,8 @@ fn small_room() {
     let text = shipped::text("simple-room").expect("a shipped scene");
     let scene = Arc::new(Scene::from_json(text).expect("a valid scene"));
     let pose = scene.poses["fig9"];
-    let range = Options { max_range_m: Some(10.7), ..Options::default() };
+    let range =
+        Options { engine: EngineKind::Paths, max_range_m: Some(10.7), ..Options::default() };
     let paths = simulator(scene.clone(), range);
     println!("simple-room, fig9, 400 azimuths to 10.7 m");
     let survey = time(|| drop(black_box(paths.station(pose.position()))));
@@ -80,6 +82,27 @@ fn small_room() {
             time,
             Some(exact),
         );
+    }
+}
+
+/// The same room with a round robot body: the worst case, a cylinder that nearly all beams meet.
+fn robot_room() {
+    let text = shipped::text("simple-room-robot").expect("a shipped scene");
+    let scene = Scene::from_json(text).expect("a valid scene");
+    let pose = scene.poses["fig9"];
+    let scene = Arc::new(scene.with_robot_at(&pose));
+    println!("\nsimple-room-robot, fig9, 400 azimuths");
+    for max_range_m in [2.5, 5.0, 10.7] {
+        let paths = simulator(
+            scene.clone(),
+            Options {
+                engine: EngineKind::Paths,
+                max_range_m: Some(max_range_m),
+                ..Options::default()
+            },
+        );
+        let exact = time(|| drop(black_box(paths.predict(&pose, &FULL_SCAN))));
+        report(&format!("paths to {max_range_m} m"), exact, None);
     }
 }
 

@@ -41,7 +41,7 @@ pub(super) struct AirArgs {
 #[command(next_help_heading = "Model")]
 pub(super) struct EngineArgs {
     /// How echoes are found
-    #[arg(long, value_enum, default_value_t = EngineName::Fan)]
+    #[arg(long, value_enum, default_value_t = EngineName::Paths)]
     engine: EngineName,
     /// Listen up to this range, metres [default: the sensor's]
     #[arg(long, value_name = "M")]

@@ -34,10 +34,9 @@ const SIGMA_E: f64 = 0.095;
 #[serde(rename_all = "snake_case")]
 pub enum EngineKind {
     /// [`PathEngine`]: all echo paths, exactly.
-    Paths,
-    /// [`Fan`]: the ray model with reflections and diffraction. The default as long as `paths`
-    /// needs minutes in a scene with a round body between walls.
     #[default]
+    Paths,
+    /// [`Fan`]: the ray model with reflections and diffraction.
     Fan,
     /// [`Cone`]: nearest hit within an aperture.
     Cone,
