@@ -7,7 +7,6 @@ use crate::messages::limits::{
 };
 use crate::messages::{Blanking, Capabilities, NakReason, Settings, Sweep};
 
-#[expect(clippy::manual_range_contains, reason = "twice the code on a microcontroller")]
 /// Checks settings against the limits and the board's capabilities.
 pub(super) fn check_settings(
     settings: &Settings,
