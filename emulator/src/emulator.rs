@@ -10,6 +10,9 @@ use std::{
 
 use board_config::Config;
 
+use crate::rig::{
+    HEARTBEAT, Rig, feed, heartbeat, keep_on, on_binh, on_blnk, on_init, on_sent, on_step,
+};
 use crate::{CYCLES_PER_US, HZ, Module, Surroundings, sys};
 
 const fn ioctl(name: [u8; 4]) -> u32 {
@@ -22,24 +25,12 @@ const PORT_B: u32 = ioctl(*b"iogB");
 const PORT_C: u32 = ioctl(*b"iogC");
 const PORT_D: u32 = ioctl(*b"iogD");
 
-/// simavr takes eleven bits for a byte: start, eight, and what it believes are two stop bits.
-const BYTE_CYCLES: u64 = 11 * 136;
-/// A sleeping chip is woken so often at least, so that the caller keeps control.
-const HEARTBEAT: u64 = HZ / 10_000;
-/// Steps for which the index sensor is on.
-const INDEX_WIDTH: i32 = 4;
-
 const RAM_START: usize = 0x100;
 /// What memory holds before anything is written to it.
 const PAINT: u8 = 0xa5;
-const PINC: usize = 0x26;
 const DDRB: usize = 0x24;
-const DDRD: usize = 0x2a;
-const PORTD: usize = 0x2b;
 const MCUSR: usize = 0x54;
 const INIT_BIT: u8 = 1 << 1;
-const DIR_BIT: u8 = 1 << 5;
-const ENABLE_BIT: u8 = 1 << 6;
 const STATE_DONE: i32 = 6;
 const STATE_CRASHED: i32 = 7;
 
@@ -74,29 +65,6 @@ impl std::error::Error for Crash {}
 /// An ATmega328P that runs the firmware, with everything wired to it.
 pub struct Emulator {
     rig: Box<Rig>,
-}
-
-/// What simavr's callbacks touch; in a box, because they keep its address.
-struct Rig {
-    avr: NonNull<sys::avr_t>,
-    echo_pin: *mut sys::avr_irq_t,
-    index_pin: *mut sys::avr_irq_t,
-    emergency_pin: *mut sys::avr_irq_t,
-    uart_in: *mut sys::avr_irq_t,
-    surroundings: Box<dyn Surroundings>,
-    steps_per_revolution: i32,
-    module: Module,
-    init: bool,
-    init_rises: Vec<u64>,
-    pulses: Vec<u64>,
-    steps: i64,
-    emergency: bool,
-    stuck_echo: bool,
-    to_chip: VecDeque<u8>,
-    sending: bool,
-    from_chip: Vec<u8>,
-    /// When the heartbeat came last.
-    beat: u64,
 }
 
 impl fmt::Debug for Emulator {
@@ -289,7 +257,7 @@ impl Emulator {
     pub fn hang(&mut self) {
         const JUMP_TO_ITSELF: [u8; 2] = [0xff, 0xcf];
         let unused = 0x7000;
-        // SAFETY: the flash has 32 KB; the firmware keeps to less than half of it.
+        // SAFETY: the flash has 32 KB, of which the firmware uses far less.
         unsafe {
             let chip = self.rig.avr.as_mut();
             std::ptr::copy_nonoverlapping(JUMP_TO_ITSELF.as_ptr(), chip.flash.add(unused), 2);
@@ -353,7 +321,7 @@ impl Emulator {
         memory.len() - end
     }
 
-    /// What is outside, if it is a `T`: for tests that change it on the way.
+    /// Puts the board into another world.
     pub fn set_surroundings(&mut self, surroundings: Box<dyn Surroundings>) {
         self.rig.surroundings = surroundings;
     }
@@ -366,191 +334,3 @@ impl Drop for Emulator {
         unsafe { sys::avr_terminate(self.rig.avr.as_ptr()) };
     }
 }
-
-impl Rig {
-    #[expect(unsafe_code, reason = "simavr is C")]
-    fn chip(&self) -> &sys::avr_t {
-        // SAFETY: made in `Emulator::new`, freed in its `drop`.
-        unsafe { self.avr.as_ref() }
-    }
-
-    #[expect(unsafe_code, reason = "simavr is C")]
-    fn data(&self) -> &[u8] {
-        let chip = self.chip();
-        // SAFETY: simavr allocates `ramend + 1` bytes of data space.
-        unsafe { std::slice::from_raw_parts(chip.data, usize::from(chip.ramend) + 1) }
-    }
-
-    #[expect(unsafe_code, reason = "simavr is C")]
-    fn data_mut(&mut self) -> &mut [u8] {
-        let chip = self.chip();
-        // SAFETY: as in `data`; the rig is borrowed for as long.
-        unsafe { std::slice::from_raw_parts_mut(chip.data, usize::from(chip.ramend) + 1) }
-    }
-
-    fn now(&self) -> u64 {
-        self.chip().cycle
-    }
-
-    fn holds_coils(&self) -> bool {
-        let data = self.data();
-        data[DDRD] & ENABLE_BIT != 0 && data[PORTD] & ENABLE_BIT == 0
-    }
-
-    fn set_init(&mut self, high: bool) {
-        if self.init == high {
-            return;
-        }
-        self.init = high;
-        let now = self.now();
-        if high {
-            self.init_rises.push(now);
-            let echoes = self.surroundings.fire();
-            self.module.fire(now, &echoes);
-        } else {
-            self.module.rest();
-        }
-        self.show_echo();
-    }
-
-    /// A reset has taken every timer out of simavr. Bytes on their way are lost.
-    #[expect(unsafe_code, reason = "simavr is C")]
-    fn start_again(&mut self) {
-        self.to_chip.clear();
-        self.sending = false;
-        self.beat = self.now();
-        let user = (&raw mut *self).cast::<c_void>();
-        // SAFETY: the rig is in its box and outlives the timer.
-        unsafe {
-            let avr = self.avr.as_ptr();
-            sys::avr_cycle_timer_cancel(avr, Some(heartbeat), user);
-            sys::avr_cycle_timer_cancel(avr, Some(feed), user);
-            sys::avr_cycle_timer_register(avr, HEARTBEAT, Some(heartbeat), user);
-        }
-    }
-
-    /// Puts ECHO on its pin, and looks again when something may change.
-    #[expect(unsafe_code, reason = "simavr is C")]
-    fn show_echo(&mut self) {
-        let level = self.module.echo() || self.stuck_echo;
-        let now = self.now();
-        let user = (&raw mut *self).cast::<c_void>();
-        // SAFETY: the rig is in its box and outlives the timer.
-        unsafe {
-            sys::avr_raise_irq(self.echo_pin, level.into());
-            sys::avr_cycle_timer_cancel(self.avr.as_ptr(), Some(look), user);
-            if let Some(at) = self.module.next_look(now) {
-                sys::avr_cycle_timer_register(self.avr.as_ptr(), at - now, Some(look), user);
-            }
-        }
-    }
-
-    /// Index sensor and emergency stop, where they are not what they should be: the chip's own
-    /// pull-ups write over them when they are switched on.
-    #[expect(unsafe_code, reason = "simavr is C")]
-    fn refresh_inputs(&mut self) {
-        let from_index = self.surroundings.steps_from_index().rem_euclid(self.steps_per_revolution);
-        let levels =
-            [(self.index_pin, from_index >= INDEX_WIDTH), (self.emergency_pin, self.emergency)];
-        for (bit, (pin, level)) in levels.into_iter().enumerate() {
-            if (self.data()[PINC] >> bit & 1 != 0) != level {
-                // There and back, because after a reset simavr's pin and its register differ, and
-                // it passes on only what changes the pin.
-                // SAFETY: a pin of the chip.
-                unsafe {
-                    sys::avr_raise_irq(pin, (!level).into());
-                    sys::avr_raise_irq(pin, level.into());
-                }
-            }
-        }
-    }
-}
-
-/// # Safety
-/// `user` is the rig, and nobody else holds it: simavr calls one handler at a time, from within
-/// `avr_run` or from a method of the emulator that is done with its borrow.
-#[expect(unsafe_code, reason = "simavr is C")]
-unsafe fn rig<'a>(user: *mut c_void) -> &'a mut Rig {
-    // SAFETY: as the caller promises.
-    unsafe { &mut *user.cast::<Rig>() }
-}
-
-macro_rules! on_pin {
-    ($name:ident, |$rig:ident, $high:ident| $body:expr) => {
-        #[expect(unsafe_code, reason = "simavr is C")]
-        unsafe extern "C" fn $name(_: *mut sys::avr_irq_t, value: u32, user: *mut c_void) {
-            // SAFETY: registered with the rig.
-            let $rig = unsafe { rig(user) };
-            let $high = value & 1 != 0;
-            $body
-        }
-    };
-}
-
-on_pin!(on_init, |rig, high| rig.set_init(high));
-on_pin!(on_binh, |rig, high| {
-    if high {
-        let now = rig.now();
-        rig.module.end_blanking(now);
-        rig.show_echo();
-    }
-});
-on_pin!(on_blnk, |rig, high| {
-    let now = rig.now();
-    rig.module.blank(now, high);
-    rig.show_echo();
-});
-on_pin!(on_step, |rig, high| {
-    if high {
-        let now = rig.now();
-        rig.pulses.push(now);
-        if rig.holds_coils() {
-            let steps = if rig.data()[PORTD] & DIR_BIT != 0 { 1 } else { -1 };
-            rig.surroundings.turn(steps);
-            rig.steps += i64::from(steps);
-            rig.refresh_inputs();
-        }
-    }
-});
-
-#[expect(unsafe_code, reason = "simavr is C")]
-unsafe extern "C" fn on_sent(_: *mut sys::avr_irq_t, value: u32, user: *mut c_void) {
-    // SAFETY: registered with the rig.
-    unsafe { rig(user) }.from_chip.push((value & 0xff) as u8);
-}
-
-#[expect(unsafe_code, reason = "simavr is C")]
-unsafe extern "C" fn look(_: *mut sys::avr_t, when: u64, user: *mut c_void) -> u64 {
-    // SAFETY: registered with the rig.
-    let rig = unsafe { rig(user) };
-    rig.module.look(when);
-    // SAFETY: a pin of the chip.
-    unsafe { sys::avr_raise_irq(rig.echo_pin, (rig.module.echo() || rig.stuck_echo).into()) };
-    rig.module.next_look(when).unwrap_or(0)
-}
-
-#[expect(unsafe_code, reason = "simavr is C")]
-unsafe extern "C" fn feed(_: *mut sys::avr_t, when: u64, user: *mut c_void) -> u64 {
-    // SAFETY: registered with the rig.
-    let rig = unsafe { rig(user) };
-    let Some(byte) = rig.to_chip.pop_front() else {
-        rig.sending = false;
-        return 0;
-    };
-    // SAFETY: the chip's UART.
-    unsafe { sys::avr_raise_irq(rig.uart_in, byte.into()) };
-    when + BYTE_CYCLES
-}
-
-#[expect(unsafe_code, reason = "simavr is C")]
-unsafe extern "C" fn heartbeat(_: *mut sys::avr_t, when: u64, user: *mut c_void) -> u64 {
-    // SAFETY: registered with the rig.
-    let rig = unsafe { rig(user) };
-    rig.refresh_inputs();
-    rig.beat = when;
-    when + HEARTBEAT
-}
-
-/// The caller does the pacing: a sleeping chip costs nothing.
-#[expect(unsafe_code, reason = "simavr is C")]
-unsafe extern "C" fn keep_on(_: *mut sys::avr_t, _: u64) {}

@@ -13,6 +13,7 @@
 mod bench;
 mod emulator;
 mod module;
+mod rig;
 mod surroundings;
 mod sys;
 

@@ -2,7 +2,7 @@
 #![no_main]
 
 use firmware_protocol::frame::{Frame, FrameDecoder, Header, PAYLOAD_MAX, Received};
-use firmware_protocol::messages::{ProtocolId, Reply, Request};
+use firmware_protocol::messages::{ProtocolId, Reply, Request, Wire};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
@@ -27,7 +27,7 @@ fn check_message(body: &[u8]) {
 }
 
 /// The body of a frame around `message`, by way of the line.
-fn body_again<M: serde::Serialize>(message: &M) -> Vec<u8> {
+fn body_again<M: Wire>(message: &M) -> Vec<u8> {
     let header = Header { boot: 1, seq: 2 };
     let frame = Frame::encode(header, message).expect("every message fits");
     let mut decoder = FrameDecoder::new();

@@ -26,23 +26,32 @@ impl Timers {
     /// The timer that ends first, seen from `now`.
     pub(super) fn earliest(&self, now: u32) -> Option<(DeviceTimer, u32)> {
         let mut first = None;
-        for (timer, deadline) in [
-            (DeviceTimer::Settle, self.settle),
-            (DeviceTimer::MinInterval, self.min_interval),
-            (DeviceTimer::Lease, self.lease),
-            (DeviceTimer::Hold, self.hold),
-        ] {
-            let Some(at) = deadline else { continue };
-            match first {
-                Some((_, best)) if ticks_until(now, at) >= ticks_until(now, best) => {}
-                _ => first = Some((timer, at)),
-            }
-        }
+        sooner(now, &mut first, DeviceTimer::Settle, self.settle);
+        sooner(now, &mut first, DeviceTimer::MinInterval, self.min_interval);
+        sooner(now, &mut first, DeviceTimer::Lease, self.lease);
+        sooner(now, &mut first, DeviceTimer::Hold, self.hold);
         first
     }
 }
 
+/// Puts `timer` in the place of `first` if it ends before it.
+// Not inlined, as `expire`: four copies of either are much for a microcontroller.
+#[inline(never)]
+fn sooner(
+    now: u32,
+    first: &mut Option<(DeviceTimer, u32)>,
+    timer: DeviceTimer,
+    deadline: Option<u32>,
+) {
+    let Some(at) = deadline else { return };
+    match *first {
+        Some((_, best)) if ticks_until(now, at) >= ticks_until(now, best) => {}
+        _ => *first = Some((timer, at)),
+    }
+}
+
 /// Whether `slot` holds a deadline that has passed; if so it is cleared.
+#[inline(never)]
 pub(super) fn expire(slot: &mut Option<u32>, now: u32) -> bool {
     let over = slot.is_some_and(|at| ticks_until(now, at) <= 0);
     if over {

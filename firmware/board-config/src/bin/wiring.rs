@@ -61,7 +61,14 @@ fn drawing() -> String {
          <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"#ffffff\"/>\n"
     );
     text(&mut svg, 40, 46, "start", 22, "Wiring of a sonard ranger");
-    text(&mut svg, 40, 72, "start", 15, "Arduino Uno (ATmega328P, 5 V), SensComp 6500 module, stepper driver (A4988 or DRV8825)");
+    text(
+        &mut svg,
+        40,
+        72,
+        "start",
+        15,
+        "Arduino Uno (ATmega328P, 5 V), SensComp 6500 module, stepper driver (A4988 or DRV8825)",
+    );
     block(&mut svg, 40, 110, 200, 300, "6500 module");
     block(&mut svg, 470, 110, 180, 430, "Arduino Uno");
     block(&mut svg, 880, 110, 200, 250, "stepper driver");
@@ -75,11 +82,11 @@ fn drawing() -> String {
     block(&mut svg, 40, 470, 200, 70, "transducer");
     line(&mut svg, 140, 410, 140, 470, POWER);
     text(&mut svg, 152, 446, "start", 14, "400 V: shielded cable");
-    text(&mut svg, 560, 470, "middle", 14, "D13: status light");
-    text(&mut svg, 560, 495, "middle", 14, "USB: 115200 bit/s");
+    text(&mut svg, 560, 385, "middle", 14, "D13: status light");
+    text(&mut svg, 560, 410, "middle", 14, "USB: 115200 bit/s");
     let notes = [
         "V+ of the module: its own supply, 5 V, at least 2.5 A peak. Not the Uno's 5 V pin: the module draws 2 A while it fires.",
-        "Motor supply (8 to 35 V) to VMOT of the driver with its 100 µF; all grounds meet at one point.",
+        "Motor supply (8 to 35 V) to VMOT of the driver with its 100 µF, RESET and SLEEP to VDD; all grounds meet at one point.",
         "The resistors at INIT and ENABLE keep the module silent and the motor free while the Uno restarts.",
         "DANGER: 400 V on the transducer, stored after power-off. Cover its contacts; wait a minute before touching.",
     ];

@@ -1,0 +1,232 @@
+//! What the chip's pins are wired to, and the callbacks through which simavr tells of them.
+
+use std::{collections::VecDeque, ffi::c_void, ptr::NonNull};
+
+use crate::{HZ, Module, Surroundings, sys};
+
+/// simavr takes eleven bits for a byte: start, eight, and what it believes are two stop bits.
+const BYTE_CYCLES: u64 = 11 * 136;
+/// A sleeping chip is woken so often at least, so that the caller keeps control.
+pub(crate) const HEARTBEAT: u64 = HZ / 10_000;
+/// Steps for which the index sensor is on.
+const INDEX_WIDTH: i32 = 4;
+const PINC: usize = 0x26;
+const DDRD: usize = 0x2a;
+const PORTD: usize = 0x2b;
+const DIR_BIT: u8 = 1 << 5;
+const ENABLE_BIT: u8 = 1 << 6;
+
+/// What simavr's callbacks touch; in a box, because they keep its address.
+pub(crate) struct Rig {
+    pub(crate) avr: NonNull<sys::avr_t>,
+    pub(crate) echo_pin: *mut sys::avr_irq_t,
+    pub(crate) index_pin: *mut sys::avr_irq_t,
+    pub(crate) emergency_pin: *mut sys::avr_irq_t,
+    pub(crate) uart_in: *mut sys::avr_irq_t,
+    pub(crate) surroundings: Box<dyn Surroundings>,
+    pub(crate) steps_per_revolution: i32,
+    pub(crate) module: Module,
+    pub(crate) init: bool,
+    pub(crate) init_rises: Vec<u64>,
+    pub(crate) pulses: Vec<u64>,
+    pub(crate) steps: i64,
+    pub(crate) emergency: bool,
+    pub(crate) stuck_echo: bool,
+    pub(crate) to_chip: VecDeque<u8>,
+    pub(crate) sending: bool,
+    pub(crate) from_chip: Vec<u8>,
+    /// When the heartbeat came last.
+    pub(crate) beat: u64,
+}
+
+impl Rig {
+    #[expect(unsafe_code, reason = "simavr is C")]
+    pub(crate) fn chip(&self) -> &sys::avr_t {
+        // SAFETY: made in `Emulator::new`, freed in its `drop`.
+        unsafe { self.avr.as_ref() }
+    }
+
+    #[expect(unsafe_code, reason = "simavr is C")]
+    pub(crate) fn data(&self) -> &[u8] {
+        let chip = self.chip();
+        // SAFETY: simavr allocates `ramend + 1` bytes of data space.
+        unsafe { std::slice::from_raw_parts(chip.data, usize::from(chip.ramend) + 1) }
+    }
+
+    #[expect(unsafe_code, reason = "simavr is C")]
+    pub(crate) fn data_mut(&mut self) -> &mut [u8] {
+        let chip = self.chip();
+        // SAFETY: as in `data`; the rig is borrowed for as long.
+        unsafe { std::slice::from_raw_parts_mut(chip.data, usize::from(chip.ramend) + 1) }
+    }
+
+    pub(crate) fn now(&self) -> u64 {
+        self.chip().cycle
+    }
+
+    pub(crate) fn holds_coils(&self) -> bool {
+        let data = self.data();
+        data[DDRD] & ENABLE_BIT != 0 && data[PORTD] & ENABLE_BIT == 0
+    }
+
+    pub(crate) fn set_init(&mut self, high: bool) {
+        if self.init == high {
+            return;
+        }
+        self.init = high;
+        let now = self.now();
+        if high {
+            self.init_rises.push(now);
+            let echoes = self.surroundings.fire();
+            self.module.fire(now, &echoes);
+        } else {
+            self.module.rest();
+        }
+        self.show_echo();
+    }
+
+    /// A reset has taken every timer out of simavr. Bytes on their way are lost.
+    #[expect(unsafe_code, reason = "simavr is C")]
+    pub(crate) fn start_again(&mut self) {
+        self.to_chip.clear();
+        self.sending = false;
+        self.beat = self.now();
+        let user = (&raw mut *self).cast::<c_void>();
+        // SAFETY: the rig is in its box and outlives the timer.
+        unsafe {
+            let avr = self.avr.as_ptr();
+            sys::avr_cycle_timer_cancel(avr, Some(heartbeat), user);
+            sys::avr_cycle_timer_cancel(avr, Some(feed), user);
+            sys::avr_cycle_timer_register(avr, HEARTBEAT, Some(heartbeat), user);
+        }
+    }
+
+    /// Puts ECHO on its pin, and looks again when something may change.
+    #[expect(unsafe_code, reason = "simavr is C")]
+    pub(crate) fn show_echo(&mut self) {
+        let level = self.module.echo() || self.stuck_echo;
+        let now = self.now();
+        let user = (&raw mut *self).cast::<c_void>();
+        // SAFETY: the rig is in its box and outlives the timer.
+        unsafe {
+            sys::avr_raise_irq(self.echo_pin, level.into());
+            sys::avr_cycle_timer_cancel(self.avr.as_ptr(), Some(look), user);
+            if let Some(at) = self.module.next_look(now) {
+                sys::avr_cycle_timer_register(self.avr.as_ptr(), at - now, Some(look), user);
+            }
+        }
+    }
+
+    /// Index sensor and emergency stop, where they are not what they should be: the chip's own
+    /// pull-ups write over them when they are switched on.
+    #[expect(unsafe_code, reason = "simavr is C")]
+    pub(crate) fn refresh_inputs(&mut self) {
+        let from_index = self.surroundings.steps_from_index().rem_euclid(self.steps_per_revolution);
+        let levels =
+            [(self.index_pin, from_index >= INDEX_WIDTH), (self.emergency_pin, self.emergency)];
+        for (bit, (pin, level)) in levels.into_iter().enumerate() {
+            if (self.data()[PINC] >> bit & 1 != 0) != level {
+                // There and back, because after a reset simavr's pin and its register differ, and
+                // it passes on only what changes the pin.
+                // SAFETY: a pin of the chip.
+                unsafe {
+                    sys::avr_raise_irq(pin, (!level).into());
+                    sys::avr_raise_irq(pin, level.into());
+                }
+            }
+        }
+    }
+}
+
+/// # Safety
+/// `user` is the rig, and nobody else holds it: simavr calls one handler at a time, from within
+/// `avr_run` or from a method of the emulator that is done with its borrow.
+#[expect(unsafe_code, reason = "simavr is C")]
+unsafe fn rig<'a>(user: *mut c_void) -> &'a mut Rig {
+    // SAFETY: as the caller promises.
+    unsafe { &mut *user.cast::<Rig>() }
+}
+
+macro_rules! on_pin {
+    ($name:ident, |$rig:ident, $high:ident| $body:expr) => {
+        #[expect(unsafe_code, reason = "simavr is C")]
+        pub(crate) unsafe extern "C" fn $name(
+            _: *mut sys::avr_irq_t,
+            value: u32,
+            user: *mut c_void,
+        ) {
+            // SAFETY: registered with the rig.
+            let $rig = unsafe { rig(user) };
+            let $high = value & 1 != 0;
+            $body
+        }
+    };
+}
+
+on_pin!(on_init, |rig, high| rig.set_init(high));
+on_pin!(on_binh, |rig, high| {
+    if high {
+        let now = rig.now();
+        rig.module.end_blanking(now);
+        rig.show_echo();
+    }
+});
+on_pin!(on_blnk, |rig, high| {
+    let now = rig.now();
+    rig.module.blank(now, high);
+    rig.show_echo();
+});
+on_pin!(on_step, |rig, high| {
+    if high {
+        let now = rig.now();
+        rig.pulses.push(now);
+        if rig.holds_coils() {
+            let steps = if rig.data()[PORTD] & DIR_BIT != 0 { 1 } else { -1 };
+            rig.surroundings.turn(steps);
+            rig.steps += i64::from(steps);
+            rig.refresh_inputs();
+        }
+    }
+});
+
+#[expect(unsafe_code, reason = "simavr is C")]
+pub(crate) unsafe extern "C" fn on_sent(_: *mut sys::avr_irq_t, value: u32, user: *mut c_void) {
+    // SAFETY: registered with the rig.
+    unsafe { rig(user) }.from_chip.push((value & 0xff) as u8);
+}
+
+#[expect(unsafe_code, reason = "simavr is C")]
+pub(crate) unsafe extern "C" fn look(_: *mut sys::avr_t, when: u64, user: *mut c_void) -> u64 {
+    // SAFETY: registered with the rig.
+    let rig = unsafe { rig(user) };
+    rig.module.look(when);
+    // SAFETY: a pin of the chip.
+    unsafe { sys::avr_raise_irq(rig.echo_pin, (rig.module.echo() || rig.stuck_echo).into()) };
+    rig.module.next_look(when).unwrap_or(0)
+}
+
+#[expect(unsafe_code, reason = "simavr is C")]
+pub(crate) unsafe extern "C" fn feed(_: *mut sys::avr_t, when: u64, user: *mut c_void) -> u64 {
+    // SAFETY: registered with the rig.
+    let rig = unsafe { rig(user) };
+    let Some(byte) = rig.to_chip.pop_front() else {
+        rig.sending = false;
+        return 0;
+    };
+    // SAFETY: the chip's UART.
+    unsafe { sys::avr_raise_irq(rig.uart_in, byte.into()) };
+    when + BYTE_CYCLES
+}
+
+#[expect(unsafe_code, reason = "simavr is C")]
+pub(crate) unsafe extern "C" fn heartbeat(_: *mut sys::avr_t, when: u64, user: *mut c_void) -> u64 {
+    // SAFETY: registered with the rig.
+    let rig = unsafe { rig(user) };
+    rig.refresh_inputs();
+    rig.beat = when;
+    when + HEARTBEAT
+}
+
+/// The caller does the pacing: a sleeping chip costs nothing.
+#[expect(unsafe_code, reason = "simavr is C")]
+pub(crate) unsafe extern "C" fn keep_on(_: *mut sys::avr_t, _: u64) {}
