@@ -8,27 +8,9 @@ use firmware_protocol::frame::{Frame, Header};
 use firmware_protocol::host::{Command, HostError, HostEvent, LinkStats, StartError};
 use firmware_protocol::messages::{Request, Settings, Sweep};
 use world::line::Faults;
+use world::ready::{BAUD, delivered, plan, ready};
 use world::settings;
 use world::sim::Sim;
-
-const BAUD: u32 = 115_200;
-
-fn ready(settings: Settings) -> Sim {
-    let mut sim = Sim::new(7, BAUD, Faults::default());
-    for command in [Command::Identify, Command::Configure(settings), Command::Home] {
-        let events = sim.run(command).expect("ends");
-        assert!(!matches!(events.last(), Some(HostEvent::Failed(_))), "{events:?}");
-    }
-    sim
-}
-
-fn plan(stops: u16, pings_per_stop: u8) -> Sweep {
-    Sweep { sweep: 0, first_step: 0, stride: 1, stops, pings_per_stop, lease_ms: 1_000 }
-}
-
-fn delivered(events: &[HostEvent]) -> usize {
-    events.iter().filter(|event| matches!(event, HostEvent::Reading { .. })).count()
-}
 
 #[test]
 fn the_link_is_never_on_the_critical_path() {

@@ -6,27 +6,8 @@ use firmware_protocol::frame::{Frame, Header};
 use firmware_protocol::host::{Command, HostError, HostEvent, Outcome};
 use firmware_protocol::messages::{FaultKind, NakReason, Request, Settings, Sweep, SweepState};
 use world::line::Faults;
+use world::ready::{BAUD, delivered, plan, ready};
 use world::settings;
-use world::sim::Sim;
-
-const BAUD: u32 = 115_200;
-
-fn ready(settings: Settings) -> Sim {
-    let mut sim = Sim::new(7, BAUD, Faults::default());
-    for command in [Command::Identify, Command::Configure(settings), Command::Home] {
-        let events = sim.run(command).expect("ends");
-        assert!(!matches!(events.last(), Some(HostEvent::Failed(_))), "{events:?}");
-    }
-    sim
-}
-
-fn plan(stops: u16, pings_per_stop: u8) -> Sweep {
-    Sweep { sweep: 0, first_step: 0, stride: 1, stops, pings_per_stop, lease_ms: 1_000 }
-}
-
-fn delivered(events: &[HostEvent]) -> usize {
-    events.iter().filter(|event| matches!(event, HostEvent::Reading { .. })).count()
-}
 
 #[test]
 fn a_silent_host_ends_the_sweep() {

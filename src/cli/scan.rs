@@ -109,7 +109,7 @@ input, 3 device or link.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let setup = Setup::new(args)?;
-    let mut output = Output::open(args.out.as_deref(), &setup)?;
+    let mut output = Output::open(args.out.as_deref())?;
     let measured = runtime::new()?.block_on(measure(args, &setup, &mut output));
     // Whatever happened, what was measured is closed properly and drawn.
     let closed = output.close(&setup);

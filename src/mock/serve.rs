@@ -35,6 +35,7 @@ pub struct MockPort {
     epoch_ticks: u64,
     to_host: Line,
     to_board: Line,
+    lock_check: Instant,
 }
 
 /// One direction of the line, with bytes that are held back.
@@ -75,6 +76,7 @@ impl MockPort {
             board,
             to_host: Line::default(),
             to_board: Line::default(),
+            lock_check: Instant::now() + LOCK_CHECK,
         })
     }
 
@@ -118,33 +120,35 @@ impl MockPort {
     /// The device time that has come.
     fn due(&mut self) -> u64 {
         let real = self.epoch_ticks + ticks(self.epoch.elapsed());
-        let Some(wake) = self.board.next_wake() else { return real };
-        if self.board.pace() == Pace::Virtual && wake.kind == WakeKind::Work && wake.at > real {
-            // From the jump on, the host's patience is measured from here.
-            self.epoch = Instant::now();
-            self.epoch_ticks = wake.at;
-            return wake.at;
-        }
-        real
+        let Some(at) = self.jump().filter(|&at| at > real) else { return real };
+        // From the jump on, the host's patience is measured from here.
+        self.epoch = Instant::now();
+        self.epoch_ticks = at;
+        at
+    }
+
+    /// The device time that virtual time may jump to.
+    fn jump(&self) -> Option<u64> {
+        let wake = self.board.next_wake().filter(|wake| wake.kind == WakeKind::Work)?;
+        (self.board.pace() == Pace::Virtual).then_some(wake.at)
     }
 
     /// Waits for bytes from the host or for the next thing to happen.
     async fn wait(&mut self) -> io::Result<()> {
-        let wake = self.board.next_wake();
-        let jump =
-            self.board.pace() == Pace::Virtual && wake.is_some_and(|w| w.kind == WakeKind::Work);
-        let at = if jump { Some(Instant::now()) } else { wake.map(|wake| self.real_time(wake.at)) };
+        let at = match self.jump() {
+            Some(_) => Some(Instant::now()),
+            None => self.board.next_wake().map(|wake| self.real_time(wake.at)),
+        };
         let lines = [self.to_host.next_due(), self.to_board.next_due()];
         let stalled_lines =
             if self.board.stalled() { None } else { lines.into_iter().flatten().min() };
-        let wake_at =
-            [at, stalled_lines, Some(Instant::now() + LOCK_CHECK)].into_iter().flatten().min();
+        let wake_at = [at, stalled_lines].into_iter().flatten().fold(self.lock_check, Instant::min);
         let timer = async {
-            match wake_at {
-                // A jump still gives the host's bytes their turn.
-                Some(at) if at <= Instant::now() => tokio::task::yield_now().await,
-                Some(at) => sleep_until(at).await,
-                None => std::future::pending().await,
+            // A jump still gives the host's bytes their turn.
+            if wake_at <= Instant::now() {
+                tokio::task::yield_now().await;
+            } else {
+                sleep_until(wake_at).await;
             }
         };
         let mut buffer = [0; 1024];
@@ -152,13 +156,20 @@ impl MockPort {
             biased;
             read = read_some(&self.pty, &mut buffer) => read?,
             () = timer => {
-                self.pty.get_ref().clear_exclusive();
+                self.check_lock();
                 return Ok(());
             }
         };
         let delay = Duration::from_millis(self.board.line_delay_ms().into());
         self.to_board.push(buffer.get(..count).unwrap_or_default().to_vec(), delay);
         Ok(())
+    }
+
+    fn check_lock(&mut self) {
+        if self.lock_check <= Instant::now() {
+            self.pty.get_ref().clear_exclusive();
+            self.lock_check = Instant::now() + LOCK_CHECK;
+        }
     }
 
     fn real_time(&self, at_ticks: u64) -> Instant {

@@ -38,6 +38,8 @@ struct Span {
 pub(super) struct Progress<'a> {
     job: &'a ScanJob,
     scan: Uuid,
+    /// First step and stride of the plan.
+    motor: (i32, i32),
     wall_epoch: Timestamp,
     identity: Identity,
     sink: &'a mut dyn Sink,
@@ -57,6 +59,7 @@ impl<'a> Progress<'a> {
     pub(super) fn new(
         job: &'a ScanJob,
         scan: Uuid,
+        motor: (i32, i32),
         wall_epoch: Timestamp,
         identity: &Identity,
         sink: &'a mut dyn Sink,
@@ -64,6 +67,7 @@ impl<'a> Progress<'a> {
         Self {
             job,
             scan,
+            motor,
             wall_epoch,
             identity: *identity,
             sink,
@@ -236,8 +240,7 @@ impl<'a> Progress<'a> {
     /// A ping of the plan without a reading.
     fn blank_ping(&self, index: u32, status: PingStatus) -> Ping {
         let stop = index / self.job.plan.pings_per_stop.max(1);
-        let motor = self.job.plan.motor_steps(u32::from(self.identity.steps_per_revolution));
-        let (from, stride) = motor.unwrap_or_default();
+        let (from, stride) = self.motor;
         Ping {
             scan: self.scan,
             index,

@@ -104,7 +104,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         let time = Timestamp::now();
         let start = ScanStart { scan, time, pose: job.pose, plan: job.plan };
         sink.record(&Record::ScanStart(start))?;
-        let mut progress = Progress::new(job, scan, self.wall_epoch, &self.identity, sink);
+        let mut progress = Progress::new(job, scan, motor, self.wall_epoch, &self.identity, sink);
         let outcome = self.measure(job, motor, &mut progress, stop).await;
         let stopped = matches!(outcome, Ok(Stopped(true)));
         if let Err(ScanError::Device(error)) = &outcome {

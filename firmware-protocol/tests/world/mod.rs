@@ -5,6 +5,7 @@
 #![allow(dead_code, unreachable_pub, reason = "each test file uses a part")]
 
 pub mod line;
+pub mod ready;
 pub mod sim;
 
 use firmware_protocol::device::{Action, Board, Device, EchoReport, HomeError};

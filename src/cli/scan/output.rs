@@ -28,7 +28,7 @@ pub(super) struct Output {
 
 impl Output {
     /// Opens `scan.jsonl` in `folder` (made if it isn't there), or standard output.
-    pub(super) fn open(folder: Option<&Path>, _setup: &Setup) -> Result<Self, Failure> {
+    pub(super) fn open(folder: Option<&Path>) -> Result<Self, Failure> {
         let log = match folder {
             Some(folder) => open_log(folder)?,
             None => LogWriter::stdout(),
