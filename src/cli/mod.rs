@@ -2,11 +2,13 @@
 
 mod compare;
 mod failure;
+mod interpret;
 mod log;
 mod mock;
 mod mock_world;
 mod options;
 mod paths;
+mod picture;
 mod place;
 mod plot;
 mod runtime;
@@ -48,6 +50,9 @@ enum Verb {
     Paths(paths::Args),
     /// Compare a log's readings with the predictions beside them
     Compare(compare::Args),
+    /// Tell planes, corners and edges apart in scans
+    #[command(long_about = interpret::ABOUT)]
+    Interpret(interpret::Args),
     /// Draw scans: floor plan, polar, residuals
     #[command(long_about = plot::ABOUT)]
     Plot(plot::Args),
@@ -68,6 +73,7 @@ pub fn main() -> ExitCode {
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
+        Verb::Interpret(args) => interpret::run(&args),
         Verb::Plot(args) => plot::run(args),
         Verb::Log(verb) => log::run(verb),
         Verb::Scene(verb) => scene::run(verb),

@@ -5,6 +5,7 @@
 
 mod canvas;
 mod caption;
+mod features;
 mod floor;
 mod keys;
 mod labels;
@@ -29,6 +30,7 @@ mod fixtures;
 #[cfg(test)]
 mod tests;
 
+pub use features::draw_features;
 pub use picture::{MAX_WIDTH_PX, Picture, PlotError};
 pub use polar::draw_polar;
 pub use residuals::draw_residuals;
