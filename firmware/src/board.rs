@@ -13,8 +13,6 @@ use crate::{OPTIONS, boot, motion, pins, ranger, serial, store};
 
 /// Bytes given to the machine before the rest of the world gets its turn.
 const BYTES_A_ROUND: u8 = 16;
-/// Bytes handed to the line at a time.
-const CHUNK: usize = 16;
 /// A deadline further away than this is left to the clock's overflow, which wakes every 33 ms.
 const FAR: u32 = 50_000;
 
@@ -171,7 +169,7 @@ impl Rig {
         } else {
             // Holds the motor where it is: that is zero now.
             pins::enable::low();
-            motion::shift_zero(motion::position());
+            motion::set_zero();
             self.alarmed = false;
             homed(device, Ok(0));
         }
@@ -222,13 +220,9 @@ fn clock_is_set(device: &Device) -> bool {
 
 #[inline(never)]
 fn speak(device: &mut Device) {
-    while serial::room() >= CHUNK {
-        let mut chunk = [0; CHUNK];
-        let count = transmit(device, &mut chunk);
-        if count == 0 {
-            return;
-        }
-        serial::send(chunk.get(..count).unwrap_or_default());
+    while serial::has_room() {
+        let Some(byte) = device.poll_byte() else { return };
+        serial::send(byte);
     }
 }
 
@@ -257,18 +251,13 @@ fn homed(device: &mut Device, outcome: Result<i32, firmware_protocol::device::Ho
 #[inline(never)]
 fn listen(device: &mut Device) {
     if let Some(report) = ranger::take_report() {
-        device.handle_echoes(clock::now(), &report);
+        device.handle_echoes(clock::now(), report);
     }
 }
 
 #[inline(never)]
 fn emergency(device: &mut Device) {
     device.handle_emergency_stop(clock::now());
-}
-
-#[inline(never)]
-fn transmit(device: &mut Device, chunk: &mut [u8]) -> usize {
-    device.poll_transmit(chunk)
 }
 
 /// PCINT1: the emergency stop changed. The pins at once, the machine when the loop comes round.
