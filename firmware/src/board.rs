@@ -3,7 +3,7 @@
 use core::mem::MaybeUninit;
 
 use board_config::{Config, OPTION_INDEX_HIGH};
-use firmware_protocol::device::{Action, Board, Device};
+use firmware_protocol::device::{Action, Board, Device, within_half_a_turn};
 use firmware_protocol::messages::{Capabilities, FirmwareVersion};
 
 use crate::clock::{self, Purpose};
@@ -127,8 +127,8 @@ impl Rig {
             self.homing = None;
             let known = core::mem::replace(&mut self.known, outcome.is_ok());
             self.alarmed = outcome.is_err();
-            let revolution = i32::from(self.revolution);
-            homed(device, outcome.map(|seen| if known { near(seen, revolution) } else { 0 }));
+            let drift = |seen| if known { within_half_a_turn(seen, self.revolution) } else { 0 };
+            homed(device, outcome.map(drift));
         }
     }
 
@@ -189,18 +189,6 @@ impl Rig {
 /// Turns the motor or fires.
 const fn is_dangerous(action: &Action) -> bool {
     matches!(action, Action::Home { .. } | Action::Move { .. } | Action::Fire { .. })
-}
-
-/// The same angle within half a turn of zero: the index comes once a turn.
-fn near(steps: i32, revolution: i32) -> i32 {
-    let mut near = steps;
-    while revolution > 0 && near > revolution / 2 {
-        near -= revolution;
-    }
-    while revolution > 0 && near < -(revolution / 2) {
-        near += revolution;
-    }
-    near
 }
 
 #[inline(never)]

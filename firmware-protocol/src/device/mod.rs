@@ -20,11 +20,13 @@ mod board;
 mod requests;
 mod ring;
 mod run;
+mod search;
 mod settings;
 mod timers;
 mod transmit;
 
 pub use board::{Action, Board, EchoReport, HomeError};
+pub use search::{IndexSearch, within_half_a_turn};
 pub use timers::DeviceTimer;
 
 use crate::frame::{FrameDecoder, LinkCounters, RawFrame, Received, count};
