@@ -51,6 +51,8 @@ pub mod cli;
 pub mod link;
 #[cfg(feature = "daemon")]
 pub mod mock;
+#[cfg(feature = "pi")]
+pub mod pi;
 #[cfg(feature = "daemon")]
 pub mod ranger;
 #[cfg(feature = "store")]

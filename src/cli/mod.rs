@@ -1,5 +1,7 @@
 //! The command line: one file a verb.
 
+#[cfg(feature = "pi")]
+mod board;
 mod compare;
 mod failure;
 mod interpret;
@@ -42,6 +44,10 @@ enum Verb {
     /// Play a ranger on a pty, with sound from the model
     #[command(long_about = mock::ABOUT)]
     Mock(mock::Args),
+    /// Be a ranger: drive module and stepper from this Raspberry Pi's own pins
+    #[cfg(feature = "pi")]
+    #[command(long_about = board::ABOUT)]
+    Board(board::Args),
     /// Predict a scan with the model alone
     #[command(long_about = simulate::ABOUT)]
     Simulate(simulate::Args),
@@ -70,6 +76,8 @@ pub fn main() -> ExitCode {
     let outcome = match Cli::parse().verb {
         Verb::Scan(args) => scan::run(&args),
         Verb::Mock(args) => mock::run(&args),
+        #[cfg(feature = "pi")]
+        Verb::Board(args) => board::run(&args),
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
