@@ -6,6 +6,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::Face;
+
 /// The data files that come with the program, by name.
 const PRESETS: [(&str, &str); 2] = [
     ("senscomp-6500", include_str!("../../sensors/senscomp-6500.json")),
@@ -24,6 +26,10 @@ pub struct Sensor {
     pub frequency_hz: f64,
     /// Shape of the radiating face, and with it the beam pattern.
     pub aperture: Aperture,
+    /// Face and housing as a reflector; without it sound passes the ranger as if it were not
+    /// there.
+    #[serde(default)]
+    pub face: Option<Face>,
     /// What it sends.
     pub pulse: Pulse,
     /// From firing until the receiver listens, microseconds.
@@ -171,6 +177,10 @@ impl Sensor {
                 positive("aperture.radius_m", radius_m)?;
             }
         }
+        if let Some(Face { radius_m, reflectance }) = self.face {
+            positive("face.radius_m", radius_m)?;
+            at_most_1("face.reflectance", reflectance)?;
+        }
         match self.pulse {
             Pulse::Burst { cycles, bandwidth_hz } => {
                 positive("pulse.cycles", cycles)?;
@@ -228,6 +238,14 @@ fn not_negative(field: &'static str, value: f64) -> Result<(), SensorError> {
         Ok(())
     } else {
         Err(SensorError::Figure { field, value, expected: "a finite number, 0 or more" })
+    }
+}
+
+fn at_most_1(field: &'static str, value: f64) -> Result<(), SensorError> {
+    if (0.0..=1.0).contains(&value) {
+        Ok(())
+    } else {
+        Err(SensorError::Figure { field, value, expected: "from 0 to 1" })
     }
 }
 

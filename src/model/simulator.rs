@@ -13,7 +13,7 @@ use super::{
     paths::{self, PathEngine},
 };
 use crate::{
-    acoustics::{Air, BeamPattern, Receiver, Sensor, SensorError, edge::EdgeLaw},
+    acoustics::{Air, BeamPattern, Disc, Receiver, Sensor, SensorError, edge::EdgeLaw},
     geometry::{DVec2, Pose},
     scan::{ModelRecord, PathRecord, ScanPlan, SimRecord},
     scene::Scene,
@@ -25,6 +25,9 @@ const MARGIN_KEPT_DB: f64 = 40.0;
 
 /// The same for `paths`, which would find a great many more down there.
 const PATHS_KEPT_DB: f64 = 20.0;
+
+/// What the transducer's own face is called among the walls of a path.
+const FACE_NAME: &str = "transducer";
 
 /// Bozma and Kuc's scattering strength of the right-angled edge that they scanned.
 const SIGMA_E: f64 = 0.095;
@@ -160,7 +163,9 @@ impl Simulator {
         let engine: Box<dyn Engine> = match options.engine {
             EngineKind::Paths => {
                 let settings = path_settings(&sensor, &air, &options, &receiver);
-                Box::new(PathEngine::new(&scene, beam, settings))
+                let wave_number_per_m = settings.wave_number_per_m;
+                let face = sensor.face.map(|face| Disc { face, wave_number_per_m });
+                Box::new(PathEngine::new(&scene, beam, face, settings))
             }
             EngineKind::Fan => {
                 Box::new(Fan::new(&scene, beam, fan_settings(&sensor, &air, &options, &receiver)))
@@ -274,6 +279,7 @@ impl Simulator {
         match reflector {
             Reflector::Wall(index) => self.scene.walls[index as usize].id.to_string(),
             Reflector::Cylinder(index) => self.scene.cylinders[index as usize].id.to_string(),
+            Reflector::Face => FACE_NAME.to_owned(),
         }
     }
 
