@@ -17,6 +17,7 @@ fn board(faults: FaultPlan) -> MockBoard {
             status: PingStatus::Echo,
             range_m: Some(1.0),
             arrival: None,
+            amplitude: None,
             margin_db: None,
             echoes_us: [echo_us(step)].into_iter().collect(),
         })

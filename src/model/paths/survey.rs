@@ -214,6 +214,7 @@ impl Survey for PathSurvey<'_> {
         Arrival {
             length_m: path.length_m,
             amplitude: sound.amplitude,
+            path_amplitude: path.amplitude,
             phase_rad: path.phase_rad,
             departure_rad: path.departure_rad,
             arrival_rad: path.arrival_rad,
