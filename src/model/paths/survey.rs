@@ -201,7 +201,7 @@ impl<'a> PathSurvey<'a> {
             .map_or_else(Vec::new, |loops| loops.trains(direction_rad, &self.engine.beam, settings))
     }
 
-    fn train_arrival(&self, train: &Train, amplitude: f64) -> Arrival {
+    fn train_arrival(&self, direction_rad: f64, train: &Train, amplitude: f64) -> Arrival {
         let paths = &self.engine.paths;
         let echoes = train.rounds.iter().map(|round| {
             let echo = &self.echoes[round.echo as usize];
@@ -217,12 +217,17 @@ impl<'a> PathSurvey<'a> {
             }
             walls.extend_from_slice(&way.path.walls);
         }
+        let (departure_rad, arrival_rad) =
+            (ways[0].departure_rad, ways[ways.len() - 1].arrival_rad);
+        let [leaving, arriving] =
+            [departure_rad, arrival_rad].map(|end| self.engine.beam.one_way(end - direction_rad));
         Arrival {
             length_m: train.length_m,
             amplitude,
+            path_amplitude: amplitude / (leaving * arriving),
             phase_rad: train.phase_rad,
-            departure_rad: ways[0].departure_rad,
-            arrival_rad: ways[ways.len() - 1].arrival_rad,
+            departure_rad,
+            arrival_rad,
             path: Path { kind, walls, edge: bent },
         }
     }
@@ -263,13 +268,14 @@ impl Survey for PathSurvey<'_> {
         let index = sound.index as usize;
         if let Some(train) = index.checked_sub(self.echoes.len()) {
             let trains = self.trains(wrap_pi(direction_rad));
-            return self.train_arrival(&trains[train], sound.amplitude);
+            return self.train_arrival(direction_rad, &trains[train], sound.amplitude);
         }
         let echo = &self.echoes[index];
         let path = self.engine.paths.path(&self.tree, echo);
         Arrival {
             length_m: path.length_m,
             amplitude: sound.amplitude,
+            path_amplitude: path.amplitude,
             phase_rad: path.phase_rad,
             departure_rad: path.departure_rad,
             arrival_rad: path.arrival_rad,

@@ -21,6 +21,20 @@ fn echo_m(readings: &[(f64, Prediction)], azimuth_deg: f64) -> Option<f64> {
     prediction.range_m.filter(|_| prediction.status == PingStatus::Echo)
 }
 
+/// An echo's range, checked against half its path: a weak echo is late by some millimetres, never
+/// early by more than what others that begin with it add.
+fn near_path(prediction: &Prediction) -> f64 {
+    let range_m = prediction.range_m.expect("a range");
+    let path_m = prediction.arrival.as_ref().expect("an echo").length_m / 2.0;
+    assert!((-1e-3..5e-3).contains(&(range_m - path_m)), "{range_m} for {path_m}");
+    path_m
+}
+
+fn at(readings: &[(f64, Prediction)], azimuth_deg: f64) -> &Prediction {
+    let reading = readings.iter().find(|(at, _)| (at - azimuth_deg).abs() < 1e-6);
+    &reading.expect("a reading").1
+}
+
 /// Figure 9: sound from the near wall passes the ranger, and the wall seems 827 mm away.
 #[test]
 fn a_false_lower_wall_appears_at_827_mm() {
@@ -51,7 +65,7 @@ fn the_top_wall_is_read_as_minimum_range() {
     close(path.length_m, 0.794, 1e-6, "length");
     let circle = readings.iter().filter(|(_, p)| p.status == PingStatus::MinRange).count();
     assert!((10..200).contains(&circle), "{circle}");
-    close(echo_m(&readings, 180.0).expect("the far wall"), 0.834, 1e-3, "far wall");
+    close(near_path(at(&readings, 180.0)), 0.834, 1e-6, "far wall");
 }
 
 /// Figure 7, on the right: the wall is 94 mm away and all its own echoes are over before the
@@ -101,7 +115,7 @@ fn a_corner_becomes_an_arc_between_holes() {
         |deg: f64, within: f64| readings.iter().filter(move |(at, _)| (at - deg).abs() < within);
     for (at, prediction) in near(bearing_deg, 7.0) {
         assert_eq!(prediction.status, PingStatus::Echo, "{at}");
-        close(prediction.range_m.expect("a range"), vertex.length(), 1e-6, "arc");
+        close(near_path(prediction), vertex.length(), 1e-6, "arc");
     }
     for wall_deg in [180.0, 270.0] {
         let hole_deg = (wall_deg + bearing_deg) / 2.0;
@@ -110,8 +124,8 @@ fn a_corner_becomes_an_arc_between_holes() {
             assert!(prediction.margin_db.is_none_or(|margin_db| margin_db < 0.0), "{at}");
         }
     }
-    close(echo_m(&readings, 180.0).expect("west"), 0.8, 1e-6, "west wall");
-    close(echo_m(&readings, 270.0).expect("south"), 0.65, 1e-6, "south wall");
+    close(near_path(at(&readings, 180.0)), 0.8, 1e-6, "west wall");
+    close(near_path(at(&readings, 270.0)), 0.65, 1e-6, "south wall");
 }
 
 /// A corridor, the ranger beside one wall: side walls right at the perpendicular, silence or
@@ -119,8 +133,8 @@ fn a_corner_becomes_an_arc_between_holes() {
 #[test]
 fn a_corridor_is_right_at_the_perpendicular_only() {
     let (_, readings) = scan("corridor", "beside-wall", 0.9);
-    close(echo_m(&readings, 90.0).expect("north"), 1.3, 1e-6, "north wall");
-    close(echo_m(&readings, 270.0).expect("south"), 0.5, 1e-6, "south wall");
+    close(near_path(at(&readings, 90.0)), 1.3, 1e-6, "north wall");
+    close(near_path(at(&readings, 270.0)), 0.5, 1e-6, "south wall");
     let slanting = readings.iter().filter(|(at, _)| (205.0..240.0).contains(at));
     let mut wrong = 0;
     for (at, prediction) in slanting {
