@@ -4,6 +4,7 @@ mod compare;
 mod failure;
 mod interpret;
 mod log;
+mod map_benchmark;
 mod mock;
 mod mock_world;
 mod options;
@@ -53,6 +54,9 @@ enum Verb {
     /// Tell planes, corners and edges apart in scans
     #[command(long_about = interpret::ABOUT)]
     Interpret(interpret::Args),
+    /// Map simulated courses without and with Feature Prediction, and score the maps
+    #[command(long_about = map_benchmark::ABOUT)]
+    MapBenchmark(map_benchmark::Args),
     /// Draw scans: floor plan, polar, residuals
     #[command(long_about = plot::ABOUT)]
     Plot(plot::Args),
@@ -74,6 +78,7 @@ pub fn main() -> ExitCode {
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Interpret(args) => interpret::run(&args),
+        Verb::MapBenchmark(args) => map_benchmark::run(&args),
         Verb::Plot(args) => plot::run(args),
         Verb::Log(verb) => log::run(verb),
         Verb::Scene(verb) => scene::run(verb),
