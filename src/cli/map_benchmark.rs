@@ -16,7 +16,11 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use serde::Serialize;
 
-use super::{Failure, Outcome, compare::RULED};
+use super::{
+    Failure, Outcome,
+    compare::RULED,
+    map::{EXTEND_M, LEAST_CONFIDENCE},
+};
 use crate::{
     acoustics::{Air, Sensor},
     geometry::DVec2,
@@ -52,11 +56,14 @@ pub(super) struct Args {
     /// Exponent of the confidence with the distance of the feature (2; the text also says 1)
     #[arg(long, value_name = "E", default_value_t = 2.0)]
     exponent: f64,
+    /// How far walls are taken to go on beyond what was seen of them, metres
+    #[arg(long, value_name = "M", default_value_t = EXTEND_M)]
+    extend: f64,
     /// Weigh whole readings, also what they say of the space before the feature, as the paper does
     #[arg(long)]
     whole_readings: bool,
     /// Leave readings of less confidence out
-    #[arg(long, value_name = "C", default_value_t = 0.0)]
+    #[arg(long, value_name = "C", default_value_t = LEAST_CONFIDENCE)]
     least_confidence: f64,
     /// One JSON object for each course instead of the table
     #[arg(long)]
@@ -78,6 +85,7 @@ const HELP: &str = "\
 Examples:
   sonard map-benchmark                         128 courses; the same seed gives the same table
   sonard map-benchmark --maps 16 --out maps    and pictures of the maps
+  sonard map-benchmark --extend 0 --whole-readings --least-confidence 0     the paper to the letter
 
 The benchmarks, in percent: correlation of the two maps (more is better); map score, the mean \
 squared difference of cells; the same of cells occupied in either map; and of the shortest ways \
@@ -186,6 +194,7 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
         arrangement: if ring { Arrangement::Ring } else { Arrangement::Stepper },
         range_sigma_m: 0.005,
         exponent: args.exponent,
+        extend_m: args.extend,
         trust: Trust { least_confidence: args.least_confidence, keep_clear: !args.whole_readings },
     };
     let sensor = Sensor::preset("senscomp-6500").map_err(|error| refuse(&error))?;

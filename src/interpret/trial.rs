@@ -55,6 +55,8 @@ pub struct TrialSettings {
     pub range_sigma_m: f64,
     /// Exponent of Feature Prediction's confidence with distance.
     pub exponent: f64,
+    /// How far Feature Prediction takes walls to go on, metres.
+    pub extend_m: f64,
     /// How Feature Prediction's confidences are used.
     pub trust: Trust,
 }
@@ -114,7 +116,11 @@ impl Course {
                 (PredictionSettings::stepper(extent_deg, max_range_m), extent_deg)
             }
         };
-        let prediction = PredictionSettings { exponent: settings.exponent, ..prediction };
+        let prediction = PredictionSettings {
+            exponent: settings.exponent,
+            extend_m: settings.extend_m,
+            ..prediction
+        };
         let model = BeamModel::Gaussian(GaussianBeam::new(beam_deg, max_range_m));
         let mut maps = [Grid::new(*self.ideal.shape()), Grid::new(*self.ideal.shape())];
         let mut predictor = FeaturePrediction::new(prediction);

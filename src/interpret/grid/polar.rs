@@ -82,7 +82,9 @@ impl Table {
             let weight = reading.share * reading.weight(distance_m);
             let off = (distance_m - reading.range_m) / said.range_sigma_m;
             let there = if reading.echo { (-0.5 * off * off).exp() } else { 0.0 };
-            let before = if off < 0.0 { 1.0 - there } else { 0.0 };
+            // Moravec and Elfes: the nearer the reading, the less sure that space is free.
+            let share = distance_m / reading.range_m;
+            let before = (1.0 - share * share).max(0.0);
             free[distance] = (weight * said.free * before) as f32;
             occupied[distance] = (weight * said.occupied * there) as f32;
         }

@@ -39,6 +39,10 @@ pub struct PredictionSettings {
     pub forget_m: f64,
     /// `T_L`: features shorter than this are dropped after a split, metres.
     pub least_length_m: f64,
+    /// A feature of several readings is taken to go on beyond its ends by this for beams that
+    /// could not hear it there, metres. The paper has no such thing (0): its ring of wide beams
+    /// sees more of a wall at once than a narrow one.
+    pub extend_m: f64,
     /// By how much both parts are shortened at a split, metres.
     pub shorten_m: f64,
 }
@@ -57,6 +61,7 @@ impl PredictionSettings {
             least_confidence: 0.40,
             forget_m: 4.0,
             least_length_m: 0.15,
+            extend_m: 0.0,
             shorten_m: 0.05,
         }
     }
@@ -79,6 +84,9 @@ pub struct Worth {
     /// reading is right in any case.
     pub clear_m: Option<f64>,
 }
+
+/// So many readings make a feature that may go on beyond what was seen of it.
+const EXTENDED_SUPPORT: f64 = 3.0;
 
 /// A reading that nothing speaks against.
 const NEUTRAL: Worth = Worth { confidence: 0.5, clear_m: None };
@@ -204,8 +212,10 @@ impl FeaturePrediction {
         let omega_rad = self.settings.omega_deg.to_radians();
         let mut worth = NEUTRAL;
         for line in map {
-            let Some(crossing_m) = self.contradicts(line, beam) else { continue };
             let theta_rad = line.angle_from(beam.axis_rad);
+            let hidden = theta_rad > omega_rad && line.support >= EXTENDED_SUPPORT;
+            let extend_m = if hidden { self.settings.extend_m } else { 0.0 };
+            let Some(crossing_m) = self.contradicts(line, beam, extend_m) else { continue };
             let confidence = if theta_rad <= omega_rad {
                 of_angle(theta_rad / omega_rad)
             } else {
@@ -218,14 +228,14 @@ impl FeaturePrediction {
     }
 
     /// Where a beam crosses a feature that it did not report, metres from the ranger.
-    fn contradicts(&self, line: &Line, beam: &Ray) -> Option<f64> {
+    fn contradicts(&self, line: &Line, beam: &Ray, extend_m: f64) -> Option<f64> {
         if line.readings.binary_search(&beam.index).is_ok() {
             return None;
         }
         let far_m = beam.range_m - self.settings.near_m;
         beam.sides
             .iter()
-            .filter_map(|direction| line.crossing_m(beam.from, *direction))
+            .filter_map(|direction| line.extended_crossing_m(beam.from, *direction, extend_m))
             .filter(|crossing_m| *crossing_m < far_m)
             .min_by(f64::total_cmp)
     }
