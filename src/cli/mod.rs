@@ -6,6 +6,9 @@ mod compare;
 mod failure;
 mod interpret;
 mod log;
+mod map;
+mod map_benchmark;
+mod map_score;
 mod mock;
 mod mock_world;
 mod options;
@@ -59,6 +62,15 @@ enum Verb {
     /// Tell planes, corners and edges apart in scans
     #[command(long_about = interpret::ABOUT)]
     Interpret(interpret::Args),
+    /// Make an occupancy grid of the scans of logs
+    #[command(long_about = map::ABOUT)]
+    Map(map::Args),
+    /// Set a map beside the ideal one
+    #[command(long_about = map_score::ABOUT)]
+    MapScore(map_score::Args),
+    /// Map simulated courses without and with Feature Prediction, and score the maps
+    #[command(long_about = map_benchmark::ABOUT)]
+    MapBenchmark(map_benchmark::Args),
     /// Draw scans: floor plan, polar, residuals
     #[command(long_about = plot::ABOUT)]
     Plot(plot::Args),
@@ -82,6 +94,9 @@ pub fn main() -> ExitCode {
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Interpret(args) => interpret::run(&args),
+        Verb::Map(args) => map::run(&args),
+        Verb::MapScore(args) => map_score::run(&args),
+        Verb::MapBenchmark(args) => map_benchmark::run(&args),
         Verb::Plot(args) => plot::run(args),
         Verb::Log(verb) => log::run(verb),
         Verb::Scene(verb) => scene::run(verb),

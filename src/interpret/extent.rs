@@ -139,6 +139,12 @@ impl Extents {
         sigma_rad.min(half_rad).to_degrees()
     }
 
+    /// The sensor's beam pattern.
+    #[must_use]
+    pub const fn beam(&self) -> &BeamPattern {
+        &self.beam
+    }
+
     /// Half the width of the sensor's face, metres.
     #[must_use]
     pub const fn half_width_m(&self) -> f64 {

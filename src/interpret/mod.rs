@@ -6,16 +6,22 @@
 //! extent against what the sensor allows ([`Extents`]) says edge or not; the same element seen
 //! from a second place says plane or corner; [`UniformSum`] is the density of the errors, from
 //! which every verdict has its probability.
+//!
+//! [`prediction`] gives each reading a confidence, and [`grid`] makes maps of readings with
+//! poses and says how good they are.
 
 mod density;
 mod differentiate;
 mod extent;
 mod feature;
+pub mod grid;
 mod next;
+pub mod prediction;
 mod region;
 mod sweep;
 #[cfg(test)]
 mod tests;
+pub mod trial;
 
 pub use density::UniformSum;
 pub use differentiate::interpret;

@@ -10,6 +10,7 @@ mod floor;
 mod keys;
 mod labels;
 mod legend;
+mod map;
 mod materials;
 mod picture;
 mod plan;
@@ -31,6 +32,7 @@ mod fixtures;
 mod tests;
 
 pub use features::draw_features;
+pub use map::draw_map;
 pub use picture::{MAX_WIDTH_PX, Picture, PlotError};
 pub use polar::draw_polar;
 pub use residuals::draw_residuals;
