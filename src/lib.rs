@@ -45,12 +45,22 @@ pub mod scan;
 pub mod scene;
 
 #[cfg(feature = "daemon")]
+pub mod board;
+#[cfg(feature = "daemon")]
 pub mod cli;
+#[cfg(feature = "daemon")]
+pub mod client;
+#[cfg(feature = "daemon")]
+pub mod config;
+#[cfg(feature = "daemon")]
+pub mod daemon;
 #[cfg(feature = "daemon")]
 pub mod link;
 #[cfg(feature = "daemon")]
 pub mod mock;
 #[cfg(feature = "daemon")]
 pub mod ranger;
+#[cfg(feature = "daemon")]
+pub mod server;
 #[cfg(feature = "store")]
 pub mod store;

@@ -104,7 +104,13 @@ fn write(
         out.write_all(b"\n")
     };
     put(&session(simulator))?;
-    put(&Record::ScanStart(ScanStart { scan, time: Timestamp::now(), pose: *pose, plan: *plan }))?;
+    put(&Record::ScanStart(ScanStart {
+        scan,
+        time: Timestamp::now(),
+        pose: *pose,
+        plan: *plan,
+        air: None,
+    }))?;
     let progress = progress(plan.stops());
     let station = simulator.station(pose.position());
     for index in 0..plan.stops() {
