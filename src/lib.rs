@@ -46,7 +46,15 @@ pub mod scan;
 pub mod scene;
 
 #[cfg(feature = "daemon")]
+pub mod board;
+#[cfg(feature = "daemon")]
 pub mod cli;
+#[cfg(feature = "daemon")]
+pub mod client;
+#[cfg(feature = "daemon")]
+pub mod config;
+#[cfg(feature = "daemon")]
+pub mod daemon;
 #[cfg(feature = "daemon")]
 pub mod link;
 #[cfg(feature = "daemon")]
@@ -55,5 +63,7 @@ pub mod mock;
 pub mod pi;
 #[cfg(feature = "daemon")]
 pub mod ranger;
+#[cfg(feature = "daemon")]
+pub mod server;
 #[cfg(feature = "store")]
 pub mod store;

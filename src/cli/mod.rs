@@ -16,11 +16,14 @@ mod paths;
 mod picture;
 mod place;
 mod plot;
+mod run;
 mod runtime;
 mod scan;
 mod scene;
 mod scene_file;
 mod simulate;
+mod status;
+mod watch;
 
 pub use failure::{Failure, Outcome};
 
@@ -44,6 +47,13 @@ enum Verb {
     /// Take one or more scans and log each reading beside the model's prediction
     #[command(long_about = scan::ABOUT)]
     Scan(scan::Args),
+    /// Run the daemon: scan by plan, keep logs, serve the API
+    #[command(long_about = run::ABOUT)]
+    Run(Box<run::Args>),
+    /// Say what a running daemon is doing
+    Status(status::Args),
+    /// Show the records of a running daemon as they are made
+    Watch(watch::Args),
     /// Play a ranger on a pty, with sound from the model
     #[command(long_about = mock::ABOUT)]
     Mock(mock::Args),
@@ -87,6 +97,9 @@ enum Verb {
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().verb {
         Verb::Scan(args) => scan::run(&args),
+        Verb::Run(args) => run::run(*args),
+        Verb::Status(args) => status::run(&args),
+        Verb::Watch(args) => watch::run(&args),
         Verb::Mock(args) => mock::run(&args),
         #[cfg(feature = "pi")]
         Verb::Board(args) => board::run(&args),

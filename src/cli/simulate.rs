@@ -101,7 +101,13 @@ fn write(
         out.write_all(b"\n")
     };
     put(&Record::Session(Box::new(Session::simulated(simulator, Timestamp::now()))))?;
-    put(&Record::ScanStart(ScanStart { scan, time: Timestamp::now(), pose: *pose, plan: *plan }))?;
+    put(&Record::ScanStart(ScanStart {
+        scan,
+        time: Timestamp::now(),
+        pose: *pose,
+        plan: *plan,
+        air: None,
+    }))?;
     let progress = progress(plan.stops());
     let station = simulator.station(pose.position());
     for index in 0..plan.stops() {
