@@ -47,14 +47,14 @@ fn deepest_stack() -> usize {
     while bench.host.is_busy() {
         let mut noise = [0; 40];
         random.fill_bytes(&mut noise);
-        bench.emulator.send(&noise);
+        bench.device.send(&noise);
         bench.run(0.05).expect("runs");
     }
     for command in [Command::Status, Command::Home, Command::Ping, Command::Identify] {
         bench.perform(command, 20.0).expect("works");
     }
     bench.perform(Command::Reset, 5.0).expect("restarts");
-    bench.emulator.stack_bytes()
+    bench.device.stack_bytes()
 }
 
 #[test]

@@ -25,10 +25,11 @@ use crate::{
 };
 use output::Output;
 use setup::Setup;
+pub(super) use setup::serial_text;
 
 /// How often a request is sent before the device counts as gone: some nine seconds, in which a
 /// board that the opening of its port has reset is long awake.
-const ATTEMPTS: u8 = 7;
+pub(super) const ATTEMPTS: u8 = 7;
 
 /// Options of `sonard scan`.
 #[derive(Debug, clap::Args)]

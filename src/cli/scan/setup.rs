@@ -161,7 +161,7 @@ fn device(identity: &Identity) -> Device {
 }
 
 /// The serial number as text if it is text, else in hexadecimal.
-pub(super) fn serial_text(identity: &Identity) -> String {
+pub(in crate::cli) fn serial_text(identity: &Identity) -> String {
     let text = std::str::from_utf8(&identity.serial).map(|text| text.trim_end_matches('\0'));
     match text {
         Ok(text) if text.chars().all(|c| c.is_ascii_graphic()) => text.to_owned(),
