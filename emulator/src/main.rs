@@ -2,9 +2,13 @@
 
 use std::{
     error::Error,
+    io::{self, Write as _},
     path::{Path, PathBuf},
     process::ExitCode,
-    sync::{Arc, atomic::AtomicBool},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use board_config::{ALWAYS, Config};
@@ -46,6 +50,9 @@ struct Args {
     /// Air temperature, degrees Celsius
     #[arg(long, value_name = "C", default_value_t = 20.0, allow_negative_numbers = true)]
     temperature_c: f64,
+    /// The same, in place of --temperature-c
+    #[arg(long, value_name = "C", allow_negative_numbers = true, hide = true)]
+    truth_temperature_c: Option<f64>,
     /// Relative humidity, percent
     #[arg(long, value_name = "PERCENT", default_value_t = 50.0)]
     humidity_percent: f64,
@@ -61,6 +68,9 @@ struct Args {
     /// Probability for each firing that the supply sags and the chip restarts
     #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
     dips: f64,
+    /// End when standard input closes: with the program that started this one
+    #[arg(long)]
+    attached: bool,
     /// How long the supply sags, milliseconds
     #[arg(long, value_name = "MS", default_value_t = 20)]
     dip_ms: u64,
@@ -98,12 +108,22 @@ fn play(args: &Args) -> Result<(), Box<dyn Error>> {
     println!("listening on {} (interrupt to stop)", pty.path().display());
     let mut firings = 0;
     let mut random = Pcg64::seed_from_u64(args.seed ^ 0x0d1b);
-    serve(&mut emulator, &pty, &AtomicBool::new(false), |emulator| {
+    let stop = Arc::new(AtomicBool::new(false));
+    if args.attached {
+        let stop = Arc::clone(&stop);
+        std::thread::spawn(move || {
+            // Nothing is expected there but its end.
+            drop(io::copy(&mut io::stdin(), &mut io::sink()));
+            stop.store(true, Ordering::Relaxed);
+        });
+    }
+    serve(&mut emulator, &pty, &stop, |emulator| {
         let fired = emulator.take_init_rises().len();
         emulator.take_pulses();
         firings += fired;
         if (0..fired).any(|_| random.random_bool(args.dips)) {
-            println!("the supply sags at firing {firings}");
+            // Whoever started it may not read any more.
+            drop(writeln!(io::stdout(), "the supply sags at firing {firings}"));
             emulator.dip(args.dip_ms);
         }
     })
@@ -147,7 +167,11 @@ fn world(args: &Args) -> Result<World, Box<dyn Error>> {
         Ok(text) => Sensor::from_json(&text)?,
         Err(_) => Sensor::preset(&args.sensor)?,
     };
-    let air = Air::new(args.temperature_c, args.humidity_percent, args.pressure_kpa)?;
+    let air = Air::new(
+        args.truth_temperature_c.unwrap_or(args.temperature_c),
+        args.humidity_percent,
+        args.pressure_kpa,
+    )?;
     let noise = Noise::of_range_mm(args.noise_mm, air.sound_speed_m_s());
     let scene = Arc::new(scene.with_robot_at(&pose));
     let simulator = Simulator::new(scene, sensor, air, Options::default())?;

@@ -98,6 +98,11 @@ impl EdgeLaw {
 }
 
 impl SensorArgs {
+    /// The same for `sonard-emulator`.
+    pub(super) fn emulator(&self) -> [String; 2] {
+        ["--sensor".into(), self.sensor.clone()]
+    }
+
     /// The sensor named: a file if there is one of that name, else a preset.
     pub(super) fn sensor(&self) -> Result<Sensor, Failure> {
         match fs::read_to_string(&self.sensor) {
@@ -134,6 +139,15 @@ impl SensorArgs {
 }
 
 impl AirArgs {
+    /// The same for `sonard-emulator`.
+    pub(super) fn emulator(&self) -> [String; 3] {
+        [
+            format!("--temperature-c={}", self.temperature_c),
+            format!("--humidity-percent={}", self.humidity_percent),
+            format!("--pressure-kpa={}", self.pressure_kpa),
+        ]
+    }
+
     /// The air described.
     pub(super) fn air(&self) -> Result<Air, Failure> {
         Air::new(self.temperature_c, self.humidity_percent, self.pressure_kpa)

@@ -79,6 +79,12 @@ impl Setup {
         }
     }
 
+    /// The pose as options take it.
+    pub(super) fn pose_numbers(&self) -> String {
+        let Pose { x_m, y_m, heading_deg } = self.pose;
+        format!("{x_m},{y_m},{heading_deg}")
+    }
+
     /// The scan for a device of this identity.
     pub(super) fn job(&self, identity: &Identity) -> Result<ScanJob, Failure> {
         self.plan.motor_steps(u32::from(identity.steps_per_revolution)).map_err(|error| {
