@@ -1,11 +1,9 @@
 //! Whole sweeps over the emulated line, with the real host machine.
 
-mod common;
-
 use std::path::Path;
 use std::sync::Arc;
 
-use common::{readings, ready, settings};
+use crate::common::{readings, ready, settings};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{ReadingStatus, Settings, Sweep, limits::TICK_HZ};
 use sonard::acoustics::{Air, Sensor};

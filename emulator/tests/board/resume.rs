@@ -1,12 +1,10 @@
 //! The real scanner on the emulated board, through a pty and at the pace of the wall clock: a
 //! supply that sags in the middle of a sweep costs time, but no beam.
 
-mod common;
-
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use common::{commanded, config, elf, settings};
+use crate::common::{commanded, config, elf, settings};
 use firmware_protocol::host::HostConfig;
 use firmware_protocol::messages::Settings;
 use sonard::geometry::Pose;

@@ -1,10 +1,8 @@
 //! Flash and memory of the firmware against its limits, with the stack as deep as it gets.
 
-mod common;
-
 use std::process::Command as Process;
 
-use common::{commanded, elf, ready, settings};
+use crate::common::{commanded, elf, ready, settings};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{Blanking, Settings, Sweep};
 use rand::{Rng as _, SeedableRng as _};

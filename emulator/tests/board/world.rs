@@ -1,8 +1,6 @@
 //! The world around the chip: a motor with limits, and a supply that sags.
 
-mod common;
-
-use common::{commanded, readings, ready, settings};
+use crate::common::{commanded, readings, ready, settings};
 use firmware_protocol::host::{Command, HostError, HostEvent, Outcome};
 use firmware_protocol::messages::{ResetCause, Settings, Sweep};
 use sonard_emulator::{Bench, BenchError, HZ, MotorLimits};

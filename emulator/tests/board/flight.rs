@@ -1,8 +1,6 @@
 //! Times of flight, to the tick of 0.5 us.
 
-mod common;
-
-use common::{commanded, readings, ready, settings};
+use crate::common::{commanded, readings, ready, settings};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{Blanking, ReadingStatus, Settings};
 use sonard_emulator::{CYCLES_PER_TICK, HZ};

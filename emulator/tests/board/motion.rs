@@ -1,8 +1,6 @@
 //! The motor: steps counted at the pins, times against the trapezoid, the index, the brake.
 
-mod common;
-
-use common::{commanded, ready, settings};
+use crate::common::{commanded, ready, settings};
 use firmware_protocol::host::{Command, HostEvent, Outcome};
 use firmware_protocol::messages::Settings;
 use rand::{RngExt as _, SeedableRng as _};

@@ -1,8 +1,6 @@
 //! What happens when something goes wrong: on the line, with the host, with the chip.
 
-mod common;
-
-use common::{commanded, readings, ready, settings};
+use crate::common::{commanded, readings, ready, settings};
 use firmware_protocol::host::{Command, HostError, HostEvent, Outcome};
 use firmware_protocol::messages::{FaultKind, ResetCause, Settings, Status, Sweep};
 use rand::{Rng as _, RngExt as _, SeedableRng as _};

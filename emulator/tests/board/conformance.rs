@@ -1,8 +1,6 @@
 //! What every board must do, the firmware's machine code does too.
 
-mod common;
-
-use common::{commanded, config, elf};
+use crate::common::{commanded, config, elf};
 use firmware_protocol::conformance_tests;
 use sonard_emulator::Emulator;
 
