@@ -145,14 +145,13 @@ impl Patient {
     }
 
     async fn motor(&mut self, identity: &Identity) -> Check {
+        let has_index = identity.capabilities.has(Capabilities::INDEX_SENSOR);
+        // With an index, home from where it stands: a motor that misses as much on its way back as
+        // on its way there would look right.
+        let back = if has_index { Command::Home } else { Command::MoveTo { step: 0 } };
+        let turn = Command::MoveTo { step: TURN_STEPS };
         let mut drift = None;
-        for command in [
-            Command::Configure(SETTINGS),
-            Command::Home,
-            Command::MoveTo { step: TURN_STEPS },
-            Command::MoveTo { step: 0 },
-            Command::Home,
-        ] {
+        for command in [Command::Configure(SETTINGS), Command::Home, turn, back] {
             match self.perform(command).await {
                 Ok((Ended::Done(Outcome::Homed { drift_steps }), _)) => drift = Some(drift_steps),
                 Ok(_) => {}
@@ -160,7 +159,7 @@ impl Patient {
             }
         }
         let turned = format!("turned by {TURN_STEPS} steps and back");
-        if !identity.capabilities.has(Capabilities::INDEX_SENSOR) {
+        if !has_index {
             return Check::ok(
                 "motor",
                 format!("{turned}; without an index sensor nobody checks it"),
