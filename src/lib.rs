@@ -37,6 +37,7 @@
 pub mod acoustics;
 pub mod compare;
 pub mod geometry;
+pub mod interpret;
 pub mod model;
 pub mod motion;
 #[cfg(feature = "plot")]

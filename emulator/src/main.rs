@@ -47,6 +47,9 @@ struct Args {
     /// Sensor preset, or a file with a sensor's data
     #[arg(long, value_name = "NAME|FILE", default_value = "senscomp-6500")]
     sensor: String,
+    /// From firing until the receiver listens, microseconds [default: the sensor's]
+    #[arg(long, value_name = "US")]
+    blanking_us: Option<f64>,
     /// Air temperature, degrees Celsius
     #[arg(long, value_name = "C", default_value_t = 20.0, allow_negative_numbers = true)]
     temperature_c: f64,
@@ -163,10 +166,12 @@ fn world(args: &Args) -> Result<World, Box<dyn Error>> {
     let scene = Scene::from_json(&text).map_err(|error| format!("{}: {error}", args.scene))?;
     let pose = scene.pose(&args.pose)?;
     scene.check_pose(&pose)?;
-    let sensor = match std::fs::read_to_string(&args.sensor) {
+    let mut sensor = match std::fs::read_to_string(&args.sensor) {
         Ok(text) => Sensor::from_json(&text)?,
         Err(_) => Sensor::preset(&args.sensor)?,
     };
+    sensor.blanking_us = args.blanking_us.unwrap_or(sensor.blanking_us);
+    sensor.check()?;
     let air = Air::new(
         args.truth_temperature_c.unwrap_or(args.temperature_c),
         args.humidity_percent,

@@ -5,11 +5,16 @@ mod board;
 mod compare;
 mod doctor;
 mod failure;
+mod interpret;
 mod log;
+mod map;
+mod map_benchmark;
+mod map_score;
 mod mock;
 mod mock_world;
 mod options;
 mod paths;
+mod picture;
 mod place;
 mod plot;
 mod runtime;
@@ -58,6 +63,18 @@ enum Verb {
     Paths(paths::Args),
     /// Compare a log's readings with the predictions beside them
     Compare(compare::Args),
+    /// Tell planes, corners and edges apart in scans
+    #[command(long_about = interpret::ABOUT)]
+    Interpret(interpret::Args),
+    /// Make an occupancy grid of the scans of logs
+    #[command(long_about = map::ABOUT)]
+    Map(map::Args),
+    /// Set a map beside the ideal one
+    #[command(long_about = map_score::ABOUT)]
+    MapScore(map_score::Args),
+    /// Map simulated courses without and with Feature Prediction, and score the maps
+    #[command(long_about = map_benchmark::ABOUT)]
+    MapBenchmark(map_benchmark::Args),
     /// Draw scans: floor plan, polar, residuals
     #[command(long_about = plot::ABOUT)]
     Plot(plot::Args),
@@ -81,6 +98,10 @@ pub fn main() -> ExitCode {
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
+        Verb::Interpret(args) => interpret::run(&args),
+        Verb::Map(args) => map::run(&args),
+        Verb::MapScore(args) => map_score::run(&args),
+        Verb::MapBenchmark(args) => map_benchmark::run(&args),
         Verb::Plot(args) => plot::run(args),
         Verb::Log(verb) => log::run(verb),
         Verb::Scene(verb) => scene::run(verb),

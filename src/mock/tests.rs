@@ -17,6 +17,7 @@ fn board(faults: FaultPlan) -> MockBoard {
             status: PingStatus::Echo,
             range_m: Some(1.0),
             arrival: None,
+            amplitude: None,
             margin_db: None,
             echoes_us: [echo_us(step)].into_iter().collect(),
         })
@@ -197,6 +198,7 @@ mod conformance {
                 status: PingStatus::Echo,
                 range_m: None,
                 arrival: None,
+                amplitude: None,
                 margin_db: None,
                 echoes_us: after_us.iter().copied().collect(),
             };

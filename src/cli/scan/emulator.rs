@@ -34,7 +34,7 @@ impl Emulator {
         let mut child = Command::new(&program)
             .args(args.world.emulator(&args.place.scene)?)
             .args(["--pose".into(), setup.pose_numbers()])
-            .args(args.sensor.emulator())
+            .args(args.sensor.emulator(&setup.sensor))
             .args(args.air.emulator())
             .arg("--attached")
             .stdin(Stdio::piped())

@@ -31,7 +31,7 @@ pub(super) struct Setup {
     pub(super) simulator: Simulator,
     motion: MotionArgs,
     max_range_m: f64,
-    sensor: Sensor,
+    pub(super) sensor: Sensor,
     air: Air,
     options: Options,
     predictions: Vec<SimRecord>,
