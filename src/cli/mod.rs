@@ -3,6 +3,7 @@
 #[cfg(feature = "pi")]
 mod board;
 mod compare;
+mod doctor;
 mod failure;
 mod interpret;
 mod log;
@@ -61,6 +62,9 @@ enum Verb {
     #[cfg(feature = "pi")]
     #[command(long_about = board::ABOUT)]
     Board(board::Args),
+    /// Find out what is wrong with a ranger: port, firmware, motor, echo
+    #[command(long_about = doctor::ABOUT)]
+    Doctor(doctor::Args),
     /// Predict a scan with the model alone
     #[command(long_about = simulate::ABOUT)]
     Simulate(simulate::Args),
@@ -103,6 +107,7 @@ pub fn main() -> ExitCode {
         Verb::Mock(args) => mock::run(&args),
         #[cfg(feature = "pi")]
         Verb::Board(args) => board::run(&args),
+        Verb::Doctor(args) => doctor::run(&args),
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),

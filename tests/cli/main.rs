@@ -2,6 +2,7 @@
 #![cfg(feature = "daemon")]
 
 mod common;
+mod doctor;
 mod faults;
 mod hangup;
 mod interpret;
