@@ -35,6 +35,9 @@ use crate::{
 /// A wall clock that moved by more than this against the one that never jumps was set.
 const CLOCK_STEP_S: f64 = 0.1;
 
+/// How often an operator that waits shows that it is alive.
+const BEAT: Duration = Duration::from_secs(1);
+
 /// Opens the port of a name.
 pub type OpenPort = Box<dyn FnMut(&str) -> Result<SerialStream, LinkError> + Send>;
 
@@ -112,7 +115,6 @@ impl Operator {
 
     /// Works until the machine has ended.
     pub(super) async fn run(mut self) {
-        self.desk.board.set_power(true);
         loop {
             let step = self.machine.poll(self.desk.now());
             self.tell();
@@ -129,7 +131,6 @@ impl Operator {
                     self.close();
                     self.desk.board.set_power(false);
                     self.wait(None).await;
-                    self.desk.board.set_power(true);
                 }
                 Step::End => break,
             }
@@ -152,6 +153,7 @@ impl Operator {
 
     fn open(&mut self) {
         self.close();
+        self.desk.board.set_power(true);
         let port = self.desk.settings.keys.device.port.clone().unwrap_or_default();
         match (self.open_port)(&port) {
             Ok(line) => {
@@ -220,7 +222,11 @@ impl Operator {
             .motion()
             .settings(&listening(&self.desk.settings, &air), ranger.identity());
         match attended(&mut self.desk, ranger.home(settings)).await {
-            Err(interrupt) => self.react(interrupt),
+            Err(interrupt) => {
+                // The motor is turning. A device that does not hear this stops at its index.
+                drop(ranger.stop().await);
+                self.react(interrupt);
+            }
             Ok(Err(error)) => self.device_failed(&error),
             Ok(Ok(_drift)) if self.desk.board.at_home() == Some(false) => {
                 let why = "the motor says it is home, but the home switch is open".into();
@@ -244,7 +250,9 @@ impl Operator {
         let Some(ranger) = &mut self.ranger else {
             return self.fail(Trouble::Lost, "the line is gone".into());
         };
-        let wake = due.map_or(self.next_check, |due| due.min(self.next_check));
+        self.out.shared.beat();
+        let wake = self.next_check.min(Instant::now() + BEAT);
+        let wake = due.map_or(wake, |due| due.min(wake));
         tokio::select! {
             unasked = ranger.unasked() => self.unasked(unasked),
             interrupt = self.desk.next() => self.react(interrupt),
@@ -456,16 +464,12 @@ impl Operator {
         self.fail(trouble, format!("{error}; {}", error.help()));
     }
 
-    /// Waits until a time or until something happens.
+    /// Waits until a time or until something happens, and for no longer than a heartbeat.
     async fn wait(&mut self, until: Option<Instant>) {
-        let timer = async {
-            match until {
-                Some(until) => sleep_until(until).await,
-                None => pending().await,
-            }
-        };
+        self.out.shared.beat();
+        let beat = Instant::now() + BEAT;
         tokio::select! {
-            () = timer => self.out.shared.beat(),
+            () = sleep_until(until.map_or(beat, |until| until.min(beat))) => {}
             interrupt = self.desk.next() => self.react(interrupt),
         }
     }

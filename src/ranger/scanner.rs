@@ -93,11 +93,14 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         Ok(())
     }
 
-    /// Sets the device up and finds home; returns by how much the index was off, steps.
+    /// Sets the device up and finds home; returns by how much the index was off, steps. A sweep
+    /// that an earlier program left behind is stopped first: it would go on for as long as
+    /// anybody talks to the device.
     ///
     /// # Errors
     /// The device's and the line's.
     pub async fn home(&mut self, settings: Settings) -> Result<i32, DriveError> {
+        self.stop().await?;
         self.driver.perform(Command::Configure(settings), ignore).await?;
         match self.driver.perform(Command::Home, ignore).await? {
             Ended::Done(Outcome::Homed { drift_steps }) => Ok(drift_steps),
@@ -245,12 +248,27 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         Ok(())
     }
 
-    /// Brings the motor to a stand, and takes in what was measured until then.
+    /// Brings the motor to a stand, whatever is under way.
+    ///
+    /// # Errors
+    /// The device's and the line's.
+    pub async fn stop(&mut self) -> Result<(), DriveError> {
+        self.bring_to_stand(ignore).await
+    }
+
+    /// The same, and takes in what was measured until then.
     async fn halt(&mut self, progress: &mut Progress<'_>) -> Result<(), DriveError> {
+        self.bring_to_stand(|event| progress.handle(event)).await
+    }
+
+    async fn bring_to_stand(
+        &mut self,
+        mut on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
+    ) -> Result<(), DriveError> {
         self.driver.start(Command::Stop)?;
         loop {
             // The end of what was stopped may come first.
-            match self.driver.finish(|event| progress.handle(event)).await {
+            match self.driver.finish(&mut on_event).await {
                 Ok(Ended::Done(Outcome::Stopped)) => return Ok(()),
                 Ok(_) | Err(DriveError::Host(HostError::Stopped) | DriveError::Abandoned) => {}
                 Err(error) => return Err(error),

@@ -2,6 +2,7 @@
 #![cfg(feature = "daemon")]
 
 mod common;
+mod daemon;
 mod faults;
 mod hangup;
 mod log;
