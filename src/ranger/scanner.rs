@@ -334,3 +334,24 @@ fn sweep_of(segment: &Segment, from_step: i32, stride: i32, settings: &Settings)
         lease_ms: timing::lease_ms(settings),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_that_is_set_moves_the_epoch_by_just_that() {
+        let start: Timestamp = "2026-03-01T10:00:00Z".parse().expect("a time");
+        let at = |since_us: i64, set_s: i64| {
+            let wall =
+                start + SignedDuration::from_micros(since_us) + SignedDuration::from_secs(set_s);
+            wall_epoch(wall, u64::try_from(since_us).expect("after the start"))
+        };
+        assert_eq!(at(0, 0), start);
+        assert_eq!(at(90_000_000, 0), start, "time that passes is no step");
+        let set = at(100_000_000, 3600).duration_since(at(90_000_000, 0));
+        assert_eq!(set, SignedDuration::from_secs(3600));
+        let set_back = at(100_000_000, -5).duration_since(start);
+        assert_eq!(set_back, SignedDuration::from_secs(-5));
+    }
+}
