@@ -37,6 +37,7 @@
 pub mod acoustics;
 pub mod compare;
 pub mod geometry;
+pub mod interpret;
 pub mod model;
 pub mod motion;
 #[cfg(feature = "plot")]
@@ -58,6 +59,8 @@ pub mod daemon;
 pub mod link;
 #[cfg(feature = "daemon")]
 pub mod mock;
+#[cfg(feature = "pi")]
+pub mod pi;
 #[cfg(feature = "daemon")]
 pub mod ranger;
 #[cfg(feature = "daemon")]

@@ -1,12 +1,19 @@
 //! The command line: one file a verb.
 
+#[cfg(feature = "pi")]
+mod board;
 mod compare;
 mod failure;
+mod interpret;
 mod log;
+mod map;
+mod map_benchmark;
+mod map_score;
 mod mock;
 mod mock_world;
 mod options;
 mod paths;
+mod picture;
 mod place;
 mod plot;
 mod run;
@@ -50,6 +57,10 @@ enum Verb {
     /// Play a ranger on a pty, with sound from the model
     #[command(long_about = mock::ABOUT)]
     Mock(mock::Args),
+    /// Be a ranger: drive module and stepper from this Raspberry Pi's own pins
+    #[cfg(feature = "pi")]
+    #[command(long_about = board::ABOUT)]
+    Board(board::Args),
     /// Predict a scan with the model alone
     #[command(long_about = simulate::ABOUT)]
     Simulate(simulate::Args),
@@ -58,6 +69,18 @@ enum Verb {
     Paths(paths::Args),
     /// Compare a log's readings with the predictions beside them
     Compare(compare::Args),
+    /// Tell planes, corners and edges apart in scans
+    #[command(long_about = interpret::ABOUT)]
+    Interpret(interpret::Args),
+    /// Make an occupancy grid of the scans of logs
+    #[command(long_about = map::ABOUT)]
+    Map(map::Args),
+    /// Set a map beside the ideal one
+    #[command(long_about = map_score::ABOUT)]
+    MapScore(map_score::Args),
+    /// Map simulated courses without and with Feature Prediction, and score the maps
+    #[command(long_about = map_benchmark::ABOUT)]
+    MapBenchmark(map_benchmark::Args),
     /// Draw scans: floor plan, polar, residuals
     #[command(long_about = plot::ABOUT)]
     Plot(plot::Args),
@@ -78,9 +101,15 @@ pub fn main() -> ExitCode {
         Verb::Status(args) => status::run(&args),
         Verb::Watch(args) => watch::run(&args),
         Verb::Mock(args) => mock::run(&args),
+        #[cfg(feature = "pi")]
+        Verb::Board(args) => board::run(&args),
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
+        Verb::Interpret(args) => interpret::run(&args),
+        Verb::Map(args) => map::run(&args),
+        Verb::MapScore(args) => map_score::run(&args),
+        Verb::MapBenchmark(args) => map_benchmark::run(&args),
         Verb::Plot(args) => plot::run(args),
         Verb::Log(verb) => log::run(verb),
         Verb::Scene(verb) => scene::run(verb),

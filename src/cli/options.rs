@@ -4,7 +4,7 @@ use std::{fs, io};
 
 use super::Failure;
 use crate::{
-    acoustics::{Air, Sensor, SensorError},
+    acoustics::{Air, Response, Sensor, SensorError},
     model::{EdgeLawKind, EngineKind, Options},
     scene::suggest,
 };
@@ -13,9 +13,16 @@ use crate::{
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Sensor and air")]
 pub(super) struct SensorArgs {
-    /// Sensor preset (senscomp-6500, bozma-kuc-60khz), or a file with a sensor's data
+    /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, fullwave-line), or a
+    /// file with a sensor's data
     #[arg(long, value_name = "NAME|FILE", default_value = "senscomp-6500")]
     sensor: String,
+    /// End the blanking by hand as early as the sensor allows, as BINH does
+    #[arg(long, conflicts_with = "blanking_us")]
+    short_blanking: bool,
+    /// From firing until the receiver listens, microseconds [default: the sensor's]
+    #[arg(long, value_name = "US")]
+    blanking_us: Option<f64>,
 }
 
 /// The air between ranger and walls.
@@ -49,6 +56,12 @@ pub(super) struct EngineArgs {
     /// Least amplitude detected; a head-on, perfect wall gives 1 [default: the sensor's]
     #[arg(long, value_name = "T")]
     threshold: Option<f64>,
+    /// How the face answers to a pulse [default: the sensor's]
+    #[arg(long, value_enum)]
+    response: Option<ResponseName>,
+    /// Detect one sound at a time and time it by its path alone; `fan` and `cone` always do
+    #[arg(long)]
+    ideal_receiver: bool,
     /// Leave out the absorption of the air
     #[arg(long)]
     lossless: bool,
@@ -77,6 +90,14 @@ enum EngineName {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum ResponseName {
+    /// By its beam pattern
+    Stationary,
+    /// Point by point: echoes off the axis begin earlier, and the pattern's nulls fill up
+    Full,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(super) enum EdgeLaw {
     /// Uniform coefficients for the wedge's angle and aspect (Kouyoumjian and Pathak)
     Utd,
@@ -98,9 +119,25 @@ impl EdgeLaw {
 }
 
 impl SensorArgs {
-    /// The sensor named: a file if there is one of that name, else a preset.
+    /// The sensor named: a file if there is one of that name, else a preset; with its blanking as
+    /// asked for.
     pub(super) fn sensor(&self) -> Result<Sensor, Failure> {
-        load_sensor(&self.sensor)
+        let mut sensor = load_sensor(&self.sensor)?;
+        if self.short_blanking {
+            sensor.blanking_us = sensor.short_blanking_us.ok_or_else(|| {
+                Failure::input(
+                    format!("--short-blanking: {} has no short_blanking_us", sensor.name),
+                    "give --blanking-us instead",
+                )
+            })?;
+        }
+        if let Some(blanking_us) = self.blanking_us {
+            sensor.blanking_us = blanking_us;
+            sensor.check().map_err(|error| {
+                Failure::input(format!("--blanking-us: {error}"), "give microseconds, 0 or more")
+            })?;
+        }
+        Ok(sensor)
     }
 }
 
@@ -172,6 +209,11 @@ impl EngineArgs {
         }
         Ok(Options {
             engine,
+            response: self.response.map(|response| match response {
+                ResponseName::Stationary => Response::Stationary,
+                ResponseName::Full => Response::Full,
+            }),
+            ideal_receiver: self.ideal_receiver,
             max_range_m: self.max_range,
             threshold: self.threshold,
             lossless: self.lossless,

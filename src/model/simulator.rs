@@ -10,11 +10,13 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    Cone, Edge, Engine, Fan, FanSettings, Path, Prediction, Reflector, Survey,
+    Cone, Edge, Engine, Fan, FanSettings, Path, Prediction, Reflector, Station,
     paths::{self, PathEngine},
 };
 use crate::{
-    acoustics::{Air, BeamPattern, Receiver, Sensor, SensorError, edge::EdgeLaw},
+    acoustics::{
+        Air, BeamPattern, Combining, Disc, Receiver, Response, Sensor, SensorError, edge::EdgeLaw,
+    },
     geometry::{DVec2, Pose},
     scan::{ModelRecord, PathRecord, ScanPlan, SimRecord},
     scene::Scene,
@@ -26,6 +28,9 @@ const MARGIN_KEPT_DB: f64 = 40.0;
 
 /// The same for `paths`, which would find a great many more down there.
 const PATHS_KEPT_DB: f64 = 20.0;
+
+/// What the transducer's own face is called among the walls of a path.
+const FACE_NAME: &str = "transducer";
 
 /// Bozma and Kuc's scattering strength of the right-angled edge that they scanned.
 const SIGMA_E: f64 = 0.095;
@@ -79,6 +84,11 @@ pub struct Options {
     pub threshold: Option<f64>,
     /// From firing until the receiver listens, microseconds.
     pub blanking_us: Option<f64>,
+    /// How the face answers to a pulse.
+    pub response: Option<Response>,
+    /// Detect one sound at a time, and time it by its path alone ([`Combining::Ideal`]); engines
+    /// other than `paths` know no phases and always do.
+    pub ideal_receiver: bool,
     /// Leave out the absorption of the air.
     pub lossless: bool,
     /// Most mirror reflections on a path (`paths`, `fan`); without it, as many as can matter.
@@ -99,6 +109,8 @@ impl Default for Options {
             max_range_m: None,
             threshold: None,
             blanking_us: None,
+            response: None,
+            ideal_receiver: false,
             lossless: false,
             max_order: None,
             edge_law: None,
@@ -149,19 +161,14 @@ impl Simulator {
     ) -> Result<Self, ModelError> {
         sensor.check()?;
         options.check()?;
-        let receiver = Receiver {
-            blanking_us: options.blanking_us.unwrap_or(sensor.blanking_us),
-            pulse_us: sensor.pulse_s() * 1e6,
-            rearm_us: sensor.rearm_us,
-            threshold: options.threshold.unwrap_or(sensor.threshold),
-            sound_speed_m_s: air.sound_speed_m_s(),
-            max_range_m: options.max_range_m.unwrap_or(sensor.max_range_m),
-        };
+        let receiver = receiver(&sensor, &air, &options);
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
         let engine: Box<dyn Engine> = match options.engine {
             EngineKind::Paths => {
                 let settings = path_settings(&sensor, &air, &options, &receiver);
-                Box::new(PathEngine::new(&scene, beam, settings))
+                let wave_number_per_m = settings.wave_number_per_m;
+                let face = sensor.face.map(|face| Disc { face, wave_number_per_m });
+                Box::new(PathEngine::new(&scene, beam, face, settings))
             }
             EngineKind::Fan => {
                 Box::new(Fan::new(&scene, beam, fan_settings(&sensor, &air, &options, &receiver)))
@@ -177,7 +184,7 @@ impl Simulator {
     /// Prepares for firing from `position` (world, metres); the costly part, worth keeping.
     #[must_use]
     pub fn station(&self, position: DVec2) -> Station<'_> {
-        Station { simulator: self, survey: self.engine.survey(position) }
+        Station::new(self, self.engine.survey(position))
     }
 
     /// A reading for each firing of a checked plan, in the order of its indices.
@@ -199,7 +206,7 @@ impl Simulator {
         SimRecord {
             status: prediction.status,
             range_m: prediction.range_m,
-            amplitude: arrival.map(|arrival| arrival.amplitude),
+            amplitude: prediction.amplitude,
             margin_db: prediction.margin_db,
             path: arrival.map(|arrival| self.path_record(&arrival.path, arrival.length_m)),
         }
@@ -275,44 +282,13 @@ impl Simulator {
         match reflector {
             Reflector::Wall(index) => self.scene.walls[index as usize].id.to_string(),
             Reflector::Cylinder(index) => self.scene.cylinders[index as usize].id.to_string(),
+            Reflector::Face => FACE_NAME.to_owned(),
         }
     }
 
     fn edge_name(&self, edge: Edge) -> String {
         let end = if edge.at_b { "b" } else { "a" };
         format!("{}.{end}", self.scene.walls[edge.wall as usize].id)
-    }
-}
-
-/// A place from which firings are predicted.
-pub struct Station<'a> {
-    simulator: &'a Simulator,
-    survey: Box<dyn Survey + 'a>,
-}
-
-impl Station<'_> {
-    /// The reading of a firing in a world direction, radians counter-clockwise from +x.
-    #[must_use]
-    pub fn ping(&self, direction_rad: f64) -> Prediction {
-        let mut sounds = Vec::new();
-        self.survey.listen(direction_rad, &mut sounds);
-        let receiver = &self.simulator.receiver;
-        let detection = receiver.detect(&sounds);
-        let margin_db =
-            detection.sound.map(|sound| 20.0 * (sound.amplitude / receiver.threshold).log10());
-        Prediction {
-            status: detection.status,
-            range_m: detection.range_m,
-            arrival: detection.sound.map(|sound| self.survey.arrival(direction_rad, &sound)),
-            margin_db,
-            echoes_us: detection.echoes_us,
-        }
-    }
-
-    /// Every echo of a firing in a world direction, detected or not, shortest path first.
-    #[must_use]
-    pub fn arrivals(&self, direction_rad: f64) -> Vec<super::Arrival> {
-        self.survey.arrivals(direction_rad)
     }
 }
 
@@ -339,6 +315,19 @@ impl Options {
         }
         within("ray_spacing_deg", self.ray_spacing_deg, 1e-4, 5.0, "from 0.0001 to 5 degrees")
     }
+}
+
+/// The sensor's receiver with the options applied. Only `paths` knows phases.
+fn receiver(sensor: &Sensor, air: &Air, options: &Options) -> Receiver {
+    let sensor = Sensor { response: options.response.unwrap_or(sensor.response), ..sensor.clone() };
+    let mut receiver = Receiver::new(&sensor, air.sound_speed_m_s())
+        .with_threshold(options.threshold.unwrap_or(sensor.threshold));
+    receiver.blanking_us = options.blanking_us.unwrap_or(sensor.blanking_us);
+    receiver.max_range_m = options.max_range_m.unwrap_or(sensor.max_range_m);
+    if options.ideal_receiver || options.engine != EngineKind::Paths {
+        receiver.combining = Combining::Ideal;
+    }
+    receiver
 }
 
 fn path_settings(

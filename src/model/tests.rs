@@ -1,6 +1,7 @@
 //! The engines against closed forms, laws, and the phenomena of Dudek, Jenkin, Milios and Wilkes.
 
 mod closed_forms;
+mod full_wave;
 mod laws;
 mod phenomena;
 
@@ -20,6 +21,8 @@ const BARE: Options = Options {
     max_range_m: None,
     threshold: None,
     blanking_us: Some(0.0),
+    response: None,
+    ideal_receiver: true,
     lossless: true,
     max_order: None,
     edge_law: None,

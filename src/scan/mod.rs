@@ -4,6 +4,7 @@ mod codec;
 mod plan;
 mod record;
 mod remaining;
+mod simulated;
 mod view;
 
 pub use codec::{EncodeError, FaultKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};

@@ -5,6 +5,7 @@ mod common;
 mod daemon;
 mod faults;
 mod hangup;
+mod interpret;
 mod log;
 mod paths;
 mod plot;

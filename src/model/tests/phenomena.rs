@@ -21,6 +21,20 @@ fn echo_m(readings: &[(f64, Prediction)], azimuth_deg: f64) -> Option<f64> {
     prediction.range_m.filter(|_| prediction.status == PingStatus::Echo)
 }
 
+/// An echo's range, checked against half its path: a weak echo is late by some millimetres, never
+/// early by more than what others that begin with it add.
+fn near_path(prediction: &Prediction) -> f64 {
+    let range_m = prediction.range_m.expect("a range");
+    let path_m = prediction.arrival.as_ref().expect("an echo").length_m / 2.0;
+    assert!((-1e-3..5e-3).contains(&(range_m - path_m)), "{range_m} for {path_m}");
+    path_m
+}
+
+fn at(readings: &[(f64, Prediction)], azimuth_deg: f64) -> &Prediction {
+    let reading = readings.iter().find(|(at, _)| (at - azimuth_deg).abs() < 1e-6);
+    &reading.expect("a reading").1
+}
+
 /// Figure 9: sound from the near wall passes the ranger, and the wall seems 827 mm away.
 #[test]
 fn a_false_lower_wall_appears_at_827_mm() {
@@ -51,7 +65,44 @@ fn the_top_wall_is_read_as_minimum_range() {
     close(path.length_m, 0.794, 1e-6, "length");
     let circle = readings.iter().filter(|(_, p)| p.status == PingStatus::MinRange).count();
     assert!((10..200).contains(&circle), "{circle}");
-    close(echo_m(&readings, 180.0).expect("the far wall"), 0.834, 1e-3, "far wall");
+    close(near_path(at(&readings, 180.0)), 0.834, 1e-6, "far wall");
+}
+
+/// Figure 7, on the right: the wall is 94 mm away and all its own echoes are over before the
+/// receiver opens, but the sound runs to and fro between wall and face, and the fourth round is
+/// still there. The paper's model, whose ranger is transparent, was silent here.
+#[test]
+fn the_near_wall_on_the_right_is_read_as_minimum_range() {
+    let (simulator, readings) = scan("simple-room", "fig7", 0.9);
+    let (_, right) = readings.iter().find(|(at, _)| *at == 0.0).expect("a reading");
+    assert_eq!(right.status, PingStatus::MinRange);
+    let path = simulator.record(right).path.expect("a path");
+    let rounds = ["east", "transducer"].repeat(4);
+    assert_eq!(path.walls, rounds[..7]);
+    close(path.length_m, 8.0 * 0.094, 1e-9, "length");
+    let near: Vec<f64> = readings
+        .iter()
+        .filter(|(at, p)| (*at < 90.0 || *at > 270.0) && p.status == PingStatus::MinRange)
+        .filter(|(_, p)| p.arrival.as_ref().is_some_and(|a| a.length_m > 0.75))
+        .map(|(at, _)| *at)
+        .collect();
+    assert!(near.len() >= 3, "{near:?}");
+}
+
+/// Figure 1 (c): a plate parallel to the transducer answers more than once.
+#[test]
+fn a_plate_before_the_transducer_answers_in_a_train() {
+    let scene = shipped_scene("echo-traces");
+    let pose = pose(&scene, "c");
+    let simulator = simulator(scene, Options::default());
+    let direction_rad = pose.direction_rad(0.0);
+    let arrivals = simulator.station(pose.position()).arrivals(direction_rad);
+    let train: Vec<f64> = of_kind(&arrivals, PathKind::Specular).map(|a| a.length_m).collect();
+    for (echo, round) in train.iter().zip(1..) {
+        close(*echo, 1.2 * f64::from(round), 1e-9, "round");
+    }
+    assert!(train.len() >= 2, "{train:?}");
+    assert!(simulator.station(pose.position()).ping(direction_rad).echoes_us.len() >= 2);
 }
 
 /// Figure 12: an arc around the corner's vertex, and a hole on each side of it.
@@ -64,7 +115,7 @@ fn a_corner_becomes_an_arc_between_holes() {
         |deg: f64, within: f64| readings.iter().filter(move |(at, _)| (at - deg).abs() < within);
     for (at, prediction) in near(bearing_deg, 7.0) {
         assert_eq!(prediction.status, PingStatus::Echo, "{at}");
-        close(prediction.range_m.expect("a range"), vertex.length(), 1e-6, "arc");
+        close(near_path(prediction), vertex.length(), 1e-6, "arc");
     }
     for wall_deg in [180.0, 270.0] {
         let hole_deg = (wall_deg + bearing_deg) / 2.0;
@@ -73,8 +124,8 @@ fn a_corner_becomes_an_arc_between_holes() {
             assert!(prediction.margin_db.is_none_or(|margin_db| margin_db < 0.0), "{at}");
         }
     }
-    close(echo_m(&readings, 180.0).expect("west"), 0.8, 1e-6, "west wall");
-    close(echo_m(&readings, 270.0).expect("south"), 0.65, 1e-6, "south wall");
+    close(near_path(at(&readings, 180.0)), 0.8, 1e-6, "west wall");
+    close(near_path(at(&readings, 270.0)), 0.65, 1e-6, "south wall");
 }
 
 /// A corridor, the ranger beside one wall: side walls right at the perpendicular, silence or
@@ -82,8 +133,8 @@ fn a_corner_becomes_an_arc_between_holes() {
 #[test]
 fn a_corridor_is_right_at_the_perpendicular_only() {
     let (_, readings) = scan("corridor", "beside-wall", 0.9);
-    close(echo_m(&readings, 90.0).expect("north"), 1.3, 1e-6, "north wall");
-    close(echo_m(&readings, 270.0).expect("south"), 0.5, 1e-6, "south wall");
+    close(near_path(at(&readings, 90.0)), 1.3, 1e-6, "north wall");
+    close(near_path(at(&readings, 270.0)), 0.5, 1e-6, "south wall");
     let slanting = readings.iter().filter(|(at, _)| (205.0..240.0).contains(at));
     let mut wrong = 0;
     for (at, prediction) in slanting {
