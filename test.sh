@@ -5,6 +5,7 @@
 #   FUZZ_SECONDS=60 ./test.sh   fuzz each target for a minute (default 5 s; 0 leaves fuzzing out)
 #   FIRMWARE=0 ./test.sh        leave firmware and emulator out, where they can't be built: they
 #                               need Debian's packages (firmware/test.sh)
+#   SONARD_SOAK_FAULTS=1000 SONARD_KILLS=200 ./test.sh   longer runs of the daemon among faults
 set -euo pipefail
 cd "$(dirname "$0")"
 fuzz_seconds=${FUZZ_SECONDS:-5}
@@ -35,6 +36,9 @@ cargo clippy --workspace --all-targets --quiet -- -D warnings
 step "the pure part alone"
 cargo clippy --lib --no-default-features --quiet -- -D warnings
 tests/pure-tree.sh
+
+step "systemd units"
+systemd/test.sh
 
 step "documentation, warnings denied"
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet

@@ -2,6 +2,7 @@
 #![cfg(feature = "daemon")]
 
 mod common;
+mod daemon;
 mod doctor;
 mod faults;
 mod hangup;
