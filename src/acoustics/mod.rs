@@ -15,5 +15,7 @@ pub use receiver::{
     Combining, Detection, EchoTrace, Hump, Incident, Receiver, ReceiverNoise, Sound, TracePoint,
     classify_tof,
 };
-pub use sensor::{Aperture, ChirpPart, Gain, GainStep, Pulse, Response, Sensor, SensorError};
+pub use sensor::{
+    Aperture, ChirpPart, EdgeLawKind, Gain, GainStep, Pulse, Response, Sensor, SensorError,
+};
 pub use transducer::{BeamPattern, kuc_siegel_response, piston_directivity};

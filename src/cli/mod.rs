@@ -7,6 +7,7 @@ mod mock;
 mod mock_world;
 mod options;
 mod paths;
+mod picture_file;
 mod place;
 mod plot;
 mod runtime;
@@ -14,6 +15,7 @@ mod scan;
 mod scene;
 mod scene_file;
 mod simulate;
+mod trace;
 
 pub use failure::{Failure, Outcome};
 
@@ -46,6 +48,9 @@ enum Verb {
     /// List the ways that echoes take from a place
     #[command(long_about = paths::ABOUT)]
     Paths(paths::Args),
+    /// Show the echo trace of one firing, each hump with its path
+    #[command(long_about = trace::ABOUT)]
+    Trace(trace::Args),
     /// Compare a log's readings with the predictions beside them
     Compare(compare::Args),
     /// Draw scans: floor plan, polar, residuals
@@ -68,7 +73,8 @@ pub fn main() -> ExitCode {
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
-        Verb::Plot(args) => plot::run(args),
+        Verb::Trace(args) => trace::run(&args),
+        Verb::Plot(args) => plot::run(&args),
         Verb::Log(verb) => log::run(verb),
         Verb::Scene(verb) => scene::run(verb),
     };

@@ -22,6 +22,8 @@ mod strip;
 mod strips;
 mod theme;
 mod ticks;
+mod trace;
+mod way;
 mod words;
 
 #[cfg(test)]
@@ -34,3 +36,5 @@ pub use polar::draw_polar;
 pub use residuals::draw_residuals;
 pub use scan::{draw_scan, draw_scans};
 pub use scene::draw_scene;
+pub use trace::{TraceView, draw_trace};
+pub use way::{WayView, draw_way};

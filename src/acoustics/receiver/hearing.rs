@@ -68,7 +68,7 @@ impl<'a> Hearing<'a> {
             parts: Vec::new(),
             over: 0,
             exponent: match receiver.gain {
-                Gain::Compensating { exponent } => exponent,
+                Gain::Compensating { exponent, .. } => exponent,
                 Gain::Steps { .. } => 0.0,
             },
             least_threshold: least_threshold(receiver),
