@@ -12,8 +12,8 @@ pub use air::{Air, AirError};
 pub use aperture::{ApertureResponse, Image, Incidence};
 pub use pulse::EchoShape;
 pub use receiver::{
-    Combining, Detection, EchoTrace, Hump, Incident, Receiver, ReceiverNoise, Sound, TracePoint,
-    classify_tof,
+    Combining, Detection, EchoTrace, Hump, Incident, Latch, Receiver, ReceiverNoise, Sound,
+    TracePoint, classify_tof,
 };
 pub use sensor::{
     Aperture, ChirpPart, EdgeLawKind, Gain, GainStep, Pulse, Response, Sensor, SensorError,

@@ -13,7 +13,7 @@ use super::{
     scene_file,
 };
 use crate::{
-    plot::{draw_polar, draw_residuals, draw_scans},
+    plot::{draw_polar, draw_residuals, draw_scans, draw_side_by_side},
     scan::ScanView,
     scene::{Scene, shipped},
     store::{Loaded, load},
@@ -53,6 +53,9 @@ enum Kind {
     Polar,
     /// Measured minus predicted range
     Residuals,
+    /// The first three scans beside each other, and how many beams differ: for scans of one place by
+    /// different engines
+    SideBySide,
 }
 
 pub(super) const ABOUT: &str = "\
@@ -71,6 +74,8 @@ Examples:
   sonard plot scan.jsonl --kind residuals --scan 2 -o residuals.png --width 2000
   sonard simulate --scene simple-room --pose fig9 | sonard plot - -o fig9.svg
   sonard plot scan.jsonl --azimuth-deg 270 -o way.png
+  for e in paths fan cone; do sonard simulate --scene corridor --pose beside-wall --engine $e; done \
+      | sonard plot - --kind side-by-side -o engines.png
 
 Exit codes: 0 drawn, 2 wrong usage or input, 3 a picture can't be written.";
 
@@ -86,6 +91,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         (Some(beam), _) => way::draw(&views, scene.as_ref(), beam)?,
         (None, Kind::Scan) => draw_scans(&views, scene.as_ref()),
         (None, Kind::Polar) => draw_polar(&views, scene.as_ref()),
+        (None, Kind::SideBySide) => draw_side_by_side(&views, scene.as_ref()),
         (None, Kind::Residuals) => draw_residuals(&views, scene.as_ref()),
     };
     targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))

@@ -120,6 +120,7 @@ pub struct Prediction {
     pub amplitude: Option<f64>,
     /// The same above the threshold in force, decibels; negative for `NoEcho`: what it lacked.
     pub margin_db: Option<f64>,
-    /// Times after firing at which the module raises ECHO, microseconds, at most eight.
+    /// Times after firing at which the module raises ECHO, microseconds: the first, or up to eight
+    /// where the receiver was made ready again.
     pub echoes_us: SmallVec<[f64; 8]>,
 }

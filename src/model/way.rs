@@ -12,8 +12,9 @@ use crate::{
     scene::Scene,
 };
 
-/// A way's length may differ from the one stated by this much, metres: logs round.
-const SAME_LENGTH_M: f64 = 1e-4;
+/// A way's length may differ from the one stated by this much, metres: logs round, and the engine
+/// squares up corners that are written with rounded coordinates.
+const SAME_LENGTH_M: f64 = 1e-3;
 
 /// A point this far beyond the end of a wall still counts as on it, metres: corners are written with
 /// rounded coordinates.
@@ -21,7 +22,8 @@ const BEYOND_END_M: f64 = 1e-4;
 
 impl Path {
     /// The points of the way from a ranger at `position` and back to it, in order: the ranger, each
-    /// reflection and the edge, the ranger. `None` if there is no such way of `length_m` metres in
+    /// reflection and the edge, the ranger. Round an edge the way may be the one run through
+    /// backwards, which meets the same walls in the same order and arrives at the same time. `None` if there is no such way of `length_m` metres in
     /// this scene.
     #[must_use]
     pub fn points(&self, scene: &Scene, position: DVec2, length_m: f64) -> Option<Vec<DVec2>> {

@@ -9,4 +9,5 @@ mod paths;
 mod plot;
 mod scan;
 mod scene;
+mod trace;
 mod wrong_input;

@@ -31,8 +31,17 @@ fn every_path_of_every_shipped_scene_has_its_way() {
                 assert_eq!((*first, *last), (pose.position(), pose.position()));
                 let leaves = (points[1] - points[0]).to_angle();
                 let comes = (points[points.len() - 2] - *last).to_angle();
-                assert!(wrap_pi(leaves - echo.departure_rad).abs() < 1e-4, "{name} {record:?}");
-                assert!(wrap_pi(comes - echo.arrival_rad).abs() < 1e-4, "{name} {record:?}");
+                // The engine squares up corners, which moves them by a tenth of a millimetre. A way round
+                // an edge reads the same backwards.
+                let ends = [
+                    (echo.departure_rad, echo.arrival_rad),
+                    (echo.arrival_rad, echo.departure_rad),
+                ];
+                let fits = |(out, back): &(f64, f64)| {
+                    wrap_pi(leaves - out).abs() < 1e-3 && wrap_pi(comes - back).abs() < 1e-3
+                };
+                let known = if echo.path.edge.is_some() { 2 } else { 1 };
+                assert!(ends[..known].iter().any(fits), "{name} {record:?}");
                 if echo.path.edge.is_none() {
                     mirrors(&scene, &echo.path, &points);
                 }
