@@ -24,6 +24,7 @@ mod scene;
 mod scene_file;
 mod simulate;
 mod status;
+mod trace;
 mod watch;
 
 pub use failure::{Failure, Outcome};
@@ -71,6 +72,9 @@ enum Verb {
     /// List the ways that echoes take from a place
     #[command(long_about = paths::ABOUT)]
     Paths(paths::Args),
+    /// Show the echo trace of one firing, each hump with its path
+    #[command(long_about = trace::ABOUT)]
+    Trace(trace::Args),
     /// Compare a log's readings with the predictions beside them
     Compare(compare::Args),
     /// Tell planes, corners and edges apart in scans
@@ -115,7 +119,8 @@ pub fn main() -> ExitCode {
         Verb::Map(args) => map::run(&args),
         Verb::MapScore(args) => map_score::run(&args),
         Verb::MapBenchmark(args) => map_benchmark::run(&args),
-        Verb::Plot(args) => plot::run(args),
+        Verb::Trace(args) => trace::run(&args),
+        Verb::Plot(args) => plot::run(&args),
         Verb::Log(verb) => log::run(verb),
         Verb::Scene(verb) => scene::run(verb),
     };

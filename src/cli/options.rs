@@ -68,7 +68,7 @@ pub(super) struct EngineArgs {
     /// Most mirror reflections on a path [default: as many as can matter]
     #[arg(long, value_name = "N")]
     max_order: Option<u32>,
-    /// How edges diffract [default: utd; `fan` has kuc-siegel only]
+    /// How edges diffract [default: the sensor's, or utd; `fan` has kuc-siegel only]
     #[arg(long, value_enum)]
     edge_law: Option<EdgeLaw>,
     /// Angle between the rays of `fan`, degrees

@@ -12,4 +12,5 @@ mod paths;
 mod plot;
 mod scan;
 mod scene;
+mod trace;
 mod wrong_input;
