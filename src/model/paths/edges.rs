@@ -52,9 +52,13 @@ struct Bending<'a> {
 #[derive(Clone, Copy)]
 struct Arm<'a> {
     ray: &'a Ray,
-    /// Its place in [`Tree::to_edges`].
+    /// See [`Tree::part`].
     number: u32,
     length_m: f64,
+    /// Width of the ray tube at the edge, metres: without cylinders its length.
+    width_m: f64,
+    /// Radius of curvature of the wave front at the edge, metres: without cylinders its length.
+    radius_m: f64,
     sector: usize,
     /// Direction from the edge towards the source, from the sector's first wall, radians.
     from_rad: f64,
@@ -104,17 +108,34 @@ impl Edges {
 
     /// All echoes that bend once: out on one ray to an edge, back on another or the same.
     pub(super) fn echoes(&self, tree: &mut Tree, law: EdgeLaw, settings: &Settings) -> Vec<Echo> {
-        tree.to_edges.sort_by(|(p, r), (q, s)| {
-            p.cmp(q).then(r.run.length_squared().total_cmp(&s.run.length_squared()))
-        });
+        tree.to_edges.sort_by_key(|(point, _)| *point);
+        tree.bent_to_edges.sort_by_key(|bent| bent.point);
         let mut echoes = Vec::new();
         let mut first = 0;
+        let bending = Bending { law, settings };
+        let mut at_point = |point: u32, first: u32, flat: &[(u32, Ray)]| {
+            let Some(Some(corner)) = self.points.get(point as usize) else { return };
+            let (from, bent) = tree.bent_to(point);
+            let from = from + tree.to_edges.len() as u32;
+            let flat = (first..).zip(flat).filter_map(|(number, (_, ray))| {
+                let length_m = ray.run.length();
+                corner.arm(ray, number, length_m, length_m)
+            });
+            let bent = (from..).zip(bent).filter_map(|(number, bent)| {
+                corner.arm(&bent.ray, number, bent.width_m, bent.radius_m)
+            });
+            corner.echoes(point, flat.chain(bent).collect(), &bending, &mut echoes);
+        };
         for rays in tree.to_edges.chunk_by(|a, b| a.0 == b.0) {
-            let point = rays[0].0;
-            if let Some(Some(corner)) = self.points.get(point as usize) {
-                corner.echoes(point, first, rays, &Bending { law, settings }, &mut echoes);
-            }
+            at_point(rays[0].0, first, rays);
             first += rays.len() as u32;
+        }
+        // Edges that are seen by way of a cylinder only.
+        for bent in tree.bent_to_edges.chunk_by(|a, b| a.point == b.point) {
+            let point = bent[0].point;
+            if tree.to_edges.binary_search_by_key(&point, |ray| ray.0).is_err() {
+                at_point(point, 0, &[]);
+            }
         }
         echoes
     }
@@ -138,17 +159,9 @@ impl Sector {
 }
 
 impl Corner {
-    /// Of the rays to this point, the first of which is number `first` in the tree.
-    fn echoes(
-        &self,
-        point: u32,
-        first: u32,
-        rays: &[(u32, Ray)],
-        bending: &Bending,
-        echoes: &mut Vec<Echo>,
-    ) {
-        let mut arms: Vec<Arm> =
-            (first..).zip(rays).filter_map(|(number, (_, ray))| self.arm(ray, number)).collect();
+    /// Of the rays to this point.
+    fn echoes(&self, point: u32, mut arms: Vec<Arm>, bending: &Bending, echoes: &mut Vec<Echo>) {
+        arms.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
         drop_repeats(&mut arms, |leg| leg.length_m, Arm::is_same);
         for (i, out) in arms.iter().enumerate() {
             for (j, back) in arms.iter().enumerate().skip(i) {
@@ -166,14 +179,19 @@ impl Corner {
                     via: Via::Edge { point, out: out.number, back: back.number },
                 };
                 if i != j {
-                    echoes.push(echo.reversed());
+                    echoes.push(Echo {
+                        departure: echo.arrival,
+                        arrival: echo.departure,
+                        via: Via::Edge { point, out: back.number, back: out.number },
+                        ..echo
+                    });
                 }
                 echoes.push(echo);
             }
         }
     }
 
-    fn arm<'a>(&self, ray: &'a Ray, number: u32) -> Option<Arm<'a>> {
+    fn arm<'a>(&self, ray: &'a Ray, number: u32, width_m: f64, radius_m: f64) -> Option<Arm<'a>> {
         let direction = (-ray.run).to_angle();
         let last = self.sectors.len() - 1;
         let sector = self.sectors.iter().rposition(|s| s.from_rad <= direction).unwrap_or(last);
@@ -184,6 +202,8 @@ impl Corner {
             ray,
             number,
             length_m: ray.run.length(),
+            width_m,
+            radius_m,
             sector,
             from_rad,
         })
@@ -207,8 +227,9 @@ impl Bending<'_> {
         let aspect = Aspect {
             in_rad: out.from_rad,
             out_rad: back.from_rad,
-            distance_m: out.length_m * back.length_m / length_m,
+            distance_m: out.radius_m * back.radius_m / (out.radius_m + back.radius_m),
         };
+        let strength = strength * out.spreading(back, &aspect);
         let k = settings.wave_number_per_m;
         if strength * law.bound(wedge, &aspect, k) < settings.floor {
             return None;
@@ -219,6 +240,15 @@ impl Bending<'_> {
 }
 
 impl Arm<'_> {
+    /// What cylinders on the way leave of the field at an edge, beside fronts that flat walls
+    /// turned: these fall by `sqrt((s + s') / (s s'))`, and the distance parameter of the
+    /// transition is that of the fronts' radii of curvature in the plane (Kouyoumjian and Pathak
+    /// 1974, equations (24) and (33), whose other radius, along the edge, no cylinder changes).
+    fn spreading(&self, back: &Self, aspect: &Aspect) -> f64 {
+        let length_m = self.length_m + back.length_m;
+        (aspect.distance_m * length_m / (self.width_m * back.width_m)).sqrt()
+    }
+
     /// Whether two arms are one that touches a corner on its way and was found on both sides.
     fn is_same(&self, other: &Self) -> bool {
         self.ray.departure.distance_squared(other.ray.departure) < SAME_RAD * SAME_RAD

@@ -46,11 +46,20 @@
 //!
 //! # Cylinders
 //!
-//! Cylinders hide what is behind them and reflect. Echoes with one reflection at a cylinder, and
-//! any at walls before and after, are exact: pairs of beams that meet the cylinder, joined where
-//! the way is shortest (`rounds`), with the spreading of a curved mirror. Echoes that touch
-//! cylinders twice, or a cylinder and an edge, and the sound that creeps around a cylinder are
-//! left out; cylinders thinner than a wavelength reflect less than they would here.
+//! Cylinders hide what is behind them and reflect. Behind a cylinder a beam has no image any more;
+//! it goes on as a tube of rays (`tubes`), which walks the same mesh. Rays off convex surfaces
+//! spread and never cross, so in each tube one ray at most comes back to the receiver, or to an
+//! edge, and is found as the zero of a monotone function. Its tube's width, by the mirror equation
+//! at each cylinder, says how much the sound has spread.
+//!
+//! Paths touch cylinders three times at most, and are followed down to the threshold only: between
+//! a round body and a wall beside it they are without number. The sound that creeps around a
+//! cylinder is left out, which matters in the shadow and for radii of few wavelengths; cylinders
+//! thinner than a wavelength reflect less than they would here.
+//!
+//! # The transducer's face
+//!
+//! It reflects too, and turns with the azimuth: an echo may go round again (`trains`).
 //!
 //! # Scans
 //!
@@ -68,12 +77,23 @@ mod survey;
 mod tests;
 mod trace;
 mod trains;
+mod tube;
+mod tubes;
+mod wheel;
 
 pub use survey::PathEngine;
 
 use smallvec::SmallVec;
 
-use self::{beam::Ray, edges::Edges, mesh::Mesh, rounds::Rounds, trace::Tree};
+use self::{
+    beam::Ray,
+    edges::Edges,
+    mesh::Mesh,
+    rounds::Rounds,
+    trace::Tree,
+    tube::{Curved, Tracer},
+    tubes::TubeGrower,
+};
 use crate::{
     acoustics::edge::EdgeLaw,
     geometry::{Arrangement, DVec2, Mirror, square_up},
@@ -219,29 +239,31 @@ impl Paths {
             })
             .filter(|echo| echo.amplitude >= self.settings.floor)
             .collect();
+        if !self.rounds.is_empty() {
+            echoes.extend(TubeGrower::new(self, &mut tree, [position, position]).grow());
+        }
         if let Some(law) = self.settings.edge_law {
             echoes.extend(self.edges.echoes(&mut tree, law, &self.settings));
         }
-        if let Some(mesh) = self.mesh.as_ref().filter(|_| !self.rounds.is_empty()) {
-            echoes.extend(self.rounds.echoes(&mut tree, mesh, &self.settings));
+        if !self.rounds.is_empty() {
             echoes.retain(|echo| !self.is_hidden(&tree, echo, position));
         }
         (tree, sorted(&echoes))
     }
 
-    /// Whether a cylinder stands in an echo's way.
+    /// Whether a cylinder stands in an echo's way. Tubes have seen to that for themselves.
     fn is_hidden(&self, tree: &Tree, echo: &Echo, position: DVec2) -> bool {
-        let hides = |leg: Leg, end| self.hides_leg(tree, leg, position, end);
-        match tree.legs(echo) {
-            (out, None) => hides(out, position),
-            (out, Some(back)) => {
-                let end = match echo.via {
-                    Via::Edge { point, .. } => self.edges.place(point),
-                    Via::Cylinder { bounce, .. } => Some(tree.bounces[bounce as usize].hit),
-                    Via::Walls { .. } => None,
-                };
-                end.is_some_and(|end| hides(out, end) || hides(back, end))
-            }
+        let hides = |part: Part, end| match part {
+            Part::Flat(leg) => self.hides_leg(tree, leg, position, end),
+            Part::Curved(_) => false,
+        };
+        match echo.via {
+            Via::Walls { node } => hides(Part::Flat(Leg { node, run: -echo.arrival }), position),
+            Via::Cylinders { .. } => false,
+            Via::Edge { point, out, back } => self
+                .edges
+                .place(point)
+                .is_some_and(|end| [out, back].into_iter().any(|ray| hides(tree.part(ray), end))),
         }
     }
 
@@ -272,20 +294,39 @@ impl Paths {
 
     /// The reflectors of an echo, in order.
     fn way(&self, tree: &Tree, echo: &Echo) -> Path {
-        let back_to = |leg| tree.walls_back(&self.faces, leg).map(Reflector::Wall);
-        let (out, back) = tree.legs(echo);
-        let mut walls: SmallVec<[Reflector; 4]> = back_to(out).collect();
-        walls.reverse();
         let (kind, edge) = match echo.via {
-            Via::Walls { .. } => (PathKind::Specular, None),
             Via::Edge { point, .. } => (PathKind::Diffracted, self.edges.edge(point)),
-            Via::Cylinder { bounce, .. } => {
-                walls.push(Reflector::Cylinder(tree.bounces[bounce as usize].cylinder));
-                (PathKind::Specular, None)
+            Via::Walls { .. } | Via::Cylinders { .. } => (PathKind::Specular, None),
+        };
+        let walls = match echo.via {
+            Via::Walls { node } => self.met(tree, Part::Flat(Leg { node, run: -echo.arrival })),
+            Via::Cylinders { curved } => self.met(tree, Part::Curved(curved)),
+            Via::Edge { out, back, .. } => {
+                let mut walls = self.met(tree, tree.part(out));
+                walls.extend(self.met(tree, tree.part(back)).into_iter().rev());
+                walls
             }
         };
-        walls.extend(back.into_iter().flat_map(back_to));
         Path { kind, walls, edge }
+    }
+
+    /// What a ray from the start met, in order.
+    fn met(&self, tree: &Tree, part: Part) -> SmallVec<[Reflector; 4]> {
+        let mut met = SmallVec::new();
+        let leg = match part {
+            Part::Flat(leg) => leg,
+            Part::Curved(curved) => {
+                let Curved { view, link, contact_rad } = tree.curved[curved as usize];
+                let view = &tree.to_cylinders[view as usize];
+                let tracer = Tracer::new(self, view, &tree.links, link);
+                met.extend(tracer.surfaces.iter().rev().copied());
+                met.push(Reflector::Cylinder(view.arc.cylinder));
+                tracer.leg(contact_rad)
+            }
+        };
+        met.extend(tree.walls_back(&self.faces, leg).map(Reflector::Wall));
+        met.reverse();
+        met
     }
 }
 
@@ -308,21 +349,21 @@ struct Echo {
     via: Via,
 }
 
-/// The way of an echo; see [`Tree::legs`].
+/// The way of an echo.
 #[derive(Debug, Clone, Copy)]
 enum Via {
     Walls {
         node: u32,
     },
-    /// `out` and `back` are rays to the edge.
+    /// `out` and `back` are rays to the edge; see [`Tree::part`].
     Edge {
         point: u32,
         out: u32,
         back: u32,
     },
-    Cylinder {
-        bounce: u32,
-        backwards: bool,
+    /// By [`Tree::curved`].
+    Cylinders {
+        curved: u32,
     },
 }
 
@@ -339,17 +380,15 @@ impl From<&Ray> for Leg {
     }
 }
 
-impl Echo {
-    /// The same way run through backwards.
-    fn reversed(&self) -> Self {
-        let via = match self.via {
-            Via::Walls { .. } => self.via,
-            Via::Edge { point, out, back } => Via::Edge { point, out: back, back: out },
-            Via::Cylinder { bounce, backwards } => Via::Cylinder { bounce, backwards: !backwards },
-        };
-        Self { departure: self.arrival, arrival: self.departure, via, ..*self }
-    }
+/// A ray from the start: over walls alone, or by way of cylinders.
+#[derive(Debug, Clone, Copy)]
+enum Part {
+    Flat(Leg),
+    /// By its place in [`Tree::curved`].
+    Curved(u32),
+}
 
+impl Echo {
     /// Whether two echoes are one that touches a corner and was found on both sides of it.
     fn is_same(&self, other: &Self) -> bool {
         self.departure.distance_squared(other.departure) < SAME_RAD * SAME_RAD

@@ -1,13 +1,12 @@
 //! The echoes of one place, weighed for an azimuth.
 
-use std::f64::consts::{PI, TAU};
-
 use smallvec::SmallVec;
 
 use super::{
     Echo, EchoPath, Paths, Settings,
     trace::Tree,
-    trains::{Loops, Train},
+    trains::{Loops, Round, Train},
+    wheel::{Envelope, Spoke, Wheel},
 };
 use crate::{
     acoustics::{BeamPattern, Disc, Sound},
@@ -43,37 +42,8 @@ impl Engine for PathEngine {
     }
 }
 
-/// Steps of the envelope, half a degree.
-const ENVELOPE_STEPS: usize = 360;
-
-/// For each angle from the axis the strongest that a beam pattern still gets beyond it.
-#[derive(Debug)]
-struct Envelope(Vec<f64>);
-
-impl Envelope {
-    fn of(beam: &BeamPattern) -> Self {
-        // Ten samples a step: a tenth of a lobe's width even at twenty wavelengths across.
-        let sample = |i: usize| beam.one_way(PI * i as f64 / (10 * ENVELOPE_STEPS) as f64);
-        let mut strongest: f64 = 0.0;
-        let mut steps: Vec<f64> = (0..ENVELOPE_STEPS)
-            .rev()
-            .map(|step| {
-                let here = (10 * step..=10 * step + 10).map(sample).fold(0.0, f64::max);
-                strongest = strongest.max(here);
-                strongest
-            })
-            .collect();
-        steps.reverse();
-        Self(steps)
-    }
-
-    /// The angle beyond which the pattern stays below `level`, rounded up to a step, radians.
-    fn reach_rad(&self, level: f64) -> f64 {
-        // A thousandth more than sampled, for what lies between the samples.
-        let steps = self.0.partition_point(|strongest| 1.001 * strongest >= level);
-        PI * steps as f64 / ENVELOPE_STEPS as f64
-    }
-}
+/// Widest reach of each wheel, degrees.
+const REACHES_DEG: [f64; 5] = [6.0, 10.0, 16.0, 30.0, 180.0];
 
 /// The echo paths of a place.
 struct PathSurvey<'a> {
@@ -85,95 +55,6 @@ struct PathSurvey<'a> {
     wheels: [Wheel; REACHES_DEG.len()],
     /// What the face can send round again.
     loops: Option<Loops>,
-}
-
-/// Widest reach of each wheel, degrees.
-const REACHES_DEG: [f64; 5] = [6.0, 10.0, 16.0, 30.0, 180.0];
-
-/// Directions are sorted into this many bins.
-const BINS: usize = 360;
-
-/// Echoes by the direction in which they are heard best.
-#[derive(Debug, Default)]
-struct Wheel {
-    /// Bin by bin.
-    spokes: Vec<Spoke>,
-    /// Where each bin begins in `spokes`, and the end of the last.
-    bins: Vec<u32>,
-    /// The widest reach of its spokes.
-    reach_rad: f64,
-}
-
-/// What an azimuth needs to know of an echo.
-#[derive(Debug, Clone, Copy)]
-struct Spoke {
-    /// Half way between departure and arrival.
-    middle_rad: f64,
-    /// Departure is this far on one side of the middle, arrival on the other.
-    half_rad: f64,
-    amplitude: f64,
-    /// Farther off the middle it is too weak.
-    reach_rad: f64,
-    echo: u32,
-}
-
-impl Spoke {
-    /// `None` if it is too weak in all directions.
-    ///
-    /// `y` off the middle, the axis is `|y| + h` off one end and at least `||y| - h|` off the
-    /// other. The pattern's product reaches a level only if its smaller factor does, and its
-    /// larger one reaches the root of it.
-    fn of(echo: &Echo, index: u32, envelope: &Envelope, floor: f64) -> Option<Self> {
-        let half_rad = 0.5 * echo.departure.angle_to(echo.arrival);
-        let level = floor / echo.amplitude;
-        let wide = envelope.reach_rad(level) - half_rad.abs();
-        if wide < 0.0 {
-            return None;
-        }
-        let reach_rad = wide.min(envelope.reach_rad(level.sqrt()) + half_rad.abs());
-        let middle_rad = wrap_pi(echo.departure.to_angle() + half_rad);
-        Some(Self { middle_rad, half_rad, amplitude: echo.amplitude, reach_rad, echo: index })
-    }
-}
-
-impl Wheel {
-    fn new(spokes: &[Spoke]) -> Self {
-        let mut bins = vec![0_u32; BINS + 1];
-        for spoke in spokes {
-            bins[bin(spoke.middle_rad) + 1] += 1;
-        }
-        for i in 0..BINS {
-            bins[i + 1] += bins[i];
-        }
-        let mut next = bins.clone();
-        let mut sorted = spokes.to_vec();
-        for spoke in spokes {
-            let place = &mut next[bin(spoke.middle_rad)];
-            sorted[*place as usize] = *spoke;
-            *place += 1;
-        }
-        let reach_rad = spokes.iter().map(|spoke| spoke.reach_rad).fold(0.0, f64::max);
-        Self { spokes: sorted, bins, reach_rad }
-    }
-
-    /// The spokes within their reach of a direction in (-pi, pi].
-    fn near(&self, direction_rad: f64) -> impl Iterator<Item = (&Spoke, f64)> {
-        let bins = BINS as i64;
-        let (middle, reach) =
-            (bin(direction_rad) as i64, (self.reach_rad / TAU * BINS as f64).ceil() as i64);
-        let (from, to) =
-            if 2 * reach + 1 >= bins { (0, bins) } else { (middle - reach, middle + reach + 1) };
-        let part = move |from: i64, to: i64| {
-            let at = |bin: i64| self.bins[bin.clamp(0, bins) as usize] as usize;
-            &self.spokes[at(from)..at(to)]
-        };
-        // What leaves the circle on one side comes in on the other.
-        let wrapped = [part(from + bins, bins), part(from, to), part(0, to - bins)];
-        wrapped.into_iter().flatten().filter_map(move |spoke| {
-            let off_rad = wrap_once(direction_rad - spoke.middle_rad);
-            (off_rad.abs() <= spoke.reach_rad).then_some((spoke, off_rad))
-        })
-    }
 }
 
 impl<'a> PathSurvey<'a> {
@@ -189,7 +70,9 @@ impl<'a> PathSurvey<'a> {
             }
         }
         let wheels = spokes.map(|spokes| Wheel::new(&spokes));
-        let loops = engine.face.map(|face| Loops::new(face, &echoes));
+        let loops = engine
+            .face
+            .map(|face| Loops::new(face, &echoes, &engine.envelope, &engine.paths.settings));
         Self { engine, tree, echoes, wheels, loops }
     }
 
@@ -203,11 +86,15 @@ impl<'a> PathSurvey<'a> {
 
     fn train_arrival(&self, train: &Train, amplitude: f64) -> Arrival {
         let paths = &self.engine.paths;
-        let echoes = train.rounds.iter().map(|round| {
-            let echo = &self.echoes[round.echo as usize];
-            if round.reversed { echo.reversed() } else { *echo }
-        });
-        let ways: Vec<EchoPath> = echoes.map(|echo| paths.path(&self.tree, &echo)).collect();
+        let way = |round: &Round| {
+            let mut way = paths.path(&self.tree, &self.echoes[round.echo as usize]);
+            if round.reversed {
+                way.path.walls.reverse();
+                std::mem::swap(&mut way.departure_rad, &mut way.arrival_rad);
+            }
+            way
+        };
+        let ways: Vec<EchoPath> = train.rounds.iter().map(way).collect();
         let bent = ways.iter().find_map(|way| way.path.edge);
         let kind = if bent.is_some() { PathKind::Diffracted } else { PathKind::Specular };
         let mut walls = SmallVec::new();
@@ -275,21 +162,5 @@ impl Survey for PathSurvey<'_> {
             arrival_rad: path.arrival_rad,
             path: path.path,
         }
-    }
-}
-
-/// The bin of an angle in (-pi, pi].
-fn bin(angle_rad: f64) -> usize {
-    (((angle_rad + PI) / TAU * BINS as f64) as usize).min(BINS - 1)
-}
-
-/// The difference of two angles in (-pi, pi], brought into that range.
-pub(super) fn wrap_once(angle_rad: f64) -> f64 {
-    if angle_rad > PI {
-        angle_rad - TAU
-    } else if angle_rad < -PI {
-        angle_rad + TAU
-    } else {
-        angle_rad
     }
 }

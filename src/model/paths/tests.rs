@@ -1,4 +1,5 @@
 mod closed_forms;
+mod cylinders;
 mod fan;
 mod full_wave;
 mod laws;

@@ -1,9 +1,12 @@
 //! The tree of beams from one place.
 
 use super::{
-    Echo, Face, Leg, Paths, Via,
+    Face, Leg, Part, Paths,
     beam::{Beam, Ray, TIE_M, reaches, reaches_well},
     mesh::{Mesh, Side},
+    rounds::Arc,
+    tube::{Curved, Link},
+    tubes::BentRay,
 };
 use crate::geometry::DVec2;
 
@@ -23,8 +26,12 @@ pub(super) struct Tree {
     pub(super) to_edges: Vec<(u32, Ray)>,
     /// Beams that meet a cylinder.
     pub(super) to_cylinders: Vec<View>,
-    /// Reflections at cylinders.
-    pub(super) bounces: Vec<Bounce>,
+    /// What tubes have met after their first cylinders.
+    pub(super) links: Vec<Link>,
+    /// Rays by way of cylinders that end at the receiver or at an edge.
+    pub(super) curved: Vec<Curved>,
+    /// Of these, the ones to edges.
+    pub(super) bent_to_edges: Vec<BentRay>,
 }
 
 /// Where beams have been.
@@ -39,17 +46,8 @@ enum Node {
 /// A beam where it passes a triangle that a cylinder reaches into.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View {
-    pub(super) cylinder: u32,
+    pub(super) arc: Arc,
     pub(super) beam: Beam,
-}
-
-/// A reflection at a cylinder, between two rays from the start.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Bounce {
-    pub(super) cylinder: u32,
-    pub(super) hit: DVec2,
-    pub(super) out: Leg,
-    pub(super) back: Leg,
 }
 
 impl Tree {
@@ -66,18 +64,21 @@ impl Tree {
         grower.tree
     }
 
-    /// The rays that an echo consists of, both seen from the start: out to where it turns back
-    /// and home from there, or the one ray of walls alone.
-    pub(super) fn legs(&self, echo: &Echo) -> (Leg, Option<Leg>) {
-        let to_edge = |ray: u32| Leg::from(&self.to_edges[ray as usize].1);
-        match echo.via {
-            Via::Walls { node } => (Leg { node, run: -echo.arrival }, None),
-            Via::Edge { out, back, .. } => (to_edge(out), Some(to_edge(back))),
-            Via::Cylinder { bounce, backwards } => {
-                let Bounce { out, back, .. } = self.bounces[bounce as usize];
-                if backwards { (back, Some(out)) } else { (out, Some(back)) }
-            }
+    /// A ray to an edge by its number: those over walls alone first, then those by cylinders.
+    pub(super) fn part(&self, ray: u32) -> Part {
+        let ray = ray as usize;
+        match ray.checked_sub(self.to_edges.len()) {
+            None => Part::Flat((&self.to_edges[ray].1).into()),
+            Some(bent) => Part::Curved(self.bent_to_edges[bent].ray.node),
         }
+    }
+
+    /// Rays by cylinders to an edge, and how many stand before them; sorted by edge.
+    pub(super) fn bent_to(&self, point: u32) -> (u32, &[BentRay]) {
+        let bent = &self.bent_to_edges;
+        let from = bent.partition_point(|ray| ray.point < point);
+        let to = bent.partition_point(|ray| ray.point <= point);
+        (from as u32, &bent[from..to])
     }
 
     /// The walls that a ray met, last one first.
@@ -324,8 +325,8 @@ impl Grower<'_> {
     }
 
     fn meet_cylinders(&mut self, beam: &Beam) {
-        for &cylinder in self.paths.rounds.in_triangle(beam.triangle) {
-            self.tree.to_cylinders.push(View { cylinder, beam: *beam });
+        for &arc in self.paths.rounds.in_triangle(beam.triangle) {
+            self.tree.to_cylinders.push(View { arc, beam: *beam });
         }
     }
 }
