@@ -7,11 +7,13 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::Face;
+use crate::geometry::DVec2;
 
 /// The data files that come with the program, by name.
-const PRESETS: [(&str, &str); 2] = [
+const PRESETS: [(&str, &str); 3] = [
     ("senscomp-6500", include_str!("../../sensors/senscomp-6500.json")),
     ("bozma-kuc-60khz", include_str!("../../sensors/bozma-kuc-60khz.json")),
+    ("hc-sr04", include_str!("../../sensors/hc-sr04.json")),
 ];
 
 /// A ranger's data.
@@ -30,6 +32,9 @@ pub struct Sensor {
     /// there.
     #[serde(default)]
     pub face: Option<Face>,
+    /// Where it sits on the rotation axis.
+    #[serde(default)]
+    pub mounting: Mounting,
     /// What it sends.
     pub pulse: Pulse,
     /// From firing until the receiver listens, microseconds.
@@ -70,6 +75,40 @@ pub enum Aperture {
         /// Radius of the face, metres; the beam does not follow from it.
         radius_m: f64,
     },
+}
+
+/// Where the transducer sits on the rotation axis, and turns with it.
+///
+/// Ranges are measured from the face, or from the middle between transmitter and receiver: half
+/// the way of the sound. What is met ahead lies `ahead_m` farther from the axis.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Mounting {
+    /// The middle of the face in front of the axis, metres.
+    pub ahead_m: f64,
+    /// The same to the left of it, metres.
+    pub left_m: f64,
+    /// Transmitter and receiver side by side, their middles this far apart, metres: the
+    /// transmitter on the left. 0 for a transducer that does both.
+    pub separation_m: f64,
+}
+
+impl Mounting {
+    /// Transmitter and receiver with the axis at `axis`, looking into `direction_rad`.
+    #[must_use]
+    pub fn places(&self, axis: DVec2, direction_rad: f64) -> [DVec2; 2] {
+        let turn = DVec2::from_angle(direction_rad);
+        [0.5, -0.5].map(|side| {
+            let left_m = self.left_m + side * self.separation_m;
+            axis + turn.rotate(DVec2::new(self.ahead_m, left_m))
+        })
+    }
+
+    /// Whether it is one transducer on the axis itself, so that turning does not move it.
+    #[must_use]
+    pub fn is_on_axis(&self) -> bool {
+        self.ahead_m == 0.0 && self.left_m == 0.0 && self.separation_m == 0.0
+    }
 }
 
 /// What the ranger sends.
@@ -188,6 +227,10 @@ impl Sensor {
             }
             Pulse::Gaussian { sigma_us } => positive("pulse.sigma_us", sigma_us)?,
         }
+        let Mounting { ahead_m, left_m, separation_m } = self.mounting;
+        within_a_metre("mounting.ahead_m", ahead_m)?;
+        within_a_metre("mounting.left_m", left_m)?;
+        within_a_metre("mounting.separation_m", separation_m)?;
         not_negative("blanking_us", self.blanking_us)?;
         not_negative("short_blanking_us", self.short_blanking_us.unwrap_or(0.0))?;
         not_negative("rearm_us", self.rearm_us)?;
@@ -238,6 +281,14 @@ fn not_negative(field: &'static str, value: f64) -> Result<(), SensorError> {
         Ok(())
     } else {
         Err(SensorError::Figure { field, value, expected: "a finite number, 0 or more" })
+    }
+}
+
+fn within_a_metre(field: &'static str, value: f64) -> Result<(), SensorError> {
+    if (-1.0..=1.0).contains(&value) {
+        Ok(())
+    } else {
+        Err(SensorError::Figure { field, value, expected: "from -1 to 1 metre" })
     }
 }
 

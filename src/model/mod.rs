@@ -77,6 +77,12 @@ pub struct Edge {
 pub trait Engine: Send + Sync {
     /// Prepares for firing from `position` (world, metres).
     fn survey<'a>(&'a self, position: DVec2) -> Box<dyn Survey + 'a>;
+
+    /// The same for a transmitter and a receiver apart; engines that know one place only take
+    /// the middle.
+    fn survey_pair<'a>(&'a self, transmitter: DVec2, receiver: DVec2) -> Box<dyn Survey + 'a> {
+        self.survey(0.5 * (transmitter + receiver))
+    }
 }
 
 /// The echoes of one place.

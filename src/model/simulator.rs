@@ -181,7 +181,8 @@ impl Simulator {
     /// Prepares for firing from `position` (world, metres); the costly part, worth keeping.
     #[must_use]
     pub fn station(&self, position: DVec2) -> Station<'_> {
-        Station { simulator: self, survey: self.engine.survey(position) }
+        let survey = self.sensor.mounting.is_on_axis().then(|| self.engine.survey(position));
+        Station { simulator: self, position, survey }
     }
 
     /// A reading for each firing of a checked plan, in the order of its indices.
@@ -292,15 +293,21 @@ impl Simulator {
 /// A place from which firings are predicted.
 pub struct Station<'a> {
     simulator: &'a Simulator,
-    survey: Box<dyn Survey + 'a>,
+    position: DVec2,
+    /// For a transducer on the axis, which stays where it is when it turns.
+    survey: Option<Box<dyn Survey + 'a>>,
 }
 
 impl Station<'_> {
     /// The reading of a firing in a world direction, radians counter-clockwise from +x.
     #[must_use]
     pub fn ping(&self, direction_rad: f64) -> Prediction {
+        let own = self.survey_towards(direction_rad);
+        let survey = own.as_deref().or(self.survey.as_deref());
         let mut sounds = Vec::new();
-        self.survey.listen(direction_rad, &mut sounds);
+        if let Some(survey) = survey {
+            survey.listen(direction_rad, &mut sounds);
+        }
         let receiver = &self.simulator.receiver;
         let detection = receiver.detect(&sounds);
         let margin_db =
@@ -308,7 +315,9 @@ impl Station<'_> {
         Prediction {
             status: detection.status,
             range_m: detection.range_m,
-            arrival: detection.sound.map(|sound| self.survey.arrival(direction_rad, &sound)),
+            arrival: survey
+                .zip(detection.sound)
+                .map(|(survey, sound)| survey.arrival(direction_rad, &sound)),
             margin_db,
             echoes_us: detection.echoes_us,
         }
@@ -317,7 +326,24 @@ impl Station<'_> {
     /// Every echo of a firing in a world direction, detected or not, shortest path first.
     #[must_use]
     pub fn arrivals(&self, direction_rad: f64) -> Vec<super::Arrival> {
-        self.survey.arrivals(direction_rad)
+        let own = self.survey_towards(direction_rad);
+        let survey = own.as_deref().or(self.survey.as_deref());
+        survey.map_or_else(Vec::new, |survey| survey.arrivals(direction_rad))
+    }
+
+    /// From where the transducer is when it looks into a direction, if that depends on it.
+    fn survey_towards(&self, direction_rad: f64) -> Option<Box<dyn Survey + '_>> {
+        if self.survey.is_some() {
+            return None;
+        }
+        let [transmitter, receiver] =
+            self.simulator.sensor.mounting.places(self.position, direction_rad);
+        let engine = &self.simulator.engine;
+        Some(if transmitter == receiver {
+            engine.survey(transmitter)
+        } else {
+            engine.survey_pair(transmitter, receiver)
+        })
     }
 }
 

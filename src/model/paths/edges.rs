@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use smallvec::SmallVec;
 
-use super::{Echo, SAME_RAD, Settings, Via, beam::Ray, drop_repeats, trace::Tree};
+use super::{Echo, SAME_RAD, Settings, Trees, Via, beam::Ray, drop_repeats, trace::Tree};
 use crate::{
     acoustics::edge::{Aspect, EdgeLaw, Wedge},
     geometry::{Arrangement, DVec2, SNAP_M},
@@ -107,34 +107,20 @@ impl Edges {
     }
 
     /// All echoes that bend once: out on one ray to an edge, back on another or the same.
-    pub(super) fn echoes(&self, tree: &mut Tree, law: EdgeLaw, settings: &Settings) -> Vec<Echo> {
-        tree.to_edges.sort_by_key(|(point, _)| *point);
-        tree.bent_to_edges.sort_by_key(|bent| bent.point);
-        let mut echoes = Vec::new();
-        let mut first = 0;
+    pub(super) fn echoes(&self, trees: &mut Trees, law: EdgeLaw, settings: &Settings) -> Vec<Echo> {
+        trees.out.sort_by_edge();
+        trees.back.iter_mut().for_each(Tree::sort_by_edge);
         let bending = Bending { law, settings };
-        let mut at_point = |point: u32, first: u32, flat: &[(u32, Ray)]| {
-            let Some(Some(corner)) = self.points.get(point as usize) else { return };
-            let (from, bent) = tree.bent_to(point);
-            let from = from + tree.to_edges.len() as u32;
-            let flat = (first..).zip(flat).filter_map(|(number, (_, ray))| {
-                let length_m = ray.run.length();
-                corner.arm(ray, number, length_m, length_m)
-            });
-            let bent = (from..).zip(bent).filter_map(|(number, bent)| {
-                corner.arm(&bent.ray, number, bent.width_m, bent.radius_m)
-            });
-            corner.echoes(point, flat.chain(bent).collect(), &bending, &mut echoes);
-        };
-        for rays in tree.to_edges.chunk_by(|a, b| a.0 == b.0) {
-            at_point(rays[0].0, first, rays);
-            first += rays.len() as u32;
-        }
-        // Edges that are seen by way of a cylinder only.
-        for bent in tree.bent_to_edges.chunk_by(|a, b| a.point == b.point) {
-            let point = bent[0].point;
-            if tree.to_edges.binary_search_by_key(&point, |ray| ray.0).is_err() {
-                at_point(point, 0, &[]);
+        let mut echoes = Vec::new();
+        for point in trees.out.edges() {
+            let Some(Some(corner)) = self.points.get(point as usize) else { continue };
+            let outs = corner.arms(&trees.out, point);
+            match &trees.back {
+                None => corner.echoes(point, &outs, &bending, &mut echoes),
+                Some(back) => {
+                    let backs = corner.arms(back, point);
+                    corner.echoes_between(point, &outs, &backs, &bending, &mut echoes);
+                }
             }
         }
         echoes
@@ -159,25 +145,31 @@ impl Sector {
 }
 
 impl Corner {
-    /// Of the rays to this point.
-    fn echoes(&self, point: u32, mut arms: Vec<Arm>, bending: &Bending, echoes: &mut Vec<Echo>) {
+    /// The rays of a tree to this point, by length, each once.
+    fn arms<'a>(&self, tree: &'a Tree, point: u32) -> Vec<Arm<'a>> {
+        let (first, flat) = tree.flat_to(point);
+        let (first_bent, bent) = tree.bent_to(point);
+        let flat = (first..).zip(flat).filter_map(|(number, (_, ray))| {
+            let length_m = ray.run.length();
+            self.arm(ray, number, length_m, length_m)
+        });
+        let bent = (first_bent..)
+            .zip(bent)
+            .filter_map(|(number, bent)| self.arm(&bent.ray, number, bent.width_m, bent.radius_m));
+        let mut arms: Vec<Arm> = flat.chain(bent).collect();
         arms.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
         drop_repeats(&mut arms, |leg| leg.length_m, Arm::is_same);
+        arms
+    }
+
+    /// Out on one ray and back on another or the same: each pair in both directions.
+    fn echoes(&self, point: u32, arms: &[Arm], bending: &Bending, echoes: &mut Vec<Echo>) {
         for (i, out) in arms.iter().enumerate() {
             for (j, back) in arms.iter().enumerate().skip(i) {
-                let length_m = out.length_m + back.length_m;
-                if length_m > bending.settings.max_path_m {
+                if out.length_m + back.length_m > bending.settings.max_path_m {
                     break;
                 }
-                let Some(field) = bending.field(self, out, back) else { continue };
-                let echo = Echo {
-                    length_m,
-                    amplitude: field.norm(),
-                    phase_rad: field.arg(),
-                    departure: out.ray.departure,
-                    arrival: back.ray.departure,
-                    via: Via::Edge { point, out: out.number, back: back.number },
-                };
+                let Some(echo) = bending.echo(self, point, out, back) else { continue };
                 if i != j {
                     echoes.push(Echo {
                         departure: echo.arrival,
@@ -187,6 +179,25 @@ impl Corner {
                     });
                 }
                 echoes.push(echo);
+            }
+        }
+    }
+
+    /// Out on a ray from the transmitter and back on one from the receiver.
+    fn echoes_between(
+        &self,
+        point: u32,
+        outs: &[Arm],
+        backs: &[Arm],
+        bending: &Bending,
+        echoes: &mut Vec<Echo>,
+    ) {
+        for out in outs {
+            for back in backs {
+                if out.length_m + back.length_m > bending.settings.max_path_m {
+                    break;
+                }
+                echoes.extend(bending.echo(self, point, out, back));
             }
         }
     }
@@ -211,6 +222,18 @@ impl Corner {
 }
 
 impl Bending<'_> {
+    fn echo(&self, corner: &Corner, point: u32, out: &Arm, back: &Arm) -> Option<Echo> {
+        let field = self.field(corner, out, back)?;
+        Some(Echo {
+            length_m: out.length_m + back.length_m,
+            amplitude: field.norm(),
+            phase_rad: field.arg(),
+            departure: out.ray.departure,
+            arrival: back.ray.departure,
+            via: Via::Edge { point, out: out.number, back: back.number },
+        })
+    }
+
     /// Relative field of the echo out and back on two arms, `None` below the floor.
     fn field(&self, corner: &Corner, out: &Arm, back: &Arm) -> Option<Complex64> {
         let Self { law, settings } = self;

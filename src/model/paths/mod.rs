@@ -220,12 +220,35 @@ impl Paths {
     /// All echo paths from a place, shortest first.
     #[must_use]
     pub fn enumerate(&self, position: DVec2) -> Vec<EchoPath> {
-        let (tree, echoes) = self.echoes(position);
-        echoes.iter().map(|echo| self.path(&tree, echo)).collect()
+        self.enumerate_between(position, position)
     }
 
-    fn echoes(&self, position: DVec2) -> (Tree, Vec<Echo>) {
-        let mut tree = Tree::grow(self, position);
+    /// All echo paths from a transmitter to a receiver, shortest first, without the straight way
+    /// from one to the other.
+    #[must_use]
+    pub fn enumerate_between(&self, transmitter: DVec2, receiver: DVec2) -> Vec<EchoPath> {
+        let (trees, echoes) = self.echoes(transmitter, receiver);
+        echoes.iter().map(|echo| self.path(&trees, echo)).collect()
+    }
+
+    fn echoes(&self, transmitter: DVec2, receiver: DVec2) -> (Trees, Vec<Echo>) {
+        let (out, mut echoes) = self.grow(transmitter, receiver);
+        // The ways back from the receiver, as ways to it, matter to edges only.
+        let apart = transmitter != receiver && self.settings.edge_law.is_some();
+        let back = apart.then(|| self.grow(receiver, transmitter).0);
+        let mut trees = Trees { out, back };
+        if let Some(law) = self.settings.edge_law {
+            echoes.extend(self.edges.echoes(&mut trees, law, &self.settings));
+        }
+        if !self.rounds.is_empty() {
+            echoes.retain(|echo| !self.is_hidden(&trees, echo, [transmitter, receiver]));
+        }
+        (trees, sorted(&echoes))
+    }
+
+    /// The beams from a place, and the echoes without an edge that they bring to another.
+    fn grow(&self, start: DVec2, target: DVec2) -> (Tree, Vec<Echo>) {
+        let mut tree = Tree::grow(self, start, target);
         let mut echoes: Vec<Echo> = tree
             .returns
             .iter()
@@ -240,30 +263,28 @@ impl Paths {
             .filter(|echo| echo.amplitude >= self.settings.floor)
             .collect();
         if !self.rounds.is_empty() {
-            echoes.extend(TubeGrower::new(self, &mut tree, [position, position]).grow());
+            echoes.extend(TubeGrower::new(self, &mut tree, [start, target]).grow());
         }
-        if let Some(law) = self.settings.edge_law {
-            echoes.extend(self.edges.echoes(&mut tree, law, &self.settings));
-        }
-        if !self.rounds.is_empty() {
-            echoes.retain(|echo| !self.is_hidden(&tree, echo, position));
-        }
-        (tree, sorted(&echoes))
+        (tree, echoes)
     }
 
     /// Whether a cylinder stands in an echo's way. Tubes have seen to that for themselves.
-    fn is_hidden(&self, tree: &Tree, echo: &Echo, position: DVec2) -> bool {
-        let hides = |part: Part, end| match part {
-            Part::Flat(leg) => self.hides_leg(tree, leg, position, end),
+    fn is_hidden(&self, trees: &Trees, echo: &Echo, [start, target]: [DVec2; 2]) -> bool {
+        let hides = |tree: &Tree, part: Part, start, end| match part {
+            Part::Flat(leg) => self.hides_leg(tree, leg, start, end),
             Part::Curved(_) => false,
         };
         match echo.via {
-            Via::Walls { node } => hides(Part::Flat(Leg { node, run: -echo.arrival }), position),
+            Via::Walls { node } => {
+                let leg = Leg { node, run: -echo.arrival };
+                hides(&trees.out, Part::Flat(leg), start, target)
+            }
             Via::Cylinders { .. } => false,
-            Via::Edge { point, out, back } => self
-                .edges
-                .place(point)
-                .is_some_and(|end| [out, back].into_iter().any(|ray| hides(tree.part(ray), end))),
+            Via::Edge { point, out, back } => self.edges.place(point).is_some_and(|end| {
+                let (there, here) = (&trees.out, trees.back());
+                hides(there, there.part(out), start, end)
+                    || hides(here, here.part(back), target, end)
+            }),
         }
     }
 
@@ -281,19 +302,20 @@ impl Paths {
         self.rounds.hide(start, to)
     }
 
-    fn path(&self, tree: &Tree, echo: &Echo) -> EchoPath {
+    fn path(&self, trees: &Trees, echo: &Echo) -> EchoPath {
         EchoPath {
             length_m: echo.length_m,
             amplitude: echo.amplitude,
             phase_rad: echo.phase_rad,
             departure_rad: echo.departure.to_angle(),
             arrival_rad: echo.arrival.to_angle(),
-            path: self.way(tree, echo),
+            path: self.way(trees, echo),
         }
     }
 
     /// The reflectors of an echo, in order.
-    fn way(&self, tree: &Tree, echo: &Echo) -> Path {
+    fn way(&self, trees: &Trees, echo: &Echo) -> Path {
+        let (tree, home) = (&trees.out, trees.back());
         let (kind, edge) = match echo.via {
             Via::Edge { point, .. } => (PathKind::Diffracted, self.edges.edge(point)),
             Via::Walls { .. } | Via::Cylinders { .. } => (PathKind::Specular, None),
@@ -303,7 +325,7 @@ impl Paths {
             Via::Cylinders { curved } => self.met(tree, Part::Curved(curved)),
             Via::Edge { out, back, .. } => {
                 let mut walls = self.met(tree, tree.part(out));
-                walls.extend(self.met(tree, tree.part(back)).into_iter().rev());
+                walls.extend(self.met(home, home.part(back)).into_iter().rev());
                 walls
             }
         };
@@ -334,6 +356,21 @@ impl Paths {
 /// that it does not absorb.
 fn mirror_gain(material: &Material) -> f64 {
     material.reflectance * (1.0 - material.roughness).sqrt()
+}
+
+/// The beams of a place, or of transmitter and receiver.
+#[derive(Debug)]
+struct Trees {
+    /// From the transmitter.
+    out: Tree,
+    /// From the receiver, if it is somewhere else.
+    back: Option<Tree>,
+}
+
+impl Trees {
+    fn back(&self) -> &Tree {
+        self.back.as_ref().unwrap_or(&self.out)
+    }
 }
 
 /// An echo path with its way as nodes of the tree.

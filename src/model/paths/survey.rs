@@ -3,8 +3,7 @@
 use smallvec::SmallVec;
 
 use super::{
-    Echo, EchoPath, Paths, Settings,
-    trace::Tree,
+    Echo, EchoPath, Paths, Settings, Trees,
     trains::{Loops, Round, Train},
     wheel::{Envelope, Spoke, Wheel},
 };
@@ -38,7 +37,11 @@ impl PathEngine {
 
 impl Engine for PathEngine {
     fn survey<'a>(&'a self, position: DVec2) -> Box<dyn Survey + 'a> {
-        Box::new(PathSurvey::new(self, position))
+        Box::new(PathSurvey::new(self, position, position))
+    }
+
+    fn survey_pair<'a>(&'a self, transmitter: DVec2, receiver: DVec2) -> Box<dyn Survey + 'a> {
+        Box::new(PathSurvey::new(self, transmitter, receiver))
     }
 }
 
@@ -48,7 +51,7 @@ const REACHES_DEG: [f64; 5] = [6.0, 10.0, 16.0, 30.0, 180.0];
 /// The echo paths of a place.
 struct PathSurvey<'a> {
     engine: &'a PathEngine,
-    tree: Tree,
+    trees: Trees,
     /// Shortest first.
     echoes: Vec<Echo>,
     /// From narrow to wide reach: the many weak echoes are heard in few directions only.
@@ -58,8 +61,8 @@ struct PathSurvey<'a> {
 }
 
 impl<'a> PathSurvey<'a> {
-    fn new(engine: &'a PathEngine, position: DVec2) -> Self {
-        let (tree, echoes) = engine.paths.echoes(position);
+    fn new(engine: &'a PathEngine, transmitter: DVec2, receiver: DVec2) -> Self {
+        let (trees, echoes) = engine.paths.echoes(transmitter, receiver);
         let floor = engine.paths.settings.floor;
         let mut spokes: [Vec<Spoke>; REACHES_DEG.len()] = Default::default();
         for (echo, index) in echoes.iter().zip(0..) {
@@ -73,7 +76,7 @@ impl<'a> PathSurvey<'a> {
         let loops = engine
             .face
             .map(|face| Loops::new(face, &echoes, &engine.envelope, &engine.paths.settings));
-        Self { engine, tree, echoes, wheels, loops }
+        Self { engine, trees, echoes, wheels, loops }
     }
 
     /// Echoes by way of the face, in a direction in (-pi, pi].
@@ -87,7 +90,7 @@ impl<'a> PathSurvey<'a> {
     fn train_arrival(&self, train: &Train, amplitude: f64) -> Arrival {
         let paths = &self.engine.paths;
         let way = |round: &Round| {
-            let mut way = paths.path(&self.tree, &self.echoes[round.echo as usize]);
+            let mut way = paths.path(&self.trees, &self.echoes[round.echo as usize]);
             if round.reversed {
                 way.path.walls.reverse();
                 std::mem::swap(&mut way.departure_rad, &mut way.arrival_rad);
@@ -153,7 +156,7 @@ impl Survey for PathSurvey<'_> {
             return self.train_arrival(&trains[train], sound.amplitude);
         }
         let echo = &self.echoes[index];
-        let path = self.engine.paths.path(&self.tree, echo);
+        let path = self.engine.paths.path(&self.trees, echo);
         Arrival {
             length_m: path.length_m,
             amplitude: sound.amplitude,

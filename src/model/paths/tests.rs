@@ -3,6 +3,7 @@ mod cylinders;
 mod fan;
 mod full_wave;
 mod laws;
+mod pairs;
 mod peers;
 
 use std::{f64::consts::TAU, sync::Arc};

@@ -9,7 +9,7 @@
 //! is in exactly one tube, as it is in one beam. An echo is a tube that holds the receiver, a ray
 //! to an edge one that holds the edge.
 
-use smallvec::{SmallVec, smallvec};
+use smallvec::SmallVec;
 
 use super::{
     Echo, Paths, Via,
