@@ -91,6 +91,10 @@ pub struct Mounting {
     /// Transmitter and receiver side by side, their middles this far apart, metres: the
     /// transmitter on the left. 0 for a transducer that does both.
     pub separation_m: f64,
+    /// Height of its middle in a scene with heights, metres.
+    pub z_m: Option<f64>,
+    /// How far its axis points up, degrees.
+    pub tilt_deg: f64,
 }
 
 impl Mounting {
@@ -227,10 +231,12 @@ impl Sensor {
             }
             Pulse::Gaussian { sigma_us } => positive("pulse.sigma_us", sigma_us)?,
         }
-        let Mounting { ahead_m, left_m, separation_m } = self.mounting;
-        within_a_metre("mounting.ahead_m", ahead_m)?;
-        within_a_metre("mounting.left_m", left_m)?;
-        within_a_metre("mounting.separation_m", separation_m)?;
+        let Mounting { ahead_m, left_m, separation_m, z_m, tilt_deg } = self.mounting;
+        within("mounting.ahead_m", ahead_m, 1.0, "from -1 to 1 metre")?;
+        within("mounting.left_m", left_m, 1.0, "from -1 to 1 metre")?;
+        within("mounting.separation_m", separation_m, 1.0, "from -1 to 1 metre")?;
+        within("mounting.z_m", z_m.unwrap_or(0.0), 1000.0, "from -1000 to 1000 metres")?;
+        within("mounting.tilt_deg", tilt_deg, 90.0, "from -90 to 90 degrees")?;
         not_negative("blanking_us", self.blanking_us)?;
         not_negative("short_blanking_us", self.short_blanking_us.unwrap_or(0.0))?;
         not_negative("rearm_us", self.rearm_us)?;
@@ -284,12 +290,13 @@ fn not_negative(field: &'static str, value: f64) -> Result<(), SensorError> {
     }
 }
 
-fn within_a_metre(field: &'static str, value: f64) -> Result<(), SensorError> {
-    if (-1.0..=1.0).contains(&value) {
-        Ok(())
-    } else {
-        Err(SensorError::Figure { field, value, expected: "from -1 to 1 metre" })
-    }
+fn within(
+    field: &'static str,
+    value: f64,
+    most: f64,
+    expected: &'static str,
+) -> Result<(), SensorError> {
+    if value.abs() <= most { Ok(()) } else { Err(SensorError::Figure { field, value, expected }) }
 }
 
 fn at_most_1(field: &'static str, value: f64) -> Result<(), SensorError> {

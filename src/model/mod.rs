@@ -62,6 +62,10 @@ pub enum Reflector {
     Cylinder(u32),
     /// The transducer's own face.
     Face,
+    /// The floor of a scene with heights.
+    Floor,
+    /// Its ceiling.
+    Ceiling,
 }
 
 /// An end of a wall.

@@ -281,6 +281,8 @@ impl Simulator {
             Reflector::Wall(index) => self.scene.walls[index as usize].id.to_string(),
             Reflector::Cylinder(index) => self.scene.cylinders[index as usize].id.to_string(),
             Reflector::Face => FACE_NAME.to_owned(),
+            Reflector::Floor => "floor".to_owned(),
+            Reflector::Ceiling => "ceiling".to_owned(),
         }
     }
 
@@ -394,6 +396,8 @@ fn path_settings(
         edge_law: Some(law),
         absorption_np_per_m: absorption_db_per_m(sensor, air, options) / (20.0 * LOG10_E),
         wave_number_per_m,
+        sensor_z_m: sensor.mounting.z_m,
+        tilt_rad: sensor.mounting.tilt_deg.to_radians(),
     }
 }
 

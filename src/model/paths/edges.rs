@@ -230,6 +230,8 @@ impl Bending<'_> {
             phase_rad: field.arg(),
             departure: out.ray.departure,
             arrival: back.ray.departure,
+            rise_rad: [0.0; 2],
+            image: 0,
             via: Via::Edge { point, out: out.number, back: back.number },
         })
     }

@@ -79,6 +79,7 @@ mod trace;
 mod trains;
 mod tube;
 mod tubes;
+mod vertical;
 mod wheel;
 
 pub use survey::PathEngine;
@@ -93,6 +94,7 @@ use self::{
     trace::Tree,
     tube::{Curved, Tracer},
     tubes::TubeGrower,
+    vertical::Image,
 };
 use crate::{
     acoustics::edge::EdgeLaw,
@@ -121,6 +123,19 @@ pub struct Settings {
     pub absorption_np_per_m: f64,
     /// Wave number `2 pi f / c`, radians a metre.
     pub wave_number_per_m: f64,
+    /// Height of the transducer in a scene with heights, metres; `None`: see [`usual_z_m`].
+    pub sensor_z_m: Option<f64>,
+    /// How far the transducer's axis points up, radians.
+    pub tilt_rad: f64,
+}
+
+/// The height of a transducer of which nothing is said, metres: half a metre above the floor, or
+/// half way up to a low ceiling.
+#[must_use]
+pub fn usual_z_m(floor_z_m: Option<f64>, ceiling_z_m: Option<f64>) -> f64 {
+    let floor_z_m = floor_z_m.or(ceiling_z_m.map(|ceiling| ceiling - 1.0)).unwrap_or(0.0);
+    let middle_m = ceiling_z_m.map_or(f64::INFINITY, |ceiling| 0.5 * (ceiling - floor_z_m));
+    floor_z_m + middle_m.min(0.5)
 }
 
 impl Settings {
@@ -151,6 +166,8 @@ pub struct Paths {
     faces: Vec<Face>,
     edges: Edges,
     rounds: Rounds,
+    /// By floor and ceiling; none in a scene in the plane.
+    images: Vec<Image>,
     /// `None` for a scene with nothing in it.
     mesh: Option<Mesh>,
 }
@@ -180,6 +197,8 @@ pub struct EchoPath {
     pub departure_rad: f64,
     /// World direction towards where the sound comes from, radians.
     pub arrival_rad: f64,
+    /// How far up it leaves and comes from, radians.
+    pub rise_rad: [f64; 2],
     /// The way it took.
     pub path: Path,
 }
@@ -204,6 +223,8 @@ impl Paths {
             Face { mirror, rotor: mirror.rotor(), gain, loss_m }
         };
         let gains: Vec<_> = scene.walls.iter().map(|wall| mirror_gain(&wall.material)).collect();
+        let z_m =
+            settings.sensor_z_m.unwrap_or_else(|| usual_z_m(scene.floor_z_m, scene.ceiling_z_m));
         let round: Vec<_> = scene.cylinders.iter().map(|c| mirror_gain(&c.material)).collect();
         Self {
             faces: segments.iter().zip(&gains).map(face).collect(),
@@ -212,6 +233,7 @@ impl Paths {
                 .map(|law| Edges::new(&plan, &segments, &gains, law))
                 .unwrap_or_default(),
             rounds: Rounds::new(&scene.cylinders, &round, mesh.as_ref()),
+            images: vertical::images(scene.floor_z_m, scene.ceiling_z_m, z_m, settings.max_path_m),
             settings,
             mesh,
         }
@@ -243,7 +265,19 @@ impl Paths {
         if !self.rounds.is_empty() {
             echoes.retain(|echo| !self.is_hidden(&trees, echo, [transmitter, receiver]));
         }
+        self.add_images(&mut echoes);
         (trees, sorted(&echoes))
+    }
+
+    /// Each echo of the plan also by way of floor and ceiling, and these by themselves.
+    fn add_images(&self, echoes: &mut Vec<Echo>) {
+        let plan = echoes.len();
+        for (image, index) in self.images.iter().zip(1..) {
+            for at in 0..plan {
+                echoes.extend(image.echo(&echoes[at], index, &self.settings));
+            }
+            echoes.extend(image.upright_echo(index, &self.settings));
+        }
     }
 
     /// The beams from a place, and the echoes without an edge that they bring to another.
@@ -258,6 +292,8 @@ impl Paths {
                 phase_rad: 0.0,
                 departure: ray.departure,
                 arrival: -ray.run.normalize_or_zero(),
+                rise_rad: [0.0; 2],
+                image: 0,
                 via: Via::Walls { node: ray.node },
             })
             .filter(|echo| echo.amplitude >= self.settings.floor)
@@ -279,7 +315,7 @@ impl Paths {
                 let leg = Leg { node, run: -echo.arrival };
                 hides(&trees.out, Part::Flat(leg), start, target)
             }
-            Via::Cylinders { .. } => false,
+            Via::Cylinders { .. } | Via::Upright => false,
             Via::Edge { point, out, back } => self.edges.place(point).is_some_and(|end| {
                 let (there, here) = (&trees.out, trees.back());
                 hides(there, there.part(out), start, end)
@@ -309,6 +345,7 @@ impl Paths {
             phase_rad: echo.phase_rad,
             departure_rad: echo.departure.to_angle(),
             arrival_rad: echo.arrival.to_angle(),
+            rise_rad: echo.rise_rad,
             path: self.way(trees, echo),
         }
     }
@@ -318,10 +355,11 @@ impl Paths {
         let (tree, home) = (&trees.out, trees.back());
         let (kind, edge) = match echo.via {
             Via::Edge { point, .. } => (PathKind::Diffracted, self.edges.edge(point)),
-            Via::Walls { .. } | Via::Cylinders { .. } => (PathKind::Specular, None),
+            Via::Walls { .. } | Via::Cylinders { .. } | Via::Upright => (PathKind::Specular, None),
         };
-        let walls = match echo.via {
+        let mut walls = match echo.via {
             Via::Walls { node } => self.met(tree, Part::Flat(Leg { node, run: -echo.arrival })),
+            Via::Upright => SmallVec::new(),
             Via::Cylinders { curved } => self.met(tree, Part::Curved(curved)),
             Via::Edge { out, back, .. } => {
                 let mut walls = self.met(tree, tree.part(out));
@@ -329,6 +367,10 @@ impl Paths {
                 walls
             }
         };
+        // Floor and ceiling stand after the walls, wherever on the way they are met.
+        if let Some(image) = echo.image.checked_sub(1) {
+            walls.extend(self.images[image as usize].met());
+        }
         Path { kind, walls, edge }
     }
 
@@ -383,6 +425,10 @@ struct Echo {
     departure: DVec2,
     /// Unit vector towards where it comes from.
     arrival: DVec2,
+    /// How far up it leaves and comes from, radians.
+    rise_rad: [f64; 2],
+    /// Its image over floor and ceiling, counted from 1; 0 for a path in the plan.
+    image: u16,
     via: Via,
 }
 
@@ -402,6 +448,8 @@ enum Via {
     Cylinders {
         curved: u32,
     },
+    /// Straight up or down and back.
+    Upright,
 }
 
 /// A ray from the start by what its walls follow from.
@@ -430,6 +478,7 @@ impl Echo {
     fn is_same(&self, other: &Self) -> bool {
         self.departure.distance_squared(other.departure) < SAME_RAD * SAME_RAD
             && self.arrival.distance_squared(other.arrival) < SAME_RAD * SAME_RAD
+            && self.image == other.image
             && std::mem::discriminant(&self.via) == std::mem::discriminant(&other.via)
     }
 }

@@ -1,5 +1,7 @@
 //! The echoes of one place, weighed for an azimuth.
 
+use std::f64::consts::PI;
+
 use smallvec::SmallVec;
 
 use super::{
@@ -35,6 +37,21 @@ impl PathEngine {
     }
 }
 
+impl PathEngine {
+    /// Whether all sound stays in the plane of the scan.
+    fn is_flat(&self) -> bool {
+        self.paths.images.is_empty() && self.paths.settings.tilt_rad == 0.0
+    }
+
+    /// Angle between the transducer's axis and a direction that is `azimuth_rad` beside it in the
+    /// plan and points up by `rise_rad`, radians.
+    fn off_axis(&self, azimuth_rad: f64, rise_rad: f64) -> f64 {
+        let (tilt_sin, tilt_cos) = self.paths.settings.tilt_rad.sin_cos();
+        let (rise_sin, rise_cos) = rise_rad.sin_cos();
+        (tilt_cos * rise_cos * azimuth_rad.cos() + tilt_sin * rise_sin).clamp(-1.0, 1.0).acos()
+    }
+}
+
 impl Engine for PathEngine {
     fn survey<'a>(&'a self, position: DVec2) -> Box<dyn Survey + 'a> {
         Box::new(PathSurvey::new(self, position, position))
@@ -66,7 +83,11 @@ impl<'a> PathSurvey<'a> {
         let floor = engine.paths.settings.floor;
         let mut spokes: [Vec<Spoke>; REACHES_DEG.len()] = Default::default();
         for (echo, index) in echoes.iter().zip(0..) {
-            if let Some(spoke) = Spoke::of(echo, index, &engine.envelope, floor) {
+            if let Some(mut spoke) = Spoke::of(echo, index, &engine.envelope, floor) {
+                if engine.paths.settings.tilt_rad != 0.0 {
+                    // A tilted axis may be nearer to a rising path than its azimuth is.
+                    spoke.reach_rad = PI;
+                }
                 let reach_deg = spoke.reach_rad.to_degrees();
                 let wheel = REACHES_DEG.iter().position(|most| reach_deg <= *most);
                 spokes[wheel.unwrap_or(REACHES_DEG.len() - 1)].push(spoke);
@@ -123,9 +144,14 @@ impl Survey for PathSurvey<'_> {
         sounds.clear();
         let direction_rad = wrap_pi(direction_rad);
         let (beam, floor) = (&self.engine.beam, self.engine.paths.settings.floor);
+        let is_flat = self.engine.is_flat();
         for wheel in &self.wheels {
             for (spoke, off_rad) in wheel.near(direction_rad) {
-                let ends = [off_rad + spoke.half_rad, off_rad - spoke.half_rad];
+                let mut ends = [off_rad + spoke.half_rad, off_rad - spoke.half_rad];
+                if !is_flat {
+                    let rise_rad = self.echoes[spoke.echo as usize].rise_rad;
+                    ends = [0, 1].map(|end| self.engine.off_axis(ends[end], rise_rad[end]));
+                }
                 let [leaving, arriving] = ends.map(|angle| beam.one_way(angle));
                 let amplitude = spoke.amplitude * leaving * arriving;
                 if amplitude >= floor {

@@ -10,7 +10,7 @@
 //! passage that is the disc's field itself. With more it holds for discs of few Fresnel zones:
 //! beside Kirchhoff's integral over each passage, fourth echoes are 1.1 dB too strong over rounds
 //! of 0.4 m and 3.9 dB over rounds of 0.19 m (a 21.5 mm disc at 49.4 kHz; a test computes them).
-//! The beam pattern weighs the first departure and the last arrival only.
+//! Rounds by floor and ceiling are left out. The beam pattern weighs the first departure and the last arrival only.
 //!
 //! The sound that passes beside the face goes on behind it: in the middle of a disc's shadow it
 //! is as strong as without the disc (Arago's spot, `|exp(-i p)| = 1`), so nothing is taken from
@@ -94,7 +94,9 @@ impl Loops {
         let floor = FLOOR_ABOVE * settings.floor;
         // A wall nearer than that is not one to see the disc's zones from.
         let far = || {
-            let far = |(echo, _): &(&Echo, u32)| echo.length_m > 2.0 * face.face.radius_m;
+            let far = |(echo, _): &(&Echo, u32)| {
+                echo.length_m > 2.0 * face.face.radius_m && echo.image == 0
+            };
             echoes.iter().zip(0..).filter(far)
         };
         let best = Best::of(far().map(|(echo, _)| (echo.length_m, echo.amplitude)));
@@ -300,6 +302,8 @@ mod tests {
             edge_law: None,
             absorption_np_per_m: 0.0,
             wave_number_per_m: DISC.wave_number_per_m,
+            sensor_z_m: None,
+            tilt_rad: 0.0,
         }
     }
 
@@ -311,6 +315,8 @@ mod tests {
             phase_rad: 0.0,
             departure: DVec2::X,
             arrival: DVec2::X,
+            rise_rad: [0.0; 2],
+            image: 0,
             via: Via::Walls { node: 0 },
         };
         let beam = BeamPattern::new(&Sensor::preset("senscomp-6500").expect("a preset"), 343.99);

@@ -105,7 +105,7 @@ impl Paths {
             Reflector::Cylinder(cylinder) => {
                 front.off_circle(&self.rounds.circles[cylinder as usize])
             }
-            Reflector::Face => *front,
+            Reflector::Face | Reflector::Floor | Reflector::Ceiling => *front,
         }
     }
 }

@@ -253,6 +253,8 @@ impl<'a> TubeGrower<'a> {
             phase_rad: 0.0,
             departure: self.departure(tube, at),
             arrival: -end.along,
+            rise_rad: [0.0; 2],
+            image: 0,
             via: Via::Cylinders { curved },
         });
     }

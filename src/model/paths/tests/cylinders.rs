@@ -92,7 +92,7 @@ fn shortest(
             let wall = &plan.walls[i as usize];
             wall.a + at * (wall.b - wall.a).normalize()
         }
-        Reflector::Face => start,
+        _ => start,
     };
     let mut at = guess.to_vec();
     let length = |at: &[f64]| {
