@@ -60,6 +60,15 @@ impl Mesh {
         Some(Self { points, triangles, across, near })
     }
 
+    /// The triangle behind a side, wall or not, and which of its sides that is.
+    pub(super) fn beyond(&self, triangle: u32, side: usize) -> Option<(u32, u8)> {
+        let other = *self.across[triangle as usize].get(side)?;
+        let end = self.triangles[triangle as usize].corners[(side + 1) % 3];
+        let corners = self.triangles.get(other as usize)?.corners;
+        let side = corners.iter().position(|&corner| corner == end)?;
+        Some((other, side as u8))
+    }
+
     /// A corner of a triangle.
     pub(super) fn corner(&self, triangle: u32, corner: usize) -> DVec2 {
         self.points[self.triangles[triangle as usize].corners[corner] as usize]

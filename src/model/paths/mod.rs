@@ -70,6 +70,7 @@
 
 mod beam;
 mod edges;
+mod heights;
 mod mesh;
 mod rounds;
 mod survey;
@@ -89,8 +90,9 @@ use smallvec::SmallVec;
 use self::{
     beam::Ray,
     edges::Edges,
+    heights::Heights,
     mesh::Mesh,
-    rounds::Rounds,
+    rounds::{Circle, Rounds},
     trace::Tree,
     tube::{Curved, Tracer},
     tubes::TubeGrower,
@@ -101,7 +103,7 @@ use crate::{
     geometry::{Arrangement, DVec2, Mirror, square_up},
     model::{Path, Reflector},
     scan::PathKind,
-    scene::{Material, Scene},
+    scene::{Cylinder, Material, Scene},
 };
 
 /// Echoes that agree in length and both directions to within this are one, metres and radians.
@@ -166,6 +168,7 @@ pub struct Paths {
     faces: Vec<Face>,
     edges: Edges,
     rounds: Rounds,
+    heights: Heights,
     /// By floor and ceiling; none in a scene in the plane.
     images: Vec<Image>,
     /// `None` for a scene with nothing in it.
@@ -209,10 +212,21 @@ impl Paths {
     pub fn new(scene: &Scene, settings: Settings) -> Self {
         let mut segments: Vec<_> = scene.walls.iter().map(|wall| (wall.a, wall.b)).collect();
         square_up(&mut segments);
+        let usual = || usual_z_m(scene.floor_z_m, scene.ceiling_z_m);
+        let z_m = settings.sensor_z_m.unwrap_or_else(usual);
+        let heights = Heights::new(scene, &segments, z_m);
+        for (segment, wall) in segments.iter_mut().zip(&scene.walls) {
+            if !heights.is_there(wall.z_m) {
+                // A point: the others keep their numbers.
+                segment.1 = segment.0;
+            }
+        }
         let plan = Arrangement::of(&segments);
+        let there = |cylinder: &&Cylinder| heights.is_there(cylinder.z_m);
         let extra: Vec<_> = scene
             .cylinders
             .iter()
+            .filter(there)
             .flat_map(|c| [c.center - c.radius_m, c.center + c.radius_m])
             .collect();
         // From outside the box no echo is short enough.
@@ -223,17 +237,22 @@ impl Paths {
             Face { mirror, rotor: mirror.rotor(), gain, loss_m }
         };
         let gains: Vec<_> = scene.walls.iter().map(|wall| mirror_gain(&wall.material)).collect();
-        let z_m =
-            settings.sensor_z_m.unwrap_or_else(|| usual_z_m(scene.floor_z_m, scene.ceiling_z_m));
-        let round: Vec<_> = scene.cylinders.iter().map(|c| mirror_gain(&c.material)).collect();
+        // One that is not there has no size: the others keep their numbers.
+        let circle = |c: &Cylinder| Circle {
+            center: c.center,
+            radius_m: if heights.is_there(c.z_m) { c.radius_m } else { 0.0 },
+            gain: mirror_gain(&c.material),
+        };
+        let circles = scene.cylinders.iter().map(circle).collect();
         Self {
             faces: segments.iter().zip(&gains).map(face).collect(),
             edges: settings
                 .edge_law
                 .map(|law| Edges::new(&plan, &segments, &gains, law))
                 .unwrap_or_default(),
-            rounds: Rounds::new(&scene.cylinders, &round, mesh.as_ref()),
+            rounds: Rounds::new(circles, mesh.as_ref()),
             images: vertical::images(scene.floor_z_m, scene.ceiling_z_m, z_m, settings.max_path_m),
+            heights,
             settings,
             mesh,
         }
@@ -265,18 +284,19 @@ impl Paths {
         if !self.rounds.is_empty() {
             echoes.retain(|echo| !self.is_hidden(&trees, echo, [transmitter, receiver]));
         }
-        self.add_images(&mut echoes);
+        self.add_images(&mut echoes, receiver - transmitter);
+        self.retain_clear(&trees, &mut echoes, [transmitter, receiver]);
         (trees, sorted(&echoes))
     }
 
     /// Each echo of the plan also by way of floor and ceiling, and these by themselves.
-    fn add_images(&self, echoes: &mut Vec<Echo>) {
+    fn add_images(&self, echoes: &mut Vec<Echo>, apart: DVec2) {
         let plan = echoes.len();
         for (image, index) in self.images.iter().zip(1..) {
             for at in 0..plan {
                 echoes.extend(image.echo(&echoes[at], index, &self.settings));
             }
-            echoes.extend(image.upright_echo(index, &self.settings));
+            echoes.extend(image.upright_echo(index, apart, &self.settings));
         }
     }
 

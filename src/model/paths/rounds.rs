@@ -8,7 +8,7 @@ use super::{
     beam::{Beam, TIE_M},
     mesh::Mesh,
 };
-use crate::{geometry::DVec2, scene::Cylinder};
+use crate::geometry::DVec2;
 
 /// The cylinders of a scene and the triangles they reach into.
 #[derive(Debug, Default)]
@@ -43,18 +43,12 @@ pub(super) struct Span {
 const LEAST_RAD: f64 = 1e-12;
 
 impl Rounds {
-    /// `gains` are the cylinders' reflectances.
-    pub(super) fn new(cylinders: &[Cylinder], gains: &[f64], mesh: Option<&Mesh>) -> Self {
-        let circle = |(cylinder, &gain): (&Cylinder, &f64)| Circle {
-            center: cylinder.center,
-            radius_m: cylinder.radius_m,
-            gain,
-        };
-        let circles: Vec<_> = cylinders.iter().zip(gains).map(circle).collect();
+    /// Finds the triangles of each.
+    pub(super) fn new(circles: Vec<Circle>, mesh: Option<&Mesh>) -> Self {
         let mut by_triangle = Vec::new();
         if let Some(mesh) = mesh.filter(|_| !circles.is_empty()) {
             by_triangle.resize(mesh.triangles.len(), SmallVec::new());
-            for (circle, cylinder) in circles.iter().zip(0..) {
+            for (circle, cylinder) in circles.iter().zip(0..).filter(|(c, _)| c.radius_m > 0.0) {
                 for triangle in mesh.triangles_near(circle.center, circle.radius_m) {
                     let spans = circle.spans_in(mesh, triangle);
                     let arcs = spans.into_iter().map(|span| Arc { cylinder, span });

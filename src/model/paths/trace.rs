@@ -258,7 +258,12 @@ impl Grower<'_> {
             }
             Side::Wall(wall) => {
                 self.reflect(&beam, wall, side);
-                None
+                if !self.paths.heights.lets_pass(wall) {
+                    return None;
+                }
+                let (triangle, side) = self.mesh.beyond(beam.triangle, side)?;
+                let next = Beam { triangle, side, ..beam };
+                self.may_return(&next).then_some(next)
             }
             Side::Outside => None,
         }

@@ -385,12 +385,19 @@ impl<'a> TubeGrower<'a> {
             Side::Open { triangle, side } => {
                 self.waiting.push(Tube { triangle, side: Some(side), ..*tube });
             }
-            Side::Wall(wall) if self.paths.settings.allows(tube.order + 1) => {
-                let gain = self.paths.faces[wall as usize].gain;
-                let next = self.reflected(tube, Reflector::Wall(wall), gain);
-                self.waiting.push(Tube { side: Some(side as u8), ..next });
+            Side::Wall(wall) => {
+                if self.paths.settings.allows(tube.order + 1) {
+                    let gain = self.paths.faces[wall as usize].gain;
+                    let next = self.reflected(tube, Reflector::Wall(wall), gain);
+                    self.waiting.push(Tube { side: Some(side as u8), ..next });
+                }
+                if self.paths.heights.lets_pass(wall)
+                    && let Some((triangle, side)) = mesh.beyond(tube.triangle, side)
+                {
+                    self.waiting.push(Tube { triangle, side: Some(side), ..*tube });
+                }
             }
-            Side::Wall(_) | Side::Outside => {}
+            Side::Outside => {}
         }
     }
 }

@@ -93,14 +93,20 @@ impl Image {
         })
     }
 
-    /// The way straight down or up and back.
-    pub(super) fn upright_echo(&self, index: u16, settings: &Settings) -> Option<Echo> {
+    /// The way by floor and ceiling alone, to a receiver that is `apart` from the transmitter.
+    pub(super) fn upright_echo(
+        &self,
+        index: u16,
+        apart: DVec2,
+        settings: &Settings,
+    ) -> Option<Echo> {
+        let along = apart.try_normalize().unwrap_or(DVec2::X);
         let nowhere = Echo {
-            length_m: 0.0,
+            length_m: apart.length(),
             amplitude: 1.0,
             phase_rad: 0.0,
-            departure: DVec2::X,
-            arrival: DVec2::X,
+            departure: along,
+            arrival: if apart == DVec2::ZERO { along } else { -along },
             rise_rad: [0.0; 2],
             image: 0,
             via: Via::Upright,

@@ -100,3 +100,33 @@ fn a_scene_in_the_plane_stays_in_the_plane() {
     assert_eq!(Paths::new(&plan, high).enumerate(DVec2::ZERO), flat);
     assert!(flat.len() > 3);
 }
+
+/// A low wall before a high one: seen below its upper edge, passed above it.
+#[test]
+fn a_low_wall_is_missed_above_and_bars_the_way_below() {
+    let mut room = scene(&[[-9.0, 0.6, 9.0, 0.6], [-9.0, 1.5, 9.0, 1.5]]);
+    room.walls[0].z_m = Some([0.0, 0.3]);
+    let (low, high, floor) = (Reflector::Wall(0), Reflector::Wall(1), Reflector::Floor);
+    let met = |room: &Scene, z_m: f64| {
+        let settings = Settings { max_order: Some(1), ..at_height(z_m) };
+        let mut met: Vec<_> = Paths::new(room, settings)
+            .enumerate(DVec2::ZERO)
+            .into_iter()
+            .map(|echo| echo.path.walls.to_vec())
+            .collect();
+        met.sort();
+        met
+    };
+    // All sound at the ranger's height.
+    assert_eq!(met(&room, 0.2), [[low]]);
+    assert_eq!(met(&room, 0.4), [[high]]);
+    // With a floor, the way by floor and wall meets the wall at its foot.
+    room.floor_z_m = Some(0.0);
+    let low_again = vec![low, floor];
+    assert_eq!(met(&room, 0.2), [vec![low], low_again.clone(), vec![floor]]);
+    // From 0.4 the corner of low wall and floor is in sight, and the high one's is hidden.
+    assert_eq!(met(&room, 0.4), [low_again, vec![high], vec![floor]]);
+    // From 0.7 the sound on its way to the far corner and back is at 0.42 over the low wall.
+    let all = met(&room, 0.7);
+    assert!(all.contains(&vec![high, floor]), "{all:?}");
+}
