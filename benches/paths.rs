@@ -57,6 +57,7 @@ fn small_room() {
     let engine = PathEngine::new(
         &scene,
         BeamPattern::new(paths.sensor(), paths.sound_speed_m_s()),
+        None,
         paths.path_settings(),
     );
     let echoes = Paths::new(&scene, paths.path_settings()).enumerate(pose.position());

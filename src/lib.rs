@@ -40,6 +40,7 @@
 pub mod acoustics;
 pub mod compare;
 pub mod geometry;
+pub mod interpret;
 pub mod model;
 pub mod motion;
 #[cfg(feature = "plot")]
@@ -48,12 +49,24 @@ pub mod scan;
 pub mod scene;
 
 #[cfg(feature = "daemon")]
+pub mod board;
+#[cfg(feature = "daemon")]
 pub mod cli;
+#[cfg(feature = "daemon")]
+pub mod client;
+#[cfg(feature = "daemon")]
+pub mod config;
+#[cfg(feature = "daemon")]
+pub mod daemon;
 #[cfg(feature = "daemon")]
 pub mod link;
 #[cfg(feature = "daemon")]
 pub mod mock;
+#[cfg(feature = "pi")]
+pub mod pi;
 #[cfg(feature = "daemon")]
 pub mod ranger;
+#[cfg(feature = "daemon")]
+pub mod server;
 #[cfg(feature = "store")]
 pub mod store;

@@ -10,8 +10,8 @@ use firmware_protocol::messages::{Blanking, Settings, Sweep};
 use rand::{Rng as _, SeedableRng as _};
 use sonard_emulator::HZ;
 
-/// The chip has 32 KB, of which the boot loader takes half a kilobyte.
-const FLASH_MAX: u32 = 19 * 1024;
+/// Half of what the chip has, so that there is room for what comes.
+const FLASH_MAX: u32 = 16 * 1024;
 const MEMORY_MAX: usize = 1_200;
 
 /// Bytes of text, data and bss.

@@ -6,7 +6,7 @@ use common::{commanded, ready, settings};
 use firmware_protocol::host::{Command, HostEvent, Outcome};
 use firmware_protocol::messages::Settings;
 use rand::{RngExt as _, SeedableRng as _};
-use sonard::mock::Trapezoid;
+use sonard::motion::Trapezoid;
 use sonard_emulator::{Commanded, HZ};
 
 const QUICK: Settings =

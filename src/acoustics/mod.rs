@@ -3,6 +3,7 @@
 mod air;
 mod aperture;
 pub mod edge;
+mod face;
 mod pulse;
 mod receiver;
 mod sensor;
@@ -10,6 +11,7 @@ mod transducer;
 
 pub use air::{Air, AirError};
 pub use aperture::{ApertureResponse, Image, Incidence};
+pub use face::{Disc, Face, FaceAspect};
 pub use pulse::EchoShape;
 pub use receiver::{
     Combining, Detection, EchoTrace, Hump, Incident, Latch, Receiver, ReceiverNoise, Sound,

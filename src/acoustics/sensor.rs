@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::Face;
 use crate::geometry::wrap_pi;
 
 /// The data files that come with the program, by name.
@@ -32,6 +33,10 @@ pub struct Sensor {
     pub frequency_hz: f64,
     /// Shape of the radiating face, and with it the beam pattern.
     pub aperture: Aperture,
+    /// Face and housing as a reflector; without it sound passes the ranger as if it were not
+    /// there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub face: Option<Face>,
     /// What it sends.
     pub pulse: Pulse,
     /// From firing until the receiver listens, microseconds.
@@ -296,6 +301,10 @@ impl Sensor {
                 positive("aperture.radius_m", radius_m)?;
             }
         }
+        if let Some(Face { radius_m, reflectance }) = self.face {
+            positive("face.radius_m", radius_m)?;
+            at_most_1("face.reflectance", reflectance)?;
+        }
         self.pulse.check()?;
         not_negative("blanking_us", self.blanking_us)?;
         not_negative("short_blanking_us", self.short_blanking_us.unwrap_or(0.0))?;
@@ -432,6 +441,14 @@ fn not_negative(field: &'static str, value: f64) -> Result<(), SensorError> {
         Ok(())
     } else {
         Err(SensorError::Figure { field, value, expected: "a finite number, 0 or more" })
+    }
+}
+
+fn at_most_1(field: &'static str, value: f64) -> Result<(), SensorError> {
+    if (0.0..=1.0).contains(&value) {
+        Ok(())
+    } else {
+        Err(SensorError::Figure { field, value, expected: "from 0 to 1" })
     }
 }
 

@@ -56,12 +56,14 @@ pub(super) struct Belief<'a> {
 }
 
 impl MockWorldArgs {
-    pub(super) const fn pace(&self) -> Pace {
-        if self.realtime { Pace::RealTime } else { Pace::Virtual }
-    }
-
     /// The board, powered up in its world.
     pub(super) fn board(&self, belief: &Belief<'_>) -> Result<MockBoard, Failure> {
+        let pace = if self.realtime { Pace::RealTime } else { Pace::Virtual };
+        self.board_at(pace, belief)
+    }
+
+    /// The same at a given pace.
+    pub(super) fn board_at(&self, pace: Pace, belief: &Belief<'_>) -> Result<MockBoard, Failure> {
         let scene = match &self.truth {
             Some(name) => Arc::new(scene_file::load(name)?),
             None => Arc::clone(belief.scene),
@@ -89,7 +91,7 @@ impl MockWorldArgs {
             steps_per_revolution: steps,
             faults: self.faults.unwrap_or_default(),
             seed: self.seed,
-            pace: self.pace(),
+            pace,
         };
         Ok(MockBoard::new(settings, world))
     }

@@ -122,7 +122,7 @@ impl SensorArgs {
     /// The sensor named: a file if there is one of that name, else a preset; with its blanking as
     /// asked for.
     pub(super) fn sensor(&self) -> Result<Sensor, Failure> {
-        let mut sensor = self.named()?;
+        let mut sensor = load_sensor(&self.sensor)?;
         if self.short_blanking {
             sensor.blanking_us = sensor.short_blanking_us.ok_or_else(|| {
                 Failure::input(
@@ -139,37 +139,37 @@ impl SensorArgs {
         }
         Ok(sensor)
     }
+}
 
-    fn named(&self) -> Result<Sensor, Failure> {
-        match fs::read_to_string(&self.sensor) {
-            Ok(text) => Sensor::from_json(&text).map_err(|error| self.refuse(&error)),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                Sensor::preset(&self.sensor).map_err(|error| self.refuse(&error))
-            }
-            Err(error) => Err(Failure::input(
-                format!("cannot read the sensor {}: {error}", self.sensor),
-                "give a text file that you may read, or the name of a preset",
-            )),
+/// A sensor by the name of its file or preset.
+pub(super) fn load_sensor(name: &str) -> Result<Sensor, Failure> {
+    match fs::read_to_string(name) {
+        Ok(text) => Sensor::from_json(&text).map_err(|error| refuse_sensor(name, &error)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            Sensor::preset(name).map_err(|error| refuse_sensor(name, &error))
         }
+        Err(error) => Err(Failure::input(
+            format!("cannot read the sensor {name}: {error}"),
+            "give a text file that you may read, or the name of a preset",
+        )),
     }
+}
 
-    fn refuse(&self, error: &SensorError) -> Failure {
-        let name = &self.sensor;
-        match error {
-            SensorError::UnknownPreset { .. } => {
-                let known: Vec<String> = Sensor::preset_names().map(str::to_owned).collect();
-                Failure::input(
-                    format!("there is no sensor file `{name}` and no preset of that name"),
-                    suggest(name, &known, "presets"),
-                )
-            }
-            SensorError::Form { line, column, field, message } => Failure::input(
-                format!("{name}:{line}:{column}: {field}: {message}"),
-                "start from a preset in the folder sensors/ of the source",
-            ),
-            SensorError::Figure { .. } => {
-                Failure::input(format!("{name}: {error}"), "correct that figure in the file")
-            }
+fn refuse_sensor(name: &str, error: &SensorError) -> Failure {
+    match error {
+        SensorError::UnknownPreset { .. } => {
+            let known: Vec<String> = Sensor::preset_names().map(str::to_owned).collect();
+            Failure::input(
+                format!("there is no sensor file `{name}` and no preset of that name"),
+                suggest(name, &known, "presets"),
+            )
+        }
+        SensorError::Form { line, column, field, message } => Failure::input(
+            format!("{name}:{line}:{column}: {field}: {message}"),
+            "start from a preset in the folder sensors/ of the source",
+        ),
+        SensorError::Figure { .. } => {
+            Failure::input(format!("{name}: {error}"), "correct that figure in the file")
         }
     }
 }

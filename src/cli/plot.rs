@@ -2,21 +2,16 @@
 
 mod way;
 
-use std::{
-    io::{self, IsTerminal},
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use super::{
     Failure, Outcome,
-    picture_file::{PictureArgs, Target},
-    scene_file,
+    picture::{PictureArgs, scene_for, targets, warn_of_damage, write},
 };
 use crate::{
     plot::{draw_polar, draw_residuals, draw_scans, draw_side_by_side},
     scan::ScanView,
-    scene::{Scene, shipped},
-    store::{Loaded, load},
+    store::load,
 };
 
 /// Options of `sonard plot`.
@@ -80,7 +75,7 @@ Examples:
 Exit codes: 0 drawn, 2 wrong usage or input, 3 a picture can't be written.";
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let targets = targets(&args.picture)?;
+    let targets = targets(&args.picture.out)?;
     let log = &args.log;
     let loaded = load(log).map_err(|error| Failure::input(&error, error.help()))?;
     warn_of_damage(log, &loaded);
@@ -94,29 +89,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         (None, Kind::SideBySide) => draw_side_by_side(&views, scene.as_ref()),
         (None, Kind::Residuals) => draw_residuals(&views, scene.as_ref()),
     };
-    targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
-}
-
-/// Without a name the picture goes to standard output, unless that is a terminal.
-fn targets(args: &PictureArgs) -> Result<Vec<Target>, Failure> {
-    if args.out.is_empty() && io::stdout().is_terminal() {
-        return Err(Failure::input(
-            "the picture would go to the terminal",
-            "name a file with -o scan.svg or -o scan.png, or send standard output somewhere",
-        ));
-    }
-    if args.out.is_empty() { Ok(vec![Target::StandardOutput]) } else { args.targets() }
-}
-
-fn warn_of_damage(log: &Path, loaded: &Loaded) {
-    const SHOWN: usize = 5;
-    for error in loaded.damaged.iter().take(SHOWN) {
-        anstream::eprintln!("warning: {}: {error}; the line is left out", log.display());
-    }
-    if loaded.damaged.len() > SHOWN {
-        let more = loaded.damaged.len() - SHOWN;
-        anstream::eprintln!("warning: {more} more damaged lines; see `sonard log verify`");
-    }
+    targets.iter().try_for_each(|target| write(&picture, target, args.picture.width))
 }
 
 /// The scans asked for; all without a choice.
@@ -158,32 +131,4 @@ fn find<'a>(views: &'a [ScanView], wanted: &str) -> Result<&'a ScanView, Failure
             ),
         )),
     }
-}
-
-/// The scene named on the command line, else the shipped scene that the log names.
-fn scene_for(views: &[ScanView], given: Option<&str>) -> Result<Option<Scene>, Failure> {
-    let logged = views.iter().find_map(|view| view.session.as_ref()?.scene.as_ref());
-    let scene = match (given, logged) {
-        (Some(given), _) => scene_file::load(given)?,
-        (None, Some(logged)) if shipped::text(&logged.name).is_some() => {
-            scene_file::shipped(&logged.name)?
-        }
-        (None, Some(logged)) => {
-            anstream::eprintln!(
-                "note: the log's scene `{}` does not come with sonard: drawn without walls; give \
-                 its file with --scene",
-                logged.name
-            );
-            return Ok(None);
-        }
-        (None, None) => return Ok(None),
-    };
-    if logged.is_some_and(|logged| logged.sha256 != scene.sha256) {
-        anstream::eprintln!(
-            "warning: the scene `{}` is not the one that the log's model used (its SHA-256 \
-             differs): walls and predictions may not fit",
-            scene.name
-        );
-    }
-    Ok(Some(scene))
 }

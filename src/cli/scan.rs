@@ -20,7 +20,7 @@ use super::{
 use crate::{
     link::{self, BAUD},
     mock::{MockBoard, MockPort},
-    ranger::{DriveError, Driver, Ranger, ScanError, ScanSummary},
+    ranger::{DriveError, Driver, Motion, Ranger, ScanError, ScanSummary},
     scan::Record,
 };
 use output::Output;
@@ -90,6 +90,13 @@ struct MotionArgs {
     acceleration: u32,
 }
 
+impl MotionArgs {
+    const fn motion(&self) -> Motion {
+        let Self { window_ms, settle_ms, min_interval_ms, max_echoes, speed, acceleration } = *self;
+        Motion { window_ms, settle_ms, min_interval_ms, max_echoes, speed, acceleration }
+    }
+}
+
 pub(super) const ABOUT: &str = "\
 Take one or more scans and log each reading beside the model's prediction.
 
@@ -131,7 +138,7 @@ async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
     let mut missing = 0;
     for turn in 1..=args.repeat {
         output.begin_scan(turn, args.repeat, job.plan.beams());
-        let summary = ranger.scan(&job, output, interrupts.clone().wait()).await;
+        let summary = ranger.scan(&job, output, interrupts.clone().reason()).await;
         output.end_scan();
         let summary = summary.map_err(scan_failure)?;
         summary::print(setup, &summary, ranger.identity(), ranger.link_stats(), output);

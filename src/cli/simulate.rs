@@ -23,12 +23,9 @@ use crate::{
     acoustics::ReceiverNoise,
     geometry::Pose,
     model::{Prediction, Simulator, Station},
-    scan::{LOG_FORMAT, Ping, Provenance, Record, ScanEnd, ScanPlan, ScanStart, SceneRef, Session},
+    scan::{Ping, Record, ScanEnd, ScanPlan, ScanStart, Session},
     scene::Scene,
 };
-
-/// Motor steps a revolution that `step` counts in.
-const STEPS_PER_REVOLUTION: u32 = 400;
 
 /// Options of `sonard simulate`.
 #[derive(Debug, clap::Args)]
@@ -147,18 +144,26 @@ fn write(
         serde_json::to_writer(&mut *out, record)?;
         out.write_all(b"\n")
     };
-    put(&session(simulator))?;
-    put(&Record::ScanStart(ScanStart { scan, time: Timestamp::now(), pose: *pose, plan: *plan }))?;
+    put(&Record::Session(Box::new(Session::simulated(simulator, Timestamp::now()))))?;
+    put(&Record::ScanStart(ScanStart {
+        scan,
+        time: Timestamp::now(),
+        pose: *pose,
+        plan: *plan,
+        air: None,
+    }))?;
     let progress = progress(plan.stops());
     let station = simulator.station(pose.position());
     for index in 0..plan.stops() {
         let azimuth_deg = plan.azimuth_deg(index);
         let prediction = predict(&station, pose.direction_rad(azimuth_deg));
-        put(&ping(simulator, scan, index, azimuth_deg, &prediction))?;
+        let ping = Ping::simulated(simulator, scan, index, azimuth_deg, &prediction);
+        put(&Record::Ping(Box::new(ping)))?;
         progress.inc(1);
     }
     progress.finish_and_clear();
-    put(&end(simulator, scan, plan.stops()))?;
+    let end = ScanEnd::simulated(simulator, scan, plan.stops(), Timestamp::now());
+    put(&Record::ScanEnd(end))?;
     out.flush()
 }
 
@@ -177,65 +182,4 @@ fn progress(stops: u32) -> ProgressBar {
         }
     });
     bar
-}
-
-fn session(simulator: &Simulator) -> Record {
-    let scene = simulator.scene();
-    Record::Session(Box::new(Session {
-        format: LOG_FORMAT,
-        started: Timestamp::now(),
-        sonard: env!("CARGO_PKG_VERSION").to_owned(),
-        provenance: Provenance::Simulated,
-        device: None,
-        sensor: simulator.sensor().clone(),
-        air: simulator.air().to_record(),
-        scene: Some(SceneRef { name: scene.name.clone(), sha256: scene.sha256.clone() }),
-        model: Some(simulator.model_record()),
-    }))
-}
-
-fn ping(
-    simulator: &Simulator,
-    scan: Uuid,
-    index: u32,
-    azimuth_deg: f64,
-    prediction: &Prediction,
-) -> Record {
-    let said = simulator.record(prediction);
-    let steps = azimuth_deg / 360.0 * f64::from(STEPS_PER_REVOLUTION);
-    Record::Ping(Box::new(Ping {
-        scan,
-        index,
-        step: steps.round() as i32,
-        azimuth_deg,
-        time: None,
-        time_sigma_us: None,
-        status: said.status,
-        fired_ticks: None,
-        echo_ticks: Vec::new(),
-        tof_us: prediction.echoes_us.first().copied(),
-        range_m: said.range_m,
-        repaired: false,
-        amplitude: said.amplitude,
-        margin_db: said.margin_db,
-        path: said.path,
-        sim: None,
-        residual_m: None,
-    }))
-}
-
-/// The model has no motor: a scan lasts as long as its listening windows.
-fn end(simulator: &Simulator, scan: Uuid, beams: u32) -> Record {
-    let window_s = 2.0 * simulator.receiver().max_range_m / simulator.sound_speed_m_s();
-    let listening_s = f64::from(beams) * window_s;
-    Record::ScanEnd(ScanEnd {
-        scan,
-        time: Timestamp::now(),
-        beams,
-        missing: 0,
-        repaired: 0,
-        duration_s: listening_s,
-        acoustic_limit_s: listening_s,
-        home_drift_steps: None,
-    })
 }

@@ -85,6 +85,11 @@ impl World {
         Self { soundings, noise, missed_step_rate: missed_step_rate.clamp(0.0, 1.0), step: 0, rng }
     }
 
+    /// Sounds otherwise from now on.
+    pub fn set_soundings(&mut self, soundings: Soundings) {
+        self.soundings = soundings;
+    }
+
     /// Turns by so many commanded steps.
     pub fn turn(&mut self, steps: i32) {
         let missed = steps != 0 && self.rng.random_bool(self.missed_step_rate);

@@ -68,6 +68,8 @@ pub enum Reflector {
     Wall(u32),
     /// `scene.cylinders[i]`.
     Cylinder(u32),
+    /// The transducer's own face.
+    Face,
 }
 
 /// An end of a wall.

@@ -5,6 +5,7 @@ use std::{
     sync::Arc,
 };
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -14,7 +15,7 @@ use super::{
 };
 use crate::{
     acoustics::{
-        Air, BeamPattern, Combining, EdgeLawKind, Receiver, Response, Sensor, SensorError,
+        Air, BeamPattern, Combining, Disc, EdgeLawKind, Receiver, Response, Sensor, SensorError,
         edge::EdgeLaw,
     },
     geometry::{DVec2, Pose},
@@ -29,11 +30,14 @@ const MARGIN_KEPT_DB: f64 = 40.0;
 /// The same for `paths`, which would find a great many more down there.
 const PATHS_KEPT_DB: f64 = 20.0;
 
+/// What the transducer's own face is called among the walls of a path.
+pub(super) const FACE_NAME: &str = "transducer";
+
 /// Bozma and Kuc's scattering strength of the right-angled edge that they scanned.
 const SIGMA_E: f64 = 0.095;
 
 /// How echoes are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EngineKind {
     /// [`PathEngine`]: all echo paths, exactly.
@@ -151,7 +155,9 @@ impl Simulator {
         let engine: Box<dyn Engine> = match options.engine {
             EngineKind::Paths => {
                 let settings = path_settings(&sensor, &air, &options, &receiver);
-                Box::new(PathEngine::new(&scene, beam, settings))
+                let wave_number_per_m = settings.wave_number_per_m;
+                let face = sensor.face.map(|face| Disc { face, wave_number_per_m });
+                Box::new(PathEngine::new(&scene, beam, face, settings))
             }
             EngineKind::Fan => {
                 Box::new(Fan::new(&scene, beam, fan_settings(&sensor, &air, &options, &receiver)))
@@ -265,6 +271,7 @@ impl Simulator {
         match reflector {
             Reflector::Wall(index) => self.scene.walls[index as usize].id.to_string(),
             Reflector::Cylinder(index) => self.scene.cylinders[index as usize].id.to_string(),
+            Reflector::Face => FACE_NAME.to_owned(),
         }
     }
 

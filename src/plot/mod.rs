@@ -5,10 +5,12 @@
 
 mod canvas;
 mod caption;
+mod features;
 mod floor;
 mod keys;
 mod labels;
 mod legend;
+mod map;
 mod materials;
 mod picture;
 mod plan;
@@ -32,6 +34,8 @@ mod fixtures;
 #[cfg(test)]
 mod tests;
 
+pub use features::draw_features;
+pub use map::draw_map;
 pub use picture::{MAX_WIDTH_PX, Picture, PlotError};
 pub use polar::draw_polar;
 pub use residuals::draw_residuals;

@@ -4,6 +4,7 @@
 mod common;
 mod faults;
 mod hangup;
+mod interpret;
 mod log;
 mod paths;
 mod plot;
