@@ -39,12 +39,12 @@ impl Board for NoBoard {}
 #[derive(Debug, Error)]
 pub enum BoardError {
     /// Built without them.
-    #[error("the configuration names pins, but this sonard was built without the feature gpio")]
+    #[error("the configuration names pins, but this sonard was built without the feature pi")]
     NotBuilt,
     /// No Raspberry Pi, or no access to its pins.
     #[cfg(feature = "pi")]
-    #[error("the pins can't be used: {0}")]
-    Gpio(#[from] rppal::gpio::Error),
+    #[error("the pins of [gpio] can't be used: {0}")]
+    Gpio(crate::pi::GpioError),
 }
 
 impl BoardError {
@@ -52,12 +52,13 @@ impl BoardError {
     #[must_use]
     pub const fn help(&self) -> &'static str {
         match self {
-            Self::NotBuilt => "build with --features gpio, or take the pins out of [gpio]",
+            Self::NotBuilt => "build with --features pi, or take the pins out of [gpio]",
             #[cfg(feature = "pi")]
-            Self::Gpio(_) => {
-                "pins exist on a Raspberry Pi only; there, /dev/gpiomem must be open to this \
-                 user (group gpio). Or take the pins out of [gpio]"
+            Self::Gpio(crate::pi::GpioError::NotAPi) => {
+                "take the pins out of [gpio]: the daemon runs without them on any computer"
             }
+            #[cfg(feature = "pi")]
+            Self::Gpio(error) => error.help(),
         }
     }
 }
@@ -72,7 +73,10 @@ pub fn open(keys: &GpioKeys) -> Result<Box<dyn Board>, BoardError> {
         return Ok(Box::new(NoBoard));
     }
     #[cfg(feature = "pi")]
-    return Ok(Box::new(raspberry_pi::Pins::open(keys)?));
+    return match raspberry_pi::Pins::open(keys) {
+        Ok(pins) => Ok(Box::new(pins)),
+        Err(error) => Err(BoardError::Gpio(error.into())),
+    };
     #[cfg(not(feature = "pi"))]
     Err(BoardError::NotBuilt)
 }

@@ -3,6 +3,7 @@
 #[cfg(feature = "pi")]
 mod board;
 mod compare;
+mod doctor;
 mod failure;
 mod interpret;
 mod log;
@@ -62,6 +63,9 @@ enum Verb {
     #[cfg(feature = "pi")]
     #[command(long_about = board::ABOUT)]
     Board(board::Args),
+    /// Find out what is wrong with a ranger: port, firmware, motor, echo
+    #[command(long_about = doctor::ABOUT)]
+    Doctor(doctor::Args),
     /// Predict a scan with the model alone
     #[command(long_about = simulate::ABOUT)]
     Simulate(simulate::Args),
@@ -107,14 +111,15 @@ pub fn main() -> ExitCode {
         Verb::Mock(args) => mock::run(&args),
         #[cfg(feature = "pi")]
         Verb::Board(args) => board::run(&args),
+        Verb::Doctor(args) => doctor::run(&args),
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
-        Verb::Trace(args) => trace::run(&args),
         Verb::Interpret(args) => interpret::run(&args),
         Verb::Map(args) => map::run(&args),
         Verb::MapScore(args) => map_score::run(&args),
         Verb::MapBenchmark(args) => map_benchmark::run(&args),
+        Verb::Trace(args) => trace::run(&args),
         Verb::Plot(args) => plot::run(&args),
         Verb::Log(verb) => log::run(verb),
         Verb::Scene(verb) => scene::run(verb),

@@ -119,6 +119,11 @@ impl EdgeLaw {
 }
 
 impl SensorArgs {
+    /// The same for `sonard-emulator`, with the blanking that came of it.
+    pub(super) fn emulator(&self, sensor: &Sensor) -> [String; 2] {
+        [format!("--sensor={}", self.sensor), format!("--blanking-us={}", sensor.blanking_us)]
+    }
+
     /// The sensor named: a file if there is one of that name, else a preset; with its blanking as
     /// asked for.
     pub(super) fn sensor(&self) -> Result<Sensor, Failure> {
@@ -175,6 +180,15 @@ fn refuse_sensor(name: &str, error: &SensorError) -> Failure {
 }
 
 impl AirArgs {
+    /// The same for `sonard-emulator`.
+    pub(super) fn emulator(&self) -> [String; 3] {
+        [
+            format!("--temperature-c={}", self.temperature_c),
+            format!("--humidity-percent={}", self.humidity_percent),
+            format!("--pressure-kpa={}", self.pressure_kpa),
+        ]
+    }
+
     /// The air described.
     pub(super) fn air(&self) -> Result<Air, Failure> {
         Air::new(self.temperature_c, self.humidity_percent, self.pressure_kpa)

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::{
     Failure, Outcome,
-    picture::{PictureArgs, scene_for, targets, warn_of_damage, write},
+    picture::{PictureArgs, scene_for, targets, warn_of_damage},
 };
 use crate::{
     plot::{draw_polar, draw_residuals, draw_scans, draw_side_by_side},
@@ -75,7 +75,7 @@ Examples:
 Exit codes: 0 drawn, 2 wrong usage or input, 3 a picture can't be written.";
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let targets = targets(&args.picture.out)?;
+    let targets = targets(&args.picture)?;
     let log = &args.log;
     let loaded = load(log).map_err(|error| Failure::input(&error, error.help()))?;
     warn_of_damage(log, &loaded);
@@ -89,7 +89,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         (None, Kind::SideBySide) => draw_side_by_side(&views, scene.as_ref()),
         (None, Kind::Residuals) => draw_residuals(&views, scene.as_ref()),
     };
-    targets.iter().try_for_each(|target| write(&picture, target, args.picture.width))
+    targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
 }
 
 /// The scans asked for; all without a choice.

@@ -5,6 +5,7 @@ mod mock;
 
 use std::{io::IsTerminal as _, path::PathBuf};
 
+use rustix::process::Signal;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 use tracing_subscriber::EnvFilter;
@@ -117,6 +118,8 @@ pub(super) fn run(args: Args) -> Outcome {
 
 /// Gets hold of everything, and lets daemon and server run until an interrupt.
 async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Outcome {
+    // With a handler, a file that gets too large is an error of the write and not the end.
+    let _too_large = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()));
     let keys = &settings.keys;
     let board = board::open(&keys.gpio).map_err(|error| Failure::input(&error, error.help()))?;
     let log_folder = PathBuf::from(&keys.log.folder);

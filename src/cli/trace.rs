@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::{
     Failure, Outcome,
     options::{AirArgs, EngineArgs, SensorArgs},
-    picture::{PictureArgs, Target, target, write},
+    picture::{PictureArgs, Target},
     place::PlaceArgs,
 };
 use crate::{
@@ -109,8 +109,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     within("--step-us", args.step_us, 1.0, 1000.0, "microseconds")?;
     within("--until", args.until.unwrap_or(1.0), 0.05, 100.0, "metres")?;
     within("--azimuth-deg", args.azimuth_deg, -360.0, 360.0, "degrees")?;
-    let targets =
-        args.picture.out.iter().map(|path| target(path)).collect::<Result<Vec<_>, _>>()?;
+    let targets = args.picture.targets()?;
     let (scene, pose) = args.place.load()?;
     let (sensor, air) = (args.sensor.sensor()?, args.air.air()?);
     let scene = Arc::new(scene.with_robot_at(&pose));
@@ -274,7 +273,7 @@ impl<'a> Firing<'a> {
             sound_speed_m_s: receiver.sound_speed_m_s,
         };
         let picture = draw_trace(&view);
-        targets.iter().try_for_each(|target| write(&picture, target, width_px))
+        targets.iter().try_for_each(|target| target.write(&picture, width_px))
     }
 }
 

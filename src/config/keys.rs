@@ -32,7 +32,7 @@ pub struct Keys {
     pub link: LinkKeys,
     /// The HTTP API.
     pub server: ServerKeys,
-    /// Pins of a Raspberry Pi (BCM numbers); only in a build with the feature gpio.
+    /// Pins of a Raspberry Pi (BCM numbers); only in a build with the feature pi.
     pub gpio: GpioKeys,
 }
 

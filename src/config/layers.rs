@@ -283,6 +283,7 @@ fn place(file: &str, text: &str, byte: usize) -> Origin {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn read(text: &str) -> Result<Keys, ConfigError> {
         Layers::new().file("s.toml", text)?.keys()
@@ -349,5 +350,36 @@ mod tests {
         let keys =
             Layers::new().option("--set", "server.hosts=robot, robot.local").and_then(Layers::keys);
         assert_eq!(keys.expect("reads").server.hosts, ["robot", "robot.local"]);
+    }
+
+    /// Words that a configuration is made of, right and wrong, in any order.
+    fn piece() -> impl Strategy<Value = String> {
+        let keys = sections().iter().flat_map(|section| {
+            let names = section.keys.iter().map(|key| key.name.clone());
+            names.chain([format!("[{}]\n", section.name)])
+        });
+        let marks = [
+            "=", " = ", "\n", "\"", "[", "]", "{", "#", "1", "-0.5", "nan", "true", "\u{e9}",
+            "1e999",
+        ];
+        let words: Vec<String> = keys.chain(marks.map(str::to_owned)).collect();
+        prop_oneof![4 => prop::sample::select(words), 1 => "\\PC{0,8}"]
+    }
+
+    proptest! {
+        /// Whatever a file holds: no panic, and what is refused is refused at a place in it.
+        #[test]
+        fn any_text_is_read_or_refused_at_its_place(pieces in prop::collection::vec(piece(), 0..40)) {
+            let text = pieces.concat();
+            if let Err(error) = read(&text) {
+                let Origin::File { line, column, .. } = error.origin else {
+                    return Err(TestCaseError::fail(format!("{error}")));
+                };
+                let lines = text.split('\n').count();
+                prop_assert!((1..=lines).contains(&line), "{error} of {lines} lines");
+                let length = text.split('\n').nth(line - 1).map_or(0, |line| line.chars().count());
+                prop_assert!((1..=length + 1).contains(&column), "{error}: {length} long");
+            }
+        }
     }
 }

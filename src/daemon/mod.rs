@@ -19,6 +19,7 @@ mod journal;
 mod machine;
 mod notify;
 mod operator;
+mod outlet;
 mod settings;
 mod status;
 
@@ -44,7 +45,8 @@ pub use status::{
 use crate::board::Board;
 use air::AirDesk;
 use desk::Desk;
-use operator::{Operator, Outlet};
+use operator::Operator;
+use outlet::Outlet;
 use status::{Shared, View};
 
 /// Orders that may wait while one is carried out.

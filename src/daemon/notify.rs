@@ -40,8 +40,8 @@ pub(super) async fn run(shared: Arc<Shared>, shutdown: CancellationToken) {
                     let microseconds = u32::try_from((4 * PATIENCE).as_micros()).unwrap_or(u32::MAX);
                     say(&[NotifyState::ExtendTimeoutUsec(microseconds)]);
                 }
-                // A scan beats with every beam, an idle device with every check, an absent one
-                // with every try. What beats no more is stuck.
+                // A scan beats with every beam, everything else once a second. What beats no more
+                // is stuck.
                 let now = shared.beats();
                 if watchdog.is_some() && beats.replace(now) != Some(now) {
                     say(&[NotifyState::Watchdog]);
@@ -54,7 +54,9 @@ pub(super) async fn run(shared: Arc<Shared>, shutdown: CancellationToken) {
 
 fn words(state: LinkState, trouble: Option<&str>) -> String {
     match trouble {
-        Some(trouble) if !state.is_up() => format!("{}: {trouble}", state.name()),
+        Some(trouble) if state.is_settled() && !state.is_up() => {
+            format!("{}: {trouble}", state.name())
+        }
         _ => state.name().to_owned(),
     }
 }

@@ -93,11 +93,14 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         Ok(())
     }
 
-    /// Sets the device up and finds home; returns by how much the index was off, steps.
+    /// Sets the device up and finds home; returns by how much the index was off, steps. A sweep
+    /// that an earlier program left behind is stopped first: it would go on for as long as
+    /// anybody talks to the device.
     ///
     /// # Errors
     /// The device's and the line's.
     pub async fn home(&mut self, settings: Settings) -> Result<i32, DriveError> {
+        self.stop().await?;
         self.driver.perform(Command::Configure(settings), ignore).await?;
         match self.driver.perform(Command::Home, ignore).await? {
             Ended::Done(Outcome::Homed { drift_steps }) => Ok(drift_steps),
@@ -245,12 +248,27 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         Ok(())
     }
 
-    /// Brings the motor to a stand, and takes in what was measured until then.
+    /// Brings the motor to a stand, whatever is under way.
+    ///
+    /// # Errors
+    /// The device's and the line's.
+    pub async fn stop(&mut self) -> Result<(), DriveError> {
+        self.bring_to_stand(ignore).await
+    }
+
+    /// The same, and takes in what was measured until then.
     async fn halt(&mut self, progress: &mut Progress<'_>) -> Result<(), DriveError> {
+        self.bring_to_stand(|event| progress.handle(event)).await
+    }
+
+    async fn bring_to_stand(
+        &mut self,
+        mut on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
+    ) -> Result<(), DriveError> {
         self.driver.start(Command::Stop)?;
         loop {
             // The end of what was stopped may come first.
-            match self.driver.finish(|event| progress.handle(event)).await {
+            match self.driver.finish(&mut on_event).await {
                 Ok(Ended::Done(Outcome::Stopped)) => return Ok(()),
                 Ok(_) | Err(DriveError::Host(HostError::Stopped) | DriveError::Abandoned) => {}
                 Err(error) => return Err(error),
@@ -314,5 +332,26 @@ fn sweep_of(segment: &Segment, from_step: i32, stride: i32, settings: &Settings)
         stops: u16::try_from(segment.stops).unwrap_or(u16::MAX),
         pings_per_stop: u8::try_from(segment.pings).unwrap_or(u8::MAX),
         lease_ms: timing::lease_ms(settings),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_that_is_set_moves_the_epoch_by_just_that() {
+        let start: Timestamp = "2026-03-01T10:00:00Z".parse().expect("a time");
+        let at = |since_us: i64, set_s: i64| {
+            let wall =
+                start + SignedDuration::from_micros(since_us) + SignedDuration::from_secs(set_s);
+            wall_epoch(wall, u64::try_from(since_us).expect("after the start"))
+        };
+        assert_eq!(at(0, 0), start);
+        assert_eq!(at(90_000_000, 0), start, "time that passes is no step");
+        let set = at(100_000_000, 3600).duration_since(at(90_000_000, 0));
+        assert_eq!(set, SignedDuration::from_secs(3600));
+        let set_back = at(100_000_000, -5).duration_since(start);
+        assert_eq!(set_back, SignedDuration::from_secs(-5));
     }
 }

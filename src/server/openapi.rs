@@ -124,10 +124,17 @@ pub(super) fn document(endpoints: &[Endpoint]) -> Value {
         settings.meta_schema = None;
     });
     let mut generator = settings.into_generator();
+    // What a client may leave out differs from what the server leaves out: bodies stand in line.
+    let mut bodies = SchemaSettings::draft2020_12()
+        .with(|settings| {
+            settings.inline_subschemas = true;
+            settings.meta_schema = None;
+        })
+        .into_generator();
     let problem = generator.subschema_for::<Problem>();
     let mut paths = Map::new();
     for endpoint in endpoints {
-        let operation = operation(endpoint, &problem, &mut generator);
+        let operation = operation(endpoint, &problem, &mut generator, &mut bodies);
         let path = paths.entry(endpoint.path).or_insert_with(|| json!({}));
         path[endpoint.method.as_str().to_ascii_lowercase()] = operation;
     }
@@ -150,7 +157,12 @@ pub(super) fn document(endpoints: &[Endpoint]) -> Value {
     })
 }
 
-fn operation(endpoint: &Endpoint, problem: &Schema, generator: &mut SchemaGenerator) -> Value {
+fn operation(
+    endpoint: &Endpoint,
+    problem: &Schema,
+    generator: &mut SchemaGenerator,
+    bodies: &mut SchemaGenerator,
+) -> Value {
     let mut responses = Map::new();
     for (status, media, about, schema) in &endpoint.answers {
         let content = match schema {
@@ -188,7 +200,7 @@ fn operation(endpoint: &Endpoint, problem: &Schema, generator: &mut SchemaGenera
         "responses": responses,
     });
     if let Some(body) = endpoint.body {
-        let schema = body(generator);
+        let schema = body(bodies);
         operation["requestBody"] =
             json!({ "required": true, "content": {"application/json": {"schema": schema}} });
     }

@@ -2,6 +2,8 @@
 #![cfg(feature = "daemon")]
 
 mod common;
+mod daemon;
+mod doctor;
 mod faults;
 mod hangup;
 mod interpret;
