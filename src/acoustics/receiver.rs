@@ -266,7 +266,7 @@ impl Receiver {
         let already_there = first_us <= self.blanking_us + 1e-6;
         let cause = hearing.cause(first_us);
         let peak = if already_there {
-            hearing.relative_level(first_us)
+            hearing.level(first_us)
         } else {
             hearing.peak(first_us, cause.as_ref())
         };
@@ -284,8 +284,8 @@ impl Receiver {
             status,
             range_m: Some(self.range_m(first_us)),
             sound: cause,
-            amplitude: Some(peak * self.threshold_at(first_us)),
-            margin_db: Some(20.0 * peak.log10()),
+            amplitude: Some(peak),
+            margin_db: Some(20.0 * (peak / self.threshold_at(first_us)).log10()),
             echoes_us,
         }
     }
@@ -309,10 +309,12 @@ impl Receiver {
             status: PingStatus::NoEcho,
             range_m: None,
             sound,
-            amplitude: sound
-                .zip(peak)
-                .map(|(sound, peak)| peak * self.threshold_at(self.tof_us(&sound))),
-            margin_db: peak.map(|peak| 20.0 * peak.log10()),
+            amplitude: peak,
+            // It may have been strong enough, but not for long enough.
+            margin_db: sound.zip(peak).map(|(sound, peak)| {
+                let threshold = self.threshold_at(self.tof_us(&sound));
+                (20.0 * (peak / threshold).log10()).min(0.0)
+            }),
             echoes_us,
         }
     }

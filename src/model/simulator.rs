@@ -31,7 +31,7 @@ const MARGIN_KEPT_DB: f64 = 40.0;
 const PATHS_KEPT_DB: f64 = 20.0;
 
 /// What the transducer's own face is called among the walls of a path.
-const FACE_NAME: &str = "transducer";
+pub(super) const FACE_NAME: &str = "transducer";
 
 /// Bozma and Kuc's scattering strength of the right-angled edge that they scanned.
 const SIGMA_E: f64 = 0.095;

@@ -5,7 +5,7 @@
 
 use smallvec::SmallVec;
 
-use super::{Edge, Path, Reflector};
+use super::{Edge, Path, Reflector, simulator::FACE_NAME};
 use crate::{
     geometry::{DVec2, Mirror},
     scan::PathRecord,
@@ -36,13 +36,16 @@ impl Path {
             Some(edge) => Some(edge.place(scene)?),
             None => None,
         };
-        let whole = Way { scene, length_m };
-        match edge {
-            None => whole.there_and_back(position, &self.walls),
-            // The record does not say where among the walls the edge was met.
-            Some(edge) => (0..=self.walls.len())
-                .find_map(|split| whole.around(position, edge, self.walls.split_at(split))),
-        }
+        let way = Way { scene, from: position, length_m };
+        // The transducer's face sends the sound off again from where it started.
+        let rounds: Vec<&[Reflector]> = self.walls.split(|wall| *wall == Reflector::Face).collect();
+        let Some(edge) = edge else { return way.whole(&rounds, None) };
+        // The record does not say where among the walls the edge was met.
+        let places = rounds
+            .iter()
+            .enumerate()
+            .flat_map(|(round, walls)| (0..=walls.len()).map(move |split| (round, split)));
+        places.into_iter().find_map(|(round, split)| way.whole(&rounds, Some((edge, round, split))))
     }
 
     /// The path of a log's record in its scene; `None` if the scene lacks one of its names.
@@ -66,6 +69,9 @@ impl Edge {
 }
 
 fn reflector(scene: &Scene, name: &str) -> Option<Reflector> {
+    if name == FACE_NAME {
+        return Some(Reflector::Face);
+    }
     let wall = scene.walls.iter().position(|wall| &*wall.id == name);
     let cylinder = || scene.cylinders.iter().position(|cylinder| &*cylinder.id == name);
     wall.map(|index| Reflector::Wall(index as u32))
@@ -84,24 +90,34 @@ fn edge(scene: &Scene, name: &str) -> Option<Edge> {
 
 struct Way<'a> {
     scene: &'a Scene,
+    from: DVec2,
     length_m: f64,
 }
 
 impl Way<'_> {
-    fn there_and_back(&self, from: DVec2, walls: &[Reflector]) -> Option<Vec<DVec2>> {
-        let points = self.leg(from, from, walls)?;
+    /// All rounds one after the other; the edge lies in one of them, after so many of its walls.
+    fn whole(
+        &self,
+        rounds: &[&[Reflector]],
+        edge: Option<(DVec2, usize, usize)>,
+    ) -> Option<Vec<DVec2>> {
+        let mut points = vec![self.from];
+        for (number, walls) in rounds.iter().enumerate() {
+            let round = match edge {
+                Some((edge, round, split)) if round == number => {
+                    self.around(edge, walls.split_at(split))?
+                }
+                _ => self.leg(self.from, self.from, walls)?,
+            };
+            points.extend(round.into_iter().skip(1));
+        }
         self.has_length(&points).then_some(points)
     }
 
-    fn around(
-        &self,
-        from: DVec2,
-        edge: DVec2,
-        (out, back): (&[Reflector], &[Reflector]),
-    ) -> Option<Vec<DVec2>> {
-        let mut points = self.leg(from, edge, out)?;
-        points.extend(self.leg(edge, from, back)?.into_iter().skip(1));
-        self.has_length(&points).then_some(points)
+    fn around(&self, edge: DVec2, (out, back): (&[Reflector], &[Reflector])) -> Option<Vec<DVec2>> {
+        let mut points = self.leg(self.from, edge, out)?;
+        points.extend(self.leg(edge, self.from, back)?.into_iter().skip(1));
+        Some(points)
     }
 
     /// From one point to another over these reflectors.

@@ -121,17 +121,16 @@ impl<'a> Hearing<'a> {
         self.sounds.get(self.over + place).copied()
     }
 
-    /// The most of the envelope over the threshold while a sound lasts that begins at `t_us`.
+    /// The most of the envelope while a sound lasts that begins at `t_us`.
     pub(super) fn peak(&mut self, t_us: f64, sound: Option<&Sound>) -> f64 {
         const SAMPLES: u32 = 16;
         if self.receiver.combining == Combining::Ideal || self.is_alone(t_us, sound) {
-            let threshold = self.receiver.threshold_at(t_us);
-            return sound.map_or(0.0, |sound| sound.amplitude / threshold);
+            return sound.map_or(0.0, |sound| sound.amplitude);
         }
         let shape = &self.receiver.shape;
         let lasts_us = shape.first_us() + shape.last_us() - 2.0 * self.receiver.lead_us;
         (0..=SAMPLES)
-            .map(|i| self.relative_level(t_us + f64::from(i) / f64::from(SAMPLES) * lasts_us))
+            .map(|i| self.level(t_us + f64::from(i) / f64::from(SAMPLES) * lasts_us))
             .fold(0.0, f64::max)
     }
 
