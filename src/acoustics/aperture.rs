@@ -90,7 +90,7 @@ impl ApertureResponse {
         let head_on =
             Incidence { leaving_rad: 0.0, arriving_rad: 0.0, length_m: 2.0, image: Image::Swapped };
         let exponent = match sensor.gain {
-            Gain::Compensating { exponent } => exponent,
+            Gain::Compensating { exponent, .. } => exponent,
             Gain::Steps { .. } => 0.0,
         };
         let way_us = 2e6 / sound_speed_m_s;

@@ -14,8 +14,10 @@ pub use aperture::{ApertureResponse, Image, Incidence};
 pub use face::{Disc, Face, FaceAspect};
 pub use pulse::EchoShape;
 pub use receiver::{
-    Combining, Detection, EchoTrace, Hump, Incident, Receiver, ReceiverNoise, Sound, TracePoint,
-    classify_tof,
+    Combining, Detection, EchoTrace, Hump, Incident, Latch, Receiver, ReceiverNoise, Sound,
+    TracePoint, classify_tof,
 };
-pub use sensor::{Aperture, ChirpPart, Gain, GainStep, Pulse, Response, Sensor, SensorError};
+pub use sensor::{
+    Aperture, ChirpPart, EdgeLawKind, Gain, GainStep, Pulse, Response, Sensor, SensorError,
+};
 pub use transducer::{BeamPattern, kuc_siegel_response, piston_directivity};

@@ -33,11 +33,21 @@ pub use self::{
 };
 
 use self::hearing::Hearing;
-use super::{ApertureResponse, EchoShape, Gain, Incidence, Response, Sensor};
+use super::{ApertureResponse, EchoShape, Gain, GainStep, Incidence, Response, Sensor};
 use crate::scan::PingStatus;
 
 /// Most echoes a firing reports.
 const MOST_ECHOES: usize = 8;
+
+/// Whether ECHO is made ready again after it has risen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Latch {
+    /// It stays up until the next firing: only the first echo is timed.
+    #[default]
+    First,
+    /// A pulse on BLNK lets it fall after each echo, up to eight times.
+    Rearmed,
+}
 
 /// ECHO this soon after the end of blanking counts as raised by sound already there,
 /// microseconds: about one cycle at 50 kHz, 3.4 mm of range.
@@ -87,6 +97,8 @@ pub struct Receiver {
     /// How sounds are heard.
     pub combining: Combining,
     gain: Gain,
+    /// By step of the gain: its end, and what it makes of the threshold at 1 m.
+    sensitivity: SmallVec<[(f64, f64); 12]>,
     /// Carrier, radians a microsecond.
     omega: f64,
     /// How long the pulse nominally lasts, microseconds.
@@ -140,6 +152,7 @@ impl Receiver {
             sound_speed_m_s,
             max_range_m: sensor.max_range_m,
             combining: Combining::Coherent,
+            sensitivity: sensitivity(&sensor.gain),
             gain: sensor.gain.clone(),
             omega: 1e-6 * TAU * sensor.frequency_hz,
             pulse_us: 1e6 * sensor.pulse_s(),
@@ -165,14 +178,15 @@ impl Receiver {
         self.response.is_some() && matches!(self.combining, Combining::Coherent)
     }
 
-    /// Listens to the sounds of one firing, which come in order of their length.
+    /// Listens to the sounds of one firing, which come in order of their length, and is made ready
+    /// again after each echo.
     ///
     /// A sound that begins before the detector is ready and still lasts then raises ECHO at that
     /// moment: at the end of blanking that is the minimum range, whatever is really there. A
     /// sound that is over by then is lost.
     #[must_use]
     pub fn detect(&self, sounds: &[Sound]) -> Detection {
-        self.detection(&mut Hearing::new(self, sounds, &|_| None))
+        self.detection(&mut Hearing::new(self, sounds, &|_| None), Latch::Rearmed)
     }
 
     /// The same with the face's full response, if the sensor asks for it: `incident` tells how a
@@ -182,8 +196,9 @@ impl Receiver {
         &self,
         sounds: &[Sound],
         incident: &dyn Fn(&Sound) -> Option<Incident>,
+        latch: Latch,
     ) -> Detection {
-        self.detection(&mut Hearing::new(self, sounds, incident))
+        self.detection(&mut Hearing::new(self, sounds, incident), latch)
     }
 
     /// The same in noise.
@@ -196,8 +211,8 @@ impl Receiver {
         rng: &mut impl rand::Rng,
     ) -> Detection {
         let track = noise.track(self, rng);
-        let mut detection =
-            self.detection(&mut Hearing::new(self, sounds, incident).in_noise(&track));
+        let mut detection = self
+            .detection(&mut Hearing::new(self, sounds, incident).in_noise(&track), Latch::Rearmed);
         for (i, echo_us) in detection.echoes_us.iter_mut().enumerate() {
             let jitter_us = noise.jitter(rng);
             if i > 0 || detection.status != PingStatus::MinRange {
@@ -225,13 +240,8 @@ impl Receiver {
     /// The least amplitude noticed at a time after firing, microseconds.
     #[must_use]
     pub fn threshold_at(&self, t_us: f64) -> f64 {
-        match &self.gain {
-            Gain::Compensating { .. } => self.threshold,
-            Gain::Steps { .. } => {
-                let spreading = self.range_m(t_us).max(1e-3);
-                self.threshold * spreading / 10f64.powf(self.gain_db(t_us) / 20.0)
-            }
-        }
+        let step = self.sensitivity.iter().find(|step| t_us < step.0).or(self.sensitivity.last());
+        step.map_or(self.threshold, |step| self.threshold * self.range_m(t_us).max(1e-3) * step.1)
     }
 
     /// Gain at a time after firing, decibels above what makes up for the spreading from a wall
@@ -248,7 +258,7 @@ impl Receiver {
         }
     }
 
-    fn detection(&self, hearing: &mut Hearing) -> Detection {
+    fn detection(&self, hearing: &mut Hearing, latch: Latch) -> Detection {
         let mut echoes_us = SmallVec::new();
         let Some(first_us) = hearing.next_rise(self.blanking_us) else {
             return self.silence(hearing);
@@ -262,7 +272,8 @@ impl Receiver {
         };
         let mut last_us = first_us;
         echoes_us.push(first_us);
-        while echoes_us.len() < MOST_ECHOES
+        while latch == Latch::Rearmed
+            && echoes_us.len() < MOST_ECHOES
             && let Some(next_us) = hearing.next_rise(last_us + self.rearm_us)
         {
             echoes_us.push(next_us);
@@ -325,6 +336,13 @@ impl Receiver {
     fn tof_us(&self, sound: &Sound) -> f64 {
         sound.length_m / self.sound_speed_m_s * 1e6
     }
+}
+
+/// The ends of the gain's steps, microseconds, and the reciprocals of their gains.
+fn sensitivity(gain: &Gain) -> SmallVec<[(f64, f64); 12]> {
+    let Gain::Steps { steps } = gain else { return SmallVec::new() };
+    let end_us = |step: &GainStep| step.until_us.unwrap_or(f64::INFINITY);
+    steps.iter().map(|step| (end_us(step), 10f64.powf(-step.gain_db / 20.0))).collect()
 }
 
 /// The status of a measured reading from its first time of flight, microseconds, if any.

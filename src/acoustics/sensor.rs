@@ -59,6 +59,9 @@ pub struct Sensor {
     /// How the face answers to a pulse.
     #[serde(default, skip_serializing_if = "is_default")]
     pub response: Response,
+    /// What edges send back in the experiments that the figures come from; without it, `utd`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub edge_law: Option<EdgeLawKind>,
     /// Least amplitude that is detected, relative to a head-on, perfectly reflecting wall with
     /// gain compensation.
     pub threshold: f64,
@@ -165,12 +168,27 @@ pub enum Gain {
         /// is made up for by the length of its way, 0.5 in a plane, 1 in space.
         #[serde(default)]
         exponent: f64,
+        /// Whether it makes up for what the air absorbs as well.
+        #[serde(default)]
+        air: bool,
     },
     /// Rises in steps; between them the threshold in force drifts up with the range.
     Steps {
         /// The steps in order; the last one's `until_us` is `null`.
         steps: Vec<GainStep>,
     },
+}
+
+/// What edges send back; see [`EdgeLaw`](super::edge::EdgeLaw).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum EdgeLawKind {
+    /// By the wedge's angle and the aspect.
+    Utd,
+    /// One ratio to a plane at the same range.
+    KucSiegel,
+    /// One scattering strength, level with planes at the face.
+    BozmaKuc,
 }
 
 /// A step of the gain.
@@ -341,14 +359,20 @@ impl Pulse {
 
 impl Default for Gain {
     fn default() -> Self {
-        Self::Compensating { exponent: 0.0 }
+        Self::Compensating { exponent: 0.0, air: false }
     }
 }
 
 impl Gain {
+    /// Whether the absorption of the air is made up for.
+    #[must_use]
+    pub const fn makes_up_for_air(&self) -> bool {
+        matches!(self, Self::Compensating { air: true, .. })
+    }
+
     fn check(&self) -> Result<(), SensorError> {
         let steps = match self {
-            Self::Compensating { exponent } => return not_negative("gain.exponent", *exponent),
+            Self::Compensating { exponent, .. } => return not_negative("gain.exponent", *exponent),
             Self::Steps { steps } => steps,
         };
         positive("gain.steps (how many)", steps.len() as f64)?;

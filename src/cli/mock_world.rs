@@ -96,6 +96,36 @@ impl MockWorldArgs {
         Ok(MockBoard::new(settings, world))
     }
 
+    /// The same world for `sonard-emulator`, as far as it has one.
+    pub(super) fn emulator(&self, scene: &str) -> Result<Vec<String>, Failure> {
+        let refuse = |option: &str, instead: &str| {
+            Err(Failure::input(format!("the emulator has no {option}"), instead))
+        };
+        if self.faults.is_some() {
+            return refuse(
+                "--faults",
+                "they are the mock's; a supply that sags is `sonard-emulator --dips`",
+            );
+        }
+        if self.missed_steps > 0.0 {
+            return refuse(
+                "--missed-steps",
+                "its motor misses steps when --speed or --acceleration ask too much of it",
+            );
+        }
+        let mut options = vec![
+            format!("--scene={}", self.truth.as_deref().unwrap_or(scene)),
+            format!("--seed={}", self.seed),
+            format!("--noise-mm={}", self.noise_mm),
+            format!("--mounting-offset-deg={}", self.mounting_offset_deg),
+            format!("--steps-per-revolution={}", self.steps_per_revolution),
+        ];
+        if let Some(temperature_c) = self.truth_temperature_c {
+            options.push(format!("--truth-temperature-c={temperature_c}"));
+        }
+        Ok(options)
+    }
+
     fn truth_air(&self, believed: &Air) -> Result<Air, Failure> {
         let Some(temperature_c) = self.truth_temperature_c else { return Ok(*believed) };
         Air::new(temperature_c, believed.humidity_percent(), believed.pressure_kpa())

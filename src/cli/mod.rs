@@ -3,6 +3,7 @@
 #[cfg(feature = "pi")]
 mod board;
 mod compare;
+mod doctor;
 mod failure;
 mod interpret;
 mod log;
@@ -23,6 +24,7 @@ mod scene;
 mod scene_file;
 mod simulate;
 mod status;
+mod trace;
 mod watch;
 
 pub use failure::{Failure, Outcome};
@@ -61,12 +63,18 @@ enum Verb {
     #[cfg(feature = "pi")]
     #[command(long_about = board::ABOUT)]
     Board(board::Args),
+    /// Find out what is wrong with a ranger: port, firmware, motor, echo
+    #[command(long_about = doctor::ABOUT)]
+    Doctor(doctor::Args),
     /// Predict a scan with the model alone
     #[command(long_about = simulate::ABOUT)]
     Simulate(simulate::Args),
     /// List the ways that echoes take from a place
     #[command(long_about = paths::ABOUT)]
     Paths(paths::Args),
+    /// Show the echo trace of one firing, each hump with its path
+    #[command(long_about = trace::ABOUT)]
+    Trace(trace::Args),
     /// Compare a log's readings with the predictions beside them
     Compare(compare::Args),
     /// Tell planes, corners and edges apart in scans
@@ -103,6 +111,7 @@ pub fn main() -> ExitCode {
         Verb::Mock(args) => mock::run(&args),
         #[cfg(feature = "pi")]
         Verb::Board(args) => board::run(&args),
+        Verb::Doctor(args) => doctor::run(&args),
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
@@ -110,7 +119,8 @@ pub fn main() -> ExitCode {
         Verb::Map(args) => map::run(&args),
         Verb::MapScore(args) => map_score::run(&args),
         Verb::MapBenchmark(args) => map_benchmark::run(&args),
-        Verb::Plot(args) => plot::run(args),
+        Verb::Trace(args) => trace::run(&args),
+        Verb::Plot(args) => plot::run(&args),
         Verb::Log(verb) => log::run(verb),
         Verb::Scene(verb) => scene::run(verb),
     };

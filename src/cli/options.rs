@@ -68,7 +68,7 @@ pub(super) struct EngineArgs {
     /// Most mirror reflections on a path [default: as many as can matter]
     #[arg(long, value_name = "N")]
     max_order: Option<u32>,
-    /// How edges diffract [default: utd; `fan` has kuc-siegel only]
+    /// How edges diffract [default: the sensor's, or utd; `fan` has kuc-siegel only]
     #[arg(long, value_enum)]
     edge_law: Option<EdgeLaw>,
     /// Angle between the rays of `fan`, degrees
@@ -119,6 +119,11 @@ impl EdgeLaw {
 }
 
 impl SensorArgs {
+    /// The same for `sonard-emulator`, with the blanking that came of it.
+    pub(super) fn emulator(&self, sensor: &Sensor) -> [String; 2] {
+        [format!("--sensor={}", self.sensor), format!("--blanking-us={}", sensor.blanking_us)]
+    }
+
     /// The sensor named: a file if there is one of that name, else a preset; with its blanking as
     /// asked for.
     pub(super) fn sensor(&self) -> Result<Sensor, Failure> {
@@ -175,6 +180,15 @@ fn refuse_sensor(name: &str, error: &SensorError) -> Failure {
 }
 
 impl AirArgs {
+    /// The same for `sonard-emulator`.
+    pub(super) fn emulator(&self) -> [String; 3] {
+        [
+            format!("--temperature-c={}", self.temperature_c),
+            format!("--humidity-percent={}", self.humidity_percent),
+            format!("--pressure-kpa={}", self.pressure_kpa),
+        ]
+    }
+
     /// The air described.
     pub(super) fn air(&self) -> Result<Air, Failure> {
         Air::new(self.temperature_c, self.humidity_percent, self.pressure_kpa)

@@ -1,5 +1,6 @@
 //! `sonard scan`.
 
+mod emulator;
 mod output;
 mod setup;
 mod summary;
@@ -23,17 +24,18 @@ use crate::{
     ranger::{DriveError, Driver, Motion, Ranger, ScanError, ScanSummary},
     scan::Record,
 };
+use emulator::Emulator;
 use output::Output;
 use setup::Setup;
 
 /// How often a request is sent before the device counts as gone: some nine seconds, in which a
 /// board that the opening of its port has reset is long awake.
-const ATTEMPTS: u8 = 7;
+pub(super) const ATTEMPTS: u8 = 7;
 
 /// Options of `sonard scan`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
-#[command(group(clap::ArgGroup::new("device").required(true).args(["port", "mock"])))]
+#[command(group(clap::ArgGroup::new("device").required(true).args(["port", "mock", "emulator"])))]
 pub(super) struct Args {
     /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number
     #[arg(long, value_name = "PATH|ID")]
@@ -41,6 +43,9 @@ pub(super) struct Args {
     /// Use a mock ranger instead of a real one
     #[arg(long)]
     mock: bool,
+    /// Use the firmware's machine code in an emulated board (starts sonard-emulator)
+    #[arg(long)]
+    emulator: bool,
     #[command(flatten)]
     place: PlaceArgs,
     /// Write scan.jsonl, scan.svg and scan.png to this folder instead of records to standard output
@@ -108,6 +113,7 @@ const EXAMPLES: &str = "\
 Examples:
   sonard scan --mock --scene simple-room --pose fig9 --out out/fig9
   sonard scan --port /dev/ttyACM0 --scene my-room.json --pose 1.2,0.8,90 --max-range 4 --out out
+  sonard scan --emulator --scene simple-room --pose fig9 --max-range 4 --out out/emulated
   sonard scan --mock --scene corridor --pose beside-wall --to-deg 45 | sonard compare -
   sonard scan --mock --scene simple-room --pose fig9 --faults flip=0.001,reset=0.005 --out noisy
 
@@ -131,7 +137,16 @@ async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
         true => Some(start_mock(args.world.board(&setup.belief())?)?),
         false => None,
     };
-    let port = mock.as_ref().map_or_else(|| args.port.clone().unwrap_or_default(), Mock::port);
+    let emulator = match args.emulator {
+        true => Some(Emulator::start(args, setup)?),
+        false => None,
+    };
+    let port = mock
+        .as_ref()
+        .map(Mock::port)
+        .or_else(|| emulator.as_ref().map(Emulator::port))
+        .or_else(|| args.port.clone())
+        .unwrap_or_default();
     let mut ranger = meet(&port, &interrupts).await?;
     let job = setup.job(ranger.identity())?;
     output.record(&Record::Session(Box::new(setup.session(ranger.identity()))))?;

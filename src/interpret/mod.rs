@@ -15,6 +15,7 @@ mod differentiate;
 mod extent;
 mod feature;
 pub mod grid;
+pub mod lines;
 mod next;
 pub mod prediction;
 mod region;

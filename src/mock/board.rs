@@ -330,8 +330,22 @@ impl MockBoard {
     }
 
     fn fire(&mut self, window_ticks: u32, max_echoes: u8) {
+        let (stuck, silent) = self.faults.of_module();
+        if stuck {
+            // Not fired: the machine is told at once.
+            let report = Box::new(EchoReport {
+                fired_ticks: self.now as u32,
+                status: ReadingStatus::ModuleFault,
+                echoes: Echoes::new(),
+            });
+            self.activity = Activity::Listening { report, until: self.now };
+            return;
+        }
         let fired = self.now + FIRE_LEAD_TICKS;
-        let heard = self.world.fire(window_ticks, TICK_HZ);
+        let mut heard = self.world.fire(window_ticks, TICK_HZ);
+        if silent {
+            heard.clear();
+        }
         let mut echoes = Echoes::from_ticks(&heard);
         echoes.truncate(max_echoes);
         let status = if echoes.is_empty() { ReadingStatus::NoEcho } else { ReadingStatus::Echo };

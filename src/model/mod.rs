@@ -3,6 +3,7 @@
 //! An [`Engine`] finds the echoes that reach the transducer's face; the receiver decides which
 //! of them is detected. [`Simulator`] joins the two.
 
+mod batch;
 mod cone;
 mod fan;
 pub mod paths;
@@ -11,11 +12,14 @@ mod simulator;
 mod station;
 #[cfg(test)]
 mod tests;
+mod way;
 
 pub use cone::Cone;
 pub use fan::{Fan, FanSettings};
-pub use simulator::{EdgeLawKind, EngineKind, ModelError, Options, Simulator};
+pub use simulator::{EngineKind, ModelError, Options, Simulator};
 pub use station::Station;
+
+pub use crate::acoustics::EdgeLawKind;
 
 use smallvec::SmallVec;
 
@@ -118,6 +122,7 @@ pub struct Prediction {
     pub amplitude: Option<f64>,
     /// The same above the threshold in force, decibels; negative for `NoEcho`: what it lacked.
     pub margin_db: Option<f64>,
-    /// Times after firing at which the module raises ECHO, microseconds, at most eight.
+    /// Times after firing at which the module raises ECHO, microseconds: the first, or up to eight
+    /// where the receiver was made ready again.
     pub echoes_us: SmallVec<[f64; 8]>,
 }

@@ -15,7 +15,8 @@ use super::{
 };
 use crate::{
     acoustics::{
-        Air, BeamPattern, Combining, Disc, Receiver, Response, Sensor, SensorError, edge::EdgeLaw,
+        Air, BeamPattern, Combining, Disc, EdgeLawKind, Receiver, Response, Sensor, SensorError,
+        edge::EdgeLaw,
     },
     geometry::{DVec2, Pose},
     scan::{ModelRecord, PathRecord, ScanPlan, SimRecord},
@@ -60,18 +61,6 @@ impl EngineKind {
     }
 }
 
-/// What edges send back; see [`EdgeLaw`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum EdgeLawKind {
-    /// [`EdgeLaw::Utd`].
-    Utd,
-    /// [`EdgeLaw::KucSiegel`].
-    KucSiegel,
-    /// [`EdgeLaw::BozmaKuc`] with their 0.095 and the sensor's far field.
-    BozmaKuc,
-}
-
 /// Settings of the model; what is `None` comes from the sensor or the engine.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -93,7 +82,7 @@ pub struct Options {
     pub lossless: bool,
     /// Most mirror reflections on a path (`paths`, `fan`); without it, as many as can matter.
     pub max_order: Option<u32>,
-    /// What edges send back (`paths`; without it, `utd`). `fan` has Kuc and Siegel's law only.
+    /// What edges send back (`paths`; without it, the sensor's law). `fan` has Kuc and Siegel's law only.
     pub edge_law: Option<EdgeLawKind>,
     /// Angle between the rays of `fan`, degrees. The default reads the same as a finer fan in
     /// every shipped scene as long as no round body is met (there is a test).
@@ -337,7 +326,7 @@ fn path_settings(
     receiver: &Receiver,
 ) -> paths::Settings {
     let wave_number_per_m = TAU * sensor.frequency_hz / receiver.sound_speed_m_s;
-    let law = match options.edge_law {
+    let law = match options.edge_law.or(sensor.edge_law) {
         None | Some(EdgeLawKind::Utd) => EdgeLaw::Utd,
         Some(EdgeLawKind::KucSiegel) => EdgeLaw::KucSiegel,
         Some(EdgeLawKind::BozmaKuc) => EdgeLaw::BozmaKuc {
@@ -356,7 +345,10 @@ fn path_settings(
 }
 
 fn absorption_db_per_m(sensor: &Sensor, air: &Air, options: &Options) -> f64 {
-    if options.lossless { 0.0 } else { air.absorption_db_per_m(sensor.frequency_hz) }
+    if options.lossless || sensor.gain.makes_up_for_air() {
+        return 0.0;
+    }
+    air.absorption_db_per_m(sensor.frequency_hz)
 }
 
 fn fan_settings(sensor: &Sensor, air: &Air, options: &Options, receiver: &Receiver) -> FanSettings {

@@ -4,7 +4,7 @@ use rand::Rng;
 
 use super::{Arrival, Prediction, Simulator, Survey};
 use crate::{
-    acoustics::{Detection, EchoTrace, Image, Incidence, Incident, ReceiverNoise, Sound},
+    acoustics::{Detection, EchoTrace, Image, Incidence, Incident, Latch, ReceiverNoise, Sound},
     geometry::wrap_pi,
     scan::PathKind,
 };
@@ -20,19 +20,31 @@ impl<'a> Station<'a> {
         Self { simulator, survey }
     }
 
-    /// The reading of a firing in a world direction, radians counter-clockwise from +x.
+    /// The reading of a firing in a world direction, radians counter-clockwise from +x: the first
+    /// echo, which latches ECHO.
     #[must_use]
     pub fn ping(&self, direction_rad: f64) -> Prediction {
+        self.listen(direction_rad, Latch::First)
+    }
+
+    /// The same with the receiver made ready again after each echo, up to eight times.
+    #[must_use]
+    pub fn ping_rearmed(&self, direction_rad: f64) -> Prediction {
+        self.listen(direction_rad, Latch::Rearmed)
+    }
+
+    fn listen(&self, direction_rad: f64, latch: Latch) -> Prediction {
         let (receiver, sounds) = (self.simulator.receiver(), self.sounds(direction_rad));
         let detection = if receiver.asks_incidents() {
-            receiver.detect_at_face(&sounds, &|sound| Some(self.incident(direction_rad, sound)))
+            let incident = |sound: &Sound| Some(self.incident(direction_rad, sound));
+            receiver.detect_at_face(&sounds, &incident, latch)
         } else {
-            receiver.detect(&sounds)
+            receiver.detect_at_face(&sounds, &|_| None, latch)
         };
         self.prediction(direction_rad, detection)
     }
 
-    /// The same in noise: the same generator in the same state gives the same reading.
+    /// [`ping_rearmed`](Self::ping_rearmed) in noise: the same generator in the same state gives the same reading.
     #[must_use]
     pub fn ping_in_noise(
         &self,

@@ -1,9 +1,11 @@
 //! The engines against closed forms, laws, and the phenomena of Dudek, Jenkin, Milios and Wilkes.
 
 mod closed_forms;
+mod extents;
 mod full_wave;
 mod laws;
 mod phenomena;
+mod ways;
 
 use std::sync::Arc;
 

@@ -271,6 +271,19 @@ pub struct PathRecord {
     pub length_m: f64,
 }
 
+impl PathRecord {
+    /// The walls in order; for a bent path the edge in front.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let walls = self.walls.join(", ");
+        match &self.edge {
+            Some(edge) if walls.is_empty() => format!("edge {edge}"),
+            Some(edge) => format!("edge {edge} by {walls}"),
+            None => walls,
+        }
+    }
+}
+
 /// A scan is over.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanEnd {

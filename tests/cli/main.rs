@@ -3,6 +3,7 @@
 
 mod common;
 mod daemon;
+mod doctor;
 mod faults;
 mod hangup;
 mod interpret;
@@ -11,4 +12,5 @@ mod paths;
 mod plot;
 mod scan;
 mod scene;
+mod trace;
 mod wrong_input;

@@ -213,9 +213,10 @@ pub fn after_noise_it_answers_at_once(mut bench: Bench<impl DeviceUnderTest>) {
     let noises = [&right[..7], &changed[..], &[0xaa; 200], &[0; 40], &[1, 0, 2, 0, 0xff, 0]];
     for (seq, noise) in (10..).zip(noises) {
         bench.device.send(noise);
+        bench.device.run(40_000).expect("runs");
         // Whatever is still open ends here.
         bench.device.send(&[0]);
-        bench.device.run(40_000).expect("runs");
+        bench.device.run(5_000).expect("runs");
         bench.device.receive();
         let told = answer(&mut bench, boot, seq, &Request::Status);
         assert!(matches!(told, Reply::StatusReport(_)), "{told:?}");
@@ -225,8 +226,9 @@ pub fn after_noise_it_answers_at_once(mut bench: Bench<impl DeviceUnderTest>) {
     // The host machine takes over the numbering.
     identify(&mut bench);
     let status = status(&mut bench);
-    let dropped = status.dropped_checksum + status.dropped_stuffing + status.dropped_too_long;
-    assert!(dropped >= 4, "{status:?}");
+    let damaged = status.dropped_checksum + status.dropped_stuffing;
+    let flooded = status.dropped_too_long + status.dropped_line;
+    assert!(damaged >= 3 && flooded >= 1, "{status:?}");
 }
 
 /// For a while the host hears nothing: the device holds when its memory is full.
@@ -406,5 +408,5 @@ fn answer(
     bench.device.run(30_000).expect("runs");
     let replies = replies(&bench.device.receive());
     let told = replies.iter().find(|(answered, _)| *answered == seq);
-    told.unwrap_or_else(|| panic!("no answer to {request:?}: {replies:?}")).1
+    told.unwrap_or_else(|| panic!("no answer to {request:?}, number {seq}: {replies:?}")).1
 }

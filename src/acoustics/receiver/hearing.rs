@@ -4,8 +4,6 @@
 //! between are summed. Where their strengths together can't reach the threshold nothing is summed;
 //! where one sound is alone its rise is looked up in the table of the pulse.
 
-use std::borrow::Cow;
-
 use num_complex::Complex64;
 
 use super::{Combining, Incident, Receiver, Sound, noise::NoiseTrack};
@@ -33,7 +31,7 @@ pub(super) struct Hearing<'a> {
     incident: &'a dyn Fn(&Sound) -> Option<Incident>,
     noise: Option<&'a NoiseTrack>,
     /// Sounds that have begun, the first `over` of which are over.
-    parts: Vec<Part<'a>>,
+    parts: Vec<Part>,
     over: usize,
     /// Power of the time by which the gain rises.
     exponent: f64,
@@ -42,14 +40,21 @@ pub(super) struct Hearing<'a> {
     span_us: (f64, f64),
 }
 
-struct Part<'a> {
+struct Part {
     tof_us: f64,
     /// Phase and strength, to be multiplied with the shape and with what the gain adds while it
     /// sounds.
     field: Complex64,
     /// The most of its modulus.
     strength: f64,
-    shape: Cow<'a, EchoShape>,
+    /// Its own shape; without it, the pulse's.
+    shape: Option<Box<EchoShape>>,
+}
+
+impl Part {
+    const fn gone(tof_us: f64) -> Self {
+        Self { tof_us, field: Complex64::ZERO, strength: 0.0, shape: None }
+    }
 }
 
 impl<'a> Hearing<'a> {
@@ -65,10 +70,10 @@ impl<'a> Hearing<'a> {
             sounds,
             incident,
             noise: None,
-            parts: Vec::new(),
+            parts: Vec::with_capacity(sounds.len()),
             over: 0,
             exponent: match receiver.gain {
-                Gain::Compensating { exponent } => exponent,
+                Gain::Compensating { exponent, .. } => exponent,
                 Gain::Steps { .. } => 0.0,
             },
             least_threshold: least_threshold(receiver),
@@ -160,7 +165,7 @@ impl<'a> Hearing<'a> {
         if self.noise.is_some() || self.receiver.response.is_some() {
             return false;
         }
-        self.enter(t_us + self.span_us.1);
+        self.enter(t_us + self.span_us.1, t_us);
         let first_us = t_us - self.span_us.1 + self.span_us.0;
         let others = self.sounds[..self.parts.len()]
             .iter()
@@ -259,16 +264,16 @@ impl<'a> Hearing<'a> {
     /// When a sound alone passes the threshold after `t_us`, and when it is last above.
     fn lone_rise(&self, part: &Part, t_us: f64) -> Option<(f64, f64)> {
         let at = |offset_us: f64| part.tof_us + offset_us - self.receiver.lead_us;
+        let field = part.field.norm();
+        let level_at =
+            |t_us: f64| self.receiver.threshold_at(t_us) / (field * self.rise_of_gain(t_us));
         let mut rise_us = part.tof_us;
         // The threshold drifts with the range, and the gain with the time.
-        for _ in 0..3 {
-            let level = self.receiver.threshold_at(rise_us)
-                / (part.field.norm() * self.rise_of_gain(rise_us));
-            rise_us = at(part.shape.rise_us(level)?);
+        for _ in 0..2 {
+            rise_us = at(self.shape(part).rise_us(level_at(rise_us))?);
         }
-        let level =
-            self.receiver.threshold_at(rise_us) / (part.field.norm() * self.rise_of_gain(rise_us));
-        (rise_us >= t_us).then_some((rise_us, at(part.shape.fall_us(level)?)))
+        let fall_us = at(self.shape(part).fall_us(level_at(rise_us))?);
+        (rise_us >= t_us).then_some((rise_us, fall_us))
     }
 
     /// Whether the gain rises by a step while a sound lasts.
@@ -356,7 +361,11 @@ impl<'a> Hearing<'a> {
     }
 
     fn shape_at(&self, part: &Part, t_us: f64) -> Complex64 {
-        part.shape.at(t_us - part.tof_us + self.receiver.lead_us)
+        self.shape(part).at(t_us - part.tof_us + self.receiver.lead_us)
+    }
+
+    fn shape<'p>(&'p self, part: &'p Part) -> &'p EchoShape {
+        part.shape.as_deref().unwrap_or(&self.receiver.shape)
     }
 
     /// What the gain adds while an echo sounds; the other half is in the fields.
@@ -371,39 +380,41 @@ impl<'a> Hearing<'a> {
 
     /// Lets sounds enter and leave up to a time.
     fn advance(&mut self, t_us: f64) {
-        self.enter(t_us);
+        self.enter(t_us, t_us);
         if self.receiver.combining == Combining::Coherent {
             let is_over = |part: &Part| part.tof_us + self.span_us.1 < t_us;
             self.over += self.parts[self.over..].iter().take_while(|part| is_over(part)).count();
         }
     }
 
-    /// Lets sounds enter that begin up to a time.
-    fn enter(&mut self, t_us: f64) {
+    /// Lets sounds enter that begin up to a time; what is over by `now_us` only keeps its place.
+    fn enter(&mut self, t_us: f64, now_us: f64) {
         while let Some(sound) = self.sounds.get(self.parts.len()) {
             let tof_us = self.receiver.tof_us(sound);
             if tof_us + self.span_us.0 > t_us {
                 break;
             }
-            let part = self.part(sound, tof_us);
+            let is_over = tof_us + self.span_us.1 < now_us;
+            let part = if is_over { Part::gone(tof_us) } else { self.part(sound, tof_us) };
             self.parts.push(part);
         }
     }
 
-    fn part(&self, sound: &Sound, tof_us: f64) -> Part<'a> {
+    fn part(&self, sound: &Sound, tof_us: f64) -> Part {
         let receiver = self.receiver;
         let at_face = receiver.response.as_ref().and_then(|response| {
             let Incident { strength, incidence } = (self.incident)(sound)?;
             Some((strength, response.echo(&incidence)))
         });
         let (strength, shape) = match at_face {
-            Some((strength, Some(shape))) => (strength, Cow::Owned(shape)),
-            Some((_, None)) => (0.0, Cow::Borrowed(&receiver.shape)),
-            None => (sound.amplitude, Cow::Borrowed(&receiver.shape)),
+            Some((strength, Some(shape))) => (strength, Some(Box::new(shape))),
+            Some((_, None)) => (0.0, None),
+            None => (sound.amplitude, None),
         };
         let turn = sound.phase_rad - receiver.omega * tof_us;
         let field = Complex64::from_polar(strength / self.rise_of_gain(tof_us), turn);
-        let strength = field.norm() * shape.peak();
+        let peak = shape.as_deref().unwrap_or(&receiver.shape).peak();
+        let strength = strength / self.rise_of_gain(tof_us) * peak;
         Part { tof_us, field, strength, shape }
     }
 }

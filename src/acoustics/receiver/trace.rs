@@ -1,6 +1,6 @@
 //! What an oscilloscope would show of a firing.
 
-use super::{Detection, Incident, Receiver, Sound, hearing::Hearing};
+use super::{Detection, Incident, Latch, Receiver, Sound, hearing::Hearing};
 
 /// The signal of one firing against time.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,7 +82,7 @@ impl Receiver {
             humps: humps
                 .map(|(sound, &peak)| Hump { sound: *sound, tof_us: self.tof_us(sound), peak })
                 .collect(),
-            detection: self.detect_at_face(sounds, incident),
+            detection: self.detect_at_face(sounds, incident, Latch::Rearmed),
         }
     }
 }

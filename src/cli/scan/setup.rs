@@ -25,7 +25,7 @@ pub(super) struct Setup {
     pub(super) simulator: Simulator,
     motion: Motion,
     max_range_m: f64,
-    sensor: Sensor,
+    pub(super) sensor: Sensor,
     air: Air,
     options: Options,
     predictions: Vec<SimRecord>,
@@ -71,6 +71,12 @@ impl Setup {
             air: &self.air,
             options: &self.options,
         }
+    }
+
+    /// The pose as options take it.
+    pub(super) fn pose_numbers(&self) -> String {
+        let Pose { x_m, y_m, heading_deg } = self.pose;
+        format!("{x_m},{y_m},{heading_deg}")
     }
 
     /// The scan for a device of this identity.

@@ -11,6 +11,9 @@ mod image;
 mod polar;
 mod score;
 
+#[cfg(test)]
+mod tests;
+
 pub use beam_model::{BeamModel, GaussianBeam, PhysicalBeam};
 pub use ideal::ideal;
 pub use image::{ImageError, MapYaml, from_pgm, to_pgm};

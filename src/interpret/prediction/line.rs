@@ -28,13 +28,12 @@ pub struct Line {
 }
 
 impl Line {
-    /// Across the beam at its reading, as long as the beam is wide there (step 1).
+    /// Across the beam at its reading, as long as the beam is wide there (step 1); its normal may
+    /// be off the beam's axis by what a feature that is heard may be.
     pub(super) fn of_reading(
-        index: u32,
-        from: DVec2,
-        axis_rad: f64,
-        range_m: f64,
+        (index, from, axis_rad, range_m): (u32, DVec2, f64, f64),
         half_rad: f64,
+        spread_rad: f64,
     ) -> Self {
         let axis = DVec2::from_angle(axis_rad);
         let across = range_m * half_rad.tan() * axis.perp();
@@ -43,7 +42,7 @@ impl Line {
             a: middle - across,
             b: middle + across,
             normal_rad: axis_rad,
-            spread_rad: half_rad,
+            spread_rad,
             support: 1.0,
             seen_from: from,
             readings: vec![index],

@@ -9,6 +9,9 @@
 mod confidence;
 mod line;
 
+#[cfg(test)]
+mod tests;
+
 pub use confidence::{combine, of_angle, of_distance};
 pub use line::Line;
 
@@ -154,10 +157,11 @@ impl FeaturePrediction {
     /// Steps 1 and 2: the sonar map `S`.
     fn predict(&self, beams: &[Ray]) -> Vec<Line> {
         let half_rad = (self.settings.beam_deg / 2.0).to_radians();
+        let omega_rad = self.settings.omega_deg.to_radians();
         let mut seen: Vec<Line> = Vec::new();
         for beam in beams.iter().filter(|beam| beam.echo) {
-            let line =
-                Line::of_reading(beam.index, beam.from, beam.axis_rad, beam.range_m, half_rad);
+            let reading = (beam.index, beam.from, beam.axis_rad, beam.range_m);
+            let line = Line::of_reading(reading, half_rad, omega_rad);
             // Neighbouring beams see the same wall, so the last features are the likely ones.
             match seen.iter_mut().rev().find(|other| self.similar(other, &line)) {
                 Some(other) => other.merge(&line),

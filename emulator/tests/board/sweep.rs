@@ -1,11 +1,9 @@
 //! Whole sweeps over the emulated line, with the real host machine.
 
-mod common;
-
 use std::path::Path;
 use std::sync::Arc;
 
-use common::{readings, ready, settings};
+use crate::common::{readings, ready, settings};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{ReadingStatus, Settings, Sweep, limits::TICK_HZ};
 use sonard::acoustics::{Air, Sensor};
@@ -40,13 +38,13 @@ const FOUR_METRES: Settings =
 #[test]
 fn a_sweep_of_400_beams_takes_what_physics_takes() {
     let mut bench = ready(world(), FOUR_METRES);
-    bench.emulator.take_init_rises();
+    bench.device.take_init_rises();
     let before = bench.bytes;
     let events = bench.perform(Command::Sweep(PLAN), 60.0).expect("sweeps");
     let mut readings = readings(&events);
     readings.sort_by_key(|reading| reading.index);
     assert_eq!(readings.len(), 400);
-    assert_eq!(bench.emulator.take_init_rises().len(), 400, "one firing for a beam");
+    assert_eq!(bench.device.take_init_rises().len(), 400, "one firing for a beam");
     let (first, last) = (readings[0], readings[399]);
     let span = last.fired_ticks.wrapping_sub(first.fired_ticks) + FOUR_METRES.window_ticks;
     let duration_s = f64::from(span) / f64::from(TICK_HZ);

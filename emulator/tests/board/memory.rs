@@ -1,10 +1,8 @@
 //! Flash and memory of the firmware against its limits, with the stack as deep as it gets.
 
-mod common;
-
 use std::process::Command as Process;
 
-use common::{commanded, elf, ready, settings};
+use crate::common::{commanded, elf, ready, settings};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{Blanking, Settings, Sweep};
 use rand::{Rng as _, SeedableRng as _};
@@ -47,14 +45,14 @@ fn deepest_stack() -> usize {
     while bench.host.is_busy() {
         let mut noise = [0; 40];
         random.fill_bytes(&mut noise);
-        bench.emulator.send(&noise);
+        bench.device.send(&noise);
         bench.run(0.05).expect("runs");
     }
     for command in [Command::Status, Command::Home, Command::Ping, Command::Identify] {
         bench.perform(command, 20.0).expect("works");
     }
     bench.perform(Command::Reset, 5.0).expect("restarts");
-    bench.emulator.stack_bytes()
+    bench.device.stack_bytes()
 }
 
 #[test]

@@ -1,8 +1,6 @@
 //! Times of flight, to the tick of 0.5 us.
 
-mod common;
-
-use common::{commanded, readings, ready, settings};
+use crate::common::{commanded, readings, ready, settings};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{Blanking, ReadingStatus, Settings};
 use sonard_emulator::{CYCLES_PER_TICK, HZ};
@@ -19,20 +17,20 @@ const SHORT: Settings = Settings {
 #[test]
 fn from_1_to_60_ms_at_every_phase_of_the_prescaler_within_a_tick() {
     let mut bench = ready(commanded(&[]), SHORT);
-    bench.emulator.take_init_rises();
+    bench.device.take_init_rises();
     // Odd, so that the delays run through all eight phases of a tick.
     let stride = 301;
     let (mut pings, mut phases, mut worst) = (0, [0_u32; 8], 0.0_f64);
     let mut after = MS;
     while after <= 60 * MS {
-        bench.emulator.set_surroundings(Box::new(commanded(&[after])));
+        bench.device.set_surroundings(Box::new(commanded(&[after])));
         let events = bench.perform(Command::Ping, 2.0).expect("pings");
         let reading = readings(&events)[0];
         assert_eq!(reading.echoes.len(), 1, "{after} cycles: {reading:?}");
         let error = f64::from(reading.echoes[0]) - after as f64 / CYCLES_PER_TICK as f64;
         assert!(error.abs() <= 1.0, "{after} cycles: {error} ticks off");
         worst = worst.max(error.abs());
-        let rises = bench.emulator.take_init_rises();
+        let rises = bench.device.take_init_rises();
         assert_eq!(rises.len(), 1, "{after} cycles: one firing for a ping, {rises:?}");
         phases[(after % 8) as usize] += 1;
         pings += 1;
@@ -46,11 +44,11 @@ fn from_1_to_60_ms_at_every_phase_of_the_prescaler_within_a_tick() {
 #[test]
 fn the_time_of_firing_is_the_devices_own_time_of_init() {
     let mut bench = ready(commanded(&[5 * MS]), settings());
-    bench.emulator.take_init_rises();
+    bench.device.take_init_rises();
     let mut offsets = Vec::new();
     for _ in 0..50 {
         let events = bench.perform(Command::Ping, 2.0).expect("pings");
-        let rise = bench.emulator.take_init_rises()[0];
+        let rise = bench.device.take_init_rises()[0];
         let ticks = (rise / CYCLES_PER_TICK) as u32;
         offsets.push(readings(&events)[0].fired_ticks.wrapping_sub(ticks) as i32);
         // Another place on the 16-bit counter each time, its turns included.
@@ -64,11 +62,11 @@ fn every_place_of_the_counter_fires_once() {
     // Firing near a wrap of the 16-bit counter is where a compare unit could be seen twice.
     let quick = Settings { window_ticks: 2_000, ..SHORT };
     let mut bench = ready(commanded(&[MS / 2 + 100]), quick);
-    bench.emulator.take_init_rises();
+    bench.device.take_init_rises();
     let mut near_wrap = 0;
     for _ in 0..2_000 {
         bench.perform(Command::Ping, 2.0).expect("pings");
-        let rises = bench.emulator.take_init_rises();
+        let rises = bench.device.take_init_rises();
         assert_eq!(rises.len(), 1);
         let place = rises[0] / CYCLES_PER_TICK % 65_536;
         near_wrap += u32::from(!(600..64_936).contains(&place));
@@ -86,7 +84,7 @@ fn several_echoes_come_within_two_ticks() {
         let echoes: Vec<u64> = (0..8)
             .map(|k| 2 * MS + round * 1_003 + k * (MS + 37 * round) + (round * k) % 8)
             .collect();
-        bench.emulator.set_surroundings(Box::new(commanded(&echoes)));
+        bench.device.set_surroundings(Box::new(commanded(&echoes)));
         let events = bench.perform(Command::Ping, 2.0).expect("pings");
         let reading = readings(&events)[0];
         assert_eq!(reading.echoes.len(), 8, "{echoes:?}: {reading:?}");
@@ -106,7 +104,7 @@ fn only_as_many_echoes_as_asked_for_and_none_behind_the_window() {
     let events = bench.perform(Command::Ping, 2.0).expect("pings");
     assert_eq!(readings(&events)[0].echoes[..], [8_000, 12_000]);
     // The window is 24 ms.
-    bench.emulator.set_surroundings(Box::new(commanded(&[25 * MS])));
+    bench.device.set_surroundings(Box::new(commanded(&[25 * MS])));
     let events = bench.perform(Command::Ping, 2.0).expect("pings");
     assert_eq!(readings(&events)[0].status, ReadingStatus::NoEcho);
 }
@@ -125,12 +123,12 @@ fn internal_blanking_keeps_the_module_deaf_and_a_short_one_does_not() {
 #[test]
 fn a_module_whose_echo_hangs_high_is_not_fired() {
     let mut bench = ready(commanded(&[5 * MS]), settings());
-    bench.emulator.take_init_rises();
-    bench.emulator.stick_echo(true);
+    bench.device.take_init_rises();
+    bench.device.stick_echo(true);
     let events = bench.perform(Command::Ping, 2.0).expect("is told");
     assert_eq!(readings(&events)[0].status, ReadingStatus::ModuleFault);
-    assert!(bench.emulator.take_init_rises().is_empty());
-    bench.emulator.stick_echo(false);
+    assert!(bench.device.take_init_rises().is_empty());
+    bench.device.stick_echo(false);
     let events = bench.perform(Command::Ping, 2.0).expect("pings");
     assert_eq!(readings(&events)[0].echoes[..], [10_000]);
 }

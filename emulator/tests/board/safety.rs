@@ -1,8 +1,6 @@
 //! What happens when something goes wrong: on the line, with the host, with the chip.
 
-mod common;
-
-use common::{commanded, readings, ready, settings};
+use crate::common::{commanded, readings, ready, settings};
 use firmware_protocol::host::{Command, HostError, HostEvent, Outcome};
 use firmware_protocol::messages::{FaultKind, ResetCause, Settings, Status, Sweep};
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
@@ -30,14 +28,14 @@ fn sweeping() -> Bench {
 
 /// No firing and no current from now on.
 fn assert_safe(bench: &mut Bench) {
-    assert!(!bench.emulator.is_firing());
-    assert!(!bench.emulator.holds_coils());
-    bench.emulator.take_init_rises();
-    bench.emulator.take_pulses();
-    bench.emulator.run(HZ).expect("runs");
-    assert!(bench.emulator.take_init_rises().is_empty());
-    assert!(bench.emulator.take_pulses().is_empty());
-    assert!(!bench.emulator.holds_coils());
+    assert!(!bench.device.is_firing());
+    assert!(!bench.device.holds_coils());
+    bench.device.take_init_rises();
+    bench.device.take_pulses();
+    bench.device.run(HZ).expect("runs");
+    assert!(bench.device.take_init_rises().is_empty());
+    assert!(bench.device.take_pulses().is_empty());
+    assert!(!bench.device.holds_coils());
 }
 
 fn status(bench: &mut Bench) -> Status {
@@ -63,9 +61,9 @@ fn noise_at_line_speed_for_a_minute_never_wedges_it() {
     let mut random = rand_pcg::Pcg64::seed_from_u64(9);
     let mut bench = ready(commanded(&[5 * MS]), settings());
     // Frames to damage: what the host says to begin a sweep, caught on the line.
-    bench.host.start(bench.emulator.now_us(), Command::Status).expect("begins");
+    bench.host.start(bench.device.now_us(), Command::Status).expect("begins");
     let frame = bench.host.poll_transmit().expect("a frame").to_vec();
-    bench.emulator.send(&frame);
+    bench.device.send(&frame);
     bench.run(0.1).expect("answers");
     bench.take_events().expect("answered");
     for second in 0..60 {
@@ -88,20 +86,20 @@ fn noise_at_line_speed_for_a_minute_never_wedges_it() {
             }
         }
         bytes.truncate(10_000);
-        bench.emulator.send(&bytes);
-        while bench.emulator.unsent() > 0 {
-            bench.emulator.run(MS).expect("never crashes");
-            bench.emulator.received();
+        bench.device.send(&bytes);
+        while bench.device.unsent() > 0 {
+            bench.device.run(MS).expect("never crashes");
+            bench.device.received();
         }
-        assert!(bench.emulator.take_init_rises().is_empty(), "noise fired it");
+        assert!(bench.device.take_init_rises().is_empty(), "noise fired it");
         if second % 10 == 9 {
             // A frame of noise may still be open: its end is lost, the next frame is right.
-            bench.emulator.send(&[0]);
-            bench.emulator.run(10 * MS).expect("runs");
-            bench.emulator.received();
-            let before = bench.emulator.now_us();
+            bench.device.send(&[0]);
+            bench.device.run(10 * MS).expect("runs");
+            bench.device.received();
+            let before = bench.device.now_us();
             bench.perform(Command::Identify, 1.0).expect("answers");
-            let took_us = bench.emulator.now_us() - before;
+            let took_us = bench.device.now_us() - before;
             assert!(took_us < 20_000, "answered Identify after {took_us} us");
         }
     }
@@ -118,7 +116,7 @@ fn a_sweep_goes_on_through_noise_between_its_frames() {
         bench.run(0.1).expect("runs");
         let mut noise = [0; 20];
         random.fill_bytes(&mut noise);
-        bench.emulator.send(&noise);
+        bench.device.send(&noise);
         if !bench.host.is_busy() {
             break;
         }
@@ -130,11 +128,11 @@ fn a_sweep_goes_on_through_noise_between_its_frames() {
 #[test]
 fn a_dead_host_ends_the_firing_within_the_lease() {
     let mut bench = sweeping();
-    bench.emulator.take_init_rises();
-    let died = bench.emulator.cycle();
+    bench.device.take_init_rises();
+    let died = bench.device.cycle();
     bench.alive = false;
     bench.run(2.0).expect("runs");
-    let last = bench.emulator.take_init_rises().last().copied().expect("it went on for a while");
+    let last = bench.device.take_init_rises().last().copied().expect("it went on for a while");
     let lease = u64::from(LEASE_MS) * MS;
     assert!(last > died && last - died <= lease, "{} ms", (last - died) / MS);
     assert_safe(&mut bench);
@@ -151,8 +149,8 @@ fn a_reset_in_the_middle_is_noticed_and_the_device_can_be_used_again() {
     {
         let mut bench = sweeping();
         let old = bench.host.identity().expect("known").boot;
-        bench.emulator.reset(cause);
-        assert!(!bench.emulator.is_firing() && !bench.emulator.holds_coils());
+        bench.device.reset(cause);
+        assert!(!bench.device.is_firing() && !bench.device.holds_coils());
         bench.run(3.0).expect("runs");
         let new = old + 1;
         assert!(bench.events().contains(&HostEvent::Rebooted { old, new }), "{cause:?}");
@@ -167,9 +165,9 @@ fn a_reset_in_the_middle_is_noticed_and_the_device_can_be_used_again() {
 #[test]
 fn a_firmware_that_hangs_is_restarted_by_the_watchdog() {
     let mut bench = sweeping();
-    bench.emulator.hang();
+    bench.device.hang();
     bench.alive = false;
-    bench.emulator.run(HZ * 6 / 10).expect("runs");
+    bench.device.run(HZ * 6 / 10).expect("runs");
     assert_safe(&mut bench);
     bench.alive = true;
     bench.run(3.0).expect("runs");
@@ -194,15 +192,15 @@ fn the_emergency_stop_ends_everything_at_once_and_keeps_it_so() {
     for wait_s in [0.0, 0.003, 0.013, 0.017, 0.023] {
         let mut bench = sweeping();
         bench.run(wait_s).expect("runs");
-        bench.emulator.press_emergency(true);
-        bench.emulator.run(MS).expect("runs");
+        bench.device.press_emergency(true);
+        bench.device.run(MS).expect("runs");
         assert_safe(&mut bench);
         bench.run(1.0).expect("runs");
         assert!(bench.events().contains(&HostEvent::Failed(HostError::EmergencyStop)));
         let again = bench.perform(Command::Home, 5.0);
         assert!(again.is_err(), "still pressed: {again:?}");
         assert_safe(&mut bench);
-        bench.emulator.press_emergency(false);
+        bench.device.press_emergency(false);
         bench.run(0.2).expect("runs");
         bench.perform(Command::Home, 20.0).expect("homes");
         bench.perform(Command::Ping, 2.0).expect("pings");
@@ -213,7 +211,7 @@ fn the_emergency_stop_ends_everything_at_once_and_keeps_it_so() {
 fn idle_coils_are_released_after_silence() {
     let mut bench = ready(commanded(&[]), Settings { hold_s: 2, ..settings() });
     bench.run(1.5).expect("runs");
-    assert!(bench.emulator.holds_coils());
+    assert!(bench.device.holds_coils());
     bench.run(1.0).expect("runs");
     assert_safe(&mut bench);
     assert_eq!(status(&mut bench).fault, Some(FaultKind::HoldExpired));
