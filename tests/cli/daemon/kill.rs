@@ -14,12 +14,16 @@ use crate::common::wait_until;
 fn killed_at_any_moment_it_loses_no_synced_record_and_doubles_none() {
     let kills = env::var("SONARD_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(8);
     let folder = tempfile::tempdir().expect("a folder");
-    let mut rig = Rig::new(folder.path(), Pace::Virtual);
+    let mut rig = Rig::new(folder.path(), Pace::RealTime);
     rig.plug("", 1);
     let mut options = rig.options();
-    for setting in
-        ["scanning.mode=continuous", "plan.to_deg=90", "log.daily=false", "log.rotate_mb=1000"]
-    {
+    for setting in [
+        "scanning.mode=continuous",
+        "plan.to_deg=18",
+        "model.max_range_m=0.6",
+        "log.sync_s=0.1",
+        "log.daily=false",
+    ] {
         options.extend(["--set".to_owned(), setting.to_owned()]);
     }
     let options: Vec<&str> = options.iter().map(String::as_str).collect();
