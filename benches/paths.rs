@@ -30,10 +30,19 @@ const FULL_SCAN: ScanPlan =
 
 fn main() {
     println!("{:72} {:>9}", "", "median, and best; ratios of the best");
-    small_room();
-    robot_room();
-    l_room();
-    building_plans();
+    // `cargo bench --bench paths -- robot` runs what has `robot` in its name.
+    let only: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with('-')).collect();
+    let parts: [(&str, fn()); 4] = [
+        ("small_room", small_room),
+        ("robot_room", robot_room),
+        ("l_room", l_room),
+        ("building_plans", building_plans),
+    ];
+    for (name, part) in parts {
+        if only.is_empty() || only.iter().any(|word| name.contains(word.as_str())) {
+            part();
+        }
+    }
 }
 
 fn simulator(scene: Arc<Scene>, options: Options) -> Simulator {
@@ -134,6 +143,8 @@ fn l_room() {
         edge_law: None,
         absorption_np_per_m: 0.0,
         wave_number_per_m: TAU * 49_400.0 / 343.2,
+        sensor_z_m: None,
+        tilt_rad: 0.0,
     };
     let paths = Paths::new(&room, settings);
     let at = DVec2::new(1.13, 0.87);

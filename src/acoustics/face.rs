@@ -80,11 +80,15 @@ impl Disc {
         self.face.reflectance * zones(p, q)
     }
 
-    /// Length of a leg over which the rim lies `1/(2 k)` behind the middle: `k a^2 / 2`, metres.
-    /// The disc scatters like a point of this strength: no aspect gives
+    /// How strongly the disc scatters with all its zones in phase, metres: no aspect gives
     /// [`Self::reflection`] more than this times `1/R1 + 1/R2`.
     #[must_use]
-    pub fn zone_m(&self) -> f64 {
+    pub fn strength_m(&self) -> f64 {
+        self.face.reflectance * self.zone_m()
+    }
+
+    /// `k a^2 / 2`.
+    fn zone_m(&self) -> f64 {
         0.5 * self.wave_number_per_m * self.face.radius_m * self.face.radius_m
     }
 }

@@ -18,6 +18,7 @@ pub use receiver::{
     TracePoint, classify_tof,
 };
 pub use sensor::{
-    Aperture, ChirpPart, EdgeLawKind, Gain, GainStep, Pulse, Response, Sensor, SensorError,
+    Aperture, ChirpPart, EdgeLawKind, Gain, GainStep, Mounting, Pulse, Response, Sensor,
+    SensorError,
 };
 pub use transducer::{BeamPattern, kuc_siegel_response, piston_directivity};

@@ -10,15 +10,16 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::Face;
-use crate::geometry::wrap_pi;
+use crate::geometry::{DVec2, wrap_pi};
 
 /// The data files that come with the program, by name.
-const PRESETS: [(&str, &str); 5] = [
+const PRESETS: [(&str, &str); 6] = [
     ("senscomp-6500", include_str!("../../sensors/senscomp-6500.json")),
     ("polaroid-chirp", include_str!("../../sensors/polaroid-chirp.json")),
     ("bozma-kuc-60khz", include_str!("../../sensors/bozma-kuc-60khz.json")),
     ("pioneer", include_str!("../../sensors/pioneer.json")),
     ("fullwave-line", include_str!("../../sensors/fullwave-line.json")),
+    ("hc-sr04", include_str!("../../sensors/hc-sr04.json")),
 ];
 
 /// A ranger's data.
@@ -37,6 +38,9 @@ pub struct Sensor {
     /// there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub face: Option<Face>,
+    /// Where it sits on the rotation axis.
+    #[serde(default, skip_serializing_if = "Mounting::is_default")]
+    pub mounting: Mounting,
     /// What it sends.
     pub pulse: Pulse,
     /// From firing until the receiver listens, microseconds.
@@ -119,6 +123,48 @@ impl Aperture {
             }
             Self::Gaussian { .. } => f64::from(u8::from(theta_rad < FRAC_PI_2)),
         }
+    }
+}
+
+/// Where the transducer sits on the rotation axis, and turns with it.
+///
+/// Ranges are measured from the face, or from the middle between transmitter and receiver: half
+/// the way of the sound. What is met ahead lies `ahead_m` farther from the axis.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Mounting {
+    /// The middle of the face in front of the axis, metres.
+    pub ahead_m: f64,
+    /// The same to the left of it, metres.
+    pub left_m: f64,
+    /// Transmitter and receiver side by side, their middles this far apart, metres: the
+    /// transmitter on the left. 0 for a transducer that does both.
+    pub separation_m: f64,
+    /// Height of its middle in a scene with heights, metres.
+    pub z_m: Option<f64>,
+    /// How far its axis points up, degrees.
+    pub tilt_deg: f64,
+}
+
+impl Mounting {
+    /// Transmitter and receiver with the axis at `axis`, looking into `direction_rad`.
+    #[must_use]
+    pub fn places(&self, axis: DVec2, direction_rad: f64) -> [DVec2; 2] {
+        let turn = DVec2::from_angle(direction_rad);
+        [0.5, -0.5].map(|side| {
+            let left_m = self.left_m + side * self.separation_m;
+            axis + turn.rotate(DVec2::new(self.ahead_m, left_m))
+        })
+    }
+
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Whether it is one transducer on the axis itself, so that turning does not move it.
+    #[must_use]
+    pub fn is_on_axis(&self) -> bool {
+        self.ahead_m == 0.0 && self.left_m == 0.0 && self.separation_m == 0.0
     }
 }
 
@@ -306,6 +352,12 @@ impl Sensor {
             at_most_1("face.reflectance", reflectance)?;
         }
         self.pulse.check()?;
+        let Mounting { ahead_m, left_m, separation_m, z_m, tilt_deg } = self.mounting;
+        within("mounting.ahead_m", ahead_m, 1.0, "from -1 to 1 metre")?;
+        within("mounting.left_m", left_m, 1.0, "from -1 to 1 metre")?;
+        within("mounting.separation_m", separation_m, 1.0, "from -1 to 1 metre")?;
+        within("mounting.z_m", z_m.unwrap_or(0.0), 1000.0, "from -1000 to 1000 metres")?;
+        within("mounting.tilt_deg", tilt_deg, 90.0, "from -90 to 90 degrees")?;
         not_negative("blanking_us", self.blanking_us)?;
         not_negative("short_blanking_us", self.short_blanking_us.unwrap_or(0.0))?;
         not_negative("rearm_us", self.rearm_us)?;
@@ -442,6 +494,15 @@ fn not_negative(field: &'static str, value: f64) -> Result<(), SensorError> {
     } else {
         Err(SensorError::Figure { field, value, expected: "a finite number, 0 or more" })
     }
+}
+
+fn within(
+    field: &'static str,
+    value: f64,
+    most: f64,
+    expected: &'static str,
+) -> Result<(), SensorError> {
+    if value.abs() <= most { Ok(()) } else { Err(SensorError::Figure { field, value, expected }) }
 }
 
 fn at_most_1(field: &'static str, value: f64) -> Result<(), SensorError> {

@@ -46,6 +46,14 @@ impl Pose {
     }
 }
 
+/// Distance of a point from the segment `a`-`b`, metres.
+#[must_use]
+pub fn distance_to_segment(point: DVec2, a: DVec2, b: DVec2) -> f64 {
+    let along = b - a;
+    let share = (point - a).dot(along) / along.length_squared();
+    point.distance(a + share.clamp(0.0, 1.0) * along)
+}
+
 /// An angle in degrees brought into [0, 360).
 #[must_use]
 pub fn wrap_360(angle_deg: f64) -> f64 {

@@ -70,6 +70,10 @@ pub enum Reflector {
     Cylinder(u32),
     /// The transducer's own face.
     Face,
+    /// The floor of a scene with heights.
+    Floor,
+    /// Its ceiling.
+    Ceiling,
 }
 
 /// An end of a wall.
@@ -85,6 +89,12 @@ pub struct Edge {
 pub trait Engine: Send + Sync {
     /// Prepares for firing from `position` (world, metres).
     fn survey<'a>(&'a self, position: DVec2) -> Box<dyn Survey + 'a>;
+
+    /// The same for a transmitter and a receiver apart; engines that know one place only take
+    /// the middle.
+    fn survey_pair<'a>(&'a self, transmitter: DVec2, receiver: DVec2) -> Box<dyn Survey + 'a> {
+        self.survey(0.5 * (transmitter + receiver))
+    }
 }
 
 /// The echoes of one place.

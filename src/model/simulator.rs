@@ -173,7 +173,8 @@ impl Simulator {
     /// Prepares for firing from `position` (world, metres); the costly part, worth keeping.
     #[must_use]
     pub fn station(&self, position: DVec2) -> Station<'_> {
-        Station::new(self, self.engine.survey(position))
+        let survey = self.sensor.mounting.is_on_axis().then(|| self.engine.survey(position));
+        Station::new(self, position, survey)
     }
 
     /// A reading for each firing of a checked plan, in the order of its indices.
@@ -261,6 +262,10 @@ impl Simulator {
         &self.scene
     }
 
+    pub(super) fn engine(&self) -> &dyn Engine {
+        self.engine.as_ref()
+    }
+
     /// The options.
     #[must_use]
     pub const fn options(&self) -> &Options {
@@ -272,6 +277,8 @@ impl Simulator {
             Reflector::Wall(index) => self.scene.walls[index as usize].id.to_string(),
             Reflector::Cylinder(index) => self.scene.cylinders[index as usize].id.to_string(),
             Reflector::Face => FACE_NAME.to_owned(),
+            Reflector::Floor => "floor".to_owned(),
+            Reflector::Ceiling => "ceiling".to_owned(),
         }
     }
 
@@ -341,6 +348,8 @@ fn path_settings(
         edge_law: Some(law),
         absorption_np_per_m: absorption_db_per_m(sensor, air, options) / (20.0 * LOG10_E),
         wave_number_per_m,
+        sensor_z_m: sensor.mounting.z_m,
+        tilt_rad: sensor.mounting.tilt_deg.to_radians(),
     }
 }
 

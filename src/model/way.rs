@@ -9,7 +9,7 @@ use super::{Edge, Path, Reflector};
 use crate::{
     geometry::{DVec2, Mirror},
     scan::PathRecord,
-    scene::Scene,
+    scene::{Cylinder, Scene},
 };
 
 /// A way's length may differ from the one stated by this much, metres: logs round, and the engine
@@ -19,6 +19,11 @@ const SAME_LENGTH_M: f64 = 1e-3;
 /// A point this far beyond the end of a wall still counts as on it, metres: corners are written with
 /// rounded coordinates.
 const BEYOND_END_M: f64 = 1e-4;
+
+/// Contacts with cylinders have been found when they move by less, metres, and are given up for as
+/// good as they get after so many rounds.
+const CLOSE_M: f64 = 1e-7;
+const MOST_ROUNDS: usize = 500;
 
 impl Path {
     /// The points of the way from a ranger at `position` and back to it, in order: the ranger, each
@@ -99,19 +104,49 @@ impl Way<'_> {
         self.has_length(&points).then_some(points)
     }
 
-    /// From one point to another over these reflectors, at most one of them a cylinder.
+    /// From one point to another over these reflectors.
     fn leg(&self, from: DVec2, to: DVec2, walls: &[Reflector]) -> Option<Vec<DVec2>> {
-        let round = walls.iter().position(|wall| !matches!(wall, Reflector::Wall(_)));
-        let Some(round) = round else { return self.flat_leg(from, to, walls) };
-        let Reflector::Cylinder(index) = walls[round] else { return None };
-        let cylinder = self.scene.cylinders.get(index as usize)?;
-        let (before, after) = (&walls[..round], &walls[round + 1..]);
-        let backwards: SmallVec<[Reflector; 4]> = after.iter().rev().copied().collect();
-        let ends = [self.image(from, before)?, self.image(to, &backwards)?];
-        let bounce = bounce(cylinder.center, cylinder.radius_m, ends);
-        let mut points = self.flat_leg(from, bounce, before)?;
-        points.extend(self.flat_leg(bounce, to, after)?.into_iter().skip(1));
+        let contacts = self.contacts(from, to, walls)?;
+        let flat = walls.split(|wall| !matches!(wall, Reflector::Wall(_)));
+        let (mut points, mut at) = (vec![from], from);
+        for (walls, end) in flat.zip(contacts.into_iter().chain([to])) {
+            points.extend(self.flat_leg(at, end, walls)?.into_iter().skip(1));
+            at = end;
+        }
         Some(points)
+    }
+
+    /// Where the cylinders of a leg are met. The way is the shortest there is, and that has one
+    /// place only (cylinders are convex): each contact is moved to where it is best for its
+    /// neighbours, in turn, until all are.
+    fn contacts(&self, from: DVec2, to: DVec2, walls: &[Reflector]) -> Option<Vec<DVec2>> {
+        let round = walls.iter().filter(|wall| !matches!(wall, Reflector::Wall(_)));
+        let cylinders: Vec<&Cylinder> =
+            round.map(|reflector| self.cylinder(*reflector)).collect::<Option<_>>()?;
+        let flat: Vec<_> = walls.split(|wall| !matches!(wall, Reflector::Wall(_))).collect();
+        let backwards: Vec<SmallVec<[Reflector; 4]>> =
+            flat.iter().map(|walls| walls.iter().rev().copied().collect()).collect();
+        let mut contacts: Vec<DVec2> = cylinders.iter().map(|cylinder| cylinder.center).collect();
+        for _ in 0..MOST_ROUNDS {
+            let mut moved_m = 0.0_f64;
+            for i in 0..contacts.len() {
+                let before = i.checked_sub(1).map_or(from, |before| contacts[before]);
+                let after = contacts.get(i + 1).copied().unwrap_or(to);
+                let ends = [self.image(before, flat[i])?, self.image(after, &backwards[i + 1])?];
+                let best = bounce(cylinders[i].center, cylinders[i].radius_m, ends);
+                moved_m = moved_m.max(best.distance(contacts[i]));
+                contacts[i] = best;
+            }
+            if moved_m < CLOSE_M {
+                break;
+            }
+        }
+        Some(contacts)
+    }
+
+    fn cylinder(&self, reflector: Reflector) -> Option<&Cylinder> {
+        let Reflector::Cylinder(index) = reflector else { return None };
+        self.scene.cylinders.get(index as usize)
     }
 
     fn flat_leg(&self, from: DVec2, to: DVec2, walls: &[Reflector]) -> Option<Vec<DVec2>> {
@@ -159,7 +194,8 @@ fn meet((a, b): (DVec2, DVec2), at: DVec2, image: DVec2) -> Option<DVec2> {
     let point = at + share * run;
     let place_m = (point - a).dot(along);
     let on_wall = (-BEYOND_END_M..=a.distance(b) + BEYOND_END_M).contains(&place_m);
-    (on_wall && share > -1e-9).then_some(point)
+    // Through a corner the second wall is met where the first was.
+    (on_wall && share * run.length() > -BEYOND_END_M).then_some(point)
 }
 
 /// Where on a circle the way between two points outside it is shortest.

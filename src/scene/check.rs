@@ -12,10 +12,10 @@ use super::{
     error::MAX_COORDINATE_M,
     file::{CircleFile, CylinderFile, Point, RobotFile, SceneFile, WallFile},
     locate::{JsonPath, Part},
-    outline::{Outlines, contains, distance_to_segment},
+    outline::{Outlines, contains},
     pose::{CLEARANCE_M, MAX_HEADING_DEG},
 };
-use crate::geometry::{DVec2, Pose};
+use crate::geometry::{DVec2, Pose, distance_to_segment};
 
 /// Shortest wall, metres: far below the wavelength, far above rounding.
 const MIN_WALL_M: f64 = 1e-4;

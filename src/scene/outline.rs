@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::Scene;
-use crate::geometry::DVec2;
+use crate::geometry::{DVec2, distance_to_segment};
 
 /// Ends that agree to this are one corner, metres.
 const SAME_POINT_M: f64 = 1e-6;
@@ -184,11 +184,4 @@ pub(super) fn contains(sides: &[(DVec2, DVec2)], point: DVec2) -> bool {
         })
         .count();
     crossings % 2 == 1
-}
-
-/// Distance of a point from the segment `a`-`b`, metres.
-pub(super) fn distance_to_segment(point: DVec2, a: DVec2, b: DVec2) -> f64 {
-    let along = b - a;
-    let share = (point - a).dot(along) / along.length_squared();
-    point.distance(a + share.clamp(0.0, 1.0) * along)
 }

@@ -5,9 +5,9 @@ use thiserror::Error;
 use super::{
     Scene,
     error::{MAX_COORDINATE_M, suggest},
-    outline::{Outline, Outlines, distance_to_segment},
+    outline::{Outline, Outlines},
 };
-use crate::geometry::{DVec2, Pose};
+use crate::geometry::{DVec2, Pose, distance_to_segment};
 
 /// A ranger closer to a surface than this is taken to be inside it, metres.
 pub(super) const CLEARANCE_M: f64 = 1e-3;

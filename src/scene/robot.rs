@@ -2,11 +2,8 @@
 
 use std::sync::Arc;
 
-use super::{
-    Cylinder, Material, PoseError, Scene, Wall,
-    outline::{contains, distance_to_segment},
-};
-use crate::geometry::{DVec2, Pose};
+use super::{Cylinder, Material, PoseError, Scene, Wall, outline::contains};
+use crate::geometry::{DVec2, Pose, distance_to_segment};
 
 /// A robot's body, in a frame that moves and turns with the pose.
 ///

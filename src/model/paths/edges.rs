@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use smallvec::SmallVec;
 
-use super::{Echo, SAME_RAD, Settings, Via, beam::Ray, drop_repeats, trace::Tree};
+use super::{Echo, SAME_RAD, Settings, Trees, Via, beam::Ray, drop_repeats, trace::Tree};
 use crate::{
     acoustics::edge::{Aspect, EdgeLaw, Wedge},
     geometry::{Arrangement, DVec2, SNAP_M},
@@ -52,9 +52,13 @@ struct Bending<'a> {
 #[derive(Clone, Copy)]
 struct Arm<'a> {
     ray: &'a Ray,
-    /// Its place in [`Tree::to_edges`].
+    /// See [`Tree::part`].
     number: u32,
     length_m: f64,
+    /// Width of the ray tube at the edge, metres: without cylinders its length.
+    width_m: f64,
+    /// Radius of curvature of the wave front at the edge, metres: without cylinders its length.
+    radius_m: f64,
     sector: usize,
     /// Direction from the edge towards the source, from the sector's first wall, radians.
     from_rad: f64,
@@ -103,18 +107,21 @@ impl Edges {
     }
 
     /// All echoes that bend once: out on one ray to an edge, back on another or the same.
-    pub(super) fn echoes(&self, tree: &mut Tree, law: EdgeLaw, settings: &Settings) -> Vec<Echo> {
-        tree.to_edges.sort_by(|(p, r), (q, s)| {
-            p.cmp(q).then(r.run.length_squared().total_cmp(&s.run.length_squared()))
-        });
+    pub(super) fn echoes(&self, trees: &mut Trees, law: EdgeLaw, settings: &Settings) -> Vec<Echo> {
+        trees.out.sort_by_edge();
+        trees.back.iter_mut().for_each(Tree::sort_by_edge);
+        let bending = Bending { law, settings };
         let mut echoes = Vec::new();
-        let mut first = 0;
-        for rays in tree.to_edges.chunk_by(|a, b| a.0 == b.0) {
-            let point = rays[0].0;
-            if let Some(Some(corner)) = self.points.get(point as usize) {
-                corner.echoes(point, first, rays, &Bending { law, settings }, &mut echoes);
+        for point in trees.out.edges() {
+            let Some(Some(corner)) = self.points.get(point as usize) else { continue };
+            let outs = corner.arms(&trees.out, point);
+            match &trees.back {
+                None => corner.echoes(point, &outs, &bending, &mut echoes),
+                Some(back) => {
+                    let backs = corner.arms(back, point);
+                    corner.echoes_between(point, &outs, &backs, &bending, &mut echoes);
+                }
             }
-            first += rays.len() as u32;
         }
         echoes
     }
@@ -138,42 +145,64 @@ impl Sector {
 }
 
 impl Corner {
-    /// Of the rays to this point, the first of which is number `first` in the tree.
-    fn echoes(
-        &self,
-        point: u32,
-        first: u32,
-        rays: &[(u32, Ray)],
-        bending: &Bending,
-        echoes: &mut Vec<Echo>,
-    ) {
-        let mut arms: Vec<Arm> =
-            (first..).zip(rays).filter_map(|(number, (_, ray))| self.arm(ray, number)).collect();
+    /// The rays of a tree to this point, by length, each once.
+    fn arms<'a>(&self, tree: &'a Tree, point: u32) -> Vec<Arm<'a>> {
+        let (first, flat) = tree.flat_to(point);
+        let (first_bent, bent) = tree.bent_to(point);
+        let flat = (first..).zip(flat).filter_map(|(number, (_, ray))| {
+            let length_m = ray.run.length();
+            self.arm(ray, number, length_m, length_m)
+        });
+        let bent = (first_bent..)
+            .zip(bent)
+            .filter_map(|(number, bent)| self.arm(&bent.ray, number, bent.width_m, bent.radius_m));
+        let mut arms: Vec<Arm> = flat.chain(bent).collect();
+        arms.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
         drop_repeats(&mut arms, |leg| leg.length_m, Arm::is_same);
+        arms
+    }
+
+    /// Out on one ray and back on another or the same: each pair in both directions.
+    fn echoes(&self, point: u32, arms: &[Arm], bending: &Bending, echoes: &mut Vec<Echo>) {
         for (i, out) in arms.iter().enumerate() {
             for (j, back) in arms.iter().enumerate().skip(i) {
-                let length_m = out.length_m + back.length_m;
-                if length_m > bending.settings.max_path_m {
+                if out.length_m + back.length_m > bending.settings.max_path_m {
                     break;
                 }
-                let Some(field) = bending.field(self, out, back) else { continue };
-                let echo = Echo {
-                    length_m,
-                    amplitude: field.norm(),
-                    phase_rad: field.arg(),
-                    departure: out.ray.departure,
-                    arrival: back.ray.departure,
-                    via: Via::Edge { point, out: out.number, back: back.number },
-                };
+                let Some(echo) = bending.echo(self, point, out, back) else { continue };
                 if i != j {
-                    echoes.push(echo.reversed());
+                    echoes.push(Echo {
+                        departure: echo.arrival,
+                        arrival: echo.departure,
+                        via: Via::Edge { point, out: back.number, back: out.number },
+                        ..echo
+                    });
                 }
                 echoes.push(echo);
             }
         }
     }
 
-    fn arm<'a>(&self, ray: &'a Ray, number: u32) -> Option<Arm<'a>> {
+    /// Out on a ray from the transmitter and back on one from the receiver.
+    fn echoes_between(
+        &self,
+        point: u32,
+        outs: &[Arm],
+        backs: &[Arm],
+        bending: &Bending,
+        echoes: &mut Vec<Echo>,
+    ) {
+        for out in outs {
+            for back in backs {
+                if out.length_m + back.length_m > bending.settings.max_path_m {
+                    break;
+                }
+                echoes.extend(bending.echo(self, point, out, back));
+            }
+        }
+    }
+
+    fn arm<'a>(&self, ray: &'a Ray, number: u32, width_m: f64, radius_m: f64) -> Option<Arm<'a>> {
         let direction = (-ray.run).to_angle();
         let last = self.sectors.len() - 1;
         let sector = self.sectors.iter().rposition(|s| s.from_rad <= direction).unwrap_or(last);
@@ -184,6 +213,8 @@ impl Corner {
             ray,
             number,
             length_m: ray.run.length(),
+            width_m,
+            radius_m,
             sector,
             from_rad,
         })
@@ -191,6 +222,20 @@ impl Corner {
 }
 
 impl Bending<'_> {
+    fn echo(&self, corner: &Corner, point: u32, out: &Arm, back: &Arm) -> Option<Echo> {
+        let field = self.field(corner, out, back)?;
+        Some(Echo {
+            length_m: out.length_m + back.length_m,
+            amplitude: field.norm(),
+            phase_rad: field.arg(),
+            departure: out.ray.departure,
+            arrival: back.ray.departure,
+            rise_rad: [0.0; 2],
+            image: 0,
+            via: Via::Edge { point, out: out.number, back: back.number },
+        })
+    }
+
     /// Relative field of the echo out and back on two arms, `None` below the floor.
     fn field(&self, corner: &Corner, out: &Arm, back: &Arm) -> Option<Complex64> {
         let Self { law, settings } = self;
@@ -207,8 +252,9 @@ impl Bending<'_> {
         let aspect = Aspect {
             in_rad: out.from_rad,
             out_rad: back.from_rad,
-            distance_m: out.length_m * back.length_m / length_m,
+            distance_m: out.radius_m * back.radius_m / (out.radius_m + back.radius_m),
         };
+        let strength = strength * out.spreading(back, &aspect);
         let k = settings.wave_number_per_m;
         if strength * law.bound(wedge, &aspect, k) < settings.floor {
             return None;
@@ -219,6 +265,15 @@ impl Bending<'_> {
 }
 
 impl Arm<'_> {
+    /// What cylinders on the way leave of the field at an edge, beside fronts that flat walls
+    /// turned: these fall by `sqrt((s + s') / (s s'))`, and the distance parameter of the
+    /// transition is that of the fronts' radii of curvature in the plane (Kouyoumjian and Pathak
+    /// 1974, equations (24) and (33), whose other radius, along the edge, no cylinder changes).
+    fn spreading(&self, back: &Self, aspect: &Aspect) -> f64 {
+        let length_m = self.length_m + back.length_m;
+        (aspect.distance_m * length_m / (self.width_m * back.width_m)).sqrt()
+    }
+
     /// Whether two arms are one that touches a corner on its way and was found on both sides.
     fn is_same(&self, other: &Self) -> bool {
         self.ray.departure.distance_squared(other.ray.departure) < SAME_RAD * SAME_RAD

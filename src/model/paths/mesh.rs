@@ -4,7 +4,7 @@
 use rstar::{RTree, primitives::GeomWithData};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
-use crate::geometry::{Arrangement, DVec2};
+use crate::geometry::{Arrangement, DVec2, distance_to_segment};
 
 /// Triangles between the walls, inside a box around the scene.
 #[derive(Debug)]
@@ -60,6 +60,15 @@ impl Mesh {
         Some(Self { points, triangles, across, near })
     }
 
+    /// The triangle behind a side, wall or not, and which of its sides that is.
+    pub(super) fn beyond(&self, triangle: u32, side: usize) -> Option<(u32, u8)> {
+        let other = *self.across[triangle as usize].get(side)?;
+        let end = self.triangles[triangle as usize].corners[(side + 1) % 3];
+        let corners = self.triangles.get(other as usize)?.corners;
+        let side = corners.iter().position(|&corner| corner == end)?;
+        Some((other, side as u8))
+    }
+
     /// A corner of a triangle.
     pub(super) fn corner(&self, triangle: u32, corner: usize) -> DVec2 {
         self.points[self.triangles[triangle as usize].corners[corner] as usize]
@@ -97,7 +106,7 @@ impl Mesh {
             for side in 0..3 {
                 let behind = self.across[triangle as usize][side];
                 let ends = [self.corner(triangle, side), self.corner(triangle, (side + 1) % 3)];
-                let near = distance_m(center, ends) <= radius_m;
+                let near = distance_to_segment(center, ends[0], ends[1]) <= radius_m;
                 if near && behind != u32::MAX && !found.contains(&behind) {
                     found.push(behind);
                 }
@@ -112,12 +121,6 @@ impl Mesh {
         let [a, b, p] = [a, b, point].map(|p| robust::Coord { x: p.x, y: p.y });
         robust::orient2d(a, b, p) < 0.0
     }
-}
-
-fn distance_m(point: DVec2, [a, b]: [DVec2; 2]) -> f64 {
-    let along = b - a;
-    let place = ((point - a).dot(along) / along.length_squared()).clamp(0.0, 1.0);
-    point.distance(a + place * along)
 }
 
 type Cdt = ConstrainedDelaunayTriangulation<Point2<f64>>;

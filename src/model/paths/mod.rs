@@ -46,11 +46,20 @@
 //!
 //! # Cylinders
 //!
-//! Cylinders hide what is behind them and reflect. Echoes with one reflection at a cylinder, and
-//! any at walls before and after, are exact: pairs of beams that meet the cylinder, joined where
-//! the way is shortest (`rounds`), with the spreading of a curved mirror. Echoes that touch
-//! cylinders twice, or a cylinder and an edge, and the sound that creeps around a cylinder are
-//! left out; cylinders thinner than a wavelength reflect less than they would here.
+//! Cylinders hide what is behind them and reflect. Behind a cylinder a beam has no image any more;
+//! it goes on as a tube of rays (`tubes`), which walks the same mesh. Rays off convex surfaces
+//! spread and never cross, so in each tube one ray at most comes back to the receiver, or to an
+//! edge, and is found as the zero of a monotone function. Its tube's width, by the mirror equation
+//! at each cylinder, says how much the sound has spread.
+//!
+//! Paths touch cylinders three times at most, and are followed down to the threshold only: between
+//! a round body and a wall beside it they are without number. The sound that creeps around a
+//! cylinder is left out, which matters in the shadow and for radii of few wavelengths; cylinders
+//! thinner than a wavelength reflect less than they would here.
+//!
+//! # The transducer's face
+//!
+//! It reflects too, and turns with the azimuth: an echo may go round again (`trains`).
 //!
 //! # Scans
 //!
@@ -61,6 +70,7 @@
 
 mod beam;
 mod edges;
+mod heights;
 mod mesh;
 mod rounds;
 mod survey;
@@ -68,18 +78,32 @@ mod survey;
 mod tests;
 mod trace;
 mod trains;
+mod tube;
+mod tubes;
+mod vertical;
+mod wheel;
 
 pub use survey::PathEngine;
 
 use smallvec::SmallVec;
 
-use self::{beam::Ray, edges::Edges, mesh::Mesh, rounds::Rounds, trace::Tree};
+use self::{
+    beam::Ray,
+    edges::Edges,
+    heights::Heights,
+    mesh::Mesh,
+    rounds::{Circle, Rounds},
+    trace::Tree,
+    tube::{Curved, Tracer},
+    tubes::TubeGrower,
+    vertical::Image,
+};
 use crate::{
     acoustics::edge::EdgeLaw,
     geometry::{Arrangement, DVec2, Mirror, square_up},
     model::{Path, Reflector},
     scan::PathKind,
-    scene::{Material, Scene},
+    scene::{Cylinder, Material, Scene},
 };
 
 /// Echoes that agree in length and both directions to within this are one, metres and radians.
@@ -101,6 +125,19 @@ pub struct Settings {
     pub absorption_np_per_m: f64,
     /// Wave number `2 pi f / c`, radians a metre.
     pub wave_number_per_m: f64,
+    /// Height of the transducer in a scene with heights, metres; `None`: see [`usual_z_m`].
+    pub sensor_z_m: Option<f64>,
+    /// How far the transducer's axis points up, radians.
+    pub tilt_rad: f64,
+}
+
+/// The height of a transducer of which nothing is said, metres: half a metre above the floor, or
+/// half way up to a low ceiling.
+#[must_use]
+pub fn usual_z_m(floor_z_m: Option<f64>, ceiling_z_m: Option<f64>) -> f64 {
+    let floor_z_m = floor_z_m.or(ceiling_z_m.map(|ceiling| ceiling - 1.0)).unwrap_or(0.0);
+    let middle_m = ceiling_z_m.map_or(f64::INFINITY, |ceiling| 0.5 * (ceiling - floor_z_m));
+    floor_z_m + middle_m.min(0.5)
 }
 
 impl Settings {
@@ -131,6 +168,9 @@ pub struct Paths {
     faces: Vec<Face>,
     edges: Edges,
     rounds: Rounds,
+    heights: Heights,
+    /// By floor and ceiling; none in a scene in the plane.
+    images: Vec<Image>,
     /// `None` for a scene with nothing in it.
     mesh: Option<Mesh>,
 }
@@ -160,6 +200,8 @@ pub struct EchoPath {
     pub departure_rad: f64,
     /// World direction towards where the sound comes from, radians.
     pub arrival_rad: f64,
+    /// How far up it leaves and comes from, radians.
+    pub rise_rad: [f64; 2],
     /// The way it took.
     pub path: Path,
 }
@@ -170,10 +212,21 @@ impl Paths {
     pub fn new(scene: &Scene, settings: Settings) -> Self {
         let mut segments: Vec<_> = scene.walls.iter().map(|wall| (wall.a, wall.b)).collect();
         square_up(&mut segments);
+        let usual = || usual_z_m(scene.floor_z_m, scene.ceiling_z_m);
+        let z_m = settings.sensor_z_m.unwrap_or_else(usual);
+        let heights = Heights::new(scene, &segments, z_m);
+        for (segment, wall) in segments.iter_mut().zip(&scene.walls) {
+            if !heights.is_there(wall.z_m) {
+                // A point: the others keep their numbers.
+                segment.1 = segment.0;
+            }
+        }
         let plan = Arrangement::of(&segments);
+        let there = |cylinder: &&Cylinder| heights.is_there(cylinder.z_m);
         let extra: Vec<_> = scene
             .cylinders
             .iter()
+            .filter(there)
             .flat_map(|c| [c.center - c.radius_m, c.center + c.radius_m])
             .collect();
         // From outside the box no echo is short enough.
@@ -184,14 +237,22 @@ impl Paths {
             Face { mirror, rotor: mirror.rotor(), gain, loss_m }
         };
         let gains: Vec<_> = scene.walls.iter().map(|wall| mirror_gain(&wall.material)).collect();
-        let round: Vec<_> = scene.cylinders.iter().map(|c| mirror_gain(&c.material)).collect();
+        // One that is not there has no size: the others keep their numbers.
+        let circle = |c: &Cylinder| Circle {
+            center: c.center,
+            radius_m: if heights.is_there(c.z_m) { c.radius_m } else { 0.0 },
+            gain: mirror_gain(&c.material),
+        };
+        let circles = scene.cylinders.iter().map(circle).collect();
         Self {
             faces: segments.iter().zip(&gains).map(face).collect(),
             edges: settings
                 .edge_law
                 .map(|law| Edges::new(&plan, &segments, &gains, law))
                 .unwrap_or_default(),
-            rounds: Rounds::new(&scene.cylinders, &round, mesh.as_ref()),
+            rounds: Rounds::new(circles, mesh.as_ref()),
+            images: vertical::images(scene.floor_z_m, scene.ceiling_z_m, z_m, settings.max_path_m),
+            heights,
             settings,
             mesh,
         }
@@ -200,12 +261,48 @@ impl Paths {
     /// All echo paths from a place, shortest first.
     #[must_use]
     pub fn enumerate(&self, position: DVec2) -> Vec<EchoPath> {
-        let (tree, echoes) = self.echoes(position);
-        echoes.iter().map(|echo| self.path(&tree, echo)).collect()
+        self.enumerate_between(position, position)
     }
 
-    fn echoes(&self, position: DVec2) -> (Tree, Vec<Echo>) {
-        let mut tree = Tree::grow(self, position);
+    /// All echo paths from a transmitter to a receiver, shortest first, without the straight way
+    /// from one to the other.
+    #[must_use]
+    pub fn enumerate_between(&self, transmitter: DVec2, receiver: DVec2) -> Vec<EchoPath> {
+        let (trees, echoes) = self.echoes(transmitter, receiver);
+        echoes.iter().map(|echo| self.path(&trees, echo)).collect()
+    }
+
+    fn echoes(&self, transmitter: DVec2, receiver: DVec2) -> (Trees, Vec<Echo>) {
+        let (out, mut echoes) = self.grow(transmitter, receiver);
+        // The ways back from the receiver, as ways to it, matter to edges only.
+        let apart = transmitter != receiver && self.settings.edge_law.is_some();
+        let back = apart.then(|| self.grow(receiver, transmitter).0);
+        let mut trees = Trees { out, back };
+        if let Some(law) = self.settings.edge_law {
+            echoes.extend(self.edges.echoes(&mut trees, law, &self.settings));
+        }
+        if !self.rounds.is_empty() {
+            echoes.retain(|echo| !self.is_hidden(&trees, echo, [transmitter, receiver]));
+        }
+        self.add_images(&mut echoes, receiver - transmitter);
+        self.retain_clear(&trees, &mut echoes, [transmitter, receiver]);
+        (trees, sorted(&echoes))
+    }
+
+    /// Each echo of the plan also by way of floor and ceiling, and these by themselves.
+    fn add_images(&self, echoes: &mut Vec<Echo>, apart: DVec2) {
+        let plan = echoes.len();
+        for (image, index) in self.images.iter().zip(1..) {
+            for at in 0..plan {
+                echoes.extend(image.echo(&echoes[at], index, &self.settings));
+            }
+            echoes.extend(image.upright_echo(index, apart, &self.settings));
+        }
+    }
+
+    /// The beams from a place, and the echoes without an edge that they bring to another.
+    fn grow(&self, start: DVec2, target: DVec2) -> (Tree, Vec<Echo>) {
+        let mut tree = Tree::grow(self, start, target);
         let mut echoes: Vec<Echo> = tree
             .returns
             .iter()
@@ -215,33 +312,35 @@ impl Paths {
                 phase_rad: 0.0,
                 departure: ray.departure,
                 arrival: -ray.run.normalize_or_zero(),
+                rise_rad: [0.0; 2],
+                image: 0,
                 via: Via::Walls { node: ray.node },
             })
             .filter(|echo| echo.amplitude >= self.settings.floor)
             .collect();
-        if let Some(law) = self.settings.edge_law {
-            echoes.extend(self.edges.echoes(&mut tree, law, &self.settings));
+        if !self.rounds.is_empty() {
+            echoes.extend(TubeGrower::new(self, &mut tree, [start, target]).grow());
         }
-        if let Some(mesh) = self.mesh.as_ref().filter(|_| !self.rounds.is_empty()) {
-            echoes.extend(self.rounds.echoes(&mut tree, mesh, &self.settings));
-            echoes.retain(|echo| !self.is_hidden(&tree, echo, position));
-        }
-        (tree, sorted(&echoes))
+        (tree, echoes)
     }
 
-    /// Whether a cylinder stands in an echo's way.
-    fn is_hidden(&self, tree: &Tree, echo: &Echo, position: DVec2) -> bool {
-        let hides = |leg: Leg, end| self.hides_leg(tree, leg, position, end);
-        match tree.legs(echo) {
-            (out, None) => hides(out, position),
-            (out, Some(back)) => {
-                let end = match echo.via {
-                    Via::Edge { point, .. } => self.edges.place(point),
-                    Via::Cylinder { bounce, .. } => Some(tree.bounces[bounce as usize].hit),
-                    Via::Walls { .. } => None,
-                };
-                end.is_some_and(|end| hides(out, end) || hides(back, end))
+    /// Whether a cylinder stands in an echo's way. Tubes have seen to that for themselves.
+    fn is_hidden(&self, trees: &Trees, echo: &Echo, [start, target]: [DVec2; 2]) -> bool {
+        let hides = |tree: &Tree, part: Part, start, end| match part {
+            Part::Flat(leg) => self.hides_leg(tree, leg, start, end),
+            Part::Curved(_) => false,
+        };
+        match echo.via {
+            Via::Walls { node } => {
+                let leg = Leg { node, run: -echo.arrival };
+                hides(&trees.out, Part::Flat(leg), start, target)
             }
+            Via::Cylinders { .. } | Via::Upright => false,
+            Via::Edge { point, out, back } => self.edges.place(point).is_some_and(|end| {
+                let (there, here) = (&trees.out, trees.back());
+                hides(there, there.part(out), start, end)
+                    || hides(here, here.part(back), target, end)
+            }),
         }
     }
 
@@ -259,33 +358,59 @@ impl Paths {
         self.rounds.hide(start, to)
     }
 
-    fn path(&self, tree: &Tree, echo: &Echo) -> EchoPath {
+    fn path(&self, trees: &Trees, echo: &Echo) -> EchoPath {
         EchoPath {
             length_m: echo.length_m,
             amplitude: echo.amplitude,
             phase_rad: echo.phase_rad,
             departure_rad: echo.departure.to_angle(),
             arrival_rad: echo.arrival.to_angle(),
-            path: self.way(tree, echo),
+            rise_rad: echo.rise_rad,
+            path: self.way(trees, echo),
         }
     }
 
     /// The reflectors of an echo, in order.
-    fn way(&self, tree: &Tree, echo: &Echo) -> Path {
-        let back_to = |leg| tree.walls_back(&self.faces, leg).map(Reflector::Wall);
-        let (out, back) = tree.legs(echo);
-        let mut walls: SmallVec<[Reflector; 4]> = back_to(out).collect();
-        walls.reverse();
+    fn way(&self, trees: &Trees, echo: &Echo) -> Path {
+        let (tree, home) = (&trees.out, trees.back());
         let (kind, edge) = match echo.via {
-            Via::Walls { .. } => (PathKind::Specular, None),
             Via::Edge { point, .. } => (PathKind::Diffracted, self.edges.edge(point)),
-            Via::Cylinder { bounce, .. } => {
-                walls.push(Reflector::Cylinder(tree.bounces[bounce as usize].cylinder));
-                (PathKind::Specular, None)
+            Via::Walls { .. } | Via::Cylinders { .. } | Via::Upright => (PathKind::Specular, None),
+        };
+        let mut walls = match echo.via {
+            Via::Walls { node } => self.met(tree, Part::Flat(Leg { node, run: -echo.arrival })),
+            Via::Upright => SmallVec::new(),
+            Via::Cylinders { curved } => self.met(tree, Part::Curved(curved)),
+            Via::Edge { out, back, .. } => {
+                let mut walls = self.met(tree, tree.part(out));
+                walls.extend(self.met(home, home.part(back)).into_iter().rev());
+                walls
             }
         };
-        walls.extend(back.into_iter().flat_map(back_to));
+        // Floor and ceiling stand after the walls, wherever on the way they are met.
+        if let Some(image) = echo.image.checked_sub(1) {
+            walls.extend(self.images[image as usize].met());
+        }
         Path { kind, walls, edge }
+    }
+
+    /// What a ray from the start met, in order.
+    fn met(&self, tree: &Tree, part: Part) -> SmallVec<[Reflector; 4]> {
+        let mut met = SmallVec::new();
+        let leg = match part {
+            Part::Flat(leg) => leg,
+            Part::Curved(curved) => {
+                let Curved { view, link, contact_rad } = tree.curved[curved as usize];
+                let view = &tree.to_cylinders[view as usize];
+                let tracer = Tracer::new(self, view, &tree.links, link);
+                met.extend(tracer.surfaces.iter().rev().copied());
+                met.push(Reflector::Cylinder(view.arc.cylinder));
+                tracer.leg(contact_rad)
+            }
+        };
+        met.extend(tree.walls_back(&self.faces, leg).map(Reflector::Wall));
+        met.reverse();
+        met
     }
 }
 
@@ -293,6 +418,21 @@ impl Paths {
 /// that it does not absorb.
 fn mirror_gain(material: &Material) -> f64 {
     material.reflectance * (1.0 - material.roughness).sqrt()
+}
+
+/// The beams of a place, or of transmitter and receiver.
+#[derive(Debug)]
+struct Trees {
+    /// From the transmitter.
+    out: Tree,
+    /// From the receiver, if it is somewhere else.
+    back: Option<Tree>,
+}
+
+impl Trees {
+    fn back(&self) -> &Tree {
+        self.back.as_ref().unwrap_or(&self.out)
+    }
 }
 
 /// An echo path with its way as nodes of the tree.
@@ -305,25 +445,31 @@ struct Echo {
     departure: DVec2,
     /// Unit vector towards where it comes from.
     arrival: DVec2,
+    /// How far up it leaves and comes from, radians.
+    rise_rad: [f64; 2],
+    /// Its image over floor and ceiling, counted from 1; 0 for a path in the plan.
+    image: u16,
     via: Via,
 }
 
-/// The way of an echo; see [`Tree::legs`].
+/// The way of an echo.
 #[derive(Debug, Clone, Copy)]
 enum Via {
     Walls {
         node: u32,
     },
-    /// `out` and `back` are rays to the edge.
+    /// `out` and `back` are rays to the edge; see [`Tree::part`].
     Edge {
         point: u32,
         out: u32,
         back: u32,
     },
-    Cylinder {
-        bounce: u32,
-        backwards: bool,
+    /// By [`Tree::curved`].
+    Cylinders {
+        curved: u32,
     },
+    /// Straight up or down and back.
+    Upright,
 }
 
 /// A ray from the start by what its walls follow from.
@@ -339,21 +485,20 @@ impl From<&Ray> for Leg {
     }
 }
 
-impl Echo {
-    /// The same way run through backwards.
-    fn reversed(&self) -> Self {
-        let via = match self.via {
-            Via::Walls { .. } => self.via,
-            Via::Edge { point, out, back } => Via::Edge { point, out: back, back: out },
-            Via::Cylinder { bounce, backwards } => Via::Cylinder { bounce, backwards: !backwards },
-        };
-        Self { departure: self.arrival, arrival: self.departure, via, ..*self }
-    }
+/// A ray from the start: over walls alone, or by way of cylinders.
+#[derive(Debug, Clone, Copy)]
+enum Part {
+    Flat(Leg),
+    /// By its place in [`Tree::curved`].
+    Curved(u32),
+}
 
+impl Echo {
     /// Whether two echoes are one that touches a corner and was found on both sides of it.
     fn is_same(&self, other: &Self) -> bool {
         self.departure.distance_squared(other.departure) < SAME_RAD * SAME_RAD
             && self.arrival.distance_squared(other.arrival) < SAME_RAD * SAME_RAD
+            && self.image == other.image
             && std::mem::discriminant(&self.via) == std::mem::discriminant(&other.via)
     }
 }

@@ -1,13 +1,13 @@
 //! The echoes of one place, weighed for an azimuth.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 use smallvec::SmallVec;
 
 use super::{
-    Echo, EchoPath, Paths, Settings,
-    trace::Tree,
-    trains::{Loops, Train},
+    Echo, EchoPath, Paths, Settings, Trees,
+    trains::{Loops, Round, Train},
+    wheel::{Envelope, Spoke, Wheel},
 };
 use crate::{
     acoustics::{BeamPattern, Disc, Sound},
@@ -37,48 +37,38 @@ impl PathEngine {
     }
 }
 
+impl PathEngine {
+    /// Whether all sound stays in the plane of the scan.
+    fn is_flat(&self) -> bool {
+        self.paths.images.is_empty() && self.paths.settings.tilt_rad == 0.0
+    }
+
+    /// Angle between the transducer's axis and a direction that is `azimuth_rad` beside it in the
+    /// plan and points up by `rise_rad`, radians.
+    fn off_axis(&self, azimuth_rad: f64, rise_rad: f64) -> f64 {
+        let (tilt_sin, tilt_cos) = self.paths.settings.tilt_rad.sin_cos();
+        let (rise_sin, rise_cos) = rise_rad.sin_cos();
+        (tilt_cos * rise_cos * azimuth_rad.cos() + tilt_sin * rise_sin).clamp(-1.0, 1.0).acos()
+    }
+}
+
 impl Engine for PathEngine {
     fn survey<'a>(&'a self, position: DVec2) -> Box<dyn Survey + 'a> {
-        Box::new(PathSurvey::new(self, position))
+        Box::new(PathSurvey::new(self, position, position))
+    }
+
+    fn survey_pair<'a>(&'a self, transmitter: DVec2, receiver: DVec2) -> Box<dyn Survey + 'a> {
+        Box::new(PathSurvey::new(self, transmitter, receiver))
     }
 }
 
-/// Steps of the envelope, half a degree.
-const ENVELOPE_STEPS: usize = 360;
-
-/// For each angle from the axis the strongest that a beam pattern still gets beyond it.
-#[derive(Debug)]
-struct Envelope(Vec<f64>);
-
-impl Envelope {
-    fn of(beam: &BeamPattern) -> Self {
-        // Ten samples a step: a tenth of a lobe's width even at twenty wavelengths across.
-        let sample = |i: usize| beam.one_way(PI * i as f64 / (10 * ENVELOPE_STEPS) as f64);
-        let mut strongest: f64 = 0.0;
-        let mut steps: Vec<f64> = (0..ENVELOPE_STEPS)
-            .rev()
-            .map(|step| {
-                let here = (10 * step..=10 * step + 10).map(sample).fold(0.0, f64::max);
-                strongest = strongest.max(here);
-                strongest
-            })
-            .collect();
-        steps.reverse();
-        Self(steps)
-    }
-
-    /// The angle beyond which the pattern stays below `level`, rounded up to a step, radians.
-    fn reach_rad(&self, level: f64) -> f64 {
-        // A thousandth more than sampled, for what lies between the samples.
-        let steps = self.0.partition_point(|strongest| 1.001 * strongest >= level);
-        PI * steps as f64 / ENVELOPE_STEPS as f64
-    }
-}
+/// Widest reach of each wheel, degrees.
+const REACHES_DEG: [f64; 5] = [6.0, 10.0, 16.0, 30.0, 180.0];
 
 /// The echo paths of a place.
 struct PathSurvey<'a> {
     engine: &'a PathEngine,
-    tree: Tree,
+    trees: Trees,
     /// Shortest first.
     echoes: Vec<Echo>,
     /// From narrow to wide reach: the many weak echoes are heard in few directions only.
@@ -87,110 +77,27 @@ struct PathSurvey<'a> {
     loops: Option<Loops>,
 }
 
-/// Widest reach of each wheel, degrees.
-const REACHES_DEG: [f64; 5] = [6.0, 10.0, 16.0, 30.0, 180.0];
-
-/// Directions are sorted into this many bins.
-const BINS: usize = 360;
-
-/// Echoes by the direction in which they are heard best.
-#[derive(Debug, Default)]
-struct Wheel {
-    /// Bin by bin.
-    spokes: Vec<Spoke>,
-    /// Where each bin begins in `spokes`, and the end of the last.
-    bins: Vec<u32>,
-    /// The widest reach of its spokes.
-    reach_rad: f64,
-}
-
-/// What an azimuth needs to know of an echo.
-#[derive(Debug, Clone, Copy)]
-struct Spoke {
-    /// Half way between departure and arrival.
-    middle_rad: f64,
-    /// Departure is this far on one side of the middle, arrival on the other.
-    half_rad: f64,
-    amplitude: f64,
-    /// Farther off the middle it is too weak.
-    reach_rad: f64,
-    echo: u32,
-}
-
-impl Spoke {
-    /// `None` if it is too weak in all directions.
-    ///
-    /// `y` off the middle, the axis is `|y| + h` off one end and at least `||y| - h|` off the
-    /// other. The pattern's product reaches a level only if its smaller factor does, and its
-    /// larger one reaches the root of it.
-    fn of(echo: &Echo, index: u32, envelope: &Envelope, floor: f64) -> Option<Self> {
-        let half_rad = 0.5 * echo.departure.angle_to(echo.arrival);
-        let level = floor / echo.amplitude;
-        let wide = envelope.reach_rad(level) - half_rad.abs();
-        if wide < 0.0 {
-            return None;
-        }
-        let reach_rad = wide.min(envelope.reach_rad(level.sqrt()) + half_rad.abs());
-        let middle_rad = wrap_pi(echo.departure.to_angle() + half_rad);
-        Some(Self { middle_rad, half_rad, amplitude: echo.amplitude, reach_rad, echo: index })
-    }
-}
-
-impl Wheel {
-    fn new(spokes: &[Spoke]) -> Self {
-        let mut bins = vec![0_u32; BINS + 1];
-        for spoke in spokes {
-            bins[bin(spoke.middle_rad) + 1] += 1;
-        }
-        for i in 0..BINS {
-            bins[i + 1] += bins[i];
-        }
-        let mut next = bins.clone();
-        let mut sorted = spokes.to_vec();
-        for spoke in spokes {
-            let place = &mut next[bin(spoke.middle_rad)];
-            sorted[*place as usize] = *spoke;
-            *place += 1;
-        }
-        let reach_rad = spokes.iter().map(|spoke| spoke.reach_rad).fold(0.0, f64::max);
-        Self { spokes: sorted, bins, reach_rad }
-    }
-
-    /// The spokes within their reach of a direction in (-pi, pi].
-    fn near(&self, direction_rad: f64) -> impl Iterator<Item = (&Spoke, f64)> {
-        let bins = BINS as i64;
-        let (middle, reach) =
-            (bin(direction_rad) as i64, (self.reach_rad / TAU * BINS as f64).ceil() as i64);
-        let (from, to) =
-            if 2 * reach + 1 >= bins { (0, bins) } else { (middle - reach, middle + reach + 1) };
-        let part = move |from: i64, to: i64| {
-            let at = |bin: i64| self.bins[bin.clamp(0, bins) as usize] as usize;
-            &self.spokes[at(from)..at(to)]
-        };
-        // What leaves the circle on one side comes in on the other.
-        let wrapped = [part(from + bins, bins), part(from, to), part(0, to - bins)];
-        wrapped.into_iter().flatten().filter_map(move |spoke| {
-            let off_rad = wrap_once(direction_rad - spoke.middle_rad);
-            (off_rad.abs() <= spoke.reach_rad).then_some((spoke, off_rad))
-        })
-    }
-}
-
 impl<'a> PathSurvey<'a> {
-    fn new(engine: &'a PathEngine, position: DVec2) -> Self {
-        let (tree, echoes) = engine.paths.echoes(position);
+    fn new(engine: &'a PathEngine, transmitter: DVec2, receiver: DVec2) -> Self {
+        let (trees, echoes) = engine.paths.echoes(transmitter, receiver);
         let floor = engine.paths.settings.floor;
         let mut spokes: [Vec<Spoke>; REACHES_DEG.len()] = Default::default();
         for (echo, index) in echoes.iter().zip(0..) {
-            if let Some(spoke) = Spoke::of(echo, index, &engine.envelope, floor) {
+            if let Some(mut spoke) = Spoke::of(echo, index, &engine.envelope, floor) {
+                if engine.paths.settings.tilt_rad != 0.0 {
+                    // A tilted axis may be nearer to a rising path than its azimuth is.
+                    spoke.reach_rad = PI;
+                }
                 let reach_deg = spoke.reach_rad.to_degrees();
                 let wheel = REACHES_DEG.iter().position(|most| reach_deg <= *most);
                 spokes[wheel.unwrap_or(REACHES_DEG.len() - 1)].push(spoke);
             }
         }
         let wheels = spokes.map(|spokes| Wheel::new(&spokes));
-        let loops = engine.face.map(|face| Loops::new(face, &echoes));
-        Self { engine, tree, echoes, wheels, loops }
+        let loops = engine
+            .face
+            .map(|face| Loops::new(face, &echoes, &engine.envelope, &engine.paths.settings));
+        Self { engine, trees, echoes, wheels, loops }
     }
 
     /// Echoes by way of the face, in a direction in (-pi, pi].
@@ -203,11 +110,15 @@ impl<'a> PathSurvey<'a> {
 
     fn train_arrival(&self, direction_rad: f64, train: &Train, amplitude: f64) -> Arrival {
         let paths = &self.engine.paths;
-        let echoes = train.rounds.iter().map(|round| {
-            let echo = &self.echoes[round.echo as usize];
-            if round.reversed { echo.reversed() } else { *echo }
-        });
-        let ways: Vec<EchoPath> = echoes.map(|echo| paths.path(&self.tree, &echo)).collect();
+        let way = |round: &Round| {
+            let mut way = paths.path(&self.trees, &self.echoes[round.echo as usize]);
+            if round.reversed {
+                way.path.walls.reverse();
+                std::mem::swap(&mut way.departure_rad, &mut way.arrival_rad);
+            }
+            way
+        };
+        let ways: Vec<EchoPath> = train.rounds.iter().map(way).collect();
         let bent = ways.iter().find_map(|way| way.path.edge);
         let kind = if bent.is_some() { PathKind::Diffracted } else { PathKind::Specular };
         let mut walls = SmallVec::new();
@@ -238,9 +149,14 @@ impl Survey for PathSurvey<'_> {
         sounds.clear();
         let direction_rad = wrap_pi(direction_rad);
         let (beam, floor) = (&self.engine.beam, self.engine.paths.settings.floor);
+        let is_flat = self.engine.is_flat();
         for wheel in &self.wheels {
             for (spoke, off_rad) in wheel.near(direction_rad) {
-                let ends = [off_rad + spoke.half_rad, off_rad - spoke.half_rad];
+                let mut ends = [off_rad + spoke.half_rad, off_rad - spoke.half_rad];
+                if !is_flat {
+                    let rise_rad = self.echoes[spoke.echo as usize].rise_rad;
+                    ends = [0, 1].map(|end| self.engine.off_axis(ends[end], rise_rad[end]));
+                }
                 let [leaving, arriving] = ends.map(|angle| beam.one_way(angle));
                 let amplitude = spoke.amplitude * leaving * arriving;
                 if amplitude >= floor {
@@ -271,7 +187,7 @@ impl Survey for PathSurvey<'_> {
             return self.train_arrival(direction_rad, &trains[train], sound.amplitude);
         }
         let echo = &self.echoes[index];
-        let path = self.engine.paths.path(&self.tree, echo);
+        let path = self.engine.paths.path(&self.trees, echo);
         Arrival {
             length_m: path.length_m,
             amplitude: sound.amplitude,
@@ -281,21 +197,5 @@ impl Survey for PathSurvey<'_> {
             arrival_rad: path.arrival_rad,
             path: path.path,
         }
-    }
-}
-
-/// The bin of an angle in (-pi, pi].
-fn bin(angle_rad: f64) -> usize {
-    (((angle_rad + PI) / TAU * BINS as f64) as usize).min(BINS - 1)
-}
-
-/// The difference of two angles in (-pi, pi], brought into that range.
-pub(super) fn wrap_once(angle_rad: f64) -> f64 {
-    if angle_rad > PI {
-        angle_rad - TAU
-    } else if angle_rad < -PI {
-        angle_rad + TAU
-    } else {
-        angle_rad
     }
 }

@@ -1,8 +1,11 @@
 mod closed_forms;
+mod cylinders;
 mod fan;
 mod full_wave;
 mod laws;
+mod pairs;
 mod peers;
+mod vertical;
 
 use std::{f64::consts::TAU, sync::Arc};
 
@@ -19,6 +22,8 @@ const LOSSLESS: Settings = Settings {
     edge_law: None,
     absorption_np_per_m: 0.0,
     wave_number_per_m: TAU * 49_400.0 / 343.2,
+    sensor_z_m: None,
+    tilt_rad: 0.0,
 };
 
 fn scene(walls: &[[f64; 4]]) -> Scene {

@@ -1,9 +1,12 @@
 //! The tree of beams from one place.
 
 use super::{
-    Echo, Face, Leg, Paths, Via,
+    Face, Leg, Part, Paths,
     beam::{Beam, Ray, TIE_M, reaches, reaches_well},
     mesh::{Mesh, Side},
+    rounds::Arc,
+    tube::{Curved, Link},
+    tubes::BentRay,
 };
 use crate::geometry::DVec2;
 
@@ -17,14 +20,18 @@ const ROOT: u32 = u32::MAX;
 #[derive(Debug, Default)]
 pub(super) struct Tree {
     nodes: Vec<Node>,
-    /// Rays that come back to where they started.
+    /// Rays that come to the receiver.
     pub(super) returns: Vec<Ray>,
     /// Rays that end at an edge, with the index of its point.
     pub(super) to_edges: Vec<(u32, Ray)>,
     /// Beams that meet a cylinder.
     pub(super) to_cylinders: Vec<View>,
-    /// Reflections at cylinders.
-    pub(super) bounces: Vec<Bounce>,
+    /// What tubes have met after their first cylinders.
+    pub(super) links: Vec<Link>,
+    /// Rays by way of cylinders that end at the receiver or at an edge.
+    pub(super) curved: Vec<Curved>,
+    /// Of these, the ones to edges.
+    pub(super) bent_to_edges: Vec<BentRay>,
 }
 
 /// Where beams have been.
@@ -39,45 +46,66 @@ enum Node {
 /// A beam where it passes a triangle that a cylinder reaches into.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View {
-    pub(super) cylinder: u32,
+    pub(super) arc: Arc,
     pub(super) beam: Beam,
 }
 
-/// A reflection at a cylinder, between two rays from the start.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Bounce {
-    pub(super) cylinder: u32,
-    pub(super) hit: DVec2,
-    pub(super) out: Leg,
-    pub(super) back: Leg,
-}
-
 impl Tree {
-    /// All beams from `start` that can still give an echo.
-    pub(super) fn grow(paths: &Paths, start: DVec2) -> Self {
+    /// All beams from `start` that can still give an echo at `target`.
+    pub(super) fn grow(paths: &Paths, start: DVec2, target: DVec2) -> Self {
         let tree = Self::default();
         let Some(mesh) = &paths.mesh else { return tree };
-        let Some(home) = mesh.locate(start) else { return tree };
+        let Some(first) = mesh.locate(start) else { return tree };
+        let Some(home) = mesh.locate(target) else { return tree };
         let most_reflections =
             paths.settings.max_order.unwrap_or(MOST_REFLECTIONS).min(MOST_REFLECTIONS);
         let (parts, next) = (Vec::new(), Vec::new());
-        let mut grower = Grower { paths, mesh, start, home, most_reflections, parts, next, tree };
-        grower.grow();
+        let mut grower =
+            Grower { paths, mesh, start, target, home, most_reflections, parts, next, tree };
+        grower.grow(first);
         grower.tree
     }
 
-    /// The rays that an echo consists of, both seen from the start: out to where it turns back
-    /// and home from there, or the one ray of walls alone.
-    pub(super) fn legs(&self, echo: &Echo) -> (Leg, Option<Leg>) {
-        let to_edge = |ray: u32| Leg::from(&self.to_edges[ray as usize].1);
-        match echo.via {
-            Via::Walls { node } => (Leg { node, run: -echo.arrival }, None),
-            Via::Edge { out, back, .. } => (to_edge(out), Some(to_edge(back))),
-            Via::Cylinder { bounce, backwards } => {
-                let Bounce { out, back, .. } = self.bounces[bounce as usize];
-                if backwards { (back, Some(out)) } else { (out, Some(back)) }
-            }
+    /// A ray to an edge by its number: those over walls alone first, then those by cylinders.
+    pub(super) fn part(&self, ray: u32) -> Part {
+        let ray = ray as usize;
+        match ray.checked_sub(self.to_edges.len()) {
+            None => Part::Flat((&self.to_edges[ray].1).into()),
+            Some(bent) => Part::Curved(self.bent_to_edges[bent].ray.node),
         }
+    }
+
+    /// Puts the rays to each edge side by side.
+    pub(super) fn sort_by_edge(&mut self) {
+        self.to_edges.sort_by_key(|(point, _)| *point);
+        self.bent_to_edges.sort_by_key(|bent| bent.point);
+    }
+
+    /// The edges that are met, each once.
+    pub(super) fn edges(&self) -> Vec<u32> {
+        let flat = self.to_edges.chunk_by(|a, b| a.0 == b.0).map(|rays| rays[0].0);
+        let mut edges: Vec<u32> = flat.collect();
+        if !self.bent_to_edges.is_empty() {
+            edges.extend(self.bent_to_edges.iter().map(|bent| bent.point));
+            edges.sort_unstable();
+            edges.dedup();
+        }
+        edges
+    }
+
+    /// Rays over walls alone to an edge, and the number of the first; sorted by edge.
+    pub(super) fn flat_to(&self, point: u32) -> (u32, &[(u32, Ray)]) {
+        let from = self.to_edges.partition_point(|ray| ray.0 < point);
+        let count = self.to_edges[from..].partition_point(|ray| ray.0 == point);
+        (from as u32, &self.to_edges[from..from + count])
+    }
+
+    /// The same for rays by way of cylinders.
+    pub(super) fn bent_to(&self, point: u32) -> (u32, &[BentRay]) {
+        let bent = &self.bent_to_edges;
+        let from = bent.partition_point(|ray| ray.point < point);
+        let count = bent[from..].partition_point(|ray| ray.point == point);
+        ((self.to_edges.len() + from) as u32, &bent[from..from + count])
     }
 
     /// The walls that a ray met, last one first.
@@ -112,7 +140,9 @@ struct Grower<'a> {
     paths: &'a Paths,
     mesh: &'a Mesh,
     start: DVec2,
-    /// Triangle of the start.
+    /// Where echoes are received: usually the start.
+    target: DVec2,
+    /// Triangle of the target.
     home: u32,
     most_reflections: u16,
     /// Parts of the beam at hand still to be followed, each before it leaves by a side.
@@ -123,7 +153,7 @@ struct Grower<'a> {
 }
 
 impl Grower<'_> {
-    fn grow(&mut self) {
+    fn grow(&mut self, triangle: u32) {
         let first = Beam {
             image: self.start,
             right: DVec2::ZERO,
@@ -132,7 +162,7 @@ impl Grower<'_> {
             gain: 1.0,
             audible_m: self.paths.settings.audible_m(),
             node: ROOT,
-            triangle: self.home,
+            triangle,
             side: 0,
             mirrored: false,
             order: 0,
@@ -192,7 +222,7 @@ impl Grower<'_> {
     /// Takes a beam through its triangle. Where the far corner splits it, the second part waits.
     fn cross(&mut self, beam: Beam) -> Option<Beam> {
         if beam.triangle == self.home && beam.node != ROOT {
-            self.meet_start(&beam);
+            self.meet_target(&beam);
         }
         self.meet_cylinders(&beam);
         let side = beam.side as usize;
@@ -228,7 +258,12 @@ impl Grower<'_> {
             }
             Side::Wall(wall) => {
                 self.reflect(&beam, wall, side);
-                None
+                if !self.paths.heights.lets_pass(wall) {
+                    return None;
+                }
+                let (triangle, side) = self.mesh.beyond(beam.triangle, side)?;
+                let next = Beam { triangle, side, ..beam };
+                self.may_return(&next).then_some(next)
             }
             Side::Outside => None,
         }
@@ -241,7 +276,7 @@ impl Grower<'_> {
         let [a, b] = [side, (side + 1) % 3].map(|corner| self.mesh.corner(beam.triangle, corner));
         let middle = 0.5 * (a + b);
         let (out, back) =
-            (middle.distance_squared(beam.image), middle.distance_squared(self.start));
+            (middle.distance_squared(beam.image), middle.distance_squared(self.target));
         let longest_m = self.longest_m(beam);
         // (p + q)^2 <= 2 p^2 + 2 q^2 spares most beams the roots.
         2.0 * (out + back) <= longest_m * longest_m
@@ -289,9 +324,9 @@ impl Grower<'_> {
     fn least_path_m(&self, beam: &Beam, next: &Beam, face: &Face, side: usize) -> f64 {
         let mirror = &face.mirror;
         let height = mirror.height_m(beam.image);
-        let behind = mirror.height_m(self.start) * height < 0.0;
+        let behind = mirror.height_m(self.target) * height < 0.0;
         let through = if behind { beam } else { next };
-        let run = self.start - through.image;
+        let run = self.target - through.image;
         if through.holds(run) {
             return run.length();
         }
@@ -304,15 +339,15 @@ impl Grower<'_> {
             // Clamped, for borders that graze the wall; min and max drop a NaN.
             let place = along.dot(hit).max(low).min(high);
             let hit = mirror.offset_m * mirror.normal + place * along;
-            hit.distance(beam.image) + hit.distance(self.start)
+            hit.distance(beam.image) + hit.distance(self.target)
         };
         by(beam.right).min(by(beam.left))
     }
 
-    fn meet_start(&mut self, beam: &Beam) {
-        let run = self.start - beam.image;
+    fn meet_target(&mut self, beam: &Beam) {
+        let run = self.target - beam.image;
         if beam.holds(run) && run.length_squared() <= self.longest_m(beam).powi(2) {
-            self.tree.returns.push(beam.ray_to(self.start));
+            self.tree.returns.push(beam.ray_to(self.target));
         }
     }
 
@@ -324,8 +359,8 @@ impl Grower<'_> {
     }
 
     fn meet_cylinders(&mut self, beam: &Beam) {
-        for &cylinder in self.paths.rounds.in_triangle(beam.triangle) {
-            self.tree.to_cylinders.push(View { cylinder, beam: *beam });
+        for &arc in self.paths.rounds.in_triangle(beam.triangle) {
+            self.tree.to_cylinders.push(View { arc, beam: *beam });
         }
     }
 }

@@ -10,21 +10,26 @@
 //! passage that is the disc's field itself. With more it holds for discs of few Fresnel zones:
 //! beside Kirchhoff's integral over each passage, fourth echoes are 1.1 dB too strong over rounds
 //! of 0.4 m and 3.9 dB over rounds of 0.19 m (a 21.5 mm disc at 49.4 kHz; a test computes them).
-//! The beam pattern weighs the first departure and the last arrival only.
+//! Rounds by floor and ceiling are left out. The beam pattern weighs the first departure and the last arrival only.
 //!
 //! The sound that passes beside the face goes on behind it: in the middle of a disc's shadow it
 //! is as strong as without the disc (Arago's spot, `|exp(-i p)| = 1`), so nothing is taken from
 //! the paths that run past the ranger.
 
+use std::f64::consts::FRAC_PI_2;
+
 use num_complex::Complex64;
 use smallvec::{SmallVec, smallvec};
 
-use super::{Echo, Settings, survey::wrap_once};
+use super::{
+    Echo, SAME_RAD, Settings,
+    wheel::{Envelope, Spoke, Wheel, wrap_once},
+};
 use crate::acoustics::{BeamPattern, Disc, FaceAspect, Sound};
 
-/// Trains are listed from this much above the weakest sound of the survey: with 20 dB for that,
-/// from 6 dB below the threshold. There are a great many of them.
-const FLOOR_ABOVE: f64 = 5.0;
+/// Trains are listed from this much above the weakest sound of the survey, which lies 20 dB below
+/// the threshold: only those that can be detected. There are a great many of the others.
+const FLOOR_ABOVE: f64 = 10.0;
 
 /// Rounds longer than this in all would not be told apart any more.
 const MOST_ROUNDS: usize = 32;
@@ -37,6 +42,8 @@ const MOST_TRAINS: usize = 4096;
 pub(super) struct Loops {
     face: Disc,
     rounds: Vec<Loop>,
+    /// By direction of departure.
+    departures: Wheel,
 }
 
 /// An echo path, run through in one of its directions.
@@ -78,18 +85,48 @@ impl Train {
 }
 
 impl Loops {
-    pub(super) fn new(face: Disc, echoes: &[Echo]) -> Self {
+    pub(super) fn new(
+        face: Disc,
+        echoes: &[Echo],
+        envelope: &Envelope,
+        settings: &Settings,
+    ) -> Self {
+        let floor = FLOOR_ABOVE * settings.floor;
         // A wall nearer than that is not one to see the disc's zones from.
-        let is_far = |(echo, _): &(&Echo, u32)| echo.length_m > 2.0 * face.face.radius_m;
-        let rounds = echoes.iter().zip(0..).filter(is_far).map(|(echo, index)| Loop {
-            round: Round { echo: index, reversed: false },
-            leaves_rad: echo.departure.to_angle(),
-            returns_rad: echo.arrival.to_angle(),
-            length_m: echo.length_m,
-            field: Complex64::from_polar(echo.amplitude, echo.phase_rad),
-            own_reverse: echo.departure == echo.arrival,
-        });
-        Self { face, rounds: rounds.collect() }
+        let far = || {
+            let far = |(echo, _): &(&Echo, u32)| {
+                echo.length_m > 2.0 * face.face.radius_m && echo.image == 0
+            };
+            echoes.iter().zip(0..).filter(far)
+        };
+        let best = Best::of(far().map(|(echo, _)| (echo.length_m, echo.amplitude)));
+        let mut rounds = Vec::new();
+        let mut spokes = Vec::new();
+        for (echo, index) in far() {
+            // What it can at most become, when the face looks into its departure.
+            let most = best.after(&face, echo.length_m, echo.amplitude);
+            let reach_rad = envelope.reach_rad(floor / most);
+            if most < floor || reach_rad == 0.0 {
+                continue;
+            }
+            let leaves_rad = echo.departure.to_angle();
+            spokes.push(Spoke {
+                middle_rad: leaves_rad,
+                half_rad: 0.0,
+                amplitude: echo.amplitude,
+                reach_rad,
+                echo: rounds.len() as u32,
+            });
+            rounds.push(Loop {
+                round: Round { echo: index, reversed: false },
+                leaves_rad,
+                returns_rad: echo.arrival.to_angle(),
+                length_m: echo.length_m,
+                field: Complex64::from_polar(echo.amplitude, echo.phase_rad),
+                own_reverse: echo.departure.distance(echo.arrival) < SAME_RAD,
+            });
+        }
+        Self { face, rounds, departures: Wheel::new(&spokes) }
     }
 
     /// All trains with at least one passage at the face, which looks into `direction_rad`.
@@ -100,19 +137,19 @@ impl Loops {
         settings: &Settings,
     ) -> Vec<Train> {
         let floor = FLOOR_ABOVE * settings.floor;
-        let zone_m = self.face.zone_m();
-        let turned = self.rounds.iter().filter_map(|round| {
+        let mut outs: SmallVec<[(Loop, f64); 16]> = SmallVec::new();
+        for (spoke, _) in self.departures.near(direction_rad) {
+            let round = &self.rounds[spoke.echo as usize];
             let leaves_rad = wrap_once(round.leaves_rad - direction_rad);
-            let leaving = round.field.norm() * beam.one_way(leaves_rad);
             let returns_rad = wrap_once(round.returns_rad - direction_rad);
-            (leaving > floor * 0.1 && returns_rad.cos() > 0.0)
-                .then_some((Loop { leaves_rad, returns_rad, ..*round }, leaving))
-        });
-        let mut outs: Vec<(Loop, f64)> = turned.collect();
-        let best = Best::of(&outs);
-        outs.retain(|(out, leaving)| {
-            zone_m * leaving / out.length_m * best.beside(out.length_m) >= floor
-        });
+            if returns_rad.abs() < FRAC_PI_2 {
+                let leaving = spoke.amplitude * beam.one_way(leaves_rad);
+                outs.push((Loop { leaves_rad, returns_rad, ..*round }, leaving));
+            }
+        }
+        // Each needs another that it can be joined to.
+        let best = Best::of(outs.iter().map(|(out, leaving)| (out.length_m, *leaving)));
+        outs.retain(|(out, leaving)| best.after(&self.face, out.length_m, *leaving) >= floor);
         let mut search = Search::new(self.face, &outs, floor, settings);
         for (out, leaving) in &outs {
             let strength = out.field / out.field.norm() * leaving / out.length_m;
@@ -130,16 +167,25 @@ struct Best {
 }
 
 impl Best {
-    fn of(outs: &[(Loop, f64)]) -> Self {
-        outs.iter().fold(Self { weight: 0.0, weight_per_m: 0.0 }, |best, (out, weight)| Self {
-            weight: best.weight.max(*weight),
-            weight_per_m: best.weight_per_m.max(weight / out.length_m),
+    /// Of rounds by length and weight.
+    fn of(rounds: impl Iterator<Item = (f64, f64)>) -> Self {
+        rounds.fold(Self { weight: 0.0, weight_per_m: 0.0 }, |best, (length_m, weight)| Self {
+            weight: best.weight.max(weight),
+            weight_per_m: best.weight_per_m.max(weight / length_m),
         })
     }
 
     /// Most that a last round makes of rounds of this length: `weight / L (length + L)`.
     fn beside(&self, length_m: f64) -> f64 {
         self.weight + self.weight_per_m * length_m
+    }
+
+    /// The strongest train that begins with a round of this length and weight and turns at the
+    /// face once.
+    fn after(&self, face: &Disc, length_m: f64, weight: f64) -> f64 {
+        // A passage scatters at most like the whole disc in phase, and at most twice a mirror.
+        let scatters = face.strength_m() / length_m * self.beside(length_m);
+        weight * scatters.min(2.0 * face.face.reflectance * self.weight)
     }
 }
 
@@ -164,10 +210,11 @@ impl<'a> Search<'a> {
             returns_rad: round.leaves_rad,
             ..*round
         };
+        let best = Best::of(outs.iter().map(|(out, weight)| (out.length_m, *weight)));
         let ends: Vec<_> = outs.iter().map(|(out, weight)| (backwards(out), *weight)).collect();
         let others = outs.iter().filter(|(out, _)| !out.own_reverse).map(|(out, _)| *out);
         let middles = ends.iter().map(|(end, _)| *end).chain(others).collect();
-        Self { face, settings, floor, best: Best::of(outs), ends, middles, found: Vec::new() }
+        Self { face, settings, floor, best: best, ends, middles, found: Vec::new() }
     }
 
     /// Ends a row of rounds, and goes on with it. `strength` is its field over its spreading,
@@ -179,8 +226,8 @@ impl<'a> Search<'a> {
         strength: Complex64,
         length_m: f64,
     ) {
-        let zone_m = self.face.zone_m();
-        let bound = strength.norm() * zone_m;
+        let disc_m = self.face.strength_m();
+        let bound = strength.norm() * disc_m;
         let too_many = rounds.len() >= MOST_ROUNDS || self.found.len() >= MOST_TRAINS;
         if too_many || bound * self.best.beside(length_m) < self.floor {
             return;
@@ -206,7 +253,7 @@ impl<'a> Search<'a> {
             let middle = self.middles[at];
             let total_m = length_m + middle.length_m;
             let per_m = middle.field.norm() / middle.length_m;
-            if bound * per_m * zone_m * self.best.beside(total_m) < self.floor
+            if bound * per_m * disc_m * self.best.beside(total_m) < self.floor
                 || total_m >= self.settings.max_path_m
             {
                 continue;
@@ -255,6 +302,8 @@ mod tests {
             edge_law: None,
             absorption_np_per_m: 0.0,
             wave_number_per_m: DISC.wave_number_per_m,
+            sensor_z_m: None,
+            tilt_rad: 0.0,
         }
     }
 
@@ -266,11 +315,13 @@ mod tests {
             phase_rad: 0.0,
             departure: DVec2::X,
             arrival: DVec2::X,
+            rise_rad: [0.0; 2],
+            image: 0,
             via: Via::Walls { node: 0 },
         };
         let beam = BeamPattern::new(&Sensor::preset("senscomp-6500").expect("a preset"), 343.99);
-        let mut trains =
-            Loops::new(disc, &[echo]).trains(direction_rad, &beam, &settings(4.5 * round_m));
+        let mut trains = Loops::new(disc, &[echo], &Envelope::of(&beam), &settings(4.5 * round_m))
+            .trains(direction_rad, &beam, &settings(4.5 * round_m));
         trains.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
         trains
     }

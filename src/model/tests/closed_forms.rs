@@ -187,3 +187,27 @@ fn the_cone_reads_the_nearest_hit_within_its_aperture() {
     }
     assert_eq!(station.ping(std::f64::consts::PI).status, PingStatus::NoEcho);
 }
+
+/// Ranges are measured from the face, and from the middle of a pair.
+#[test]
+fn a_face_off_the_axis_sees_the_wall_from_where_it_is() {
+    let room = || scene(vec![wall("north", (-9.0, 1.0), (9.0, 1.0), 1.0)]);
+    let range_m = |mounting: crate::acoustics::Mounting, direction_deg: f64| {
+        let mut sensor = Sensor::preset("senscomp-6500").expect("a preset");
+        sensor.mounting = mounting;
+        let options = Options { engine: EngineKind::Paths, ..BARE };
+        let simulator = Simulator::new(Arc::new(room()), sensor, Air::default(), options)
+            .expect("good options");
+        let ping = simulator.station(DVec2::ZERO).ping(f64::to_radians(direction_deg));
+        ping.range_m.expect("a range")
+    };
+    let mounting = crate::acoustics::Mounting::default();
+    close(range_m(mounting, 90.0), 1.0, 1e-12, "on the axis");
+    let ahead = crate::acoustics::Mounting { ahead_m: 0.05, left_m: 0.02, ..mounting };
+    close(range_m(ahead, 90.0), 0.95, 1e-12, "ahead");
+    let turn = DVec2::from_angle(84_f64.to_radians());
+    let face = turn.rotate(DVec2::new(0.05, 0.02));
+    close(range_m(ahead, 84.0), 1.0 - face.y, 1e-12, "turned");
+    let pair = crate::acoustics::Mounting { separation_m: 0.026, ..mounting };
+    close(range_m(pair, 90.0), 1.0_f64.hypot(0.013), 1e-12, "a pair");
+}

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    model::Prediction,
+    model::{Prediction, Reflector},
     scan::{PingStatus, ScanPlan},
 };
 
@@ -218,6 +218,28 @@ fn the_near_wall_on_the_right_is_read_as_minimum_range() {
     assert!(near.len() >= 3, "{near:?}");
 }
 
+/// Figure 9 with a robot's body behind the ranger: the body is in the way of the sound that
+/// passed the ranger, and what runs to and fro between body and wall still sounds when the
+/// receiver opens. Where the false lower wall was, the minimum range is read.
+#[test]
+fn a_robots_body_turns_the_false_wall_into_minimum_range() {
+    let scene = shipped_scene("simple-room-robot");
+    let pose = pose(&scene, "fig9");
+    let plan = ScanPlan::default();
+    for engine in [EngineKind::Paths, EngineKind::Fan] {
+        let options = Options { engine, max_range_m: Some(2.0), ..Options::default() };
+        let readings = simulator(scene.with_robot_at(&pose), options).predict(&pose, &plan);
+        let ahead = readings[0].clone();
+        assert_eq!(ahead.status, PingStatus::MinRange, "{engine:?}: {ahead:?}");
+        let walls = ahead.arrival.expect("what sounded").path.walls;
+        let at_body = walls.iter().filter(|wall| **wall == Reflector::Cylinder(0)).count();
+        println!("{engine:?}: {walls:?}");
+        assert!(at_body >= 2 || walls.contains(&Reflector::Face), "{engine:?}: {walls:?}");
+        let circle = readings.iter().filter(|reading| reading.status == PingStatus::MinRange);
+        println!("{engine:?}: {}", circle.count());
+    }
+}
+
 /// Figure 1 (c): a plate parallel to the transducer answers more than once.
 #[test]
 fn a_plate_before_the_transducer_answers_in_a_train() {
@@ -231,7 +253,7 @@ fn a_plate_before_the_transducer_answers_in_a_train() {
         close(*echo, 1.2 * f64::from(round), 1e-9, "round");
     }
     assert!(train.len() >= 2, "{train:?}");
-    assert!(simulator.station(pose.position()).ping(direction_rad).echoes_us.len() >= 2);
+    assert!(simulator.station(pose.position()).ping_rearmed(direction_rad).echoes_us.len() >= 2);
 }
 
 /// Figure 12: an arc around the corner's vertex, and a hole on each side of it.

@@ -59,8 +59,8 @@ fn mirrors(scene: &Scene, path: &Path, points: &[DVec2]) {
         let turned = Mirror::through(wall.a, wall.b).turn(corner[1] - corner[0]);
         let (before, after) =
             (turned.normalize_or_zero(), (corner[2] - corner[1]).normalize_or_zero());
-        // In a corner two reflections fall into one point.
-        if turned.length() > 1e-6 && corner[2].distance(corner[1]) > 1e-6 {
+        // In a corner two reflections fall into one point, as nearly as its coordinates are written.
+        if turned.length() > 2e-4 && corner[2].distance(corner[1]) > 2e-4 {
             assert!((before - after).length() < 1e-4, "{path:?} {points:?}");
         }
     }

@@ -1,19 +1,8 @@
 //! Scenes whose echoes are known in closed form.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::*;
-use crate::{model::Reflector, scene::Cylinder};
-
-fn cylinder(x: f64, y: f64, radius_m: f64) -> Cylinder {
-    Cylinder {
-        id: Arc::from("round"),
-        center: DVec2::new(x, y),
-        radius_m,
-        material: Material { reflectance: 1.0, roughness: 0.0 },
-        z_m: None,
-    }
-}
 
 /// Two walls from the origin, `opening_rad` apart, long enough to have no ends.
 fn dihedral(opening_rad: f64, turn_rad: f64) -> Scene {
@@ -118,59 +107,4 @@ fn an_edge_seen_along_its_wall_answers() {
     assert_eq!(echoes.len(), 1);
     assert_eq!(echoes[0].path.edge, Some(crate::model::Edge { wall: 0, at_b: false }));
     assert!((echoes[0].length_m - 1.0).abs() < 1e-12);
-}
-
-#[test]
-fn a_cylinder_answers_from_its_nearest_point_and_spreads() {
-    let mut plan = scene(&[]);
-    plan.cylinders = vec![cylinder(1.0, 2.0, 0.3)];
-    let at = DVec2::new(2.5, 0.0);
-    let echoes = Paths::new(&plan, LOSSLESS).enumerate(at);
-    assert_eq!(echoes.len(), 1);
-    let distance = 2.5 - 0.3;
-    assert!((echoes[0].length_m - 2.0 * distance).abs() < 1e-12);
-    assert!((echoes[0].amplitude - (0.3_f64 / (0.3 + distance)).sqrt()).abs() < 1e-12);
-    assert_eq!(echoes[0].path.walls[..], [Reflector::Cylinder(0)]);
-}
-
-#[test]
-fn a_cylinder_hides_the_wall_behind_it() {
-    let mut plan = scene(&[[-5.0, 3.0, 5.0, 3.0]]);
-    plan.cylinders = vec![cylinder(0.0, 1.5, 0.2)];
-    let settings = Settings { max_order: Some(1), ..LOSSLESS };
-    let paths = Paths::new(&plan, settings);
-    let kinds = |x: f64| {
-        let echoes = paths.enumerate(DVec2::new(x, 0.0));
-        echoes.iter().map(|echo| echo.path.walls[0]).collect::<Vec<_>>()
-    };
-    assert_eq!(kinds(0.1), [Reflector::Cylinder(0)]);
-    assert_eq!(kinds(0.3), [Reflector::Cylinder(0), Reflector::Wall(0)]);
-}
-
-/// Ways from wall to cylinder and back: the reflected way is the shortest one over points of
-/// both, found here by searching.
-#[test]
-fn echoes_between_cylinder_and_walls_take_the_shortest_way() {
-    let mut plan = scene(&[[-5.0, 0.0, 5.0, 0.0]]);
-    plan.cylinders = vec![cylinder(0.9, 0.8, 0.25)];
-    let at = DVec2::new(-0.4, 0.5);
-    let settings = Settings { max_path_m: 6.0, ..LOSSLESS };
-    let echoes = Paths::new(&plan, settings).enumerate(at);
-    let below = DVec2::new(at.x, -at.y);
-    let over = |p: DVec2, q: DVec2| {
-        (0..200_000)
-            .map(|i| {
-                let normal = DVec2::from_angle(TAU * f64::from(i) / 200_000.0);
-                let hit = plan.cylinders[0].center + 0.25 * normal;
-                let lit = normal.dot(p - hit) > 0.0 && normal.dot(q - hit) > 0.0;
-                if lit { p.distance(hit) + hit.distance(q) } else { f64::INFINITY }
-            })
-            .fold(f64::INFINITY, f64::min)
-    };
-    for (p, q, count) in [(at, at, 1), (at, below, 2), (below, below, 1)] {
-        let length_m = over(p, q);
-        let same = echoes.iter().filter(|echo| (echo.length_m - length_m).abs() < 1e-8).count();
-        assert_eq!(same, count, "{length_m} m");
-    }
-    assert_eq!(echoes.len(), 5);
 }

@@ -15,7 +15,7 @@ fn simulator(scene: &Arc<Scene>, engine: EngineKind, ray_spacing_deg: f64) -> Si
     Simulator::new(scene.clone(), sensor, Air::default(), options).expect("valid options")
 }
 
-/// Mirror echoes over the threshold; `paths` has one reflection at a cylinder at most, and the
+/// Mirror echoes over the threshold; `paths` has three reflections at cylinders at most, and the
 /// fan's ranger is transparent.
 fn mirrored(simulator: &Simulator, pose: &Pose, azimuth_deg: f64) -> Vec<Arrival> {
     let is_round = |r: &&crate::model::Reflector| matches!(r, crate::model::Reflector::Cylinder(_));
@@ -24,7 +24,7 @@ fn mirrored(simulator: &Simulator, pose: &Pose, azimuth_deg: f64) -> Vec<Arrival
     arrivals.retain(|arrival| {
         arrival.path.kind == PathKind::Specular
             && arrival.amplitude > 0.02
-            && arrival.path.walls.iter().filter(is_round).count() < 2
+            && arrival.path.walls.iter().filter(is_round).count() < 4
             && !arrival.path.walls.contains(&crate::model::Reflector::Face)
     });
     arrivals

@@ -1,0 +1,237 @@
+//! Cylinders: what they reflect, spread and hide.
+
+use std::f64::consts::TAU;
+
+use super::*;
+use crate::{model::Reflector, scene::Cylinder};
+
+fn cylinder(x: f64, y: f64, radius_m: f64) -> Cylinder {
+    Cylinder {
+        id: Arc::from("round"),
+        center: DVec2::new(x, y),
+        radius_m,
+        material: Material { reflectance: 1.0, roughness: 0.0 },
+        z_m: None,
+    }
+}
+
+#[test]
+fn a_cylinder_answers_from_its_nearest_point_and_spreads() {
+    let mut plan = scene(&[]);
+    plan.cylinders = vec![cylinder(1.0, 2.0, 0.3)];
+    let at = DVec2::new(2.5, 0.0);
+    let echoes = Paths::new(&plan, LOSSLESS).enumerate(at);
+    assert_eq!(echoes.len(), 1);
+    let distance = 2.5 - 0.3;
+    assert!((echoes[0].length_m - 2.0 * distance).abs() < 1e-12);
+    assert!((echoes[0].amplitude - (0.3_f64 / (0.3 + distance)).sqrt()).abs() < 1e-12);
+    assert_eq!(echoes[0].path.walls[..], [Reflector::Cylinder(0)]);
+}
+
+#[test]
+fn a_cylinder_hides_the_wall_behind_it() {
+    let mut plan = scene(&[[-5.0, 3.0, 5.0, 3.0]]);
+    plan.cylinders = vec![cylinder(0.0, 1.5, 0.2)];
+    let settings = Settings { max_order: Some(1), ..LOSSLESS };
+    let paths = Paths::new(&plan, settings);
+    let kinds = |x: f64| {
+        let echoes = paths.enumerate(DVec2::new(x, 0.0));
+        echoes.iter().map(|echo| echo.path.walls[0]).collect::<Vec<_>>()
+    };
+    assert_eq!(kinds(0.1), [Reflector::Cylinder(0)]);
+    assert_eq!(kinds(0.3), [Reflector::Cylinder(0), Reflector::Wall(0)]);
+}
+
+/// Ways from wall to cylinder and back: the reflected way is the shortest one over points of
+/// both, found here by searching.
+#[test]
+fn echoes_between_cylinder_and_walls_take_the_shortest_way() {
+    let mut plan = scene(&[[-5.0, 0.0, 5.0, 0.0]]);
+    plan.cylinders = vec![cylinder(0.9, 0.8, 0.25)];
+    let at = DVec2::new(-0.4, 0.5);
+    let settings = Settings { max_path_m: 6.0, ..LOSSLESS };
+    let echoes = Paths::new(&plan, settings).enumerate(at);
+    let below = DVec2::new(at.x, -at.y);
+    let over = |p: DVec2, q: DVec2| {
+        (0..200_000)
+            .map(|i| {
+                let normal = DVec2::from_angle(TAU * f64::from(i) / 200_000.0);
+                let hit = plan.cylinders[0].center + 0.25 * normal;
+                let lit = normal.dot(p - hit) > 0.0 && normal.dot(q - hit) > 0.0;
+                if lit { p.distance(hit) + hit.distance(q) } else { f64::INFINITY }
+            })
+            .fold(f64::INFINITY, f64::min)
+    };
+    for (p, q, count) in [(at, at, 1), (at, below, 2), (below, below, 1)] {
+        let length_m = over(p, q);
+        let same = echoes.iter().filter(|echo| (echo.length_m - length_m).abs() < 1e-8).count();
+        assert_eq!(same, count, "{length_m} m");
+    }
+    // And those that touch the cylinder again and again: to and fro between the two.
+    let once = echoes.iter().filter(|echo| {
+        let is_round = |r: &&Reflector| matches!(r, Reflector::Cylinder(_));
+        echo.path.walls.iter().filter(is_round).count() < 2
+    });
+    assert_eq!(once.count(), 5);
+}
+
+/// The length of the shortest way that touches the given circles and lines in turn, by moving
+/// each contact in turn to where it is shortest.
+fn shortest(
+    start: DVec2,
+    surfaces: &[Reflector],
+    plan: &Scene,
+    guess: &[f64],
+) -> (f64, Vec<DVec2>) {
+    let place = |surface: Reflector, at: f64| match surface {
+        Reflector::Cylinder(i) => {
+            let round = &plan.cylinders[i as usize];
+            round.center + round.radius_m * DVec2::from_angle(at)
+        }
+        Reflector::Wall(i) => {
+            let wall = &plan.walls[i as usize];
+            wall.a + at * (wall.b - wall.a).normalize()
+        }
+        _ => start,
+    };
+    let mut at = guess.to_vec();
+    let length = |at: &[f64]| {
+        let mut from = start;
+        let mut sum = 0.0;
+        for (surface, &at) in surfaces.iter().zip(at) {
+            let to = place(*surface, at);
+            sum += from.distance(to);
+            from = to;
+        }
+        sum + from.distance(start)
+    };
+    let mut step = 0.1;
+    while step > 1e-11 {
+        let before = length(&at);
+        for i in 0..at.len() {
+            for way in [-step, step] {
+                let mut other = at.clone();
+                other[i] += way;
+                if length(&other) < length(&at) {
+                    at = other;
+                }
+            }
+        }
+        if length(&at) >= before {
+            step *= 0.5;
+        }
+    }
+    let contacts = surfaces.iter().zip(&at).map(|(surface, &at)| place(*surface, at)).collect();
+    (length(&at), contacts)
+}
+
+#[test]
+fn echoes_by_two_cylinders_take_the_shortest_way() {
+    let mut plan = scene(&[[-3.0, -0.9, 3.0, -0.9]]);
+    plan.cylinders = vec![cylinder(1.0, 0.3, 0.25), cylinder(-0.9, 0.6, 0.35)];
+    let at = DVec2::new(0.1, -0.2);
+    let echoes = Paths::new(&plan, Settings { max_path_m: 6.0, ..LOSSLESS }).enumerate(at);
+    let (a, b, w) = (Reflector::Cylinder(0), Reflector::Cylinder(1), Reflector::Wall(0));
+    for (surfaces, guess) in [
+        (vec![a, b], vec![3.3, 0.0]),
+        (vec![b, a], vec![0.0, 3.3]),
+        (vec![w, a, b], vec![3.3, 3.3, 0.0]),
+        (vec![a, w, b], vec![3.9, 3.1, -0.8]),
+        (vec![a, b, a], vec![3.3, 0.0, 3.3]),
+        (vec![b, w, b], vec![-0.8, 2.6, -0.8]),
+    ] {
+        let (length_m, contacts) = shortest(at, &surfaces, &plan, &guess);
+        let found: Vec<_> =
+            echoes.iter().filter(|echo| echo.path.walls[..] == surfaces[..]).collect();
+        assert_eq!(found.len(), 1, "{surfaces:?}: {found:?}");
+        assert!((found[0].length_m - length_m).abs() < 1e-9, "{surfaces:?} {length_m}");
+        let leaves = (contacts[0] - at).to_angle();
+        assert!(crate::geometry::wrap_pi(found[0].departure_rad - leaves).abs() < 1e-5);
+    }
+}
+
+/// Rays beside an echo's own diverge by the amount that its amplitude says.
+#[test]
+fn cylinders_spread_sound_as_rays_beside_it_diverge() {
+    let mut plan = scene(&[]);
+    plan.cylinders = vec![cylinder(0.8, 0.3, 0.25), cylinder(-0.9, 0.1, 0.35)];
+    let at = DVec2::new(0.1, 0.0);
+    let echoes = Paths::new(&plan, Settings { max_path_m: 6.0, ..LOSSLESS }).enumerate(at);
+    let echo = echoes.iter().find(|echo| echo.path.walls.len() == 2).expect("by both");
+    // A ray of its own: on to the first and the second circle, and to abreast of the start.
+    let trace = |angle: f64| {
+        let (mut p, mut d) = (at, DVec2::from_angle(angle));
+        for wall in &echo.path.walls {
+            let Reflector::Cylinder(i) = *wall else { panic!("a wall") };
+            let round = &plan.cylinders[i as usize];
+            let foot = (round.center - p).dot(d);
+            let off = (round.center - p).perp_dot(d);
+            p += (foot - (round.radius_m.powi(2) - off * off).sqrt()) * d;
+            let normal = (p - round.center).normalize();
+            d -= 2.0 * d.dot(normal) * normal;
+        }
+        d.perp_dot(at - p)
+    };
+    let step = 1e-6;
+    let width =
+        (trace(echo.departure_rad + step) - trace(echo.departure_rad - step)) / (2.0 * step);
+    let expected = (echo.length_m / width.abs()).sqrt();
+    assert!((echo.amplitude / expected - 1.0).abs() < 1e-6, "{} {expected}", echo.amplitude);
+}
+
+/// Round a cylinder with a very large radius everything is as before a wall.
+#[test]
+fn a_huge_cylinder_is_a_wall() {
+    let mut round = scene(&[[-1.5, 1.0, 1.0, 1.0], [1.0, 1.0, 1.3, 0.4]]);
+    round.cylinders = vec![cylinder(0.0, -1e5, 1e5)];
+    let flat = scene(&[[-1.5, 1.0, 1.0, 1.0], [1.0, 1.0, 1.3, 0.4], [-60.0, 0.0, 60.0, 0.0]]);
+    let settings =
+        Settings { max_path_m: 7.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-3, ..LOSSLESS };
+    let at = DVec2::new(0.2, 0.35);
+    let all = |plan: &Scene| Paths::new(plan, settings.clone()).enumerate(at);
+    let (round, flat) = (all(&round), all(&flat));
+    // Ways by cylinders are followed down to ten times the floor, and over three of them.
+    let at_round = |echo: &&EchoPath| {
+        echo.path.walls.iter().filter(|wall| **wall == Reflector::Wall(2)).count()
+    };
+    let flat: Vec<_> =
+        flat.iter().filter(|echo| echo.amplitude > 0.01 && at_round(echo) <= 3).collect();
+    assert!(flat.iter().filter(|echo| at_round(echo) > 1).count() > 10);
+    for other in flat {
+        let is_same = |one: &&EchoPath| {
+            (one.length_m - other.length_m).abs() < 1e-3
+                && (one.amplitude - other.amplitude).abs() < 1e-2 * other.amplitude
+                && one.path.edge == other.path.edge
+                && one.path.walls.len() == other.path.walls.len()
+        };
+        assert!(round.iter().any(|one| is_same(&one)), "{other:?}");
+    }
+}
+
+/// An edge that a cylinder reflects to: length and way are those of the shortest way.
+#[test]
+fn edges_answer_by_way_of_cylinders() {
+    let mut plan = scene(&[[0.0, 1.2, 2.0, 1.2]]);
+    plan.cylinders = vec![cylinder(-1.0, 0.3, 0.3)];
+    let at = DVec2::new(0.0, 0.0);
+    let settings =
+        Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
+    let echoes = Paths::new(&plan, settings).enumerate(at);
+    let edge = DVec2::new(0.0, 1.2);
+    let by = (0..1_000_000)
+        .map(|i| {
+            let hit = plan.cylinders[0].center
+                + 0.3 * DVec2::from_angle(TAU * f64::from(i) / 1_000_000.0);
+            at.distance(hit) + hit.distance(edge)
+        })
+        .fold(f64::INFINITY, f64::min);
+    let bent: Vec<_> = echoes
+        .iter()
+        .filter(|echo| echo.path.edge.is_some_and(|edge| !edge.at_b))
+        .map(|echo| (echo.length_m, echo.path.walls.len()))
+        .collect();
+    for (expected, count) in [(2.4, 1), (1.2 + by, 2), (2.0 * by, 1)] {
+        let found = bent.iter().filter(|echo| (echo.0 - expected).abs() < 1e-9).count();
+        assert_eq!(found, count, "{expected}: {bent:?}");
+    }
+}

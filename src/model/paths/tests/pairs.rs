@@ -1,0 +1,95 @@
+//! Transmitter and receiver apart.
+
+use super::*;
+use crate::{model::Reflector, scene::Cylinder};
+
+const T: DVec2 = DVec2::new(0.3, 0.2);
+const R: DVec2 = DVec2::new(0.7, 0.25);
+
+/// A wall whose end both see, and a cylinder.
+fn plan() -> Scene {
+    let mut plan = scene(&[[-5.0, -0.4, 5.0, -0.4], [0.4, 1.5, 0.4, 3.0]]);
+    plan.cylinders = vec![Cylinder {
+        id: Arc::from("round"),
+        center: DVec2::new(1.9, 0.6),
+        radius_m: 0.3,
+        material: Material { reflectance: 1.0, roughness: 0.0 },
+        z_m: None,
+    }];
+    plan
+}
+
+#[test]
+fn lengths_are_those_of_both_ways() {
+    let settings =
+        Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
+    let echoes = Paths::new(&plan(), settings).enumerate_between(T, R);
+    let below = DVec2::new(R.x, -0.8 - R.y);
+    let edge = DVec2::new(0.4, 1.5);
+    let by_round = |p: DVec2, q: DVec2| {
+        (0..1_000_000)
+            .map(|i| {
+                let normal = DVec2::from_angle(TAU * f64::from(i) / 1_000_000.0);
+                let hit = DVec2::new(1.9, 0.6) + 0.3 * normal;
+                let lit = normal.dot(p - hit) > 0.0 && normal.dot(q - hit) > 0.0;
+                if lit { p.distance(hit) + hit.distance(q) } else { f64::INFINITY }
+            })
+            .fold(f64::INFINITY, f64::min)
+    };
+    let (wall, round) = (Reflector::Wall(0), Reflector::Cylinder(0));
+    for (walls, bent, expected) in [
+        (vec![wall], false, T.distance(below)),
+        (vec![round], false, by_round(T, R)),
+        (vec![round, wall], false, by_round(T, below)),
+        (vec![], true, T.distance(edge) + R.distance(edge)),
+        (vec![wall], true, T.distance(edge) + below.distance(edge)),
+        (vec![round], true, by_round(T, edge) + R.distance(edge)),
+    ] {
+        let found: Vec<_> = echoes
+            .iter()
+            .filter(|echo| echo.path.walls[..] == walls[..] && echo.path.edge.is_some() == bent)
+            .filter(|echo| (echo.length_m - expected).abs() < 1e-9)
+            .collect();
+        assert_eq!(found.len(), 1, "{walls:?} {expected}: {echoes:#?}");
+    }
+    // The straight way from one to the other is no echo.
+    assert!(echoes.iter().all(|echo| echo.length_m > T.distance(R) + 1e-6));
+}
+
+#[test]
+fn the_same_way_back_from_receiver_to_transmitter() {
+    let settings =
+        Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-4, ..LOSSLESS };
+    let paths = Paths::new(&plan(), settings);
+    let (there, back) = (paths.enumerate_between(T, R), paths.enumerate_between(R, T));
+    assert!(there.len() >= 15, "{}", there.len());
+    for echo in there.iter().filter(|echo| echo.amplitude > 2e-3) {
+        let mut walls = echo.path.walls.clone();
+        walls.reverse();
+        let found = back.iter().any(|other| {
+            other.path.walls == walls
+                && other.path.edge == echo.path.edge
+                && (other.length_m - echo.length_m).abs() < 1e-9
+                && (other.amplitude - echo.amplitude).abs() < 1e-6 * echo.amplitude
+                && crate::geometry::wrap_pi(other.departure_rad - echo.arrival_rad).abs() < 1e-7
+        });
+        assert!(found, "no reverse of {echo:?}");
+    }
+}
+
+#[test]
+fn a_pair_in_one_place_is_one_transducer() {
+    let settings =
+        Settings { max_path_m: 5.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-3, ..LOSSLESS };
+    let paths = Paths::new(&plan(), settings);
+    let one = paths.enumerate(T);
+    let two = paths.enumerate_between(T, T + DVec2::new(1e-7, 0.0));
+    let strong = |echoes: &[EchoPath]| {
+        echoes.iter().filter(|echo| echo.amplitude > 0.02).map(|echo| echo.length_m).collect()
+    };
+    let (one, two): (Vec<f64>, Vec<f64>) = (strong(&one), strong(&two));
+    assert_eq!(one.len(), two.len());
+    for (a, b) in one.iter().zip(&two) {
+        assert!((a - b).abs() < 1e-6, "{a} {b}");
+    }
+}

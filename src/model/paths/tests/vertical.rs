@@ -1,0 +1,132 @@
+//! Floor and ceiling.
+
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+
+use super::*;
+use crate::{
+    acoustics::{BeamPattern, Sensor},
+    model::{Engine, Reflector},
+};
+
+fn at_height(z_m: f64) -> Settings {
+    Settings { sensor_z_m: Some(z_m), max_path_m: 8.0, ..LOSSLESS }
+}
+
+#[test]
+fn a_wall_and_the_floor_answer_from_their_corner() {
+    let (d, h) = (0.8, 0.35);
+    let mut room = scene(&[[-9.0, d, 9.0, d]]);
+    room.floor_z_m = Some(0.0);
+    let echoes = Paths::new(&room, at_height(h)).enumerate(DVec2::ZERO);
+    let lengths: Vec<f64> = echoes.iter().map(|echo| echo.length_m).collect();
+    for (length_m, expected) in lengths.iter().zip([2.0 * h, 2.0 * d, 2.0 * d.hypot(h)]) {
+        assert!((length_m - expected).abs() < 1e-12, "{lengths:?}");
+    }
+    assert_eq!(lengths.len(), 3);
+    let corner = &echoes[2];
+    assert_eq!(corner.path.walls[..], [Reflector::Wall(0), Reflector::Floor]);
+    let below = -(h / d).atan();
+    assert!((corner.rise_rad[0] - below).abs() < 1e-12);
+    assert!((corner.rise_rad[1] - below).abs() < 1e-12, "as steep back as there");
+    assert!((corner.amplitude - 1.0).abs() < 1e-12);
+}
+
+/// A box: the images are the lattice in three dimensions.
+#[test]
+fn in_a_box_the_echoes_are_the_lattice_in_space() {
+    let size = [1.3, 0.9, 1.1];
+    let at = [0.4, 0.25, 0.3];
+    let corners =
+        [[0.0, 0.0], [size[0], 0.0], [size[0], size[1]], [0.0, size[1]]].map(DVec2::from_array);
+    let mut room = polygon(&corners);
+    (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(size[2]));
+    let settings = Settings { max_path_m: 6.0, ..at_height(at[2]) };
+    let echoes = Paths::new(&room, settings).enumerate(DVec2::new(at[0], at[1]));
+    let along = |axis: usize| {
+        (-4..=4).flat_map(move |m| {
+            let shift = 2.0 * f64::from(m) * size[axis];
+            [shift, shift - 2.0 * at[axis]]
+        })
+    };
+    let mut expected = Vec::new();
+    for x in along(0) {
+        for y in along(1) {
+            for z in along(2) {
+                expected.push((x * x + y * y + z * z).sqrt());
+            }
+        }
+    }
+    expected.retain(|length| (1e-9..=6.0).contains(length));
+    expected.sort_by(f64::total_cmp);
+    assert_eq!(echoes.len(), expected.len());
+    for (echo, length_m) in echoes.iter().zip(expected) {
+        assert!((echo.length_m - length_m).abs() < 1e-9);
+    }
+}
+
+/// The weight is the beam pattern's at the angle in space.
+#[test]
+fn the_beam_is_weighed_in_space_and_a_tilt_finds_the_floor() {
+    let (d, h) = (2.0, 0.3);
+    let mut room = scene(&[[-9.0, d, 9.0, d]]);
+    room.floor_z_m = Some(0.0);
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    let beam = BeamPattern::new(&sensor, 343.99);
+    let heard = |tilt_rad: f64, walls: &[Reflector]| {
+        let settings = Settings { tilt_rad, floor: 1e-6, ..at_height(h) };
+        let engine = PathEngine::new(&room, beam.clone(), None, settings);
+        let place = engine.survey(DVec2::ZERO);
+        let arrivals = place.arrivals(FRAC_PI_2);
+        arrivals.iter().find(|a| a.path.walls[..] == *walls).map_or(0.0, |a| a.amplitude)
+    };
+    let (wall, corner) = ([Reflector::Wall(0)], [Reflector::Wall(0), Reflector::Floor]);
+    let below = (h / d).atan();
+    assert!((heard(0.0, &wall) - 1.0).abs() < 1e-9);
+    assert!((heard(0.0, &corner) - beam.one_way(below).powi(2)).abs() < 1e-9);
+    assert!((heard(-0.05, &corner) - beam.one_way(below - 0.05).powi(2)).abs() < 1e-9);
+    assert!((heard(-0.05, &wall) - beam.one_way(0.05).powi(2)).abs() < 1e-9);
+    assert_eq!(heard(0.0, &[Reflector::Floor]), 0.0);
+    assert!((heard(-FRAC_PI_2, &[Reflector::Floor]) - 1.0).abs() < 1e-9);
+    assert!(heard(-FRAC_PI_4, &[Reflector::Floor]) < 0.01);
+}
+
+/// Without heights nothing changes, at whatever height the ranger is said to be.
+#[test]
+fn a_scene_in_the_plane_stays_in_the_plane() {
+    let plan = scene(&[[-1.0, 0.5, 4.0, 0.5], [0.3, -1.0, 4.0, 0.2]]);
+    let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..LOSSLESS };
+    let flat = Paths::new(&plan, settings.clone()).enumerate(DVec2::ZERO);
+    let high = Settings { sensor_z_m: Some(3.0), ..settings };
+    assert_eq!(Paths::new(&plan, high).enumerate(DVec2::ZERO), flat);
+    assert!(flat.len() > 3);
+}
+
+/// A low wall before a high one: seen below its upper edge, passed above it.
+#[test]
+fn a_low_wall_is_missed_above_and_bars_the_way_below() {
+    let mut room = scene(&[[-9.0, 0.6, 9.0, 0.6], [-9.0, 1.5, 9.0, 1.5]]);
+    room.walls[0].z_m = Some([0.0, 0.3]);
+    let (low, high, floor) = (Reflector::Wall(0), Reflector::Wall(1), Reflector::Floor);
+    let met = |room: &Scene, z_m: f64| {
+        let settings = Settings { max_order: Some(1), ..at_height(z_m) };
+        let mut met: Vec<_> = Paths::new(room, settings)
+            .enumerate(DVec2::ZERO)
+            .into_iter()
+            .map(|echo| echo.path.walls.to_vec())
+            .collect();
+        met.sort();
+        met
+    };
+    // All sound at the ranger's height.
+    assert_eq!(met(&room, 0.2), [[low]]);
+    assert_eq!(met(&room, 0.4), [[high]]);
+    // With a floor, the way by floor and wall meets the wall at its foot.
+    room.floor_z_m = Some(0.0);
+    let low_again = vec![low, floor];
+    assert_eq!(met(&room, 0.2), [vec![low], low_again.clone(), vec![floor]]);
+    // From 0.4 the corner of low wall and floor is in sight, and the high one's is hidden.
+    assert_eq!(met(&room, 0.4), [low_again, vec![high], vec![floor]]);
+    // From 0.7 the sound on its way to the far corner and back is at 0.42 over the low wall.
+    let all = met(&room, 0.7);
+    assert!(all.contains(&vec![high, floor]), "{all:?}");
+}

@@ -1,0 +1,116 @@
+//! Heights: floor and ceiling as mirrors, and walls that end below or above.
+//!
+//! Walls are upright, so a path's shape in the plan and its heights do not depend on each other:
+//! between floor and ceiling, at `a` above the floor in a room of height `H`, the images of the
+//! ranger stand at `2 m H` and `2 m H - 2 a` above it (Allen and Berkley's lattice, in one
+//! dimension), and each path of length `L` in the plan is also heard over `sqrt(L^2 + dz^2)`. A wall
+//! at `d` and the floor, `h` below, make a corner that answers from `sqrt(d^2 + h^2)`.
+//!
+//! What the plan says of amplitudes stays: cylinders spread sound in the plan alone. Of an edge,
+//! Kouyoumjian and Pathak's coefficient grows by `1 / sin b` for a ray that is `b` off the
+//! edge's direction, and the field by the square root of that; the small part of it that shifts the
+//! transition (its distance parameter falls by `sin b`) is left out.
+
+use smallvec::SmallVec;
+
+use super::{Echo, Settings, Via};
+use crate::{geometry::DVec2, model::Reflector};
+
+/// An image of the ranger below the floor or above the ceiling.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Image {
+    /// Height above the ranger, metres.
+    pub(super) rise_m: f64,
+    /// Reflections at floor and ceiling.
+    pub(super) bounces: u16,
+}
+
+/// The images within reach; the ranger itself is not among them.
+pub(super) fn images(
+    floor_z_m: Option<f64>,
+    ceiling_z_m: Option<f64>,
+    z_m: f64,
+    reach_m: f64,
+) -> Vec<Image> {
+    let below = floor_z_m.map(|floor| z_m - floor);
+    let above = ceiling_z_m.map(|ceiling| ceiling - z_m);
+    let mut images = Vec::new();
+    let mut add = |rise_m: f64, bounces| {
+        if rise_m.abs() <= reach_m {
+            images.push(Image { rise_m, bounces });
+        }
+    };
+    match (below, above) {
+        (None, None) => {}
+        (Some(below), None) => add(-2.0 * below, 1),
+        (None, Some(above)) => add(2.0 * above, 1),
+        (Some(below), Some(above)) => {
+            let height = below + above;
+            for turn in 0..=(reach_m / (2.0 * height)) as u16 {
+                let whole = 2.0 * f64::from(turn) * height;
+                add(-whole - 2.0 * below, 2 * turn + 1);
+                add(whole + 2.0 * above, 2 * turn + 1);
+                if turn > 0 {
+                    add(-whole, 2 * turn);
+                    add(whole, 2 * turn);
+                }
+            }
+        }
+    }
+    images
+}
+
+impl Image {
+    /// Floor and ceiling in the order in which they are met.
+    pub(super) fn met(&self) -> SmallVec<[Reflector; 4]> {
+        let first = u16::from(self.rise_m > 0.0);
+        (0..self.bounces)
+            .map(|i| if (first + i) % 2 == 0 { Reflector::Floor } else { Reflector::Ceiling })
+            .collect()
+    }
+
+    /// An echo of the plan by way of this image, which is number `index`; `None` if it is too long
+    /// or too weak.
+    pub(super) fn echo(&self, plan: &Echo, index: u16, settings: &Settings) -> Option<Echo> {
+        let length_m = plan.length_m.hypot(self.rise_m);
+        let cosine = plan.length_m / length_m;
+        let bending = match plan.via {
+            Via::Edge { .. } => cosine.sqrt().recip(),
+            Via::Walls { .. } | Via::Cylinders { .. } | Via::Upright => 1.0,
+        };
+        let amplitude = plan.amplitude * bending * settings.air_gain(length_m - plan.length_m);
+        let leaves_rad = self.rise_m.atan2(plan.length_m);
+        // After an even number of reflections it still runs the way it left, and comes from the
+        // other side.
+        let comes_rad = if self.bounces % 2 == 0 { -leaves_rad } else { leaves_rad };
+        let fits = length_m <= settings.max_path_m && amplitude >= settings.floor;
+        fits.then_some(Echo {
+            length_m,
+            amplitude,
+            rise_rad: [leaves_rad, comes_rad],
+            image: index,
+            ..*plan
+        })
+    }
+
+    /// The way by floor and ceiling alone, to a receiver that is `apart` from the transmitter.
+    pub(super) fn upright_echo(
+        &self,
+        index: u16,
+        apart: DVec2,
+        settings: &Settings,
+    ) -> Option<Echo> {
+        let along = apart.try_normalize().unwrap_or(DVec2::X);
+        let nowhere = Echo {
+            length_m: apart.length(),
+            amplitude: 1.0,
+            phase_rad: 0.0,
+            departure: along,
+            arrival: if apart == DVec2::ZERO { along } else { -along },
+            rise_rad: [0.0; 2],
+            image: 0,
+            via: Via::Upright,
+        };
+        self.echo(&nowhere, index, settings)
+    }
+}

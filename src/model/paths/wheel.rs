@@ -1,0 +1,140 @@
+//! Echoes sorted by the direction in which they are heard.
+
+use std::f64::consts::{PI, TAU};
+
+use super::Echo;
+use crate::{acoustics::BeamPattern, geometry::wrap_pi};
+
+/// Steps of the envelope, half a degree.
+const ENVELOPE_STEPS: usize = 360;
+
+/// For each angle from the axis the strongest that a beam pattern still gets beyond it.
+#[derive(Debug)]
+pub(super) struct Envelope(Vec<f64>);
+
+impl Envelope {
+    pub(super) fn of(beam: &BeamPattern) -> Self {
+        // Ten samples a step: a tenth of a lobe's width even at twenty wavelengths across.
+        let sample = |i: usize| beam.one_way(PI * i as f64 / (10 * ENVELOPE_STEPS) as f64);
+        let mut strongest: f64 = 0.0;
+        let mut steps: Vec<f64> = (0..ENVELOPE_STEPS)
+            .rev()
+            .map(|step| {
+                let here = (10 * step..=10 * step + 10).map(sample).fold(0.0, f64::max);
+                strongest = strongest.max(here);
+                strongest
+            })
+            .collect();
+        steps.reverse();
+        Self(steps)
+    }
+
+    /// The angle beyond which the pattern stays below `level`, rounded up to a step, radians.
+    pub(super) fn reach_rad(&self, level: f64) -> f64 {
+        // A thousandth more than sampled, for what lies between the samples.
+        let steps = self.0.partition_point(|strongest| 1.001 * strongest >= level);
+        PI * steps as f64 / ENVELOPE_STEPS as f64
+    }
+}
+
+/// Directions are sorted into this many bins.
+const BINS: usize = 360;
+
+/// Echoes by the direction in which they are heard best.
+#[derive(Debug, Default)]
+pub(super) struct Wheel {
+    /// Bin by bin.
+    spokes: Vec<Spoke>,
+    /// Where each bin begins in `spokes`, and the end of the last.
+    bins: Vec<u32>,
+    /// The widest reach of its spokes.
+    reach_rad: f64,
+}
+
+/// What an azimuth needs to know of an echo.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spoke {
+    /// Half way between departure and arrival.
+    pub(super) middle_rad: f64,
+    /// Departure is this far on one side of the middle, arrival on the other.
+    pub(super) half_rad: f64,
+    pub(super) amplitude: f64,
+    /// Farther off the middle it is too weak.
+    pub(super) reach_rad: f64,
+    pub(super) echo: u32,
+}
+
+impl Spoke {
+    /// `None` if it is too weak in all directions.
+    ///
+    /// `y` off the middle, the axis is `|y| + h` off one end and at least `||y| - h|` off the
+    /// other. The pattern's product reaches a level only if its smaller factor does, and its
+    /// larger one reaches the root of it.
+    pub(super) fn of(echo: &Echo, index: u32, envelope: &Envelope, floor: f64) -> Option<Self> {
+        let half_rad = 0.5 * echo.departure.angle_to(echo.arrival);
+        let level = floor / echo.amplitude;
+        let wide = envelope.reach_rad(level) - half_rad.abs();
+        if wide < 0.0 {
+            return None;
+        }
+        let reach_rad = wide.min(envelope.reach_rad(level.sqrt()) + half_rad.abs());
+        let middle_rad = wrap_pi(echo.departure.to_angle() + half_rad);
+        Some(Self { middle_rad, half_rad, amplitude: echo.amplitude, reach_rad, echo: index })
+    }
+}
+
+impl Wheel {
+    pub(super) fn new(spokes: &[Spoke]) -> Self {
+        let mut bins = vec![0_u32; BINS + 1];
+        for spoke in spokes {
+            bins[bin(spoke.middle_rad) + 1] += 1;
+        }
+        for i in 0..BINS {
+            bins[i + 1] += bins[i];
+        }
+        let mut next = bins.clone();
+        let mut sorted = spokes.to_vec();
+        for spoke in spokes {
+            let place = &mut next[bin(spoke.middle_rad)];
+            sorted[*place as usize] = *spoke;
+            *place += 1;
+        }
+        let reach_rad = spokes.iter().map(|spoke| spoke.reach_rad).fold(0.0, f64::max);
+        Self { spokes: sorted, bins, reach_rad }
+    }
+
+    /// The spokes within their reach of a direction in (-pi, pi].
+    pub(super) fn near(&self, direction_rad: f64) -> impl Iterator<Item = (&Spoke, f64)> {
+        let bins = BINS as i64;
+        let (middle, reach) =
+            (bin(direction_rad) as i64, (self.reach_rad / TAU * BINS as f64).ceil() as i64);
+        let (from, to) =
+            if 2 * reach + 1 >= bins { (0, bins) } else { (middle - reach, middle + reach + 1) };
+        let part = move |from: i64, to: i64| {
+            let at = |bin: i64| self.bins[bin.clamp(0, bins) as usize] as usize;
+            &self.spokes[at(from)..at(to)]
+        };
+        // What leaves the circle on one side comes in on the other.
+        let wrapped = [part(from + bins, bins), part(from, to), part(0, to - bins)];
+        wrapped.into_iter().flatten().filter_map(move |spoke| {
+            let off_rad = wrap_once(direction_rad - spoke.middle_rad);
+            (off_rad.abs() <= spoke.reach_rad).then_some((spoke, off_rad))
+        })
+    }
+}
+
+/// The bin of an angle in (-pi, pi].
+fn bin(angle_rad: f64) -> usize {
+    (((angle_rad + PI) / TAU * BINS as f64) as usize).min(BINS - 1)
+}
+
+/// The difference of two angles in (-pi, pi], brought into that range.
+pub(super) fn wrap_once(angle_rad: f64) -> f64 {
+    if angle_rad > PI {
+        angle_rad - TAU
+    } else if angle_rad < -PI {
+        angle_rad + TAU
+    } else {
+        angle_rad
+    }
+}
