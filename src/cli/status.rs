@@ -53,7 +53,7 @@ impl DaemonArgs {
 pub(super) fn run(args: &Args) -> Outcome {
     let place = args.daemon.place();
     let ask = async |path| -> Result<Value, Failure> {
-        let body = client::get_whole(&place, path).await.map_err(refuse)?;
+        let body = client::get_whole(&place, path).await.map_err(|error| refuse(&error))?;
         serde_json::from_slice(&body).map_err(|error| {
             Failure::device(format!("the daemon's answer is no JSON: {error}"), "is it a sonard?")
         })
@@ -70,8 +70,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     if health["healthy"] == true { Ok(()) } else { Err(Failure::Found(None)) }
 }
 
-pub(super) fn refuse(error: ClientError) -> Failure {
-    Failure::device(&error, error.help())
+pub(super) fn refuse(error: &ClientError) -> Failure {
+    Failure::device(error, error.help())
 }
 
 /// One screen for a person.

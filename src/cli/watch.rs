@@ -56,10 +56,11 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 async fn watch(args: &Args, path: &str) -> Outcome {
-    let mut body = client::get(&args.daemon.place(), path).await.map_err(refuse)?.into_body();
+    let mut body =
+        client::get(&args.daemon.place(), path).await.map_err(|error| refuse(&error))?.into_body();
     let mut rest = Vec::new();
     while let Some(frame) = body.frame().await {
-        let frame = frame.map_err(|error| refuse(error.into()))?;
+        let frame = frame.map_err(|error| refuse(&error.into()))?;
         rest.extend_from_slice(frame.data_ref().map_or(&[][..], |data| data));
         while let Some(end) = rest.iter().position(|&byte| byte == b'\n') {
             let line: Vec<u8> = rest.drain(..=end).collect();

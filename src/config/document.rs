@@ -11,7 +11,7 @@ const HEAD: &str = "\
 # a comment with an example. Over the file go environment variables (SONARD_PLAN_STEP_DEG=1.8),
 # over those the options of the command line (--set plan.step_deg=1.8). `sonard run --check` reads
 # it all and says what is in force. `systemctl reload` (SIGHUP) takes changes in; those of keys
-# marked [restart] wait for the next start.
+# marked (restart) wait for the next start.
 ";
 const WIDTH: usize = 98;
 

@@ -169,7 +169,7 @@ pub struct AirKeys {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LogKeys {
-    /// Folder of the logs [restart]. systemd's STATE_DIRECTORY goes before the default.
+    /// Folder of the logs (restart). systemd's STATE_DIRECTORY goes before the default.
     pub folder: String,
     /// Begin another file when this one is larger, megabytes.
     #[schemars(range(min = 0.01, max = 100_000))]
@@ -206,33 +206,33 @@ pub struct LinkKeys {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ServerKeys {
-    /// Unix socket [restart]; empty for none. systemd's RUNTIME_DIRECTORY goes before the default.
+    /// Unix socket (restart); empty for none. systemd's RUNTIME_DIRECTORY goes before the default.
     pub socket: String,
-    /// Who may use the socket: its permissions, octal [restart].
+    /// Who may use the socket: its permissions, octal (restart).
     #[schemars(regex(pattern = "^0?[0-7]{3}$"))]
     pub socket_mode: String,
-    /// TCP address [restart]. Anything but loopback needs a token for every request.
+    /// TCP address (restart). Anything but loopback needs a token for every request.
     #[schemars(example = "127.0.0.1:8765")]
     pub listen: Option<String>,
-    /// File with the token that writes over TCP must show [restart]; without one there are no
+    /// File with the token that writes over TCP must show (restart); without one there are no
     /// writes over TCP.
     #[schemars(example = "/etc/sonard/token")]
     pub token_file: Option<String>,
-    /// Host names, besides those of loopback, under which a browser may ask [restart].
+    /// Host names, besides those of loopback, under which a browser may ask (restart).
     pub hosts: Vec<String>,
-    /// Connections at a time [restart].
+    /// Connections at a time (restart).
     #[schemars(range(min = 1, max = 10_000))]
     pub max_clients: u32,
-    /// Requests a second, from all clients together [restart].
+    /// Requests a second, from all clients together (restart).
     #[schemars(range(min = 1, max = 100_000))]
     pub max_requests_per_s: f64,
-    /// Largest body of a request, kilobytes [restart].
+    /// Largest body of a request, kilobytes (restart).
     #[schemars(range(min = 1, max = 10_000))]
     pub max_body_kb: u32,
-    /// Readings kept for a subscriber that is slow; older ones are dropped, with a count [restart].
+    /// Readings kept for a subscriber that is slow; older ones are dropped, with a count (restart).
     #[schemars(range(min = 16, max = 100_000))]
     pub queue: u32,
-    /// A client that takes nothing for so long is cut off, seconds [restart].
+    /// A client that takes nothing for so long is cut off, seconds (restart).
     #[schemars(range(min = 0.1, max = 600))]
     pub stall_s: f64,
 }
@@ -241,19 +241,19 @@ pub struct ServerKeys {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GpioKeys {
-    /// Output, low for 50 ms, that resets the microcontroller [restart].
+    /// Output, low for 50 ms, that resets the microcontroller (restart).
     #[schemars(range(min = 0, max = 27), example = 17)]
     pub reset_pin: Option<u8>,
-    /// Output, high while the daemon runs, that powers the ranging module [restart].
+    /// Output, high while the daemon runs, that powers the ranging module (restart).
     #[schemars(range(min = 0, max = 27), example = 27)]
     pub power_pin: Option<u8>,
-    /// Input with pull-up, low while the motor is at home [restart].
+    /// Input with pull-up, low while the motor is at home (restart).
     #[schemars(range(min = 0, max = 27), example = 22)]
     pub home_pin: Option<u8>,
-    /// Input with pull-up, high (also: cable broken) while the emergency stop is pressed [restart].
+    /// Input with pull-up, high (also: cable broken) while the emergency stop is pressed (restart).
     #[schemars(range(min = 0, max = 27), example = 23)]
     pub stop_pin: Option<u8>,
-    /// Output, high while the ranger is ready or scanning [restart].
+    /// Output, high while the ranger is ready or scanning (restart).
     #[schemars(range(min = 0, max = 27), example = 24)]
     pub light_pin: Option<u8>,
 }

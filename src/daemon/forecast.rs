@@ -14,10 +14,16 @@ use crate::{
     scan::{LOG_FORMAT, ModelRecord, ScanAir, ScanPlan, SceneRef, Session, SimRecord},
 };
 
+/// What predictions depend on, besides scene and sensor.
+pub(super) type Place = (Pose, ScanPlan, Air);
+
+/// For each stop what the model says, and which model that was.
+pub(super) type Predicted = (Vec<SimRecord>, Option<ModelRecord>);
+
 /// The predictions made last, kept for as long as nothing they depend on changes.
 #[derive(Debug, Default)]
 pub(super) struct Forecast {
-    made_for: Option<(Pose, ScanPlan, Air)>,
+    made_for: Option<Place>,
     predictions: Vec<SimRecord>,
     model: Option<ModelRecord>,
 }
@@ -28,23 +34,25 @@ impl Forecast {
         *self = Self::default();
     }
 
-    /// The scan of a plan at a pose. Predicting takes its time, beside everything else.
-    ///
-    /// # Errors
-    /// When the model refuses, in words.
-    pub(super) async fn job(
-        &mut self,
+    /// Whether there are predictions for this.
+    pub(super) fn knows(&self, what: Place) -> bool {
+        self.made_for == Some(what)
+    }
+
+    /// Takes predictions in.
+    pub(super) fn learn(&mut self, what: Place, (predictions, model): Predicted) {
+        *self = Self { made_for: Some(what), predictions, model };
+    }
+
+    /// The scan of a plan at a pose, with the predictions made last.
+    pub(super) fn job(
+        &self,
         settings: &Settings,
-        (pose, plan, air): (Pose, ScanPlan, Air),
+        (pose, plan, air): Place,
         scan_air: ScanAir,
         identity: &Identity,
-    ) -> Result<ScanJob, String> {
-        if self.made_for != Some((pose, plan, air)) {
-            self.made_for = None;
-            (self.predictions, self.model) = predict(settings, pose, plan, air).await?;
-            self.made_for = Some((pose, plan, air));
-        }
-        Ok(ScanJob {
+    ) -> ScanJob {
+        ScanJob {
             pose,
             plan,
             settings: settings.motion().settings(&listening(settings, &air), identity),
@@ -52,7 +60,7 @@ impl Forecast {
             air: Some(scan_air),
             blanking_us: settings.sensor.blanking_us,
             predictions: self.predictions.clone(),
-        })
+        }
     }
 
     /// The session's record for scans with this air.
@@ -83,23 +91,28 @@ pub(super) fn listening(settings: &Settings, air: &Air) -> Listening {
     }
 }
 
-async fn predict(
+/// Asks the model, beside everything else: it may take its time. Nothing without a scene.
+///
+/// # Errors
+/// When the model refuses, in words.
+pub(super) fn predict(
     settings: &Settings,
-    pose: Pose,
-    plan: ScanPlan,
-    air: Air,
-) -> Result<(Vec<SimRecord>, Option<ModelRecord>), String> {
-    let Some(scene) = settings.scene.clone() else { return Ok((Vec::new(), None)) };
-    let (sensor, options) = (settings.sensor.clone(), settings.options());
-    let predicting = tokio::task::spawn_blocking(move || {
-        let scene = Arc::new(scene.with_robot_at(&pose));
-        let simulator =
-            Simulator::new(scene, sensor, air, options).map_err(|error| error.to_string())?;
-        // All firings at a stop have the same prediction.
-        let stops = ScanPlan { pings_per_stop: 1, ..plan };
-        let predictions = simulator.predict(&pose, &stops);
-        let records = predictions.iter().map(|one| simulator.record(one)).collect();
-        Ok((records, Some(simulator.model_record())))
-    });
-    predicting.await.map_err(|error| format!("the model failed: {error}"))?
+    (pose, plan, air): Place,
+) -> impl Future<Output = Result<Predicted, String>> + use<> {
+    let (scene, sensor) = (settings.scene.clone(), settings.sensor.clone());
+    let options = settings.options();
+    async move {
+        let Some(scene) = scene else { return Ok((Vec::new(), None)) };
+        let predicting = tokio::task::spawn_blocking(move || {
+            let scene = Arc::new(scene.with_robot_at(&pose));
+            let simulator =
+                Simulator::new(scene, sensor, air, options).map_err(|error| error.to_string())?;
+            // All firings at a stop have the same prediction.
+            let stops = ScanPlan { pings_per_stop: 1, ..plan };
+            let predictions = simulator.predict(&pose, &stops);
+            let records = predictions.iter().map(|one| simulator.record(one)).collect();
+            Ok((records, Some(simulator.model_record())))
+        });
+        predicting.await.map_err(|error| format!("the model failed: {error}"))?
+    }
 }

@@ -32,7 +32,7 @@ pub struct Wanted {
 /// One line of a stream: a JSON text, without its newline.
 pub type Line = Arc<[u8]>;
 
-/// See the [module](self).
+/// Hands records to subscribers. Cheap to clone: all clones are one hub.
 #[derive(Debug, Clone)]
 pub struct Hub {
     inner: Arc<Inner>,

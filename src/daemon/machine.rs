@@ -128,7 +128,8 @@ pub struct BackOff {
     pub max: Duration,
 }
 
-/// See the [module](self).
+/// Decides what to do about the link: [`Self::poll`] says what, [`Self::handle`] is told what came
+/// of it, [`Self::poll_transition`] what to tell others.
 #[derive(Debug, Clone)]
 pub struct LinkMachine {
     back_off: BackOff,

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! [`LinkMachine`] and [`Agenda`] are pure and decide; the operator does what they say and tells
-//! them what came of it. [`run`] wires them and returns when all are done.
+//! them what came of it. [`prepare`] wires them, and [`Daemon::run`] returns when all are done.
 
 mod agenda;
 mod air;

@@ -131,7 +131,7 @@ impl Settings {
         Ok(())
     }
 
-    /// Keys marked `[restart]` that differ from those of `before`, as `section.key`.
+    /// Keys marked `(restart)` that differ from those of `before`, as `section.key`.
     #[must_use]
     pub fn needs_restart(&self, before: &Self) -> Vec<String> {
         let (now, then) = (&self.keys, &before.keys);

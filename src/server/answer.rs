@@ -39,8 +39,12 @@ pub struct Accepted {
 }
 
 impl Failed {
-    pub(super) fn new(status: StatusCode, error: impl ToString, help: impl ToString) -> Self {
-        Self { status, problem: Problem { error: error.to_string(), help: help.to_string() } }
+    pub(super) fn new(
+        status: StatusCode,
+        error: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Self {
+        Self { status, problem: Problem { error: error.into(), help: help.into() } }
     }
 }
 

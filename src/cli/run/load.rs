@@ -30,7 +30,7 @@ impl Loader {
 
     pub(super) fn load(&mut self) -> Result<Settings, Failure> {
         let layers = self.layers()?;
-        let mut keys = layers.clone().keys().map_err(refuse)?;
+        let mut keys = layers.clone().keys().map_err(|error| refuse(&error))?;
         self.fill_in(&layers, &mut keys);
         let settings = settings(keys)?;
         settings.check().map_err(|mismatch| {
@@ -64,7 +64,9 @@ impl Loader {
         };
         match fs::read_to_string(&file) {
             Ok(text) => {
-                layers = layers.file(&file.display().to_string(), &text).map_err(refuse)?;
+                layers = layers
+                    .file(&file.display().to_string(), &text)
+                    .map_err(|error| refuse(&error))?;
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound && !wanted => {}
             Err(error) => {
@@ -78,7 +80,7 @@ impl Loader {
         let variables = env::vars_os().filter_map(|(name, value)| {
             Some((name.into_string().ok()?, value.into_string().ok()?))
         });
-        layers = layers.environment(variables).map_err(refuse)?;
+        layers = layers.environment(variables).map_err(|error| refuse(&error))?;
         let shortcuts = [
             ("--port", "device.port", &self.args.port),
             ("--scene", "place.scene", &self.args.scene),
@@ -87,11 +89,13 @@ impl Loader {
             ("--socket", "server.socket", &self.args.socket),
         ];
         for setting in &self.args.set {
-            layers = layers.option("--set", setting).map_err(refuse)?;
+            layers = layers.option("--set", setting).map_err(|error| refuse(&error))?;
         }
         for (option, key, value) in shortcuts {
             if let Some(value) = value {
-                layers = layers.option(option, &format!("{key}={value}")).map_err(refuse)?;
+                layers = layers
+                    .option(option, &format!("{key}={value}"))
+                    .map_err(|error| refuse(&error))?;
             }
         }
         Ok(layers)
@@ -151,6 +155,6 @@ pub(super) fn words(failure: &Failure) -> String {
     }
 }
 
-fn refuse(error: ConfigError) -> Failure {
-    Failure::input(&error, &error.help)
+fn refuse(error: &ConfigError) -> Failure {
+    Failure::input(error, &error.help)
 }

@@ -9,9 +9,10 @@ use tokio_serial::SerialStream;
 use super::{
     super::{
         desk::Interrupt,
+        forecast::predict,
         machine::{Input, Trouble},
     },
-    Operator,
+    Operator, attended,
 };
 use crate::{
     ranger::{Ranger, ScanError, ScanJob, ScanSummary},
@@ -39,33 +40,39 @@ impl Operator {
         interrupts.into_iter().for_each(|interrupt| self.react(interrupt));
     }
 
-    /// The next scan, and a session in the log that it fits; `None` if it can't be taken.
+    /// The next scan, and a session in the log that it fits; `None` if it can't be taken now.
     async fn prepare(&mut self, identity: &Identity) -> Option<ScanJob> {
         if std::mem::take(&mut self.desk.stale) {
             self.forecast.forget();
         }
-        let (air, now) = (self.desk.air.settled(), Instant::now());
+        let air = self.desk.air.settled();
         let what = (self.desk.pose, self.desk.plan, air);
-        let scan_air = self.desk.air.scan_air(&air, now);
-        let steps_per_revolution = u32::from(identity.steps_per_revolution);
-        let job = match what.1.motor_steps(steps_per_revolution) {
-            Err(error) => Err(error.to_string()),
-            Ok(_) => self.forecast.job(&self.desk.settings, what, scan_air, identity).await,
-        };
-        match job {
-            Ok(job) => {
-                let session = self.forecast.session(&self.desk.settings, &air, identity);
-                self.put_session(session);
-                Some(job)
-            }
-            Err(why) => {
-                // Trying again would fail again: somebody has to change something first.
-                self.desk.agenda.stop();
-                tracing::error!("no scan is taken: {why}");
-                self.out.event(EventKind::Stopped, format!("no scan is taken: {why}"));
-                None
+        if let Err(error) = what.1.motor_steps(identity.steps_per_revolution.into()) {
+            return self.give_up_scans(&error.to_string());
+        }
+        if !self.forecast.knows(what) {
+            let predicting = predict(&self.desk.settings, what);
+            match attended(&mut self.desk, predicting).await {
+                Err(interrupt) => {
+                    self.react(interrupt);
+                    return None;
+                }
+                Ok(Err(why)) => return self.give_up_scans(&why),
+                Ok(Ok(predicted)) => self.forecast.learn(what, predicted),
             }
         }
+        let session = self.forecast.session(&self.desk.settings, &air, identity);
+        self.put_session(session);
+        let scan_air = self.desk.air.scan_air(&air, Instant::now());
+        Some(self.forecast.job(&self.desk.settings, what, scan_air, identity))
+    }
+
+    /// Takes no more scans: trying again would fail again, until somebody changes something.
+    fn give_up_scans(&mut self, why: &str) -> Option<ScanJob> {
+        self.desk.agenda.stop();
+        tracing::error!("no scan is taken: {why}");
+        self.out.event(EventKind::Stopped, format!("no scan is taken: {why}"));
+        None
     }
 
     /// Writes a session's record if the one in force says something else.

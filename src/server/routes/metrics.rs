@@ -29,7 +29,11 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
 async fn metrics(State(api): State<Api>) -> Result<Response, Failed> {
     let mut text = String::new();
     encode(&mut text, &registry(&api.daemon)).map_err(|error| {
-        Failed::new(StatusCode::INTERNAL_SERVER_ERROR, error, "this is a fault of the program")
+        Failed::new(
+            StatusCode::INTERNAL_SERVER_ERROR,
+            error.to_string(),
+            "this is a fault of the program",
+        )
     })?;
     Ok(([(header::CONTENT_TYPE, MEDIA)], text).into_response())
 }

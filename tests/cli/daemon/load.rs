@@ -35,11 +35,15 @@ fn idle_and_scanning_it_takes_next_to_nothing() {
     daemon.wait_for("ready");
     let idle = core_share(&daemon, Duration::from_secs(5));
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":2}"#).status, 202);
+    // Before the first beam of a new place the model is asked, once.
+    wait_until("a beam", || daemon.status()["scan"]["done"].as_u64() >= Some(1));
+    let predicted_s = cpu_s(daemon.id());
     let scanning = core_share(&daemon, Duration::from_secs(10));
     let kb = resident_kb(daemon.id());
     assert_eq!(daemon.stop(), Some(0));
     println!(
-        "idle {:.2} %, scanning {:.2} % of a core, {kb} kB resident",
+        "idle {:.2} %, scanning {:.2} % of a core, {kb} kB resident; {predicted_s:.2} s of CPU until \
+         the first beam",
         idle * 100.0,
         scanning * 100.0
     );
