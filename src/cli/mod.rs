@@ -3,6 +3,7 @@
 mod compare;
 mod failure;
 mod interpret;
+mod lines;
 mod log;
 mod map;
 mod map_benchmark;
@@ -56,6 +57,9 @@ enum Verb {
     /// Tell planes, corners and edges apart in scans
     #[command(long_about = interpret::ABOUT)]
     Interpret(interpret::Args),
+    /// Make a map of line segments of the scans of logs
+    #[command(long_about = lines::ABOUT)]
+    Lines(lines::Args),
     /// Make an occupancy grid of the scans of logs
     #[command(long_about = map::ABOUT)]
     Map(map::Args),
@@ -86,6 +90,7 @@ pub fn main() -> ExitCode {
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Interpret(args) => interpret::run(&args),
+        Verb::Lines(args) => lines::run(&args),
         Verb::Map(args) => map::run(&args),
         Verb::MapScore(args) => map_score::run(&args),
         Verb::MapBenchmark(args) => map_benchmark::run(&args),
