@@ -10,11 +10,11 @@ use comfy_table::{CellAlignment, Table};
 use super::{
     Failure, Outcome,
     compare::RULED,
-    picture::{scene_for, target, warn_of_damage, write},
+    picture::{PictureArgs, scene_for, warn_of_damage},
 };
 use crate::{
     interpret::{Extents, Feature, FeatureKind, Noise, Settings, Sweep, interpret},
-    plot::{MAX_WIDTH_PX, draw_features},
+    plot::draw_features,
     scan::ScanView,
     store::load,
 };
@@ -29,16 +29,11 @@ pub(super) struct Args {
     /// One JSON object a feature
     #[arg(long)]
     json: bool,
-    /// Picture of the floor plan with what was found, .svg or .png; several are possible
-    #[arg(short = 'o', long = "out", value_name = "FILE")]
-    out: Vec<PathBuf>,
+    #[command(flatten)]
+    picture: PictureArgs,
     /// Scene file or name of a shipped scene to draw; without it, the shipped one that the log names
     #[arg(long, value_name = "SCENE")]
     scene: Option<String>,
-    /// Width of a PNG, pixels
-    #[arg(long, value_name = "PX", default_value_t = 1000,
-          value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_WIDTH_PX)))]
-    width: u32,
     /// Strength of an edge's echo, sigma_E: for the boundary between edges and the rest
     #[arg(long, value_name = "S", default_value_t = Settings::default().sigma_e, value_parser = positive)]
     sigma_e: f64,
@@ -83,7 +78,7 @@ min_range (closer than can be measured).
 Exit codes: 0 done, also if nothing was found, 2 wrong usage or input, 3 a picture can't be written.";
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let targets = args.out.iter().map(|path| target(path)).collect::<Result<Vec<_>, _>>()?;
+    let targets = args.picture.targets()?;
     let (scans, features) = find(args)?;
     let mut out = io::stdout().lock();
     let printed = if args.json {
@@ -100,7 +95,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let scene = scene_for(&scans, args.scene.as_deref())?;
     let picture = draw_features(&scans, scene.as_ref(), &features);
-    targets.iter().try_for_each(|target| write(&picture, target, args.width))
+    targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
 }
 
 /// The scans that can be interpreted, and what is in them.

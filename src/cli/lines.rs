@@ -7,14 +7,14 @@ use std::{
 
 use super::{
     Failure, Outcome,
-    picture::{scene_for, target, warn_of_damage, write},
+    picture::{PictureArgs, scene_for, warn_of_damage},
 };
 use crate::{
     interpret::{
         Sweep,
         lines::{LineMap, LineMapSettings, MapLine},
     },
-    plot::{MAX_WIDTH_PX, draw_lines},
+    plot::draw_lines,
     scan::ScanView,
     store::load,
 };
@@ -32,16 +32,11 @@ pub(super) struct Args {
     /// One JSON object a line
     #[arg(long)]
     json: bool,
-    /// Picture of the floor plan with the lines, .svg or .png; several are possible
-    #[arg(short = 'o', long = "out", value_name = "FILE")]
-    out: Vec<PathBuf>,
+    #[command(flatten)]
+    picture: PictureArgs,
     /// Scene file or name of a shipped scene to draw; without it, the shipped one that the log names
     #[arg(long, value_name = "SCENE")]
     scene: Option<String>,
-    /// Width of a PNG, pixels
-    #[arg(long, value_name = "PX", default_value_t = 1000,
-          value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_WIDTH_PX)))]
-    width: u32,
 }
 
 pub(super) const ABOUT: &str = "\
@@ -66,7 +61,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             "give a length in metres, greater than 0",
         ));
     }
-    let targets = args.out.iter().map(|path| target(path)).collect::<Result<Vec<_>, _>>()?;
+    let targets = args.picture.targets()?;
     let (scans, map, left_out) = read(args)?;
     let mut out = io::stdout().lock();
     let printed = if args.json {
@@ -83,7 +78,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let scene = scene_for(&scans, args.scene.as_deref())?;
     let picture = draw_lines(&scans, scene.as_ref(), map.lines());
-    targets.iter().try_for_each(|target| write(&picture, target, args.width))
+    targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
 }
 
 fn read(args: &Args) -> Result<(Vec<ScanView>, LineMap, usize), Failure> {

@@ -8,11 +8,30 @@ use std::{
 
 use super::{Failure, Outcome, scene_file};
 use crate::{
-    plot::Picture,
+    plot::{MAX_WIDTH_PX, Picture},
     scan::ScanView,
     scene::{Scene, shipped},
     store::Loaded,
 };
+
+/// Which pictures.
+#[derive(Debug, clap::Args)]
+pub(super) struct PictureArgs {
+    /// Picture to write, .svg or .png, or - for SVG to standard output; several are possible
+    #[arg(short = 'o', long = "out", value_name = "FILE")]
+    pub(super) out: Vec<PathBuf>,
+    /// Width of a PNG, pixels
+    #[arg(long, value_name = "PX", default_value_t = 1000,
+          value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_WIDTH_PX)))]
+    pub(super) width: u32,
+}
+
+impl PictureArgs {
+    /// Checked before anything is read, so that a wrong name costs no time.
+    pub(super) fn targets(&self) -> Result<Vec<Target>, Failure> {
+        self.out.iter().map(|path| target(path)).collect()
+    }
+}
 
 /// Where a picture goes, and in which format.
 pub(super) enum Target {
@@ -21,21 +40,45 @@ pub(super) enum Target {
     Png(PathBuf),
 }
 
-/// Checked before anything is read, so that a wrong name costs no time.
-pub(super) fn targets(out: &[PathBuf]) -> Result<Vec<Target>, Failure> {
-    if out.is_empty() && io::stdout().is_terminal() {
+impl Target {
+    /// Writes a picture; `width_px` is a PNG's.
+    pub(super) fn write(&self, picture: &Picture, width_px: u32) -> Outcome {
+        let (path, bytes) = match self {
+            Self::StandardOutput => {
+                return io::stdout()
+                    .lock()
+                    .write_all(picture.to_svg().as_bytes())
+                    .or_else(|error| Failure::from_write("standard output", &error));
+            }
+            Self::Svg(path) => (path, picture.to_svg().into_bytes()),
+            Self::Png(path) => {
+                let png = picture.to_png(width_px).map_err(|error| {
+                    Failure::input(format!("{}: {error}", path.display()), "choose another --width")
+                })?;
+                (path, png)
+            }
+        };
+        fs::write(path, bytes).map_err(|error| {
+            Failure::device(
+                format!("cannot write {}: {error}", path.display()),
+                "check that its folder exists, may be written to and has room",
+            )
+        })
+    }
+}
+
+/// Without a name the picture goes to standard output, unless that is a terminal.
+pub(super) fn targets(args: &PictureArgs) -> Result<Vec<Target>, Failure> {
+    if args.out.is_empty() && io::stdout().is_terminal() {
         return Err(Failure::input(
             "the picture would go to the terminal",
             "name a file with -o scan.svg or -o scan.png, or send standard output somewhere",
         ));
     }
-    if out.is_empty() {
-        return Ok(vec![Target::StandardOutput]);
-    }
-    out.iter().map(|path| target(path)).collect()
+    if args.out.is_empty() { Ok(vec![Target::StandardOutput]) } else { args.targets() }
 }
 
-pub(super) fn target(path: &Path) -> Result<Target, Failure> {
+fn target(path: &Path) -> Result<Target, Failure> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
         Some("svg") => Ok(Target::Svg(path.into())),
@@ -86,29 +129,4 @@ pub(super) fn scene_for(views: &[ScanView], given: Option<&str>) -> Result<Optio
         );
     }
     Ok(Some(scene))
-}
-
-/// Writes a picture in the format of its target.
-pub(super) fn write(picture: &Picture, target: &Target, width_px: u32) -> Outcome {
-    let (path, bytes) = match target {
-        Target::StandardOutput => {
-            return io::stdout()
-                .lock()
-                .write_all(picture.to_svg().as_bytes())
-                .or_else(|error| Failure::from_write("standard output", &error));
-        }
-        Target::Svg(path) => (path, picture.to_svg().into_bytes()),
-        Target::Png(path) => {
-            let png = picture.to_png(width_px).map_err(|error| {
-                Failure::input(format!("{}: {error}", path.display()), "choose another --width")
-            })?;
-            (path, png)
-        }
-    };
-    fs::write(path, bytes).map_err(|error| {
-        Failure::device(
-            format!("cannot write {}: {error}", path.display()),
-            "check that its folder exists, may be written to and has room",
-        )
-    })
 }

@@ -1,13 +1,15 @@
 //! `sonard plot`.
 
+mod way;
+
 use std::path::{Path, PathBuf};
 
 use super::{
     Failure, Outcome,
-    picture::{scene_for, targets, warn_of_damage, write},
+    picture::{PictureArgs, scene_for, targets, warn_of_damage},
 };
 use crate::{
-    plot::{MAX_WIDTH_PX, draw_polar, draw_residuals, draw_scans},
+    plot::{draw_polar, draw_residuals, draw_scans, draw_side_by_side},
     scan::ScanView,
     store::load,
 };
@@ -28,13 +30,14 @@ pub(super) struct Args {
     /// are drawn over each other
     #[arg(long, value_name = "N|ID")]
     scan: Vec<String>,
-    /// Picture to write, .svg or .png; several are possible. Without it, SVG to standard output
-    #[arg(short = 'o', long = "out", value_name = "FILE")]
-    out: Vec<PathBuf>,
-    /// Width of a PNG, pixels
-    #[arg(long, value_name = "PX", default_value_t = 1000,
-          value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_WIDTH_PX)))]
-    width: u32,
+    /// Draw the way that one beam's sound took: the beam's index in the plan
+    #[arg(long, value_name = "INDEX", conflicts_with = "azimuth_deg")]
+    beam: Option<u32>,
+    /// The same for the beam nearest to this azimuth, degrees
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    azimuth_deg: Option<f64>,
+    #[command(flatten)]
+    picture: PictureArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -45,6 +48,9 @@ enum Kind {
     Polar,
     /// Measured minus predicted range
     Residuals,
+    /// The first three scans beside each other, and how many beams differ: for scans of one place by
+    /// different engines
+    SideBySide,
 }
 
 pub(super) const ABOUT: &str = "\
@@ -54,28 +60,36 @@ Filled marks are readings; shape and colour say what made them: a direct echo, m
 reflections, an edge, sound that was there when the receiver opened (minimum range), or nothing \
 the model knows. Rings and thin rays are the model's. Ticks on the border are silent beams, \
 arrows readings that lie beyond the view. In a browser, pointing at a mark of an SVG tells its \
-numbers. Scans of one log are drawn over each other.";
+numbers. Scans of one log are drawn over each other. With --beam or --azimuth-deg the way of one \
+beam's sound is drawn instead, reflection by reflection.";
 
 const HELP: &str = "\
 Examples:
   sonard plot scan.jsonl -o scan.svg -o scan.png
   sonard plot scan.jsonl --kind residuals --scan 2 -o residuals.png --width 2000
   sonard simulate --scene simple-room --pose fig9 | sonard plot - -o fig9.svg
+  sonard plot scan.jsonl --azimuth-deg 270 -o way.png
+  for e in paths fan cone; do sonard simulate --scene corridor --pose beside-wall --engine $e; done \
+      | sonard plot - --kind side-by-side -o engines.png
+
 Exit codes: 0 drawn, 2 wrong usage or input, 3 a picture can't be written.";
 
-pub(super) fn run(args: Args) -> Outcome {
-    let targets = targets(&args.out)?;
-    let (log, wanted) = (args.log, args.scan);
-    let loaded = load(&log).map_err(|error| Failure::input(&error, error.help()))?;
-    warn_of_damage(&log, &loaded);
-    let views = choose(ScanView::from_records(loaded.records), &log, &wanted)?;
+pub(super) fn run(args: &Args) -> Outcome {
+    let targets = targets(&args.picture)?;
+    let log = &args.log;
+    let loaded = load(log).map_err(|error| Failure::input(&error, error.help()))?;
+    warn_of_damage(log, &loaded);
+    let views = choose(ScanView::from_records(loaded.records), log, &args.scan)?;
     let scene = scene_for(&views, args.scene.as_deref())?;
-    let picture = match args.kind {
-        Kind::Scan => draw_scans(&views, scene.as_ref()),
-        Kind::Polar => draw_polar(&views, scene.as_ref()),
-        Kind::Residuals => draw_residuals(&views, scene.as_ref()),
+    let beam = args.beam.map(way::Beam::Index).or(args.azimuth_deg.map(way::Beam::Azimuth));
+    let picture = match (beam, args.kind) {
+        (Some(beam), _) => way::draw(&views, scene.as_ref(), beam)?,
+        (None, Kind::Scan) => draw_scans(&views, scene.as_ref()),
+        (None, Kind::Polar) => draw_polar(&views, scene.as_ref()),
+        (None, Kind::SideBySide) => draw_side_by_side(&views, scene.as_ref()),
+        (None, Kind::Residuals) => draw_residuals(&views, scene.as_ref()),
     };
-    targets.iter().try_for_each(|target| write(&picture, target, args.width))
+    targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
 }
 
 /// The scans asked for; all without a choice.

@@ -10,6 +10,8 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use jiff::Timestamp;
+use rand::SeedableRng as _;
+use rand_pcg::Pcg64;
 use uuid::Uuid;
 
 use super::{
@@ -18,8 +20,9 @@ use super::{
     place::{AzimuthArgs, PlaceArgs},
 };
 use crate::{
+    acoustics::ReceiverNoise,
     geometry::Pose,
-    model::Simulator,
+    model::{Prediction, Simulator, Station},
     scan::{Ping, Record, ScanEnd, ScanPlan, ScanStart, Session},
     scene::Scene,
 };
@@ -36,11 +39,44 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     #[command(flatten)]
+    noise: NoiseArgs,
+    #[command(flatten)]
     engine: EngineArgs,
     #[command(flatten)]
     sensor: SensorArgs,
     #[command(flatten)]
     air: AirArgs,
+}
+
+/// What disturbs the readings.
+#[derive(Debug, Clone, Copy, clap::Args)]
+#[command(next_help_heading = "Noise")]
+struct NoiseArgs {
+    /// Noise at the receiver's input, root mean square, as the amplitude of an echo from 1 m
+    #[arg(long, value_name = "A", default_value_t = 0.0)]
+    noise_floor: f64,
+    /// Standard deviation of the time of flight beside what the noise does to it, microseconds
+    #[arg(long, value_name = "US", default_value_t = 0.0)]
+    jitter_us: f64,
+    /// Seed of the noise: the same one gives the same readings
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+}
+
+impl NoiseArgs {
+    /// The noise asked for, if any.
+    fn noise(&self) -> Result<Option<ReceiverNoise>, Failure> {
+        for (option, value, most) in
+            [("noise-floor", self.noise_floor, 1.0), ("jitter-us", self.jitter_us, 1e4)]
+        {
+            if !(0.0..=most).contains(&value) {
+                let help = format!("give a number from 0 to {most}");
+                return Err(Failure::input(format!("--{option} is {value}"), help));
+            }
+        }
+        let noise = ReceiverNoise { floor: self.noise_floor, jitter_us: self.jitter_us };
+        Ok(Some(noise).filter(|noise| *noise != ReceiverNoise::NONE))
+    }
 }
 
 pub(super) const ABOUT: &str = "\
@@ -63,8 +99,15 @@ pub(super) fn run(args: &Args) -> Outcome {
     let (scene, pose) = args.place.load()?;
     let plan = args.azimuths.plan(1)?;
     let simulator = simulator(args, &scene, &pose)?;
+    let noise = args.noise.noise()?;
     let (what, mut out) = open(args.out.as_deref())?;
-    write(&mut out, &simulator, &pose, &plan).or_else(|error| Failure::from_write(&what, &error))
+    let mut rng = Pcg64::seed_from_u64(args.noise.seed);
+    let mut ping = |station: &Station, direction_rad| match &noise {
+        Some(noise) => station.ping_in_noise(direction_rad, noise, &mut rng),
+        None => station.ping(direction_rad),
+    };
+    write(&mut out, &simulator, &pose, &plan, &mut ping)
+        .or_else(|error| Failure::from_write(&what, &error))
 }
 
 /// Where the records go, and its name.
@@ -94,6 +137,7 @@ fn write(
     simulator: &Simulator,
     pose: &Pose,
     plan: &ScanPlan,
+    predict: &mut dyn FnMut(&Station, f64) -> Prediction,
 ) -> io::Result<()> {
     let scan = Uuid::new_v4();
     let mut put = |record: &Record| {
@@ -101,12 +145,18 @@ fn write(
         out.write_all(b"\n")
     };
     put(&Record::Session(Box::new(Session::simulated(simulator, Timestamp::now()))))?;
-    put(&Record::ScanStart(ScanStart { scan, time: Timestamp::now(), pose: *pose, plan: *plan }))?;
+    put(&Record::ScanStart(ScanStart {
+        scan,
+        time: Timestamp::now(),
+        pose: *pose,
+        plan: *plan,
+        air: None,
+    }))?;
     let progress = progress(plan.stops());
     let station = simulator.station(pose.position());
     for index in 0..plan.stops() {
         let azimuth_deg = plan.azimuth_deg(index);
-        let prediction = station.ping(pose.direction_rad(azimuth_deg));
+        let prediction = predict(&station, pose.direction_rad(azimuth_deg));
         let ping = Ping::simulated(simulator, scan, index, azimuth_deg, &prediction);
         put(&Record::Ping(Box::new(ping)))?;
         progress.inc(1);

@@ -19,11 +19,16 @@ use crate::{
     scene::Scene,
 };
 
-/// The model as the paper has it: its sensor, whose gain makes up for the air, and its edges.
+/// The model as the paper has it: its sensor, whose gain makes up for the air and whose detector
+/// knows no time walk, and its edges.
 fn simulator(scene: Arc<Scene>) -> Simulator {
     let sensor = Sensor::preset("bozma-kuc-60khz").expect("a preset");
-    let options =
-        Options { lossless: true, edge_law: Some(EdgeLawKind::BozmaKuc), ..Options::default() };
+    let options = Options {
+        lossless: true,
+        edge_law: Some(EdgeLawKind::BozmaKuc),
+        ideal_receiver: true,
+        ..Options::default()
+    };
     Simulator::new(scene, sensor, Air::default(), options).expect("sensible figures")
 }
 

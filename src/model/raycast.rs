@@ -97,13 +97,14 @@ impl Reflectors {
         match reflector {
             Reflector::Wall(index) => self.segments[index as usize].mirror,
             Reflector::Cylinder(index) => self.circles[index as usize].mirror,
+            Reflector::Face => 0.0,
         }
     }
 
     /// Radius of curvature of a surface, metres; `None` for a flat one.
     pub(super) fn radius_m(&self, reflector: Reflector) -> Option<f64> {
         match reflector {
-            Reflector::Wall(_) => None,
+            Reflector::Wall(_) | Reflector::Face => None,
             Reflector::Cylinder(index) => Some(self.circles[index as usize].radius_m),
         }
     }

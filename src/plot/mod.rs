@@ -22,10 +22,13 @@ mod region;
 mod residuals;
 mod scan;
 mod scene;
+mod side_by_side;
 mod strip;
 mod strips;
 mod theme;
 mod ticks;
+mod trace;
+mod way;
 mod words;
 
 #[cfg(test)]
@@ -41,3 +44,6 @@ pub use polar::draw_polar;
 pub use residuals::draw_residuals;
 pub use scan::{draw_scan, draw_scans};
 pub use scene::draw_scene;
+pub use side_by_side::draw_side_by_side;
+pub use trace::{TraceView, draw_trace};
+pub use way::{WayView, draw_way};

@@ -34,7 +34,7 @@ impl ScanView {
         Self {
             scan,
             session: Some(std::sync::Arc::new(Session::simulated(simulator, time))),
-            start: Some(ScanStart { scan, time, pose: *pose, plan: *plan }),
+            start: Some(ScanStart { scan, time, pose: *pose, plan: *plan, air: None }),
             pings: pings.collect(),
             events: Vec::new(),
             end: Some(ScanEnd::simulated(simulator, scan, plan.beams(), time)),

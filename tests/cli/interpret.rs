@@ -22,6 +22,7 @@ fn simulate(folder: &Path, pose: &str) -> String {
         "--edge-law",
         "bozma-kuc",
         "--lossless",
+        "--ideal-receiver",
         "--out",
         &path,
     ]);

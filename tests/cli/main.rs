@@ -2,6 +2,8 @@
 #![cfg(feature = "daemon")]
 
 mod common;
+mod daemon;
+mod doctor;
 mod faults;
 mod hangup;
 mod interpret;
@@ -11,4 +13,5 @@ mod paths;
 mod plot;
 mod scan;
 mod scene;
+mod trace;
 mod wrong_input;

@@ -63,11 +63,11 @@ mod beam;
 mod edges;
 mod mesh;
 mod rounds;
-
 mod survey;
 #[cfg(test)]
 mod tests;
 mod trace;
+mod trains;
 
 pub use survey::PathEngine;
 

@@ -2,30 +2,38 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{Echo, Paths, Settings, trace::Tree};
+use smallvec::SmallVec;
+
+use super::{
+    Echo, EchoPath, Paths, Settings,
+    trace::Tree,
+    trains::{Loops, Train},
+};
 use crate::{
-    acoustics::{BeamPattern, Sound},
+    acoustics::{BeamPattern, Disc, Sound},
     geometry::{DVec2, wrap_pi},
-    model::{Arrival, Engine, Survey},
+    model::{Arrival, Engine, Path, Reflector, Survey},
+    scan::PathKind,
     scene::Scene,
 };
 
-/// The exact engine: echo paths and a beam pattern.
+/// The exact engine: echo paths, a beam pattern and a face that reflects.
 ///
 /// [`Settings::floor`] is also the weakest sound that [`Survey::listen`] gives.
 #[derive(Debug)]
 pub struct PathEngine {
-    paths: Paths,
-    beam: BeamPattern,
+    pub(super) paths: Paths,
+    pub(super) beam: BeamPattern,
+    pub(super) face: Option<Disc>,
     envelope: Envelope,
 }
 
 impl PathEngine {
-    /// Prepares a scene for a ranger.
+    /// Prepares a scene for a ranger; without a face, sound passes it as if it were not there.
     #[must_use]
-    pub fn new(scene: &Scene, beam: BeamPattern, settings: Settings) -> Self {
+    pub fn new(scene: &Scene, beam: BeamPattern, face: Option<Disc>, settings: Settings) -> Self {
         let envelope = Envelope::of(&beam);
-        Self { paths: Paths::new(scene, settings), beam, envelope }
+        Self { paths: Paths::new(scene, settings), beam, face, envelope }
     }
 }
 
@@ -75,6 +83,8 @@ struct PathSurvey<'a> {
     echoes: Vec<Echo>,
     /// From narrow to wide reach: the many weak echoes are heard in few directions only.
     wheels: [Wheel; REACHES_DEG.len()],
+    /// What the face can send round again.
+    loops: Option<Loops>,
 }
 
 /// Widest reach of each wheel, degrees.
@@ -179,7 +189,47 @@ impl<'a> PathSurvey<'a> {
             }
         }
         let wheels = spokes.map(|spokes| Wheel::new(&spokes));
-        Self { engine, tree, echoes, wheels }
+        let loops = engine.face.map(|face| Loops::new(face, &echoes));
+        Self { engine, tree, echoes, wheels, loops }
+    }
+
+    /// Echoes by way of the face, in a direction in (-pi, pi].
+    fn trains(&self, direction_rad: f64) -> Vec<Train> {
+        let settings = &self.engine.paths.settings;
+        self.loops
+            .as_ref()
+            .map_or_else(Vec::new, |loops| loops.trains(direction_rad, &self.engine.beam, settings))
+    }
+
+    fn train_arrival(&self, direction_rad: f64, train: &Train, amplitude: f64) -> Arrival {
+        let paths = &self.engine.paths;
+        let echoes = train.rounds.iter().map(|round| {
+            let echo = &self.echoes[round.echo as usize];
+            if round.reversed { echo.reversed() } else { *echo }
+        });
+        let ways: Vec<EchoPath> = echoes.map(|echo| paths.path(&self.tree, &echo)).collect();
+        let bent = ways.iter().find_map(|way| way.path.edge);
+        let kind = if bent.is_some() { PathKind::Diffracted } else { PathKind::Specular };
+        let mut walls = SmallVec::new();
+        for way in &ways {
+            if !walls.is_empty() {
+                walls.push(Reflector::Face);
+            }
+            walls.extend_from_slice(&way.path.walls);
+        }
+        let (departure_rad, arrival_rad) =
+            (ways[0].departure_rad, ways[ways.len() - 1].arrival_rad);
+        let [leaving, arriving] =
+            [departure_rad, arrival_rad].map(|end| self.engine.beam.one_way(end - direction_rad));
+        Arrival {
+            length_m: train.length_m,
+            amplitude,
+            path_amplitude: amplitude / (leaving * arriving),
+            phase_rad: train.phase_rad,
+            departure_rad,
+            arrival_rad,
+            path: Path { kind, walls, edge: bent },
+        }
     }
 }
 
@@ -204,16 +254,28 @@ impl Survey for PathSurvey<'_> {
                 }
             }
         }
-        // Echoes are numbered by length.
+        // Echoes are numbered by length; trains come after all of them.
         sounds.sort_unstable_by_key(|sound| sound.index);
+        let trains = self.trains(direction_rad);
+        if !trains.is_empty() {
+            let numbers = self.echoes.len() as u32..;
+            sounds.extend(trains.iter().zip(numbers).map(|(train, index)| train.sound(index)));
+            sounds.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
+        }
     }
 
-    fn arrival(&self, _direction_rad: f64, sound: &Sound) -> Arrival {
-        let echo = &self.echoes[sound.index as usize];
+    fn arrival(&self, direction_rad: f64, sound: &Sound) -> Arrival {
+        let index = sound.index as usize;
+        if let Some(train) = index.checked_sub(self.echoes.len()) {
+            let trains = self.trains(wrap_pi(direction_rad));
+            return self.train_arrival(direction_rad, &trains[train], sound.amplitude);
+        }
+        let echo = &self.echoes[index];
         let path = self.engine.paths.path(&self.tree, echo);
         Arrival {
             length_m: path.length_m,
             amplitude: sound.amplitude,
+            path_amplitude: path.amplitude,
             phase_rad: path.phase_rad,
             departure_rad: path.departure_rad,
             arrival_rad: path.arrival_rad,
@@ -228,7 +290,7 @@ fn bin(angle_rad: f64) -> usize {
 }
 
 /// The difference of two angles in (-pi, pi], brought into that range.
-fn wrap_once(angle_rad: f64) -> f64 {
+pub(super) fn wrap_once(angle_rad: f64) -> f64 {
     if angle_rad > PI {
         angle_rad - TAU
     } else if angle_rad < -PI {

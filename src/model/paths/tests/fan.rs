@@ -15,7 +15,8 @@ fn simulator(scene: &Arc<Scene>, engine: EngineKind, ray_spacing_deg: f64) -> Si
     Simulator::new(scene.clone(), sensor, Air::default(), options).expect("valid options")
 }
 
-/// Mirror echoes over the threshold; `paths` has one reflection at a cylinder at most.
+/// Mirror echoes over the threshold; `paths` has one reflection at a cylinder at most, and the
+/// fan's ranger is transparent.
 fn mirrored(simulator: &Simulator, pose: &Pose, azimuth_deg: f64) -> Vec<Arrival> {
     let is_round = |r: &&crate::model::Reflector| matches!(r, crate::model::Reflector::Cylinder(_));
     let direction = pose.direction_rad(azimuth_deg);
@@ -24,6 +25,7 @@ fn mirrored(simulator: &Simulator, pose: &Pose, azimuth_deg: f64) -> Vec<Arrival
         arrival.path.kind == PathKind::Specular
             && arrival.amplitude > 0.02
             && arrival.path.walls.iter().filter(is_round).count() < 2
+            && !arrival.path.walls.contains(&crate::model::Reflector::Face)
     });
     arrivals
 }

@@ -1,0 +1,201 @@
+//! The transducer's face as a reflector.
+
+use std::f64::consts::SQRT_2;
+
+use num_complex::Complex64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A transducer's face and housing as a reflector.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Face {
+    /// Radius of the disc, metres.
+    pub radius_m: f64,
+    /// Amplitude that it mirrors, 0 to 1.
+    pub reflectance: f64,
+}
+
+/// Nodes and weights of Gauss and Legendre's rule on (0, 1), the half above the middle.
+const NODES: [(f64, f64); 4] = [
+    (0.591_717_321_247_825, 0.181_341_891_689_181),
+    (0.762_766_204_958_164, 0.156_853_322_938_944),
+    (0.898_333_238_706_813, 0.111_190_517_226_687),
+    (0.980_144_928_248_768, 0.050_614_268_145_188),
+];
+
+/// A disc that turns sound back at some frequency.
+///
+/// Its back is left out: sound that comes from behind the face is not reflected.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Disc {
+    /// Size and surface.
+    pub face: Face,
+    /// Wave number `2 pi f / c`, radians a metre.
+    pub wave_number_per_m: f64,
+}
+
+/// The way of sound that a face turns back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FaceAspect {
+    /// From the (mirrored) source to the disc, metres.
+    pub in_m: f64,
+    /// From the disc to the (mirrored) receiver, metres.
+    pub out_m: f64,
+    /// Direction towards the source, from the disc's axis, radians.
+    pub in_rad: f64,
+    /// Direction towards the receiver, from the disc's axis and the same way round, radians.
+    pub out_rad: f64,
+}
+
+impl Disc {
+    /// Field that the disc returns relative to that of an endless mirror in its place.
+    ///
+    /// Kirchhoff's integral over the disc in Fresnel's approximation (Born and Wolf, Principles
+    /// of Optics, section 8.8, has the same integral for a lens). From a source at `R1` and to a
+    /// receiver at `R2` the way over a point at `rho a` from the centre is longer by
+    /// `(rho a)^2 / 2 (1/R1 + 1/R2)`, and by `rho a (sin i + sin o) cos(phi)` to one side. With
+    /// `p = k a^2 / 2 (1/R1 + 1/R2)` and `q = k a |sin i + sin o|` the field is
+    ///
+    /// ```text
+    /// F = 2 i p  integral from 0 to 1 of  J0(q rho) exp(-i p rho^2) rho d rho,
+    /// ```
+    ///
+    /// over what an endless disc gives (`p` times as many zones, each cancelling the next but
+    /// for half of the first). On the axis (`q = 0`) that is `1 - exp(-i p)`, between nothing
+    /// and twice a mirror; far away it is the aperture's pattern `i p 2 J1(q)/q`. Seen at an
+    /// angle the disc is an ellipse; its zones are counted by the geometric mean, `p cos`, with
+    /// the mean of both cosines, so that it reads the same backwards.
+    ///
+    /// Legs of at least `a`; at the rim of a disc smaller than a wavelength it is an estimate.
+    #[must_use]
+    pub fn reflection(&self, aspect: &FaceAspect) -> Complex64 {
+        let cosine = 0.5 * (aspect.in_rad.cos() + aspect.out_rad.cos());
+        if aspect.in_rad.cos() <= 0.0 || aspect.out_rad.cos() <= 0.0 {
+            return Complex64::ZERO;
+        }
+        let p = self.zone_m() * (1.0 / aspect.in_m + 1.0 / aspect.out_m) * cosine;
+        let slant = aspect.in_rad.sin() + aspect.out_rad.sin();
+        let q = self.wave_number_per_m * self.face.radius_m * slant.abs();
+        self.face.reflectance * zones(p, q)
+    }
+
+    /// Length of a leg over which the rim lies `1/(2 k)` behind the middle: `k a^2 / 2`, metres.
+    /// The disc scatters like a point of this strength: no aspect gives
+    /// [`Self::reflection`] more than this times `1/R1 + 1/R2`.
+    #[must_use]
+    pub fn zone_m(&self) -> f64 {
+        0.5 * self.wave_number_per_m * self.face.radius_m * self.face.radius_m
+    }
+}
+
+/// `i p` times the integral over `u = rho^2` from 0 to 1 of `J0(q sqrt(u)) exp(-i p u)`.
+fn zones(p: f64, q: f64) -> Complex64 {
+    if q < 1e-9 {
+        return Complex64::ONE - Complex64::cis(-p);
+    }
+    // Eight nodes resolve a turn of phase or a lobe of J0 each; the lobes crowd at u = 0.
+    let panels = ((p + 0.5 * SQRT_2 * q) / 6.0).ceil().max(1.0);
+    let width = 1.0 / panels;
+    let mut sum = Complex64::ZERO;
+    for panel in 0..panels as u32 {
+        for (node, weight) in NODES {
+            for place in [node, 1.0 - node] {
+                let u = (f64::from(panel) + place) * width;
+                sum += weight * libm::j0(q * u.sqrt()) * Complex64::cis(-p * u);
+            }
+        }
+    }
+    Complex64::new(0.0, p * width) * sum
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{PI, TAU};
+
+    use super::*;
+
+    const LAMBDA_M: f64 = 343.99 / 49_400.0;
+    const FACE: Disc = Disc {
+        face: Face { radius_m: 0.0215, reflectance: 1.0 },
+        wave_number_per_m: TAU / LAMBDA_M,
+    };
+
+    fn head_on(in_m: f64, out_m: f64) -> FaceAspect {
+        FaceAspect { in_m, out_m, in_rad: 0.0, out_rad: 0.0 }
+    }
+
+    #[test]
+    fn on_its_axis_it_is_the_closed_form() {
+        for (near, far) in [(0.094, 0.188), (0.5, 0.5), (3.0, 0.2)] {
+            let p = PI * 0.0215_f64.powi(2) / LAMBDA_M * (1.0 / near + 1.0 / far);
+            let expected = (Complex64::ONE - Complex64::cis(-p)).norm();
+            let found = FACE.reflection(&head_on(near, far)).norm();
+            assert!((found - expected).abs() < 1e-12, "{near} {far}");
+            // The quadrature agrees with it just off the axis.
+            assert!((zones(p, 1e-7).norm() - expected).abs() < 1e-9, "{p}");
+        }
+    }
+
+    #[test]
+    fn far_away_it_is_the_apertures_pattern() {
+        for degrees in [1.0_f64, 4.0, 9.0, 20.0, 60.0] {
+            let theta_rad = degrees.to_radians();
+            let aspect =
+                FaceAspect { in_m: 1e3, out_m: 1e3, in_rad: theta_rad, out_rad: theta_rad };
+            let x = FACE.wave_number_per_m * FACE.face.radius_m * 2.0 * theta_rad.sin();
+            let p = FACE.zone_m() * 2e-3 * theta_rad.cos();
+            let expected = p * (2.0 * libm::j1(x) / x).abs();
+            assert!((FACE.reflection(&aspect).norm() - expected).abs() < 1e-6 * p, "{degrees}");
+        }
+    }
+
+    /// Kirchhoff's integral summed point by point over the disc, with exact distances.
+    #[test]
+    fn off_its_axis_it_is_the_sum_over_the_disc() {
+        let k = FACE.wave_number_per_m;
+        for (in_m, out_m, in_deg, out_deg) in
+            [(0.188, 0.188, 0.0_f64, 0.0_f64), (0.188, 0.3, 4.0, 0.0), (0.3, 0.3, 9.0, -9.0)]
+        {
+            let place = |length: f64, degrees: f64| {
+                (length * degrees.to_radians().sin(), length * degrees.to_radians().cos())
+            };
+            let (source, receiver) = (place(in_m, in_deg), place(out_m, out_deg));
+            let (rings, steps) = (150, 240);
+            let mut sum = Complex64::ZERO;
+            for ring in 0..rings {
+                let rho = (f64::from(ring) + 0.5) / f64::from(rings) * FACE.face.radius_m;
+                for step in 0..steps {
+                    let (sin, cos) = (f64::from(step) / f64::from(steps) * TAU).sin_cos();
+                    let to = |(x, z): (f64, f64)| {
+                        ((x - rho * cos).powi(2) + (rho * sin).powi(2) + z * z).sqrt()
+                    };
+                    let (r1, r2) = (to(source), to(receiver));
+                    let obliquity = 0.5 * (source.1 / r1 + receiver.1 / r2);
+                    let element =
+                        rho * FACE.face.radius_m / f64::from(rings) * TAU / f64::from(steps);
+                    sum += obliquity * element / (r1 * r2) * Complex64::cis(-k * (r1 + r2));
+                }
+            }
+            // An endless mirror gives exp(-i k (R1 + R2)) / (R1 + R2).
+            let mirror = TAU / k / (in_m + out_m);
+            let (in_rad, out_rad) = (in_deg.to_radians(), out_deg.to_radians());
+            let found = FACE.reflection(&FaceAspect { in_m, out_m, in_rad, out_rad });
+            let off = (found.norm() - sum.norm() / mirror).abs();
+            assert!(
+                off < 0.02,
+                "{in_m} {in_deg} {out_deg}: {found} beside {}",
+                sum.norm() / mirror
+            );
+        }
+    }
+
+    #[test]
+    fn it_reads_the_same_backwards_and_not_from_behind() {
+        let aspect = FaceAspect { in_m: 0.2, out_m: 0.7, in_rad: 0.3, out_rad: -0.1 };
+        let back = FaceAspect { in_m: 0.7, out_m: 0.2, in_rad: -0.1, out_rad: 0.3 };
+        assert!((FACE.reflection(&aspect) - FACE.reflection(&back)).norm() < 1e-12);
+        let behind = FaceAspect { in_rad: 2.0, ..aspect };
+        assert_eq!(FACE.reflection(&behind), Complex64::ZERO);
+    }
+}
