@@ -77,9 +77,9 @@ pub(super) struct Args {
 }
 
 /// What did best on the made-up rooms of `sonard map-benchmark`.
-pub(super) const EXTEND_M: f64 = 1.0;
+pub(super) const EXTEND_M: f64 = 2.0;
 /// The same.
-pub(super) const LEAST_CONFIDENCE: f64 = 0.45;
+pub(super) const LEAST_CONFIDENCE: f64 = 0.48;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Switch {

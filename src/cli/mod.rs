@@ -6,6 +6,7 @@ mod compare;
 mod doctor;
 mod failure;
 mod interpret;
+mod lines;
 mod log;
 mod map;
 mod map_benchmark;
@@ -80,6 +81,9 @@ enum Verb {
     /// Tell planes, corners and edges apart in scans
     #[command(long_about = interpret::ABOUT)]
     Interpret(interpret::Args),
+    /// Make a map of line segments of the scans of logs
+    #[command(long_about = lines::ABOUT)]
+    Lines(lines::Args),
     /// Make an occupancy grid of the scans of logs
     #[command(long_about = map::ABOUT)]
     Map(map::Args),
@@ -116,6 +120,7 @@ pub fn main() -> ExitCode {
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Interpret(args) => interpret::run(&args),
+        Verb::Lines(args) => lines::run(&args),
         Verb::Map(args) => map::run(&args),
         Verb::MapScore(args) => map_score::run(&args),
         Verb::MapBenchmark(args) => map_benchmark::run(&args),

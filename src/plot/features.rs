@@ -1,14 +1,14 @@
 //! The floor plan with what a scan was interpreted as.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Rect, Shape},
-    caption, keys,
+    canvas::{Anchor, Layer, Px, Shape},
+    keys,
     labels::Labels,
-    legend::{self, Entry, Sample},
+    legend::{Entry, Sample},
+    overlay,
     picture::Picture,
     plan::Plan,
-    readings::Readings,
-    region, theme, words,
+    theme, words,
 };
 use crate::{
     geometry::{DVec2, Pose},
@@ -25,36 +25,12 @@ const KINDS: [FeatureKind; 4] =
 /// a next scan is proposed from.
 #[must_use]
 pub fn draw_features(scans: &[ScanView], scene: Option<&Scene>, features: &[Feature]) -> Picture {
-    let readings: Vec<Readings> = scans.iter().map(Readings::of).collect();
-    let placed: Vec<(Pose, &Readings)> = scans
-        .iter()
-        .zip(&readings)
-        .filter_map(|(view, r)| Some((words::pose_of(view)?, r)))
-        .collect();
-    let lines = [words::lines(scans), vec![counts(features)]].concat();
-    let (heading, top) = caption::draw(&words::title(scans, scene), words::badge(scans), &lines);
-    let region = region::region(&placed, scene);
-    let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
-    let height = Plan::height_for(&region, right - left, [320.0, 760.0]);
-    let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
-
-    let mut inside = Layer::new("inside").clipped("features-window", plan.panel);
-    inside.extend(scene.map(|scene| plan.walls(scene)));
-    inside.extend(placed.iter().map(|(pose, r)| dots(&plan, pose, r)));
-    inside.extend(placed.iter().map(|(pose, _)| plan.pose(pose)));
-    inside.extend(features.iter().map(|feature| arc(&plan, scans, feature)));
-    inside.add(next_places(&plan, scans, features));
-
-    let mut page = Layer::new("features");
-    page.add(heading);
-    page.add(plan.frame());
-    page.add(inside);
-    page.add(names(&plan, scans, features));
-    page.add(plan.scale_bar());
-    let below = Px::new(left, plan.panel.bottom + 24.0);
-    let (entries, legend_height) = legend::draw(&entries(features, scene), below, right - left);
-    page.add(entries);
-    Picture::new(theme::PAGE_PX, below.y + legend_height + theme::MARGIN_PX / 2.0, page)
+    let over = |plan: &Plan| {
+        let arcs = features.iter().map(|feature| arc(plan, scans, feature));
+        arcs.chain([next_places(plan, scans, features)]).collect()
+    };
+    let beside = |plan: &Plan| Some(names(plan, scans, features));
+    overlay::draw(scans, scene, counts(features), over, beside, &entries(features, scene))
 }
 
 /// How many of each kind there are.
@@ -108,17 +84,6 @@ fn entries(features: &[Feature], scene: Option<&Scene>) -> Vec<Entry> {
         .chain(proposes.then(|| Entry::new(next, "way to the next scan")))
         .chain(scene.map(keys::materials).into_iter().flatten())
         .collect()
-}
-
-fn dots(plan: &Plan, pose: &Pose, readings: &Readings) -> Layer {
-    let mut layer = Layer::new("readings").with("fill", theme::SILENT);
-    for beam in &readings.beams {
-        if let Some(range_m) = beam.range_m {
-            let at = plan.px(pose.point_at(beam.azimuth_deg, range_m));
-            layer.mark(Shape::Dot, at, 1.4, None);
-        }
-    }
-    layer
 }
 
 /// Where the scan that a feature belongs to was taken.

@@ -10,8 +10,10 @@ mod floor;
 mod keys;
 mod labels;
 mod legend;
+mod lines;
 mod map;
 mod materials;
+mod overlay;
 mod picture;
 mod plan;
 mod polar;
@@ -35,6 +37,7 @@ mod fixtures;
 mod tests;
 
 pub use features::draw_features;
+pub use lines::draw_lines;
 pub use map::draw_map;
 pub use picture::{MAX_WIDTH_PX, Picture, PlotError};
 pub use polar::draw_polar;

@@ -8,6 +8,7 @@ mod faults;
 mod hangup;
 mod interpret;
 mod log;
+mod map;
 mod paths;
 mod plot;
 mod scan;

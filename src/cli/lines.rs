@@ -1,0 +1,135 @@
+//! `sonard lines`.
+
+use std::{
+    io::{self, Write},
+    path::PathBuf,
+};
+
+use super::{
+    Failure, Outcome,
+    picture::{PictureArgs, scene_for, warn_of_damage},
+};
+use crate::{
+    interpret::{
+        Sweep,
+        lines::{LineMap, LineMapSettings, MapLine},
+    },
+    plot::draw_lines,
+    scan::ScanView,
+    store::load,
+};
+
+/// Options of `sonard lines`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(super) struct Args {
+    /// Logs whose scans have poses; - for standard input
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// Leave out readings beyond this "logical" distance, metres
+    #[arg(long, value_name = "M", default_value_t = LineMapSettings::default().logical_m)]
+    logical: f64,
+    /// One JSON object a line
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    picture: PictureArgs,
+    /// Scene file or name of a shipped scene to draw; without it, the shipped one that the log names
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<String>,
+}
+
+pub(super) const ABOUT: &str = "\
+Make a map of line segments of the scans of logs.
+
+After G. Dudek, P. Freedman and I. Rekleitis (ICRA 1996): readings that can't be right are left \
+out (too far, or against what was seen from close by), the rest are grouped by the \
+sphere-of-influence graph, segments are fitted to each group by split and merge, and segments of \
+one wall are merged.";
+
+const HELP: &str = "\
+Examples:
+  sonard lines run/*.jsonl -o lines.png
+  sonard lines scan.jsonl --logical 2 --json
+
+Exit codes: 0 done, 2 wrong usage or input, 3 a picture can't be written.";
+
+pub(super) fn run(args: &Args) -> Outcome {
+    if !(args.logical.is_finite() && args.logical > 0.0) {
+        return Err(Failure::input(
+            format!("--logical is {}", args.logical),
+            "give a length in metres, greater than 0",
+        ));
+    }
+    let targets = args.picture.targets()?;
+    let (scans, map, left_out) = read(args)?;
+    let mut out = io::stdout().lock();
+    let printed = if args.json {
+        map.lines().iter().try_for_each(|line| {
+            serde_json::to_writer(&mut out, &record(line))?;
+            writeln!(out)
+        })
+    } else {
+        print(&mut out, &map, left_out)
+    };
+    printed.or_else(|error| Failure::from_write("standard output", &error))?;
+    if targets.is_empty() {
+        return Ok(());
+    }
+    let scene = scene_for(&scans, args.scene.as_deref())?;
+    let picture = draw_lines(&scans, scene.as_ref(), map.lines());
+    targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
+}
+
+fn read(args: &Args) -> Result<(Vec<ScanView>, LineMap, usize), Failure> {
+    let settings = LineMapSettings { logical_m: args.logical, ..LineMapSettings::default() };
+    let (mut scans, mut map, mut left_out) = (Vec::new(), LineMap::new(settings), 0);
+    for log in &args.logs {
+        let loaded = load(log).map_err(|error| Failure::input(&error, error.help()))?;
+        warn_of_damage(log, &loaded);
+        for scan in ScanView::from_records(loaded.records) {
+            match Sweep::of(&scan) {
+                Ok(sweep) => {
+                    left_out += map.add_sonar(&sweep);
+                    scans.push(scan);
+                }
+                Err(error) => {
+                    let log = log.display();
+                    anstream::eprintln!("{log}: scan {} is left out: {error}", scan.scan);
+                }
+            }
+        }
+    }
+    if scans.is_empty() {
+        return Err(Failure::input(
+            "there is no scan with its pose to map",
+            "give logs as `sonard scan` or `sonard simulate` writes them",
+        ));
+    }
+    Ok((scans, map, left_out))
+}
+
+fn record(line: &MapLine) -> serde_json::Value {
+    let [a, b] = line.ends;
+    serde_json::json!({
+        "kind": line.kind, "from_m": a.to_array(), "to_m": b.to_array(),
+        "length_m": line.length_m(), "confidence": line.confidence, "terminal": line.terminal,
+    })
+}
+
+fn print(out: &mut impl Write, map: &LineMap, left_out: usize) -> io::Result<()> {
+    for line in map.lines() {
+        let [a, b] = line.ends;
+        writeln!(
+            out,
+            "({:.3}, {:.3}) to ({:.3}, {:.3}) m: {:.3} m, confidence {:.2}",
+            a.x,
+            a.y,
+            b.x,
+            b.y,
+            line.length_m(),
+            line.confidence
+        )?;
+    }
+    writeln!(out, "{} lines; {left_out} readings left out", map.lines().len())
+}

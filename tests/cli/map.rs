@@ -1,0 +1,153 @@
+//! `sonard map`, `map-score`, `map-benchmark` and `lines` as a user runs them.
+
+use std::{fs, path::Path};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::common::{run, stderr};
+
+/// Simulated scans of a room from three places, as files.
+fn logs(folder: &Path) -> Vec<String> {
+    let places = ["0.7,0.8,0", "1.6,0.5,90", "1.1,2.2,0"];
+    let log = |place: &&str| {
+        let path = folder.join(format!("{place}.jsonl")).to_str().expect("plain path").to_owned();
+        let output = run(&[
+            "simulate",
+            "--scene",
+            "two-surface-room",
+            "--pose",
+            place,
+            "--max-range",
+            "4",
+            "--out",
+            &path,
+        ]);
+        assert!(output.status.success(), "{}", stderr(&output));
+        path
+    };
+    places.iter().map(log).collect()
+}
+
+/// Runs and reads the one object it prints.
+fn object(arguments: &[&str]) -> Value {
+    let output = run(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
+    serde_json::from_slice(&output.stdout).expect("one object")
+}
+
+fn with<'a>(verb: &'a str, logs: &'a [String], further: &[&'a str]) -> Vec<&'a str> {
+    let logs = logs.iter().map(String::as_str);
+    std::iter::once(verb).chain(logs).chain(further.iter().copied()).collect()
+}
+
+#[test]
+fn feature_prediction_makes_the_better_map() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let logs = logs(folder.path());
+    let path = |name: &str| folder.path().join(name).to_str().expect("plain path").to_owned();
+    let scores: Vec<Value> = ["on", "off"]
+        .iter()
+        .map(|switch| {
+            let out = path(switch);
+            let confidences = path("confidences.jsonl");
+            let further = [
+                "--out",
+                &out,
+                "--feature-prediction",
+                switch,
+                "--json",
+                "--confidences",
+                &confidences,
+            ];
+            let map = object(&with("map", &logs, &further));
+            assert_eq!((map["scans"].as_u64(), map["readings"].as_u64()), (Some(3), Some(1200)));
+            let pgm = fs::read(folder.path().join(switch).join("map.pgm")).expect("written");
+            assert!(pgm.starts_with(b"P5\n"));
+            if *switch == "on" {
+                let text = fs::read_to_string(&confidences).expect("written");
+                assert_eq!(text.lines().count(), 1200, "a confidence for every reading");
+            }
+            object(&["map-score", &out, "two-surface-room", "--json"])
+        })
+        .collect();
+    let figure = |score: &Value, name: &str| score[name].as_f64().expect(name);
+    let [on, off] = scores.as_slice() else { panic!("two maps") };
+    assert!(figure(on, "correlation_percent") > figure(off, "correlation_percent"));
+    for less in ["map_score_percent", "map_score_occupied_percent", "false_positive_paths_percent"]
+    {
+        assert!(figure(on, less) < figure(off, less), "{less}: {on} {off}");
+    }
+}
+
+#[test]
+fn an_ideal_map_scores_full_marks_against_its_scene() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let logs = logs(folder.path());
+    let [map, ideal] =
+        ["map", "ideal"].map(|name| folder.path().join(name).to_str().expect("path").to_owned());
+    let further = ["--out", &map, "--region", "-0.5,-0.5,4.1,3.5", "--model", "physical", "--json"];
+    let made = object(&with("map", &logs, &further));
+    assert_eq!((made["width"].as_u64(), made["height"].as_u64()), (Some(92), Some(80)));
+    object(&["map-score", &map, "two-surface-room", "--save-ideal", &ideal, "--json"]);
+    let perfect = object(&["map-score", &ideal, "two-surface-room", "--json"]);
+    assert_eq!(perfect["false_positive_paths_percent"].as_f64(), Some(0.0));
+    assert!(perfect["correlation_percent"].as_f64().expect("it varies") > 99.9);
+}
+
+#[test]
+fn the_benchmark_gives_the_same_table_for_the_same_seed() {
+    let arguments = ["map-benchmark", "--maps", "3", "--places", "8", "--seed", "7"];
+    let [one, two] = [run(&arguments), run(&arguments)];
+    assert!(one.status.success(), "{}", stderr(&one));
+    assert_eq!(one.stdout, two.stdout);
+    assert!(String::from_utf8_lossy(&one.stdout).contains("mcgill-lab"));
+}
+
+#[test]
+fn lines_are_drawn_and_listed() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let logs = logs(folder.path());
+    let picture = folder.path().join("lines.png").to_str().expect("plain path").to_owned();
+    let output = run(&with("lines", &logs, &["--json", "-o", &picture]));
+    assert!(output.status.success(), "{}", stderr(&output));
+    let lines: Vec<Value> = String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("a line"))
+        .collect();
+    // The west wall, x = 0, is seen from all three places.
+    let on_west = |line: &&Value| {
+        ["from_m", "to_m"].iter().all(|end| line[end][0].as_f64().is_some_and(|x| x.abs() < 0.03))
+    };
+    assert!(lines.iter().any(|line| on_west(&line)), "{lines:?}");
+    assert_eq!(&fs::read(picture).expect("written")[..4], b"\x89PNG");
+}
+
+#[test]
+fn wrong_input_is_refused_with_what_would_be_right() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let logs = logs(folder.path());
+    let out = folder.path().join("map").to_str().expect("plain path").to_owned();
+    let empty = folder.path().join("empty.jsonl");
+    fs::write(&empty, "").expect("written");
+    let empty = empty.to_str().expect("plain path").to_owned();
+    let small = ["--out", &out, "--region", "0,0,1,1"];
+    assert!(run(&with("map", &logs, &small)).status.success());
+    for (arguments, words) in [
+        (vec!["map", &empty, "--out", &out], "sonard scan"),
+        (with("map", &logs, &["--out", &out, "--resolution", "0"]), "resolution"),
+        (with("map", &logs, &["--out", &out, "--resolution", "1e-9"]), "too many"),
+        (with("map", &logs, &["--out", &out, "--region", "1,2,3"]), "X0,Y0,X1,Y1"),
+        (with("map", &logs, &["--out", &out, "--region", "1,1,0,0"]), "no area"),
+        (with("map", &logs, &["--out", &out, "--max-range", "0"]), "greater than 0"),
+        (vec!["map-score", "nowhere", "simple-room"], "map.yaml beside map.pgm"),
+        (vec!["map-score", &out, "simple-rom"], "simple-room"),
+        (vec!["map-score", &out, "simple-room", "--spacing", "0"], "greater than 0"),
+        (vec!["lines", &empty], "sonard scan"),
+        (with("lines", &logs, &["--logical", "0"]), "greater than 0"),
+    ] {
+        let output = run(&arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(stderr(&output).replace('\n', " ").contains(words), "{words}: {}", stderr(&output));
+    }
+}
