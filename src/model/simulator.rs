@@ -135,6 +135,7 @@ pub struct Simulator {
     air: Air,
     options: Options,
     receiver: Receiver,
+    scatter_height_rad: f64,
     engine: Box<dyn Engine>,
 }
 
@@ -160,9 +161,11 @@ impl Simulator {
             max_range_m: options.max_range_m.unwrap_or(sensor.max_range_m),
         };
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
+        let scatter_height_rad = beam.two_way_power_rad();
         let engine: Box<dyn Engine> = match options.engine {
             EngineKind::Paths => {
-                let settings = path_settings(&sensor, &air, &options, &receiver);
+                let settings =
+                    path_settings(&sensor, &air, &options, &receiver, scatter_height_rad);
                 let wave_number_per_m = settings.wave_number_per_m;
                 let face = sensor.face.map(|face| Disc { face, wave_number_per_m });
                 Box::new(PathEngine::new(&scene, beam, face, settings))
@@ -175,7 +178,7 @@ impl Simulator {
                 Box::new(Cone::new(&scene, options.aperture_deg.unwrap_or_else(two_way_deg)))
             }
         };
-        Ok(Self { scene, sensor, air, options, receiver, engine })
+        Ok(Self { scene, sensor, air, options, receiver, scatter_height_rad, engine })
     }
 
     /// Prepares for firing from `position` (world, metres); the costly part, worth keeping.
@@ -261,7 +264,13 @@ impl Simulator {
     /// What [`paths::Paths`] needs for this sensor, air and options.
     #[must_use]
     pub fn path_settings(&self) -> paths::Settings {
-        path_settings(&self.sensor, &self.air, &self.options, &self.receiver)
+        path_settings(
+            &self.sensor,
+            &self.air,
+            &self.options,
+            &self.receiver,
+            self.scatter_height_rad,
+        )
     }
 
     /// The scene.
@@ -379,6 +388,7 @@ fn path_settings(
     air: &Air,
     options: &Options,
     receiver: &Receiver,
+    scatter_height_rad: f64,
 ) -> paths::Settings {
     let wave_number_per_m = TAU * sensor.frequency_hz / receiver.sound_speed_m_s;
     let law = match options.edge_law {
@@ -398,6 +408,7 @@ fn path_settings(
         wave_number_per_m,
         sensor_z_m: sensor.mounting.z_m,
         tilt_rad: sensor.mounting.tilt_deg.to_radians(),
+        scatter_height_rad,
     }
 }
 

@@ -304,6 +304,7 @@ mod tests {
             wave_number_per_m: DISC.wave_number_per_m,
             sensor_z_m: None,
             tilt_rad: 0.0,
+            scatter_height_rad: 0.0,
         }
     }
 
