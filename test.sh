@@ -3,6 +3,9 @@
 #
 #   ./test.sh            all of it
 #   FUZZ_SECONDS=60 ./test.sh   fuzz each target for a minute (default 5 s; 0 leaves fuzzing out)
+#   FIRMWARE=0 ./test.sh        leave firmware and emulator out, where they can't be built: they
+#                               need Debian's packages (firmware/test.sh)
+#   SONARD_SOAK_FAULTS=1000 SONARD_KILLS=200 ./test.sh   longer runs of the daemon among faults
 set -euo pipefail
 cd "$(dirname "$0")"
 fuzz_seconds=${FUZZ_SECONDS:-5}
@@ -34,6 +37,9 @@ step "the pure part alone"
 cargo clippy --lib --no-default-features --quiet -- -D warnings
 tests/pure-tree.sh
 
+step "systemd units"
+systemd/test.sh
+
 step "documentation, warnings denied"
 RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
 
@@ -45,6 +51,12 @@ if [ "$fuzz_seconds" != 0 ]; then
   }
   rm -f "${TMPDIR:-/tmp}/sonard-fuzz.$$"
   printf 'no finding\n'
+fi
+
+if [ "${FIRMWARE:-1}" = 0 ]; then
+  step "firmware and emulator: LEFT OUT, because FIRMWARE=0"
+else
+  firmware/test.sh || fail "firmware or emulator: see above. Where they can't be built, FIRMWARE=0 leaves them out"
 fi
 
 step "examples in the documentation"

@@ -1,13 +1,44 @@
 #!/usr/bin/env bash
-# Makes the pictures of the README. Run it after a change that may change them, and look at them.
+# Makes the pictures of the documentation. Run it after a change that may change them, and look at
+# them.
+#
+#   docs/make-pictures.sh            all of them
+#   SONARD=path/to/sonard docs/make-pictures.sh    with a program that is built already
 set -euo pipefail
 cd "$(dirname "$0")/.."
-cargo build --release --quiet
-sonard=target/release/sonard
+if [ -z "${SONARD:-}" ]; then
+  cargo build --release --quiet
+  SONARD=target/release/sonard
+fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+pictures=docs/pictures
 for pose in fig7 fig9; do
-  "$sonard" scan --mock --scene simple-room --pose "$pose" --seed 1 --out "$work/$pose" 2>/dev/null
-  "$sonard" plot "$work/$pose/scan.jsonl" -o "docs/pictures/simple-room-$pose.png" --width 1200
+  "$SONARD" scan --mock --scene simple-room --pose "$pose" --seed 1 --out "$work/$pose" 2>/dev/null
+  "$SONARD" plot "$work/$pose/scan.jsonl" -o "$pictures/simple-room-$pose.png" --width 1200
 done
-ls -l docs/pictures
+
+# The phenomena of Dudek, Jenkin, Milios and Wilkes, by engine (docs/engines.md).
+while read -r scene pose step; do
+  for engine in paths fan cone; do
+    "$SONARD" simulate --scene "$scene" --pose "$pose" --step-deg "$step" --engine "$engine"
+  done >"$work/engines.jsonl"
+  "$SONARD" plot "$work/engines.jsonl" --kind side-by-side -o "$pictures/engines-$scene-$pose.png"
+done <<'EOF'
+simple-room fig7 1.8
+simple-room fig9 1.8
+simple-room-robot fig9 1.8
+mcgill-lab fig4 5
+oblique-corner robot 3
+right-angle-corner robot 3
+two-surface-room middle 1.8
+corridor beside-wall 1.8
+EOF
+
+# Figure 2's echo traces, and the way to the false lower wall of figure 9.
+for pose in a b c d; do
+  "$SONARD" trace --scene echo-traces --pose "$pose" --until 3 -o "$pictures/echo-trace-$pose.png"
+done
+"$SONARD" simulate --scene simple-room --pose fig9 --out "$work/fig9.jsonl"
+"$SONARD" plot "$work/fig9.jsonl" --azimuth-deg 270 -o "$pictures/simple-room-fig9-way.png"
+ls -l "$pictures"

@@ -40,6 +40,40 @@ impl Trapezoid {
         (stand as i32 * self.steps.signum(), time_s + speed / self.acceleration)
     }
 
+    /// When pulse `number` (from 1 on) is due, seconds after the start: as the motor passes the
+    /// middle between two steps.
+    #[must_use]
+    pub fn pulse_s(&self, number: u32) -> f64 {
+        let distance = f64::from(self.steps.unsigned_abs());
+        let gone = (f64::from(number) - 0.5).clamp(0.0, distance);
+        let ramp = self.peak * self.peak / (2.0 * self.acceleration);
+        if gone <= ramp.min(distance / 2.0) {
+            (2.0 * gone / self.acceleration).sqrt()
+        } else if gone < distance - ramp {
+            self.peak / self.acceleration + (gone - ramp) / self.peak
+        } else {
+            self.duration_s() - (2.0 * (distance - gone) / self.acceleration).sqrt()
+        }
+    }
+
+    /// The same move, but braked from `time_s` on: as far as [`Self::braked_at`] says.
+    #[must_use]
+    pub fn braked(&self, time_s: f64) -> Self {
+        let (stand, _) = self.braked_at(time_s);
+        let (gone, speed) = self.state_at(time_s);
+        let slowing = f64::from(self.steps.unsigned_abs()) - gone
+            <= speed * speed / (2.0 * self.acceleration) + 0.5;
+        let peak = if slowing { self.peak } else { speed };
+        let reachable = (f64::from(stand.unsigned_abs()) * self.acceleration).sqrt();
+        Self { steps: stand, peak: peak.min(reachable), acceleration: self.acceleration }
+    }
+
+    /// Steps from start to stand, with their sign.
+    #[must_use]
+    pub const fn steps(&self) -> i32 {
+        self.steps
+    }
+
     /// Distance gone, steps, and speed, steps/s, after `time_s`.
     fn state_at(&self, time_s: f64) -> (f64, f64) {
         let distance = f64::from(self.steps.unsigned_abs());
@@ -70,6 +104,40 @@ mod tests {
         // One step never reaches the speed: twice sqrt(1 / a).
         assert!((Trapezoid::new(-1, 500, 40_000).duration_s() - 0.01).abs() < 1e-12);
         assert_eq!(Trapezoid::new(0, 500, 1000).duration_s(), 0.0);
+    }
+
+    #[test]
+    fn pulses_come_where_the_motor_passes_the_middle_between_two_steps() {
+        for (steps, speed, acceleration) in [(1, 800, 40_000), (7, 800, 40_000), (-400, 800, 9_000)]
+        {
+            let motion = Trapezoid::new(steps, speed, acceleration);
+            let pulses: Vec<f64> = (1..=steps.unsigned_abs()).map(|k| motion.pulse_s(k)).collect();
+            for (k, at_s) in pulses.iter().enumerate() {
+                let (gone, _) = motion.state_at(*at_s);
+                assert!((gone - (k as f64 + 0.5)).abs() < 1e-9, "{steps}: pulse {k} at {gone}");
+            }
+            // The same forwards and backwards in time.
+            let end_s = motion.duration_s();
+            for (first, last) in pulses.iter().zip(pulses.iter().rev()) {
+                assert!((first - (end_s - last)).abs() < 1e-9, "{steps}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_braked_move_is_the_same_until_the_brake_and_then_stands_where_it_was_said() {
+        let motion = Trapezoid::new(1_000, 800, 2_000);
+        for hundredth in 1..165 {
+            let time_s = f64::from(hundredth) / 100.0;
+            let braked = motion.braked(time_s);
+            assert_eq!(braked.steps(), motion.braked_at(time_s).0);
+            let (gone, _) = motion.state_at(time_s);
+            for k in 1..=gone as u32 {
+                let off_s = braked.pulse_s(k) - motion.pulse_s(k);
+                // Half a step of rounding where the motor stands, at the speed it has.
+                assert!(off_s.abs() < 0.01, "{time_s}: pulse {k} is {off_s} s off");
+            }
+        }
     }
 
     #[test]

@@ -9,11 +9,12 @@ use std::{
 };
 
 use board_config::Config;
+use firmware_protocol::conformance::DeviceUnderTest;
 
 use crate::rig::{
     HEARTBEAT, Rig, feed, heartbeat, keep_on, on_binh, on_blnk, on_init, on_sent, on_step,
 };
-use crate::{CYCLES_PER_US, HZ, Module, Surroundings, sys};
+use crate::{CYCLES_PER_US, Commanded, HZ, Module, MotorLimits, Surroundings, motor::Motor, sys};
 
 const fn ioctl(name: [u8; 4]) -> u32 {
     u32::from_be_bytes(name)
@@ -131,6 +132,7 @@ impl Emulator {
                 init_rises: Vec::new(),
                 pulses: Vec::new(),
                 steps: 0,
+                motor: Motor::default(),
                 emergency: false,
                 stuck_echo: false,
                 to_chip: VecDeque::new(),
@@ -252,6 +254,20 @@ impl Emulator {
         self.rig.start_again();
     }
 
+    /// The supply sags for so long: the chip stands still, its pins let go, and then it restarts.
+    #[expect(unsafe_code, reason = "simavr is C")]
+    pub fn dip(&mut self, milliseconds: u64) {
+        self.reset(Reset::BrownOut);
+        // SAFETY: the chip was initialised. Its clock stands while time passes.
+        unsafe { self.rig.avr.as_mut() }.cycle += milliseconds * 1_000 * CYCLES_PER_US;
+        self.rig.start_again();
+    }
+
+    /// Gives the motor limits, or none: then it follows whatever the pulses ask of it.
+    pub fn set_motor(&mut self, limits: Option<MotorLimits>) {
+        self.rig.motor.set_limits(limits);
+    }
+
     /// Makes the firmware hang with interrupts on: an instruction that jumps to itself.
     #[expect(unsafe_code, reason = "simavr is C")]
     pub fn hang(&mut self) {
@@ -332,5 +348,44 @@ impl Drop for Emulator {
     fn drop(&mut self) {
         // SAFETY: nobody uses the chip afterwards. simavr frees what it made.
         unsafe { sys::avr_terminate(self.rig.avr.as_ptr()) };
+    }
+}
+
+impl DeviceUnderTest for Emulator {
+    type Error = Crash;
+
+    fn now_us(&self) -> u64 {
+        self.now_us()
+    }
+
+    fn run(&mut self, us: u64) -> Result<(), Crash> {
+        self.run(us * CYCLES_PER_US)
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        self.send(bytes);
+    }
+
+    fn receive(&mut self) -> Vec<u8> {
+        self.received()
+    }
+
+    fn set_echoes(&mut self, after_us: &[f64]) {
+        let cycles = |us: &f64| (us * CYCLES_PER_US as f64).round() as u64;
+        let echoes = after_us.iter().map(cycles).collect();
+        let step = self.rig.surroundings.steps_from_index();
+        self.set_surroundings(Box::new(Commanded { echoes, step }));
+    }
+
+    fn take_firings(&mut self) -> usize {
+        self.take_init_rises().len()
+    }
+
+    fn motor_steps(&self) -> i64 {
+        self.steps()
+    }
+
+    fn holds_coils(&self) -> bool {
+        self.holds_coils()
     }
 }

@@ -7,20 +7,29 @@
 //!
 //! What it models: every instruction with its cycles, both timers' units that the firmware
 //! uses, the UART (a byte takes 11 bits, as simavr has it), the EEPROM, the watchdog; the module's
-//! blanking, latch and re-arming ([`Module`]). What it does not: voltages, and simavr's own limits:
-//! interrupts begin at instruction boundaries, so an echo may be seen up to two cycles late.
+//! blanking, latch and re-arming ([`Module`]); the motor's rotor, if it is given limits
+//! ([`MotorLimits`]); dips of the supply that restart the chip ([`Emulator::dip`]). What it does
+//! not: voltages, and simavr's own limits: its UART takes the next byte only a byte's time after
+//! the last was read, so that some 200 bytes in a row at line speed overrun it; interrupts begin at
+//! instruction boundaries, so an echo may be seen up to two cycles late.
 
-mod bench;
 mod emulator;
 mod module;
+mod motor;
 mod rig;
+mod serve;
 mod surroundings;
 mod sys;
 
-pub use bench::{Bench, BenchError};
 pub use emulator::{Crash, Emulator, Reset};
+pub use firmware_protocol::conformance::BenchError;
 pub use module::Module;
+pub use motor::MotorLimits;
+pub use serve::serve;
 pub use surroundings::{Commanded, Surroundings};
+
+/// The board and the host machine, joined by its line.
+pub type Bench = firmware_protocol::conformance::Bench<Emulator>;
 
 /// Clock of the chip.
 pub const HZ: u64 = 16_000_000;

@@ -2,26 +2,27 @@
 
 use std::{
     error::Error,
-    io,
-    path::PathBuf,
+    io::{self, Write as _},
+    path::{Path, PathBuf},
     process::ExitCode,
-    sync::Arc,
-    time::{Duration, Instant},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use board_config::{ALWAYS, Config};
 use clap::Parser;
 use firmware_protocol::messages::Capabilities;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_pcg::Pcg64;
 use sonard::{
     acoustics::{Air, Sensor},
     mock::{Noise, Pty, Soundings, World},
     model::{Options, Simulator},
     scene::{Scene, shipped},
 };
-use sonard_emulator::{Emulator, HZ};
-
-/// How much device time passes between two looks at the pty.
-const SLICE: Duration = Duration::from_micros(500);
+use sonard_emulator::{Emulator, MotorLimits, serve};
 
 /// Run the firmware's machine code in an emulated Arduino Uno, with its serial line on a pty.
 ///
@@ -39,13 +40,43 @@ struct Args {
     /// Make this symbolic link to the pty
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
-    /// The firmware
-    #[arg(
-        long,
-        value_name = "ELF",
-        default_value = "firmware/target/avr-none/release/sonard-firmware.elf"
-    )]
-    elf: PathBuf,
+    /// The firmware [default: firmware/target/avr-none/release/sonard-firmware.elf, here or in a
+    /// folder above this program]
+    #[arg(long, value_name = "ELF", env = "SONARD_FIRMWARE")]
+    elf: Option<PathBuf>,
+    /// Sensor preset, or a file with a sensor's data
+    #[arg(long, value_name = "NAME|FILE", default_value = "senscomp-6500")]
+    sensor: String,
+    /// From firing until the receiver listens, microseconds [default: the sensor's]
+    #[arg(long, value_name = "US")]
+    blanking_us: Option<f64>,
+    /// Air temperature, degrees Celsius
+    #[arg(long, value_name = "C", default_value_t = 20.0, allow_negative_numbers = true)]
+    temperature_c: f64,
+    /// The same, in place of --temperature-c
+    #[arg(long, value_name = "C", allow_negative_numbers = true, hide = true)]
+    truth_temperature_c: Option<f64>,
+    /// Relative humidity, percent
+    #[arg(long, value_name = "PERCENT", default_value_t = 50.0)]
+    humidity_percent: f64,
+    /// Static pressure, kilopascals
+    #[arg(long, value_name = "KPA", default_value_t = 101.325)]
+    pressure_kpa: f64,
+    /// How far the transducer is turned on the motor's shaft, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
+    mounting_offset_deg: f64,
+    /// The motor follows whatever is asked of it, instead of missing steps beyond its torque
+    #[arg(long)]
+    tireless_motor: bool,
+    /// Probability for each firing that the supply sags and the chip restarts
+    #[arg(long, value_name = "P", default_value_t = 0.0, value_parser = probability)]
+    dips: f64,
+    /// End when standard input closes: with the program that started this one
+    #[arg(long)]
+    attached: bool,
+    /// How long the supply sags, milliseconds
+    #[arg(long, value_name = "MS", default_value_t = 20)]
+    dip_ms: u64,
     /// Standard deviation of the range noise, millimetres
     #[arg(long, value_name = "MM", default_value_t = 0.5)]
     noise_mm: f64,
@@ -74,36 +105,46 @@ fn main() -> ExitCode {
 }
 
 fn play(args: &Args) -> Result<(), Box<dyn Error>> {
-    let mut emulator = Emulator::new(&args.elf, &config(args), Box::new(world(args)?))?;
+    let mut emulator = Emulator::new(&elf(args)?, &config(args), Box::new(world(args)?))?;
+    emulator.set_motor((!args.tireless_motor).then(MotorLimits::typical));
     let pty = Pty::open(args.link.as_deref())?;
     println!("listening on {} (interrupt to stop)", pty.path().display());
-    let started = Instant::now();
-    loop {
-        emulator.run(HZ * SLICE.as_micros() as u64 / 1_000_000)?;
-        let mut buffer = [0; 256];
-        match pty.read(&mut buffer) {
-            Ok(count) => emulator.send(&buffer[..count]),
-            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
-            Err(error) => return Err(error.into()),
-        }
-        speak(&pty, &emulator.received())?;
-        let ahead = Duration::from_micros(emulator.now_us()).saturating_sub(started.elapsed());
-        if !ahead.is_zero() {
-            pty.clear_exclusive();
-            std::thread::sleep(ahead);
-        }
+    let mut firings = 0;
+    let mut random = Pcg64::seed_from_u64(args.seed ^ 0x0d1b);
+    let stop = Arc::new(AtomicBool::new(false));
+    if args.attached {
+        let stop = Arc::clone(&stop);
+        std::thread::spawn(move || {
+            // Nothing is expected there but its end.
+            drop(io::copy(&mut io::stdin(), &mut io::sink()));
+            stop.store(true, Ordering::Relaxed);
+        });
     }
+    serve(&mut emulator, &pty, &stop, |emulator| {
+        let fired = emulator.take_init_rises().len();
+        emulator.take_pulses();
+        firings += fired;
+        if (0..fired).any(|_| random.random_bool(args.dips)) {
+            // Whoever started it may not read any more.
+            drop(writeln!(io::stdout(), "the supply sags at firing {firings}"));
+            emulator.dip(args.dip_ms);
+        }
+    })
+    .map_err(|error| error as Box<dyn Error>)
 }
 
-/// A serial line loses what nobody reads; so does a full pty.
-fn speak(pty: &Pty, bytes: &[u8]) -> io::Result<()> {
-    if bytes.is_empty() {
-        return Ok(());
+/// The firmware: where it was said to be, or where its build leaves it, as seen from here or from
+/// this program.
+fn elf(args: &Args) -> Result<PathBuf, String> {
+    if let Some(elf) = &args.elf {
+        return Ok(elf.clone());
     }
-    match pty.write(bytes) {
-        Err(error) if error.kind() != io::ErrorKind::WouldBlock => Err(error),
-        _ => Ok(()),
-    }
+    let built = Path::new("firmware/target/avr-none/release/sonard-firmware.elf");
+    let program = std::env::current_exe().unwrap_or_default();
+    let above = program.ancestors().map(|folder| folder.join(built));
+    std::iter::once(built.to_path_buf()).chain(above).find(|elf| elf.exists()).ok_or_else(|| {
+        format!("{} is missing: build it with firmware/test.sh, or give --elf", built.display())
+    })
 }
 
 fn config(args: &Args) -> Config {
@@ -125,11 +166,26 @@ fn world(args: &Args) -> Result<World, Box<dyn Error>> {
     let scene = Scene::from_json(&text).map_err(|error| format!("{}: {error}", args.scene))?;
     let pose = scene.pose(&args.pose)?;
     scene.check_pose(&pose)?;
-    let sensor = Sensor::preset("senscomp-6500")?;
-    let air = Air::default();
+    let mut sensor = match std::fs::read_to_string(&args.sensor) {
+        Ok(text) => Sensor::from_json(&text)?,
+        Err(_) => Sensor::preset(&args.sensor)?,
+    };
+    sensor.blanking_us = args.blanking_us.unwrap_or(sensor.blanking_us);
+    sensor.check()?;
+    let air = Air::new(
+        args.truth_temperature_c.unwrap_or(args.temperature_c),
+        args.humidity_percent,
+        args.pressure_kpa,
+    )?;
     let noise = Noise::of_range_mm(args.noise_mm, air.sound_speed_m_s());
     let scene = Arc::new(scene.with_robot_at(&pose));
     let simulator = Simulator::new(scene, sensor, air, Options::default())?;
-    let soundings = Soundings::of(&simulator, &pose, args.steps_per_revolution, 0.0);
+    let soundings =
+        Soundings::of(&simulator, &pose, args.steps_per_revolution, args.mounting_offset_deg);
     Ok(World::new(soundings, noise, 0.0, args.seed))
+}
+
+fn probability(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "a probability, 0 to 1".to_owned())?;
+    if (0.0..=1.0).contains(&value) { Ok(value) } else { Err("a probability, 0 to 1".into()) }
 }

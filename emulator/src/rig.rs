@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, ffi::c_void, ptr::NonNull};
 
-use crate::{HZ, Module, Surroundings, sys};
+use crate::{HZ, Module, Surroundings, motor::Motor, sys};
 
 /// simavr takes eleven bits for a byte: start, eight, and what it believes are two stop bits.
 const BYTE_CYCLES: u64 = 11 * 136;
@@ -30,6 +30,7 @@ pub(crate) struct Rig {
     pub(crate) init_rises: Vec<u64>,
     pub(crate) pulses: Vec<u64>,
     pub(crate) steps: i64,
+    pub(crate) motor: Motor,
     pub(crate) emergency: bool,
     pub(crate) stuck_echo: bool,
     pub(crate) to_chip: VecDeque<u8>,
@@ -76,6 +77,7 @@ impl Rig {
         self.init = high;
         let now = self.now();
         if high {
+            self.follow();
             self.init_rises.push(now);
             let echoes = self.surroundings.fire();
             self.module.fire(now, &echoes);
@@ -114,6 +116,23 @@ impl Rig {
             if let Some(at) = self.module.next_look(now) {
                 sys::avr_cycle_timer_register(self.avr.as_ptr(), at - now, Some(look), user);
             }
+        }
+    }
+
+    /// The rotor goes where the field draws it.
+    pub(crate) fn follow(&mut self) {
+        if self.holds_coils() {
+            let slipped = self.motor.follow(self.now());
+            self.turn(slipped);
+        } else {
+            self.motor.rest();
+        }
+    }
+
+    fn turn(&mut self, steps: i32) {
+        if steps != 0 {
+            self.surroundings.turn(steps);
+            self.refresh_inputs();
         }
     }
 
@@ -182,9 +201,9 @@ on_pin!(on_step, |rig, high| {
         rig.pulses.push(now);
         if rig.holds_coils() {
             let steps = if rig.data()[PORTD] & DIR_BIT != 0 { 1 } else { -1 };
-            rig.surroundings.turn(steps);
             rig.steps += i64::from(steps);
-            rig.refresh_inputs();
+            let turned = rig.motor.pulse(now, steps);
+            rig.turn(turned);
         }
     }
 });
@@ -222,6 +241,7 @@ pub(crate) unsafe extern "C" fn feed(_: *mut sys::avr_t, when: u64, user: *mut c
 pub(crate) unsafe extern "C" fn heartbeat(_: *mut sys::avr_t, when: u64, user: *mut c_void) -> u64 {
     // SAFETY: registered with the rig.
     let rig = unsafe { rig(user) };
+    rig.follow();
     rig.refresh_inputs();
     rig.beat = when;
     when + HEARTBEAT

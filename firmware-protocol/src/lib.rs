@@ -14,6 +14,8 @@
 //! `PROTOCOL.md` beside this crate describes the bytes for writers of other clients.
 #![no_std]
 
+#[cfg(feature = "conformance")]
+pub mod conformance;
 pub mod device;
 pub mod frame;
 pub mod host;

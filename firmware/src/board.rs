@@ -3,7 +3,7 @@
 use core::mem::MaybeUninit;
 
 use board_config::{Config, OPTION_INDEX_HIGH};
-use firmware_protocol::device::{Action, Board, Device};
+use firmware_protocol::device::{Action, Board, Device, within_half_a_turn};
 use firmware_protocol::messages::{Capabilities, FirmwareVersion};
 
 use crate::clock::{self, Purpose};
@@ -13,8 +13,6 @@ use crate::{OPTIONS, boot, motion, pins, ranger, serial, store};
 
 /// Bytes given to the machine before the rest of the world gets its turn.
 const BYTES_A_ROUND: u8 = 16;
-/// Bytes handed to the line at a time.
-const CHUNK: usize = 16;
 /// A deadline further away than this is left to the clock's overflow, which wakes every 33 ms.
 const FAR: u32 = 50_000;
 
@@ -129,8 +127,8 @@ impl Rig {
             self.homing = None;
             let known = core::mem::replace(&mut self.known, outcome.is_ok());
             self.alarmed = outcome.is_err();
-            let revolution = i32::from(self.revolution);
-            homed(device, outcome.map(|seen| if known { near(seen, revolution) } else { 0 }));
+            let drift = |seen| if known { within_half_a_turn(seen, self.revolution) } else { 0 };
+            homed(device, outcome.map(drift));
         }
     }
 
@@ -171,7 +169,7 @@ impl Rig {
         } else {
             // Holds the motor where it is: that is zero now.
             pins::enable::low();
-            motion::shift_zero(motion::position());
+            motion::set_zero();
             self.alarmed = false;
             homed(device, Ok(0));
         }
@@ -193,18 +191,6 @@ const fn is_dangerous(action: &Action) -> bool {
     matches!(action, Action::Home { .. } | Action::Move { .. } | Action::Fire { .. })
 }
 
-/// The same angle within half a turn of zero: the index comes once a turn.
-fn near(steps: i32, revolution: i32) -> i32 {
-    let mut near = steps;
-    while revolution > 0 && near > revolution / 2 {
-        near -= revolution;
-    }
-    while revolution > 0 && near < -(revolution / 2) {
-        near += revolution;
-    }
-    near
-}
-
 #[inline(never)]
 /// Whether the machine's next deadline will wake the chip; if not, it has come already.
 fn clock_is_set(device: &Device) -> bool {
@@ -222,13 +208,9 @@ fn clock_is_set(device: &Device) -> bool {
 
 #[inline(never)]
 fn speak(device: &mut Device) {
-    while serial::room() >= CHUNK {
-        let mut chunk = [0; CHUNK];
-        let count = transmit(device, &mut chunk);
-        if count == 0 {
-            return;
-        }
-        serial::send(chunk.get(..count).unwrap_or_default());
+    while serial::has_room() {
+        let Some(byte) = device.poll_byte() else { return };
+        serial::send(byte);
     }
 }
 
@@ -257,18 +239,13 @@ fn homed(device: &mut Device, outcome: Result<i32, firmware_protocol::device::Ho
 #[inline(never)]
 fn listen(device: &mut Device) {
     if let Some(report) = ranger::take_report() {
-        device.handle_echoes(clock::now(), &report);
+        device.handle_echoes(clock::now(), report);
     }
 }
 
 #[inline(never)]
 fn emergency(device: &mut Device) {
     device.handle_emergency_stop(clock::now());
-}
-
-#[inline(never)]
-fn transmit(device: &mut Device, chunk: &mut [u8]) -> usize {
-    device.poll_transmit(chunk)
 }
 
 /// PCINT1: the emergency stop changed. The pins at once, the machine when the loop comes round.

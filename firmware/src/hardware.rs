@@ -60,8 +60,9 @@ impl Register {
     /// A pair of registers, low byte first, which latches the high one.
     #[inline(always)]
     pub fn read_pair(self, _: &Alone) -> u16 {
-        let low = self.read();
-        u16::from_le_bytes([low, Self(self.0 + 1).read()])
+        // SAFETY: as in `read`. The compiler loads the low byte of a pair first, as this family
+        // of chips wants it, and stores the high one first.
+        unsafe { (self.0 as *const u16).read_volatile() }
     }
 
     /// A pair of registers, high byte first: the low one takes both over.

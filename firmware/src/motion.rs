@@ -106,8 +106,7 @@ pub fn brake() {
     alone(|alone| {
         let motion = MOTION.get(alone);
         if motion.phase == Phase::Turning {
-            motion.left = motion.left.min(u32::from(motion.ramp));
-            motion.watch = None;
+            motion.brake();
         } else {
             motion.phase = Phase::Arrived;
         }
@@ -146,6 +145,11 @@ pub fn position() -> i32 {
     alone(|alone| MOTION.get(alone).position)
 }
 
+/// The present position is zero from now on.
+pub fn set_zero() {
+    alone(|alone| MOTION.get(alone).position = 0);
+}
+
 /// The present position is `steps` less from now on.
 pub fn shift_zero(steps: i32) {
     alone(|alone| {
@@ -160,8 +164,7 @@ pub fn step(alone: &Alone) {
     // The motor has had the whole pause to reach its position.
     if motion.watch.is_some_and(|level| pins::index() == level) {
         motion.seen = Some(motion.position);
-        motion.watch = None;
-        motion.left = motion.left.min(u32::from(motion.ramp));
+        motion.brake();
     }
     if motion.left == 0 {
         motion.phase = Phase::Arrived;
@@ -180,6 +183,12 @@ pub fn step(alone: &Alone) {
 }
 
 impl Motion {
+    #[inline(never)]
+    fn brake(&mut self) {
+        self.left = self.left.min(u32::from(self.ramp));
+        self.watch = None;
+    }
+
     fn wait(&mut self, alone: &Alone, pause: u32) {
         let eighths = pause + u32::from(self.eighths);
         self.eighths = (eighths & 7) as u8;
@@ -194,10 +203,10 @@ impl Motion {
             return self.slower();
         }
         if self.left > ramp && self.ramp < RAMP_MAX {
-            let pause = match early(self.first, self.ramp + 1) {
-                Some(pause) => pause,
-                None => self.pause - divide(2 * self.pause, 4 * ramp + 3),
-            };
+            let mut pause = early(self.first, self.ramp + 1);
+            if pause == 0 {
+                pause = self.pause - divide(2 * self.pause, 4 * ramp + 3);
+            }
             if pause > self.cruise {
                 self.pause = pause;
                 self.ramp += 1;
@@ -216,25 +225,27 @@ impl Motion {
     fn slower(&mut self) -> u32 {
         self.ramp -= 1;
         let ramp = u32::from(self.ramp);
-        self.pause = match early(self.first, self.ramp) {
-            Some(pause) => pause,
-            None => self.pause + divide(2 * self.pause, 4 * ramp + 1),
-        };
-        self.pause
+        let mut pause = early(self.first, self.ramp);
+        if pause == 0 {
+            pause = self.pause + divide(2 * self.pause, 4 * ramp + 1);
+        }
+        self.pause = pause;
+        pause
     }
 }
 
 /// The first pauses, which the recurrence does not give: `sqrt(2k + 1) - sqrt(2k - 1)` in 2048ths.
-fn early(first: u32, ramp: u16) -> Option<u32> {
+/// 0 for later ones.
+fn early(first: u32, ramp: u16) -> u32 {
     let share = match ramp {
-        0 => return Some(first),
+        0 => return first,
         1 => 1_499,
         2 => 1_032,
         3 => 839,
-        _ => return None,
+        _ => return 0,
     };
     // `first` has 24 bits.
-    Some((first >> 4) * share >> 7)
+    (first >> 4) * share >> 7
 }
 
 /// The integer part of the square root.

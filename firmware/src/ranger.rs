@@ -4,7 +4,7 @@
 //! what the program does meanwhile.
 
 use firmware_protocol::device::EchoReport;
-use firmware_protocol::messages::{Blanking, Echoes, ReadingStatus, limits::MAX_ECHOES};
+use firmware_protocol::messages::{Blanking, Echoes, ReadingStatus};
 
 use crate::clock::{self, Purpose};
 use crate::hardware::{Alone, ICR1, OCR1A, Shared, TCCR1A, TCCR1C, TCNT1, alone};
@@ -23,18 +23,16 @@ static LISTENING: Shared<Listening> = Shared::new(Listening::none());
 
 struct Listening {
     phase: Phase,
-    fired: u32,
+    report: EchoReport,
     window: u32,
     /// When BINH is to rise, ticks after firing; 0 for never, or when it has.
     binh_after: u16,
     /// When BLNK is to fall.
     blnk_until: Option<u32>,
     max_echoes: u8,
-    count: u8,
-    echoes: [u32; MAX_ECHOES as usize],
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd)]
 enum Phase {
     Idle,
     Listening,
@@ -48,13 +46,15 @@ impl Listening {
     const fn none() -> Self {
         Self {
             phase: Phase::Idle,
-            fired: 0,
+            report: EchoReport {
+                fired_ticks: 0,
+                status: ReadingStatus::Echo,
+                echoes: Echoes::new(),
+            },
             window: 0,
             binh_after: 0,
             blnk_until: None,
             max_echoes: 0,
-            count: 0,
-            echoes: [0; MAX_ECHOES as usize],
         }
     }
 
@@ -65,9 +65,9 @@ impl Listening {
             after = after.min(u32::from(self.binh_after));
         }
         if let Some(until) = self.blnk_until {
-            after = after.min(until.wrapping_sub(self.fired));
+            after = after.min(until.wrapping_sub(self.report.fired_ticks));
         }
-        clock::set_alarm(alone, Purpose::Listen, self.fired.wrapping_add(after));
+        clock::set_alarm(alone, Purpose::Listen, self.report.fired_ticks.wrapping_add(after));
     }
 }
 
@@ -81,12 +81,12 @@ pub fn fire(window: u32, max_echoes: u8, blanking: Blanking) {
         let listening = LISTENING.get(alone);
         *listening = Listening { window, binh_after, max_echoes, ..Listening::none() };
         if pins::echo() {
-            listening.fired = clock::now_alone(alone);
+            listening.report.fired_ticks = clock::now_alone(alone);
             listening.phase = Phase::Stuck;
             clock::wake(alone);
             return;
         }
-        listening.fired = raise_init(alone);
+        listening.report.fired_ticks = raise_init(alone);
         listening.phase = Phase::Listening;
         listening.schedule(alone);
     });
@@ -110,7 +110,9 @@ fn raise_init(alone: &Alone) -> u32 {
 }
 
 /// Takes INIT away and makes everything as before firing.
-fn lower_init() {
+fn lower_init(alone: &Alone) {
+    // The emulator's compare unit raises the pin if the counter wraps while it is to lower it.
+    while TCNT1.read_pair(alone) > u16::MAX - 4 {}
     // The compare unit keeps the level of its last match, and would show it as soon as it gets
     // the pin back: it is set low first, while INIT is still high.
     TCCR1A.write(LOWER_AT_MATCH);
@@ -127,7 +129,7 @@ pub fn abort() {
         let listening = LISTENING.get(alone);
         if listening.phase == Phase::Listening {
             clock::cancel_alarm(alone);
-            lower_init();
+            lower_init(alone);
         }
         listening.phase = Phase::Idle;
     });
@@ -137,28 +139,28 @@ pub fn is_listening() -> bool {
     alone(|alone| LISTENING.get(alone).phase == Phase::Listening)
 }
 
-/// What was heard, once, after the window.
-pub fn take_report() -> Option<EchoReport> {
+/// What was heard, once, after the window; to be let go of before the next firing.
+pub fn take_report() -> Option<&'static EchoReport> {
     alone(|alone| {
         let listening = LISTENING.get(alone);
-        let status = match listening.phase {
-            Phase::Over => ReadingStatus::Echo,
-            Phase::Stuck => ReadingStatus::ModuleFault,
-            Phase::Idle | Phase::Listening => return None,
-        };
+        if listening.phase < Phase::Over {
+            return None;
+        }
+        if listening.phase == Phase::Stuck {
+            listening.report.status = ReadingStatus::ModuleFault;
+        }
         listening.phase = Phase::Idle;
-        let heard = listening.echoes.get(..usize::from(listening.count)).unwrap_or_default();
-        let echoes = Echoes::from_ticks(heard);
-        Some(EchoReport { fired_ticks: listening.fired, status, echoes })
+        // SAFETY: nobody writes to it before the next firing.
+        Some(unsafe { &*(&raw const listening.report) })
     })
 }
 
 /// The alarm that [`Listening::schedule`] has set.
 pub fn alarm(alone: &Alone, now: u32) {
     let listening = LISTENING.get(alone);
-    let after = now.wrapping_sub(listening.fired);
+    let after = now.wrapping_sub(listening.report.fired_ticks);
     if after >= listening.window {
-        lower_init();
+        lower_init(alone);
         listening.phase = Phase::Over;
         clock::cancel_alarm(alone);
         clock::wake(alone);
@@ -182,20 +184,18 @@ extern "avr-interrupt" fn __vector_10() {
     let alone = &unsafe { Alone::in_interrupt() };
     let captured = clock::extend(alone, ICR1.read_pair(alone));
     let listening = LISTENING.get(alone);
-    let after = captured.wrapping_sub(listening.fired);
+    let after = captured.wrapping_sub(listening.report.fired_ticks);
     if listening.phase != Phase::Listening || after > listening.window {
         return;
     }
-    if let Some(slot) = listening.echoes.get_mut(usize::from(listening.count))
-        && listening.count < listening.max_echoes
+    let echoes = &mut listening.report.echoes;
+    if echoes.len() < usize::from(listening.max_echoes)
+        && echoes.push(after).is_ok()
+        && echoes.len() < usize::from(listening.max_echoes)
     {
-        *slot = after;
-        listening.count += 1;
-        if listening.count < listening.max_echoes {
-            // Lowers ECHO and keeps the module deaf until the same echo has passed.
-            pins::blnk::high();
-            listening.blnk_until = Some(captured.wrapping_add(BLNK_TICKS));
-            listening.schedule(alone);
-        }
+        // Lowers ECHO and keeps the module deaf until the same echo has passed.
+        pins::blnk::high();
+        listening.blnk_until = Some(captured.wrapping_add(BLNK_TICKS));
+        listening.schedule(alone);
     }
 }

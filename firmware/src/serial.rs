@@ -66,17 +66,15 @@ pub fn take_damage() -> bool {
     alone(|alone| core::mem::replace(DAMAGED.get(alone), false))
 }
 
-/// Bytes that can be sent now.
-pub fn room() -> usize {
-    alone(|alone| OUT - usize::from(TO_SEND.get(alone).len))
+/// Whether a byte can be sent now.
+pub fn has_room() -> bool {
+    alone(|alone| usize::from(TO_SEND.get(alone).len) < OUT)
 }
 
-/// Sends; the caller has asked for the room.
-pub fn send(bytes: &[u8]) {
+/// Sends a byte; the caller has asked for the room.
+pub fn send(byte: u8) {
     alone(|alone| {
-        for byte in bytes {
-            TO_SEND.get(alone).push(*byte);
-        }
+        TO_SEND.get(alone).push(byte);
         UCSR0B.set(alone, ROOM_INTERRUPT);
     });
 }

@@ -1,14 +1,24 @@
 //! The physics of the sound: air, transducer, pulse and receiver.
 
 mod air;
+mod aperture;
 pub mod edge;
 mod face;
+mod pulse;
 mod receiver;
 mod sensor;
 mod transducer;
 
 pub use air::{Air, AirError};
+pub use aperture::{ApertureResponse, Image, Incidence};
 pub use face::{Disc, Face, FaceAspect};
-pub use receiver::{Detection, Receiver, Sound, classify_tof};
-pub use sensor::{Aperture, Mounting, Pulse, Sensor, SensorError};
+pub use pulse::EchoShape;
+pub use receiver::{
+    Combining, Detection, EchoTrace, Hump, Incident, Latch, Receiver, ReceiverNoise, Sound,
+    TracePoint, classify_tof,
+};
+pub use sensor::{
+    Aperture, ChirpPart, EdgeLawKind, Gain, GainStep, Mounting, Pulse, Response, Sensor,
+    SensorError,
+};
 pub use transducer::{BeamPattern, kuc_siegel_response, piston_directivity};

@@ -1,13 +1,18 @@
 //! The transducer's face: how strong a sound leaves or arrives at an angle to its axis.
 
-use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::{Aperture, Pulse, Sensor};
+use num_complex::Complex64;
+
+use super::{Aperture, EchoShape, Pulse, Sensor, aperture::points};
 
 /// Table spacing: 0.05 degrees. For a 19 mm face at 50 kHz a straight line between entries errs by
 /// less than 2e-5 in the main lobe, and by less than 4e-4 where a side lobe's steady part overtakes
 /// the transient and the pattern has a kink (there is a test).
-const TABLE_INTERVALS: usize = 1800;
+const STEP_RAD: f64 = FRAC_PI_2 / 1800.0;
+
+/// Entries from the axis to straight backwards.
+const TABLE_LENGTH: usize = 3601;
 
 /// One-way amplitude against the angle from the axis, 1 on the axis and 0 behind the face.
 #[derive(Debug, Clone)]
@@ -15,10 +20,8 @@ pub struct BeamPattern(Shape);
 
 #[derive(Debug, Clone)]
 enum Shape {
-    /// Kuc and Siegel's response of a disc to the pulse, from 0 to 90 degrees.
-    Disc(Vec<f64>),
-    /// `sin(x)/x`, `x = ka sin(theta)`.
-    Line { ka: f64 },
+    /// The face's response to the pulse, from 0 degrees to straight backwards.
+    Table(Vec<f64>),
     /// `exp(-2 theta^2 / half_angle^2)`.
     Gaussian { half_angle_rad: f64 },
 }
@@ -31,19 +34,17 @@ impl BeamPattern {
     /// [`piston_directivity`] times `cos(theta)`; a short one fills the nulls.
     #[must_use]
     pub fn new(sensor: &Sensor, sound_speed_m_s: f64) -> Self {
-        let wave_number = TAU * sensor.frequency_hz / sound_speed_m_s;
         Self(match sensor.aperture {
-            Aperture::Piston { radius_m } => {
-                let disc = Disc {
-                    ka: wave_number * radius_m,
-                    crossing_s: radius_m / sound_speed_m_s,
-                    envelope: Envelope::new(sensor),
-                };
-                let step_rad = FRAC_PI_2 / TABLE_INTERVALS as f64;
-                let table = (0..=TABLE_INTERVALS).map(|i| disc.peak(i as f64 * step_rad)).collect();
-                Shape::Disc(table)
+            Aperture::Piston { .. } | Aperture::Line { .. } => {
+                let face = Face::new(sensor, sound_speed_m_s);
+                let mut table: Vec<f64> = (0..TABLE_LENGTH)
+                    .map(|i| i as f64 * STEP_RAD)
+                    .take_while(|theta_rad| sensor.aperture.obliquity(*theta_rad) > 1e-12)
+                    .map(|theta_rad| face.peak(theta_rad))
+                    .collect();
+                table.push(0.0);
+                Shape::Table(table)
             }
-            Aperture::Line { half_length_m } => Shape::Line { ka: wave_number * half_length_m },
             Aperture::Gaussian { half_angle_deg, .. } => {
                 Shape::Gaussian { half_angle_rad: half_angle_deg.to_radians() }
             }
@@ -54,20 +55,16 @@ impl BeamPattern {
     #[must_use]
     pub fn one_way(&self, theta_rad: f64) -> f64 {
         let theta_rad = theta_rad.abs();
-        if theta_rad >= FRAC_PI_2 {
-            return 0.0;
-        }
         match &self.0 {
-            Shape::Disc(table) => {
-                let place = theta_rad / FRAC_PI_2 * TABLE_INTERVALS as f64;
-                let below = (place as usize).min(TABLE_INTERVALS - 1);
-                let part = place - below as f64;
-                table[below] + part * (table[below + 1] - table[below])
+            Shape::Table(table) => {
+                let place = theta_rad / STEP_RAD;
+                let below = place as usize;
+                let (Some(low), Some(high)) = (table.get(below), table.get(below + 1)) else {
+                    return 0.0;
+                };
+                low + (place - below as f64) * (high - low)
             }
-            Shape::Line { ka } => {
-                let x = ka * theta_rad.sin();
-                if x < 1e-8 { 1.0 } else { (x.sin() / x).abs() }
-            }
+            Shape::Gaussian { .. } if theta_rad >= FRAC_PI_2 => 0.0,
             Shape::Gaussian { half_angle_rad } => {
                 (-2.0 * (theta_rad / half_angle_rad).powi(2)).exp()
             }
@@ -78,22 +75,21 @@ impl BeamPattern {
     /// wide a strip of a surface that scatters counts as fully in the beam.
     #[must_use]
     pub fn two_way_power_rad(&self) -> f64 {
-        let step_rad = FRAC_PI_2 / TABLE_INTERVALS as f64;
+        const STEPS: usize = 1800;
+        let step_rad = FRAC_PI_2 / STEPS as f64;
         let power = |i: usize| self.one_way(i as f64 * step_rad).powi(4);
-        2.0 * step_rad * (0.5 + (1..TABLE_INTERVALS).map(power).sum::<f64>())
+        2.0 * step_rad * (0.5 + (1..STEPS).map(power).sum::<f64>())
     }
 
     /// The least angle from the axis, radians, at which the one-way amplitude is down to `level`
     /// (between 0 and 1); 90 degrees if it never is.
     #[must_use]
     pub fn angle_at(&self, level: f64) -> f64 {
-        let step_rad = FRAC_PI_2 / TABLE_INTERVALS as f64;
-        let Some(first) =
-            (1..=TABLE_INTERVALS).find(|&i| self.one_way(i as f64 * step_rad) <= level)
-        else {
+        let ahead = (FRAC_PI_2 / STEP_RAD).round() as usize;
+        let Some(first) = (1..=ahead).find(|&i| self.one_way(i as f64 * STEP_RAD) <= level) else {
             return FRAC_PI_2;
         };
-        let (mut inside, mut outside) = ((first - 1) as f64 * step_rad, first as f64 * step_rad);
+        let (mut inside, mut outside) = ((first - 1) as f64 * STEP_RAD, first as f64 * STEP_RAD);
         for _ in 0..40 {
             let middle = (inside + outside) / 2.0;
             if self.one_way(middle) <= level { outside = middle } else { inside = middle }
@@ -134,64 +130,80 @@ pub fn kuc_siegel_response(
     2.0 * theta_rad.cos() / (PI * half_span_s) * (1.0 - place * place).sqrt()
 }
 
-/// A disc that meets a pulse.
-struct Disc {
+/// A face that meets a pulse.
+struct Face {
+    aperture: Aperture,
+    /// Radians a second.
+    omega: f64,
+    sound_speed_m_s: f64,
+    /// `k a` of the face's half width.
     ka: f64,
-    /// Time sound takes for one radius, seconds.
-    crossing_s: f64,
-    envelope: Envelope,
+    pulse: EchoShape,
+    /// About which the pulse is even, if it is, microseconds.
+    middle_us: Option<f64>,
 }
 
-impl Disc {
-    /// Peak over time of `|h * pulse|` at an angle, relative to the axis.
-    fn peak(&self, theta_rad: f64) -> f64 {
-        let half_span_s = self.crossing_s * theta_rad.sin();
-        let first_s = -half_span_s - self.envelope.rise_s;
-        // The envelope is even about its middle, and so is the response.
-        let last_s = self.envelope.middle_s;
-        let steps = ((last_s - first_s) / Envelope::SEARCH_S).ceil().max(2.0) as usize;
-        let quadrature = self.quadrature(theta_rad);
-        let at = |time_s: f64| self.magnitude(time_s.min(last_s), &quadrature);
-        let step_s = (last_s - first_s) / steps as f64;
-        let times: Vec<f64> = (0..=steps).map(|i| first_s + i as f64 * step_s).collect();
-        let samples: Vec<f64> = times.iter().map(|&time_s| at(time_s)).collect();
-        // Several humps can be nearly as high: each is climbed.
-        let humps = (1..steps).filter(|&i| {
-            samples[i] >= samples[i - 1].max(samples[i + 1]) && samples[i] > samples[0]
-        });
-        let peak =
-            humps.map(|i| highest(at, times[i - 1], times[i + 1])).fold(samples[steps], f64::max);
-        // Rounding must not let any direction beat the axis.
-        (peak / self.envelope.peak()).min(1.0)
+/// Spacing at which the peak is looked for, microseconds.
+const SEARCH_US: f64 = 6.0;
+
+impl Face {
+    fn new(sensor: &Sensor, sound_speed_m_s: f64) -> Self {
+        let omega = TAU * sensor.frequency_hz;
+        let ka = omega / sound_speed_m_s * sensor.half_width_m();
+        let (aperture, pulse) = (sensor.aperture, EchoShape::of(sensor));
+        let middle_us = match sensor.pulse {
+            Pulse::Burst { .. } => Some(0.5e6 * sensor.pulse_s()),
+            Pulse::Gaussian { .. } => Some(0.0),
+            Pulse::Chirp { .. } => None,
+        };
+        Self { aperture, omega, sound_speed_m_s, ka, pulse, middle_us }
     }
 
-    /// Nodes (delay in seconds) and complex weights for the integral of the response against
-    /// the pulse. Gauss-Chebyshev quadrature of the second kind has the response's own weight
-    /// `sqrt(1 - s^2)`.
-    fn quadrature(&self, theta_rad: f64) -> Vec<(f64, f64, f64)> {
+    /// Peak over time of `|h * pulse|` at an angle, relative to the axis.
+    fn peak(&self, theta_rad: f64) -> f64 {
+        let points = self.quadrature(theta_rad);
+        let reach_us = points.iter().map(|point| point.0.abs()).fold(0.0, f64::max);
+        // An even pulse has an even response: its first half will do.
+        let first_us = self.pulse.first_us() - reach_us;
+        let last_us = self.middle_us.unwrap_or_else(|| self.pulse.last_us() + reach_us);
+        let steps = ((last_us - first_us) / SEARCH_US).ceil().max(2.0) as usize;
+        let step_us = (last_us - first_us) / steps as f64;
+        let at = |t_us: f64| self.magnitude(t_us.min(last_us), &points);
+        let times: Vec<f64> = (0..=steps).map(|i| first_us + i as f64 * step_us).collect();
+        let samples: Vec<f64> = times.iter().map(|&t_us| at(t_us)).collect();
+        let highest_sample = samples.iter().copied().fold(0.0, f64::max);
+        // Several humps can be nearly as high: each that may be the highest is climbed.
+        let humps = (1..steps).filter(|&i| {
+            samples[i] >= samples[i - 1].max(samples[i + 1]) && samples[i] > 0.8 * highest_sample
+        });
+        let peak = humps.map(|i| highest(at, times[i - 1], times[i + 1])).fold(0.0, f64::max);
+        // Rounding must not let any direction beat the axis.
+        peak.max(highest_sample).min(1.0)
+    }
+
+    /// Delays (microseconds) and complex shares of the face's points.
+    fn quadrature(&self, theta_rad: f64) -> Vec<(f64, Complex64)> {
         let sine = theta_rad.sin();
-        // The phase runs over +-ka sin(theta); from half of that on, more nodes gain nothing
+        // The phase runs over +-ka sin(theta); from half of that on, more points gain nothing
         // but the digits of the rest.
-        let nodes = (0.5 * self.ka * sine).ceil() as usize + 14;
-        (1..=nodes)
-            .map(|i| {
-                let angle = PI * i as f64 / (nodes + 1) as f64;
-                let weight = 2.0 * theta_rad.cos() * angle.sin().powi(2) / (nodes + 1) as f64;
-                let phase = self.ka * sine * angle.cos();
-                let delay_s = self.crossing_s * sine * angle.cos();
-                (delay_s, weight * phase.cos(), -weight * phase.sin())
+        let count = (0.5 * self.ka * sine).ceil() as usize + 14;
+        let obliquity = self.aperture.obliquity(theta_rad);
+        points(&self.aperture, count)
+            .unwrap_or_default()
+            .into_iter()
+            .map(|(place_m, share)| {
+                let delay_s = place_m * sine / self.sound_speed_m_s;
+                (1e6 * delay_s, obliquity * share * Complex64::cis(-self.omega * delay_s))
             })
             .collect()
     }
 
-    fn magnitude(&self, time_s: f64, quadrature: &[(f64, f64, f64)]) -> f64 {
-        let (mut real, mut imaginary) = (0.0, 0.0);
-        for &(delay_s, cosine, sine) in quadrature {
-            let strength = self.envelope.at(time_s - delay_s);
-            real += strength * cosine;
-            imaginary += strength * sine;
-        }
-        real.hypot(imaginary)
+    fn magnitude(&self, t_us: f64, points: &[(f64, Complex64)]) -> f64 {
+        points
+            .iter()
+            .map(|(delay_us, share)| share * self.pulse.at(t_us - delay_us))
+            .sum::<Complex64>()
+            .norm()
     }
 }
 
@@ -213,58 +225,6 @@ fn highest(curve: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
         }
     }
     at_left.max(at_right)
-}
-
-/// A pulse's envelope, tabulated.
-struct Envelope {
-    samples: Vec<f64>,
-    /// Time of the first sample, seconds.
-    first_s: f64,
-    /// From the first sample to where the burst nominally starts, seconds.
-    rise_s: f64,
-    middle_s: f64,
-}
-
-impl Envelope {
-    const STEP_S: f64 = 0.5e-6;
-    const SEARCH_S: f64 = 6e-6;
-
-    fn new(sensor: &Sensor) -> Self {
-        let (length_s, sigma_s) = match sensor.pulse {
-            // A Gaussian filter of standard deviation s hertz has an impulse response of
-            // standard deviation 1 / (2 pi s) seconds.
-            Pulse::Burst { cycles, bandwidth_hz } => {
-                (cycles / sensor.frequency_hz, 1.0 / (TAU * bandwidth_hz))
-            }
-            Pulse::Gaussian { sigma_us } => (0.0, sigma_us * 1e-6),
-        };
-        let rise_s = 4.5 * sigma_s;
-        let strength = |time_s: f64| {
-            let edge = |from_s: f64| libm::erf((time_s - from_s) / sigma_s * FRAC_1_SQRT_2);
-            if length_s > 0.0 {
-                0.5 * (edge(0.0) - edge(length_s))
-            } else {
-                (-0.5 * (time_s / sigma_s).powi(2)).exp()
-            }
-        };
-        let count = ((length_s + 2.0 * rise_s) / Self::STEP_S).ceil() as usize + 1;
-        let samples = (0..count).map(|i| strength(i as f64 * Self::STEP_S - rise_s)).collect();
-        Self { samples, first_s: -rise_s, rise_s, middle_s: length_s / 2.0 }
-    }
-
-    fn at(&self, time_s: f64) -> f64 {
-        let place = (time_s - self.first_s) / Self::STEP_S;
-        if place < 0.0 || place >= (self.samples.len() - 1) as f64 {
-            return 0.0;
-        }
-        let below = place as usize;
-        let part = place - below as f64;
-        self.samples[below] + part * (self.samples[below + 1] - self.samples[below])
-    }
-
-    fn peak(&self) -> f64 {
-        self.at(self.middle_s)
-    }
 }
 
 #[cfg(test)]
@@ -357,11 +317,7 @@ mod tests {
     fn interpolation_errs_less_than_stated() {
         let sensor = preset("senscomp-6500");
         let beam = BeamPattern::new(&sensor, SPEED_M_S);
-        let disc = Disc {
-            ka: ka(SPEED_M_S),
-            crossing_s: RADIUS_M / SPEED_M_S,
-            envelope: Envelope::new(&sensor),
-        };
+        let disc = Face::new(&sensor, SPEED_M_S);
         for i in 0..1800 {
             let theta_rad = (f64::from(i) * 0.05 + 0.025).to_radians();
             let error = (beam.one_way(theta_rad) - disc.peak(theta_rad)).abs();
@@ -382,7 +338,11 @@ mod tests {
     #[test]
     fn nothing_leaves_backwards_and_nothing_beats_the_axis() {
         let line = Sensor {
-            aperture: Aperture::Line { half_length_m: 0.0192 },
+            aperture: Aperture::Line {
+                half_length_m: 0.0192,
+                full_within_deg: 90.0,
+                none_beyond_deg: 90.0,
+            },
             ..preset("senscomp-6500")
         };
         for sensor in [preset("senscomp-6500"), preset("bozma-kuc-60khz"), line] {

@@ -56,12 +56,14 @@ pub(super) struct Belief<'a> {
 }
 
 impl MockWorldArgs {
-    pub(super) const fn pace(&self) -> Pace {
-        if self.realtime { Pace::RealTime } else { Pace::Virtual }
-    }
-
     /// The board, powered up in its world.
     pub(super) fn board(&self, belief: &Belief<'_>) -> Result<MockBoard, Failure> {
+        let pace = if self.realtime { Pace::RealTime } else { Pace::Virtual };
+        self.board_at(pace, belief)
+    }
+
+    /// The same at a given pace.
+    pub(super) fn board_at(&self, pace: Pace, belief: &Belief<'_>) -> Result<MockBoard, Failure> {
         let scene = match &self.truth {
             Some(name) => Arc::new(scene_file::load(name)?),
             None => Arc::clone(belief.scene),
@@ -89,9 +91,39 @@ impl MockWorldArgs {
             steps_per_revolution: steps,
             faults: self.faults.unwrap_or_default(),
             seed: self.seed,
-            pace: self.pace(),
+            pace,
         };
         Ok(MockBoard::new(settings, world))
+    }
+
+    /// The same world for `sonard-emulator`, as far as it has one.
+    pub(super) fn emulator(&self, scene: &str) -> Result<Vec<String>, Failure> {
+        let refuse = |option: &str, instead: &str| {
+            Err(Failure::input(format!("the emulator has no {option}"), instead))
+        };
+        if self.faults.is_some() {
+            return refuse(
+                "--faults",
+                "they are the mock's; a supply that sags is `sonard-emulator --dips`",
+            );
+        }
+        if self.missed_steps > 0.0 {
+            return refuse(
+                "--missed-steps",
+                "its motor misses steps when --speed or --acceleration ask too much of it",
+            );
+        }
+        let mut options = vec![
+            format!("--scene={}", self.truth.as_deref().unwrap_or(scene)),
+            format!("--seed={}", self.seed),
+            format!("--noise-mm={}", self.noise_mm),
+            format!("--mounting-offset-deg={}", self.mounting_offset_deg),
+            format!("--steps-per-revolution={}", self.steps_per_revolution),
+        ];
+        if let Some(temperature_c) = self.truth_temperature_c {
+            options.push(format!("--truth-temperature-c={temperature_c}"));
+        }
+        Ok(options)
     }
 
     fn truth_air(&self, believed: &Air) -> Result<Air, Failure> {

@@ -1,19 +1,31 @@
 //! The command line: one file a verb.
 
+#[cfg(feature = "pi")]
+mod board;
 mod compare;
+mod doctor;
 mod failure;
+mod interpret;
 mod log;
+mod map;
+mod map_benchmark;
+mod map_score;
 mod mock;
 mod mock_world;
 mod options;
 mod paths;
+mod picture;
 mod place;
 mod plot;
+mod run;
 mod runtime;
 mod scan;
 mod scene;
 mod scene_file;
 mod simulate;
+mod status;
+mod trace;
+mod watch;
 
 pub use failure::{Failure, Outcome};
 
@@ -37,17 +49,46 @@ enum Verb {
     /// Take one or more scans and log each reading beside the model's prediction
     #[command(long_about = scan::ABOUT)]
     Scan(scan::Args),
+    /// Run the daemon: scan by plan, keep logs, serve the API
+    #[command(long_about = run::ABOUT)]
+    Run(Box<run::Args>),
+    /// Say what a running daemon is doing
+    Status(status::Args),
+    /// Show the records of a running daemon as they are made
+    Watch(watch::Args),
     /// Play a ranger on a pty, with sound from the model
     #[command(long_about = mock::ABOUT)]
     Mock(mock::Args),
+    /// Be a ranger: drive module and stepper from this Raspberry Pi's own pins
+    #[cfg(feature = "pi")]
+    #[command(long_about = board::ABOUT)]
+    Board(board::Args),
+    /// Find out what is wrong with a ranger: port, firmware, motor, echo
+    #[command(long_about = doctor::ABOUT)]
+    Doctor(doctor::Args),
     /// Predict a scan with the model alone
     #[command(long_about = simulate::ABOUT)]
     Simulate(simulate::Args),
     /// List the ways that echoes take from a place
     #[command(long_about = paths::ABOUT)]
     Paths(paths::Args),
+    /// Show the echo trace of one firing, each hump with its path
+    #[command(long_about = trace::ABOUT)]
+    Trace(trace::Args),
     /// Compare a log's readings with the predictions beside them
     Compare(compare::Args),
+    /// Tell planes, corners and edges apart in scans
+    #[command(long_about = interpret::ABOUT)]
+    Interpret(interpret::Args),
+    /// Make an occupancy grid of the scans of logs
+    #[command(long_about = map::ABOUT)]
+    Map(map::Args),
+    /// Set a map beside the ideal one
+    #[command(long_about = map_score::ABOUT)]
+    MapScore(map_score::Args),
+    /// Map simulated courses without and with Feature Prediction, and score the maps
+    #[command(long_about = map_benchmark::ABOUT)]
+    MapBenchmark(map_benchmark::Args),
     /// Draw scans: floor plan, polar, residuals
     #[command(long_about = plot::ABOUT)]
     Plot(plot::Args),
@@ -64,11 +105,22 @@ enum Verb {
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().verb {
         Verb::Scan(args) => scan::run(&args),
+        Verb::Run(args) => run::run(*args),
+        Verb::Status(args) => status::run(&args),
+        Verb::Watch(args) => watch::run(&args),
         Verb::Mock(args) => mock::run(&args),
+        #[cfg(feature = "pi")]
+        Verb::Board(args) => board::run(&args),
+        Verb::Doctor(args) => doctor::run(&args),
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
-        Verb::Plot(args) => plot::run(args),
+        Verb::Interpret(args) => interpret::run(&args),
+        Verb::Map(args) => map::run(&args),
+        Verb::MapScore(args) => map_score::run(&args),
+        Verb::MapBenchmark(args) => map_benchmark::run(&args),
+        Verb::Trace(args) => trace::run(&args),
+        Verb::Plot(args) => plot::run(&args),
         Verb::Log(verb) => log::run(verb),
         Verb::Scene(verb) => scene::run(verb),
     };

@@ -4,7 +4,7 @@ use std::{fs, io};
 
 use super::Failure;
 use crate::{
-    acoustics::{Air, Sensor, SensorError},
+    acoustics::{Air, Response, Sensor, SensorError},
     model::{EdgeLawKind, EngineKind, Options},
     scene::suggest,
 };
@@ -13,9 +13,23 @@ use crate::{
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Sensor and air")]
 pub(super) struct SensorArgs {
-    /// Sensor preset (senscomp-6500, bozma-kuc-60khz), or a file with a sensor's data
+    /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, hc-sr04,
+    /// fullwave-line), or a file with a sensor's data
     #[arg(long, value_name = "NAME|FILE", default_value = "senscomp-6500")]
     sensor: String,
+    /// End the blanking by hand as early as the sensor allows, as BINH does
+    #[arg(long, conflicts_with = "blanking_us")]
+    short_blanking: bool,
+    /// From firing until the receiver listens, microseconds [default: the sensor's]
+    #[arg(long, value_name = "US")]
+    blanking_us: Option<f64>,
+    /// Height of the transducer in a scene with floor, ceiling or low walls, metres [default: the
+    /// sensor's, else half a metre above the floor]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    sensor_z: Option<f64>,
+    /// How far the transducer's axis points up, degrees [default: the sensor's]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    tilt_deg: Option<f64>,
 }
 
 /// The air between ranger and walls.
@@ -49,13 +63,19 @@ pub(super) struct EngineArgs {
     /// Least amplitude detected; a head-on, perfect wall gives 1 [default: the sensor's]
     #[arg(long, value_name = "T")]
     threshold: Option<f64>,
+    /// How the face answers to a pulse [default: the sensor's]
+    #[arg(long, value_enum)]
+    response: Option<ResponseName>,
+    /// Detect one sound at a time and time it by its path alone; `fan` and `cone` always do
+    #[arg(long)]
+    ideal_receiver: bool,
     /// Leave out the absorption of the air
     #[arg(long)]
     lossless: bool,
     /// Most mirror reflections on a path [default: as many as can matter]
     #[arg(long, value_name = "N")]
     max_order: Option<u32>,
-    /// How edges diffract [default: utd; `fan` has kuc-siegel only]
+    /// How edges diffract [default: the sensor's, or utd; `fan` has kuc-siegel only]
     #[arg(long, value_enum)]
     edge_law: Option<EdgeLaw>,
     /// Angle between the rays of `fan`, degrees
@@ -74,6 +94,14 @@ enum EngineName {
     Fan,
     /// Nearest hit of one ray a degree
     Cone,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum ResponseName {
+    /// By its beam pattern
+    Stationary,
+    /// Point by point: echoes off the axis begin earlier, and the pattern's nulls fill up
+    Full,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -98,42 +126,82 @@ impl EdgeLaw {
 }
 
 impl SensorArgs {
-    /// The sensor named: a file if there is one of that name, else a preset.
-    pub(super) fn sensor(&self) -> Result<Sensor, Failure> {
-        match fs::read_to_string(&self.sensor) {
-            Ok(text) => Sensor::from_json(&text).map_err(|error| self.refuse(&error)),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                Sensor::preset(&self.sensor).map_err(|error| self.refuse(&error))
-            }
-            Err(error) => Err(Failure::input(
-                format!("cannot read the sensor {}: {error}", self.sensor),
-                "give a text file that you may read, or the name of a preset",
-            )),
-        }
+    /// The same for `sonard-emulator`, with the blanking that came of it.
+    pub(super) fn emulator(&self, sensor: &Sensor) -> [String; 2] {
+        [format!("--sensor={}", self.sensor), format!("--blanking-us={}", sensor.blanking_us)]
     }
 
-    fn refuse(&self, error: &SensorError) -> Failure {
-        let name = &self.sensor;
-        match error {
-            SensorError::UnknownPreset { .. } => {
-                let known: Vec<String> = Sensor::preset_names().map(str::to_owned).collect();
+    /// The sensor named: a file if there is one of that name, else a preset; with its blanking as
+    /// asked for.
+    pub(super) fn sensor(&self) -> Result<Sensor, Failure> {
+        let mut sensor = load_sensor(&self.sensor)?;
+        if self.short_blanking {
+            sensor.blanking_us = sensor.short_blanking_us.ok_or_else(|| {
                 Failure::input(
-                    format!("there is no sensor file `{name}` and no preset of that name"),
-                    suggest(name, &known, "presets"),
+                    format!("--short-blanking: {} has no short_blanking_us", sensor.name),
+                    "give --blanking-us instead",
                 )
-            }
-            SensorError::Form { line, column, field, message } => Failure::input(
-                format!("{name}:{line}:{column}: {field}: {message}"),
-                "start from a preset in the folder sensors/ of the source",
-            ),
-            SensorError::Figure { .. } => {
-                Failure::input(format!("{name}: {error}"), "correct that figure in the file")
-            }
+            })?;
+        }
+        if let Some(blanking_us) = self.blanking_us {
+            sensor.blanking_us = blanking_us;
+            sensor.check().map_err(|error| {
+                Failure::input(format!("--blanking-us: {error}"), "give microseconds, 0 or more")
+            })?;
+        }
+        let mounting = &mut sensor.mounting;
+        mounting.z_m = self.sensor_z.or(mounting.z_m);
+        mounting.tilt_deg = self.tilt_deg.unwrap_or(mounting.tilt_deg);
+        sensor.check().map_err(|error| {
+            Failure::input(error, "give --sensor-z in metres and --tilt-deg from -90 to 90")
+        })?;
+        Ok(sensor)
+    }
+}
+
+/// A sensor by the name of its file or preset.
+pub(super) fn load_sensor(name: &str) -> Result<Sensor, Failure> {
+    match fs::read_to_string(name) {
+        Ok(text) => Sensor::from_json(&text).map_err(|error| refuse_sensor(name, &error)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            Sensor::preset(name).map_err(|error| refuse_sensor(name, &error))
+        }
+        Err(error) => Err(Failure::input(
+            format!("cannot read the sensor {name}: {error}"),
+            "give a text file that you may read, or the name of a preset",
+        )),
+    }
+}
+
+fn refuse_sensor(name: &str, error: &SensorError) -> Failure {
+    match error {
+        SensorError::UnknownPreset { .. } => {
+            let known: Vec<String> = Sensor::preset_names().map(str::to_owned).collect();
+            Failure::input(
+                format!("there is no sensor file `{name}` and no preset of that name"),
+                suggest(name, &known, "presets"),
+            )
+        }
+        SensorError::Form { line, column, field, message } => Failure::input(
+            format!("{name}:{line}:{column}: {field}: {message}"),
+            "start from a preset in the folder sensors/ of the source",
+        ),
+        SensorError::Figure { .. } => {
+            Failure::input(format!("{name}: {error}"), "correct that figure in the file")
         }
     }
 }
 
 impl AirArgs {
+    /// The same for `sonard-emulator`.
+    pub(super) fn emulator(&self) -> [String; 3] {
+        [
+            format!("--temperature-c={}", self.temperature_c),
+            format!("--humidity-percent={}", self.humidity_percent),
+            format!("--pressure-kpa={}", self.pressure_kpa),
+        ]
+    }
+
     /// The air described.
     pub(super) fn air(&self) -> Result<Air, Failure> {
         Air::new(self.temperature_c, self.humidity_percent, self.pressure_kpa)
@@ -168,6 +236,11 @@ impl EngineArgs {
         }
         Ok(Options {
             engine,
+            response: self.response.map(|response| match response {
+                ResponseName::Stationary => Response::Stationary,
+                ResponseName::Full => Response::Full,
+            }),
+            ideal_receiver: self.ideal_receiver,
             max_range_m: self.max_range,
             threshold: self.threshold,
             lossless: self.lossless,

@@ -37,9 +37,9 @@ pub(super) struct Args {
     /// Leave out paths weaker than this; a head-on, perfect wall gives 1
     #[arg(long, value_name = "A", default_value_t = 0.001)]
     weakest: f64,
-    /// How edges diffract
-    #[arg(long, value_enum, default_value_t = EdgeLaw::Utd)]
-    edge_law: EdgeLaw,
+    /// How edges diffract [default: the sensor's, or utd]
+    #[arg(long, value_enum)]
+    edge_law: Option<EdgeLaw>,
     /// Leave out the absorption of the air
     #[arg(long)]
     lossless: bool,
@@ -80,6 +80,8 @@ struct PathLine {
     arrival_deg: f64,
     amplitude: f64,
     phase_deg: f64,
+    #[serde(skip)]
+    way: String,
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
@@ -93,7 +95,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let options = Options {
         max_range_m: args.max_range,
         max_order: args.max_order,
-        edge_law: Some(args.edge_law.kind()),
+        edge_law: args.edge_law.map(EdgeLaw::kind),
         lossless: args.lossless,
         ..Options::default()
     };
@@ -111,6 +113,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn line(simulator: &Simulator, path: &EchoPath) -> PathLine {
     let record = simulator.path_record(&path.path, path.length_m);
     PathLine {
+        way: record.in_words(),
         length_m: path.length_m,
         kind: record.kind,
         order: record.order,
@@ -159,21 +162,11 @@ fn write_table(lines: impl Iterator<Item = PathLine>, count: usize) -> io::Resul
             format!("{:.1}°", line.departure_deg),
             format!("{:.1}°", line.arrival_deg),
             format!("{:.4}", line.amplitude),
-            way(&line),
+            line.way,
         ]);
     }
     let mut out = io::BufWriter::new(io::stdout().lock());
     writeln!(out, "{table}")?;
     writeln!(out, "{count} paths")?;
     out.flush()
-}
-
-/// The walls in order; for a bent path the edge in front.
-fn way(line: &PathLine) -> String {
-    let walls = line.walls.join(", ");
-    match &line.edge {
-        Some(edge) if walls.is_empty() => format!("edge {edge}"),
-        Some(edge) => format!("edge {edge} by {walls}"),
-        None => walls,
-    }
 }

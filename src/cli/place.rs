@@ -8,7 +8,7 @@ use crate::{geometry::Pose, scan::ScanPlan, scene::Scene};
 pub(super) struct PlaceArgs {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(long, value_name = "SCENE")]
-    scene: String,
+    pub(super) scene: String,
     /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pub(super) pose: String,

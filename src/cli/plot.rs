@@ -1,17 +1,17 @@
 //! `sonard plot`.
 
-use std::{
-    fs,
-    io::{self, IsTerminal, Write as _},
-    path::{Path, PathBuf},
-};
+mod way;
 
-use super::{Failure, Outcome, scene_file};
+use std::path::{Path, PathBuf};
+
+use super::{
+    Failure, Outcome,
+    picture::{PictureArgs, scene_for, targets, warn_of_damage},
+};
 use crate::{
-    plot::{MAX_WIDTH_PX, Picture, draw_polar, draw_residuals, draw_scans},
+    plot::{draw_polar, draw_residuals, draw_scans, draw_side_by_side},
     scan::ScanView,
-    scene::{Scene, shipped},
-    store::{Loaded, load},
+    store::load,
 };
 
 /// Options of `sonard plot`.
@@ -30,13 +30,14 @@ pub(super) struct Args {
     /// are drawn over each other
     #[arg(long, value_name = "N|ID")]
     scan: Vec<String>,
-    /// Picture to write, .svg or .png; several are possible. Without it, SVG to standard output
-    #[arg(short = 'o', long = "out", value_name = "FILE")]
-    out: Vec<PathBuf>,
-    /// Width of a PNG, pixels
-    #[arg(long, value_name = "PX", default_value_t = 1000,
-          value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_WIDTH_PX)))]
-    width: u32,
+    /// Draw the way that one beam's sound took: the beam's index in the plan
+    #[arg(long, value_name = "INDEX", conflicts_with = "azimuth_deg")]
+    beam: Option<u32>,
+    /// The same for the beam nearest to this azimuth, degrees
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    azimuth_deg: Option<f64>,
+    #[command(flatten)]
+    picture: PictureArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -47,6 +48,9 @@ enum Kind {
     Polar,
     /// Measured minus predicted range
     Residuals,
+    /// The first three scans beside each other, and how many beams differ: for scans of one place by
+    /// different engines
+    SideBySide,
 }
 
 pub(super) const ABOUT: &str = "\
@@ -56,73 +60,36 @@ Filled marks are readings; shape and colour say what made them: a direct echo, m
 reflections, an edge, sound that was there when the receiver opened (minimum range), or nothing \
 the model knows. Rings and thin rays are the model's. Ticks on the border are silent beams, \
 arrows readings that lie beyond the view. In a browser, pointing at a mark of an SVG tells its \
-numbers. Scans of one log are drawn over each other.";
+numbers. Scans of one log are drawn over each other. With --beam or --azimuth-deg the way of one \
+beam's sound is drawn instead, reflection by reflection.";
 
 const HELP: &str = "\
 Examples:
   sonard plot scan.jsonl -o scan.svg -o scan.png
   sonard plot scan.jsonl --kind residuals --scan 2 -o residuals.png --width 2000
   sonard simulate --scene simple-room --pose fig9 | sonard plot - -o fig9.svg
+  sonard plot scan.jsonl --azimuth-deg 270 -o way.png
+  for e in paths fan cone; do sonard simulate --scene corridor --pose beside-wall --engine $e; done \
+      | sonard plot - --kind side-by-side -o engines.png
+
 Exit codes: 0 drawn, 2 wrong usage or input, 3 a picture can't be written.";
 
-pub(super) fn run(args: Args) -> Outcome {
-    let targets = targets(&args.out)?;
-    let (log, wanted) = (args.log, args.scan);
-    let loaded = load(&log).map_err(|error| Failure::input(&error, error.help()))?;
-    warn_of_damage(&log, &loaded);
-    let views = choose(ScanView::from_records(loaded.records), &log, &wanted)?;
+pub(super) fn run(args: &Args) -> Outcome {
+    let targets = targets(&args.picture)?;
+    let log = &args.log;
+    let loaded = load(log).map_err(|error| Failure::input(&error, error.help()))?;
+    warn_of_damage(log, &loaded);
+    let views = choose(ScanView::from_records(loaded.records), log, &args.scan)?;
     let scene = scene_for(&views, args.scene.as_deref())?;
-    let picture = match args.kind {
-        Kind::Scan => draw_scans(&views, scene.as_ref()),
-        Kind::Polar => draw_polar(&views, scene.as_ref()),
-        Kind::Residuals => draw_residuals(&views, scene.as_ref()),
+    let beam = args.beam.map(way::Beam::Index).or(args.azimuth_deg.map(way::Beam::Azimuth));
+    let picture = match (beam, args.kind) {
+        (Some(beam), _) => way::draw(&views, scene.as_ref(), beam)?,
+        (None, Kind::Scan) => draw_scans(&views, scene.as_ref()),
+        (None, Kind::Polar) => draw_polar(&views, scene.as_ref()),
+        (None, Kind::SideBySide) => draw_side_by_side(&views, scene.as_ref()),
+        (None, Kind::Residuals) => draw_residuals(&views, scene.as_ref()),
     };
-    targets.iter().try_for_each(|target| write(&picture, target, args.width))
-}
-
-/// Where a picture goes, and in which format.
-enum Target {
-    StandardOutput,
-    Svg(PathBuf),
-    Png(PathBuf),
-}
-
-/// Checked before anything is read, so that a wrong name costs no time.
-fn targets(out: &[PathBuf]) -> Result<Vec<Target>, Failure> {
-    if out.is_empty() && io::stdout().is_terminal() {
-        return Err(Failure::input(
-            "the picture would go to the terminal",
-            "name a file with -o scan.svg or -o scan.png, or send standard output somewhere",
-        ));
-    }
-    if out.is_empty() {
-        return Ok(vec![Target::StandardOutput]);
-    }
-    out.iter().map(|path| target(path)).collect()
-}
-
-fn target(path: &Path) -> Result<Target, Failure> {
-    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-    match extension.as_deref() {
-        Some("svg") => Ok(Target::Svg(path.into())),
-        Some("png") => Ok(Target::Png(path.into())),
-        None if path == Path::new("-") => Ok(Target::StandardOutput),
-        _ => Err(Failure::input(
-            format!("{}: the format of a picture follows from its ending", path.display()),
-            "let the name end in .svg or .png",
-        )),
-    }
-}
-
-fn warn_of_damage(log: &Path, loaded: &Loaded) {
-    const SHOWN: usize = 5;
-    for error in loaded.damaged.iter().take(SHOWN) {
-        anstream::eprintln!("warning: {}: {error}; the line is left out", log.display());
-    }
-    if loaded.damaged.len() > SHOWN {
-        let more = loaded.damaged.len() - SHOWN;
-        anstream::eprintln!("warning: {more} more damaged lines; see `sonard log verify`");
-    }
+    targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
 }
 
 /// The scans asked for; all without a choice.
@@ -164,56 +131,4 @@ fn find<'a>(views: &'a [ScanView], wanted: &str) -> Result<&'a ScanView, Failure
             ),
         )),
     }
-}
-
-/// The scene named on the command line, else the shipped scene that the log names.
-fn scene_for(views: &[ScanView], given: Option<&str>) -> Result<Option<Scene>, Failure> {
-    let logged = views.iter().find_map(|view| view.session.as_ref()?.scene.as_ref());
-    let scene = match (given, logged) {
-        (Some(given), _) => scene_file::load(given)?,
-        (None, Some(logged)) if shipped::text(&logged.name).is_some() => {
-            scene_file::shipped(&logged.name)?
-        }
-        (None, Some(logged)) => {
-            anstream::eprintln!(
-                "note: the log's scene `{}` does not come with sonard: drawn without walls; give \
-                 its file with --scene",
-                logged.name
-            );
-            return Ok(None);
-        }
-        (None, None) => return Ok(None),
-    };
-    if logged.is_some_and(|logged| logged.sha256 != scene.sha256) {
-        anstream::eprintln!(
-            "warning: the scene `{}` is not the one that the log's model used (its SHA-256 \
-             differs): walls and predictions may not fit",
-            scene.name
-        );
-    }
-    Ok(Some(scene))
-}
-
-fn write(picture: &Picture, target: &Target, width_px: u32) -> Outcome {
-    let (path, bytes) = match target {
-        Target::StandardOutput => {
-            return io::stdout()
-                .lock()
-                .write_all(picture.to_svg().as_bytes())
-                .or_else(|error| Failure::from_write("standard output", &error));
-        }
-        Target::Svg(path) => (path, picture.to_svg().into_bytes()),
-        Target::Png(path) => {
-            let png = picture.to_png(width_px).map_err(|error| {
-                Failure::input(format!("{}: {error}", path.display()), "choose another --width")
-            })?;
-            (path, png)
-        }
-    };
-    fs::write(path, bytes).map_err(|error| {
-        Failure::device(
-            format!("cannot write {}: {error}", path.display()),
-            "check that its folder exists, may be written to and has room",
-        )
-    })
 }

@@ -41,6 +41,12 @@ impl Interrupts {
         }
     }
 
+    /// The same, with the words for a log.
+    pub(super) async fn reason(self) -> String {
+        self.wait().await;
+        "stopped on request".into()
+    }
+
     pub(super) fn happened(&self) -> bool {
         *self.0.borrow()
     }

@@ -1,5 +1,6 @@
 //! `sonard scan`.
 
+mod emulator;
 mod output;
 mod setup;
 mod summary;
@@ -20,20 +21,21 @@ use super::{
 use crate::{
     link::{self, BAUD},
     mock::{MockBoard, MockPort},
-    ranger::{DriveError, Driver, Ranger, ScanError, ScanSummary},
+    ranger::{DriveError, Driver, Motion, Ranger, ScanError, ScanSummary},
     scan::Record,
 };
+use emulator::Emulator;
 use output::Output;
 use setup::Setup;
 
 /// How often a request is sent before the device counts as gone: some nine seconds, in which a
 /// board that the opening of its port has reset is long awake.
-const ATTEMPTS: u8 = 7;
+pub(super) const ATTEMPTS: u8 = 7;
 
 /// Options of `sonard scan`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
-#[command(group(clap::ArgGroup::new("device").required(true).args(["port", "mock"])))]
+#[command(group(clap::ArgGroup::new("device").required(true).args(["port", "mock", "emulator"])))]
 pub(super) struct Args {
     /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number
     #[arg(long, value_name = "PATH|ID")]
@@ -41,6 +43,9 @@ pub(super) struct Args {
     /// Use a mock ranger instead of a real one
     #[arg(long)]
     mock: bool,
+    /// Use the firmware's machine code in an emulated board (starts sonard-emulator)
+    #[arg(long)]
+    emulator: bool,
     #[command(flatten)]
     place: PlaceArgs,
     /// Write scan.jsonl, scan.svg and scan.png to this folder instead of records to standard output
@@ -90,6 +95,13 @@ struct MotionArgs {
     acceleration: u32,
 }
 
+impl MotionArgs {
+    const fn motion(&self) -> Motion {
+        let Self { window_ms, settle_ms, min_interval_ms, max_echoes, speed, acceleration } = *self;
+        Motion { window_ms, settle_ms, min_interval_ms, max_echoes, speed, acceleration }
+    }
+}
+
 pub(super) const ABOUT: &str = "\
 Take one or more scans and log each reading beside the model's prediction.
 
@@ -101,6 +113,7 @@ const EXAMPLES: &str = "\
 Examples:
   sonard scan --mock --scene simple-room --pose fig9 --out out/fig9
   sonard scan --port /dev/ttyACM0 --scene my-room.json --pose 1.2,0.8,90 --max-range 4 --out out
+  sonard scan --emulator --scene simple-room --pose fig9 --max-range 4 --out out/emulated
   sonard scan --mock --scene corridor --pose beside-wall --to-deg 45 | sonard compare -
   sonard scan --mock --scene simple-room --pose fig9 --faults flip=0.001,reset=0.005 --out noisy
 
@@ -124,14 +137,23 @@ async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
         true => Some(start_mock(args.world.board(&setup.belief())?)?),
         false => None,
     };
-    let port = mock.as_ref().map_or_else(|| args.port.clone().unwrap_or_default(), Mock::port);
+    let emulator = match args.emulator {
+        true => Some(Emulator::start(args, setup)?),
+        false => None,
+    };
+    let port = mock
+        .as_ref()
+        .map(Mock::port)
+        .or_else(|| emulator.as_ref().map(Emulator::port))
+        .or_else(|| args.port.clone())
+        .unwrap_or_default();
     let mut ranger = meet(&port, &interrupts).await?;
     let job = setup.job(ranger.identity())?;
     output.record(&Record::Session(Box::new(setup.session(ranger.identity()))))?;
     let mut missing = 0;
     for turn in 1..=args.repeat {
         output.begin_scan(turn, args.repeat, job.plan.beams());
-        let summary = ranger.scan(&job, output, interrupts.clone().wait()).await;
+        let summary = ranger.scan(&job, output, interrupts.clone().reason()).await;
         output.end_scan();
         let summary = summary.map_err(scan_failure)?;
         summary::print(setup, &summary, ranger.identity(), ranger.link_stats(), output);

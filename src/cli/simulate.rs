@@ -10,6 +10,8 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use jiff::Timestamp;
+use rand::SeedableRng as _;
+use rand_pcg::Pcg64;
 use uuid::Uuid;
 
 use super::{
@@ -18,14 +20,12 @@ use super::{
     place::{AzimuthArgs, PlaceArgs},
 };
 use crate::{
+    acoustics::ReceiverNoise,
     geometry::Pose,
-    model::{Prediction, Simulator},
-    scan::{LOG_FORMAT, Ping, Provenance, Record, ScanEnd, ScanPlan, ScanStart, SceneRef, Session},
+    model::{Prediction, Simulator, Station},
+    scan::{Ping, Record, ScanEnd, ScanPlan, ScanStart, Session},
     scene::Scene,
 };
-
-/// Motor steps a revolution that `step` counts in.
-const STEPS_PER_REVOLUTION: u32 = 400;
 
 /// Options of `sonard simulate`.
 #[derive(Debug, clap::Args)]
@@ -39,11 +39,44 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     #[command(flatten)]
+    noise: NoiseArgs,
+    #[command(flatten)]
     engine: EngineArgs,
     #[command(flatten)]
     sensor: SensorArgs,
     #[command(flatten)]
     air: AirArgs,
+}
+
+/// What disturbs the readings.
+#[derive(Debug, Clone, Copy, clap::Args)]
+#[command(next_help_heading = "Noise")]
+struct NoiseArgs {
+    /// Noise at the receiver's input, root mean square, as the amplitude of an echo from 1 m
+    #[arg(long, value_name = "A", default_value_t = 0.0)]
+    noise_floor: f64,
+    /// Standard deviation of the time of flight beside what the noise does to it, microseconds
+    #[arg(long, value_name = "US", default_value_t = 0.0)]
+    jitter_us: f64,
+    /// Seed of the noise: the same one gives the same readings
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+}
+
+impl NoiseArgs {
+    /// The noise asked for, if any.
+    fn noise(&self) -> Result<Option<ReceiverNoise>, Failure> {
+        for (option, value, most) in
+            [("noise-floor", self.noise_floor, 1.0), ("jitter-us", self.jitter_us, 1e4)]
+        {
+            if !(0.0..=most).contains(&value) {
+                let help = format!("give a number from 0 to {most}");
+                return Err(Failure::input(format!("--{option} is {value}"), help));
+            }
+        }
+        let noise = ReceiverNoise { floor: self.noise_floor, jitter_us: self.jitter_us };
+        Ok(Some(noise).filter(|noise| *noise != ReceiverNoise::NONE))
+    }
 }
 
 pub(super) const ABOUT: &str = "\
@@ -66,8 +99,15 @@ pub(super) fn run(args: &Args) -> Outcome {
     let (scene, pose) = args.place.load()?;
     let plan = args.azimuths.plan(1)?;
     let simulator = simulator(args, &scene, &pose)?;
+    let noise = args.noise.noise()?;
     let (what, mut out) = open(args.out.as_deref())?;
-    write(&mut out, &simulator, &pose, &plan).or_else(|error| Failure::from_write(&what, &error))
+    let mut rng = Pcg64::seed_from_u64(args.noise.seed);
+    let mut ping = |station: &Station, direction_rad| match &noise {
+        Some(noise) => station.ping_in_noise(direction_rad, noise, &mut rng),
+        None => station.ping(direction_rad),
+    };
+    write(&mut out, &simulator, &pose, &plan, &mut ping)
+        .or_else(|error| Failure::from_write(&what, &error))
 }
 
 /// Where the records go, and its name.
@@ -97,24 +137,33 @@ fn write(
     simulator: &Simulator,
     pose: &Pose,
     plan: &ScanPlan,
+    predict: &mut dyn FnMut(&Station, f64) -> Prediction,
 ) -> io::Result<()> {
     let scan = Uuid::new_v4();
     let mut put = |record: &Record| {
         serde_json::to_writer(&mut *out, record)?;
         out.write_all(b"\n")
     };
-    put(&session(simulator))?;
-    put(&Record::ScanStart(ScanStart { scan, time: Timestamp::now(), pose: *pose, plan: *plan }))?;
+    put(&Record::Session(Box::new(Session::simulated(simulator, Timestamp::now()))))?;
+    put(&Record::ScanStart(ScanStart {
+        scan,
+        time: Timestamp::now(),
+        pose: *pose,
+        plan: *plan,
+        air: None,
+    }))?;
     let progress = progress(plan.stops());
     let station = simulator.station(pose.position());
     for index in 0..plan.stops() {
         let azimuth_deg = plan.azimuth_deg(index);
-        let prediction = station.ping(pose.direction_rad(azimuth_deg));
-        put(&ping(simulator, scan, index, azimuth_deg, &prediction))?;
+        let prediction = predict(&station, pose.direction_rad(azimuth_deg));
+        let ping = Ping::simulated(simulator, scan, index, azimuth_deg, &prediction);
+        put(&Record::Ping(Box::new(ping)))?;
         progress.inc(1);
     }
     progress.finish_and_clear();
-    put(&end(simulator, scan, plan.stops()))?;
+    let end = ScanEnd::simulated(simulator, scan, plan.stops(), Timestamp::now());
+    put(&Record::ScanEnd(end))?;
     out.flush()
 }
 
@@ -133,65 +182,4 @@ fn progress(stops: u32) -> ProgressBar {
         }
     });
     bar
-}
-
-fn session(simulator: &Simulator) -> Record {
-    let scene = simulator.scene();
-    Record::Session(Box::new(Session {
-        format: LOG_FORMAT,
-        started: Timestamp::now(),
-        sonard: env!("CARGO_PKG_VERSION").to_owned(),
-        provenance: Provenance::Simulated,
-        device: None,
-        sensor: simulator.sensor().clone(),
-        air: simulator.air().to_record(),
-        scene: Some(SceneRef { name: scene.name.clone(), sha256: scene.sha256.clone() }),
-        model: Some(simulator.model_record()),
-    }))
-}
-
-fn ping(
-    simulator: &Simulator,
-    scan: Uuid,
-    index: u32,
-    azimuth_deg: f64,
-    prediction: &Prediction,
-) -> Record {
-    let said = simulator.record(prediction);
-    let steps = azimuth_deg / 360.0 * f64::from(STEPS_PER_REVOLUTION);
-    Record::Ping(Box::new(Ping {
-        scan,
-        index,
-        step: steps.round() as i32,
-        azimuth_deg,
-        time: None,
-        time_sigma_us: None,
-        status: said.status,
-        fired_ticks: None,
-        echo_ticks: Vec::new(),
-        tof_us: prediction.echoes_us.first().copied(),
-        range_m: said.range_m,
-        repaired: false,
-        amplitude: said.amplitude,
-        margin_db: said.margin_db,
-        path: said.path,
-        sim: None,
-        residual_m: None,
-    }))
-}
-
-/// The model has no motor: a scan lasts as long as its listening windows.
-fn end(simulator: &Simulator, scan: Uuid, beams: u32) -> Record {
-    let window_s = 2.0 * simulator.receiver().max_range_m / simulator.sound_speed_m_s();
-    let listening_s = f64::from(beams) * window_s;
-    Record::ScanEnd(ScanEnd {
-        scan,
-        time: Timestamp::now(),
-        beams,
-        missing: 0,
-        repaired: 0,
-        duration_s: listening_s,
-        acoustic_limit_s: listening_s,
-        home_drift_steps: None,
-    })
 }

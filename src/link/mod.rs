@@ -93,6 +93,50 @@ pub fn open(port: &str) -> Result<SerialStream, LinkError> {
     Ok(stream)
 }
 
+/// A serial port of this machine, as far as can be told without opening it.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Candidate {
+    /// Its path.
+    pub port: String,
+    /// Its stable name under `/dev/serial/by-id`, which survives replugging.
+    pub id: Option<String>,
+    /// What its USB descriptor says: manufacturer, product, serial number.
+    pub usb: Option<String>,
+}
+
+/// The serial ports of this machine, those with a stable name first. None is opened.
+#[must_use]
+pub fn candidates() -> Vec<Candidate> {
+    let ids: Vec<PathBuf> = fs::read_dir(BY_ID)
+        .map(|entries| entries.flatten().map(|entry| entry.path()).collect())
+        .unwrap_or_default();
+    let id_of = |port: &str| {
+        let target = fs::canonicalize(port).ok()?;
+        let id = ids.iter().find(|id| fs::canonicalize(id).is_ok_and(|path| path == target))?;
+        Some(id.file_name()?.to_string_lossy().into_owned())
+    };
+    let mut candidates: Vec<Candidate> = serialport::available_ports()
+        .unwrap_or_default()
+        .into_iter()
+        .map(|port| Candidate {
+            id: id_of(&port.port_name),
+            usb: match port.port_type {
+                SerialPortType::UsbPort(usb) => Some(
+                    [usb.manufacturer, usb.product, usb.serial_number]
+                        .into_iter()
+                        .flatten()
+                        .collect::<Vec<_>>()
+                        .join(" "),
+                ),
+                _ => None,
+            },
+            port: port.port_name,
+        })
+        .collect();
+    candidates.sort_by_key(|candidate| (candidate.id.is_none(), candidate.port.clone()));
+    candidates
+}
+
 /// The device path behind a path or a stable id.
 fn resolve(port: &str) -> Result<PathBuf, LinkError> {
     let path = PathBuf::from(port);

@@ -50,6 +50,7 @@ pub struct MockBoard {
     /// What the step counter says.
     step: i32,
     known: bool,
+    coils: bool,
     activity: Activity,
     stalled_until: u64,
     /// Half of the lease that was left when the host was last heard, ticks.
@@ -93,6 +94,7 @@ impl MockBoard {
             boot: settings.boot,
             step: 0,
             known: false,
+            coils: false,
             activity: Activity::Nothing,
             stalled_until: 0,
             patience: 0,
@@ -216,6 +218,23 @@ impl MockBoard {
         std::mem::replace(&mut self.hung_up, false)
     }
 
+    /// The world around it.
+    pub const fn world(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    /// Steps that the motor really stands away from the index.
+    #[must_use]
+    pub const fn steps_from_index(&self) -> i32 {
+        self.world.steps_from_index()
+    }
+
+    /// Whether the motor's coils have current.
+    #[must_use]
+    pub const fn holds_coils(&self) -> bool {
+        self.coils
+    }
+
     /// What happened since the last call.
     pub fn take_notes(&mut self) -> Vec<Note> {
         std::mem::take(&mut self.notes)
@@ -248,6 +267,7 @@ impl MockBoard {
 
     fn act(&mut self) {
         while let Some(action) = self.device.poll_action() {
+            self.coils |= matches!(action, Action::Home { .. } | Action::Move { .. });
             match action {
                 Action::Home { speed, acceleration } => self.home(speed, acceleration),
                 Action::Move { target, speed, acceleration } => {
@@ -305,12 +325,27 @@ impl MockBoard {
             self.step = from + gone;
         }
         self.known = false;
+        self.coils = false;
         self.activity = Activity::Nothing;
     }
 
     fn fire(&mut self, window_ticks: u32, max_echoes: u8) {
+        let (stuck, silent) = self.faults.of_module();
+        if stuck {
+            // Not fired: the machine is told at once.
+            let report = Box::new(EchoReport {
+                fired_ticks: self.now as u32,
+                status: ReadingStatus::ModuleFault,
+                echoes: Echoes::new(),
+            });
+            self.activity = Activity::Listening { report, until: self.now };
+            return;
+        }
         let fired = self.now + FIRE_LEAD_TICKS;
-        let heard = self.world.fire(window_ticks, TICK_HZ);
+        let mut heard = self.world.fire(window_ticks, TICK_HZ);
+        if silent {
+            heard.clear();
+        }
         let mut echoes = Echoes::from_ticks(&heard);
         echoes.truncate(max_echoes);
         let status = if echoes.is_empty() { ReadingStatus::NoEcho } else { ReadingStatus::Echo };

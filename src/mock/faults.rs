@@ -27,6 +27,10 @@ pub struct FaultPlan {
     pub reset: f64,
     /// Probability for each firing that the line hangs up and comes back.
     pub hangup: f64,
+    /// Probability for each firing that no echo comes back, as without a transducer.
+    pub no_echo: f64,
+    /// Probability for each firing that ECHO is high before it, as from a module without power.
+    pub stuck_echo: f64,
     /// Protocol version to claim instead of the true one.
     pub version: Option<u8>,
 }
@@ -34,7 +38,7 @@ pub struct FaultPlan {
 /// The keys of a fault specification, with what their value means.
 pub const FAULT_HELP: &str = "comma-separated KEY=VALUE: flip, drop, double (probability a byte), \
 delay (probability a chunk; delay_ms, default 20), stall (probability a firing; stall_ms, default \
-500), reset, hangup (probability a firing), version (protocol version to claim)";
+500), reset, hangup, no_echo, stuck_echo (probability a firing), version (protocol version to claim)";
 
 /// Why a fault specification can't be read.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -81,6 +85,8 @@ impl FaultPlan {
             "stall" => self.stall = probability(key, value)?,
             "reset" => self.reset = probability(key, value)?,
             "hangup" => self.hangup = probability(key, value)?,
+            "no_echo" => self.no_echo = probability(key, value)?,
+            "stuck_echo" => self.stuck_echo = probability(key, value)?,
             "delay_ms" => self.delay_ms = whole(key, value, "milliseconds, 0 to 60000")?,
             "stall_ms" => self.stall_ms = whole(key, value, "milliseconds, 0 to 60000")?,
             "version" => self.version = Some(whole(key, value, "a protocol version, 0 to 255")?),
@@ -176,6 +182,12 @@ impl Faults {
             .into_iter()
             .zip(draws)
             .find_map(|(fault, happens)| happens.then_some(fault))
+    }
+
+    /// What the module does at a firing: whether ECHO hangs high, and whether nothing comes back.
+    pub fn of_module(&mut self) -> (bool, bool) {
+        let FaultPlan { stuck_echo, no_echo, .. } = self.plan;
+        (self.happens(stuck_echo), self.happens(no_echo))
     }
 
     fn happens(&mut self, probability: f64) -> bool {

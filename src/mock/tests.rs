@@ -17,6 +17,7 @@ fn board(faults: FaultPlan) -> MockBoard {
             status: PingStatus::Echo,
             range_m: Some(1.0),
             arrival: None,
+            amplitude: None,
             margin_db: None,
             echoes_us: [echo_us(step)].into_iter().collect(),
         })
@@ -160,4 +161,62 @@ fn a_restart_changes_the_nonce_and_ends_the_sweep() {
     let ended_well =
         |event: &HostEvent| matches!(event, HostEvent::SweepDone { end: SweepState::Complete, .. });
     assert!(!bench.events.iter().any(ended_well));
+}
+
+/// What every board must do, the mock does too.
+mod conformance {
+    use std::convert::Infallible;
+
+    use firmware_protocol::{conformance::DeviceUnderTest, conformance_tests};
+
+    use super::*;
+
+    impl DeviceUnderTest for MockBoard {
+        type Error = Infallible;
+
+        fn now_us(&self) -> u64 {
+            self.now() / TICKS_PER_US
+        }
+
+        fn run(&mut self, us: u64) -> Result<(), Infallible> {
+            self.advance(self.now() + us * TICKS_PER_US);
+            Ok(())
+        }
+
+        fn send(&mut self, bytes: &[u8]) {
+            self.handle_bytes(bytes);
+        }
+
+        fn receive(&mut self) -> Vec<u8> {
+            let mut said = Vec::new();
+            self.poll_transmit(&mut said);
+            said
+        }
+
+        fn set_echoes(&mut self, after_us: &[f64]) {
+            let everywhere = Prediction {
+                status: PingStatus::Echo,
+                range_m: None,
+                arrival: None,
+                amplitude: None,
+                margin_db: None,
+                echoes_us: after_us.iter().copied().collect(),
+            };
+            self.world().set_soundings(Soundings::from_predictions(&[everywhere]));
+        }
+
+        fn take_firings(&mut self) -> usize {
+            self.take_notes().iter().filter(|note| matches!(note, Note::Fired(_))).count()
+        }
+
+        fn motor_steps(&self) -> i64 {
+            self.steps_from_index().into()
+        }
+
+        fn holds_coils(&self) -> bool {
+            Self::holds_coils(self)
+        }
+    }
+
+    conformance_tests!(board(FaultPlan::default()));
 }

@@ -41,7 +41,9 @@ impl Soundings {
         let mounted = Pose { heading_deg: pose.heading_deg + mounting_offset_deg, ..*pose };
         let turn =
             ScanPlan { step_deg: 360.0 / f64::from(steps_per_revolution), ..ScanPlan::default() };
-        Self::from_predictions(&simulator.predict(&mounted, &turn))
+        let station = simulator.station(mounted.position());
+        let ping = |stop| station.ping_rearmed(mounted.direction_rad(turn.azimuth_deg(stop)));
+        Self::from_predictions(&(0..turn.stops()).map(ping).collect::<Vec<_>>())
     }
 
     /// One prediction for each step of a revolution, from azimuth 0 on.
@@ -81,6 +83,11 @@ impl World {
     pub fn new(soundings: Soundings, noise: Noise, missed_step_rate: f64, seed: u64) -> Self {
         let rng = Pcg64::seed_from_u64(seed);
         Self { soundings, noise, missed_step_rate: missed_step_rate.clamp(0.0, 1.0), step: 0, rng }
+    }
+
+    /// Sounds otherwise from now on.
+    pub fn set_soundings(&mut self, soundings: Soundings) {
+        self.soundings = soundings;
     }
 
     /// Turns by so many commanded steps.

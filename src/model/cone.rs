@@ -67,6 +67,7 @@ impl ConeSurvey<'_> {
         Some(Arrival {
             length_m: 2.0 * hit.distance_m,
             amplitude: 1.0,
+            path_amplitude: 1.0,
             phase_rad: 0.0,
             departure_rad: ray_rad,
             arrival_rad: ray_rad,

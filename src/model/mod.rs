@@ -3,17 +3,23 @@
 //! An [`Engine`] finds the echoes that reach the transducer's face; the receiver decides which
 //! of them is detected. [`Simulator`] joins the two.
 
+mod batch;
 mod cone;
 mod fan;
 pub mod paths;
 mod raycast;
 mod simulator;
+mod station;
 #[cfg(test)]
 mod tests;
+mod way;
 
 pub use cone::Cone;
 pub use fan::{Fan, FanSettings};
-pub use simulator::{EdgeLawKind, EngineKind, ModelError, Options, Simulator, Station};
+pub use simulator::{EngineKind, ModelError, Options, Simulator};
+pub use station::Station;
+
+pub use crate::acoustics::EdgeLawKind;
 
 use smallvec::SmallVec;
 
@@ -31,6 +37,8 @@ pub struct Arrival {
     /// Strength after gain compensation and the beam pattern on both ways; a head-on, perfectly
     /// reflecting wall without absorption gives 1.
     pub amplitude: f64,
+    /// The same before the beam pattern.
+    pub path_amplitude: f64,
     /// Phase of the carrier beside that of the way, for `exp(+i omega t)`, radians: what an edge
     /// adds. Mirror reflections add none.
     pub phase_rad: f64,
@@ -114,12 +122,17 @@ pub trait Survey: Send + Sync {
 pub struct Prediction {
     /// `Echo`, `NoEcho` or `MinRange`.
     pub status: PingStatus,
-    /// Half the detected path (for `MinRange`: the range of the end of blanking), metres.
+    /// Range of the moment at which ECHO rose (for `MinRange`, of the end of blanking), metres. For a
+    /// strong echo that is half its path; see [`Receiver`](crate::acoustics::Receiver) for what a
+    /// weak one adds.
     pub range_m: Option<f64>,
-    /// The detected echo; for `NoEcho` the candidate that came closest, if there was any.
+    /// The echo that raised ECHO; for `NoEcho` the candidate that came closest, if there was any.
     pub arrival: Option<Arrival>,
-    /// Amplitude of `arrival` above the threshold, decibels.
+    /// The most that the envelope reached with that echo, all sounds together.
+    pub amplitude: Option<f64>,
+    /// The same above the threshold in force, decibels; negative for `NoEcho`: what it lacked.
     pub margin_db: Option<f64>,
-    /// Times after firing at which the module raises ECHO, microseconds, at most eight.
+    /// Times after firing at which the module raises ECHO, microseconds: the first, or up to eight
+    /// where the receiver was made ready again.
     pub echoes_us: SmallVec<[f64; 8]>,
 }

@@ -5,15 +5,19 @@ use std::{
     sync::Arc,
 };
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    Cone, Edge, Engine, Fan, FanSettings, Path, Prediction, Reflector, Survey,
+    Cone, Edge, Engine, Fan, FanSettings, Path, Prediction, Reflector, Station,
     paths::{self, PathEngine},
 };
 use crate::{
-    acoustics::{Air, BeamPattern, Disc, Receiver, Sensor, SensorError, edge::EdgeLaw},
+    acoustics::{
+        Air, BeamPattern, Combining, Disc, EdgeLawKind, Receiver, Response, Sensor, SensorError,
+        edge::EdgeLaw,
+    },
     geometry::{DVec2, Pose},
     scan::{ModelRecord, PathRecord, ScanPlan, SimRecord},
     scene::Scene,
@@ -33,7 +37,7 @@ const FACE_NAME: &str = "transducer";
 const SIGMA_E: f64 = 0.095;
 
 /// How echoes are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EngineKind {
     /// [`PathEngine`]: all echo paths, exactly.
@@ -57,18 +61,6 @@ impl EngineKind {
     }
 }
 
-/// What edges send back; see [`EdgeLaw`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum EdgeLawKind {
-    /// [`EdgeLaw::Utd`].
-    Utd,
-    /// [`EdgeLaw::KucSiegel`].
-    KucSiegel,
-    /// [`EdgeLaw::BozmaKuc`] with their 0.095 and the sensor's far field.
-    BozmaKuc,
-}
-
 /// Settings of the model; what is `None` comes from the sensor or the engine.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -81,11 +73,16 @@ pub struct Options {
     pub threshold: Option<f64>,
     /// From firing until the receiver listens, microseconds.
     pub blanking_us: Option<f64>,
+    /// How the face answers to a pulse.
+    pub response: Option<Response>,
+    /// Detect one sound at a time, and time it by its path alone ([`Combining::Ideal`]); engines
+    /// other than `paths` know no phases and always do.
+    pub ideal_receiver: bool,
     /// Leave out the absorption of the air.
     pub lossless: bool,
     /// Most mirror reflections on a path (`paths`, `fan`); without it, as many as can matter.
     pub max_order: Option<u32>,
-    /// What edges send back (`paths`; without it, `utd`). `fan` has Kuc and Siegel's law only.
+    /// What edges send back (`paths`; without it, the sensor's law). `fan` has Kuc and Siegel's law only.
     pub edge_law: Option<EdgeLawKind>,
     /// Angle between the rays of `fan`, degrees. The default reads the same as a finer fan in
     /// every shipped scene as long as no round body is met (there is a test).
@@ -101,6 +98,8 @@ impl Default for Options {
             max_range_m: None,
             threshold: None,
             blanking_us: None,
+            response: None,
+            ideal_receiver: false,
             lossless: false,
             max_order: None,
             edge_law: None,
@@ -152,14 +151,7 @@ impl Simulator {
     ) -> Result<Self, ModelError> {
         sensor.check()?;
         options.check()?;
-        let receiver = Receiver {
-            blanking_us: options.blanking_us.unwrap_or(sensor.blanking_us),
-            pulse_us: sensor.pulse_s() * 1e6,
-            rearm_us: sensor.rearm_us,
-            threshold: options.threshold.unwrap_or(sensor.threshold),
-            sound_speed_m_s: air.sound_speed_m_s(),
-            max_range_m: options.max_range_m.unwrap_or(sensor.max_range_m),
-        };
+        let receiver = receiver(&sensor, &air, &options);
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
         let scatter_height_rad = beam.two_way_power_rad();
         let engine: Box<dyn Engine> = match options.engine {
@@ -184,8 +176,7 @@ impl Simulator {
     /// Prepares for firing from `position` (world, metres); the costly part, worth keeping.
     #[must_use]
     pub fn station(&self, position: DVec2) -> Station<'_> {
-        let survey = self.sensor.mounting.is_on_axis().then(|| self.engine.survey(position));
-        Station { simulator: self, position, survey }
+        Station::new(self, position)
     }
 
     /// A reading for each firing of a checked plan, in the order of its indices.
@@ -207,7 +198,7 @@ impl Simulator {
         SimRecord {
             status: prediction.status,
             range_m: prediction.range_m,
-            amplitude: arrival.map(|arrival| arrival.amplitude),
+            amplitude: prediction.amplitude,
             margin_db: prediction.margin_db,
             path: arrival.map(|arrival| self.path_record(&arrival.path, arrival.length_m)),
         }
@@ -247,6 +238,10 @@ impl Simulator {
     #[must_use]
     pub const fn receiver(&self) -> &Receiver {
         &self.receiver
+    }
+
+    pub(super) fn engine(&self) -> &dyn Engine {
+        self.engine.as_ref()
     }
 
     /// The sensor.
@@ -301,63 +296,6 @@ impl Simulator {
     }
 }
 
-/// A place from which firings are predicted.
-pub struct Station<'a> {
-    simulator: &'a Simulator,
-    position: DVec2,
-    /// For a transducer on the axis, which stays where it is when it turns.
-    survey: Option<Box<dyn Survey + 'a>>,
-}
-
-impl Station<'_> {
-    /// The reading of a firing in a world direction, radians counter-clockwise from +x.
-    #[must_use]
-    pub fn ping(&self, direction_rad: f64) -> Prediction {
-        let own = self.survey_towards(direction_rad);
-        let survey = own.as_deref().or(self.survey.as_deref());
-        let mut sounds = Vec::new();
-        if let Some(survey) = survey {
-            survey.listen(direction_rad, &mut sounds);
-        }
-        let receiver = &self.simulator.receiver;
-        let detection = receiver.detect(&sounds);
-        let margin_db =
-            detection.sound.map(|sound| 20.0 * (sound.amplitude / receiver.threshold).log10());
-        Prediction {
-            status: detection.status,
-            range_m: detection.range_m,
-            arrival: survey
-                .zip(detection.sound)
-                .map(|(survey, sound)| survey.arrival(direction_rad, &sound)),
-            margin_db,
-            echoes_us: detection.echoes_us,
-        }
-    }
-
-    /// Every echo of a firing in a world direction, detected or not, shortest path first.
-    #[must_use]
-    pub fn arrivals(&self, direction_rad: f64) -> Vec<super::Arrival> {
-        let own = self.survey_towards(direction_rad);
-        let survey = own.as_deref().or(self.survey.as_deref());
-        survey.map_or_else(Vec::new, |survey| survey.arrivals(direction_rad))
-    }
-
-    /// From where the transducer is when it looks into a direction, if that depends on it.
-    fn survey_towards(&self, direction_rad: f64) -> Option<Box<dyn Survey + '_>> {
-        if self.survey.is_some() {
-            return None;
-        }
-        let [transmitter, receiver] =
-            self.simulator.sensor.mounting.places(self.position, direction_rad);
-        let engine = &self.simulator.engine;
-        Some(if transmitter == receiver {
-            engine.survey(transmitter)
-        } else {
-            engine.survey_pair(transmitter, receiver)
-        })
-    }
-}
-
 impl Options {
     fn check(&self) -> Result<(), ModelError> {
         let within = |option, value: f64, min: f64, max: f64, expected| {
@@ -383,6 +321,19 @@ impl Options {
     }
 }
 
+/// The sensor's receiver with the options applied. Only `paths` knows phases.
+fn receiver(sensor: &Sensor, air: &Air, options: &Options) -> Receiver {
+    let sensor = Sensor { response: options.response.unwrap_or(sensor.response), ..sensor.clone() };
+    let mut receiver = Receiver::new(&sensor, air.sound_speed_m_s())
+        .with_threshold(options.threshold.unwrap_or(sensor.threshold));
+    receiver.blanking_us = options.blanking_us.unwrap_or(sensor.blanking_us);
+    receiver.max_range_m = options.max_range_m.unwrap_or(sensor.max_range_m);
+    if options.ideal_receiver || options.engine != EngineKind::Paths {
+        receiver.combining = Combining::Ideal;
+    }
+    receiver
+}
+
 fn path_settings(
     sensor: &Sensor,
     air: &Air,
@@ -391,7 +342,7 @@ fn path_settings(
     scatter_height_rad: f64,
 ) -> paths::Settings {
     let wave_number_per_m = TAU * sensor.frequency_hz / receiver.sound_speed_m_s;
-    let law = match options.edge_law {
+    let law = match options.edge_law.or(sensor.edge_law) {
         None | Some(EdgeLawKind::Utd) => EdgeLaw::Utd,
         Some(EdgeLawKind::KucSiegel) => EdgeLaw::KucSiegel,
         Some(EdgeLawKind::BozmaKuc) => EdgeLaw::BozmaKuc {
@@ -413,7 +364,10 @@ fn path_settings(
 }
 
 fn absorption_db_per_m(sensor: &Sensor, air: &Air, options: &Options) -> f64 {
-    if options.lossless { 0.0 } else { air.absorption_db_per_m(sensor.frequency_hz) }
+    if options.lossless || sensor.gain.makes_up_for_air() {
+        return 0.0;
+    }
+    air.absorption_db_per_m(sensor.frequency_hz)
 }
 
 fn fan_settings(sensor: &Sensor, air: &Air, options: &Options, receiver: &Receiver) -> FanSettings {

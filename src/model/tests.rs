@@ -1,8 +1,11 @@
 //! The engines against closed forms, laws, and the phenomena of Dudek, Jenkin, Milios and Wilkes.
 
 mod closed_forms;
+mod extents;
+mod full_wave;
 mod laws;
 mod phenomena;
+mod ways;
 
 use std::sync::Arc;
 
@@ -20,6 +23,8 @@ const BARE: Options = Options {
     max_range_m: None,
     threshold: None,
     blanking_us: Some(0.0),
+    response: None,
+    ideal_receiver: true,
     lossless: true,
     max_order: None,
     edge_law: None,

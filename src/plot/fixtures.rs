@@ -81,7 +81,7 @@ pub(super) fn scan_of_room(pose: Pose, step_deg: f64, seed: u64) -> ScanView {
         let sim = predict(&pose, azimuth_deg);
         measure(scan, i, azimuth_deg, sim, &mut rng)
     });
-    let start = ScanStart { scan, time: jiff::Timestamp::UNIX_EPOCH, pose, plan };
+    let start = ScanStart { scan, time: jiff::Timestamp::UNIX_EPOCH, pose, plan, air: None };
     let end = ScanEnd {
         scan,
         time: jiff::Timestamp::UNIX_EPOCH,

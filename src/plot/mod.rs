@@ -5,10 +5,12 @@
 
 mod canvas;
 mod caption;
+mod features;
 mod floor;
 mod keys;
 mod labels;
 mod legend;
+mod map;
 mod materials;
 mod picture;
 mod plan;
@@ -18,10 +20,13 @@ mod region;
 mod residuals;
 mod scan;
 mod scene;
+mod side_by_side;
 mod strip;
 mod strips;
 mod theme;
 mod ticks;
+mod trace;
+mod way;
 mod words;
 
 #[cfg(test)]
@@ -29,8 +34,13 @@ mod fixtures;
 #[cfg(test)]
 mod tests;
 
+pub use features::draw_features;
+pub use map::draw_map;
 pub use picture::{MAX_WIDTH_PX, Picture, PlotError};
 pub use polar::draw_polar;
 pub use residuals::draw_residuals;
 pub use scan::{draw_scan, draw_scans};
 pub use scene::draw_scene;
+pub use side_by_side::draw_side_by_side;
+pub use trace::{TraceView, draw_trace};
+pub use way::{WayView, draw_way};

@@ -86,6 +86,7 @@ const fn kind(kind: EventKind) -> &'static str {
         EventKind::Fault => "fault",
         EventKind::Gap => "gap",
         EventKind::Stopped => "stopped",
+        EventKind::ClockStep => "clock step",
     }
 }
 

@@ -166,6 +166,20 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
         }
     }
 
+    /// Waits on a line without work until the device says something by itself; `None` when the
+    /// line was closed.
+    ///
+    /// Cancel-safe, as [`Self::finish`].
+    pub async fn idle(&mut self) -> Option<HostEvent> {
+        while !self.hung_up {
+            if let Some(event) = self.host.poll_event() {
+                return Some(event);
+            }
+            self.wait().await;
+        }
+        None
+    }
+
     /// The machine's next event.
     async fn next_event(&mut self) -> HostEvent {
         loop {

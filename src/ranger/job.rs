@@ -4,7 +4,7 @@ use firmware_protocol::messages::Settings;
 
 use crate::{
     geometry::Pose,
-    scan::{ScanPlan, SimRecord},
+    scan::{ScanAir, ScanPlan, SimRecord},
 };
 
 /// What is to be scanned, and what the model says about it.
@@ -18,6 +18,8 @@ pub struct ScanJob {
     pub settings: Settings,
     /// For ranges, metres a second.
     pub sound_speed_m_s: f64,
+    /// The air as it was known, if that is to stand with the scan.
+    pub air: Option<ScanAir>,
     /// When the receiver opens, microseconds after firing.
     pub blanking_us: f64,
     /// For each stop of the plan, what the model predicts; empty without a model.

@@ -3,14 +3,18 @@
 
 mod clock;
 mod driver;
+mod introduction;
 mod job;
 mod progress;
 mod scanner;
+mod settings;
 mod timing;
 
 pub use clock::{ClockFit, HostTime, TickExtender};
 pub use driver::{DriveError, Driver, Ended};
+pub use introduction::{device_record, provenance, serial_text};
 pub use job::ScanJob;
 pub use progress::Sink;
-pub use scanner::{Ranger, ScanError, ScanSummary};
+pub use scanner::{Ranger, ScanError, ScanSummary, Unasked};
+pub use settings::{Listening, Motion};
 pub use timing::limit_s;

@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// Where records go.
-pub trait Sink {
+pub trait Sink: Send {
     /// Takes a record in.
     ///
     /// # Errors
@@ -33,6 +33,13 @@ pub trait Sink {
 struct Span {
     first: u64,
     last: u64,
+}
+
+/// What there is to say about a scan that is over.
+pub(super) struct Finished {
+    pub(super) end: ScanEnd,
+    pub(super) restarts: u32,
+    pub(super) clock_drift: Option<f64>,
 }
 
 pub(super) struct Progress<'a> {
@@ -168,7 +175,7 @@ impl<'a> Progress<'a> {
         mut self,
         acoustic_limit_s: f64,
         home_drift_steps: Option<i32>,
-    ) -> Result<(ScanEnd, u32), StoreError> {
+    ) -> Result<Finished, StoreError> {
         if let Some(drift) = home_drift_steps.filter(|&drift| drift != 0) {
             let detail = format!(
                 "the index was found {drift} steps off after the scan: its azimuths are doubtful"
@@ -188,7 +195,7 @@ impl<'a> Progress<'a> {
         };
         self.write(&Record::ScanEnd(end.clone()));
         self.check_sink()?;
-        Ok((end, self.restarts))
+        Ok(Finished { end, restarts: self.restarts, clock_drift: self.clock.drift() })
     }
 
     fn reading(&mut self, reading: &Reading, repaired: bool) {

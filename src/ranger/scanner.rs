@@ -2,9 +2,9 @@
 
 use firmware_protocol::{
     host::{Command, HostError, HostEvent, LinkStats, Outcome},
-    messages::{Capabilities, Identity, Settings, Sweep},
+    messages::{Capabilities, FaultKind, Identity, Settings, Sweep},
 };
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use std::ops::ControlFlow;
 use thiserror::Error;
 use tokio::io::{AsyncRead, AsyncWrite};
@@ -13,7 +13,7 @@ use uuid::Uuid;
 use super::{
     driver::{DriveError, Driver, Ended},
     job::ScanJob,
-    progress::{Progress, Sink},
+    progress::{Finished, Progress, Sink},
     timing,
 };
 use crate::{
@@ -35,6 +35,8 @@ pub struct ScanSummary {
     pub stopped: bool,
     /// Restarts of the device that it survived.
     pub restarts: u32,
+    /// Relative deviation of the device's clock from its nominal rate; `None` until known.
+    pub clock_drift: Option<f64>,
 }
 
 /// Why a scan ended early. Its records up to there are written, `scan_end` included.
@@ -60,16 +62,80 @@ pub struct Ranger<L> {
     wall_epoch: Timestamp,
 }
 
+/// What happened on a line without work.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unasked {
+    /// The line was closed.
+    Hangup,
+    /// The device restarted: identify it anew.
+    Restarted,
+    /// The device reported a fault.
+    Fault(FaultKind),
+}
+
 impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
     /// Meets the device on a line.
     ///
     /// # Errors
     /// When nothing or something else answers.
     pub async fn meet(mut driver: Driver<L>) -> Result<Self, DriveError> {
-        let since_us = i64::try_from(driver.now_us()).unwrap_or(0);
-        let wall_epoch = Timestamp::now() - jiff::SignedDuration::from_micros(since_us);
+        let wall_epoch = wall_epoch(Timestamp::now(), driver.now_us());
         let identity = identify(&mut driver).await?;
         Ok(Self { driver, identity, wall_epoch })
+    }
+
+    /// Asks the device again who it is, after it restarted.
+    ///
+    /// # Errors
+    /// When nothing or something else answers.
+    pub async fn meet_again(&mut self) -> Result<(), DriveError> {
+        self.identity = identify(&mut self.driver).await?;
+        Ok(())
+    }
+
+    /// Sets the device up and finds home; returns by how much the index was off, steps. A sweep
+    /// that an earlier program left behind is stopped first: it would go on for as long as
+    /// anybody talks to the device.
+    ///
+    /// # Errors
+    /// The device's and the line's.
+    pub async fn home(&mut self, settings: Settings) -> Result<i32, DriveError> {
+        self.stop().await?;
+        self.driver.perform(Command::Configure(settings), ignore).await?;
+        match self.driver.perform(Command::Home, ignore).await? {
+            Ended::Done(Outcome::Homed { drift_steps }) => Ok(drift_steps),
+            _ => Ok(0),
+        }
+    }
+
+    /// Asks a device without work how it is.
+    ///
+    /// # Errors
+    /// When it does not answer any more.
+    pub async fn check(&mut self) -> Result<(), DriveError> {
+        self.driver.perform(Command::Status, ignore).await.map(drop)
+    }
+
+    /// Waits until the line is closed or the device says something by itself. Cancel-safe.
+    pub async fn unasked(&mut self) -> Unasked {
+        loop {
+            match self.driver.idle().await {
+                None => return Unasked::Hangup,
+                Some(HostEvent::Rebooted { .. }) => return Unasked::Restarted,
+                Some(HostEvent::Fault(kind)) => return Unasked::Fault(kind),
+                Some(_) => {}
+            }
+        }
+    }
+
+    /// Takes the computer's wall clock anew, and returns by how much it was set meanwhile (or
+    /// drifted away from the clock that never jumps). Called between scans, so that within a scan
+    /// times are consistent.
+    pub fn reanchor(&mut self) -> SignedDuration {
+        let epoch = wall_epoch(Timestamp::now(), self.driver.now_us());
+        let step = epoch.duration_since(self.wall_epoch);
+        self.wall_epoch = epoch;
+        step
     }
 
     /// What the device said of itself.
@@ -86,7 +152,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
     ///
     /// Goes home first and, if there is an index sensor, afterwards. A device that restarts
     /// meanwhile is homed and goes on with what is left. When `stop` is ready, the motor is
-    /// stopped and the scan closed.
+    /// stopped and the scan closed, with the words of `stop` as an event.
     ///
     /// # Errors
     /// The device's, the line's and the log's; what was measured is written all the same.
@@ -94,7 +160,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         &mut self,
         job: &ScanJob,
         sink: &mut dyn Sink,
-        stop: impl Future<Output = ()>,
+        stop: impl Future<Output = String>,
     ) -> Result<ScanSummary, ScanError> {
         tokio::pin!(stop);
         job.plan.check()?;
@@ -102,7 +168,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         let motor = job.plan.motor_steps(steps_per_revolution)?;
         let scan = Uuid::new_v4();
         let time = Timestamp::now();
-        let start = ScanStart { scan, time, pose: job.pose, plan: job.plan };
+        let start = ScanStart { scan, time, pose: job.pose, plan: job.plan, air: job.air };
         sink.record(&Record::ScanStart(start))?;
         let mut progress = Progress::new(job, scan, motor, self.wall_epoch, &self.identity, sink);
         let outcome = self.measure(job, motor, &mut progress, stop).await;
@@ -115,8 +181,8 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
             _ => None,
         };
         let summary = progress.finish(timing::limit_s(&job.plan, &job.settings, motor.1), drift);
-        let (end, restarts) = summary?;
-        outcome.map(|_| ScanSummary { end, stopped, restarts })
+        let Finished { end, restarts, clock_drift } = summary?;
+        outcome.map(|_| ScanSummary { end, stopped, restarts, clock_drift })
     }
 
     /// Sweeps until nothing is left of the plan.
@@ -125,27 +191,27 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         job: &ScanJob,
         motor: (i32, i32),
         progress: &mut Progress<'_>,
-        mut stop: std::pin::Pin<&mut impl Future<Output = ()>>,
+        mut stop: std::pin::Pin<&mut impl Future<Output = String>>,
     ) -> Result<Stopped, ScanError> {
         let mut fruitless = 0;
         loop {
             let before = progress.measured();
             let outcome = tokio::select! {
                 biased;
-                () = &mut stop => None,
-                outcome = self.sweep_rest(job, motor, progress) => Some(outcome),
+                why = &mut stop => Err(why),
+                outcome = self.sweep_rest(job, motor, progress) => Ok(outcome),
             };
             match outcome {
-                None => {
+                Err(why) => {
                     self.halt(progress).await?;
-                    progress.note(EventKind::Stopped, "stopped on request".into());
+                    progress.note(EventKind::Stopped, why);
                     return Ok(Stopped(true));
                 }
-                Some(Err(ScanError::Device(DriveError::Abandoned))) => {
+                Ok(Err(ScanError::Device(DriveError::Abandoned))) => {
                     self.halt(progress).await?;
                     return progress.check_sink().map(|()| Stopped(true)).map_err(ScanError::Store);
                 }
-                Some(Err(ScanError::Device(DriveError::Host(HostError::Rebooted)))) => {
+                Ok(Err(ScanError::Device(DriveError::Host(HostError::Rebooted)))) => {
                     fruitless = if progress.measured() > before { 0 } else { fruitless + 1 };
                     if fruitless >= FRUITLESS_RESTARTS {
                         return Err(DriveError::Host(HostError::Rebooted).into());
@@ -153,7 +219,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
                     self.identity = identify(&mut self.driver).await?;
                     progress.restarted(&self.identity);
                 }
-                Some(done) => {
+                Ok(done) => {
                     done?;
                     progress.check_sink()?;
                     return Ok(Stopped(false));
@@ -182,12 +248,27 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         Ok(())
     }
 
-    /// Brings the motor to a stand, and takes in what was measured until then.
+    /// Brings the motor to a stand, whatever is under way.
+    ///
+    /// # Errors
+    /// The device's and the line's.
+    pub async fn stop(&mut self) -> Result<(), DriveError> {
+        self.bring_to_stand(ignore).await
+    }
+
+    /// The same, and takes in what was measured until then.
     async fn halt(&mut self, progress: &mut Progress<'_>) -> Result<(), DriveError> {
+        self.bring_to_stand(|event| progress.handle(event)).await
+    }
+
+    async fn bring_to_stand(
+        &mut self,
+        mut on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
+    ) -> Result<(), DriveError> {
         self.driver.start(Command::Stop)?;
         loop {
             // The end of what was stopped may come first.
-            match self.driver.finish(|event| progress.handle(event)).await {
+            match self.driver.finish(&mut on_event).await {
                 Ok(Ended::Done(Outcome::Stopped)) => return Ok(()),
                 Ok(_) | Err(DriveError::Host(HostError::Stopped) | DriveError::Abandoned) => {}
                 Err(error) => return Err(error),
@@ -221,6 +302,12 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
 
 struct Stopped(bool);
 
+/// The wall clock when the driver's clock began, from both read now.
+fn wall_epoch(wall: Timestamp, driver_us: u64) -> Timestamp {
+    let since = SignedDuration::from_micros(i64::try_from(driver_us).unwrap_or(0));
+    wall.checked_sub(since).unwrap_or(wall)
+}
+
 async fn identify<L: AsyncRead + AsyncWrite + Unpin>(
     driver: &mut Driver<L>,
 ) -> Result<Identity, DriveError> {
@@ -245,5 +332,26 @@ fn sweep_of(segment: &Segment, from_step: i32, stride: i32, settings: &Settings)
         stops: u16::try_from(segment.stops).unwrap_or(u16::MAX),
         pings_per_stop: u8::try_from(segment.pings).unwrap_or(u8::MAX),
         lease_ms: timing::lease_ms(settings),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_that_is_set_moves_the_epoch_by_just_that() {
+        let start: Timestamp = "2026-03-01T10:00:00Z".parse().expect("a time");
+        let at = |since_us: i64, set_s: i64| {
+            let wall =
+                start + SignedDuration::from_micros(since_us) + SignedDuration::from_secs(set_s);
+            wall_epoch(wall, u64::try_from(since_us).expect("after the start"))
+        };
+        assert_eq!(at(0, 0), start);
+        assert_eq!(at(90_000_000, 0), start, "time that passes is no step");
+        let set = at(100_000_000, 3600).duration_since(at(90_000_000, 0));
+        assert_eq!(set, SignedDuration::from_secs(3600));
+        let set_back = at(100_000_000, -5).duration_since(start);
+        assert_eq!(set_back, SignedDuration::from_secs(-5));
     }
 }

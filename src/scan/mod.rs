@@ -4,13 +4,15 @@ mod codec;
 mod plan;
 mod record;
 mod remaining;
+mod simulated;
 mod view;
 
 pub use codec::{EncodeError, FaultKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};
 pub use plan::{PlanError, ScanPlan};
 pub use record::{
-    AirRecord, Device, Event, EventKind, LOG_FORMAT, ModelRecord, PathKind, PathRecord, Ping,
-    PingStatus, Provenance, Record, ScanEnd, ScanStart, SceneRef, Session, SimRecord,
+    AirRecord, AirSource, Device, Event, EventKind, LOG_FORMAT, ModelRecord, PathKind, PathRecord,
+    Ping, PingStatus, Provenance, Record, ScanAir, ScanEnd, ScanStart, SceneRef, Session,
+    SimRecord,
 };
 pub use remaining::Segment;
 pub use view::ScanView;

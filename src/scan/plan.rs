@@ -1,5 +1,6 @@
 //! What a scan is to measure.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -8,7 +9,7 @@ use crate::geometry::wrap_360;
 /// Azimuths of a scan: from `from_deg` up to, but not including, `to_deg`, every `step_deg`.
 ///
 /// `to_deg` itself is left out so that a full turn has no beam twice.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanPlan {
     /// First azimuth, degrees.
     pub from_deg: f64,

@@ -1,6 +1,7 @@
 //! The log's records: one JSON object a line. These names are the project's public interface.
 
 use jiff::Timestamp;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
@@ -10,7 +11,7 @@ use crate::{acoustics::Sensor, geometry::Pose, scan::ScanPlan};
 pub const LOG_FORMAT: u32 = 1;
 
 /// One line of a log.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum Record {
     /// What is true for everything until the next session.
@@ -26,7 +27,7 @@ pub enum Record {
 }
 
 /// Where the readings of a session come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Provenance {
     /// A real ranger.
@@ -44,7 +45,7 @@ pub enum Provenance {
 }
 
 /// Opens a log, and again after each reconnection to a different device.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Session {
     /// Record format, [`LOG_FORMAT`].
     pub format: u32,
@@ -67,7 +68,7 @@ pub struct Session {
 }
 
 /// Identity of a ranger.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Device {
     /// Serial number stored on the board.
     pub serial: String,
@@ -84,7 +85,7 @@ pub struct Device {
 }
 
 /// Air conditions and the speed of sound that follows from them.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AirRecord {
     /// Temperature, degrees Celsius.
     pub temperature_c: f64,
@@ -97,7 +98,7 @@ pub struct AirRecord {
 }
 
 /// Which scene file the model used.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct SceneRef {
     /// The scene's own name.
     pub name: String,
@@ -106,7 +107,7 @@ pub struct SceneRef {
 }
 
 /// Which engine predicted, and with what settings.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ModelRecord {
     /// Engine: `paths`, `fan` or `cone`.
     pub engine: String,
@@ -116,7 +117,7 @@ pub struct ModelRecord {
 }
 
 /// A scan begins.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanStart {
     /// Identifies the scan in all its records.
     pub scan: Uuid,
@@ -126,10 +127,38 @@ pub struct ScanStart {
     pub pose: Pose,
     /// What is to be measured.
     pub plan: ScanPlan,
+    /// The air as it was known then; the session's if it is not here.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub air: Option<ScanAir>,
+}
+
+/// The air of a scan, as it was known when it began.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ScanAir {
+    /// Temperature, degrees Celsius.
+    pub temperature_c: f64,
+    /// Speed of sound that ranges were computed with, metres a second.
+    pub sound_speed_m_s: f64,
+    /// Who gave the temperature.
+    pub source: AirSource,
+    /// How old it was, seconds; `null` for a fixed one.
+    pub age_s: Option<f64>,
+}
+
+/// Who gave a temperature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AirSource {
+    /// The configuration.
+    Configuration,
+    /// A thermometer's file.
+    File,
+    /// A program, through the API.
+    Api,
 }
 
 /// What became of one firing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PingStatus {
     /// An echo passed the threshold after blanking.
@@ -155,7 +184,7 @@ impl PingStatus {
 }
 
 /// One reading, measured or simulated, and beside a measured one what the model predicts.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Ping {
     /// The scan it belongs to.
     pub scan: Uuid,
@@ -199,7 +228,7 @@ pub struct Ping {
 }
 
 /// A prediction.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SimRecord {
     /// What the model says becomes of the firing.
     pub status: PingStatus,
@@ -215,7 +244,9 @@ pub struct SimRecord {
 }
 
 /// How the sound got back.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum PathKind {
     /// Mirror reflections only.
@@ -227,7 +258,7 @@ pub enum PathKind {
 }
 
 /// The path of an echo.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PathRecord {
     /// How the sound got back.
     pub kind: PathKind,
@@ -242,8 +273,21 @@ pub struct PathRecord {
     pub length_m: f64,
 }
 
+impl PathRecord {
+    /// The walls in order; for a bent path the edge in front.
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let walls = self.walls.join(", ");
+        match &self.edge {
+            Some(edge) if walls.is_empty() => format!("edge {edge}"),
+            Some(edge) => format!("edge {edge} by {walls}"),
+            None => walls,
+        }
+    }
+}
+
 /// A scan is over.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanEnd {
     /// The scan.
     pub scan: Uuid,
@@ -269,7 +313,7 @@ pub struct ScanEnd {
 }
 
 /// Something happened that a reader of the data must know.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Event {
     /// Wall clock.
     pub time: Timestamp,
@@ -280,7 +324,7 @@ pub struct Event {
 }
 
 /// Kinds of events.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum EventKind {
     /// The device stopped answering or the line hung up.
@@ -295,4 +339,6 @@ pub enum EventKind {
     Gap,
     /// Stopped on request.
     Stopped,
+    /// The computer's wall clock was set.
+    ClockStep,
 }

@@ -119,6 +119,7 @@ mod tests {
             time: jiff::Timestamp::UNIX_EPOCH,
             pose: Pose { x_m: 1.0, y_m: 2.0, heading_deg: 0.0 },
             plan: ScanPlan::default(),
+            air: None,
         })
     }
 

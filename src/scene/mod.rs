@@ -18,7 +18,7 @@ pub mod shipped;
 mod tests;
 
 pub use error::{SceneError, SceneProblem, suggest};
-pub use pose::PoseError;
+pub use pose::{PoseError, parse_pose};
 pub use robot::{Robot, RobotShape};
 pub use schema::json_schema;
 

@@ -133,6 +133,24 @@ fn extent(low: &[f64; 2], high: &[f64; 2]) -> String {
     format!("the room spans x {} to {} m and y {} to {} m", low[0], high[0], low[1], high[1])
 }
 
+/// The pose written `X,Y,DEG` or `X,Y`, metres and degrees.
+///
+/// # Errors
+/// Numbers that make no pose.
+pub fn parse_pose(spec: &str) -> Result<Pose, PoseError> {
+    let parts: Vec<&str> = spec.split(',').map(str::trim).collect();
+    let (x, y, heading) = match parts[..] {
+        [x, y] => (x, y, "0"),
+        [x, y, heading] => (x, y, heading),
+        _ => return Err(PoseError::Malformed(spec.to_owned())),
+    };
+    Ok(Pose {
+        x_m: number("X", x, MAX_COORDINATE_M)?,
+        y_m: number("Y", y, MAX_COORDINATE_M)?,
+        heading_deg: number("DEG", heading, MAX_HEADING_DEG)?,
+    })
+}
+
 impl Scene {
     /// The pose meant by `X,Y,DEG`, `X,Y`, or the name of a pose of this scene. Whether a
     /// ranger can stand there is for [`Scene::check_pose`] to say.
@@ -150,17 +168,7 @@ impl Scene {
                 known: self.poses.keys().cloned().collect(),
             });
         }
-        let parts: Vec<&str> = spec.split(',').map(str::trim).collect();
-        let (x, y, heading) = match parts[..] {
-            [x, y] => (x, y, "0"),
-            [x, y, heading] => (x, y, heading),
-            _ => return Err(PoseError::Malformed(spec.to_owned())),
-        };
-        Ok(Pose {
-            x_m: number("X", x, MAX_COORDINATE_M)?,
-            y_m: number("Y", y, MAX_COORDINATE_M)?,
-            heading_deg: number("DEG", heading, MAX_HEADING_DEG)?,
-        })
+        parse_pose(spec)
     }
 
     /// Whether a ranger can stand at a pose: inside the room (if the walls close one round

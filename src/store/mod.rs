@@ -7,6 +7,7 @@
 
 mod check;
 mod error;
+mod folder;
 mod medium;
 mod open;
 mod reader;
@@ -15,6 +16,7 @@ mod writer;
 
 pub use check::{Checker, Finding, FindingKind, Severity, Totals, check};
 pub use error::StoreError;
+pub use folder::{LogFile, LogFolder, Rotation, log_files};
 pub use medium::{FileMedium, Medium, Pipe};
 pub use open::{Recovered, is_being_written};
 pub(crate) use reader::open_for_reading;

@@ -2,6 +2,7 @@
 
 mod checking;
 mod faults;
+mod folder;
 mod reading;
 mod repairing;
 

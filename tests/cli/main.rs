@@ -2,11 +2,15 @@
 #![cfg(feature = "daemon")]
 
 mod common;
+mod daemon;
+mod doctor;
 mod faults;
 mod hangup;
+mod interpret;
 mod log;
 mod paths;
 mod plot;
 mod scan;
 mod scene;
+mod trace;
 mod wrong_input;

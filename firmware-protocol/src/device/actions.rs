@@ -31,6 +31,7 @@ impl Pending {
 }
 
 impl Device {
+    #[inline(never)]
     pub(super) fn next_action(&mut self) -> Option<Action> {
         if self.pending.take(Pending::ABORT_FIRE) {
             return Some(Action::AbortFire);

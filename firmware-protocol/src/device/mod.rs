@@ -20,15 +20,17 @@ mod board;
 mod requests;
 mod ring;
 mod run;
+mod search;
 mod settings;
 mod timers;
 mod transmit;
 
 pub use board::{Action, Board, EchoReport, HomeError};
+pub use search::{IndexSearch, within_half_a_turn};
 pub use timers::DeviceTimer;
 
-use crate::frame::{FrameDecoder, LinkCounters, RawFrame, Received};
-use crate::messages::{FaultKind, NakReason, Request, Settings, Sweep, SweepState};
+use crate::frame::{FrameDecoder, LinkCounters, RawFrame, Received, count};
+use crate::messages::{FaultKind, NakReason, Request, Settings, Sweep, SweepState, Wire as _};
 use actions::Pending;
 use ring::Ring;
 use timers::Timers;
@@ -162,11 +164,12 @@ impl Device {
         }
         match self.decoder.push(byte) {
             Received::Nothing => {}
-            Received::Empty => self.counters.empty = self.counters.empty.saturating_add(1),
+            Received::Empty => count(&mut self.counters.empty),
             Received::Dropped(reason) => self.counters.count(reason),
             Received::Frame(RawFrame { header, body, crc, .. }) => {
-                let request = Request::decode(body).ok();
-                self.handle_frame(header, crc, request);
+                let mut request = Request::BLANK;
+                let known = request.read_exactly(body);
+                self.handle_frame(header, crc, known.then_some(&request));
             }
         }
     }
@@ -249,7 +252,18 @@ impl Device {
 
     /// Copies the next bytes for the host into `buffer`; 0 if there are none.
     pub fn poll_transmit(&mut self, buffer: &mut [u8]) -> usize {
-        self.transmit(buffer)
+        let mut written = 0;
+        while let Some(slot) = buffer.get_mut(written) {
+            let Some(byte) = self.poll_byte() else { break };
+            *slot = byte;
+            written = written.wrapping_add(1);
+        }
+        written
+    }
+
+    /// The next byte for the host, for a board that sends them one by one.
+    pub fn poll_byte(&mut self) -> Option<u8> {
+        self.next_byte()
     }
 
     /// What was dropped since boot.

@@ -3,7 +3,7 @@
 use super::actions::Pending;
 use super::settings::{check_plan, check_settings, check_step};
 use super::{Accepted, Answer, Beam, Device, Phase, Run};
-use crate::frame::Header;
+use crate::frame::{Header, count};
 use crate::messages::{NakReason, Request, Settings, Sweep, SweepState};
 
 /// What became of a request: an answer at once, or one that follows when it is done.
@@ -16,9 +16,9 @@ enum Outcome {
 
 impl Device {
     /// A frame with a right CRC came in; `request` is `None` if its body is no request.
-    pub(super) fn handle_frame(&mut self, header: Header, crc: u32, request: Option<Request>) {
+    pub(super) fn handle_frame(&mut self, header: Header, crc: u32, request: Option<&Request>) {
         let Some(request) = request else {
-            self.counters.undecodable = self.counters.undecodable.saturating_add(1);
+            count(&mut self.counters.undecodable);
             self.outbox.answer(header.seq, Answer::Nak(NakReason::UnknownRequest));
             return;
         };
@@ -30,10 +30,10 @@ impl Device {
             Request::Identify => self.outbox.answer(header.seq, Answer::Identity),
             Request::Stop if !addressed => self.stop_for_stranger(header.seq),
             _ if !addressed => {
-                self.counters.stale = self.counters.stale.saturating_add(1);
+                count(&mut self.counters.stale);
                 self.outbox.answer(header.seq, Answer::Nak(NakReason::WrongBoot));
             }
-            _ => self.handle_numbered(header.seq, crc, &request),
+            _ => self.handle_numbered(header.seq, crc, request),
         }
     }
 
@@ -48,7 +48,7 @@ impl Device {
             }
             0 => self.repeat(last, request),
             1..0x8000 => self.accept(seq, crc, request),
-            _ => self.counters.stale = self.counters.stale.saturating_add(1),
+            _ => count(&mut self.counters.stale),
         }
     }
 
@@ -84,17 +84,17 @@ impl Device {
     }
 
     fn perform(&mut self, seq: u16, request: &Request) -> Result<Outcome, NakReason> {
-        match *request {
+        match request {
             Request::Identify => Ok(Outcome::Told(Answer::Identity)),
             Request::Stop => Ok(self.stop(seq)),
             Request::Reset => Ok(self.reset()),
-            Request::Resend { sweep, first, count } => Ok(self.resend(sweep, first, count)),
-            Request::KeepAlive { sweep, next } => Ok(self.keep_alive(sweep, next)),
+            &Request::Resend { sweep, first, count } => Ok(self.resend(sweep, first, count)),
+            &Request::KeepAlive { sweep, next } => Ok(self.keep_alive(sweep, next)),
             Request::Status => Ok(Outcome::Told(Answer::Status { ticks: self.now })),
             _ if self.phase != Phase::Idle => Err(NakReason::Busy),
             Request::Configure(settings) => self.configure(settings),
             Request::Home => self.home(seq),
-            Request::MoveTo { step } => self.move_to(seq, step),
+            &Request::MoveTo { step } => self.move_to(seq, step),
             Request::Ping => self.ping(seq),
             Request::Sweep(plan) => self.sweep(seq, plan),
         }
@@ -148,9 +148,9 @@ impl Device {
         Outcome::Told(Answer::Alive { ticks: self.now })
     }
 
-    fn configure(&mut self, settings: Settings) -> Result<Outcome, NakReason> {
-        check_settings(&settings, self.board.capabilities)?;
-        self.settings = Some(settings);
+    fn configure(&mut self, settings: &Settings) -> Result<Outcome, NakReason> {
+        check_settings(settings, self.board.capabilities)?;
+        self.settings = Some(*settings);
         self.rest();
         Ok(Outcome::Done(Answer::Ack))
     }
@@ -181,11 +181,11 @@ impl Device {
         Ok(Outcome::Running)
     }
 
-    fn sweep(&mut self, seq: u16, plan: Sweep) -> Result<Outcome, NakReason> {
+    fn sweep(&mut self, seq: u16, plan: &Sweep) -> Result<Outcome, NakReason> {
         self.configured()?;
-        let beams = check_plan(&plan)?;
+        let beams = check_plan(plan)?;
         self.at_home()?;
-        self.begin_run(Run::sweep(seq, plan, beams));
+        self.begin_run(Run::sweep(seq, *plan, beams));
         Ok(Outcome::Done(Answer::Ack))
     }
 

@@ -4,19 +4,22 @@
 //! bytes an echo. Sweep, index and step follow from the plan.
 
 use crate::messages::limits::{MAX_ECHOES, RING_BYTES, kept_bytes};
-use crate::messages::{Echoes, ReadingStatus};
+use crate::messages::{ReadingStatus, Wire as _, Writer};
 
 /// Offsets are `u8` and wrap by themselves, so they always lie inside.
 const CAPACITY: usize = RING_BYTES as usize;
 const _: () = assert!(CAPACITY == 1 << u8::BITS);
 
-/// A reading without what follows from the plan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Kept {
-    pub(super) fired_ticks: u32,
-    pub(super) status: ReadingStatus,
-    pub(super) echoes: Echoes,
+/// A reading in the ring, where it is. What follows from the plan is not kept.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Kept<'a> {
+    ring: &'a Ring,
+    at: u8,
 }
+
+/// Its echoes, written as [`Echoes`] are.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct KeptEchoes<'a>(Kept<'a>);
 
 #[derive(Debug, Clone)]
 pub(super) struct Ring {
@@ -52,20 +55,15 @@ impl Ring {
     }
 
     /// Keeps a reading; the caller has made sure of the room.
-    pub(super) fn push(&mut self, kept: &Kept) {
+    pub(super) fn push(&mut self, fired_ticks: u32, status: ReadingStatus, echoes: &[u32]) {
         let mut cursor = self.oldest.wrapping_add(low_byte(self.used));
-        for byte in kept.fired_ticks.to_le_bytes() {
-            self.put(&mut cursor, byte);
+        self.put(&mut cursor, fired_ticks, 4);
+        let echo_count = low_byte_of_len(echoes.len());
+        self.put(&mut cursor, pack(status, echo_count).into(), 1);
+        for ticks in echoes {
+            self.put(&mut cursor, *ticks, 3);
         }
-        let echo_count = low_byte_of_len(kept.echoes.len());
-        self.put(&mut cursor, pack(kept.status, echo_count));
-        for ticks in kept.echoes.iter() {
-            let [low, middle, high, _] = ticks.to_le_bytes();
-            for byte in [low, middle, high] {
-                self.put(&mut cursor, byte);
-            }
-        }
-        self.used = self.used.saturating_add(kept_bytes(echo_count));
+        self.used = self.used.wrapping_add(kept_bytes(echo_count));
         self.count = self.count.wrapping_add(1);
     }
 
@@ -74,36 +72,20 @@ impl Ring {
         while self.count > 0 && self.first < next {
             let size = kept_bytes(self.echo_count_at(self.oldest));
             self.oldest = self.oldest.wrapping_add(low_byte(size));
-            self.used = self.used.saturating_sub(size);
+            self.used = self.used.wrapping_sub(size);
             self.first = self.first.wrapping_add(1);
             self.count = self.count.wrapping_sub(1);
         }
     }
 
     /// The reading of beam `index`, if it is kept.
-    pub(super) fn get(&self, index: u16) -> Option<Kept> {
+    pub(super) fn get(&self, index: u16) -> Option<Kept<'_>> {
         let behind = index.checked_sub(self.first).filter(|&behind| behind < self.count)?;
-        let mut cursor = self.oldest;
+        let mut at = self.oldest;
         for _ in 0..behind {
-            cursor = cursor.wrapping_add(low_byte(kept_bytes(self.echo_count_at(cursor))));
+            at = at.wrapping_add(low_byte(kept_bytes(self.echo_count_at(at))));
         }
-        Some(self.read(cursor))
-    }
-
-    fn read(&self, mut cursor: u8) -> Kept {
-        let mut next = || {
-            let byte = self.at(cursor);
-            cursor = cursor.wrapping_add(1);
-            byte
-        };
-        let fired_ticks = u32::from_le_bytes([next(), next(), next(), next()]);
-        let (status, echo_count) = unpack(next());
-        let mut echoes = Echoes::new();
-        for _ in 0..echo_count {
-            // Fits: it came out of such a list.
-            let _ = echoes.push(u32::from_le_bytes([next(), next(), next(), 0]));
-        }
-        Kept { fired_ticks, status, echoes }
+        Some(Kept { ring: self, at })
     }
 
     fn echo_count_at(&self, start: u8) -> u8 {
@@ -114,9 +96,50 @@ impl Ring {
         self.bytes[usize::from(offset)]
     }
 
-    fn put(&mut self, cursor: &mut u8, byte: u8) {
-        self.bytes[usize::from(*cursor)] = byte;
-        *cursor = cursor.wrapping_add(1);
+    /// Three bytes, lowest first.
+    fn three_at(&self, offset: u8) -> u32 {
+        let byte = |behind| self.at(offset.wrapping_add(behind));
+        u32::from_le_bytes([byte(0), byte(1), byte(2), 0])
+    }
+
+    /// The lowest bytes of `value`, lowest first.
+    #[inline(never)]
+    fn put(&mut self, cursor: &mut u8, mut value: u32, bytes: u8) {
+        for _ in 0..bytes {
+            let [low, ..] = value.to_le_bytes();
+            self.bytes[usize::from(*cursor)] = low;
+            *cursor = cursor.wrapping_add(1);
+            value >>= 8;
+        }
+    }
+}
+
+impl<'a> Kept<'a> {
+    /// Ticks at firing.
+    pub(super) fn fired_ticks(self) -> u32 {
+        let top = self.ring.at(self.at.wrapping_add(3));
+        self.ring.three_at(self.at) | u32::from(top) << 24
+    }
+
+    pub(super) fn status(self) -> ReadingStatus {
+        unpack(self.ring.at(self.at.wrapping_add(4))).0
+    }
+
+    pub(super) const fn echoes(self) -> KeptEchoes<'a> {
+        KeptEchoes(self)
+    }
+}
+
+impl KeptEchoes<'_> {
+    pub(super) fn put(self, out: &mut Writer<'_>) {
+        let Self(Kept { ring, at }) = self;
+        let echo_count = ring.echo_count_at(at);
+        out.byte(echo_count);
+        let mut cursor = at.wrapping_add(5);
+        for _ in 0..echo_count {
+            ring.three_at(cursor).put(out);
+            cursor = cursor.wrapping_add(3);
+        }
     }
 }
 
@@ -157,13 +180,32 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{Kept, Ring};
-    use crate::messages::limits::{MAX_ECHOES, readings_in};
-    use crate::messages::{Echoes, ReadingStatus};
+    use crate::messages::limits::{MAX_ECHOES, WINDOW_TICKS_MAX, readings_in};
+    use crate::messages::{Echoes, ReadingStatus, Wire as _, Writer};
 
-    fn kept(fired_ticks: u32, echo_count: u8) -> Kept {
-        let ticks: Vec<u32> =
-            (0..u32::from(echo_count)).map(|echo| fired_ticks / 7 % 1_000 + echo).collect();
-        Kept { fired_ticks, status: ReadingStatus::Echo, echoes: Echoes::from_ticks(&ticks) }
+    /// Ticks at firing, status, and the bytes of the echoes.
+    type Told = (u32, ReadingStatus, Vec<u8>);
+
+    fn written(put: impl FnOnce(&mut Writer<'_>)) -> Vec<u8> {
+        let mut bytes = [0; 64];
+        let mut out = Writer::new(&mut bytes);
+        put(&mut out);
+        let len = out.finish().expect("fits");
+        bytes[..usize::from(len)].to_vec()
+    }
+
+    /// What was kept is what a list of the same echoes says.
+    fn told(kept: Kept<'_>) -> Told {
+        (kept.fired_ticks(), kept.status(), written(|out| kept.echoes().put(out)))
+    }
+
+    /// Keeps a reading made of `number`, and tells what it must read as.
+    fn push(ring: &mut Ring, number: u32, echo_count: u8) -> Told {
+        let first = number / 7 % (WINDOW_TICKS_MAX - 8);
+        let ticks: Vec<u32> = (first..).take(echo_count.into()).collect();
+        let status = [ReadingStatus::Echo, ReadingStatus::StepDoubtful][(number % 2) as usize];
+        ring.push(number, status, &ticks);
+        (number, status, written(|out| Echoes::from_ticks(&ticks).put(out)))
     }
 
     proptest! {
@@ -175,11 +217,10 @@ mod tests {
             let mut ring = Ring::new();
             let mut queue = VecDeque::new();
             let mut first = 0_u16;
-            for (push, number, echo_count) in operations {
-                if push && ring.has_room(echo_count) {
-                    ring.push(&kept(number, echo_count));
-                    queue.push_back(kept(number, echo_count));
-                } else if !push {
+            for (keep, number, echo_count) in operations {
+                if keep && ring.has_room(echo_count) {
+                    queue.push_back(push(&mut ring, number, echo_count));
+                } else if !keep {
                     let next = first + u16::try_from(number % 4).expect("small");
                     ring.acknowledge(next);
                     while first < next && queue.pop_front().is_some() {
@@ -188,10 +229,10 @@ mod tests {
                 }
                 prop_assert_eq!(ring.first(), first);
                 for (index, expected) in (first..).zip(&queue) {
-                    prop_assert_eq!(ring.get(index), Some(*expected));
+                    prop_assert_eq!(ring.get(index).map(told), Some(expected.clone()));
                 }
                 let end = first + u16::try_from(queue.len()).expect("small");
-                prop_assert_eq!(ring.get(end), None);
+                prop_assert!(ring.get(end).is_none());
             }
         }
     }
@@ -202,7 +243,7 @@ mod tests {
             let mut ring = Ring::new();
             let mut count = 0;
             while ring.has_room(echo_count) {
-                ring.push(&kept(count, echo_count));
+                push(&mut ring, count, echo_count);
                 count += 1;
             }
             assert_eq!(count, u32::from(readings_in(256, echo_count)));

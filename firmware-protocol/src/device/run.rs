@@ -1,7 +1,6 @@
 //! Moving, firing, listening: the course of moves, pings and sweeps.
 
 use super::actions::Pending;
-use super::ring::Kept;
 use super::timers::ticks_until;
 use super::{Answer, Beam, Device, EchoReport, HomeError, Phase, Run};
 use crate::messages::limits::TICK_HZ;
@@ -100,8 +99,8 @@ impl Device {
         };
         let next_fire = report.fired_ticks.wrapping_add(settings.min_interval_ticks);
         self.timers.min_interval = (ticks_until(self.now, next_fire) > 0).then_some(next_fire);
-        let mut echoes = report.echoes;
-        echoes.truncate(settings.max_echoes);
+        let wanted = report.echoes.len().min(usize::from(settings.max_echoes));
+        let echoes = report.echoes.get(..wanted).unwrap_or_default();
         let status = match report.status {
             ReadingStatus::Echo | ReadingStatus::NoEcho if !self.homed => {
                 ReadingStatus::StepDoubtful
@@ -109,7 +108,7 @@ impl Device {
             ReadingStatus::Echo if echoes.is_empty() => ReadingStatus::NoEcho,
             status => status,
         };
-        self.ring.push(&Kept { fired_ticks: report.fired_ticks, status, echoes });
+        self.ring.push(report.fired_ticks, status, echoes);
         self.run.fired = self.run.fired.wrapping_add(1);
         self.next_beam();
     }

@@ -8,6 +8,7 @@ use crate::messages::limits::{
 use crate::messages::{Blanking, Capabilities, NakReason, Settings, Sweep};
 
 /// Checks settings against the limits and the board's capabilities.
+#[inline(never)]
 pub(super) fn check_settings(
     settings: &Settings,
     capabilities: Capabilities,
@@ -53,6 +54,7 @@ fn blanking_is_right(settings: &Settings, capabilities: Capabilities) -> bool {
 }
 
 /// Checks a position.
+#[inline(never)]
 pub(super) fn check_step(step: i32) -> Result<(), NakReason> {
     if (-POSITION_MAX..=POSITION_MAX).contains(&step) {
         Ok(())
@@ -62,6 +64,7 @@ pub(super) fn check_step(step: i32) -> Result<(), NakReason> {
 }
 
 /// Checks a plan; gives its number of beams.
+#[inline(never)]
 pub(super) fn check_plan(plan: &Sweep) -> Result<u16, NakReason> {
     let beams = plan.beams().filter(|_| plan.sweep != 0).ok_or(NakReason::SweepOutOfRange)?;
     if plan.lease_ms < LEASE_MS_MIN {

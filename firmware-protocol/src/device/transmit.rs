@@ -2,9 +2,10 @@
 
 use super::{Answer, Beam, Device, Phase};
 use crate::frame::{Frame, Header};
+use crate::messages::table::{code_of, put_record};
 use crate::messages::{
     Alive, DeviceState, FaultKind, Identity, PROTOCOL, Reading, Reply, Status, SweepDone,
-    SweepState, limits,
+    SweepState, Wire as _, Writer, limits,
 };
 
 /// Frames not yet begun, and the one on its way.
@@ -20,7 +21,6 @@ pub(super) struct Outbox {
     resend_left: u8,
     /// On its way, or empty.
     frame: Frame,
-    frame_at: u8,
 }
 
 impl Outbox {
@@ -34,7 +34,6 @@ impl Outbox {
             resend_next: 0,
             resend_left: 0,
             frame: Frame::EMPTY,
-            frame_at: 0,
         }
     }
 
@@ -69,29 +68,12 @@ impl Outbox {
 }
 
 impl Device {
-    pub(super) fn transmit(&mut self, buffer: &mut [u8]) -> usize {
-        let mut written = 0;
-        while let Some(room) = buffer.get_mut(written..).filter(|room| !room.is_empty()) {
-            if self.outbox.frame.is_empty() {
-                self.outbox.frame_at = 0;
-                if !self.next_frame() {
-                    break;
-                }
-            }
-            let at = usize::from(self.outbox.frame_at);
-            let rest = self.outbox.frame.get(at..).unwrap_or_default();
-            let count = rest.len().min(room.len());
-            for (slot, byte) in room.iter_mut().zip(rest) {
-                *slot = *byte;
-            }
-            written = written.wrapping_add(count);
-            if count == rest.len() {
-                self.outbox.frame.clear();
-            } else {
-                self.outbox.frame_at = self.outbox.frame_at.wrapping_add(low_byte(count));
-            }
+    /// The next byte for the host.
+    pub(super) fn next_byte(&mut self) -> Option<u8> {
+        if self.outbox.frame.is_empty() && !self.next_frame() {
+            return None;
         }
-        written
+        self.outbox.frame.pop()
     }
 
     /// Builds the next frame, if there is one. Answers first, so that requests are quick; then
@@ -141,90 +123,125 @@ impl Device {
     }
 
     /// Builds a frame; false if there is nothing to say it about any more.
-    // Not inlined: all frames are built in one place, with one message on the stack.
+    // Not inlined, as its parts: all frames are built in one place, beside the machine that they
+    // tell of, and each part has a small frame of its own on a microcontroller's stack.
     #[inline(never)]
     fn say(&mut self, seq: u16, answer: Answer) -> bool {
-        let header = Header { boot: self.board.boot, seq };
-        let Some(reply) = self.reply(answer) else {
+        let mut frame = Frame::EMPTY;
+        let Some(body_len) = self.put(answer, frame.body()) else {
             return false;
         };
-        self.outbox.frame.fill(header, &reply).is_ok()
+        let header = Header { boot: self.board.boot, seq };
+        let closed = frame.close(header, body_len).is_ok();
+        self.outbox.frame = frame;
+        closed
     }
 
-    fn reply(&self, answer: Answer) -> Option<Reply> {
-        Some(match answer {
-            Answer::Identity => Reply::Identity(self.identity()),
-            Answer::Ack => Reply::Ack,
-            Answer::Nak(reason) => Reply::Nak { reason },
-            Answer::Started => Reply::Started,
-            Answer::Homed { drift_steps } => Reply::Homed { drift_steps },
-            Answer::Ping => Reply::Reading(self.reading(0)?),
-            Answer::Beam(index) => Reply::Reading(self.reading(index)?),
-            Answer::Fault(kind) => Reply::Fault { kind },
-            Answer::SweepDone => Reply::SweepDone(SweepDone {
-                sweep: self.run.plan.sweep,
-                fired: self.run.fired,
-                end: self.run.state,
-            }),
-            Answer::Alive { ticks } => Reply::Alive(self.alive(ticks)),
-            Answer::Status { ticks } => Reply::StatusReport(self.status(ticks)),
-        })
+    #[inline(never)]
+    fn put(&self, answer: Answer, mut body: Writer<'_>) -> Option<u8> {
+        let out = &mut body;
+        match answer {
+            Answer::Identity => self.put_identity(out),
+            Answer::Ack => Reply::Ack.put(out),
+            Answer::Nak(reason) => Reply::Nak { reason }.put(out),
+            Answer::Started => Reply::Started.put(out),
+            Answer::Homed { drift_steps } => Reply::Homed { drift_steps }.put(out),
+            Answer::Ping => self.put_reading(0, out)?,
+            Answer::Beam(index) => self.put_reading(index, out)?,
+            Answer::Fault(kind) => Reply::Fault { kind }.put(out),
+            Answer::SweepDone => self.put_sweep_done(out),
+            Answer::Alive { ticks } => self.put_alive(ticks, out),
+            Answer::Status { ticks } => self.put_status(ticks, out),
+        }
+        body.finish()
     }
 
-    fn reading(&self, index: u16) -> Option<Reading> {
+    #[inline(never)]
+    fn put_reading(&self, index: u16, out: &mut Writer<'_>) -> Option<()> {
         let kept = self.ring.get(index)?;
         let plan = &self.run.plan;
-        Some(Reading {
-            sweep: plan.sweep,
-            index,
-            step: plan.step_of(index)?,
-            fired_ticks: kept.fired_ticks,
-            status: kept.status,
-            echoes: kept.echoes,
-        })
+        let step = plan.step_of(index)?;
+        out.byte(const { code_of(Reply::VARIANTS, "Reading") });
+        put_record!(
+            out,
+            Reading {
+                sweep: plan.sweep,
+                index: index,
+                step: step,
+                fired_ticks: kept.fired_ticks(),
+                status: kept.status(),
+                echoes: kept.echoes(),
+            }
+        );
+        Some(())
     }
 
-    const fn identity(&self) -> Identity {
-        Identity {
-            protocol: PROTOCOL,
-            firmware: self.board.firmware,
-            serial: self.board.serial,
-            boot: self.board.boot,
-            last_seq: match self.last {
-                Some(last) => Some(last.seq),
-                None => None,
-            },
-            tick_hz: limits::TICK_HZ,
-            steps_per_revolution: self.board.steps_per_revolution,
-            capabilities: self.board.capabilities,
-            ring_bytes: limits::RING_BYTES,
-            reset_cause: self.board.reset_cause,
-        }
+    #[inline(never)]
+    fn put_identity(&self, out: &mut Writer<'_>) {
+        let board = &self.board;
+        out.byte(const { code_of(Reply::VARIANTS, "Identity") });
+        put_record!(
+            out,
+            Identity {
+                protocol: PROTOCOL,
+                firmware: board.firmware,
+                serial: board.serial,
+                boot: board.boot,
+                last_seq: self.last.map(|last| last.seq),
+                tick_hz: limits::TICK_HZ,
+                steps_per_revolution: board.steps_per_revolution,
+                capabilities: board.capabilities,
+                ring_bytes: limits::RING_BYTES,
+                reset_cause: board.reset_cause,
+            }
+        );
     }
 
-    const fn alive(&self, ticks: u32) -> Alive {
+    fn put_sweep_done(&self, out: &mut Writer<'_>) {
         let run = &self.run;
-        let state = if run.is_ping() { SweepState::None } else { run.state };
-        Alive { ticks, sweep: run.plan.sweep, fired: run.fired, sent: self.outbox.sent, state }
+        out.byte(const { code_of(Reply::VARIANTS, "SweepDone") });
+        put_record!(out, SweepDone { sweep: run.plan.sweep, fired: run.fired, end: run.state });
     }
 
-    fn status(&self, ticks: u32) -> Status {
-        Status {
-            ticks,
-            state: self.state(),
-            configured: self.settings.is_some(),
-            homed: self.homed,
-            step: self.step,
-            sweep: self.run.plan.sweep,
-            fired: self.run.fired,
-            fault: self.fault,
-            dropped_checksum: self.counters.checksum,
-            dropped_stuffing: self.counters.stuffing,
-            dropped_too_long: self.counters.too_long,
-            dropped_line: self.counters.line,
-            undecodable: self.counters.undecodable,
-            stale: self.counters.stale,
-        }
+    #[inline(never)]
+    fn put_alive(&self, ticks: u32, out: &mut Writer<'_>) {
+        let run = &self.run;
+        out.byte(const { code_of(Reply::VARIANTS, "Alive") });
+        put_record!(
+            out,
+            Alive {
+                ticks: ticks,
+                sweep: run.plan.sweep,
+                fired: run.fired,
+                sent: self.outbox.sent,
+                state: if run.is_ping() { SweepState::None } else { run.state },
+            }
+        );
+    }
+
+    #[inline(never)]
+    fn put_status(&self, ticks: u32, out: &mut Writer<'_>) {
+        let counters = &self.counters;
+        out.byte(const { code_of(Reply::VARIANTS, "StatusReport") });
+        put_record!(
+            out,
+            Status {
+                ticks: ticks,
+                state: self.state(),
+                configured: self.settings.is_some(),
+                homed: self.homed,
+                step: self.step,
+                sweep: self.run.plan.sweep,
+                fired: self.run.fired,
+                fault: self.fault,
+                dropped_checksum: counters.checksum,
+                dropped_stuffing: counters.stuffing,
+                dropped_too_long: counters.too_long,
+                dropped_line: counters.line,
+                undecodable: counters.undecodable,
+                stale: counters.stale,
+            }
+        );
     }
 
     const fn state(&self) -> DeviceState {
@@ -238,10 +255,4 @@ impl Device {
             }
         }
     }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "a frame has at most 66 bytes")]
-/// A frame has at most 66 bytes.
-const fn low_byte(len: usize) -> u8 {
-    len as u8
 }

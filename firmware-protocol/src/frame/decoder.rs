@@ -92,8 +92,15 @@ impl LinkCounters {
             DropReason::Checksum => &mut self.checksum,
             DropReason::Line => &mut self.line,
         };
-        *counter = counter.saturating_add(1);
+        count(counter);
     }
+}
+
+/// Counts up to the largest value, and stays there.
+// Not inlined: there are many counters.
+#[inline(never)]
+pub(crate) fn count(counter: &mut u16) {
+    *counter = counter.saturating_add(1);
 }
 
 impl Default for FrameDecoder {

@@ -1,6 +1,6 @@
 //! Building frames, in place and without a second buffer.
 
-use core::ops::Deref;
+use core::ops::{Deref, Range};
 
 use super::{CRC_LEN, DELIMITER, FRAME_MAX, HEADER_LEN, Header, PAYLOAD_MAX, crc32};
 use crate::messages::{Wire, Writer};
@@ -24,6 +24,8 @@ pub struct TooLong;
 
 /// Where the header begins in the buffer: behind the leading delimiter and the code byte.
 const PAYLOAD_AT: usize = 2;
+/// Where the message is.
+const BODY: Range<usize> = PAYLOAD_AT + HEADER_LEN..PAYLOAD_AT + PAYLOAD_MAX - CRC_LEN;
 
 impl Frame {
     /// Encodes `message` behind `header`.
@@ -33,7 +35,10 @@ impl Frame {
     /// [`TooLong`] if the encoded message does not fit.
     pub fn encode<M: Wire>(header: Header, message: &M) -> Result<Self, TooLong> {
         let mut frame = Self::EMPTY;
-        frame.fill(header, message)?;
+        let mut body = frame.body();
+        message.put(&mut body);
+        let body_len = body.finish().ok_or(TooLong)?;
+        frame.close(header, body_len)?;
         Ok(frame)
     }
 
@@ -41,20 +46,19 @@ impl Frame {
     pub(crate) const EMPTY: Self =
         Self { bytes: [DELIMITER; FRAME_MAX + 1], start: 0, end: 0, crc: 0 };
 
-    /// Becomes what [`Self::encode`] makes, in place: a copy is a lot for a microcontroller's
-    /// stack. Empty if the message is too long.
+    /// Where the message is to be written.
+    pub(crate) fn body(&mut self) -> Writer<'_> {
+        Writer::new(self.bytes.get_mut(BODY).unwrap_or_default())
+    }
+
+    /// Puts header, CRC and stuffing around a message of `body_len` bytes.
     #[inline(never)]
-    pub(crate) fn fill<M: Wire>(&mut self, header: Header, message: &M) -> Result<(), TooLong> {
-        *self = Self::EMPTY;
+    pub(crate) fn close(&mut self, header: Header, body_len: u8) -> Result<(), TooLong> {
         let bytes = &mut self.bytes;
         let [boot_low, boot_high] = header.boot.to_le_bytes();
         let [seq_low, seq_high] = header.seq.to_le_bytes();
         put(bytes, PAYLOAD_AT, [boot_low, boot_high, seq_low, seq_high])?;
-        let room = PAYLOAD_AT + HEADER_LEN..PAYLOAD_AT + PAYLOAD_MAX - CRC_LEN;
-        let mut writer = Writer::new(bytes.get_mut(room).ok_or(TooLong)?);
-        message.put(&mut writer);
-        let body_len = usize::from(writer.finish().ok_or(TooLong)?);
-        let covered = HEADER_LEN + body_len;
+        let covered = HEADER_LEN + usize::from(body_len);
         let crc = crc32(bytes.get(PAYLOAD_AT..PAYLOAD_AT + covered).ok_or(TooLong)?);
         put(bytes, PAYLOAD_AT + covered, crc.to_le_bytes())?;
         let payload_len = covered + CRC_LEN;
@@ -64,9 +68,16 @@ impl Frame {
         Ok(())
     }
 
-    /// Forgets the bytes.
-    pub(crate) const fn clear(&mut self) {
-        self.end = self.start;
+    /// Whether no bytes are left.
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.start == self.end
+    }
+
+    /// Takes the first byte away.
+    pub(crate) fn pop(&mut self) -> Option<u8> {
+        let byte = self.bytes.get(usize::from(self.start)).filter(|_| !self.is_empty())?;
+        self.start = self.start.wrapping_add(1);
+        Some(*byte)
     }
 
     /// The same with a delimiter in front as well, which ends whatever noise came before.

@@ -6,6 +6,7 @@
 mod decoder;
 mod encoder;
 
+pub(crate) use decoder::count;
 pub use decoder::{DropReason, FrameDecoder, LinkCounters, RawFrame, Received};
 pub use encoder::{Frame, TooLong};
 

@@ -82,6 +82,8 @@ impl fmt::Debug for Echoes {
 }
 
 impl Wire for Echoes {
+    const BLANK: Self = Self::new();
+
     fn put(&self, out: &mut Writer<'_>) {
         out.byte(self.len);
         for ticks in self.iter() {
@@ -89,15 +91,15 @@ impl Wire for Echoes {
         }
     }
 
-    fn take(input: &mut Reader<'_>) -> Self {
-        let mut echoes = Self::new();
+    fn read(&mut self, input: &mut Reader<'_>) {
+        *self = Self::new();
         for _ in 0..input.code() {
-            if !input.is_right() || echoes.push(u32::take(input)).is_err() {
-                input.fail();
-                break;
+            let mut ticks = 0;
+            ticks.read(input);
+            if !input.is_right() || self.push(ticks).is_err() {
+                return input.fail();
             }
         }
-        echoes
     }
 }
 

@@ -156,9 +156,8 @@ impl Reply {
 }
 
 fn decode_exactly<M: Wire>(body: &[u8]) -> Result<M, Undecodable> {
-    let mut input = Reader::new(body);
-    let message = M::take(&mut input);
-    if input.is_done() { Ok(message) } else { Err(Undecodable) }
+    let mut message = M::BLANK;
+    if message.read_exactly(body) { Ok(message) } else { Err(Undecodable) }
 }
 
 impl ProtocolId {
@@ -167,7 +166,9 @@ impl ProtocolId {
     pub fn peek(body: &[u8]) -> Option<(Self, FirmwareVersion)> {
         let mut input = Reader::new(body);
         let code = input.byte();
-        let front = (Self::take(&mut input), FirmwareVersion::take(&mut input));
+        let mut front = (Self::BLANK, FirmwareVersion::BLANK);
+        front.0.read(&mut input);
+        front.1.read(&mut input);
         (code == 0 && input.is_right()).then_some(front)
     }
 }

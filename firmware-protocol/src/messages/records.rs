@@ -58,12 +58,14 @@ wire_struct! {
 pub struct Capabilities(pub u16);
 
 impl Wire for Capabilities {
+    const BLANK: Self = Self(0);
+
     fn put(&self, out: &mut Writer<'_>) {
         self.0.put(out);
     }
 
-    fn take(input: &mut Reader<'_>) -> Self {
-        Self(Wire::take(input))
+    fn read(&mut self, input: &mut Reader<'_>) {
+        self.0.read(input);
     }
 }
 

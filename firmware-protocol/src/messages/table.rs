@@ -64,14 +64,22 @@ macro_rules! wire_enum {
         }
 
         impl $crate::messages::Wire for $name {
+            const BLANK: Self = $crate::messages::table::first_unit!(
+                $($variant $(($record))? $({ $($field)+ })?),+);
+
+            // Where the variant is known, nothing is left of the others.
+            #[inline(always)]
             fn put(&self, out: &mut $crate::messages::Writer<'_>) {
+                // Apart from the fields, so that it is one byte that is already there.
+                out.byte(match self {
+                    $(Self::$variant $(($crate::messages::table::any!($record)))? $({ $($field: _),+ })? => $code),+
+                });
                 match self {
                     $(
                         Self::$variant
                             $(($crate::messages::table::bind!(record $record)))?
                             $({ $($field),+ })?
                         => {
-                            out.byte($code);
                             $(<$record as $crate::messages::Wire>::put(
                                 $crate::messages::table::bind!(record $record), out);)?
                             $($($crate::messages::Wire::put($field, out);)+)?
@@ -80,25 +88,26 @@ macro_rules! wire_enum {
                 }
             }
 
-            fn take(input: &mut $crate::messages::Reader<'_>) -> Self {
+            fn read(&mut self, input: &mut $crate::messages::Reader<'_>) {
                 match input.code() {
                     $(
-                        $code => Self::$variant
-                            $((<$record as $crate::messages::Wire>::take(input)))?
-                            $({ $($field: $crate::messages::Wire::take(input)),+ })?,
+                        $code => {
+                            *self = Self::$variant
+                                $((<$record as $crate::messages::Wire>::BLANK))?
+                                $({ $($field: $crate::messages::Wire::BLANK),+ })?;
+                            if let Self::$variant
+                                $(($crate::messages::table::bind!(record $record)))?
+                                $({ $($field),+ })? = self
+                            {
+                                $(<$record as $crate::messages::Wire>::read(
+                                    $crate::messages::table::bind!(record $record), input);)?
+                                $($($crate::messages::Wire::read($field, input);)+)?
+                            }
+                        }
                     )+
-                    _ => {
-                        input.fail();
-                        $name::FALLBACK
-                    }
+                    _ => input.fail(),
                 }
             }
-        }
-
-        impl $name {
-            /// What a failed reader gives.
-            const FALLBACK: Self = $crate::messages::table::first_unit!(
-                $($variant $(($record))? $({ $($field)+ })?),+);
         }
 
         const _: () = $crate::messages::table::assert_codes($name::VARIANTS);
@@ -130,13 +139,14 @@ macro_rules! wire_struct {
         }
 
         impl $crate::messages::Wire for $name {
+            const BLANK: Self = Self { $($field: <$kind as $crate::messages::Wire>::BLANK),+ };
+
             fn put(&self, out: &mut $crate::messages::Writer<'_>) {
                 $($crate::messages::Wire::put(&self.$field, out);)+
             }
 
-            fn take(input: &mut $crate::messages::Reader<'_>) -> Self {
-                // In the order written, which is that of the wire.
-                Self { $($field: $crate::messages::Wire::take(input)),+ }
+            fn read(&mut self, input: &mut $crate::messages::Reader<'_>) {
+                $($crate::messages::Wire::read(&mut self.$field, input);)+
             }
         }
     };
@@ -149,6 +159,13 @@ macro_rules! bind {
     };
 }
 
+/// Ignores the record of a variant in a pattern.
+macro_rules! any {
+    ($record:ty) => {
+        _
+    };
+}
+
 /// The first variant without fields.
 macro_rules! first_unit {
     ($variant:ident $(, $($rest:tt)*)?) => { Self::$variant };
@@ -156,7 +173,18 @@ macro_rules! first_unit {
     ($variant:ident {$($fields:tt)*}, $($rest:tt)*) => { $crate::messages::table::first_unit!($($rest)*) };
 }
 
-pub(crate) use {bind, first_unit, wire_enum, wire_struct};
+/// Writes a record field by field, each read where it is when its turn comes: a record that is
+/// first made and then written passes through a microcontroller's stack byte by byte. The
+/// fields stand in the record's own order.
+macro_rules! put_record {
+    ($out:expr, $record:ident { $($field:ident: $value:expr),+ $(,)? }) => {{
+        const _: () = $crate::messages::table::assert_order(
+            $record::FIELDS, &[$(stringify!($field)),+]);
+        $($value.put($out);)+
+    }};
+}
+
+pub(crate) use {any, bind, first_unit, put_record, wire_enum, wire_struct};
 
 /// Codes must count up from 0, because postcard numbers variants so.
 pub(crate) const fn assert_codes(variants: &[Variant]) {
@@ -165,6 +193,39 @@ pub(crate) const fn assert_codes(variants: &[Variant]) {
         assert!(variants[index].code as usize == index, "codes must count up from 0");
         index += 1;
     }
+}
+
+/// Names must be those of the fields, in their order.
+pub(crate) const fn assert_order(fields: &[Field], names: &[&str]) {
+    assert!(fields.len() == names.len(), "every field once");
+    let mut index = 0;
+    while index < fields.len() {
+        let (name, written) = (fields[index].name.as_bytes(), names[index].as_bytes());
+        assert!(name.len() == written.len(), "fields in the record's order");
+        let mut at = 0;
+        while at < name.len() {
+            assert!(name[at] == written[at], "fields in the record's order");
+            at += 1;
+        }
+        index += 1;
+    }
+}
+
+/// The code of variant `name`.
+pub(crate) const fn code_of(variants: &[Variant], name: &str) -> u8 {
+    let mut index = 0;
+    while index < variants.len() {
+        let (this, wanted) = (variants[index].name.as_bytes(), name.as_bytes());
+        let mut at = 0;
+        while at < this.len() && at < wanted.len() && this[at] == wanted[at] {
+            at += 1;
+        }
+        if at == this.len() && at == wanted.len() {
+            return variants[index].code;
+        }
+        index += 1;
+    }
+    panic!("no such variant")
 }
 
 /// FNV-1a, 32 bits, over names and types of the tables.

@@ -7,8 +7,19 @@
 pub trait Wire: Sized {
     /// Appends the encoding.
     fn put(&self, out: &mut Writer<'_>);
-    /// Reads one value. What comes out after a fault is of no meaning: see [`Reader::is_done`].
-    fn take(input: &mut Reader<'_>) -> Self;
+    /// Reads a value in the place of this one. What is there after a fault is of no meaning: see
+    /// [`Reader::is_done`].
+    // In place, because a value that is returned passes through a microcontroller's registers.
+    fn read(&mut self, input: &mut Reader<'_>);
+    /// What to read over.
+    const BLANK: Self;
+
+    /// Reads a value that fills `body` exactly; false if there is none.
+    fn read_exactly(&mut self, body: &[u8]) -> bool {
+        let mut input = Reader::new(body);
+        self.read(&mut input);
+        input.is_done()
+    }
 }
 
 /// Writes into a buffer; what does not fit is remembered, not written.
@@ -132,74 +143,94 @@ impl<'a> Reader<'a> {
 }
 
 impl Wire for u8 {
+    const BLANK: Self = 0;
+
     fn put(&self, out: &mut Writer<'_>) {
         out.byte(*self);
     }
 
-    fn take(input: &mut Reader<'_>) -> Self {
-        input.byte()
+    fn read(&mut self, input: &mut Reader<'_>) {
+        *self = input.byte();
     }
 }
 
 impl Wire for bool {
+    const BLANK: Self = false;
+
     fn put(&self, out: &mut Writer<'_>) {
         out.byte(u8::from(*self));
     }
 
-    fn take(input: &mut Reader<'_>) -> Self {
+    fn read(&mut self, input: &mut Reader<'_>) {
         let byte = input.byte();
         if byte > 1 {
             input.fail();
         }
-        byte == 1
+        *self = byte == 1;
     }
 }
 
 impl Wire for u16 {
+    const BLANK: Self = 0;
+
     fn put(&self, out: &mut Writer<'_>) {
         out.varint(u32::from(*self));
     }
 
-    fn take(input: &mut Reader<'_>) -> Self {
-        low_half(input.varint(3, 0x03))
+    #[inline(never)]
+    fn read(&mut self, input: &mut Reader<'_>) {
+        *self = low_half(input.varint(3, 0x03));
     }
 }
 
 impl Wire for u32 {
+    const BLANK: Self = 0;
+
     fn put(&self, out: &mut Writer<'_>) {
         out.varint(*self);
     }
 
-    fn take(input: &mut Reader<'_>) -> Self {
-        input.varint(5, 0x0f)
+    #[inline(never)]
+    fn read(&mut self, input: &mut Reader<'_>) {
+        *self = input.varint(5, 0x0f);
     }
 }
 
 impl Wire for i16 {
+    const BLANK: Self = 0;
+
     fn put(&self, out: &mut Writer<'_>) {
         i32::from(*self).put(out);
     }
 
-    fn take(input: &mut Reader<'_>) -> Self {
-        let zigzag = u16::take(input);
-        (zigzag >> 1).cast_signed() ^ -(zigzag & 1).cast_signed()
+    fn read(&mut self, input: &mut Reader<'_>) {
+        let mut zigzag = 0_u16;
+        zigzag.read(input);
+        let half = (zigzag >> 1).cast_signed();
+        *self = if zigzag & 1 == 1 { !half } else { half };
     }
 }
 
 impl Wire for i32 {
+    const BLANK: Self = 0;
+
     fn put(&self, out: &mut Writer<'_>) {
         let doubled = self.cast_unsigned() << 1;
         out.varint(if *self < 0 { !doubled } else { doubled });
     }
 
-    fn take(input: &mut Reader<'_>) -> Self {
-        let zigzag = u32::take(input);
+    #[inline(never)]
+    fn read(&mut self, input: &mut Reader<'_>) {
+        let mut zigzag = 0_u32;
+        zigzag.read(input);
         let half = (zigzag >> 1).cast_signed();
-        if zigzag & 1 == 1 { !half } else { half }
+        *self = if zigzag & 1 == 1 { !half } else { half };
     }
 }
 
 impl<T: Wire> Wire for Option<T> {
+    const BLANK: Self = None;
+
     fn put(&self, out: &mut Writer<'_>) {
         self.is_some().put(out);
         if let Some(value) = self {
@@ -207,24 +238,29 @@ impl<T: Wire> Wire for Option<T> {
         }
     }
 
-    fn take(input: &mut Reader<'_>) -> Self {
-        bool::take(input).then(|| T::take(input))
+    fn read(&mut self, input: &mut Reader<'_>) {
+        let mut there = false;
+        there.read(input);
+        *self = None;
+        if there {
+            self.insert(T::BLANK).read(input);
+        }
     }
 }
 
 impl<const N: usize> Wire for [u8; N] {
+    const BLANK: Self = [0; N];
+
     fn put(&self, out: &mut Writer<'_>) {
         for byte in self {
             out.byte(*byte);
         }
     }
 
-    fn take(input: &mut Reader<'_>) -> Self {
-        let mut bytes = [0; N];
-        for byte in &mut bytes {
+    fn read(&mut self, input: &mut Reader<'_>) {
+        for byte in self {
             *byte = input.byte();
         }
-        bytes
     }
 }
 

@@ -2,10 +2,10 @@
 
 use firmware_protocol::{host::LinkStats, messages::Identity};
 
-use super::{output::Output, setup, setup::Setup};
+use super::{output::Output, setup::Setup};
 use crate::{
     compare::{Comparison, compare},
-    ranger::ScanSummary,
+    ranger::{ScanSummary, provenance, serial_text},
     scan::{PingStatus, ScanView},
 };
 
@@ -37,13 +37,13 @@ pub(super) fn print(
 }
 
 fn headline(setup: &Setup, identity: &Identity) -> String {
-    let provenance = serde_json::to_value(setup::provenance(identity)).unwrap_or_default();
+    let provenance = serde_json::to_value(provenance(identity)).unwrap_or_default();
     format!(
         "{} at {} by {} {}",
         setup.scene.name,
         setup.pose_text,
         provenance.as_str().unwrap_or("ranger"),
-        setup::serial_text(identity),
+        serial_text(identity),
     )
 }
 

@@ -221,6 +221,7 @@ impl Candidate {
         Arrival {
             length_m: self.length_m,
             amplitude,
+            path_amplitude: self.gain,
             phase_rad: 0.0,
             departure_rad: wrap_pi(self.departure_rad),
             arrival_rad: wrap_pi(self.arrival_rad),

@@ -94,8 +94,12 @@ impl<'a> PathSurvey<'a> {
             }
         }
         let wheels = spokes.map(|spokes| Wheel::new(&spokes));
+        // Transmitter and receiver apart have a face each, and a tilted one turns sound up or down:
+        // what runs between them and the walls is left out.
+        let faces_level = transmitter == receiver && engine.paths.settings.tilt_rad == 0.0;
         let loops = engine
             .face
+            .filter(|_| faces_level)
             .map(|face| Loops::new(face, &echoes, &engine.envelope, &engine.paths.settings));
         Self { engine, trees, echoes, wheels, loops }
     }
@@ -108,7 +112,7 @@ impl<'a> PathSurvey<'a> {
             .map_or_else(Vec::new, |loops| loops.trains(direction_rad, &self.engine.beam, settings))
     }
 
-    fn train_arrival(&self, train: &Train, amplitude: f64) -> Arrival {
+    fn train_arrival(&self, direction_rad: f64, train: &Train, amplitude: f64) -> Arrival {
         let paths = &self.engine.paths;
         let way = |round: &Round| {
             let mut way = paths.path(&self.trees, &self.echoes[round.echo as usize]);
@@ -128,12 +132,17 @@ impl<'a> PathSurvey<'a> {
             }
             walls.extend_from_slice(&way.path.walls);
         }
+        let (departure_rad, arrival_rad) =
+            (ways[0].departure_rad, ways[ways.len() - 1].arrival_rad);
+        let [leaving, arriving] = [departure_rad, arrival_rad]
+            .map(|end| self.engine.beam.one_way(wrap_pi(end - direction_rad)));
         Arrival {
             length_m: train.length_m,
             amplitude,
+            path_amplitude: amplitude / (leaving * arriving),
             phase_rad: train.phase_rad,
-            departure_rad: ways[0].departure_rad,
-            arrival_rad: ways[ways.len() - 1].arrival_rad,
+            departure_rad,
+            arrival_rad,
             path: Path { kind, walls, edge: bent },
         }
     }
@@ -179,13 +188,14 @@ impl Survey for PathSurvey<'_> {
         let index = sound.index as usize;
         if let Some(train) = index.checked_sub(self.echoes.len()) {
             let trains = self.trains(wrap_pi(direction_rad));
-            return self.train_arrival(&trains[train], sound.amplitude);
+            return self.train_arrival(direction_rad, &trains[train], sound.amplitude);
         }
         let echo = &self.echoes[index];
         let path = self.engine.paths.path(&self.trees, echo);
         Arrival {
             length_m: path.length_m,
             amplitude: sound.amplitude,
+            path_amplitude: path.amplitude,
             phase_rad: path.phase_rad,
             departure_rad: path.departure_rad,
             arrival_rad: path.arrival_rad,

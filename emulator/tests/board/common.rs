@@ -1,0 +1,79 @@
+//! What the tests share.
+
+use std::path::PathBuf;
+
+use board_config::{ALWAYS, Config};
+use firmware_protocol::host::{Command, HostEvent};
+use firmware_protocol::messages::{Blanking, Capabilities, Reading, Settings};
+use sonard_emulator::{Bench, Commanded, Emulator, Surroundings};
+
+/// The firmware, as `test.sh` builds it.
+pub fn elf() -> PathBuf {
+    let path = std::env::var_os("SONARD_FIRMWARE").map_or_else(
+        || {
+            PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+                .join("../firmware/target/avr-none/release/sonard-firmware.elf")
+        },
+        PathBuf::from,
+    );
+    assert!(path.exists(), "{} is missing: run firmware/test.sh", path.display());
+    path
+}
+
+/// A board with everything fitted.
+pub fn config() -> Config {
+    Config {
+        serial: *b"EMU-000001",
+        steps_per_revolution: 400,
+        capabilities: ALWAYS
+            .with(Capabilities::INDEX_SENSOR)
+            .with(Capabilities::EMERGENCY_STOP)
+            .with(Capabilities::EMULATED),
+        options: 0,
+    }
+}
+
+pub const fn settings() -> Settings {
+    Settings {
+        window_ticks: 48_000,
+        min_interval_ticks: 0,
+        settle_ticks: 4_000,
+        max_echoes: 1,
+        blanking: Blanking::Internal,
+        speed: 800,
+        acceleration: 40_000,
+        hold_s: 0,
+    }
+}
+
+pub fn commanded(echoes: &[u64]) -> Commanded {
+    Commanded { echoes: echoes.to_vec(), step: 0 }
+}
+
+/// A board that has booted, and a host that has not spoken to it.
+pub fn bench(surroundings: impl Surroundings + 'static) -> Bench {
+    let emulator = Emulator::new(&elf(), &config(), Box::new(surroundings)).expect("a firmware");
+    let mut bench = Bench::new(emulator);
+    // What is sent before the receiver is on is lost, as on the board.
+    bench.run(0.05).expect("boots");
+    bench
+}
+
+/// The same, identified, set up and at home.
+pub fn ready(surroundings: impl Surroundings + 'static, settings: Settings) -> Bench {
+    let mut bench = bench(surroundings);
+    for command in [Command::Identify, Command::Configure(settings), Command::Home] {
+        bench.perform(command, 20.0).expect("gets ready");
+    }
+    bench
+}
+
+pub fn readings(events: &[HostEvent]) -> Vec<Reading> {
+    events
+        .iter()
+        .filter_map(|event| match event {
+            HostEvent::Reading { reading, .. } => Some(*reading),
+            _ => None,
+        })
+        .collect()
+}

@@ -1,0 +1,412 @@
+//! The scenarios, each on a bench of its own. They panic where a board does wrong.
+#![expect(clippy::missing_panics_doc, reason = "panicking is what a test is for")]
+
+extern crate std;
+
+use std::vec::Vec;
+
+use super::{Bench, BenchError, DeviceUnderTest};
+use crate::frame::{Frame, FrameDecoder, Header, Received};
+use crate::host::{Command, HostError, HostEvent, Outcome};
+use crate::messages::{
+    Blanking, Capabilities, FaultKind, Identity, NakReason, Reading, ReadingStatus, Reply, Request,
+    ResetCause, Settings, Status, Sweep, SweepState,
+};
+
+/// 24 ms of listening, 2 ms of rest.
+const SETTINGS: Settings = Settings {
+    window_ticks: 48_000,
+    min_interval_ticks: 0,
+    settle_ticks: 4_000,
+    max_echoes: 1,
+    blanking: Blanking::Internal,
+    speed: 800,
+    acceleration: 40_000,
+    hold_s: 0,
+};
+const SWEEP: Sweep =
+    Sweep { sweep: 1, first_step: 0, stride: 1, stops: 40, pings_per_stop: 1, lease_ms: 500 };
+/// Time to boot.
+const BOOT_S: f64 = 0.1;
+
+/// Identity comes unasked after power-on, and again for each Identify.
+pub fn it_announces_itself_once_and_answers_identify_at_once(
+    mut bench: Bench<impl DeviceUnderTest>,
+) {
+    bench.device.run(100_000).expect("boots");
+    let announced = replies(&bench.device.receive());
+    let [(_, Reply::Identity(identity))] = announced[..] else {
+        panic!("announced {announced:?} instead of itself, once");
+    };
+    assert_ne!(identity.boot, 0);
+    assert_eq!(identity.tick_hz, crate::messages::limits::TICK_HZ);
+    assert!(identity.steps_per_revolution > 0);
+    let asked_us = bench.device.now_us();
+    bench.device.send(&frame(0, 0, &Request::Identify));
+    bench.device.run(20_000).expect("runs");
+    assert!(bench.device.now_us() - asked_us < 40_000);
+    let answer = replies(&bench.device.receive());
+    assert_eq!(answer.len(), 1, "{answer:?}");
+    assert_eq!(answer[0].1, Reply::Identity(identity));
+}
+
+/// Settings before pings and homing, homing before moves and sweeps.
+pub fn what_must_come_first_must_come_first(mut bench: Bench<impl DeviceUnderTest>) {
+    let boot = identify(&mut bench).boot;
+    let ask = |bench: &mut Bench<_>, seq, request| answer(bench, boot, seq, &request);
+    let refused = |reason| Reply::Nak { reason };
+    assert_eq!(ask(&mut bench, 1, Request::Ping), refused(NakReason::NotConfigured));
+    assert_eq!(ask(&mut bench, 2, Request::Home), refused(NakReason::NotConfigured));
+    assert_eq!(ask(&mut bench, 3, Request::Configure(SETTINGS)), Reply::Ack);
+    assert_eq!(ask(&mut bench, 4, Request::MoveTo { step: 3 }), refused(NakReason::NotHomed));
+    assert_eq!(ask(&mut bench, 5, Request::Sweep(SWEEP)), refused(NakReason::NotHomed));
+    assert_eq!(answer(&mut bench, boot.wrapping_add(1), 6, &Request::Ping), {
+        refused(NakReason::WrongBoot)
+    });
+    assert_eq!(bench.device.take_firings(), 0);
+    assert_eq!(bench.device.motor_steps(), 0);
+}
+
+/// Each limit has its own reason.
+pub fn settings_beyond_the_limits_are_refused_by_name(mut bench: Bench<impl DeviceUnderTest>) {
+    let boot = identify(&mut bench).boot;
+    let wrong = [
+        (Settings { window_ticks: 10, ..SETTINGS }, NakReason::WindowOutOfRange),
+        (Settings { min_interval_ticks: u32::MAX, ..SETTINGS }, NakReason::IntervalOutOfRange),
+        (Settings { settle_ticks: u32::MAX, ..SETTINGS }, NakReason::SettleOutOfRange),
+        (Settings { max_echoes: 0, ..SETTINGS }, NakReason::EchoesOutOfRange),
+        (
+            Settings { blanking: Blanking::Short { ticks: 1 }, ..SETTINGS },
+            NakReason::BlankingOutOfRange,
+        ),
+        (Settings { speed: 0, ..SETTINGS }, NakReason::SpeedOutOfRange),
+        (Settings { acceleration: 0, ..SETTINGS }, NakReason::AccelerationOutOfRange),
+        (Settings { hold_s: u16::MAX, ..SETTINGS }, NakReason::HoldOutOfRange),
+    ];
+    for (seq, (settings, reason)) in (1..).zip(wrong) {
+        let told = answer(&mut bench, boot, seq, &Request::Configure(settings));
+        assert_eq!(told, Reply::Nak { reason }, "{settings:?}");
+    }
+    let told = answer(&mut bench, boot, 20, &Request::Ping);
+    assert_eq!(told, Reply::Nak { reason: NakReason::NotConfigured }, "none of them was taken");
+}
+
+/// Times of flight over the module's whole range.
+pub fn an_echo_is_timed_from_the_rise_of_init(mut bench: Bench<impl DeviceUnderTest>) {
+    ready(&mut bench, SETTINGS);
+    bench.device.take_firings();
+    for tenth in 26..200_u32 {
+        let after_us = f64::from(tenth) * 101.3;
+        bench.device.set_echoes(&[after_us]);
+        let reading = ping(&mut bench);
+        assert_eq!(reading.status, ReadingStatus::Echo, "{after_us} us");
+        assert_echoes(&bench, &reading, &[after_us]);
+    }
+    assert_eq!(bench.device.take_firings(), 174, "one firing for each ping");
+}
+
+/// Up to eight, in order; a board that can't is refused more than one.
+pub fn several_echoes_come_in_order_where_the_board_can_tell_them(
+    mut bench: Bench<impl DeviceUnderTest>,
+) {
+    let capabilities = ready(&mut bench, SETTINGS).capabilities;
+    let many = Command::Configure(Settings { max_echoes: 4, ..SETTINGS });
+    if !capabilities.has(Capabilities::MULTIPLE_ECHOES) {
+        let refused = bench.perform(many, 2.0).expect_err("is refused");
+        let reason = NakReason::EchoesOutOfRange;
+        assert!(matches!(refused, BenchError::Host(HostError::Refused(told)) if told == reason));
+        return;
+    }
+    bench.perform(many, 2.0).expect("is set");
+    let echoes = [4_000.0, 6_500.5, 9_000.0, 15_000.5, 20_000.0];
+    bench.device.set_echoes(&echoes);
+    let reading = ping(&mut bench);
+    assert_echoes(&bench, &reading, &echoes[..4]);
+}
+
+/// An echo that comes too late, and none at all.
+pub fn an_echo_behind_the_window_is_none(mut bench: Bench<impl DeviceUnderTest>) {
+    ready(&mut bench, SETTINGS);
+    for echoes in [&[25_000.0][..], &[]] {
+        bench.device.set_echoes(echoes);
+        let reading = ping(&mut bench);
+        assert_eq!((reading.status, reading.echoes.len()), (ReadingStatus::NoEcho, 0));
+    }
+}
+
+/// There and back, near and far.
+pub fn the_motor_turns_by_exactly_what_was_asked(mut bench: Bench<impl DeviceUnderTest>) {
+    ready(&mut bench, SETTINGS);
+    let home = bench.device.motor_steps();
+    for step in [1, 0, -1, 2, 400, 399, -250, 17, 1_000, 0] {
+        let events = bench.perform(Command::MoveTo { step }, 20.0).expect("moves");
+        assert!(events.contains(&HostEvent::Done(Outcome::Moved { step })), "{events:?}");
+        assert_eq!(bench.device.motor_steps() - home, i64::from(step));
+        assert_eq!(status(&mut bench).step, step);
+        assert!(bench.device.holds_coils());
+    }
+}
+
+/// A sweep on its own, with two pings at each stop.
+pub fn a_sweep_fires_once_at_each_beam(mut bench: Bench<impl DeviceUnderTest>) {
+    ready(&mut bench, SETTINGS);
+    bench.device.set_echoes(&[5_000.0]);
+    bench.device.take_firings();
+    let home = bench.device.motor_steps();
+    let plan = Sweep { first_step: 10, stride: -3, stops: 12, pings_per_stop: 2, ..SWEEP };
+    let events = bench.perform(Command::Sweep(plan), 20.0).expect("sweeps");
+    let mut readings = readings(&events);
+    readings.sort_by_key(|reading| reading.index);
+    assert_eq!(readings.len(), 24);
+    for (index, reading) in (0..).zip(&readings) {
+        assert_eq!(reading.index, index);
+        assert_eq!(reading.step, 10 - 3 * i32::from(index / 2));
+        assert_echoes(&bench, reading, &[5_000.0]);
+    }
+    assert_eq!(bench.device.take_firings(), 24);
+    assert_eq!(bench.device.motor_steps() - home, 10 - 33);
+    let span = readings[23].fired_ticks.wrapping_sub(readings[0].fired_ticks);
+    // 23 windows, 11 moves of three steps and 11 rests; nothing else may take long.
+    assert!((1_150_000..2_600_000).contains(&span), "{span} ticks");
+}
+
+/// The reply of a Ping is lost; the host asks again, with the same bytes.
+pub fn a_repeated_request_is_answered_again_and_not_done_twice(
+    mut bench: Bench<impl DeviceUnderTest>,
+) {
+    let boot = identify(&mut bench).boot;
+    assert_eq!(answer(&mut bench, boot, 1, &Request::Configure(SETTINGS)), Reply::Ack);
+    bench.device.take_firings();
+    let request = frame(boot, 2, &Request::Ping);
+    bench.device.send(&request);
+    bench.device.run(60_000).expect("pings");
+    let first = replies(&bench.device.receive());
+    bench.device.send(&request);
+    bench.device.run(60_000).expect("runs");
+    let again = replies(&bench.device.receive());
+    let reading = |replies: &[(u16, Reply)]| {
+        replies.iter().find_map(|(_, reply)| match reply {
+            Reply::Reading(reading) => Some(*reading),
+            _ => None,
+        })
+    };
+    assert!(reading(&first).is_some(), "{first:?}");
+    assert_eq!(reading(&first), reading(&again));
+    assert_eq!(bench.device.take_firings(), 1);
+}
+
+/// A number belongs to the request it came with first.
+pub fn the_same_number_on_another_request_is_refused(mut bench: Bench<impl DeviceUnderTest>) {
+    let boot = identify(&mut bench).boot;
+    assert_eq!(answer(&mut bench, boot, 1, &Request::Configure(SETTINGS)), Reply::Ack);
+    let told = answer(&mut bench, boot, 1, &Request::Ping);
+    assert_eq!(told, Reply::Nak { reason: NakReason::SequenceReused });
+    assert_eq!(bench.device.take_firings(), 0);
+}
+
+/// Cut frames, changed frames, too many bytes without an end.
+pub fn after_noise_it_answers_at_once(mut bench: Bench<impl DeviceUnderTest>) {
+    let boot = identify(&mut bench).boot;
+    let right = frame(boot, 1, &Request::Configure(SETTINGS));
+    let mut changed = right.clone();
+    changed[5] ^= 0x10;
+    let noises = [&right[..7], &changed[..], &[0xaa; 200], &[0; 40], &[1, 0, 2, 0, 0xff, 0]];
+    for (seq, noise) in (10..).zip(noises) {
+        bench.device.send(noise);
+        bench.device.run(40_000).expect("runs");
+        // Whatever is still open ends here.
+        bench.device.send(&[0]);
+        bench.device.run(5_000).expect("runs");
+        bench.device.receive();
+        let told = answer(&mut bench, boot, seq, &Request::Status);
+        assert!(matches!(told, Reply::StatusReport(_)), "{told:?}");
+        let Reply::StatusReport(status) = told else { continue };
+        assert!(!status.configured, "noise is no request");
+    }
+    // The host machine takes over the numbering.
+    identify(&mut bench);
+    let status = status(&mut bench);
+    let damaged = status.dropped_checksum + status.dropped_stuffing;
+    let flooded = status.dropped_too_long + status.dropped_line;
+    assert!(damaged >= 3 && flooded >= 1, "{status:?}");
+}
+
+/// For a while the host hears nothing: the device holds when its memory is full.
+pub fn readings_that_were_lost_are_told_again(mut bench: Bench<impl DeviceUnderTest>) {
+    ready(&mut bench, SETTINGS);
+    bench.device.set_echoes(&[5_000.0]);
+    bench.device.take_firings();
+    bench.start(Command::Sweep(Sweep { lease_ms: 5_000, ..SWEEP })).expect("begins");
+    bench.run(0.1).expect("sweeps");
+    for _ in 0..4_000 {
+        bench.device.run(500).expect("runs");
+        drop(bench.device.receive());
+    }
+    bench.run(5.0).expect("sweeps");
+    let events = bench.take_events().expect("comes to its end");
+    let mut indices: Vec<u16> = readings(&events).iter().map(|reading| reading.index).collect();
+    indices.sort_unstable();
+    assert_eq!(indices, (0..SWEEP.stops).collect::<Vec<_>>());
+    let repaired = |event: &&HostEvent| matches!(event, HostEvent::Reading { repaired: true, .. });
+    assert!(events.iter().filter(repaired).count() > 5, "none had to be told again");
+    assert_eq!(bench.device.take_firings(), usize::from(SWEEP.stops));
+}
+
+/// The lease: no firing and no current after it.
+pub fn a_silent_host_ends_the_firing_within_the_lease(mut bench: Bench<impl DeviceUnderTest>) {
+    ready(&mut bench, SETTINGS);
+    bench.start(Command::Sweep(Sweep { stops: 2_000, ..SWEEP })).expect("begins");
+    bench.run(0.3).expect("sweeps");
+    bench.alive = false;
+    bench.run(0.4).expect("runs");
+    assert!(bench.device.take_firings() > 5, "it goes on for a while");
+    bench.run(0.11).expect("runs");
+    bench.device.take_firings();
+    bench.run(1.0).expect("runs");
+    assert_eq!(bench.device.take_firings(), 0);
+    assert!(!bench.device.holds_coils());
+    bench.alive = true;
+    bench.run(1.0).expect("runs");
+    assert!(bench.events().contains(&HostEvent::Failed(HostError::LeaseExpired)));
+    let status = status(&mut bench);
+    assert_eq!((status.fault, status.homed), (Some(FaultKind::LeaseExpired), false));
+}
+
+/// A stop in a move and in a sweep: the motor stands, and where it stands is known.
+pub fn a_stop_keeps_the_position(mut bench: Bench<impl DeviceUnderTest>) {
+    ready(&mut bench, SETTINGS);
+    let home = bench.device.motor_steps();
+    bench.start(Command::MoveTo { step: 3_000 }).expect("begins");
+    bench.run(0.5).expect("moves");
+    bench.start(Command::Stop).expect("begins");
+    bench.run(1.0).expect("stops");
+    let stood = bench.device.motor_steps() - home;
+    assert!((100..1_000).contains(&stood), "{stood} steps");
+    let told = status(&mut bench);
+    assert_eq!((i64::from(told.step), told.homed), (stood, true));
+    bench.start(Command::Sweep(SWEEP)).expect("begins");
+    bench.run(1.0).expect("sweeps");
+    bench.start(Command::Stop).expect("begins");
+    bench.run(0.5).expect("stops");
+    bench.device.take_firings();
+    bench.run(0.5).expect("runs");
+    assert_eq!(bench.device.take_firings(), 0);
+    assert_eq!(i64::from(status(&mut bench).step), bench.device.motor_steps() - home);
+}
+
+/// The hold time: a motor that nobody asks for anything gets no current for ever.
+pub fn idle_coils_are_let_go_after_silence(mut bench: Bench<impl DeviceUnderTest>) {
+    ready(&mut bench, Settings { hold_s: 1, ..SETTINGS });
+    bench.run(0.8).expect("runs");
+    assert!(bench.device.holds_coils());
+    bench.run(0.4).expect("runs");
+    assert!(!bench.device.holds_coils());
+    assert_eq!(status(&mut bench).fault, Some(FaultKind::HoldExpired));
+}
+
+/// Reset: acknowledged, then everything anew.
+pub fn a_restart_on_request_has_a_new_number_and_forgets_everything(
+    mut bench: Bench<impl DeviceUnderTest>,
+) {
+    let before = ready(&mut bench, SETTINGS);
+    bench.perform(Command::Reset, 5.0).expect("restarts");
+    let after = identify(&mut bench);
+    assert_ne!(after.boot, before.boot);
+    assert_eq!(after.reset_cause, ResetCause::Requested);
+    let status = status(&mut bench);
+    assert!(!status.configured && !status.homed);
+    assert!(!bench.device.holds_coils());
+    ready(&mut bench, SETTINGS);
+    bench.device.set_echoes(&[5_000.0]);
+    let reading = ping(&mut bench);
+    assert_echoes(&bench, &reading, &[5_000.0]);
+}
+
+fn ready(bench: &mut Bench<impl DeviceUnderTest>, settings: Settings) -> Identity {
+    let identity = identify(bench);
+    for command in [Command::Configure(settings), Command::Home] {
+        bench.perform(command, 20.0).expect("gets ready");
+    }
+    identity
+}
+
+fn identify(bench: &mut Bench<impl DeviceUnderTest>) -> Identity {
+    bench.run(BOOT_S).expect("boots");
+    bench.perform(Command::Identify, 5.0).expect("identifies itself");
+    *bench.host.identity().expect("identified")
+}
+
+fn status(bench: &mut Bench<impl DeviceUnderTest>) -> Status {
+    let events = bench.perform(Command::Status, 2.0).expect("answers");
+    let told = events.iter().find_map(|event| match event {
+        HostEvent::Done(Outcome::Status(status)) => Some(*status),
+        _ => None,
+    });
+    told.expect("a status")
+}
+
+fn ping(bench: &mut Bench<impl DeviceUnderTest>) -> Reading {
+    let events = bench.perform(Command::Ping, 2.0).expect("pings");
+    let readings = readings(&events);
+    assert_eq!(readings.len(), 1);
+    readings[0]
+}
+
+fn readings(events: &[HostEvent]) -> Vec<Reading> {
+    let reading = |event: &HostEvent| match event {
+        HostEvent::Reading { reading, .. } => Some(*reading),
+        _ => None,
+    };
+    assert!(!events.iter().any(|event| matches!(
+        event,
+        HostEvent::SweepDone { end, .. } if *end != SweepState::Complete
+    )));
+    events.iter().filter_map(reading).collect()
+}
+
+fn assert_echoes(bench: &Bench<impl DeviceUnderTest>, reading: &Reading, expected_us: &[f64]) {
+    assert_eq!(reading.echoes.len(), expected_us.len(), "{reading:?} for {expected_us:?}");
+    for (ticks, us) in reading.echoes.iter().zip(expected_us) {
+        let off = (f64::from(*ticks) - 2.0 * us).abs();
+        let allowed = f64::from(bench.device.tolerance_ticks());
+        assert!(off <= allowed, "{reading:?} for {expected_us:?}: {off} ticks off");
+    }
+}
+
+fn frame(boot: u16, seq: u16, request: &Request) -> Vec<u8> {
+    Frame::encode(Header { boot, seq }, request).expect("fits").to_vec()
+}
+
+/// What came over the line, with the numbers they answer. Anything that is no frame is an error.
+fn replies(bytes: &[u8]) -> Vec<(u16, Reply)> {
+    let mut decoder = FrameDecoder::new();
+    let mut replies = Vec::new();
+    for byte in bytes {
+        match decoder.push(*byte) {
+            Received::Frame(frame) => {
+                let reply = Reply::decode(frame.body).expect("a reply");
+                replies.push((frame.header.seq, reply));
+            }
+            Received::Dropped(reason) => panic!("the device sent something else: {reason:?}"),
+            Received::Nothing | Received::Empty => {}
+        }
+    }
+    replies
+}
+
+/// Sends a request past the host machine, and gives the reply to it.
+fn answer(
+    bench: &mut Bench<impl DeviceUnderTest>,
+    boot: u16,
+    seq: u16,
+    request: &Request,
+) -> Reply {
+    // Numbers far from those of the host machine, which counts from a random one.
+    let seq = bench.host.identity().and_then(|known| known.last_seq).unwrap_or(0).wrapping_add(seq);
+    bench.device.receive();
+    bench.device.send(&frame(boot, seq, request));
+    bench.device.run(30_000).expect("runs");
+    let replies = replies(&bench.device.receive());
+    let told = replies.iter().find(|(answered, _)| *answered == seq);
+    told.unwrap_or_else(|| panic!("no answer to {request:?}, number {seq}: {replies:?}")).1
+}

@@ -1,0 +1,441 @@
+//! The sum of a firing's sounds, and when its envelope passes the threshold.
+//!
+//! Time runs forward: sounds enter when they begin and leave when they are over, and only those in
+//! between are summed. Where their strengths together can't reach the threshold nothing is summed;
+//! where one sound is alone its rise is looked up in the table of the pulse.
+
+use num_complex::Complex64;
+
+use super::{Combining, Incident, Receiver, Sound, noise::NoiseTrack};
+use crate::acoustics::{EchoShape, Gain};
+
+/// Steps at which an envelope is watched, microseconds: a third of the standard deviation of a
+/// 7 kHz filter's response, below which nothing rises.
+const STEP_US: f64 = 8.0;
+
+/// Longest step while the envelope is above the threshold, microseconds.
+const LONG_STEP_US: f64 = 30.0;
+
+/// Sounds that together add less than this part to another's amplitude leave it as it is.
+const NEGLIGIBLE: f64 = 3e-3;
+
+/// About one cycle of the carrier, microseconds.
+const CYCLE_US: f64 = 20.0;
+
+/// An echo from exactly the largest range still counts.
+const WINDOW_SLACK_US: f64 = 1e-6;
+
+pub(super) struct Hearing<'a> {
+    receiver: &'a Receiver,
+    pub(super) sounds: &'a [Sound],
+    incident: &'a dyn Fn(&Sound) -> Option<Incident>,
+    noise: Option<&'a NoiseTrack>,
+    /// Sounds that have begun, the first `over` of which are over.
+    parts: Vec<Part>,
+    over: usize,
+    /// Power of the time by which the gain rises.
+    exponent: f64,
+    least_threshold: f64,
+    /// A sound lasts from so long before its nominal time to so long after it.
+    span_us: (f64, f64),
+}
+
+struct Part {
+    tof_us: f64,
+    /// Phase and strength, to be multiplied with the shape and with what the gain adds while it
+    /// sounds.
+    field: Complex64,
+    /// The most of its modulus.
+    strength: f64,
+    /// Its own shape; without it, the pulse's.
+    shape: Option<Box<EchoShape>>,
+}
+
+impl Part {
+    const fn gone(tof_us: f64) -> Self {
+        Self { tof_us, field: Complex64::ZERO, strength: 0.0, shape: None }
+    }
+}
+
+impl<'a> Hearing<'a> {
+    pub(super) fn new(
+        receiver: &'a Receiver,
+        sounds: &'a [Sound],
+        incident: &'a dyn Fn(&Sound) -> Option<Incident>,
+    ) -> Self {
+        let longest = receiver.response.as_ref().map_or(0.0, |response| response.crossing_us());
+        let shape = &receiver.shape;
+        Self {
+            receiver,
+            sounds,
+            incident,
+            noise: None,
+            parts: Vec::with_capacity(sounds.len()),
+            over: 0,
+            exponent: match receiver.gain {
+                Gain::Compensating { exponent, .. } => exponent,
+                Gain::Steps { .. } => 0.0,
+            },
+            least_threshold: least_threshold(receiver),
+            span_us: (
+                shape.first_us() - receiver.lead_us - longest,
+                shape.last_us() - receiver.lead_us + longest,
+            ),
+        }
+    }
+
+    pub(super) fn in_noise(mut self, noise: &'a NoiseTrack) -> Self {
+        self.noise = Some(noise);
+        self
+    }
+
+    /// Back to the firing.
+    pub(super) fn rewind(&mut self) {
+        self.parts.clear();
+        self.over = 0;
+    }
+
+    /// When ECHO next rises if the detector is ready from `ready_us` on: at once if the envelope is
+    /// above the threshold then and stays there for the integration time.
+    pub(super) fn next_rise(&mut self, ready_us: f64) -> Option<f64> {
+        match self.receiver.combining {
+            Combining::Coherent => self.next_rise_of_sum(ready_us),
+            Combining::Ideal => self.next_rise_of_one(ready_us),
+        }
+    }
+
+    /// The sound that drives the envelope one carrier cycle after a time.
+    pub(super) fn cause(&mut self, t_us: f64) -> Option<Sound> {
+        if self.receiver.combining == Combining::Ideal {
+            return self.cause_of_one(t_us);
+        }
+        let t_us = t_us + CYCLE_US;
+        self.advance(t_us);
+        let size = |part: &Part| part.field.norm() * self.shape_at(part, t_us).norm();
+        let (place, _) = self.parts[self.over..]
+            .iter()
+            .enumerate()
+            .map(|(place, part)| (place, size(part)))
+            .filter(|(_, size)| *size > 0.0)
+            .max_by(|one, other| one.1.total_cmp(&other.1))?;
+        self.sounds.get(self.over + place).copied()
+    }
+
+    /// The most of the envelope over the threshold while a sound lasts that begins at `t_us`.
+    pub(super) fn peak(&mut self, t_us: f64, sound: Option<&Sound>) -> f64 {
+        const SAMPLES: u32 = 16;
+        if self.receiver.combining == Combining::Ideal || self.is_alone(t_us, sound) {
+            let threshold = self.receiver.threshold_at(t_us);
+            return sound.map_or(0.0, |sound| sound.amplitude / threshold);
+        }
+        let shape = &self.receiver.shape;
+        let lasts_us = shape.first_us() + shape.last_us() - 2.0 * self.receiver.lead_us;
+        (0..=SAMPLES)
+            .map(|i| self.relative_level(t_us + f64::from(i) / f64::from(SAMPLES) * lasts_us))
+            .fold(0.0, f64::max)
+    }
+
+    /// Envelope over threshold at a time; no earlier time can be asked for afterwards.
+    pub(super) fn relative_level(&mut self, t_us: f64) -> f64 {
+        self.level(t_us) / self.receiver.threshold_at(t_us)
+    }
+
+    /// Envelope at a time; no earlier time can be asked for afterwards.
+    pub(super) fn level(&mut self, t_us: f64) -> f64 {
+        self.advance(t_us);
+        self.level_of(self.over, t_us)
+    }
+
+    /// Places of the sounds that last now.
+    pub(super) fn living(&self) -> std::ops::Range<usize> {
+        self.over..self.parts.len()
+    }
+
+    /// The part of a sound in the envelope.
+    pub(super) fn share(&self, place: usize, t_us: f64) -> f64 {
+        self.parts.get(place).map_or(0.0, |part| {
+            part.field.norm() * self.shape_at(part, t_us).norm() * self.rise_of_gain(t_us)
+        })
+    }
+
+    /// Whether nothing else sounds with `sound` or within its length after it, and its strength is
+    /// its amplitude.
+    fn is_alone(&mut self, t_us: f64, sound: Option<&Sound>) -> bool {
+        let Some(sound) = sound else { return false };
+        if self.noise.is_some() || self.receiver.response.is_some() {
+            return false;
+        }
+        self.enter(t_us + self.span_us.1, t_us);
+        let first_us = t_us - self.span_us.1 + self.span_us.0;
+        let others = self.sounds[..self.parts.len()]
+            .iter()
+            .rev()
+            .take_while(|other| self.receiver.tof_us(other) > first_us);
+        let rest: f64 = others.filter(|other| *other != sound).map(|other| other.amplitude).sum();
+        rest < NEGLIGIBLE * sound.amplitude
+    }
+
+    fn next_rise_of_sum(&mut self, ready_us: f64) -> Option<f64> {
+        let integration_us = self.receiver.integration_us;
+        let window_us = self.receiver.window_us() + WINDOW_SLACK_US;
+        let heard = |rise_us: f64| Some(rise_us.max(ready_us)).filter(|us| *us <= window_us);
+        let (mut t_us, mut here) = (ready_us, self.relative_level(ready_us));
+        // How long the envelope has been above, less how long below since.
+        let mut charge_us = 0.0_f64;
+        while t_us <= window_us + 2.0 * integration_us {
+            if here < 1.0 && charge_us == 0.0 {
+                match self.skip(t_us) {
+                    Skip::Silence => return None,
+                    Skip::Lone { rise_us } => return heard(rise_us),
+                    Skip::To(later_us) if later_us > t_us => {
+                        (t_us, here) = (later_us, self.relative_level(later_us));
+                        continue;
+                    }
+                    Skip::To(_) => {}
+                }
+            }
+            let wanted_us = integration_us - charge_us;
+            if here >= 1.0 && wanted_us <= 0.0 {
+                return heard(t_us - charge_us);
+            }
+            let step_us = if here >= 1.0 { wanted_us.clamp(1.0, LONG_STEP_US) } else { STEP_US };
+            let next_us = t_us + step_us;
+            let next = self.relative_level(next_us);
+            let turn_us = if (here >= 1.0) == (next >= 1.0) {
+                next_us
+            } else {
+                self.turn((t_us, here), (next_us, next))
+            };
+            // Before the turn as it is here, after it as it is next.
+            for (part_us, above) in
+                [(turn_us - t_us, here >= 1.0), (next_us - turn_us, next >= 1.0)]
+            {
+                charge_us = (charge_us + if above { part_us } else { -part_us }).max(0.0);
+            }
+            (t_us, here) = (next_us, next);
+        }
+        None
+    }
+
+    /// From a time at which the envelope is below the threshold: the next one at which it may pass.
+    fn skip(&mut self, mut t_us: f64) -> Skip {
+        if self.noise.is_some() {
+            return Skip::To(t_us);
+        }
+        loop {
+            self.advance(t_us);
+            let entry_us = self.next_entry_us();
+            let live = &self.parts[self.over..];
+            let most: f64 = live.iter().map(|part| part.strength).sum();
+            if most * self.rise_of_gain(t_us).max(1.0) >= self.least_threshold {
+                let [part] = live else { return Skip::To(t_us) };
+                if self.gain_steps_during(part) {
+                    return Skip::To(t_us);
+                }
+                let Some((rise_us, fall_us)) = self.lone_rise(part, t_us) else {
+                    // It has passed already, or never does.
+                    let end_us = part.tof_us + self.span_us.1 + 1e-3;
+                    match entry_us {
+                        Some(entry_us) => t_us = entry_us.min(end_us),
+                        None => return Skip::Silence,
+                    }
+                    continue;
+                };
+                let done_us = rise_us + self.receiver.integration_us;
+                if entry_us.is_none_or(|entry_us| entry_us > done_us) {
+                    if fall_us >= done_us {
+                        return Skip::Lone { rise_us };
+                    }
+                    t_us = part.tof_us + self.span_us.1 + 1e-3;
+                    if let Some(entry_us) = entry_us {
+                        t_us = t_us.min(entry_us);
+                    }
+                    continue;
+                }
+                return Skip::To(t_us.max(rise_us.min(entry_us.unwrap_or(rise_us)) - STEP_US));
+            }
+            match entry_us {
+                Some(entry_us) => t_us = entry_us,
+                None => return Skip::Silence,
+            }
+        }
+    }
+
+    /// When a sound alone passes the threshold after `t_us`, and when it is last above.
+    fn lone_rise(&self, part: &Part, t_us: f64) -> Option<(f64, f64)> {
+        let at = |offset_us: f64| part.tof_us + offset_us - self.receiver.lead_us;
+        let field = part.field.norm();
+        let level_at =
+            |t_us: f64| self.receiver.threshold_at(t_us) / (field * self.rise_of_gain(t_us));
+        let mut rise_us = part.tof_us;
+        // The threshold drifts with the range, and the gain with the time.
+        for _ in 0..2 {
+            rise_us = at(self.shape(part).rise_us(level_at(rise_us))?);
+        }
+        let fall_us = at(self.shape(part).fall_us(level_at(rise_us))?);
+        (rise_us >= t_us).then_some((rise_us, fall_us))
+    }
+
+    /// Whether the gain rises by a step while a sound lasts.
+    fn gain_steps_during(&self, part: &Part) -> bool {
+        let Gain::Steps { steps } = &self.receiver.gain else { return false };
+        let lasts = part.tof_us + self.span_us.0..part.tof_us + self.span_us.1;
+        steps.iter().filter_map(|step| step.until_us).any(|until_us| lasts.contains(&until_us))
+    }
+
+    /// One sound at a time: the first that comes after `ready_us`, or one that lasts then.
+    fn next_rise_of_one(&self, ready_us: f64) -> Option<f64> {
+        let receiver = self.receiver;
+        let lasts_until_us = |sound: &Sound| receiver.tof_us(sound) + receiver.pulse_us;
+        let sound = self.loud().find(|sound| lasts_until_us(sound) >= ready_us)?;
+        Some(receiver.tof_us(sound).max(ready_us))
+    }
+
+    /// The sound that came at a time, or the strongest of those that last then.
+    fn cause_of_one(&self, t_us: f64) -> Option<Sound> {
+        let receiver = self.receiver;
+        let lasting = || {
+            let begun = self.loud().take_while(|sound| receiver.tof_us(sound) <= t_us);
+            begun.filter(|sound| receiver.tof_us(sound) + receiver.pulse_us >= t_us)
+        };
+        let strongest = || lasting().max_by(|one, other| one.amplitude.total_cmp(&other.amplitude));
+        lasting().find(|sound| receiver.tof_us(sound) == t_us).or_else(strongest).copied()
+    }
+
+    /// The sounds that pass the threshold by themselves.
+    fn loud(&self) -> impl Iterator<Item = &Sound> {
+        let receiver = self.receiver;
+        let window_us = receiver.window_us() + WINDOW_SLACK_US;
+        self.sounds
+            .iter()
+            .take_while(move |sound| receiver.tof_us(sound) <= window_us)
+            .filter(|sound| sound.amplitude >= receiver.threshold_at(receiver.tof_us(sound)))
+    }
+
+    /// Where the envelope passes the threshold between two times, by false position on its
+    /// logarithm, which is nearly straight.
+    fn turn(&self, from: (f64, f64), to: (f64, f64)) -> f64 {
+        let (mut low, mut high) = ((from.0, from.1.max(1e-9).ln()), (to.0, to.1.max(1e-9).ln()));
+        let rises = high.1 >= 0.0;
+        let mut t_us = low.0;
+        for round in 0..16 {
+            // Where the gain rises by a step there is a jump, which only halving finds.
+            let share = if round < 4 { low.1 / (low.1 - high.1) } else { 0.5 };
+            t_us = low.0 + share * (high.0 - low.0);
+            let here = self.relative_level_back(t_us).max(1e-9).ln();
+            if (here >= 0.0) == rises {
+                high = (t_us, here);
+            } else {
+                low = (t_us, here);
+            }
+            if here.abs() < 1e-6 || high.0 - low.0 < 0.01 {
+                break;
+            }
+        }
+        t_us
+    }
+
+    /// The same as [`relative_level`](Self::relative_level) a step or less before the last time
+    /// asked for.
+    fn relative_level_back(&self, t_us: f64) -> f64 {
+        // What was over at the later time may not have been.
+        self.level_of(self.over.saturating_sub(8), t_us) / self.receiver.threshold_at(t_us)
+    }
+
+    /// Envelope of the parts from a place on.
+    fn level_of(&self, from: usize, t_us: f64) -> f64 {
+        let live = &self.parts[from..];
+        let noise = self.noise.map_or(Complex64::ZERO, |noise| noise.at(t_us));
+        let gain = self.rise_of_gain(t_us);
+        match self.receiver.combining {
+            Combining::Coherent => {
+                let sum: Complex64 =
+                    live.iter().map(|part| part.field * self.shape_at(part, t_us)).sum();
+                (sum * gain + noise).norm()
+            }
+            Combining::Ideal => live
+                .iter()
+                .map(|part| part.field.norm() * self.shape_at(part, t_us).norm() * gain)
+                .fold(noise.norm(), f64::max),
+        }
+    }
+
+    fn shape_at(&self, part: &Part, t_us: f64) -> Complex64 {
+        self.shape(part).at(t_us - part.tof_us + self.receiver.lead_us)
+    }
+
+    fn shape<'p>(&'p self, part: &'p Part) -> &'p EchoShape {
+        part.shape.as_deref().unwrap_or(&self.receiver.shape)
+    }
+
+    /// What the gain adds while an echo sounds; the other half is in the fields.
+    fn rise_of_gain(&self, t_us: f64) -> f64 {
+        if self.exponent == 0.0 { 1.0 } else { t_us.max(1.0).powf(self.exponent) }
+    }
+
+    fn next_entry_us(&self) -> Option<f64> {
+        let next = self.sounds.get(self.parts.len())?;
+        Some(self.receiver.tof_us(next) + self.span_us.0)
+    }
+
+    /// Lets sounds enter and leave up to a time.
+    fn advance(&mut self, t_us: f64) {
+        self.enter(t_us, t_us);
+        if self.receiver.combining == Combining::Coherent {
+            let is_over = |part: &Part| part.tof_us + self.span_us.1 < t_us;
+            self.over += self.parts[self.over..].iter().take_while(|part| is_over(part)).count();
+        }
+    }
+
+    /// Lets sounds enter that begin up to a time; what is over by `now_us` only keeps its place.
+    fn enter(&mut self, t_us: f64, now_us: f64) {
+        while let Some(sound) = self.sounds.get(self.parts.len()) {
+            let tof_us = self.receiver.tof_us(sound);
+            if tof_us + self.span_us.0 > t_us {
+                break;
+            }
+            let is_over = tof_us + self.span_us.1 < now_us;
+            let part = if is_over { Part::gone(tof_us) } else { self.part(sound, tof_us) };
+            self.parts.push(part);
+        }
+    }
+
+    fn part(&self, sound: &Sound, tof_us: f64) -> Part {
+        let receiver = self.receiver;
+        let at_face = receiver.response.as_ref().and_then(|response| {
+            let Incident { strength, incidence } = (self.incident)(sound)?;
+            Some((strength, response.echo(&incidence)))
+        });
+        let (strength, shape) = match at_face {
+            Some((strength, Some(shape))) => (strength, Some(Box::new(shape))),
+            Some((_, None)) => (0.0, None),
+            None => (sound.amplitude, None),
+        };
+        let turn = sound.phase_rad - receiver.omega * tof_us;
+        let field = Complex64::from_polar(strength / self.rise_of_gain(tof_us), turn);
+        let peak = shape.as_deref().unwrap_or(&receiver.shape).peak();
+        let strength = strength / self.rise_of_gain(tof_us) * peak;
+        Part { tof_us, field, strength, shape }
+    }
+}
+
+/// Where to go on from a time without echo.
+enum Skip {
+    /// Nothing more will come.
+    Silence,
+    /// One sound, alone, passes the threshold.
+    Lone { rise_us: f64 },
+    /// Here the envelope has to be watched.
+    To(f64),
+}
+
+/// The least that the threshold in force ever is.
+fn least_threshold(receiver: &Receiver) -> f64 {
+    let Gain::Steps { steps } = &receiver.gain else { return receiver.threshold };
+    let starts = steps.iter().filter_map(|step| step.until_us);
+    starts
+        .chain([receiver.blanking_us])
+        .filter(|start_us| *start_us >= receiver.blanking_us)
+        .map(|start_us| receiver.threshold_at(start_us))
+        .fold(f64::INFINITY, f64::min)
+}

@@ -1,0 +1,234 @@
+//! Sounds at given times against what the module's description says of them.
+
+use rand::SeedableRng as _;
+use rand_pcg::Pcg64;
+
+use super::*;
+
+/// At 340 m/s a path of 0.34 m takes 1000 us.
+const SPEED_M_S: f64 = 340.0;
+
+/// The 6500's timing and pulse with a gain that makes up for the spreading: the reference echo
+/// rises 47 us before its nominal onset at 0.02 and sounds for 417 us.
+fn receiver() -> Receiver {
+    let sensor = Sensor {
+        gain: Gain::default(),
+        threshold: 0.02,
+        max_range_m: 3.4,
+        ..Sensor::preset("senscomp-6500").expect("a preset")
+    };
+    Receiver::new(&sensor, SPEED_M_S)
+}
+
+/// Times (microseconds), amplitudes and phases.
+fn sounds(of: &[(f64, f64, f64)]) -> Vec<Sound> {
+    of.iter()
+        .zip(0..)
+        .map(|(&(tof_us, amplitude, phase_rad), index)| Sound {
+            length_m: tof_us * SPEED_M_S * 1e-6,
+            amplitude,
+            // The way's own phase is taken out, so that `phase_rad` is what meets.
+            phase_rad: phase_rad + TAU * 49.4e-3 * tof_us,
+            index,
+        })
+        .collect()
+}
+
+/// Expected status and times of ECHO.
+fn check(of: &[(f64, f64)], status: PingStatus, echoes_us: &[f64]) -> Detection {
+    let of: Vec<_> = of.iter().map(|&(tof_us, amplitude)| (tof_us, amplitude, 0.0)).collect();
+    let detection = receiver().detect(&sounds(&of));
+    assert_eq!(detection.status, status, "{of:?}: {detection:?}");
+    assert_eq!(detection.echoes_us.len(), echoes_us.len(), "{detection:?}");
+    for (found, expected) in detection.echoes_us.iter().zip(echoes_us) {
+        assert!((found - expected).abs() < 0.05, "{detection:?}");
+    }
+    detection
+}
+
+/// When an echo of this strength rises after one of strength 1, microseconds: the error function
+/// solved by hand for the filter's 22.736 us.
+fn walk_us(strength: f64) -> f64 {
+    let (mut low, mut high) = (-6.0, 6.0);
+    let solve = |level: f64, low: &mut f64, high: &mut f64| {
+        for _ in 0..60 {
+            let middle = (*low + *high) / 2.0;
+            let value = 0.5 * (1.0 + libm::erf(middle / 2f64.sqrt()));
+            if value < level { *low = middle } else { *high = middle }
+        }
+        *low
+    };
+    let weak = solve(0.02 / strength, &mut low, &mut high);
+    (low, high) = (-6.0, 6.0);
+    let strong = solve(0.02, &mut low, &mut high);
+    (weak - strong) * 22.736
+}
+
+#[test]
+fn a_strong_echo_is_timed_by_its_path_and_a_weak_one_is_late() {
+    let strong = check(&[(3000.0, 1.0)], PingStatus::Echo, &[3000.0]);
+    assert!((strong.range_m.expect("a range") - 0.51).abs() < 1e-6);
+    assert!((strong.margin_db.expect("a margin") - 34.0).abs() < 0.03);
+    for strength in [0.5, 0.1, 0.03] {
+        check(&[(3000.0, strength)], PingStatus::Echo, &[3000.0 + walk_us(strength)]);
+    }
+    assert!((walk_us(0.1) - 27.6).abs() < 0.1, "{}", walk_us(0.1));
+}
+
+#[test]
+fn blanking_loses_what_ended_and_catches_what_still_sounds() {
+    check(&[(1900.0, 1.0)], PingStatus::NoEcho, &[]);
+    let caught = check(&[(2100.0, 1.0)], PingStatus::MinRange, &[2380.0]);
+    assert!((caught.range_m.expect("a range") - 0.4046).abs() < 1e-12);
+    check(&[(2100.0, 0.01)], PingStatus::NoEcho, &[]);
+    // Above the threshold at the end of blanking, but not for the three cycles it takes.
+    check(&[(2000.0, 1.0)], PingStatus::NoEcho, &[]);
+    check(&[(2380.5, 1.0)], PingStatus::Echo, &[2380.5]);
+}
+
+#[test]
+fn the_first_loud_sound_wins_over_louder_later_ones() {
+    let echo = check(
+        &[(3000.0, 0.019), (4000.0, 0.1), (5000.0, 0.9)],
+        PingStatus::Echo,
+        &[4000.0 + walk_us(0.1), 5000.0 + walk_us(0.9)],
+    );
+    assert_eq!(echo.sound.map(|sound| sound.index), Some(1));
+}
+
+#[test]
+fn silence_names_its_best_candidate_in_the_window_and_what_it_lacked() {
+    let silence = check(
+        &[(1000.0, 1.0), (3000.0, 0.01), (4000.0, 0.015), (25_000.0, 1.0)],
+        PingStatus::NoEcho,
+        &[],
+    );
+    assert_eq!(silence.sound.map(|sound| sound.index), Some(2));
+    let lacked_db = 20.0 * (0.015_f64 / 0.02).log10();
+    assert!((silence.margin_db.expect("a margin") - lacked_db).abs() < 1e-6);
+    assert_eq!(check(&[], PingStatus::NoEcho, &[]).sound, None);
+}
+
+#[test]
+fn held_detector_skips_sounds_that_end_and_catches_those_that_last() {
+    check(&[(3000.0, 1.0), (3010.0, 0.005)], PingStatus::Echo, &[3000.0]);
+    check(&[(3000.0, 1.0), (3200.0, 1.0)], PingStatus::Echo, &[3000.0, 3440.0]);
+    let many: Vec<(f64, f64)> = (0..20).map(|i| (3000.0 + 700.0 * f64::from(i), 1.0)).collect();
+    let first_eight: Vec<f64> = many.iter().take(8).map(|&(tof_us, _)| tof_us).collect();
+    check(&many, PingStatus::Echo, &first_eight);
+}
+
+#[test]
+fn two_weak_sounds_in_phase_are_heard_and_out_of_phase_are_not() {
+    let pair = |phase_rad| sounds(&[(3000.0, 0.015, 0.0), (3001.0, 0.015, phase_rad)]);
+    let together = receiver().detect(&pair(0.0));
+    assert_eq!(together.status, PingStatus::Echo);
+    assert!((together.amplitude.expect("an amplitude") - 0.03).abs() < 1e-3);
+    let against = receiver().detect(&pair(TAU / 2.0));
+    assert_eq!(against.status, PingStatus::NoEcho);
+    assert!(against.margin_db.expect("a margin") < -6.0);
+    let ideal = Receiver { combining: Combining::Ideal, ..receiver() };
+    assert_eq!(ideal.detect(&pair(0.0)).status, PingStatus::NoEcho);
+}
+
+#[test]
+fn a_strong_pair_out_of_phase_is_heard_where_it_does_not_overlap() {
+    let pair = sounds(&[(3000.0, 0.5, 0.0), (3150.0, 0.5, TAU / 2.0)]);
+    let detection = receiver().detect(&pair);
+    assert!((detection.echoes_us[0] - 3000.0 - walk_us(0.5)).abs() < 0.05, "{detection:?}");
+    // Then both are gone from the envelope until the first one is over.
+    let trace = receiver().trace(&pair, &|_| None, 4000.0, 1.0);
+    let at = |t_us: f64| trace.points[t_us as usize].envelope;
+    assert!(at(3130.0) > 0.45 && at(3285.0) < 0.02 && at(3450.0) > 0.45);
+    assert_eq!(trace.humps.len(), 2);
+    assert!((trace.humps[1].peak.0 - 0.5).abs() < 1e-3);
+}
+
+/// The ideal detector names the same sounds and times each by its path.
+#[test]
+fn the_ideal_receiver_is_the_limit_of_sounds_that_do_not_overlap() {
+    let of = [(2600.0, 0.4, 1.0), (3500.0, 0.05, 2.0), (4400.0, 0.9, 0.3), (9000.0, 0.03, 0.0)];
+    let coherent = receiver().detect(&sounds(&of));
+    let ideal = Receiver { combining: Combining::Ideal, ..receiver() }.detect(&sounds(&of));
+    assert_eq!(coherent.sound, ideal.sound);
+    assert_eq!(coherent.echoes_us.len(), 4);
+    for ((one, other), (tof_us, strength, _)) in
+        coherent.echoes_us.iter().zip(&ideal.echoes_us).zip(of)
+    {
+        assert!((other - tof_us).abs() < 1e-9);
+        assert!((one - other - walk_us(strength)).abs() < 0.05, "{one} {other}");
+    }
+}
+
+/// The threshold in force drifts up with the range within a step and falls at its end.
+#[test]
+fn gain_steps_move_the_threshold() {
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    let receiver = Receiver::new(&sensor, 343.99);
+    let [before, after] = [5119.0, 5121.0].map(|t_us| receiver.threshold_at(t_us));
+    assert!((20.0 * (before / after).log10() - 5.2).abs() < 0.01, "{before} {after}");
+    // It is the sensor's own within each step, and at the rated range.
+    assert!((receiver.threshold_at(3491.0) / sensor.threshold - 1.0).abs() < 0.01);
+    assert!((receiver.threshold_at(62_210.0) / sensor.threshold - 1.0).abs() < 0.01);
+    // An echo too weak at the end of step 1 is heard once the gain has risen.
+    let tof_us = 5000.0;
+    let weak =
+        Sound { length_m: tof_us * 343.99e-6, amplitude: 0.8 * before, phase_rad: 0.0, index: 0 };
+    let detection = receiver.detect(&[weak]);
+    assert_eq!(detection.status, PingStatus::Echo);
+    assert!((detection.echoes_us[0] - 5120.0).abs() < 0.1, "{detection:?}");
+}
+
+#[test]
+fn measured_times_at_the_end_of_blanking_are_minimum_range() {
+    for (tof_us, status) in [
+        (None, PingStatus::NoEcho),
+        (Some(2380.0), PingStatus::MinRange),
+        (Some(2395.0), PingStatus::MinRange),
+        (Some(2401.0), PingStatus::Echo),
+    ] {
+        assert_eq!(classify_tof(tof_us, 2380.0), status, "{tof_us:?}");
+    }
+}
+
+#[test]
+fn noise_is_off_by_default_repeats_with_its_seed_and_shakes_weak_echoes_most() {
+    let one = |strength, noise: &ReceiverNoise, seed| {
+        let mut rng = Pcg64::seed_from_u64(seed);
+        receiver().detect_in_noise(&sounds(&[(4000.0, strength, 0.0)]), &|_| None, noise, &mut rng)
+    };
+    let quiet = one(0.1, &ReceiverNoise::NONE, 1);
+    let plain = receiver().detect(&sounds(&[(4000.0, 0.1, 0.0)]));
+    assert!((quiet.echoes_us[0] - plain.echoes_us[0]).abs() < 0.01);
+    let noise = ReceiverNoise { floor: 0.002, jitter_us: 0.0 };
+    assert_eq!(one(0.1, &noise, 7), one(0.1, &noise, 7));
+    assert_ne!(one(0.1, &noise, 7), one(0.1, &noise, 8));
+    let spread_us = |strength| {
+        let times: Vec<f64> = (0..60)
+            .filter_map(|seed| one(strength, &noise, seed).echoes_us.first().copied())
+            .collect();
+        let mean = times.iter().sum::<f64>() / times.len() as f64;
+        (times.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / times.len() as f64).sqrt()
+    };
+    let (weak, strong) = (spread_us(0.05), spread_us(1.0));
+    assert!(weak > 1.0 && weak > 1.5 * strong, "{weak} {strong}");
+    // Noise alone raises ECHO when its envelope is of the threshold's size.
+    let loud = ReceiverNoise { floor: 0.05, jitter_us: 0.0 };
+    let mut rng = Pcg64::seed_from_u64(3);
+    let alarm = receiver().detect_in_noise(&[], &|_| None, &loud, &mut rng);
+    assert_eq!((alarm.status, alarm.sound), (PingStatus::Echo, None));
+}
+
+/// The envelope of the noise has the size asked for.
+#[test]
+fn noise_has_its_floor() {
+    let noise = ReceiverNoise { floor: 0.01, jitter_us: 0.0 };
+    let receiver = receiver();
+    let track = noise.track(&receiver, &mut Pcg64::seed_from_u64(5));
+    let squares = (1..2000).map(|i| {
+        let t_us = 10.0 * f64::from(i);
+        (track.at(t_us).norm() / receiver.range_m(t_us)).powi(2)
+    });
+    let rms = (squares.sum::<f64>() / 1999.0).sqrt();
+    assert!((rms / 0.01 - 1.0).abs() < 0.1, "{rms}");
+}

@@ -1,0 +1,96 @@
+//! `sonard doctor`.
+
+mod examine;
+mod report;
+
+use super::{Failure, Outcome, runtime};
+use crate::link::{self, Candidate};
+use report::Report;
+
+/// Options of `sonard doctor`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Args {
+    /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number
+    #[arg(long, value_name = "PATH|ID")]
+    port: Option<String>,
+    /// Leave the motor alone
+    #[arg(long)]
+    no_motion: bool,
+    /// Firings
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pings: u32,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) const ABOUT: &str = "\
+Find out what is wrong with a ranger: port, firmware, motor, echo.
+
+With --port, opens that port, asks the board who it is, measures the line, turns the motor a few \
+steps there and back, and fires some times. Each check says what it found and, where something \
+is wrong, what to do. Without --port it lists the serial ports by their stable names and opens \
+none of them: another device might take offence.";
+
+const EXAMPLES: &str = "\
+Examples:
+  sonard doctor                                  # which ports are there?
+  sonard doctor --port /dev/ttyACM0
+  sonard doctor --port LAB-000042 --no-motion --json
+
+Point the ranger at a wall 0.5 to 5 m away. The motor turns by 25 steps at 200 steps/s; keep clear \
+of the transducer, which carries 400 V while it fires.
+
+With --json, `checks` holds objects {check, status, detail, cause, help}. status is ok, warning, \
+failed or skipped; cause is null or one of not_found, permission, busy, not_serial, port_error, \
+cable, silent, wrong_firmware, wrong_version, power, line, emergency_stop, motor, missing_echo, \
+stuck_echo, device.
+
+Exit codes: 0 all well (or ports listed), 1 the board works but something was found, 2 wrong \
+usage, 3 no port, no board or no link to it.";
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let Some(port) = &args.port else {
+        return list(&link::candidates(), args.json);
+    };
+    let report = runtime::new()?.block_on(examine::examine(port, args));
+    report.print(args.json)?;
+    report.outcome()
+}
+
+fn list(candidates: &[Candidate], json: bool) -> Outcome {
+    if json {
+        let text = serde_json::json!({ "port": null, "candidates": candidates }).to_string();
+        anstream::println!("{text}");
+    } else {
+        for Candidate { port, id, usb } in candidates {
+            let name = id.as_deref().unwrap_or(port);
+            let path = id.as_ref().map_or_else(String::new, |_| format!("  ({port})"));
+            let usb = usb.as_ref().map_or_else(String::new, |usb| format!("  {usb}"));
+            anstream::println!("{name}{path}{usb}");
+        }
+    }
+    if candidates.is_empty() {
+        return Err(Failure::device(
+            "there is no serial port",
+            "plug the board in; if it is, its cable may be one for charging only, or `dmesg` tells \
+             why it is not recognised",
+        ));
+    }
+    if !json {
+        anstream::eprintln!("none was opened: examine one with `sonard doctor --port NAME`");
+    }
+    Ok(())
+}
+
+impl Report {
+    /// The exit code that goes with it.
+    fn outcome(&self) -> Outcome {
+        match self.worst() {
+            None => Ok(()),
+            Some(check) if check.reaches_device() => Err(Failure::Found(None)),
+            Some(check) => Err(Failure::device(&check.detail, check.help.as_deref().unwrap_or(""))),
+        }
+    }
+}

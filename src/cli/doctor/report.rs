@@ -1,0 +1,131 @@
+//! What was found.
+
+use serde::Serialize;
+
+use crate::cli::{Failure, Outcome};
+
+/// How a check went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Status {
+    Ok,
+    Warning,
+    Failed,
+    Skipped,
+}
+
+/// What is wrong, by its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Cause {
+    NotFound,
+    Permission,
+    Busy,
+    NotSerial,
+    PortError,
+    Cable,
+    Silent,
+    WrongFirmware,
+    WrongVersion,
+    Power,
+    Line,
+    EmergencyStop,
+    Motor,
+    MissingEcho,
+    StuckEcho,
+    Device,
+}
+
+/// One check.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Check {
+    pub(super) check: &'static str,
+    pub(super) status: Status,
+    pub(super) detail: String,
+    pub(super) cause: Option<Cause>,
+    pub(super) help: Option<String>,
+}
+
+impl Check {
+    pub(super) fn ok(check: &'static str, detail: impl Into<String>) -> Self {
+        Self { check, status: Status::Ok, detail: detail.into(), cause: None, help: None }
+    }
+
+    pub(super) fn skipped(check: &'static str, detail: impl Into<String>) -> Self {
+        Self { status: Status::Skipped, ..Self::ok(check, detail) }
+    }
+
+    pub(super) fn warning(
+        check: &'static str,
+        cause: Cause,
+        detail: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Self {
+        let (cause, help) = (Some(cause), Some(help.into()));
+        Self { check, status: Status::Warning, detail: detail.into(), cause, help }
+    }
+
+    pub(super) fn failed(
+        check: &'static str,
+        cause: Cause,
+        detail: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Self {
+        Self { status: Status::Failed, ..Self::warning(check, cause, detail, help) }
+    }
+
+    /// Whether a board was talked to when it failed.
+    pub(super) const fn reaches_device(&self) -> bool {
+        !matches!(
+            self.cause,
+            Some(
+                Cause::NotFound
+                    | Cause::Permission
+                    | Cause::Busy
+                    | Cause::NotSerial
+                    | Cause::PortError
+                    | Cause::Cable
+                    | Cause::Silent
+                    | Cause::WrongFirmware
+                    | Cause::WrongVersion
+            )
+        )
+    }
+}
+
+/// All of them, in order.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    pub(super) port: String,
+    pub(super) checks: Vec<Check>,
+}
+
+impl Report {
+    /// The first failure.
+    pub(super) fn worst(&self) -> Option<&Check> {
+        self.checks.iter().find(|check| check.status == Status::Failed)
+    }
+
+    pub(super) fn print(&self, json: bool) -> Outcome {
+        if json {
+            let text = serde_json::to_string(self).map_err(|error| {
+                Failure::device(error, "this is a fault of the program: report it")
+            })?;
+            anstream::println!("{text}");
+            return Ok(());
+        }
+        for Check { check, status, detail, help, .. } in &self.checks {
+            let word = match status {
+                Status::Ok => "ok",
+                Status::Warning => "WARNING",
+                Status::Failed => "FAILED",
+                Status::Skipped => "skipped",
+            };
+            anstream::println!("{check:<9} {word:<8} {detail}");
+            if let Some(help) = help {
+                anstream::println!("{:<18} -> {help}", "");
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,238 @@
+//! `sonard interpret`.
+
+use std::{
+    io::{self, Write},
+    path::PathBuf,
+};
+
+use comfy_table::{CellAlignment, Table};
+
+use super::{
+    Failure, Outcome,
+    compare::RULED,
+    picture::{PictureArgs, scene_for, warn_of_damage},
+};
+use crate::{
+    interpret::{Extents, Feature, FeatureKind, Noise, Settings, Sweep, interpret},
+    plot::draw_features,
+    scan::ScanView,
+    store::load,
+};
+
+/// Options of `sonard interpret`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(super) struct Args {
+    /// Logs of scans by one ranger, from one place or more; - for standard input
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// One JSON object a feature
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    picture: PictureArgs,
+    /// Scene file or name of a shipped scene to draw; without it, the shipped one that the log names
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<String>,
+    /// Strength of an edge's echo, sigma_E: for the boundary between edges and the rest
+    #[arg(long, value_name = "S", default_value_t = Settings::default().sigma_e, value_parser = positive)]
+    sigma_e: f64,
+    /// How far a reading may be from its arc's mean, millimetres
+    #[arg(long, value_name = "MM", default_value_t = 10.0, value_parser = positive)]
+    depth_tolerance_mm: f64,
+    /// Ratio of a head-on wall's echo to the noise, decibels [default: no noise]
+    #[arg(long, value_name = "DB")]
+    snr_db: Option<f64>,
+    /// Standard deviation of each beam's azimuth beside the step, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = not_negative)]
+    azimuth_sigma_deg: f64,
+    /// Standard deviation of the heading from scan to scan, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = not_negative)]
+    heading_sigma_deg: f64,
+    /// Name nothing that is less probable than this
+    #[arg(long, value_name = "P", default_value_t = Settings::default().min_confidence, value_parser = probability)]
+    min_confidence: f64,
+}
+
+pub(super) const ABOUT: &str = "\
+Tell planes, corners and edges apart in scans.
+
+After O. Bozma and R. Kuc (IEEE PAMI 13, 1991): beams that read one range make an arc. An arc \
+narrower than b(r), half way between what the sensor gives edges and what it gives planes and \
+corners, is an edge. A plane is seen in the same direction from a second place, a corner is not. \
+With one scan, planes and corners stay `unresolved`, with the place to scan from next that decides \
+most of them; give the log of that scan too, and they are decided.";
+
+const HELP: &str = "\
+Examples:
+  sonard simulate --scene plane-corner-edge --pose fig13 --sensor bozma-kuc-60khz \\
+      --edge-law bozma-kuc --lossless --out one.jsonl
+  sonard interpret one.jsonl -o one.png
+  sonard interpret one.jsonl two.jsonl --json
+
+A feature's bearing is counter-clockwise from the heading of the scan it was first seen in. Why \
+one is unresolved: second_position (plane or corner), translation (the places are too near to \
+each other), lost (not seen again), ambiguous (several arcs fit, or none), interference \
+(something nearer covers a part of the arc), cut_off (the scan ends in it), extent (fits neither), \
+min_range (closer than can be measured).
+Exit codes: 0 done, also if nothing was found, 2 wrong usage or input, 3 a picture can't be written.";
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let targets = args.picture.targets()?;
+    let (scans, features) = find(args)?;
+    let mut out = io::stdout().lock();
+    let printed = if args.json {
+        features.iter().try_for_each(|feature| {
+            serde_json::to_writer(&mut out, feature)?;
+            writeln!(out)
+        })
+    } else {
+        print(&mut out, &features)
+    };
+    printed.or_else(|error| Failure::from_write("standard output", &error))?;
+    if targets.is_empty() {
+        return Ok(());
+    }
+    let scene = scene_for(&scans, args.scene.as_deref())?;
+    let picture = draw_features(&scans, scene.as_ref(), &features);
+    targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
+}
+
+/// The scans that can be interpreted, and what is in them.
+fn find(args: &Args) -> Result<(Vec<ScanView>, Vec<Feature>), Failure> {
+    let (mut scans, mut sweeps) = (Vec::new(), Vec::new());
+    for log in &args.logs {
+        let loaded = load(log).map_err(|error| Failure::input(&error, error.help()))?;
+        warn_of_damage(log, &loaded);
+        for scan in ScanView::from_records(loaded.records) {
+            match Sweep::of(&scan) {
+                Ok(sweep) => {
+                    sweeps.push((scan.scan, sweep));
+                    scans.push(scan);
+                }
+                Err(error) => {
+                    let log = log.display();
+                    anstream::eprintln!("{log}: scan {} is left out: {error}", scan.scan);
+                }
+            }
+        }
+    }
+    let Some(session) = scans.iter().find_map(|scan| scan.session.clone()) else {
+        return Err(Failure::input(
+            "there is no scan with its session to interpret",
+            "give a log as `sonard scan` or `sonard simulate` writes it",
+        ));
+    };
+    if scans.iter().flat_map(|scan| &scan.session).any(|other| other.sensor != session.sensor) {
+        return Err(Failure::input(
+            "the scans are of different sensors, whose arcs differ",
+            "interpret the logs of each sensor by themselves",
+        ));
+    }
+    let extents = Extents::of_session(&session).map_err(|error| {
+        Failure::input(format!("session: {error}"), "correct the session's record in the log")
+    })?;
+    let features = interpret(&sweeps, &extents, &settings(args));
+    Ok((scans, features))
+}
+
+fn settings(args: &Args) -> Settings {
+    Settings {
+        sigma_e: args.sigma_e,
+        depth_tolerance_m: args.depth_tolerance_mm * 1e-3,
+        noise: Noise {
+            amplitude: args.snr_db.map_or(0.0, |db| 10_f64.powf(-db / 20.0)),
+            azimuth_deg: args.azimuth_sigma_deg,
+            heading_deg: args.heading_sigma_deg,
+        },
+        min_confidence: args.min_confidence,
+        ..Settings::default()
+    }
+}
+
+fn print(out: &mut impl Write, features: &[Feature]) -> io::Result<()> {
+    if features.is_empty() {
+        return writeln!(out, "no feature: every beam is silent");
+    }
+    let mut table = Table::new();
+    table.load_style(RULED).set_header([
+        "kind",
+        "bearing",
+        "range",
+        "extent",
+        "b(r)",
+        "beta",
+        "corner's",
+        "confidence",
+        "why open",
+    ]);
+    for feature in features {
+        table.add_row(row(feature));
+    }
+    for column in table.column_iter_mut().skip(1).take(7) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    writeln!(out, "{table}")?;
+    let mut said = Vec::new();
+    for next in features.iter().filter_map(|feature| feature.next) {
+        if !said.contains(&next.direction_deg) {
+            said.push(next.direction_deg);
+            writeln!(
+                out,
+                "next scan: {:.1} cm in direction {:.1} degrees, at ({:.4}, {:.4}) m, decides {} \
+                 (planes at least {:.1} cm wide, corners' sides {:.1} cm)",
+                100.0 * next.delta_m,
+                next.direction_deg,
+                next.x_m,
+                next.y_m,
+                next.decides,
+                100.0 * next.least_plane_m,
+                100.0 * next.least_corner_m
+            )?;
+        }
+    }
+    Ok(())
+}
+
+fn row(feature: &Feature) -> [String; 9] {
+    // Adding zero makes -0 plain.
+    let hundredths = |value: f64| (value * 100.0).round() / 100.0 + 0.0;
+    let degrees =
+        |value: Option<f64>| value.map_or("-".into(), |value| format!("{:.2}", hundredths(value)));
+    let kind = match feature.kind {
+        FeatureKind::Plane => "plane",
+        FeatureKind::Corner => "corner",
+        FeatureKind::Edge => "edge",
+        FeatureKind::Unresolved => "unresolved",
+    };
+    let reason = serde_json::to_value(feature.reason).ok();
+    let reason = reason.and_then(|reason| reason.as_str().map(str::to_owned));
+    [
+        kind.into(),
+        format!("{:.2}", feature.bearing_deg),
+        feature.range_m.map_or("-".into(), |m| format!("{m:.3} m")),
+        format!("{:.2}", feature.extent_deg),
+        degrees(feature.boundary_deg),
+        degrees(feature.beta_deg),
+        degrees(feature.beta_corner_deg),
+        format!("{:.4}", feature.confidence),
+        reason.unwrap_or_default(),
+    ]
+}
+
+fn within(text: &str, least: f64, most: f64, what: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| (least..=most).contains(value));
+    value.ok_or_else(|| format!("give {what}"))
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    within(text, f64::MIN_POSITIVE, 1e6, "a number greater than 0")
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    within(text, 0.0, 1e6, "a number, 0 or more")
+}
+
+fn probability(text: &str) -> Result<f64, String> {
+    within(text, 0.0, 1.0, "a number from 0 to 1")
+}

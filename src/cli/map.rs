@@ -1,0 +1,376 @@
+//! `sonard map`.
+
+use std::{
+    fs,
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use super::{Failure, Outcome, picture::warn_of_damage, scene_file};
+use crate::{
+    geometry::DVec2,
+    interpret::{
+        Extents, Heard, Sweep,
+        grid::{BeamModel, GaussianBeam, Grid, GridShape, MapYaml, PhysicalBeam, Trust, to_pgm},
+        prediction::{FeaturePrediction, PredictionSettings, Worth},
+    },
+    plot::draw_map,
+    scan::{ScanView, Session},
+    store::load,
+};
+
+/// Without a word on it, ranges beyond this are not mapped, metres.
+const MAX_RANGE_M: f64 = 5.0;
+
+/// Around what was seen, metres.
+const MARGIN_M: f64 = 0.5;
+
+/// Options of `sonard map`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(super) struct Args {
+    /// Logs whose scans have poses; - for standard input
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// Folder for map.pgm, map.yaml and map.png
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Whether readings that predicted features contradict count less
+    #[arg(long, value_enum, default_value_t = Switch::On)]
+    feature_prediction: Switch,
+    /// What a reading says about the space before the ranger
+    #[arg(long, value_enum, default_value_t = ModelName::Gaussian)]
+    model: ModelName,
+    /// Side of a cell, metres
+    #[arg(long, value_name = "M", default_value_t = 0.05)]
+    resolution: f64,
+    /// Take longer ranges as silence, metres [default: the sensor's, at most 5]
+    #[arg(long, value_name = "M")]
+    max_range: Option<f64>,
+    /// Map this region: X0,Y0,X1,Y1 in metres [default: around what was seen]
+    #[arg(long, value_name = "REGION", allow_hyphen_values = true, value_parser = region)]
+    region: Option<[f64; 4]>,
+    /// Beam width, degrees [default: that of a plane's arc]
+    #[arg(long, value_name = "DEG")]
+    beam_deg: Option<f64>,
+    /// Exponent of the confidence with the distance of the feature
+    #[arg(long, value_name = "E", default_value_t = 2.0)]
+    exponent: f64,
+    /// How far walls are taken to go on beyond what was seen of them, metres
+    #[arg(long, value_name = "M", default_value_t = EXTEND_M)]
+    extend: f64,
+    /// Leave readings of less confidence out; 0.5 is full confidence
+    #[arg(long, value_name = "C", default_value_t = LEAST_CONFIDENCE)]
+    least_confidence: f64,
+    /// Write the confidence of every reading to this file, one JSON object a line
+    #[arg(long, value_name = "FILE")]
+    confidences: Option<PathBuf>,
+    /// Scene file or name of a shipped scene whose walls to draw over map.png
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<String>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// What did best on the made-up rooms of `sonard map-benchmark`.
+pub(super) const EXTEND_M: f64 = 1.0;
+/// The same.
+pub(super) const LEAST_CONFIDENCE: f64 = 0.45;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Switch {
+    On,
+    Off,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum ModelName {
+    /// Gaussian in direction and distance
+    Gaussian,
+    /// From the sensor's beam pattern and threshold
+    Physical,
+}
+
+pub(super) const ABOUT: &str = "\
+Make an occupancy grid of the scans of logs.
+
+Each scan is taken at its pose. Feature Prediction (O'Sullivan and others) predicts walls from \
+readings that are right and gives readings that such walls contradict less confidence, so that \
+mirror-like walls are not mapped as free space. Writes the pair map.pgm and map.yaml that ROS's \
+map_server reads (bright is free, dark occupied, in between is how likely), and map.png with the \
+way of the ranger.";
+
+const HELP: &str = "\
+Examples:
+  sonard map run/*.jsonl --out map
+  sonard map scan.jsonl --out map --feature-prediction off --resolution 0.02 --json
+  sonard map-score map simple-room
+
+A confidence is 0.5 where nothing speaks against a reading and less where something does; clear_m \
+is how far the reading is right in any case.
+Exit codes: 0 done, 2 wrong usage or input, 3 a file can't be written.";
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let (session, taken) = sweeps(args)?;
+    let refuse = |error: &dyn std::fmt::Display| {
+        Failure::input(error.to_string(), "see `sonard map --help`")
+    };
+    let extents = Extents::of_session(&session).map_err(|error| {
+        Failure::input(format!("session: {error}"), "correct the session's record in the log")
+    })?;
+    let sensor_m = extents.max_range_m.min(MAX_RANGE_M);
+    let max_range_m = args.max_range.unwrap_or(sensor_m);
+    if !(max_range_m.is_finite() && max_range_m > 0.0) {
+        return Err(refuse(&format!("--max-range {max_range_m}: give a length greater than 0")));
+    }
+    let shape = shape(args, &taken, max_range_m)?;
+    let (model, prediction) = models(args, extents, max_range_m);
+    let scene = args.scene.as_deref().map(scene_file::load).transpose()?;
+    fs::create_dir_all(&args.out).map_err(|error| {
+        Failure::input(
+            format!("cannot make the folder {}: {error}", args.out.display()),
+            "give a folder that you may write to",
+        )
+    })?;
+
+    let mapped = map(args, &taken, shape, &model, prediction)?;
+    let way: Vec<DVec2> = taken.iter().map(|(_, sweep)| sweep.pose.position()).collect();
+    let png = draw_map(&mapped.grid, scene.as_ref(), &way, 4).map_err(|error| refuse(&error))?;
+    for (name, bytes) in [
+        ("map.pgm", to_pgm(&mapped.grid)),
+        ("map.yaml", MapYaml::of(&shape, "map.pgm").to_text().into_bytes()),
+        ("map.png", png),
+    ] {
+        save(&args.out.join(name), &bytes)?;
+    }
+    let summary = mapped.summary(args, &taken);
+    let mut out = io::stdout().lock();
+    let printed = if args.json {
+        serde_json::to_writer(&mut out, &summary)
+            .map_err(io::Error::from)
+            .and_then(|()| writeln!(out))
+    } else {
+        summary.print(&mut out)
+    };
+    printed.or_else(|error| Failure::from_write("standard output", &error))
+}
+
+/// The scans that can be mapped, and the session of the first.
+fn sweeps(args: &Args) -> Result<(Session, Vec<(uuid::Uuid, Sweep)>), Failure> {
+    let (mut session, mut taken) = (None, Vec::new());
+    for log in &args.logs {
+        let loaded = load(log).map_err(|error| Failure::input(&error, error.help()))?;
+        warn_of_damage(log, &loaded);
+        for scan in ScanView::from_records(loaded.records) {
+            match Sweep::of(&scan) {
+                Ok(sweep) => {
+                    taken.push((scan.scan, sweep));
+                    session = session.or(scan.session.as_deref().cloned());
+                }
+                Err(error) => {
+                    let log = log.display();
+                    anstream::eprintln!("{log}: scan {} is left out: {error}", scan.scan);
+                }
+            }
+        }
+    }
+    match session {
+        Some(session) => Ok((session, taken)),
+        None => Err(Failure::input(
+            "there is no scan with its session and pose to map",
+            "give logs as `sonard scan` or `sonard simulate` writes them",
+        )),
+    }
+}
+
+/// The region asked for, else around poses and echoes within range.
+fn shape(
+    args: &Args,
+    taken: &[(uuid::Uuid, Sweep)],
+    max_range_m: f64,
+) -> Result<GridShape, Failure> {
+    let (low, high) = match args.region {
+        Some([x0, y0, x1, y1]) => (DVec2::new(x0, y0), DVec2::new(x1, y1)),
+        None => {
+            let points = taken.iter().flat_map(|(_, sweep)| {
+                let echoes = sweep.beams.iter().filter_map(|beam| match beam.heard {
+                    Heard::Echo(m) if m <= max_range_m => {
+                        Some(sweep.pose.point_at(beam.azimuth_deg, m))
+                    }
+                    _ => None,
+                });
+                echoes.chain([sweep.pose.position()])
+            });
+            let corners = points.map(|p| (p, p)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+            let (low, high) = corners.unwrap_or((DVec2::ZERO, DVec2::ONE));
+            // Corners on whole cells, so that maps of one place lie on each other.
+            let cell = args.resolution;
+            let low = ((low - MARGIN_M) / cell).floor() * cell;
+            (low, ((high + MARGIN_M) / cell).ceil() * cell)
+        }
+    };
+    GridShape::covering(low, high, args.resolution)
+        .map_err(|error| Failure::input(error, "choose another --resolution or --region"))
+}
+
+fn models(args: &Args, extents: Extents, max_range_m: f64) -> (BeamModel, PredictionSettings) {
+    let beam_deg = args.beam_deg.unwrap_or_else(|| extents.plane_corner_deg(1.0, 1.0));
+    let prediction = PredictionSettings {
+        exponent: args.exponent,
+        extend_m: args.extend,
+        ..PredictionSettings::stepper(beam_deg, max_range_m)
+    };
+    let model = match args.model {
+        ModelName::Gaussian => BeamModel::Gaussian(GaussianBeam::new(beam_deg, max_range_m)),
+        ModelName::Physical => {
+            BeamModel::Physical(Box::new(PhysicalBeam::new(extents, max_range_m)))
+        }
+    };
+    (model, prediction)
+}
+
+/// A finished map and what was noticed on the way.
+struct Mapped {
+    grid: Grid,
+    readings: usize,
+    left_out: usize,
+    outside: usize,
+    confidence: f64,
+}
+
+fn map(
+    args: &Args,
+    taken: &[(uuid::Uuid, Sweep)],
+    shape: GridShape,
+    model: &BeamModel,
+    prediction: PredictionSettings,
+) -> Result<Mapped, Failure> {
+    let trust = Trust { least_confidence: args.least_confidence, keep_clear: true };
+    let mut predictor = FeaturePrediction::new(prediction);
+    let mut confidences = Vec::new();
+    let mut mapped =
+        Mapped { grid: Grid::new(shape), readings: 0, left_out: 0, outside: 0, confidence: 0.0 };
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} scans, {eta} left");
+    let bar = ProgressBar::new(taken.len() as u64)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    for (scan, sweep) in taken {
+        let worths = match args.feature_prediction {
+            Switch::On => Some(predictor.assess(sweep)),
+            Switch::Off => None,
+        };
+        mapped.left_out += mapped.grid.add(sweep, worths.as_deref(), model, &trust);
+        mapped.readings += sweep.beams.len();
+        mapped.outside += usize::from(shape.index_at(sweep.pose.position()).is_none());
+        for (beam, worth) in sweep.beams.iter().zip(worths.unwrap_or_default()) {
+            mapped.confidence += worth.confidence;
+            if args.confidences.is_some() {
+                write_confidence(&mut confidences, *scan, beam.index, &worth);
+            }
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    if let Some(path) = &args.confidences {
+        save(path, &confidences)?;
+    }
+    Ok(mapped)
+}
+
+fn write_confidence(bytes: &mut Vec<u8>, scan: uuid::Uuid, index: u32, worth: &Worth) {
+    let Worth { confidence, clear_m } = *worth;
+    let line = serde_json::json!({
+        "scan": scan, "index": index, "confidence": confidence, "clear_m": clear_m
+    });
+    bytes.extend_from_slice(line.to_string().as_bytes());
+    bytes.push(b'\n');
+}
+
+/// What is printed.
+#[derive(Debug, Serialize)]
+struct Summary<'a> {
+    map: PathBuf,
+    scans: usize,
+    readings: usize,
+    feature_prediction: bool,
+    mean_confidence: Option<f64>,
+    left_out: usize,
+    poses_outside: usize,
+    resolution_m: f64,
+    width: usize,
+    height: usize,
+    origin_m: [f64; 2],
+    occupied_cells: usize,
+    free_cells: usize,
+    unknown_cells: usize,
+    #[serde(skip)]
+    out: &'a Path,
+}
+
+impl Mapped {
+    fn summary<'a>(&self, args: &'a Args, taken: &[(uuid::Uuid, Sweep)]) -> Summary<'a> {
+        let shape = self.grid.shape();
+        let of = |wanted: fn(f64) -> bool| self.grid.probabilities().filter(|p| wanted(*p)).count();
+        let predicted = args.feature_prediction == Switch::On && self.readings > 0;
+        Summary {
+            map: args.out.join("map.yaml"),
+            scans: taken.len(),
+            readings: self.readings,
+            feature_prediction: args.feature_prediction == Switch::On,
+            mean_confidence: predicted.then(|| self.confidence / self.readings as f64),
+            left_out: self.left_out,
+            poses_outside: self.outside,
+            resolution_m: shape.resolution_m,
+            width: shape.width,
+            height: shape.height,
+            origin_m: shape.origin.into(),
+            occupied_cells: of(|p| p > 0.65),
+            free_cells: of(|p| p < 0.196),
+            unknown_cells: of(|p| (0.196..=0.65).contains(&p)),
+            out: &args.out,
+        }
+    }
+}
+
+impl Summary<'_> {
+    fn print(&self, out: &mut impl Write) -> io::Result<()> {
+        writeln!(
+            out,
+            "{} scans, {} readings -> {}x{} cells of {} m in {}: {} occupied, {} free, {} between",
+            self.scans,
+            self.readings,
+            self.width,
+            self.height,
+            self.resolution_m,
+            self.out.display(),
+            self.occupied_cells,
+            self.free_cells,
+            self.unknown_cells
+        )?;
+        if let Some(confidence) = self.mean_confidence {
+            writeln!(out, "mean confidence {confidence:.3}, {} readings left out", self.left_out)?;
+        }
+        if self.poses_outside > 0 {
+            writeln!(out, "{} poses lie outside the map", self.poses_outside)?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes a whole file.
+pub(super) fn save(path: &Path, bytes: &[u8]) -> Outcome {
+    fs::write(path, bytes).map_err(|error| {
+        Failure::device(
+            format!("cannot write {}: {error}", path.display()),
+            "check that its folder exists, may be written to and has room",
+        )
+    })
+}
+
+fn region(text: &str) -> Result<[f64; 4], String> {
+    let parts: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    parts.try_into().map_err(|_| "give X0,Y0,X1,Y1 in metres, as in -1,-1,4,3".to_owned())
+}

@@ -1,0 +1,306 @@
+//! `sonard map-benchmark`.
+
+use std::{
+    fs,
+    io::{self, Write},
+    path::PathBuf,
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
+
+use comfy_table::{CellAlignment, Table};
+use indicatif::{ProgressBar, ProgressStyle};
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+use serde::Serialize;
+
+use super::{
+    Failure, Outcome,
+    compare::RULED,
+    map::{EXTEND_M, LEAST_CONFIDENCE},
+};
+use crate::{
+    acoustics::{Air, Sensor},
+    geometry::DVec2,
+    interpret::{
+        Extents,
+        grid::{MapScore, Trust},
+        trial::{Arrangement, Course, Trial, TrialSettings, random_room},
+    },
+    model::{Options, Simulator},
+    plot::draw_map,
+    scene::{Scene, shipped},
+};
+
+/// Options of `sonard map-benchmark`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(super) struct Args {
+    /// How many courses, each mapped without and with Feature Prediction
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    maps: u32,
+    /// Seed of rooms, courses and noise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Sets of readings in each course
+    #[arg(long, value_name = "N", default_value_t = 60)]
+    places: usize,
+    /// Side of a cell, metres
+    #[arg(long, value_name = "M", default_value_t = 0.05)]
+    resolution: f64,
+    /// Ranges longer than this are taken as silence, metres
+    #[arg(long, value_name = "M", default_value_t = 5.0)]
+    max_range: f64,
+    /// Exponent of the confidence with the distance of the feature (2; the text also says 1)
+    #[arg(long, value_name = "E", default_value_t = 2.0)]
+    exponent: f64,
+    /// How far walls are taken to go on beyond what was seen of them, metres
+    #[arg(long, value_name = "M", default_value_t = EXTEND_M)]
+    extend: f64,
+    /// Weigh whole readings, also what they say of the space before the feature, as the paper does
+    #[arg(long)]
+    whole_readings: bool,
+    /// Leave readings of less confidence out
+    #[arg(long, value_name = "C", default_value_t = LEAST_CONFIDENCE)]
+    least_confidence: f64,
+    /// One JSON object for each course instead of the table
+    #[arg(long)]
+    json: bool,
+    /// Folder for PNG pictures of the maps: ideal, without, with
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+pub(super) const ABOUT: &str = "\
+Map simulated courses without and with Feature Prediction, and score the maps.
+
+A robot wanders through shipped scenes and rooms made up at random, reading with a ring of seven \
+sonars (as the Pioneer 1) or a stepper; the model makes the readings. The maps are set beside \
+ideal ones by the four benchmarks of the Feature Prediction paper; the table gives the mean of \
+each scene.";
+
+const HELP: &str = "\
+Examples:
+  sonard map-benchmark                         128 courses; the same seed gives the same table
+  sonard map-benchmark --maps 16 --out maps    and pictures of the maps
+  sonard map-benchmark --extend 0 --whole-readings --least-confidence 0     the paper to the letter
+
+The benchmarks, in percent: correlation of the two maps (more is better); map score, the mean \
+squared difference of cells; the same of cells occupied in either map; and of the shortest ways \
+through the map's free space between places half a metre apart, how many run into an obstacle of \
+the ideal map.";
+
+/// Scenes that come with sonard, with the pose to begin at.
+const SHIPPED: [(&str, &str); 4] = [
+    ("mcgill-lab", "fig4"),
+    ("corridor", "beside-wall"),
+    ("two-surface-room", "middle"),
+    ("simple-room", "fig7"),
+];
+/// Made-up rooms: how many boxes and partitions.
+const MADE_UP: [(&str, usize, usize); 4] =
+    [("room", 0, 0), ("room with boxes", 3, 0), ("two rooms", 0, 1), ("three rooms, boxes", 2, 2)];
+
+/// A course's result.
+#[derive(Debug, Clone, Serialize)]
+struct Row {
+    scene: &'static str,
+    arrangement: &'static str,
+    course: usize,
+    without: MapScore,
+    with: MapScore,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    if let Some(folder) = &args.out {
+        fs::create_dir_all(folder).map_err(|error| {
+            Failure::input(
+                format!("cannot make the folder {}: {error}", folder.display()),
+                "give a folder that you may write to",
+            )
+        })?;
+    }
+    let rows = trials(args)?;
+    let mut out = io::stdout().lock();
+    let printed = if args.json {
+        rows.iter().try_for_each(|row| {
+            serde_json::to_writer(&mut out, row)?;
+            writeln!(out)
+        })
+    } else {
+        print(&mut out, &rows)
+    };
+    printed.or_else(|error| Failure::from_write("standard output", &error))
+}
+
+/// All courses, on as many threads as there are cores.
+fn trials(args: &Args) -> Result<Vec<Row>, Failure> {
+    let count = args.maps as usize;
+    let bar = ProgressBar::new(count as u64).with_style(
+        ProgressStyle::with_template("{bar:40} {pos}/{len} courses, {eta} left")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    let (next, rows) = (AtomicUsize::new(0), Mutex::new(Vec::with_capacity(count)));
+    let failure = Mutex::new(None);
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                loop {
+                    let course = next.fetch_add(1, Ordering::Relaxed);
+                    if course >= count {
+                        break;
+                    }
+                    match trial(args, course) {
+                        Ok(row) => lock(&rows).push(row),
+                        Err(error) => {
+                            lock(&failure).get_or_insert(error);
+                            next.store(count, Ordering::Relaxed);
+                        }
+                    }
+                    bar.inc(1);
+                }
+            });
+        }
+    });
+    bar.finish_and_clear();
+    if let Some(failure) = lock(&failure).take() {
+        return Err(failure);
+    }
+    let mut rows = std::mem::take(&mut *lock(&rows));
+    rows.sort_by_key(|row| row.course);
+    Ok(rows)
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+/// One course: its scene, arrangement and random numbers follow from its number and the seed.
+fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
+    let refuse = |error: &dyn std::fmt::Display| {
+        Failure::input(error.to_string(), "see `sonard map-benchmark --help`")
+    };
+    let mut rng = Pcg64::seed_from_u64(args.seed.wrapping_mul(1_000_003) ^ course as u64);
+    let (name, scene, start) = scene(course % 8, &mut rng)?;
+    let ring = course / 8 % 2 == 0;
+    let settings = TrialSettings {
+        resolution_m: args.resolution,
+        places: args.places,
+        stride_m: 0.25,
+        clearance_m: if name == "simple-room" { 0.2 } else { 0.3 },
+        arrangement: if ring { Arrangement::Ring } else { Arrangement::Stepper },
+        range_sigma_m: 0.005,
+        exponent: args.exponent,
+        extend_m: args.extend,
+        trust: Trust { least_confidence: args.least_confidence, keep_clear: !args.whole_readings },
+    };
+    let sensor = Sensor::preset("senscomp-6500").map_err(|error| refuse(&error))?;
+    let air = Air::default();
+    let extents = Extents::new(&sensor, &air, false).map_err(|error| refuse(&error))?;
+    let options = Options { max_range_m: Some(args.max_range), ..Options::default() };
+    let simulator =
+        Simulator::new(Arc::new(scene), sensor, air, options).map_err(|error| refuse(&error))?;
+    let course_taken = Course::through(&simulator, start, &settings, &mut rng)
+        .ok_or_else(|| refuse(&format!("{name}: there is no room for the robot to move")))?;
+    let trial =
+        course_taken.map(&extents, args.max_range, &settings).map_err(|error| refuse(&error))?;
+    let arrangement = if ring { "ring" } else { "stepper" };
+    if let Some(folder) = &args.out {
+        let stem = format!("{course:03}-{}-{arrangement}", name.replace([' ', ','], "-"));
+        save(folder, &stem, simulator.scene(), &course_taken, &trial)?;
+    }
+    let [without, with] = trial.scores;
+    Ok(Row { scene: name, arrangement, course, without, with })
+}
+
+fn scene(number: usize, rng: &mut Pcg64) -> Result<(&'static str, Scene, DVec2), Failure> {
+    if let Some((name, pose)) = SHIPPED.get(number) {
+        let text = shipped::text(name).unwrap_or_default();
+        let scene = Scene::from_json(text).map_err(|error| Failure::input(&error, error.help()))?;
+        let pose = scene.pose(pose).map_err(|error| Failure::input(&error, error.help()))?;
+        return Ok((name, scene, pose.position()));
+    }
+    let (name, boxes, partitions) = MADE_UP[number - SHIPPED.len()];
+    let scene = random_room(name, boxes, partitions, rng);
+    let start = scene.poses.get("start").map_or(DVec2::ZERO, crate::geometry::Pose::position);
+    Ok((name, scene, start))
+}
+
+fn save(
+    folder: &std::path::Path,
+    stem: &str,
+    scene: &Scene,
+    course: &Course,
+    trial: &Trial,
+) -> Outcome {
+    let way: Vec<DVec2> = course.sweeps.iter().map(|sweep| sweep.pose.position()).collect();
+    let pictures =
+        [("ideal", &course.ideal), ("without", &trial.maps[0]), ("with", &trial.maps[1])];
+    for (kind, map) in pictures {
+        let path = folder.join(format!("{stem}-{kind}.png"));
+        let png = draw_map(map, Some(scene), &way, 5)
+            .map_err(|error| Failure::input(error, "choose a coarser --resolution"))?;
+        fs::write(&path, png)
+            .or_else(|error| Failure::from_write(&path.display().to_string(), &error))?;
+    }
+    Ok(())
+}
+
+fn print(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
+    let mut table = Table::new();
+    table.load_style(RULED).set_header([
+        "scene",
+        "readings",
+        "maps",
+        "correlation",
+        "map score",
+        "occupied",
+        "false paths",
+    ]);
+    let mut groups: Vec<(&str, &str)> = Vec::new();
+    for row in rows {
+        if !groups.contains(&(row.scene, row.arrangement)) {
+            groups.push((row.scene, row.arrangement));
+        }
+    }
+    groups.sort_by_key(|(_, arrangement)| *arrangement);
+    for (scene, arrangement) in groups {
+        let of: Vec<&Row> =
+            rows.iter().filter(|r| r.scene == scene && r.arrangement == arrangement).collect();
+        table.add_row(line(scene, arrangement, &of));
+    }
+    for arrangement in ["ring", "stepper"] {
+        let of: Vec<&Row> = rows.iter().filter(|r| r.arrangement == arrangement).collect();
+        if !of.is_empty() {
+            table.add_row(line("all", arrangement, &of));
+        }
+    }
+    table.add_row(line("all", "both", &rows.iter().collect::<Vec<_>>()));
+    for column in table.column_iter_mut().skip(2) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    writeln!(out, "percent, without -> with Feature Prediction (change)\n{table}")
+}
+
+fn line(scene: &str, arrangement: &str, rows: &[&Row]) -> Vec<String> {
+    let cell = |of: fn(&MapScore) -> Option<f64>| {
+        let mean = |side: fn(&Row) -> &MapScore| {
+            let values: Vec<f64> = rows.iter().filter_map(|row| of(side(row))).collect();
+            values.iter().sum::<f64>() / values.len() as f64
+        };
+        let (without, with) = (mean(|row| &row.without), mean(|row| &row.with));
+        format!("{without:.2} -> {with:.2} ({:+.0} %)", 100.0 * (with / without - 1.0))
+    };
+    vec![
+        scene.into(),
+        arrangement.into(),
+        rows.len().to_string(),
+        cell(|score| score.correlation_percent),
+        cell(|score| Some(score.map_score_percent)),
+        cell(|score| Some(score.map_score_occupied_percent)),
+        cell(|score| score.false_positive_paths_percent),
+    ]
+}

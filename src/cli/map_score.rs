@@ -1,0 +1,138 @@
+//! `sonard map-score`.
+
+use std::{
+    fs,
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use super::{Failure, Outcome, map::save, scene_file};
+use crate::{
+    geometry::{DVec2, Pose},
+    interpret::grid::{
+        Grid, GridShape, MapScore, MapYaml, PathSettings, from_pgm, ideal, score, to_pgm,
+    },
+};
+
+/// Options of `sonard map-score`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(super) struct Args {
+    /// The map: its .yaml, or the folder that holds map.yaml
+    #[arg(value_name = "MAP")]
+    map: PathBuf,
+    /// What it should be: another map of the same region, or a scene file or a shipped scene's name
+    #[arg(value_name = "IDEAL")]
+    ideal: String,
+    /// From place to place of the lattice that ways are tried between, metres
+    #[arg(long, value_name = "M", default_value_t = PathSettings::default().spacing_m)]
+    spacing: f64,
+    /// Also write the ideal map drawn from the scene into this folder
+    #[arg(long, value_name = "DIR")]
+    save_ideal: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) const ABOUT: &str = "\
+Set a map beside the ideal one.
+
+Four benchmarks, in percent. Correlation of the two maps' cells: more is better. Map score: the \
+squared difference of the cells, summed, over the number of cells: less is better. The same sum \
+over cells that are occupied in either map only. False-positive paths: of the shortest ways through \
+the map's free space between places on a lattice, how many run into an obstacle of the ideal map.
+
+An ideal map is drawn from a scene on the map's own cells: walls are occupied, what can be reached \
+from the scene's poses is free, the rest is unknown.";
+
+const HELP: &str = "\
+Examples:
+  sonard map-score map simple-room
+  sonard map-score map/map.yaml ideal/map.yaml --json
+Exit codes: 0 done, 2 wrong usage or input, 3 the ideal map can't be written.";
+
+pub(super) fn run(args: &Args) -> Outcome {
+    if !(args.spacing.is_finite() && args.spacing > 0.0) {
+        return Err(Failure::input(
+            format!("--spacing is {}", args.spacing),
+            "give a length in metres, greater than 0",
+        ));
+    }
+    let map = read(&args.map)?;
+    let ideal = if is_map(Path::new(&args.ideal)) {
+        read(Path::new(&args.ideal))?
+    } else {
+        drawn(&args.ideal, *map.shape())?
+    };
+    if let Some(folder) = &args.save_ideal {
+        fs::create_dir_all(folder).map_err(|error| {
+            Failure::input(
+                format!("cannot make the folder {}: {error}", folder.display()),
+                "give a folder that you may write to",
+            )
+        })?;
+        save(&folder.join("map.pgm"), &to_pgm(&ideal))?;
+        let yaml = MapYaml::of(ideal.shape(), "map.pgm").to_text();
+        save(&folder.join("map.yaml"), yaml.as_bytes())?;
+    }
+    let settings = PathSettings { spacing_m: args.spacing, ..PathSettings::default() };
+    let found = score(&map, &ideal, &settings).map_err(|error| {
+        Failure::input(error, "give maps of one region and resolution (sonard map --region)")
+    })?;
+    let mut out = io::stdout().lock();
+    let printed = if args.json {
+        serde_json::to_writer(&mut out, &found)
+            .map_err(io::Error::from)
+            .and_then(|()| writeln!(out))
+    } else {
+        print(&mut out, &found)
+    };
+    printed.or_else(|error| Failure::from_write("standard output", &error))
+}
+
+/// Whether a name is that of a map rather than of a scene.
+fn is_map(path: &Path) -> bool {
+    let yaml = path.extension().is_some_and(|extension| extension == "yaml" || extension == "yml");
+    yaml || path.join("map.yaml").is_file()
+}
+
+fn read(path: &Path) -> Result<Grid, Failure> {
+    let yaml_path = if path.is_dir() { path.join("map.yaml") } else { path.to_path_buf() };
+    let refuse = |path: &Path, error: &dyn std::fmt::Display| {
+        Failure::input(
+            format!("{}: {error}", path.display()),
+            "give a map as `sonard map` writes it: map.yaml beside map.pgm",
+        )
+    };
+    let text = fs::read_to_string(&yaml_path).map_err(|error| refuse(&yaml_path, &error))?;
+    let yaml = MapYaml::from_text(&text).map_err(|error| refuse(&yaml_path, &error))?;
+    let image_path = yaml_path.parent().unwrap_or(Path::new("")).join(&yaml.image);
+    let bytes = fs::read(&image_path).map_err(|error| refuse(&image_path, &error))?;
+    from_pgm(&bytes, &yaml).map_err(|error| refuse(&image_path, &error))
+}
+
+fn drawn(name: &str, shape: GridShape) -> Result<Grid, Failure> {
+    let scene = scene_file::load(name)?;
+    let places: Vec<DVec2> = scene.poses.values().map(Pose::position).collect();
+    if places.is_empty() {
+        return Err(Failure::input(
+            format!("the scene {name} has no pose: what is free can't be told"),
+            "add a pose inside the room to the scene file",
+        ));
+    }
+    Ok(ideal(&scene, shape, &places))
+}
+
+fn print(out: &mut impl Write, score: &MapScore) -> io::Result<()> {
+    let percent = |value: Option<f64>| value.map_or("none".into(), |value| format!("{value:.2} %"));
+    writeln!(out, "correlation            {}", percent(score.correlation_percent))?;
+    writeln!(out, "map score              {}", percent(Some(score.map_score_percent)))?;
+    writeln!(out, "map score, occupied    {}", percent(Some(score.map_score_occupied_percent)))?;
+    writeln!(
+        out,
+        "false-positive paths   {} of {}",
+        percent(score.false_positive_paths_percent),
+        score.paths
+    )
+}

@@ -1,0 +1,106 @@
+//! The way of one beam's sound.
+
+use crate::{
+    cli::Failure,
+    geometry::wrap_pi,
+    model::Path,
+    plot::{Picture, WayView, draw_way},
+    scan::{PathRecord, Ping, PingStatus, ScanView},
+    scene::Scene,
+};
+
+/// Which beam.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Beam {
+    /// Its index in the plan.
+    Index(u32),
+    /// The one nearest to an azimuth, degrees.
+    Azimuth(f64),
+}
+
+/// The picture of a beam of the first scan, by the path that its record or the prediction in it
+/// names.
+pub(super) fn draw(
+    views: &[ScanView],
+    scene: Option<&Scene>,
+    beam: Beam,
+) -> Result<Picture, Failure> {
+    let scene = scene.ok_or_else(|| {
+        Failure::input("a way needs a floor plan", "give the log's scene with --scene")
+    })?;
+    let Some(view) = views.first() else { return Err(no_beam(views, beam)) };
+    let ping = find(view, beam).ok_or_else(|| no_beam(views, beam))?;
+    let pose = view.pose().ok_or_else(|| {
+        Failure::input("the scan lacks its scan_start record", "choose another with --scan")
+    })?;
+    let (azimuth_deg, index) = (ping.azimuth_deg, ping.index);
+    let record = path_of(ping).ok_or_else(|| {
+        Failure::input(
+            format!("beam {index}, azimuth {azimuth_deg}\u{b0}, has no path: nothing came near"),
+            "choose a beam with an echo; `sonard log show --pings` lists them",
+        )
+    })?;
+    let whole = scene.with_robot_at(&pose);
+    let points = Path::from_record(record, &whole)
+        .and_then(|path| path.points(&whole, pose.position(), record.length_m))
+        .ok_or_else(|| {
+            Failure::input(
+                format!("beam {index}: the scene has no way over {}", record.in_words()),
+                "give the scene that the log's model used with --scene",
+            )
+        })?;
+    Ok(draw_way(&WayView {
+        title: format!("{}, beam {index} at azimuth {azimuth_deg}\u{b0}", scene.name),
+        lines: vec![reading(ping), by(record)],
+        scene,
+        pose,
+        azimuth_deg,
+        range_m: ping.range_m,
+        points,
+    }))
+}
+
+fn find(view: &ScanView, beam: Beam) -> Option<&Ping> {
+    match beam {
+        Beam::Index(index) => view.pings.iter().find(|ping| ping.index == index),
+        Beam::Azimuth(wanted_deg) => {
+            let off = |ping: &&Ping| wrap_pi((ping.azimuth_deg - wanted_deg).to_radians()).abs();
+            view.pings.iter().min_by(|one, other| off(one).total_cmp(&off(other)))
+        }
+    }
+}
+
+fn path_of(ping: &Ping) -> Option<&PathRecord> {
+    ping.path.as_ref().or_else(|| ping.sim.as_ref()?.path.as_ref())
+}
+
+/// What was read, and what the model says.
+fn reading(ping: &Ping) -> String {
+    let said = |status: PingStatus, range_m: Option<f64>| match (status, range_m) {
+        (PingStatus::MinRange, Some(range_m)) => format!("minimum range, {range_m:.4} m"),
+        (_, Some(range_m)) => format!("echo at {range_m:.4} m"),
+        (PingStatus::NoEcho, _) => "no echo".to_owned(),
+        _ => "no valid reading".to_owned(),
+    };
+    let margin_db = ping.margin_db.or_else(|| ping.sim.as_ref()?.margin_db);
+    let margin = match margin_db {
+        Some(db) if db < 0.0 => format!(", the best candidate lacks {:.1} dB", -db),
+        Some(db) => format!(", {db:.1} dB above the threshold"),
+        None => String::new(),
+    };
+    let model = ping.sim.as_ref().map(|sim| format!("; model: {}", said(sim.status, sim.range_m)));
+    format!("{}{}{margin}", said(ping.status, ping.range_m), model.unwrap_or_default())
+}
+
+fn by(record: &PathRecord) -> String {
+    format!("way of {:.4} m: {}", record.length_m, record.in_words())
+}
+
+fn no_beam(views: &[ScanView], beam: Beam) -> Failure {
+    let last = views.first().and_then(|view| view.pings.iter().map(|ping| ping.index).max());
+    let help = match last {
+        Some(last) => format!("the scan's beams run from 0 to {last}"),
+        None => "the scan has no readings; choose another with --scan".to_owned(),
+    };
+    Failure::input(format!("there is no such beam: {beam:?}"), help)
+}

@@ -1,0 +1,219 @@
+//! `sonard run`.
+
+mod load;
+mod mock;
+
+use std::{io::IsTerminal as _, path::PathBuf};
+
+use rustix::process::Signal;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio_util::sync::CancellationToken;
+use tracing_subscriber::EnvFilter;
+
+use super::{
+    Failure, Outcome,
+    mock_world::MockWorldArgs,
+    runtime::{self, Interrupts},
+};
+use crate::{
+    board,
+    daemon::{self, Handle, Journal, Order, Resources, Settings},
+    link,
+    server::{Access, Listeners, Server},
+};
+use load::Loader;
+use mock::Mock;
+
+/// Options of `sonard run`.
+#[derive(Debug, Clone, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Args {
+    /// Configuration file [default: /etc/sonard/sonard.toml if it is there]
+    #[arg(long, value_name = "FILE", env = "SONARD_CONFIG")]
+    config: Option<PathBuf>,
+    /// Set a key of the configuration, over file and environment; may be given several times
+    #[arg(long, value_name = "SECTION.KEY=VALUE")]
+    set: Vec<String>,
+    /// Check the configuration, say what is in force, and end
+    #[arg(long)]
+    check: bool,
+    /// Print the configuration file that documents every key, and end
+    #[arg(long)]
+    print_config: bool,
+    /// Serial port of the ranger (device.port)
+    #[arg(long, value_name = "PATH|ID")]
+    port: Option<String>,
+    /// Use a mock ranger in the scene instead of a real one, in real time
+    #[arg(long, conflicts_with = "port")]
+    mock: bool,
+    /// Let the mock's time run as fast as the computer can
+    #[arg(long, requires = "mock", conflicts_with = "realtime")]
+    virtual_time: bool,
+    /// Scene file, or the name of a shipped scene (place.scene)
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<String>,
+    /// Where the ranger stands (place.pose)
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    pose: Option<String>,
+    /// Folder of the logs (log.folder)
+    #[arg(long, value_name = "DIR")]
+    log: Option<String>,
+    /// Unix socket of the API (server.socket)
+    #[arg(long, value_name = "PATH")]
+    socket: Option<String>,
+    #[command(flatten)]
+    world: MockWorldArgs,
+}
+
+pub(super) const ABOUT: &str = "\
+Run the daemon: scan by plan, keep logs, serve the API.
+
+It finds the ranger by its stable name, homes it, and scans continuously, on a schedule or on \
+request. A ranger that goes away is waited for; nothing is measured that can't be logged. SIGHUP \
+reads the configuration again; SIGTERM and SIGINT stop the motor, close the scan and sync the \
+log. `sonard status`, `sonard watch` and curl talk to it.";
+
+const EXAMPLES: &str = "\
+Examples:
+  sonard run --mock --scene simple-room --pose fig9 --log log --socket /tmp/sonard.sock \\
+      --set scanning.mode=continuous --set model.max_range_m=4
+  curl --unix-socket /tmp/sonard.sock http://localhost/v1/status
+  curl --unix-socket /tmp/sonard.sock -N http://localhost/v1/live/records
+  curl --unix-socket /tmp/sonard.sock --json '{\"scans\": 1}' http://localhost/v1/start
+  sonard run --print-config > sonard.toml
+  sonard run --config sonard.toml --check
+
+SONARD_LOG sets what is said on standard error: error, warn, info (default), debug.
+Exit codes: 0 stopped by a signal, 2 wrong configuration, 3 the log or a socket can't be had.";
+
+pub(super) fn run(args: Args) -> Outcome {
+    if args.print_config {
+        return print(&crate::config::document());
+    }
+    say_on_stderr();
+    let (check, mock, virtual_time) = (args.check, args.mock, args.virtual_time);
+    let world = args.world.clone();
+    let mut loader = Loader::new(args);
+    let mut settings = loader.load()?;
+    if check {
+        return print(&load::in_force(&settings));
+    }
+    runtime::new()?.block_on(async move {
+        let interrupts = Interrupts::listen();
+        let mock = match mock {
+            true => Some(Mock::start(&world, virtual_time, &settings)?),
+            false => None,
+        };
+        if let Some(mock) = &mock {
+            loader.fix_port(mock.port());
+            settings.keys.device.port = Some(mock.port());
+        }
+        let outcome = serve(loader, settings, interrupts).await;
+        if let Some(mock) = mock {
+            mock.stop().await;
+        }
+        outcome
+    })
+}
+
+/// Gets hold of everything, and lets daemon and server run until an interrupt.
+async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Outcome {
+    // With a handler, a file that gets too large is an error of the write and not the end.
+    let _too_large = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()));
+    let keys = &settings.keys;
+    let board = board::open(&keys.gpio).map_err(|error| Failure::input(&error, error.help()))?;
+    let log_folder = PathBuf::from(&keys.log.folder);
+    let (journal, thread) = Journal::open(&log_folder, settings.rotation())
+        .map_err(|error| Failure::device(&error, error.help()))?;
+    let listeners =
+        Listeners::open(&keys.server).map_err(|error| Failure::device(&error, error.help()))?;
+    for address in listeners.addresses().into_iter().flatten() {
+        tracing::info!("listening on http://{address}");
+    }
+    let server_keys = keys.server.clone();
+    let access = access(&settings, &listeners)?;
+    let resources = Resources { open_port: Box::new(link::open), board, journal };
+    let (daemon, handle) = daemon::prepare(resources, settings);
+    let server = Server::new(handle.clone(), log_folder, access, &server_keys);
+    let reloading = tokio::spawn(reload_on_hangup(loader, handle));
+    let ended = CancellationToken::new();
+    let serving = tokio::spawn(server.run(listeners, ended.clone().cancelled_owned()));
+    daemon.run(interrupts.wait()).await;
+    ended.cancel();
+    reloading.abort();
+    // It ends by itself; a panic in it is printed already.
+    drop(serving.await);
+    let last = tokio::task::spawn_blocking(|| thread.close()).await.unwrap_or_default();
+    match last.error {
+        Some(error) => Err(Failure::device(format!("the log was not closed well: {error}"), "")),
+        None => Ok(()),
+    }
+}
+
+/// Who may write over TCP, and under which names the server is asked.
+fn access(settings: &Settings, listeners: &Listeners) -> Result<Access, Failure> {
+    let keys = &settings.keys.server;
+    let token = match &keys.token_file {
+        Some(file) => Some(std::fs::read_to_string(file).map_err(|error| {
+            Failure::input(
+                format!("cannot read server.token_file {file}: {error}"),
+                "make it with `openssl rand -hex 32`, readable for this user only",
+            )
+        })?),
+        None => None,
+    };
+    if token.as_ref().is_some_and(|token| token.trim().len() < 16) {
+        return Err(Failure::input(
+            "the token in server.token_file is shorter than 16 characters",
+            "make one with `openssl rand -hex 32`",
+        ));
+    }
+    let mut access = Access::new(&keys.hosts, token.as_deref());
+    for address in listeners.addresses().into_iter().flatten() {
+        if !address.ip().is_loopback() && token.is_none() {
+            return Err(Failure::input(
+                format!("server.listen {address} can be reached from other computers"),
+                "listen on 127.0.0.1, or set server.token_file",
+            ));
+        }
+        access = access.with_address(address.ip());
+    }
+    Ok(access)
+}
+
+/// Reads the configuration again at each SIGHUP.
+async fn reload_on_hangup(mut loader: Loader, daemon: Handle) {
+    let Ok(mut hangups) = signal(SignalKind::hangup()) else { return };
+    while hangups.recv().await.is_some() {
+        let loaded = loader.load().map(Box::new).map_err(|failure| load::words(&failure));
+        match &loaded {
+            Ok(_) => tracing::info!("the configuration was read again"),
+            Err(error) => tracing::error!("the configuration stays as it was: {error}"),
+        }
+        // A daemon that is stopping needs no new configuration.
+        drop(daemon.order(Order::Reload(loaded)).await);
+    }
+}
+
+fn print(text: &str) -> Outcome {
+    use std::io::Write as _;
+    let written = std::io::stdout().lock().write_all(text.as_bytes());
+    written.or_else(|error| Failure::from_write("to standard output", &error))
+}
+
+/// What the daemon says goes to standard error; under systemd the journal knows the time.
+fn say_on_stderr() {
+    let filter = EnvFilter::try_from_env("SONARD_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
+    let subscriber = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_target(false);
+    let done = if std::env::var_os("JOURNAL_STREAM").is_some() {
+        subscriber.without_time().try_init()
+    } else {
+        subscriber.try_init()
+    };
+    // Somebody who set up another subscriber wants that one.
+    drop(done);
+}

@@ -1,0 +1,156 @@
+//! From options, environment and file to settings; again at each reload.
+
+use std::{env, fs, io, path::PathBuf, sync::Arc};
+
+use super::Args;
+use crate::{
+    cli::{Failure, options::load_sensor, scene_file},
+    config::{ConfigError, Keys, Layers},
+    daemon::Settings,
+    scene::{PoseError, parse_pose},
+};
+
+const FILE: &str = "/etc/sonard/sonard.toml";
+
+/// Reads the configuration as often as it is asked to.
+pub(super) struct Loader {
+    args: Args,
+    port: Option<String>,
+}
+
+impl Loader {
+    pub(super) const fn new(args: Args) -> Self {
+        Self { args, port: None }
+    }
+
+    /// Whatever is configured, the port is this: the mock's.
+    pub(super) fn fix_port(&mut self, port: String) {
+        self.port = Some(port);
+    }
+
+    pub(super) fn load(&mut self) -> Result<Settings, Failure> {
+        let layers = self.layers()?;
+        let mut keys = layers.clone().keys().map_err(refuse)?;
+        self.fill_in(&layers, &mut keys);
+        let settings = settings(keys)?;
+        settings.check().map_err(|mismatch| {
+            let origin = mismatch
+                .key
+                .split_once('.')
+                .and_then(|(section, key)| layers.origin(section, key))
+                .map_or_else(|| mismatch.key.to_owned(), ToString::to_string);
+            Failure::input(format!("{origin}: {}", mismatch.message), &mismatch.help)
+        })?;
+        if settings.keys.device.port.is_none() && !self.args.mock {
+            return Err(Failure::input(
+                "no device: device.port is not set",
+                "set device.port in the file, give --port, or use --mock to try without one",
+            ));
+        }
+        if self.args.mock && settings.scene.is_none() {
+            return Err(Failure::input(
+                "a mock needs a scene to hear",
+                "give --scene, for instance --scene simple-room --pose fig9",
+            ));
+        }
+        Ok(settings)
+    }
+
+    fn layers(&self) -> Result<Layers, Failure> {
+        let mut layers = Layers::new();
+        let (file, wanted) = match &self.args.config {
+            Some(file) => (file.clone(), true),
+            None => (PathBuf::from(FILE), false),
+        };
+        match fs::read_to_string(&file) {
+            Ok(text) => {
+                layers = layers.file(&file.display().to_string(), &text).map_err(refuse)?;
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound && !wanted => {}
+            Err(error) => {
+                return Err(Failure::input(
+                    format!("cannot read the configuration {}: {error}", file.display()),
+                    "give --config a TOML file; `sonard run --print-config` prints one",
+                ));
+            }
+        }
+        // Names and values that are no text can't be ours.
+        let variables = env::vars_os().filter_map(|(name, value)| {
+            Some((name.into_string().ok()?, value.into_string().ok()?))
+        });
+        layers = layers.environment(variables).map_err(refuse)?;
+        let shortcuts = [
+            ("--port", "device.port", &self.args.port),
+            ("--scene", "place.scene", &self.args.scene),
+            ("--pose", "place.pose", &self.args.pose),
+            ("--log", "log.folder", &self.args.log),
+            ("--socket", "server.socket", &self.args.socket),
+        ];
+        for setting in &self.args.set {
+            layers = layers.option("--set", setting).map_err(refuse)?;
+        }
+        for (option, key, value) in shortcuts {
+            if let Some(value) = value {
+                layers = layers.option(option, &format!("{key}={value}")).map_err(refuse)?;
+            }
+        }
+        Ok(layers)
+    }
+
+    /// What systemd provides goes before defaults, and the mock's port before everything.
+    fn fill_in(&self, layers: &Layers, keys: &mut Keys) {
+        // Of several folders, systemd separates by colons, the first is meant.
+        let first = |variable| {
+            let folders = env::var(variable).ok()?;
+            folders.split(':').next().map(str::to_owned).filter(|folder| !folder.is_empty())
+        };
+        if layers.origin("log", "folder").is_none()
+            && let Some(folder) = first("STATE_DIRECTORY")
+        {
+            keys.log.folder = folder;
+        }
+        if layers.origin("server", "socket").is_none()
+            && let Some(folder) = first("RUNTIME_DIRECTORY")
+        {
+            keys.server.socket = format!("{folder}/sonard.sock");
+        }
+        if self.port.is_some() {
+            keys.device.port.clone_from(&self.port);
+        }
+    }
+}
+
+fn settings(keys: Keys) -> Result<Settings, Failure> {
+    let refuse_pose = |error: PoseError| Failure::input(&error, error.help());
+    let (scene, pose) = match &keys.place.scene {
+        Some(name) => {
+            let scene = scene_file::load(name)?;
+            let pose = scene_file::pose(&scene, &keys.place.pose)?;
+            (Some(Arc::new(scene)), pose)
+        }
+        None => (None, parse_pose(&keys.place.pose).map_err(refuse_pose)?),
+    };
+    let sensor = load_sensor(&keys.model.sensor)?;
+    Ok(Settings { keys, scene, sensor, pose })
+}
+
+/// What is in force, as a file that would say the same.
+pub(super) fn in_force(settings: &Settings) -> String {
+    let text = toml::to_string(&settings.keys).unwrap_or_default();
+    format!("# The configuration is right. What is in force:\n{text}")
+}
+
+/// A failure on one line.
+pub(super) fn words(failure: &Failure) -> String {
+    match failure {
+        Failure::Found(text) => text.clone().unwrap_or_default(),
+        Failure::Input(report) | Failure::Device(report) => match report.help() {
+            Some(help) => format!("{report}; {help}"),
+            None => report.to_string(),
+        },
+    }
+}
+
+fn refuse(error: ConfigError) -> Failure {
+    Failure::input(&error, &error.help)
+}

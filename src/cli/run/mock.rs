@@ -1,0 +1,66 @@
+//! A mock ranger playing beside the daemon, behind a link that it keeps over hangups.
+
+use std::path::PathBuf;
+
+use tokio::task::JoinHandle;
+use tokio_util::sync::CancellationToken;
+
+use crate::{
+    acoustics::Air,
+    cli::{
+        Failure,
+        mock_world::{Belief, MockWorldArgs},
+    },
+    daemon::Settings,
+    mock::{MockPort, Pace},
+};
+
+pub(super) struct Mock {
+    link: PathBuf,
+    stop: CancellationToken,
+    playing: JoinHandle<std::io::Result<()>>,
+}
+
+impl Mock {
+    pub(super) fn start(
+        world: &MockWorldArgs,
+        virtual_time: bool,
+        settings: &Settings,
+    ) -> Result<Self, Failure> {
+        let air = &settings.keys.air;
+        let air = Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa)
+            .map_err(|error| Failure::input(error, "see [air]"))?;
+        // Loading has refused a mock without a scene.
+        let Some(scene) = &settings.scene else {
+            return Err(Failure::input("a mock needs a scene", "give --scene"));
+        };
+        let belief = Belief {
+            scene,
+            pose: &settings.pose,
+            sensor: &settings.sensor,
+            air: &air,
+            options: &settings.options(),
+        };
+        let pace = if virtual_time { Pace::Virtual } else { Pace::RealTime };
+        let board = world.board_at(pace, &belief)?;
+        let link = std::env::temp_dir().join(format!("sonard-mock-{}", std::process::id()));
+        let port = MockPort::open(board, Some(&link)).map_err(|error| {
+            Failure::device(format!("cannot make a pty: {error}"), "is /dev/pts mounted?")
+        })?;
+        let stop = CancellationToken::new();
+        let stopped = stop.clone().cancelled_owned();
+        let note = |note: crate::mock::Note| tracing::debug!("mock: {note}");
+        let playing = tokio::spawn(port.run(stopped, note));
+        Ok(Self { link, stop, playing })
+    }
+
+    pub(super) fn port(&self) -> String {
+        self.link.display().to_string()
+    }
+
+    pub(super) async fn stop(self) {
+        self.stop.cancel();
+        // A mock that is gone already has nothing left to say.
+        drop(self.playing.await);
+    }
+}

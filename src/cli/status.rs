@@ -1,0 +1,142 @@
+//! `sonard status`.
+
+use std::{io::Write as _, path::PathBuf};
+
+use serde_json::{Value, json};
+
+use super::{Failure, Outcome, runtime};
+use crate::client::{self, ClientError, Place};
+
+/// Options of `sonard status`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(super) struct Args {
+    #[command(flatten)]
+    daemon: DaemonArgs,
+    /// One JSON object: status and health as the API gives them
+    #[arg(long)]
+    json: bool,
+}
+
+/// Where the daemon is.
+#[derive(Debug, Clone, clap::Args)]
+pub(super) struct DaemonArgs {
+    /// Unix socket of the daemon
+    #[arg(
+        long,
+        value_name = "PATH",
+        env = "SONARD_SERVER_SOCKET",
+        default_value = "/run/sonard/sonard.sock"
+    )]
+    socket: PathBuf,
+    /// TCP address of the daemon, HOST:PORT, instead of its socket
+    #[arg(long, value_name = "ADDRESS")]
+    address: Option<String>,
+}
+
+const HELP: &str = "\
+Examples:
+  sonard status
+  sonard status --socket /tmp/sonard.sock --json
+
+Exit codes: 0 all is well, 1 something is not, 3 no daemon answers.";
+
+impl DaemonArgs {
+    pub(super) fn place(&self) -> Place {
+        match &self.address {
+            Some(address) => Place::Address(address.clone()),
+            None => Place::Socket(self.socket.clone()),
+        }
+    }
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let place = args.daemon.place();
+    let ask = async |path| -> Result<Value, Failure> {
+        let body = client::get_whole(&place, path).await.map_err(refuse)?;
+        serde_json::from_slice(&body).map_err(|error| {
+            Failure::device(format!("the daemon's answer is no JSON: {error}"), "is it a sonard?")
+        })
+    };
+    let (status, health) = runtime::new()?.block_on(async {
+        Ok::<_, Failure>((ask("/v1/status").await?, ask("/v1/health").await?))
+    })?;
+    let text = match args.json {
+        true => format!("{}\n", json!({ "status": status, "health": health })),
+        false => screen(&status, &health),
+    };
+    let written = std::io::stdout().lock().write_all(text.as_bytes());
+    written.or_else(|error| Failure::from_write("to standard output", &error))?;
+    if health["healthy"] == true { Ok(()) } else { Err(Failure::Found(None)) }
+}
+
+pub(super) fn refuse(error: ClientError) -> Failure {
+    Failure::device(&error, error.help())
+}
+
+/// One screen for a person.
+fn screen(status: &Value, health: &Value) -> String {
+    let word = |value: &Value| value.as_str().unwrap_or("-").to_owned();
+    let figure =
+        |value: &Value| value.as_f64().map_or_else(|| "-".into(), |figure| format!("{figure:.1}"));
+    let mut lines = vec![
+        format!(
+            "{} for {} s on {}",
+            word(&status["link"]["state"]).replace('_', " "),
+            figure(&status["uptime_s"]),
+            word(&status["link"]["port"]),
+        ),
+        format!(
+            "  device   {} firmware {} ({})",
+            word(&status["device"]["serial"]),
+            word(&status["device"]["firmware"]),
+            word(&status["provenance"]),
+        ),
+        format!(
+            "  scans    {} completed, {} stopped, {} failed; {} beams, {} missing; mode {}{}",
+            health["scans"]["completed"],
+            health["scans"]["stopped"],
+            health["scans"]["failed"],
+            health["scans"]["beams"],
+            health["scans"]["missing"],
+            word(&status["scanning"]["mode"]),
+            if status["scanning"]["paused"] == true { " (stopped)" } else { "" },
+        ),
+    ];
+    if let Some(scan) = status["scan"].as_object() {
+        lines.push(format!("  scan     {} of {} beams", scan["done"], scan["beams"]));
+    }
+    lines.extend([
+        format!(
+            "  line     {} CRC errors, {} requests repeated, {} readings repaired, lost {} times",
+            health["line"]["crc_errors"],
+            health["line"]["retries"],
+            health["line"]["repaired"],
+            health["line"]["losses"],
+        ),
+        format!(
+            "  air      {} C ({}), sound {} m/s",
+            figure(&status["air"]["temperature_c"]),
+            word(&status["air"]["source"]),
+            figure(&status["air"]["sound_speed_m_s"]),
+        ),
+        format!(
+            "  log      {} ({} records, {} synced)",
+            word(&status["log"]["file"]),
+            status["log"]["written"],
+            status["log"]["synced"],
+        ),
+        format!(
+            "  clients  {} live; {} readings dropped, {} cut off",
+            status["subscribers"]["now"],
+            status["subscribers"]["dropped_readings"],
+            status["subscribers"]["cut_off"],
+        ),
+    ]);
+    let reasons = health["reasons"].as_array().into_iter().flatten();
+    lines.extend(reasons.map(|reason| format!("  not well: {}", word(reason))));
+    if let Some(error) = status["configuration"]["error"].as_str() {
+        lines.push(format!("  the last change of the configuration was refused: {error}"));
+    }
+    lines.join("\n") + "\n"
+}

@@ -1,0 +1,287 @@
+//! `sonard trace`.
+
+use std::{io::Write as _, sync::Arc};
+
+use comfy_table::{CellAlignment, Table, presets::NOTHING};
+use serde::Serialize;
+
+use super::{
+    Failure, Outcome,
+    options::{AirArgs, EngineArgs, SensorArgs},
+    picture::{PictureArgs, Target},
+    place::PlaceArgs,
+};
+use crate::{
+    acoustics::{EchoTrace, Hump},
+    geometry::Pose,
+    model::{Simulator, Station},
+    plot::{TraceView, draw_trace},
+    scan::{PathRecord, PingStatus},
+};
+
+/// Options of `sonard trace`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(super) struct Args {
+    #[command(flatten)]
+    place: PlaceArgs,
+    /// Where the ranger looks, degrees counter-clockwise from the heading
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
+    azimuth_deg: f64,
+    /// Show the trace up to this range, metres [default: until nothing more comes near the threshold]
+    #[arg(long, value_name = "M")]
+    until: Option<f64>,
+    /// Spacing of the samples, microseconds
+    #[arg(long, value_name = "US", default_value_t = 5.0)]
+    step_us: f64,
+    /// One JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    picture: PictureArgs,
+    #[command(flatten)]
+    engine: EngineArgs,
+    #[command(flatten)]
+    sensor: SensorArgs,
+    #[command(flatten)]
+    air: AirArgs,
+}
+
+pub(super) const ABOUT: &str = "\
+Show what an oscilloscope would show of one firing.
+
+The envelope of all echoes together against time, with the gain, the threshold in force, the \
+blanking and the moments at which ECHO rises; each hump with the path it came by. Without -o and \
+--json, a table of the humps. Times are counted as a calibrated ranger counts them: a head-on, \
+perfectly reflecting wall rises at its path's length over the speed of sound.";
+
+const HELP: &str = "\
+Examples:
+  sonard trace --scene echo-traces --pose d -o trace.png
+  sonard trace --scene simple-room --pose fig9 --azimuth-deg 270
+  sonard trace --scene simple-room --pose fig9 --azimuth-deg 270 --short-blanking --until 1 -o t.svg
+  sonard trace --scene corridor --pose beside-wall --azimuth-deg 90 --json | jq .detection
+
+Exit codes: 0 done, 2 wrong usage or input, 3 a picture can't be written.";
+
+/// A trace as `--json` prints it.
+#[derive(Debug, Serialize)]
+struct TraceObject<'a> {
+    scene: &'a str,
+    pose: Pose,
+    azimuth_deg: f64,
+    sensor: &'a str,
+    sound_speed_m_s: f64,
+    blanking_us: f64,
+    t_us: Vec<f64>,
+    envelope: Vec<f64>,
+    threshold: Vec<f64>,
+    gain_db: Vec<f64>,
+    transmission: &'a [(f64, f64)],
+    humps: Vec<HumpObject>,
+    detection: DetectionObject,
+}
+
+#[derive(Debug, Serialize)]
+struct HumpObject {
+    tof_us: f64,
+    peak_us: f64,
+    peak: f64,
+    path: PathRecord,
+}
+
+#[derive(Debug, Serialize)]
+struct DetectionObject {
+    status: PingStatus,
+    range_m: Option<f64>,
+    tof_us: Vec<f64>,
+    amplitude: Option<f64>,
+    margin_db: Option<f64>,
+    path: Option<PathRecord>,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let within = |option: &str, value: f64, from: f64, to: f64, unit: &str| {
+        let help = format!("give a number from {from} to {to} {unit}");
+        let refuse = || Failure::input(format!("{option} is {value}"), help);
+        if (from..=to).contains(&value) { Ok(()) } else { Err(refuse()) }
+    };
+    within("--step-us", args.step_us, 1.0, 1000.0, "microseconds")?;
+    within("--until", args.until.unwrap_or(1.0), 0.05, 100.0, "metres")?;
+    within("--azimuth-deg", args.azimuth_deg, -360.0, 360.0, "degrees")?;
+    let targets = args.picture.targets()?;
+    let (scene, pose) = args.place.load()?;
+    let (sensor, air) = (args.sensor.sensor()?, args.air.air()?);
+    let scene = Arc::new(scene.with_robot_at(&pose));
+    let simulator = Simulator::new(scene, sensor, air, args.engine.options()?)
+        .map_err(|error| Failure::input(error, "see `sonard trace --help`"))?;
+    let firing = Firing::new(args, &simulator, pose);
+    if args.json {
+        let printed = serde_json::to_writer(std::io::stdout().lock(), &firing.object())
+            .map_err(std::io::Error::from)
+            .and_then(|()| writeln!(std::io::stdout()));
+        printed.or_else(|error| Failure::from_write("to standard output", &error))?;
+    } else if targets.is_empty() {
+        let table = firing.table();
+        writeln!(std::io::stdout(), "{table}\n{}", firing.reading())
+            .or_else(|error| Failure::from_write("to standard output", &error))?;
+    }
+    firing.draw(&targets, args.picture.width)
+}
+
+/// One firing, with names for its humps.
+struct Firing<'a> {
+    simulator: &'a Simulator,
+    pose: Pose,
+    pose_text: &'a str,
+    azimuth_deg: f64,
+    trace: EchoTrace,
+    paths: Vec<PathRecord>,
+    path: Option<PathRecord>,
+}
+
+impl<'a> Firing<'a> {
+    fn new(args: &'a Args, simulator: &'a Simulator, pose: Pose) -> Self {
+        let direction_rad = pose.direction_rad(args.azimuth_deg);
+        let station = simulator.station(pose.position());
+        let whole = || {
+            let longest_m = simulator.receiver().max_range_m;
+            let trace = station.trace(direction_rad, longest_m, args.step_us);
+            interesting_m(simulator, &trace)
+        };
+        let trace = station.trace(direction_rad, args.until.unwrap_or_else(whole), args.step_us);
+        let record = |sound| {
+            let arrival = Station::arrival(&station, direction_rad, sound);
+            simulator.path_record(&arrival.path, arrival.length_m)
+        };
+        let paths = trace.humps.iter().map(|hump| record(&hump.sound)).collect();
+        let path = trace.detection.sound.as_ref().map(record);
+        Self {
+            simulator,
+            pose,
+            pose_text: &args.place.pose,
+            azimuth_deg: args.azimuth_deg,
+            trace,
+            paths,
+            path,
+        }
+    }
+
+    fn humps(&self) -> impl Iterator<Item = (&Hump, &PathRecord)> {
+        self.trace.humps.iter().zip(&self.paths)
+    }
+
+    fn object(&self) -> TraceObject<'_> {
+        let points = &self.trace.points;
+        let detection = &self.trace.detection;
+        TraceObject {
+            scene: &self.simulator.scene().name,
+            pose: self.pose,
+            azimuth_deg: self.azimuth_deg,
+            sensor: &self.simulator.sensor().name,
+            sound_speed_m_s: self.simulator.sound_speed_m_s(),
+            blanking_us: self.simulator.receiver().blanking_us,
+            t_us: points.iter().map(|point| point.t_us).collect(),
+            envelope: points.iter().map(|point| point.envelope).collect(),
+            threshold: points.iter().map(|point| point.threshold).collect(),
+            gain_db: points.iter().map(|point| point.gain_db).collect(),
+            transmission: &self.trace.transmission,
+            humps: self
+                .humps()
+                .map(|(hump, path)| HumpObject {
+                    tof_us: hump.tof_us,
+                    peak_us: hump.peak.1,
+                    peak: hump.peak.0,
+                    path: path.clone(),
+                })
+                .collect(),
+            detection: DetectionObject {
+                status: detection.status,
+                range_m: detection.range_m,
+                tof_us: detection.echoes_us.to_vec(),
+                amplitude: detection.amplitude,
+                margin_db: detection.margin_db,
+                path: self.path.clone(),
+            },
+        }
+    }
+
+    fn table(&self) -> Table {
+        let mut table = Table::new();
+        table.load_style(NOTHING).set_header(["time us", "range m", "peak", "peak dB", "way"]);
+        for index in 0..4 {
+            if let Some(column) = table.column_mut(index) {
+                column.set_cell_alignment(CellAlignment::Right);
+            }
+        }
+        for (hump, path) in self.humps() {
+            table.add_row([
+                format!("{:.1}", hump.tof_us),
+                format!("{:.4}", path.length_m / 2.0),
+                format!("{:.4}", hump.peak.0),
+                format!("{:.1}", 20.0 * hump.peak.0.log10()),
+                path.in_words(),
+            ]);
+        }
+        table
+    }
+
+    /// What the receiver makes of it, in words.
+    fn reading(&self) -> String {
+        let detection = &self.trace.detection;
+        let way = self.path.as_ref().map(PathRecord::in_words);
+        let by = way.map(|way| format!(" by {way}")).unwrap_or_default();
+        let margin_db = detection.margin_db.unwrap_or(f64::NEG_INFINITY);
+        match (detection.status, detection.range_m) {
+            (PingStatus::MinRange, Some(range_m)) => format!(
+                "minimum range, {range_m:.4} m: sound{by} is there when the blanking ends, \
+                 {margin_db:.1} dB above the threshold"
+            ),
+            (_, Some(range_m)) => {
+                format!("echo at {range_m:.4} m{by}, {margin_db:.1} dB above the threshold")
+            }
+            _ if self.path.is_some() => {
+                format!("no echo; the best candidate{by} lacks {:.1} dB", -margin_db)
+            }
+            _ => "no echo, and nothing that comes near".to_owned(),
+        }
+    }
+
+    fn draw(&self, targets: &[Target], width_px: u32) -> Outcome {
+        if targets.is_empty() {
+            return Ok(());
+        }
+        let receiver = self.simulator.receiver();
+        let view = TraceView {
+            title: format!(
+                "{}, pose {}, azimuth {}\u{b0}: {}",
+                self.simulator.scene().name,
+                self.pose_text,
+                self.azimuth_deg,
+                self.reading()
+            ),
+            lines: vec![format!(
+                "{} \u{b7} {:.2} m/s \u{b7} blanking {:.0} us",
+                self.simulator.sensor().name,
+                self.simulator.sound_speed_m_s(),
+                receiver.blanking_us
+            )],
+            trace: &self.trace,
+            names: self.paths.iter().map(PathRecord::in_words).collect(),
+            blanking_us: receiver.blanking_us,
+            rearm_us: receiver.rearm_us,
+            sound_speed_m_s: receiver.sound_speed_m_s,
+        };
+        let picture = draw_trace(&view);
+        targets.iter().try_for_each(|target| target.write(&picture, width_px))
+    }
+}
+
+/// Half a metre beyond the last hump that comes within 10 dB of the threshold, and of the blanking.
+fn interesting_m(simulator: &Simulator, trace: &EchoTrace) -> f64 {
+    let receiver = simulator.receiver();
+    let near = |hump: &&Hump| hump.peak.0 > 0.3 * receiver.threshold_at(hump.tof_us);
+    let last = trace.humps.iter().rev().find(near);
+    let last_m = last.map_or(1.0, |hump| hump.sound.length_m / 2.0);
+    (last_m.max(receiver.min_range_m()) + 0.5).min(receiver.max_range_m)
+}

@@ -1,0 +1,121 @@
+//! The configuration file that documents every key, written from the keys themselves.
+
+use std::fmt::Write as _;
+
+use serde_json::Value;
+
+use super::schema::{Key, Kind, sections};
+
+const HEAD: &str = "\
+# Configuration of `sonard run`. Every key is here, with its default; a key without one stands in
+# a comment with an example. Over the file go environment variables (SONARD_PLAN_STEP_DEG=1.8),
+# over those the options of the command line (--set plan.step_deg=1.8). `sonard run --check` reads
+# it all and says what is in force. `systemctl reload` (SIGHUP) takes changes in; those of keys
+# marked [restart] wait for the next start.
+";
+const WIDTH: usize = 98;
+
+/// The text of `config/sonard.toml`.
+#[must_use]
+pub fn document() -> String {
+    let mut text = HEAD.to_owned();
+    for section in sections() {
+        text += "\n";
+        comment(&mut text, &section.about);
+        // Writing to a text can't fail.
+        let _ = writeln!(text, "[{}]", section.name);
+        for key in &section.keys {
+            write_key(&mut text, key);
+        }
+    }
+    text
+}
+
+fn write_key(text: &mut String, key: &Key) {
+    comment(text, &format!("{} {}", key.about, wanted(&key.kind)));
+    let _ = match (&key.default, &key.example) {
+        (Some(default), _) => writeln!(text, "{} = {}", key.name, toml_text(&key.kind, default)),
+        (None, Some(example)) => {
+            writeln!(text, "# {} = {}", key.name, toml_text(&key.kind, example))
+        }
+        (None, None) => writeln!(text, "# {} =", key.name),
+    };
+}
+
+fn comment(text: &mut String, about: &str) {
+    for line in textwrap::wrap(about, WIDTH) {
+        let _ = writeln!(text, "# {line}");
+    }
+}
+
+/// What may be given, as a sentence.
+#[must_use]
+pub(super) fn wanted(kind: &Kind) -> String {
+    match kind {
+        Kind::Number { min, max } => format!("Number, {min} to {max}."),
+        Kind::Whole { min, max } => format!("Whole number, {min} to {max}."),
+        Kind::Switch => "true or false.".into(),
+        Kind::Choice(words) => format!("One of \"{}\".", words.join("\", \"")),
+        Kind::Text => "Text.".into(),
+        Kind::Texts => "List of texts.".into(),
+    }
+}
+
+fn toml_text(kind: &Kind, value: &Value) -> String {
+    match (kind, value.as_f64()) {
+        // 20.0 and not 20: the file shows that fractions are welcome.
+        (Kind::Number { .. }, Some(number)) => format!("{number:?}"),
+        _ => value.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        super::{Keys, Layers},
+        *,
+    };
+
+    const SHIPPED: &str = include_str!("../../config/sonard.toml");
+
+    #[test]
+    fn the_shipped_file_shows_every_key_as_the_program_knows_it() {
+        let fresh = document();
+        if std::env::var_os("SONARD_TEST_WRITE").is_some() {
+            std::fs::write("config/sonard.toml", &fresh).expect("it can be written");
+        }
+        assert!(
+            SHIPPED == fresh,
+            "config/sonard.toml is behind: `SONARD_TEST_WRITE=1 cargo test config::document`"
+        );
+    }
+
+    #[test]
+    fn the_shipped_file_is_the_defaults_and_its_examples_are_right() {
+        let read = |text: &str| Layers::new().file("sonard.toml", text).and_then(Layers::keys);
+        assert_eq!(read(SHIPPED), Ok(Keys::default()));
+        // Every comment that holds a key becomes that key.
+        let sets = |line: &str| line.split_once(" = ").is_some_and(|(key, _)| !key.contains(' '));
+        let opened: Vec<&str> = SHIPPED
+            .lines()
+            .map(|line| line.strip_prefix("# ").filter(|rest| sets(rest)).unwrap_or(line))
+            .collect();
+        let opened = read(&opened.join("\n")).expect("the examples are right");
+        assert_eq!(opened.server.listen.as_deref(), Some("127.0.0.1:8765"));
+        assert_eq!(opened.gpio.reset_pin, Some(17));
+    }
+
+    #[test]
+    fn every_key_says_what_it_is_and_every_number_has_a_range() {
+        for section in sections() {
+            assert!(!section.about.is_empty() && !section.keys.is_empty(), "{}", section.name);
+            for key in &section.keys {
+                assert!(key.about.ends_with('.'), "{}.{}: {}", section.name, key.name, key.about);
+                if let Kind::Number { min, max } | Kind::Whole { min, max } = key.kind {
+                    assert!(min > f64::MIN && max < f64::MAX, "{}.{}", section.name, key.name);
+                }
+                assert!(key.default.is_some() || key.example.is_some(), "{}", key.name);
+            }
+        }
+    }
+}

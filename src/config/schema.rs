@@ -1,0 +1,147 @@
+//! What is known about each key, taken from the schema of [`Keys`].
+
+use std::sync::LazyLock;
+
+use schemars::generate::SchemaSettings;
+use serde_json::{Map, Value};
+
+use super::keys::Keys;
+
+/// A section of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Section {
+    /// Its name.
+    pub name: String,
+    /// What it is about.
+    pub about: String,
+    /// Its keys, in the order of the file.
+    pub keys: Vec<Key>,
+}
+
+/// A key of a section.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Key {
+    /// Its name, with the unit.
+    pub name: String,
+    /// What it means.
+    pub about: String,
+    /// What may be given.
+    pub kind: Kind,
+    /// What is in force when nothing is given; `None` if that is nothing.
+    pub default: Option<Value>,
+    /// What one could give, for keys without a default.
+    pub example: Option<Value>,
+}
+
+/// What a key may be given.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Kind {
+    /// Any finite number between two.
+    Number {
+        /// Least.
+        min: f64,
+        /// Greatest.
+        max: f64,
+    },
+    /// A whole number between two.
+    Whole {
+        /// Least.
+        min: f64,
+        /// Greatest.
+        max: f64,
+    },
+    /// `true` or `false`.
+    Switch,
+    /// One of some words.
+    Choice(Vec<String>),
+    /// Text.
+    Text,
+    /// A list of texts.
+    Texts,
+}
+
+/// Every section, in the order of the file.
+pub fn sections() -> &'static [Section] {
+    static SECTIONS: LazyLock<Vec<Section>> = LazyLock::new(read);
+    &SECTIONS
+}
+
+/// The key of a section, if there is one of that name.
+#[must_use]
+pub(super) fn key(section: &str, name: &str) -> Option<&'static Key> {
+    let section = sections().iter().find(|known| known.name == section)?;
+    section.keys.iter().find(|key| key.name == name)
+}
+
+fn read() -> Vec<Section> {
+    let generator = SchemaSettings::default().with(|s| s.inline_subschemas = true);
+    let schema = generator.into_generator().into_root_schema_for::<Keys>().to_value();
+    let defaults = serde_json::to_string(&Keys::default()).unwrap_or_default();
+    let section = |(name, of): (&String, &Value)| {
+        // A key's name may stand in several sections: it is looked for behind the section's.
+        let at = defaults.find(&format!("\"{name}\":{{")).unwrap_or(0);
+        let keys = properties(of, defaults.get(at..).unwrap_or_default());
+        Section {
+            name: name.clone(),
+            about: text(of, "description"),
+            keys: keys.into_iter().map(|(name, of)| read_key(name, of)).collect(),
+        }
+    };
+    properties(&schema, &defaults).into_iter().map(section).collect()
+}
+
+/// The properties of an object in the order of declaration, which only serialized text has kept.
+fn properties<'a>(of: &'a Value, serialized: &str) -> Vec<(&'a String, &'a Value)> {
+    let map = of.get("properties").and_then(Value::as_object);
+    let mut properties: Vec<_> = map.into_iter().flat_map(Map::iter).collect();
+    properties.sort_by_key(|(name, _)| serialized.find(&format!("\"{name}\":")));
+    properties
+}
+
+fn read_key(name: &str, of: &Value) -> Key {
+    Key {
+        name: name.to_owned(),
+        about: text(of, "description"),
+        kind: kind(of),
+        default: of.get("default").filter(|default| !default.is_null()).cloned(),
+        example: of.get("examples").and_then(|examples| examples.get(0)).cloned(),
+    }
+}
+
+fn kind(of: &Value) -> Kind {
+    let words = choices(of);
+    if !words.is_empty() {
+        return Kind::Choice(words);
+    }
+    let bound = |name, otherwise| of.get(name).and_then(Value::as_f64).unwrap_or(otherwise);
+    let (min, max) = (bound("minimum", f64::MIN), bound("maximum", f64::MAX));
+    let is = |wanted: &str| match of.get("type") {
+        Some(Value::Array(types)) => types.iter().any(|kind| kind == wanted),
+        Some(kind) => kind == wanted,
+        None => false,
+    };
+    match () {
+        () if is("integer") => Kind::Whole { min, max },
+        () if is("number") => Kind::Number { min, max },
+        () if is("boolean") => Kind::Switch,
+        () if is("array") => Kind::Texts,
+        () => Kind::Text,
+    }
+}
+
+/// The words of an enumeration, with or without a description each.
+fn choices(of: &Value) -> Vec<String> {
+    let listed = of.get("enum").and_then(Value::as_array).into_iter().flatten().collect::<Vec<_>>();
+    let described = of.get("oneOf").and_then(Value::as_array).into_iter().flatten();
+    let constants = described.filter_map(|one| one.get("const"));
+    listed
+        .into_iter()
+        .chain(constants)
+        .filter_map(|word| word.as_str().map(str::to_owned))
+        .collect()
+}
+
+/// A text on one line.
+fn text(of: &Value, name: &str) -> String {
+    of.get(name).and_then(Value::as_str).unwrap_or_default().replace('\n', " ")
+}

@@ -1,0 +1,252 @@
+//! Takes orders: from the API, from signals, from the emergency stop, at any time.
+
+use std::time::Duration;
+
+use firmware_protocol::messages::Identity;
+use thiserror::Error;
+use tokio::{
+    sync::{mpsc, oneshot, watch},
+    time::{Instant, sleep},
+};
+use tokio_util::sync::CancellationToken;
+
+use super::{
+    agenda::Agenda,
+    air::{AirDesk, AirOrder, Reading, watch_thermometer},
+    journal::Journal,
+    settings::Settings,
+    status::ConfigurationReport,
+};
+use crate::{board::Board, geometry::Pose, scan::ScanPlan};
+
+/// How often the emergency stop is looked at.
+const STOP_CHECK: Duration = Duration::from_millis(50);
+
+/// What the daemon can be told.
+#[derive(Debug)]
+pub enum Order {
+    /// Take so many scans, or go on with those of the mode.
+    Start(Option<u32>),
+    /// End the scan under way and take no more until the next start.
+    Stop,
+    /// Measure these azimuths from the next scan on.
+    Plan(ScanPlan),
+    /// The ranger stands here from the next scan on.
+    Pose(Pose),
+    /// The air is like this.
+    Air(AirOrder),
+    /// The configuration was read again.
+    Reload(Result<Box<Settings>, String>),
+}
+
+/// An order and the way for its answer.
+#[derive(Debug)]
+pub struct Request {
+    /// The order.
+    pub order: Order,
+    /// Where the answer goes; a program that left needs none.
+    pub reply: oneshot::Sender<Result<(), Refusal>>,
+}
+
+/// Why an order is not carried out.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{message}")]
+pub struct Refusal {
+    /// What is wrong.
+    pub message: String,
+    /// What would be right.
+    pub help: String,
+}
+
+/// What the operator has to react to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Interrupt {
+    /// The end.
+    Shutdown,
+    /// The emergency stop was pressed or released.
+    EmergencyStop(bool),
+    /// The scan under way is to end.
+    Stop,
+    /// Another port is to be used.
+    PortChanged,
+    /// The log began or ceased to be in trouble.
+    Log,
+    /// What is due may have changed.
+    Agenda,
+}
+
+/// What is in force, and the ends of everything that may change it.
+pub(super) struct Desk {
+    pub(super) settings: Settings,
+    pub(super) plan: ScanPlan,
+    pub(super) pose: Pose,
+    pub(super) agenda: Agenda,
+    pub(super) air: AirDesk,
+    pub(super) board: Box<dyn Board>,
+    pub(super) configuration: ConfigurationReport,
+    pub(super) epoch: Instant,
+    /// The device, for the check of plans.
+    pub(super) identity: Option<Identity>,
+    /// Scene or sensor changed: predictions are out of date.
+    pub(super) stale: bool,
+    requests: mpsc::Receiver<Request>,
+    shutdown: CancellationToken,
+    thermometer: watch::Receiver<Option<Reading>>,
+    journal: Journal,
+    pressed: bool,
+}
+
+impl Desk {
+    pub(super) fn new(
+        settings: Settings,
+        board: Box<dyn Board>,
+        requests: mpsc::Receiver<Request>,
+        shutdown: CancellationToken,
+        journal: Journal,
+    ) -> Self {
+        Self {
+            plan: settings.plan(),
+            pose: settings.pose,
+            agenda: Agenda::new(settings.keys.scanning.mode, settings.every(), Duration::ZERO),
+            air: AirDesk::new(settings.keys.air.clone()),
+            thermometer: watch_thermometer(&settings.keys.air),
+            board,
+            configuration: ConfigurationReport::default(),
+            epoch: Instant::now(),
+            identity: None,
+            stale: false,
+            requests,
+            shutdown,
+            journal,
+            pressed: false,
+            settings,
+        }
+    }
+
+    /// Time since the start, on a clock that does not jump.
+    pub(super) fn now(&self) -> Duration {
+        self.epoch.elapsed()
+    }
+
+    /// Carries out orders until one needs the operator. Cancel-safe.
+    pub(super) async fn next(&mut self) -> Interrupt {
+        loop {
+            let watches_stop = self.board.emergency_stop().is_some();
+            tokio::select! {
+                biased;
+                () = self.shutdown.cancelled() => return Interrupt::Shutdown,
+                () = sleep(STOP_CHECK), if watches_stop => {
+                    let pressed = self.board.emergency_stop() == Some(true);
+                    if std::mem::replace(&mut self.pressed, pressed) != pressed {
+                        return Interrupt::EmergencyStop(pressed);
+                    }
+                }
+                Some(request) = self.requests.recv() => {
+                    if let Some(interrupt) = self.carry_out(request) {
+                        return interrupt;
+                    }
+                }
+                Ok(()) = self.thermometer.changed() => {
+                    let reading = self.thermometer.borrow_and_update().clone();
+                    if let Some(reading) = reading {
+                        self.air.read(&reading, Instant::now());
+                        return Interrupt::Agenda;
+                    }
+                }
+                () = self.journal.changed() => return Interrupt::Log,
+            }
+        }
+    }
+
+    fn carry_out(&mut self, Request { order, reply }: Request) -> Option<Interrupt> {
+        let (answer, interrupt) = match order {
+            Order::Start(scans) => {
+                self.agenda.start(scans);
+                (Ok(()), Some(Interrupt::Agenda))
+            }
+            Order::Stop => {
+                self.agenda.stop();
+                (Ok(()), Some(Interrupt::Stop))
+            }
+            Order::Plan(plan) => (self.set_plan(plan), Some(Interrupt::Agenda)),
+            Order::Pose(pose) => (self.set_pose(pose), Some(Interrupt::Agenda)),
+            Order::Air(order) => {
+                let outcome = self.air.order(&order, Instant::now());
+                let refuse = |error: crate::acoustics::AirError| Refusal {
+                    message: error.to_string(),
+                    help: "temperatures are degrees Celsius, pressures kilopascals".into(),
+                };
+                (outcome.map_err(refuse), Some(Interrupt::Agenda))
+            }
+            Order::Reload(Ok(settings)) => (Ok(()), Some(self.reload(*settings))),
+            Order::Reload(Err(error)) => {
+                self.configuration.error = Some(error);
+                (Ok(()), Some(Interrupt::Agenda))
+            }
+        };
+        // A program that did not wait for its answer does not want it.
+        drop(reply.send(answer));
+        interrupt
+    }
+
+    fn set_plan(&mut self, plan: ScanPlan) -> Result<(), Refusal> {
+        let refuse = |error: crate::scan::PlanError| Refusal {
+            message: error.to_string(),
+            help: "a full turn is from_deg 0, to_deg 360, step_deg 0.9, pings_per_stop 1".into(),
+        };
+        plan.check().map_err(refuse)?;
+        if let Some(identity) = &self.identity {
+            plan.motor_steps(identity.steps_per_revolution.into()).map_err(refuse)?;
+        }
+        self.plan = plan;
+        Ok(())
+    }
+
+    fn set_pose(&mut self, pose: Pose) -> Result<(), Refusal> {
+        check_pose(&self.settings, &pose)?;
+        self.pose = pose;
+        Ok(())
+    }
+
+    /// Takes a new configuration in: what changed in it goes before what programs said.
+    fn reload(&mut self, settings: Settings) -> Interrupt {
+        let before = std::mem::replace(&mut self.settings, settings);
+        let now = self.now();
+        let (keys, then) = (&self.settings.keys, &before.keys);
+        if keys.plan != then.plan {
+            self.plan = self.settings.plan();
+        }
+        let moved = self.settings.scene.as_ref().map(|scene| &scene.sha256)
+            != before.scene.as_ref().map(|scene| &scene.sha256);
+        if self.settings.pose != before.pose || moved {
+            self.pose = self.settings.pose;
+        }
+        self.stale |= moved || keys.model != then.model || self.settings.sensor != before.sensor;
+        if keys.air != then.air {
+            self.air = AirDesk::new(keys.air.clone());
+            self.thermometer = watch_thermometer(&keys.air);
+        }
+        self.agenda.set_mode(keys.scanning.mode, self.settings.every(), now);
+        self.journal.set_rotation(self.settings.rotation());
+        self.configuration = ConfigurationReport {
+            error: None,
+            needs_restart: self.settings.needs_restart(&before),
+        };
+        if keys.device == then.device { Interrupt::Agenda } else { Interrupt::PortChanged }
+    }
+}
+
+/// Whether a ranger can stand there; without a scene it can stand anywhere.
+fn check_pose(settings: &Settings, pose: &Pose) -> Result<(), Refusal> {
+    let finite = [pose.x_m, pose.y_m, pose.heading_deg].iter().all(|figure| figure.is_finite());
+    if !finite {
+        return Err(Refusal {
+            message: "a figure of the pose is not finite".into(),
+            help: "metres and degrees".into(),
+        });
+    }
+    let Some(scene) = &settings.scene else { return Ok(()) };
+    scene
+        .check_pose(pose)
+        .map_err(|error| Refusal { message: error.to_string(), help: error.help() })
+}

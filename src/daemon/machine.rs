@@ -1,0 +1,337 @@
+//! The link to the device as a state machine: what to do next, how long to wait, what to say.
+//!
+//! Pure: it is told what came of each step and what time it is (any clock that does not jump),
+//! and never waits itself. It holds two rules: the motor moves only after homing on this
+//! connection, and between two tries there is a bounded wait.
+
+use std::time::Duration;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// What the link is doing or suffering.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LinkState {
+    /// The port is being opened.
+    Opening,
+    /// The device is asked who it is.
+    Identifying,
+    /// The motor is looking for its index.
+    Homing,
+    /// The device stands at home, without work.
+    Ready,
+    /// A scan is under way.
+    Scanning,
+    /// The port is not there.
+    Absent,
+    /// Another program has the port.
+    Busy,
+    /// This user may not open the port, or it is no serial port.
+    Forbidden,
+    /// Nothing that speaks the protocol answers.
+    NotAnswering,
+    /// The device speaks another version of the protocol.
+    WrongFirmware,
+    /// The device is not the one with the configured serial number.
+    WrongDevice,
+    /// The line was lost while the device was in use.
+    Lost,
+    /// The device refused, or its motor or module failed.
+    Fault,
+    /// The emergency stop is pressed.
+    EmergencyStop,
+    /// Stopped for good.
+    Stopped,
+}
+
+/// Why the link can't be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Trouble {
+    /// See [`LinkState::Absent`].
+    Absent,
+    /// See [`LinkState::Busy`].
+    Busy,
+    /// See [`LinkState::Forbidden`].
+    Forbidden,
+    /// See [`LinkState::NotAnswering`].
+    NotAnswering,
+    /// See [`LinkState::WrongFirmware`].
+    WrongFirmware,
+    /// See [`LinkState::WrongDevice`].
+    WrongDevice,
+    /// See [`LinkState::Lost`].
+    Lost,
+    /// See [`LinkState::Fault`].
+    Fault,
+}
+
+/// What came of a step, or what happened by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Input {
+    /// The port is open and locked.
+    Opened,
+    /// The right device told its identity.
+    Identified,
+    /// The motor is at home.
+    Homed,
+    /// A scan began.
+    ScanBegun,
+    /// A scan ended as it should, or was stopped.
+    ScanEnded,
+    /// The device restarted while it had no work: its position is unknown.
+    Restarted,
+    /// The step, or the link by itself, failed.
+    Failed(Trouble),
+    /// The emergency stop was pressed (`true`) or released.
+    EmergencyStop(bool),
+    /// Another port is to be used.
+    PortChanged,
+    /// The end.
+    Shutdown,
+}
+
+/// What to do now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Step {
+    /// Open the port.
+    Open,
+    /// Ask who is there.
+    Identify,
+    /// Set up the device and home the motor.
+    Home,
+    /// The device can be used; scans may begin.
+    Serve,
+    /// Close the port if it is open, and wait until this time or until something happens.
+    Wait(Duration),
+    /// Close the port and wait until something happens.
+    Rest,
+    /// Close everything.
+    End,
+}
+
+/// From one settled state to another, to be told once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Transition {
+    /// Settled state before, if there was one.
+    pub from: Option<LinkState>,
+    /// Settled state now.
+    pub to: LinkState,
+}
+
+/// Bounds of the wait from try to try.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BackOff {
+    /// After the first failure.
+    pub min: Duration,
+    /// Never longer.
+    pub max: Duration,
+}
+
+/// See the [module](self).
+#[derive(Debug, Clone)]
+pub struct LinkMachine {
+    back_off: BackOff,
+    state: LinkState,
+    since: Duration,
+    retry_at: Duration,
+    /// Failures since the device was last in proper use.
+    failures: u32,
+    /// Since when the device can be used without a break.
+    up_since: Option<Duration>,
+    pressed: bool,
+    /// The settled state that was told last.
+    told: Option<LinkState>,
+    transition: Option<Transition>,
+}
+
+impl LinkMachine {
+    /// A machine that begins by opening the port.
+    #[must_use]
+    pub const fn new(back_off: BackOff, now: Duration) -> Self {
+        Self {
+            back_off,
+            state: LinkState::Opening,
+            since: now,
+            retry_at: now,
+            failures: 0,
+            up_since: None,
+            pressed: false,
+            told: None,
+            transition: None,
+        }
+    }
+
+    /// Other bounds from the next failure on.
+    pub const fn set_back_off(&mut self, back_off: BackOff) {
+        self.back_off = back_off;
+    }
+
+    /// What to do now. The same until something is handled, except that a wait ends.
+    pub fn poll(&mut self, now: Duration) -> Step {
+        use LinkState as State;
+        match self.state {
+            State::Opening => Step::Open,
+            State::Identifying => Step::Identify,
+            State::Homing => Step::Home,
+            State::Ready | State::Scanning => Step::Serve,
+            State::EmergencyStop => Step::Rest,
+            State::Stopped => Step::End,
+            _ if now < self.retry_at => Step::Wait(self.retry_at),
+            _ => {
+                self.enter(now, State::Opening);
+                Step::Open
+            }
+        }
+    }
+
+    /// Takes in what happened. What does not fit the state is ignored.
+    pub fn handle(&mut self, now: Duration, input: Input) {
+        use LinkState as State;
+        match (input, self.state) {
+            (_, State::Stopped) => {}
+            (Input::Shutdown, _) => self.enter(now, State::Stopped),
+            (Input::EmergencyStop(pressed), state) => {
+                self.pressed = pressed;
+                if pressed {
+                    self.enter(now, State::EmergencyStop);
+                } else if state == State::EmergencyStop {
+                    // Somebody may have turned the motor by hand: begin anew, homing and all.
+                    self.enter(now, State::Opening);
+                }
+            }
+            (_, State::EmergencyStop) => {}
+            (Input::PortChanged, _) => self.enter(now, State::Opening),
+            (Input::Failed(trouble), _) => self.fail(now, trouble),
+            (Input::Opened, State::Opening) => self.enter(now, State::Identifying),
+            (Input::Identified, State::Identifying) => self.enter(now, State::Homing),
+            (Input::Homed, State::Homing) => {
+                self.up_since = Some(now);
+                self.enter(now, State::Ready);
+            }
+            (Input::ScanBegun, State::Ready) => self.enter(now, State::Scanning),
+            (Input::ScanEnded, State::Scanning) => {
+                self.failures = 0;
+                self.enter(now, State::Ready);
+            }
+            (Input::Restarted, State::Ready | State::Scanning) => {
+                self.enter(now, State::Identifying);
+            }
+            _ => {}
+        }
+    }
+
+    /// The next change of settled state that nobody was told of.
+    pub const fn poll_transition(&mut self) -> Option<Transition> {
+        self.transition.take()
+    }
+
+    /// What the link is doing.
+    #[must_use]
+    pub const fn state(&self) -> LinkState {
+        self.state
+    }
+
+    /// Since when.
+    #[must_use]
+    pub const fn since(&self) -> Duration {
+        self.since
+    }
+
+    /// Failures since the device was last in proper use.
+    #[must_use]
+    pub const fn failures(&self) -> u32 {
+        self.failures
+    }
+
+    /// When the next try is due, if the link waits for one.
+    #[must_use]
+    pub fn retry_at(&self) -> Option<Duration> {
+        let waits = self.state.is_settled() && !self.state.is_up();
+        let for_ever = matches!(self.state, LinkState::EmergencyStop | LinkState::Stopped);
+        (waits && !for_ever).then_some(self.retry_at)
+    }
+
+    fn fail(&mut self, now: Duration, trouble: Trouble) {
+        // A device that was up for long enough is a new case, not one more failure of the same.
+        if self.up_since.is_some_and(|since| now.saturating_sub(since) > self.back_off.max) {
+            self.failures = 0;
+        }
+        let doublings = self.failures.min(16);
+        let wait = self.back_off.min.saturating_mul(1 << doublings).min(self.back_off.max);
+        self.failures = self.failures.saturating_add(1);
+        self.retry_at = now.saturating_add(wait);
+        self.enter(now, trouble.state());
+    }
+
+    fn enter(&mut self, now: Duration, state: LinkState) {
+        if state == self.state {
+            return;
+        }
+        self.state = state;
+        self.since = now;
+        if !state.is_up() {
+            self.up_since = None;
+        }
+        let settled = if state == LinkState::Scanning { LinkState::Ready } else { state };
+        if settled.is_settled() && self.told != Some(settled) {
+            let from = self.told.replace(settled);
+            self.transition = Some(Transition { from, to: settled });
+        }
+    }
+}
+
+impl LinkState {
+    /// Whether the device can be used.
+    #[must_use]
+    pub const fn is_up(self) -> bool {
+        matches!(self, Self::Ready | Self::Scanning)
+    }
+
+    /// Whether the link stays like this until something happens. The steps of a try are not
+    /// settled: telling of each would flood a log while a device is away.
+    #[must_use]
+    pub const fn is_settled(self) -> bool {
+        !matches!(self, Self::Opening | Self::Identifying | Self::Homing)
+    }
+
+    /// Its name in records and on the screen.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Opening => "opening",
+            Self::Identifying => "identifying",
+            Self::Homing => "homing",
+            Self::Ready => "ready",
+            Self::Scanning => "scanning",
+            Self::Absent => "absent",
+            Self::Busy => "busy",
+            Self::Forbidden => "forbidden",
+            Self::NotAnswering => "not_answering",
+            Self::WrongFirmware => "wrong_firmware",
+            Self::WrongDevice => "wrong_device",
+            Self::Lost => "lost",
+            Self::Fault => "fault",
+            Self::EmergencyStop => "emergency_stop",
+            Self::Stopped => "stopped",
+        }
+    }
+}
+
+impl Trouble {
+    const fn state(self) -> LinkState {
+        match self {
+            Self::Absent => LinkState::Absent,
+            Self::Busy => LinkState::Busy,
+            Self::Forbidden => LinkState::Forbidden,
+            Self::NotAnswering => LinkState::NotAnswering,
+            Self::WrongFirmware => LinkState::WrongFirmware,
+            Self::WrongDevice => LinkState::WrongDevice,
+            Self::Lost => LinkState::Lost,
+            Self::Fault => LinkState::Fault,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

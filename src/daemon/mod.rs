@@ -1,0 +1,182 @@
+//! The daemon: one task a resource, an explicit state machine for the link, orders at any time.
+//!
+//! ```text
+//!  API, signals ──orders──> Desk ──┐                        ┌──> Journal (thread: log folder)
+//!  emergency stop, thermometer ────┤   Operator (port,      ├──> Hub ──> subscribers' queues
+//!                                  └─> Ranger) ──records──> ┤
+//!                      LinkMachine, Agenda: what to do      └──> Shared: status, latest scan
+//! ```
+//!
+//! [`LinkMachine`] and [`Agenda`] are pure and decide; the operator does what they say and tells
+//! them what came of it. [`run`] wires them and returns when all are done.
+
+mod agenda;
+mod air;
+mod desk;
+mod forecast;
+mod hub;
+mod journal;
+mod machine;
+mod notify;
+mod operator;
+mod outlet;
+mod settings;
+mod status;
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+use tokio::sync::{mpsc, oneshot};
+use tokio_util::sync::CancellationToken;
+
+pub use agenda::{Agenda, Due};
+pub use air::{AirOrder, AirStatus};
+pub use desk::{Order, Refusal, Request};
+pub use hub::{Hub, Line, Subscription, Wanted};
+pub use journal::{Journal, JournalThread, LogStatus};
+pub use machine::{BackOff, Input, LinkMachine, LinkState, Step, Transition, Trouble};
+pub use operator::OpenPort;
+pub use settings::{Mismatch, Settings};
+pub use status::{
+    ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, ScanProgress, ScanReport,
+    ScanTotals, ScanningReport, Status, SubscriberReport,
+};
+
+use crate::board::Board;
+use air::AirDesk;
+use desk::Desk;
+use operator::Operator;
+use outlet::Outlet;
+use status::{Shared, View};
+
+/// Orders that may wait while one is carried out.
+const ORDERS: usize = 64;
+
+/// What the daemon owns.
+pub struct Resources {
+    /// Opens the serial port.
+    pub open_port: OpenPort,
+    /// Pins of the computer.
+    pub board: Box<dyn Board>,
+    /// The log.
+    pub journal: Journal,
+}
+
+/// The daemon for whoever gives it orders or wants to know something: cheap to clone.
+#[derive(Debug, Clone)]
+pub struct Handle {
+    orders: mpsc::Sender<Request>,
+    shared: Arc<Shared>,
+    hub: Hub,
+    journal: Journal,
+}
+
+/// The daemon's tasks, not yet running.
+pub struct Daemon {
+    operator: Operator,
+    shared: Arc<Shared>,
+    hub: Hub,
+    shutdown: CancellationToken,
+}
+
+/// A daemon that owns `resources` and works by `settings`, and the handle to it. Must be called
+/// within a multi-threaded tokio runtime.
+#[must_use]
+pub fn prepare(resources: Resources, settings: Settings) -> (Daemon, Handle) {
+    let (orders, requests) = mpsc::channel(ORDERS);
+    let shutdown = CancellationToken::new();
+    let hub = Hub::new(settings.keys.server.queue as usize);
+    let shared = Arc::new(Shared::new(first_view(&settings)));
+    let Resources { open_port, board, journal } = resources;
+    let desk = Desk::new(settings, board, requests, shutdown.clone(), journal.clone());
+    let outlet = Outlet { journal: journal.clone(), hub: hub.clone(), shared: Arc::clone(&shared) };
+    let operator = Operator::new(desk, open_port, outlet);
+    let handle = Handle { orders, shared: Arc::clone(&shared), hub: hub.clone(), journal };
+    (Daemon { operator, shared, hub, shutdown }, handle)
+}
+
+impl Daemon {
+    /// Works until `stop` is ready; then the motor is stopped, the scan closed, and every live
+    /// stream ended.
+    pub async fn run(self, stop: impl Future<Output = ()>) {
+        let notifier = tokio::spawn(notify::run(Arc::clone(&self.shared), self.shutdown.clone()));
+        let operator = tokio::spawn(self.operator.run());
+        stop.await;
+        self.shutdown.cancel();
+        if let Err(error) = operator.await {
+            tracing::error!("the operator failed: {error}");
+        }
+        self.hub.close();
+        drop(notifier.await);
+    }
+}
+
+impl Handle {
+    /// Gives an order and waits for the answer.
+    ///
+    /// # Errors
+    /// When the order is refused, or the daemon is stopping.
+    pub async fn order(&self, order: Order) -> Result<(), Refusal> {
+        let gone = || Refusal { message: "the daemon is stopping".into(), help: String::new() };
+        let (reply, answer) = oneshot::channel();
+        self.orders.send(Request { order, reply }).await.map_err(|_| gone())?;
+        answer.await.map_err(|_| gone())?
+    }
+
+    /// What the daemon is doing.
+    #[must_use]
+    pub fn status(&self) -> Status {
+        self.shared.status(self.journal.status(), self.subscribers())
+    }
+
+    /// Whether all is well.
+    #[must_use]
+    pub fn health(&self) -> Health {
+        self.shared.health(&self.journal.status())
+    }
+
+    /// The last scan that is over.
+    #[must_use]
+    pub fn latest_scan(&self) -> Option<Arc<ScanReport>> {
+        self.shared.latest_scan()
+    }
+
+    /// Live records.
+    #[must_use]
+    pub const fn hub(&self) -> &Hub {
+        &self.hub
+    }
+
+    fn subscribers(&self) -> SubscriberReport {
+        SubscriberReport {
+            now: self.hub.subscribers(),
+            dropped_readings: self.hub.dropped(),
+            cut_off: self.hub.cut_off(),
+        }
+    }
+}
+
+fn first_view(settings: &Settings) -> View {
+    View {
+        state: LinkState::Opening,
+        since: Timestamp::now(),
+        port: settings.keys.device.port.clone().unwrap_or_default(),
+        trouble: None,
+        failures: 0,
+        retry_at: None,
+        device: None,
+        provenance: None,
+        mode: settings.keys.scanning.mode,
+        paused: false,
+        requested: 0,
+        next_at: None,
+        scan: None,
+        plan: settings.plan(),
+        pose: settings.pose,
+        air: AirDesk::new(settings.keys.air.clone()),
+        configuration: ConfigurationReport::default(),
+        line: LineTotals::default(),
+        scans: ScanTotals::default(),
+        clock: ClockReport::default(),
+    }
+}

@@ -1,0 +1,68 @@
+//! Tells systemd how it goes: ready once the ranger told its identity, alive as long as the
+//! operator gets on.
+
+use std::{sync::Arc, time::Duration};
+
+use sd_notify::{NotifyState, notify, watchdog_enabled};
+use tokio::time::interval;
+use tokio_util::sync::CancellationToken;
+
+use super::{machine::LinkState, status::Shared};
+
+/// How often systemd is asked to wait longer for a ranger that is not there yet.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Notifies until `shutdown`. Does nothing where there is no systemd.
+pub(super) async fn run(shared: Arc<Shared>, shutdown: CancellationToken) {
+    if std::env::var_os("NOTIFY_SOCKET").is_none() {
+        return;
+    }
+    let watchdog = watchdog_enabled();
+    let mut tick = interval(watchdog.map_or(PATIENCE, |limit| (limit / 3).min(PATIENCE)));
+    let mut views = shared.view.subscribe();
+    let (mut ready, mut told, mut beats) = (false, None, None);
+    loop {
+        let (state, met, trouble) = {
+            let view = views.borrow_and_update();
+            (view.state, view.device.is_some(), view.trouble.clone())
+        };
+        if met && !std::mem::replace(&mut ready, true) {
+            say(&[NotifyState::Ready]);
+        }
+        if told.replace(state) != Some(state) {
+            say(&[NotifyState::Status(&words(state, trouble.as_deref()))]);
+        }
+        tokio::select! {
+            () = shutdown.cancelled() => break,
+            changed = views.changed() => if changed.is_err() { break },
+            _ = tick.tick() => {
+                if !ready {
+                    let microseconds = u32::try_from((4 * PATIENCE).as_micros()).unwrap_or(u32::MAX);
+                    say(&[NotifyState::ExtendTimeoutUsec(microseconds)]);
+                }
+                // A scan beats with every beam, everything else once a second. What beats no more
+                // is stuck.
+                let now = shared.beats();
+                if watchdog.is_some() && beats.replace(now) != Some(now) {
+                    say(&[NotifyState::Watchdog]);
+                }
+            }
+        }
+    }
+    say(&[NotifyState::Stopping]);
+}
+
+fn words(state: LinkState, trouble: Option<&str>) -> String {
+    match trouble {
+        Some(trouble) if state.is_settled() && !state.is_up() => {
+            format!("{}: {trouble}", state.name())
+        }
+        _ => state.name().to_owned(),
+    }
+}
+
+fn say(state: &[NotifyState<'_>]) {
+    if let Err(error) = notify(state) {
+        tracing::debug!("systemd could not be told: {error}");
+    }
+}

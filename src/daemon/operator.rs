@@ -1,0 +1,325 @@
+//! The task that owns the port and the ranger: does what the link's state machine says.
+
+mod scan;
+mod tell;
+
+use std::time::Duration;
+
+use firmware_protocol::host::{HostConfig, HostError};
+use tokio::time::{Instant, sleep_until};
+use tokio_serial::SerialStream;
+
+use super::{
+    agenda::Due,
+    desk::{Desk, Interrupt},
+    forecast::{Forecast, listening},
+    machine::{Input, LinkMachine, Step, Trouble},
+    outlet::Outlet,
+    status::{LineTotals, ScanTotals},
+};
+use crate::{
+    link::{BAUD, LinkError},
+    ranger::{DriveError, Driver, Ranger, Unasked, serial_text},
+    scan::{EventKind, Session},
+};
+
+/// How often an operator that waits shows that it is alive.
+const BEAT: Duration = Duration::from_secs(1);
+
+/// Opens the port of a name.
+pub type OpenPort = Box<dyn FnMut(&str) -> Result<SerialStream, LinkError> + Send>;
+
+pub(super) struct Operator {
+    desk: Desk,
+    machine: LinkMachine,
+    open_port: OpenPort,
+    ranger: Option<Ranger<SerialStream>>,
+    line: Option<SerialStream>,
+    forecast: Forecast,
+    /// The session's record that is in force in the log.
+    session: Option<Session>,
+    out: Outlet,
+    trouble: Option<String>,
+    /// Figures of the connections before this one.
+    earlier: LineTotals,
+    line_totals: LineTotals,
+    scans: ScanTotals,
+    next_check: Instant,
+}
+
+impl Operator {
+    pub(super) fn new(desk: Desk, open_port: OpenPort, out: Outlet) -> Self {
+        let machine = LinkMachine::new(desk.settings.back_off(), desk.now());
+        Self {
+            desk,
+            machine,
+            open_port,
+            ranger: None,
+            line: None,
+            forecast: Forecast::default(),
+            session: None,
+            out,
+            trouble: None,
+            earlier: LineTotals::default(),
+            line_totals: LineTotals::default(),
+            scans: ScanTotals::default(),
+            next_check: Instant::now(),
+        }
+    }
+
+    /// Works until the machine has ended.
+    pub(super) async fn run(mut self) {
+        loop {
+            let step = self.machine.poll(self.desk.now());
+            self.tell();
+            match step {
+                Step::Open => self.open(),
+                Step::Identify => self.identify().await,
+                Step::Home => self.home().await,
+                Step::Serve => self.serve().await,
+                Step::Wait(until) => {
+                    self.close();
+                    self.wait(Some(self.desk.epoch + until)).await;
+                }
+                Step::Rest => {
+                    self.close();
+                    self.desk.board.set_power(false);
+                    self.wait(None).await;
+                }
+                Step::End => break,
+            }
+        }
+        self.close();
+        self.desk.board.set_light(false);
+        self.desk.board.set_power(false);
+    }
+
+    fn handle(&mut self, input: Input) {
+        self.out.shared.beat();
+        self.machine.handle(self.desk.now(), input);
+    }
+
+    fn fail(&mut self, trouble: Trouble, why: String) {
+        tracing::debug!("{why}");
+        self.trouble = Some(why);
+        self.handle(Input::Failed(trouble));
+    }
+
+    fn open(&mut self) {
+        self.close();
+        self.desk.board.set_power(true);
+        let port = self.desk.settings.keys.device.port.clone().unwrap_or_default();
+        match (self.open_port)(&port) {
+            Ok(line) => {
+                self.line = Some(line);
+                self.handle(Input::Opened);
+            }
+            Err(error) => {
+                let trouble = match &error {
+                    LinkError::NotFound { .. } => Trouble::Absent,
+                    LinkError::Busy(_) => Trouble::Busy,
+                    LinkError::Permission(_) | LinkError::NotSerial(_) => Trouble::Forbidden,
+                    // A port that is being unplugged says all kinds of things.
+                    LinkError::Io { .. } => Trouble::Lost,
+                };
+                self.fail(trouble, format!("{error}; {}", error.help()));
+            }
+        }
+    }
+
+    async fn identify(&mut self) {
+        let attempts = self.desk.settings.keys.link.attempts;
+        let met = match (self.line.take(), self.ranger.take()) {
+            (Some(line), _) => {
+                let config =
+                    HostConfig { max_attempts: attempts, ..HostConfig::new(BAUD, rand::random()) };
+                attended(&mut self.desk, Ranger::meet(Driver::new(line, config))).await
+            }
+            (None, Some(mut ranger)) => {
+                let again = async {
+                    ranger.meet_again().await?;
+                    Ok(ranger)
+                };
+                attended(&mut self.desk, again).await
+            }
+            (None, None) => return self.fail(Trouble::Lost, "the line is gone".into()),
+        };
+        match met {
+            Err(interrupt) => self.react(interrupt),
+            Ok(Err(error)) => self.device_failed(&error),
+            Ok(Ok(ranger)) => self.meet(ranger),
+        }
+    }
+
+    /// Takes the device if it is the right one.
+    fn meet(&mut self, ranger: Ranger<SerialStream>) {
+        let serial = serial_text(ranger.identity());
+        let wanted = self.desk.settings.keys.device.serial.clone();
+        if let Some(wanted) = wanted.filter(|wanted| *wanted != serial) {
+            let why = format!(
+                "the device says it is {serial}, not {wanted}; connect that one, or change \
+                 device.serial"
+            );
+            return self.fail(Trouble::WrongDevice, why);
+        }
+        self.desk.identity = Some(*ranger.identity());
+        self.ranger = Some(ranger);
+        self.handle(Input::Identified);
+    }
+
+    async fn home(&mut self) {
+        let Some(ranger) = &mut self.ranger else { return };
+        let air = self.desk.air.settled();
+        let settings = self
+            .desk
+            .settings
+            .motion()
+            .settings(&listening(&self.desk.settings, &air), ranger.identity());
+        match attended(&mut self.desk, ranger.home(settings)).await {
+            Err(interrupt) => {
+                // The motor is turning. A device that does not hear this stops at its index.
+                let _ = ranger.stop().await;
+                self.react(interrupt);
+            }
+            Ok(Err(error)) => self.device_failed(&error),
+            Ok(Ok(_drift)) if self.desk.board.at_home() == Some(false) => {
+                let why = "the motor says it is home, but the home switch is open".into();
+                self.fail(Trouble::Fault, why);
+            }
+            Ok(Ok(_drift)) => {
+                self.next_check = Instant::now() + self.check_interval();
+                self.handle(Input::Homed);
+            }
+        }
+    }
+
+    /// The device can be used: scans if that is due, else listens until it is.
+    async fn serve(&mut self) {
+        let due = match self.desk.agenda.due(self.desk.now()) {
+            // Nothing is measured that can't be kept.
+            Due::Now if self.out.journal.is_well() => return self.scan().await,
+            Due::Now | Due::OnRequest => None,
+            Due::At(at) => Some(self.desk.epoch + at),
+        };
+        let Some(ranger) = &mut self.ranger else {
+            return self.fail(Trouble::Lost, "the line is gone".into());
+        };
+        self.out.shared.beat();
+        let wake = self.next_check.min(Instant::now() + BEAT);
+        let wake = due.map_or(wake, |due| due.min(wake));
+        tokio::select! {
+            unasked = ranger.unasked() => self.unasked(unasked),
+            interrupt = self.desk.next() => self.react(interrupt),
+            () = sleep_until(wake) => self.check_if_due().await,
+        }
+    }
+
+    fn unasked(&mut self, unasked: Unasked) {
+        match unasked {
+            Unasked::Hangup => {
+                self.fail(Trouble::Lost, "the line was closed: the cable was pulled?".into());
+            }
+            Unasked::Restarted => {
+                let detail = "the device restarted without work: homing again".to_owned();
+                self.out.event(EventKind::Reboot, detail);
+                self.handle(Input::Restarted);
+            }
+            Unasked::Fault(kind) => {
+                self.fail(Trouble::Fault, format!("the device stopped by itself: {kind}"));
+            }
+        }
+    }
+
+    async fn check_if_due(&mut self) {
+        if Instant::now() < self.next_check {
+            return;
+        }
+        self.next_check = Instant::now() + self.check_interval();
+        self.out.shared.beat();
+        let Some(ranger) = &mut self.ranger else { return };
+        match attended(&mut self.desk, ranger.check()).await {
+            Err(interrupt) => self.react(interrupt),
+            Ok(Err(DriveError::Host(HostError::Rebooted))) => self.unasked(Unasked::Restarted),
+            Ok(Err(error)) => self.device_failed(&error),
+            Ok(Ok(())) => {}
+        }
+    }
+
+    fn device_failed(&mut self, error: &DriveError) {
+        use HostError as Host;
+        let trouble = match error {
+            DriveError::Host(Host::NoAnswer { .. } | Host::NotADevice { .. }) => {
+                Trouble::NotAnswering
+            }
+            DriveError::Host(Host::WrongVersion { .. }) => Trouble::WrongFirmware,
+            DriveError::Host(Host::Hangup) => Trouble::Lost,
+            _ => Trouble::Fault,
+        };
+        if trouble == Trouble::NotAnswering && self.desk.board.can_reset() {
+            tracing::warn!("the device does not answer: pulling its reset line");
+            tokio::task::block_in_place(|| self.desk.board.reset());
+        }
+        self.fail(trouble, format!("{error}; {}", error.help()));
+    }
+
+    /// Waits until a time or until something happens, and for no longer than a heartbeat.
+    async fn wait(&mut self, until: Option<Instant>) {
+        self.out.shared.beat();
+        let beat = Instant::now() + BEAT;
+        tokio::select! {
+            () = sleep_until(until.map_or(beat, |until| until.min(beat))) => {}
+            interrupt = self.desk.next() => self.react(interrupt),
+        }
+    }
+
+    fn react(&mut self, interrupt: Interrupt) {
+        match interrupt {
+            Interrupt::Shutdown => self.handle(Input::Shutdown),
+            Interrupt::EmergencyStop(pressed) => {
+                let (kind, what) = match pressed {
+                    true => (EventKind::Fault, "the emergency stop was pressed"),
+                    false => (EventKind::Reconnected, "the emergency stop was released"),
+                };
+                self.out.event(kind, what.to_owned());
+                self.handle(Input::EmergencyStop(pressed));
+            }
+            Interrupt::PortChanged => self.handle(Input::PortChanged),
+            Interrupt::Log => match self.out.journal.status().error {
+                Some(error) => tracing::error!("no scan until the log can be written: {error}"),
+                None => tracing::info!("the log can be written again"),
+            },
+            Interrupt::Stop | Interrupt::Agenda => {}
+        }
+        self.machine.set_back_off(self.desk.settings.back_off());
+    }
+
+    fn close(&mut self) {
+        self.line = None;
+        if let Some(ranger) = self.ranger.take() {
+            self.earlier = self.earlier.with(ranger.link_stats());
+        }
+        self.desk.identity = None;
+    }
+
+    fn check_interval(&self) -> Duration {
+        Duration::from_secs_f64(self.desk.settings.keys.link.check_s)
+    }
+}
+
+/// Waits for something of the device, carrying out orders meanwhile; broken off only by what
+/// can't wait.
+async fn attended<T>(desk: &mut Desk, work: impl Future<Output = T>) -> Result<T, Interrupt> {
+    tokio::pin!(work);
+    loop {
+        tokio::select! {
+            done = &mut work => return Ok(done),
+            interrupt = desk.next() => match interrupt {
+                Interrupt::Shutdown | Interrupt::EmergencyStop(_) | Interrupt::PortChanged => {
+                    return Err(interrupt);
+                }
+                // The operator looks at the agenda and the log when the device can be used.
+                Interrupt::Stop | Interrupt::Log | Interrupt::Agenda => {}
+            }
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! One scan, with whatever happens meanwhile.
+
+use std::future::pending;
+
+use firmware_protocol::messages::Identity;
+use tokio::{sync::oneshot, time::Instant};
+use tokio_serial::SerialStream;
+
+use super::{
+    super::{
+        desk::Interrupt,
+        machine::{Input, Trouble},
+    },
+    Operator,
+};
+use crate::{
+    ranger::{Ranger, ScanError, ScanJob, ScanSummary},
+    scan::{EventKind, Record, Session},
+};
+
+/// A wall clock that moved by more than this against the one that never jumps was set.
+const CLOCK_STEP_S: f64 = 0.1;
+
+impl Operator {
+    pub(super) async fn scan(&mut self) {
+        let Some(identity) = self.desk.identity else { return };
+        let Some(job) = self.prepare(&identity).await else { return };
+        let Some(mut ranger) = self.ranger.take() else { return };
+        self.note_clock_step(&mut ranger);
+        self.desk.agenda.begun(self.desk.now());
+        self.handle(Input::ScanBegun);
+        self.tell();
+        let (outcome, interrupts) = self.scan_attended(&mut ranger, &job).await;
+        self.desk.identity = Some(*ranger.identity());
+        self.ranger = Some(ranger);
+        self.next_check = Instant::now() + self.check_interval();
+        self.out.shared.view.send_modify(|view| view.scan = None);
+        self.scan_ended(outcome);
+        interrupts.into_iter().for_each(|interrupt| self.react(interrupt));
+    }
+
+    /// The next scan, and a session in the log that it fits; `None` if it can't be taken.
+    async fn prepare(&mut self, identity: &Identity) -> Option<ScanJob> {
+        if std::mem::take(&mut self.desk.stale) {
+            self.forecast.forget();
+        }
+        let (air, now) = (self.desk.air.settled(), Instant::now());
+        let what = (self.desk.pose, self.desk.plan, air);
+        let scan_air = self.desk.air.scan_air(&air, now);
+        let steps_per_revolution = u32::from(identity.steps_per_revolution);
+        let job = match what.1.motor_steps(steps_per_revolution) {
+            Err(error) => Err(error.to_string()),
+            Ok(_) => self.forecast.job(&self.desk.settings, what, scan_air, identity).await,
+        };
+        match job {
+            Ok(job) => {
+                let session = self.forecast.session(&self.desk.settings, &air, identity);
+                self.put_session(session);
+                Some(job)
+            }
+            Err(why) => {
+                // Trying again would fail again: somebody has to change something first.
+                self.desk.agenda.stop();
+                tracing::error!("no scan is taken: {why}");
+                self.out.event(EventKind::Stopped, format!("no scan is taken: {why}"));
+                None
+            }
+        }
+    }
+
+    /// Writes a session's record if the one in force says something else.
+    fn put_session(&mut self, session: Session) {
+        let same = self.session.as_ref().is_some_and(|before| {
+            *before == Session { started: before.started, ..session.clone() }
+        });
+        if !same {
+            self.out.put(&Record::Session(Box::new(session.clone())));
+            self.session = Some(session);
+        }
+    }
+
+    fn note_clock_step(&mut self, ranger: &mut Ranger<SerialStream>) {
+        let step_s = ranger.reanchor().as_secs_f64();
+        if step_s.abs() > CLOCK_STEP_S {
+            let detail = format!(
+                "the computer's clock was set by {step_s:+.3} s since it was looked at last"
+            );
+            tracing::warn!("{detail}");
+            self.out.shared.view.send_modify(|view| view.clock.steps += 1);
+            self.out.event(EventKind::ClockStep, detail);
+        }
+    }
+
+    /// Takes the scan, and carries out orders meanwhile. What happened that the machine has to
+    /// know comes back with the outcome.
+    async fn scan_attended(
+        &mut self,
+        ranger: &mut Ranger<SerialStream>,
+        job: &ScanJob,
+    ) -> (Result<ScanSummary, ScanError>, Vec<Interrupt>) {
+        let mut out = self.out.clone();
+        let (halt, halted) = oneshot::channel::<String>();
+        let mut halt = Some(halt);
+        let stop = async {
+            match halted.await {
+                Ok(why) => why,
+                Err(_) => pending().await,
+            }
+        };
+        let scan = ranger.scan(job, &mut out, stop);
+        tokio::pin!(scan);
+        let mut interrupts = Vec::new();
+        let outcome = loop {
+            let interrupt = tokio::select! {
+                outcome = &mut scan => break outcome,
+                // After the end there is nothing more to be told.
+                interrupt = self.desk.next(), if !interrupts.contains(&Interrupt::Shutdown) => interrupt,
+            };
+            let why = match interrupt {
+                Interrupt::Shutdown => "the daemon is stopping",
+                Interrupt::Stop => "stopped on request",
+                Interrupt::EmergencyStop(true) => "the emergency stop was pressed",
+                Interrupt::PortChanged => "another port is to be used",
+                Interrupt::Log if !self.out.journal.is_well() => "the log can't be written",
+                Interrupt::Log | Interrupt::Agenda | Interrupt::EmergencyStop(false) => {
+                    if let Interrupt::EmergencyStop(_) = interrupt {
+                        interrupts.push(interrupt);
+                    }
+                    continue;
+                }
+            };
+            interrupts.push(interrupt);
+            if let Some(halt) = halt.take() {
+                // A scan that has just ended needs no halt.
+                drop(halt.send(why.to_owned()));
+            }
+        };
+        drop(halt);
+        (outcome, interrupts)
+    }
+
+    fn scan_ended(&mut self, outcome: Result<ScanSummary, ScanError>) {
+        if let Some(latest) = self.out.shared.latest_scan()
+            && let Some(end) = &latest.end
+            && outcome.is_err()
+        {
+            self.scans.beams += u64::from(end.beams);
+            self.scans.missing += u64::from(end.missing);
+        }
+        match outcome {
+            Ok(summary) => {
+                self.count(&summary);
+                self.handle(Input::ScanEnded);
+            }
+            Err(ScanError::Device(error)) => {
+                self.scans.failed += 1;
+                self.device_failed(&error);
+            }
+            Err(error) => {
+                self.scans.failed += 1;
+                self.fail(Trouble::Fault, error.to_string());
+            }
+        }
+    }
+
+    fn count(&mut self, summary: &ScanSummary) {
+        let end = &summary.end;
+        *if summary.stopped { &mut self.scans.stopped } else { &mut self.scans.completed } += 1;
+        self.scans.beams += u64::from(end.beams);
+        self.scans.missing += u64::from(end.missing);
+        self.scans.restarts += u64::from(summary.restarts);
+        let drift_ppm = summary.clock_drift.map(|drift| drift * 1e6);
+        let latest = self.out.shared.latest_scan();
+        let sigma_us =
+            latest.and_then(|scan| scan.pings.last().and_then(|ping| ping.time_sigma_us));
+        self.out.shared.view.send_modify(|view| {
+            (view.clock.drift_ppm, view.clock.sigma_us) = (drift_ppm, sigma_us);
+        });
+    }
+}

@@ -1,0 +1,78 @@
+//! What others get to know.
+
+use jiff::{SignedDuration, Timestamp};
+
+use super::{
+    super::{agenda::Due, machine::LinkState, status::LineTotals},
+    Operator,
+};
+use crate::{
+    ranger::{device_record, provenance},
+    scan::EventKind,
+};
+
+impl Operator {
+    /// Tells of a change of state, once, and publishes what is in force.
+    pub(super) fn tell(&mut self) {
+        if let Some(transition) = self.machine.poll_transition() {
+            self.tell_transition(transition.from, transition.to);
+        }
+        if self.machine.state().is_up() {
+            self.trouble = None;
+        }
+        if let Some(ranger) = &self.ranger {
+            let losses = self.line_totals.losses;
+            self.line_totals = LineTotals { losses, ..self.earlier.with(ranger.link_stats()) };
+        }
+        let since = Timestamp::now()
+            - SignedDuration::try_from(self.desk.now().saturating_sub(self.machine.since()))
+                .unwrap_or_default();
+        let next_at = match self.desk.agenda.due(self.desk.now()) {
+            Due::At(at) => Some(self.desk.epoch + at),
+            Due::Now | Due::OnRequest => None,
+        };
+        let retry_at = self.machine.retry_at().map(|at| self.desk.epoch + at);
+        let (desk, machine) = (&self.desk, &self.machine);
+        self.out.shared.view.send_modify(|view| {
+            if view.state != machine.state() {
+                view.since = since;
+            }
+            view.state = machine.state();
+            view.port = desk.settings.keys.device.port.clone().unwrap_or_default();
+            view.trouble.clone_from(&self.trouble);
+            (view.failures, view.retry_at) = (machine.failures(), retry_at);
+            view.device = desk.identity.as_ref().map(device_record);
+            view.provenance = desk.identity.as_ref().map(provenance);
+            view.mode = desk.settings.keys.scanning.mode;
+            (view.paused, view.requested) = (desk.agenda.is_paused(), desk.agenda.requested());
+            (view.next_at, view.plan, view.pose) = (next_at, desk.plan, desk.pose);
+            view.air = desk.air.clone();
+            view.configuration = desk.configuration.clone();
+            (view.line, view.scans) = (self.line_totals, self.scans);
+        });
+        self.desk.board.set_light(self.machine.state().is_up());
+    }
+
+    fn tell_transition(&mut self, from: Option<LinkState>, to: LinkState) {
+        let trouble = self.trouble.clone().unwrap_or_default();
+        let was_up = from.is_some_and(LinkState::is_up);
+        match to {
+            LinkState::Ready => {
+                tracing::info!("the ranger is ready");
+                if from.is_some() {
+                    let detail = "the ranger is ready again: identified and homed".to_owned();
+                    self.out.event(EventKind::Reconnected, detail);
+                }
+            }
+            LinkState::Stopped => tracing::info!("stopped"),
+            LinkState::EmergencyStop => tracing::warn!("the emergency stop is pressed"),
+            state => {
+                tracing::warn!("{}: {trouble}", state.name());
+                self.line_totals.losses += u64::from(was_up);
+                let kind =
+                    if state == LinkState::Fault { EventKind::Fault } else { EventKind::LinkLost };
+                self.out.event(kind, format!("{}: {trouble}", state.name()));
+            }
+        }
+    }
+}

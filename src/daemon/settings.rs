@@ -1,0 +1,150 @@
+//! Everything the daemon works by, checked and loaded.
+
+use std::{sync::Arc, time::Duration};
+
+use super::machine::BackOff;
+use crate::{
+    acoustics::{Air, Sensor},
+    config::Keys,
+    geometry::Pose,
+    model::Options,
+    ranger::Motion,
+    scan::ScanPlan,
+    scene::Scene,
+    store::Rotation,
+};
+
+/// The configuration with what it names: scene and sensor.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// The keys, each within its range.
+    pub keys: Keys,
+    /// The scene, if there is one.
+    pub scene: Option<Arc<Scene>>,
+    /// The sensor's data.
+    pub sensor: Sensor,
+    /// Where the ranger stands.
+    pub pose: Pose,
+}
+
+/// What is wrong with values that are each within their range.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Mismatch {
+    /// The key to look at, as `section.key`.
+    pub key: &'static str,
+    /// What is wrong.
+    pub message: String,
+    /// What would be right.
+    pub help: String,
+}
+
+impl Settings {
+    /// Which azimuths.
+    #[must_use]
+    pub const fn plan(&self) -> ScanPlan {
+        let plan = &self.keys.plan;
+        ScanPlan {
+            from_deg: plan.from_deg,
+            to_deg: plan.to_deg,
+            step_deg: plan.step_deg,
+            pings_per_stop: plan.pings_per_stop,
+        }
+    }
+
+    /// How the motor turns and the ranger listens.
+    #[must_use]
+    pub const fn motion(&self) -> Motion {
+        let motion = &self.keys.motion;
+        Motion {
+            window_ms: motion.window_ms,
+            settle_ms: motion.settle_ms,
+            min_interval_ms: motion.min_interval_ms,
+            max_echoes: motion.max_echoes,
+            speed: motion.speed,
+            acceleration: motion.acceleration,
+        }
+    }
+
+    /// How echoes are predicted.
+    #[must_use]
+    pub fn options(&self) -> Options {
+        let model = &self.keys.model;
+        Options { engine: model.engine, max_range_m: model.max_range_m, ..Options::default() }
+    }
+
+    /// Farthest range of interest, metres.
+    #[must_use]
+    pub fn max_range_m(&self) -> f64 {
+        self.keys.model.max_range_m.unwrap_or(self.sensor.max_range_m)
+    }
+
+    /// When another log is begun.
+    #[must_use]
+    pub fn rotation(&self) -> Rotation {
+        let log = &self.keys.log;
+        let bytes = |megabytes: f64| (megabytes * 1e6) as u64;
+        Rotation {
+            max_bytes: bytes(log.rotate_mb),
+            daily: log.daily,
+            keep_bytes: bytes(log.keep_mb),
+            sync_interval: Duration::from_secs_f64(log.sync_s),
+        }
+    }
+
+    /// Bounds of the wait from try to try.
+    #[must_use]
+    pub fn back_off(&self) -> BackOff {
+        let link = &self.keys.link;
+        BackOff {
+            min: Duration::from_secs_f64(link.retry_min_s),
+            max: Duration::from_secs_f64(link.retry_max_s.max(link.retry_min_s)),
+        }
+    }
+
+    /// From the start of a scan to the next, if the mode is schedule.
+    #[must_use]
+    pub fn every(&self) -> Duration {
+        Duration::from_secs_f64(self.keys.scanning.every_s)
+    }
+
+    /// Checks what ranges can't say.
+    ///
+    /// # Errors
+    /// The first pair of values that do not go together.
+    pub fn check(&self) -> Result<(), Mismatch> {
+        let air = &self.keys.air;
+        self.plan().check().map_err(|error| Mismatch {
+            key: "plan.to_deg",
+            message: error.to_string(),
+            help: "a full turn is from_deg = 0, to_deg = 360, step_deg = 0.9".into(),
+        })?;
+        Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa).map_err(|error| {
+            Mismatch { key: "air.temperature_c", message: error.to_string(), help: String::new() }
+        })?;
+        if self.keys.link.retry_max_s < self.keys.link.retry_min_s {
+            return Err(Mismatch {
+                key: "link.retry_max_s",
+                message: "the longest wait is shorter than the first one".into(),
+                help: "give link.retry_max_s at least link.retry_min_s".into(),
+            });
+        }
+        Ok(())
+    }
+
+    /// Keys marked `[restart]` that differ from those of `before`, as `section.key`.
+    #[must_use]
+    pub fn needs_restart(&self, before: &Self) -> Vec<String> {
+        let (now, then) = (&self.keys, &before.keys);
+        let mut keys = Vec::new();
+        if now.log.folder != then.log.folder {
+            keys.push("log.folder".to_owned());
+        }
+        if now.server != then.server {
+            keys.push("server".to_owned());
+        }
+        if now.gpio != then.gpio {
+            keys.push("gpio".to_owned());
+        }
+        keys
+    }
+}

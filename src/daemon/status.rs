@@ -1,0 +1,372 @@
+//! What the daemon tells about itself.
+
+use std::sync::{
+    Arc, Mutex, MutexGuard, PoisonError,
+    atomic::{AtomicU32, AtomicU64, Ordering},
+};
+
+use firmware_protocol::host::LinkStats;
+use jiff::Timestamp;
+use schemars::JsonSchema;
+use serde::Serialize;
+use tokio::{sync::watch, time::Instant};
+use uuid::Uuid;
+
+use super::{
+    air::{AirDesk, AirStatus},
+    journal::LogStatus,
+    machine::LinkState,
+};
+use crate::{
+    config::Mode,
+    geometry::Pose,
+    scan::{Device, Event, Ping, Provenance, Record, ScanEnd, ScanPlan, ScanStart},
+};
+
+/// What the daemon is doing.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Status {
+    /// Version of the program.
+    pub sonard: String,
+    /// How long it runs, seconds.
+    pub uptime_s: f64,
+    /// The link to the device.
+    pub link: LinkReport,
+    /// The device, once it told its identity on this connection.
+    pub device: Option<Device>,
+    /// Whether readings come from hardware.
+    pub provenance: Option<Provenance>,
+    /// When scans are taken.
+    pub scanning: ScanningReport,
+    /// The scan under way.
+    pub scan: Option<ScanProgress>,
+    /// Azimuths of the next scan.
+    pub plan: ScanPlan,
+    /// Where the ranger stands.
+    pub pose: Pose,
+    /// The air in force.
+    pub air: AirStatus,
+    /// The log.
+    pub log: LogStatus,
+    /// Clients of live streams.
+    pub subscribers: SubscriberReport,
+    /// What became of the last change of the configuration.
+    pub configuration: ConfigurationReport,
+}
+
+/// The link to the device.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct LinkReport {
+    /// What it is doing or suffering.
+    pub state: LinkState,
+    /// Since when, by the wall clock.
+    pub since: Timestamp,
+    /// The port, as configured.
+    pub port: String,
+    /// What went wrong last and what to do, while the device can't be used.
+    pub trouble: Option<String>,
+    /// Failures since the device was last in proper use.
+    pub failures: u32,
+    /// Until the next try, seconds.
+    pub retry_in_s: Option<f64>,
+}
+
+/// When scans are taken.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ScanningReport {
+    /// The mode.
+    pub mode: Mode,
+    /// Whether somebody stopped the mode's own scans.
+    pub paused: bool,
+    /// Scans asked for and not yet begun.
+    pub requested: u32,
+    /// Until the next scan, seconds, if that is known.
+    pub next_in_s: Option<f64>,
+}
+
+/// How far a scan is.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ScanProgress {
+    /// The scan.
+    pub scan: Uuid,
+    /// Beams of the plan.
+    pub beams: u32,
+    /// Beams that are in.
+    pub done: u32,
+}
+
+/// Clients of live streams.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct SubscriberReport {
+    /// At the moment.
+    pub now: usize,
+    /// Readings that slow ones missed.
+    pub dropped_readings: u64,
+    /// Clients that were cut off because they took nothing.
+    pub cut_off: u64,
+}
+
+/// What became of the last change of the configuration.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ConfigurationReport {
+    /// Why it was refused, if it was; what was in force before is in force still.
+    pub error: Option<String>,
+    /// Keys whose change waits for the next start.
+    pub needs_restart: Vec<String>,
+}
+
+/// Whether all is well, with the figures to judge by.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Health {
+    /// Whether the device can be used, the log written, and the temperature is fresh.
+    pub healthy: bool,
+    /// Why not.
+    pub reasons: Vec<String>,
+    /// The serial line, since the start.
+    pub line: LineTotals,
+    /// Scans since the start.
+    pub scans: ScanTotals,
+    /// The device's clock in the last scan.
+    pub clock: ClockReport,
+}
+
+/// Figures of the serial line since the start.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct LineTotals {
+    /// Bytes sent.
+    pub bytes_sent: u64,
+    /// Bytes received.
+    pub bytes_received: u64,
+    /// Frames received whose checksum was right.
+    pub frames_received: u64,
+    /// Frames whose checksum was wrong.
+    pub crc_errors: u64,
+    /// Frames that were damaged otherwise.
+    pub framing_errors: u64,
+    /// Requests sent again.
+    pub retries: u64,
+    /// Readings that were lost at first and fetched again.
+    pub repaired: u64,
+    /// Times that the device was lost from use.
+    pub losses: u64,
+}
+
+/// Figures of the scans since the start.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ScanTotals {
+    /// Every beam was measured.
+    pub completed: u64,
+    /// Stopped on request.
+    pub stopped: u64,
+    /// Given up.
+    pub failed: u64,
+    /// Beams measured.
+    pub beams: u64,
+    /// Beams that scans lacked at their end.
+    pub missing: u64,
+    /// Restarts of the device that scans survived.
+    pub restarts: u64,
+}
+
+/// The device's clock.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, JsonSchema)]
+pub struct ClockReport {
+    /// Deviation from its nominal rate, parts in a million.
+    pub drift_ppm: Option<f64>,
+    /// Standard deviation of the times in records, microseconds.
+    pub sigma_us: Option<f64>,
+    /// Times that the computer's wall clock was set.
+    pub steps: u64,
+}
+
+/// One scan, whole.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ScanReport {
+    /// How it began.
+    pub start: ScanStart,
+    /// Its readings.
+    pub pings: Vec<Ping>,
+    /// What happened meanwhile.
+    pub events: Vec<Event>,
+    /// How it ended.
+    pub end: Option<ScanEnd>,
+}
+
+/// What the operator publishes; ages and waits are computed when somebody asks.
+#[derive(Debug, Clone)]
+pub(super) struct View {
+    pub(super) state: LinkState,
+    pub(super) since: Timestamp,
+    pub(super) port: String,
+    pub(super) trouble: Option<String>,
+    pub(super) failures: u32,
+    pub(super) retry_at: Option<Instant>,
+    pub(super) device: Option<Device>,
+    pub(super) provenance: Option<Provenance>,
+    pub(super) mode: Mode,
+    pub(super) paused: bool,
+    pub(super) requested: u32,
+    pub(super) next_at: Option<Instant>,
+    pub(super) scan: Option<(Uuid, u32)>,
+    pub(super) plan: ScanPlan,
+    pub(super) pose: Pose,
+    pub(super) air: AirDesk,
+    pub(super) configuration: ConfigurationReport,
+    pub(super) line: LineTotals,
+    pub(super) scans: ScanTotals,
+    pub(super) clock: ClockReport,
+}
+
+/// State that several tasks look at.
+#[derive(Debug)]
+pub(super) struct Shared {
+    pub(super) started: Instant,
+    pub(super) view: watch::Sender<View>,
+    /// Counts whatever shows that the operator gets on; the watchdog looks at it.
+    beats: AtomicU64,
+    beams_done: AtomicU32,
+    scans: Mutex<Collector>,
+}
+
+#[derive(Debug, Default)]
+struct Collector {
+    current: Option<ScanReport>,
+    latest: Option<Arc<ScanReport>>,
+}
+
+impl Shared {
+    pub(super) fn new(view: View) -> Self {
+        Self {
+            started: Instant::now(),
+            view: watch::Sender::new(view),
+            beats: AtomicU64::new(0),
+            beams_done: AtomicU32::new(0),
+            scans: Mutex::default(),
+        }
+    }
+
+    /// Something went on.
+    pub(super) fn beat(&self) {
+        self.beats.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(super) fn beats(&self) -> u64 {
+        self.beats.load(Ordering::Relaxed)
+    }
+
+    /// Takes in a record of a scan; gives back the scan if this was its end.
+    pub(super) fn collect(&self, record: &Record) -> Option<Arc<ScanReport>> {
+        self.beat();
+        let mut scans = self.scans();
+        match record {
+            Record::ScanStart(start) => {
+                self.beams_done.store(0, Ordering::Relaxed);
+                let start = start.clone();
+                scans.current =
+                    Some(ScanReport { start, pings: Vec::new(), events: Vec::new(), end: None });
+            }
+            Record::Ping(ping) => {
+                self.beams_done.fetch_add(1, Ordering::Relaxed);
+                let pings = scans.current.as_mut().map(|scan| &mut scan.pings);
+                pings.into_iter().for_each(|pings| pings.push((**ping).clone()));
+            }
+            Record::Event(event) => {
+                let events = scans.current.as_mut().map(|scan| &mut scan.events);
+                events.into_iter().for_each(|events| events.push(event.clone()));
+            }
+            Record::ScanEnd(end) => {
+                let mut report = scans.current.take()?;
+                report.end = Some(end.clone());
+                let report = Arc::new(report);
+                scans.latest = Some(Arc::clone(&report));
+                return Some(report);
+            }
+            Record::Session(_) => {}
+        }
+        None
+    }
+
+    /// The last scan that is over.
+    pub(super) fn latest_scan(&self) -> Option<Arc<ScanReport>> {
+        self.scans().latest.clone()
+    }
+
+    pub(super) fn status(&self, log: LogStatus, subscribers: SubscriberReport) -> Status {
+        let now = Instant::now();
+        let until =
+            |at: Option<Instant>| at.map(|at| at.saturating_duration_since(now).as_secs_f64());
+        let view = self.view.borrow().clone();
+        Status {
+            sonard: env!("CARGO_PKG_VERSION").into(),
+            uptime_s: now.duration_since(self.started).as_secs_f64(),
+            link: LinkReport {
+                state: view.state,
+                since: view.since,
+                port: view.port,
+                trouble: view.trouble,
+                failures: view.failures,
+                retry_in_s: until(view.retry_at),
+            },
+            device: view.device,
+            provenance: view.provenance,
+            scanning: ScanningReport {
+                mode: view.mode,
+                paused: view.paused,
+                requested: view.requested,
+                next_in_s: until(view.next_at),
+            },
+            scan: view.scan.map(|(scan, beams)| ScanProgress {
+                scan,
+                beams,
+                done: self.beams_done.load(Ordering::Relaxed),
+            }),
+            plan: view.plan,
+            pose: view.pose,
+            air: view.air.status(now),
+            log,
+            subscribers,
+            configuration: view.configuration,
+        }
+    }
+
+    pub(super) fn health(&self, log: &LogStatus) -> Health {
+        let view = self.view.borrow().clone();
+        let air = view.air.status(Instant::now());
+        let mut reasons = Vec::new();
+        if !view.state.is_up() {
+            let trouble = view.trouble.unwrap_or_default();
+            reasons.push(format!("the link is {}: {trouble}", view.state.name()));
+        }
+        reasons.extend(log.error.iter().map(|error| format!("the log: {error}")));
+        if air.stale {
+            reasons.push("the air temperature is stale".into());
+        }
+        Health {
+            healthy: reasons.is_empty(),
+            reasons,
+            line: view.line,
+            scans: view.scans,
+            clock: view.clock,
+        }
+    }
+
+    fn scans(&self) -> MutexGuard<'_, Collector> {
+        // Nothing under this lock can panic, so a poisoned one holds what it should.
+        self.scans.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl LineTotals {
+    /// These and the figures of one connection more.
+    pub(super) fn with(mut self, stats: &LinkStats) -> Self {
+        let dropped = &stats.dropped;
+        self.bytes_sent += stats.bytes_sent;
+        self.bytes_received += stats.bytes_received;
+        self.frames_received += stats.frames_received;
+        self.crc_errors += u64::from(dropped.checksum);
+        self.framing_errors += u64::from(dropped.stuffing) + u64::from(dropped.too_long);
+        self.retries += stats.retries;
+        self.repaired += stats.repaired;
+        self
+    }
+}

@@ -1,0 +1,82 @@
+//! Ways through the floor plan: every path that the engine finds can be drawn.
+
+use super::*;
+use crate::{
+    geometry::{Mirror, wrap_pi},
+    model::{Path, Reflector, paths::Paths},
+};
+
+/// Each way has the path's length, leaves and comes back in its directions, and at each flat
+/// reflection the angles on both sides of the normal are equal.
+#[test]
+fn every_path_of_every_shipped_scene_has_its_way() {
+    let mut drawn = 0;
+    for name in shipped::names() {
+        let scene = shipped_scene(name);
+        for pose in scene.poses.values() {
+            let scene = Arc::new(scene.with_robot_at(pose));
+            let options = Options { max_range_m: Some(2.0), ..Options::default() };
+            let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+            let simulator =
+                Simulator::new(scene.clone(), sensor, Air::default(), options).expect("options");
+            let paths = Paths::new(&scene, simulator.path_settings()).enumerate(pose.position());
+            for echo in paths {
+                let record = simulator.path_record(&echo.path, echo.length_m);
+                assert_eq!(Path::from_record(&record, &scene).as_ref(), Some(&echo.path));
+                let points = echo
+                    .path
+                    .points(&scene, pose.position(), echo.length_m)
+                    .unwrap_or_else(|| panic!("{name}: no way for {record:?}"));
+                let [first, .., last] = points.as_slice() else { panic!("{record:?}") };
+                assert_eq!((*first, *last), (pose.position(), pose.position()));
+                let leaves = (points[1] - points[0]).to_angle();
+                let comes = (points[points.len() - 2] - *last).to_angle();
+                // The engine squares up corners, which moves them by a tenth of a millimetre. A way round
+                // an edge reads the same backwards.
+                let ends = [
+                    (echo.departure_rad, echo.arrival_rad),
+                    (echo.arrival_rad, echo.departure_rad),
+                ];
+                let fits = |(out, back): &(f64, f64)| {
+                    wrap_pi(leaves - out).abs() < 1e-3 && wrap_pi(comes - back).abs() < 1e-3
+                };
+                let known = if echo.path.edge.is_some() { 2 } else { 1 };
+                assert!(ends[..known].iter().any(fits), "{name} {record:?}");
+                if echo.path.edge.is_none() {
+                    mirrors(&scene, &echo.path, &points);
+                }
+                drawn += 1;
+            }
+        }
+    }
+    assert!(drawn > 1000, "{drawn}");
+}
+
+fn mirrors(scene: &Scene, path: &Path, points: &[DVec2]) {
+    for (corner, reflector) in points.windows(3).zip(&path.walls) {
+        let Reflector::Wall(index) = reflector else { continue };
+        let wall = &scene.walls[*index as usize];
+        let turned = Mirror::through(wall.a, wall.b).turn(corner[1] - corner[0]);
+        let (before, after) =
+            (turned.normalize_or_zero(), (corner[2] - corner[1]).normalize_or_zero());
+        // In a corner two reflections fall into one point.
+        if turned.length() > 1e-6 && corner[2].distance(corner[1]) > 1e-6 {
+            assert!((before - after).length() < 1e-4, "{path:?} {points:?}");
+        }
+    }
+}
+
+#[test]
+fn no_way_is_made_up() {
+    let room = shipped_scene("simple-room");
+    let path = Path {
+        kind: PathKind::Specular,
+        walls: [Reflector::Wall(0)].into_iter().collect(),
+        edge: None,
+    };
+    let at = DVec2::new(0.774, 0.085);
+    assert!(path.points(&room, at, 0.17).is_some());
+    assert_eq!(path.points(&room, at, 0.3), None, "not of that length");
+    let missing = Path { walls: [Reflector::Wall(99)].into_iter().collect(), ..path };
+    assert_eq!(missing.points(&room, at, 0.17), None, "no such wall");
+}

@@ -1,0 +1,255 @@
+//! Pins that exist on paper: a module, a motor with an index, and a clock that is told the time.
+//! The shared tests of all boards run on them.
+
+use std::collections::VecDeque;
+use std::convert::Infallible;
+
+use firmware_protocol::conformance::DeviceUnderTest;
+use firmware_protocol::conformance_tests;
+
+use super::{Output, PiBoard, PiSettings, Pins};
+
+const TICKS_PER_US: u64 = 2;
+/// What blanks the module by itself, ticks.
+const INTERNAL_BLANKING: u64 = 4_760;
+/// How long an echo lasts, ticks: 16 cycles at 49.4 kHz.
+const PULSE: u64 = 648;
+
+#[derive(Debug, Default)]
+struct FakePins {
+    now: u64,
+    init: bool,
+    blnk: bool,
+    forward: bool,
+    enabled: bool,
+    steps: i64,
+    /// Ticks after INIT rises.
+    echoes: Vec<u64>,
+    fired: u64,
+    unblanked: u64,
+    blnk_fell: u64,
+    latched: bool,
+    rises: VecDeque<u64>,
+    firings: usize,
+    index: Option<i64>,
+    emergency: Option<bool>,
+}
+
+impl FakePins {
+    /// Lets time pass: ECHO latches where an echo comes while the module listens.
+    fn pass(&mut self, to: u64) {
+        for after in &self.echoes {
+            let begins = (self.fired + after).max(self.unblanked).max(self.blnk_fell);
+            let heard = begins < self.fired + after + PULSE && begins > self.now && begins <= to;
+            if self.init && !self.blnk && !self.latched && heard {
+                self.latched = true;
+                self.rises.push_back(begins);
+            }
+        }
+        self.now = to;
+    }
+}
+
+impl Pins for FakePins {
+    fn now(&mut self) -> u64 {
+        self.now
+    }
+
+    fn set(&mut self, output: Output, high: bool) {
+        match output {
+            Output::Init => {
+                self.init = high;
+                self.latched &= high;
+            }
+            Output::Binh if high => self.unblanked = self.unblanked.min(self.now),
+            Output::Binh => {}
+            Output::Blnk => {
+                if self.blnk && !high {
+                    self.blnk_fell = self.now;
+                }
+                self.blnk = high;
+                self.latched &= !high;
+            }
+            Output::Step => {}
+            Output::Dir => self.forward = high,
+            Output::Enable => self.enabled = !high,
+        }
+    }
+
+    fn raise_init(&mut self) -> u64 {
+        assert!(!self.init, "INIT was high already");
+        (self.init, self.fired, self.firings) = (true, self.now, self.firings + 1);
+        self.unblanked = self.now + INTERNAL_BLANKING;
+        self.now
+    }
+
+    fn pulse(&mut self) {
+        assert!(self.enabled, "a pulse without current");
+        self.steps += if self.forward { 1 } else { -1 };
+    }
+
+    fn echo(&mut self) -> bool {
+        self.latched
+    }
+
+    fn next_echo(&mut self) -> Option<u64> {
+        self.rises.pop_front()
+    }
+
+    fn at_index(&mut self) -> Option<bool> {
+        self.index.map(|index| (0..4).contains(&(self.steps - index).rem_euclid(400)))
+    }
+
+    fn emergency(&mut self) -> Option<bool> {
+        self.emergency
+    }
+}
+
+/// The board on these pins.
+struct Fake(PiBoard<FakePins>);
+
+impl Fake {
+    fn new(pins: FakePins) -> Self {
+        let settings = PiSettings { boot: 7, serial: *b"PI-FAKE-01", steps_per_revolution: 400 };
+        Self(PiBoard::new(pins, settings))
+    }
+}
+
+impl DeviceUnderTest for Fake {
+    type Error = Infallible;
+
+    fn now_us(&self) -> u64 {
+        self.0.pins.now / TICKS_PER_US
+    }
+
+    fn run(&mut self, us: u64) -> Result<(), Infallible> {
+        let end = self.0.pins.now + us * TICKS_PER_US;
+        loop {
+            self.0.advance();
+            let now = self.0.pins.now;
+            // The processor takes a moment for each round.
+            let wake = self.0.next_wake().unwrap_or(end).clamp(now + 2, end.max(now + 2));
+            self.0.pins.pass(wake);
+            if wake >= end {
+                self.0.advance();
+                return Ok(());
+            }
+        }
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        self.0.handle_bytes(bytes);
+    }
+
+    fn receive(&mut self) -> Vec<u8> {
+        let mut said = Vec::new();
+        self.0.poll_transmit(&mut said);
+        said
+    }
+
+    fn set_echoes(&mut self, after_us: &[f64]) {
+        self.0.pins.echoes = after_us.iter().map(|us| (us * 2.0).round() as u64).collect();
+    }
+
+    fn take_firings(&mut self) -> usize {
+        std::mem::take(&mut self.0.pins.firings)
+    }
+
+    fn motor_steps(&self) -> i64 {
+        self.0.pins.steps
+    }
+
+    fn holds_coils(&self) -> bool {
+        self.0.pins.enabled
+    }
+}
+
+mod without_an_index {
+    use super::*;
+
+    conformance_tests!(Fake::new(FakePins::default()));
+}
+
+mod with_an_index {
+    use super::*;
+
+    conformance_tests!(Fake::new(FakePins { index: Some(0), ..FakePins::default() }));
+
+    use firmware_protocol::conformance::Bench;
+    use firmware_protocol::host::{Command, HostEvent, Outcome};
+    use firmware_protocol::messages::{Blanking, Settings};
+
+    #[test]
+    fn home_is_the_same_step_from_everywhere() {
+        let settings = Settings {
+            window_ticks: 48_000,
+            min_interval_ticks: 0,
+            settle_ticks: 0,
+            max_echoes: 1,
+            blanking: Blanking::Internal,
+            speed: 2_000,
+            acceleration: 100_000,
+            hold_s: 0,
+        };
+        for index in [0, 1, 3, 57, 200, 201, 396, -130] {
+            let pins = FakePins { index: Some(index), ..FakePins::default() };
+            let mut bench = Bench::new(Fake::new(pins));
+            for command in [Command::Identify, Command::Configure(settings), Command::Home] {
+                bench.perform(command, 20.0).expect("gets ready");
+            }
+            let turned = bench.device.motor_steps();
+            assert_eq!((turned - index).rem_euclid(400), 0, "index at {index}");
+            assert!(turned.abs() <= 400, "index at {index}: wound by {turned} steps");
+            // Somebody turns the motor by hand.
+            bench.perform(Command::MoveTo { step: 50 }, 10.0).expect("moves");
+            bench.device.0.pins.steps -= 3;
+            let events = bench.perform(Command::Home, 20.0).expect("homes");
+            let drift = HostEvent::Done(Outcome::Homed { drift_steps: 3 });
+            assert!(events.contains(&drift), "index at {index}: {events:?}");
+        }
+    }
+}
+
+#[test]
+fn an_emergency_stop_ends_everything_at_once() {
+    use firmware_protocol::conformance::Bench;
+    use firmware_protocol::host::{Command, HostError, HostEvent};
+    use firmware_protocol::messages::NakReason;
+
+    let pins = FakePins { emergency: Some(false), ..FakePins::default() };
+    let mut bench = Bench::new(Fake::new(pins));
+    let settings = firmware_protocol::messages::Settings {
+        window_ticks: 48_000,
+        min_interval_ticks: 0,
+        settle_ticks: 0,
+        max_echoes: 1,
+        blanking: firmware_protocol::messages::Blanking::Internal,
+        speed: 800,
+        acceleration: 40_000,
+        hold_s: 0,
+    };
+    for command in [Command::Identify, Command::Configure(settings), Command::Home] {
+        bench.perform(command, 20.0).expect("gets ready");
+    }
+    bench.start(Command::MoveTo { step: 1_000 }).expect("begins");
+    bench.run(0.3).expect("moves");
+    bench.device.0.pins.emergency = Some(true);
+    bench.run(0.01).expect("stops");
+    assert!(!bench.device.holds_coils());
+    bench.run(0.5).expect("runs");
+    let ended_it = |event: &HostEvent| {
+        matches!(
+            event,
+            HostEvent::Failed(
+                HostError::EmergencyStop | HostError::Refused(NakReason::EmergencyStop)
+            )
+        )
+    };
+    assert!(bench.events().iter().any(ended_it), "{:?}", bench.events());
+    let stood = bench.device.motor_steps();
+    assert!(bench.perform(Command::Home, 5.0).is_err(), "still pressed");
+    bench.device.0.pins.emergency = Some(false);
+    bench.run(0.1).expect("runs");
+    bench.perform(Command::Home, 5.0).expect("homes");
+    assert_eq!(bench.device.motor_steps(), stood, "home is where it stands, without an index");
+}

@@ -1,0 +1,207 @@
+//! The floor plan with what a scan was interpreted as.
+
+use super::{
+    canvas::{Anchor, Layer, Px, Rect, Shape},
+    caption, keys,
+    labels::Labels,
+    legend::{self, Entry, Sample},
+    picture::Picture,
+    plan::Plan,
+    readings::Readings,
+    region, theme, words,
+};
+use crate::{
+    geometry::{DVec2, Pose},
+    interpret::{Feature, FeatureKind},
+    scan::ScanView,
+    scene::Scene,
+};
+
+const KINDS: [FeatureKind; 4] =
+    [FeatureKind::Plane, FeatureKind::Corner, FeatureKind::Edge, FeatureKind::Unresolved];
+
+/// Draws what scans were interpreted as: each feature's arc in the colour and with the mark of
+/// its kind, on the floor plan with the readings as small dots; an arrow leads to the place that
+/// a next scan is proposed from.
+#[must_use]
+pub fn draw_features(scans: &[ScanView], scene: Option<&Scene>, features: &[Feature]) -> Picture {
+    let readings: Vec<Readings> = scans.iter().map(Readings::of).collect();
+    let placed: Vec<(Pose, &Readings)> = scans
+        .iter()
+        .zip(&readings)
+        .filter_map(|(view, r)| Some((words::pose_of(view)?, r)))
+        .collect();
+    let lines = [words::lines(scans), vec![counts(features)]].concat();
+    let (heading, top) = caption::draw(&words::title(scans, scene), words::badge(scans), &lines);
+    let region = region::region(&placed, scene);
+    let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
+    let height = Plan::height_for(&region, right - left, [320.0, 760.0]);
+    let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
+
+    let mut inside = Layer::new("inside").clipped("features-window", plan.panel);
+    inside.extend(scene.map(|scene| plan.walls(scene)));
+    inside.extend(placed.iter().map(|(pose, r)| dots(&plan, pose, r)));
+    inside.extend(placed.iter().map(|(pose, _)| plan.pose(pose)));
+    inside.extend(features.iter().map(|feature| arc(&plan, scans, feature)));
+    inside.add(next_places(&plan, scans, features));
+
+    let mut page = Layer::new("features");
+    page.add(heading);
+    page.add(plan.frame());
+    page.add(inside);
+    page.add(names(&plan, scans, features));
+    page.add(plan.scale_bar());
+    let below = Px::new(left, plan.panel.bottom + 24.0);
+    let (entries, legend_height) = legend::draw(&entries(features, scene), below, right - left);
+    page.add(entries);
+    Picture::new(theme::PAGE_PX, below.y + legend_height + theme::MARGIN_PX / 2.0, page)
+}
+
+/// How many of each kind there are.
+fn counts(features: &[Feature]) -> String {
+    let parts: Vec<String> = KINDS
+        .iter()
+        .map(|kind| (features.iter().filter(|f| f.kind == *kind).count(), name(*kind)))
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, name)| format!("{count} {name}"))
+        .collect();
+    if parts.is_empty() { "no feature".to_owned() } else { format!("found: {}", parts.join(", ")) }
+}
+
+const fn name(kind: FeatureKind) -> &'static str {
+    match kind {
+        FeatureKind::Plane => "plane",
+        FeatureKind::Corner => "corner",
+        FeatureKind::Edge => "edge",
+        FeatureKind::Unresolved => "unresolved",
+    }
+}
+
+const fn colour(kind: FeatureKind) -> &'static str {
+    match kind {
+        FeatureKind::Plane => theme::BLUE,
+        FeatureKind::Corner => theme::VERMILLION,
+        FeatureKind::Edge => theme::GREEN,
+        FeatureKind::Unresolved => theme::PURPLE,
+    }
+}
+
+const fn shape(kind: FeatureKind) -> Shape {
+    match kind {
+        FeatureKind::Plane => Shape::Square,
+        FeatureKind::Corner => Shape::Triangle,
+        FeatureKind::Edge => Shape::Diamond,
+        FeatureKind::Unresolved => Shape::Cross,
+    }
+}
+
+fn entries(features: &[Feature], scene: Option<&Scene>) -> Vec<Entry> {
+    let present = KINDS.into_iter().filter(|kind| features.iter().any(|f| f.kind == *kind));
+    let kinds = present.map(|kind| {
+        Entry::new(Sample::Mark { shape: shape(kind), colour: colour(kind) }, name(kind))
+    });
+    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::SILENT };
+    let next = Sample::Line { colour: theme::ORANGE, width_px: 2.0, dash: "none" };
+    let proposes = features.iter().any(|feature| feature.next.is_some());
+    kinds
+        .chain([Entry::new(dot, "reading")])
+        .chain(proposes.then(|| Entry::new(next, "way to the next scan")))
+        .chain(scene.map(keys::materials).into_iter().flatten())
+        .collect()
+}
+
+fn dots(plan: &Plan, pose: &Pose, readings: &Readings) -> Layer {
+    let mut layer = Layer::new("readings").with("fill", theme::SILENT);
+    for beam in &readings.beams {
+        if let Some(range_m) = beam.range_m {
+            let at = plan.px(pose.point_at(beam.azimuth_deg, range_m));
+            layer.mark(Shape::Dot, at, 1.4, None);
+        }
+    }
+    layer
+}
+
+/// Where the scan that a feature belongs to was taken.
+fn pose_of(scans: &[ScanView], feature: &Feature) -> Option<Pose> {
+    scans.iter().find(|scan| scan.scan == feature.scan).and_then(words::pose_of)
+}
+
+fn arc(plan: &Plan, scans: &[ScanView], feature: &Feature) -> Layer {
+    let colour = colour(feature.kind);
+    let mut layer = Layer::new("feature").stroked(colour, 2.6);
+    let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) else {
+        return layer;
+    };
+    let half_deg = feature.extent_deg / 2.0;
+    let points: Vec<Px> = (-8..=8)
+        .map(|i| {
+            let azimuth_deg = feature.bearing_deg + half_deg * f64::from(i) / 8.0;
+            plan.px(pose.point_at(azimuth_deg, range_m))
+        })
+        .collect();
+    layer.runs([points]);
+    let mut solid = Layer::new("mark").with("fill", colour).with("stroke", theme::PAPER);
+    let at = plan.px(pose.point_at(feature.bearing_deg, range_m));
+    solid.mark(shape(feature.kind), at, 6.0, Some(&hint(feature)));
+    layer.add(solid);
+    layer
+}
+
+fn hint(feature: &Feature) -> String {
+    let reason = feature.reason.map(|reason| format!(" ({reason:?})")).unwrap_or_default();
+    format!(
+        "{}{reason}: extent {:.1}\u{b0}, confidence {:.3}",
+        name(feature.kind),
+        feature.extent_deg,
+        feature.confidence
+    )
+}
+
+/// Extent and, where there is one, beta beside each mark.
+fn names(plan: &Plan, scans: &[ScanView], features: &[Feature]) -> Layer {
+    let mut labels = Labels::new(plan.panel);
+    let mut layer = Layer::new("names").haloed();
+    for feature in features {
+        let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) else {
+            continue;
+        };
+        let at = plan.px(pose.point_at(feature.bearing_deg, range_m));
+        let beta = feature.beta_deg.map(|beta| format!(", \u{3b2} {:.1}\u{b0}", plain(beta, 10.0)));
+        let text = format!(
+            "{} {:.1}\u{b0}{}",
+            name(feature.kind),
+            feature.extent_deg,
+            beta.unwrap_or_default()
+        );
+        let places = [
+            (Px::new(11.0, -8.0), Anchor::Start),
+            (Px::new(11.0, 16.0), Anchor::Start),
+            (Px::new(-11.0, -8.0), Anchor::End),
+            (Px::new(-11.0, 16.0), Anchor::End),
+        ];
+        let free = places
+            .into_iter()
+            .find(|(shift, anchor)| labels.place(at + *shift, *anchor, theme::SMALL_PX, &text));
+        if let Some((shift, anchor)) = free {
+            layer.text(at + shift, anchor, theme::SMALL_PX, &text);
+        }
+    }
+    layer
+}
+
+/// Without a minus sign before a zero.
+fn plain(value: f64, digits: f64) -> f64 {
+    (value * digits).round() / digits + 0.0
+}
+
+fn next_places(plan: &Plan, scans: &[ScanView], features: &[Feature]) -> Layer {
+    let mut layer = Layer::new("next").stroked(theme::ORANGE, 2.0);
+    for feature in features {
+        if let (Some(pose), Some(next)) = (pose_of(scans, feature), feature.next) {
+            let to = plan.px(DVec2::new(next.x_m, next.y_m));
+            layer.line(plan.px(pose.position()), to);
+            layer.circle(to, 4.0);
+        }
+    }
+    layer
+}

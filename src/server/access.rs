@@ -1,0 +1,224 @@
+//! Who may ask for what. Pure: it sees the headers and says yes or no.
+//!
+//! On the unix socket the file's permissions decide. Over TCP any program on the computer, and
+//! any page in a browser on it, could knock: a page gives itself away by `Host` (a name made to
+//! point here) or `Origin`, and writing needs a token that no page knows.
+
+use std::net::IpAddr;
+
+use axum::http::{
+    HeaderMap, Method, StatusCode, Uri,
+    header::{AUTHORIZATION, HOST, ORIGIN},
+};
+use sha2::{Digest as _, Sha256};
+
+/// How a client came in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Peer {
+    /// By the unix socket.
+    Unix,
+    /// By TCP on a loopback address.
+    Loopback,
+    /// By TCP on another address.
+    Network,
+}
+
+/// Why a request is refused.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refused {
+    /// Status of the answer.
+    pub status: StatusCode,
+    /// What is wrong.
+    pub message: String,
+    /// What would be right.
+    pub help: &'static str,
+}
+
+/// The rules.
+#[derive(Debug, Clone, Default)]
+pub struct Access {
+    hosts: Vec<String>,
+    token: Option<[u8; 32]>,
+}
+
+impl Access {
+    /// Rules that accept these host names besides those of loopback, and this token.
+    #[must_use]
+    pub fn new(hosts: &[String], token: Option<&str>) -> Self {
+        Self {
+            hosts: hosts.iter().map(|host| host.to_ascii_lowercase()).collect(),
+            token: token.map(|token| digest(token.trim())),
+        }
+    }
+
+    /// Accepts the address that the server listens on as a host, too.
+    #[must_use]
+    pub fn with_address(mut self, address: IpAddr) -> Self {
+        if !address.is_unspecified() {
+            self.hosts.push(match address {
+                IpAddr::V4(address) => address.to_string(),
+                IpAddr::V6(address) => format!("[{address}]"),
+            });
+        }
+        self
+    }
+
+    /// Whether a request may go on.
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn check(
+        &self,
+        peer: Peer,
+        method: &Method,
+        uri: &Uri,
+        headers: &HeaderMap,
+    ) -> Result<(), Refused> {
+        self.check_origin(headers)?;
+        if peer == Peer::Unix {
+            return Ok(());
+        }
+        self.check_host(uri, headers)?;
+        let reads = matches!(*method, Method::GET | Method::HEAD | Method::OPTIONS);
+        if reads && peer == Peer::Loopback { Ok(()) } else { self.check_token(headers) }
+    }
+
+    fn check_origin(&self, headers: &HeaderMap) -> Result<(), Refused> {
+        let Some(origin) = headers.get(ORIGIN) else { return Ok(()) };
+        let host = origin
+            .to_str()
+            .ok()
+            .and_then(|origin| origin.strip_prefix("http://").or(origin.strip_prefix("https://")));
+        if host.is_some_and(|host| self.knows(host)) {
+            return Ok(());
+        }
+        Err(Refused {
+            status: StatusCode::FORBIDDEN,
+            message: format!("pages of {origin:?} may not ask here"),
+            help: "open the page from this server itself, or name its host in server.hosts",
+        })
+    }
+
+    fn check_host(&self, uri: &Uri, headers: &HeaderMap) -> Result<(), Refused> {
+        let mut hosts = headers.get_all(HOST).iter();
+        let (first, second) = (hosts.next(), hosts.next());
+        let named = first.and_then(|host| host.to_str().ok()).filter(|_| second.is_none());
+        let in_uri = uri.authority().is_none_or(|authority| self.knows(authority.as_str()));
+        if named.is_some_and(|host| self.knows(host)) && in_uri {
+            return Ok(());
+        }
+        Err(Refused {
+            status: StatusCode::FORBIDDEN,
+            message: format!("there is no {} here", named.unwrap_or("host of that name")),
+            help: "ask for localhost, or name the host in server.hosts",
+        })
+    }
+
+    fn check_token(&self, headers: &HeaderMap) -> Result<(), Refused> {
+        let Some(token) = self.token else {
+            return Err(Refused {
+                status: StatusCode::FORBIDDEN,
+                message: "nothing may be changed over TCP: there is no token".into(),
+                help: "use the unix socket, or set server.token_file",
+            });
+        };
+        let shown = headers
+            .get(AUTHORIZATION)
+            .and_then(|value| value.to_str().ok())
+            .and_then(|value| value.strip_prefix("Bearer "));
+        // Digests are compared, so that the time says nothing about the token.
+        if shown.is_some_and(|shown| digest(shown.trim()) == token) {
+            return Ok(());
+        }
+        Err(Refused {
+            status: StatusCode::UNAUTHORIZED,
+            message: "the token is missing or wrong".into(),
+            help: "send `Authorization: Bearer TOKEN` with what is in server.token_file",
+        })
+    }
+
+    /// Whether a host, with or without a port, is one of this server's names.
+    fn knows(&self, host: &str) -> bool {
+        let name = match host.rsplit_once(':') {
+            // The colons of an IPv6 address stand in brackets.
+            Some((name, port)) if port.chars().all(|digit| digit.is_ascii_digit()) => name,
+            _ => host,
+        };
+        let name = name.to_ascii_lowercase();
+        ["localhost", "127.0.0.1", "[::1]"].contains(&name.as_str()) || self.hosts.contains(&name)
+    }
+}
+
+fn digest(token: &str) -> [u8; 32] {
+    Sha256::digest(token.as_bytes()).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use axum::http::HeaderValue;
+
+    fn ask(
+        access: &Access,
+        peer: Peer,
+        method: &Method,
+        headers: &[(&'static str, &str)],
+    ) -> Result<(), u16> {
+        let mut map = HeaderMap::new();
+        for (name, value) in headers {
+            map.append(*name, HeaderValue::from_str(value).expect("a header"));
+        }
+        let uri = "/v1/status".parse().expect("a path");
+        access.check(peer, method, &uri, &map).map_err(|refused| refused.status.as_u16())
+    }
+
+    #[test]
+    fn foreign_hosts_and_origins_are_refused_and_writing_needs_the_token() {
+        let access = Access::new(&["robot.local".into()], Some("secret\n"));
+        let (get, put) = (Method::GET, Method::PUT);
+        let host = ("host", "localhost:8765");
+        let token = ("authorization", "Bearer secret");
+        for (method, headers, expected) in [
+            (&get, vec![host], Ok(())),
+            (&get, vec![("host", "[::1]:8765")], Ok(())),
+            (&get, vec![("host", "ROBOT.local")], Ok(())),
+            (&get, vec![("host", "evil.example")], Err(403)),
+            (&get, vec![("host", "localhost.evil.example:8765")], Err(403)),
+            (&get, vec![("host", "evil.example:8765:localhost")], Err(403)),
+            (&get, vec![], Err(403)),
+            (&get, vec![host, ("host", "evil.example")], Err(403)),
+            (&get, vec![host, ("origin", "http://localhost:8765")], Ok(())),
+            (&get, vec![host, ("origin", "https://evil.example")], Err(403)),
+            (&get, vec![host, ("origin", "null")], Err(403)),
+            (&get, vec![host, ("origin", "http://localhost.evil.example")], Err(403)),
+            (&put, vec![host], Err(401)),
+            (&put, vec![host, ("authorization", "Bearer wrong")], Err(401)),
+            (&put, vec![host, ("authorization", "secret")], Err(401)),
+            (&put, vec![host, token], Ok(())),
+            (&put, vec![host, token, ("origin", "http://evil.example")], Err(403)),
+        ] {
+            assert_eq!(ask(&access, Peer::Loopback, method, &headers), expected, "{headers:?}");
+        }
+    }
+
+    #[test]
+    fn from_the_network_even_reading_needs_the_token() {
+        let access = Access::new(&[], Some("secret"))
+            .with_address("192.168.1.5".parse().expect("an address"));
+        let host = ("host", "192.168.1.5:8765");
+        assert_eq!(ask(&access, Peer::Network, &Method::GET, &[host]), Err(401));
+        let token = ("authorization", "Bearer secret");
+        assert_eq!(ask(&access, Peer::Network, &Method::GET, &[host, token]), Ok(()));
+    }
+
+    #[test]
+    fn without_a_token_nothing_is_written_over_tcp_and_anything_over_the_socket() {
+        let access = Access::default();
+        let headers = [("host", "localhost")];
+        assert_eq!(ask(&access, Peer::Loopback, &Method::POST, &headers), Err(403));
+        assert_eq!(ask(&access, Peer::Unix, &Method::POST, &headers), Ok(()));
+        assert_eq!(ask(&access, Peer::Unix, &Method::POST, &[]), Ok(()));
+        let foreign = [("origin", "http://evil.example")];
+        assert_eq!(ask(&access, Peer::Unix, &Method::GET, &foreign), Err(403));
+    }
+}

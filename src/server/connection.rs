@@ -1,0 +1,134 @@
+//! Connections: taken in up to a bound, each with its own limits, ended in order.
+
+use std::{error::Error as _, future::Future, io, pin::pin, sync::Arc, time::Duration};
+
+use axum::extract::Request;
+use hyper::{body::Incoming, server::conn::http1, service::service_fn};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use tokio::{
+    io::{AsyncRead, AsyncWrite, AsyncWriteExt as _},
+    sync::OwnedSemaphorePermit,
+    task::JoinSet,
+    time::{sleep, timeout},
+};
+use tokio_io_timeout::TimeoutStream;
+use tokio_util::sync::CancellationToken;
+use tower::ServiceExt as _;
+
+use super::{Listeners, Peer, Server};
+
+/// How long the head of a request may take.
+const HEAD_TIME: Duration = Duration::from_secs(5);
+/// How long clients have to take in what is left at the end.
+const LAST_CALL: Duration = Duration::from_secs(2);
+/// What is kept of a connection in memory, bytes: heads, and answers not yet taken.
+const BUFFER: usize = 32 * 1024;
+
+impl Server {
+    /// Serves until `stop` is ready, then lets requests under way end.
+    pub async fn run(self, listeners: Listeners, stop: impl Future<Output = ()>) {
+        let shutdown = CancellationToken::new();
+        let server = Arc::new(self);
+        let mut accepting = JoinSet::new();
+        for listener in listeners.unix {
+            let server = Arc::clone(&server);
+            accepting.spawn(server.accept(Peer::Unix, shutdown.clone(), async move || {
+                listener.accept().await.map(|(stream, _)| stream)
+            }));
+        }
+        for (listener, peer) in listeners.tcp {
+            let server = Arc::clone(&server);
+            accepting.spawn(server.accept(peer, shutdown.clone(), async move || {
+                let (stream, _) = listener.accept().await?;
+                // Each line goes out at once.
+                stream.set_nodelay(true)?;
+                Ok(stream)
+            }));
+        }
+        stop.await;
+        shutdown.cancel();
+        while accepting.join_next().await.is_some() {}
+        listeners.made.iter().for_each(|path| drop(std::fs::remove_file(path)));
+    }
+
+    /// Takes connections in until the end, and waits for them then.
+    async fn accept<S: AsyncRead + AsyncWrite + Send + 'static>(
+        self: Arc<Self>,
+        peer: Peer,
+        shutdown: CancellationToken,
+        next: impl AsyncFn() -> io::Result<S>,
+    ) {
+        let mut connections = JoinSet::new();
+        loop {
+            let stream = tokio::select! {
+                () = shutdown.cancelled() => break,
+                Some(_) = connections.join_next(), if !connections.is_empty() => continue,
+                stream = next() => stream,
+            };
+            match (stream, Arc::clone(&self.places).try_acquire_owned()) {
+                (Ok(stream), Ok(place)) => {
+                    let server = Arc::clone(&self);
+                    connections.spawn(server.serve(peer, stream, place, shutdown.clone()));
+                }
+                (Ok(stream), Err(_full)) => drop(connections.spawn(turn_away(stream))),
+                // No descriptors left: some will be given back.
+                (Err(_), _) => sleep(Duration::from_millis(100)).await,
+            }
+        }
+        drop(timeout(LAST_CALL, async { while connections.join_next().await.is_some() {} }).await);
+    }
+
+    async fn serve<S: AsyncRead + AsyncWrite + Send + 'static>(
+        self: Arc<Self>,
+        peer: Peer,
+        stream: S,
+        _place: OwnedSemaphorePermit,
+        shutdown: CancellationToken,
+    ) {
+        let mut stream = TimeoutStream::new(stream);
+        stream.set_write_timeout(Some(self.stall));
+        let service = service_fn(|mut request: Request<Incoming>| {
+            request.extensions_mut().insert(peer);
+            let router = self.router.clone();
+            router.oneshot(request)
+        });
+        let connection = http1::Builder::new()
+            .timer(TokioTimer::new())
+            .header_read_timeout(HEAD_TIME)
+            .max_buf_size(BUFFER)
+            .serve_connection(TokioIo::new(Box::pin(stream)), service);
+        let mut connection = pin!(connection);
+        let ended = tokio::select! {
+            ended = &mut connection => ended,
+            () = shutdown.cancelled() => {
+                connection.as_mut().graceful_shutdown();
+                connection.await
+            }
+        };
+        if let Err(error) = ended
+            && took_nothing(&error)
+        {
+            self.daemon.hub().count_cut_off();
+        }
+    }
+}
+
+/// Says that all places are taken.
+async fn turn_away<S: AsyncRead + AsyncWrite>(stream: S) {
+    const BODY: &str =
+        "{\"error\":\"too many clients\",\"help\":\"try later, or raise server.max_clients\"}\n";
+    let answer = format!(
+        "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\n\
+         Connection: close\r\nRetry-After: 5\r\nContent-Length: {}\r\n\r\n{BODY}",
+        BODY.len()
+    );
+    let mut stream = pin!(stream);
+    // Whoever can't take even this is gone.
+    drop(timeout(HEAD_TIME, stream.write_all(answer.as_bytes())).await);
+}
+
+/// Whether a connection ended because the client did not read.
+fn took_nothing(error: &hyper::Error) -> bool {
+    let io = error.source().and_then(|source| source.downcast_ref::<io::Error>());
+    io.is_some_and(|error| error.kind() == io::ErrorKind::TimedOut)
+}

@@ -1,0 +1,43 @@
+//! How many requests a second are let in. Pure: the time is given.
+
+use std::time::Duration;
+
+/// A bucket that fills at a constant rate and holds one second's worth; each request takes one.
+#[derive(Debug, Clone)]
+pub(super) struct Bucket {
+    per_s: f64,
+    level: f64,
+    at: Duration,
+}
+
+impl Bucket {
+    pub(super) fn new(per_s: f64) -> Self {
+        Self { per_s, level: per_s.max(1.0), at: Duration::ZERO }
+    }
+
+    /// Whether one more may come in now.
+    pub(super) fn take(&mut self, now: Duration) -> bool {
+        let since_s = now.saturating_sub(self.at).as_secs_f64();
+        self.at = self.at.max(now);
+        self.level = (self.level + since_s * self.per_s).min(self.per_s.max(1.0));
+        let free = self.level >= 1.0;
+        self.level -= f64::from(u8::from(free));
+        free
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_burst_passes_and_then_only_the_rate() {
+        let mut bucket = Bucket::new(10.0);
+        let passed = |bucket: &mut Bucket, from_ms: u64, to_ms: u64| {
+            (from_ms..to_ms).filter(|&ms| bucket.take(Duration::from_millis(ms))).count()
+        };
+        assert_eq!(passed(&mut bucket, 0, 10), 10);
+        let later = passed(&mut bucket, 10, 5010);
+        assert!((49..=51).contains(&later), "{later} in five seconds");
+    }
+}

@@ -1,0 +1,126 @@
+//! Live streams: lines of JSON, or server-sent events for browsers.
+
+use std::{convert::Infallible, time::Duration};
+
+use axum::{
+    body::{Body, Bytes},
+    extract::State,
+    http::{HeaderMap, HeaderValue, header},
+    response::{IntoResponse, Response},
+};
+use futures_util::stream;
+use serde::Deserialize;
+use serde_json::json;
+use tokio::time::timeout;
+
+use crate::{
+    daemon::{Line, ScanReport, Subscription, Wanted},
+    scan::Record,
+    server::{
+        Api,
+        answer::{Failed, Query},
+        openapi::Endpoint,
+    },
+};
+
+const NDJSON: &str = "application/x-ndjson";
+const SSE: &str = "text/event-stream";
+/// How often an event stream without events shows that it is alive.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(15);
+
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Options {
+    #[serde(default)]
+    format: Option<Format>,
+    #[serde(default)]
+    moved_m: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Format {
+    Ndjson,
+    Sse,
+}
+
+pub(super) fn endpoints() -> Vec<Endpoint> {
+    let format = json!({"type": "string", "enum": ["ndjson", "sse"]});
+    let format_about = "Lines of JSON or server-sent events; without it, as `Accept` says";
+    let records = "One record a line, as in a log. A line {\"type\":\"dropped\",\"readings\":N} \
+        stands for readings that this client was too slow for";
+    vec![
+        Endpoint::get("/v1/live/records", live_records, "Records as they are made")
+            .parameter("query", "format", format.clone(), format_about)
+            .parameter(
+                "query",
+                "moved_m",
+                json!({"type": "number", "minimum": 0}),
+                "Only readings whose range moved by more than this since it was last sent for \
+                 that direction, or whose status changed",
+            )
+            .answers_as::<Record>(200, NDJSON, records)
+            .answers_as::<Record>(200, SSE, records),
+        Endpoint::get("/v1/live/scans", live_scans, "Whole scans when they are over")
+            .parameter("query", "format", format, format_about)
+            .answers_as::<ScanReport>(200, NDJSON, "One scan a line")
+            .answers_as::<ScanReport>(200, SSE, "One scan an event"),
+    ]
+}
+
+async fn live_records(
+    State(api): State<Api>,
+    headers: HeaderMap,
+    Query(options): Query<Options>,
+) -> Result<Response, Failed> {
+    if options.moved_m.is_some_and(|moved_m| !(moved_m.is_finite() && moved_m >= 0.0)) {
+        let status = axum::http::StatusCode::UNPROCESSABLE_ENTITY;
+        return Err(Failed::new(status, "moved_m is no length", "metres, 0 or more"));
+    }
+    Ok(live(&api, &headers, options, Wanted { moved_m: options.moved_m, scans: false }))
+}
+
+async fn live_scans(
+    State(api): State<Api>,
+    headers: HeaderMap,
+    Query(options): Query<Options>,
+) -> Response {
+    live(&api, &headers, options, Wanted { moved_m: None, scans: true })
+}
+
+fn live(api: &Api, headers: &HeaderMap, options: Options, wanted: Wanted) -> Response {
+    let accepts_events = headers
+        .get(header::ACCEPT)
+        .and_then(|accept| accept.to_str().ok())
+        .is_some_and(|accept| accept.contains(SSE));
+    let format =
+        options.format.unwrap_or(if accepts_events { Format::Sse } else { Format::Ndjson });
+    let subscription = api.daemon.hub().subscribe(wanted);
+    let chunks = stream::unfold(subscription, move |mut subscription| async move {
+        let chunk = next_chunk(&mut subscription, format).await?;
+        Some((Ok::<_, Infallible>(chunk), subscription))
+    });
+    let mut response = Body::from_stream(chunks).into_response();
+    let media = if format == Format::Sse { SSE } else { NDJSON };
+    response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(media));
+    response
+}
+
+/// The next piece of a stream; `None` at its end.
+async fn next_chunk(subscription: &mut Subscription, format: Format) -> Option<Bytes> {
+    match format {
+        Format::Ndjson => {
+            let mut chunk = subscription.next().await?.to_vec();
+            chunk.push(b'\n');
+            Some(chunk.into())
+        }
+        Format::Sse => match timeout(SIGN_OF_LIFE, subscription.next()).await {
+            Ok(line) => line.map(|line| event(&line)),
+            Err(_nothing_yet) => Some(Bytes::from_static(b":\n\n")),
+        },
+    }
+}
+
+fn event(line: &Line) -> Bytes {
+    [b"data: ", &line[..], b"\n\n"].concat().into()
+}

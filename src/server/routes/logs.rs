@@ -1,0 +1,78 @@
+//! The logs on disk.
+
+use axum::{
+    Json,
+    body::Body,
+    extract::{Path, State},
+    http::{StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::json;
+use tokio::{fs::File, io::AsyncReadExt as _};
+use tokio_util::io::ReaderStream;
+
+use crate::{
+    server::{Api, answer::Failed, openapi::Endpoint},
+    store::log_files,
+};
+
+/// A log.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub(super) struct LogEntry {
+    /// Its name, for GET /v1/logs/{name}.
+    name: String,
+    /// Its size, bytes.
+    bytes: u64,
+    /// Whether it is the one being written.
+    current: bool,
+}
+
+pub(super) fn endpoints() -> Vec<Endpoint> {
+    vec![
+        Endpoint::get("/v1/logs", list, "The logs, oldest first")
+            .answers::<Vec<LogEntry>>(200, "The logs"),
+        Endpoint::get("/v1/logs/{name}", download, "A log, as far as it is written")
+            .parameter("path", "name", json!({"type": "string"}), "A name from GET /v1/logs")
+            .answers_text(200, "application/x-ndjson", "One record a line"),
+    ]
+}
+
+async fn list(State(api): State<Api>) -> Result<Json<Vec<LogEntry>>, Failed> {
+    let current = api.daemon.status().log.file;
+    let current = current.as_deref().and_then(|file| file.file_name()).map(ToOwned::to_owned);
+    let entries = files(&api)?.into_iter().map(|file| LogEntry {
+        current: current.as_ref().is_some_and(|current| *current == *file.name),
+        name: file.name,
+        bytes: file.bytes,
+    });
+    Ok(Json(entries.collect()))
+}
+
+async fn download(State(api): State<Api>, Path(name): Path<String>) -> Result<Response, Failed> {
+    // Only what the list shows: a name can't lead out of the folder.
+    let known = files(&api)?.into_iter().any(|file| file.name == name);
+    if !known {
+        let help = "GET /v1/logs names them";
+        return Err(Failed::new(StatusCode::NOT_FOUND, format!("there is no log {name}"), help));
+    }
+    let file = File::open(api.log_folder.join(&name)).await.map_err(|error| unreadable(&error))?;
+    let bytes = file.metadata().await.map_err(|error| unreadable(&error))?.len();
+    let headers = [
+        (header::CONTENT_TYPE, "application/x-ndjson".to_owned()),
+        (header::CONTENT_LENGTH, bytes.to_string()),
+        (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{name}\"")),
+    ];
+    // The log grows: what was announced is what is sent.
+    Ok((headers, Body::from_stream(ReaderStream::new(file.take(bytes)))).into_response())
+}
+
+fn files(api: &Api) -> Result<Vec<crate::store::LogFile>, Failed> {
+    log_files(&api.log_folder).map_err(|error| unreadable(&error))
+}
+
+fn unreadable(error: &std::io::Error) -> Failed {
+    let help = "check the log folder and its permissions";
+    Failed::new(StatusCode::INTERNAL_SERVER_ERROR, format!("cannot read: {error}"), help)
+}

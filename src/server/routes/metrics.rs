@@ -1,0 +1,94 @@
+//! Figures for Prometheus, in the OpenMetrics text format.
+
+use axum::{
+    extract::State,
+    http::{StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use prometheus_client::{
+    encoding::text::encode,
+    metrics::{counter::ConstCounter, gauge::ConstGauge},
+    registry::Registry,
+};
+
+use crate::{
+    daemon::Handle,
+    server::{Api, answer::Failed, openapi::Endpoint},
+};
+
+const MEDIA: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+
+pub(super) fn endpoints() -> Vec<Endpoint> {
+    vec![Endpoint::get("/metrics", metrics, "Figures for Prometheus").answers_text(
+        200,
+        MEDIA,
+        "OpenMetrics text",
+    )]
+}
+
+async fn metrics(State(api): State<Api>) -> Result<Response, Failed> {
+    let mut text = String::new();
+    encode(&mut text, &registry(&api.daemon)).map_err(|error| {
+        Failed::new(StatusCode::INTERNAL_SERVER_ERROR, error, "this is a fault of the program")
+    })?;
+    Ok(([(header::CONTENT_TYPE, MEDIA)], text).into_response())
+}
+
+fn registry(daemon: &Handle) -> Registry {
+    let (status, health) = (daemon.status(), daemon.health());
+    let mut registry = Registry::with_prefix("sonard");
+    for (name, help, value) in [
+        ("line_sent_bytes", "Bytes sent to the device", health.line.bytes_sent),
+        ("line_received_bytes", "Bytes received from the device", health.line.bytes_received),
+        ("line_frames", "Frames received whole", health.line.frames_received),
+        ("line_crc_errors", "Frames with a wrong checksum", health.line.crc_errors),
+        ("line_framing_errors", "Frames damaged otherwise", health.line.framing_errors),
+        ("line_retries", "Requests sent again", health.line.retries),
+        ("line_repaired_readings", "Readings fetched again", health.line.repaired),
+        ("link_losses", "Times that the device was lost from use", health.line.losses),
+        ("scans_completed", "Scans with every beam", health.scans.completed),
+        ("scans_stopped", "Scans stopped on request", health.scans.stopped),
+        ("scans_failed", "Scans given up", health.scans.failed),
+        ("beams_measured", "Beams measured", health.scans.beams),
+        ("beams_missing", "Beams that scans lacked at their end", health.scans.missing),
+        ("device_restarts", "Restarts of the device that scans survived", health.scans.restarts),
+        ("clock_steps", "Times that the wall clock was set", health.clock.steps),
+        ("log_records", "Records written to the log", status.log.written),
+        ("log_synced_records", "Of those, records on the disk for good", status.log.synced),
+        (
+            "dropped_readings",
+            "Readings that slow subscribers missed",
+            status.subscribers.dropped_readings,
+        ),
+        (
+            "cut_off_clients",
+            "Clients cut off because they took nothing",
+            status.subscribers.cut_off,
+        ),
+    ] {
+        registry.register(name, help, ConstCounter::new(value));
+    }
+    let mut gauges = vec![
+        ("healthy", "Whether all is well", f64::from(u8::from(health.healthy))),
+        (
+            "link_up",
+            "Whether the device can be used",
+            f64::from(u8::from(status.link.state.is_up())),
+        ),
+        ("log_waiting_records", "Records that could not be written yet", status.log.waiting as f64),
+        ("subscribers", "Live streams", status.subscribers.now as f64),
+        ("air_temperature_celsius", "Air temperature", status.air.temperature_c),
+        ("sound_speed_meters_per_second", "Speed of sound", status.air.sound_speed_m_s),
+        ("uptime_seconds", "How long the daemon runs", status.uptime_s),
+    ];
+    let known = [
+        ("air_age_seconds", "Age of the air temperature", status.air.age_s),
+        ("clock_drift_ppm", "Drift of the device's clock", health.clock.drift_ppm),
+        ("clock_sigma_microseconds", "Standard deviation of times", health.clock.sigma_us),
+    ];
+    gauges.extend(known.iter().filter_map(|&(name, help, value)| Some((name, help, value?))));
+    for (name, help, value) in gauges {
+        registry.register(name, help, ConstGauge::new(value));
+    }
+    registry
+}

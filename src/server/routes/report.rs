@@ -1,0 +1,58 @@
+//! What the daemon is doing and has done.
+
+use std::sync::Arc;
+
+use axum::{Json, extract::State, http::StatusCode};
+
+use crate::{
+    daemon::{AirStatus, Health, ScanReport, Status},
+    geometry::Pose,
+    scan::ScanPlan,
+    server::{Api, answer::Failed, openapi::Endpoint},
+};
+
+pub(super) fn endpoints() -> Vec<Endpoint> {
+    vec![
+        Endpoint::get("/v1/status", status, "What the daemon is doing")
+            .answers::<Status>(200, "The status"),
+        Endpoint::get("/v1/health", health, "Whether all is well, with link and scan statistics")
+            .answers::<Health>(200, "All is well")
+            .answers::<Health>(503, "Something is not well, and what"),
+        Endpoint::get("/v1/scan/latest", latest, "The last scan that is over")
+            .answers::<ScanReport>(200, "The scan"),
+        Endpoint::get("/v1/plan", plan, "The azimuths of the next scan")
+            .answers::<ScanPlan>(200, "The plan"),
+        Endpoint::get("/v1/pose", pose, "Where the ranger stands").answers::<Pose>(200, "The pose"),
+        Endpoint::get("/v1/air", air, "The air in force, with its age")
+            .answers::<AirStatus>(200, "The air"),
+    ]
+}
+
+async fn status(State(api): State<Api>) -> Json<Status> {
+    Json(api.daemon.status())
+}
+
+async fn health(State(api): State<Api>) -> (StatusCode, Json<Health>) {
+    let health = api.daemon.health();
+    let status = if health.healthy { StatusCode::OK } else { StatusCode::SERVICE_UNAVAILABLE };
+    (status, Json(health))
+}
+
+async fn latest(State(api): State<Api>) -> Result<Json<Arc<ScanReport>>, Failed> {
+    api.daemon.latest_scan().map(Json).ok_or_else(|| {
+        let help = "start one with POST /v1/start, and wait for it";
+        Failed::new(StatusCode::NOT_FOUND, "no scan is over yet", help)
+    })
+}
+
+async fn plan(State(api): State<Api>) -> Json<ScanPlan> {
+    Json(api.daemon.status().plan)
+}
+
+async fn pose(State(api): State<Api>) -> Json<Pose> {
+    Json(api.daemon.status().pose)
+}
+
+async fn air(State(api): State<Api>) -> Json<AirStatus> {
+    Json(api.daemon.status().air)
+}

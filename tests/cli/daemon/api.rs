@@ -1,0 +1,212 @@
+//! What the API says and does.
+
+use std::{
+    io::{BufRead as _, BufReader, Write as _},
+    time::Duration,
+};
+
+use serde_json::{Value, json};
+
+use super::{Daemon, clean_log, schema::misfits};
+use crate::common::{run, stderr, wait_until};
+
+/// A scan of a quarter turn that takes a second.
+const SHORT: [&str; 6] =
+    ["--set", "plan.to_deg=36", "--set", "model.max_range_m=3", "--set", "plan.step_deg=1.8"];
+
+#[test]
+fn the_server_does_what_its_document_says() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    let document = daemon.get("/v1/openapi.json").json();
+    assert_eq!(document["openapi"], "3.1.0");
+    daemon.wait_for("ready");
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+    daemon.wait_for_scans(1);
+    let log = daemon.get("/v1/logs").json()[0]["name"].as_str().expect("a log").to_owned();
+    let bodies = [
+        ("/v1/start", json!({"scans": 1})),
+        ("/v1/stop", json!({})),
+        ("/v1/plan", json!({"from_deg": 0.0, "to_deg": 9.0, "step_deg": 0.9, "pings_per_stop": 1})),
+        ("/v1/pose", json!({"x_m": 0.5, "y_m": 0.3, "heading_deg": 0.0})),
+        ("/v1/air", json!({"temperature_c": 22.5})),
+    ];
+    let mut operations = 0;
+    for (path, methods) in document["paths"].as_object().expect("paths") {
+        for (method, operation) in methods.as_object().expect("methods") {
+            operations += 1;
+            let body = bodies.iter().find(|(of, _)| of == path).map(|(_, body)| body);
+            let takes = &operation["requestBody"]["content"]["application/json"]["schema"];
+            if let (Some(body), false) = (body, takes.is_null() || method == "get") {
+                assert_eq!(misfits(takes, &document, body), Vec::<String>::new(), "{path}");
+            }
+            let content =
+                |status: u16| operation["responses"][status.to_string()]["content"].clone();
+            if path.starts_with("/v1/live/") {
+                check_stream(&daemon, path, &content(200), &document);
+                continue;
+            }
+            let path = path.replace("{name}", &log);
+            let text = if method == "get" {
+                String::new()
+            } else {
+                body.map_or_else(String::new, Value::to_string)
+            };
+            let reply = daemon.send(&method.to_ascii_uppercase(), &path, &text);
+            let content = content(reply.status);
+            assert!(
+                content.is_object(),
+                "{method} {path}: {} is not in the document",
+                reply.status
+            );
+            let (media, schema) =
+                content.as_object().expect("content").iter().next().expect("a kind");
+            assert!(
+                reply.head.contains(&format!("content-type: {media}")),
+                "{path}: {}",
+                reply.head
+            );
+            if media == "application/json" {
+                let faults = misfits(&schema["schema"], &document, &reply.json());
+                assert_eq!(faults, Vec::<String>::new(), "{method} {path}");
+            }
+        }
+    }
+    assert!(operations >= 17, "{operations} operations");
+    // Refusals are as the document says, too.
+    for (method, path, body, status) in [
+        ("GET", "/v1/nothing", "", 404),
+        ("GET", "/v1/logs/..%2F..%2Fetc%2Fpasswd", "", 404),
+        ("DELETE", "/v1/plan", "", 405),
+        ("PUT", "/v1/plan", "{", 400),
+        ("PUT", "/v1/plan", "{}", 422),
+        ("PUT", "/v1/pose", r#"{"x_m":99,"y_m":0,"heading_deg":0}"#, 422),
+        ("PUT", "/v1/air", r#"{"temperature_c":70}"#, 422),
+        ("POST", "/v1/start", r#"{"scnas":1}"#, 422),
+        ("GET", "/v1/live/records?moved_m=-1", "", 422),
+        ("GET", "/v1/live/records?mvoed_m=1", "", 400),
+    ] {
+        let reply = daemon.send(method, path, body);
+        assert_eq!(reply.status, status, "{method} {path}: {}", reply.json());
+        let problem = &document["paths"]["/v1/plan"]["get"]["responses"]["default"]["content"];
+        let faults = misfits(&problem["application/json"]["schema"], &document, &reply.json());
+        assert_eq!(faults, Vec::<String>::new(), "{method} {path}");
+    }
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+/// Both forms of a stream carry what the document says.
+fn check_stream(daemon: &Daemon, path: &str, content: &Value, document: &Value) {
+    for (format, media, prefix) in
+        [("ndjson", "application/x-ndjson", ""), ("sse", "text/event-stream", "data: ")]
+    {
+        let mut stream = daemon.connect().expect("it listens");
+        let request = format!("GET {path}?format={format} HTTP/1.1\r\nHost: localhost\r\n\r\n");
+        stream.write_all(request.as_bytes()).expect("it listens");
+        let mut lines = BufReader::new(stream).lines().map(|line| line.expect("a line"));
+        assert!(lines.any(|line| line.eq_ignore_ascii_case(&format!("content-type: {media}"))));
+        assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+        let first = lines.find_map(|line| {
+            let json = line.strip_prefix(prefix)?;
+            serde_json::from_str::<Value>(json).ok().filter(Value::is_object)
+        });
+        let schema = &content[media]["schema"];
+        assert!(schema.is_object(), "{media} is not in the document");
+        let faults = misfits(schema, document, &first.expect("a record"));
+        assert_eq!(faults, Vec::<String>::new(), "{path} {format}");
+    }
+}
+
+#[test]
+fn scans_are_taken_on_request_with_the_plan_pose_and_air_in_force() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    daemon.wait_for("ready");
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(daemon.get("/v1/scan/latest").status, 404, "nothing is scanned unasked");
+    for (method, path, body) in [
+        ("PUT", "/v1/plan", r#"{"from_deg":-9,"to_deg":9,"step_deg":0.9,"pings_per_stop":2}"#),
+        ("PUT", "/v1/pose", r#"{"x_m":0.5,"y_m":0.3,"heading_deg":90}"#),
+        ("PUT", "/v1/air", r#"{"temperature_c":25}"#),
+        ("POST", "/v1/start", r#"{"scans":2}"#),
+    ] {
+        let reply = daemon.send(method, path, body);
+        assert_eq!(reply.status, 202, "{path}: {}", reply.json());
+    }
+    daemon.wait_for_scans(2);
+    let latest = daemon.get("/v1/scan/latest").json();
+    assert_eq!(latest["pings"].as_array().map(Vec::len), Some(40));
+    assert_eq!(latest["start"]["pose"]["heading_deg"], 90.0);
+    let air = &latest["start"]["air"];
+    assert_eq!((&air["temperature_c"], &air["source"]), (&json!(25.0), &json!("api")));
+    assert!(air["age_s"].as_f64().is_some_and(|age_s| (0.0..20.0).contains(&age_s)), "{air}");
+    // A plan off the motor's steps is refused while the motor is known.
+    let off = daemon.send(
+        "PUT",
+        "/v1/plan",
+        r#"{"from_deg":0,"to_deg":9,"step_deg":1,"pings_per_stop":1}"#,
+    );
+    assert_eq!(off.status, 422);
+    assert!(off.json()["error"].as_str().is_some_and(|error| error.contains("0.9")));
+    assert_eq!(daemon.stop(), Some(0));
+    let log = clean_log(folder.path());
+    assert_eq!(log.of_type("scan_end").count(), 2);
+    assert_eq!(log.of_type("session").count(), 1);
+}
+
+#[test]
+fn continuous_scans_stop_in_mid_scan_and_go_on_when_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &["--set", "scanning.mode=continuous"]);
+    wait_until("some beams", || daemon.status()["scan"]["done"].as_u64() >= Some(5));
+    assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
+    daemon.wait_for("ready");
+    let health = daemon.health();
+    assert_eq!(
+        (&health["scans"]["stopped"], &health["scans"]["completed"]),
+        (&json!(1), &json!(0))
+    );
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(daemon.status()["scanning"]["paused"], true);
+    assert_eq!(daemon.send("POST", "/v1/start", "{}").status, 202);
+    wait_until("the next scan", || daemon.status()["scan"]["done"].as_u64() >= Some(2));
+    assert_eq!(daemon.stop(), Some(0));
+    let log = clean_log(folder.path());
+    let stops: Vec<String> = log.events().into_iter().filter(|e| e.contains("stopped")).collect();
+    assert!(
+        stops[0].contains("on request") && stops[1].contains("daemon is stopping"),
+        "{stops:?}"
+    );
+}
+
+#[test]
+fn status_and_watch_are_clients() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    daemon.wait_for("ready");
+    let socket = folder.path().join("s").display().to_string();
+    let status = run(&["status", "--socket", &socket]);
+    assert_eq!(status.status.code(), Some(0), "{}", stderr(&status));
+    assert!(String::from_utf8_lossy(&status.stdout).contains("MOCK-00001"));
+    let json = run(&["status", "--socket", &socket, "--json"]);
+    let json: Value = serde_json::from_slice(&json.stdout).expect("one object");
+    assert_eq!(json["status"]["link"]["state"], "ready");
+
+    let watching = crate::common::sonard(&["watch", "--socket", &socket, "--json"])
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .expect("starts");
+    wait_until("the subscriber", || daemon.status()["subscribers"]["now"] == 1);
+    daemon.send("POST", "/v1/start", r#"{"scans":1}"#);
+    daemon.wait_for_scans(1);
+    assert_eq!(daemon.stop(), Some(0));
+    // It ends with the daemon.
+    let watched = watching.wait_with_output().expect("it ends");
+    let text = String::from_utf8(watched.stdout).expect("text");
+    let log = crate::common::Log::parse(&text);
+    log.assert_each_beam_once(20);
+    assert_eq!(log.of_type("scan_end").count(), 1);
+    let gone = run(&["status", "--socket", &socket]);
+    assert_eq!(gone.status.code(), Some(3));
+    assert!(stderr(&gone).contains("sonard run"), "{}", stderr(&gone));
+}

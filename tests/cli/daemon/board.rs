@@ -1,0 +1,120 @@
+//! Pins: emergency stop, power, reset line, home switch and light, on a board made of switches.
+
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicU32, Ordering::SeqCst},
+    },
+    time::Duration,
+};
+
+use sonard::{
+    acoustics::Sensor,
+    board::Board,
+    config::{Keys, Mode},
+    daemon::{Handle, Journal, LinkState, Resources, Settings, prepare},
+    link,
+    mock::Pace,
+    scene::parse_pose,
+};
+use tokio_util::sync::CancellationToken;
+
+use super::{clean_log, rig::Rig};
+use crate::common::wait_until;
+
+#[derive(Default)]
+struct Switches {
+    pressed: AtomicBool,
+    home_open: AtomicBool,
+    power: AtomicBool,
+    light: AtomicBool,
+    resets: AtomicU32,
+}
+
+struct Switchboard(Arc<Switches>);
+
+impl Board for Switchboard {
+    fn can_reset(&self) -> bool {
+        true
+    }
+    fn reset(&mut self) {
+        self.0.resets.fetch_add(1, SeqCst);
+    }
+    fn set_power(&mut self, on: bool) {
+        self.0.power.store(on, SeqCst);
+    }
+    fn at_home(&self) -> Option<bool> {
+        Some(!self.0.home_open.load(SeqCst))
+    }
+    fn emergency_stop(&self) -> Option<bool> {
+        Some(self.0.pressed.load(SeqCst))
+    }
+    fn set_light(&mut self, on: bool) {
+        self.0.light.store(on, SeqCst);
+    }
+}
+
+fn settings(port: String) -> Settings {
+    let mut keys = Keys::default();
+    keys.device.port = Some(port);
+    keys.scanning.mode = Mode::Continuous;
+    keys.model.max_range_m = Some(2.0);
+    keys.link.attempts = 2;
+    (keys.link.retry_min_s, keys.link.retry_max_s) = (0.05, 0.3);
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    Settings { keys, scene: None, sensor, pose: parse_pose("0,0,0").expect("a pose") }
+}
+
+#[test]
+fn pins_stop_power_reset_and_show() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut rig = Rig::new(folder.path(), Pace::RealTime);
+    let switches = Arc::new(Switches::default());
+    let runtime = tokio::runtime::Runtime::new().expect("threads");
+    let settings = settings(folder.path().join("ranger").display().to_string());
+    let (journal, thread) =
+        Journal::open(&folder.path().join("log"), settings.rotation()).expect("a log");
+    let board = Box::new(Switchboard(Arc::clone(&switches)));
+    let resources = Resources { open_port: Box::new(link::open), board, journal };
+    let stop = CancellationToken::new();
+    let context = runtime.enter();
+    let (daemon, handle) = prepare(resources, settings);
+    drop(context);
+    let running = runtime.spawn(daemon.run(stop.clone().cancelled_owned()));
+    play(&mut rig, &handle, &switches);
+    stop.cancel();
+    runtime.block_on(running).expect("it ends");
+    assert!(!switches.power.load(SeqCst) && !switches.light.load(SeqCst), "off at the end");
+    assert_eq!(thread.close().error, None);
+    let events = clean_log(folder.path()).events();
+    for part in ["emergency stop was pressed", "emergency stop was released", "home switch is open"]
+    {
+        assert!(events.iter().any(|event| event.contains(part)), "no {part:?} in {events:?}");
+    }
+}
+
+fn play(rig: &mut Rig, daemon: &Handle, switches: &Switches) {
+    let state = || daemon.status().link.state;
+    let scans = |beams| {
+        wait_until("beams", || daemon.status().scan.is_some_and(|scan| scan.done >= beams));
+    };
+    let silent = rig.plug_silent();
+    wait_until("resets", || switches.resets.load(SeqCst) >= 2);
+    drop(silent);
+    switches.home_open.store(true, SeqCst);
+    rig.plug("", 1);
+    wait_until("doubt", || state() == LinkState::Fault);
+    switches.home_open.store(false, SeqCst);
+    scans(3);
+    assert!(switches.power.load(SeqCst) && switches.light.load(SeqCst));
+
+    switches.pressed.store(true, SeqCst);
+    wait_until("the stop", || state() == LinkState::EmergencyStop);
+    wait_until("no power", || !switches.power.load(SeqCst) && !switches.light.load(SeqCst));
+    let beams = daemon.health().scans.beams;
+    std::thread::sleep(Duration::from_millis(400));
+    assert_eq!((state(), daemon.health().scans.beams), (LinkState::EmergencyStop, beams));
+    switches.pressed.store(false, SeqCst);
+    scans(3);
+    assert!(switches.power.load(SeqCst));
+}

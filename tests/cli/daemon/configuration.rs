@@ -1,0 +1,101 @@
+//! File, environment and options, and taking changes in while running.
+
+use std::fs;
+
+use rustix::process::Signal;
+
+use super::Daemon;
+use crate::common::{run, sonard, stderr, wait_until};
+
+#[test]
+fn the_shipped_file_is_what_the_program_prints_and_it_is_right() {
+    let printed = run(&["run", "--print-config"]);
+    let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/config/sonard.toml");
+    let text = fs::read_to_string(shipped).expect("it is shipped");
+    assert_eq!(String::from_utf8_lossy(&printed.stdout), text);
+    let checked = run(&["run", "--check", "--config", shipped, "--port", "/dev/ttyACM0"]);
+    assert_eq!(checked.status.code(), Some(0), "{}", stderr(&checked));
+    assert!(String::from_utf8_lossy(&checked.stdout).contains("step_deg = 0.9"));
+}
+
+#[test]
+fn wrong_configurations_end_with_the_place_and_a_way_out() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("s.toml");
+    let port = ["--port", "/dev/ttyACM0"];
+    for (text, further, parts) in [
+        ("[plan]\nstep_dge = 1\n", &port[..], &["s.toml:2:1", "did you mean `step_deg`"][..]),
+        (
+            "[plan]\nfrom_deg = 90\nto_deg = 10\n",
+            &port[..],
+            &["s.toml:3:10", "greater than from_deg"],
+        ),
+        (
+            "[place]\nscene = \"simple-rom\"\n",
+            &port[..],
+            &["simple-rom", "did you mean `simple-room`"],
+        ),
+        ("[place]\nscene = \"simple-room\"\npose = \"99,99\"\n", &port[..], &["room spans"]),
+        ("[model]\nsensor = \"hc\"\n", &port[..], &["presets"]),
+        ("", &[][..], &["device.port is not set", "--mock"]),
+        ("", &["--mock"][..], &["needs a scene"]),
+        ("", &["--port", "x", "--set", "link.retry_max_s=0.1"][..], &["--set", "retry_min_s"]),
+    ] {
+        fs::write(&file, text).expect("a file");
+        let arguments = ["run", "--check", "--config", file.to_str().expect("plain path")];
+        let output = sonard(&arguments).args(further).env_remove("SONARD_PLAN_STEP_DEG").output();
+        let output = output.expect("the program starts");
+        // A terminal's width breaks lines where it likes.
+        let said = stderr(&output).replace("\n  │ ", "").replace('\n', " ");
+        assert_eq!(output.status.code(), Some(2), "{text}: {said}");
+        for part in parts {
+            assert!(said.contains(part), "{text}: no {part:?} in {said}");
+        }
+    }
+    let missing = run(&["run", "--check", "--config", "/no/such.toml"]);
+    assert_eq!(missing.status.code(), Some(2));
+    let output =
+        sonard(&["run", "--check", "--port", "x"]).env("SONARD_PLAN_STEP_DEG", "fast").output();
+    assert!(stderr(&output.expect("starts")).contains("SONARD_PLAN_STEP_DEG"));
+}
+
+#[test]
+fn a_hangup_takes_changes_in_and_a_wrong_file_changes_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("s.toml");
+    fs::write(&file, "[plan]\nto_deg = 90\n").expect("a file");
+    let config = ["--config", file.to_str().expect("plain path")];
+    let daemon = Daemon::start_mock(folder.path(), &config);
+    assert_eq!(daemon.status()["plan"]["to_deg"], 90.0);
+
+    fs::write(&file, "[plan]\nto_deg = 45\n[server]\nmax_clients = 7\n").expect("a file");
+    daemon.signal(Signal::HUP);
+    wait_until("the new plan", || daemon.status()["plan"]["to_deg"] == 45.0);
+    let configuration = &daemon.status()["configuration"];
+    assert_eq!(configuration["needs_restart"], serde_json::json!(["server"]));
+
+    fs::write(&file, "[plan]\nto_dge = 30\n").expect("a file");
+    daemon.signal(Signal::HUP);
+    wait_until("the refusal", || daemon.status()["configuration"]["error"].is_string());
+    let status = daemon.status();
+    assert_eq!(status["plan"]["to_deg"], 45.0);
+    let error = status["configuration"]["error"].as_str().expect("text");
+    assert!(error.contains("s.toml:2:1") && error.contains("to_deg"), "{error}");
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn a_second_daemon_gets_neither_the_log_nor_the_socket() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &[]);
+    let mock = ["run", "--mock", "--scene", "simple-room", "--pose", "fig9"];
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (log, socket, other) = (path("log"), path("s"), path("other"));
+    let second = run(&[&mock[..], &["--log", &log, "--socket", &other]].concat());
+    assert_eq!(second.status.code(), Some(3));
+    assert!(stderr(&second).contains("another process"), "{}", stderr(&second));
+    let third = run(&[&mock[..], &["--log", &other, "--socket", &socket]].concat());
+    assert_eq!(third.status.code(), Some(3));
+    assert!(stderr(&third).contains("another sonard"), "{}", stderr(&third));
+    assert_eq!(daemon.status()["link"]["state"], "ready");
+}

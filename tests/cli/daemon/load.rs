@@ -1,0 +1,138 @@
+//! What it costs, and what a crowd does to it.
+
+use std::{
+    io::{BufRead as _, BufReader, Write as _},
+    time::{Duration, Instant},
+};
+
+use jiff::Timestamp;
+use serde_json::Value;
+use sonard::mock::Pace;
+
+use super::{Daemon, clean_log, resident_kb, rig::Rig};
+use crate::common::{cpu_s, wait_until};
+
+/// Share of a core that a process used over a while.
+fn core_share(daemon: &Daemon, over: Duration) -> f64 {
+    let (before, since) = (cpu_s(daemon.id()), Instant::now());
+    std::thread::sleep(over);
+    (cpu_s(daemon.id()) - before) / since.elapsed().as_secs_f64()
+}
+
+fn start(rig: &Rig, folder: &std::path::Path, further: &[&str]) -> Daemon {
+    let options = rig.options();
+    let options: Vec<&str> = options.iter().map(String::as_str).collect();
+    Daemon::start(folder, &[&options[..], &["--set", "link.check_s=5"], further].concat())
+}
+
+#[test]
+fn idle_and_scanning_it_takes_next_to_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut rig = Rig::new(folder.path(), Pace::RealTime);
+    rig.plug("", 1);
+    let began = Timestamp::now();
+    let daemon = start(&rig, folder.path(), &["--set", "model.max_range_m=10"]);
+    daemon.wait_for("ready");
+    let idle = core_share(&daemon, Duration::from_secs(5));
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":2}"#).status, 202);
+    let scanning = core_share(&daemon, Duration::from_secs(10));
+    let kb = resident_kb(daemon.id());
+    assert_eq!(daemon.stop(), Some(0));
+    println!(
+        "idle {:.2} %, scanning {:.2} % of a core, {kb} kB resident",
+        idle * 100.0,
+        scanning * 100.0
+    );
+    assert!(kb < 25_000, "{kb} kB resident");
+    assert!(idle < 0.01, "{:.2} % of a core while idle", idle * 100.0);
+    // The tests' build is hardly optimised, and the clock ticks in hundredths of a second.
+    let bound = if cfg!(debug_assertions) { 0.03 } else { 0.01 };
+    assert!(scanning < bound, "{:.2} % of a core while scanning", scanning * 100.0);
+
+    let second = tempfile::tempdir().expect("a folder");
+    rig.plug("", 2);
+    let again = Timestamp::now();
+    let daemon = start(&rig, second.path(), &["--set", "scanning.mode=continuous"]);
+    wait_until("a beam", || daemon.status()["scan"]["done"].as_u64() >= Some(1));
+    let own_s = cpu_s(daemon.id());
+    assert_eq!(daemon.stop(), Some(0));
+    let log = clean_log(second.path());
+    let first: Timestamp =
+        log.pings()[0]["time"].as_str().expect("a time").parse().expect("a time");
+    let waited_s = first.duration_since(again).as_secs_f64();
+    println!("first ping {waited_s:.2} s after the start, {own_s:.2} s of CPU; begun {began}");
+    assert!(own_s < 1.0, "{own_s} s of the daemon's own time");
+}
+
+#[test]
+fn a_crowd_of_subscribers_with_dead_ones_among_them_delays_nobody() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut rig = Rig::new(folder.path(), Pace::RealTime);
+    rig.plug("", 1);
+    let further = [
+        "scanning.mode=continuous",
+        "model.max_range_m=0.6",
+        "motion.min_interval_ms=8",
+        "plan.pings_per_stop=20",
+        "server.stall_s=2",
+        "server.queue=64",
+    ];
+    let further: Vec<&str> = further.iter().flat_map(|setting| ["--set", setting]).collect();
+    let daemon = start(&rig, folder.path(), &further);
+    daemon.wait_for("scanning");
+    let alone_kb = resident_kb(daemon.id());
+    let subscribe = || {
+        let mut stream = daemon.connect().expect("it listens");
+        let request = b"GET /v1/live/records HTTP/1.1\r\nHost: localhost\r\n\r\n";
+        stream.write_all(request).expect("it listens");
+        stream
+    };
+    let dead: Vec<_> = (0..10).map(|_| subscribe()).collect();
+    let until = Instant::now() + Duration::from_secs(15);
+    let living: Vec<_> = (0..90)
+        .map(|_| {
+            let stream = BufReader::new(subscribe());
+            std::thread::spawn(move || lateness_ms(stream, until))
+        })
+        .collect();
+    wait_until("everybody", || daemon.status()["subscribers"]["now"] == 100);
+    let crowded_kb = resident_kb(daemon.id());
+    wait_until("the dead ones to be cut off", || daemon.status()["subscribers"]["cut_off"] == 10);
+    let subscribers = daemon.status()["subscribers"].clone();
+    let mut late_ms: Vec<f64> =
+        living.into_iter().flat_map(|one| one.join().expect("no panic")).collect();
+    late_ms.sort_by(f64::total_cmp);
+    let end_kb = resident_kb(daemon.id());
+    drop(dead);
+    let percentile = |p: f64| late_ms[(p * (late_ms.len() - 1) as f64) as usize];
+    println!(
+        "{} readings at 90 subscribers: {:.1} ms late in the middle, {:.1} ms at 95 %; {subscribers}; \
+         resident {alone_kb} kB alone, {crowded_kb} kB with 100, {end_kb} kB in the end",
+        late_ms.len(),
+        percentile(0.5),
+        percentile(0.95),
+    );
+    assert!(late_ms.len() > 90 * 100, "{} readings", late_ms.len());
+    assert!(percentile(0.95) < 200.0, "{} ms late at 95 %", percentile(0.95));
+    assert!(end_kb < 25_000, "{end_kb} kB resident");
+    assert_eq!(subscribers["now"], 90, "the others are still there");
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+/// How late readings came, milliseconds after the end of their listening window.
+fn lateness_ms(stream: impl std::io::Read, until: Instant) -> Vec<f64> {
+    let mut late_ms = Vec::new();
+    for line in BufReader::new(stream).lines().map_while(Result::ok) {
+        if Instant::now() > until {
+            break;
+        }
+        let Ok(record) = serde_json::from_str::<Value>(&line) else { continue };
+        let Some(time) = record["time"].as_str().filter(|_| record["type"] == "ping") else {
+            continue;
+        };
+        let fired: Timestamp = time.parse().expect("a time");
+        // 0.6 m there and back take 3.5 ms.
+        late_ms.push(Timestamp::now().duration_since(fired).as_secs_f64() * 1e3 - 3.5);
+    }
+    late_ms
+}

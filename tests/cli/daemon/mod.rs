@@ -1,0 +1,247 @@
+//! `sonard run` as its users meet it: a process, a socket, a log folder.
+
+mod access;
+mod api;
+mod board;
+mod configuration;
+mod faults;
+mod kill;
+mod load;
+mod rig;
+mod schema;
+mod soak;
+mod systemd;
+
+use std::{
+    fs,
+    io::{BufRead as _, BufReader, Read, Write},
+    net::TcpStream,
+    os::unix::net::UnixStream,
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    sync::{Arc, Mutex},
+    time::Duration,
+};
+
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+
+use crate::common::{Log, run, sonard, wait_until};
+
+/// A `sonard run` with a folder of its own.
+pub(crate) struct Daemon {
+    child: Child,
+    pub(crate) folder: PathBuf,
+    said: Arc<Mutex<String>>,
+}
+
+/// An answer.
+pub(crate) struct Reply {
+    pub(crate) status: u16,
+    pub(crate) head: String,
+    pub(crate) body: Vec<u8>,
+}
+
+impl Reply {
+    pub(crate) fn json(&self) -> Value {
+        serde_json::from_slice(&self.body)
+            .unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&self.body)))
+    }
+}
+
+impl Daemon {
+    /// Starts one in `folder` and waits until its API answers.
+    pub(crate) fn start(folder: &Path, further: &[&str]) -> Self {
+        Self::start_as(sonard(&[]), folder, further)
+    }
+
+    /// The same with a mock in the simple room, in real time.
+    pub(crate) fn start_mock(folder: &Path, further: &[&str]) -> Self {
+        let mock = ["--mock", "--scene", "simple-room", "--pose", "fig9"];
+        Self::start(folder, &[&mock, further].concat())
+    }
+
+    /// The same by a command that ends in the program.
+    pub(crate) fn start_as(mut command: Command, folder: &Path, further: &[&str]) -> Self {
+        let mut child = command
+            .args(["run", "--log"])
+            .arg(folder.join("log"))
+            .arg("--socket")
+            .arg(folder.join("s"))
+            .args(further)
+            // Nothing on this computer decides what is tested.
+            .env_remove("STATE_DIRECTORY")
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let said = Arc::new(Mutex::new(String::new()));
+        let lines = BufReader::new(child.stderr.take().expect("piped"));
+        let heard = Arc::clone(&said);
+        std::thread::spawn(move || {
+            for line in lines.lines().map_while(Result::ok) {
+                *heard.lock().expect("no panic") += &(line + "\n");
+            }
+        });
+        let daemon = Self { child, folder: folder.into(), said };
+        wait_until("the API", || daemon.connect().is_ok());
+        daemon
+    }
+
+    pub(crate) fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    pub(crate) fn said(&self) -> String {
+        self.said.lock().expect("no panic").clone()
+    }
+
+    pub(crate) fn connect(&self) -> std::io::Result<UnixStream> {
+        let stream = UnixStream::connect(self.folder.join("s"))?;
+        stream.set_read_timeout(Some(Duration::from_secs(20)))?;
+        Ok(stream)
+    }
+
+    /// Connects by TCP, where the daemon says it listens.
+    pub(crate) fn connect_tcp(&self) -> TcpStream {
+        let said = self.said();
+        let address = said.split("http://").nth(1).expect("it says where it listens");
+        let address = address.split_whitespace().next().expect("an address");
+        let stream = TcpStream::connect(address).expect("it listens there");
+        stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a socket");
+        stream
+    }
+
+    pub(crate) fn get(&self, path: &str) -> Reply {
+        ask(self.connect().expect("it listens"), "GET", path, &[("Host", "localhost")], "")
+    }
+
+    pub(crate) fn send(&self, method: &str, path: &str, body: &str) -> Reply {
+        let headers = [("Host", "localhost"), ("Content-Type", "application/json")];
+        ask(self.connect().expect("it listens"), method, path, &headers, body)
+    }
+
+    pub(crate) fn status(&self) -> Value {
+        self.get("/v1/status").json()
+    }
+
+    pub(crate) fn health(&self) -> Value {
+        self.get("/v1/health").json()
+    }
+
+    /// Waits for a state of the link.
+    pub(crate) fn wait_for(&self, state: &str) {
+        wait_until(state, || self.status()["link"]["state"] == state);
+    }
+
+    /// Waits until so many scans are whole, in all.
+    pub(crate) fn wait_for_scans(&self, scans: u64) {
+        wait_until("scans", || self.health()["scans"]["completed"].as_u64() >= Some(scans));
+    }
+
+    pub(crate) fn signal(&self, signal: Signal) {
+        let pid = Pid::from_raw(self.child.id().cast_signed()).expect("a process id");
+        kill_process(pid, signal).expect("it runs");
+    }
+
+    /// Ends it as systemd does, and returns its exit code.
+    pub(crate) fn stop(mut self) -> Option<i32> {
+        self.signal(Signal::TERM);
+        self.child.wait().expect("it ends").code()
+    }
+
+    /// Ends it as a power cut does.
+    pub(crate) fn kill(mut self) {
+        self.child.kill().expect("it runs");
+        self.child.wait().expect("it ends");
+    }
+}
+
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        drop(self.child.kill());
+        drop(self.child.wait());
+    }
+}
+
+/// The logs of a daemon's folder, oldest first.
+pub(crate) fn logs(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder.join("log")).expect("a folder").flatten();
+    let mut logs: Vec<PathBuf> = entries
+        .map(|entry| entry.path())
+        .filter(|p| p.extension().is_some_and(|e| e == "jsonl"))
+        .collect();
+    logs.sort();
+    logs
+}
+
+/// Every record of a daemon's logs; they must be clean.
+pub(crate) fn clean_log(folder: &Path) -> Log {
+    let mut text = String::new();
+    for log in logs(folder) {
+        let verified = run(&["log", "verify", log.to_str().expect("plain path")]);
+        let said = String::from_utf8_lossy(&verified.stdout).into_owned();
+        assert_eq!(verified.status.code(), Some(0), "{said}");
+        text += &fs::read_to_string(&log).expect("readable");
+    }
+    Log::parse(&text)
+}
+
+/// Sends a request on a connection of its own and reads the answer to its end.
+pub(crate) fn ask(
+    mut stream: impl Read + Write,
+    method: &str,
+    path: &str,
+    headers: &[(&str, &str)],
+    body: &str,
+) -> Reply {
+    let mut request = format!("{method} {path} HTTP/1.1\r\nConnection: close\r\n");
+    for (name, value) in headers {
+        request += &format!("{name}: {value}\r\n");
+    }
+    if !body.is_empty() || method != "GET" {
+        request += &format!("Content-Length: {}\r\n", body.len());
+    }
+    request += "\r\n";
+    request += body;
+    // A server that has refused already may have closed its end.
+    drop(stream.write_all(request.as_bytes()));
+    read_reply(stream)
+}
+
+/// Reads an answer to the end of the connection.
+pub(crate) fn read_reply(mut stream: impl Read) -> Reply {
+    let mut bytes = Vec::new();
+    let mut chunk = [0; 4096];
+    while let Ok(count @ 1..) = stream.read(&mut chunk) {
+        bytes.extend_from_slice(&chunk[..count]);
+    }
+    let end = bytes.windows(4).position(|window| window == b"\r\n\r\n");
+    let end = end.unwrap_or_else(|| panic!("no answer: {:?}", String::from_utf8_lossy(&bytes)));
+    let head = String::from_utf8_lossy(&bytes[..end]).to_ascii_lowercase();
+    let body = bytes.split_off(end + 4);
+    let status = head.split(' ').nth(1).and_then(|s| s.parse().ok()).expect("a status");
+    let body = if head.contains("transfer-encoding: chunked") { dechunked(&body) } else { body };
+    Reply { status, head, body }
+}
+
+fn dechunked(mut rest: &[u8]) -> Vec<u8> {
+    let mut body = Vec::new();
+    while let Some(end) = rest.windows(2).position(|window| window == b"\r\n") {
+        let size = String::from_utf8_lossy(&rest[..end]);
+        let size = usize::from_str_radix(size.trim(), 16).expect("a chunk's size");
+        let chunk = &rest[end + 2..];
+        if size == 0 || chunk.len() < size + 2 {
+            break;
+        }
+        body.extend_from_slice(&chunk[..size]);
+        rest = &chunk[size + 2..];
+    }
+    body
+}
+
+/// Resident memory of a process, kilobytes.
+pub(crate) fn resident_kb(process: u32) -> u64 {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).expect("it runs");
+    let line = status.lines().find(|line| line.starts_with("VmRSS:")).expect("a figure");
+    line.split_whitespace().nth(1).and_then(|kb| kb.parse().ok()).expect("a number")
+}

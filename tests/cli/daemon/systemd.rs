@@ -1,0 +1,88 @@
+//! What the daemon tells systemd, and the socket that systemd hands over.
+
+use std::{
+    os::unix::net::UnixDatagram,
+    path::Path,
+    process::Command,
+    time::{Duration, Instant},
+};
+
+use sonard::mock::Pace;
+
+use super::{Daemon, ask, rig::Rig};
+use crate::common::{sonard, wait_until};
+
+/// Everything said to `socket` until `wanted` was among it.
+fn hear(socket: &UnixDatagram, wanted: &str) -> String {
+    let mut said = String::new();
+    let mut datagram = [0; 4096];
+    let until = Instant::now() + Duration::from_secs(20);
+    while !said.contains(wanted) {
+        assert!(Instant::now() < until, "no {wanted} in {said}");
+        let count = socket.recv(&mut datagram).unwrap_or_else(|_| panic!("no {wanted} in {said}"));
+        said += &String::from_utf8_lossy(&datagram[..count]);
+        said.push('\n');
+    }
+    said
+}
+
+#[test]
+fn ready_comes_after_identity_and_the_watchdog_is_fed_while_it_gets_on() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut rig = Rig::new(folder.path(), Pace::RealTime);
+    let path = folder.path().join("notify");
+    let socket = UnixDatagram::bind(&path).expect("a socket");
+    socket.set_read_timeout(Some(Duration::from_secs(20))).expect("a socket");
+    let mut command = sonard(&[]);
+    command.env("NOTIFY_SOCKET", &path).env("WATCHDOG_USEC", "3300000").env_remove("WATCHDOG_PID");
+    let options = rig.options();
+    let options: Vec<&str> = options.iter().map(String::as_str).collect();
+    let continuous = ["--set", "scanning.mode=continuous"];
+    let daemon = Daemon::start_as(command, folder.path(), &[&options[..], &continuous].concat());
+    let mut waiting = hear(&socket, "EXTEND_TIMEOUT_USEC");
+    for _ in 0..4 {
+        waiting += &hear(&socket, "WATCHDOG=1");
+    }
+    assert!(waiting.contains("STATUS=absent: ") && !waiting.contains("READY=1"), "{waiting}");
+    rig.plug("", 1);
+    hear(&socket, "READY=1");
+    hear(&socket, "STATUS=scanning");
+    for _ in 0..3 {
+        hear(&socket, "WATCHDOG=1");
+    }
+    let reader = std::thread::spawn(move || hear(&socket, "STOPPING=1"));
+    assert_eq!(daemon.stop(), Some(0));
+    reader.join().expect("it says that it stops");
+}
+
+#[test]
+fn a_socket_that_systemd_hands_over_is_served_and_left_behind() {
+    if Command::new("systemd-socket-activate").arg("--version").output().is_err() {
+        println!("systemd-socket-activate is not here: left out");
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let handed = folder.path().join("handed");
+    let mut child = Command::new("systemd-socket-activate")
+        .arg("-l")
+        .arg(&handed)
+        .arg(env!("CARGO_BIN_EXE_sonard"))
+        .args(["run", "--mock", "--scene", "simple-room", "--pose", "fig9", "--log"])
+        .arg(folder.path().join("log"))
+        .arg("--socket")
+        .arg(folder.path().join("configured"))
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .expect("starts");
+    wait_until("the socket", || handed.exists());
+    assert_eq!(status(&handed), 200);
+    assert!(!folder.path().join("configured").exists(), "the socket handed over is enough");
+    crate::common::interrupt(child.id());
+    child.wait().expect("it ends");
+    assert!(handed.exists(), "it belongs to systemd");
+}
+
+fn status(socket: &Path) -> u16 {
+    let stream = std::os::unix::net::UnixStream::connect(socket).expect("it listens");
+    ask(stream, "GET", "/v1/status", &[("Host", "localhost")], "").status
+}

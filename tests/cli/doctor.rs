@@ -1,0 +1,171 @@
+//! `sonard doctor` tells what is wrong apart.
+
+use std::{
+    io::{ErrorKind, Write as _},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
+};
+
+use serde_json::Value;
+use sonard::mock::Pty;
+
+use crate::common::{MockProcess, run, stderr};
+
+/// Examines a mock with such faults; exit code and report.
+fn examine(further: &[&str], options: &[&str]) -> (Option<i32>, Value) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mock = MockProcess::start(folder.path(), further);
+    doctor(mock.port(), options)
+}
+
+fn doctor(port: &str, options: &[&str]) -> (Option<i32>, Value) {
+    let arguments = [&["doctor", "--json", "--port", port][..], options].concat();
+    let output = run(&arguments);
+    let report = serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|error| panic!("{error}: {}", stderr(&output)));
+    (output.status.code(), report)
+}
+
+/// The checks that did not go well, as `check cause status`.
+fn findings(report: &Value) -> Vec<String> {
+    let checks = report["checks"].as_array().expect("checks");
+    let text = |check: &Value, key: &str| check[key].as_str().unwrap_or("null").to_owned();
+    for check in checks.iter().filter(|check| !check["cause"].is_null()) {
+        assert!(check["help"].as_str().is_some_and(|help| help.len() > 20), "{check}");
+    }
+    checks
+        .iter()
+        .filter(|check| !["ok", "skipped"].contains(&&text(check, "status")[..]))
+        .map(|check| {
+            format!("{} {} {}", text(check, "check"), text(check, "cause"), {
+                text(check, "status")
+            })
+        })
+        .collect()
+}
+
+#[test]
+fn a_sound_ranger_is_called_sound() {
+    let (code, report) = examine(&[], &[]);
+    assert_eq!(findings(&report), [""; 0], "{report:#}");
+    assert_eq!(code, Some(0));
+    let names: Vec<&str> = report["checks"]
+        .as_array()
+        .expect("checks")
+        .iter()
+        .filter_map(|check| check["check"].as_str())
+        .collect();
+    assert_eq!(names, ["port", "board", "restart", "line", "motor", "echo"]);
+    assert!(report["checks"][1]["detail"].as_str().expect("text").contains("mock"));
+    assert!(report["checks"][5]["detail"].as_str().expect("text").contains("10 of 10"));
+}
+
+#[test]
+fn each_fault_has_its_name() {
+    let cases: [(&str, &[&str], &str, i32); 5] = [
+        ("no_echo=1", &["--no-motion"], "echo missing_echo failed", 1),
+        ("stuck_echo=1", &["--no-motion"], "echo stuck_echo failed", 1),
+        ("reset=1", &[], "echo power failed", 1),
+        ("hangup=1", &["--no-motion"], "echo cable failed", 3),
+        ("version=9", &[], "board wrong_version failed", 3),
+    ];
+    for (faults, options, expected, code) in cases {
+        let (exit, report) = examine(&["--faults", faults], options);
+        assert_eq!(findings(&report), [expected], "{faults}: {report:#}");
+        assert_eq!(exit, Some(code), "{faults}");
+    }
+}
+
+#[test]
+fn a_line_that_loses_bytes_is_a_warning_while_it_works() {
+    let (code, report) = examine(&["--faults", "flip=0.004"], &["--pings", "2"]);
+    assert_eq!(findings(&report), ["line line warning"], "{report:#}");
+    assert_eq!(code, Some(0));
+}
+
+#[test]
+fn a_motor_that_misses_steps_is_found_by_its_index() {
+    let (code, report) = examine(&["--missed-steps", "1"], &["--pings", "1"]);
+    assert_eq!(findings(&report), ["motor motor failed"], "{report:#}");
+    assert_eq!(code, Some(1));
+}
+
+/// A port at which something else speaks, or nobody.
+fn stranger(says: &'static [u8]) -> (Option<i32>, Value) {
+    let pty = Pty::open(None).expect("a pty");
+    let port = pty.path().to_str().expect("plain path").to_owned();
+    let stop = Arc::new(AtomicBool::new(false));
+    let stopped = Arc::clone(&stop);
+    let speaking = std::thread::spawn(move || {
+        let mut buffer = [0; 256];
+        while !stopped.load(Ordering::Relaxed) {
+            std::thread::sleep(Duration::from_millis(100));
+            match pty.read(&mut buffer) {
+                Ok(_) => {}
+                Err(error) => assert_eq!(error.kind(), ErrorKind::WouldBlock),
+            }
+            // A full pty loses what nobody reads.
+            drop(pty.write(says));
+        }
+    });
+    let found = doctor(&port, &[]);
+    stop.store(true, Ordering::Relaxed);
+    speaking.join().expect("speaks to the end");
+    found
+}
+
+#[test]
+fn silence_and_other_firmware_are_told_apart() {
+    let (code, report) = stranger(b"");
+    assert_eq!(findings(&report), ["board silent failed"], "{report:#}");
+    assert_eq!(code, Some(3));
+    let (code, report) = stranger(b"$GPGGA,123519,4807.038,N,01131.000,E*47\r\n");
+    assert_eq!(findings(&report), ["board wrong_firmware failed"], "{report:#}");
+    assert_eq!(code, Some(3));
+}
+
+#[test]
+fn a_missing_a_wrong_and_a_busy_port_are_told_apart() {
+    let (code, report) = doctor("/dev/no-such-port", &[]);
+    assert_eq!(findings(&report), ["port not_found failed"]);
+    assert_eq!(code, Some(3));
+    let mut file = tempfile::NamedTempFile::new().expect("a file");
+    file.write_all(b"data").expect("writes");
+    let (_, report) = doctor(file.path().to_str().expect("plain path"), &[]);
+    assert_eq!(findings(&report), ["port not_serial failed"]);
+    let pty = Pty::open(None).expect("a pty");
+    let port = pty.path().to_str().expect("plain path");
+    let runtime = tokio::runtime::Runtime::new().expect("a runtime");
+    let _inside = runtime.enter();
+    let held = sonard::link::open(port).expect("opens");
+    let (code, report) = doctor(port, &[]);
+    assert_eq!(findings(&report), ["port busy failed"], "{report:#}");
+    assert_eq!(code, Some(3));
+    drop(held);
+}
+
+#[test]
+fn without_a_port_it_lists_and_opens_none() {
+    let output = run(&["doctor", "--json"]);
+    let listed: Value = serde_json::from_slice(&output.stdout).expect("an object");
+    let empty = listed["candidates"].as_array().expect("a list").is_empty();
+    assert_eq!(output.status.code(), Some(if empty { 3 } else { 0 }));
+    assert!(listed["port"].is_null());
+}
+
+#[test]
+fn an_emulator_that_is_missing_is_named_with_how_to_build_it() {
+    let scan = ["scan", "--emulator", "--scene", "simple-room", "--pose", "fig9"];
+    let output = crate::common::sonard(&scan)
+        .env("SONARD_EMULATOR", "/no/such/emulator")
+        .output()
+        .expect("the program starts");
+    assert_eq!(output.status.code(), Some(3));
+    let text = stderr(&output);
+    assert!(text.contains("/no/such/emulator") && text.contains("firmware/test.sh"), "{text}");
+    let output = run(&[&scan[..], &["--faults", "flip=0.1"]].concat());
+    assert_ne!(output.status.code(), Some(0), "the emulator has no faults of the line");
+}
