@@ -145,6 +145,7 @@ fn l_room() {
         wave_number_per_m: TAU * 49_400.0 / 343.2,
         sensor_z_m: None,
         tilt_rad: 0.0,
+        scatter_height_rad: 0.0,
     };
     let paths = Paths::new(&room, settings);
     let at = DVec2::new(1.13, 0.87);

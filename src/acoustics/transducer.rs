@@ -71,6 +71,16 @@ impl BeamPattern {
         }
     }
 
+    /// Integral over the angle of the two-way power, the pattern's fourth power, radians: how
+    /// wide a strip of a surface that scatters counts as fully in the beam.
+    #[must_use]
+    pub fn two_way_power_rad(&self) -> f64 {
+        const STEPS: usize = 1800;
+        let step_rad = FRAC_PI_2 / STEPS as f64;
+        let power = |i: usize| self.one_way(i as f64 * step_rad).powi(4);
+        2.0 * step_rad * (0.5 + (1..STEPS).map(power).sum::<f64>())
+    }
+
     /// The least angle from the axis, radians, at which the one-way amplitude is down to `level`
     /// (between 0 and 1); 90 degrees if it never is.
     #[must_use]

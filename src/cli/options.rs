@@ -13,8 +13,8 @@ use crate::{
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Sensor and air")]
 pub(super) struct SensorArgs {
-    /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, fullwave-line), or a
-    /// file with a sensor's data
+    /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, hc-sr04,
+    /// fullwave-line), or a file with a sensor's data
     #[arg(long, value_name = "NAME|FILE", default_value = "senscomp-6500")]
     sensor: String,
     /// End the blanking by hand as early as the sensor allows, as BINH does
@@ -23,6 +23,13 @@ pub(super) struct SensorArgs {
     /// From firing until the receiver listens, microseconds [default: the sensor's]
     #[arg(long, value_name = "US")]
     blanking_us: Option<f64>,
+    /// Height of the transducer in a scene with floor, ceiling or low walls, metres [default: the
+    /// sensor's, else half a metre above the floor]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    sensor_z: Option<f64>,
+    /// How far the transducer's axis points up, degrees [default: the sensor's]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    tilt_deg: Option<f64>,
 }
 
 /// The air between ranger and walls.
@@ -142,6 +149,12 @@ impl SensorArgs {
                 Failure::input(format!("--blanking-us: {error}"), "give microseconds, 0 or more")
             })?;
         }
+        let mounting = &mut sensor.mounting;
+        mounting.z_m = self.sensor_z.or(mounting.z_m);
+        mounting.tilt_deg = self.tilt_deg.unwrap_or(mounting.tilt_deg);
+        sensor.check().map_err(|error| {
+            Failure::input(error, "give --sensor-z in metres and --tilt-deg from -90 to 90")
+        })?;
         Ok(sensor)
     }
 }

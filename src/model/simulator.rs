@@ -134,6 +134,7 @@ pub struct Simulator {
     air: Air,
     options: Options,
     receiver: Receiver,
+    scatter_height_rad: f64,
     engine: Box<dyn Engine>,
 }
 
@@ -152,9 +153,11 @@ impl Simulator {
         options.check()?;
         let receiver = receiver(&sensor, &air, &options);
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
+        let scatter_height_rad = beam.two_way_power_rad();
         let engine: Box<dyn Engine> = match options.engine {
             EngineKind::Paths => {
-                let settings = path_settings(&sensor, &air, &options, &receiver);
+                let settings =
+                    path_settings(&sensor, &air, &options, &receiver, scatter_height_rad);
                 let wave_number_per_m = settings.wave_number_per_m;
                 let face = sensor.face.map(|face| Disc { face, wave_number_per_m });
                 Box::new(PathEngine::new(&scene, beam, face, settings))
@@ -167,14 +170,13 @@ impl Simulator {
                 Box::new(Cone::new(&scene, options.aperture_deg.unwrap_or_else(two_way_deg)))
             }
         };
-        Ok(Self { scene, sensor, air, options, receiver, engine })
+        Ok(Self { scene, sensor, air, options, receiver, scatter_height_rad, engine })
     }
 
     /// Prepares for firing from `position` (world, metres); the costly part, worth keeping.
     #[must_use]
     pub fn station(&self, position: DVec2) -> Station<'_> {
-        let survey = self.sensor.mounting.is_on_axis().then(|| self.engine.survey(position));
-        Station::new(self, position, survey)
+        Station::new(self, position)
     }
 
     /// A reading for each firing of a checked plan, in the order of its indices.
@@ -253,7 +255,13 @@ impl Simulator {
     /// What [`paths::Paths`] needs for this sensor, air and options.
     #[must_use]
     pub fn path_settings(&self) -> paths::Settings {
-        path_settings(&self.sensor, &self.air, &self.options, &self.receiver)
+        path_settings(
+            &self.sensor,
+            &self.air,
+            &self.options,
+            &self.receiver,
+            self.scatter_height_rad,
+        )
     }
 
     /// The scene.
@@ -331,6 +339,7 @@ fn path_settings(
     air: &Air,
     options: &Options,
     receiver: &Receiver,
+    scatter_height_rad: f64,
 ) -> paths::Settings {
     let wave_number_per_m = TAU * sensor.frequency_hz / receiver.sound_speed_m_s;
     let law = match options.edge_law.or(sensor.edge_law) {
@@ -350,6 +359,7 @@ fn path_settings(
         wave_number_per_m,
         sensor_z_m: sensor.mounting.z_m,
         tilt_rad: sensor.mounting.tilt_deg.to_radians(),
+        scatter_height_rad,
     }
 }
 

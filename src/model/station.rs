@@ -1,7 +1,5 @@
 //! A place from which firings are predicted.
 
-use std::ops::Deref;
-
 use rand::Rng;
 
 use super::{Arrival, Prediction, Simulator, Survey};
@@ -15,33 +13,15 @@ use crate::{
 pub struct Station<'a> {
     simulator: &'a Simulator,
     position: DVec2,
-    /// For a transducer on the axis, which stays where it is when it turns.
+    /// Of a transducer on the axis, which stays where it is when it turns; one beside the axis is
+    /// somewhere else at each azimuth.
     survey: Option<Box<dyn Survey + 'a>>,
 }
 
-/// The echoes of where the transducer is: the station's, or those of one direction.
-enum Here<'a> {
-    Shared(&'a dyn Survey),
-    Own(Box<dyn Survey + 'a>),
-}
-
-impl<'a> Deref for Here<'a> {
-    type Target = dyn Survey + 'a;
-
-    fn deref(&self) -> &Self::Target {
-        match self {
-            Self::Shared(survey) => *survey,
-            Self::Own(survey) => survey.as_ref(),
-        }
-    }
-}
-
 impl<'a> Station<'a> {
-    pub(super) fn new(
-        simulator: &'a Simulator,
-        position: DVec2,
-        survey: Option<Box<dyn Survey + 'a>>,
-    ) -> Self {
+    pub(super) fn new(simulator: &'a Simulator, position: DVec2) -> Self {
+        let on_axis = simulator.sensor().mounting.is_on_axis();
+        let survey = on_axis.then(|| simulator.engine().survey(position));
         Self { simulator, position, survey }
     }
 
@@ -59,15 +39,16 @@ impl<'a> Station<'a> {
     }
 
     fn listen(&self, direction_rad: f64, latch: Latch) -> Prediction {
-        let (receiver, survey) = (self.simulator.receiver(), self.survey(direction_rad));
-        let sounds = sounds(&*survey, direction_rad);
-        let detection = if receiver.asks_incidents() {
-            let incident = |sound: &Sound| Some(incident(&*survey, direction_rad, sound));
-            receiver.detect_at_face(&sounds, &incident, latch)
-        } else {
-            receiver.detect_at_face(&sounds, &|_| None, latch)
-        };
-        prediction(&*survey, direction_rad, detection)
+        self.firing(direction_rad, |firing| {
+            let (receiver, sounds) = (self.simulator.receiver(), firing.sounds());
+            let detection = if receiver.asks_incidents() {
+                let incident = |sound: &Sound| Some(firing.incident(sound));
+                receiver.detect_at_face(&sounds, &incident, latch)
+            } else {
+                receiver.detect_at_face(&sounds, &|_| None, latch)
+            };
+            firing.prediction(detection)
+        })
     }
 
     /// [`ping_rearmed`](Self::ping_rearmed) in noise: the same generator in the same state gives the same reading.
@@ -78,11 +59,11 @@ impl<'a> Station<'a> {
         noise: &ReceiverNoise,
         rng: &mut impl Rng,
     ) -> Prediction {
-        let survey = self.survey(direction_rad);
-        let sounds = sounds(&*survey, direction_rad);
-        let incident = |sound: &Sound| Some(incident(&*survey, direction_rad, sound));
-        let detection = self.simulator.receiver().detect_in_noise(&sounds, &incident, noise, rng);
-        prediction(&*survey, direction_rad, detection)
+        self.firing(direction_rad, |firing| {
+            let incident = |sound: &Sound| Some(firing.incident(sound));
+            let receiver = self.simulator.receiver();
+            firing.prediction(receiver.detect_in_noise(&firing.sounds(), &incident, noise, rng))
+        })
     }
 
     /// What an oscilloscope would show of a firing, up to a range in metres, in steps of so many
@@ -90,73 +71,83 @@ impl<'a> Station<'a> {
     /// [`arrival`](Self::arrival).
     #[must_use]
     pub fn trace(&self, direction_rad: f64, until_m: f64, step_us: f64) -> EchoTrace {
-        let receiver = self.simulator.receiver();
-        let until_us = 2e6 * until_m / receiver.sound_speed_m_s;
-        let survey = self.survey(direction_rad);
-        let sounds = sounds(&*survey, direction_rad);
-        let incident = |sound: &Sound| Some(incident(&*survey, direction_rad, sound));
-        receiver.trace(&sounds, &incident, until_us, step_us)
+        self.firing(direction_rad, |firing| {
+            let receiver = self.simulator.receiver();
+            let until_us = 2e6 * until_m / receiver.sound_speed_m_s;
+            let incident = |sound: &Sound| Some(firing.incident(sound));
+            receiver.trace(&firing.sounds(), &incident, until_us, step_us)
+        })
     }
 
     /// Every echo of a firing in a world direction, detected or not, shortest path first.
     #[must_use]
     pub fn arrivals(&self, direction_rad: f64) -> Vec<Arrival> {
-        self.survey(direction_rad).arrivals(direction_rad)
+        self.firing(direction_rad, |firing| firing.survey.arrivals(direction_rad))
     }
 
     /// The full account of a sound of a firing in the same direction.
     #[must_use]
     pub fn arrival(&self, direction_rad: f64, sound: &Sound) -> Arrival {
-        self.survey(direction_rad).arrival(direction_rad, sound)
+        self.firing(direction_rad, |firing| firing.survey.arrival(direction_rad, sound))
     }
 
-    /// From where the transducer is when it looks into a direction.
-    fn survey(&self, direction_rad: f64) -> Here<'_> {
+    /// Fires from where the transducer is when it looks into a direction.
+    fn firing<T>(&self, direction_rad: f64, tell: impl FnOnce(&Firing) -> T) -> T {
         if let Some(survey) = &self.survey {
-            return Here::Shared(survey.as_ref());
+            return tell(&Firing { survey: survey.as_ref(), direction_rad });
         }
         let mounting = &self.simulator.sensor().mounting;
         let [transmitter, receiver] = mounting.places(self.position, direction_rad);
         let engine = self.simulator.engine();
-        Here::Own(if transmitter == receiver {
+        let survey = if transmitter == receiver {
             engine.survey(transmitter)
         } else {
             engine.survey_pair(transmitter, receiver)
-        })
+        };
+        tell(&Firing { survey: survey.as_ref(), direction_rad })
     }
 }
 
-fn sounds(survey: &dyn Survey, direction_rad: f64) -> Vec<Sound> {
-    let mut sounds = Vec::new();
-    survey.listen(direction_rad, &mut sounds);
-    sounds
+/// The echoes of a place in a direction.
+struct Firing<'a> {
+    survey: &'a dyn Survey,
+    direction_rad: f64,
 }
 
-fn incident(survey: &dyn Survey, direction_rad: f64, sound: &Sound) -> Incident {
-    let arrival = survey.arrival(direction_rad, sound);
-    let image = match arrival.path.kind {
-        PathKind::Diffracted => Image::Lost,
-        PathKind::Specular if arrival.path.walls.len() % 2 == 1 => Image::Swapped,
-        PathKind::Specular => Image::Upright,
-    };
-    Incident {
-        strength: arrival.path_amplitude,
-        incidence: Incidence {
-            leaving_rad: wrap_pi(arrival.departure_rad - direction_rad),
-            arriving_rad: wrap_pi(arrival.arrival_rad - direction_rad),
-            length_m: arrival.length_m,
-            image,
-        },
+impl Firing<'_> {
+    fn sounds(&self) -> Vec<Sound> {
+        let mut sounds = Vec::new();
+        self.survey.listen(self.direction_rad, &mut sounds);
+        sounds
     }
-}
 
-fn prediction(survey: &dyn Survey, direction_rad: f64, detection: Detection) -> Prediction {
-    Prediction {
-        status: detection.status,
-        range_m: detection.range_m,
-        arrival: detection.sound.map(|sound| survey.arrival(direction_rad, &sound)),
-        amplitude: detection.amplitude,
-        margin_db: detection.margin_db,
-        echoes_us: detection.echoes_us,
+    fn incident(&self, sound: &Sound) -> Incident {
+        let arrival = self.survey.arrival(self.direction_rad, sound);
+        let image = match arrival.path.kind {
+            PathKind::Diffracted | PathKind::Scattered => Image::Lost,
+            PathKind::Specular if arrival.path.walls.len() % 2 == 1 => Image::Swapped,
+            PathKind::Specular => Image::Upright,
+        };
+        Incident {
+            strength: arrival.path_amplitude,
+            incidence: Incidence {
+                leaving_rad: wrap_pi(arrival.departure_rad - self.direction_rad),
+                arriving_rad: wrap_pi(arrival.arrival_rad - self.direction_rad),
+                length_m: arrival.length_m,
+                image,
+            },
+        }
+    }
+
+    fn prediction(&self, detection: Detection) -> Prediction {
+        let arrival = |sound| self.survey.arrival(self.direction_rad, &sound);
+        Prediction {
+            status: detection.status,
+            range_m: detection.range_m,
+            arrival: detection.sound.map(arrival),
+            amplitude: detection.amplitude,
+            margin_db: detection.margin_db,
+            echoes_us: detection.echoes_us,
+        }
     }
 }

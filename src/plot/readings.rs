@@ -195,8 +195,8 @@ fn unheard_kind(judged: &Judged<'_>) -> Kind {
 fn path_kind(path: &PathRecord) -> Kind {
     match (path.kind, path.order) {
         (PathKind::Diffracted, _) => Kind::Edge,
-        (PathKind::Specular, 0 | 1) => Kind::Direct,
-        (PathKind::Specular, _) => Kind::Multiple,
+        (PathKind::Specular | PathKind::Scattered, 0 | 1) => Kind::Direct,
+        (PathKind::Specular | PathKind::Scattered, _) => Kind::Multiple,
     }
 }
 

@@ -253,6 +253,8 @@ pub enum PathKind {
     Specular,
     /// Bent at an edge or free end once (or twice) on its way.
     Diffracted,
+    /// Sent back by the roughness of the last wall.
+    Scattered,
 }
 
 /// The path of an echo.

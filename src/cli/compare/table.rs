@@ -169,6 +169,7 @@ pub(in crate::cli) fn path_text(path: &PathRecord) -> String {
         (PathKind::Diffracted, Some(edge)) if walls.is_empty() => format!("edge {edge}"),
         (PathKind::Diffracted, Some(edge)) => format!("edge {edge}, by {walls}"),
         (PathKind::Diffracted, None) => format!("edge, by {walls}"),
+        (PathKind::Scattered, _) => format!("scattered by {walls}"),
         (PathKind::Specular, _) => match path.order {
             1 => format!("1 reflection: {walls}"),
             order => format!("{order} reflections: {walls}"),

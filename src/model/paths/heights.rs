@@ -148,6 +148,14 @@ impl Paths {
     fn contacts(&self, trees: &Trees, echo: &Echo, target: DVec2) -> Contacts {
         match echo.via {
             Via::Upright => Contacts::new(),
+            Via::Scatter { spot } => {
+                let spot = &trees.out.spots[spot as usize];
+                let mut contacts = self.part_contacts(&trees.out, Part::Flat(spot.leg), spot.place);
+                let back: Contacts = contacts.iter().rev().copied().collect();
+                contacts.push((spot.place, Reflector::Wall(spot.wall)));
+                contacts.extend(back);
+                contacts
+            }
             Via::Walls { node } => {
                 let leg = Leg { node, run: -echo.arrival };
                 self.part_contacts(&trees.out, Part::Flat(leg), target)

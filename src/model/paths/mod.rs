@@ -57,6 +57,16 @@
 //! cylinder is left out, which matters in the shadow and for radii of few wavelengths; cylinders
 //! thinner than a wavelength reflect less than they would here.
 //!
+//! # Rough walls
+//!
+//! They scatter what they do not mirror, and so are seen at aspects from which a mirror is not
+//! (`scatter`).
+//!
+//! # Heights
+//!
+//! Walls are upright: what floor and ceiling add to the paths of the plan, and what low walls take
+//! away, is worked out after them (`vertical`, `heights`).
+//!
 //! # The transducer's face
 //!
 //! It reflects too, and turns with the azimuth: an echo may go round again (`trains`).
@@ -65,14 +75,16 @@
 //!
 //! Paths depend on the place alone. A survey by [`PathEngine`] finds them,
 //! and each azimuth weighs them with the beam pattern on departure and arrival (`survey`).
-//! For a transducer off the rotation axis, or a robot body that turns with it, each azimuth is a
-//! place of its own: survey from where the face is, in the scene as it then stands.
+//! For a transducer off the rotation axis each azimuth is a place of its own: survey from where the
+//! face is. Transmitter and receiver apart are two places ([`Paths::enumerate_between`]). A robot
+//! body is part of the scene ([`Scene::with_robot_at`]).
 
 mod beam;
 mod edges;
 mod heights;
 mod mesh;
 mod rounds;
+mod scatter;
 mod survey;
 #[cfg(test)]
 mod tests;
@@ -103,7 +115,7 @@ use crate::{
     geometry::{Arrangement, DVec2, Mirror, square_up},
     model::{Path, Reflector},
     scan::PathKind,
-    scene::{Cylinder, Material, Scene},
+    scene::{Cylinder, Material, Scene, Wall},
 };
 
 /// Echoes that agree in length and both directions to within this are one, metres and radians.
@@ -129,6 +141,9 @@ pub struct Settings {
     pub sensor_z_m: Option<f64>,
     /// How far the transducer's axis points up, radians.
     pub tilt_rad: f64,
+    /// How high a strip of a rough wall it hears: the integral of the beam pattern's fourth
+    /// power over the rise, radians. 0: rough walls only mirror.
+    pub scatter_height_rad: f64,
 }
 
 /// The height of a transducer of which nothing is said, metres: half a metre above the floor, or
@@ -184,6 +199,8 @@ struct Face {
     gain: f64,
     /// The length of air that weakens as much, metres; 0 without absorption.
     loss_m: f64,
+    /// Share of the energy that it scatters.
+    scatter: f64,
 }
 
 /// An echo path, before the beam pattern.
@@ -231,10 +248,11 @@ impl Paths {
             .collect();
         // From outside the box no echo is short enough.
         let mesh = Mesh::new(&plan, &extra, 0.5 * settings.max_path_m + 1.0);
-        let face = |(&(a, b), &gain): (&(DVec2, DVec2), &f64)| {
+        let face = |((&(a, b), &gain), wall): ((&(DVec2, DVec2), &f64), &Wall)| {
+            let scatter = scattered(&wall.material);
             let mirror = Mirror::through(a, b);
             let loss_m = settings.same_loss_m(gain);
-            Face { mirror, rotor: mirror.rotor(), gain, loss_m }
+            Face { mirror, rotor: mirror.rotor(), gain, loss_m, scatter }
         };
         let gains: Vec<_> = scene.walls.iter().map(|wall| mirror_gain(&wall.material)).collect();
         // One that is not there has no size: the others keep their numbers.
@@ -245,7 +263,7 @@ impl Paths {
         };
         let circles = scene.cylinders.iter().map(circle).collect();
         Self {
-            faces: segments.iter().zip(&gains).map(face).collect(),
+            faces: segments.iter().zip(&gains).zip(&scene.walls).map(face).collect(),
             edges: settings
                 .edge_law
                 .map(|law| Edges::new(&plan, &segments, &gains, law))
@@ -321,6 +339,9 @@ impl Paths {
         if !self.rounds.is_empty() {
             echoes.extend(TubeGrower::new(self, &mut tree, [start, target]).grow());
         }
+        if start == target {
+            echoes.extend(scatter::echoes(self, &mut tree));
+        }
         (tree, echoes)
     }
 
@@ -336,6 +357,10 @@ impl Paths {
                 hides(&trees.out, Part::Flat(leg), start, target)
             }
             Via::Cylinders { .. } | Via::Upright => false,
+            Via::Scatter { spot } => {
+                let spot = &trees.out.spots[spot as usize];
+                hides(&trees.out, Part::Flat(spot.leg), start, spot.place)
+            }
             Via::Edge { point, out, back } => self.edges.place(point).is_some_and(|end| {
                 let (there, here) = (&trees.out, trees.back());
                 hides(there, there.part(out), start, end)
@@ -376,10 +401,19 @@ impl Paths {
         let (kind, edge) = match echo.via {
             Via::Edge { point, .. } => (PathKind::Diffracted, self.edges.edge(point)),
             Via::Walls { .. } | Via::Cylinders { .. } | Via::Upright => (PathKind::Specular, None),
+            Via::Scatter { .. } => (PathKind::Scattered, None),
         };
         let mut walls = match echo.via {
             Via::Walls { node } => self.met(tree, Part::Flat(Leg { node, run: -echo.arrival })),
             Via::Upright => SmallVec::new(),
+            Via::Scatter { spot } => {
+                let spot = &tree.spots[spot as usize];
+                let mut walls = self.met(tree, Part::Flat(spot.leg));
+                let back: SmallVec<[Reflector; 4]> = walls.iter().rev().copied().collect();
+                walls.push(Reflector::Wall(spot.wall));
+                walls.extend(back);
+                walls
+            }
             Via::Cylinders { curved } => self.met(tree, Part::Curved(curved)),
             Via::Edge { out, back, .. } => {
                 let mut walls = self.met(tree, tree.part(out));
@@ -435,6 +469,11 @@ impl Trees {
     }
 }
 
+/// Share of the energy that a material scatters.
+fn scattered(material: &Material) -> f64 {
+    material.reflectance.powi(2) * material.roughness
+}
+
 /// An echo path with its way as nodes of the tree.
 #[derive(Debug, Clone, Copy)]
 struct Echo {
@@ -470,6 +509,10 @@ enum Via {
     },
     /// Straight up or down and back.
     Upright,
+    /// Back from a place of a rough wall, by [`Tree::spots`].
+    Scatter {
+        spot: u32,
+    },
 }
 
 /// A ray from the start by what its walls follow from.

@@ -94,8 +94,12 @@ impl<'a> PathSurvey<'a> {
             }
         }
         let wheels = spokes.map(|spokes| Wheel::new(&spokes));
+        // Transmitter and receiver apart have a face each, and a tilted one turns sound up or down:
+        // what runs between them and the walls is left out.
+        let faces_level = transmitter == receiver && engine.paths.settings.tilt_rad == 0.0;
         let loops = engine
             .face
+            .filter(|_| faces_level)
             .map(|face| Loops::new(face, &echoes, &engine.envelope, &engine.paths.settings));
         Self { engine, trees, echoes, wheels, loops }
     }
@@ -130,8 +134,8 @@ impl<'a> PathSurvey<'a> {
         }
         let (departure_rad, arrival_rad) =
             (ways[0].departure_rad, ways[ways.len() - 1].arrival_rad);
-        let [leaving, arriving] =
-            [departure_rad, arrival_rad].map(|end| self.engine.beam.one_way(end - direction_rad));
+        let [leaving, arriving] = [departure_rad, arrival_rad]
+            .map(|end| self.engine.beam.one_way(wrap_pi(end - direction_rad)));
         Arrival {
             length_m: train.length_m,
             amplitude,

@@ -5,6 +5,7 @@ mod full_wave;
 mod laws;
 mod pairs;
 mod peers;
+mod rough;
 mod vertical;
 
 use std::{f64::consts::TAU, sync::Arc};
@@ -15,7 +16,7 @@ use rand_pcg::Pcg64;
 use super::*;
 use crate::scene::Wall;
 
-const LOSSLESS: Settings = Settings {
+pub(super) const LOSSLESS: Settings = Settings {
     max_path_m: 20.0,
     max_order: None,
     floor: 1e-4,
@@ -24,6 +25,7 @@ const LOSSLESS: Settings = Settings {
     wave_number_per_m: TAU * 49_400.0 / 343.2,
     sensor_z_m: None,
     tilt_rad: 0.0,
+    scatter_height_rad: 0.0,
 };
 
 fn scene(walls: &[[f64; 4]]) -> Scene {

@@ -5,6 +5,7 @@ use super::{
     beam::{Beam, Ray, TIE_M, reaches, reaches_well},
     mesh::{Mesh, Side},
     rounds::Arc,
+    scatter::{Lit, Spot},
     tube::{Curved, Link},
     tubes::BentRay,
 };
@@ -26,6 +27,10 @@ pub(super) struct Tree {
     pub(super) to_edges: Vec<(u32, Ray)>,
     /// Beams that meet a cylinder.
     pub(super) to_cylinders: Vec<View>,
+    /// Parts of rough walls in sight, until they have become `spots`.
+    pub(super) lit: Vec<Lit>,
+    /// Where rough walls send sound back.
+    pub(super) spots: Vec<Spot>,
     /// What tubes have met after their first cylinders.
     pub(super) links: Vec<Link>,
     /// Rays by way of cylinders that end at the receiver or at an edge.
@@ -289,6 +294,10 @@ impl Grower<'_> {
 
     fn reflect(&mut self, beam: &Beam, wall: u32, side: usize) {
         let face = &self.paths.faces[wall as usize];
+        if face.scatter > 0.0 && self.paths.settings.scatter_height_rad > 0.0 {
+            let span_m = self.lit_span_m(beam, face, side);
+            self.tree.lit.push(Lit { beam: *beam, wall, span_m });
+        }
         let gain = beam.gain * face.gain;
         if beam.order >= self.most_reflections || gain < self.paths.settings.floor {
             return;
@@ -342,6 +351,21 @@ impl Grower<'_> {
             hit.distance(beam.image) + hit.distance(self.target)
         };
         by(beam.right).min(by(beam.left))
+    }
+
+    /// The places along a wall between which a beam meets it.
+    fn lit_span_m(&self, beam: &Beam, face: &Face, side: usize) -> [f64; 2] {
+        let mirror = &face.mirror;
+        let along = mirror.normal.perp();
+        let ends =
+            [side, (side + 1) % 3].map(|corner| along.dot(self.mesh.corner(beam.triangle, corner)));
+        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+        let by = |border: DVec2| {
+            let hit = beam.image - mirror.height_m(beam.image) / mirror.normal.dot(border) * border;
+            along.dot(hit).max(low).min(high)
+        };
+        let (right, left) = (by(beam.right), by(beam.left));
+        [right.min(left), right.max(left)]
     }
 
     fn meet_target(&mut self, beam: &Beam) {

@@ -214,7 +214,7 @@ impl<'a> Search<'a> {
         let ends: Vec<_> = outs.iter().map(|(out, weight)| (backwards(out), *weight)).collect();
         let others = outs.iter().filter(|(out, _)| !out.own_reverse).map(|(out, _)| *out);
         let middles = ends.iter().map(|(end, _)| *end).chain(others).collect();
-        Self { face, settings, floor, best: best, ends, middles, found: Vec::new() }
+        Self { face, settings, floor, best, ends, middles, found: Vec::new() }
     }
 
     /// Ends a row of rounds, and goes on with it. `strength` is its field over its spreading,
@@ -304,6 +304,7 @@ mod tests {
             wave_number_per_m: DISC.wave_number_per_m,
             sensor_z_m: None,
             tilt_rad: 0.0,
+            scatter_height_rad: 0.0,
         }
     }
 

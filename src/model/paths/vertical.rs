@@ -72,17 +72,21 @@ impl Image {
     /// An echo of the plan by way of this image, which is number `index`; `None` if it is too long
     /// or too weak.
     pub(super) fn echo(&self, plan: &Echo, index: u16, settings: &Settings) -> Option<Echo> {
+        // What is scattered goes straight back; it has its own way to floor and ceiling.
+        if matches!(plan.via, Via::Scatter { .. }) {
+            return None;
+        }
         let length_m = plan.length_m.hypot(self.rise_m);
         let cosine = plan.length_m / length_m;
         let bending = match plan.via {
             Via::Edge { .. } => cosine.sqrt().recip(),
-            Via::Walls { .. } | Via::Cylinders { .. } | Via::Upright => 1.0,
+            Via::Walls { .. } | Via::Cylinders { .. } | Via::Upright | Via::Scatter { .. } => 1.0,
         };
         let amplitude = plan.amplitude * bending * settings.air_gain(length_m - plan.length_m);
         let leaves_rad = self.rise_m.atan2(plan.length_m);
         // After an even number of reflections it still runs the way it left, and comes from the
         // other side.
-        let comes_rad = if self.bounces % 2 == 0 { -leaves_rad } else { leaves_rad };
+        let comes_rad = if self.bounces.is_multiple_of(2) { -leaves_rad } else { leaves_rad };
         let fits = length_m <= settings.max_path_m && amplitude >= settings.floor;
         fits.then_some(Echo {
             length_m,

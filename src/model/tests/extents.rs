@@ -35,7 +35,7 @@ fn runs(simulator: &Simulator, readings: &[(f64, Prediction)]) -> Vec<Run> {
                 run.middle_deg += STEP_DEG / 2.0;
             }
             (Some(name), _) => {
-                runs.push(Run { by: name.clone(), middle_deg: *azimuth_deg, extent_deg: STEP_DEG })
+                runs.push(Run { by: name.clone(), middle_deg: *azimuth_deg, extent_deg: STEP_DEG });
             }
             (None, _) => {}
         }
