@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 use super::{Edge, Path, Reflector, simulator::FACE_NAME};
 use crate::{
     geometry::{DVec2, Mirror},
-    scan::PathRecord,
+    scan::{PathKind, PathRecord},
     scene::{Cylinder, Scene},
 };
 
@@ -32,6 +32,10 @@ impl Path {
     /// this scene.
     #[must_use]
     pub fn points(&self, scene: &Scene, position: DVec2, length_m: f64) -> Option<Vec<DVec2>> {
+        // Which part of a rough wall sent it back is not in a record.
+        if self.kind == PathKind::Scattered {
+            return None;
+        }
         let edge = match self.edge {
             Some(edge) => Some(edge.place(scene)?),
             None => None,

@@ -20,7 +20,7 @@ fn every_path_of_every_shipped_scene_has_its_way() {
             let simulator =
                 Simulator::new(scene.clone(), sensor, Air::default(), options).expect("options");
             let paths = Paths::new(&scene, simulator.path_settings()).enumerate(pose.position());
-            for echo in paths {
+            for echo in paths.iter().filter(|echo| echo.path.kind != PathKind::Scattered) {
                 let record = simulator.path_record(&echo.path, echo.length_m);
                 assert_eq!(Path::from_record(&record, &scene).as_ref(), Some(&echo.path));
                 let points = echo
