@@ -253,7 +253,7 @@ fn a_plate_before_the_transducer_answers_in_a_train() {
         close(*echo, 1.2 * f64::from(round), 1e-9, "round");
     }
     assert!(train.len() >= 2, "{train:?}");
-    assert!(simulator.station(pose.position()).ping(direction_rad).echoes_us.len() >= 2);
+    assert!(simulator.station(pose.position()).ping_rearmed(direction_rad).echoes_us.len() >= 2);
 }
 
 /// Figure 12: an arc around the corner's vertex, and a hole on each side of it.
