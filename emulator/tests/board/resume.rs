@@ -63,6 +63,7 @@ async fn take(port: &str) -> (ScanSummary, Vec<Record>) {
         plan: ScanPlan { to_deg: f64::from(BEAMS) * 0.9, ..ScanPlan::default() },
         settings: Settings { window_ticks: 20_000, ..settings() },
         sound_speed_m_s: 343.4,
+        air: None,
         blanking_us: 2_380.0,
         predictions: Vec::new(),
     };
