@@ -188,7 +188,7 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
     };
     let mut rng = Pcg64::seed_from_u64(args.seed.wrapping_mul(1_000_003) ^ course as u64);
     let (name, scene, start) = scene(course % 8, &mut rng)?;
-    let ring = course / 8 % 2 == 0;
+    let ring = (course / 8).is_multiple_of(2);
     let settings = TrialSettings {
         resolution_m: args.resolution,
         places: args.places,

@@ -152,9 +152,7 @@ impl World {
     fn seen_from(&self, place: DVec2, extents: &Extents) -> Option<Vec<&Element>> {
         let mut heard: Vec<(f64, f64, f64, &Element)> = Vec::new();
         for element in &self.elements {
-            let Some(point) = element.echo_point(place, extents.half_width_m()) else {
-                return None;
-            };
+            let point = element.echo_point(place, extents.half_width_m())?;
             let (range_m, bearing) = ((point - place).length(), (point - place).to_angle());
             let half_deg = match element.kind {
                 FeatureKind::Edge if range_m > EDGE_HEARD_M => continue,
