@@ -65,6 +65,9 @@ pub(super) struct Args {
     /// Leave readings of less confidence out
     #[arg(long, value_name = "C", default_value_t = LEAST_CONFIDENCE)]
     least_confidence: f64,
+    /// Hear one sound at a time, timed by its path, instead of the receiver's envelope
+    #[arg(long)]
+    ideal_receiver: bool,
     /// One JSON object for each course instead of the table
     #[arg(long)]
     json: bool,
@@ -200,7 +203,11 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
     let sensor = Sensor::preset("senscomp-6500").map_err(|error| refuse(&error))?;
     let air = Air::default();
     let extents = Extents::new(&sensor, &air, false).map_err(|error| refuse(&error))?;
-    let options = Options { max_range_m: Some(args.max_range), ..Options::default() };
+    let options = Options {
+        max_range_m: Some(args.max_range),
+        ideal_receiver: args.ideal_receiver,
+        ..Options::default()
+    };
     let simulator =
         Simulator::new(Arc::new(scene), sensor, air, options).map_err(|error| refuse(&error))?;
     let course_taken = Course::through(&simulator, start, &settings, &mut rng)
