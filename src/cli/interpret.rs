@@ -65,8 +65,7 @@ most of them; give the log of that scan too, and they are decided.";
 
 const HELP: &str = "\
 Examples:
-  sonard simulate --scene plane-corner-edge --pose fig13 --sensor bozma-kuc-60khz \\
-      --edge-law bozma-kuc --lossless --out one.jsonl
+  sonard simulate --scene plane-corner-edge --pose fig13 --sensor bozma-kuc-60khz --out one.jsonl
   sonard interpret one.jsonl -o one.png
   sonard interpret one.jsonl two.jsonl --json
 

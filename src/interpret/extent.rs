@@ -41,7 +41,8 @@ pub enum ExtentError {
 }
 
 impl Extents {
-    /// For a sensor in some air; `compensated`: its gain makes up for the air's absorption.
+    /// For a sensor in some air; `compensated`: the air's absorption is made up for even if the
+    /// sensor's gain is not said to do so.
     ///
     /// # Errors
     /// When the sensor's data make no sense.
@@ -50,8 +51,11 @@ impl Extents {
         let speed_m_s = air.sound_speed_m_s();
         let wavelength_m = speed_m_s / sensor.frequency_hz;
         let half_width_m = sensor.half_width_m();
-        let absorption =
-            if compensated { 0.0 } else { air.absorption_db_per_m(sensor.frequency_hz) };
+        let absorption = if compensated || sensor.gain.makes_up_for_air() {
+            0.0
+        } else {
+            air.absorption_db_per_m(sensor.frequency_hz)
+        };
         Ok(Self {
             beam: BeamPattern::new(sensor, speed_m_s),
             threshold: sensor.threshold,

@@ -19,10 +19,6 @@ fn simulate(folder: &Path, pose: &str) -> String {
         pose,
         "--sensor",
         "bozma-kuc-60khz",
-        "--edge-law",
-        "bozma-kuc",
-        "--lossless",
-        "--ideal-receiver",
         "--out",
         &path,
     ]);
