@@ -10,13 +10,13 @@ use comfy_table::{CellAlignment, Table};
 use super::{
     Failure, Outcome,
     compare::RULED,
-    picture::{PictureArgs, scene_for, warn_of_damage},
+    picture::{PictureArgs, scene_for},
+    sweeps::for_each_sweep,
 };
 use crate::{
-    interpret::{Extents, Feature, FeatureKind, Noise, Settings, Sweep, interpret},
+    interpret::{Extents, Feature, FeatureKind, Noise, Settings, interpret},
     plot::draw_features,
     scan::ScanView,
-    store::load,
 };
 
 /// Options of `sonard interpret`.
@@ -100,22 +100,10 @@ pub(super) fn run(args: &Args) -> Outcome {
 /// The scans that can be interpreted, and what is in them.
 fn find(args: &Args) -> Result<(Vec<ScanView>, Vec<Feature>), Failure> {
     let (mut scans, mut sweeps) = (Vec::new(), Vec::new());
-    for log in &args.logs {
-        let loaded = load(log).map_err(|error| Failure::input(&error, error.help()))?;
-        warn_of_damage(log, &loaded);
-        for scan in ScanView::from_records(loaded.records) {
-            match Sweep::of(&scan) {
-                Ok(sweep) => {
-                    sweeps.push((scan.scan, sweep));
-                    scans.push(scan);
-                }
-                Err(error) => {
-                    let log = log.display();
-                    anstream::eprintln!("{log}: scan {} is left out: {error}", scan.scan);
-                }
-            }
-        }
-    }
+    for_each_sweep(&args.logs, |scan, sweep| {
+        sweeps.push((scan.scan, sweep));
+        scans.push(scan);
+    })?;
     let Some(session) = scans.iter().find_map(|scan| scan.session.clone()) else {
         return Err(Failure::input(
             "there is no scan with its session to interpret",

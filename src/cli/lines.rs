@@ -7,16 +7,13 @@ use std::{
 
 use super::{
     Failure, Outcome,
-    picture::{PictureArgs, scene_for, warn_of_damage},
+    picture::{PictureArgs, scene_for},
+    sweeps::for_each_sweep,
 };
 use crate::{
-    interpret::{
-        Sweep,
-        lines::{LineMap, LineMapSettings, MapLine},
-    },
+    interpret::lines::{LineMap, LineMapSettings, MapLine},
     plot::draw_lines,
     scan::ScanView,
-    store::load,
 };
 
 /// Options of `sonard lines`.
@@ -84,22 +81,10 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn read(args: &Args) -> Result<(Vec<ScanView>, LineMap, usize), Failure> {
     let settings = LineMapSettings { logical_m: args.logical, ..LineMapSettings::default() };
     let (mut scans, mut map, mut left_out) = (Vec::new(), LineMap::new(settings), 0);
-    for log in &args.logs {
-        let loaded = load(log).map_err(|error| Failure::input(&error, error.help()))?;
-        warn_of_damage(log, &loaded);
-        for scan in ScanView::from_records(loaded.records) {
-            match Sweep::of(&scan) {
-                Ok(sweep) => {
-                    left_out += map.add_sonar(&sweep);
-                    scans.push(scan);
-                }
-                Err(error) => {
-                    let log = log.display();
-                    anstream::eprintln!("{log}: scan {} is left out: {error}", scan.scan);
-                }
-            }
-        }
-    }
+    for_each_sweep(&args.logs, |scan, sweep| {
+        left_out += map.add_sonar(&sweep);
+        scans.push(scan);
+    })?;
     if scans.is_empty() {
         return Err(Failure::input(
             "there is no scan with its pose to map",

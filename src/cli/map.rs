@@ -9,7 +9,7 @@ use std::{
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::{Failure, Outcome, picture::warn_of_damage, scene_file};
+use super::{Failure, Outcome, scene_file, sweeps::for_each_sweep};
 use crate::{
     geometry::DVec2,
     interpret::{
@@ -18,8 +18,7 @@ use crate::{
         prediction::{FeaturePrediction, PredictionSettings, Worth},
     },
     plot::draw_map,
-    scan::{ScanView, Session},
-    store::load,
+    scan::Session,
 };
 
 /// Without a word on it, ranges beyond this are not mapped, metres.
@@ -162,22 +161,12 @@ pub(super) fn run(args: &Args) -> Outcome {
 /// The scans that can be mapped, and the session of the first.
 fn sweeps(args: &Args) -> Result<(Session, Vec<(uuid::Uuid, Sweep)>), Failure> {
     let (mut session, mut taken) = (None, Vec::new());
-    for log in &args.logs {
-        let loaded = load(log).map_err(|error| Failure::input(&error, error.help()))?;
-        warn_of_damage(log, &loaded);
-        for scan in ScanView::from_records(loaded.records) {
-            match Sweep::of(&scan) {
-                Ok(sweep) => {
-                    taken.push((scan.scan, sweep));
-                    session = session.or(scan.session.as_deref().cloned());
-                }
-                Err(error) => {
-                    let log = log.display();
-                    anstream::eprintln!("{log}: scan {} is left out: {error}", scan.scan);
-                }
-            }
+    for_each_sweep(&args.logs, |scan, sweep| {
+        taken.push((scan.scan, sweep));
+        if session.is_none() {
+            session = scan.session.as_deref().cloned();
         }
-    }
+    })?;
     match session {
         Some(session) => Ok((session, taken)),
         None => Err(Failure::input(

@@ -25,6 +25,7 @@ mod scene;
 mod scene_file;
 mod simulate;
 mod status;
+mod sweeps;
 mod trace;
 mod watch;
 

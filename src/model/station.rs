@@ -51,7 +51,8 @@ impl<'a> Station<'a> {
         })
     }
 
-    /// [`ping_rearmed`](Self::ping_rearmed) in noise: the same generator in the same state gives the same reading.
+    /// [`ping_rearmed`](Self::ping_rearmed) in noise: the same generator in the same state gives
+    /// the same reading.
     #[must_use]
     pub fn ping_in_noise(
         &self,

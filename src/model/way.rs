@@ -28,11 +28,11 @@ const MOST_ROUNDS: usize = 500;
 impl Path {
     /// The points of the way from a ranger at `position` and back to it, in order: the ranger, each
     /// reflection and the edge, the ranger. Round an edge the way may be the one run through
-    /// backwards, which meets the same walls in the same order and arrives at the same time. `None` if there is no such way of `length_m` metres in
-    /// this scene.
+    /// backwards, which meets the same walls in the same order and arrives at the same time. `None`
+    /// if there is no such way of `length_m` metres in this scene, and for what a rough wall
+    /// scattered: which part of it did is not in a record.
     #[must_use]
     pub fn points(&self, scene: &Scene, position: DVec2, length_m: f64) -> Option<Vec<DVec2>> {
-        // Which part of a rough wall sent it back is not in a record.
         if self.kind == PathKind::Scattered {
             return None;
         }

@@ -1,0 +1,28 @@
+//! Scans of logs as sweeps, for the verbs that make sense of them.
+
+use std::path::PathBuf;
+
+use super::{Failure, picture::warn_of_damage};
+use crate::{interpret::Sweep, scan::ScanView, store::load};
+
+/// Hands over each scan of the logs that can be interpreted, one by one, since a collection of days
+/// need not be in memory at once. Says which scans are left out.
+pub(super) fn for_each_sweep(
+    logs: &[PathBuf],
+    mut take: impl FnMut(ScanView, Sweep),
+) -> Result<(), Failure> {
+    for log in logs {
+        let loaded = load(log).map_err(|error| Failure::input(&error, error.help()))?;
+        warn_of_damage(log, &loaded);
+        for scan in ScanView::from_records(loaded.records) {
+            match Sweep::of(&scan) {
+                Ok(sweep) => take(scan, sweep),
+                Err(error) => {
+                    let log = log.display();
+                    anstream::eprintln!("{log}: scan {} is left out: {error}", scan.scan);
+                }
+            }
+        }
+    }
+    Ok(())
+}
