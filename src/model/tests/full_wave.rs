@@ -4,40 +4,11 @@
 //! The figures, mirrored and bent echoes apart:
 //! `cargo test --lib tests::full_wave -- --nocapture`
 
-use std::collections::BTreeMap;
-
-use serde::Deserialize;
-
-use super::*;
+use super::{
+    reference::{Crossing, Reference, ReferenceScene},
+    *,
+};
 use crate::{acoustics::Sensor, model::Prediction, scan::PingStatus};
-
-#[derive(Deserialize)]
-struct Reference {
-    c: f64,
-    scenes: BTreeMap<String, ReferenceScene>,
-}
-
-#[derive(Deserialize)]
-struct ReferenceScene {
-    segments: Vec<[f64; 4]>,
-    sensor: [f64; 2],
-    scan: Vec<Beam>,
-}
-
-#[derive(Deserialize)]
-struct Beam {
-    azimuth: f64,
-    /// Time and height of the burst's maxima.
-    peaks: Vec<(f64, f64)>,
-    threshold: BTreeMap<String, Option<Crossing>>,
-}
-
-#[derive(Deserialize)]
-struct Crossing {
-    range_unbiased: f64,
-    range_unbiased_09tau: Option<f64>,
-    range_unbiased_11tau: Option<f64>,
-}
 
 impl Crossing {
     /// Whether an echo grazes the threshold here.
@@ -150,9 +121,7 @@ fn kind(found: &Prediction) -> usize {
 
 #[test]
 fn ranges_are_those_of_the_full_wave_reference() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/fullwave/reference.json");
-    let text = std::fs::read_to_string(path).expect("the reference");
-    let reference: Reference = serde_json::from_str(&text).expect("the reference");
+    let reference = Reference::load();
     let mut score = Score::default();
     for (name, of) in &reference.scenes {
         for tau in ["0.02", "0.05", "0.1"] {

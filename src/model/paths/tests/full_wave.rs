@@ -4,32 +4,9 @@
 //! frequency of its band, so what is compared is the paths and their amplitudes alone.
 
 use num_complex::Complex64;
-use serde::Deserialize;
-use std::collections::BTreeMap;
 
 use super::*;
-
-#[derive(Deserialize)]
-struct Reference {
-    c: f64,
-    f0: f64,
-    piston_half_width_m: f64,
-    scenes: BTreeMap<String, ReferenceScene>,
-}
-
-#[derive(Deserialize)]
-struct ReferenceScene {
-    segments: Vec<[f64; 4]>,
-    sensor: [f64; 2],
-    scan: Vec<Beam>,
-}
-
-#[derive(Deserialize)]
-struct Beam {
-    azimuth: f64,
-    /// Time and amplitude.
-    arrivals: Vec<(f64, f64)>,
-}
+use crate::model::tests::reference::{Reference, ReferenceScene};
 
 /// Standard deviation of the band, and the part of it that counts, hertz.
 const BAND_SIGMA_HZ: f64 = 7000.0;
@@ -252,9 +229,7 @@ fn compare(reference: &Reference, name: &str) -> [Errors; 2] {
 
 #[test]
 fn arrivals_are_those_of_the_full_wave_reference() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/fullwave/reference.json");
-    let text = std::fs::read_to_string(path).expect("the reference");
-    let reference: Reference = serde_json::from_str(&text).expect("the reference");
+    let reference = Reference::load();
     let mut all = [Errors::default(), Errors::default()];
     for name in reference.scenes.keys() {
         let errors = compare(&reference, name);
