@@ -5,7 +5,8 @@
 //! a [`scene`] (walls and cylinders of some material) and the [`acoustics`] of air, transducer
 //! and receiver go into a [`model`], which predicts what the ranger reads at each azimuth of a
 //! [`scan`]; the same scan record holds measured readings, and [`compare`] sets the two side
-//! by side. [`plot`] draws all of it.
+//! by side. [`plot`] draws all of it. An [`array`](mod@array) is several rangers at fixed bearings in
+//! place of one that turns.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -38,6 +39,7 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub mod acoustics;
+pub mod array;
 pub mod compare;
 pub mod geometry;
 pub mod interpret;

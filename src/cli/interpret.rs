@@ -100,10 +100,21 @@ pub(super) fn run(args: &Args) -> Outcome {
 /// The scans that can be interpreted, and what is in them.
 fn find(args: &Args) -> Result<(Vec<ScanView>, Vec<Feature>), Failure> {
     let (mut scans, mut sweeps) = (Vec::new(), Vec::new());
+    let mut of_arrays = 0;
     for_each_sweep(&args.logs, |scan, sweep| {
+        if scan.is_of_array() {
+            of_arrays += 1;
+            return;
+        }
         sweeps.push((scan.scan, sweep));
         scans.push(scan);
     })?;
+    if of_arrays > 0 {
+        return Err(Failure::input(
+            format!("{of_arrays} scan(s) are of an array: arcs need one ranger that turns"),
+            "`sonard map` and `sonard lines` take an array's readings",
+        ));
+    }
     let Some(session) = scans.iter().find_map(|scan| scan.session.clone()) else {
         return Err(Failure::input(
             "there is no scan with its session to interpret",

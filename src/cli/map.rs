@@ -52,7 +52,7 @@ pub(super) struct Args {
     /// Map this region: X0,Y0,X1,Y1 in metres [default: around what was seen]
     #[arg(long, value_name = "REGION", allow_hyphen_values = true, value_parser = region)]
     region: Option<[f64; 4]>,
-    /// Beam width, degrees [default: that of a plane's arc]
+    /// Beam width, degrees [default: that of a plane's arc; of an array, 25]
     #[arg(long, value_name = "DEG")]
     beam_deg: Option<f64>,
     /// Exponent of the confidence with the distance of the feature
@@ -127,7 +127,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Err(refuse(&format!("--max-range {max_range_m}: give a length greater than 0")));
     }
     let shape = shape(args, &taken, max_range_m)?;
-    let (model, prediction) = models(args, extents, max_range_m);
+    let (model, prediction) = models(args, extents, max_range_m, session.array.is_some());
     let scene = args.scene.as_deref().map(scene_file::load).transpose()?;
     fs::create_dir_all(&args.out).map_err(|error| {
         Failure::input(
@@ -187,9 +187,7 @@ fn shape(
         None => {
             let points = taken.iter().flat_map(|(_, sweep)| {
                 let echoes = sweep.beams.iter().filter_map(|beam| match beam.heard {
-                    Heard::Echo(m) if m <= max_range_m => {
-                        Some(sweep.pose.point_at(beam.azimuth_deg, m))
-                    }
+                    Heard::Echo(m) if m <= max_range_m => Some(sweep.point(beam, m)),
                     _ => None,
                 });
                 echoes.chain([sweep.pose.position()])
@@ -206,13 +204,21 @@ fn shape(
         .map_err(|error| Failure::input(error, "choose another --resolution or --region"))
 }
 
-fn models(args: &Args, extents: Extents, max_range_m: f64) -> (BeamModel, PredictionSettings) {
-    let beam_deg = args.beam_deg.unwrap_or_else(|| extents.plane_corner_deg(1.0, 1.0));
-    let prediction = PredictionSettings {
-        exponent: args.exponent,
-        extend_m: args.extend,
-        ..PredictionSettings::stepper(beam_deg, max_range_m)
+fn models(
+    args: &Args,
+    extents: Extents,
+    max_range_m: f64,
+    of_array: bool,
+) -> (BeamModel, PredictionSettings) {
+    let ring = PredictionSettings::ring(max_range_m);
+    let of_sensor = || if of_array { ring.beam_deg } else { extents.plane_corner_deg(1.0, 1.0) };
+    let beam_deg = args.beam_deg.unwrap_or_else(of_sensor);
+    let prediction = match of_array {
+        true => PredictionSettings { beam_deg, omega_deg: beam_deg, ..ring },
+        false => PredictionSettings::stepper(beam_deg, max_range_m),
     };
+    let (exponent, extend_m) = (args.exponent, args.extend);
+    let prediction = PredictionSettings { exponent, extend_m, ..prediction };
     let model = match args.model {
         ModelName::Gaussian => BeamModel::Gaussian(GaussianBeam::new(beam_deg, max_range_m)),
         ModelName::Physical => {

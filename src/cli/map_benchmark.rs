@@ -23,6 +23,7 @@ use super::{
 };
 use crate::{
     acoustics::{Air, Sensor},
+    array::RangerArray,
     geometry::DVec2,
     interpret::{
         Extents,
@@ -94,6 +95,9 @@ The benchmarks, in percent: correlation of the two maps (more is better); map sc
 squared difference of cells; the same of cells occupied in either map; and of the shortest ways \
 through the map's free space between places half a metre apart, how many run into an obstacle of \
 the ideal map.";
+
+/// The array of the Feature Prediction paper's robot.
+const RING: &str = "pioneer-7";
 
 /// Scenes that come with sonard, with the pose to begin at.
 const SHIPPED: [(&str, &str); 4] = [
@@ -189,12 +193,16 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
     let mut rng = Pcg64::seed_from_u64(args.seed.wrapping_mul(1_000_003) ^ course as u64);
     let (name, scene, start) = scene(course % 8, &mut rng)?;
     let ring = (course / 8).is_multiple_of(2);
+    let arrangement = match ring {
+        true => Arrangement::Ring(RangerArray::preset(RING).map_err(|error| refuse(&error))?),
+        false => Arrangement::Stepper,
+    };
     let settings = TrialSettings {
         resolution_m: args.resolution,
         places: args.places,
         stride_m: 0.25,
         clearance_m: if name == "simple-room" { 0.2 } else { 0.3 },
-        arrangement: if ring { Arrangement::Ring } else { Arrangement::Stepper },
+        arrangement,
         range_sigma_m: 0.005,
         exponent: args.exponent,
         extend_m: args.extend,

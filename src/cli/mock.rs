@@ -4,6 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use super::{
     Failure, Outcome,
+    array::NoArray,
     mock_world::{Belief, MockWorldArgs},
     options::{AirArgs, EngineArgs, SensorArgs},
     place::PlaceArgs,
@@ -31,6 +32,8 @@ pub(super) struct Args {
     air: AirArgs,
     #[command(flatten)]
     engine: EngineArgs,
+    #[command(flatten)]
+    no_array: NoArray,
 }
 
 pub(super) const ABOUT: &str = "\

@@ -1,5 +1,6 @@
 //! The command line: one file a verb.
 
+mod array;
 #[cfg(feature = "pi")]
 mod board;
 mod compare;

@@ -9,14 +9,17 @@ use crate::{
     scene::suggest,
 };
 
+/// The sensor that is meant when none is named.
+const SENSOR: &str = "senscomp-6500";
+
 /// Which ranger.
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Sensor and air")]
 pub(super) struct SensorArgs {
     /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, hc-sr04,
-    /// fullwave-line), or a file with a sensor's data
-    #[arg(long, value_name = "NAME|FILE", default_value = "senscomp-6500")]
-    sensor: String,
+    /// fullwave-line), or a file with a sensor's data [default: senscomp-6500; of an array, its own]
+    #[arg(long, value_name = "NAME|FILE")]
+    sensor: Option<String>,
     /// End the blanking by hand as early as the sensor allows, as BINH does
     #[arg(long, conflicts_with = "blanking_us")]
     short_blanking: bool,
@@ -128,13 +131,19 @@ impl EdgeLaw {
 impl SensorArgs {
     /// The same for `sonard-emulator`, with the blanking that came of it.
     pub(super) fn emulator(&self, sensor: &Sensor) -> [String; 2] {
-        [format!("--sensor={}", self.sensor), format!("--blanking-us={}", sensor.blanking_us)]
+        let name = self.sensor.as_deref().unwrap_or(SENSOR);
+        [format!("--sensor={name}"), format!("--blanking-us={}", sensor.blanking_us)]
     }
 
     /// The sensor named: a file if there is one of that name, else a preset; with its blanking as
     /// asked for.
     pub(super) fn sensor(&self) -> Result<Sensor, Failure> {
-        let mut sensor = load_sensor(&self.sensor)?;
+        self.sensor_or(SENSOR)
+    }
+
+    /// The same with another one to fall back on.
+    pub(super) fn sensor_or(&self, otherwise: &str) -> Result<Sensor, Failure> {
+        let mut sensor = load_sensor(self.sensor.as_deref().unwrap_or(otherwise))?;
         if self.short_blanking {
             sensor.blanking_us = sensor.short_blanking_us.ok_or_else(|| {
                 Failure::input(

@@ -13,6 +13,7 @@ use tokio_serial::SerialStream;
 
 use super::{
     Failure, Outcome,
+    array::NoArray,
     mock_world::MockWorldArgs,
     options::{AirArgs, EngineArgs, SensorArgs},
     place::{AzimuthArgs, PlaceArgs},
@@ -69,6 +70,8 @@ pub(super) struct Args {
     engine: EngineArgs,
     #[command(flatten)]
     world: MockWorldArgs,
+    #[command(flatten)]
+    no_array: NoArray,
 }
 
 /// How the motor turns and the ranger listens.

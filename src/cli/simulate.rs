@@ -1,5 +1,7 @@
 //! `sonard simulate`.
 
+mod array;
+
 use std::{
     fs::File,
     io::{self, BufWriter, Write},
@@ -17,7 +19,8 @@ use uuid::Uuid;
 use super::{
     Failure, Outcome,
     options::{AirArgs, EngineArgs, SensorArgs},
-    place::{AzimuthArgs, PlaceArgs},
+    place::AzimuthArgs,
+    scene_file,
 };
 use crate::{
     acoustics::ReceiverNoise,
@@ -27,12 +30,25 @@ use crate::{
     scene::Scene,
 };
 
+use array::ArrayArgs;
+
 /// Options of `sonard simulate`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
+    /// Scene file, or the name of a shipped scene (`sonard scene list`)
+    #[arg(long, value_name = "SCENE")]
+    scene: String,
+    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
+    #[arg(
+        long,
+        value_name = "POSE",
+        allow_hyphen_values = true,
+        required_unless_present = "poses"
+    )]
+    pose: Option<String>,
     #[command(flatten)]
-    place: PlaceArgs,
+    array: ArrayArgs,
     #[command(flatten)]
     azimuths: AzimuthArgs,
     /// Write the records to this file instead of standard output
@@ -84,7 +100,11 @@ Predict a scan with the model alone.
 
 Writes the records of a log, one JSON object a line, with provenance `simulated`: each reading \
 carries the path its sound took, its amplitude and its margin over the threshold. A silence \
-carries the candidate that came closest, with a negative margin.";
+carries the candidate that came closest, with a negative margin.
+
+With --array, several rangers at fixed bearings on a robot fire in turn, each from its own place. \
+Their readings say which ranger (`ranger`) and, where the robot turned or moved within a scan, \
+where it stood (`pose`). Crosstalk, one ranger's sound in another's ear, is left out.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -92,11 +112,17 @@ Examples:
   sonard simulate --scene simple-room --pose fig9 --from-deg 270 --to-deg 270.9 | tail -n 2
   sonard simulate --scene corridor --pose 1,0.4,0 --engine cone --max-range 4 | sonard plot -
   sonard simulate --scene my-room.json --pose 1.2,0.8,90 --temperature-c 5 --lossless
+  sonard simulate --scene two-surface-room --pose 1.2,1,30 --array pioneer-8 | sonard plot - -o a.svg
+  sonard simulate --scene corridor --poses way.jsonl --array ring-12 --rounds 15 > ring.jsonl
 
 Exit codes: 0 done, 2 wrong usage or input, 3 a disk that gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let (scene, pose) = args.place.load()?;
+    if let Some(name) = &args.array.array {
+        return array::run(args, name);
+    }
+    let scene = scene_file::load(&args.scene)?;
+    let pose = scene_file::pose(&scene, args.pose.as_deref().unwrap_or_default())?;
     let plan = args.azimuths.plan(1)?;
     let simulator = simulator(args, &scene, &pose)?;
     let noise = args.noise.noise()?;
@@ -151,8 +177,9 @@ fn write(
         pose: *pose,
         plan: *plan,
         air: None,
+        provenance: None,
     }))?;
-    let progress = progress(plan.stops());
+    let progress = progress(plan.stops().into());
     let station = simulator.station(pose.position());
     for index in 0..plan.stops() {
         let azimuth_deg = plan.azimuth_deg(index);
@@ -168,12 +195,12 @@ fn write(
 }
 
 /// A bar on the terminal, drawn from the first second on.
-fn progress(stops: u32) -> ProgressBar {
+fn progress(beams: u64) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} beams, {eta} left")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     // Draw calls come a few times a second; the first second is left without any.
-    let bar = ProgressBar::with_draw_target(Some(stops.into()), ProgressDrawTarget::hidden())
-        .with_style(style);
+    let bar =
+        ProgressBar::with_draw_target(Some(beams), ProgressDrawTarget::hidden()).with_style(style);
     let shown = bar.clone();
     std::thread::spawn(move || {
         std::thread::sleep(Duration::from_secs(1));

@@ -72,6 +72,7 @@ impl Forecast {
             provenance: provenance(identity),
             device: Some(device_record(identity)),
             sensor: settings.sensor.clone(),
+            array: None,
             air: air.to_record(),
             scene: settings
                 .scene

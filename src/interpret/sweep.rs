@@ -1,4 +1,4 @@
-//! A scan's readings as one turn of beams.
+//! A scan's readings as one turn of beams, or as one round of an array's.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::{
     compare::quantile,
-    geometry::{Pose, wrap_360},
+    geometry::{DVec2, Pose, wrap_360},
     scan::{Ping, PingStatus, ScanView},
 };
 
@@ -33,6 +33,9 @@ pub struct Beam {
     pub index: u32,
     /// What was heard.
     pub heard: Heard,
+    /// Where the transducer was, metres ahead and to the left of the sweep's pose: zero for one on
+    /// a stepper.
+    pub mount: DVec2,
 }
 
 /// The stops of one scan in order of azimuth, those without a usable reading left out.
@@ -64,6 +67,14 @@ pub enum SweepError {
         /// Heading, degrees.
         heading_deg: f64,
     },
+    /// A reading of a ranger that nothing is known about.
+    #[error("beam {index} is of ranger {id}, which its session's array does not have")]
+    UnknownRanger {
+        /// The reading.
+        index: u32,
+        /// The ranger.
+        id: String,
+    },
     /// Fewer than two stops.
     #[error("it has {0} usable stop(s): angles need at least 2")]
     TooFew(usize),
@@ -76,15 +87,19 @@ impl Sweep {
     /// a finite range count as not measured. Of several readings of one beam the last counts; of
     /// several beams at one stop the majority, with the median range.
     ///
+    /// Of an array, each beam has the place of its ranger, and a robot that moved meanwhile is
+    /// reckoned with.
+    ///
     /// # Errors
-    /// When the pose is missing or there are fewer than two usable stops.
+    /// When the pose is missing, a ranger is not in the session's array, or there are fewer than
+    /// two usable stops.
     pub fn of(scan: &ScanView) -> Result<Self, SweepError> {
         let start = scan.start.as_ref().ok_or(SweepError::NoPose)?;
         let Pose { x_m, y_m, heading_deg } = start.pose;
         if ![x_m, y_m, heading_deg].iter().all(|part| part.is_finite()) {
             return Err(SweepError::BadPose { x_m, y_m, heading_deg });
         }
-        let beams = stops(&scan.pings);
+        let beams = stops(scan, &start.pose)?;
         if beams.len() < 2 {
             return Err(SweepError::TooFew(beams.len()));
         }
@@ -96,8 +111,22 @@ impl Sweep {
             quantile(gaps.collect(), 0.5).unwrap_or(360.0)
         };
         let closing_deg = beams[0].azimuth_deg + 360.0 - beams[beams.len() - 1].azimuth_deg;
-        let closed = closing_deg < MOST_GAP_STEPS * step_deg;
+        let closed = closing_deg < MOST_GAP_STEPS * step_deg && !scan.is_of_array();
         Ok(Self { pose: start.pose, step_deg, beams, closed })
+    }
+
+    /// Where a beam's transducer was, world, metres.
+    #[must_use]
+    pub fn place(&self, beam: &Beam) -> DVec2 {
+        let turn = DVec2::from_angle(self.pose.direction_rad(0.0));
+        self.pose.position() + turn.rotate(beam.mount)
+    }
+
+    /// The point at `range_m` along a beam, world, metres.
+    #[must_use]
+    pub fn point(&self, beam: &Beam, range_m: f64) -> DVec2 {
+        let direction_rad = self.pose.direction_rad(beam.azimuth_deg);
+        self.place(beam) + range_m * DVec2::from_angle(direction_rad)
     }
 
     /// Degrees from the stop before to this one; `None` where it is too far to be a neighbour.
@@ -115,19 +144,34 @@ impl Sweep {
 /// Neighbours may be this many steps apart: two lost readings in a row.
 const MOST_GAP_STEPS: f64 = 3.5;
 
-fn stops(pings: &[Ping]) -> Vec<Beam> {
+fn stops(scan: &ScanView, pose: &Pose) -> Result<Vec<Beam>, SweepError> {
     let mut by_index: BTreeMap<u32, Beam> = BTreeMap::new();
-    for ping in pings {
+    for ping in &scan.pings {
         if let Some(beam) = beam(ping) {
-            by_index.insert(ping.index, beam);
+            by_index.insert(ping.index, mounted(scan, ping, beam, pose)?);
         }
     }
     let mut beams: Vec<Beam> = by_index.into_values().collect();
     beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
-    beams
-        .chunk_by(|a, b| (b.azimuth_deg - a.azimuth_deg).abs() < SAME_STOP_DEG)
-        .map(one_of_stop)
-        .collect()
+    let same_stop = |a: &Beam, b: &Beam| {
+        (b.azimuth_deg - a.azimuth_deg).abs() < SAME_STOP_DEG && a.mount == b.mount
+    };
+    Ok(beams.chunk_by(same_stop).map(one_of_stop).collect())
+}
+
+/// A beam with its transducer's place and direction as seen from the scan's pose.
+fn mounted(scan: &ScanView, ping: &Ping, beam: Beam, pose: &Pose) -> Result<Beam, SweepError> {
+    if ping.ranger.is_none() && ping.pose.is_none() {
+        return Ok(beam);
+    }
+    let transducer = scan.transducer(ping).ok_or_else(|| SweepError::UnknownRanger {
+        index: ping.index,
+        id: ping.ranger.clone().unwrap_or_default(),
+    })?;
+    let turn_back = DVec2::from_angle(-pose.direction_rad(0.0));
+    let mount = turn_back.rotate(transducer.position() - pose.position());
+    let azimuth_deg = wrap_360(transducer.heading_deg - pose.heading_deg);
+    Ok(Beam { azimuth_deg, mount, ..beam })
 }
 
 fn beam(ping: &Ping) -> Option<Beam> {
@@ -138,7 +182,8 @@ fn beam(ping: &Ping) -> Option<Beam> {
         PingStatus::LinkLost | PingStatus::StepDoubtful | PingStatus::ModuleFault => return None,
     };
     let azimuth_deg = Some(ping.azimuth_deg).filter(|azimuth| azimuth.is_finite())?;
-    Some(Beam { azimuth_deg: wrap_360(azimuth_deg), index: ping.index, heard })
+    let azimuth_deg = wrap_360(azimuth_deg);
+    Some(Beam { azimuth_deg, index: ping.index, heard, mount: DVec2::ZERO })
 }
 
 fn one_of_stop(same: &[Beam]) -> Beam {

@@ -1,7 +1,7 @@
 //! Maps made of readings that the model makes: how well does a way of mapping do?
 //!
-//! A robot wanders through a scene; at each place it takes a set of readings, as a ring of sonars
-//! or as a stepper's scan. The readings make a map without and with Feature Prediction, and both
+//! A robot wanders through a scene; at each place it takes a set of readings, with an array of
+//! rangers or as a stepper's scan. The readings make a map without and with Feature Prediction, and both
 //! are scored against the ideal map.
 
 mod rooms;
@@ -20,26 +20,24 @@ use super::{
     prediction::{FeaturePrediction, PredictionSettings},
 };
 use crate::{
-    geometry::{DVec2, Pose, wrap_360},
-    model::{Simulator, Station},
+    array::RangerArray,
+    geometry::{DVec2, Pose},
+    model::{Prediction, Simulator},
     scan::PingStatus,
     scene::Scene,
 };
 
-/// Directions of the Pioneer 1's seven sonars, degrees: five ahead and one to each side.
-pub const PIONEER_1_DEG: [f64; 7] = [90.0, 30.0, 15.0, 0.0, 345.0, 330.0, 270.0];
-
 /// How the readings of a set are arranged.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Arrangement {
-    /// [`PIONEER_1_DEG`].
-    Ring,
+    /// One round of an array's rangers.
+    Ring(RangerArray),
     /// A full turn in steps of 0.9 degrees.
     Stepper,
 }
 
 /// How a trial goes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TrialSettings {
     /// Side of a cell, metres.
     pub resolution_m: f64,
@@ -111,7 +109,7 @@ impl Course {
     ) -> Result<Trial, ScoreError> {
         let extent_deg = extents.plane_corner_deg(1.0, 1.0);
         let (prediction, beam_deg) = match settings.arrangement {
-            Arrangement::Ring => (PredictionSettings::ring(max_range_m), 25.0),
+            Arrangement::Ring(_) => (PredictionSettings::ring(max_range_m), 25.0),
             Arrangement::Stepper => {
                 (PredictionSettings::stepper(extent_deg, max_range_m), extent_deg)
             }
@@ -182,33 +180,39 @@ fn clearance_m(scene: &Scene, at: DVec2) -> f64 {
 
 /// A set of readings at a pose.
 fn read(simulator: &Simulator, pose: &Pose, settings: &TrialSettings, rng: &mut impl Rng) -> Sweep {
-    let station = simulator.station(pose.position());
-    let (azimuths_deg, step_deg): (Vec<f64>, f64) = match settings.arrangement {
-        Arrangement::Ring => (PIONEER_1_DEG.to_vec(), 25.0),
-        Arrangement::Stepper => ((0..400).map(|i| 0.9 * f64::from(i)).collect(), 0.9),
+    let mut heard = |prediction: &Prediction| hear(prediction, settings.range_sigma_m, rng);
+    let (mut beams, step_deg): (Vec<Beam>, f64) = match &settings.arrangement {
+        Arrangement::Ring(array) => {
+            let beam = |(index, at): (u32, usize)| {
+                let ranger = &array.rangers[at];
+                let (azimuth_deg, mount) =
+                    (ranger.azimuth_deg(), DVec2::new(ranger.x_m, ranger.y_m));
+                let mounted = ranger.pose_on(pose);
+                let station = simulator.station(mounted.position());
+                let heard = heard(&station.ping(mounted.direction_rad(0.0)));
+                Beam { azimuth_deg, index, heard, mount }
+            };
+            ((0..).zip(array.round()).map(beam).collect(), RING_STEP_DEG)
+        }
+        Arrangement::Stepper => {
+            let station = simulator.station(pose.position());
+            let beam = |index: u32| {
+                let azimuth_deg = 0.9 * f64::from(index);
+                let heard = heard(&station.ping(pose.direction_rad(azimuth_deg)));
+                Beam { azimuth_deg, index, heard, mount: DVec2::ZERO }
+            };
+            ((0..400).map(beam).collect(), 0.9)
+        }
     };
-    let mut beams: Vec<Beam> = azimuths_deg
-        .iter()
-        .zip(0..)
-        .map(|(&azimuth_deg, index)| {
-            let azimuth_deg = wrap_360(azimuth_deg);
-            let heard = hear(&station, pose, azimuth_deg, settings.range_sigma_m, rng);
-            Beam { azimuth_deg, index, heard }
-        })
-        .collect();
     beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
     let closed = settings.arrangement == Arrangement::Stepper;
     Sweep { pose: *pose, step_deg, beams, closed }
 }
 
-fn hear(
-    station: &Station<'_>,
-    pose: &Pose,
-    azimuth_deg: f64,
-    sigma_m: f64,
-    rng: &mut impl Rng,
-) -> Heard {
-    let prediction = station.ping(pose.direction_rad(azimuth_deg));
+/// Rangers of a ring are so far apart that each counts by itself, degrees.
+const RING_STEP_DEG: f64 = 25.0;
+
+fn hear(prediction: &Prediction, sigma_m: f64, rng: &mut impl Rng) -> Heard {
     match (prediction.status, prediction.range_m) {
         (PingStatus::Echo, Some(range_m)) => {
             let unit: f64 = StandardNormal.sample(rng);

@@ -3,6 +3,7 @@
 //! An [`Engine`] finds the echoes that reach the transducer's face; the receiver decides which
 //! of them is detected. [`Simulator`] joins the two.
 
+mod array;
 mod batch;
 mod cone;
 mod fan;
@@ -14,6 +15,7 @@ mod station;
 mod tests;
 mod way;
 
+pub use array::{ArrayModel, ArrayStand};
 pub use cone::Cone;
 pub use fan::{Fan, FanSettings};
 pub use simulator::{EngineKind, ModelError, Options, Simulator};

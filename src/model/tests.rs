@@ -1,5 +1,6 @@
 //! The engines against closed forms, laws, and the phenomena of Dudek, Jenkin, Milios and Wilkes.
 
+mod array;
 mod closed_forms;
 mod extents;
 mod full_wave;

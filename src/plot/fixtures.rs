@@ -81,7 +81,8 @@ pub(super) fn scan_of_room(pose: Pose, step_deg: f64, seed: u64) -> ScanView {
         let sim = predict(&pose, azimuth_deg);
         measure(scan, i, azimuth_deg, sim, &mut rng)
     });
-    let start = ScanStart { scan, time: jiff::Timestamp::UNIX_EPOCH, pose, plan, air: None };
+    let time = jiff::Timestamp::UNIX_EPOCH;
+    let start = ScanStart { scan, time, pose, plan, air: None, provenance: None };
     let end = ScanEnd {
         scan,
         time: jiff::Timestamp::UNIX_EPOCH,
@@ -91,6 +92,7 @@ pub(super) fn scan_of_room(pose: Pose, step_deg: f64, seed: u64) -> ScanView {
         duration_s: 25.1,
         acoustic_limit_s: 24.9,
         home_drift_steps: Some(0),
+        provenance: None,
     };
     let records = [Record::Session(Box::new(session())), Record::ScanStart(start)]
         .into_iter()
@@ -128,6 +130,7 @@ pub(super) fn session() -> Session {
         provenance: Provenance::Mock,
         device: None,
         sensor: Sensor::preset("senscomp-6500").expect("a preset"),
+        array: None,
         air: air.to_record(),
         scene: Some(SceneRef { name: "simple-room".into(), sha256: String::new() }),
         model: Some(ModelRecord { engine: "fan".into(), settings: serde_json::Map::new() }),
@@ -204,6 +207,9 @@ fn measure(
         index,
         step: index as i32,
         azimuth_deg,
+        ranger: None,
+        pose: None,
+        provenance: None,
         time: None,
         time_sigma_us: Some(12.0),
         status,

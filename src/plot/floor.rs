@@ -8,7 +8,7 @@ use super::{
     readings::{Kind, Reading, Readings},
     theme,
 };
-use crate::geometry::{Pose, wrap_360};
+use crate::geometry::{DVec2, Pose, wrap_360};
 
 /// More rays than this are thinned out.
 const MAX_RAYS: usize = 120;
@@ -26,19 +26,22 @@ pub(super) struct Floor<'a> {
 impl Floor<'_> {
     /// Rays from the ranger to each predicted range, and a ring there; for a scan that the
     /// model made, rays to its readings.
+    /// Of an array, fans to its readings.
     pub(super) fn model(&self) -> Layer {
+        if let (Some(fan), false) = (self.scan.fan, self.scan.has_model) {
+            return fan.draw(self.plan, self.scan);
+        }
         let mut rays =
             Layer::new("rays").stroked(theme::SKY, theme::HAIRLINE_PX).with("stroke-opacity", 0.55);
         let mut rings = Layer::new("model").stroked(theme::SKY, 1.0);
         let every = self.scan.beams.len().div_ceil(MAX_RAYS).max(1);
-        let from = self.plan.px(self.pose.position());
         let mut ends = Vec::new();
         for (i, beam) in self.scan.beams.iter().enumerate() {
             let target = if self.scan.has_model { beam.model_range_m } else { beam.range_m };
             let Some(range_m) = target else { continue };
             let at = self.at(beam, range_m);
             if i % every == 0 {
-                ends.push([from, at]);
+                ends.push([self.plan.px(beam.ray(&self.pose).0), at]);
             }
             if self.scan.has_model && self.plan.panel.contains(at) {
                 rings.circle(at, RING_PX);
@@ -53,6 +56,9 @@ impl Floor<'_> {
 
     /// The circle within which nothing is measured.
     pub(super) fn min_range(&self) -> Layer {
+        if let Some(fan) = self.scan.fan {
+            return fan.min_range(self.plan, self.scan);
+        }
         let mut layer = Layer::new("min-range")
             .stroked(theme::PURPLE, 1.0)
             .with("stroke-dasharray", MIN_RANGE_DASH);
@@ -83,7 +89,7 @@ impl Floor<'_> {
             let length_px = if kind == Kind::Silent { 6.0 } else { 10.0 };
             let beams = self.scan.beams.iter().filter(|beam| beam.kind == kind);
             let runs = beams.filter_map(|beam| {
-                let (at, outward) = self.rim(beam.azimuth_deg)?;
+                let (at, outward) = self.rim(beam.ray(&self.pose))?;
                 Some([at - length_px * outward, at])
             });
             ticks.runs(runs);
@@ -97,7 +103,9 @@ impl Floor<'_> {
         let mut layer = Layer::new("beyond").with("fill", theme::INK);
         let mut texts = Layer::new("ranges").haloed();
         for cluster in self.clusters_beyond() {
-            let Some((at, outward)) = self.rim(cluster.azimuth_deg) else { continue };
+            let direction_rad = self.pose.direction_rad(cluster.azimuth_deg);
+            let ray = (self.pose.position(), direction_rad);
+            let Some((at, outward)) = self.rim(ray) else { continue };
             let (nose, side) = (at - 2.0 * outward, 4.5 * outward.perp());
             let tail = nose - 9.0 * outward;
             let mut arrow = Layer::new("arrow").with("fill", cluster.colour());
@@ -129,19 +137,18 @@ impl Floor<'_> {
     }
 
     fn at(&self, beam: &Reading, range_m: f64) -> Px {
-        self.plan.px(self.pose.point_at(beam.azimuth_deg, range_m))
+        self.plan.px(beam.point(&self.pose, range_m))
     }
 
     /// Where a beam leaves the panel, and its direction on the page; `None` when the ranger
     /// itself is outside.
-    fn rim(&self, azimuth_deg: f64) -> Option<(Px, Px)> {
+    fn rim(&self, (place, direction_rad): (DVec2, f64)) -> Option<(Px, Px)> {
         let panel = self.plan.panel;
-        let from = self.plan.px(self.pose.position());
+        let from = self.plan.px(place);
         if !panel.contains(from) {
             return None;
         }
-        let direction = self.pose.direction_rad(azimuth_deg);
-        let outward = Px::new(direction.cos(), -direction.sin());
+        let outward = Px::new(direction_rad.cos(), -direction_rad.sin());
         let until = |at: f64, along: f64, low: f64, high: f64| match along {
             a if a > 1e-12 => (high - at) / a,
             a if a < -1e-12 => (low - at) / a,

@@ -5,6 +5,7 @@
 
 mod canvas;
 mod caption;
+mod fans;
 mod features;
 mod floor;
 mod keys;

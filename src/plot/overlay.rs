@@ -56,7 +56,7 @@ fn dots(plan: &Plan, pose: &Pose, readings: &Readings) -> Layer {
     let mut layer = Layer::new("readings").with("fill", theme::SILENT);
     for beam in &readings.beams {
         if let Some(range_m) = beam.range_m {
-            let at = plan.px(pose.point_at(beam.azimuth_deg, range_m));
+            let at = plan.px(beam.point(pose, range_m));
             layer.mark(Shape::Dot, at, 1.4, None);
         }
     }

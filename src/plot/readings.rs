@@ -2,9 +2,11 @@
 //! prediction stands beside a reading, [`crate::compare`] says what explains it, so that pictures
 //! and tables agree.
 
-use super::{canvas::Shape, theme};
+use super::{canvas::Shape, fans::Fan, theme};
 use crate::{
+    acoustics::BeamPattern,
     compare::{Judged, Verdict, compare},
+    geometry::{DVec2, Pose, wrap_360},
     scan::{PathKind, PathRecord, Ping, PingStatus, ScanView, Session},
 };
 
@@ -78,7 +80,10 @@ impl Kind {
 /// One beam.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Reading {
+    /// Azimuth from the scan's heading, degrees.
     pub(super) azimuth_deg: f64,
+    /// Of a ranger of an array: where it stood and looked.
+    pub(super) transducer: Option<Pose>,
     pub(super) kind: Kind,
     /// Finite, not negative, and there exactly for the kinds that were heard.
     pub(super) range_m: Option<f64>,
@@ -99,6 +104,26 @@ pub(super) struct Readings {
     pub(super) min_range_m: Option<f64>,
     /// Whether predictions stand beside the readings.
     pub(super) has_model: bool,
+    /// How to draw readings of an array.
+    pub(super) fan: Option<Fan>,
+}
+
+impl Reading {
+    /// The place at a range along the beam, for a scan at `pose`.
+    pub(super) fn point(&self, pose: &Pose, range_m: f64) -> DVec2 {
+        match &self.transducer {
+            Some(ranger) => ranger.point_at(0.0, range_m),
+            None => pose.point_at(self.azimuth_deg, range_m),
+        }
+    }
+
+    /// Where the beam begins, and the world direction that it has, radians.
+    pub(super) fn ray(&self, pose: &Pose) -> (DVec2, f64) {
+        match &self.transducer {
+            Some(ranger) => (ranger.position(), ranger.direction_rad(0.0)),
+            None => (pose.position(), pose.direction_rad(self.azimuth_deg)),
+        }
+    }
 }
 
 impl Readings {
@@ -109,20 +134,22 @@ impl Readings {
         let mut beams: Vec<_> = judged
             .iter()
             .filter(|judged| judged.ping.azimuth_deg.is_finite())
-            .map(|judged| reading(judged, min_range_m))
+            .map(|judged| mounted(view, judged.ping, reading(judged, min_range_m)))
             .collect();
         beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
         let has_model = view.pings.iter().any(|ping| ping.sim.is_some());
-        Self { beams, min_range_m, has_model }
+        let fan = view.session.as_deref().and_then(fan);
+        Self { beams, min_range_m, has_model, fan }
     }
 
     /// The beams of several scans as one.
     pub(super) fn merged<'a>(scans: impl IntoIterator<Item = &'a Self>) -> Self {
-        let mut all = Self { beams: Vec::new(), min_range_m: None, has_model: false };
+        let mut all = Self { beams: Vec::new(), min_range_m: None, has_model: false, fan: None };
         for scan in scans {
             all.beams.extend_from_slice(&scan.beams);
             all.min_range_m = all.min_range_m.or(scan.min_range_m);
             all.has_model |= scan.has_model;
+            all.fan = all.fan.or(scan.fan);
         }
         all.beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
         all
@@ -147,6 +174,34 @@ fn min_range_m(session: &Session) -> Option<f64> {
     length(Some(session.air.sound_speed_m_s * blanking_us * 1e-6 / 2.0))
 }
 
+/// The beam's width and reach, for the session of an array.
+fn fan(session: &Session) -> Option<Fan> {
+    session.array.as_ref()?;
+    let (sensor, air) = (&session.sensor, &session.air);
+    sensor.check().ok()?;
+    let speed_m_s = Some(air.sound_speed_m_s).filter(|speed| speed.is_finite() && *speed > 0.0)?;
+    let settings = session.model.as_ref().map(|model| &model.settings);
+    let modelled_m = settings.and_then(|settings| settings.get("max_range_m")?.as_f64());
+    let max_range_m = length(modelled_m).unwrap_or(sensor.max_range_m);
+    Some(Fan { half_rad: BeamPattern::new(sensor, speed_m_s).angle_at(0.5), max_range_m })
+}
+
+/// A reading of an array with its transducer's place, and its azimuth as seen from the scan's.
+fn mounted(view: &ScanView, ping: &Ping, reading: Reading) -> Reading {
+    let transducer = view.transducer(ping).filter(|pose| {
+        (ping.ranger.is_some() || ping.pose.is_some())
+            && pose.position().is_finite()
+            && pose.heading_deg.is_finite()
+    });
+    let azimuth_deg = match (&transducer, view.pose()) {
+        (Some(ranger), Some(pose)) if pose.heading_deg.is_finite() => {
+            wrap_360(ranger.heading_deg - pose.heading_deg)
+        }
+        _ => reading.azimuth_deg,
+    };
+    Reading { azimuth_deg, transducer, ..reading }
+}
+
 fn reading(judged: &Judged<'_>, min_range_m: Option<f64>) -> Reading {
     let ping = judged.ping;
     let or_min_range = |status: PingStatus, range_m: Option<f64>| match status {
@@ -162,6 +217,7 @@ fn reading(judged: &Judged<'_>, min_range_m: Option<f64>) -> Reading {
     };
     Reading {
         azimuth_deg: ping.azimuth_deg,
+        transducer: None,
         kind,
         range_m,
         model_range_m,
@@ -205,7 +261,8 @@ fn length(range_m: Option<f64>) -> Option<f64> {
 }
 
 fn hint(ping: &Ping, kind: Kind, range_m: Option<f64>, model_m: Option<f64>) -> String {
-    let mut words = format!("{:.1}\u{b0} {}", ping.azimuth_deg, kind.words());
+    let ranger = ping.ranger.as_ref().map(|id| format!("{id}, ")).unwrap_or_default();
+    let mut words = format!("{ranger}{:.1}\u{b0} {}", ping.azimuth_deg, kind.words());
     if let Some(range) = range_m {
         words += &format!(" {range:.3} m");
     }

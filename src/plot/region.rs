@@ -43,7 +43,7 @@ fn points<'a>(pose: &'a Pose, scan: &'a Readings) -> impl Iterator<Item = DVec2>
             [beam.range_m, beam.model_range_m]
                 .into_iter()
                 .flatten()
-                .map(|range_m| pose.point_at(beam.azimuth_deg, range_m))
+                .map(|range_m| beam.point(pose, range_m))
         })
         .filter(|point| point.is_finite())
 }

@@ -298,7 +298,8 @@ prop_compose! {
         sim in prop::option::of(any_sim()),
     ) -> Ping {
         Ping {
-            scan: Uuid::nil(), index, step: 0, azimuth_deg, time: None, time_sigma_us: None,
+            scan: Uuid::nil(), index, step: 0, azimuth_deg, ranger: None, pose: None,
+            provenance: None, time: None, time_sigma_us: None,
             status, fired_ticks: None, echo_ticks: Vec::new(), tof_us: None, range_m,
             repaired: false, amplitude: None, margin_db, path: None, sim, residual_m,
         }
@@ -323,6 +324,7 @@ prop_compose! {
                 from_deg: plan[0], to_deg: plan[1], step_deg: plan[2], pings_per_stop: 1,
             },
             air: None,
+            provenance: None,
         });
         let session = with_session.then(|| session.into());
         ScanView { scan: Uuid::nil(), session, start, pings, events: Vec::new(), end: None }

@@ -100,7 +100,11 @@ fn pose(pose: &Pose) -> String {
 }
 
 fn sensor(session: &Session) -> String {
-    session.sensor.name.clone()
+    let sensor = &session.sensor.name;
+    match &session.array {
+        Some(array) => format!("{}: {} rangers {sensor}", array.name, array.rangers.len()),
+        None => sensor.clone(),
+    }
 }
 
 fn air(session: &Session) -> String {

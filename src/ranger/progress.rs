@@ -192,6 +192,7 @@ impl<'a> Progress<'a> {
             duration_s: ticks as f64 / f64::from(self.identity.tick_hz),
             acoustic_limit_s,
             home_drift_steps,
+            provenance: None,
         };
         self.write(&Record::ScanEnd(end.clone()));
         self.check_sink()?;
@@ -253,6 +254,9 @@ impl<'a> Progress<'a> {
             index,
             step: from + stop as i32 * stride,
             azimuth_deg: self.job.plan.azimuth_deg(stop),
+            ranger: None,
+            pose: None,
+            provenance: None,
             time: None,
             time_sigma_us: None,
             status,

@@ -168,7 +168,8 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         let motor = job.plan.motor_steps(steps_per_revolution)?;
         let scan = Uuid::new_v4();
         let time = Timestamp::now();
-        let start = ScanStart { scan, time, pose: job.pose, plan: job.plan, air: job.air };
+        let (pose, plan, air) = (job.pose, job.plan, job.air);
+        let start = ScanStart { scan, time, pose, plan, air, provenance: None };
         sink.record(&Record::ScanStart(start))?;
         let mut progress = Progress::new(job, scan, motor, self.wall_epoch, &self.identity, sink);
         let outcome = self.measure(job, motor, &mut progress, stop).await;

@@ -261,6 +261,9 @@ fn first_not_finite(record: &Record) -> Option<(&'static str, f64)> {
                 |path: &Option<super::PathRecord>| path.as_ref().map_or(0.0, |p| p.length_m);
             &[
                 ("azimuth_deg", ping.azimuth_deg),
+                ("pose.x_m", ping.pose.map_or(0.0, |pose| pose.x_m)),
+                ("pose.y_m", ping.pose.map_or(0.0, |pose| pose.y_m)),
+                ("pose.heading_deg", ping.pose.map_or(0.0, |pose| pose.heading_deg)),
                 ("path.length_m", length(&ping.path)),
                 ("sim.path.length_m", ping.sim.as_ref().map_or(0.0, |sim| length(&sim.path))),
             ]

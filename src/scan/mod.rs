@@ -1,5 +1,6 @@
 //! Scans: the plan, the readings, and the records they are logged as.
 
+mod array;
 mod codec;
 mod plan;
 mod record;

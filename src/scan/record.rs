@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-use crate::{acoustics::Sensor, geometry::Pose, scan::ScanPlan};
+use crate::{acoustics::Sensor, array::RangerArray, geometry::Pose, scan::ScanPlan};
 
 /// Version of the record format, written into every session.
 pub const LOG_FORMAT: u32 = 1;
@@ -59,6 +59,9 @@ pub struct Session {
     pub device: Option<Device>,
     /// The sensor's data in force.
     pub sensor: Sensor,
+    /// The array, all of whose rangers are such sensors; without it, one ranger on a stepper.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub array: Option<RangerArray>,
     /// The air in force.
     pub air: AirRecord,
     /// The scene the model was given.
@@ -125,11 +128,15 @@ pub struct ScanStart {
     pub time: Timestamp,
     /// Where the ranger stands.
     pub pose: Pose,
-    /// What is to be measured.
+    /// What is to be measured. Of an array, it has as many beams as the scan has firings; where they
+    /// look is the array's.
     pub plan: ScanPlan,
     /// The air as it was known then; the session's if it is not here.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub air: Option<ScanAir>,
+    /// The session's, repeated for readers of a live stream, by sources that make readings up.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub provenance: Option<Provenance>,
 }
 
 /// The air of a scan, as it was known when it began.
@@ -190,10 +197,20 @@ pub struct Ping {
     pub scan: Uuid,
     /// Index in the plan: stop times pings-per-stop plus ping.
     pub index: u32,
-    /// Motor position, steps from home.
+    /// Motor position, steps from home; of a ranger of an array, which has no motor, 0.
     pub step: i32,
     /// Azimuth, degrees counter-clockwise from the heading, in [0, 360).
     pub azimuth_deg: f64,
+    /// Which ranger of the session's array; without it, the one on the stepper.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ranger: Option<String>,
+    /// Where the robot stood at firing, if that is not the scan's pose: `azimuth_deg` counts from
+    /// its heading.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose: Option<Pose>,
+    /// The session's, repeated for readers of a live stream, by sources that make readings up.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub provenance: Option<Provenance>,
     /// Wall clock at firing, from the fit of the device's clock.
     pub time: Option<Timestamp>,
     /// Standard deviation of `time`, microseconds.
@@ -310,6 +327,9 @@ pub struct ScanEnd {
     /// the scan, steps; `null` if it did not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub home_drift_steps: Option<i32>,
+    /// The session's, repeated for readers of a live stream, by sources that make readings up.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub provenance: Option<Provenance>,
 }
 
 /// Something happened that a reader of the data must know.

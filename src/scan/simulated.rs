@@ -34,7 +34,14 @@ impl ScanView {
         Self {
             scan,
             session: Some(std::sync::Arc::new(Session::simulated(simulator, time))),
-            start: Some(ScanStart { scan, time, pose: *pose, plan: *plan, air: None }),
+            start: Some(ScanStart {
+                scan,
+                time,
+                pose: *pose,
+                plan: *plan,
+                air: None,
+                provenance: None,
+            }),
             pings: pings.collect(),
             events: Vec::new(),
             end: Some(ScanEnd::simulated(simulator, scan, plan.beams(), time)),
@@ -54,6 +61,7 @@ impl Session {
             provenance: Provenance::Simulated,
             device: None,
             sensor: simulator.sensor().clone(),
+            array: None,
             air: simulator.air().to_record(),
             scene: Some(SceneRef { name: scene.name.clone(), sha256: scene.sha256.clone() }),
             model: Some(simulator.model_record()),
@@ -77,6 +85,9 @@ impl Ping {
             index,
             step: (azimuth_deg / 360.0 * STEPS_PER_REVOLUTION).round() as i32,
             azimuth_deg,
+            ranger: None,
+            pose: None,
+            provenance: None,
             time: None,
             time_sigma_us: None,
             status: said.status,
@@ -109,6 +120,7 @@ impl ScanEnd {
             duration_s: listening_s,
             acoustic_limit_s: listening_s,
             home_drift_steps: None,
+            provenance: None,
         }
     }
 }

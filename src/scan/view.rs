@@ -97,6 +97,9 @@ mod tests {
             index,
             step: 0,
             azimuth_deg: 0.0,
+            ranger: None,
+            pose: None,
+            provenance: None,
             time: None,
             time_sigma_us: None,
             status: PingStatus::NoEcho,
@@ -120,6 +123,7 @@ mod tests {
             pose: Pose { x_m: 1.0, y_m: 2.0, heading_deg: 0.0 },
             plan: ScanPlan::default(),
             air: None,
+            provenance: None,
         })
     }
 

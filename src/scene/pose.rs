@@ -187,10 +187,27 @@ impl Scene {
         outlines: &Outlines,
         pose: &Pose,
     ) -> Result<(), PoseError> {
-        let (position, Pose { x_m, y_m, heading_deg }) = (pose.position(), *pose);
+        within("DEG", pose.heading_deg, MAX_HEADING_DEG)?;
+        self.check_place(outlines, pose.position())?;
+        self.check_robot(pose)
+    }
+
+    /// Whether the faces of rangers can stand at some places: inside the room, in no body, and a
+    /// millimetre from every surface.
+    ///
+    /// # Errors
+    /// The first place that fails, by its index, and why.
+    pub fn check_places(&self, places: &[DVec2]) -> Result<(), (usize, PoseError)> {
+        let outlines = Outlines::of(self);
+        places.iter().enumerate().try_for_each(|(at, place)| {
+            self.check_place(&outlines, *place).map_err(|error| (at, error))
+        })
+    }
+
+    fn check_place(&self, outlines: &Outlines, position: DVec2) -> Result<(), PoseError> {
+        let DVec2 { x: x_m, y: y_m } = position;
         within("X", x_m, MAX_COORDINATE_M)?;
         within("Y", y_m, MAX_COORDINATE_M)?;
-        within("DEG", heading_deg, MAX_HEADING_DEG)?;
         let room = outlines.room.as_ref().map(Outline::extent);
         if let Some((reflector, distance_m)) = self.nearest_surface(position)
             && distance_m < CLEARANCE_M
@@ -204,10 +221,10 @@ impl Scene {
             let [low, high] = outline.extent();
             return Err(PoseError::OutsideRoom { x_m, y_m, low, high });
         }
-        if let Some(body) = self.body_around(outlines, position) {
-            return Err(PoseError::InsideBody { x_m, y_m, body, room });
+        match self.body_around(outlines, position) {
+            Some(body) => Err(PoseError::InsideBody { x_m, y_m, body, room }),
+            None => Ok(()),
         }
-        self.check_robot(pose)
     }
 
     /// Name and distance (metres) of the nearest surface.

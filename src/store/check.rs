@@ -11,8 +11,12 @@ use jiff::{SignedDuration, Timestamp};
 use serde::Serialize;
 use uuid::Uuid;
 
-use crate::scan::{
-    Event, FaultKind, LOG_FORMAT, Ping, PingStatus, Record, ScanEnd, ScanPlan, ScanStart, Session,
+use crate::{
+    array::{MountedRanger, RangerArray},
+    scan::{
+        Event, FaultKind, LOG_FORMAT, Ping, PingStatus, Record, ScanEnd, ScanPlan, ScanStart,
+        Session,
+    },
 };
 
 use super::{Line, read_log};
@@ -66,8 +70,10 @@ pub enum FindingKind {
     NotEnded,
     /// Status, range, prediction and residual of a reading contradict each other.
     Contradiction,
-    /// A reading's azimuth is not the plan's.
+    /// A reading's azimuth is not the plan's, or not its ranger's.
     WrongAzimuth,
+    /// A reading of a ranger that the session's array does not have.
+    UnknownRanger,
     /// A record older than the one before it.
     TimeBackwards,
 }
@@ -134,6 +140,8 @@ pub struct Checker {
     /// The line now looked at.
     at: u64,
     session: bool,
+    /// The array of the session in force.
+    array: Option<RangerArray>,
     scan: Option<OpenScan>,
     scans: HashSet<Uuid>,
     latest: Option<Timestamp>,
@@ -212,6 +220,7 @@ impl Checker {
         self.totals.sessions += 1;
         self.leave_scan("when another session begins");
         self.session = true;
+        self.array.clone_from(&session.array);
         if session.format > LOG_FORMAT {
             let format = session.format;
             let detail = format!("format {format}, and this program reads up to {LOG_FORMAT}");
@@ -307,13 +316,34 @@ impl Checker {
             let detail = format!("beam {index}: the plan has beams 0 to {}", plan.beams() - 1);
             return self.problem(FindingKind::NoSuchBeam, detail);
         }
+        if let Some(id) = &ping.ranger {
+            return self.mounted(ping, id);
+        }
         let planned_deg = plan.azimuth_deg(index / plan.pings_per_stop);
-        let apart_deg = (ping.azimuth_deg - planned_deg + 180.0).rem_euclid(360.0) - 180.0;
-        if apart_deg.abs() > AZIMUTH_TOLERANCE_DEG && ping.status != PingStatus::StepDoubtful {
+        let off = is_off(ping.azimuth_deg, planned_deg);
+        if off && ping.status != PingStatus::StepDoubtful {
             let is_deg = ping.azimuth_deg;
             let detail =
                 format!("beam {index}: azimuth_deg is {is_deg}; the plan says {planned_deg}");
             self.problem(FindingKind::WrongAzimuth, detail);
+        }
+    }
+
+    /// Whether the session's array has this ranger, looking there.
+    fn mounted(&mut self, ping: &Ping, id: &str) {
+        let (index, is_deg) = (ping.index, ping.azimuth_deg);
+        let ranger = self.array.as_ref().and_then(|array| array.ranger(id));
+        match ranger.map(MountedRanger::azimuth_deg) {
+            Some(deg) if is_off(is_deg, deg) => {
+                let detail =
+                    format!("beam {index}: azimuth_deg is {is_deg}; ranger {id} looks to {deg}");
+                self.problem(FindingKind::WrongAzimuth, detail);
+            }
+            Some(_) => {}
+            None => {
+                let detail = format!("beam {index}: the session has no array with a ranger {id}");
+                self.problem(FindingKind::UnknownRanger, detail);
+            }
         }
     }
 
@@ -381,6 +411,12 @@ impl OpenScan {
         }
         wrong
     }
+}
+
+/// Whether two azimuths are not the same, degrees.
+fn is_off(one_deg: f64, other_deg: f64) -> bool {
+    let apart_deg = (one_deg - other_deg + 180.0).rem_euclid(360.0) - 180.0;
+    apart_deg.abs() > AZIMUTH_TOLERANCE_DEG
 }
 
 /// What in a reading contradicts itself.

@@ -113,6 +113,7 @@ impl Setup {
             provenance: provenance(identity),
             device: Some(device_record(identity)),
             sensor: self.sensor.clone(),
+            array: None,
             air: self.air.to_record(),
             scene: Some(SceneRef {
                 name: self.scene.name.clone(),

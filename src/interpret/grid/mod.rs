@@ -184,8 +184,22 @@ impl Grid {
         model: &BeamModel,
         trust: &Trust,
     ) -> usize {
-        let table = polar::Table::of(sweep, worths, model, trust, self.shape.resolution_m);
-        table.add_to(&self.shape, sweep.pose.position(), &mut self.log_odds);
-        table.left_out
+        let cell_m = self.shape.resolution_m;
+        // Rangers of an array hear from where they are: a table for each place.
+        let mut places: Vec<DVec2> = Vec::new();
+        for beam in &sweep.beams {
+            if !places.contains(&beam.mount) {
+                places.push(beam.mount);
+            }
+        }
+        let mut left_out = 0;
+        for mount in places {
+            let table = polar::Table::of(sweep, mount, worths, model, trust, cell_m);
+            let turn = DVec2::from_angle(sweep.pose.direction_rad(0.0));
+            let from = sweep.pose.position() + turn.rotate(mount);
+            table.add_to(&self.shape, from, &mut self.log_odds);
+            left_out += table.left_out;
+        }
+        left_out
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::{BeamModel, GridShape, MOST_LOG_ODDS, Trust};
 use crate::{
     geometry::DVec2,
-    interpret::{Heard, Sweep, prediction::Worth},
+    interpret::{Beam, Heard, Sweep, prediction::Worth},
 };
 
 /// Directions of the table: 0.75 degrees each, finer than the motor's steps.
@@ -27,8 +27,10 @@ pub(super) struct Table {
 }
 
 impl Table {
+    /// Of the readings of a set that were taken at one place on the robot.
     pub(super) fn of(
         sweep: &Sweep,
+        mount: DVec2,
         worths: Option<&[Worth]>,
         model: &BeamModel,
         trust: &Trust,
@@ -47,7 +49,8 @@ impl Table {
         // side.
         let share = (sweep.step_deg / model.width_deg()).clamp(0.0, 1.0);
         let mut profiles = [vec![0.0; distances], vec![0.0; distances]];
-        for (at, beam) in sweep.beams.iter().enumerate() {
+        let here = |(_, beam): &(usize, &Beam)| beam.mount == mount;
+        for (at, beam) in sweep.beams.iter().enumerate().filter(here) {
             let worth = worths.and_then(|worths| worths.get(at));
             let (range_m, echo) = match beam.heard {
                 Heard::Echo(range_m) if range_m <= model.max_range_m() => (range_m, true),
@@ -105,20 +108,18 @@ impl Table {
 
     /// Adds each entry to the cells it is about, around `from`.
     pub(super) fn add_to(&self, shape: &GridShape, from: DVec2, cells: &mut [f32]) {
-        let reach_m = self.reach.iter().max().map_or(0.0, |most| *most as f64 * self.cell_m);
         let place = (from - shape.origin) / shape.resolution_m;
-        if reach_m == 0.0 || !place.is_finite() {
+        if !place.is_finite() {
             return;
         }
-        let reach = reach_m / shape.resolution_m;
-        let range = |middle: f64, count: usize| {
-            let low = (middle - reach).floor().clamp(0.0, count as f64) as usize;
-            let high = (middle + reach).ceil().clamp(0.0, count as f64) as usize;
-            low..high
+        let [low, high] = self.box_in_cells(shape).map(|corner| place + corner);
+        let range = |low: f64, high: f64, count: usize| {
+            let within = |cell: f64| cell.clamp(0.0, count as f64) as usize;
+            within(low.floor())..within(high.ceil())
         };
-        let columns = range(place.x, shape.width);
+        let columns = range(low.x, high.x, shape.width);
         let per_radian = DIRECTIONS as f32 / TAU as f32;
-        for row in range(place.y, shape.height) {
+        for row in range(low.y, high.y, shape.height) {
             let dy = (row as f64 + 0.5 - place.y) as f32;
             let line = &mut cells[row * shape.width..][..shape.width];
             for column in columns.clone() {
@@ -134,6 +135,23 @@ impl Table {
                 *cell = (*cell + said).clamp(-MOST_LOG_ODDS, MOST_LOG_ODDS);
             }
         }
+    }
+}
+
+impl Table {
+    /// Lower left and upper right corner of what something is said of, from the place of the
+    /// ranger, cells.
+    fn box_in_cells(&self, shape: &GridShape) -> [DVec2; 2] {
+        let bin_rad = TAU / DIRECTIONS as f64;
+        let told = self.reach.iter().enumerate().filter(|(_, reach)| **reach > 0);
+        let sides = told.flat_map(|(direction, reach)| {
+            let reach = *reach as f64 * self.cell_m / shape.resolution_m;
+            // A direction's entry is for half a direction to each side of it.
+            [-0.5, 0.5].map(|off| reach * DVec2::from_angle((direction as f64 + off) * bin_rad))
+        });
+        let corners = sides.fold([DVec2::ZERO; 2], |[low, high], at| [low.min(at), high.max(at)]);
+        // An arc reaches a little beyond its ends.
+        [corners[0] - 1.0, corners[1] + 1.0]
     }
 }
 

@@ -21,7 +21,7 @@ fn gaussian() -> BeamModel {
 
 /// One beam along +x from (1, 2).
 fn beam(heard: Heard) -> Sweep {
-    let beams = vec![Beam { azimuth_deg: 0.0, index: 0, heard }];
+    let beams = vec![Beam { azimuth_deg: 0.0, index: 0, heard, mount: DVec2::ZERO }];
     let pose = Pose { x_m: 1.0, y_m: 2.0, heading_deg: 0.0 };
     Sweep { pose, step_deg: 25.0, beams, closed: false }
 }

@@ -76,7 +76,7 @@ impl LineMap {
             .beams
             .iter()
             .filter_map(|beam| match beam.heard {
-                Heard::Echo(range_m) => Some(sweep.pose.point_at(beam.azimuth_deg, range_m)),
+                Heard::Echo(range_m) => Some(sweep.point(beam, range_m)),
                 _ => None,
             })
             .collect();

@@ -155,7 +155,8 @@ fn lines_apart_or_across_stay_two() {
 fn sweep(place: DVec2, points: &[DVec2]) -> Sweep {
     let beams = (0..).zip(points).map(|(index, point)| {
         let off = *point - place;
-        Beam { azimuth_deg: off.to_angle().to_degrees(), index, heard: Heard::Echo(off.length()) }
+        let (azimuth_deg, heard) = (off.to_angle().to_degrees(), Heard::Echo(off.length()));
+        Beam { azimuth_deg, index, heard, mount: DVec2::ZERO }
     });
     let pose = Pose { x_m: place.x, y_m: place.y, heading_deg: 0.0 };
     Sweep { pose, step_deg: 0.9, beams: beams.collect(), closed: true }

@@ -148,7 +148,7 @@ impl FeaturePrediction {
                 Heard::Near => (0.0, false),
             };
             let echo = echo && range_m < self.settings.max_range_m;
-            let from = sweep.pose.position();
+            let from = sweep.place(beam);
             Ray { index: index as u32, from, axis_rad, sides: sides(axis_rad), range_m, echo }
         };
         sweep.beams.iter().enumerate().map(ray).collect()

@@ -14,6 +14,7 @@ fn ring(pose: Pose, readings: &[(f64, f64)]) -> Sweep {
         azimuth_deg,
         index,
         heard: if range_m > 0.0 { Heard::Echo(range_m) } else { Heard::Silent },
+        mount: DVec2::ZERO,
     };
     let beams = (0..).zip(readings).map(beam).collect();
     Sweep { pose, step_deg: 25.0, beams, closed: false }

@@ -65,7 +65,8 @@ pub(super) fn print_line(out: &mut impl Write, line: &Line, pings: bool) -> io::
 }
 
 fn print_session(out: &mut impl Write, session: &Session) -> io::Result<()> {
-    let Session { started, sonard, provenance, device, sensor, air, scene, model, .. } = session;
+    let Session { started, sonard, provenance, device, sensor, array, air, scene, model, .. } =
+        session;
     let provenance = format!("{provenance:?}").to_lowercase();
     writeln!(out, "session   {}  {provenance}, sonard {sonard}", seconds(*started))?;
     if let Some(device) = device {
@@ -78,6 +79,10 @@ fn print_session(out: &mut impl Write, session: &Session) -> io::Result<()> {
     }
     let (celsius, humidity, speed) = (air.temperature_c, air.humidity_percent, air.sound_speed_m_s);
     writeln!(out, "  sensor  {}; air {celsius} C, {humidity} %, {speed:.2} m/s", sensor.name)?;
+    if let Some(array) = array {
+        let (name, count) = (&array.name, array.rangers.len());
+        writeln!(out, "  array   {name}: {count} rangers, one each {} ms", array.interval_ms)?;
+    }
     let scene = scene.as_ref().map_or("no scene", |scene| &scene.name);
     let model = model.as_ref().map_or("none", |model| &model.engine);
     writeln!(out, "  scene   {scene}; model {model}")
@@ -186,7 +191,11 @@ fn ping_text(ping: &Ping) -> String {
         number(sim.and_then(|sim| sim.range_m), 1.0, 4),
         number(ping.residual_m, 1e3, 1),
         number(sim.and_then(|sim| sim.margin_db).or(ping.margin_db), 1.0, 1),
-        if ping.repaired { "  (repaired)" } else { "" },
+        match (ping.repaired, &ping.ranger) {
+            (true, _) => "  (repaired)".to_owned(),
+            (false, Some(ranger)) => format!("  (ranger {ranger})"),
+            (false, None) => String::new(),
+        },
     )
 }
 

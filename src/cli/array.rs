@@ -1,0 +1,60 @@
+//! Arrays of rangers and courses named on the command line.
+
+use std::{fs, io, path::Path};
+
+use super::Failure;
+use crate::array::{ArrayError, Course, RangerArray};
+
+/// An array: a file, or a preset by its name. A file of that name wins.
+pub(super) fn load_array(name: &str) -> Result<RangerArray, Failure> {
+    let array = match fs::read_to_string(name) {
+        Ok(text) => RangerArray::from_json(&text),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => RangerArray::preset(name),
+        Err(error) => {
+            return Err(Failure::input(
+                format!("cannot read the array {name}: {error}"),
+                "give a text file that you may read, or the name of a preset",
+            ));
+        }
+    };
+    array.map_err(|error| {
+        let message = match &error {
+            ArrayError::UnknownPreset { .. } => {
+                format!("there is no array file `{name}` and no preset of that name")
+            }
+            ArrayError::Form { line, column, field, message } => {
+                format!("{name}:{line}:{column}: {field}: {message}")
+            }
+            other => format!("{name}: {other}"),
+        };
+        Failure::input(message, error.help())
+    })
+}
+
+/// A course from a file of poses.
+pub(super) fn load_course(path: &Path) -> Result<Course, Failure> {
+    let name = path.display();
+    let text = fs::read_to_string(path).map_err(|error| {
+        Failure::input(
+            format!("cannot read the poses {name}: {error}"),
+            "give a text file with a pose a line: {\"x_m\": 1.0, \"y_m\": 2.0, \"heading_deg\": 90.0}",
+        )
+    })?;
+    Course::from_json_lines(&text).map_err(|error| {
+        let message = format!("{name}:{}: {}", error.line, error.message);
+        Failure::input(message, "correct that line")
+    })
+}
+
+/// Refuses `--array` where one ranger turns on a stepper.
+#[derive(Debug, Clone, clap::Args)]
+pub(super) struct NoArray {
+    #[arg(long, hide = true, value_name = "NAME|FILE", value_parser = no_array)]
+    array: Option<String>,
+}
+
+fn no_array(_name: &str) -> Result<String, String> {
+    Err("a stepper turns one ranger, and no device here drives several: arrays work with \
+         `sonard simulate --array` and `sonard run --simulate --array`"
+        .into())
+}

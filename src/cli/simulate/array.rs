@@ -1,0 +1,151 @@
+//! `sonard simulate --array`: rounds of an array's rangers at one pose or many.
+
+use std::{io, io::Write, path::PathBuf, sync::Arc};
+
+use jiff::Timestamp;
+use rand::SeedableRng as _;
+use rand_pcg::Pcg64;
+use uuid::Uuid;
+
+use super::{Args, open, progress};
+use crate::{
+    acoustics::ReceiverNoise,
+    cli::{
+        Failure, Outcome,
+        array::{load_array, load_course},
+        scene_file,
+    },
+    geometry::{Pose, wrap_360},
+    model::{ArrayModel, ArrayStand, ModelError},
+    scan::{Ping, Record, ScanEnd, ScanStart, Session},
+};
+
+/// Several rangers instead of one that turns.
+#[derive(Debug, Clone, clap::Args)]
+#[command(next_help_heading = "Array")]
+pub(super) struct ArrayArgs {
+    /// Fire the rangers of an array in turn instead of turning one: a preset (pioneer-8, pioneer-7,
+    /// ring-12), or a file with an array's data; the pose is then the robot's
+    #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["from_deg", "to_deg", "step_deg"])]
+    pub(super) array: Option<String>,
+    /// Poses of the robot, a scan each: a file with one a line, as {"x_m": 1.0, "y_m": 2.0,
+    /// "heading_deg": 90.0}
+    #[arg(long, value_name = "FILE", requires = "array", conflicts_with = "pose")]
+    pub(super) poses: Option<PathBuf>,
+    /// Rounds at each pose, between which the robot turns in place: of an even ring, so that
+    /// directions are spread evenly
+    #[arg(long, value_name = "N", requires = "array", default_value_t = 1,
+          value_parser = clap::value_parser!(u32).range(1..=200))]
+    pub(super) rounds: u32,
+}
+
+pub(super) fn run(args: &Args, name: &str) -> Outcome {
+    let array = load_array(name)?;
+    let scene = scene_file::load(&args.scene)?;
+    let poses = poses(args, &scene)?;
+    let rounds: Vec<Vec<Pose>> = poses.iter().map(|pose| turned(args, *pose, &array)).collect();
+    for (number, pose) in (1..).zip(&rounds).flat_map(|(n, all)| all.iter().map(move |p| (n, p))) {
+        array.check_pose(&scene, pose).map_err(|error| {
+            let which = args.array.poses.as_ref().map(|file| format!("{}: ", file.display()));
+            let which = which.map(|file| format!("{file}pose {number}: ")).unwrap_or_default();
+            Failure::input(format!("{which}{error}"), error.help())
+        })?;
+    }
+    let (sensor, air) = (args.sensor.sensor_or(&array.sensor)?, args.air.air()?);
+    let model =
+        ArrayModel::new(Arc::new(array), Arc::new(scene), sensor, air, args.engine.options()?)
+            .map_err(|error| refuse(&error))?;
+    let noise = args.noise.noise()?;
+    let (what, mut out) = open(args.out.as_deref())?;
+    let mut player = Player { model: &model, noise, rng: Pcg64::seed_from_u64(args.noise.seed) };
+    match player.play(&mut out, &rounds) {
+        Ok(()) => Ok(()),
+        Err(Stop::Model(error)) => Err(refuse(&error)),
+        Err(Stop::Write(error)) => Failure::from_write(&what, &error),
+    }
+}
+
+fn poses(args: &Args, scene: &crate::scene::Scene) -> Result<Vec<Pose>, Failure> {
+    match (&args.array.poses, &args.pose) {
+        (Some(file), _) => Ok(load_course(file)?.poses().to_vec()),
+        (None, pose) => {
+            let pose = scene.pose(pose.as_deref().unwrap_or_default());
+            Ok(vec![pose.map_err(|error| Failure::input(&error, error.help()))?])
+        }
+    }
+}
+
+/// The robot's pose in each round: turned by equal parts of the angle between two rangers of an
+/// even ring.
+fn turned(args: &Args, pose: Pose, array: &crate::array::RangerArray) -> Vec<Pose> {
+    let step_deg = array.plan(args.array.rounds).step_deg;
+    let heading_deg = |round| wrap_360(pose.heading_deg + f64::from(round) * step_deg);
+    let turned =
+        (1..args.array.rounds).map(|round| Pose { heading_deg: heading_deg(round), ..pose });
+    std::iter::once(pose).chain(turned).collect()
+}
+
+fn refuse(error: &ModelError) -> Failure {
+    Failure::input(error, "see `sonard simulate --help`")
+}
+
+/// Why it ended before the last scan.
+enum Stop {
+    Model(ModelError),
+    Write(io::Error),
+}
+
+impl From<io::Error> for Stop {
+    fn from(error: io::Error) -> Self {
+        Self::Write(error)
+    }
+}
+
+struct Player<'a> {
+    model: &'a ArrayModel,
+    noise: Option<ReceiverNoise>,
+    rng: Pcg64,
+}
+
+impl Player<'_> {
+    /// Writes the session, and a scan for each place with its rounds.
+    fn play(&mut self, out: &mut dyn Write, places: &[Vec<Pose>]) -> Result<(), Stop> {
+        put(out, &Record::Session(Box::new(Session::of_array(self.model, Timestamp::now()))))?;
+        let firings =
+            self.model.array().round().count() * places.iter().map(Vec::len).sum::<usize>();
+        let progress = progress(firings as u64);
+        for rounds in places {
+            let Some(first) = rounds.first() else { continue };
+            let (scan, count) = (Uuid::new_v4(), rounds.len() as u32);
+            let start = ScanStart::of_array(self.model, scan, *first, count, Timestamp::now());
+            put(out, &Record::ScanStart(start))?;
+            let mut index = 0;
+            for pose in rounds {
+                let stand = self.model.at(*pose).map_err(Stop::Model)?;
+                for ranger in self.model.array().round() {
+                    let prediction = self.listen(&stand, ranger);
+                    let ping = Ping::of_array(&stand, scan, first, index, ranger, &prediction);
+                    put(out, &Record::Ping(Box::new(ping)))?;
+                    index += 1;
+                    progress.inc(1);
+                }
+            }
+            let end = ScanEnd::of_array(self.model, scan, [index, 0], Timestamp::now());
+            put(out, &Record::ScanEnd(end))?;
+        }
+        progress.finish_and_clear();
+        Ok(out.flush()?)
+    }
+
+    fn listen(&mut self, stand: &ArrayStand<'_>, ranger: usize) -> crate::model::Prediction {
+        match &self.noise {
+            Some(noise) => stand.ping_in_noise(ranger, noise, &mut self.rng),
+            None => stand.ping(ranger),
+        }
+    }
+}
+
+fn put(out: &mut dyn Write, record: &Record) -> io::Result<()> {
+    serde_json::to_writer(&mut *out, record)?;
+    out.write_all(b"\n")
+}

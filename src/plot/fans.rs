@@ -1,0 +1,75 @@
+//! An array's readings: a fan for each, from the ranger's own place. What was heard is somewhere on
+//! the arc; a silent one is an empty outline as far as the ranger listens.
+
+use super::{
+    canvas::{Layer, Px, Shape},
+    floor::MIN_RANGE_DASH,
+    plan::Plan,
+    readings::{Reading, Readings},
+    theme,
+};
+use crate::geometry::{DVec2, Pose};
+
+/// An arc has so many pieces.
+const PIECES: i32 = 12;
+
+/// How an array's readings are drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Fan {
+    /// Half the beam's width, radians: to where the sound that leaves is 6 dB weaker.
+    pub(super) half_rad: f64,
+    /// How far the rangers listen, metres.
+    pub(super) max_range_m: f64,
+}
+
+impl Fan {
+    /// Every fan, and a dot where its ranger is.
+    pub(super) fn draw(&self, plan: &Plan, scan: &Readings) -> Layer {
+        let mut layer = Layer::new("fans");
+        let mut faces = Layer::new("faces").with("fill", theme::INK);
+        for (beam, ranger) in scan.beams.iter().filter_map(|beam| Some((beam, beam.transducer?))) {
+            layer.add(self.fan(plan, beam, &ranger));
+            faces.mark(Shape::Dot, plan.px(ranger.position()), 1.6, None);
+        }
+        layer.add(faces);
+        layer
+    }
+
+    fn fan(&self, plan: &Plan, beam: &Reading, ranger: &Pose) -> Layer {
+        let colour = beam.kind.colour();
+        let arc = self.arc(plan, ranger, beam.range_m.unwrap_or(self.max_range_m));
+        let outline = [&[plan.px(ranger.position())], arc.as_slice()].concat();
+        if beam.range_m.is_none() {
+            let mut silent = Layer::new("silent").stroked(colour, theme::HAIRLINE_PX);
+            silent.polygon_with_hint(&outline, &beam.hint);
+            return silent;
+        }
+        let mut heard = Layer::new("heard").with("fill", colour).with("fill-opacity", 0.13);
+        heard.polygon_with_hint(&outline, &beam.hint);
+        let mut rim = Layer::new("arc").stroked(colour, 2.2);
+        rim.runs([arc]);
+        heard.add(rim);
+        heard
+    }
+
+    /// The arcs within which nothing is measured.
+    pub(super) fn min_range(&self, plan: &Plan, scan: &Readings) -> Layer {
+        let mut layer = Layer::new("min-range")
+            .stroked(theme::PURPLE, 1.0)
+            .with("stroke-dasharray", MIN_RANGE_DASH);
+        if let Some(range_m) = scan.min_range_m {
+            let rangers = scan.beams.iter().filter_map(|beam| beam.transducer);
+            layer.runs(rangers.map(|ranger| self.arc(plan, &ranger, range_m)));
+        }
+        layer
+    }
+
+    fn arc(&self, plan: &Plan, ranger: &Pose, range_m: f64) -> Vec<Px> {
+        let point = |i: i32| {
+            let off_rad = self.half_rad * (2.0 * f64::from(i) / f64::from(PIECES) - 1.0);
+            let direction = DVec2::from_angle(ranger.direction_rad(0.0) + off_rad);
+            plan.px(ranger.position() + range_m * direction)
+        };
+        (0..=PIECES).map(point).collect()
+    }
+}
