@@ -46,6 +46,13 @@ pub(super) struct Args {
     /// Use a mock ranger in the scene instead of a real one, in real time
     #[arg(long, conflicts_with = "port")]
     mock: bool,
+    /// Play an array of rangers from the model, in real time, instead of using a device
+    #[arg(long, conflicts_with_all = ["port", "mock"])]
+    simulate: bool,
+    /// Array that --simulate plays: pioneer-8 (default), pioneer-7, ring-12, or a file
+    /// (simulate.array)
+    #[arg(long, value_name = "NAME|FILE", requires = "simulate")]
+    array: Option<String>,
     /// Let the mock's time run as fast as the computer can
     #[arg(long, requires = "mock", conflicts_with = "realtime")]
     virtual_time: bool,
@@ -71,7 +78,12 @@ Run the daemon: scan by plan, keep logs, serve the API.
 It finds the ranger by its stable name, homes it, and scans continuously, on a schedule or on \
 request. A ranger that goes away is waited for; nothing is measured that can't be logged. SIGHUP \
 reads the configuration again; SIGTERM and SIGINT stop the motor, close the scan and sync the \
-log. `sonard status`, `sonard watch` and curl talk to it.";
+log. `sonard status`, `sonard watch` and curl talk to it.
+
+With --simulate there is no device: the model plays an array of rangers at fixed bearings on a \
+robot, fired in turn (pioneer-8: one each 40 ms, so each of eight every 320 ms), round after round \
+unless scanning.mode says otherwise. Every record says that it is simulated. PUT /v1/pose moves the \
+robot, simulate.course drives it.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -80,6 +92,8 @@ Examples:
   curl --unix-socket /tmp/sonard.sock http://localhost/v1/status
   curl --unix-socket /tmp/sonard.sock -N http://localhost/v1/live/records
   curl --unix-socket /tmp/sonard.sock --json '{\"scans\": 1}' http://localhost/v1/start
+  sonard run --simulate --array pioneer-8 --scene mcgill-lab --pose fig4 --log log --socket /tmp/s.sock
+  curl --unix-socket /tmp/s.sock -N 'http://localhost/v1/live/records?moved_m=0.05'
   sonard run --print-config > sonard.toml
   sonard run --config sonard.toml --check
 
@@ -121,7 +135,13 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     // With a handler, a file that gets too large is an error of the write and not the end.
     let _too_large = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()));
     let keys = &settings.keys;
-    let board = board::open(&keys.gpio).map_err(|error| Failure::input(&error, error.help()))?;
+    let board = match settings.simulated {
+        // What is made up touches no pins.
+        Some(_) => None,
+        None => {
+            Some(board::open(&keys.gpio).map_err(|error| Failure::input(&error, error.help()))?)
+        }
+    };
     let log_folder = PathBuf::from(&keys.log.folder);
     let (journal, thread) = Journal::open(&log_folder, settings.rotation())
         .map_err(|error| Failure::device(&error, error.help()))?;
@@ -132,8 +152,13 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     }
     let server_keys = keys.server.clone();
     let access = access(&settings, &listeners)?;
-    let resources = Resources { open_port: Box::new(link::open), board, journal };
-    let (daemon, handle) = daemon::prepare(resources, settings);
+    let (daemon, handle) = match board {
+        Some(board) => {
+            let resources = Resources { open_port: Box::new(link::open), board, journal };
+            daemon::prepare(resources, settings)
+        }
+        None => daemon::prepare_simulated(journal, settings),
+    };
     let server = Server::new(handle.clone(), log_folder, access, &server_keys);
     let reloading = tokio::spawn(reload_on_hangup(loader, handle));
     let ended = CancellationToken::new();

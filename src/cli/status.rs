@@ -76,44 +76,24 @@ pub(super) fn refuse(error: &ClientError) -> Failure {
 
 /// One screen for a person.
 fn screen(status: &Value, health: &Value) -> String {
-    let word = |value: &Value| value.as_str().unwrap_or("-").to_owned();
-    let figure =
-        |value: &Value| value.as_f64().map_or_else(|| "-".into(), |figure| format!("{figure:.1}"));
-    let mut lines = vec![
-        format!(
-            "{} for {} s on {}",
-            word(&status["link"]["state"]).replace('_', " "),
-            figure(&status["uptime_s"]),
-            word(&status["link"]["port"]),
-        ),
-        format!(
-            "  device   {} firmware {} ({})",
-            word(&status["device"]["serial"]),
-            word(&status["device"]["firmware"]),
-            word(&status["provenance"]),
-        ),
-        format!(
-            "  scans    {} completed, {} stopped, {} failed; {} beams, {} missing; mode {}{}",
-            health["scans"]["completed"],
-            health["scans"]["stopped"],
-            health["scans"]["failed"],
-            health["scans"]["beams"],
-            health["scans"]["missing"],
-            word(&status["scanning"]["mode"]),
-            if status["scanning"]["paused"] == true { " (stopped)" } else { "" },
-        ),
-    ];
+    let mut lines = match status["simulation"].is_null() {
+        true => device(status, health),
+        false => simulation(status),
+    };
+    lines.push(format!(
+        "  scans    {} completed, {} stopped, {} failed; {} beams, {} missing; mode {}{}",
+        health["scans"]["completed"],
+        health["scans"]["stopped"],
+        health["scans"]["failed"],
+        health["scans"]["beams"],
+        health["scans"]["missing"],
+        word(&status["scanning"]["mode"]),
+        if status["scanning"]["paused"] == true { " (stopped)" } else { "" },
+    ));
     if let Some(scan) = status["scan"].as_object() {
         lines.push(format!("  scan     {} of {} beams", scan["done"], scan["beams"]));
     }
     lines.extend([
-        format!(
-            "  line     {} CRC errors, {} requests repeated, {} readings repaired, lost {} times",
-            health["line"]["crc_errors"],
-            health["line"]["retries"],
-            health["line"]["repaired"],
-            health["line"]["losses"],
-        ),
         format!(
             "  air      {} C ({}), sound {} m/s",
             figure(&status["air"]["temperature_c"]),
@@ -139,4 +119,69 @@ fn screen(status: &Value, health: &Value) -> String {
         lines.push(format!("  the last change of the configuration was refused: {error}"));
     }
     lines.join("\n") + "\n"
+}
+
+/// The ranger and its line.
+fn device(status: &Value, health: &Value) -> Vec<String> {
+    vec![
+        format!(
+            "{} for {} s on {}",
+            word(&status["link"]["state"]).replace('_', " "),
+            figure(&status["uptime_s"]),
+            word(&status["link"]["port"]),
+        ),
+        format!(
+            "  device   {} firmware {} ({})",
+            word(&status["device"]["serial"]),
+            word(&status["device"]["firmware"]),
+            word(&status["provenance"]),
+        ),
+        format!(
+            "  line     {} CRC errors, {} requests repeated, {} readings repaired, lost {} times",
+            health["line"]["crc_errors"],
+            health["line"]["retries"],
+            health["line"]["repaired"],
+            health["line"]["losses"],
+        ),
+    ]
+}
+
+/// The array that the model plays, and what it reads.
+fn simulation(status: &Value) -> Vec<String> {
+    let told = &status["simulation"];
+    let driving = if told["driving"] == true { ", driving" } else { "" };
+    let pose = &status["pose"];
+    let metres = |value: &Value| value.as_f64().map_or("-".into(), |m| format!("{m:.2}"));
+    let readings = told["readings"].as_array().into_iter().flatten().map(|reading| {
+        let (id, range) = (word(&reading["id"]), metres(&reading["range_m"]));
+        format!("{id} {range}")
+    });
+    vec![
+        format!(
+            "SIMULATED, nothing measured: {} for {} s",
+            word(&status["link"]["state"]).replace('_', " "),
+            figure(&status["uptime_s"]),
+        ),
+        format!(
+            "  array    {}, one ranger each {} ms, {} turns left out",
+            word(&told["array"]),
+            figure(&told["interval_ms"]),
+            told["skipped"],
+        ),
+        format!(
+            "  robot    at {}, {} m, heading {} degrees{driving}",
+            metres(&pose["x_m"]),
+            metres(&pose["y_m"]),
+            figure(&pose["heading_deg"]),
+        ),
+        format!("  ranges   {} m", readings.collect::<Vec<_>>().join(", ")),
+    ]
+}
+
+fn word(value: &Value) -> String {
+    value.as_str().unwrap_or("-").to_owned()
+}
+
+fn figure(value: &Value) -> String {
+    value.as_f64().map_or_else(|| "-".into(), |figure| format!("{figure:.1}"))
 }

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     client,
-    scan::{PingStatus, Record, decode_line},
+    scan::{PingStatus, Provenance, Record, decode_line},
 };
 
 /// Options of `sonard watch`.
@@ -96,7 +96,16 @@ fn words(line: &[u8]) -> String {
                 .sim
                 .as_ref()
                 .map_or_else(String::new, |sim| format!("  model {}", length(sim.range_m)));
-            format!("{:>6.1} deg  {:>9}  {status}{model}\n", ping.azimuth_deg, length(ping.range_m))
+            let ranger = ping.ranger.map_or_else(String::new, |id| format!("{id:>4} "));
+            let made_up = match ping.provenance {
+                Some(Provenance::Simulated) => "  (simulated)",
+                _ => "",
+            };
+            format!(
+                "{ranger}{:>6.1} deg  {:>9}  {status}{model}{made_up}\n",
+                ping.azimuth_deg,
+                length(ping.range_m)
+            )
         }
         Ok(Record::ScanStart(start)) => {
             format!("scan {} of {} beams\n", start.scan, start.plan.beams())
@@ -108,7 +117,10 @@ fn words(line: &[u8]) -> String {
             )
         }
         Ok(Record::Event(event)) => format!("{}\n", event.detail),
-        Ok(Record::Session(_)) => "a new session\n".into(),
+        Ok(Record::Session(session)) => match &session.array {
+            Some(array) => format!("a new session: array {}, simulated\n", array.name),
+            None => "a new session\n".into(),
+        },
         // What the daemon says about the stream itself.
         Err(_) => format!("{}\n", String::from_utf8_lossy(line)),
     }

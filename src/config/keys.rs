@@ -24,6 +24,8 @@ pub struct Keys {
     pub motion: MotionKeys,
     /// What is known about the ranger, and how echoes are predicted.
     pub model: ModelKeys,
+    /// What `sonard run --simulate` plays.
+    pub simulate: SimulateKeys,
     /// The air, from which the speed of sound follows.
     pub air: AirKeys,
     /// Where records are kept.
@@ -138,6 +140,31 @@ pub struct ModelKeys {
     /// Listen and predict up to this range, metres, instead of the sensor's.
     #[schemars(range(min = 0.1, max = 100), example = 4)]
     pub max_range_m: Option<f64>,
+}
+
+/// What `sonard run --simulate` plays.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SimulateKeys {
+    /// Array of rangers: a preset (pioneer-8, pioneer-7, ring-12), or a file with an array's data.
+    /// Unless model.sensor is set, its rangers are what the array says.
+    pub array: String,
+    /// From one firing to the next, milliseconds, instead of the array's own interval.
+    #[schemars(range(min = 1, max = 10_000), example = 40)]
+    pub interval_ms: Option<f64>,
+    /// File of poses that the robot drives along, one JSON object a line, with or without time_s;
+    /// the first goes before place.pose. A pose set through the API ends the drive.
+    #[schemars(example = "/etc/sonard/course.jsonl")]
+    pub course: Option<String>,
+    /// How fast it drives where the file has no times, metres a second.
+    #[schemars(range(min = 0.001, max = 10))]
+    pub speed_m_s: f64,
+    /// Standard deviation of the range noise, millimetres (the far tail is longer).
+    #[schemars(range(min = 0, max = 1000))]
+    pub noise_mm: f64,
+    /// Seed of the noise.
+    #[schemars(range(min = 0, max = 9_007_199_254_740_991_i64))]
+    pub seed: u64,
 }
 
 /// The air, from which the speed of sound follows.
@@ -292,6 +319,19 @@ impl Default for MotionKeys {
 impl Default for ModelKeys {
     fn default() -> Self {
         Self { sensor: "senscomp-6500".into(), engine: EngineKind::default(), max_range_m: None }
+    }
+}
+
+impl Default for SimulateKeys {
+    fn default() -> Self {
+        Self {
+            array: "pioneer-8".into(),
+            interval_ms: None,
+            course: None,
+            speed_m_s: 0.3,
+            noise_mm: 0.0,
+            seed: 1,
+        }
     }
 }
 

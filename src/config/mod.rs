@@ -12,7 +12,7 @@ mod schema;
 pub use document::document;
 pub use keys::{
     AirKeys, DeviceKeys, GpioKeys, Keys, LinkKeys, LogKeys, Mode, ModelKeys, MotionKeys, PlaceKeys,
-    PlanKeys, ScanningKeys, ServerKeys,
+    PlanKeys, ScanningKeys, ServerKeys, SimulateKeys,
 };
 pub use layers::{ConfigError, Layers, Origin};
 pub use schema::{Key, Kind, Section, sections};

@@ -190,6 +190,12 @@ impl Desk {
     }
 
     fn set_plan(&mut self, plan: ScanPlan) -> Result<(), Refusal> {
+        if self.settings.simulated.is_some() {
+            return Err(Refusal {
+                message: "an array has no plan: its rangers are fixed".into(),
+                help: "another array is simulate.array in the configuration".into(),
+            });
+        }
         let refuse = |error: crate::scan::PlanError| Refusal {
             message: error.to_string(),
             help: "a full turn is from_deg 0, to_deg 360, step_deg 0.9, pings_per_stop 1".into(),
@@ -208,6 +214,11 @@ impl Desk {
         Ok(())
     }
 
+    /// Whether what is simulated, or the ranger, can stand there.
+    pub(super) fn check_pose(&self, pose: &Pose) -> Result<(), Refusal> {
+        check_pose(&self.settings, pose)
+    }
+
     /// Takes a new configuration in: what changed in it goes before what programs said.
     fn reload(&mut self, settings: Settings) -> Interrupt {
         let before = std::mem::replace(&mut self.settings, settings);
@@ -222,6 +233,7 @@ impl Desk {
             self.pose = self.settings.pose;
         }
         self.stale |= moved || keys.model != then.model || self.settings.sensor != before.sensor;
+        self.stale |= keys.simulate != then.simulate || self.settings.simulated != before.simulated;
         if keys.air != then.air {
             self.air = AirDesk::new(keys.air.clone());
             self.thermometer = watch_thermometer(&keys.air);
@@ -246,6 +258,12 @@ fn check_pose(settings: &Settings, pose: &Pose) -> Result<(), Refusal> {
         });
     }
     let Some(scene) = &settings.scene else { return Ok(()) };
+    if let Some(simulated) = &settings.simulated {
+        return simulated
+            .array
+            .check_pose(scene, pose)
+            .map_err(|error| Refusal { message: error.to_string(), help: error.help() });
+    }
     scene
         .check_pose(pose)
         .map_err(|error| Refusal { message: error.to_string(), help: error.help() })

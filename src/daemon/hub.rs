@@ -61,8 +61,8 @@ struct Queue {
     /// Readings pushed out since that was last told.
     dropped: u64,
     closed: bool,
-    /// What was last sent for each motor step.
-    sent: HashMap<i32, (PingStatus, Option<f64>)>,
+    /// What was last sent for each direction: a motor step, or a ranger of an array.
+    sent: HashMap<(i32, Option<String>), (PingStatus, Option<f64>)>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -194,12 +194,13 @@ impl Queue {
     fn is_news(&mut self, ping: &Ping, moved_m: Option<f64>) -> bool {
         let Some(moved_m) = moved_m else { return true };
         let now = (ping.status, ping.range_m);
-        let same = self.sent.get(&ping.step).is_some_and(|&(status, range_m)| {
+        let direction = (ping.step, ping.ranger.clone());
+        let same = self.sent.get(&direction).is_some_and(|&(status, range_m)| {
             let moved = range_m.zip(ping.range_m).map_or(0.0, |(before, now)| (now - before).abs());
             status == ping.status && moved <= moved_m
         });
         if !same {
-            self.sent.insert(ping.step, now);
+            self.sent.insert(direction, now);
         }
         !same
     }

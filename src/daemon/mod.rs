@@ -20,6 +20,7 @@ mod machine;
 mod notify;
 mod operator;
 mod outlet;
+mod player;
 mod settings;
 mod status;
 
@@ -36,17 +37,18 @@ pub use hub::{Hub, Line, Subscription, Wanted};
 pub use journal::{Journal, JournalThread, LogStatus};
 pub use machine::{BackOff, Input, LinkMachine, LinkState, Step, Transition, Trouble};
 pub use operator::OpenPort;
-pub use settings::{Mismatch, Settings};
+pub use settings::{Mismatch, Settings, Simulated};
 pub use status::{
-    ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, ScanProgress, ScanReport,
-    ScanTotals, ScanningReport, Status, SubscriberReport,
+    ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, RangerReading, ScanProgress,
+    ScanReport, ScanTotals, ScanningReport, SimulationReport, Status, SubscriberReport,
 };
 
-use crate::board::Board;
+use crate::board::{Board, NoBoard};
 use air::AirDesk;
 use desk::Desk;
 use operator::Operator;
 use outlet::Outlet;
+use player::Player;
 use status::{Shared, View};
 
 /// Orders that may wait while one is carried out.
@@ -73,26 +75,51 @@ pub struct Handle {
 
 /// The daemon's tasks, not yet running.
 pub struct Daemon {
-    operator: Operator,
+    worker: Worker,
     shared: Arc<Shared>,
     hub: Hub,
     shutdown: CancellationToken,
+}
+
+/// Who has the readings: a ranger on a port, or the model.
+enum Worker {
+    Ranger(Box<Operator>),
+    Array(Box<Player>),
 }
 
 /// A daemon that owns `resources` and works by `settings`, and the handle to it. Must be called
 /// within a multi-threaded tokio runtime.
 #[must_use]
 pub fn prepare(resources: Resources, settings: Settings) -> (Daemon, Handle) {
+    let Resources { open_port, board, journal } = resources;
+    wire(board, journal, settings, |desk, outlet| {
+        Worker::Ranger(Box::new(Operator::new(desk, open_port, outlet)))
+    })
+}
+
+/// The same for the array that `settings` name, played by the model: no port and no pin is opened.
+#[must_use]
+pub fn prepare_simulated(journal: Journal, settings: Settings) -> (Daemon, Handle) {
+    wire(Box::new(NoBoard), journal, settings, |desk, outlet| {
+        Worker::Array(Box::new(Player::new(desk, outlet)))
+    })
+}
+
+fn wire(
+    board: Box<dyn Board>,
+    journal: Journal,
+    settings: Settings,
+    employ: impl FnOnce(Desk, Outlet) -> Worker,
+) -> (Daemon, Handle) {
     let (orders, requests) = mpsc::channel(ORDERS);
     let shutdown = CancellationToken::new();
     let hub = Hub::new(settings.keys.server.queue as usize);
     let shared = Arc::new(Shared::new(first_view(&settings)));
-    let Resources { open_port, board, journal } = resources;
     let desk = Desk::new(settings, board, requests, shutdown.clone(), journal.clone());
     let outlet = Outlet { journal: journal.clone(), hub: hub.clone(), shared: Arc::clone(&shared) };
-    let operator = Operator::new(desk, open_port, outlet);
+    let worker = employ(desk, outlet);
     let handle = Handle { orders, shared: Arc::clone(&shared), hub: hub.clone(), journal };
-    (Daemon { operator, shared, hub, shutdown }, handle)
+    (Daemon { worker, shared, hub, shutdown }, handle)
 }
 
 impl Daemon {
@@ -100,7 +127,12 @@ impl Daemon {
     /// stream ended.
     pub async fn run(self, stop: impl Future<Output = ()>) {
         let notifier = tokio::spawn(notify::run(Arc::clone(&self.shared), self.shutdown.clone()));
-        let operator = tokio::spawn(self.operator.run());
+        let operator = tokio::spawn(async {
+            match self.worker {
+                Worker::Ranger(operator) => operator.run().await,
+                Worker::Array(player) => player.run().await,
+            }
+        });
         stop.await;
         self.shutdown.cancel();
         if let Err(error) = operator.await {
@@ -178,5 +210,6 @@ fn first_view(settings: &Settings) -> View {
         line: LineTotals::default(),
         scans: ScanTotals::default(),
         clock: ClockReport::default(),
+        simulation: None,
     }
 }

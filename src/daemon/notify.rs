@@ -24,7 +24,8 @@ pub(super) async fn run(shared: Arc<Shared>, shutdown: CancellationToken) {
     loop {
         let (state, met, trouble) = {
             let view = views.borrow_and_update();
-            (view.state, view.device.is_some(), view.trouble.clone())
+            let met = view.device.is_some() || view.simulation.is_some();
+            (view.state, met, view.trouble.clone())
         };
         if met && !std::mem::replace(&mut ready, true) {
             say(&[NotifyState::Ready]);

@@ -5,6 +5,7 @@ use std::{sync::Arc, time::Duration};
 use super::machine::BackOff;
 use crate::{
     acoustics::{Air, Sensor},
+    array::{Course, RangerArray},
     config::Keys,
     geometry::Pose,
     model::Options,
@@ -25,6 +26,17 @@ pub struct Settings {
     pub sensor: Sensor,
     /// Where the ranger stands.
     pub pose: Pose,
+    /// What the model plays in place of a device, if it does.
+    pub simulated: Option<Simulated>,
+}
+
+/// An array that the model plays.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulated {
+    /// The array.
+    pub array: Arc<RangerArray>,
+    /// The way its robot takes, with times.
+    pub course: Option<Arc<Course>>,
 }
 
 /// What is wrong with values that are each within their range.

@@ -1,12 +1,21 @@
 //! From options, environment and file to settings; again at each reload.
 
-use std::{env, fs, io, path::PathBuf, sync::Arc};
+use std::{
+    env, fs, io,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use super::Args;
 use crate::{
-    cli::{Failure, options::load_sensor, scene_file},
-    config::{ConfigError, Keys, Layers},
-    daemon::Settings,
+    cli::{
+        Failure,
+        array::{load_array, load_course},
+        options::load_sensor,
+        scene_file,
+    },
+    config::{ConfigError, Keys, Layers, Mode},
+    daemon::{Settings, Simulated},
     scene::{PoseError, parse_pose},
 };
 
@@ -32,7 +41,10 @@ impl Loader {
         let layers = self.layers()?;
         let mut keys = layers.clone().keys().map_err(|error| refuse(&error))?;
         self.fill_in(&layers, &mut keys);
-        let settings = settings(keys)?;
+        let settings = match self.args.simulate {
+            true => simulated(keys, layers.origin("model", "sensor").is_some())?,
+            false => settings(keys)?,
+        };
         settings.check().map_err(|mismatch| {
             let origin = mismatch
                 .key
@@ -41,10 +53,11 @@ impl Loader {
                 .map_or_else(|| mismatch.key.to_owned(), ToString::to_string);
             Failure::input(format!("{origin}: {}", mismatch.message), &mismatch.help)
         })?;
-        if settings.keys.device.port.is_none() && !self.args.mock {
+        if settings.keys.device.port.is_none() && !self.args.mock && !self.args.simulate {
             return Err(Failure::input(
                 "no device: device.port is not set",
-                "set device.port in the file, give --port, or use --mock to try without one",
+                "set device.port in the file, give --port, or use --mock or --simulate to try \
+                 without one",
             ));
         }
         if self.args.mock && settings.scene.is_none() {
@@ -87,6 +100,7 @@ impl Loader {
             ("--pose", "place.pose", &self.args.pose),
             ("--log", "log.folder", &self.args.log),
             ("--socket", "server.socket", &self.args.socket),
+            ("--array", "simulate.array", &self.args.array),
         ];
         for setting in &self.args.set {
             layers = layers.option("--set", setting).map_err(|error| refuse(&error))?;
@@ -118,6 +132,10 @@ impl Loader {
         {
             keys.server.socket = format!("{folder}/sonard.sock");
         }
+        // A simulated array is polled all the time, as on the robot.
+        if self.args.simulate && layers.origin("scanning", "mode").is_none() {
+            keys.scanning.mode = Mode::Continuous;
+        }
         if self.port.is_some() {
             keys.device.port.clone_from(&self.port);
         }
@@ -135,7 +153,44 @@ fn settings(keys: Keys) -> Result<Settings, Failure> {
         None => (None, parse_pose(&keys.place.pose).map_err(refuse_pose)?),
     };
     let sensor = load_sensor(&keys.model.sensor)?;
-    Ok(Settings { keys, scene, sensor, pose })
+    Ok(Settings { keys, scene, sensor, pose, simulated: None })
+}
+
+/// The same for an array that the model plays; its rangers are what it says, unless the sensor was
+/// chosen.
+fn simulated(mut keys: Keys, sensor_chosen: bool) -> Result<Settings, Failure> {
+    let wanted = &keys.simulate;
+    let mut array = load_array(&wanted.array)?;
+    array.interval_ms = wanted.interval_ms.unwrap_or(array.interval_ms);
+    let course = wanted.course.as_ref().map(|file| load_course(Path::new(file))).transpose()?;
+    let course = course.map(|course| course.timed(wanted.speed_m_s));
+    if !sensor_chosen {
+        keys.model.sensor.clone_from(&array.sensor);
+    }
+    let Some(name) = &keys.place.scene else {
+        return Err(Failure::input(
+            "an array needs a scene to hear",
+            "give --scene, for instance --scene mcgill-lab --pose fig4",
+        ));
+    };
+    let scene = scene_file::load(name)?;
+    let pose = match &course {
+        Some(course) => course.poses()[0],
+        None => {
+            scene.pose(&keys.place.pose).map_err(|error| Failure::input(&error, error.help()))?
+        }
+    };
+    let all = course.as_ref().map_or(std::slice::from_ref(&pose), |course| course.poses());
+    for (number, pose) in (1..).zip(all) {
+        array.check_pose(&scene, pose).map_err(|error| {
+            let file = keys.simulate.course.as_ref();
+            let which = file.map(|file| format!("{file}: pose {number}: ")).unwrap_or_default();
+            Failure::input(format!("{which}{error}"), error.help())
+        })?;
+    }
+    let sensor = load_sensor(&keys.model.sensor)?;
+    let simulated = Simulated { array: Arc::new(array), course: course.map(Arc::new) };
+    Ok(Settings { keys, scene: Some(Arc::new(scene)), sensor, pose, simulated: Some(simulated) })
 }
 
 /// What is in force, as a file that would say the same.

@@ -79,6 +79,16 @@ fn registry(daemon: &Handle) -> Registry {
             "Whether the device can be used",
             f64::from(u8::from(status.link.state.is_up())),
         ),
+        (
+            "simulated",
+            "Whether the model makes the readings, and nothing is measured",
+            f64::from(u8::from(status.simulation.is_some())),
+        ),
+        (
+            "simulation_skipped_turns",
+            "Turns of a simulated array left out because the model was not ready",
+            status.simulation.as_ref().map_or(0.0, |told| told.skipped as f64),
+        ),
         ("log_waiting_records", "Records that could not be written yet", status.log.waiting as f64),
         ("subscribers", "Live streams", status.subscribers.now as f64),
         ("air_temperature_celsius", "Air temperature", status.air.temperature_c),

@@ -62,7 +62,8 @@ fn settings(port: String) -> Settings {
     keys.link.attempts = 2;
     (keys.link.retry_min_s, keys.link.retry_max_s) = (0.05, 0.3);
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-    Settings { keys, scene: None, sensor, pose: parse_pose("0,0,0").expect("a pose") }
+    let pose = parse_pose("0,0,0").expect("a pose");
+    Settings { keys, scene: None, sensor, pose, simulated: None }
 }
 
 #[test]

@@ -9,6 +9,7 @@ mod kill;
 mod load;
 mod rig;
 mod schema;
+mod simulate;
 mod soak;
 mod systemd;
 

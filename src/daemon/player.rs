@@ -1,0 +1,284 @@
+//! The operator of an array that the model plays: fires its rangers in turn, by the clock.
+//!
+//! As S5's service did: one ranger each interval (25 Hz on a Pioneer), a scan for each round. No
+//! port is opened, and every record says that it is simulated. A survey of the model belongs to a
+//! place: a robot that stands costs nothing new, one that moves a survey for each firing.
+
+mod rhythm;
+mod stage;
+
+use std::{ops::ControlFlow, time::Duration};
+
+use jiff::Timestamp;
+use tokio::time::{Instant, sleep_until};
+use uuid::Uuid;
+
+use super::{
+    agenda::Due,
+    desk::{Desk, Interrupt},
+    machine::LinkState,
+    outlet::Outlet,
+    status::{RangerReading, ScanTotals, SimulationReport},
+};
+use crate::{
+    geometry::Pose,
+    ranger::Sink as _,
+    scan::{EventKind, Ping, Provenance, Record, ScanEnd, ScanStart, Session},
+};
+use rhythm::Rhythm;
+use stage::{Drive, Stage};
+
+/// How often a player that waits shows that it is alive.
+const BEAT: Duration = Duration::from_secs(1);
+
+pub(super) struct Player {
+    desk: Desk,
+    out: Outlet,
+    stage: Option<Stage>,
+    drive: Drive,
+    rhythm: Rhythm,
+    /// The session's record that is in force in the log.
+    session: Option<Session>,
+    state: LinkState,
+    since: Timestamp,
+    scans: ScanTotals,
+}
+
+/// What is told on one line: a round, and where it began.
+#[derive(Debug, Clone, Copy)]
+struct Round {
+    scan: Uuid,
+    pose: Pose,
+}
+
+impl Player {
+    pub(super) fn new(desk: Desk, out: Outlet) -> Self {
+        Self {
+            drive: Drive::new(&desk),
+            desk,
+            out,
+            stage: None,
+            rhythm: Rhythm::new(Instant::now()),
+            session: None,
+            state: LinkState::Ready,
+            since: Timestamp::now(),
+            scans: ScanTotals::default(),
+        }
+    }
+
+    /// Plays until the end.
+    pub(super) async fn run(mut self) {
+        if let Some(simulated) = &self.desk.settings.simulated {
+            let array = &simulated.array;
+            let (name, count) = (&array.name, array.rangers.len());
+            tracing::info!("nothing is measured: the model plays {count} rangers, array {name}");
+        }
+        loop {
+            let due = match self.desk.agenda.due(self.desk.now()) {
+                // Nothing is told that can't be kept.
+                Due::Now if self.out.journal.is_well() => {
+                    if self.round().await.is_break() {
+                        break;
+                    }
+                    continue;
+                }
+                Due::Now | Due::OnRequest => None,
+                Due::At(at) => Some(self.desk.epoch + at),
+            };
+            self.enter(LinkState::Ready);
+            let beat = Instant::now() + BEAT;
+            let until = due.map_or(beat, |due| due.min(beat));
+            if self.attend_until(until).await == Some(Interrupt::Shutdown) {
+                break;
+            }
+            self.out.shared.beat();
+        }
+        self.enter(LinkState::Stopped);
+    }
+
+    /// One round of the array.
+    async fn round(&mut self) -> ControlFlow<()> {
+        if let Err(why) = self.set_stage().await {
+            // Trying again would fail again, until somebody changes something.
+            self.desk.agenda.stop();
+            tracing::error!("no scan is taken: {why}");
+            self.out.event(EventKind::Stopped, format!("no scan is taken: {why}"));
+            return ControlFlow::Continue(());
+        }
+        let Some(stage) = &self.stage else { return ControlFlow::Continue(()) };
+        let (model, order) = (stage.model(), stage.order());
+        self.enter(LinkState::Scanning);
+        self.desk.agenda.begun(self.desk.now());
+        self.rhythm.resume(Instant::now());
+        let round =
+            Round { scan: Uuid::new_v4(), pose: self.drive.pose(&mut self.desk, &self.out) };
+        let air = self.desk.air.settled();
+        let start = ScanStart {
+            air: Some(self.desk.air.scan_air(&air, Instant::now())),
+            ..ScanStart::of_array(&model, round.scan, round.pose, 1, Timestamp::now())
+        };
+        self.put(&Record::ScanStart(start));
+        let (mut fired, mut halted) = (0, None);
+        for &ranger in &order {
+            halted = self.attend_until(self.rhythm.next()).await;
+            if halted.is_some() {
+                break;
+            }
+            self.fire(round, fired, ranger).await;
+            fired += 1;
+            self.rhythm.advance(Instant::now(), self.interval());
+        }
+        if let Some(interrupt) = halted {
+            let stopping = interrupt == Interrupt::Shutdown;
+            let why = if stopping { "the daemon is stopping" } else { "stopped on request" };
+            self.out.event(EventKind::Stopped, why.to_owned());
+        }
+        let missing = order.len() as u32 - fired;
+        let counts = [fired, missing];
+        self.put(&Record::ScanEnd(ScanEnd::of_array(&model, round.scan, counts, Timestamp::now())));
+        self.count(counts);
+        match halted {
+            Some(Interrupt::Shutdown) => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
+        }
+    }
+
+    /// Fires one ranger, and tells of its reading when its echo is back or its turn is over.
+    async fn fire(&mut self, round: Round, index: u32, ranger: usize) {
+        let (slot, time) = (Instant::now(), Timestamp::now());
+        let pose = self.drive.pose(&mut self.desk, &self.out);
+        let Some(stage) = &mut self.stage else { return };
+        let heard = match stage.reading(ranger, pose).await {
+            Ok(heard) => heard,
+            Err(why) => {
+                tracing::error!("ranger {ranger}: {why}");
+                return;
+            }
+        };
+        let pose = Some(pose).filter(|pose| *pose != round.pose);
+        let ping = Ping { scan: round.scan, index, pose, time: Some(time), ..heard };
+        let listening_s = ping.tof_us.map_or_else(|| stage.window_s(), |tof_us| tof_us * 1e-6);
+        sleep_until(slot + Duration::from_secs_f64(listening_s.max(0.0))).await;
+        self.out.shared.view.send_modify(|view| {
+            let readings = view.simulation.as_mut().map(|told| &mut told.readings);
+            if let Some(reading) = readings.and_then(|readings| readings.get_mut(ranger)) {
+                (reading.time, reading.status) = (ping.time, Some(ping.status));
+                reading.range_m = ping.range_m;
+            }
+        });
+        self.put(&Record::Ping(Box::new(ping)));
+    }
+
+    /// Carries out orders until a time, or until one that a round has to end for.
+    async fn attend_until(&mut self, until: Instant) -> Option<Interrupt> {
+        loop {
+            let interrupt = tokio::select! {
+                () = sleep_until(until) => return None,
+                interrupt = self.desk.next() => interrupt,
+            };
+            match interrupt {
+                Interrupt::Shutdown | Interrupt::Stop => return Some(interrupt),
+                Interrupt::Log => match self.out.journal.status().error {
+                    Some(error) => {
+                        tracing::error!("no scan until the log can be written: {error}");
+                    }
+                    None => tracing::info!("the log can be written again"),
+                },
+                // There is neither a port nor a board.
+                Interrupt::PortChanged | Interrupt::EmergencyStop(_) | Interrupt::Agenda => {}
+            }
+            self.tell();
+            // A waiting player has to look at its agenda again.
+            if self.state == LinkState::Ready {
+                return Some(interrupt);
+            }
+        }
+    }
+
+    /// The model of what is in force now, and a session that says so.
+    async fn set_stage(&mut self) -> Result<(), String> {
+        let air = self.desk.air.settled();
+        let stale = std::mem::take(&mut self.desk.stale);
+        if stale {
+            self.drive.reload(&self.desk);
+        }
+        if stale || self.stage.as_ref().is_none_or(|stage| !stage.is_of(&air)) {
+            self.stage = Some(Stage::set(&self.desk.settings, air).await?);
+        }
+        let Some(stage) = &self.stage else { return Ok(()) };
+        let session = Session::of_array(&stage.model(), Timestamp::now());
+        let same = self.session.as_ref().is_some_and(|before| {
+            *before == Session { started: before.started, ..session.clone() }
+        });
+        if !same {
+            self.put(&Record::Session(Box::new(session.clone())));
+            self.session = Some(session);
+            self.tell();
+        }
+        Ok(())
+    }
+
+    fn put(&mut self, record: &Record) {
+        // The journal keeps what can't be written yet.
+        let _ = self.out.record(record);
+    }
+
+    fn count(&mut self, [beams, missing]: [u32; 2]) {
+        self.out.shared.view.send_modify(|view| view.scan = None);
+        *if missing > 0 { &mut self.scans.stopped } else { &mut self.scans.completed } += 1;
+        self.scans.beams += u64::from(beams);
+        self.scans.missing += u64::from(missing);
+        self.tell();
+    }
+
+    fn enter(&mut self, state: LinkState) {
+        if std::mem::replace(&mut self.state, state) != state {
+            self.since = Timestamp::now();
+            if state == LinkState::Stopped {
+                tracing::info!("stopped");
+            }
+        }
+        self.tell();
+    }
+
+    /// Publishes what is in force.
+    fn tell(&mut self) {
+        let next_at = match self.desk.agenda.due(self.desk.now()) {
+            Due::At(at) => Some(self.desk.epoch + at),
+            Due::Now | Due::OnRequest => None,
+        };
+        let (desk, drive, rhythm) = (&self.desk, &self.drive, &self.rhythm);
+        self.out.shared.view.send_modify(|view| {
+            (view.state, view.since) = (self.state, self.since);
+            view.provenance = Some(Provenance::Simulated);
+            view.mode = desk.settings.keys.scanning.mode;
+            (view.paused, view.requested) = (desk.agenda.is_paused(), desk.agenda.requested());
+            (view.next_at, view.pose) = (next_at, desk.pose);
+            view.air = desk.air.clone();
+            view.configuration = desk.configuration.clone();
+            view.scans = self.scans;
+            let told = desk.settings.simulated.as_ref().map(|simulated| {
+                let array = &simulated.array;
+                let before = view.simulation.take().filter(|told| told.is_of(array));
+                let readings = before.map_or_else(|| RangerReading::none(array), |b| b.readings);
+                SimulationReport {
+                    array: array.name.clone(),
+                    interval_ms: array.interval_ms,
+                    driving: drive.is_driving(),
+                    skipped: rhythm.skipped(),
+                    readings,
+                }
+            });
+            if let Some(simulated) = &desk.settings.simulated {
+                view.plan = simulated.array.plan(1);
+            }
+            view.simulation = told;
+        });
+    }
+
+    fn interval(&self) -> Duration {
+        let simulated = self.desk.settings.simulated.as_ref();
+        let interval_ms = simulated.map_or(40.0, |simulated| simulated.array.interval_ms);
+        Duration::from_secs_f64(interval_ms * 1e-3)
+    }
+}

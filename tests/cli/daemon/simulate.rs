@@ -1,0 +1,382 @@
+//! `sonard run --simulate`: an array of rangers from the model, served as if it were there.
+
+use std::{
+    fs,
+    io::{BufRead as _, BufReader, Write as _},
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use jiff::Timestamp;
+use rustix::process::Signal;
+use serde_json::{Value, json};
+
+use super::{Daemon, clean_log, logs, resident_kb};
+use crate::common::{Log, cpu_s, run, sonard, stderr, wait_until};
+
+const IDS: [&str; 8] = ["s0", "s1", "s2", "s3", "s4", "s5", "s6", "s7"];
+
+fn start(folder: &Path, further: &[&str]) -> Daemon {
+    let array = ["--simulate", "--array", "pioneer-8", "--scene", "mcgill-lab"];
+    Daemon::start(folder, &[&array, further].concat())
+}
+
+/// One in the laboratory, standing.
+fn standing(folder: &Path, further: &[&str]) -> Daemon {
+    start(folder, &[&["--pose", "3,1.2,20"], further].concat())
+}
+
+/// What a subscriber is sent in so many seconds, and when it came.
+fn listen(daemon: &Daemon, path: &str, seconds: f64) -> Vec<(Timestamp, Value)> {
+    let mut stream = daemon.connect().expect("it listens");
+    stream.set_read_timeout(Some(Duration::from_millis(100))).expect("a socket");
+    let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    stream.write_all(request.as_bytes()).expect("it listens");
+    let (until, mut told) = (Instant::now() + Duration::from_secs_f64(seconds), Vec::new());
+    let (mut reader, mut line) = (BufReader::new(stream), Vec::new());
+    while Instant::now() < until {
+        // A read that times out keeps what it has read.
+        if reader.read_until(b'\n', &mut line).is_ok_and(|count| count > 0) {
+            let now = Timestamp::now();
+            if let Ok(record @ Value::Object(_)) = serde_json::from_slice::<Value>(&line) {
+                told.push((now, record));
+            }
+            line.clear();
+        }
+    }
+    told
+}
+
+fn pings(told: &[(Timestamp, Value)]) -> Vec<(Timestamp, &Value)> {
+    told.iter().filter(|(_, record)| record["type"] == "ping").map(|(at, r)| (*at, r)).collect()
+}
+
+/// What `sonard simulate` reads at a pose: status and range by ranger.
+fn predicted(pose: &str) -> Vec<(Value, Value)> {
+    let output =
+        run(&["simulate", "--scene", "mcgill-lab", "--pose", pose, "--array", "pioneer-8"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let log = Log::parse(&String::from_utf8_lossy(&output.stdout));
+    log.pings().iter().map(|ping| (ping["status"].clone(), ping["range_m"].clone())).collect()
+}
+
+/// What the daemon says that its rangers read.
+fn told(daemon: &Daemon) -> Vec<(Value, Value)> {
+    let status = daemon.status();
+    let readings = status["simulation"]["readings"].as_array().expect("an array").clone();
+    readings.iter().map(|reading| (reading["status"].clone(), reading["range_m"].clone())).collect()
+}
+
+#[test]
+fn eight_sonars_are_polled_in_turn_at_25_hz_and_every_record_says_simulated() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = standing(folder.path(), &[]);
+    daemon.wait_for_scans(1);
+    let (before_s, since) = (cpu_s(daemon.id()), Instant::now());
+    let told = listen(&daemon, "/v1/live/records", 8.0);
+    let share = (cpu_s(daemon.id()) - before_s) / since.elapsed().as_secs_f64();
+    let kb = resident_kb(daemon.id());
+    for (_, record) in &told {
+        assert_eq!(record["provenance"], "simulated", "{record}");
+    }
+    let pings = pings(&told);
+    let fired: Vec<Timestamp> = pings
+        .iter()
+        .map(|(_, ping)| ping["time"].as_str().and_then(|t| t.parse().ok()).expect("a time"))
+        .collect();
+    let first = IDS.iter().position(|id| pings[0].1["ranger"] == *id).expect("a ranger");
+    for (at, (_, ping)) in pings.iter().enumerate() {
+        assert_eq!(ping["ranger"], IDS[(first + at) % 8], "in turn");
+    }
+    let mut late_ms: Vec<f64> = pings
+        .iter()
+        .zip(&fired)
+        .map(|((came, ping), fired)| {
+            let heard_ms = ping["tof_us"].as_f64().map_or(1e3 * 2.0 * 6.8 / 343.99, |us| us * 1e-3);
+            came.duration_since(*fired).as_secs_f64() * 1e3 - heard_ms
+        })
+        .collect();
+    late_ms.sort_by(f64::total_cmp);
+    let percentile = |p: f64| late_ms[(p * (late_ms.len() - 1) as f64) as usize];
+    let span_s = fired[fired.len() - 1].duration_since(fired[0]).as_secs_f64();
+    let rate_hz = (fired.len() - 1) as f64 / span_s;
+    let skipped = daemon.status()["simulation"]["skipped"].as_u64().expect("a count");
+    println!(
+        "{} readings, {rate_hz:.3} Hz, {skipped} turns left out; {:.2} ms after their echo in the \
+         middle, {:.2} ms at 95 %; {:.2} % of a core, {kb} kB resident",
+        pings.len(),
+        percentile(0.5),
+        percentile(0.95),
+        100.0 * share
+    );
+    // Firings are on a grid of 40 ms; only a machine that is too busy leaves turns out.
+    for pair in fired.windows(2) {
+        let apart_ms = pair[1].duration_since(pair[0]).as_secs_f64() * 1e3;
+        let off_ms = (apart_ms - 40.0 * (apart_ms / 40.0).round()).abs();
+        assert!(apart_ms > 20.0 && off_ms < 18.0, "{apart_ms} ms from firing to firing");
+    }
+    assert!((23.0..25.5).contains(&rate_hz), "{rate_hz} Hz");
+    assert!(percentile(0.95) < 40.0, "{} ms late at 95 %", percentile(0.95));
+    assert!(share < 0.1, "{share} of a core");
+    assert!(kb < 40_000, "{kb} kB resident");
+
+    // For people, too.
+    let socket = folder.path().join("s");
+    let status = run(&["status", "--socket", socket.to_str().expect("plain path")]);
+    assert_eq!(status.status.code(), Some(0));
+    let said = String::from_utf8_lossy(&status.stdout).into_owned();
+    assert!(said.contains("SIMULATED") && said.contains("pioneer-8, one ranger each 40"), "{said}");
+    let metrics = String::from_utf8(daemon.get("/metrics").body).expect("text");
+    assert!(metrics.contains("sonard_simulated 1"), "{metrics}");
+    assert!(daemon.status()["device"].is_null() && daemon.status()["link"]["port"] == "");
+    assert_eq!(daemon.stop(), Some(0));
+    let log = clean_log(folder.path());
+    assert_eq!(log.of_type("session").count(), 1);
+    let session = log.of_type("session").next().expect("a session");
+    assert_eq!(
+        (&session["provenance"], &session["array"]["name"]),
+        (&json!("simulated"), &json!("pioneer-8"))
+    );
+}
+
+#[test]
+fn a_pose_set_shows_in_readings_that_are_those_of_sonard_simulate() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = standing(folder.path(), &[]);
+    daemon.wait_for_scans(1);
+    assert_eq!(told(&daemon), predicted("3,1.2,20"));
+    for pose in ["2.2,1.4,110", "2.2,1.4,-70"] {
+        let [x, y, deg] = pose.split(',').collect::<Vec<_>>()[..] else { panic!("a pose") };
+        let body = format!("{{\"x_m\":{x},\"y_m\":{y},\"heading_deg\":{deg}}}");
+        assert_eq!(daemon.send("PUT", "/v1/pose", &body).status, 202);
+        assert_eq!(daemon.get("/v1/pose").json()["x_m"].as_f64(), x.parse().ok());
+        let scans = daemon.health()["scans"]["completed"].as_u64().expect("a count");
+        daemon.wait_for_scans(scans + 2);
+        assert_eq!(told(&daemon), predicted(pose), "{pose}");
+    }
+    // Places where it can't be, and plans, are refused.
+    for (path, body, word) in [
+        ("/v1/pose", r#"{"x_m":99,"y_m":0,"heading_deg":0}"#, "outside"),
+        ("/v1/pose", r#"{"x_m":5.55,"y_m":1.2,"heading_deg":0}"#, "ranger s"),
+        ("/v1/plan", r#"{"from_deg":0,"to_deg":9,"step_deg":0.9,"pings_per_stop":1}"#, "fixed"),
+    ] {
+        let reply = daemon.send("PUT", path, body);
+        assert_eq!(reply.status, 422, "{}", reply.json());
+        assert!(
+            reply.json()["error"].as_str().is_some_and(|e| e.contains(word)),
+            "{}",
+            reply.json()
+        );
+    }
+    assert_eq!(daemon.stop(), Some(0));
+    clean_log(folder.path());
+}
+
+#[test]
+fn subscribers_may_be_told_of_substantial_changes_only() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = standing(folder.path(), &[]);
+    daemon.wait_for_scans(1);
+    let quiet = listen(&daemon, "/v1/live/records?moved_m=0.05", 2.0);
+    assert_eq!(pings(&quiet).len(), 8, "each ranger once, and then nothing: the robot stands");
+    let every = listen(&daemon, "/v1/live/records", 2.0);
+    assert!(pings(&every).len() > 24, "{}", pings(&every).len());
+    let mover = std::thread::scope(|scope| {
+        let watching = scope.spawn(|| listen(&daemon, "/v1/live/records?moved_m=0.05", 3.0));
+        std::thread::sleep(Duration::from_millis(1200));
+        let body = r#"{"x_m":3.3,"y_m":1.2,"heading_deg":20}"#;
+        assert_eq!(daemon.send("PUT", "/v1/pose", body).status, 202);
+        watching.join().expect("no panic")
+    });
+    let count = pings(&mover).len();
+    assert!((9..=16).contains(&count), "{count}: each once, and what the move changed");
+    // A whole round is a message, too.
+    let rounds = listen(&daemon, "/v1/live/scans", 1.5);
+    assert!(rounds.iter().all(|(_, scan)| scan["pings"].as_array().map(Vec::len) == Some(8)));
+    assert!(rounds.len() >= 2, "{}", rounds.len());
+    // And for people.
+    let socket = folder.path().join("s").display().to_string();
+    let mut watch = sonard(&["watch", "--socket", &socket]);
+    let mut child = watch.stdout(std::process::Stdio::piped()).spawn().expect("starts");
+    let mut lines = BufReader::new(child.stdout.take().expect("piped")).lines();
+    let line =
+        lines.find_map(|line| line.ok().filter(|line| line.contains("deg"))).expect("a line");
+    assert!(line.trim_start().starts_with('s') && line.ends_with("(simulated)"), "{line}");
+    child.kill().expect("it runs");
+    child.wait().expect("it ends");
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn a_robot_drives_along_its_course_and_its_log_says_where_each_sonar_fired() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let course = folder.path().join("course.jsonl");
+    let line = |time_s: f64, x_m: f64, y_m: f64, heading_deg: f64| {
+        json!({"time_s": time_s, "x_m": x_m, "y_m": y_m, "heading_deg": heading_deg}).to_string()
+            + "\n"
+    };
+    let text = line(0.0, 2.0, 1.2, 0.0) + &line(3.0, 3.2, 1.2, 0.0) + &line(5.0, 3.2, 1.2, 90.0);
+    fs::write(&course, text).expect("writes");
+    let setting = format!("simulate.course={}", course.display());
+    let daemon = start(folder.path(), &["--set", &setting]);
+    daemon.wait_for_scans(1);
+    assert_eq!(daemon.status()["simulation"]["driving"], true);
+    let (before_s, since) = (cpu_s(daemon.id()), Instant::now());
+    std::thread::sleep(Duration::from_secs(2));
+    let share = (cpu_s(daemon.id()) - before_s) / since.elapsed().as_secs_f64();
+    wait_until("the end of the course", || daemon.status()["simulation"]["driving"] == false);
+    let skipped = daemon.status()["simulation"]["skipped"].clone();
+    let pose = daemon.get("/v1/pose").json();
+    assert_eq!(pose, json!({"x_m": 3.2, "y_m": 1.2, "heading_deg": 90.0}));
+    let scans = daemon.health()["scans"]["completed"].as_u64().expect("a count");
+    daemon.wait_for_scans(scans + 2);
+    assert_eq!(told(&daemon), predicted("3.2,1.2,90"));
+    assert_eq!(daemon.stop(), Some(0));
+    println!("driving takes {:.1} % of a core, {skipped} turns left out", 100.0 * share);
+
+    let log = clean_log(folder.path());
+    let moved = log.pings().iter().filter(|ping| ping["pose"].is_object()).count();
+    assert!(moved > 50, "{moved} readings from another place than their scan's");
+    // The model in the same places says the same: every place in the log is right.
+    let file = logs(folder.path())[0].display().to_string();
+    let compared = run(&["compare", &file, "--scene", "mcgill-lab", "--json"]);
+    let compared: Value = serde_json::from_slice(&compared.stdout).expect("one object");
+    let beams = log.pings().len() as u64;
+    assert_eq!(
+        (compared["beams"].as_u64(), &compared["verdicts"]["unexplained"]),
+        (Some(beams), &json!(0))
+    );
+    assert!(compared["p90_abs_residual_m"].as_f64().is_some_and(|m| m < 1e-9), "{compared}");
+}
+
+#[test]
+fn rounds_are_taken_on_request_and_stop_when_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = standing(folder.path(), &["--set", "scanning.mode=on-request"]);
+    daemon.wait_for("ready");
+    std::thread::sleep(Duration::from_millis(500));
+    assert_eq!(daemon.get("/v1/scan/latest").status, 404, "nothing is played unasked");
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":3}"#).status, 202);
+    daemon.wait_for_scans(3);
+    daemon.wait_for("ready");
+    assert_eq!(daemon.health()["scans"]["beams"], 24);
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":100}"#).status, 202);
+    daemon.wait_for_scans(4);
+    assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
+    daemon.wait_for("ready");
+    let scans = daemon.health()["scans"].clone();
+    std::thread::sleep(Duration::from_millis(600));
+    assert_eq!(daemon.health()["scans"], scans, "it stays stopped");
+    assert_eq!(daemon.stop(), Some(0));
+    let log = clean_log(folder.path());
+    assert!(log.events().iter().any(|event| event.contains("on request")), "{:?}", log.events());
+}
+
+#[test]
+fn another_scene_array_and_noise_come_with_the_configuration() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("sonard.toml");
+    let text = |scene: &str, array: &str, noise_mm: f64| {
+        format!(
+            "[place]\nscene = \"{scene}\"\npose = \"1.2,1,30\"\n[simulate]\narray = \"{array}\"\nnoise_mm = {noise_mm}\n"
+        )
+    };
+    fs::write(&file, text("mcgill-lab", "pioneer-8", 0.0)).expect("writes");
+    let config = file.display().to_string();
+    let daemon = Daemon::start(folder.path(), &["--simulate", "--config", &config]);
+    daemon.wait_for_scans(1);
+    fs::write(&file, text("two-surface-room", "pioneer-7", 2.0)).expect("writes");
+    daemon.signal(Signal::HUP);
+    wait_until("the other array", || daemon.status()["simulation"]["array"] == "pioneer-7");
+    let scans = daemon.health()["scans"]["completed"].as_u64().expect("a count");
+    daemon.wait_for_scans(scans + 4);
+    // A configuration that makes no sense changes nothing and is told.
+    fs::write(&file, text("two-surface-room", "pioneer-9", 2.0)).expect("writes");
+    daemon.signal(Signal::HUP);
+    wait_until("the refusal", || daemon.status()["configuration"]["error"].is_string());
+    assert_eq!(daemon.status()["simulation"]["array"], "pioneer-7");
+    assert_eq!(daemon.stop(), Some(0));
+    let log = clean_log(folder.path());
+    let sessions: Vec<_> = log
+        .of_type("session")
+        .map(|session| (session["scene"]["name"].clone(), session["array"]["name"].clone()))
+        .collect();
+    let expected = [("mcgill-lab", "pioneer-8"), ("two-surface-room", "pioneer-7")];
+    assert_eq!(sessions, expected.map(|(scene, array)| (json!(scene), json!(array))));
+    // With noise, a robot that stands reads a little otherwise each time.
+    let pings = log.pings();
+    let ranges: Vec<f64> = pings
+        .iter()
+        .rev()
+        .filter(|ping| ping["ranger"] == "s0")
+        .filter_map(|ping| ping["range_m"].as_f64())
+        .take(3)
+        .collect();
+    assert!(ranges.windows(2).any(|pair| pair[0] != pair[1]), "{ranges:?}");
+    assert!(ranges.iter().all(|m| (m - ranges[0]).abs() < 0.05), "{ranges:?}");
+}
+
+#[test]
+fn killed_at_any_moment_it_loses_no_synced_record_and_goes_on_with_the_same_log() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let records = || -> u64 {
+        let bytes = |log| fs::read(log).expect("readable");
+        let lines = |log| bytes(log).iter().filter(|&&byte| byte == b'\n').count() as u64;
+        logs(folder.path()).into_iter().map(lines).sum()
+    };
+    for turn in 0..4 {
+        let before = if turn > 0 { records() } else { 0 };
+        let daemon =
+            standing(folder.path(), &["--set", "log.sync_s=0.1", "--set", "log.daily=false"]);
+        wait_until("records", || daemon.status()["log"]["synced"].as_u64() > Some(12));
+        std::thread::sleep(Duration::from_millis(37 * turn));
+        let synced = daemon.status()["log"]["synced"].as_u64().expect("a count");
+        daemon.kill();
+        assert!(records() >= before + synced, "{} of {before} and {synced}", records());
+    }
+    let daemon = standing(folder.path(), &["--set", "log.daily=false"]);
+    daemon.wait_for_scans(1);
+    assert_eq!(daemon.stop(), Some(0));
+    assert_eq!(logs(folder.path()).len(), 1, "the same log goes on");
+    clean_log(folder.path());
+}
+
+#[test]
+fn wrong_configurations_are_refused_with_what_would_be_right() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = folder.path().join("log").display().to_string();
+    let socket = folder.path().join("s").display().to_string();
+    let course = folder.path().join("course.jsonl");
+    fs::write(&course, "{\"x_m\":3,\"y_m\":1.2}\n{\"x_m\":30,\"y_m\":1.2}\n").expect("writes");
+    let course = format!("simulate.course={}", course.display());
+    let lab = ["--scene", "mcgill-lab", "--pose", "3,1.2,0"];
+    for (arguments, parts) in [
+        (&["--simulate"][..], &["needs a scene"][..]),
+        (&["--simulate", "--mock", "--scene", "mcgill-lab"], &["--mock"]),
+        (&["--simulate", "--port", "/dev/ttyACM0"], &["--port"]),
+        (&["--array", "pioneer-8"], &["--simulate"]),
+        (
+            &[&["--simulate", "--array", "pioneer-9"], &lab[..]].concat(),
+            &["pioneer-9", "did you mean"],
+        ),
+        (&["--simulate", "--scene", "mcgill-lab", "--pose", "99,0,0"], &["outside"]),
+        (
+            &["--simulate", "--scene", "mcgill-lab", "--pose", "5.55,1.2,0"],
+            &["ranger s", "outside"],
+        ),
+        (&["--simulate", "--scene", "mcgill-lab", "--set", &course], &["pose 2", "outside"]),
+        (
+            &[&["--simulate", "--set", "simulate.interval_ms=0"], &lab[..]].concat(),
+            &["simulate.interval_ms", "1 to 10000"],
+        ),
+        (&[&["--simulate", "--set", "simulate.arrray=x"], &lab[..]].concat(), &["arrray", "array"]),
+        (&[&["--simulate", "--set", "model.sensor=pionier"], &lab[..]].concat(), &["pioneer"]),
+    ] {
+        let output = run(&[&["run", "--log", &log, "--socket", &socket], arguments].concat());
+        let said = stderr(&output).replace(['\n', '\u{2502}'], " ");
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        for part in parts {
+            assert!(said.contains(part), "{arguments:?}: {part:?} is not in: {said}");
+        }
+    }
+}
