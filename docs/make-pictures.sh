@@ -41,4 +41,8 @@ for pose in a b c d; do
 done
 "$SONARD" simulate --scene simple-room --pose fig9 --out "$work/fig9.jsonl"
 "$SONARD" plot "$work/fig9.jsonl" --azimuth-deg 270 -o "$pictures/simple-room-fig9-way.png"
+
+# Eight sonars of a Pioneer 3-DX.
+"$SONARD" simulate --array pioneer-8 --scene mcgill-lab --pose fig4 --out "$work/array.jsonl"
+"$SONARD" plot "$work/array.jsonl" -o "$pictures/array-mcgill-lab.png"
 ls -l "$pictures"

@@ -1,7 +1,7 @@
 //! The operator of an array that the model plays: fires its rangers in turn, by the clock.
 //!
-//! As S5's service did: one ranger each interval (25 Hz on a Pioneer), a scan for each round. No
-//! port is opened, and every record says that it is simulated. A survey of the model belongs to a
+//! After R. Arrabales' service of simulated sonars: one ranger each interval (25 Hz on a Pioneer), a
+//! scan for each round. No port is opened, and every record says that it is simulated. A survey of the model belongs to a
 //! place: a robot that stands costs nothing new, one that moves a survey for each firing.
 
 mod rhythm;
@@ -44,7 +44,7 @@ pub(super) struct Player {
     scans: ScanTotals,
 }
 
-/// What is told on one line: a round, and where it began.
+/// A round, and where it began.
 #[derive(Debug, Clone, Copy)]
 struct Round {
     scan: Uuid,
@@ -119,13 +119,12 @@ impl Player {
         };
         self.put(&Record::ScanStart(start));
         let (mut fired, mut halted) = (0, None);
-        for &ranger in &order {
+        for (index, &ranger) in (0..).zip(&order) {
             halted = self.attend_until(self.rhythm.next()).await;
             if halted.is_some() {
                 break;
             }
-            self.fire(round, fired, ranger).await;
-            fired += 1;
+            fired += u32::from(self.fire(round, index, ranger).await);
             self.rhythm.advance(Instant::now(), self.interval());
         }
         if let Some(interrupt) = halted {
@@ -143,16 +142,17 @@ impl Player {
         }
     }
 
-    /// Fires one ranger, and tells of its reading when its echo is back or its turn is over.
-    async fn fire(&mut self, round: Round, index: u32, ranger: usize) {
+    /// Fires one ranger, and tells of its reading when its echo is back or its turn is over; not if
+    /// the model failed.
+    async fn fire(&mut self, round: Round, index: u32, ranger: usize) -> bool {
         let (slot, time) = (Instant::now(), Timestamp::now());
         let pose = self.drive.pose(&mut self.desk, &self.out);
-        let Some(stage) = &mut self.stage else { return };
+        let Some(stage) = &mut self.stage else { return false };
         let heard = match stage.reading(ranger, pose).await {
             Ok(heard) => heard,
             Err(why) => {
                 tracing::error!("ranger {ranger}: {why}");
-                return;
+                return false;
             }
         };
         let pose = Some(pose).filter(|pose| *pose != round.pose);
@@ -167,6 +167,7 @@ impl Player {
             }
         });
         self.put(&Record::Ping(Box::new(ping)));
+        true
     }
 
     /// Carries out orders until a time, or until one that a round has to end for.
@@ -251,6 +252,8 @@ impl Player {
         self.out.shared.view.send_modify(|view| {
             (view.state, view.since) = (self.state, self.since);
             view.provenance = Some(Provenance::Simulated);
+            // Whatever port is configured, none is open.
+            view.port.clear();
             view.mode = desk.settings.keys.scanning.mode;
             (view.paused, view.requested) = (desk.agenda.is_paused(), desk.agenda.requested());
             (view.next_at, view.pose) = (next_at, desk.pose);

@@ -26,11 +26,15 @@ impl Rhythm {
         self.next = self.next.max(now);
     }
 
-    /// A ranger has fired. Turns that are missed are left out and counted, never made up for.
+    /// A ranger has fired. Turns that are missed are left out and counted, never made up for; one
+    /// that is late by up to half an interval is taken late.
     pub(super) fn advance(&mut self, now: Instant, interval: Duration) {
         self.next += interval;
         let behind = now.saturating_duration_since(self.next).as_nanos();
-        let missed = behind.div_ceil(interval.as_nanos().max(1));
+        let missed = match interval.as_nanos().max(1) {
+            each if behind * 2 <= each => 0,
+            each => behind.div_ceil(each),
+        };
         self.skipped += missed as u64;
         self.next += interval.saturating_mul(u32::try_from(missed).unwrap_or(u32::MAX));
     }
@@ -52,6 +56,10 @@ mod tests {
         let mut rhythm = Rhythm::new(start);
         rhythm.advance(at(39), interval);
         assert_eq!((rhythm.next(), rhythm.skipped()), (at(40), 0));
+        // A reading was told 2 ms late: the next ranger fires at once, and the grid stays.
+        let mut late = Rhythm::new(start);
+        late.advance(at(42), interval);
+        assert_eq!((late.next(), late.skipped()), (at(40), 0));
         // The model took until 130: the turns at 80 and 120 are gone.
         rhythm.advance(at(130), interval);
         assert_eq!((rhythm.next(), rhythm.skipped()), (at(160), 2));
