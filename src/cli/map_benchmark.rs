@@ -194,7 +194,10 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
     let (name, scene, start) = scene(course % 8, &mut rng)?;
     let ring = (course / 8).is_multiple_of(2);
     let arrangement = match ring {
-        true => Arrangement::Ring(RangerArray::preset(RING).map_err(|error| refuse(&error))?),
+        true => {
+            let array = RangerArray::preset(RING).map_err(|error| refuse(&error))?;
+            Arrangement::Ring(Box::new(array))
+        }
         false => Arrangement::Stepper,
     };
     let settings = TrialSettings {

@@ -31,7 +31,7 @@ use crate::{
 #[derive(Debug, Clone, PartialEq)]
 pub enum Arrangement {
     /// One round of an array's rangers.
-    Ring(RangerArray),
+    Ring(Box<RangerArray>),
     /// A full turn in steps of 0.9 degrees.
     Stepper,
 }

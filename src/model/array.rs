@@ -45,7 +45,7 @@ impl ArrayModel {
     /// When the sensor's data or an option are out of range.
     pub fn new(
         array: Arc<RangerArray>,
-        scene: Arc<Scene>,
+        scene: &Scene,
         sensor: Sensor,
         air: Air,
         options: Options,
@@ -59,7 +59,7 @@ impl ArrayModel {
                 heights.push(ranger.z_m);
             }
         }
-        let scene = Arc::new(array.in_scene(&scene));
+        let scene = Arc::new(array.in_scene(scene));
         let mut model =
             Self { array, scene, sensor, air, options, simulators: Vec::new(), heights };
         model.simulators = model.simulators_in(&model.scene)?;

@@ -85,8 +85,7 @@ fn array_model(
 ) -> Result<ArrayModel, Failure> {
     array.check().map_err(|error| refuse(log, &error))?;
     let (air, options) = conditions(log, session)?;
-    let (array, scene) = (Arc::new(array.clone()), Arc::new(scene.clone()));
-    ArrayModel::new(array, scene, session.sensor.clone(), air, options)
+    ArrayModel::new(Arc::new(array.clone()), scene, session.sensor.clone(), air, options)
         .map_err(|error| refuse(log, &error))
 }
 

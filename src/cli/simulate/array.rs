@@ -52,9 +52,8 @@ pub(super) fn run(args: &Args, name: &str) -> Outcome {
         })?;
     }
     let (sensor, air) = (args.sensor.sensor_or(&array.sensor)?, args.air.air()?);
-    let model =
-        ArrayModel::new(Arc::new(array), Arc::new(scene), sensor, air, args.engine.options()?)
-            .map_err(|error| refuse(&error))?;
+    let model = ArrayModel::new(Arc::new(array), &scene, sensor, air, args.engine.options()?)
+        .map_err(|error| refuse(&error))?;
     let noise = args.noise.noise()?;
     let (what, mut out) = open(args.out.as_deref())?;
     let mut player = Player { model: &model, noise, rng: Pcg64::seed_from_u64(args.noise.seed) };

@@ -35,7 +35,7 @@ impl Stage {
         let (array, scene) = (Arc::clone(&simulated.array), Arc::clone(scene));
         let (sensor, options) = (settings.sensor.clone(), settings.options());
         let rangers = array.rangers.len();
-        let making = move || ArrayModel::new(array, scene, sensor, air, options);
+        let making = move || ArrayModel::new(array, &scene, sensor, air, options);
         let model = tokio::task::spawn_blocking(making)
             .await
             .map_err(|error| format!("the model failed: {error}"))?

@@ -21,11 +21,10 @@ fn room(side_m: f64) -> Scene {
     Scene::from_json(&text).expect("a scene")
 }
 
-fn model(array: &str, scene: Scene, options: Options) -> ArrayModel {
+fn model(array: &str, scene: &Scene, options: Options) -> ArrayModel {
     let array = RangerArray::preset(array).expect("a preset");
     let sensor = Sensor::preset(&array.sensor).expect("a preset");
-    ArrayModel::new(Arc::new(array), Arc::new(scene), sensor, Air::default(), options)
-        .expect("right options")
+    ArrayModel::new(Arc::new(array), scene, sensor, Air::default(), options).expect("right options")
 }
 
 /// Of a ring in the middle of a square room, the four rangers that look straight at a wall read
@@ -33,7 +32,7 @@ fn model(array: &str, scene: Scene, options: Options) -> ArrayModel {
 #[test]
 fn a_ring_in_the_middle_of_a_room_reads_its_walls_from_its_own_radius() {
     let options = Options { ideal_receiver: true, ..Options::default() };
-    let model = model("ring-12", room(4.0), options);
+    let model = model("ring-12", &room(4.0), options);
     for heading_deg in [0.0, 90.0, 180.0] {
         let stand = model.at(Pose { x_m: 2.0, y_m: 2.0, heading_deg }).expect("a stand");
         for ranger in [0, 3, 6, 9] {
@@ -49,7 +48,7 @@ fn a_ring_in_the_middle_of_a_room_reads_its_walls_from_its_own_radius() {
 #[test]
 fn each_ranger_reads_what_a_single_one_reads_at_its_place() {
     let (scene, options) = (room(3.0), Options::default());
-    let model = model("pioneer-8", scene.clone(), options);
+    let model = model("pioneer-8", &scene, options);
     let sensor = Sensor::preset("pioneer").expect("a preset");
     let options = *model.simulator().options();
     let single = Simulator::new(Arc::new(scene), sensor, Air::default(), options).expect("right");
@@ -65,7 +64,7 @@ fn each_ranger_reads_what_a_single_one_reads_at_its_place() {
 #[test]
 fn no_ranger_hears_beyond_its_turn() {
     let model =
-        model("pioneer-8", room(30.0), Options { max_range_m: Some(50.0), ..Options::default() });
+        model("pioneer-8", &room(30.0), Options { max_range_m: Some(50.0), ..Options::default() });
     // 40 ms there and back.
     let heard_m = model.simulator().receiver().max_range_m;
     assert!((heard_m - 0.5 * 0.04 * Air::default().sound_speed_m_s()).abs() < 1e-9, "{heard_m}");
@@ -77,7 +76,7 @@ fn no_ranger_hears_beyond_its_turn() {
 /// robot, and turns and moves with it.
 #[test]
 fn a_body_moves_with_the_robot_and_is_in_the_way_of_sound() {
-    let with = model("ring-12", room(3.0), Options::default());
+    let with = model("ring-12", &room(3.0), Options::default());
     for (x_m, heading_deg) in [(1.0, 0.0), (1.5, 90.0), (1.7, 200.0)] {
         let robot = Pose { x_m, y_m: 1.5, heading_deg };
         assert_eq!(with.array().check_pose(with.scene(), &robot), Ok(()));
@@ -89,9 +88,8 @@ fn a_body_moves_with_the_robot_and_is_in_the_way_of_sound() {
         bare.body = None;
         let (scene, sensor) = (room(3.0), with.simulator().sensor().clone());
         let options = *with.simulator().options();
-        let bare =
-            ArrayModel::new(Arc::new(bare), Arc::new(scene), sensor, Air::default(), options)
-                .expect("right options");
+        let bare = ArrayModel::new(Arc::new(bare), &scene, sensor, Air::default(), options)
+            .expect("right options");
         let bare = bare.at(robot).expect("a stand");
         for ranger in [0, 3, 6, 9].into_iter().filter(|_| heading_deg != 200.0) {
             let [own, alone] = [&stand, &bare].map(|stand| stand.ping(ranger).range_m);
@@ -117,8 +115,7 @@ fn rangers_of_two_heights_hear_the_floor_differently() {
     scene.floor_z_m = Some(0.0);
     let sensor = Sensor::preset("pioneer").expect("a preset");
     let build = |array: RangerArray| {
-        let (array, scene) = (Arc::new(array), Arc::new(scene.clone()));
-        ArrayModel::new(array, scene, sensor.clone(), Air::default(), Options::default())
+        ArrayModel::new(Arc::new(array), &scene, sensor.clone(), Air::default(), Options::default())
             .expect("right options")
     };
     let robot = Pose { x_m: 3.0, y_m: 3.0, heading_deg: 0.0 };
@@ -134,7 +131,7 @@ fn rangers_of_two_heights_hear_the_floor_differently() {
 #[test]
 fn a_scan_of_an_array_says_where_each_transducer_was() {
     use crate::scan::{Ping, Record, ScanStart, Session, decode_line, encode_line};
-    let model = model("pioneer-8", room(3.0), Options::default());
+    let model = model("pioneer-8", &room(3.0), Options::default());
     let (time, scan) = (jiff::Timestamp::UNIX_EPOCH, uuid::Uuid::from_u128(1));
     let [from, to] = [0.0, 10.0].map(|heading_deg| Pose { x_m: 1.0, y_m: 1.0, heading_deg });
     let pings = [from, to].into_iter().zip(0..).map(|(pose, index)| {
