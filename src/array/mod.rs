@@ -24,7 +24,7 @@ pub use error::{ArrayError, ArrayPoseError};
 use crate::{
     geometry::{DVec2, Pose, wrap_360},
     scan::ScanPlan,
-    scene::Scene,
+    scene::{PoseError, Scene},
 };
 
 /// The data files that come with the program, by name.
@@ -218,10 +218,19 @@ impl RangerArray {
         let whole = scene.with_robot_at(robot);
         let places: Vec<DVec2> =
             self.rangers.iter().map(|ranger| ranger.pose_on(robot).position()).collect();
-        whole.check_places(&places).map_err(|(at, error)| ArrayPoseError {
+        let refuse = |(at, error): (usize, PoseError)| ArrayPoseError {
             ranger: Some(self.rangers[at].id.clone()),
             error,
-        })
+        };
+        whole.check_places(&places).map_err(refuse)?;
+        let behind = |place: &DVec2| {
+            let reflector = scene.wall_between(robot.position(), *place)?.to_owned();
+            Some(PoseError::BehindWall { x_m: place.x, y_m: place.y, reflector })
+        };
+        match places.iter().enumerate().find_map(|(at, place)| Some((at, behind(place)?))) {
+            Some(separated) => Err(refuse(separated)),
+            None => Ok(()),
+        }
     }
 }
 

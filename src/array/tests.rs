@@ -107,6 +107,14 @@ fn a_ranger_outside_the_room_or_in_a_wall_is_named() {
     let error = array.check_pose(&room, &at(0.762, 0.37, 0.0)).expect_err("on the wall");
     assert_eq!(error.ranger.as_deref(), Some("s3"));
     assert!(error.to_string().starts_with("ranger s3 of the array: "), "{error}");
+    // A screen between the robot's middle and its foremost sonars.
+    let text = r#"{"name":"screen","materials":{"m":{"reflectance":1.0}},
+        "walls":[{"id":"screen","from":[0.12,-1],"to":[0.12,1],"material":"m"}]}"#;
+    let screen = Scene::from_json(text).expect("a scene");
+    let error = array.check_pose(&screen, &at(0.0, 0.0, 0.0)).expect_err("through the screen");
+    assert_eq!(error.ranger.as_deref(), Some("s2"));
+    assert!(error.to_string().contains("other side of `screen`"), "{error}");
+    assert_eq!(array.check_pose(&screen, &at(-0.1, 0.0, 0.0)), Ok(()));
     assert_eq!(array.check_pose(&room, &at(2.0, 0.3, 0.0)).expect_err("outside").ranger, None);
     let nan = array.check_pose(&room, &at(f64::NAN, 0.3, 0.0));
     assert!(nan.is_err());

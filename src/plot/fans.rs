@@ -2,7 +2,7 @@
 //! the arc; a silent one is an empty outline as far as the ranger listens.
 
 use super::{
-    canvas::{Layer, Px, Shape},
+    canvas::{Anchor, Layer, Px, Shape},
     floor::MIN_RANGE_DASH,
     plan::Plan,
     readings::{Reading, Readings},
@@ -12,6 +12,9 @@ use crate::geometry::{DVec2, Pose};
 
 /// An arc has so many pieces.
 const PIECES: i32 = 12;
+
+/// More fans than this are not named.
+const MOST_NAMED: usize = 24;
 
 /// How an array's readings are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +35,24 @@ impl Fan {
             faces.mark(Shape::Dot, plan.px(ranger.position()), 1.6, None);
         }
         layer.add(faces);
+        if scan.beams.len() <= MOST_NAMED {
+            layer.add(self.names(plan, scan));
+        }
         layer
+    }
+
+    /// Each ranger's name, in its fan.
+    fn names(&self, plan: &Plan, scan: &Readings) -> Layer {
+        let mut names = Layer::new("rangers").with("fill", theme::QUIET).haloed();
+        for beam in &scan.beams {
+            let (Some(ranger), Some(name)) = (&beam.transducer, &beam.ranger) else { continue };
+            let range_m = beam.range_m.unwrap_or(self.max_range_m);
+            // Where the fan is wide enough, but not so far out that it leaves the picture.
+            let out_m = (0.6 * range_m).min(0.3 * plan.view.size().min_element());
+            let at = plan.px(ranger.point_at(0.0, out_m)) + Px::new(0.0, 4.0);
+            names.text(at, Anchor::Middle, theme::SMALL_PX, name);
+        }
+        names
     }
 
     fn fan(&self, plan: &Plan, beam: &Reading, ranger: &Pose) -> Layer {

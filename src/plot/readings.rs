@@ -84,6 +84,8 @@ pub(super) struct Reading {
     pub(super) azimuth_deg: f64,
     /// Of a ranger of an array: where it stood and looked.
     pub(super) transducer: Option<Pose>,
+    /// Its name.
+    pub(super) ranger: Option<String>,
     pub(super) kind: Kind,
     /// Finite, not negative, and there exactly for the kinds that were heard.
     pub(super) range_m: Option<f64>,
@@ -199,7 +201,7 @@ fn mounted(view: &ScanView, ping: &Ping, reading: Reading) -> Reading {
         }
         _ => reading.azimuth_deg,
     };
-    Reading { azimuth_deg, transducer, ..reading }
+    Reading { azimuth_deg, transducer, ranger: ping.ranger.clone(), ..reading }
 }
 
 fn reading(judged: &Judged<'_>, min_range_m: Option<f64>) -> Reading {
@@ -218,6 +220,7 @@ fn reading(judged: &Judged<'_>, min_range_m: Option<f64>) -> Reading {
     Reading {
         azimuth_deg: ping.azimuth_deg,
         transducer: None,
+        ranger: None,
         kind,
         range_m,
         model_range_m,

@@ -80,6 +80,16 @@ pub enum PoseError {
         /// The room's extent, if there is a room, lower left and upper right corner, metres.
         room: Option<[[f64; 2]; 2]>,
     },
+    /// A wall separates it from the robot that carries it.
+    #[error("the place ({x_m}, {y_m}) m is on the other side of `{reflector}` than the robot")]
+    BehindWall {
+        /// World x, metres.
+        x_m: f64,
+        /// World y, metres.
+        y_m: f64,
+        /// Name of the wall.
+        reflector: String,
+    },
     /// The robot's body does not fit there.
     #[error(
         "at the pose ({x_m}, {y_m}) m, heading {heading_deg} degrees, the body `{robot}` runs into `{reflector}`"
@@ -120,6 +130,7 @@ impl PoseError {
                 Some([low, high]) => format!("keep 1 mm away from surfaces; {}", extent(low, high)),
                 None => "keep 1 mm away from surfaces".to_owned(),
             },
+            Self::BehindWall { .. } => "keep the robot clear of walls".to_owned(),
             Self::BodyCollides { .. } => {
                 "move or turn the pose; the body stands as `robot` in the scene says, relative to \
                  position and heading"

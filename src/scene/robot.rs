@@ -95,6 +95,13 @@ impl Scene {
         scene
     }
 
+    /// Name of a wall that stands between two places, if there is one.
+    #[must_use]
+    pub fn wall_between(&self, from: DVec2, to: DVec2) -> Option<&str> {
+        let between = self.walls.iter().find(|wall| cross(from, to, wall.a, wall.b));
+        between.map(|wall| &*wall.id)
+    }
+
     /// Whether the robot's body fits at a pose.
     pub(super) fn check_robot(&self, pose: &Pose) -> Result<(), PoseError> {
         let Some(robot) = &self.robot else { return Ok(()) };

@@ -67,13 +67,29 @@ fn told(daemon: &Daemon) -> Vec<(Value, Value)> {
     readings.iter().map(|reading| (reading["status"].clone(), reading["range_m"].clone())).collect()
 }
 
+/// How late this machine wakes a thread up that sleeps on a grid of 40 ms: 95 % of the times within
+/// so many milliseconds.
+fn wake_ups_ms(over: Duration) -> f64 {
+    let (start, each) = (Instant::now(), Duration::from_millis(40));
+    let mut late_ms: Vec<f64> = (1..=over.as_millis() as u32 / 40)
+        .map(|turn| {
+            std::thread::sleep((start + each * turn).saturating_duration_since(Instant::now()));
+            (start + each * turn).elapsed().as_secs_f64() * 1e3
+        })
+        .collect();
+    late_ms.sort_by(f64::total_cmp);
+    late_ms[late_ms.len() * 95 / 100]
+}
+
 #[test]
 fn eight_sonars_are_polled_in_turn_at_25_hz_and_every_record_says_simulated() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = standing(folder.path(), &[]);
     daemon.wait_for_scans(1);
     let (before_s, since) = (cpu_s(daemon.id()), Instant::now());
+    let machine = std::thread::spawn(|| wake_ups_ms(Duration::from_secs(8)));
     let told = listen(&daemon, "/v1/live/records", 8.0);
+    let machine_ms = machine.join().expect("no panic");
     let share = (cpu_s(daemon.id()) - before_s) / since.elapsed().as_secs_f64();
     let kb = resident_kb(daemon.id());
     for (_, record) in &told {
@@ -103,7 +119,8 @@ fn eight_sonars_are_polled_in_turn_at_25_hz_and_every_record_says_simulated() {
     let skipped = daemon.status()["simulation"]["skipped"].as_u64().expect("a count");
     println!(
         "{} readings, {rate_hz:.3} Hz, {skipped} turns left out; {:.2} ms after their echo in the \
-         middle, {:.2} ms at 95 %; {:.2} % of a core, {kb} kB resident",
+         middle, {:.2} ms at 95 % (a plain sleep: {machine_ms:.2} ms); {:.2} % of a core, {kb} kB \
+         resident",
         pings.len(),
         percentile(0.5),
         percentile(0.95),
@@ -116,8 +133,10 @@ fn eight_sonars_are_polled_in_turn_at_25_hz_and_every_record_says_simulated() {
         let off_ms = (apart_ms - 40.0 * (apart_ms / 40.0).round()).abs();
         assert!(apart_ms > 15.0 && off_ms <= 20.0, "{apart_ms} ms from firing to firing");
     }
-    assert!((20.0..25.5).contains(&rate_hz), "{rate_hz} Hz");
-    assert!(percentile(0.95) < 40.0, "{} ms late at 95 %", percentile(0.95));
+    // On a machine that wakes nobody in time, there is not much to be asked of a daemon.
+    let (least_hz, most_ms) = if machine_ms < 4.0 { (24.0, 20.0) } else { (12.0, 200.0) };
+    assert!((least_hz..25.5).contains(&rate_hz), "{rate_hz} Hz");
+    assert!(percentile(0.95) < most_ms, "{} ms late at 95 %", percentile(0.95));
     assert!(share < 0.1, "{share} of a core");
     assert!(kb < 40_000, "{kb} kB resident");
 
