@@ -39,6 +39,7 @@
 
 pub mod acoustics;
 pub mod compare;
+pub mod explore;
 pub mod geometry;
 pub mod interpret;
 pub mod model;

@@ -240,6 +240,7 @@ impl<'a> Progress<'a> {
             range_m,
             repaired,
             residual_m: range_m.zip(predicted).map(|(measured, predicted)| measured - predicted),
+            confidence: None,
             ..blank
         }
     }
@@ -266,6 +267,7 @@ impl<'a> Progress<'a> {
             path: None,
             sim: self.job.predictions.get(stop as usize).cloned(),
             residual_m: None,
+            confidence: None,
         }
     }
 

@@ -90,6 +90,7 @@ impl Ping {
             path: said.path,
             sim: None,
             residual_m: None,
+            confidence: None,
         }
     }
 }

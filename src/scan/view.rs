@@ -110,6 +110,7 @@ mod tests {
             path: None,
             sim: None,
             residual_m: None,
+            confidence: None,
         }))
     }
 

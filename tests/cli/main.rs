@@ -3,7 +3,9 @@
 
 mod common;
 mod daemon;
+mod degenerate;
 mod doctor;
+mod explore;
 mod faults;
 mod hangup;
 mod interpret;
