@@ -41,6 +41,7 @@
 pub mod acoustics;
 pub mod array;
 pub mod compare;
+pub mod explore;
 pub mod geometry;
 pub mod interpret;
 pub mod model;

@@ -1,5 +1,7 @@
 //! `sonard lines`.
 
+mod laser;
+
 use std::{
     io::{self, Write},
     path::PathBuf,
@@ -21,8 +23,12 @@ use crate::{
 #[command(after_help = HELP)]
 pub(super) struct Args {
     /// Logs whose scans have poses; - for standard input
-    #[arg(required = true, value_name = "LOG")]
+    #[arg(required_unless_present = "laser", value_name = "LOG")]
     logs: Vec<PathBuf>,
+    /// What a laser saw in the same place, after the sonar's scans: one JSON object a line; - for
+    /// standard input
+    #[arg(long, value_name = "FILE")]
+    laser: Vec<PathBuf>,
     /// Leave out readings beyond this "logical" distance, metres
     #[arg(long, value_name = "M", default_value_t = LineMapSettings::default().logical_m)]
     logical: f64,
@@ -48,6 +54,12 @@ const HELP: &str = "\
 Examples:
   sonard lines run/*.jsonl -o lines.png
   sonard lines scan.jsonl --logical 2 --json
+  sonard lines run/*.jsonl --laser laser.jsonl -o lines.png
+
+A line of a laser's file is what it saw from one place, counter-clockwise, null where nothing came \
+back: {\"pose\":{\"x_m\":1,\"y_m\":0.5,\"heading_deg\":90},\"returns\":[{\"azimuth_deg\":-12.5,\"range_m\":1.21}, ...]}
+Lines it saw are `laser`, and `complex` where sonar lines were laid onto them; ends that it saw are \
+terminal.
 
 Exit codes: 0 done, 2 wrong usage or input, 3 a picture can't be written.";
 
@@ -85,7 +97,12 @@ fn read(args: &Args) -> Result<(Vec<ScanView>, LineMap, usize), Failure> {
         left_out += map.add_sonar(&sweep);
         scans.push(scan);
     })?;
-    if scans.is_empty() {
+    for file in &args.laser {
+        for scan in laser::load(file)? {
+            map.add_laser(&scan);
+        }
+    }
+    if scans.is_empty() && args.laser.is_empty() {
         return Err(Failure::input(
             "there is no scan with its pose to map",
             "give logs as `sonard scan` or `sonard simulate` writes them",
@@ -94,7 +111,7 @@ fn read(args: &Args) -> Result<(Vec<ScanView>, LineMap, usize), Failure> {
     Ok((scans, map, left_out))
 }
 
-fn record(line: &MapLine) -> serde_json::Value {
+pub(super) fn record(line: &MapLine) -> serde_json::Value {
     let [a, b] = line.ends;
     serde_json::json!({
         "kind": line.kind, "from_m": a.to_array(), "to_m": b.to_array(),

@@ -1,5 +1,6 @@
 //! `sonard log`.
 
+mod annotate;
 mod repair;
 mod show;
 mod verify;
@@ -17,6 +18,8 @@ pub(super) enum Verb {
     Repair(repair::Args),
     /// Show what is in a log: sessions, scans, events
     Show(show::Args),
+    /// Write a log again with Feature Prediction's confidence in every ping
+    Annotate(annotate::Args),
 }
 
 pub(super) fn run(verb: Verb) -> Outcome {
@@ -24,6 +27,7 @@ pub(super) fn run(verb: Verb) -> Outcome {
         Verb::Verify(args) => verify::run(&args),
         Verb::Repair(args) => repair::run(&args),
         Verb::Show(args) => show::run(&args),
+        Verb::Annotate(args) => annotate::run(&args),
     }
 }
 

@@ -5,6 +5,8 @@ mod array;
 mod board;
 mod compare;
 mod doctor;
+mod explore;
+mod explore_benchmark;
 mod failure;
 mod interpret;
 mod lines;
@@ -95,6 +97,12 @@ enum Verb {
     /// Map simulated courses without and with Feature Prediction, and score the maps
     #[command(long_about = map_benchmark::ABOUT)]
     MapBenchmark(map_benchmark::Args),
+    /// Let a simulated robot explore a scene and map it with lines
+    #[command(long_about = explore::ABOUT)]
+    Explore(explore::Args),
+    /// Explore made-up rooms with sonar, laser, and laser just in time, and compare the maps
+    #[command(long_about = explore_benchmark::ABOUT)]
+    ExploreBenchmark(explore_benchmark::Args),
     /// Draw scans: floor plan, polar, residuals
     #[command(long_about = plot::ABOUT)]
     Plot(plot::Args),
@@ -126,6 +134,8 @@ pub fn main() -> ExitCode {
         Verb::Map(args) => map::run(&args),
         Verb::MapScore(args) => map_score::run(&args),
         Verb::MapBenchmark(args) => map_benchmark::run(&args),
+        Verb::Explore(args) => explore::run(&args),
+        Verb::ExploreBenchmark(args) => explore_benchmark::run(&args),
         Verb::Trace(args) => trace::run(&args),
         Verb::Plot(args) => plot::run(&args),
         Verb::Log(verb) => log::run(verb),

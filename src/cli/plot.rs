@@ -9,7 +9,7 @@ use super::{
     picture::{PictureArgs, scene_for, targets, warn_of_damage},
 };
 use crate::{
-    plot::{draw_polar, draw_residuals, draw_scans, draw_side_by_side},
+    plot::{draw_confidence, draw_polar, draw_residuals, draw_scans, draw_side_by_side},
     scan::ScanView,
     store::load,
 };
@@ -51,6 +51,8 @@ enum Kind {
     /// The first three scans beside each other, and how many beams differ: for scans of one place by
     /// different engines
     SideBySide,
+    /// Floor plan with each reading in the colour of its confidence, from `sonard log annotate`
+    Confidence,
 }
 
 pub(super) const ABOUT: &str = "\
@@ -87,6 +89,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         (None, Kind::Scan) => draw_scans(&views, scene.as_ref()),
         (None, Kind::Polar) => draw_polar(&views, scene.as_ref()),
         (None, Kind::SideBySide) => draw_side_by_side(&views, scene.as_ref()),
+        (None, Kind::Confidence) => draw_confidence(&views, scene.as_ref()),
         (None, Kind::Residuals) => draw_residuals(&views, scene.as_ref()),
     };
     targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))

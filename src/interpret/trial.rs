@@ -9,7 +9,7 @@ mod rooms;
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
-pub use rooms::random_room;
+pub use rooms::{gallery, random_room};
 
 use super::{
     Beam, Extents, Heard, Sweep,
@@ -143,7 +143,7 @@ fn wander(
 ) -> Option<Vec<Pose>> {
     let is_free = |at: DVec2| {
         let reached = ideal.shape().index_at(at).is_some_and(|cell| ideal.probability(cell) < 0.5);
-        reached && clearance_m(scene, at) >= settings.clearance_m
+        reached && scene.clearance_m(at) >= settings.clearance_m
     };
     // A named place may be closer to a wall than the robot may go: begin as near as it may.
     let mut at = (0..400)
@@ -166,16 +166,6 @@ fn wander(
         }
     }
     Some(poses)
-}
-
-fn clearance_m(scene: &Scene, at: DVec2) -> f64 {
-    let walls = scene.walls.iter().map(|wall| {
-        let along = wall.b - wall.a;
-        let share = ((at - wall.a).dot(along) / along.length_squared()).clamp(0.0, 1.0);
-        at.distance(wall.a + share * along)
-    });
-    let round = scene.cylinders.iter().map(|c| at.distance(c.center) - c.radius_m);
-    walls.chain(round).fold(f64::INFINITY, f64::min)
 }
 
 /// A set of readings at a pose.
@@ -212,7 +202,8 @@ fn read(simulator: &Simulator, pose: &Pose, settings: &TrialSettings, rng: &mut 
 /// Rangers of a ring are so far apart that each counts by itself, degrees.
 const RING_STEP_DEG: f64 = 25.0;
 
-fn hear(prediction: &Prediction, sigma_m: f64, rng: &mut impl Rng) -> Heard {
+/// One reading by the model, its range with noise.
+pub(crate) fn hear(prediction: &Prediction, sigma_m: f64, rng: &mut impl Rng) -> Heard {
     match (prediction.status, prediction.range_m) {
         (PingStatus::Echo, Some(range_m)) => {
             let unit: f64 = StandardNormal.sample(rng);

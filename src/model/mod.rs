@@ -8,7 +8,7 @@ mod batch;
 mod cone;
 mod fan;
 pub mod paths;
-mod raycast;
+pub(crate) mod raycast;
 mod simulator;
 mod station;
 #[cfg(test)]

@@ -13,9 +13,9 @@ const JOINT_M: f64 = 1e-12;
 
 /// Where a ray meets a reflector.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Hit {
+pub(crate) struct Hit {
     /// From the ray's origin, metres.
-    pub(super) distance_m: f64,
+    pub(crate) distance_m: f64,
     /// What it meets.
     pub(super) reflector: Reflector,
     /// Unit normal of the surface there; out of a cylinder, to either side of a wall.
@@ -26,7 +26,7 @@ pub(super) struct Hit {
 
 /// A scene's reflectors, ready for ray casts.
 #[derive(Debug)]
-pub(super) struct Reflectors {
+pub(crate) struct Reflectors {
     segments: Vec<Segment>,
     circles: Vec<Circle>,
 }
@@ -47,7 +47,7 @@ struct Circle {
 }
 
 impl Reflectors {
-    pub(super) fn new(scene: &Scene) -> Self {
+    pub(crate) fn new(scene: &Scene) -> Self {
         Self {
             segments: scene.walls.iter().map(Segment::new).collect(),
             circles: scene.cylinders.iter().map(Circle::new).collect(),
@@ -56,7 +56,7 @@ impl Reflectors {
 
     /// The nearest reflector from `origin` along the unit vector `direction`, leaving out the
     /// one it starts on: a ray never meets the same flat wall twice in a row.
-    pub(super) fn nearest(
+    pub(crate) fn nearest(
         &self,
         origin: DVec2,
         direction: DVec2,

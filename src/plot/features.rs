@@ -30,7 +30,7 @@ pub fn draw_features(scans: &[ScanView], scene: Option<&Scene>, features: &[Feat
         arcs.chain([next_places(plan, scans, features)]).collect()
     };
     let beside = |plan: &Plan| Some(names(plan, scans, features));
-    overlay::draw(scans, scene, counts(features), over, beside, &entries(features, scene))
+    overlay::draw(scans, scene, counts(features), &[], over, beside, &entries(features, scene))
 }
 
 /// How many of each kind there are.

@@ -222,6 +222,7 @@ fn measure(
         margin_db: None,
         path: None,
         residual_m: range_m.zip(sim.range_m).map(|(a, b)| a - b),
+        confidence: None,
         sim: Some(sim),
     }
 }

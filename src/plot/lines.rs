@@ -10,6 +10,7 @@ use super::{
     theme,
 };
 use crate::{
+    geometry::DVec2,
     interpret::lines::{LineKind, MapLine},
     scan::ScanView,
     scene::Scene,
@@ -25,21 +26,29 @@ const KINDS: [(LineKind, &str, &str); 3] = [
 /// less confident they are; ends are dots where they are confirmed.
 #[must_use]
 pub fn draw_lines(scans: &[ScanView], scene: Option<&Scene>, lines: &[MapLine]) -> Picture {
-    let present = KINDS.iter().filter(|(kind, ..)| lines.iter().any(|line| line.kind == *kind));
-    let samples = present.map(|(_, name, colour)| {
-        Entry::new(Sample::Line { colour, width_px: 2.6, dash: "none" }, *name)
-    });
+    let samples = entries(lines);
     let dot = Sample::Mark { shape: Shape::Dot, colour: theme::SILENT };
     let entries: Vec<Entry> = samples
+        .into_iter()
         .chain([Entry::new(dot, "reading")])
         .chain(scene.map(keys::materials).into_iter().flatten())
         .collect();
     let finding = format!("{} lines", lines.len());
     let draw = |plan: &Plan| lines.iter().map(|line| layer(plan, line)).collect();
-    overlay::draw(scans, scene, finding, draw, |_| None, &entries)
+    let ends: Vec<DVec2> = lines.iter().flat_map(|line| line.ends).collect();
+    overlay::draw(scans, scene, finding, &ends, draw, |_| None, &entries)
 }
 
-fn layer(plan: &Plan, line: &MapLine) -> Layer {
+/// A legend's entry for each kind of line that there is.
+pub(super) fn entries<'a>(lines: impl IntoIterator<Item = &'a MapLine>) -> Vec<Entry> {
+    let present: Vec<LineKind> = lines.into_iter().map(|line| line.kind).collect();
+    let kinds = KINDS.iter().filter(|(kind, ..)| present.contains(kind));
+    let sample = |colour| Sample::Line { colour, width_px: 2.6, dash: "none" };
+    kinds.map(|(_, name, colour)| Entry::new(sample(colour), *name)).collect()
+}
+
+/// One line and its confirmed ends.
+pub(super) fn layer(plan: &Plan, line: &MapLine) -> Layer {
     let colour = KINDS
         .iter()
         .find(|(kind, ..)| *kind == line.kind)

@@ -3,8 +3,11 @@
 //! Everything here is a pure function from data to a [`Picture`]; writing it to a file is the
 //! caller's business.
 
+mod animation;
 mod canvas;
 mod caption;
+mod confidence;
+mod explore;
 mod fans;
 mod features;
 mod floor;
@@ -37,6 +40,9 @@ mod fixtures;
 #[cfg(test)]
 mod tests;
 
+pub use animation::animate;
+pub use confidence::draw_confidence;
+pub use explore::{draw_exploration, draw_explorations};
 pub use features::draw_features;
 pub use lines::draw_lines;
 pub use map::draw_map;

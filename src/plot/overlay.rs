@@ -5,18 +5,26 @@ use super::{
     caption,
     legend::{self, Entry},
     picture::Picture,
-    plan::Plan,
+    plan::{Bounds, Plan},
     readings::Readings,
     region, theme, words,
 };
-use crate::{geometry::Pose, scan::ScanView, scene::Scene};
+use crate::{
+    geometry::{DVec2, Pose},
+    scan::ScanView,
+    scene::Scene,
+};
 
-/// Draws scans small, in their scene; `finding` is a line under the title, `over` draws clipped
-/// to the plan, `beside` over its frame.
+/// Around what was found, where nothing else is drawn, metres.
+const MARGIN_M: f64 = 0.5;
+
+/// Draws scans small, in their scene; `finding` is a line under the title, `found` are places that
+/// must be in view, `over` draws clipped to the plan, `beside` over its frame.
 pub(super) fn draw(
     scans: &[ScanView],
     scene: Option<&Scene>,
     finding: String,
+    found: &[DVec2],
     over: impl FnOnce(&Plan) -> Vec<Layer>,
     beside: impl FnOnce(&Plan) -> Option<Layer>,
     entries: &[Entry],
@@ -29,7 +37,12 @@ pub(super) fn draw(
         .collect();
     let lines = [words::lines(scans), vec![finding]].concat();
     let (heading, top) = caption::draw(&words::title(scans, scene), words::badge(scans), &lines);
-    let region = region::region(&placed, scene);
+    let around = match (placed.is_empty() && scene.is_none(), Bounds::around(found.iter().copied()))
+    {
+        (true, Some(around)) => around.grown(MARGIN_M),
+        _ => region::region(&placed, scene),
+    };
+    let region = around.including(found.iter().copied());
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
     let height = Plan::height_for(&region, right - left, [320.0, 760.0]);
     let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));

@@ -71,6 +71,12 @@ impl Picture {
     /// # Errors
     /// When the size is out of bounds, or the rasteriser fails.
     pub fn to_png(&self, width_px: u32) -> Result<Vec<u8>, PlotError> {
+        let pixels = self.to_pixels(width_px)?;
+        pixels.encode_png().map_err(|error| PlotError::Encoding(error.to_string()))
+    }
+
+    /// The picture as pixels, the same size.
+    pub(super) fn to_pixels(&self, width_px: u32) -> Result<tiny_skia::Pixmap, PlotError> {
         if !(1..=MAX_WIDTH_PX).contains(&width_px) {
             return Err(PlotError::Width(width_px));
         }
@@ -84,7 +90,7 @@ impl Picture {
             .ok_or(PlotError::Height { width_px, height_px: f64::from(height_px) })?;
         let transform = tiny_skia::Transform::from_scale(scale, scale);
         resvg::render(&tree, transform, &mut pixels.as_mut());
-        pixels.encode_png().map_err(|error| PlotError::Encoding(error.to_string()))
+        Ok(pixels)
     }
 }
 

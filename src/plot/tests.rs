@@ -302,6 +302,7 @@ prop_compose! {
             provenance: None, time: None, time_sigma_us: None,
             status, fired_ticks: None, echo_ticks: Vec::new(), tof_us: None, range_m,
             repaired: false, amplitude: None, margin_db, path: None, sim, residual_m,
+            confidence: None,
         }
     }
 }

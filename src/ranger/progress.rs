@@ -241,6 +241,7 @@ impl<'a> Progress<'a> {
             range_m,
             repaired,
             residual_m: range_m.zip(predicted).map(|(measured, predicted)| measured - predicted),
+            confidence: None,
             ..blank
         }
     }
@@ -270,6 +271,7 @@ impl<'a> Progress<'a> {
             path: None,
             sim: self.job.predictions.get(stop as usize).cloned(),
             residual_m: None,
+            confidence: None,
         }
     }
 

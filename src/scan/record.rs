@@ -242,6 +242,10 @@ pub struct Ping {
     pub sim: Option<SimRecord>,
     /// Measured minus predicted range, metres, where both have one.
     pub residual_m: Option<f64>,
+    /// How far Feature Prediction trusts it, from 0 (not at all) to 0.5 (nothing speaks against it);
+    /// written by `sonard log annotate`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub confidence: Option<f64>,
 }
 
 /// A prediction.

@@ -101,6 +101,7 @@ impl Ping {
             path: said.path,
             sim: None,
             residual_m: None,
+            confidence: None,
         }
     }
 }

@@ -113,6 +113,7 @@ mod tests {
             path: None,
             sim: None,
             residual_m: None,
+            confidence: None,
         }))
     }
 

@@ -27,7 +27,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{DVec2, Pose};
+use crate::geometry::{DVec2, Pose, distance_to_segment};
 
 /// A checked scene: every wall has a length, every material is known.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,6 +65,15 @@ impl Scene {
     /// makes it panic.
     pub fn from_json(text: &str) -> Result<Self, SceneError> {
         parse::scene_from_json(text)
+    }
+
+    /// Distance of a point from the nearest wall or cylinder, metres; negative inside a cylinder,
+    /// infinite in an empty scene.
+    #[must_use]
+    pub fn clearance_m(&self, at: DVec2) -> f64 {
+        let walls = self.walls.iter().map(|wall| distance_to_segment(at, wall.a, wall.b));
+        let round = self.cylinders.iter().map(|c| at.distance(c.center) - c.radius_m);
+        walls.chain(round).fold(f64::INFINITY, f64::min)
     }
 }
 

@@ -4,7 +4,9 @@
 mod array;
 mod common;
 mod daemon;
+mod degenerate;
 mod doctor;
+mod explore;
 mod faults;
 mod hangup;
 mod interpret;

@@ -105,6 +105,86 @@ fn the_benchmark_gives_the_same_table_for_the_same_seed() {
 }
 
 #[test]
+fn one_scan_makes_a_map_with_free_space() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let logs = logs(folder.path());
+    let out = folder.path().join("map").to_str().expect("plain path").to_owned();
+    let of = |logs: &[String]| object(&with("map", logs, &["--out", &out, "--json"]));
+    let (one, three) = (of(&logs[..1]), of(&logs));
+    assert_eq!((one["evidence"].as_u64(), three["evidence"].as_u64()), (Some(3), Some(1)));
+    let free_m2 = |map: &Value| map["free_cells"].as_f64().expect("a number") * 0.05 * 0.05;
+    // The room has 10.8 square metres; one scan hears a good part of it.
+    assert!(free_m2(&one) > 2.0, "{one}");
+}
+
+#[test]
+fn confidences_are_written_into_the_log_and_drawn() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let log = &logs(folder.path())[0];
+    let path = |name: &str| folder.path().join(name).to_str().expect("plain path").to_owned();
+    let (out, confidences) = (path("trusted.jsonl"), path("confidences.jsonl"));
+    let output = run(&["log", "annotate", log, "--out", &out]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(run(&["log", "verify", &out]).status.success());
+    let read = |path: &str| -> Vec<Value> {
+        let text = fs::read_to_string(path).expect("written");
+        text.lines().map(|line| serde_json::from_str(line).expect("a record")).collect()
+    };
+    // They are what `sonard map` uses, and all else is as it was.
+    object(&["map", log, "--out", &path("map"), "--confidences", &confidences, "--json"]);
+    let used: Vec<Value> = read(&confidences).iter().map(|one| one["confidence"].clone()).collect();
+    let (annotated, plain) = (read(&out), read(log));
+    let pings = annotated.iter().filter(|record| record["type"] == "ping");
+    assert_eq!(pings.map(|ping| ping["confidence"].clone()).collect::<Vec<_>>(), used);
+    assert!(used.iter().any(|one| one.as_f64() < Some(0.4)), "some are doubted");
+    let without = annotated.into_iter().map(|mut record| {
+        record.as_object_mut().expect("an object").remove("confidence");
+        record
+    });
+    assert_eq!(without.collect::<Vec<_>>(), plain);
+
+    let picture = path("trusted.svg");
+    let output = run(&["plot", &out, "--kind", "confidence", "-o", &picture]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(fs::read_to_string(&picture).expect("written").contains("contradicted"));
+    // In place is refused.
+    let output = run(&["log", "annotate", log, "--out", log]);
+    assert_eq!(output.status.code(), Some(2));
+}
+
+#[test]
+fn laser_scans_are_refused_by_file_line_and_field() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let file = folder.path().join("laser.jsonl");
+    let path = file.to_str().expect("plain path");
+    let pose = r#""pose":{"x_m":0,"y_m":0,"heading_deg":0}"#;
+    for (line, words) in [
+        ("nonsense", "laser.jsonl:2"),
+        (
+            &format!(r#"{{{pose},"returns":[{{"azimuth_deg":"x","range_m":1}}]}}"#),
+            "returns[0].azimuth_deg",
+        ),
+        (
+            &format!(
+                r#"{{{pose},"returns":[{{"azimuth_deg":1,"range_m":1}},{{"azimuth_deg":0,"range_m":1}}]}}"#
+            ),
+            "comes after",
+        ),
+        (
+            &format!(r#"{{{pose},"returns":[{{"azimuth_deg":1,"range_m":-1}}]}}"#),
+            "returns[0].range_m",
+        ),
+        (r#"{"returns":[]}"#, "pose"),
+    ] {
+        fs::write(&file, format!("{{{pose},\"returns\":[]}}\n{line}\n")).expect("written");
+        let output = run(&["lines", "--laser", path]);
+        assert_eq!(output.status.code(), Some(2), "{line}");
+        let said = stderr(&output).replace('\n', " ");
+        assert!(said.contains(words) && said.contains("give one JSON object"), "{words}: {said}");
+    }
+}
+
+#[test]
 fn lines_are_drawn_and_listed() {
     let folder = TempDir::new().expect("a temporary folder");
     let logs = logs(folder.path());

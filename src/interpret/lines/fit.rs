@@ -27,6 +27,8 @@ pub struct Segment {
     /// Confidence from 0 to 1: `(1 - rms / tolerance) (1 - 2 / n)` for n points that are off by
     /// `rms`. The paper's own measure is in a report that it only cites.
     pub confidence: f64,
+    /// The first of the points it stands on, counted among those that are finite.
+    pub from: usize,
     /// How many points it stands on.
     pub points: usize,
 }
@@ -43,7 +45,7 @@ pub fn fit(points: &[DVec2], settings: &FitSettings) -> Vec<Segment> {
     let runs = join(&points, &cuts, settings);
     runs.into_iter()
         .filter(|(from, to)| to - from >= settings.least_points.max(2))
-        .filter_map(|(from, to)| segment(&points[from..to], settings))
+        .filter_map(|(from, to)| segment(&points[from..to], from, settings))
         .collect()
 }
 
@@ -84,7 +86,7 @@ fn fits(points: &[DVec2], tolerance_m: f64) -> bool {
     points.iter().all(|point| along.perp_dot(*point - middle).abs() <= tolerance_m)
 }
 
-fn segment(points: &[DVec2], settings: &FitSettings) -> Option<Segment> {
+fn segment(points: &[DVec2], from: usize, settings: &FitSettings) -> Option<Segment> {
     let (middle, along) = line(points);
     let place = |point: &DVec2| along.dot(*point - middle);
     let (low, high) = points
@@ -100,6 +102,7 @@ fn segment(points: &[DVec2], settings: &FitSettings) -> Option<Segment> {
     (high - low >= settings.least_length_m).then_some(Segment {
         ends: if forward { ends } else { [ends[1], ends[0]] },
         confidence,
+        from,
         points: points.len(),
     })
 }

@@ -28,7 +28,8 @@ impl Default for MergeSettings {
 /// confidence, `l f`, and `g = max(l1 / (l1 + l2) f1, l2 / (l1 + l2) f2)`; slopes are counted
 /// from line i, so that none is infinite. It goes through the crossing of the two, or else through
 /// the point between their nearest ends, weighted alike. A confirmed end stays one and stays
-/// where it is along the line.
+/// where it is: a line with one goes through it, a line with two is the line between them. Of two
+/// that confirm the same end, the middle counts.
 #[must_use]
 pub fn merge(one: &MapLine, other: &MapLine, settings: &MergeSettings) -> Option<MapLine> {
     let weight = |line: &MapLine| line.length_m() * line.confidence;
@@ -43,12 +44,8 @@ pub fn merge(one: &MapLine, other: &MapLine, settings: &MergeSettings) -> Option
     })
 }
 
-fn direction(line: &MapLine) -> DVec2 {
-    (line.ends[1] - line.ends[0]).normalize_or_zero()
-}
-
 fn are_close(main: &MapLine, minor: &MapLine, settings: &MergeSettings) -> bool {
-    let (along, across) = (direction(main), direction(minor));
+    let (along, across) = (main.direction(), minor.direction());
     let sine = along.perp_dot(across).abs();
     if along == DVec2::ZERO
         || across == DVec2::ZERO
@@ -78,15 +75,14 @@ fn project(sonar: &MapLine, better: &MapLine) -> MapLine {
     let weight = sonar.length_m() + better.length_m();
     let confidence =
         (sonar.length_m() * sonar.confidence + better.length_m() * better.confidence) / weight;
-    lay_on(better.ends[0], direction(better), sonar, better, LineKind::Complex, confidence)
+    lay_on(better.ends[0], better.direction(), better, sonar, LineKind::Complex, confidence)
 }
 
 /// Both with their weights (1).
 fn blend(main: &MapLine, minor: &MapLine) -> MapLine {
     let (l1, l2) = (main.length_m(), minor.length_m());
     let gamma = (l1 / (l1 + l2) * main.confidence).max(l2 / (l1 + l2) * minor.confidence);
-    let along = direction(main);
-    let across = direction(minor);
+    let (along, across) = (main.direction(), minor.direction());
     let across = if across.dot(along) < 0.0 { -across } else { across };
     let slope = (1.0 - gamma) * along.perp_dot(across) / along.dot(across);
     let turned = (along + slope * along.perp()).normalize();
@@ -114,6 +110,9 @@ fn crossing(one: &MapLine, other: &MapLine) -> Option<DVec2> {
     inside.then(|| one.ends[0] + s * u)
 }
 
+/// Ends confirmed twice are one end if they are so close, metres; else the outer one holds.
+const SAME_END_M: f64 = 0.15;
+
 /// A line through a point that reaches as far as two others do, or to their confirmed ends.
 fn lay_on(
     through: DVec2,
@@ -123,28 +122,39 @@ fn lay_on(
     kind: LineKind,
     confidence: f64,
 ) -> MapLine {
+    let place_m = |point: DVec2| along.dot(point - through);
     let spans = [one, other].map(|line| {
-        let mut places =
-            [0, 1].map(|end| (along.dot(line.ends[end] - through), line.terminal[end]));
-        if places[0].0 > places[1].0 {
-            places.swap(0, 1);
+        let mut ends = [0, 1].map(|end| (line.ends[end], line.terminal[end]));
+        if place_m(ends[0].0) > place_m(ends[1].0) {
+            ends.swap(0, 1);
         }
-        places
+        ends
     });
-    // Of two confirmed ends the outer one holds.
-    let choose = |end: usize, outer: fn(f64, f64) -> f64| {
+    let choose = |end: usize, outwards: f64| {
         let [(a, a_holds), (b, b_holds)] = [spans[0][end], spans[1][end]];
+        let outer = if outwards * (place_m(a) - place_m(b)) > 0.0 { a } else { b };
         match (a_holds, b_holds) {
             (true, false) => (a, true),
             (false, true) => (b, true),
-            (both, _) => (outer(a, b), both),
+            (true, true) if a.distance(b) < SAME_END_M => (a.midpoint(b), true),
+            (both, _) => (outer, both),
         }
     };
-    let ((low, low_holds), (high, high_holds)) = (choose(0, f64::min), choose(1, f64::max));
+    let ((low, low_holds), (high, high_holds)) = (choose(0, -1.0), choose(1, 1.0));
+    // The line is shifted onto a confirmed end, if there is one.
+    let anchor = match (low_holds, high_holds) {
+        (true, _) => low,
+        (_, true) => high,
+        _ => through,
+    };
+    let laid = |point: DVec2, holds: bool| {
+        if holds { point } else { anchor + along.dot(point - anchor) * along }
+    };
     MapLine {
-        ends: [through + low * along, through + high * along],
+        ends: [laid(low, low_holds), laid(high, high_holds)],
         terminal: [low_holds, high_holds],
         kind,
         confidence,
+        seen_from: one.seen_from,
     }
 }

@@ -7,7 +7,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::{
-    FitSettings, LineKind, LineMap, LineMapSettings, MapLine, MergeSettings, clusters, fit, merge,
+    FitSettings, LaserReturn, LaserScan, LineKind, LineMap, LineMapSettings, MOST_ERROR_M, MapLine,
+    MergeSettings, clusters, fit, map_error, merge,
 };
 use crate::{
     geometry::{DVec2, Pose},
@@ -92,7 +93,13 @@ fn too_few_points_make_no_segment() {
 }
 
 fn line(a: [f64; 2], b: [f64; 2], kind: LineKind, confidence: f64) -> MapLine {
-    MapLine { ends: [a.into(), b.into()], terminal: [false; 2], kind, confidence }
+    MapLine {
+        ends: [a.into(), b.into()],
+        terminal: [false; 2],
+        kind,
+        confidence,
+        seen_from: DVec2::Y,
+    }
 }
 
 #[test]
@@ -162,6 +169,21 @@ fn sweep(place: DVec2, points: &[DVec2]) -> Sweep {
     Sweep { pose, step_deg: 0.9, beams: beams.collect(), closed: true }
 }
 
+/// A laser that sees these points from a place.
+fn laser(place: DVec2, points: &[DVec2]) -> LaserScan {
+    let pose = Pose { x_m: place.x, y_m: place.y, heading_deg: 0.0 };
+    let mut returns: Vec<LaserReturn> = points
+        .iter()
+        .map(|point| *point - place)
+        .map(|off| LaserReturn {
+            azimuth_deg: off.to_angle().to_degrees(),
+            range_m: Some(off.length()),
+        })
+        .collect();
+    returns.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
+    LaserScan { pose, returns }
+}
+
 #[test]
 fn the_three_rules_leave_out_what_cannot_be() {
     let mut map = LineMap::new(LineMapSettings::default());
@@ -175,7 +197,7 @@ fn the_three_rules_leave_out_what_cannot_be() {
     assert_eq!(map.add_sonar(&sweep(DVec2::new(1.5, 0.0), &later)), 1);
     // Between the laser and what it saw; what lies on that wall stays.
     let wall: Vec<DVec2> = along(DVec2::new(4.0, -1.0), DVec2::new(4.0, 1.0), 100).collect();
-    map.add_laser(DVec2::new(2.5, 0.0), &wall);
+    map.add_laser(&laser(DVec2::new(2.5, 0.0), &wall));
     let doubtful = [DVec2::new(3.5, 0.1), DVec2::new(3.98, 0.1), DVec2::new(3.5, 2.0)];
     assert_eq!(map.add_sonar(&sweep(DVec2::new(2.5, 1.0), &doubtful)), 1);
 }
@@ -188,8 +210,118 @@ fn a_wall_seen_from_two_places_is_one_line() {
     let mut map = LineMap::new(LineMapSettings::default());
     map.add_sonar(&sweep(DVec2::ZERO, &wall(-0.5, 0.7)));
     map.add_sonar(&sweep(DVec2::X, &wall(0.6, 1.5)));
-    map.add_laser(DVec2::X, &wall(1.3, 1.9));
+    map.add_laser(&laser(DVec2::X, &wall(1.3, 1.9)));
     let [line] = map.lines() else { panic!("{:?}", map.lines()) };
     assert_eq!(line.kind, LineKind::Complex);
     assert!((line.length_m() - 2.4).abs() < 1e-6, "{line:?}");
+}
+
+/// A laser scan without noise of walls given by their ends, over a field in degrees.
+fn shot(place: DVec2, field_deg: [f64; 2], walls: &[[DVec2; 2]]) -> LaserScan {
+    let returns = (0..512).map(|at| {
+        let azimuth_deg = field_deg[0] + (field_deg[1] - field_deg[0]) * f64::from(at) / 511.0;
+        let ray = DVec2::from_angle(azimuth_deg.to_radians());
+        let meet = |[a, b]: &[DVec2; 2]| {
+            let (side, to_a) = (*b - *a, *a - place);
+            let across = ray.perp_dot(side);
+            let (range_m, share) = (to_a.perp_dot(side) / across, to_a.perp_dot(ray) / across);
+            (range_m > 0.0 && (0.0..=1.0).contains(&share)).then_some(range_m)
+        };
+        let range_m = walls.iter().filter_map(meet).min_by(f64::total_cmp);
+        LaserReturn { azimuth_deg, range_m }
+    });
+    let pose = Pose { x_m: place.x, y_m: place.y, heading_deg: 0.0 };
+    LaserScan { pose, returns: returns.collect() }
+}
+
+/// Ends of the segments seen, and which are terminal, sorted by place along x then y.
+fn ends_of(scan: &LaserScan) -> Vec<(DVec2, bool)> {
+    let lines = scan.lines(&LineMapSettings::default());
+    let mut ends: Vec<(DVec2, bool)> = lines
+        .iter()
+        .flat_map(|line| [0, 1].map(|end| (line.ends[end], line.terminal[end])))
+        .collect();
+    ends.sort_by(|a, b| a.0.x.total_cmp(&b.0.x).then(a.0.y.total_cmp(&b.0.y)));
+    ends
+}
+
+#[test]
+fn a_laser_confirms_borders_and_corners_but_not_its_own_field_nor_what_is_hidden() {
+    let at = DVec2::new;
+    let wall = [at(1.2, -2.0), at(1.2, 2.0)];
+    // The field ends on a wall: nothing is confirmed.
+    let seen = ends_of(&shot(DVec2::ZERO, [-12.0, 12.0], &[wall]));
+    assert_eq!(seen.iter().map(|end| end.1).collect::<Vec<_>>(), [false, false]);
+    // A wall that ends within the field, nothing behind it.
+    let seen = ends_of(&shot(DVec2::ZERO, [-12.0, 12.0], &[[at(1.2, -2.0), at(1.2, 0.1)]]));
+    let (border, _) = seen.iter().find(|end| end.1).expect("a border");
+    assert!(border.distance(at(1.2, 0.1)) < 1e-3, "{border}");
+    assert_eq!(seen.iter().filter(|end| end.1).count(), 1);
+    // A corner, seen from within and from outside.
+    for side in [at(0.6, 0.2), at(1.8, 0.2)] {
+        let seen = ends_of(&shot(
+            DVec2::ZERO,
+            [-5.0, 22.0],
+            &[[at(1.2, -2.0), at(1.2, 0.2)], [at(1.2, 0.2), side]],
+        ));
+        let corners: Vec<_> =
+            seen.iter().filter(|end| end.1 && end.0.distance(at(1.2, 0.2)) < 1e-6).collect();
+        // From below its plane the outer face can't be seen: then the corner is a border.
+        let count = if side.x < 1.2 { 2 } else { 0 };
+        assert_eq!(corners.len(), count, "{seen:?}");
+        assert!(seen.iter().any(|end| end.1 && end.0.distance(at(1.2, 0.2)) < 1e-3));
+    }
+    // Something nearer hides the rest of a wall: the wall's end is open, that of the other is not.
+    let seen = ends_of(&shot(DVec2::ZERO, [-12.0, 12.0], &[wall, [at(0.8, 0.0), at(0.8, 2.0)]]));
+    let confirmed: Vec<_> = seen.iter().filter(|end| end.1).collect();
+    assert_eq!(confirmed.len(), 1, "{seen:?}");
+    assert!(confirmed[0].0.distance(at(0.8, 0.0)) < 1e-3);
+}
+
+#[test]
+fn the_laser_cuts_what_sonar_only_thought() {
+    let at = DVec2::new;
+    let mut map = LineMap::new(LineMapSettings::default());
+    let phantom: Vec<DVec2> = along(at(1.0, -0.4), at(1.0, 0.4), 40).collect();
+    let behind: Vec<DVec2> = along(at(2.4, -0.2), at(2.4, 0.2), 40).collect();
+    map.add_sonar(&sweep(DVec2::ZERO, &[phantom, behind].concat()));
+    assert_eq!(map.lines().len(), 2);
+    map.add_laser(&shot(DVec2::ZERO, [-30.0, 30.0], &[[at(1.5, -2.0), at(1.5, 2.0)]]));
+    let [wall] = map.lines() else { panic!("{:?}", map.lines()) };
+    assert_eq!(wall.kind, LineKind::Laser);
+}
+
+#[test]
+fn a_line_between_two_confirmed_ends_goes_through_both() {
+    let mut one = line([0.0, 0.0], [1.0, 0.01], LineKind::Laser, 0.9);
+    one.terminal = [true, false];
+    let mut other = line([1.1, 0.0], [3.0, 0.02], LineKind::Laser, 0.8);
+    other.terminal = [false, true];
+    let merged = merge(&one, &other, &MergeSettings::default()).expect("one wall");
+    assert_eq!(
+        (merged.ends, merged.terminal),
+        ([DVec2::ZERO, DVec2::new(3.0, 0.02)], [true, true])
+    );
+}
+
+#[test]
+fn map_errors_are_what_they_say() {
+    let text = r#"{"name":"t","materials":{"m":{"reflectance":0.9}},"walls":[
+        {"id":"a","from":[0,0],"to":[2,0],"material":"m"}]}"#;
+    let scene = crate::scene::Scene::from_json(text).expect("a scene");
+    let error = |lines: &[MapLine]| map_error(lines, &scene);
+    let right = line([0.0, 0.0], [2.0, 0.0], LineKind::Laser, 1.0);
+    assert_eq!(error(&[right]).map_error_m, 0.0);
+    assert_eq!(error(&[]).map_error_m, MOST_ERROR_M);
+    // Beside the wall by 1 cm, the whole of it.
+    let beside = error(&[line([0.0, 0.01], [2.0, 0.01], LineKind::Laser, 1.0)]);
+    assert!(
+        (beside.line_error_m - 0.01).abs() < 1e-12
+            && (beside.endpoint_error_m - 0.01).abs() < 1e-12
+    );
+    // Half of the wall is missing: 0 to 0.5 m away over the first half metre, then 0.5 m.
+    let half = error(&[line([0.0, 0.0], [1.0, 0.0], LineKind::Laser, 1.0)]);
+    assert_eq!(half.false_m, 0.0);
+    assert!((half.missing_m - (0.5 * 0.25 + 0.5 * 0.5) / 2.0).abs() < 1e-3, "{half:?}");
+    assert!((half.missing_end_m - 0.25).abs() < 1e-12 && (half.false_end_m - 0.25).abs() < 1e-12);
 }

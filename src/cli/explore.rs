@@ -1,0 +1,330 @@
+//! `sonard explore`.
+
+use std::{
+    fs,
+    io::{self, Write},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+use serde::Serialize;
+
+use super::{
+    Failure, Outcome,
+    lines::record,
+    map::save,
+    options::{AirArgs, SensorArgs},
+    place::PlaceArgs,
+};
+use crate::{
+    explore::{
+        Exploration, ExploreSettings, Ranger, RobotSettings, Sensing, SimulatedRobot, Stop, explore,
+    },
+    geometry::Pose,
+    interpret::lines::{MapError, map_error},
+    model::{Options, Simulator},
+    plot::{PlotError, animate, draw_exploration},
+    scene::Scene,
+};
+
+/// Options of `sonard explore`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(super) struct Args {
+    #[command(flatten)]
+    place: PlaceArgs,
+    /// What the map is made with
+    #[arg(long, value_enum, default_value_t = SensingName::JustInTime)]
+    sensing: SensingName,
+    #[command(flatten)]
+    robot: RobotArgs,
+    /// Seed of the noise of ranges, laser and odometry
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Folder for the map, what the laser saw, the stops and pictures
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    sensor: SensorArgs,
+    #[command(flatten)]
+    air: AirArgs,
+}
+
+/// The robot and how it explores.
+#[derive(Debug, Clone, Copy, clap::Args)]
+#[command(next_help_heading = "Robot")]
+pub(super) struct RobotArgs {
+    /// How its sonars are arranged
+    #[arg(long, value_enum, default_value_t = RangerName::Ring)]
+    ranger: RangerName,
+    /// Standard deviation of each drive's way and turn, as a share of them
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    odometry_noise: f64,
+    /// Distance from the object that is followed, metres
+    #[arg(long, value_name = "M", default_value_t = ExploreSettings::default().standoff_m)]
+    standoff: f64,
+    /// Leave out sonar readings beyond this "logical" distance, metres
+    #[arg(long, value_name = "M", default_value_t = ExploreSettings::default().map.logical_m)]
+    logical: f64,
+    /// The sonars listen as far as this, metres
+    #[arg(long, value_name = "M", default_value_t = 8.0)]
+    pub(super) max_range: f64,
+    /// Give up after so many stops
+    #[arg(long, value_name = "N", default_value_t = ExploreSettings::default().most_stops)]
+    most_stops: usize,
+}
+
+/// A [`Sensing`] on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum SensingName {
+    /// Sonar only
+    Sonar,
+    /// Laser only: all around at each stop
+    Laser,
+    /// Sonar, and one shot of the laser at ends of lines
+    JustInTime,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum RangerName {
+    /// Twelve sonars, turned in place for 180 readings
+    Ring,
+    /// One ranger on a stepper, 400 readings
+    Stepper,
+}
+
+pub(super) const ABOUT: &str = "\
+Let a simulated robot explore a scene and map it with lines.
+
+After G. Dudek, P. Freedman and I. Rekleitis, \"Just-in-time sensing\" (ICRA 1996): the robot follows \
+the nearest object at about a metre and goes on to the next in the order of their discovery. Sonar, \
+heard by the model, finds walls; where it is ambiguous, at corners and borders, a laser with 25 \
+degrees of view is aimed at the end of the line and confirms it. The robot knows nothing but what it \
+sensed, and what it can't pass stops it.";
+
+const HELP: &str = "\
+Examples:
+  sonard explore --scene two-surface-room --pose middle --out explored
+  sonard explore --scene mcgill-lab --pose fig4 --sensing sonar --json
+  sonard explore --scene my-room.json --pose 1,1,0 --odometry-noise 0.005
+
+--out receives lines.jsonl (as `sonard lines --json`), laser.jsonl (one shot or turn a line, for `sonard \
+lines --laser`), stops.jsonl, exploration.svg and .png, stage-1.png to stage-4.png and exploration.apng, \
+an animation that browsers play.
+
+Map errors, in metres, each distance counting up to 0.5: the line error is the mean of how far the \
+map's lines are from walls and how far walls are from the map's lines (both along their length); the \
+endpoint error is the mean of how far ends of lines are from ends of walls and the other way round; \
+the map error is the mean of the two.
+Exit codes: 0 done, 1 stopped before everything was explored, 2 wrong usage or input, 3 a file can't \
+be written.";
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let (scene, pose) = args.place.load()?;
+    let sensing = args.sensing.sensing();
+    let (robot, settings) = args.robot.settings()?;
+    let options = Options { max_range_m: Some(args.robot.max_range), ..Options::default() };
+    let simulator =
+        Simulator::new(Arc::new(scene), args.sensor.sensor()?, args.air.air()?, options)
+            .map_err(|error| Failure::input(error, "see `sonard explore --help`"))?;
+    let made = explored(&simulator, pose, sensing, robot, &settings, args.seed)?;
+    let scene = simulator.scene();
+    let summary = Summary::of(scene, sensing, &made);
+    if let Some(folder) = &args.out {
+        write_all(folder, &made, sensing, scene)?;
+    }
+    let mut out = io::stdout().lock();
+    let printed = if args.json {
+        serde_json::to_writer(&mut out, &summary)
+            .map_err(io::Error::from)
+            .and_then(|()| writeln!(out))
+    } else {
+        summary.print(&mut out)
+    };
+    printed.or_else(|error| Failure::from_write("standard output", &error))?;
+    if made.finished {
+        return Ok(());
+    }
+    Err(Failure::Found(Some(format!(
+        "{} stops were not enough to explore everything: see --most-stops",
+        made.stops.len()
+    ))))
+}
+
+/// One exploration; the same seed gives the same.
+pub(super) fn explored(
+    simulator: &Simulator,
+    pose: Pose,
+    sensing: Sensing,
+    robot: RobotSettings,
+    settings: &ExploreSettings,
+    seed: u64,
+) -> Result<Exploration, Failure> {
+    let free_m = simulator.scene().clearance_m(pose.position());
+    if free_m <= robot.radius_m {
+        return Err(Failure::input(
+            format!("the robot's body, {} m in radius, does not fit at the pose", robot.radius_m),
+            format!("something is {free_m:.3} m from there: give a pose that is farther from it"),
+        ));
+    }
+    let rng = Pcg64::seed_from_u64(seed);
+    Ok(explore(&mut SimulatedRobot::new(simulator, pose, robot, rng), sensing, settings))
+}
+
+impl SensingName {
+    pub(super) const fn sensing(self) -> Sensing {
+        match self {
+            Self::Sonar => Sensing::Sonar,
+            Self::Laser => Sensing::Laser,
+            Self::JustInTime => Sensing::JustInTime,
+        }
+    }
+}
+
+impl RobotArgs {
+    /// Checked settings.
+    pub(super) fn settings(&self) -> Result<(RobotSettings, ExploreSettings), Failure> {
+        let checks = [
+            ("odometry-noise", self.odometry_noise, 0.0, 1.0),
+            ("standoff", self.standoff, 0.4, 3.0),
+            ("logical", self.logical, 0.5, 20.0),
+        ];
+        for (option, value, least, most) in checks {
+            if !(least..=most).contains(&value) {
+                let help = format!("give a number from {least} to {most}");
+                return Err(Failure::input(format!("--{option} is {value}"), help));
+            }
+        }
+        let ranger = match self.ranger {
+            RangerName::Ring => Ranger::Ring,
+            RangerName::Stepper => Ranger::Stepper,
+        };
+        let robot = RobotSettings {
+            ranger,
+            odometry_noise: self.odometry_noise,
+            ..RobotSettings::default()
+        };
+        let mut settings = ExploreSettings {
+            standoff_m: self.standoff,
+            most_stops: self.most_stops.max(1),
+            ..ExploreSettings::default()
+        };
+        settings.map.logical_m = self.logical;
+        Ok((robot, settings))
+    }
+}
+
+/// What is printed.
+#[derive(Debug, Serialize)]
+pub(super) struct Summary {
+    pub(super) scene: String,
+    pub(super) sensing: Sensing,
+    pub(super) finished: bool,
+    pub(super) stops: usize,
+    pub(super) laser_shots: u32,
+    pub(super) sonar_readings: usize,
+    pub(super) travel_m: f64,
+    pub(super) bumps: u32,
+    pub(super) lines: usize,
+    #[serde(flatten)]
+    pub(super) error: MapError,
+}
+
+impl Summary {
+    pub(super) fn of(scene: &Scene, sensing: Sensing, made: &Exploration) -> Self {
+        Self {
+            scene: scene.name.clone(),
+            sensing,
+            finished: made.finished,
+            stops: made.stops.len(),
+            laser_shots: made.laser_shots,
+            sonar_readings: made.sonar_readings,
+            travel_m: made.travel_m,
+            bumps: made.bumps,
+            lines: made.lines().len(),
+            error: map_error(made.lines(), scene),
+        }
+    }
+
+    fn print(&self, out: &mut impl Write) -> io::Result<()> {
+        writeln!(
+            out,
+            "{}: {} stops, {:.1} m, {} laser shots, {} sonar readings, ran into something {} times",
+            self.sensing.name(),
+            self.stops,
+            self.travel_m,
+            self.laser_shots,
+            self.sonar_readings,
+            self.bumps
+        )?;
+        writeln!(
+            out,
+            "{} lines; error of lines {:.1} mm, of endpoints {:.1} mm, of the map {:.1} mm",
+            self.lines,
+            1e3 * self.error.line_error_m,
+            1e3 * self.error.endpoint_error_m,
+            1e3 * self.error.map_error_m
+        )
+    }
+}
+
+/// How many pictures of the map in the making are written.
+const STAGES: usize = 4;
+/// Most pictures of the animation; of longer explorations some stops are skipped.
+const MOST_FRAMES: usize = 120;
+const FRAME_MS: u16 = 150;
+const FRAME_PX: u32 = 700;
+
+/// Writes map, stops and pictures into a folder.
+pub(super) fn write_all(
+    folder: &Path,
+    made: &Exploration,
+    sensing: Sensing,
+    scene: &Scene,
+) -> Outcome {
+    fs::create_dir_all(folder).map_err(|error| {
+        Failure::input(
+            format!("cannot make the folder {}: {error}", folder.display()),
+            "give a folder that you may write to",
+        )
+    })?;
+    let refuse = |error: PlotError| Failure::device(error, "this scene can't be drawn");
+    save(&folder.join("lines.jsonl"), &json_lines(made.lines().iter().map(record)))?;
+    let laser = made.stops.iter().flat_map(|stop| &stop.laser).map(serde_json::to_value);
+    save(&folder.join("laser.jsonl"), &json_lines(laser.filter_map(Result::ok)))?;
+    save(&folder.join("stops.jsonl"), &json_lines(made.stops.iter().map(stop_record)))?;
+    let count = made.stops.len();
+    let draw = |stops: usize| draw_exploration(made, stops, sensing, Some(scene));
+    save(&folder.join("exploration.svg"), draw(count).to_svg().as_bytes())?;
+    save(&folder.join("exploration.png"), &draw(count).to_png(1000).map_err(refuse)?)?;
+    for stage in 1..=STAGES {
+        let png = draw((count * stage).div_ceil(STAGES)).to_png(1000).map_err(refuse)?;
+        save(&folder.join(format!("stage-{stage}.png")), &png)?;
+    }
+    let every = count.div_ceil(MOST_FRAMES);
+    let shown: Vec<usize> = (1..=count).filter(|stop| (count - stop) % every == 0).collect();
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left");
+    let bar = ProgressBar::new(shown.len() as u64)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let frames = shown.iter().map(|stops| draw(*stops)).inspect(|_| bar.inc(1));
+    let animation = animate(frames, shown.len(), FRAME_PX, FRAME_MS).map_err(refuse)?;
+    bar.finish_and_clear();
+    save(&folder.join("exploration.apng"), &animation)
+}
+
+fn json_lines(records: impl Iterator<Item = serde_json::Value>) -> Vec<u8> {
+    records.flat_map(|record| format!("{record}\n").into_bytes()).collect()
+}
+
+fn stop_record(stop: &Stop) -> serde_json::Value {
+    serde_json::json!({
+        "pose": stop.pose, "task": stop.task, "target_m": stop.target.map(|at| at.to_array()),
+        "laser_shots": stop.laser.len(), "lines": stop.lines.len(),
+    })
+}
