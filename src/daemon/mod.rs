@@ -42,7 +42,7 @@ pub use status::{
     ScanTotals, ScanningReport, Status, SubscriberReport,
 };
 
-use crate::board::Board;
+use crate::{board::Board, scene::Scene};
 use air::AirDesk;
 use desk::Desk;
 use operator::Operator;
@@ -141,6 +141,12 @@ impl Handle {
         self.shared.latest_scan()
     }
 
+    /// The scene in force, if there is one.
+    #[must_use]
+    pub fn scene(&self) -> Option<Arc<Scene>> {
+        self.shared.view.borrow().scene.clone()
+    }
+
     /// Live records.
     #[must_use]
     pub const fn hub(&self) -> &Hub {
@@ -173,6 +179,7 @@ fn first_view(settings: &Settings) -> View {
         scan: None,
         plan: settings.plan(),
         pose: settings.pose,
+        scene: settings.scene.clone(),
         air: AirDesk::new(settings.keys.air.clone()),
         configuration: ConfigurationReport::default(),
         line: LineTotals::default(),

@@ -21,6 +21,7 @@ use crate::{
     config::Mode,
     geometry::Pose,
     scan::{Device, Event, Ping, Provenance, Record, ScanEnd, ScanPlan, ScanStart},
+    scene::Scene,
 };
 
 /// What the daemon is doing.
@@ -210,6 +211,7 @@ pub(super) struct View {
     pub(super) scan: Option<(Uuid, u32)>,
     pub(super) plan: ScanPlan,
     pub(super) pose: Pose,
+    pub(super) scene: Option<Arc<Scene>>,
     pub(super) air: AirDesk,
     pub(super) configuration: ConfigurationReport,
     pub(super) line: LineTotals,

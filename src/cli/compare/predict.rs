@@ -6,7 +6,7 @@ use crate::{
     acoustics::Air,
     cli::Failure,
     model::{EngineKind, Options, Simulator},
-    scan::{ModelRecord, ScanView, Session},
+    scan::{ScanView, Session},
     scene::Scene,
 };
 
@@ -48,7 +48,7 @@ fn simulator(log: &Path, scene: Scene, session: &Session) -> Result<Simulator, F
     };
     let air = Air::from_record(&session.air).map_err(|error| refuse(error.to_string()))?;
     let options = session.model.as_ref().map_or_else(Options::default, |model| {
-        options(model).unwrap_or_else(|| {
+        Options::from_record(model).unwrap_or_else(|| {
             let engine = EngineKind::default().name();
             let had = &model.engine;
             anstream::eprintln!(
@@ -61,12 +61,4 @@ fn simulator(log: &Path, scene: Scene, session: &Session) -> Result<Simulator, F
     });
     Simulator::new(Arc::new(scene), session.sensor.clone(), air, options)
         .map_err(|error| refuse(error.to_string()))
-}
-
-/// The settings that a log's model was run with; `None` if this program has no such engine or
-/// setting.
-fn options(model: &ModelRecord) -> Option<Options> {
-    let mut settings = model.settings.clone();
-    settings.insert("engine".into(), model.engine.clone().into());
-    serde_json::from_value(settings.into()).ok()
 }
