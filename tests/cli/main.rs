@@ -9,6 +9,7 @@ mod hangup;
 mod interpret;
 mod log;
 mod map;
+mod page;
 mod paths;
 mod plot;
 mod scan;
