@@ -41,4 +41,10 @@ for pose in a b c d; do
 done
 "$SONARD" simulate --scene simple-room --pose fig9 --out "$work/fig9.jsonl"
 "$SONARD" plot "$work/fig9.jsonl" --azimuth-deg 270 -o "$pictures/simple-room-fig9-way.png"
+
+# The live page, as its test sees it in Chromium.
+tests/axe.sh
+cargo test --quiet --test cli page::accessible
+cp target/page/desk.png "$pictures/page-desk.png"
+cp target/page/phone-dark.png "$pictures/page-phone.png"
 ls -l "$pictures"

@@ -5,6 +5,7 @@ mod board;
 mod compare;
 mod doctor;
 mod failure;
+mod generate;
 mod interpret;
 mod lines;
 mod log;
@@ -100,6 +101,9 @@ enum Verb {
     /// Check, repair or show a log
     #[command(subcommand)]
     Log(log::Verb),
+    /// Write manual pages and shell completions, for packages
+    #[command(hide = true)]
+    Generate(generate::Args),
     /// Check or draw a scene file, or print its JSON Schema
     #[command(subcommand)]
     Scene(scene::Verb),
@@ -128,6 +132,7 @@ pub fn main() -> ExitCode {
         Verb::Trace(args) => trace::run(&args),
         Verb::Plot(args) => plot::run(&args),
         Verb::Log(verb) => log::run(verb),
+        Verb::Generate(args) => generate::run(&args),
         Verb::Scene(verb) => scene::run(verb),
     };
     failure::report(outcome)
