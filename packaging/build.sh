@@ -34,11 +34,11 @@ rm -rf "$target/package"
 
 case ${1:-} in
 "")
-  "$tools/bin/cargo-deb" --no-build --quiet ;;
+  "$tools/bin/cargo-deb" --no-build --strip --quiet ;;
 arm64)
   build_for_arm64
   CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_STRIP=aarch64-linux-gnu-strip \
-    "$tools/bin/cargo-deb" --no-build --quiet --target aarch64-unknown-linux-gnu ;;
+    "$tools/bin/cargo-deb" --no-build --strip --quiet --target aarch64-unknown-linux-gnu ;;
 *)
   fail "for this computer (no argument) or for arm64, not $1" ;;
 esac

@@ -21,7 +21,8 @@ done
 if sonard run --check >/tmp/said 2>&1; then fail "a daemon without a port is right"; fi
 grep -q device.port /tmp/said || fail "$(cat /tmp/said)"
 sonard run --check --port /dev/sonard >/tmp/said 2>&1 || fail "$(cat /tmp/said)"
-sonard scan --mock --scene simple-room --pose fig9 --step-deg 9 --out /tmp/scan >/tmp/said 2>&1 || fail "$(cat /tmp/said)"
+sonard simulate --scene simple-room --pose fig9 --step-deg 9 >/tmp/scan.jsonl 2>/tmp/said || fail "$(cat /tmp/said)"
+sonard log verify /tmp/scan.jsonl >/tmp/said 2>&1 || fail "$(cat /tmp/said)"
 
 step "upgrade with an edited configuration"
 sed -i 's/^# port = .*/port = "\/dev\/sonard"/' $here
