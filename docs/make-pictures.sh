@@ -44,7 +44,7 @@ done
 
 # The live page, as its test sees it in Chromium.
 tests/axe.sh
-cargo test --quiet --test cli page::accessible
+cargo test --quiet --test cli live_page::accessible
 cp target/page/desk.png "$pictures/page-desk.png"
 cp target/page/phone-dark.png "$pictures/page-phone.png"
 ls -l "$pictures"

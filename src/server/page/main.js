@@ -190,7 +190,11 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
 
 tell();
 let answered = true;
+let version = null;
 watch((status) => {
+  // Another version of the daemon brings its own page.
+  if (version && status && status.sonard !== version) location.reload();
+  version ??= status?.sonard;
   // A daemon that is back after a restart has news, whether or not the stream noticed.
   if (status && !answered) catchUp();
   answered = status !== null;

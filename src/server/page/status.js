@@ -50,14 +50,11 @@ function mode({ mode, paused, requested, next_in_s }) {
   return parts.join(", ");
 }
 
-/** What a person should know about, if anything. */
+/** What a person should know about, if anything; read out once, so without a countdown. */
 function trouble({ link, log, configuration }) {
   const [lamp, text] = words.state(link.state);
   const parts = [];
-  if (lamp === "bad") {
-    const retry = link.retry_in_s === null ? "" : ` Next try in ${link.retry_in_s.toFixed(1)} s.`;
-    parts.push(`Ranger: ${text}. ${link.trouble ?? ""}${retry}`);
-  }
+  if (lamp === "bad") parts.push(`Ranger: ${text}. ${link.trouble ?? ""}`);
   if (log.error) parts.push(`Log: ${log.error}. No scan begins until it can be written.`);
   if (configuration.error) parts.push(`The configuration was refused: ${configuration.error}`);
   return parts.join(" ");
@@ -71,7 +68,7 @@ function showHealth(status, health) {
   const parts = (figure, unit, digits = 1) => (figure === null ? "–" : `${figure.toFixed(digits)} ${unit}`);
   words.facts(byId("health"), [
     ["Device", device ? `${device.serial}, firmware ${device.firmware}` : "–"],
-    ["Port", status.link.port],
+    ["Port", port(status.link)],
     ["Scans", `${scans.completed} whole, ${scans.stopped} stopped, ${scans.failed} given up`],
     ["Beams", `${scans.beams} measured, ${scans.missing} missing`],
     ["Line", `${line.crc_errors} checksum errors, ${line.framing_errors} framing errors`],
@@ -85,6 +82,7 @@ function showHealth(status, health) {
   ]);
 }
 
+const port = ({ port, retry_in_s }) => (retry_in_s === null ? port : `${port}, next try in ${retry_in_s.toFixed(1)} s`);
 const running = (s) => (s < 120 ? `${s.toFixed(0)} s` : s < 7200 ? `${(s / 60).toFixed(0)} min` : `${(s / 3600).toFixed(1)} h`);
 
 function showProvenance(name) {
@@ -103,8 +101,6 @@ function showLost(error) {
 function showTrouble(text) {
   const place = byId("trouble");
   place.hidden = !text;
-  // A countdown would be read out every second.
-  place.ariaLive = "off";
   words.setText(place, text);
 }
 

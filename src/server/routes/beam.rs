@@ -38,7 +38,7 @@ pub(super) struct Beam {
     /// What the model hears, in order of time, faint sounds included; `null` if it could not be
     /// asked.
     humps: Option<Vec<HumpLine>>,
-    /// Why there are no humps or no way, in words.
+    /// Why the model could not be asked, in words.
     lacks: Option<String>,
 }
 
@@ -75,18 +75,12 @@ struct HumpLine {
 /// was taken in.
 pub(super) fn look(view: &ScanView, ping: Ping, scene: Option<&Scene>) -> Beam {
     let session = view.session.as_deref();
-    let mut beam = Beam {
-        echoes: echoes(view, session, &ping),
-        reading: ping.clone().into(),
-        way: None,
-        humps: None,
-        lacks: None,
+    let echoes = echoes(view, session, &ping);
+    let (way, humps, lacks) = match ask_model(view, session, &ping, scene) {
+        Ok((way, humps)) => (way, Some(humps), None),
+        Err(lacks) => (None, None, Some(lacks)),
     };
-    match ask_model(view, session, &ping, scene) {
-        Ok((way, humps)) => (beam.way, beam.humps) = (way, Some(humps)),
-        Err(lacks) => beam.lacks = Some(lacks),
-    }
-    beam
+    Beam { reading: ping.into(), echoes, way, humps, lacks }
 }
 
 fn echoes(view: &ScanView, session: Option<&Session>, ping: &Ping) -> Vec<Echo> {

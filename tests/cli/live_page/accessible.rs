@@ -27,7 +27,7 @@ const NAMED: [&str; 9] = [
 fn everything_has_a_name_and_contrast_on_desk_and_phone_in_light_and_dark() {
     let folder = tempfile::tempdir().expect("a folder");
     let (daemon, address) = daemon(folder.path(), "127.0.0.1:0", &["--set", "plan.step_deg=0.9"]);
-    let Some(browser) = Browser::open(&address, DESK) else { return };
+    let browser = Browser::open(&address, DESK);
     scan_once(&daemon);
     browser.until(OVER);
     browser.eval(
@@ -58,7 +58,7 @@ fn everything_has_a_name_and_contrast_on_desk_and_phone_in_light_and_dark() {
 
 /// Roles of controls and pictures that a screen reader would find without a name.
 fn nameless(browser: &Browser) -> Vec<String> {
-    let tree = browser.devtools("Accessibility.getFullAXTree", json!({}));
+    let tree = browser.devtools("Accessibility.getFullAXTree", &json!({}));
     let nodes = tree["nodes"].as_array().expect("a tree");
     let named: Vec<&Value> = nodes
         .iter()
@@ -126,7 +126,7 @@ fn axe(browser: &Browser) -> Vec<String> {
             file.display()
         ),
     };
-    browser.devtools("Runtime.evaluate", json!({"expression": script}));
+    browser.devtools("Runtime.evaluate", &json!({"expression": script}));
     let found = browser.eval("axe.run({resultTypes: ['violations']})");
     let passes = found["passes"].as_array().map_or(0, Vec::len);
     assert!(passes > 10, "axe looked at nothing: {passes} rules passed");

@@ -67,7 +67,7 @@ fn assert_clean(browser: &Browser) {
 fn readings_appear_while_the_sweep_goes_on_and_add_up_at_its_end() {
     let folder = tempfile::tempdir().expect("a folder");
     let (daemon, address) = daemon(folder.path(), "127.0.0.1:0", &[]);
-    let Some(browser) = Browser::open(&address, DESK) else { return };
+    let browser = Browser::open(&address, DESK);
     browser.until("document.getElementById('link').textContent === 'ready'");
     assert_eq!(browser.text("#which"), "no scan yet");
     assert!(browser.text("#provenance").contains("MOCK"));
@@ -100,7 +100,7 @@ fn readings_appear_while_the_sweep_goes_on_and_add_up_at_its_end() {
 fn a_beam_is_chosen_by_click_or_key_and_its_way_is_drawn() {
     let folder = tempfile::tempdir().expect("a folder");
     let (daemon, address) = daemon(folder.path(), "127.0.0.1:0", &[]);
-    let Some(browser) = Browser::open(&address, DESK) else { return };
+    let browser = Browser::open(&address, DESK);
     scan_once(&daemon);
     browser.until(OVER);
     let now = || browser.text("#beam-now");
@@ -146,7 +146,7 @@ fn a_past_scan_is_shown_and_played_again() {
     let (daemon, address) = daemon(folder.path(), "127.0.0.1:0", &[]);
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":2}"#).status, 202);
     daemon.wait_for_scans(2);
-    let Some(browser) = Browser::open(&address, DESK) else { return };
+    let browser = Browser::open(&address, DESK);
     browser.until("document.querySelectorAll('#scans-list button').length === 2");
     let newest = browser.text("#which");
     browser.click("#scans-list li:nth-child(2) button");
@@ -179,7 +179,7 @@ fn the_page_finds_back_by_itself_when_the_daemon_was_killed() {
     let port = free_port();
     let listen = format!("127.0.0.1:{port}");
     let (first, address) = daemon(folder.path(), &listen, &[]);
-    let Some(browser) = Browser::open(&address, DESK) else { return };
+    let browser = Browser::open(&address, DESK);
     scan_once(&first);
     browser.until("document.getElementById('progress').value > 5");
     assert_clean(&browser);

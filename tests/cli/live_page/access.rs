@@ -7,7 +7,7 @@ use crate::common::wait_until;
 fn without_a_token_the_page_says_why_nothing_is_started() {
     let folder = tempfile::tempdir().expect("a folder");
     let (daemon, address) = daemon(folder.path(), "127.0.0.1:0", &[]);
-    let Some(browser) = Browser::open(&address, DESK) else { return };
+    let browser = Browser::open(&address, DESK);
     browser.until("document.getElementById('link').textContent === 'ready'");
     browser.click("#control [type=submit]");
     browser.until("document.getElementById('summary').textContent.startsWith('Refused')");
@@ -24,7 +24,7 @@ fn with_a_token_scans_are_started_and_stopped() {
     std::fs::write(&file, token).expect("there is room");
     let setting = format!("server.token_file={}", file.display());
     let (daemon, address) = daemon(folder.path(), "127.0.0.1:0", &["--set", &setting]);
-    let Some(browser) = Browser::open(&address, DESK) else { return };
+    let browser = Browser::open(&address, DESK);
     browser.until("document.getElementById('link').textContent === 'ready'");
     let asks = "document.getElementById('token').open";
 

@@ -46,12 +46,8 @@ pub(crate) struct Browser {
 }
 
 impl Browser {
-    /// Opens the page of a daemon at `address`. `None` if the page's tests are to be left out.
-    pub(crate) fn open(address: &str, screen: Screen) -> Option<Self> {
-        if std::env::var_os("PAGE").is_some_and(|value| value == "0") {
-            eprintln!("LEFT OUT, because PAGE=0: nothing of the page was tested");
-            return None;
-        }
+    /// Opens the page of a daemon at `address`.
+    pub(crate) fn open(address: &str, screen: Screen) -> Self {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let (driver, port) = start_driver();
         let runtime = Runtime::new().expect("threads");
@@ -64,7 +60,7 @@ impl Browser {
         let browser = Self { runtime, client: Some(client), driver, base, _turn: turn };
         browser.look_through(screen);
         browser.go();
-        Some(browser)
+        browser
     }
 
     /// Loads the page, again if it is there.
@@ -77,13 +73,13 @@ impl Browser {
         let scale = if screen.phone { 2 } else { 1 };
         self.devtools(
             "Emulation.setDeviceMetricsOverride",
-            json!({"width": width, "height": height, "deviceScaleFactor": scale,
+            &json!({"width": width, "height": height, "deviceScaleFactor": scale,
                    "mobile": screen.phone}),
         );
         let scheme = if screen.dark { "dark" } else { "light" };
         self.devtools(
             "Emulation.setEmulatedMedia",
-            json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]}),
+            &json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]}),
         );
     }
 
@@ -126,7 +122,7 @@ impl Browser {
         for kind in ["mousePressed", "mouseReleased"] {
             let event = json!({"type": kind, "x": at[0], "y": at[1], "button": "left",
                                "clickCount": 1});
-            self.devtools("Input.dispatchMouseEvent", event);
+            self.devtools("Input.dispatchMouseEvent", &event);
         }
     }
 
@@ -142,7 +138,7 @@ impl Browser {
     }
 
     /// A command of the DevTools protocol.
-    pub(crate) fn devtools(&self, method: &'static str, params: Value) -> Value {
+    pub(crate) fn devtools(&self, method: &'static str, params: &Value) -> Value {
         let command = DriverCommand {
             path: "goog/cdp/execute",
             body: json!({"cmd": method, "params": params}),
@@ -247,7 +243,7 @@ fn start_driver() -> (Child, u16) {
         .spawn()
         .expect(
             "the page is tested in Chromium: apt-get install chromium chromium-driver, or leave it \
-             out with PAGE=0",
+             out with `PAGE=0 ./test.sh` or `cargo test -- --skip live_page::`",
         );
     let lines = BufReader::new(driver.stdout.take().expect("piped")).lines();
     let told = lines.map_while(Result::ok).find_map(|line| {
