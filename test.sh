@@ -5,6 +5,9 @@
 #   FUZZ_SECONDS=60 ./test.sh   fuzz each target for a minute (default 5 s; 0 leaves fuzzing out)
 #   FIRMWARE=0 ./test.sh        leave firmware and emulator out, where they can't be built: they
 #                               need Debian's packages (firmware/test.sh)
+#   PAGE=0 ./test.sh            leave the live page out, where there is no Chromium to look at it
+#   AXE=0 ./test.sh             leave axe-core out of that, where there is no npm to get it with
+#   PACKAGE=1 ./test.sh         build, install, upgrade and remove the Debian package, too
 #   SONARD_SOAK_FAULTS=1000 SONARD_KILLS=200 ./test.sh   longer runs of the daemon among faults
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -59,8 +62,35 @@ else
   firmware/test.sh || fail "firmware or emulator: see above. Where they can't be built, FIRMWARE=0 leaves them out"
 fi
 
+if [ "${PAGE:-1}" != 0 ]; then
+  step "a browser for the live page"
+  if ! command -v chromium >/dev/null || ! command -v chromedriver >/dev/null; then
+    if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
+      apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium chromium-driver >/dev/null
+    else
+      fail "Chromium is missing: sudo apt-get install chromium chromium-driver, or leave the page out with PAGE=0"
+    fi
+  fi
+  if [ "${AXE:-1}" = 0 ]; then printf 'axe-core: LEFT OUT, because AXE=0\n'; else tests/axe.sh; fi
+fi
+
+if [ "${PACKAGE:-0}" = 1 ]; then
+  step "the Debian package"
+  packaging/test.sh
+else
+  step "the Debian package: left to packaging/test.sh (PACKAGE=1 runs it here)"
+fi
+
 step "examples in the documentation"
 cargo test --workspace --doc --quiet
 
 step "tests"
-cargo test --workspace --lib --bins --tests --quiet
+cargo test --workspace --lib --bins --tests --quiet -- --skip live_page::
+
+if [ "${PAGE:-1}" = 0 ]; then
+  step "the live page: LEFT OUT, because PAGE=0"
+else
+  # By itself: a browser takes the processors that tests of timing want.
+  step "the live page in $(chromium --version)"
+  cargo test --test cli --quiet live_page::
+fi

@@ -45,4 +45,10 @@ done
 # Eight sonars of a Pioneer 3-DX.
 "$SONARD" simulate --array pioneer-8 --scene mcgill-lab --pose fig4 --out "$work/array.jsonl"
 "$SONARD" plot "$work/array.jsonl" -o "$pictures/array-mcgill-lab.png"
+
+# The live page, as its test sees it in Chromium.
+tests/axe.sh
+cargo test --quiet --test cli live_page::accessible
+cp target/page/desk.png "$pictures/page-desk.png"
+cp target/page/phone-dark.png "$pictures/page-phone.png"
 ls -l "$pictures"

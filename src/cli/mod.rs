@@ -8,6 +8,7 @@ mod doctor;
 mod explore;
 mod explore_benchmark;
 mod failure;
+mod generate;
 mod interpret;
 mod lines;
 mod log;
@@ -109,6 +110,9 @@ enum Verb {
     /// Check, repair or show a log
     #[command(subcommand)]
     Log(log::Verb),
+    /// Write manual pages and shell completions, for packages
+    #[command(hide = true)]
+    Generate(generate::Args),
     /// Check or draw a scene file, or print its JSON Schema
     #[command(subcommand)]
     Scene(scene::Verb),
@@ -139,6 +143,7 @@ pub fn main() -> ExitCode {
         Verb::Trace(args) => trace::run(&args),
         Verb::Plot(args) => plot::run(&args),
         Verb::Log(verb) => log::run(verb),
+        Verb::Generate(args) => generate::run(&args),
         Verb::Scene(verb) => scene::run(verb),
     };
     failure::report(outcome)

@@ -22,6 +22,7 @@ mod statistics;
 
 use std::collections::HashMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::scan::{PathKind, Ping, PingStatus, ScanView, SimRecord};
@@ -34,7 +35,7 @@ pub const AGREE_WITHIN_M: f64 = 0.010;
 pub const AGREE_WITHIN_SHARE: f64 = 0.01;
 
 /// What explains a reading.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Echoes agree; the sound met one reflector, or none on a path given without them.
@@ -53,7 +54,7 @@ pub enum Verdict {
 }
 
 /// Why a reading can't be set beside a prediction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NotCompared {
     /// The reading never arrived.

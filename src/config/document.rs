@@ -2,9 +2,7 @@
 
 use std::fmt::Write as _;
 
-use serde_json::Value;
-
-use super::schema::{Key, Kind, sections};
+use super::schema::{Key, sections};
 
 const HEAD: &str = "\
 # Configuration of `sonard run`. Every key is here, with its default; a key without one stands in
@@ -32,11 +30,11 @@ pub fn document() -> String {
 }
 
 fn write_key(text: &mut String, key: &Key) {
-    comment(text, &format!("{} {}", key.about, wanted(&key.kind)));
+    comment(text, &format!("{} {}", key.about, key.kind.wanted()));
     let _ = match (&key.default, &key.example) {
-        (Some(default), _) => writeln!(text, "{} = {}", key.name, toml_text(&key.kind, default)),
+        (Some(default), _) => writeln!(text, "{} = {}", key.name, key.kind.toml(default)),
         (None, Some(example)) => {
-            writeln!(text, "# {} = {}", key.name, toml_text(&key.kind, example))
+            writeln!(text, "# {} = {}", key.name, key.kind.toml(example))
         }
         (None, None) => writeln!(text, "# {} =", key.name),
     };
@@ -48,31 +46,10 @@ fn comment(text: &mut String, about: &str) {
     }
 }
 
-/// What may be given, as a sentence.
-#[must_use]
-pub(super) fn wanted(kind: &Kind) -> String {
-    match kind {
-        Kind::Number { min, max } => format!("Number, {min} to {max}."),
-        Kind::Whole { min, max } => format!("Whole number, {min} to {max}."),
-        Kind::Switch => "true or false.".into(),
-        Kind::Choice(words) => format!("One of \"{}\".", words.join("\", \"")),
-        Kind::Text => "Text.".into(),
-        Kind::Texts => "List of texts.".into(),
-    }
-}
-
-fn toml_text(kind: &Kind, value: &Value) -> String {
-    match (kind, value.as_f64()) {
-        // 20.0 and not 20: the file shows that fractions are welcome.
-        (Kind::Number { .. }, Some(number)) => format!("{number:?}"),
-        _ => value.to_string(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::{
-        super::{Keys, Layers},
+        super::{Keys, Kind, Layers},
         *,
     };
 

@@ -6,7 +6,6 @@ use thiserror::Error;
 use toml::{Value, de::DeTable};
 
 use super::{
-    document::wanted,
     keys::Keys,
     schema::{self, Key, Kind, sections},
 };
@@ -265,7 +264,7 @@ fn wrong(section: &str, key: &Key, value: &str, origin: Origin) -> ConfigError {
     ConfigError {
         origin,
         message: format!("{section}.{} is {value}", key.name),
-        help: format!("what is wanted: {}", wanted(&key.kind)),
+        help: format!("what is wanted: {}", key.kind.wanted()),
     }
 }
 

@@ -60,6 +60,31 @@ pub enum Kind {
     Texts,
 }
 
+impl Kind {
+    /// What may be given, as a sentence.
+    #[must_use]
+    pub fn wanted(&self) -> String {
+        match self {
+            Self::Number { min, max } => format!("Number, {min} to {max}."),
+            Self::Whole { min, max } => format!("Whole number, {min} to {max}."),
+            Self::Switch => "true or false.".into(),
+            Self::Choice(words) => format!("One of \"{}\".", words.join("\", \"")),
+            Self::Text => "Text.".into(),
+            Self::Texts => "List of texts.".into(),
+        }
+    }
+
+    /// A value of this kind as it stands in the file.
+    #[must_use]
+    pub fn toml(&self, value: &Value) -> String {
+        match (self, value.as_f64()) {
+            // 20.0 and not 20: the file shows that fractions are welcome.
+            (Self::Number { .. }, Some(number)) => format!("{number:?}"),
+            _ => value.to_string(),
+        }
+    }
+}
+
 /// Every section, in the order of the file.
 pub fn sections() -> &'static [Section] {
     static SECTIONS: LazyLock<Vec<Section>> = LazyLock::new(read);

@@ -43,7 +43,10 @@ pub use status::{
     ScanReport, ScanTotals, ScanningReport, SimulationReport, Status, SubscriberReport,
 };
 
-use crate::board::{Board, NoBoard};
+use crate::{
+    board::{Board, NoBoard},
+    scene::Scene,
+};
 use air::AirDesk;
 use desk::Desk;
 use operator::Operator;
@@ -173,6 +176,12 @@ impl Handle {
         self.shared.latest_scan()
     }
 
+    /// The scene in force, if there is one.
+    #[must_use]
+    pub fn scene(&self) -> Option<Arc<Scene>> {
+        self.shared.view.borrow().scene.clone()
+    }
+
     /// Live records.
     #[must_use]
     pub const fn hub(&self) -> &Hub {
@@ -205,6 +214,7 @@ fn first_view(settings: &Settings) -> View {
         scan: None,
         plan: settings.plan(),
         pose: settings.pose,
+        scene: settings.scene.clone(),
         air: AirDesk::new(settings.keys.air.clone()),
         configuration: ConfigurationReport::default(),
         line: LineTotals::default(),

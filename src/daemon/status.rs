@@ -22,6 +22,7 @@ use crate::{
     config::Mode,
     geometry::Pose,
     scan::{Device, Event, Ping, PingStatus, Provenance, Record, ScanEnd, ScanPlan, ScanStart},
+    scene::Scene,
 };
 
 /// What the daemon is doing.
@@ -265,6 +266,7 @@ pub(super) struct View {
     pub(super) scan: Option<(Uuid, u32)>,
     pub(super) plan: ScanPlan,
     pub(super) pose: Pose,
+    pub(super) scene: Option<Arc<Scene>>,
     pub(super) air: AirDesk,
     pub(super) configuration: ConfigurationReport,
     pub(super) line: LineTotals,

@@ -297,6 +297,15 @@ impl Simulator {
 }
 
 impl Options {
+    /// The settings that a log's model was run with; `None` if this program has no such engine or
+    /// setting.
+    #[must_use]
+    pub fn from_record(model: &ModelRecord) -> Option<Self> {
+        let mut settings = model.settings.clone();
+        settings.insert("engine".into(), model.engine.clone().into());
+        serde_json::from_value(settings.into()).ok()
+    }
+
     fn check(&self) -> Result<(), ModelError> {
         let within = |option, value: f64, min: f64, max: f64, expected| {
             if (min..=max).contains(&value) {

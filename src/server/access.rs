@@ -12,6 +12,8 @@ use axum::http::{
 };
 use sha2::{Digest as _, Sha256};
 
+use super::routes::is_public;
+
 /// How a client came in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Peer {
@@ -80,7 +82,11 @@ impl Access {
         }
         self.check_host(uri, headers)?;
         let reads = matches!(*method, Method::GET | Method::HEAD | Method::OPTIONS);
-        if reads && peer == Peer::Loopback { Ok(()) } else { self.check_token(headers) }
+        // A browser can't show a token before the page is there that asks for it.
+        if reads && (peer == Peer::Loopback || is_public(uri.path())) {
+            return Ok(());
+        }
+        self.check_token(headers)
     }
 
     fn check_origin(&self, headers: &HeaderMap) -> Result<(), Refused> {
@@ -164,11 +170,21 @@ mod tests {
         method: &Method,
         headers: &[(&'static str, &str)],
     ) -> Result<(), u16> {
+        ask_for("/v1/status", access, peer, method, headers)
+    }
+
+    fn ask_for(
+        path: &str,
+        access: &Access,
+        peer: Peer,
+        method: &Method,
+        headers: &[(&'static str, &str)],
+    ) -> Result<(), u16> {
         let mut map = HeaderMap::new();
         for (name, value) in headers {
             map.append(*name, HeaderValue::from_str(value).expect("a header"));
         }
-        let uri = "/v1/status".parse().expect("a path");
+        let uri = path.parse().expect("a path");
         access.check(peer, method, &uri, &map).map_err(|refused| refused.status.as_u16())
     }
 
@@ -209,6 +225,18 @@ mod tests {
         assert_eq!(ask(&access, Peer::Network, &Method::GET, &[host]), Err(401));
         let token = ("authorization", "Bearer secret");
         assert_eq!(ask(&access, Peer::Network, &Method::GET, &[host, token]), Ok(()));
+        // The page itself, which asks for the token, holds nothing to hide.
+        for (path, headers, expected) in [
+            ("/", &[host][..], Ok(())),
+            ("/page/main.js", &[host], Ok(())),
+            ("/", &[("host", "evil.example")], Err(403)),
+            ("/pages", &[host], Err(401)),
+            ("/v1/scans", &[host], Err(401)),
+        ] {
+            let answer = ask_for(path, &access, Peer::Network, &Method::GET, headers);
+            assert_eq!(answer, expected, "{path}");
+        }
+        assert_eq!(ask_for("/", &access, Peer::Network, &Method::POST, &[host]), Err(401));
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub use access::{Access, Peer, Refused};
 pub use answer::{Accepted, Problem};
 pub use listen::{ListenError, Listeners};
 
-use crate::{config::ServerKeys, daemon::Handle};
+use crate::{config::ServerKeys, daemon::Handle, store::History};
 use answer::Failed;
 use rate::Bucket;
 
@@ -49,6 +49,9 @@ pub(crate) struct Api {
     log_folder: Arc<PathBuf>,
     document: Arc<Value>,
     access: Arc<Access>,
+    history: Arc<Mutex<History>>,
+    /// Who asks the model about a beam.
+    looking: Arc<Semaphore>,
     bucket: Arc<Mutex<Bucket>>,
     epoch: Instant,
 }
@@ -68,6 +71,8 @@ impl Server {
         let endpoints = routes::endpoints();
         let api = Api {
             daemon: daemon.clone(),
+            history: Arc::new(Mutex::new(History::new(log_folder.clone()))),
+            looking: Arc::new(Semaphore::new(1)),
             log_folder: Arc::new(log_folder),
             document: Arc::new(openapi::document(&endpoints)),
             access: Arc::new(access),

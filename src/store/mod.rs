@@ -3,11 +3,12 @@
 //!
 //! [`LogWriter`] appends one record with one write. [`read_log`] gives every line of a log with
 //! its record or with what is wrong. [`check`] looks at a whole log, [`repair`] leaves out what
-//! can't be read.
+//! can't be read. [`History`] finds the scans in a folder of logs.
 
 mod check;
 mod error;
 mod folder;
+mod history;
 mod medium;
 mod open;
 mod reader;
@@ -17,6 +18,7 @@ mod writer;
 pub use check::{Checker, Finding, FindingKind, Severity, Totals, check};
 pub use error::StoreError;
 pub use folder::{LogFile, LogFolder, Rotation, log_files};
+pub use history::{History, PastScan};
 pub use medium::{FileMedium, Medium, Pipe};
 pub use open::{Recovered, is_being_written};
 pub(crate) use reader::open_for_reading;

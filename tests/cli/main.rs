@@ -10,6 +10,7 @@ mod explore;
 mod faults;
 mod hangup;
 mod interpret;
+mod live_page;
 mod log;
 mod map;
 mod paths;

@@ -8,7 +8,7 @@ use crate::{
     cli::Failure,
     geometry::Pose,
     model::{ArrayModel, EngineKind, ModelError, Options, Simulator},
-    scan::{ModelRecord, Ping, ScanView, Session, SimRecord},
+    scan::{Ping, ScanView, Session, SimRecord},
     scene::Scene,
 };
 
@@ -100,7 +100,7 @@ fn refuse(log: &Path, error: &dyn std::fmt::Display) -> Failure {
 fn conditions(log: &Path, session: &Session) -> Result<(Air, Options), Failure> {
     let air = Air::from_record(&session.air).map_err(|error| refuse(log, &error))?;
     let options = session.model.as_ref().map_or_else(Options::default, |model| {
-        options(model).unwrap_or_else(|| {
+        Options::from_record(model).unwrap_or_else(|| {
             let engine = EngineKind::default().name();
             let had = &model.engine;
             anstream::eprintln!(
@@ -112,12 +112,4 @@ fn conditions(log: &Path, session: &Session) -> Result<(Air, Options), Failure> 
         })
     });
     Ok((air, options))
-}
-
-/// The settings that a log's model was run with; `None` if this program has no such engine or
-/// setting.
-fn options(model: &ModelRecord) -> Option<Options> {
-    let mut settings = model.settings.clone();
-    settings.insert("engine".into(), model.engine.clone().into());
-    serde_json::from_value(settings.into()).ok()
 }

@@ -46,6 +46,7 @@ impl Operator {
             view.mode = desk.settings.keys.scanning.mode;
             (view.paused, view.requested) = (desk.agenda.is_paused(), desk.agenda.requested());
             (view.next_at, view.plan, view.pose) = (next_at, desk.plan, desk.pose);
+            view.scene.clone_from(&desk.settings.scene);
             view.air = desk.air.clone();
             view.configuration = desk.configuration.clone();
             (view.line, view.scans) = (self.line_totals, self.scans);

@@ -1,6 +1,6 @@
 //! Live streams: lines of JSON, or server-sent events for browsers.
 
-use std::{convert::Infallible, time::Duration};
+use std::{borrow::Cow, convert::Infallible, time::Duration};
 
 use axum::{
     body::{Body, Bytes},
@@ -13,9 +13,10 @@ use serde::Deserialize;
 use serde_json::json;
 use tokio::time::timeout;
 
+use super::scans::Word;
 use crate::{
-    daemon::{Line, ScanReport, Subscription, Wanted},
-    scan::Record,
+    daemon::{ScanReport, Subscription, Wanted},
+    scan::{Record, decode_line},
     server::{
         Api,
         answer::{Failed, Query},
@@ -35,6 +36,8 @@ pub(super) struct Options {
     format: Option<Format>,
     #[serde(default)]
     moved_m: Option<f64>,
+    #[serde(default)]
+    verdicts: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -58,6 +61,12 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
                 json!({"type": "number", "minimum": 0}),
                 "Only readings whose range moved by more than this since it was last sent for \
                  that direction, or whose status changed",
+            )
+            .parameter(
+                "query",
+                "verdicts",
+                json!({"type": "boolean"}),
+                "Give each reading a `verdict`, as GET /v1/scans/{scan} has it",
             )
             .answers_as::<Record>(200, NDJSON, records)
             .answers_as::<Record>(200, SSE, records),
@@ -97,7 +106,7 @@ fn live(api: &Api, headers: &HeaderMap, options: Options, wanted: Wanted) -> Res
         options.format.unwrap_or(if accepts_events { Format::Sse } else { Format::Ndjson });
     let subscription = api.daemon.hub().subscribe(wanted);
     let chunks = stream::unfold(subscription, move |mut subscription| async move {
-        let chunk = next_chunk(&mut subscription, format).await?;
+        let chunk = next_chunk(&mut subscription, format, options.verdicts).await?;
         Some((Ok::<_, Infallible>(chunk), subscription))
     });
     let mut response = Body::from_stream(chunks).into_response();
@@ -107,20 +116,71 @@ fn live(api: &Api, headers: &HeaderMap, options: Options, wanted: Wanted) -> Res
 }
 
 /// The next piece of a stream; `None` at its end.
-async fn next_chunk(subscription: &mut Subscription, format: Format) -> Option<Bytes> {
-    match format {
-        Format::Ndjson => {
-            let mut chunk = subscription.next().await?.to_vec();
-            chunk.push(b'\n');
-            Some(chunk.into())
-        }
+async fn next_chunk(
+    subscription: &mut Subscription,
+    format: Format,
+    verdicts: bool,
+) -> Option<Bytes> {
+    let line = match format {
+        Format::Ndjson => subscription.next().await?,
         Format::Sse => match timeout(SIGN_OF_LIFE, subscription.next()).await {
-            Ok(line) => line.map(|line| event(&line)),
-            Err(_nothing_yet) => Some(Bytes::from_static(b":\n\n")),
+            Ok(line) => line?,
+            Err(_nothing_yet) => return Some(Bytes::from_static(b":\n\n")),
         },
-    }
+    };
+    let line = if verdicts { with_verdict(&line) } else { Cow::Borrowed(&*line) };
+    Some(match format {
+        Format::Ndjson => [&*line, b"\n"].concat().into(),
+        Format::Sse => [b"data: ", &*line, b"\n\n"].concat().into(),
+    })
 }
 
-fn event(line: &Line) -> Bytes {
-    [b"data: ", &line[..], b"\n\n"].concat().into()
+/// A reading with what explains it as its last field; any other line as it is.
+fn with_verdict(line: &[u8]) -> Cow<'_, [u8]> {
+    let Ok(Record::Ping(ping)) = decode_line(line) else { return Cow::Borrowed(line) };
+    let (Some(open), Ok(verdict)) =
+        (line.strip_suffix(b"}"), serde_json::to_string(&Word::of(&ping)))
+    else {
+        return Cow::Borrowed(line);
+    };
+    Cow::Owned([open, b",\"verdict\":", verdict.as_bytes(), b"}"].concat())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reading_gets_its_verdict_and_other_lines_stay() {
+        let log = include_str!("../../../tests/fixtures/small.jsonl");
+        let judged: Vec<serde_json::Value> = log
+            .lines()
+            .map(|line| serde_json::from_slice(&with_verdict(line.as_bytes())).expect("JSON"))
+            .collect();
+        let verdicts: Vec<Option<&str>> =
+            judged.iter().map(|record| record["verdict"].as_str()).collect();
+        assert_eq!(
+            verdicts,
+            [
+                None,
+                None,
+                Some("direct"),
+                Some("multiple"),
+                Some("edge"),
+                Some("min_range"),
+                Some("silent"),
+                Some("unexplained"),
+                Some("link_lost"),
+                None,
+                None
+            ]
+        );
+        for (record, line) in judged.iter().zip(log.lines()) {
+            let mut record = record.clone();
+            record.as_object_mut().expect("an object").remove("verdict");
+            let before: serde_json::Value = serde_json::from_str(line).expect("JSON");
+            assert_eq!(record, before);
+        }
+        assert_eq!(&*with_verdict(b"{\"type\":\"dropped\"}"), b"{\"type\":\"dropped\"}");
+    }
 }

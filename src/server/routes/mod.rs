@@ -1,13 +1,19 @@
 //! What can be asked for, one file a subject.
 
+mod beam;
 mod control;
 mod live;
 mod logs;
 mod metrics;
+mod page;
 mod report;
+mod scans;
+mod scene;
 
 use axum::{Json, extract::State};
 use serde_json::Value;
+
+pub(super) use page::is_public;
 
 use super::{Api, openapi::Endpoint};
 
@@ -15,9 +21,12 @@ use super::{Api, openapi::Endpoint};
 pub(super) fn endpoints() -> Vec<Endpoint> {
     let mut endpoints = report::endpoints();
     endpoints.extend(control::endpoints());
+    endpoints.extend(scene::endpoints());
     endpoints.extend(live::endpoints());
+    endpoints.extend(scans::endpoints());
     endpoints.extend(logs::endpoints());
     endpoints.extend(metrics::endpoints());
+    endpoints.extend(page::endpoints());
     endpoints.push(
         Endpoint::get("/v1/openapi.json", openapi, "This description")
             .answers::<Value>(200, "An OpenAPI 3.1 document"),

@@ -24,6 +24,8 @@ fn the_server_does_what_its_document_says() {
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
     daemon.wait_for_scans(1);
     let log = daemon.get("/v1/logs").json()[0]["name"].as_str().expect("a log").to_owned();
+    let latest = daemon.get("/v1/scan/latest").json();
+    let scan = latest["start"]["scan"].as_str().expect("an id").to_owned();
     let bodies = [
         ("/v1/start", json!({"scans": 1})),
         ("/v1/stop", json!({})),
@@ -46,7 +48,11 @@ fn the_server_does_what_its_document_says() {
                 check_stream(&daemon, path, &content(200), &document);
                 continue;
             }
-            let path = path.replace("{name}", &log);
+            let path = path
+                .replace("{name}", &log)
+                .replace("{file}", "main.js")
+                .replace("{scan}", &scan)
+                .replace("{index}", "7");
             let text = if method == "get" {
                 String::new()
             } else {
@@ -59,20 +65,18 @@ fn the_server_does_what_its_document_says() {
                 "{method} {path}: {} is not in the document",
                 reply.status
             );
-            let (media, schema) =
-                content.as_object().expect("content").iter().next().expect("a kind");
-            assert!(
-                reply.head.contains(&format!("content-type: {media}")),
-                "{path}: {}",
-                reply.head
-            );
+            let mut kinds = content.as_object().expect("content").iter();
+            let says = |media: &str| reply.head.contains(&format!("content-type: {media}"));
+            let (media, schema) = kinds
+                .find(|(media, _)| says(media))
+                .unwrap_or_else(|| panic!("{path}: {}", reply.head));
             if media == "application/json" {
                 let faults = misfits(&schema["schema"], &document, &reply.json());
                 assert_eq!(faults, Vec::<String>::new(), "{method} {path}");
             }
         }
     }
-    assert!(operations >= 17, "{operations} operations");
+    assert!(operations >= 23, "{operations} operations");
     // Refusals are as the document says, too.
     for (method, path, body, status) in [
         ("GET", "/v1/nothing", "", 404),
@@ -85,6 +89,13 @@ fn the_server_does_what_its_document_says() {
         ("POST", "/v1/start", r#"{"scnas":1}"#, 422),
         ("GET", "/v1/live/records?moved_m=-1", "", 422),
         ("GET", "/v1/live/records?mvoed_m=1", "", 400),
+        ("GET", "/v1/live/records?verdicts=1", "", 400),
+        ("GET", "/v1/scans?limit=0", "", 422),
+        ("GET", "/v1/scans?limit=many", "", 400),
+        ("GET", "/v1/scans/latest", "", 404),
+        ("GET", "/v1/scans/00000000-0000-4000-8000-000000000000", "", 404),
+        ("GET", "/page/..%2Findex.html", "", 404),
+        ("GET", "/page/nothing.js", "", 404),
     ] {
         let reply = daemon.send(method, path, body);
         assert_eq!(reply.status, status, "{method} {path}: {}", reply.json());
@@ -115,6 +126,59 @@ fn check_stream(daemon: &Daemon, path: &str, content: &Value, document: &Value) 
         let faults = misfits(schema, document, &first.expect("a record"));
         assert_eq!(faults, Vec::<String>::new(), "{path} {format}");
     }
+}
+
+#[test]
+fn past_scans_and_their_beams_are_read_from_the_logs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    daemon.wait_for("ready");
+    assert_eq!(daemon.get("/v1/scans").json(), json!([]));
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":2}"#).status, 202);
+    daemon.wait_for_scans(2);
+    let latest = daemon.get("/v1/scan/latest").json();
+    let scans = daemon.get("/v1/scans?limit=1").json();
+    assert_eq!(scans.as_array().map(Vec::len), Some(1));
+    assert_eq!(scans[0]["scan"], latest["start"]["scan"]);
+    assert_eq!((&scans[0]["provenance"], &scans[0]["end"]["beams"]), (&json!("mock"), &json!(20)));
+
+    let id = scans[0]["scan"].as_str().expect("an id").to_owned();
+    let whole = daemon.get(&format!("/v1/scans/{id}")).json();
+    assert_eq!(whole["session"]["scene"]["name"], "simple-room");
+    // The same readings as in memory, with their verdicts.
+    let mut pings = whole["pings"].clone();
+    for ping in pings.as_array_mut().expect("readings") {
+        let verdict = ping.as_object_mut().expect("an object").remove("verdict");
+        assert!(verdict.is_some_and(|verdict| verdict.is_string()));
+    }
+    assert_eq!(pings, latest["pings"]);
+
+    // In this room everything is explained: the way goes from the ranger round and back to it.
+    let beam = daemon.get(&format!("/v1/scans/{id}/beams/5")).json();
+    assert_eq!(beam["reading"], whole["pings"][5]);
+    let way = beam["way"].as_array().expect("a way");
+    assert_eq!((&way[0], way.last()), (&json!([0.774, 0.085]), Some(&way[0])));
+    let length_m: f64 = way.windows(2).map(|leg| distance(&leg[0], &leg[1])).sum();
+    let stated_m = whole["pings"][5]["sim"]["path"]["length_m"].as_f64().expect("a length");
+    assert!((length_m - stated_m).abs() < 1e-6, "{length_m} and {stated_m}");
+    let drawn = |hump: &Value| hump["path"] == whole["pings"][5]["sim"]["path"];
+    let humps = beam["humps"].as_array().expect("humps");
+    assert!(humps.iter().any(|hump| drawn(hump) && hump["way"] == beam["way"]), "{humps:?}");
+    let echo = &beam["echoes"][0];
+    let off_m = echo["range_m"].as_f64().zip(whole["pings"][5]["range_m"].as_f64());
+    assert!(off_m.is_some_and(|(a, b)| (a - b).abs() < 1e-9), "{echo}");
+
+    assert_eq!(daemon.get(&format!("/v1/scans/{id}/beams/20")).status, 404);
+    assert_eq!(daemon.get(&format!("/v1/scans/{id}/beams/one")).status, 404);
+    let scene = daemon.get("/v1/scene").json();
+    assert_eq!(scene["sha256"], whole["session"]["scene"]["sha256"]);
+    assert_eq!(scene["walls"].as_array().map(Vec::len), Some(4));
+}
+
+/// Between two points of a floor plan, metres.
+fn distance(one: &Value, other: &Value) -> f64 {
+    let along = |axis: usize| one[axis].as_f64().zip(other[axis].as_f64()).map(|(a, b)| a - b);
+    along(0).zip(along(1)).map(|(x, y)| x.hypot(y)).expect("two points")
 }
 
 #[test]

@@ -104,12 +104,16 @@ impl Daemon {
 
     /// Connects by TCP, where the daemon says it listens.
     pub(crate) fn connect_tcp(&self) -> TcpStream {
-        let said = self.said();
-        let address = said.split("http://").nth(1).expect("it says where it listens");
-        let address = address.split_whitespace().next().expect("an address");
-        let stream = TcpStream::connect(address).expect("it listens there");
+        let stream = TcpStream::connect(self.address()).expect("it listens there");
         stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a socket");
         stream
+    }
+
+    /// Where it says that it listens by TCP.
+    pub(crate) fn address(&self) -> String {
+        let said = self.said();
+        let address = said.split("http://").nth(1).expect("it says where it listens");
+        address.split_whitespace().next().expect("an address").to_owned()
     }
 
     pub(crate) fn get(&self, path: &str) -> Reply {

@@ -22,6 +22,8 @@ fn check(schema: &Value, document: &Value, value: &Value, at: &str, found: &mut 
         "required",
         "additionalProperties",
         "items",
+        "minItems",
+        "maxItems",
         "enum",
         "const",
         "oneOf",
@@ -82,6 +84,14 @@ fn check(schema: &Value, document: &Value, value: &Value, at: &str, found: &mut 
             }
         }
     }
+    if let Some(values) = value.as_array() {
+        let count = values.len() as u64;
+        let few = schema["minItems"].as_u64().is_some_and(|least| count < least);
+        let many = schema["maxItems"].as_u64().is_some_and(|most| count > most);
+        if few || many {
+            found.push(format!("{at}: {count} items"));
+        }
+    }
     if let (Some(items), Some(values)) = (schema.get("items"), value.as_array()) {
         for (index, value) in values.iter().enumerate() {
             check(items, document, value, &format!("{at}[{index}]"), found);
@@ -105,7 +115,8 @@ fn is(value: &Value, kind: &str) -> bool {
 #[test]
 fn the_check_finds_what_does_not_fit() {
     let document = serde_json::json!({"a": {"type": "object", "properties": {
-        "x": {"type": ["number", "null"]}, "k": {"enum": ["u", "v"]}}, "required": ["x"]}});
+        "x": {"type": ["number", "null"]}, "k": {"enum": ["u", "v"]},
+        "p": {"type": "array", "minItems": 2, "maxItems": 2}}, "required": ["x"]}});
     let schema = serde_json::json!({"$ref": "#/a"});
     for (value, faults) in [
         (serde_json::json!({"x": 1.5, "k": "u"}), 0),
@@ -113,6 +124,9 @@ fn the_check_finds_what_does_not_fit() {
         (serde_json::json!({"k": "w"}), 2),
         (serde_json::json!({"x": "1"}), 1),
         (serde_json::json!(3), 1),
+        (serde_json::json!({"x": 1, "p": [0, 0]}), 0),
+        (serde_json::json!({"x": 1, "p": [0]}), 1),
+        (serde_json::json!({"x": 1, "p": [0, 0, 0]}), 1),
     ] {
         assert_eq!(misfits(&schema, &document, &value).len(), faults, "{value}");
     }

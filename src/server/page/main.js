@@ -1,0 +1,203 @@
+// Puts the page together: the live scan or a past one on plan, strip, table and panel.
+
+import { ask, follow } from "./api.js";
+import { BeamPanel, inWords } from "./beam.js";
+import { control } from "./control.js";
+import { History } from "./history.js";
+import { Plan } from "./plan.js";
+import { Scan } from "./scan.js";
+import { watch } from "./status.js";
+import { Strip } from "./strip.js";
+import { Summary } from "./summary.js";
+import { BeamTable } from "./table.js";
+import { colours, legend } from "./verdicts.js";
+import { clock, setText } from "./words.js";
+
+const byId = (id) => document.getElementById(id);
+const slider = byId("beam");
+
+let palette = colours();
+/** The scan under way or the last one, whatever is shown. */
+let live = null;
+let session = null;
+/** What is shown: `live`, or one of the logs. */
+let shown = null;
+let selected = null;
+let changed = false;
+
+const plan = new Plan(byId("stage"), select);
+const strip = new Strip(byId("strip"), select);
+const table = new BeamTable(byId("table"));
+const panel = new BeamPanel(byId("beam-panel"), (way) => plan.select(selected, way));
+const summary = new Summary(byId("summary"));
+const history = new History(
+  { list: byId("scans-list"), live: byId("live"), replay: byId("replay"), speed: byId("speed") },
+  (scan, trouble) => {
+    show(scan ?? live);
+    if (trouble) summary.say(trouble);
+    else if (shown) summary.shows(shown);
+  },
+);
+control(byId("control"), byId("stop"), (text) => summary.say(text));
+
+/** Shows a scan, or the same one anew. */
+function show(scan) {
+  if (scan?.id !== shown?.id) deselect();
+  shown = scan;
+  for (const view of [plan, strip, table]) view.scan = scan;
+  if (scan) scan.added = [];
+  plan.latest = null;
+  redraw();
+}
+
+function redraw() {
+  plan.redraw(palette);
+  strip.redraw(palette);
+  table.redraw();
+  tell();
+}
+
+/** Takes up what came in since the last frame. */
+function frame() {
+  if (shown?.added.length) {
+    const added = shown.added.splice(0);
+    for (const view of [plan, strip, table]) view.addReadings(added);
+    changed = true;
+  }
+  if (changed) tell();
+  changed = false;
+  requestAnimationFrame(frame);
+}
+
+/** The texts around the plan. */
+function tell() {
+  legend(byId("legend"), shown?.counts ?? new Map(), palette);
+  const beyond = plan.beyond();
+  setText(byId("beyond"), beyond ? `${beyond} readings lie beyond the view: arrows on its border` : "");
+  const progress = byId("progress");
+  progress.hidden = !shown || shown.end !== null;
+  if (!shown) return setText(byId("which"), "no scan yet");
+  progress.max = shown.planned;
+  progress.value = shown.beams.size;
+  const when = shown === live && !shown.end ? "live" : clock(shown.start.time);
+  setText(byId("which"), `${when} · ${shown.beams.size} of ${shown.planned} beams`);
+  const other = shown.session?.scene && !plan.sceneFits();
+  byId("stage").title = other ? `Taken in the scene ${shown.session.scene.name}, which is not in force: no walls are drawn` : "";
+  slider.max = Math.max(0, shown.planned - 1);
+  slider.disabled = shown.beams.size === 0;
+}
+
+function select(index) {
+  const ping = shown?.nearest(index);
+  if (!ping) return;
+  selected = ping;
+  slider.value = ping.index;
+  const text = inWords(ping);
+  slider.setAttribute("aria-valuetext", text);
+  setText(byId("beam-now"), text);
+  plan.select(ping);
+  strip.select(ping);
+  table.select(ping);
+  panel.show(shown, ping);
+}
+
+function deselect() {
+  selected = null;
+  slider.value = 0;
+  slider.removeAttribute("aria-valuetext");
+  setText(byId("beam-now"), "none selected");
+  plan.select(null);
+  strip.selected = null;
+  panel.clear();
+}
+
+function take(record) {
+  switch (record.type) {
+    case "session":
+      session = record;
+      loadScene();
+      break;
+    case "scan_start":
+      live = new Scan(record, session);
+      if (history.shown === null) {
+        show(live);
+        summary.began(live);
+      }
+      break;
+    case "ping":
+      if (live?.id === record.scan) live.add(record);
+      break;
+    case "scan_end":
+      if (live?.id !== record.scan) break;
+      live.finish(record);
+      changed = true;
+      if (shown === live) {
+        plan.drawOver();
+        summary.ended(live);
+      }
+      history.refresh();
+      break;
+    case "event":
+      summary.event(record);
+      break;
+    case "dropped":
+      // This page was too slow: the log has what it missed.
+      catchUp();
+      break;
+  }
+}
+
+/** Gets from the log what was not heard live: all of the newest scan so far. */
+async function catchUp() {
+  await Promise.all([loadScene(), history.refresh()]);
+  const newest = byId("scans-list").querySelector("button")?.dataset.scan;
+  if (!newest) return;
+  const whole = await ask(`/v1/scans/${newest}`).catch(() => null);
+  if (!whole?.start) return;
+  const since = live?.id === newest ? live.beams : new Map();
+  session = whole.session ?? session;
+  live = Scan.of(whole);
+  // Readings that came by the stream while the log was read.
+  for (const ping of since.values()) if (!live.beams.has(ping.index)) live.add(ping);
+  if (history.shown === null) {
+    show(live);
+    summary.shows(live);
+  }
+}
+
+async function loadScene() {
+  const scene = await ask("/v1/scene").catch((error) => (error.status === 404 ? null : undefined));
+  if (scene === undefined || scene?.sha256 === plan.scene?.sha256) return;
+  plan.scene = scene;
+  setText(byId("floor-title"), scene ? `Floor plan: ${scene.name}` : "Floor plan");
+  plan.redraw(palette);
+}
+
+slider.addEventListener("input", () => select(Number(slider.value)));
+slider.addEventListener("focus", () => {
+  if (!selected && shown?.beams.size) select(Number(slider.value));
+});
+byId("fit").addEventListener("click", (event) => {
+  plan.fitAll = !plan.fitAll;
+  event.currentTarget.ariaPressed = String(plan.fitAll);
+  plan.redraw(palette);
+  tell();
+});
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  palette = colours();
+  redraw();
+});
+
+tell();
+let answered = true;
+let version = null;
+watch((status) => {
+  // Another version of the daemon brings its own page.
+  if (version && status && status.sonard !== version) location.reload();
+  version ??= status?.sonard;
+  // A daemon that is back after a restart has news, whether or not the stream noticed.
+  if (status && !answered) catchUp();
+  answered = status !== null;
+});
+follow("/v1/live/records?format=sse&verdicts=true", take, (there) => there && catchUp());
+requestAnimationFrame(frame);

@@ -1,0 +1,103 @@
+// What each reading is drawn as. The words, shapes and hues are those of `sonard plot`.
+
+/** Marks by name: words of the legend, shape, and the style's colour. */
+export const MARKS = {
+  echo: { words: "echo, no model", shape: "dot", colour: "--direct" },
+  direct: { words: "direct echo", shape: "dot", colour: "--direct" },
+  multiple: { words: "multiple reflection", shape: "square", colour: "--multiple" },
+  edge: { words: "edge", shape: "triangle", colour: "--edge-mark" },
+  min_range: { words: "minimum range", shape: "diamond", colour: "--min-range" },
+  unexplained: { words: "unexplained", shape: "cross", colour: "--unexplained" },
+  silent: { words: "silent", shape: "tick", colour: "--silent" },
+  silent_unexplained: { words: "silent, model hears", shape: "tick", colour: "--unexplained" },
+  lost: { words: "no valid reading", shape: "tick", colour: "--lost" },
+  model: { words: "model", shape: "ring", colour: "--model" },
+};
+
+/** The mark of a reading, by the verdict that the daemon gave. */
+export function markOf(ping) {
+  const heard = ping.range_m !== null && (ping.status === "echo" || ping.status === "min_range");
+  if (heard) return ping.verdict in MARKS ? ping.verdict : ping.status === "echo" ? "echo" : "min_range";
+  if (ping.status !== "no_echo") return "lost";
+  return ping.verdict === "unexplained" ? "silent_unexplained" : "silent";
+}
+
+/** Draws a mark of half-width r at x, y; `direction` is the way outward of a tick, radians. */
+export function draw(c, mark, x, y, r, colour, direction = -Math.PI / 2) {
+  c.fillStyle = c.strokeStyle = colour;
+  c.beginPath();
+  switch (MARKS[mark].shape) {
+    case "dot":
+      c.arc(x, y, r, 0, 2 * Math.PI);
+      return c.fill();
+    case "square":
+      return c.fillRect(x - 0.9 * r, y - 0.9 * r, 1.8 * r, 1.8 * r);
+    case "triangle":
+      c.moveTo(x, y - 1.3 * r);
+      c.lineTo(x + 1.2 * r, y + 0.9 * r);
+      c.lineTo(x - 1.2 * r, y + 0.9 * r);
+      return c.fill();
+    case "diamond":
+      c.moveTo(x, y - 1.3 * r);
+      c.lineTo(x + 1.3 * r, y);
+      c.lineTo(x, y + 1.3 * r);
+      c.lineTo(x - 1.3 * r, y);
+      return c.fill();
+    case "cross":
+      c.lineWidth = 1.6;
+      c.moveTo(x - r, y - r);
+      c.lineTo(x + r, y + r);
+      c.moveTo(x + r, y - r);
+      c.lineTo(x - r, y + r);
+      return c.stroke();
+    case "ring":
+      c.lineWidth = 1.1;
+      c.arc(x, y, 1.35 * r, 0, 2 * Math.PI);
+      return c.stroke();
+    default:
+      c.lineWidth = 1.4;
+      c.moveTo(x - 2.5 * r * Math.cos(direction), y - 2.5 * r * Math.sin(direction));
+      c.lineTo(x, y);
+      return c.stroke();
+  }
+}
+
+/** The style's colours, by name; read anew when the style changes. */
+export function colours() {
+  const style = getComputedStyle(document.documentElement);
+  return new Proxy({}, {
+    get(known, name) {
+      return (known[name] ??= style.getPropertyValue(name).trim());
+    },
+  });
+}
+
+/** Fills the legend with the marks that occur and their numbers. */
+export function legend(list, counts, palette) {
+  const names = Object.keys(MARKS).filter((name) => counts.get(name));
+  const same = names.length === list.children.length && names.every((name, i) => list.children[i].dataset.mark === name);
+  if (!same || list.palette !== palette) {
+    list.palette = palette;
+    list.replaceChildren(...names.map((name) => entry(name, palette)));
+  }
+  names.forEach((name, i) => {
+    const text = name === "model" ? MARKS[name].words : `${MARKS[name].words} (${counts.get(name)})`;
+    const label = list.children[i].lastChild;
+    if (label.data !== text) label.data = text;
+  });
+}
+
+function entry(name, palette) {
+  const item = document.createElement("li");
+  item.dataset.mark = name;
+  const sample = item.appendChild(document.createElement("canvas"));
+  sample.ariaHidden = "true";
+  const scale = devicePixelRatio;
+  sample.width = sample.height = 16 * scale;
+  const c = sample.getContext("2d");
+  c.scale(scale, scale);
+  const tick = MARKS[name].shape === "tick";
+  draw(c, name, 8, tick ? 2 : 8, 4, palette[MARKS[name].colour]);
+  item.append("");
+  return item;
+}

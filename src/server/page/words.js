@@ -1,0 +1,70 @@
+// Figures and records in words, with their units.
+
+export const metres = (m) => (m === null || m === undefined ? "–" : `${m.toFixed(m < 10 ? 4 : 3)} m`);
+export const millimetres = (m) =>
+  m === null || m === undefined ? "–" : `${m < 0 ? "−" : "+"}${Math.abs(1e3 * m).toFixed(1)} mm`;
+export const degrees = (deg) => `${deg.toFixed(1)}°`;
+export const decibels = (db) => `${db < 0 ? "−" : "+"}${Math.abs(db).toFixed(1)} dB`;
+
+export const clock = (time) =>
+  new Date(time).toLocaleString(undefined, {
+    month: "short", day: "numeric", hour: "2-digit", minute: "2-digit", second: "2-digit", hour12: false,
+  });
+
+export function path(record) {
+  if (!record) return "nothing came near";
+  const walls = record.walls.join(", ");
+  if (!record.edge) return record.kind === "scattered" ? `scattered by ${walls}` : walls;
+  return walls ? `edge ${record.edge} by ${walls}` : `edge ${record.edge}`;
+}
+
+const STATES = {
+  opening: ["wait", "opening the port"],
+  identifying: ["wait", "asking the device who it is"],
+  homing: ["wait", "homing"],
+  ready: ["good", "ready"],
+  scanning: ["good", "scanning"],
+  absent: ["bad", "ranger absent"],
+  busy: ["bad", "port busy"],
+  forbidden: ["bad", "port forbidden"],
+  not_answering: ["bad", "ranger not answering"],
+  wrong_firmware: ["bad", "wrong firmware"],
+  wrong_device: ["bad", "wrong device"],
+  lost: ["bad", "link lost"],
+  fault: ["bad", "fault"],
+  emergency_stop: ["bad", "emergency stop"],
+  stopped: ["bad", "stopped"],
+};
+
+/** Lamp and words of a state of the link. */
+export const state = (name) => STATES[name] ?? ["bad", name];
+
+const PROVENANCES = {
+  mock: "MOCK, not hardware",
+  emulator: "EMULATOR, not hardware",
+  simulated: "SIMULATED",
+  imported: "IMPORTED",
+  replay: "REPLAY",
+};
+
+/** What a reader must know about readings that no ranger made; nothing for hardware. */
+export const provenance = (name) => PROVENANCES[name];
+
+/** The facts of a list, each a name and a text; only what changed is touched. */
+export function facts(list, entries) {
+  const rows = list.children;
+  entries.forEach(([name, text], i) => {
+    let row = rows[i];
+    if (!row) {
+      row = list.appendChild(document.createElement("div"));
+      row.append(document.createElement("dt"), document.createElement("dd"));
+    }
+    setText(row.firstChild, name);
+    setText(row.lastChild, text);
+  });
+  while (rows.length > entries.length) list.lastChild.remove();
+}
+
+export function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}

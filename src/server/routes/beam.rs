@@ -1,0 +1,169 @@
+//! One beam of a scan: what was heard, what the model hears, and the ways of the sound.
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::{
+    scans::JudgedPing,
+    scene::{Point, point},
+};
+use crate::{
+    acoustics::{Air, Hump},
+    geometry::Pose,
+    model::{Options, Path, Simulator, Station},
+    scan::{PathRecord, Ping, ScanView, Session},
+    scene::Scene,
+};
+
+/// The model is asked so far beyond what was heard or predicted, metres.
+const BEYOND_M: f64 = 0.5;
+/// Humps this far below the threshold are left out, as a factor of amplitude.
+const FAINT: f64 = 0.1;
+/// The strongest so many humps are told.
+const MOST_HUMPS: usize = 24;
+/// Spacing of the samples that find a hump's peak, microseconds.
+const STEP_US: f64 = 20.0;
+
+/// A beam with all that is known about it.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub(super) struct Beam {
+    /// The reading, and what explains it.
+    reading: JudgedPing,
+    /// Its echoes, in the order in which they came.
+    echoes: Vec<Echo>,
+    /// The way of the predicted echo: the ranger, each reflection and edge, the ranger.
+    way: Option<Vec<Point>>,
+    /// What the model hears, in order of time, faint sounds included; `null` if it could not be
+    /// asked.
+    humps: Option<Vec<HumpLine>>,
+    /// Why the model could not be asked, in words.
+    lacks: Option<String>,
+}
+
+/// An echo that the ranger heard.
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
+struct Echo {
+    /// Time after firing, device ticks.
+    ticks: u32,
+    /// The same in microseconds; `null` without a session.
+    tof_us: Option<f64>,
+    /// Half the way that sound goes in that time, metres.
+    range_m: Option<f64>,
+}
+
+/// A hump of the echo trace that the model predicts.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+struct HumpLine {
+    /// When it begins to rise, microseconds after firing.
+    tof_us: f64,
+    /// Half its path's length, metres.
+    range_m: f64,
+    /// Its peak, relative to a head-on, perfectly reflecting wall.
+    peak: f64,
+    /// Its peak above the threshold in force then, decibels.
+    margin_db: f64,
+    /// The path the sound took.
+    path: PathRecord,
+    /// The path's points; `null` where a record does not say them (scattered sound, floor and
+    /// ceiling).
+    way: Option<Vec<Point>>,
+}
+
+/// Everything about a reading of a scan. The model is asked if `scene` is the one that the scan
+/// was taken in.
+pub(super) fn look(view: &ScanView, ping: Ping, scene: Option<&Scene>) -> Beam {
+    let session = view.session.as_deref();
+    let echoes = echoes(view, session, &ping);
+    let (way, humps, lacks) = match ask_model(view, session, &ping, scene) {
+        Ok((way, humps)) => (way, Some(humps), None),
+        Err(lacks) => (None, None, Some(lacks)),
+    };
+    Beam { reading: ping.into(), echoes, way, humps, lacks }
+}
+
+fn echoes(view: &ScanView, session: Option<&Session>, ping: &Ping) -> Vec<Echo> {
+    let tick_hz = session.and_then(|session| session.device.as_ref()).map(|device| device.tick_hz);
+    let air = view.start.as_ref().and_then(|start| start.air);
+    let sound_speed_m_s = air
+        .map(|air| air.sound_speed_m_s)
+        .or_else(|| session.map(|session| session.air.sound_speed_m_s));
+    let echo = |&ticks: &u32| {
+        let tof_us = tick_hz.map(|tick_hz| f64::from(ticks) / f64::from(tick_hz) * 1e6);
+        let range_m = tof_us.zip(sound_speed_m_s).map(|(tof_us, c)| tof_us * 1e-6 * c / 2.0);
+        Echo { ticks, tof_us, range_m }
+    };
+    ping.echo_ticks.iter().map(echo).collect()
+}
+
+type Asked = (Option<Vec<Point>>, Vec<HumpLine>);
+
+fn ask_model(
+    view: &ScanView,
+    session: Option<&Session>,
+    ping: &Ping,
+    scene: Option<&Scene>,
+) -> Result<Asked, String> {
+    let (session, pose) = session.zip(view.pose()).ok_or("the log lacks the scan's session")?;
+    let scene = scene.ok_or("there is no scene in force")?;
+    let taken_in = session.scene.as_ref().ok_or("the scan was taken without a scene")?;
+    if taken_in.sha256 != scene.sha256 {
+        return Err(format!("the scan was taken in another scene, {}", taken_in.name));
+    }
+    let model = session.model.as_ref().ok_or("the scan was taken without a model")?;
+    let options = Options::from_record(model).ok_or("the scan's model is unknown here")?;
+    let air = air(view, session).map_err(|error| error.to_string())?;
+    let scene = Arc::new(scene.with_robot_at(&pose));
+    let heard_m = [ping.range_m, ping.sim.as_ref().and_then(|sim| sim.range_m)];
+    let heard_m = heard_m.into_iter().flatten().fold(0.0, f64::max);
+    let until_m = options.max_range_m.unwrap_or(session.sensor.max_range_m);
+    let until_m = if heard_m > 0.0 { until_m.min(heard_m + BEYOND_M) } else { until_m };
+    let options = Options { max_range_m: Some(until_m), ..options };
+    let simulator = Simulator::new(Arc::clone(&scene), session.sensor.clone(), air, options)
+        .map_err(|error| error.to_string())?;
+    let path = ping.sim.as_ref().and_then(|sim| sim.path.as_ref());
+    let way = path.and_then(|path| way(&scene, &pose, path));
+    Ok((way, humps(&simulator, &pose, ping.azimuth_deg, until_m)))
+}
+
+/// The session's air, at the temperature that was known when the scan began.
+fn air(view: &ScanView, session: &Session) -> Result<Air, crate::acoustics::AirError> {
+    match view.start.as_ref().and_then(|start| start.air) {
+        Some(scan) => {
+            Air::new(scan.temperature_c, session.air.humidity_percent, session.air.pressure_kpa)
+        }
+        None => Air::from_record(&session.air),
+    }
+}
+
+fn humps(simulator: &Simulator, pose: &Pose, azimuth_deg: f64, until_m: f64) -> Vec<HumpLine> {
+    let direction_rad = pose.direction_rad(azimuth_deg);
+    let station = simulator.station(pose.position());
+    let trace = station.trace(direction_rad, until_m, STEP_US);
+    let receiver = simulator.receiver();
+    let over = |hump: &Hump| hump.peak.0 / receiver.threshold_at(hump.tof_us);
+    let mut loudest: Vec<&Hump> = trace.humps.iter().filter(|hump| over(hump) > FAINT).collect();
+    loudest.sort_by(|one, other| over(other).total_cmp(&over(one)));
+    loudest.truncate(MOST_HUMPS);
+    loudest.sort_by(|one, other| one.tof_us.total_cmp(&other.tof_us));
+    let line = |hump: &Hump| {
+        let arrival = Station::arrival(&station, direction_rad, &hump.sound);
+        let path = simulator.path_record(&arrival.path, arrival.length_m);
+        HumpLine {
+            tof_us: hump.tof_us,
+            range_m: arrival.length_m / 2.0,
+            peak: hump.peak.0,
+            margin_db: 20.0 * over(hump).log10(),
+            way: way(simulator.scene(), pose, &path),
+            path,
+        }
+    };
+    loudest.into_iter().map(line).collect()
+}
+
+fn way(scene: &Scene, pose: &Pose, record: &PathRecord) -> Option<Vec<Point>> {
+    let path = Path::from_record(record, scene)?;
+    let points = path.points(scene, pose.position(), record.length_m)?;
+    Some(points.into_iter().map(point).collect())
+}

@@ -1,0 +1,163 @@
+//! The live page: files without secrets, which ask the API like any other client.
+
+use axum::{
+    extract::Path,
+    http::{HeaderMap, HeaderValue, StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use serde_json::json;
+use sha2::{Digest as _, Sha256};
+
+use crate::server::{answer::Failed, openapi::Endpoint};
+
+const HTML: &str = "text/html; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const SVG: &str = "image/svg+xml";
+
+/// Nothing from elsewhere, no script or style within the page, no frame around it.
+const POLICY: HeaderValue = HeaderValue::from_static(
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; \
+     base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+);
+/// A browser asks whether its copy is good, each time: after an update it must not be.
+const CACHED: HeaderValue = HeaderValue::from_static("no-cache");
+
+struct Asset {
+    name: &'static str,
+    media: &'static str,
+    text: &'static str,
+}
+
+macro_rules! assets {
+    ($($name:literal $media:ident),* $(,)?) => {
+        [$(Asset {
+            name: $name,
+            media: $media,
+            text: include_str!(concat!("../page/", $name)),
+        }),*]
+    };
+}
+
+/// Every file of the page; the first is the page itself.
+static ASSETS: &[Asset] = &assets![
+    "index.html" HTML,
+    "style.css" CSS,
+    "icon.svg" SVG,
+    "main.js" SCRIPT,
+    "api.js" SCRIPT,
+    "beam.js" SCRIPT,
+    "control.js" SCRIPT,
+    "history.js" SCRIPT,
+    "plan.js" SCRIPT,
+    "scan.js" SCRIPT,
+    "status.js" SCRIPT,
+    "strip.js" SCRIPT,
+    "summary.js" SCRIPT,
+    "table.js" SCRIPT,
+    "verdicts.js" SCRIPT,
+    "words.js" SCRIPT,
+];
+
+/// Whether a path is one of the page's files, which anybody who reaches the server may see: they
+/// hold no data and no secret.
+pub(in crate::server) fn is_public(path: &str) -> bool {
+    path == "/" || path.starts_with("/page/")
+}
+
+pub(super) fn endpoints() -> Vec<Endpoint> {
+    let about = "A file of the page";
+    vec![
+        Endpoint::get("/", index, "The live page").answers_text(200, HTML, "The page"),
+        Endpoint::get("/page/{file}", file, "A file of the live page")
+            .parameter("path", "file", json!({"type": "string"}), "As the page names it")
+            .answers_text(200, SCRIPT, about)
+            .answers_text(200, CSS, about)
+            .answers_text(200, SVG, about),
+    ]
+}
+
+async fn index(headers: HeaderMap) -> Response {
+    answer(&ASSETS[0], &headers)
+}
+
+async fn file(Path(name): Path<String>, headers: HeaderMap) -> Result<Response, Failed> {
+    let asset = ASSETS.iter().skip(1).find(|asset| asset.name == name);
+    let missing =
+        || Failed::new(StatusCode::NOT_FOUND, "the page has no such file", "the page is at GET /");
+    Ok(answer(asset.ok_or_else(missing)?, &headers))
+}
+
+/// The file, or that the browser's copy is good.
+fn answer(asset: &Asset, headers: &HeaderMap) -> Response {
+    let tag = tag(asset.text);
+    let known = headers.get(header::IF_NONE_MATCH).and_then(|known| known.to_str().ok());
+    let good = known.is_some_and(|known| known.split(',').any(|one| one.trim() == tag));
+    let common = [
+        (header::CACHE_CONTROL, CACHED),
+        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::REFERRER_POLICY, HeaderValue::from_static("no-referrer")),
+    ];
+    let tag = [(header::ETAG, tag)];
+    if good {
+        return (StatusCode::NOT_MODIFIED, common, tag).into_response();
+    }
+    (common, tag, [(header::CONTENT_TYPE, asset.media)], asset.text).into_response()
+}
+
+/// Names a text by what is in it.
+fn tag(text: &str) -> String {
+    let digest = Sha256::digest(text.as_bytes());
+    let hex: String = digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    format!("\"{hex}\"")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_file_of_the_page_is_served_and_small() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/src/server/page");
+        let mut names: Vec<String> = std::fs::read_dir(folder)
+            .expect("the page's folder")
+            .map(|entry| entry.expect("readable").file_name().into_string().expect("plain"))
+            .collect();
+        let mut served: Vec<&str> = ASSETS.iter().map(|asset| asset.name).collect();
+        names.sort();
+        served.sort_unstable();
+        assert_eq!(names, served);
+        let bytes: usize = ASSETS.iter().map(|asset| asset.text.len()).sum();
+        assert!(bytes < 100_000, "the page is {bytes} bytes");
+    }
+
+    #[test]
+    fn what_a_file_names_is_there_and_nothing_is_from_elsewhere() {
+        for asset in ASSETS {
+            let mut rest = asset.text;
+            while let Some((_, after)) = rest.split_once("from \"./") {
+                let (name, after) = after.split_once('"').expect("an end");
+                assert!(ASSETS.iter().any(|known| known.name == name), "{}: {name}", asset.name);
+                rest = after;
+            }
+            let elsewhere = asset.text.replace("http://www.w3.org/2000/svg", "");
+            assert!(!elsewhere.contains("://"), "{} names another place", asset.name);
+        }
+    }
+
+    #[test]
+    fn a_copy_that_is_good_is_not_sent_again() {
+        let mut headers = HeaderMap::new();
+        let first = answer(&ASSETS[0], &headers);
+        assert_eq!(first.status(), StatusCode::OK);
+        let tag = first.headers().get(header::ETAG).expect("a tag").clone();
+        for (known, status) in [
+            (tag.to_str().expect("text").to_owned(), StatusCode::NOT_MODIFIED),
+            (format!("\"other\", {}", tag.to_str().expect("text")), StatusCode::NOT_MODIFIED),
+            ("\"other\"".to_owned(), StatusCode::OK),
+        ] {
+            headers.insert(header::IF_NONE_MATCH, known.parse().expect("a value"));
+            assert_eq!(answer(&ASSETS[0], &headers).status(), status, "{known}");
+        }
+    }
+}
