@@ -151,6 +151,7 @@ fn write(
         pose: *pose,
         plan: *plan,
         air: None,
+        request: None,
     }))?;
     let progress = progress(plan.stops());
     let station = simulator.station(pose.position());

@@ -81,7 +81,8 @@ pub(super) fn scan_of_room(pose: Pose, step_deg: f64, seed: u64) -> ScanView {
         let sim = predict(&pose, azimuth_deg);
         measure(scan, i, azimuth_deg, sim, &mut rng)
     });
-    let start = ScanStart { scan, time: jiff::Timestamp::UNIX_EPOCH, pose, plan, air: None };
+    let start =
+        ScanStart { scan, time: jiff::Timestamp::UNIX_EPOCH, pose, plan, air: None, request: None };
     let end = ScanEnd {
         scan,
         time: jiff::Timestamp::UNIX_EPOCH,
@@ -131,6 +132,7 @@ pub(super) fn session() -> Session {
         air: air.to_record(),
         scene: Some(SceneRef { name: "simple-room".into(), sha256: String::new() }),
         model: Some(ModelRecord { engine: "fan".into(), settings: serde_json::Map::new() }),
+        collection: None,
     }
 }
 

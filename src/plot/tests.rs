@@ -323,6 +323,7 @@ prop_compose! {
                 from_deg: plan[0], to_deg: plan[1], step_deg: plan[2], pings_per_stop: 1,
             },
             air: None,
+            request: None,
         });
         let session = with_session.then(|| session.into());
         ScanView { scan: Uuid::nil(), session, start, pings, events: Vec::new(), end: None }

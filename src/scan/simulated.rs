@@ -34,7 +34,14 @@ impl ScanView {
         Self {
             scan,
             session: Some(std::sync::Arc::new(Session::simulated(simulator, time))),
-            start: Some(ScanStart { scan, time, pose: *pose, plan: *plan, air: None }),
+            start: Some(ScanStart {
+                scan,
+                time,
+                pose: *pose,
+                plan: *plan,
+                air: None,
+                request: None,
+            }),
             pings: pings.collect(),
             events: Vec::new(),
             end: Some(ScanEnd::simulated(simulator, scan, plan.beams(), time)),
@@ -57,6 +64,7 @@ impl Session {
             air: simulator.air().to_record(),
             scene: Some(SceneRef { name: scene.name.clone(), sha256: scene.sha256.clone() }),
             model: Some(simulator.model_record()),
+            collection: None,
         }
     }
 }

@@ -120,6 +120,7 @@ mod tests {
             pose: Pose { x_m: 1.0, y_m: 2.0, heading_deg: 0.0 },
             plan: ScanPlan::default(),
             air: None,
+            request: None,
         })
     }
 
