@@ -5,7 +5,8 @@
 #   FUZZ_SECONDS=60 ./test.sh   fuzz each target for a minute (default 5 s; 0 leaves fuzzing out)
 #   FIRMWARE=0 ./test.sh        leave firmware and emulator out, where they can't be built: they
 #                               need Debian's packages (firmware/test.sh)
-#   SONARD_SOAK_FAULTS=1000 SONARD_KILLS=200 ./test.sh   longer runs of the daemon among faults
+#   SONARD_SOAK_FAULTS=1000 SONARD_KILLS=200 SONARD_COLLECT_KILLS=200 ./test.sh   longer runs of daemon
+#                               and collection among faults
 set -euo pipefail
 cd "$(dirname "$0")"
 fuzz_seconds=${FUZZ_SECONDS:-5}

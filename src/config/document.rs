@@ -4,22 +4,15 @@ use std::fmt::Write as _;
 
 use serde_json::Value;
 
-use super::schema::{Key, Kind, sections};
+use super::schema::{Form, Key, Kind};
 
-const HEAD: &str = "\
-# Configuration of `sonard run`. Every key is here, with its default; a key without one stands in
-# a comment with an example. Over the file go environment variables (SONARD_PLAN_STEP_DEG=1.8),
-# over those the options of the command line (--set plan.step_deg=1.8). `sonard run --check` reads
-# it all and says what is in force. `systemctl reload` (SIGHUP) takes changes in; those of keys
-# marked (restart) wait for the next start.
-";
 const WIDTH: usize = 98;
 
-/// The text of `config/sonard.toml`.
+/// The file that documents every key; for `sonard run` the text of `config/sonard.toml`.
 #[must_use]
-pub fn document() -> String {
-    let mut text = HEAD.to_owned();
-    for section in sections() {
+pub fn document<K: Form>() -> String {
+    let mut text = K::HEAD.to_owned();
+    for section in K::sections() {
         text += "\n";
         comment(&mut text, &section.about);
         // Writing to a text can't fail.
@@ -58,6 +51,7 @@ pub(super) fn wanted(kind: &Kind) -> String {
         Kind::Choice(words) => format!("One of \"{}\".", words.join("\", \"")),
         Kind::Text => "Text.".into(),
         Kind::Texts => "List of texts.".into(),
+        Kind::Any => "Text, number, true or false.".into(),
     }
 }
 
@@ -72,7 +66,7 @@ fn toml_text(kind: &Kind, value: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::{
-        super::{Keys, Layers},
+        super::{Keys, Layers, sections},
         *,
     };
 
@@ -80,7 +74,7 @@ mod tests {
 
     #[test]
     fn the_shipped_file_shows_every_key_as_the_program_knows_it() {
-        let fresh = document();
+        let fresh = document::<Keys>();
         if std::env::var_os("SONARD_TEST_WRITE").is_some() {
             std::fs::write("config/sonard.toml", &fresh).expect("it can be written");
         }

@@ -1,6 +1,7 @@
 //! The program as a user meets it. One test binary, because each would link all of it.
 #![cfg(feature = "daemon")]
 
+mod collect;
 mod common;
 mod daemon;
 mod doctor;
