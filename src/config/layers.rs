@@ -314,7 +314,7 @@ mod tests {
         let file = "[plan]\nstep_deg = 3.6\nto_deg = 90\n[device]\nport = \"a\"\n";
         let environment =
             [("SONARD_PLAN_STEP_DEG", "1.8"), ("SONARD_DEVICE_PORT", "b"), ("HOME", "x")];
-        let keys = Layers::new()
+        let keys = Layers::<Keys>::new()
             .file("s.toml", file)
             .and_then(|l| l.environment(environment.map(|(k, v)| (k.into(), v.into()))))
             .and_then(|l| l.option("--set", "device.port=c"))
@@ -367,8 +367,9 @@ mod tests {
 
     #[test]
     fn lists_can_be_given_as_text() {
-        let keys =
-            Layers::new().option("--set", "server.hosts=robot, robot.local").and_then(Layers::keys);
+        let keys = Layers::<Keys>::new()
+            .option("--set", "server.hosts=robot, robot.local")
+            .and_then(Layers::keys);
         assert_eq!(keys.expect("reads").server.hosts, ["robot", "robot.local"]);
     }
 

@@ -163,8 +163,15 @@ mod tests {
         let fast = Budget::of(&plan, &settings(), (0, 1), 115_200);
         let slow = Budget::of(&plan, &settings(), (0, 1), 4_800);
         assert_eq!(fast.acoustics_s, slow.acoustics_s);
-        // 41 bytes of reading at 4,800 baud take longer than the 38 ms of a beam.
-        assert!(slow.link_s > 15.0, "{slow:?}");
+        // Code byte, header, body (1 + 2 + 2 + 2 + 5 + 1, and 1 + 3 for each echo), CRC, delimiter.
+        let bytes = f64::from(1 + 4 + (13 + 1 + 3 * 3) + 4 + 1);
+        assert_eq!(reading_bytes(3), bytes);
+        // A reading takes 69 ms at 4,800 baud and a beam 38 ms: the difference is waited for.
+        let (reading_s, beam_s) =
+            (bytes * 10.0 / 4_800.0, timing::limit_s(&plan, &settings(), 1) / 400.0);
+        let exchanges_s = exchange_bytes(&settings()) * 10.0 / 4_800.0;
+        let expected_s = 400.0 * (reading_s - beam_s) + reading_s + exchanges_s;
+        assert!((slow.link_s - expected_s).abs() < 1e-9 && slow.link_s > 10.0, "{slow:?}");
     }
 
     #[test]
