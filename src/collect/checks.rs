@@ -98,7 +98,7 @@ pub fn check(figures: &Figures, keys: &CheckKeys) -> Vec<Finding> {
     if let Some(drift) = figures.home_drift_steps
         && drift.unsigned_abs() > keys.max_home_drift_steps
     {
-        let detail = format!("the index was found {drift} steps off: the motor missed steps");
+        let detail = format!("the index was found off by {drift} motor steps: it missed steps");
         find("home_drift_steps", keys.on_home_drift, detail);
     }
     if let Some(change_c) = figures.temperature_change_c

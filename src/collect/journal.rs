@@ -267,6 +267,33 @@ fn read(text: &[u8], path: &Path) -> Result<History, FolderError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// A journal that was changed at any place is read or refused at a line, without a panic.
+        #[test]
+        fn a_changed_journal_is_read_or_refused(
+            changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+        ) {
+            let mut text: Vec<u8> = Vec::new();
+            for number in 1..4 {
+                serde_json::to_writer(&mut text, &pose(number)).expect("JSON");
+                text.push(b'\n');
+            }
+            for (at, byte) in changes {
+                let at = at.index(text.len());
+                text[at] = byte;
+            }
+            match read(&text, Path::new("journal.jsonl")) {
+                Ok(history) => prop_assert!(history.poses.len() <= 3),
+                Err(FolderError::Damaged { line, .. }) => {
+                    let lines = text.split(|&byte| byte == b'\n').count() as u64;
+                    prop_assert!((1..=lines).contains(&line));
+                }
+                Err(other) => return Err(TestCaseError::fail(other.to_string())),
+            }
+        }
+    }
 
     fn pose(number: u32) -> Entry {
         let pose = crate::geometry::Pose { x_m: 0.5, y_m: 0.25, heading_deg: 90.0 };

@@ -186,6 +186,7 @@ fn value(column: &str, cell: &str) -> Value {
 mod tests {
     use super::*;
     use crate::scene::shipped;
+    use proptest::prelude::*;
 
     fn room() -> Scene {
         Scene::from_json(shipped::text("simple-room").expect("shipped")).expect("it is right")
@@ -207,6 +208,35 @@ mod tests {
         assert!(poses[1].conditions.is_empty());
         let lines = format!("{json}\n\n{json}\n");
         assert_eq!(read_file(&lines, &room).expect("poses").len(), 2);
+    }
+
+    proptest! {
+        /// Whatever a file of poses holds: no panic, and what is refused is refused at a line of it.
+        #[test]
+        fn any_text_is_read_or_refused_at_a_line(
+            pieces in prop::collection::vec(
+                prop_oneof![
+                    8 => prop::sample::select(vec![
+                        "x_m", "y_m", "heading_deg", "name", ",", ",", "\n", "0.5", "0.3", "1e999",
+                        "\"", "{\"x_m\":0.5,\"y_m\":0.3,\"heading_deg\":0}", "{", "}", "true", "\r\n",
+                    ]).prop_map(str::to_owned),
+                    1 => "\\PC{0,6}",
+                ],
+                0..30,
+            ),
+            header in any::<bool>(),
+        ) {
+            let text = if header { "x_m,y_m,heading_deg\n".to_owned() } else { String::new() };
+            let text = text + &pieces.concat();
+            match read_file(&text, &room()) {
+                Ok(poses) => prop_assert!(!poses.is_empty()),
+                Err(fault) => {
+                    let lines = text.split('\n').count() as u64;
+                    let line = fault.line.unwrap_or(1);
+                    prop_assert!((1..=lines + 1).contains(&line), "{fault} at {line} of {lines}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub(super) struct Device {
 }
 
 impl Device {
-    /// Gets it ready for the first pose; nothing is asked of it yet.
+    /// Gets it ready at the first pose; nothing is asked of it yet.
     pub(super) fn new(
         args: &Args,
         loaded: &Loaded,
@@ -53,8 +53,13 @@ impl Device {
             let port = args.port.clone().or_else(|| keys.device.port.clone());
             Kind::Port(port.unwrap_or_default())
         };
-        let scene = keys.place.scene.clone();
-        Ok(Self { kind, world: args.world.clone(), scene, interrupts, ranger: None })
+        let (world, scene) = (args.world.clone(), keys.place.scene.clone());
+        let mut device = Self { kind, world, scene, interrupts, ranger: None };
+        // A mock was made there.
+        if args.emulator {
+            device.carry_to(first)?;
+        }
+        Ok(device)
     }
 
     /// Lets it stand where the setup says. A real ranger stands where somebody put it.

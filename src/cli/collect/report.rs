@@ -8,11 +8,11 @@ use super::refuse;
 use crate::{
     cli::{Failure, Outcome as Done},
     collect::{
-        CheckKeys, CollectionKeys, Conditions, Figures, Folder, History, INPUTS, NamedPose,
-        Outcome, Repeatability, Take, repeatability,
+        BeamSpread, CheckKeys, CollectionKeys, Conditions, Figures, Folder, History, INPUTS,
+        NamedPose, Outcome, Repeatability, Take, repeatability,
     },
     compare::{Comparison, compare},
-    plot::{Picture, Timeline, draw_scans, draw_scene, draw_timelines},
+    plot::{Picture, Point, Series, draw_scans, draw_scene, draw_series},
     scan::ScanView,
     scene::Scene,
     store::load,
@@ -20,7 +20,18 @@ use crate::{
 
 /// Scans that are drawn over each other at most: more of them hide what is below.
 const DRAWN: usize = 12;
+/// Poses whose spreads are drawn at most.
+const STRIPS: usize = 6;
 const PICTURES: &str = "report";
+const TABLE: &str = "\
+## Poses
+
+Residuals are measured minus predicted range over the pairs of echoes; spread is the standard deviation
+of a beam's range over the repeats.
+
+| pose | where | scans | agree | median residual | 90 % within | spread | 90 % within | unsteady beams |
+|---|---|---|---|---|---|---|---|---|
+";
 
 /// Writes report and pictures into the folder.
 pub(super) fn write(folder: &Folder, history: &History) -> Done {
@@ -34,31 +45,44 @@ pub(super) fn write(folder: &Folder, history: &History) -> Done {
         draw(folder, "overview", &overview(scene, history))?;
         text += "![The poses in the scene](report/overview.svg)\n\n";
     }
-    text += "## Poses\n\nResiduals are measured minus predicted range over the pairs of echoes; spread is \
-             the standard deviation of a beam's range over the repeats.\n\n\
-             | pose | where | scans | agree | median residual | 90 % within | spread | 90 % within | \
-             unsteady beams |\n|---|---|---|---|---|---|---|---|---|\n";
-    let mut details = String::new();
+    let (poses, details) = poses(folder, history, scene.as_ref())?;
+    text += &poses;
+    text += &fates(history);
+    draw(folder, "drift", &drift(history, &keys.checks))?;
+    text += "\n## Drift\n\n![Every scan over time](report/drift.svg)\n\n";
+    text += &format!("## Scans\n\n{details}");
+    folder.write("report.md", text.as_bytes()).map_err(|error| refuse(&error))
+}
+
+/// The table of poses, and a picture of the scans at each.
+fn poses(
+    folder: &Folder,
+    history: &History,
+    scene: Option<&Scene>,
+) -> Result<(String, String), Failure> {
+    let (mut table, mut details) = (TABLE.to_owned(), String::new());
+    let mut repeated = Vec::new();
     for (&number, pose) in &history.poses {
         let views = views(folder, history, number)?;
-        let row =
-            Row { number, pose, compared: compare(&views).0, repeat: repeatability(&views).0 };
-        text += &row.line();
+        let (repeat, beams) = repeatability(&views);
+        table += &Row { number, pose, compared: compare(&views).0, repeat }.line();
+        let label = pose.label();
         if !views.is_empty() {
             let name = format!("pose-{number:03}");
             let drawn = &views[..views.len().min(DRAWN)];
-            draw(folder, &name, &draw_scans(drawn, scene.as_ref()))?;
-            let label = pose.label();
+            draw(folder, &name, &draw_scans(drawn, scene))?;
             let _ = write!(details, "### {number}: {label}\n\n{}", conditions(&pose.conditions));
             let _ = write!(details, "![Scans at {label}](report/{name}.svg)\n\n");
         }
+        if repeat.scans > 1 {
+            repeated.push((format!("{number} {label}"), repeat, beams));
+        }
     }
-    text += &fates(history);
-    draw(folder, "drift", &drift(history, &keys.checks))?;
-    text +=
-        "\n## Drift\n\n![Temperature, bias, agreement and index over time](report/drift.svg)\n\n";
-    text += &format!("## Scans\n\n{details}");
-    folder.write("report.md", text.as_bytes()).map_err(|error| refuse(&error))
+    if !repeated.is_empty() {
+        draw(folder, "repeatability", &spreads(repeated))?;
+        table += "\n![Spread of each beam over the repeats](report/repeatability.svg)\n";
+    }
+    Ok((table, details))
 }
 
 /// What there is, from when to when, by what.
@@ -81,7 +105,7 @@ fn head(history: &History, keys: &CollectionKeys) -> String {
     if let (Some(first), Some(last)) = (times().min(), times().max()) {
         let _ = writeln!(
             text,
-            "Begun {first:.0}, last scan {last:.0}, in {} runs.",
+            "Begun {first:.0}, last scan {last:.0}; started {} times.",
             history.starts.len()
         );
     }
@@ -190,28 +214,67 @@ fn overview(scene: &Scene, history: &History) -> Picture {
     draw_scene(&Scene { poses, ..scene.clone() })
 }
 
+/// What every scan was like over time, those set aside among them.
 fn drift(history: &History, checks: &CheckKeys) -> Picture {
+    let first = history.takes.iter().filter_map(|take| take.started).min().unwrap_or_default();
+    let hours = |at: Timestamp| at.duration_since(first).as_secs_f64() / 3600.0;
+    let times = history.takes.iter().filter_map(|take| take.started);
+    let last_h = times.map(hours).fold(0.0, f64::max);
+    let (scale, unit) = if last_h < 1.0 { (60.0, "minutes") } else { (1.0, "hours") };
     let strip = |title: &str, limits, of: &dyn Fn(&Figures) -> Option<f64>| {
         let point = |take: &Take| {
-            Some((take.started?, of(&take.figures)?, take.file.clone()))
-                as Option<(Timestamp, f64, String)>
+            Some(Point {
+                x: scale * hours(take.started?),
+                y: of(&take.figures)?,
+                hint: take.file.clone(),
+                aside: take.outcome != Outcome::Accepted,
+            })
         };
-        Timeline {
-            title: title.into(),
-            points: history.accepted().filter_map(point).collect(),
-            limits,
-        }
+        let points = history.takes.iter().filter_map(point).collect();
+        Series { title: title.into(), points, limits }
     };
-    let drift = f64::from(checks.max_home_drift_steps);
+    let off = f64::from(checks.max_home_drift_steps);
     let strips = [
         strip("air temperature, C", None, &|figures| figures.temperature_c),
         strip("median of measured \u{2212} model, mm", None, &|f| Some(1e3 * f.median_residual_m?)),
         strip("echo pairs that agree, %", None, &|f| Some(100.0 * f.agree_fraction?)),
-        strip("index off after the scan, steps", Some([-drift, drift]), &|f| {
-            f.home_drift_steps.map(f64::from)
+        strip("index off after the scan, steps", Some([-off, off]), &|figures| {
+            figures.home_drift_steps.map(f64::from)
         }),
     ];
-    draw_timelines("Over time, one mark a scan that counts", &[], &strips)
+    draw_series("Every scan over time", &[], &format!("{unit} since {first:.0}"), &strips)
+}
+
+/// The spread of each beam's ranges at the poses that repeat worst.
+fn spreads(mut poses: Vec<(String, Repeatability, Vec<BeamSpread>)>) -> Picture {
+    poses.sort_by(|a, b| {
+        let worst = |of: &Repeatability| of.p90_spread_m.unwrap_or(0.0);
+        worst(&b.1).total_cmp(&worst(&a.1))
+    });
+    let all = poses.len();
+    poses.truncate(STRIPS);
+    let strips: Vec<Series> = poses
+        .into_iter()
+        .map(|(label, of, beams)| {
+            let point = |beam: BeamSpread| Point {
+                x: beam.azimuth_deg,
+                y: 1e3 * beam.spread_m,
+                hint: format!("{:.1}\u{b0}: {:.2} mm", beam.azimuth_deg, 1e3 * beam.spread_m),
+                aside: false,
+            };
+            Series {
+                title: format!("{label}: standard deviation over {} scans, mm", of.scans),
+                points: beams.into_iter().map(point).collect(),
+                limits: None,
+            }
+        })
+        .collect();
+    let lines = match all > STRIPS {
+        true => vec![format!("The {STRIPS} of {all} poses that repeat worst")],
+        false => Vec::new(),
+    };
+    let along = "azimuth, degrees counter-clockwise from the heading";
+    draw_series("How well beams repeat", &lines, along, &strips)
 }
 
 /// The scans of a pose that count, by repeat.

@@ -26,7 +26,8 @@ use crate::{
     collect::{
         AfterRetakes, AirAction, Conditions, Entry, Folder, Journal, Manifest, NamedPose, Slot,
     },
-    scan::{AirSource, CollectionRef, ScanAir},
+    ranger::ScanJob,
+    scan::{AirSource, CollectionRef, ScanAir, Session},
 };
 use uuid::Uuid;
 
@@ -48,8 +49,10 @@ struct Collector<'a> {
     /// What is to be measured at each pose in that air.
     setups: HashMap<u32, Arc<Setup>>,
     device: Option<Device>,
-    /// The pose at which the ranger stands, as far as this run knows.
+    /// The pose at which the ranger stands, as far as people said so in this run.
     here: Option<u32>,
+    /// The pose that the device was carried to.
+    carried_to: Option<u32>,
     /// Refused scans of this run.
     refused: BTreeMap<Slot, u32>,
     /// Noted at the start of this run.
@@ -85,8 +88,9 @@ impl Collector<'_> {
             if !std::mem::take(&mut first) {
                 self.pause().await?;
             }
-            self.go_to(slot.pose).await?;
+            self.stand_at(slot.pose).await?;
             self.follow_air().await?;
+            self.carry_to(slot.pose)?;
             let taken = self.take(slot).await?;
             if let Next::Stop(why) = self.judge(slot, taken).await? {
                 return Err(Failure::Found(Some(format!(
@@ -151,13 +155,11 @@ impl Collector<'_> {
         }
     }
 
-    /// Lets the ranger stand at a pose: asks, waits and carries as far as that is wanted.
-    async fn go_to(&mut self, number: u32) -> Outcome {
-        if self.here == Some(number) {
-            return Ok(());
-        }
+    /// Waits until people say that the ranger stands at a pose, as far as that is wanted, and
+    /// asks what is to be noted there.
+    async fn stand_at(&mut self, number: u32) -> Outcome {
         let pose = self.pose(number);
-        if self.loaded.keys.poses.confirm {
+        if self.here != Some(number) && self.loaded.keys.poses.confirm {
             self.bar.hide();
             let question =
                 format!("put the ranger at {}, pose {number}, and press Enter:", pose.label());
@@ -168,13 +170,18 @@ impl Collector<'_> {
                 ));
             }
         }
-        self.ask_at_pose(number, pose).await?;
-        let setup = self.setup(number)?;
-        if let Some(device) = &mut self.device {
-            device.carry_to(&setup)?;
-        }
         self.here = Some(number);
-        Ok(())
+        self.ask_at_pose(number, pose).await
+    }
+
+    /// Carries a ranger that is no real one.
+    fn carry_to(&mut self, number: u32) -> Outcome {
+        if self.carried_to == Some(number) {
+            return Ok(());
+        }
+        let setup = self.setup(number)?;
+        self.carried_to = Some(number);
+        self.device.as_mut().map_or(Ok(()), |device| device.carry_to(&setup))
     }
 
     /// Asks what is to be noted at a pose, unless it is noted already.
@@ -211,34 +218,36 @@ impl Collector<'_> {
                 self.bar.say(&format!("{said}: from here on it is predicted and ranged with that"));
                 self.air = self.loaded.air(now_c)?;
                 self.setups.clear();
+                // A mock's air is what the thermometer says, unless it has a truth of its own.
+                self.carried_to = None;
             }
         }
         Ok(())
     }
 
+    /// Takes a scan; beside it, by how much the air changed meanwhile.
     async fn take(&mut self, slot: Slot) -> Result<(Taken, Option<f64>), Failure> {
         let setup = self.setup(slot.pose)?;
-        let before_c = self.temperature().await;
-        let done = self.journal.history().accepted().count() as u32;
+        let history = self.journal.history();
+        let (done, of) = (history.accepted().count() as u32, history.wanted().len() as u32);
         let label = self.pose(slot.pose).label();
-        let of = self.journal.history().wanted().len() as u32;
         self.bar.begin(format!("{label}, scan {} of {of}", done + 1), done, of);
-        let patience = Duration::from_secs_f64(self.loaded.keys.collection.patience_s);
-        let session_of = self.collection_ref(slot);
-        let Some(device) = &mut self.device else {
-            return Err(Failure::device("there is no device", "this is a fault of the program"));
-        };
-        let ranger = device.find(patience).await?;
-        let identity = *ranger.identity();
-        let mut job = setup.job(&identity)?;
-        job.air = before_c.map(|_| ScanAir {
+        let before_c = self.temperature().await;
+        let air = before_c.map(|_| ScanAir {
             temperature_c: self.air.temperature_c(),
             sound_speed_m_s: self.air.sound_speed_m_s(),
             source: AirSource::File,
             age_s: Some(0.0),
         });
-        let mut session = setup.session(&identity);
-        session.collection = Some(Box::new(session_of));
+        let of = self.collection_ref(slot);
+        let patience = Duration::from_secs_f64(self.loaded.keys.collection.patience_s);
+        let Some(device) = &mut self.device else {
+            return Err(Failure::device("there is no device", "this is a fault of the program"));
+        };
+        let ranger = device.find(patience).await?;
+        let identity = *ranger.identity();
+        let job = ScanJob { air, ..setup.job(&identity)? };
+        let session = Session { collection: Some(Box::new(of)), ..setup.session(&identity) };
         let path = self.folder.taking(slot);
         let taken =
             taking::take(ranger, (&job, session), &path, &self.bar, &self.interrupts).await?;

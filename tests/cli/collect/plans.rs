@@ -29,7 +29,7 @@ fn a_plan_becomes_scans_a_report_and_a_manifest_that_notices_any_change() {
     for part in ["# shelf", "6 of 6 scans", "| 1 fig9 |", "carpet false", "report/pose-003.svg"] {
         assert!(report.contains(part), "{part} is not in\n{report}");
     }
-    for picture in ["overview", "drift", "pose-001", "pose-002", "pose-003"] {
+    for picture in ["overview", "drift", "repeatability", "pose-001", "pose-002", "pose-003"] {
         assert!(case.text(&format!("out/report/{picture}.svg")).contains("<svg"), "{picture}");
     }
     assert!(case.text("out/inputs/plan.toml").contains("seed = 5"));
@@ -117,26 +117,29 @@ fn the_estimate_is_what_a_collection_takes() {
     let case = Case::new(
         "[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 3\npause_s = 0.2\n[motion]\nsettle_ms = 20\n",
     );
-    let output = case.collect(&["--plan-only", "--json"]);
+    let turn = ["--set", "plan.to_deg=360"];
+    let output = case.collect(&[&turn[..], &["--plan-only", "--json"]].concat());
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let said: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let (scan, total) = (&said["scan"], &said["total"]);
     let figure = |value: &serde_json::Value| value.as_f64().expect("a figure");
-    // 25 windows of 3 m there and back at 343.99 m/s, no less than 20 ms apart.
+    // 100 windows of 3 m there and back at 343.99 m/s, no less than 20 ms apart.
     let acoustics_s = figure(&scan["acoustics_s"]);
-    assert!((acoustics_s - 25.0 * 2.0 * 1.5 / 343.99).abs() < 1e-4, "{scan}");
+    assert!((acoustics_s - 100.0 * 2.0 * 1.5 / 343.99).abs() < 1e-4, "{scan}");
     let parts = ["acoustics_s", "motor_s", "link_s"].map(|part| figure(&scan[part]));
     assert!((parts.iter().sum::<f64>() - figure(&scan["total_s"])).abs() < 1e-9);
     assert!((figure(&total["total_s"]) - 3.0 * figure(&scan["total_s"]) - 0.4).abs() < 1e-9);
     assert!(!case.path("out").exists(), "it was only asked");
 
-    case.collect_all(&["--realtime"]);
+    case.collect_all(&[&turn[..], &["--realtime"]].concat());
     let takes = case.entries("take");
-    let measured: Vec<f64> = takes.iter().map(|take| figure(&take["wall_s"])).collect();
-    let mean_s = measured.iter().sum::<f64>() / measured.len() as f64;
+    let mut measured: Vec<f64> = takes.iter().map(|take| figure(&take["wall_s"])).collect();
+    measured.sort_by(f64::total_cmp);
     let estimated_s = figure(&scan["total_s"]);
     println!("estimated {estimated_s:.4} s a scan, measured {measured:.4?}");
-    assert!((mean_s / estimated_s - 1.0).abs() < 0.05, "{mean_s} s, {estimated_s} s estimated");
+    // A busy computer keeps one scan or another waiting, so the middle one counts.
+    let median_s = measured[1];
+    assert!((median_s / estimated_s - 1.0).abs() < 0.03, "{median_s} s, {estimated_s} s estimated");
     // The files are about as large as was said.
     let bytes: u64 = case.manifest()["files"]
         .as_array()

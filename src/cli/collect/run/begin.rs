@@ -51,6 +51,7 @@ impl<'a> Collector<'a> {
             setups: HashMap::new(),
             device: None,
             here: None,
+            carried_to: None,
             refused: BTreeMap::new(),
             conditions: Conditions::new(),
             bar: Bar::new(scan_s, loaded.keys.collection.pause_s, loaded.plan.beams()),
@@ -161,9 +162,7 @@ impl<'a> Collector<'a> {
         };
         let setup = self.setup(first)?;
         let mut device = Device::new(self.args, &self.loaded, &setup, self.interrupts.clone())?;
-        device.carry_to(&setup)?;
-        // Somebody who carries the ranger is to say so even for the first pose.
-        self.here = None;
+        self.carried_to = Some(first);
         let ranger = device.meet().await?;
         let identity = *ranger.identity();
         self.device = Some(device);
