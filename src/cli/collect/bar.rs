@@ -14,7 +14,6 @@ pub(super) struct Bar {
     scan_s: f64,
     pause_s: f64,
     beams_a_scan: u32,
-    doing: String,
 }
 
 impl Bar {
@@ -24,24 +23,15 @@ impl Bar {
         if let Ok(style) = style {
             bar.set_style(style);
         }
-        Self {
-            bar,
-            estimated_s: 0.0,
-            measured_s: 0.0,
-            scan_s,
-            pause_s,
-            beams_a_scan,
-            doing: String::new(),
-        }
+        Self { bar, estimated_s: 0.0, measured_s: 0.0, scan_s, pause_s, beams_a_scan }
     }
 
     /// A scan begins: so many are done, of so many.
-    pub(super) fn begin(&mut self, doing: String, done: u32, of: u32) {
+    pub(super) fn begin(&mut self, doing: &str, done: u32, of: u32) {
         self.bar.set_length(u64::from(of) * u64::from(self.beams_a_scan));
         self.bar.set_position(u64::from(done) * u64::from(self.beams_a_scan));
         let left = human(self.left_s(of.saturating_sub(done)));
-        self.doing = format!("{doing}, {left} left,");
-        self.bar.set_message(self.doing.clone());
+        self.bar.set_message(format!("{doing}, {left} left,"));
     }
 
     pub(super) fn beam(&self) {

@@ -231,7 +231,7 @@ impl Collector<'_> {
         let history = self.journal.history();
         let (done, of) = (history.accepted().count() as u32, history.wanted().len() as u32);
         let label = self.pose(slot.pose).label();
-        self.bar.begin(format!("{label}, scan {} of {of}", done + 1), done, of);
+        self.bar.begin(&format!("{label}, scan {} of {of}", done + 1), done, of);
         let before_c = self.temperature().await;
         let air = before_c.map(|_| ScanAir {
             temperature_c: self.air.temperature_c(),
