@@ -66,9 +66,10 @@ fn a_file_whose_beginning_failed_begins_with_the_session_all_the_same() {
     // at just that moment.
     fs::rename(&folder, &away).expect("renamed");
     let second = scan(2);
-    assert!(log.append(&second[1], now).is_err());
+    let tomorrow = time("2026-03-02T10:00:00Z");
+    assert!(log.append(&second[1], tomorrow).is_err());
     fs::rename(&away, &folder).expect("renamed");
-    put(&mut log, &second[1..], now);
+    put(&mut log, &second[1..], tomorrow);
     log.close().expect("syncs");
     assert_eq!((names(&folder).len(), faults(&folder)), (2, (0, 0)));
 }
