@@ -8,7 +8,8 @@
 #   PAGE=0 ./test.sh            leave the live page out, where there is no Chromium to look at it
 #   AXE=0 ./test.sh             leave axe-core out of that, where there is no npm to get it with
 #   PACKAGE=1 ./test.sh         build, install, upgrade and remove the Debian package, too
-#   SONARD_SOAK_FAULTS=1000 SONARD_KILLS=200 ./test.sh   longer runs of the daemon among faults
+#   SONARD_SOAK_FAULTS=1000 SONARD_KILLS=200 SONARD_COLLECT_KILLS=200 ./test.sh   longer runs of daemon
+#                               and collection among faults
 set -euo pipefail
 cd "$(dirname "$0")"
 fuzz_seconds=${FUZZ_SECONDS:-5}

@@ -2,11 +2,16 @@
 
 use std::{io, path::PathBuf, time::Duration};
 
-use http_body_util::{BodyExt as _, Empty};
+use http_body_util::{BodyExt as _, Full};
 use hyper::{
-    Request, Response, StatusCode, body::Bytes, body::Incoming, client::conn::http1, header,
+    Request, Response, StatusCode,
+    body::{Bytes, Incoming},
+    client::conn::http1,
+    header,
+    http::request::Builder,
 };
 use hyper_util::rt::TokioIo;
+use serde_json::Value;
 use thiserror::Error;
 use tokio::{
     net::{TcpStream, UnixStream},
@@ -76,8 +81,34 @@ impl ClientError {
 /// # Errors
 /// When nobody answers, or the answer is not of success.
 pub async fn get(place: &Place, path: &str) -> Result<Response<Incoming>, ClientError> {
-    let response =
-        timeout(PATIENCE, begin(place, path)).await.map_err(|_| ClientError::TooSlow)??;
+    ask(place, Request::get(path), Bytes::new()).await
+}
+
+/// The whole body of an answer.
+///
+/// # Errors
+/// As [`get`].
+pub async fn get_whole(place: &Place, path: &str) -> Result<Bytes, ClientError> {
+    Ok(get(place, path).await?.into_body().collect().await?.to_bytes())
+}
+
+/// Gives an order with a JSON body, and returns the whole answer.
+///
+/// # Errors
+/// As [`get`]; over TCP a daemon takes orders only with its token.
+pub async fn post(place: &Place, path: &str, body: &Value) -> Result<Bytes, ClientError> {
+    let request = Request::post(path).header(header::CONTENT_TYPE, "application/json");
+    let answer = ask(place, request, body.to_string().into()).await?;
+    Ok(answer.into_body().collect().await?.to_bytes())
+}
+
+async fn ask(
+    place: &Place,
+    request: Builder,
+    body: Bytes,
+) -> Result<Response<Incoming>, ClientError> {
+    let begun = timeout(PATIENCE, begin(place, request, body));
+    let response = begun.await.map_err(|_| ClientError::TooSlow)??;
     let status = response.status();
     // A daemon that is not well says so with a body that is wanted all the same.
     if status.is_success() || status == StatusCode::SERVICE_UNAVAILABLE {
@@ -91,37 +122,38 @@ pub async fn get(place: &Place, path: &str) -> Result<Response<Incoming>, Client
     Err(ClientError::Refused { status, error, help })
 }
 
-/// The whole body of an answer.
-///
-/// # Errors
-/// As [`get`].
-pub async fn get_whole(place: &Place, path: &str) -> Result<Bytes, ClientError> {
-    Ok(get(place, path).await?.into_body().collect().await?.to_bytes())
-}
-
-async fn begin(place: &Place, path: &str) -> Result<Response<Incoming>, ClientError> {
+async fn begin(
+    place: &Place,
+    request: Builder,
+    body: Bytes,
+) -> Result<Response<Incoming>, ClientError> {
     match place {
         Place::Socket(socket) => {
             let stream = UnixStream::connect(socket).await;
             let stream = stream.map_err(|source| no_daemon(&socket.display(), source))?;
-            send(stream, "localhost", path).await
+            send(stream, "localhost", request, body).await
         }
         Place::Address(address) => {
             let stream = TcpStream::connect(address).await;
             let stream = stream.map_err(|source| no_daemon(address, source))?;
-            send(stream, address, path).await
+            send(stream, address, request, body).await
         }
     }
 }
 
-async fn send<S>(stream: S, host: &str, path: &str) -> Result<Response<Incoming>, ClientError>
+async fn send<S>(
+    stream: S,
+    host: &str,
+    request: Builder,
+    body: Bytes,
+) -> Result<Response<Incoming>, ClientError>
 where
     S: tokio::io::AsyncRead + tokio::io::AsyncWrite + Send + Unpin + 'static,
 {
     let (mut sender, connection) = http1::handshake(TokioIo::new(stream)).await?;
     // Its end shows in the body.
     tokio::spawn(async move { drop(connection.await) });
-    let request = Request::get(path).header(header::HOST, host).body(Empty::<Bytes>::new());
+    let request = request.header(header::HOST, host).body(Full::new(body));
     let request = request.map_err(|error| no_daemon(&host, io::Error::other(error)))?;
     Ok(sender.send_request(request).await?)
 }

@@ -35,7 +35,8 @@
 //!
 //! Those modules are pure: no clock, no file, no socket, and random numbers are passed in. They
 //! build without the feature `daemon`. Behind it, [`link`] opens serial lines, [`ranger`]
-//! drives the protocol, [`mock`] plays the device from the model, and [`store`] keeps logs.
+//! drives the protocol, [`mock`] plays the device from the model, [`store`] keeps logs, and [`collect`]
+//! keeps a collection of scans that is taken over days.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub mod acoustics;
@@ -57,6 +58,8 @@ pub mod board;
 pub mod cli;
 #[cfg(feature = "daemon")]
 pub mod client;
+#[cfg(feature = "daemon")]
+pub mod collect;
 #[cfg(feature = "daemon")]
 pub mod config;
 #[cfg(feature = "daemon")]

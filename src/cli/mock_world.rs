@@ -64,23 +64,9 @@ impl MockWorldArgs {
 
     /// The same at a given pace.
     pub(super) fn board_at(&self, pace: Pace, belief: &Belief<'_>) -> Result<MockBoard, Failure> {
-        let scene = match &self.truth {
-            Some(name) => Arc::new(scene_file::load(name)?),
-            None => Arc::clone(belief.scene),
-        };
-        let air = self.truth_air(belief.air)?;
-        let sound_speed_m_s = air.sound_speed_m_s();
-        // The mock hears to the end of whatever window it is told; the model must reach as far.
-        let options = Options { max_range_m: None, ..*belief.options };
-        let simulator = Simulator::new(
-            Arc::new(scene.with_robot_at(belief.pose)),
-            belief.sensor.clone(),
-            air,
-            options,
-        )
-        .map_err(|error| Failure::input(error, "see `sonard mock --help`"))?;
+        let sound_speed_m_s = self.truth_air(belief.air)?.sound_speed_m_s();
+        let soundings = self.soundings(belief)?;
         let steps = self.steps_per_revolution;
-        let soundings = Soundings::of(&simulator, belief.pose, steps, self.mounting_offset_deg);
         let noise = Noise::of_range_mm(self.noise_mm, sound_speed_m_s);
         let world = World::new(soundings, noise, self.missed_steps, self.seed);
         // Two mocks in a row are two boots: a nonce from the seed would repeat.
@@ -94,6 +80,31 @@ impl MockWorldArgs {
             pace,
         };
         Ok(MockBoard::new(settings, world))
+    }
+
+    /// What is heard at the pose believed in.
+    pub(super) fn soundings(&self, belief: &Belief<'_>) -> Result<Soundings, Failure> {
+        let scene = match &self.truth {
+            Some(name) => Arc::new(scene_file::load(name)?),
+            None => Arc::clone(belief.scene),
+        };
+        let air = self.truth_air(belief.air)?;
+        // The mock hears to the end of whatever window it is told; the model must reach as far.
+        let options = Options { max_range_m: None, ..*belief.options };
+        let simulator = Simulator::new(
+            Arc::new(scene.with_robot_at(belief.pose)),
+            belief.sensor.clone(),
+            air,
+            options,
+        )
+        .map_err(|error| Failure::input(error, "see `sonard mock --help`"))?;
+        let steps = self.steps_per_revolution;
+        Ok(Soundings::of(&simulator, belief.pose, steps, self.mounting_offset_deg))
+    }
+
+    /// Motor steps a revolution.
+    pub(super) const fn steps_per_revolution(&self) -> u16 {
+        self.steps_per_revolution
     }
 
     /// The same world for `sonard-emulator`, as far as it has one.

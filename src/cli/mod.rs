@@ -3,6 +3,7 @@
 mod array;
 #[cfg(feature = "pi")]
 mod board;
+mod collect;
 mod compare;
 mod doctor;
 mod explore;
@@ -55,6 +56,9 @@ enum Verb {
     /// Take one or more scans and log each reading beside the model's prediction
     #[command(long_about = scan::ABOUT)]
     Scan(scan::Args),
+    /// Take scans by a plan, over days: poses, repeats, checks, a report
+    #[command(long_about = collect::ABOUT)]
+    Collect(Box<collect::Args>),
     /// Run the daemon: scan by plan, keep logs, serve the API
     #[command(long_about = run::ABOUT)]
     Run(Box<run::Args>),
@@ -123,6 +127,7 @@ enum Verb {
 pub fn main() -> ExitCode {
     let outcome = match Cli::parse().verb {
         Verb::Scan(args) => scan::run(&args),
+        Verb::Collect(args) => collect::run(&args),
         Verb::Run(args) => run::run(*args),
         Verb::Status(args) => status::run(&args),
         Verb::Watch(args) => watch::run(&args),

@@ -102,7 +102,7 @@ Exit codes: 0 stopped by a signal, 2 wrong configuration, 3 the log or a socket 
 
 pub(super) fn run(args: Args) -> Outcome {
     if args.print_config {
-        return print(&crate::config::document());
+        return print(&crate::config::document::<crate::config::Keys>());
     }
     say_on_stderr();
     let (check, mock, virtual_time) = (args.check, args.mock, args.virtual_time);

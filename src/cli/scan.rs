@@ -1,14 +1,15 @@
 //! `sonard scan`.
 
-mod emulator;
+mod daemon;
+pub(super) mod emulator;
 mod output;
-mod setup;
+pub(super) mod setup;
 mod summary;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use firmware_protocol::host::HostConfig;
-use tokio::sync::oneshot;
+use tokio::sync::{mpsc, oneshot};
 use tokio_serial::SerialStream;
 
 use super::{
@@ -21,7 +22,7 @@ use super::{
 };
 use crate::{
     link::{self, BAUD},
-    mock::{MockBoard, MockPort},
+    mock::{MockBoard, MockPort, Soundings},
     ranger::{DriveError, Driver, Motion, Ranger, ScanError, ScanSummary},
     scan::Record,
 };
@@ -33,10 +34,48 @@ use setup::Setup;
 /// board that the opening of its port has reset is long awake.
 pub(super) const ATTEMPTS: u8 = 7;
 
+/// What a daemon has of its own, and a scan by it is not told.
+const OF_THE_DAEMON: [&str; 34] = [
+    "sensor",
+    "short_blanking",
+    "blanking_us",
+    "sensor_z",
+    "tilt_deg",
+    "temperature_c",
+    "humidity_percent",
+    "pressure_kpa",
+    "sound_speed",
+    "engine",
+    "max_range",
+    "threshold",
+    "response",
+    "ideal_receiver",
+    "lossless",
+    "max_order",
+    "edge_law",
+    "ray_spacing_deg",
+    "aperture_deg",
+    "window_ms",
+    "settle_ms",
+    "min_interval_ms",
+    "max_echoes",
+    "speed",
+    "acceleration",
+    "truth",
+    "truth_temperature_c",
+    "realtime",
+    "seed",
+    "faults",
+    "noise_mm",
+    "missed_steps",
+    "mounting_offset_deg",
+    "steps_per_revolution",
+];
+
 /// Options of `sonard scan`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
-#[command(group(clap::ArgGroup::new("device").required(true).args(["port", "mock", "emulator"])))]
+#[command(group(clap::ArgGroup::new("device").required(true).args(["port", "mock", "emulator", "daemon"])))]
 pub(super) struct Args {
     /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number
     #[arg(long, value_name = "PATH|ID")]
@@ -47,6 +86,17 @@ pub(super) struct Args {
     /// Use the firmware's machine code in an emulated board (starts sonard-emulator)
     #[arg(long)]
     emulator: bool,
+    /// Let a running daemon take the scan, with its own ranger, sensor, air and model
+    #[arg(long, conflicts_with_all = OF_THE_DAEMON)]
+    daemon: bool,
+    /// Unix socket of that daemon
+    #[arg(
+        long,
+        value_name = "PATH",
+        env = "SONARD_SERVER_SOCKET",
+        default_value = "/run/sonard/sonard.sock"
+    )]
+    socket: PathBuf,
     #[command(flatten)]
     place: PlaceArgs,
     /// Write scan.jsonl, scan.svg and scan.png to this folder instead of records to standard output
@@ -117,6 +167,7 @@ Examples:
   sonard scan --mock --scene simple-room --pose fig9 --out out/fig9
   sonard scan --port /dev/ttyACM0 --scene my-room.json --pose 1.2,0.8,90 --max-range 4 --out out
   sonard scan --emulator --scene simple-room --pose fig9 --max-range 4 --out out/emulated
+  sonard scan --daemon --socket /tmp/sonard.sock --scene simple-room --pose fig9 --out out
   sonard scan --mock --scene corridor --pose beside-wall --to-deg 45 | sonard compare -
   sonard scan --mock --scene simple-room --pose fig9 --faults flip=0.001,reset=0.005 --out noisy
 
@@ -124,11 +175,14 @@ Exit codes: 0 every beam measured, 1 stopped on request or beams are missing, 2 
 input, 3 device or link.";
 
 pub(super) fn run(args: &Args) -> Outcome {
+    if args.daemon {
+        return daemon::run(args);
+    }
     let setup = Setup::new(args)?;
     let mut output = Output::open(args.out.as_deref())?;
     let measured = runtime::new()?.block_on(measure(args, &setup, &mut output));
     // Whatever happened, what was measured is closed properly and drawn.
-    let closed = output.close(&setup);
+    let closed = output.close(&setup.scene);
     measured?;
     closed
 }
@@ -137,11 +191,11 @@ pub(super) fn run(args: &Args) -> Outcome {
 async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
     let interrupts = Interrupts::listen();
     let mock = match args.mock {
-        true => Some(start_mock(args.world.board(&setup.belief())?)?),
+        true => Some(Mock::start(args.world.board(&setup.belief())?, None)?),
         false => None,
     };
     let emulator = match args.emulator {
-        true => Some(Emulator::start(args, setup)?),
+        true => Some(Emulator::start(&emulator_options(args, setup)?)?),
         false => None,
     };
     let port = mock
@@ -174,7 +228,19 @@ async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
     Ok(())
 }
 
-async fn meet(port: &str, interrupts: &Interrupts) -> Result<Ranger<SerialStream>, Failure> {
+/// The world that the options say, as `sonard-emulator` takes it.
+fn emulator_options(args: &Args, setup: &Setup) -> Result<Vec<String>, Failure> {
+    let mut options = args.world.emulator(&args.place.scene)?;
+    options.push(format!("--pose={}", setup.pose_numbers()));
+    options.extend(args.sensor.emulator(&setup.sensor));
+    options.extend(args.air.emulator());
+    Ok(options)
+}
+
+pub(super) async fn meet(
+    port: &str,
+    interrupts: &Interrupts,
+) -> Result<Ranger<SerialStream>, Failure> {
     let line = link::open(port).map_err(|error| Failure::device(&error, error.help()))?;
     let config = HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, rand::random()) };
     tokio::select! {
@@ -186,28 +252,39 @@ async fn meet(port: &str, interrupts: &Interrupts) -> Result<Ranger<SerialStream
 }
 
 /// A mock playing beside the scan.
-struct Mock {
+pub(super) struct Mock {
     port: PathBuf,
+    soundings: mpsc::UnboundedSender<Soundings>,
     stop: oneshot::Sender<()>,
     playing: tokio::task::JoinHandle<std::io::Result<()>>,
 }
 
-fn start_mock(board: MockBoard) -> Result<Mock, Failure> {
-    let port = MockPort::open(board, None).map_err(|error| {
-        Failure::device(format!("cannot make a pty for the mock: {error}"), "is /dev/pts mounted?")
-    })?;
-    let path = port.path().to_path_buf();
-    let (stop, stopped) = oneshot::channel::<()>();
-    let playing = tokio::spawn(port.run(async move { drop(stopped.await) }, |_note| {}));
-    Ok(Mock { port: path, stop, playing })
-}
-
 impl Mock {
-    fn port(&self) -> String {
+    /// Begins to play; behind `link`, a mock comes back after a hangup.
+    pub(super) fn start(board: MockBoard, link: Option<&Path>) -> Result<Self, Failure> {
+        let port = MockPort::open(board, link).map_err(|error| {
+            let help = "is /dev/pts mounted?";
+            Failure::device(format!("cannot make a pty for the mock: {error}"), help)
+        })?;
+        let path = link.map_or_else(|| port.path().to_path_buf(), Path::to_path_buf);
+        let (soundings, moves) = mpsc::unbounded_channel();
+        let (stop, stopped) = oneshot::channel::<()>();
+        let port = port.moved_by(moves);
+        let playing = tokio::spawn(port.run(async move { drop(stopped.await) }, |_note| {}));
+        Ok(Self { port: path, soundings, stop, playing })
+    }
+
+    pub(super) fn port(&self) -> String {
         self.port.display().to_string()
     }
 
-    async fn stop(self) {
+    /// Hears this from now on, as if it had been carried elsewhere.
+    pub(super) fn carry_to(&self, soundings: Soundings) {
+        // A mock that is gone hears nothing any more.
+        drop(self.soundings.send(soundings));
+    }
+
+    pub(super) async fn stop(self) {
         // A mock that is gone already has nothing left to say.
         let _ = self.stop.send(());
         let _ = self.playing.await;
@@ -219,7 +296,7 @@ fn stopped(summary: &ScanSummary) -> Failure {
     Failure::Found(Some(format!("stopped after {} of {planned} beams", summary.end.beams)))
 }
 
-fn scan_failure(error: ScanError) -> Failure {
+pub(super) fn scan_failure(error: ScanError) -> Failure {
     match error {
         ScanError::Plan(error) => Failure::input(error, "see `sonard scan --help`"),
         ScanError::Device(error) => device_failure(&error),
@@ -228,7 +305,7 @@ fn scan_failure(error: ScanError) -> Failure {
     }
 }
 
-fn device_failure(error: &DriveError) -> Failure {
+pub(super) fn device_failure(error: &DriveError) -> Failure {
     Failure::device(error, error.help())
 }
 

@@ -39,7 +39,8 @@ pub(super) fn pose(scene: &Scene, spec: &str) -> Result<Pose, Failure> {
     Ok(pose)
 }
 
-fn read(path_or_name: &str) -> Result<String, Failure> {
+/// The text of a scene, by its file or name.
+pub(super) fn read(path_or_name: &str) -> Result<String, Failure> {
     let bytes = match fs::read(path_or_name) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {

@@ -178,6 +178,7 @@ fn write(
         plan: *plan,
         air: None,
         provenance: None,
+        request: None,
     }))?;
     let progress = progress(plan.stops().into());
     let station = simulator.station(pose.position());

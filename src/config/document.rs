@@ -2,22 +2,15 @@
 
 use std::fmt::Write as _;
 
-use super::schema::{Key, sections};
+use super::schema::{Form, Key};
 
-const HEAD: &str = "\
-# Configuration of `sonard run`. Every key is here, with its default; a key without one stands in
-# a comment with an example. Over the file go environment variables (SONARD_PLAN_STEP_DEG=1.8),
-# over those the options of the command line (--set plan.step_deg=1.8). `sonard run --check` reads
-# it all and says what is in force. `systemctl reload` (SIGHUP) takes changes in; those of keys
-# marked (restart) wait for the next start.
-";
 const WIDTH: usize = 98;
 
-/// The text of `config/sonard.toml`.
+/// The file that documents every key; for `sonard run` the text of `config/sonard.toml`.
 #[must_use]
-pub fn document() -> String {
-    let mut text = HEAD.to_owned();
-    for section in sections() {
+pub fn document<K: Form>() -> String {
+    let mut text = K::HEAD.to_owned();
+    for section in K::sections() {
         text += "\n";
         comment(&mut text, &section.about);
         // Writing to a text can't fail.
@@ -49,7 +42,7 @@ fn comment(text: &mut String, about: &str) {
 #[cfg(test)]
 mod tests {
     use super::{
-        super::{Keys, Kind, Layers},
+        super::{Keys, Kind, Layers, sections},
         *,
     };
 
@@ -57,7 +50,7 @@ mod tests {
 
     #[test]
     fn the_shipped_file_shows_every_key_as_the_program_knows_it() {
-        let fresh = document();
+        let fresh = document::<Keys>();
         if std::env::var_os("SONARD_TEST_WRITE").is_some() {
             std::fs::write("config/sonard.toml", &fresh).expect("it can be written");
         }

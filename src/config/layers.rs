@@ -1,13 +1,13 @@
 //! File, environment and options, one over the other, with each value's place kept for errors.
 
-use std::{collections::BTreeMap, fmt, ops::Range};
+use std::{collections::BTreeMap, fmt, marker::PhantomData, ops::Range};
 
 use thiserror::Error;
 use toml::{Value, de::DeTable};
 
 use super::{
     keys::Keys,
-    schema::{self, Key, Kind, sections},
+    schema::{Form, Key, Kind, Section},
 };
 use crate::scene::suggest;
 
@@ -51,17 +51,27 @@ pub struct ConfigError {
     pub help: String,
 }
 
-/// Values given so far, the later ones over the earlier ones.
+/// Values given so far for the keys of a form, the later ones over the earlier ones.
 #[derive(Debug, Clone, Default)]
-pub struct Layers {
+pub struct Layers<K = Keys> {
     given: BTreeMap<(String, String), (Value, Origin)>,
+    form: PhantomData<K>,
 }
 
-impl Layers {
+/// What may be given in sections without keys of their own.
+static FREE_KEY: Key = Key {
+    name: String::new(),
+    about: String::new(),
+    kind: Kind::Any,
+    default: None,
+    example: None,
+};
+
+impl<K: Form> Layers<K> {
     /// Nothing given: the defaults.
     #[must_use]
-    pub fn new() -> Self {
-        Self::default()
+    pub const fn new() -> Self {
+        Self { given: BTreeMap::new(), form: PhantomData }
     }
 
     /// Puts a file's text over what was given before; `name` is what errors call it.
@@ -79,7 +89,7 @@ impl Layers {
         let values: toml::Table = toml::from_str(text).map_err(syntax)?;
         for (section, entries) in spans.get_ref() {
             let (section_at, section) = (at(section.span()), section.get_ref());
-            check_section(section, &section_at)?;
+            check_section::<K>(section, &section_at)?;
             let Some(entries) = entries.get_ref().as_table() else {
                 return Err(ConfigError {
                     origin: section_at,
@@ -88,7 +98,7 @@ impl Layers {
                 });
             };
             for (key, value) in entries {
-                find(section, key.get_ref(), &at(key.span()))?;
+                find::<K>(section, key.get_ref(), &at(key.span()))?;
                 let Some(given) = values.get(&**section).and_then(|s| s.get(&**key.get_ref()))
                 else {
                     continue;
@@ -113,7 +123,7 @@ impl Layers {
             let Some(name) = variable.strip_prefix("SONARD_") else { continue };
             let name = name.to_lowercase();
             let Some((section, key)) = name.split_once('_') else { continue };
-            if sections().iter().any(|known| known.name == section) {
+            if K::sections().iter().any(|known| known.name == section) {
                 self.text(section, key, &value, Origin::Environment(variable.clone()))?;
             }
         }
@@ -135,7 +145,7 @@ impl Layers {
                 help: "for instance plan.step_deg=1.8".into(),
             });
         };
-        check_section(section.trim(), &origin)?;
+        check_section::<K>(section.trim(), &origin)?;
         self.text(section.trim(), key.trim(), value.trim(), origin)?;
         Ok(self)
     }
@@ -144,11 +154,11 @@ impl Layers {
     ///
     /// # Errors
     /// The first value that is of the wrong kind or out of range.
-    pub fn keys(self) -> Result<Keys, ConfigError> {
+    pub fn keys(self) -> Result<K, ConfigError> {
         let mut table = toml::Table::new();
         for ((section, name), (value, origin)) in &self.given {
-            let key = find(section, name, origin)?;
-            let value = checked(section, key, value, origin)?;
+            let key = find::<K>(section, name, origin)?;
+            let value = checked(section, name, key, value, origin)?;
             let entries = table.entry(section.clone()).or_insert_with(|| toml::Table::new().into());
             if let (Some(entries), Some(value)) = (entries.as_table_mut(), value) {
                 entries.insert(name.clone(), value);
@@ -161,7 +171,7 @@ impl Layers {
                 .next()
                 .map_or_else(|| Origin::Option("defaults".into()), |(_, origin)| origin),
             message: error.message().to_owned(),
-            help: "see config/sonard.toml".into(),
+            help: format!("`{}` shows every key", K::DOCUMENTED_BY),
         })
     }
 
@@ -178,19 +188,23 @@ impl Layers {
         text: &str,
         origin: Origin,
     ) -> Result<(), ConfigError> {
-        let key = find(section, name, &origin)?;
+        let key = find::<K>(section, name, &origin)?;
         let value = match key.kind {
             Kind::Text | Kind::Choice(_) => Value::String(text.to_owned()),
             Kind::Texts => {
                 let parts = text.split(',').map(str::trim).filter(|part| !part.is_empty());
                 Value::Array(parts.map(|part| Value::String(part.to_owned())).collect())
             }
+            Kind::Any => toml::from_str::<toml::Table>(&format!("value = {text}"))
+                .ok()
+                .and_then(|mut table| table.remove("value"))
+                .unwrap_or_else(|| Value::String(text.to_owned())),
             // "nan" is a number in TOML; the range refuses it.
             Kind::Number { .. } | Kind::Whole { .. } | Kind::Switch => {
                 toml::from_str::<toml::Table>(&format!("value = {text}"))
                     .ok()
                     .and_then(|mut table| table.remove("value"))
-                    .ok_or_else(|| wrong(section, key, text, origin.clone()))?
+                    .ok_or_else(|| wrong(section, name, key, text, origin.clone()))?
             }
         };
         self.give(section, name, value, origin);
@@ -202,11 +216,11 @@ impl Layers {
     }
 }
 
-fn check_section(name: &str, origin: &Origin) -> Result<(), ConfigError> {
-    if sections().iter().any(|known| known.name == name) {
+fn check_section<K: Form>(name: &str, origin: &Origin) -> Result<(), ConfigError> {
+    if K::sections().iter().any(|known| known.name == name) {
         return Ok(());
     }
-    let known: Vec<String> = sections().iter().map(|section| section.name.clone()).collect();
+    let known: Vec<String> = K::sections().iter().map(|section| section.name.clone()).collect();
     Err(ConfigError {
         origin: origin.clone(),
         message: format!("there is no section [{name}]"),
@@ -214,11 +228,14 @@ fn check_section(name: &str, origin: &Origin) -> Result<(), ConfigError> {
     })
 }
 
-fn find(section: &str, name: &str, origin: &Origin) -> Result<&'static Key, ConfigError> {
-    schema::key(section, name).ok_or_else(|| {
-        let here = sections().iter().find(|known| known.name == section);
+fn find<K: Form>(section: &str, name: &str, origin: &Origin) -> Result<&'static Key, ConfigError> {
+    let here: Option<&'static Section> = K::sections().iter().find(|known| known.name == section);
+    if here.is_some_and(|here| here.free) {
+        return Ok(&FREE_KEY);
+    }
+    here.and_then(|here| here.keys.iter().find(|key| key.name == name)).ok_or_else(|| {
         let elsewhere =
-            sections().iter().find(|known| known.keys.iter().any(|key| key.name == name));
+            K::sections().iter().find(|known| known.keys.iter().any(|key| key.name == name));
         let known: Vec<String> =
             here.into_iter().flat_map(|known| &known.keys).map(|key| key.name.clone()).collect();
         ConfigError {
@@ -235,11 +252,12 @@ fn find(section: &str, name: &str, origin: &Origin) -> Result<&'static Key, Conf
 /// The value if it fits its key; `None` for an empty text where nothing may be given.
 fn checked(
     section: &str,
+    name: &str,
     key: &Key,
     value: &Value,
     origin: &Origin,
 ) -> Result<Option<Value>, ConfigError> {
-    let refuse = || Err(wrong(section, key, &value.to_string(), origin.clone()));
+    let refuse = || Err(wrong(section, name, key, &value.to_string(), origin.clone()));
     match (&key.kind, value) {
         (Kind::Number { min, max }, Value::Float(number)) if (*min..=*max).contains(number) => {}
         (Kind::Number { min, max } | Kind::Whole { min, max }, Value::Integer(number))
@@ -247,23 +265,25 @@ fn checked(
         (Kind::Switch, Value::Boolean(_)) => {}
         (Kind::Choice(words), Value::String(word)) if words.contains(word) => {}
         (Kind::Choice(words), Value::String(word)) => {
-            let error = wrong(section, key, &value.to_string(), origin.clone());
+            let error = wrong(section, name, key, &value.to_string(), origin.clone());
             return Err(ConfigError { help: suggest(word, words, "choices"), ..error });
         }
         (Kind::Text, Value::String(text)) if text.is_empty() && key.default.is_none() => {
             return Ok(None);
         }
         (Kind::Text, Value::String(_)) => {}
+        (Kind::Any, Value::String(_) | Value::Integer(_) | Value::Boolean(_)) => {}
+        (Kind::Any, Value::Float(number)) if number.is_finite() => {}
         (Kind::Texts, Value::Array(texts)) if texts.iter().all(Value::is_str) => {}
         _ => return refuse(),
     }
     Ok(Some(value.clone()))
 }
 
-fn wrong(section: &str, key: &Key, value: &str, origin: Origin) -> ConfigError {
+fn wrong(section: &str, name: &str, key: &Key, value: &str, origin: Origin) -> ConfigError {
     ConfigError {
         origin,
-        message: format!("{section}.{} is {value}", key.name),
+        message: format!("{section}.{name} is {value}"),
         help: format!("what is wanted: {}", key.kind.wanted()),
     }
 }
@@ -281,7 +301,7 @@ fn place(file: &str, text: &str, byte: usize) -> Origin {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::sections, *};
     use proptest::prelude::*;
 
     fn read(text: &str) -> Result<Keys, ConfigError> {
@@ -293,7 +313,7 @@ mod tests {
         let file = "[plan]\nstep_deg = 3.6\nto_deg = 90\n[device]\nport = \"a\"\n";
         let environment =
             [("SONARD_PLAN_STEP_DEG", "1.8"), ("SONARD_DEVICE_PORT", "b"), ("HOME", "x")];
-        let keys = Layers::new()
+        let keys = Layers::<Keys>::new()
             .file("s.toml", file)
             .and_then(|l| l.environment(environment.map(|(k, v)| (k.into(), v.into()))))
             .and_then(|l| l.option("--set", "device.port=c"))
@@ -333,7 +353,7 @@ mod tests {
             ("plan.step_deg=fast", "plan.step_deg is fast"),
             ("plan.hosts=1", "no key hosts"),
         ] {
-            let error = Layers::new().option("--set", option).expect_err(option);
+            let error = Layers::<Keys>::new().option("--set", option).expect_err(option);
             assert!(error.to_string().contains(message), "{error}");
         }
     }
@@ -346,8 +366,9 @@ mod tests {
 
     #[test]
     fn lists_can_be_given_as_text() {
-        let keys =
-            Layers::new().option("--set", "server.hosts=robot, robot.local").and_then(Layers::keys);
+        let keys = Layers::<Keys>::new()
+            .option("--set", "server.hosts=robot, robot.local")
+            .and_then(Layers::keys);
         assert_eq!(keys.expect("reads").server.hosts, ["robot", "robot.local"]);
     }
 

@@ -1,8 +1,8 @@
-//! Configuration of the daemon: the keys, and the layers that give them values.
+//! Configuration: the daemon's keys, and what reads any file of sections and keys.
 //!
-//! [`Keys`] is what there is, with a doc comment, a range and a default each. From it come the
-//! file that documents them ([`document`]), the check of every value with its place, and the
-//! refusal of unknown keys ([`Layers`]).
+//! [`Keys`] is what there is for `sonard run`, with a doc comment, a range and a default each. From
+//! such a [`Form`] come the file that documents it ([`document`]), the check of every value with
+//! its place, and the refusal of unknown keys ([`Layers`]).
 
 mod document;
 mod keys;
@@ -15,4 +15,4 @@ pub use keys::{
     PlanKeys, ScanningKeys, ServerKeys, SimulateKeys,
 };
 pub use layers::{ConfigError, Layers, Origin};
-pub use schema::{Key, Kind, Section, sections};
+pub use schema::{Form, Key, Kind, Section, read_sections, sections};

@@ -1,11 +1,40 @@
-//! What is known about each key, taken from the schema of [`Keys`].
+//! What is known about each key, taken from the schema of the type that holds them.
 
 use std::sync::LazyLock;
 
-use schemars::generate::SchemaSettings;
+use schemars::{JsonSchema, generate::SchemaSettings};
+use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value};
 
 use super::keys::Keys;
+
+/// A file of sections and keys: its type says what there is, with a doc comment, a range and a
+/// default each, and everything else follows from it.
+pub trait Form: Default + Serialize + DeserializeOwned + JsonSchema {
+    /// What stands above the first section of the file that documents every key.
+    const HEAD: &'static str;
+    /// What prints that file.
+    const DOCUMENTED_BY: &'static str;
+
+    /// Every section, in the order of the file. Read once and kept: see [`read_sections`].
+    fn sections() -> &'static [Section];
+}
+
+impl Form for Keys {
+    const HEAD: &'static str = "\
+# Configuration of `sonard run`. Every key is here, with its default; a key without one stands in
+# a comment with an example. Over the file go environment variables (SONARD_PLAN_STEP_DEG=1.8),
+# over those the options of the command line (--set plan.step_deg=1.8). `sonard run --check` reads
+# it all and says what is in force. `systemctl reload` (SIGHUP) takes changes in; those of keys
+# marked (restart) wait for the next start.
+";
+    const DOCUMENTED_BY: &'static str = "sonard run --print-config";
+
+    fn sections() -> &'static [Section] {
+        static SECTIONS: LazyLock<Vec<Section>> = LazyLock::new(read_sections::<Keys>);
+        &SECTIONS
+    }
+}
 
 /// A section of the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +45,8 @@ pub struct Section {
     pub about: String,
     /// Its keys, in the order of the file.
     pub keys: Vec<Key>,
+    /// Whether any key may stand in it, with a text, a number or a switch.
+    pub free: bool,
 }
 
 /// A key of a section.
@@ -58,6 +89,8 @@ pub enum Kind {
     Text,
     /// A list of texts.
     Texts,
+    /// Text, number or switch.
+    Any,
 }
 
 impl Kind {
@@ -71,6 +104,7 @@ impl Kind {
             Self::Choice(words) => format!("One of \"{}\".", words.join("\", \"")),
             Self::Text => "Text.".into(),
             Self::Texts => "List of texts.".into(),
+            Self::Any => "Text, number, true or false.".into(),
         }
     }
 
@@ -85,23 +119,18 @@ impl Kind {
     }
 }
 
-/// Every section, in the order of the file.
-pub fn sections() -> &'static [Section] {
-    static SECTIONS: LazyLock<Vec<Section>> = LazyLock::new(read);
-    &SECTIONS
-}
-
-/// The key of a section, if there is one of that name.
+/// The sections of the configuration of `sonard run`.
 #[must_use]
-pub(super) fn key(section: &str, name: &str) -> Option<&'static Key> {
-    let section = sections().iter().find(|known| known.name == section)?;
-    section.keys.iter().find(|key| key.name == name)
+pub fn sections() -> &'static [Section] {
+    Keys::sections()
 }
 
-fn read() -> Vec<Section> {
+/// Reads a form's sections from its schema.
+#[must_use]
+pub fn read_sections<K: Form>() -> Vec<Section> {
     let generator = SchemaSettings::default().with(|s| s.inline_subschemas = true);
-    let schema = generator.into_generator().into_root_schema_for::<Keys>().to_value();
-    let defaults = serde_json::to_string(&Keys::default()).unwrap_or_default();
+    let schema = generator.into_generator().into_root_schema_for::<K>().to_value();
+    let defaults = serde_json::to_string(&K::default()).unwrap_or_default();
     let section = |(name, of): (&String, &Value)| {
         // A key's name may stand in several sections: it is looked for behind the section's.
         let at = defaults.find(&format!("\"{name}\":{{")).unwrap_or(0);
@@ -110,6 +139,7 @@ fn read() -> Vec<Section> {
             name: name.clone(),
             about: text(of, "description"),
             keys: keys.into_iter().map(|(name, of)| read_key(name, of)).collect(),
+            free: of.get("additionalProperties").is_some_and(|more| *more != false),
         }
     };
     properties(&schema, &defaults).into_iter().map(section).collect()

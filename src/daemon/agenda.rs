@@ -1,16 +1,35 @@
 //! When the next scan is due. Pure: the time is given.
 
-use std::time::Duration;
+use std::{collections::VecDeque, time::Duration};
 
-use crate::config::Mode;
+use uuid::Uuid;
+
+use crate::{config::Mode, geometry::Pose, scan::ScanPlan};
+
+/// Requests that may wait: each costs memory.
+const MOST_REQUESTS: usize = 64;
+
+/// Scans that somebody asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Asked {
+    /// Identifies the request; its scans bear it.
+    pub request: Uuid,
+    /// So many scans; `None` for those of the mode to go on (on-request, or with a plan or a pose
+    /// of its own: one scan).
+    pub scans: Option<u32>,
+    /// Azimuths for these scans alone, instead of those in force.
+    pub plan: Option<ScanPlan>,
+    /// Where the ranger stands for these scans alone, instead of the pose in force.
+    pub pose: Option<Pose>,
+}
 
 /// What is to be scanned when.
 #[derive(Debug, Clone)]
 pub struct Agenda {
     mode: Mode,
     every: Duration,
-    /// Scans asked for and not yet begun.
-    requested: u32,
+    /// Scans asked for and not yet begun: how many of each request.
+    asked: VecDeque<(Asked, u32)>,
     /// Whether the mode's own scans are held until the next start.
     paused: bool,
     /// When the schedule's next scan is due.
@@ -32,7 +51,7 @@ impl Agenda {
     /// An agenda whose schedule begins at once.
     #[must_use]
     pub const fn new(mode: Mode, every: Duration, now: Duration) -> Self {
-        Self { mode, every, requested: 0, paused: false, due: now }
+        Self { mode, every, asked: VecDeque::new(), paused: false, due: now }
     }
 
     /// Another mode; what was asked for stays.
@@ -42,18 +61,39 @@ impl Agenda {
         }
     }
 
-    /// Somebody asks for scans, or, without a number, for the mode's own to go on. In the mode
-    /// on-request that is one scan.
-    pub fn start(&mut self, scans: Option<u32>) {
-        let one = u32::from(self.mode == Mode::OnRequest);
-        self.requested = self.requested.saturating_add(scans.unwrap_or(one));
-        self.paused &= scans.is_some();
+    /// Somebody asks for scans, or, without a number, for the mode's own to go on. Whether there
+    /// was room for the request.
+    pub fn start(&mut self, asked: Asked) -> bool {
+        let of_its_own = asked.plan.is_some() || asked.pose.is_some();
+        let one = u32::from(self.mode == Mode::OnRequest || of_its_own);
+        let scans = asked.scans.unwrap_or(one);
+        if scans > 0 {
+            if self.asked.len() >= MOST_REQUESTS {
+                return false;
+            }
+            self.asked.push_back((asked, scans));
+        }
+        self.paused &= asked.scans.is_some() || of_its_own;
+        true
     }
 
     /// Somebody wants no more scans until the next start.
-    pub const fn stop(&mut self) {
-        self.requested = 0;
+    pub fn stop(&mut self) {
+        self.asked.clear();
         self.paused = true;
+    }
+
+    /// Somebody wants no more scans of a request. Whether any were waiting.
+    pub fn cancel(&mut self, request: Uuid) -> bool {
+        let before = self.asked.len();
+        self.asked.retain(|(asked, _)| asked.request != request);
+        self.asked.len() < before
+    }
+
+    /// What the next scan is asked for by; `None` if it is the mode's own.
+    #[must_use]
+    pub fn next(&self) -> Option<Asked> {
+        self.asked.front().map(|(asked, _)| *asked)
     }
 
     /// Whether somebody stopped the mode's own scans.
@@ -64,15 +104,15 @@ impl Agenda {
 
     /// Scans asked for and not yet begun.
     #[must_use]
-    pub const fn requested(&self) -> u32 {
-        self.requested
+    pub fn requested(&self) -> u32 {
+        self.asked.iter().fold(0, |sum, (_, scans)| sum.saturating_add(*scans))
     }
 
     /// When the next scan is due.
     #[must_use]
     pub fn due(&self, now: Duration) -> Due {
         match self.mode {
-            _ if self.requested > 0 => Due::Now,
+            _ if !self.asked.is_empty() => Due::Now,
             _ if self.paused => Due::OnRequest,
             Mode::OnRequest => Due::OnRequest,
             Mode::Continuous => Due::Now,
@@ -83,8 +123,11 @@ impl Agenda {
 
     /// A scan begins.
     pub fn begun(&mut self, now: Duration) {
-        if self.requested > 0 {
-            self.requested -= 1;
+        if let Some((_, left)) = self.asked.front_mut() {
+            *left -= 1;
+            if *left == 0 {
+                self.asked.pop_front();
+            }
         } else if self.mode == Mode::Schedule {
             // Turns that were missed are left out; the rhythm stays.
             let behind = now.saturating_sub(self.due).as_nanos();
@@ -103,6 +146,10 @@ mod tests {
         Duration::from_secs(s)
     }
 
+    fn asked(scans: Option<u32>) -> Asked {
+        Asked { request: Uuid::from_u128(7), scans, plan: None, pose: None }
+    }
+
     #[test]
     fn a_schedule_keeps_its_rhythm_and_leaves_out_what_it_missed() {
         let mut agenda = Agenda::new(Mode::Schedule, s(60), s(5));
@@ -119,7 +166,7 @@ mod tests {
     fn requests_come_first_and_do_not_shift_the_schedule() {
         let mut agenda = Agenda::new(Mode::Schedule, s(60), s(0));
         agenda.begun(s(0));
-        agenda.start(Some(2));
+        assert!(agenda.start(asked(Some(2))));
         assert_eq!(agenda.due(s(1)), Due::Now);
         agenda.begun(s(1));
         agenda.begun(s(2));
@@ -132,11 +179,11 @@ mod tests {
         assert_eq!(agenda.due(s(0)), Due::Now);
         agenda.stop();
         assert_eq!(agenda.due(s(0)), Due::OnRequest);
-        agenda.start(Some(1));
+        assert!(agenda.start(asked(Some(1))));
         assert_eq!(agenda.due(s(0)), Due::Now);
         agenda.begun(s(0));
         assert_eq!(agenda.due(s(0)), Due::OnRequest, "a counted request does not end the hold");
-        agenda.start(None);
+        assert!(agenda.start(asked(None)));
         agenda.begun(s(1));
         assert_eq!((agenda.due(s(1)), agenda.requested()), (Due::Now, 0));
     }
@@ -145,8 +192,30 @@ mod tests {
     fn on_request_a_start_is_one_scan() {
         let mut agenda = Agenda::new(Mode::OnRequest, s(60), s(0));
         assert_eq!(agenda.due(s(0)), Due::OnRequest);
-        agenda.start(None);
+        assert!(agenda.start(asked(None)));
         agenda.begun(s(0));
         assert_eq!(agenda.due(s(0)), Due::OnRequest);
+    }
+
+    #[test]
+    fn a_request_with_a_plan_of_its_own_is_one_scan_in_any_mode_and_can_be_cancelled() {
+        let mut agenda = Agenda::new(Mode::Continuous, s(60), s(0));
+        agenda.stop();
+        let own = Asked { plan: Some(ScanPlan::default()), ..asked(None) };
+        let other = Asked { request: Uuid::from_u128(8), scans: Some(3), ..own };
+        assert!(agenda.start(own) && agenda.start(other));
+        assert_eq!((agenda.next(), agenda.requested()), (Some(own), 4));
+        agenda.begun(s(0));
+        assert_eq!((agenda.next(), agenda.due(s(1))), (Some(other), Due::Now));
+        agenda.begun(s(1));
+        assert!(agenda.cancel(other.request) && !agenda.cancel(other.request));
+        assert_eq!(agenda.due(s(2)), Due::OnRequest, "the hold stays");
+    }
+
+    #[test]
+    fn requests_without_end_are_refused() {
+        let mut agenda = Agenda::new(Mode::OnRequest, s(60), s(0));
+        let taken = (0..1000).filter(|_| agenda.start(asked(Some(u32::MAX)))).count();
+        assert_eq!((taken, agenda.requested()), (MOST_REQUESTS, u32::MAX));
     }
 }

@@ -184,8 +184,12 @@ pub(super) fn watch_thermometer(keys: &AirKeys) -> watch::Receiver<Option<Readin
     receiver
 }
 
-/// The temperature in a file of a 1-wire or hwmon driver, degrees Celsius.
-fn read_thermometer(path: &Path) -> Reading {
+/// The temperature in a file of a 1-wire or hwmon driver, degrees Celsius. A 1-wire conversion takes
+/// most of a second.
+///
+/// # Errors
+/// When it can't be read or is no temperature, in words.
+pub fn read_thermometer(path: &Path) -> Result<f64, String> {
     let text = fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
     parse_thermometer(&text).map_err(|error| format!("{}: {error}", path.display()))
 }

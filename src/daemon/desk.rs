@@ -9,15 +9,21 @@ use tokio::{
     time::{Instant, sleep},
 };
 use tokio_util::sync::CancellationToken;
+use uuid::Uuid;
 
 use super::{
-    agenda::Agenda,
+    agenda::{Agenda, Asked},
     air::{AirDesk, AirOrder, Reading, watch_thermometer},
     journal::Journal,
     settings::Settings,
     status::ConfigurationReport,
 };
-use crate::{board::Board, geometry::Pose, scan::ScanPlan};
+use crate::{
+    board::Board,
+    config::{Mode, ScanningKeys},
+    geometry::Pose,
+    scan::ScanPlan,
+};
 
 /// How often the emergency stop is looked at.
 const STOP_CHECK: Duration = Duration::from_millis(50);
@@ -25,8 +31,12 @@ const STOP_CHECK: Duration = Duration::from_millis(50);
 /// What the daemon can be told.
 #[derive(Debug)]
 pub enum Order {
-    /// Take so many scans, or go on with those of the mode.
-    Start(Option<u32>),
+    /// Take scans, or go on with those of the mode.
+    Start(Asked),
+    /// Take no more scans of a request, and end the one under way if it is one of them.
+    Cancel(Uuid),
+    /// Take scans in this way from now on.
+    Mode(Mode, Option<f64>),
     /// End the scan under way and take no more until the next start.
     Stop,
     /// Measure these azimuths from the next scan on.
@@ -80,7 +90,10 @@ pub(super) struct Desk {
     pub(super) settings: Settings,
     pub(super) plan: ScanPlan,
     pub(super) pose: Pose,
+    pub(super) scanning: ScanningKeys,
     pub(super) agenda: Agenda,
+    /// The request that the scan under way was asked for by.
+    pub(super) serving: Option<Uuid>,
     pub(super) air: AirDesk,
     pub(super) board: Box<dyn Board>,
     pub(super) configuration: ConfigurationReport,
@@ -107,7 +120,9 @@ impl Desk {
         Self {
             plan: settings.plan(),
             pose: settings.pose,
+            scanning: settings.keys.scanning.clone(),
             agenda: Agenda::new(settings.keys.scanning.mode, settings.every(), Duration::ZERO),
+            serving: None,
             air: AirDesk::new(settings.keys.air.clone()),
             thermometer: watch_thermometer(&settings.keys.air),
             board,
@@ -160,10 +175,9 @@ impl Desk {
 
     fn carry_out(&mut self, Request { order, reply }: Request) -> Option<Interrupt> {
         let (answer, interrupt) = match order {
-            Order::Start(scans) => {
-                self.agenda.start(scans);
-                (Ok(()), Some(Interrupt::Agenda))
-            }
+            Order::Start(asked) => (self.start(asked), Some(Interrupt::Agenda)),
+            Order::Cancel(request) => self.cancel(request),
+            Order::Mode(mode, every_s) => (self.set_mode(mode, every_s), Some(Interrupt::Agenda)),
             Order::Stop => {
                 self.agenda.stop();
                 (Ok(()), Some(Interrupt::Stop))
@@ -189,7 +203,51 @@ impl Desk {
         interrupt
     }
 
+    fn start(&mut self, asked: Asked) -> Result<(), Refusal> {
+        asked.plan.map_or(Ok(()), |plan| self.check_plan(&plan))?;
+        asked.pose.map_or(Ok(()), |pose| check_pose(&self.settings, &pose))?;
+        if self.agenda.start(asked) {
+            return Ok(());
+        }
+        Err(Refusal {
+            message: "too many requests wait already".into(),
+            help: "wait until some are done, or POST /v1/stop".into(),
+        })
+    }
+
+    fn cancel(&mut self, request: Uuid) -> (Result<(), Refusal>, Option<Interrupt>) {
+        let waiting = self.agenda.cancel(request);
+        if self.serving == Some(request) {
+            return (Ok(()), Some(Interrupt::Stop));
+        }
+        if waiting {
+            return (Ok(()), Some(Interrupt::Agenda));
+        }
+        let message = format!("there is no request {request}");
+        let help = "POST /v1/start gives it its id; it may be over".into();
+        (Err(Refusal { message, help }), None)
+    }
+
+    fn set_mode(&mut self, mode: Mode, every_s: Option<f64>) -> Result<(), Refusal> {
+        let every_s = every_s.unwrap_or(self.scanning.every_s);
+        if !(1.0..=604_800.0).contains(&every_s) {
+            return Err(Refusal {
+                message: format!("every_s is {every_s}"),
+                help: "1 to 604800 seconds".into(),
+            });
+        }
+        self.scanning = ScanningKeys { mode, every_s };
+        self.agenda.set_mode(mode, Duration::from_secs_f64(every_s), self.now());
+        Ok(())
+    }
+
     fn set_plan(&mut self, plan: ScanPlan) -> Result<(), Refusal> {
+        self.check_plan(&plan)?;
+        self.plan = plan;
+        Ok(())
+    }
+
+    fn check_plan(&self, plan: &ScanPlan) -> Result<(), Refusal> {
         if self.settings.simulated.is_some() {
             return Err(Refusal {
                 message: "an array has no plan: its rangers are fixed".into(),
@@ -204,7 +262,6 @@ impl Desk {
         if let Some(identity) = &self.identity {
             plan.motor_steps(identity.steps_per_revolution.into()).map_err(refuse)?;
         }
-        self.plan = plan;
         Ok(())
     }
 
@@ -238,7 +295,10 @@ impl Desk {
             self.air = AirDesk::new(keys.air.clone());
             self.thermometer = watch_thermometer(&keys.air);
         }
-        self.agenda.set_mode(keys.scanning.mode, self.settings.every(), now);
+        if keys.scanning != then.scanning {
+            self.scanning = keys.scanning.clone();
+            self.agenda.set_mode(keys.scanning.mode, self.settings.every(), now);
+        }
         self.journal.set_rotation(self.settings.rotation());
         self.configuration = ConfigurationReport {
             error: None,

@@ -11,7 +11,7 @@ use crate::{
     geometry::Pose,
     model::Simulator,
     ranger::{Listening, ScanJob, device_record, provenance},
-    scan::{LOG_FORMAT, ModelRecord, ScanAir, ScanPlan, SceneRef, Session, SimRecord},
+    scan::{LOG_FORMAT, ModelRecord, ScanAir, ScanPlan, Session, SimRecord},
 };
 
 /// What predictions depend on, besides scene and sensor.
@@ -58,6 +58,7 @@ impl Forecast {
             settings: settings.motion().settings(&listening(settings, &air), identity),
             sound_speed_m_s: air.sound_speed_m_s(),
             air: Some(scan_air),
+            request: None,
             blanking_us: settings.sensor.blanking_us,
             predictions: self.predictions.clone(),
         }
@@ -74,11 +75,9 @@ impl Forecast {
             sensor: settings.sensor.clone(),
             array: None,
             air: air.to_record(),
-            scene: settings
-                .scene
-                .as_ref()
-                .map(|scene| SceneRef { name: scene.name.clone(), sha256: scene.sha256.clone() }),
+            scene: settings.scene_ref(),
             model: self.model.clone(),
+            collection: None,
         }
     }
 }

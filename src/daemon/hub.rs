@@ -14,6 +14,7 @@ use std::{
 
 use tokio::sync::Notify;
 
+use super::status::ScanReport;
 use crate::scan::{Ping, PingStatus, Record, encode_line};
 
 /// Records other than readings that may wait for one subscriber.
@@ -23,7 +24,7 @@ const CONTROL_LIMIT: usize = 1024;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wanted {
     /// Only readings whose range moved by more than this since it was last sent for that
-    /// direction, metres, or whose status changed.
+    /// direction, metres, or whose status changed; of whole scans, too.
     pub moved_m: Option<f64>,
     /// Whole scans when they are over, instead of single records.
     pub scans: bool,
@@ -117,13 +118,22 @@ impl Hub {
         }
     }
 
-    /// Hands a whole scan, as JSON, to everybody who wants those.
-    pub fn publish_scan(&self, json: impl FnOnce() -> Vec<u8>) {
+    /// Hands a whole scan to everybody who wants those; to who wants only what moved, with those
+    /// readings alone.
+    pub fn publish_scan(&self, scan: &ScanReport) {
         let subscribers = held(&self.inner.subscribers);
-        let mut wanting = subscribers.values().filter(|one| one.wanted.scans).peekable();
-        if wanting.peek().is_some() {
-            let line: Line = json().into();
-            wanting.for_each(|subscriber| self.push_control(subscriber, &line));
+        let mut whole: Option<Line> = None;
+        for subscriber in subscribers.values().filter(|one| one.wanted.scans) {
+            let line = match subscriber.wanted.moved_m {
+                None => Arc::clone(whole.get_or_insert_with(|| json(scan))),
+                Some(_) => {
+                    let mut queue = held(&subscriber.queue);
+                    let moved = |ping: &&Ping| queue.is_news(ping, subscriber.wanted.moved_m);
+                    let pings = scan.pings.iter().filter(moved).cloned().collect();
+                    json(&ScanReport { pings, ..scan.clone() })
+                }
+            };
+            self.push_control(subscriber, &line);
         }
     }
 
@@ -258,6 +268,10 @@ impl Drop for Subscription {
     }
 }
 
+fn json(scan: &ScanReport) -> Line {
+    serde_json::to_vec(scan).unwrap_or_default().into()
+}
+
 /// Nothing under these locks can panic, so a poisoned one holds what it should.
 fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
@@ -328,6 +342,29 @@ mod tests {
             .map(|line| (line["step"].as_i64().unwrap_or(-1), line["range_m"].as_f64()))
             .collect();
         assert_eq!(ranges, [(0, Some(1.0)), (0, Some(1.08)), (1, Some(1.08)), (0, Some(0.9))]);
+    }
+
+    #[tokio::test]
+    async fn whole_scans_hold_only_what_moved_for_who_wants_that() {
+        let hub = Hub::new(100);
+        let mut all_of_it = hub.subscribe(Wanted { moved_m: None, scans: true });
+        let mut some = hub.subscribe(Wanted { moved_m: Some(0.05), scans: true });
+        let Record::ScanStart(start) = control() else { panic!("a start") };
+        let pinged = |range_m| match ping(3, Some(range_m)) {
+            Record::Ping(ping) => *ping,
+            _ => panic!("a reading"),
+        };
+        for range_m in [1.0, 1.01, 1.2] {
+            let fixed = Ping { step: 9, ..pinged(0.5) };
+            let pings = vec![pinged(range_m), fixed];
+            let (start, events) = (start.clone(), Vec::new());
+            hub.publish_scan(&ScanReport { start, pings, events, end: None });
+        }
+        let counts = |lines: Vec<serde_json::Value>| -> Vec<usize> {
+            lines.iter().map(|scan| scan["pings"].as_array().map_or(0, Vec::len)).collect()
+        };
+        assert_eq!(counts(all(&mut some, &hub).await), [2, 0, 1]);
+        assert_eq!(counts(all(&mut all_of_it, &hub).await), [2, 2, 2]);
     }
 
     #[tokio::test]

@@ -23,6 +23,19 @@ pub enum LinkState {
     Ready,
     /// A scan is under way.
     Scanning,
+    /// The emergency stop is pressed.
+    EmergencyStop,
+    /// Stopped for good.
+    Stopped,
+    /// It can't be used, and why; in records the trouble stands for itself.
+    #[serde(untagged)]
+    Down(Trouble),
+}
+
+/// Why the link can't be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Trouble {
     /// The port is not there.
     Absent,
     /// Another program has the port.
@@ -38,31 +51,6 @@ pub enum LinkState {
     /// The line was lost while the device was in use.
     Lost,
     /// The device refused, or its motor or module failed.
-    Fault,
-    /// The emergency stop is pressed.
-    EmergencyStop,
-    /// Stopped for good.
-    Stopped,
-}
-
-/// Why the link can't be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Trouble {
-    /// See [`LinkState::Absent`].
-    Absent,
-    /// See [`LinkState::Busy`].
-    Busy,
-    /// See [`LinkState::Forbidden`].
-    Forbidden,
-    /// See [`LinkState::NotAnswering`].
-    NotAnswering,
-    /// See [`LinkState::WrongFirmware`].
-    WrongFirmware,
-    /// See [`LinkState::WrongDevice`].
-    WrongDevice,
-    /// See [`LinkState::Lost`].
-    Lost,
-    /// See [`LinkState::Fault`].
     Fault,
 }
 
@@ -262,7 +250,7 @@ impl LinkMachine {
         let wait = self.back_off.min.saturating_mul(1 << doublings).min(self.back_off.max);
         self.failures = self.failures.saturating_add(1);
         self.retry_at = now.saturating_add(wait);
-        self.enter(now, trouble.state());
+        self.enter(now, LinkState::Down(trouble));
     }
 
     fn enter(&mut self, now: Duration, state: LinkState) {
@@ -305,6 +293,18 @@ impl LinkState {
             Self::Homing => "homing",
             Self::Ready => "ready",
             Self::Scanning => "scanning",
+            Self::EmergencyStop => "emergency_stop",
+            Self::Stopped => "stopped",
+            Self::Down(trouble) => trouble.name(),
+        }
+    }
+}
+
+impl Trouble {
+    /// Its name in records and on the screen.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
             Self::Absent => "absent",
             Self::Busy => "busy",
             Self::Forbidden => "forbidden",
@@ -313,23 +313,6 @@ impl LinkState {
             Self::WrongDevice => "wrong_device",
             Self::Lost => "lost",
             Self::Fault => "fault",
-            Self::EmergencyStop => "emergency_stop",
-            Self::Stopped => "stopped",
-        }
-    }
-}
-
-impl Trouble {
-    const fn state(self) -> LinkState {
-        match self {
-            Self::Absent => LinkState::Absent,
-            Self::Busy => LinkState::Busy,
-            Self::Forbidden => LinkState::Forbidden,
-            Self::NotAnswering => LinkState::NotAnswering,
-            Self::WrongFirmware => LinkState::WrongFirmware,
-            Self::WrongDevice => LinkState::WrongDevice,
-            Self::Lost => LinkState::Lost,
-            Self::Fault => LinkState::Fault,
         }
     }
 }

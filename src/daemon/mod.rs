@@ -30,8 +30,8 @@ use jiff::Timestamp;
 use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
 
-pub use agenda::{Agenda, Due};
-pub use air::{AirOrder, AirStatus};
+pub use agenda::{Agenda, Asked, Due};
+pub use air::{AirOrder, AirStatus, read_thermometer};
 pub use desk::{Order, Refusal, Request};
 pub use hub::{Hub, Line, Subscription, Wanted};
 pub use journal::{Journal, JournalThread, LogStatus};
@@ -45,6 +45,7 @@ pub use status::{
 
 use crate::{
     board::{Board, NoBoard},
+    scan::Session,
     scene::Scene,
 };
 use air::AirDesk;
@@ -182,6 +183,12 @@ impl Handle {
         self.shared.view.borrow().scene.clone()
     }
 
+    /// The session in force in the log, once there was a scan.
+    #[must_use]
+    pub fn session(&self) -> Option<Arc<Session>> {
+        self.shared.view.borrow().session.clone()
+    }
+
     /// Live records.
     #[must_use]
     pub const fn hub(&self) -> &Hub {
@@ -207,7 +214,9 @@ fn first_view(settings: &Settings) -> View {
         retry_at: None,
         device: None,
         provenance: None,
-        mode: settings.keys.scanning.mode,
+        scanning: settings.keys.scanning.clone(),
+        scene: settings.scene_ref(),
+        session: None,
         paused: false,
         requested: 0,
         next_at: None,
@@ -217,7 +226,7 @@ fn first_view(settings: &Settings) -> View {
         scene: settings.scene.clone(),
         air: AirDesk::new(settings.keys.air.clone()),
         configuration: ConfigurationReport::default(),
-        line: LineTotals::default(),
+        line: status::Line::default(),
         scans: ScanTotals::default(),
         clock: ClockReport::default(),
         simulation: None,

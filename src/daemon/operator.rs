@@ -15,7 +15,7 @@ use super::{
     forecast::{Forecast, listening},
     machine::{Input, LinkMachine, Step, Trouble},
     outlet::Outlet,
-    status::{LineTotals, ScanTotals},
+    status::{Line, ScanTotals},
 };
 use crate::{
     link::{BAUD, LinkError},
@@ -40,9 +40,7 @@ pub(super) struct Operator {
     session: Option<Session>,
     out: Outlet,
     trouble: Option<String>,
-    /// Figures of the connections before this one.
-    earlier: LineTotals,
-    line_totals: LineTotals,
+    line_figures: Line,
     scans: ScanTotals,
     next_check: Instant,
 }
@@ -60,8 +58,7 @@ impl Operator {
             session: None,
             out,
             trouble: None,
-            earlier: LineTotals::default(),
-            line_totals: LineTotals::default(),
+            line_figures: Line::default(),
             scans: ScanTotals::default(),
             next_check: Instant::now(),
         }
@@ -163,6 +160,7 @@ impl Operator {
             return self.fail(Trouble::WrongDevice, why);
         }
         self.desk.identity = Some(*ranger.identity());
+        self.line_figures.live = Some(ranger.watch_link());
         self.ranger = Some(ranger);
         self.handle(Input::Identified);
     }
@@ -295,9 +293,8 @@ impl Operator {
 
     fn close(&mut self) {
         self.line = None;
-        if let Some(ranger) = self.ranger.take() {
-            self.earlier = self.earlier.with(ranger.link_stats());
-        }
+        self.ranger = None;
+        self.line_figures.close();
         self.desk.identity = None;
     }
 

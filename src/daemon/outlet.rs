@@ -27,11 +27,15 @@ impl Outlet {
 
     /// A record for everybody.
     pub(super) fn put(&self, record: &Record) {
+        if let Record::Session(session) = record {
+            let session = Arc::new((**session).clone());
+            self.shared.view.send_modify(|view| view.session = Some(session));
+        }
         let over = self.shared.collect(record);
         self.journal.record(record);
         self.hub.publish(record);
         if let Some(scan) = over {
-            self.hub.publish_scan(|| serde_json::to_vec(&*scan).unwrap_or_default());
+            self.hub.publish_scan(&scan);
         }
     }
 }

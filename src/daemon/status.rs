@@ -19,9 +19,12 @@ use super::{
 };
 use crate::{
     array::{MountedRanger, RangerArray},
-    config::Mode,
+    config::{Mode, ScanningKeys},
     geometry::Pose,
-    scan::{Device, Event, Ping, PingStatus, Provenance, Record, ScanEnd, ScanPlan, ScanStart},
+    scan::{
+        Device, Event, Ping, PingStatus, Provenance, Record, ScanEnd, ScanPlan, ScanStart, SceneRef,
+        Session,
+    },
     scene::Scene,
 };
 
@@ -46,6 +49,8 @@ pub struct Status {
     pub plan: ScanPlan,
     /// Where the ranger stands.
     pub pose: Pose,
+    /// The scene that readings are predicted in, if there is one.
+    pub scene: Option<SceneRef>,
     /// The air in force.
     pub air: AirStatus,
     /// The log.
@@ -132,6 +137,8 @@ pub struct LinkReport {
 pub struct ScanningReport {
     /// The mode.
     pub mode: Mode,
+    /// From the start of a scan to the start of the next, seconds, when the mode is schedule.
+    pub every_s: f64,
     /// Whether somebody stopped the mode's own scans.
     pub paused: bool,
     /// Scans asked for and not yet begun.
@@ -259,7 +266,9 @@ pub(super) struct View {
     pub(super) retry_at: Option<Instant>,
     pub(super) device: Option<Device>,
     pub(super) provenance: Option<Provenance>,
-    pub(super) mode: Mode,
+    pub(super) scanning: ScanningKeys,
+    pub(super) scene: Option<SceneRef>,
+    pub(super) session: Option<Arc<Session>>,
     pub(super) paused: bool,
     pub(super) requested: u32,
     pub(super) next_at: Option<Instant>,
@@ -269,10 +278,31 @@ pub(super) struct View {
     pub(super) scene: Option<Arc<Scene>>,
     pub(super) air: AirDesk,
     pub(super) configuration: ConfigurationReport,
-    pub(super) line: LineTotals,
+    pub(super) line: Line,
     pub(super) scans: ScanTotals,
     pub(super) clock: ClockReport,
     pub(super) simulation: Option<SimulationReport>,
+}
+
+/// Figures of the line: what is settled, and the connection that there is.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Line {
+    /// Connections before this one, and losses.
+    pub(super) earlier: LineTotals,
+    /// This one's, which go on changing.
+    pub(super) live: Option<watch::Receiver<LinkStats>>,
+}
+
+impl Line {
+    /// All together, now.
+    pub(super) fn totals(&self) -> LineTotals {
+        self.live.as_ref().map_or(self.earlier, |live| self.earlier.with(&live.borrow()))
+    }
+
+    /// The connection is over.
+    pub(super) fn close(&mut self) {
+        *self = Self { earlier: self.totals(), live: None };
+    }
 }
 
 /// State that several tasks look at.
@@ -368,7 +398,8 @@ impl Shared {
             device: view.device,
             provenance: view.provenance,
             scanning: ScanningReport {
-                mode: view.mode,
+                mode: view.scanning.mode,
+                every_s: view.scanning.every_s,
                 paused: view.paused,
                 requested: view.requested,
                 next_in_s: until(view.next_at),
@@ -380,6 +411,7 @@ impl Shared {
             }),
             plan: view.plan,
             pose: view.pose,
+            scene: view.scene,
             air: view.air.status(now),
             log,
             subscribers,
@@ -403,7 +435,7 @@ impl Shared {
         Health {
             healthy: reasons.is_empty(),
             reasons,
-            line: view.line,
+            line: view.line.totals(),
             scans: view.scans,
             clock: view.clock,
         }

@@ -9,6 +9,7 @@ use std::{
 
 use tokio::{
     io::unix::AsyncFd,
+    sync::mpsc::UnboundedReceiver,
     time::{Instant, sleep_until},
 };
 
@@ -17,6 +18,7 @@ use super::{
     identity::Pace,
     note::Note,
     pty::Pty,
+    world::Soundings,
 };
 
 /// How often a lock left behind by a killed host is lifted.
@@ -36,6 +38,7 @@ pub struct MockPort {
     to_host: Line,
     to_board: Line,
     lock_check: Instant,
+    moves: Option<UnboundedReceiver<Soundings>>,
 }
 
 /// One direction of the line, with bytes that are held back.
@@ -77,7 +80,15 @@ impl MockPort {
             to_host: Line::default(),
             to_board: Line::default(),
             lock_check: Instant::now() + LOCK_CHECK,
+            moves: None,
         })
+    }
+
+    /// The same board, carried from place to place: what comes is heard from then on, before any
+    /// byte that was sent after it.
+    #[must_use]
+    pub fn moved_by(self, moves: UnboundedReceiver<Soundings>) -> Self {
+        Self { moves: Some(moves), ..self }
     }
 
     /// Where a host opens it.
@@ -97,6 +108,10 @@ impl MockPort {
     ) -> io::Result<()> {
         tokio::pin!(shutdown);
         loop {
+            while let Some(soundings) = self.moves.as_mut().and_then(|moves| moves.try_recv().ok())
+            {
+                self.board.world().set_soundings(soundings);
+            }
             let due = self.due();
             self.board.advance(due);
             while !self.board.stalled()

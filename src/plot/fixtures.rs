@@ -82,7 +82,7 @@ pub(super) fn scan_of_room(pose: Pose, step_deg: f64, seed: u64) -> ScanView {
         measure(scan, i, azimuth_deg, sim, &mut rng)
     });
     let time = jiff::Timestamp::UNIX_EPOCH;
-    let start = ScanStart { scan, time, pose, plan, air: None, provenance: None };
+    let start = ScanStart { scan, time, pose, plan, air: None, provenance: None, request: None };
     let end = ScanEnd {
         scan,
         time: jiff::Timestamp::UNIX_EPOCH,
@@ -134,6 +134,7 @@ pub(super) fn session() -> Session {
         air: air.to_record(),
         scene: Some(SceneRef { name: "simple-room".into(), sha256: String::new() }),
         model: Some(ModelRecord { engine: "fan".into(), settings: serde_json::Map::new() }),
+        collection: None,
     }
 }
 

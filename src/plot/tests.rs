@@ -326,6 +326,7 @@ prop_compose! {
             },
             air: None,
             provenance: None,
+            request: None,
         });
         let session = with_session.then(|| session.into());
         ScanView { scan: Uuid::nil(), session, start, pings, events: Vec::new(), end: None }

@@ -3,12 +3,13 @@
 use std::{ops::ControlFlow, time::Duration};
 
 use firmware_protocol::{
-    host::{Command, Host, HostConfig, HostError, HostEvent, Outcome, StartError},
+    host::{Command, Host, HostConfig, HostError, HostEvent, LinkStats, Outcome, StartError},
     messages::{Identity, SweepState},
 };
 use thiserror::Error;
 use tokio::{
     io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _},
+    sync::watch,
     time::{Instant, sleep_until},
 };
 
@@ -20,6 +21,7 @@ pub struct Driver<L> {
     epoch: Instant,
     hung_up: bool,
     outgoing: Vec<u8>,
+    stats: watch::Sender<LinkStats>,
 }
 
 /// How a command ended well.
@@ -103,12 +105,19 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
             epoch: Instant::now(),
             hung_up: false,
             outgoing: Vec::new(),
+            stats: watch::Sender::new(LinkStats::default()),
         }
     }
 
     /// The machine, for its statistics.
     pub const fn host(&self) -> &Host {
         &self.host
+    }
+
+    /// Its statistics for somebody else, also while a command is under way.
+    #[must_use]
+    pub fn watch_stats(&self) -> watch::Receiver<LinkStats> {
+        self.stats.subscribe()
     }
 
     /// Microseconds since the driver was made: the time line of the machine's events.
@@ -227,6 +236,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
             Happened::Written(count) => drop(self.outgoing.drain(..count)),
             Happened::Timeout => self.host.handle_timeout(now_us),
         }
+        self.stats.send_replace(*self.host.stats());
     }
 }
 

@@ -1,6 +1,7 @@
 //! What is to be scanned.
 
 use firmware_protocol::messages::Settings;
+use uuid::Uuid;
 
 use crate::{
     geometry::Pose,
@@ -20,6 +21,8 @@ pub struct ScanJob {
     pub sound_speed_m_s: f64,
     /// The air as it was known, if that is to stand with the scan.
     pub air: Option<ScanAir>,
+    /// The request that it is taken for, if that is to stand with the scan.
+    pub request: Option<Uuid>,
     /// When the receiver opens, microseconds after firing.
     pub blanking_us: f64,
     /// For each stop of the plan, what the model predicts; empty without a model.

@@ -1,6 +1,7 @@
 //! Drives a ranger over its protocol: [`Driver`] pumps the host machine on a line, [`Ranger`]
 //! takes scans with it.
 
+mod budget;
 mod clock;
 mod driver;
 mod introduction;
@@ -10,6 +11,7 @@ mod scanner;
 mod settings;
 mod timing;
 
+pub use budget::Budget;
 pub use clock::{ClockFit, HostTime, TickExtender};
 pub use driver::{DriveError, Driver, Ended};
 pub use introduction::{device_record, provenance, serial_text};

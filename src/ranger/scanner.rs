@@ -7,7 +7,10 @@ use firmware_protocol::{
 use jiff::{SignedDuration, Timestamp};
 use std::ops::ControlFlow;
 use thiserror::Error;
-use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::{
+    io::{AsyncRead, AsyncWrite},
+    sync::watch,
+};
 use uuid::Uuid;
 
 use super::{
@@ -148,6 +151,12 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         self.driver.host().stats()
     }
 
+    /// The same for somebody else, also while a scan is under way.
+    #[must_use]
+    pub fn watch_link(&self) -> watch::Receiver<LinkStats> {
+        self.driver.watch_stats()
+    }
+
     /// Takes one scan, from `scan_start` to `scan_end`, handing each record to `sink`.
     ///
     /// Goes home first and, if there is an index sensor, afterwards. A device that restarts
@@ -168,8 +177,8 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         let motor = job.plan.motor_steps(steps_per_revolution)?;
         let scan = Uuid::new_v4();
         let time = Timestamp::now();
-        let (pose, plan, air) = (job.pose, job.plan, job.air);
-        let start = ScanStart { scan, time, pose, plan, air, provenance: None };
+        let ScanJob { pose, plan, air, request, .. } = *job;
+        let start = ScanStart { scan, time, pose, plan, air, provenance: None, request };
         sink.record(&Record::ScanStart(start))?;
         let mut progress = Progress::new(job, scan, motor, self.wall_epoch, &self.identity, sink);
         let outcome = self.measure(job, motor, &mut progress, stop).await;

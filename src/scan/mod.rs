@@ -11,9 +11,9 @@ mod view;
 pub use codec::{EncodeError, FaultKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};
 pub use plan::{PlanError, ScanPlan};
 pub use record::{
-    AirRecord, AirSource, Device, Event, EventKind, LOG_FORMAT, ModelRecord, PathKind, PathRecord,
-    Ping, PingStatus, Provenance, Record, ScanAir, ScanEnd, ScanStart, SceneRef, Session,
-    SimRecord,
+    AirRecord, AirSource, CollectionRef, Device, Event, EventKind, LOG_FORMAT, ModelRecord,
+    PathKind, PathRecord, Ping, PingStatus, Provenance, Record, ScanAir, ScanEnd, ScanStart,
+    SceneRef, Session, SimRecord,
 };
 pub use remaining::Segment;
 pub use view::ScanView;

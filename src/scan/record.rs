@@ -68,6 +68,28 @@ pub struct Session {
     pub scene: Option<SceneRef>,
     /// The model whose predictions stand beside the readings.
     pub model: Option<ModelRecord>,
+    /// The collection that its scans were taken for, if it was one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub collection: Option<Box<CollectionRef>>,
+}
+
+/// What a scan was taken for, and what was noted about it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CollectionRef {
+    /// Identifies the collection.
+    pub id: Uuid,
+    /// What it is called.
+    pub name: String,
+    /// Number of the pose, from 1.
+    pub pose: u32,
+    /// What the pose is called.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose_name: Option<String>,
+    /// Number of the scan at that pose, from 1.
+    pub repeat: u32,
+    /// Conditions: name and value.
+    #[serde(default, skip_serializing_if = "serde_json::Map::is_empty")]
+    pub conditions: serde_json::Map<String, serde_json::Value>,
 }
 
 /// Identity of a ranger.
@@ -137,6 +159,9 @@ pub struct ScanStart {
     /// The session's, repeated for readers of a live stream, by sources that make readings up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub provenance: Option<Provenance>,
+    /// The request to a daemon that it was taken for, if it was one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub request: Option<Uuid>,
 }
 
 /// The air of a scan, as it was known when it began.

@@ -41,6 +41,7 @@ impl ScanView {
                 plan: *plan,
                 air: None,
                 provenance: None,
+                request: None,
             }),
             pings: pings.collect(),
             events: Vec::new(),
@@ -65,6 +66,7 @@ impl Session {
             air: simulator.air().to_record(),
             scene: Some(SceneRef { name: scene.name.clone(), sha256: scene.sha256.clone() }),
             model: Some(simulator.model_record()),
+            collection: None,
         }
     }
 }

@@ -125,6 +125,7 @@ mod tests {
             plan: ScanPlan::default(),
             air: None,
             provenance: None,
+            request: None,
         })
     }
 

@@ -52,6 +52,8 @@ pub struct LogFolder {
     in_scan: bool,
     /// No scan is in the log yet: it has no reason to end.
     fresh: bool,
+    /// Whether the file lacks the session in force.
+    bare: bool,
     synced_before: u64,
 }
 
@@ -95,6 +97,7 @@ impl LogFolder {
             session: None,
             in_scan: false,
             fresh: false,
+            bare: false,
             synced_before: 0,
         };
         log.writer()?;
@@ -117,15 +120,17 @@ impl LogFolder {
     pub fn append(&mut self, record: &Record, now: Timestamp) -> Result<(), StoreError> {
         let begins = matches!(record, Record::ScanStart(_));
         if begins || matches!(record, Record::Session(_)) {
-            let rotated = self.rotate_if_due(now)?;
-            if let Some(session) = self.session.clone().filter(|_| rotated && begins) {
-                self.put(&Record::Session(session))?;
+            self.rotate_if_due(now)?;
+            if begins && self.bare {
+                self.put_session()?;
             }
         }
         let outcome = self.put(record);
         if matches!(outcome, Ok(()) | Err(StoreError::Sync { .. })) {
             match record {
-                Record::Session(session) => self.session = Some(session.clone()),
+                Record::Session(session) => {
+                    (self.session, self.bare) = (Some(session.clone()), false);
+                }
                 Record::ScanStart(_) => (self.in_scan, self.fresh) = (true, false),
                 Record::ScanEnd(_) => self.in_scan = false,
                 Record::Ping(_) | Record::Event(_) => {}
@@ -193,12 +198,31 @@ impl LogFolder {
         outcome
     }
 
-    /// Whether another file was begun.
-    fn rotate_if_due(&mut self, now: Timestamp) -> Result<bool, StoreError> {
+    /// Repeats the session in force in a file that lacks it. Until that has succeeded the file
+    /// stays bare, so that another try does not leave it out.
+    fn put_session(&mut self) -> Result<(), StoreError> {
+        let Some(session) = self.session.clone() else { return Ok(()) };
+        match self.put(&Record::Session(session)) {
+            Ok(()) => {
+                self.bare = false;
+                Ok(())
+            }
+            Err(StoreError::Sync { path, .. }) => {
+                self.bare = false;
+                // The session is in the log; the record that is to follow is not, which `Sync`
+                // would say.
+                Err(StoreError::Failed { path })
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Begins another file if it is time.
+    fn rotate_if_due(&mut self, now: Timestamp) -> Result<(), StoreError> {
         let bytes = fs::metadata(&self.path).map_or(0, |metadata| metadata.len());
         let too_old = self.rotation.daily && self.day != day(now);
         if self.in_scan || self.fresh || !(bytes > self.rotation.max_bytes || too_old) {
-            return Ok(false);
+            return Ok(());
         }
         if let Some(writer) = self.writer.take() {
             self.synced_before += writer.appended();
@@ -207,10 +231,10 @@ impl LogFolder {
             writer.close().map_err(|_| StoreError::Failed { path })?;
         }
         self.path = self.folder.join(file_name(&self.folder, now));
-        (self.day, self.fresh) = (day(now), true);
+        (self.day, self.fresh, self.bare) = (day(now), true, true);
         self.writer()?;
         self.remove_oldest();
-        Ok(true)
+        Ok(())
     }
 
     /// Removes the oldest logs as far as the limit asks for it, never the one being written.

@@ -2,6 +2,7 @@
 #![cfg(feature = "daemon")]
 
 mod array;
+mod collect;
 mod common;
 mod daemon;
 mod degenerate;

@@ -64,6 +64,7 @@ async fn take(port: &str) -> (ScanSummary, Vec<Record>) {
         settings: Settings { window_ticks: 20_000, ..settings() },
         sound_speed_m_s: 343.4,
         air: None,
+        request: None,
         blanking_us: 2_380.0,
         predictions: Vec::new(),
     };

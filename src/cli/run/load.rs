@@ -70,7 +70,7 @@ impl Loader {
     }
 
     fn layers(&self) -> Result<Layers, Failure> {
-        let mut layers = Layers::new();
+        let mut layers = Layers::<Keys>::new();
         let (file, wanted) = match &self.args.config {
             Some(file) => (file.clone(), true),
             None => (PathBuf::from(FILE), false),

@@ -8,7 +8,6 @@ use std::{
     process::{Child, Command, Stdio},
 };
 
-use super::{Args, Setup};
 use crate::cli::Failure;
 
 const PROGRAM: &str = "sonard-emulator";
@@ -22,20 +21,17 @@ const BUILD: &str = "build it, in a clone of the repository, with `firmware/test
                      SONARD_EMULATOR. Without it, `--mock` runs the same device code";
 
 /// A `sonard-emulator` that ends when this is dropped.
-pub(super) struct Emulator {
+pub(in crate::cli) struct Emulator {
     child: Child,
     port: String,
 }
 
 impl Emulator {
     /// Starts one in the world that the options say, and waits until its port is there.
-    pub(super) fn start(args: &Args, setup: &Setup) -> Result<Self, Failure> {
+    pub(in crate::cli) fn start(options: &[String]) -> Result<Self, Failure> {
         let program = find()?;
         let mut child = Command::new(&program)
-            .args(args.world.emulator(&args.place.scene)?)
-            .args(["--pose".into(), setup.pose_numbers()])
-            .args(args.sensor.emulator(&setup.sensor))
-            .args(args.air.emulator())
+            .args(options)
             .arg("--attached")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -58,7 +54,7 @@ impl Emulator {
         }
     }
 
-    pub(super) fn port(&self) -> String {
+    pub(in crate::cli) fn port(&self) -> String {
         self.port.clone()
     }
 }

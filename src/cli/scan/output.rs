@@ -7,12 +7,12 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::setup::Setup;
 use crate::{
     cli::{Failure, Outcome},
     plot,
     ranger::Sink,
     scan::{Record, ScanView},
+    scene::Scene,
     store::{LogWriter, StoreError},
 };
 
@@ -71,7 +71,7 @@ impl Output {
     }
 
     /// Closes the log and draws the pictures.
-    pub(super) fn close(mut self, setup: &Setup) -> Outcome {
+    pub(super) fn close(mut self, scene: &Scene) -> Outcome {
         if let Some(log) = self.log.take() {
             log.close()
                 .or_else(|error| if error.is_broken_pipe() { Ok(()) } else { Err(error) })
@@ -80,7 +80,7 @@ impl Output {
         let Some(folder) = &self.folder else { return Ok(()) };
         let views = self.views();
         let Some(view) = views.last().filter(|view| !view.pings.is_empty()) else { return Ok(()) };
-        let picture = plot::draw_scan(view, Some(&setup.scene));
+        let picture = plot::draw_scan(view, Some(scene));
         let png = picture.to_png(PICTURE_WIDTH_PX).map_err(|error| {
             Failure::device(format!("cannot draw the scan: {error}"), "the log is complete")
         })?;

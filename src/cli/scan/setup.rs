@@ -16,9 +16,22 @@ use crate::{
     scene::Scene,
 };
 
-/// The checked request.
-pub(super) struct Setup {
-    pub(super) scene: Arc<Scene>,
+/// What is to be measured, where and with what; each part is checked.
+pub(in crate::cli) struct Wish {
+    pub(in crate::cli) scene: Arc<Scene>,
+    pub(in crate::cli) pose: Pose,
+    /// The pose as a person calls it.
+    pub(in crate::cli) pose_text: String,
+    pub(in crate::cli) plan: ScanPlan,
+    pub(in crate::cli) motion: Motion,
+    pub(in crate::cli) sensor: Sensor,
+    pub(in crate::cli) air: Air,
+    pub(in crate::cli) options: Options,
+}
+
+/// The checked wish, with what the model says about it.
+pub(in crate::cli) struct Setup {
+    pub(in crate::cli) scene: Arc<Scene>,
     pub(super) pose: Pose,
     pub(super) pose_text: String,
     pub(super) plan: ScanPlan,
@@ -34,10 +47,21 @@ pub(super) struct Setup {
 impl Setup {
     pub(super) fn new(args: &Args) -> Result<Self, Failure> {
         let (scene, pose) = args.place.load()?;
-        let scene = Arc::new(scene);
-        let plan = args.azimuths.plan(args.pings_per_stop)?;
-        let (sensor, air, options) =
-            (args.sensor.sensor()?, args.air.air()?, args.engine.options()?);
+        Self::of(Wish {
+            scene: Arc::new(scene),
+            pose,
+            pose_text: args.place.pose.clone(),
+            plan: args.azimuths.plan(args.pings_per_stop)?,
+            motion: args.motion.motion(),
+            sensor: args.sensor.sensor()?,
+            air: args.air.air()?,
+            options: args.engine.options()?,
+        })
+    }
+
+    /// Asks the model about every stop.
+    pub(in crate::cli) fn of(wish: Wish) -> Result<Self, Failure> {
+        let Wish { scene, pose, pose_text, plan, motion, sensor, air, options } = wish;
         let simulator =
             Simulator::new(Arc::new(scene.with_robot_at(&pose)), sensor.clone(), air, options)
                 .map_err(|error| Failure::input(error, "see `sonard scan --help`"))?;
@@ -50,9 +74,9 @@ impl Setup {
             .collect();
         Ok(Self {
             pose,
-            pose_text: args.place.pose.clone(),
+            pose_text,
             plan,
-            motion: args.motion.motion(),
+            motion,
             max_range_m: options.max_range_m.unwrap_or(sensor.max_range_m),
             scene,
             simulator,
@@ -63,7 +87,7 @@ impl Setup {
         })
     }
 
-    pub(super) const fn belief(&self) -> Belief<'_> {
+    pub(in crate::cli) const fn belief(&self) -> Belief<'_> {
         Belief {
             scene: &self.scene,
             pose: &self.pose,
@@ -73,14 +97,19 @@ impl Setup {
         }
     }
 
+    /// When the receiver opens, microseconds after firing.
+    pub(in crate::cli) const fn blanking_us(&self) -> f64 {
+        self.sensor.blanking_us
+    }
+
     /// The pose as options take it.
-    pub(super) fn pose_numbers(&self) -> String {
+    pub(in crate::cli) fn pose_numbers(&self) -> String {
         let Pose { x_m, y_m, heading_deg } = self.pose;
         format!("{x_m},{y_m},{heading_deg}")
     }
 
     /// The scan for a device of this identity.
-    pub(super) fn job(&self, identity: &Identity) -> Result<ScanJob, Failure> {
+    pub(in crate::cli) fn job(&self, identity: &Identity) -> Result<ScanJob, Failure> {
         self.plan.motor_steps(u32::from(identity.steps_per_revolution)).map_err(|error| {
             Failure::input(error, "give --from-deg and --step-deg on the motor's steps")
         })?;
@@ -90,12 +119,14 @@ impl Setup {
             settings: self.settings(identity),
             sound_speed_m_s: self.air.sound_speed_m_s(),
             air: None,
+            request: None,
             blanking_us: self.sensor.blanking_us,
             predictions: self.predictions.clone(),
         })
     }
 
-    fn settings(&self, identity: &Identity) -> Settings {
+    /// The settings for a device of this identity.
+    pub(in crate::cli) fn settings(&self, identity: &Identity) -> Settings {
         let listening = Listening {
             max_range_m: self.max_range_m,
             sound_speed_m_s: self.air.sound_speed_m_s(),
@@ -105,7 +136,7 @@ impl Setup {
     }
 
     /// The session's record: what is true for every reading, and who measured.
-    pub(super) fn session(&self, identity: &Identity) -> Session {
+    pub(in crate::cli) fn session(&self, identity: &Identity) -> Session {
         Session {
             format: LOG_FORMAT,
             started: Timestamp::now(),
@@ -120,6 +151,7 @@ impl Setup {
                 sha256: self.scene.sha256.clone(),
             }),
             model: Some(self.simulator.model_record()),
+            collection: None,
         }
     }
 }

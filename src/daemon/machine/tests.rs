@@ -90,7 +90,10 @@ fn a_long_absence_is_told_once_and_the_return_once() {
     }
     told.extend(machine.poll_transition());
     let states: Vec<_> = told.iter().map(|transition| transition.to).collect();
-    assert_eq!(states, [LinkState::Lost, LinkState::Absent, LinkState::Ready]);
+    assert_eq!(
+        states,
+        [LinkState::Down(Trouble::Lost), LinkState::Down(Trouble::Absent), LinkState::Ready]
+    );
     // Scan after scan is not told either.
     machine.handle(now, Input::ScanBegun);
     machine.handle(now, Input::ScanEnded);
@@ -186,4 +189,11 @@ proptest! {
         machine.handle(now, Input::Shutdown);
         prop_assert_eq!(machine.poll(now), Step::End);
     }
+}
+
+#[test]
+fn a_trouble_is_one_word_in_records() {
+    let state = LinkState::Down(Trouble::NotAnswering);
+    assert_eq!(serde_json::to_value(state).expect("a word"), "not_answering");
+    assert_eq!(serde_json::to_value(LinkState::Ready).expect("a word"), LinkState::Ready.name());
 }

@@ -8,6 +8,7 @@ use tokio_serial::SerialStream;
 
 use super::{
     super::{
+        agenda::Asked,
         desk::Interrupt,
         forecast::predict,
         machine::{Input, Trouble},
@@ -25,13 +26,20 @@ const CLOCK_STEP_S: f64 = 0.1;
 impl Operator {
     pub(super) async fn scan(&mut self) {
         let Some(identity) = self.desk.identity else { return };
-        let Some(job) = self.prepare(&identity).await else { return };
+        let asked = self.desk.agenda.next();
+        let Some(job) = self.prepare(&identity, asked).await else { return };
+        if self.desk.agenda.next() != asked {
+            // While the model was asked, somebody wanted something else.
+            return;
+        }
         let Some(mut ranger) = self.ranger.take() else { return };
         self.note_clock_step(&mut ranger);
         self.desk.agenda.begun(self.desk.now());
+        self.desk.serving = job.request;
         self.handle(Input::ScanBegun);
         self.tell();
         let (outcome, interrupts) = self.scan_attended(&mut ranger, &job).await;
+        self.desk.serving = None;
         self.desk.identity = Some(*ranger.identity());
         self.ranger = Some(ranger);
         self.next_check = Instant::now() + self.check_interval();
@@ -41,14 +49,16 @@ impl Operator {
     }
 
     /// The next scan, and a session in the log that it fits; `None` if it can't be taken now.
-    async fn prepare(&mut self, identity: &Identity) -> Option<ScanJob> {
+    async fn prepare(&mut self, identity: &Identity, asked: Option<Asked>) -> Option<ScanJob> {
         if std::mem::take(&mut self.desk.stale) {
             self.forecast.forget();
         }
         let air = self.desk.air.settled();
-        let what = (self.desk.pose, self.desk.plan, air);
+        let pose = asked.and_then(|asked| asked.pose).unwrap_or(self.desk.pose);
+        let plan = asked.and_then(|asked| asked.plan).unwrap_or(self.desk.plan);
+        let what = (pose, plan, air);
         if let Err(error) = what.1.motor_steps(identity.steps_per_revolution.into()) {
-            return self.give_up_scans(&error.to_string());
+            return self.give_up_scans(&error.to_string(), asked);
         }
         if !self.forecast.knows(what) {
             let predicting = predict(&self.desk.settings, what);
@@ -57,19 +67,24 @@ impl Operator {
                     self.react(interrupt);
                     return None;
                 }
-                Ok(Err(why)) => return self.give_up_scans(&why),
+                Ok(Err(why)) => return self.give_up_scans(&why, asked),
                 Ok(Ok(predicted)) => self.forecast.learn(what, predicted),
             }
         }
         let session = self.forecast.session(&self.desk.settings, &air, identity);
         self.put_session(session);
         let scan_air = self.desk.air.scan_air(&air, Instant::now());
-        Some(self.forecast.job(&self.desk.settings, what, scan_air, identity))
+        let job = self.forecast.job(&self.desk.settings, what, scan_air, identity);
+        Some(ScanJob { request: asked.map(|asked| asked.request), ..job })
     }
 
-    /// Takes no more scans: trying again would fail again, until somebody changes something.
-    fn give_up_scans(&mut self, why: &str) -> Option<ScanJob> {
-        self.desk.agenda.stop();
+    /// Takes no more scans (of a request with its own plan: no more of those): trying again would
+    /// fail again, until somebody changes something.
+    fn give_up_scans(&mut self, why: &str, asked: Option<Asked>) -> Option<ScanJob> {
+        match asked.filter(|asked| asked.plan.is_some() || asked.pose.is_some()) {
+            Some(asked) => drop(self.desk.agenda.cancel(asked.request)),
+            None => self.desk.agenda.stop(),
+        }
         tracing::error!("no scan is taken: {why}");
         self.out.event(EventKind::Stopped, format!("no scan is taken: {why}"));
         None

@@ -3,7 +3,10 @@
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    super::{agenda::Due, machine::LinkState, status::LineTotals},
+    super::{
+        agenda::Due,
+        machine::{LinkState, Trouble},
+    },
     Operator,
 };
 use crate::{
@@ -19,10 +22,6 @@ impl Operator {
         }
         if self.machine.state().is_up() {
             self.trouble = None;
-        }
-        if let Some(ranger) = &self.ranger {
-            let losses = self.line_totals.losses;
-            self.line_totals = LineTotals { losses, ..self.earlier.with(ranger.link_stats()) };
         }
         let since = Timestamp::now()
             - SignedDuration::try_from(self.desk.now().saturating_sub(self.machine.since()))
@@ -43,13 +42,15 @@ impl Operator {
             (view.failures, view.retry_at) = (machine.failures(), retry_at);
             view.device = desk.identity.as_ref().map(device_record);
             view.provenance = desk.identity.as_ref().map(provenance);
-            view.mode = desk.settings.keys.scanning.mode;
+            view.scanning = desk.scanning.clone();
+            view.scene = desk.settings.scene_ref();
             (view.paused, view.requested) = (desk.agenda.is_paused(), desk.agenda.requested());
             (view.next_at, view.plan, view.pose) = (next_at, desk.plan, desk.pose);
             view.scene.clone_from(&desk.settings.scene);
             view.air = desk.air.clone();
             view.configuration = desk.configuration.clone();
-            (view.line, view.scans) = (self.line_totals, self.scans);
+            view.line.clone_from(&self.line_figures);
+            view.scans = self.scans;
         });
         self.desk.board.set_light(self.machine.state().is_up());
     }
@@ -69,9 +70,9 @@ impl Operator {
             LinkState::EmergencyStop => tracing::warn!("the emergency stop is pressed"),
             state => {
                 tracing::warn!("{}: {trouble}", state.name());
-                self.line_totals.losses += u64::from(was_up);
-                let kind =
-                    if state == LinkState::Fault { EventKind::Fault } else { EventKind::LinkLost };
+                self.line_figures.earlier.losses += u64::from(was_up);
+                let fault = state == LinkState::Down(Trouble::Fault);
+                let kind = if fault { EventKind::Fault } else { EventKind::LinkLost };
                 self.out.event(kind, format!("{}: {trouble}", state.name()));
             }
         }

@@ -2,10 +2,12 @@
 
 use axum::{Json, extract::State, http::StatusCode};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
+use uuid::Uuid;
 
 use crate::{
-    daemon::{AirOrder, Order},
+    config::Mode,
+    daemon::{AirOrder, Asked, Order},
     geometry::Pose,
     scan::ScanPlan,
     server::{
@@ -23,6 +25,43 @@ pub(super) struct Start {
     #[serde(default)]
     #[schemars(range(min = 1))]
     scans: Option<u32>,
+    /// Azimuths for these scans alone, instead of those in force.
+    #[serde(default)]
+    plan: Option<ScanPlan>,
+    /// Where the ranger stands for these scans alone, instead of the pose in force.
+    #[serde(default)]
+    pose: Option<Pose>,
+}
+
+/// Scans were asked for.
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
+pub(super) struct Started {
+    /// Always `true`.
+    accepted: bool,
+    /// Identifies the request: `scan_start.request` of its scans bears it. Scans that the mode
+    /// takes by itself bear none.
+    request: Uuid,
+}
+
+/// Which request.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Cancel {
+    /// As POST /v1/start gave it.
+    request: Uuid,
+}
+
+/// When scans are taken.
+#[derive(Debug, Clone, Copy, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Scanning {
+    /// The mode.
+    mode: Mode,
+    /// From the start of a scan to the start of the next, seconds, when the mode is schedule;
+    /// without it, as it was.
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 604_800))]
+    every_s: Option<f64>,
 }
 
 type Answer = Result<(StatusCode, Json<Accepted>), Failed>;
@@ -32,6 +71,18 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
     vec![
         Endpoint::post("/v1/start", start, "Take scans, or go on with those of the mode")
             .takes::<Start>()
+            .answers::<Started>(202, "Taken in"),
+        Endpoint::post(
+            "/v1/cancel",
+            cancel,
+            "Take no more scans of a request, end the one under way",
+        )
+        .takes::<Cancel>()
+        .answers::<Accepted>(202, "Taken in"),
+        Endpoint::get("/v1/scanning", scanning, "When scans are taken")
+            .answers::<Scanning>(200, "The mode"),
+        Endpoint::put("/v1/scanning", set_scanning, "Take scans in this way, from now on")
+            .takes::<Scanning>()
             .answers::<Accepted>(202, "Taken in"),
         Endpoint::post("/v1/stop", stop, "End the scan under way and take no more until a start")
             .answers::<Accepted>(202, "Taken in"),
@@ -47,12 +98,31 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
     ]
 }
 
-async fn start(State(api): State<Api>, Body(start): Body<Start>) -> Answer {
+async fn start(
+    State(api): State<Api>,
+    Body(start): Body<Start>,
+) -> Result<(StatusCode, Json<Started>), Failed> {
     if start.scans == Some(0) {
         let help = "give 1 or more, or leave it out";
         return Err(Failed::new(StatusCode::UNPROCESSABLE_ENTITY, "scans is 0", help));
     }
-    carry_out(&api, Order::Start(start.scans)).await
+    let Start { scans, plan, pose } = start;
+    let request = Uuid::new_v4();
+    api.daemon.order(Order::Start(Asked { request, scans, plan, pose })).await?;
+    Ok((StatusCode::ACCEPTED, Json(Started { accepted: true, request })))
+}
+
+async fn cancel(State(api): State<Api>, Body(cancel): Body<Cancel>) -> Answer {
+    carry_out(&api, Order::Cancel(cancel.request)).await
+}
+
+async fn scanning(State(api): State<Api>) -> Json<Scanning> {
+    let report = api.daemon.status().scanning;
+    Json(Scanning { mode: report.mode, every_s: Some(report.every_s) })
+}
+
+async fn set_scanning(State(api): State<Api>, Body(scanning): Body<Scanning>) -> Answer {
+    carry_out(&api, Order::Mode(scanning.mode, scanning.every_s)).await
 }
 
 async fn stop(State(api): State<Api>) -> Answer {

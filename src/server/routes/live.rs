@@ -24,6 +24,8 @@ use crate::{
     },
 };
 
+const MOVED: &str = "Only readings whose range moved by more than this since it was last sent for \
+                     that direction, or whose status changed";
 const NDJSON: &str = "application/x-ndjson";
 const SSE: &str = "text/event-stream";
 /// How often an event stream without events shows that it is alive.
@@ -55,13 +57,7 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
     vec![
         Endpoint::get("/v1/live/records", live_records, "Records as they are made")
             .parameter("query", "format", format.clone(), format_about)
-            .parameter(
-                "query",
-                "moved_m",
-                json!({"type": "number", "minimum": 0}),
-                "Only readings whose range moved by more than this since it was last sent for \
-                 that direction, or whose status changed",
-            )
+            .parameter("query", "moved_m", json!({"type": "number", "minimum": 0}), MOVED)
             .parameter(
                 "query",
                 "verdicts",
@@ -72,6 +68,7 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
             .answers_as::<Record>(200, SSE, records),
         Endpoint::get("/v1/live/scans", live_scans, "Whole scans when they are over")
             .parameter("query", "format", format, format_about)
+            .parameter("query", "moved_m", json!({"type": "number", "minimum": 0}), MOVED)
             .answers_as::<ScanReport>(200, NDJSON, "One scan a line")
             .answers_as::<ScanReport>(200, SSE, "One scan an event"),
     ]
@@ -82,22 +79,23 @@ async fn live_records(
     headers: HeaderMap,
     Query(options): Query<Options>,
 ) -> Result<Response, Failed> {
-    if options.moved_m.is_some_and(|moved_m| !(moved_m.is_finite() && moved_m >= 0.0)) {
-        let status = axum::http::StatusCode::UNPROCESSABLE_ENTITY;
-        return Err(Failed::new(status, "moved_m is no length", "metres, 0 or more"));
-    }
-    Ok(live(&api, &headers, options, Wanted { moved_m: options.moved_m, scans: false }))
+    live(&api, &headers, options, false)
 }
 
 async fn live_scans(
     State(api): State<Api>,
     headers: HeaderMap,
     Query(options): Query<Options>,
-) -> Response {
-    live(&api, &headers, options, Wanted { moved_m: None, scans: true })
+) -> Result<Response, Failed> {
+    live(&api, &headers, options, true)
 }
 
-fn live(api: &Api, headers: &HeaderMap, options: Options, wanted: Wanted) -> Response {
+fn live(api: &Api, headers: &HeaderMap, options: Options, scans: bool) -> Result<Response, Failed> {
+    if options.moved_m.is_some_and(|moved_m| !(moved_m.is_finite() && moved_m >= 0.0)) {
+        let status = axum::http::StatusCode::UNPROCESSABLE_ENTITY;
+        return Err(Failed::new(status, "moved_m is no length", "metres, 0 or more"));
+    }
+    let wanted = Wanted { moved_m: options.moved_m, scans };
     let accepts_events = headers
         .get(header::ACCEPT)
         .and_then(|accept| accept.to_str().ok())
@@ -112,7 +110,7 @@ fn live(api: &Api, headers: &HeaderMap, options: Options, wanted: Wanted) -> Res
     let mut response = Body::from_stream(chunks).into_response();
     let media = if format == Format::Sse { SSE } else { NDJSON };
     response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(media));
-    response
+    Ok(response)
 }
 
 /// The next piece of a stream; `None` at its end.

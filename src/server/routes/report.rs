@@ -7,7 +7,7 @@ use axum::{Json, extract::State, http::StatusCode};
 use crate::{
     daemon::{AirStatus, Health, ScanReport, Status},
     geometry::Pose,
-    scan::ScanPlan,
+    scan::{ScanPlan, Session},
     server::{Api, answer::Failed, openapi::Endpoint},
 };
 
@@ -20,6 +20,12 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
             .answers::<Health>(503, "Something is not well, and what"),
         Endpoint::get("/v1/scan/latest", latest, "The last scan that is over")
             .answers::<ScanReport>(200, "The scan"),
+        Endpoint::get(
+            "/v1/session",
+            session,
+            "What is true for the scans now: device, sensor, model",
+        )
+        .answers::<Session>(200, "The session"),
         Endpoint::get("/v1/plan", plan, "The azimuths of the next scan")
             .answers::<ScanPlan>(200, "The plan"),
         Endpoint::get("/v1/pose", pose, "Where the ranger stands").answers::<Pose>(200, "The pose"),
@@ -42,6 +48,13 @@ async fn latest(State(api): State<Api>) -> Result<Json<Arc<ScanReport>>, Failed>
     api.daemon.latest_scan().map(Json).ok_or_else(|| {
         let help = "start one with POST /v1/start, and wait for it";
         Failed::new(StatusCode::NOT_FOUND, "no scan is over yet", help)
+    })
+}
+
+async fn session(State(api): State<Api>) -> Result<Json<Arc<Session>>, Failed> {
+    api.daemon.session().map(Json).ok_or_else(|| {
+        let help = "a session begins with the first scan: POST /v1/start";
+        Failed::new(StatusCode::NOT_FOUND, "there is no session yet", help)
     })
 }
 

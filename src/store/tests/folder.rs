@@ -56,6 +56,25 @@ fn faults(folder: &Path) -> (u64, u64) {
 }
 
 #[test]
+fn a_file_whose_beginning_failed_begins_with_the_session_all_the_same() {
+    let root = tempfile::tempdir().expect("a folder");
+    let (folder, away) = (root.path().join("log"), root.path().join("away"));
+    let now = time("2026-03-01T10:00:00Z");
+    let mut log = LogFolder::open(&folder, rotation(1), now).expect("opens");
+    put(&mut log, &scan(1), now);
+    // The next file can't be made: found by a thousand faults, one of them a disk that was full
+    // at just that moment.
+    fs::rename(&folder, &away).expect("renamed");
+    let second = scan(2);
+    let tomorrow = time("2026-03-02T10:00:00Z");
+    assert!(log.append(&second[1], tomorrow).is_err());
+    fs::rename(&away, &folder).expect("renamed");
+    put(&mut log, &second[1..], tomorrow);
+    log.close().expect("syncs");
+    assert_eq!((names(&folder).len(), faults(&folder)), (2, (0, 0)));
+}
+
+#[test]
 fn each_file_begins_with_a_session_and_holds_whole_scans() {
     let folder = tempfile::tempdir().expect("a folder");
     let now = time("2026-03-01T10:00:00Z");

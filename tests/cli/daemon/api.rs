@@ -26,8 +26,11 @@ fn the_server_does_what_its_document_says() {
     let log = daemon.get("/v1/logs").json()[0]["name"].as_str().expect("a log").to_owned();
     let latest = daemon.get("/v1/scan/latest").json();
     let scan = latest["start"]["scan"].as_str().expect("an id").to_owned();
+    let asked = daemon.send("POST", "/v1/start", r#"{"scans":20}"#).json();
     let bodies = [
         ("/v1/start", json!({"scans": 1})),
+        ("/v1/cancel", json!({"request": asked["request"]})),
+        ("/v1/scanning", json!({"mode": "on-request"})),
         ("/v1/stop", json!({})),
         ("/v1/plan", json!({"from_deg": 0.0, "to_deg": 9.0, "step_deg": 0.9, "pings_per_stop": 1})),
         ("/v1/pose", json!({"x_m": 0.5, "y_m": 0.3, "heading_deg": 0.0})),

@@ -12,7 +12,7 @@ use sonard::{
     acoustics::Sensor,
     board::Board,
     config::{Keys, Mode},
-    daemon::{Handle, Journal, LinkState, Resources, Settings, prepare},
+    daemon::{Handle, Journal, LinkState, Resources, Settings, Trouble, prepare},
     link,
     mock::Pace,
     scene::parse_pose,
@@ -104,7 +104,7 @@ fn play(rig: &mut Rig, daemon: &Handle, switches: &Switches) {
     drop(silent);
     switches.home_open.store(true, SeqCst);
     rig.plug("", 1);
-    wait_until("doubt", || state() == LinkState::Fault);
+    wait_until("doubt", || state() == LinkState::Down(Trouble::Fault));
     switches.home_open.store(false, SeqCst);
     scans(3);
     assert!(switches.power.load(SeqCst) && switches.light.load(SeqCst));

@@ -77,6 +77,10 @@ fn print_session(out: &mut impl Write, session: &Session) -> io::Result<()> {
             "  device  {serial}, firmware {firmware}, boot {boot}, {steps} steps a turn"
         )?;
     }
+    if let Some(of) = &session.collection {
+        let pose = of.pose_name.as_ref().map_or_else(String::new, |name| format!(" ({name})"));
+        writeln!(out, "  taken for {}, pose {}{pose}, repeat {}", of.name, of.pose, of.repeat)?;
+    }
     let (celsius, humidity, speed) = (air.temperature_c, air.humidity_percent, air.sound_speed_m_s);
     writeln!(out, "  sensor  {}; air {celsius} C, {humidity} %, {speed:.2} m/s", sensor.name)?;
     if let Some(array) = array {

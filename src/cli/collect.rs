@@ -1,0 +1,184 @@
+//! `sonard collect`.
+
+mod bar;
+mod changes;
+mod device;
+mod load;
+mod preview;
+mod report;
+mod run;
+mod source;
+mod taking;
+mod terminal;
+mod thermometer;
+
+use std::{
+    io::Write as _,
+    path::{Path, PathBuf},
+};
+
+use indicatif::ProgressBar;
+use rustix::process::Signal;
+use tokio::signal::unix::{SignalKind, signal};
+
+use super::{
+    Failure, Outcome,
+    mock_world::MockWorldArgs,
+    runtime::{self, Interrupts},
+};
+use crate::{
+    collect::{CollectionKeys, Folder, FolderError, Manifest, read_journal, verify},
+    config::document,
+};
+use load::Loaded;
+
+/// Options of `sonard collect`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+#[command(group(clap::ArgGroup::new("device").args(["port", "mock", "emulator"])))]
+#[command(group(clap::ArgGroup::new("instead").args(["example", "check", "plan_only", "verify", "report"])))]
+pub(super) struct Args {
+    /// The plan, a TOML file: `sonard collect --example` prints one with every key explained
+    #[arg(value_name = "PLAN.toml", required_unless_present_any = ["example", "verify", "report"])]
+    plan: Option<PathBuf>,
+    /// Folder of the collection, instead of the plan's
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Set a key of the plan, over the file; may be given several times
+    #[arg(long, value_name = "SECTION.KEY=VALUE")]
+    set: Vec<String>,
+    /// Print a plan with every key, its range and its default, and end
+    #[arg(long)]
+    example: bool,
+    /// Check the plan and everything it names, and end
+    #[arg(long)]
+    check: bool,
+    /// Say how long it takes, how it splits into acoustics, motor and link, and how much disk, and
+    /// end
+    #[arg(long)]
+    plan_only: bool,
+    /// With --plan-only: one JSON object
+    #[arg(long, requires = "plan_only")]
+    json: bool,
+    /// Check a collection's files against its manifest, and end
+    #[arg(long, value_name = "DIR", conflicts_with = "plan")]
+    verify: Option<PathBuf>,
+    /// Write a collection's report and manifest anew, and end
+    #[arg(long, value_name = "DIR", conflicts_with = "plan")]
+    report: Option<PathBuf>,
+    /// Go on although the plan, the scene or the ranger is not what it was when it began
+    #[arg(long)]
+    accept_changed_plan: bool,
+    /// Try those scans again that were given up
+    #[arg(long)]
+    retry_given_up: bool,
+    /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number
+    #[arg(long, value_name = "PATH|ID")]
+    port: Option<String>,
+    /// Use a mock ranger, which is carried to each pose
+    #[arg(long)]
+    mock: bool,
+    /// Use the firmware's machine code in an emulated board, one for each pose
+    #[arg(long)]
+    emulator: bool,
+    #[command(flatten)]
+    world: MockWorldArgs,
+}
+
+pub(super) const ABOUT: &str = "\
+Take scans by a plan: poses, repeats, checks, retakes; over days if need be.
+
+Each scan is a log of its own; it counts once it is whole and the plan's checks let it pass. What was \
+cut off or refused is kept beside and taken again. An interrupted collection (a signal, a crash, a \
+power cut, a ranger that is gone) goes on where it stopped when it is started again. In the end there \
+are a report with pictures and a manifest with checksums.";
+
+const EXAMPLES: &str = "\
+Examples:
+  sonard collect --example > plan.toml
+  sonard collect plan.toml --plan-only
+  sonard collect plan.toml --mock --out trial
+  sonard collect plan.toml --port /dev/ttyACM0
+  sonard collect --verify collection
+  sonard compare collection/scans/*.jsonl
+
+In the folder: scans/ (those that count), set-aside/ (cut off or refused), journal.jsonl, manifest.json,
+report.md with report/, inputs/ (plan, scene and sensor as used).
+
+Exit codes: 0 every scan is there, 1 stopped on request, given up, or --verify found something, 2 wrong
+plan or input, 3 device, link or disk.";
+
+pub(super) fn run(args: &Args) -> Outcome {
+    if args.example {
+        return say(&document::<CollectionKeys>());
+    }
+    if let Some(root) = &args.verify {
+        return verify_folder(root);
+    }
+    if let Some(root) = &args.report {
+        return write_report(root);
+    }
+    let loaded = Loaded::new(args)?;
+    if args.check {
+        return say(&loaded.in_words());
+    }
+    if args.plan_only {
+        return say(&preview::of(&loaded, args)?);
+    }
+    runtime::new()?.block_on(async {
+        let interrupts = Interrupts::listen();
+        // With a handler, a file that gets too large is an error of the write and not the end.
+        let _too_large = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()));
+        run::collect(args, loaded, interrupts).await
+    })
+}
+
+fn verify_folder(root: &Path) -> Outcome {
+    let files = Manifest::read(root).map_err(|error| missing_manifest(root, &error))?.files.len();
+    let bar = ProgressBar::new(files as u64);
+    let verified = verify(root, || bar.inc(1)).map_err(|error| refuse(&error));
+    bar.finish_and_clear();
+    let verified = verified?;
+    let counts = &verified.manifest.counts;
+    let mut text = format!(
+        "{}: {} scans of {} wanted, {} set aside, {} given up; {files} files\n",
+        verified.manifest.name, counts.accepted, counts.wanted, counts.set_aside, counts.given_up,
+    );
+    for problem in &verified.problems {
+        text += &format!("  {problem}\n");
+    }
+    if verified.problems.is_empty() {
+        text += "every file is as it was written\n";
+    }
+    say(&text)?;
+    if verified.problems.is_empty() { Ok(()) } else { Err(Failure::Found(None)) }
+}
+
+fn missing_manifest(root: &Path, error: &FolderError) -> Failure {
+    let help = if root.join(crate::collect::JOURNAL).exists() {
+        "the collection was broken off before the first scan was whole, or its manifest was removed: \
+         start it again, or `sonard collect --report DIR`"
+    } else {
+        "give the folder of a collection"
+    };
+    Failure::input(error, help)
+}
+
+/// Report and manifest of a folder as it is.
+fn write_report(root: &Path) -> Outcome {
+    let folder = Folder::at(root);
+    let help = "give the folder of a collection";
+    let history = read_journal(&folder.journal()).map_err(|error| Failure::input(&error, help))?;
+    report::write(&folder, &history)?;
+    let manifest = Manifest::of(&folder, &history).map_err(|error| refuse(&error))?;
+    manifest.write(&folder).map_err(|error| refuse(&error))
+}
+
+fn refuse(error: &FolderError) -> Failure {
+    Failure::device(error, error.help())
+}
+
+fn say(text: &str) -> Outcome {
+    let written = std::io::stdout().lock().write_all(text.as_bytes());
+    written.or_else(|error| Failure::from_write("to standard output", &error))
+}

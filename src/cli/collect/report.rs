@@ -1,0 +1,317 @@
+//! The report of a collection: one page of Markdown, with pictures beside it.
+
+use std::fmt::Write as _;
+
+use jiff::Timestamp;
+
+use super::refuse;
+use crate::{
+    cli::{Failure, Outcome as Done},
+    collect::{
+        BeamSpread, CheckKeys, CollectionKeys, Conditions, Figures, Folder, History, INPUTS,
+        NamedPose, Outcome, Repeatability, Take, repeatability,
+    },
+    compare::{Comparison, compare},
+    plot::{Picture, Point, Series, draw_scans, draw_scene, draw_series},
+    scan::ScanView,
+    scene::Scene,
+    store::load,
+};
+
+/// Scans that are drawn over each other at most: more of them hide what is below.
+const DRAWN: usize = 12;
+/// Poses whose spreads are drawn at most.
+const STRIPS: usize = 6;
+const PICTURES: &str = "report";
+const TABLE: &str = "\
+## Poses
+
+Residuals are measured minus predicted range over the pairs of echoes; spread is the standard deviation
+of a beam's range over the repeats.
+
+| pose | where | scans | agree | median residual | 90 % within | spread | 90 % within | unsteady beams |
+|---|---|---|---|---|---|---|---|---|
+";
+
+/// Writes report and pictures into the folder.
+pub(super) fn write(folder: &Folder, history: &History) -> Done {
+    let Some(plan) = history.plans.last() else {
+        return Err(Failure::input("there is no plan in the journal", "nothing was collected yet"));
+    };
+    let keys: CollectionKeys = serde_json::from_value(plan.keys.clone()).unwrap_or_default();
+    let scene = scene(folder)?;
+    let mut text = head(history, &keys);
+    if let Some(scene) = &scene {
+        draw(folder, "overview", &overview(scene, history))?;
+        text += "![The poses in the scene](report/overview.svg)\n\n";
+    }
+    let (poses, details) = poses(folder, history, scene.as_ref())?;
+    text += &poses;
+    text += &fates(history);
+    draw(folder, "drift", &drift(history, &keys.checks))?;
+    text += "\n## Drift\n\n![Every scan over time](report/drift.svg)\n\n";
+    text += &format!("## Scans\n\n{details}");
+    folder.write("report.md", text.as_bytes()).map_err(|error| refuse(&error))
+}
+
+/// The table of poses, and a picture of the scans at each.
+fn poses(
+    folder: &Folder,
+    history: &History,
+    scene: Option<&Scene>,
+) -> Result<(String, String), Failure> {
+    let (mut table, mut details) = (TABLE.to_owned(), String::new());
+    let mut repeated = Vec::new();
+    for (&number, pose) in &history.poses {
+        let views = views(folder, history, number)?;
+        let (repeat, beams) = repeatability(&views);
+        table += &Row { number, pose, compared: compare(&views).0, repeat }.line();
+        let label = pose.label();
+        if !views.is_empty() {
+            let name = format!("pose-{number:03}");
+            let drawn = &views[..views.len().min(DRAWN)];
+            draw(folder, &name, &draw_scans(drawn, scene))?;
+            let _ = write!(details, "### {number}: {label}\n\n{}", conditions(&pose.conditions));
+            let _ = write!(details, "![Scans at {label}](report/{name}.svg)\n\n");
+        }
+        if repeat.scans > 1 {
+            repeated.push((format!("{number} {label}"), repeat, beams));
+        }
+    }
+    if !repeated.is_empty() {
+        draw(folder, "repeatability", &spreads(repeated))?;
+        table += "\n![Spread of each beam over the repeats](report/repeatability.svg)\n";
+    }
+    Ok((table, details))
+}
+
+/// What there is, from when to when, by what.
+fn head(history: &History, keys: &CollectionKeys) -> String {
+    let wanted = history.wanted();
+    let accepted: Vec<&Take> = history.accepted().collect();
+    let given_up = wanted.iter().filter(|slot| history.is_given_up(**slot)).count();
+    let beams: u64 = accepted.iter().map(|take| u64::from(take.figures.beams)).sum();
+    let missing: u64 = accepted.iter().map(|take| u64::from(take.figures.missing)).sum();
+    let mut text = format!("# {}\n\n", keys.collection.name);
+    let _ = writeln!(
+        text,
+        "{} of {} scans, {} set aside, {given_up} given up; {beams} beams, {missing} without a usable \
+         reading.",
+        accepted.len(),
+        wanted.len(),
+        history.set_aside().count(),
+    );
+    let times = || accepted.iter().filter_map(|take| take.started);
+    if let (Some(first), Some(last)) = (times().min(), times().max()) {
+        let _ = writeln!(
+            text,
+            "Begun {first:.0}, last scan {last:.0}; started {} times.",
+            history.starts.len()
+        );
+    }
+    let seconds: f64 = accepted.iter().filter_map(|take| take.wall_s).sum();
+    let _ = writeln!(text, "Scanning took {seconds:.0} s in all.\n");
+    for start in &history.starts {
+        let device = &start.device;
+        let provenance = serde_json::to_value(start.provenance).unwrap_or_default();
+        let _ = writeln!(
+            text,
+            "- {:.0}: {} {} (firmware {}){}",
+            start.time,
+            provenance.as_str().unwrap_or("ranger"),
+            device.serial,
+            device.firmware,
+            listed(&start.conditions)
+        );
+    }
+    let plan = history.plans.last();
+    let scene = plan.map_or("", |plan| plan.scene.name.as_str());
+    let sensor = &keys.sensor.sensor;
+    let _ = write!(text, "\nScene {scene}, sensor {sensor}. {}\n", conditions(&keys.conditions));
+    if history.plans.len() > 1 {
+        let _ = writeln!(
+            text,
+            "The plan was changed {} times; journal.jsonl keeps each.\n",
+            history.plans.len() - 1
+        );
+    }
+    text
+}
+
+/// One pose of the table.
+struct Row<'a> {
+    number: u32,
+    pose: &'a NamedPose,
+    compared: Comparison,
+    repeat: Repeatability,
+}
+
+impl Row<'_> {
+    fn line(&self) -> String {
+        let mm = |m: Option<f64>| m.map_or_else(|| "-".into(), |m| format!("{:.1} mm", 1e3 * m));
+        let Self { number, pose, compared, repeat } = self;
+        let share = compared.agree_fraction;
+        format!(
+            "| {number} {} | {:.3}, {:.3}, {:.1}\u{b0} | {} | {} | {} | {} | {} | {} | {} |\n",
+            pose.label(),
+            pose.pose.x_m,
+            pose.pose.y_m,
+            pose.pose.heading_deg,
+            repeat.scans,
+            share.map_or_else(|| "-".into(), |share| format!("{:.1} %", 100.0 * share)),
+            mm(compared.median_residual_m),
+            mm(compared.p90_abs_residual_m),
+            mm(repeat.median_spread_m),
+            mm(repeat.p90_spread_m),
+            repeat.unsteady,
+        )
+    }
+}
+
+/// What was set aside, given up, or kept with a finding, and why.
+fn fates(history: &History) -> String {
+    let mut text = String::new();
+    let mut aside = String::new();
+    for take in history.set_aside() {
+        let what = if take.outcome == Outcome::Cut { "cut" } else { "refused" };
+        let why = take.cut.clone().unwrap_or_else(|| why(take));
+        let _ = writeln!(aside, "| {} | {what} | {why} |", take.file);
+    }
+    if !aside.is_empty() {
+        let _ =
+            write!(text, "\n## Set aside and retaken\n\n| file | | why |\n|---|---|---|\n{aside}");
+    }
+    let given_up: Vec<_> = history.given_up.iter().filter(|s| history.is_given_up(**s)).collect();
+    if !given_up.is_empty() {
+        text += "\n## Given up\n\n";
+        for slot in given_up {
+            let _ = writeln!(text, "- pose {}, repeat {}", slot.pose, slot.repeat);
+        }
+    }
+    let noted: Vec<_> = history.accepted().filter(|take| !take.findings.is_empty()).collect();
+    if !noted.is_empty() {
+        text += "\n## Noted\n\n";
+        for take in noted {
+            let _ = writeln!(text, "- {}: {}", take.file, why(take));
+        }
+    }
+    text
+}
+
+fn why(take: &Take) -> String {
+    let details: Vec<_> = take.findings.iter().map(|finding| finding.detail.as_str()).collect();
+    details.join("; ")
+}
+
+/// The scene with the collection's poses in place of its own.
+fn overview(scene: &Scene, history: &History) -> Picture {
+    let name = |number: u32, pose: &NamedPose| match &pose.name {
+        Some(name) => format!("{number} {name}"),
+        None => number.to_string(),
+    };
+    let poses =
+        history.poses.iter().map(|(&number, pose)| (name(number, pose), pose.pose)).collect();
+    draw_scene(&Scene { poses, ..scene.clone() })
+}
+
+/// What every scan was like over time, those set aside among them.
+fn drift(history: &History, checks: &CheckKeys) -> Picture {
+    let first = history.takes.iter().filter_map(|take| take.started).min().unwrap_or_default();
+    let hours = |at: Timestamp| at.duration_since(first).as_secs_f64() / 3600.0;
+    let times = history.takes.iter().filter_map(|take| take.started);
+    let last_h = times.map(hours).fold(0.0, f64::max);
+    let (scale, unit) = if last_h < 1.0 { (60.0, "minutes") } else { (1.0, "hours") };
+    let strip = |title: &str, limits, of: &dyn Fn(&Figures) -> Option<f64>| {
+        let point = |take: &Take| {
+            Some(Point {
+                x: scale * hours(take.started?),
+                y: of(&take.figures)?,
+                hint: take.file.clone(),
+                aside: take.outcome != Outcome::Accepted,
+            })
+        };
+        let points = history.takes.iter().filter_map(point).collect();
+        Series { title: title.into(), points, limits }
+    };
+    let off = f64::from(checks.max_home_drift_steps);
+    let strips = [
+        strip("air temperature, C", None, &|figures| figures.temperature_c),
+        strip("median of measured \u{2212} model, mm", None, &|f| Some(1e3 * f.median_residual_m?)),
+        strip("echo pairs that agree, %", None, &|f| Some(100.0 * f.agree_fraction?)),
+        strip("index off after the scan, steps", Some([-off, off]), &|figures| {
+            figures.home_drift_steps.map(f64::from)
+        }),
+    ];
+    draw_series("Every scan over time", &[], &format!("{unit} since {first:.0}"), &strips)
+}
+
+/// The spread of each beam's ranges at the poses that repeat worst.
+fn spreads(mut poses: Vec<(String, Repeatability, Vec<BeamSpread>)>) -> Picture {
+    poses.sort_by(|a, b| {
+        let worst = |of: &Repeatability| of.p90_spread_m.unwrap_or(0.0);
+        worst(&b.1).total_cmp(&worst(&a.1))
+    });
+    let all = poses.len();
+    poses.truncate(STRIPS);
+    let strips: Vec<Series> = poses
+        .into_iter()
+        .map(|(label, of, beams)| {
+            let point = |beam: BeamSpread| Point {
+                x: beam.azimuth_deg,
+                y: 1e3 * beam.spread_m,
+                hint: format!("{:.1}\u{b0}: {:.2} mm", beam.azimuth_deg, 1e3 * beam.spread_m),
+                aside: false,
+            };
+            Series {
+                title: format!("{label}: standard deviation over {} scans, mm", of.scans),
+                points: beams.into_iter().map(point).collect(),
+                limits: None,
+            }
+        })
+        .collect();
+    let lines = match all > STRIPS {
+        true => vec![format!("The {STRIPS} of {all} poses that repeat worst")],
+        false => Vec::new(),
+    };
+    let along = "azimuth, degrees counter-clockwise from the heading";
+    draw_series("How well beams repeat", &lines, along, &strips)
+}
+
+/// The scans of a pose that count, by repeat.
+fn views(folder: &Folder, history: &History, pose: u32) -> Result<Vec<ScanView>, Failure> {
+    let mut takes: Vec<&Take> = history.accepted().filter(|take| take.slot.pose == pose).collect();
+    takes.sort_by_key(|take| take.slot.repeat);
+    let mut views = Vec::new();
+    for take in takes {
+        let loaded = load(&folder.root().join(&take.file))
+            .map_err(|error| Failure::device(&error, error.help()))?;
+        views.extend(ScanView::from_records(loaded.records));
+    }
+    Ok(views)
+}
+
+fn scene(folder: &Folder) -> Result<Option<Scene>, Failure> {
+    let path = folder.root().join(INPUTS).join("scene.json");
+    let Ok(text) = std::fs::read_to_string(&path) else { return Ok(None) };
+    Scene::from_json(&text).map(Some).map_err(|error| {
+        Failure::input(format!("{}: {error}", path.display()), "it was changed: put it back")
+    })
+}
+
+fn draw(folder: &Folder, name: &str, picture: &Picture) -> Done {
+    folder
+        .write(&format!("{PICTURES}/{name}.svg"), picture.to_svg().as_bytes())
+        .map_err(|error| refuse(&error))
+}
+
+/// Conditions as a paragraph; nothing if there are none.
+fn conditions(of: &Conditions) -> String {
+    if of.is_empty() { String::new() } else { format!("Conditions{}.\n\n", listed(of)) }
+}
+
+fn listed(of: &Conditions) -> String {
+    let plain =
+        |value: &serde_json::Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+    let all: Vec<_> = of.iter().map(|(key, value)| format!("{key} {}", plain(value))).collect();
+    if all.is_empty() { String::new() } else { format!(": {}", all.join(", ")) }
+}

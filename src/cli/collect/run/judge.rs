@@ -1,0 +1,237 @@
+//! What becomes of a scan: accepted, refused or cut.
+
+use super::{
+    super::{
+        refuse,
+        taking::{self, Taken},
+    },
+    Collector, Next,
+};
+use crate::{
+    cli::{Failure, Outcome as Done},
+    collect::{Action, Entry, Figures, Finding, Outcome, Slot, Take, check, is_cut, verdict},
+    scan::ScanView,
+    store::load,
+};
+
+impl Collector<'_> {
+    /// Lets a scan count, or sets it aside, and says what is next.
+    pub(super) async fn judge(
+        &mut self,
+        slot: Slot,
+        (taken, change_c): (Taken, Option<f64>),
+    ) -> Result<Next, Failure> {
+        let Taken { view, lost, wall_s } = taken;
+        let Some(view) = view.filter(|view| !is_cut(view)) else {
+            self.set_aside(slot, None, Outcome::Cut, Vec::new(), "it was broken off")?;
+            if self.interrupts.happened() {
+                return Ok(Next::Stop("stopped on request".into()));
+            }
+            if let Some(Failure::Device(report)) = &lost {
+                self.bar.say(&format!("the ranger was lost: {report}"));
+            }
+            return self.count_refusal(slot);
+        };
+        let figures = Figures::of(&view, change_c);
+        let findings = check(&figures, &self.loaded.keys.checks);
+        let mut action = verdict(&findings);
+        self.tell(slot, &figures, &findings);
+        if action == Action::Ask {
+            action = self.ask_what_to_do().await?;
+        }
+        if action == Action::Note {
+            self.accept(slot, &view, figures, findings, Some(wall_s))?;
+            return Ok(Next::GoOn);
+        }
+        let why = words(&findings);
+        self.set_aside(slot, Some((&view, figures, wall_s)), Outcome::Refused, findings, &why)?;
+        if self.interrupts.happened() {
+            return Ok(Next::Stop("stopped on request".into()));
+        }
+        match action {
+            Action::Stop | Action::Ask => Ok(Next::Stop(format!("stopped: {why}"))),
+            Action::Note | Action::Retake => self.count_refusal(slot),
+        }
+    }
+
+    /// Takes in what an earlier run left behind: a scan that was whole counts as if nothing had
+    /// happened, another one is kept beside.
+    pub(super) fn take_in_left_overs(&mut self) -> Done {
+        // Renamed, but not told: the rename is what counts.
+        let told: std::collections::HashSet<Slot> =
+            self.journal.history().accepted().map(|take| take.slot).collect();
+        let scans = self.folder.scans().map_err(|error| refuse(&error))?;
+        for slot in scans.into_iter().filter(|slot| !told.contains(slot)) {
+            let sealed = self.folder.sealed(slot).map_err(|error| refuse(&error))?;
+            let path = self.folder.root().join(&sealed.file);
+            let Some(view) = read(&path)? else { continue };
+            let figures = Figures::of(&view, None);
+            let findings = check(&figures, &self.loaded.keys.checks);
+            self.note(take_entry(slot, Some(&view), Outcome::Accepted, sealed, figures, findings))?;
+        }
+        for slot in self.folder.left_over().map_err(|error| refuse(&error))? {
+            let path = self.folder.taking(slot);
+            // Opening mends an end that was torn off.
+            crate::store::LogWriter::open(&path)
+                .and_then(crate::store::LogWriter::close)
+                .map_err(|error| Failure::device(&error, error.help()))?;
+            let view = read(&path)?.filter(|view| !is_cut(view));
+            let done = self.folder.sealed(slot).is_ok();
+            match view {
+                Some(view) if !done => self.judge_left_over(slot, &view)?,
+                _ => {
+                    let why = "the program ended within it";
+                    self.set_aside(slot, None, Outcome::Cut, Vec::new(), why)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn judge_left_over(&mut self, slot: Slot, view: &ScanView) -> Done {
+        let figures = Figures::of(view, None);
+        let findings = check(&figures, &self.loaded.keys.checks);
+        if verdict(&findings) == Action::Note {
+            return self.accept(slot, view, figures, findings, None);
+        }
+        let why = words(&findings);
+        let wall_s = f64::NAN;
+        self.set_aside(slot, Some((view, figures, wall_s)), Outcome::Refused, findings, &why)
+    }
+
+    fn accept(
+        &mut self,
+        slot: Slot,
+        view: &ScanView,
+        figures: Figures,
+        findings: Vec<Finding>,
+        wall_s: Option<f64>,
+    ) -> Done {
+        let sealed = self.folder.accept(slot).map_err(|error| refuse(&error))?;
+        let mut entry = take_entry(slot, Some(view), Outcome::Accepted, sealed, figures, findings);
+        if let Entry::Take(take) = &mut entry {
+            take.wall_s = wall_s;
+        }
+        self.note(entry)?;
+        if let Some(wall_s) = wall_s {
+            self.bar.learn(wall_s);
+        }
+        self.write_manifest()
+    }
+
+    fn set_aside(
+        &mut self,
+        slot: Slot,
+        of: Option<(&ScanView, Figures, f64)>,
+        outcome: Outcome,
+        findings: Vec<Finding>,
+        why: &str,
+    ) -> Done {
+        let path = self.folder.taking(slot);
+        taking::mark(&path, why)?;
+        let sealed = self.folder.set_aside(slot).map_err(|error| refuse(&error))?;
+        let kept = match of {
+            Some(_) => None,
+            None => read(&self.folder.root().join(&sealed.file))?,
+        };
+        let view = of.map(|(view, ..)| view).or(kept.as_ref());
+        let figures = of.map_or_else(
+            || view.map(|view| Figures::of(view, None)).unwrap_or_default(),
+            |(_, figures, _)| figures,
+        );
+        let mut entry = take_entry(slot, view, outcome, sealed, figures, findings);
+        if let Entry::Take(take) = &mut entry {
+            take.wall_s = of.map(|(.., wall_s)| wall_s).filter(|wall_s| wall_s.is_finite());
+            take.cut = (outcome == Outcome::Cut).then(|| why.to_owned());
+        }
+        self.note(entry)
+    }
+
+    /// One refusal more; after too many the scan is given up.
+    fn count_refusal(&mut self, slot: Slot) -> Result<Next, Failure> {
+        let refused = self.refused.entry(slot).or_default();
+        *refused += 1;
+        if *refused > self.loaded.keys.collection.retakes {
+            return self.give_up(slot);
+        }
+        Ok(Next::GoOn)
+    }
+
+    async fn ask_what_to_do(&mut self) -> Result<Action, Failure> {
+        self.bar.hide();
+        loop {
+            let question = "keep it, retake it or stop? [k/r/s]";
+            let answer = self.terminal.ask(question, &self.interrupts).await?;
+            match answer.as_deref() {
+                Some("k" | "keep") => return Ok(Action::Note),
+                Some("r" | "retake") => return Ok(Action::Retake),
+                Some("s" | "stop") | None => return Ok(Action::Stop),
+                Some(_) => {}
+            }
+        }
+    }
+
+    /// One line about a scan, and one about each finding.
+    fn tell(&self, slot: Slot, figures: &Figures, findings: &[Finding]) {
+        let percent = |share: Option<f64>| {
+            share.map_or_else(|| "-".into(), |share| format!("{:.0} %", 100.0 * share))
+        };
+        self.bar.say(&format!(
+            "pose {} ({}), repeat {}: {} of {} beams, {} of the echo pairs agree",
+            slot.pose,
+            self.pose(slot.pose).label(),
+            slot.repeat,
+            figures.beams - figures.missing,
+            figures.beams,
+            percent(figures.agree_fraction),
+        ));
+        for finding in findings {
+            let done = match finding.action {
+                Action::Note => "noted",
+                Action::Retake => "to be retaken",
+                Action::Ask => "asking",
+                Action::Stop => "stopping",
+            };
+            self.bar.say(&format!("  {}: {done}", finding.detail));
+        }
+    }
+}
+
+fn words(findings: &[Finding]) -> String {
+    let details: Vec<_> = findings
+        .iter()
+        .filter(|finding| finding.action != Action::Note)
+        .map(|finding| finding.detail.as_str())
+        .collect();
+    details.join("; ")
+}
+
+fn take_entry(
+    slot: Slot,
+    view: Option<&ScanView>,
+    outcome: Outcome,
+    sealed: crate::collect::Sealed,
+    figures: Figures,
+    findings: Vec<Finding>,
+) -> Entry {
+    let start = view.and_then(|view| view.start.as_ref());
+    Entry::Take(Box::new(Take {
+        slot,
+        scan: view.map(|view| view.scan),
+        started: start.map(|start| start.time),
+        outcome,
+        file: sealed.file,
+        bytes: sealed.bytes,
+        sha256: sealed.sha256,
+        figures,
+        findings,
+        cut: None,
+        wall_s: None,
+    }))
+}
+
+/// The scan in a file, if it holds one.
+fn read(path: &std::path::Path) -> Result<Option<ScanView>, Failure> {
+    let loaded = load(path).map_err(|error| Failure::device(&error, error.help()))?;
+    Ok(ScanView::from_records(loaded.records).into_iter().next())
+}

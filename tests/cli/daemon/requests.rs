@@ -1,0 +1,166 @@
+//! Scans that are asked for while the daemon does something else: by their own plan, by the command
+//! line; and what can be changed while it runs.
+
+use std::{
+    io::{BufRead as _, BufReader, Write as _},
+    process::Stdio,
+    thread,
+    time::Duration,
+};
+
+use serde_json::{Value, json};
+
+use super::Daemon;
+use crate::common::{Log, interrupt, sonard, stderr, wait_until};
+
+const SHORT: [&str; 6] =
+    ["--set", "plan.to_deg=36", "--set", "model.max_range_m=2", "--set", "plan.step_deg=3.6"];
+
+/// `sonard scan --daemon` at the daemon, with further options.
+fn scan(daemon: &Daemon, further: &[&str]) -> std::process::Command {
+    let socket = daemon.folder.join("s");
+    let socket = socket.to_str().expect("plain path");
+    let mut command = sonard(&["scan", "--daemon", "--socket", socket]);
+    command.args(further).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+#[test]
+fn a_scan_through_a_busy_daemon_has_its_own_plan_and_leaves_the_daemons_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let continuous = ["--set", "scanning.mode=continuous"];
+    let daemon = Daemon::start_mock(folder.path(), &[&SHORT[..], &continuous].concat());
+    daemon.wait_for_scans(1);
+    let out = folder.path().join("out");
+    let own =
+        ["--scene", "simple-room", "--pose", "0.5,0.3,90", "--to-deg", "90", "--step-deg", "1.8"];
+    let taken = scan(&daemon, &own)
+        .args(["--repeat", "2", "--out", out.to_str().expect("plain path")])
+        .output()
+        .expect("it runs");
+    assert_eq!(taken.status.code(), Some(0), "{}", stderr(&taken));
+    let log = Log::read(&out.join("scan.jsonl"));
+    let starts: Vec<_> = log.of_type("scan_start").collect();
+    assert_eq!(starts.len(), 2);
+    for start in starts {
+        assert_eq!(start["pose"], json!({"x_m": 0.5, "y_m": 0.3, "heading_deg": 90.0}));
+        assert_eq!(start["plan"]["to_deg"], 90.0);
+    }
+    assert_eq!(log.pings().len(), 100);
+    assert!(log.pings().iter().all(|ping| ping["sim"].is_object()), "predictions for that pose");
+    assert_eq!(log.of_type("session").count(), 1);
+    assert!(out.join("scan.png").exists() && out.join("scan.svg").exists());
+    let verified =
+        crate::common::run(&["log", "verify", out.join("scan.jsonl").to_str().expect("plain")]);
+    assert_eq!(verified.status.code(), Some(0));
+    let status = daemon.status();
+    assert_eq!((&status["plan"]["to_deg"], &status["pose"]["x_m"]), (&36.0.into(), &0.774.into()));
+    let before = daemon.health()["scans"]["completed"].as_u64();
+    wait_until("its own scans again", || daemon.health()["scans"]["completed"].as_u64() > before);
+
+    // What can't be: another scene, a sensor of one's own, a pose in the wall, nobody there.
+    let corridor = scan(&daemon, &["--scene", "corridor", "--pose", "beside-wall"]).output();
+    let corridor = corridor.expect("it runs");
+    let said = stderr(&corridor).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(corridor.status.code() == Some(2) && said.contains("its scene simple-room"), "{said}");
+    let sensor = [&own[..], &["--sensor", "pioneer"]].concat();
+    assert_eq!(scan(&daemon, &sensor).output().expect("it runs").status.code(), Some(2));
+    let wrong = daemon.send("POST", "/v1/start", r#"{"pose":{"x_m":9,"y_m":9,"heading_deg":0}}"#);
+    assert_eq!(wrong.status, 422);
+    assert_eq!(daemon.stop(), Some(0));
+    let nobody = sonard(&["scan", "--daemon", "--socket", "/nowhere"]).args(own).output();
+    assert_eq!(nobody.expect("it runs").status.code(), Some(3));
+}
+
+#[test]
+fn an_interrupt_and_a_stop_end_the_wait_for_a_scan() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    let own = ["--scene", "simple-room", "--pose", "fig9", "--repeat", "50"];
+    for by_stop in [false, true] {
+        let child = scan(&daemon, &own).spawn().expect("it runs");
+        wait_until("a scan", || daemon.status()["scan"]["done"].as_u64() > Some(3));
+        if by_stop {
+            assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
+        } else {
+            interrupt(child.id());
+        }
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+        let log = Log::parse(&String::from_utf8_lossy(&output.stdout));
+        assert!(log.end()["missing"].as_u64() > Some(0), "the scan was closed");
+        wait_until("rest", || daemon.status()["scan"].is_null());
+        assert_eq!(daemon.status()["scanning"]["requested"], 0);
+    }
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn the_mode_can_be_changed_while_it_runs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    daemon.wait_for("ready");
+    assert_eq!(daemon.get("/v1/scanning").json(), json!({"mode": "on-request", "every_s": 60.0}));
+    assert_eq!(daemon.send("PUT", "/v1/scanning", r#"{"mode":"continuous"}"#).status, 202);
+    daemon.wait_for_scans(3);
+    let scheduled = r#"{"mode":"schedule","every_s":3600}"#;
+    assert_eq!(daemon.send("PUT", "/v1/scanning", scheduled).status, 202);
+    // The schedule begins at once, and then waits for an hour.
+    wait_until("the wait", || daemon.status()["scanning"]["next_in_s"].as_f64() > Some(3500.0));
+    assert_eq!(daemon.send("PUT", "/v1/scanning", r#"{"mode":"on-request"}"#).status, 202);
+    wait_until("rest", || daemon.status()["scan"].is_null());
+    let status = daemon.status();
+    assert_eq!(
+        (&status["scanning"]["mode"], &status["scanning"]["every_s"]),
+        (&"on-request".into(), &3600.0.into())
+    );
+    for (body, code) in [
+        (r#"{"mode":"schedule","every_s":0}"#, 422),
+        (r#"{"mode":"often"}"#, 422),
+        (r#"{"mode":"schedule","every":1}"#, 422),
+    ] {
+        assert_eq!(daemon.send("PUT", "/v1/scanning", body).status, code, "{body}");
+    }
+    let unknown = format!(r#"{{"request":"{}"}}"#, "6ba7b810-9dad-11d1-80b4-00c04fd430c8");
+    assert_eq!(daemon.send("POST", "/v1/cancel", &unknown).status, 422);
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn the_figures_of_the_line_go_on_within_a_scan() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &["--set", "model.max_range_m=4"]);
+    daemon.wait_for("ready");
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+    let done = || daemon.status()["scan"]["done"].as_u64();
+    wait_until("beams", || done() > Some(3));
+    let mut received = Vec::new();
+    for _ in 0..4 {
+        received.push(daemon.health()["line"]["bytes_received"].as_u64().expect("a count"));
+        thread::sleep(Duration::from_millis(300));
+    }
+    assert!(done() < Some(400), "still the same scan");
+    assert!(received.windows(2).all(|pair| pair[1] > pair[0]), "{received:?}");
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn whole_scans_can_be_had_with_only_what_moved() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    daemon.wait_for("ready");
+    let mut stream = daemon.connect().expect("it listens");
+    let request = "GET /v1/live/scans?moved_m=0.05 HTTP/1.1\r\nHost: localhost\r\n\r\n";
+    stream.write_all(request.as_bytes()).expect("it listens");
+    let mut lines = BufReader::new(stream).lines().map(|line| line.expect("a line"));
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":2}"#).status, 202);
+    let mut next = || -> Value {
+        lines
+            .find_map(|line| serde_json::from_str(&line).ok().filter(Value::is_object))
+            .expect("a scan")
+    };
+    let counts = [next(), next()].map(|scan| scan["pings"].as_array().map_or(0, Vec::len));
+    assert_eq!(counts, [10, 0], "nothing moved in between");
+    assert_eq!(daemon.get("/v1/live/scans?moved_m=-1").status, 422);
+    assert_eq!(daemon.stop(), Some(0));
+}
