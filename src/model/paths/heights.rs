@@ -5,7 +5,7 @@
 //! and pass it, and a path counts if it meets its walls where they stand and the others where they
 //! do not. What their upper and lower edges bend comes on its own (`rims`).
 
-use super::{Echo, Paths, Trees};
+use super::{Echo, Paths, Trees, beam::TIE_M};
 use crate::{geometry::DVec2, model::Reflector, scene::Scene};
 
 /// Heights of a scene around a ranger.
@@ -127,7 +127,8 @@ impl Heights {
 }
 
 fn holds(limits: Option<[f64; 2]>, z_m: f64) -> bool {
-    limits.is_none_or(|[from, to]| (from..=to).contains(&z_m))
+    // On the very end counts as met; a rim's echo knows that.
+    limits.is_none_or(|[from, to]| (from - TIE_M..=to + TIE_M).contains(&z_m))
 }
 
 impl Paths {

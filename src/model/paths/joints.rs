@@ -113,7 +113,7 @@ impl Meeting<'_> {
         found: &mut Vec<Pair>,
     ) {
         let arm = &out.arms[number as usize];
-        let floor = self.paths.round_floor(arm.level).powi(2);
+        let floor = self.paths.settings.round_floor(arm.level).powi(2);
         let tracer = ArmTracer::new(self.paths, out.views, arm);
         for sheaf in sheaves {
             let most = arm.strength.with(&sheaf.most) * self.heard(&arm.leaves, &sheaf.leaves);
@@ -153,7 +153,7 @@ impl Meeting<'_> {
     fn pair(&self, out: &ArmTracer, back: &ArmTracer) -> Option<Pair> {
         let settings = &self.paths.settings;
         let circle = &self.paths.rounds.circles[out.arm.cylinder as usize];
-        let floor = self.paths.round_floor(out.arm.level);
+        let floor = self.paths.settings.round_floor(out.arm.level);
         let gain = out.arm.gain * back.arm.gain * circle.gain;
         let (contacts, place_rad) = meet(out, back, circle.radius_m)?;
         let [one, other] = &contacts;

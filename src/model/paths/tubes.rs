@@ -13,29 +13,24 @@
 //! one of both can still be heard.
 
 mod meet;
+mod part;
 
 use smallvec::SmallVec;
 
 use super::{
     Paths,
     arms::{Arm, DIRECT, LOUDER, Leaves, Partners, Strength},
-    beam::{Ray, TIE_M},
+    beam::Ray,
     mesh::Side,
-    rounds::{Circle, Span},
+    rounds::Span,
     trace::{Tree, View},
-    tube::{Curved, EXACT_M, FIRST, Front, Link, Surfaces, Tracer, surfaces_to, zero_between},
+    tube::{Curved, FIRST, Front, Link, Surfaces, Tracer, surfaces_to},
 };
 use crate::{
     geometry::{DVec2, distance_to_segment, wrap_pi},
     model::Reflector,
 };
-
-/// A tube's part of a cylinder is split until it turns the rays by no more than twice this,
-/// radians.
-const MOST_TURN_RAD: f64 = 0.7;
-
-/// Halvings of a tube at a cylinder, at most: what grazes it is then too weak.
-const MOST_HALVINGS: u32 = 12;
+use part::{Tube, ray_through, split};
 
 /// Rays that cylinders have turned to edges are followed from this much above the weakest sound
 /// that is asked for, so with 20 dB below the threshold for that, down to the threshold.
@@ -54,49 +49,6 @@ pub(super) struct BentRay {
     pub(super) width_m: f64,
     /// Radius of curvature of the wave front, metres.
     pub(super) radius_m: f64,
-}
-
-/// Rays between two, all of which have met the same surfaces.
-#[derive(Debug, Clone, Copy)]
-struct Tube {
-    view: u32,
-    link: u32,
-    /// The contact of its borders with the first cylinder, in growing order.
-    span: Span,
-    /// The borders as they leave the last surface, in the same order.
-    borders: [Front; 2],
-    /// Whether the ray at `from_rad` is the left border.
-    mirrored: bool,
-    triangle: u32,
-    /// The side it came in by, if it did not start here.
-    side: Option<u8>,
-    gain: f64,
-    order: u16,
-    /// Cylinders met.
-    level: u16,
-    /// The best that its arms can be joined with.
-    partner: Strength,
-}
-
-impl Tube {
-    /// The borders, the right one first.
-    fn in_order(&self) -> [&Front; 2] {
-        let [from, to] = &self.borders;
-        if self.mirrored { [to, from] } else { [from, to] }
-    }
-
-    fn halves(&self, at_rad: f64, front: Front) -> [Self; 2] {
-        let Span { from_rad, to_rad } = self.span;
-        let [from, to] = self.borders;
-        let part =
-            |from_rad, to_rad, borders| Self { span: Span { from_rad, to_rad }, borders, ..*self };
-        [part(from_rad, at_rad, [from, front]), part(at_rad, to_rad, [front, to])]
-    }
-
-    /// The least of its borders.
-    fn least(&self, of: impl Fn(&Front) -> f64) -> f64 {
-        of(&self.borders[0]).min(of(&self.borders[1]))
-    }
 }
 
 /// Follows the tubes of a tree, level by level.
@@ -200,7 +152,7 @@ impl<'a> TubeGrower<'a> {
         let arm = &self.arms[index];
         let partner = partners.best(&arm.leaves);
         let order = arm.order + 1;
-        let is_heard = arm.strength.with(&partner) >= self.paths.round_floor(1).powi(2);
+        let is_heard = arm.strength.with(&partner) >= self.paths.settings.round_floor(1).powi(2);
         if !(is_heard || self.has_edges) || !self.paths.settings.allows(order + 1) {
             return;
         }
@@ -280,7 +232,7 @@ impl<'a> TubeGrower<'a> {
         let growth = tube.least(|front| front.growth);
         let spread = [length_m, width_m, growth];
         let strength = Strength::of(tube.gain, spread, self.radius_m, self.paths);
-        strength.with(&tube.partner) >= self.paths.round_floor(1).powi(2)
+        strength.with(&tube.partner) >= self.paths.settings.round_floor(1).powi(2)
             || self.has_edges && self.is_worth_an_edge(tube.gain, spread)
     }
 
@@ -389,53 +341,4 @@ impl<'a> TubeGrower<'a> {
             Side::Outside => {}
         }
     }
-}
-
-/// Puts a tube that has just met a circle in parts that turn little.
-fn split(
-    tube: &Tube,
-    tracer: &Tracer,
-    circle: &Circle,
-    halvings: u32,
-    partners: &Partners,
-    waiting: &mut Vec<Tube>,
-) {
-    let [from, to] = tube.borders;
-    let middle = |front: &Front| front.origin - circle.center;
-    let turn = middle(&from).angle_to(middle(&to)).abs();
-    let opens = from.along.angle_to(to.along).abs();
-    let Span { from_rad, to_rad } = tube.span;
-    if halvings < MOST_HALVINGS && (turn > MOST_TURN_RAD || opens > 2.0 * MOST_TURN_RAD) {
-        let half = 0.5 * (from_rad + to_rad);
-        for part in tube.halves(half, tracer.front(half)) {
-            split(&part, tracer, circle, halvings + 1, partners, waiting);
-        }
-    } else {
-        let leaves = Leaves::between(tracer.departure(from_rad), tracer.departure(to_rad));
-        waiting.push(Tube { partner: partners.best(&leaves), ..*tube });
-    }
-}
-
-/// The contact of the ray of a tube that passes a point at `offset_m` to its right.
-fn ray_past(tube: &Tube, tracer: &Tracer, point: DVec2, offset_m: f64) -> f64 {
-    let ends = tube.borders.each_ref().map(|border| border.offset_m(point) - offset_m);
-    // Farther along the first contact's surface a ray is farther to the left.
-    let way = if tube.mirrored { 1.0 } else { -1.0 };
-    zero_between([tube.span.from_rad, tube.span.to_rad], ends, EXACT_M, |at| {
-        let front = tracer.front(at);
-        let width_m = front.width_m + front.growth * front.ahead_m(point);
-        (front.offset_m(point) - offset_m, way * front.rate * width_m)
-    })
-}
-
-/// The ray of the tube through a point; `None` if the point is beside it.
-fn ray_through(tube: &Tube, tracer: &Tracer, point: DVec2) -> Option<(f64, Front)> {
-    let [right, left] = tube.in_order();
-    let is_between = right.offset_m(point) >= -TIE_M && left.offset_m(point) <= TIE_M;
-    if !is_between {
-        return None;
-    }
-    let at = ray_past(tube, tracer, point, 0.0);
-    let front = tracer.front(at);
-    (front.ahead_m(point) > 0.0).then_some((at, front))
 }

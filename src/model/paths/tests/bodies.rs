@@ -109,11 +109,11 @@ fn crossings(room: &Scene, from: DVec2, angle: f64, reach_m: f64, at: DVec2, rad
 #[test]
 fn echoes_bring_as_much_energy_as_random_rays_do() {
     const RAYS: u32 = 600_000;
-    let (from, at, reach_m, radius_m) = (DVec2::new(0.3, 0.2), DVec2::new(0.25, 0.5), 1.6, 0.005);
+    let (from, at, reach_m, radius_m) = (DVec2::new(0.3, 0.2), DVec2::new(0.25, 0.5), 1.9, 0.005);
     let room = narrow_room();
     let settings = Settings { max_path_m: reach_m, floor: 1e-5, ..LOSSLESS };
     let echoes = Paths::new(&room, settings).enumerate_between(from, at);
-    assert!(echoes.len() > 100, "{}", echoes.len());
+    assert!(echoes.len() > 40, "{}", echoes.len());
     let share: f64 = echoes.iter().map(|echo| echo.amplitude.powi(2) / echo.length_m).sum();
     let expected = share * radius_m / PI * f64::from(RAYS);
     let mut random = Pcg64::seed_from_u64(5);

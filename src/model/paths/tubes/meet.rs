@@ -2,7 +2,10 @@
 
 use smallvec::SmallVec;
 
-use super::{Tube, TubeGrower, ray_past};
+use super::{
+    TubeGrower,
+    part::{Tube, ray_past},
+};
 use crate::{
     geometry::DVec2,
     model::{
@@ -60,7 +63,7 @@ impl TubeGrower<'_> {
         let least = |of: fn(&Contact) -> f64| of(&ends[0]).min(of(&ends[1])).min(of(&half));
         let spread = [least(|c| c.length_m), least(|c| c.width_m), least(|c| c.growth)];
         let strength = Strength::of(tube.gain, spread, self.radius_m, self.paths);
-        let is_worth = strength.with(&tube.partner) >= self.paths.round_floor(1).powi(2)
+        let is_worth = strength.with(&tube.partner) >= self.paths.settings.round_floor(1).powi(2)
             || self.has_edges && self.is_worth_an_edge(tube.gain, spread);
         let back_m = self.target.distance(circle.center) - circle.radius_m;
         if !is_worth || spread[0] + back_m.max(0.0) > settings.max_path_m {
