@@ -115,6 +115,16 @@ fn robot_room() {
         );
         let exact = time(|| drop(black_box(paths.predict(&pose, &FULL_SCAN))));
         report(&format!("paths to {max_range_m} m"), exact, None);
+        let fan = simulator(
+            scene.clone(),
+            Options {
+                engine: EngineKind::Fan,
+                max_range_m: Some(max_range_m),
+                ..Options::default()
+            },
+        );
+        let time = time(|| drop(black_box(fan.predict(&pose, &FULL_SCAN))));
+        report("fan at its usual spacing", time, Some(exact));
     }
 }
 

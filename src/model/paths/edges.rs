@@ -5,7 +5,12 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use smallvec::SmallVec;
 
-use super::{Echo, SAME_RAD, Settings, Trees, Via, beam::Ray, drop_repeats, trace::Tree};
+use super::{
+    Echo, Settings, Trees, Via,
+    beam::Ray,
+    echo::{SAME_RAD, drop_repeats},
+    trace::Tree,
+};
 use crate::{
     acoustics::edge::{Aspect, EdgeLaw, Wedge},
     geometry::{Arrangement, DVec2, SNAP_M},

@@ -3,16 +3,9 @@
 //! Without floor and ceiling all sound stays at the ranger's height, and what does not stand there
 //! is not there. With them a path has a height at each place. Beams then both turn at such a wall
 //! and pass it, and a path counts if it meets its walls where they stand and the others where they
-//! do not. What a wall's upper edge bends is left out, and behind a low cylinder sound is taken to
-//! be hidden at all heights.
+//! do not. What their upper and lower edges bend comes on its own (`rims`).
 
-use smallvec::SmallVec;
-
-use super::{
-    Echo, Leg, Part, Paths, Trees, Via,
-    trace::Tree,
-    tube::{Curved, Tracer},
-};
+use super::{Echo, Paths, Trees, beam::TIE_M};
 use crate::{geometry::DVec2, model::Reflector, scene::Scene};
 
 /// Heights of a scene around a ranger.
@@ -28,9 +21,6 @@ pub(super) struct Heights {
     /// Walls with limits, and their ends in the plan.
     limited: Vec<(u32, [DVec2; 2])>,
 }
-
-/// A point where a path in the plan meets something.
-type Contacts = SmallVec<[(DVec2, Reflector); 8]>;
 
 impl Heights {
     pub(super) fn new(scene: &Scene, segments: &[(DVec2, DVec2)], z_m: f64) -> Self {
@@ -60,9 +50,25 @@ impl Heights {
         self.rises() || holds(limits, self.z_m)
     }
 
+    /// Whether nothing passes a cylinder with such limits.
+    pub(super) fn is_opaque(&self, limits: Option<[f64; 2]>) -> bool {
+        !(self.rises() && limits.is_some())
+    }
+
     /// Whether sound can pass a wall below or above.
     pub(super) fn lets_pass(&self, wall: u32) -> bool {
         self.rises() && self.walls[wall as usize].is_some()
+    }
+
+    /// How far above the ranger the level edges of a wall with limits are, metres, and whether each is
+    /// its upper one. Where it stands on the floor or reaches the ceiling it has none.
+    pub(super) fn rims(&self, wall: u32) -> impl Iterator<Item = (f64, bool)> {
+        let [from_m, to_m] = self.walls[wall as usize].unwrap_or_default();
+        let lower = self.floor_z_m.is_none_or(|floor| from_m > floor);
+        let upper = self.ceiling_z_m.is_none_or(|ceiling| to_m < ceiling);
+        let lower = lower.then_some((from_m - self.z_m, false));
+        let upper = upper.then_some((to_m - self.z_m, true));
+        lower.into_iter().chain(upper)
     }
 
     /// Whether paths have to be asked where they meet things.
@@ -77,6 +83,32 @@ impl Heights {
             Reflector::Cylinder(cylinder) => self.cylinders[cylinder as usize],
             Reflector::Face | Reflector::Floor | Reflector::Ceiling => None,
         }
+    }
+
+    /// Whether something between such heights is met between two heights of a path that would be
+    /// there if floor and ceiling were windows.
+    fn bars(&self, limits: Option<[f64; 2]>, straight_m: [f64; 2]) -> bool {
+        let Some([from_m, to_m]) = limits else { return true };
+        let [low_m, high_m] = [straight_m[0].min(straight_m[1]), straight_m[0].max(straight_m[1])];
+        // Where it turns at floor and ceiling in between.
+        let images = [self.floor_z_m, self.ceiling_z_m].into_iter().flatten();
+        let turns = images.filter(|&at| {
+            let period = match (self.floor_z_m, self.ceiling_z_m) {
+                (Some(floor), Some(ceiling)) => 2.0 * (ceiling - floor),
+                _ => f64::INFINITY,
+            };
+            let next =
+                if period.is_finite() { at + ((low_m - at) / period).ceil() * period } else { at };
+            (low_m..=high_m).contains(&next)
+        });
+        let ends = [low_m, high_m].map(|z_m| self.folded_m(z_m));
+        let (low_m, high_m) = ends
+            .into_iter()
+            .chain(turns)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z_m| {
+                (low.min(z_m), high.max(z_m))
+            });
+        low_m <= to_m && high_m >= from_m
     }
 
     /// The height of a path that would be at `z_m` if floor and ceiling were windows.
@@ -95,7 +127,8 @@ impl Heights {
 }
 
 fn holds(limits: Option<[f64; 2]>, z_m: f64) -> bool {
-    limits.is_none_or(|[from, to]| (from..=to).contains(&z_m))
+    // On the very end counts as met; a rim's echo knows that.
+    limits.is_none_or(|[from, to]| (from - TIE_M..=to + TIE_M).contains(&z_m))
 }
 
 impl Paths {
@@ -112,101 +145,78 @@ impl Paths {
     }
 
     fn is_clear(&self, trees: &Trees, echo: &Echo, start: DVec2, target: DVec2) -> bool {
-        let heights = &self.heights;
         let image = echo.image.checked_sub(1).map(|image| self.images[image as usize]);
         let rise_m = image.map_or(0.0, |image| image.rise_m);
-        let contacts = self.contacts(trees, echo, target);
+        let ends = Ends { start, end: Some(target), rise_m };
+        self.is_way_clear(&self.contacts(trees, echo, target), &ends)
+    }
+
+    /// Whether a way meets its contacts where they stand, and nothing else.
+    pub(super) fn is_way_clear(&self, contacts: &[(DVec2, Reflector)], ends: &Ends) -> bool {
+        let heights = &self.heights;
         let points = || {
-            let first = [(start, None)].into_iter();
-            let last = [(target, None)];
+            let first = [(ends.start, None)].into_iter();
+            let last = ends.end.map(|end| (end, None));
             first.chain(contacts.iter().map(|&(at, what)| (at, Some(what)))).chain(last)
         };
         let plan_m: f64 =
             points().zip(points().skip(1)).map(|((a, _), (b, _))| a.distance(b)).sum();
-        let z_at = |along_m: f64| heights.folded_m(heights.z_m + rise_m * along_m / plan_m);
+        // As if floor and ceiling were windows.
+        let straight_z = |along_m: f64| heights.z_m + ends.rise_m * along_m / plan_m;
         let mut along_m = 0.0;
+        let mut left_contacts = contacts.len();
         for ((from, left), (to, met)) in points().zip(points().skip(1)) {
             let leg_m = from.distance(to);
-            let barred = heights.limited.iter().any(|&(wall, ends)| {
-                let own = Some(Reflector::Wall(wall));
-                left != own
-                    && met != own
-                    && crossing(from, to, ends).is_some_and(|share| {
-                        holds(heights.walls[wall as usize], z_at(along_m + share * leg_m))
-                    })
-            });
-            along_m += leg_m;
-            let missed = met.is_some_and(|met| !holds(heights.limits(met), z_at(along_m)));
-            if barred || missed {
+            let z_at = |share: f64| straight_z(along_m + share * leg_m);
+            if self.is_barred([from, to], [left, met], z_at) {
                 return false;
             }
+            left_contacts = left_contacts.saturating_sub(1);
+            let is_rim = ends.end.is_none() && left_contacts == 0;
+            let z_m = heights.folded_m(z_at(1.0));
+            if !is_rim && met.is_some_and(|met| !holds(heights.limits(met), z_m)) {
+                return false;
+            }
+            along_m += leg_m;
         }
         true
     }
 
-    /// What a path meets in the plan, from transmitter to receiver; an edge counts as its wall.
-    fn contacts(&self, trees: &Trees, echo: &Echo, target: DVec2) -> Contacts {
-        match echo.via {
-            Via::Upright => Contacts::new(),
-            Via::Scatter { spot } => {
-                let spot = &trees.out.spots[spot as usize];
-                let mut contacts = self.part_contacts(&trees.out, Part::Flat(spot.leg), spot.place);
-                let back: Contacts = contacts.iter().rev().copied().collect();
-                contacts.push((spot.place, Reflector::Wall(spot.wall)));
-                contacts.extend(back);
-                contacts
-            }
-            Via::Walls { node } => {
-                let leg = Leg { node, run: -echo.arrival };
-                self.part_contacts(&trees.out, Part::Flat(leg), target)
-            }
-            Via::Cylinders { curved } => {
-                self.part_contacts(&trees.out, Part::Curved(curved), target)
-            }
-            Via::Edge { point, out, back } => {
-                let Some(place) = self.edges.place(point) else { return Contacts::new() };
-                let (there, here) = (&trees.out, trees.back());
-                let mut contacts = self.part_contacts(there, there.part(out), place);
-                let wall = self.edges.edge(point).map(|edge| Reflector::Wall(edge.wall));
-                contacts.extend(wall.map(|wall| (place, wall)));
-                let back = self.part_contacts(here, here.part(back), place);
-                contacts.extend(back.into_iter().rev());
-                contacts
-            }
-        }
-    }
-
-    fn part_contacts(&self, tree: &Tree, part: Part, end: DVec2) -> Contacts {
-        match part {
-            Part::Flat(leg) => self.leg_contacts(tree, leg, end),
-            Part::Curved(curved) => {
-                let Curved { view, link, contact_rad } = tree.curved[curved as usize];
-                let view = &tree.to_cylinders[view as usize];
-                let tracer = Tracer::new(self, view, &tree.links, link);
-                let points = tracer.contacts(contact_rad);
-                let mut contacts = self.leg_contacts(tree, tracer.leg(contact_rad), points[0]);
-                let first = Reflector::Cylinder(view.arc.cylinder);
-                let met = [first].into_iter().chain(tracer.surfaces.iter().copied());
-                contacts.extend(points.into_iter().zip(met));
-                contacts
-            }
-        }
-    }
-
-    fn leg_contacts(&self, tree: &Tree, leg: Leg, end: DVec2) -> Contacts {
-        let (mut to, mut run) = (end, leg.run);
-        let mut contacts: Contacts = tree
-            .walls_back(&self.faces, leg)
-            .map(|wall| {
-                let mirror = &self.faces[wall as usize].mirror;
-                to -= mirror.height_m(to) / mirror.normal.dot(run) * run;
-                run = mirror.turn(run);
-                (to, Reflector::Wall(wall))
+    /// Whether something with limits stands in a leg between two surfaces, whose height (as if floor
+    /// and ceiling were windows) is given for each share of it.
+    fn is_barred(
+        &self,
+        [from, to]: [DVec2; 2],
+        own: [Option<Reflector>; 2],
+        z_at: impl Fn(f64) -> f64,
+    ) -> bool {
+        let heights = &self.heights;
+        let by_wall = heights.limited.iter().any(|&(wall, ends)| {
+            !own.contains(&Some(Reflector::Wall(wall)))
+                && crossing(from, to, ends).is_some_and(|share| {
+                    holds(heights.walls[wall as usize], heights.folded_m(z_at(share)))
+                })
+        });
+        let by_cylinder = || {
+            self.rounds.circles.iter().zip(0..).any(|(circle, cylinder)| {
+                !circle.is_opaque
+                    && !own.contains(&Some(Reflector::Cylinder(cylinder)))
+                    && circle.chord(from, to).is_some_and(|chord| {
+                        heights.bars(heights.cylinders[cylinder as usize], chord.map(&z_at))
+                    })
             })
-            .collect();
-        contacts.reverse();
-        contacts
+        };
+        by_wall || by_cylinder()
     }
+}
+
+/// Where a way begins and ends.
+pub(super) struct Ends {
+    pub(super) start: DVec2,
+    /// `None` for one that ends at its last contact, the rim of a wall.
+    pub(super) end: Option<DVec2>,
+    /// How much higher it ends, if floor and ceiling are windows, metres.
+    pub(super) rise_m: f64,
 }
 
 /// Where on the way from `from` to `to` a segment is crossed, as a share of it.

@@ -46,16 +46,23 @@
 //!
 //! # Cylinders
 //!
-//! Cylinders hide what is behind them and reflect. Behind a cylinder a beam has no image any more;
-//! it goes on as a tube of rays (`tubes`), which walks the same mesh. Rays off convex surfaces
-//! spread and never cross, so in each tube one ray at most comes back to the receiver, or to an
-//! edge, and is found as the zero of a monotone function. Its tube's width, by the mirror equation
-//! at each cylinder, says how much the sound has spread.
+//! Cylinders take their shadow out of a beam and reflect what they take. Behind a cylinder a beam has
+//! no image any more; it goes on as a tube of rays (`tubes`), which walks the same mesh. Rays off
+//! convex surfaces spread and never cross, so in each tube one ray at most comes to an edge, and is
+//! found as the zero of a monotone function. Its tube's width, by the mirror equation at each
+//! cylinder, says how much the sound has spread.
 //!
-//! Paths touch cylinders three times at most, and are followed down to the threshold only: between
-//! a round body and a wall beside it they are without number. The sound that creeps around a
-//! cylinder is left out, which matters in the shadow and for radii of few wavelengths; cylinders
-//! thinner than a wavelength reflect less than they would here.
+//! Echoes by cylinders are two ways that meet at one of them, one from the start and one back from
+//! the receiver, each with half of the contacts (`joints`). How many contacts there can be follows
+//! from what can be heard: a way is given up when no partner that is left for it would make an echo
+//! above the floor (`arms` has the bound), the beam pattern on departure and arrival included where
+//! a survey asks. Between a round body and a wall beside it that is a dozen. The floor of echoes that
+//! touch cylinders more than once is ten times that of the others.
+//!
+//! The sound that creeps around a cylinder is left out, and so is what reaches its shadow. Head-on on a
+//! rigid chair leg of 2 cm at 49.4 kHz (`ka = 9`) it is 34 dB below the mirror's echo, with which it
+//! beats by 0.2 dB, on one of 5 cm 48 dB (from the exact series, in the tests); on one of 1 cm 27 dB.
+//! Cylinders thinner than a wavelength reflect less than they would here.
 //!
 //! # Rough walls
 //!
@@ -65,7 +72,8 @@
 //! # Heights
 //!
 //! Walls are upright: what floor and ceiling add to the paths of the plan, and what low walls take
-//! away, is worked out after them (`vertical`, `heights`).
+//! away, is worked out after them (`vertical`, `heights`). A low wall's upper edge answers from the
+//! foot of the perpendicular (`rims`).
 //!
 //! # The transducer's face
 //!
@@ -79,12 +87,17 @@
 //! face is. Transmitter and receiver apart are two places ([`Paths::enumerate_between`]). A robot
 //! body is part of the scene ([`Scene::with_robot_at`]).
 
+mod arms;
 mod beam;
+mod echo;
 mod edges;
 mod heights;
+mod joints;
 mod mesh;
+mod rims;
 mod rounds;
 mod scatter;
+mod settings;
 mod survey;
 #[cfg(test)]
 mod tests;
@@ -93,87 +106,30 @@ mod trains;
 mod tube;
 mod tubes;
 mod vertical;
+mod ways;
 mod wheel;
 
+pub use settings::{Settings, usual_z_m};
 pub use survey::PathEngine;
 
-use smallvec::SmallVec;
-
 use self::{
-    beam::Ray,
+    arms::Partners,
+    echo::{Echo, Via, sorted},
     edges::Edges,
     heights::Heights,
+    joints::{Joint, Meeting},
     mesh::Mesh,
     rounds::{Circle, Rounds},
     trace::Tree,
-    tube::{Curved, Tracer},
     tubes::TubeGrower,
     vertical::Image,
+    wheel::Both,
 };
 use crate::{
-    acoustics::edge::EdgeLaw,
     geometry::{Arrangement, DVec2, Mirror, square_up},
-    model::{Path, Reflector},
-    scan::PathKind,
+    model::Path,
     scene::{Cylinder, Material, Scene, Wall},
 };
-
-/// Echoes that agree in length and both directions to within this are one, metres and radians.
-const SAME_M: f64 = 1e-8;
-const SAME_RAD: f64 = 1e-9;
-
-/// Which paths count, and the physics on the way.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
-    /// Longest path there and back, metres.
-    pub max_path_m: f64,
-    /// Most mirror reflections; `None`: as many as length and amplitude allow.
-    pub max_order: Option<u16>,
-    /// Weakest amplitude, before the beam pattern, relative to a head-on, rigid wall.
-    pub floor: f64,
-    /// What edges send back; `None`: mirror reflections only.
-    pub edge_law: Option<EdgeLaw>,
-    /// Attenuation of the amplitude in air, nepers a metre.
-    pub absorption_np_per_m: f64,
-    /// Wave number `2 pi f / c`, radians a metre.
-    pub wave_number_per_m: f64,
-    /// Height of the transducer in a scene with heights, metres; `None`: see [`usual_z_m`].
-    pub sensor_z_m: Option<f64>,
-    /// How far the transducer's axis points up, radians.
-    pub tilt_rad: f64,
-    /// How high a strip of a rough wall it hears: the integral of the beam pattern's fourth
-    /// power over the rise, radians. 0: rough walls only mirror.
-    pub scatter_height_rad: f64,
-}
-
-/// The height of a transducer of which nothing is said, metres: half a metre above the floor, or
-/// half way up to a low ceiling.
-#[must_use]
-pub fn usual_z_m(floor_z_m: Option<f64>, ceiling_z_m: Option<f64>) -> f64 {
-    let floor_z_m = floor_z_m.or(ceiling_z_m.map(|ceiling| ceiling - 1.0)).unwrap_or(0.0);
-    let middle_m = ceiling_z_m.map_or(f64::INFINITY, |ceiling| 0.5 * (ceiling - floor_z_m));
-    floor_z_m + middle_m.min(0.5)
-}
-
-impl Settings {
-    fn allows(&self, order: u16) -> bool {
-        self.max_order.is_none_or(|most| order <= most)
-    }
-
-    /// The length of air that leaves a share `gain` of the amplitude; 0 without absorption.
-    fn same_loss_m(&self, gain: f64) -> f64 {
-        if self.absorption_np_per_m > 0.0 { -gain.ln() / self.absorption_np_per_m } else { 0.0 }
-    }
-
-    /// The longest path over perfect walls that is strong enough.
-    fn audible_m(&self) -> f64 {
-        if self.absorption_np_per_m > 0.0 { self.same_loss_m(self.floor) } else { self.max_path_m }
-    }
-
-    fn air_gain(&self, length_m: f64) -> f64 {
-        (-self.absorption_np_per_m * length_m).exp()
-    }
-}
 
 /// A scene made ready for enumerating echo paths.
 #[derive(Debug)]
@@ -260,6 +216,7 @@ impl Paths {
             center: c.center,
             radius_m: if heights.is_there(c.z_m) { c.radius_m } else { 0.0 },
             gain: mirror_gain(&c.material),
+            is_opaque: heights.is_opaque(c.z_m),
         };
         let circles = scene.cylinders.iter().map(circle).collect();
         Self {
@@ -286,43 +243,43 @@ impl Paths {
     /// from one to the other.
     #[must_use]
     pub fn enumerate_between(&self, transmitter: DVec2, receiver: DVec2) -> Vec<EchoPath> {
-        let (trees, echoes) = self.echoes(transmitter, receiver);
+        let (trees, echoes) = self.echoes(transmitter, receiver, None);
         echoes.iter().map(|echo| self.path(&trees, echo)).collect()
     }
 
-    fn echoes(&self, transmitter: DVec2, receiver: DVec2) -> (Trees, Vec<Echo>) {
-        let (out, mut echoes) = self.grow(transmitter, receiver);
-        // The ways back from the receiver, as ways to it, matter to edges only.
-        let apart = transmitter != receiver && self.settings.edge_law.is_some();
-        let back = apart.then(|| self.grow(receiver, transmitter).0);
-        let mut trees = Trees { out, back };
+    /// The same as the survey needs them. With `both`, echoes by cylinders only that can be heard.
+    fn echoes(
+        &self,
+        transmitter: DVec2,
+        receiver: DVec2,
+        both: Option<&Both>,
+    ) -> (Trees, Vec<Echo>) {
+        let mut out = Tree::grow(self, transmitter, receiver);
+        let mut echoes = self.mirrored(&out);
+        // The ways back from the receiver, as ways to it, matter to edges and cylinders only.
+        let needs_back = self.settings.edge_law.is_some() || !self.rounds.is_empty();
+        let apart = transmitter != receiver;
+        let mut back = (apart && needs_back).then(|| Tree::grow(self, receiver, transmitter));
+        if !apart {
+            echoes.extend(scatter::echoes(self, &mut out));
+        }
+        let joints =
+            self.add_rounds(&mut echoes, &mut out, back.as_mut(), [transmitter, receiver], both);
+        let mut trees = Trees { out, back, joints };
         if let Some(law) = self.settings.edge_law {
             echoes.extend(self.edges.echoes(&mut trees, law, &self.settings));
         }
-        if !self.rounds.is_empty() {
-            echoes.retain(|echo| !self.is_hidden(&trees, echo, [transmitter, receiver]));
-        }
         self.add_images(&mut echoes, receiver - transmitter);
         self.retain_clear(&trees, &mut echoes, [transmitter, receiver]);
+        if let Some(law) = self.settings.edge_law.filter(|_| !apart) {
+            echoes.extend(rims::echoes(self, &mut trees.out, transmitter, law));
+        }
         (trees, sorted(&echoes))
     }
 
-    /// Each echo of the plan also by way of floor and ceiling, and these by themselves.
-    fn add_images(&self, echoes: &mut Vec<Echo>, apart: DVec2) {
-        let plan = echoes.len();
-        for (image, index) in self.images.iter().zip(1..) {
-            for at in 0..plan {
-                echoes.extend(image.echo(&echoes[at], index, &self.settings));
-            }
-            echoes.extend(image.upright_echo(index, apart, &self.settings));
-        }
-    }
-
-    /// The beams from a place, and the echoes without an edge that they bring to another.
-    fn grow(&self, start: DVec2, target: DVec2) -> (Tree, Vec<Echo>) {
-        let mut tree = Tree::grow(self, start, target);
-        let mut echoes: Vec<Echo> = tree
-            .returns
+    /// Echoes over walls alone.
+    fn mirrored(&self, tree: &Tree) -> Vec<Echo> {
+        tree.returns
             .iter()
             .map(|ray| Echo {
                 length_m: ray.run.length(),
@@ -335,116 +292,55 @@ impl Paths {
                 via: Via::Walls { node: ray.node },
             })
             .filter(|echo| echo.amplitude >= self.settings.floor)
-            .collect();
-        if !self.rounds.is_empty() {
-            echoes.extend(TubeGrower::new(self, &mut tree, [start, target]).grow());
-        }
-        if start == target {
-            echoes.extend(scatter::echoes(self, &mut tree));
-        }
-        (tree, echoes)
+            .collect()
     }
 
-    /// Whether a cylinder stands in an echo's way. Tubes have seen to that for themselves.
-    fn is_hidden(&self, trees: &Trees, echo: &Echo, [start, target]: [DVec2; 2]) -> bool {
-        let hides = |tree: &Tree, part: Part, start, end| match part {
-            Part::Flat(leg) => self.hides_leg(tree, leg, start, end),
-            Part::Curved(_) => false,
-        };
-        match echo.via {
-            Via::Walls { node } => {
-                let leg = Leg { node, run: -echo.arrival };
-                hides(&trees.out, Part::Flat(leg), start, target)
-            }
-            Via::Cylinders { .. } | Via::Upright => false,
-            Via::Scatter { spot } => {
-                let spot = &trees.out.spots[spot as usize];
-                hides(&trees.out, Part::Flat(spot.leg), start, spot.place)
-            }
-            Via::Edge { point, out, back } => self.edges.place(point).is_some_and(|end| {
-                let (there, here) = (&trees.out, trees.back());
-                hides(there, there.part(out), start, end)
-                    || hides(here, here.part(back), target, end)
-            }),
+    /// Echoes that touch cylinders, and rays by way of them to edges.
+    fn add_rounds(
+        &self,
+        echoes: &mut Vec<Echo>,
+        out: &mut Tree,
+        mut back: Option<&mut Tree>,
+        [transmitter, receiver]: [DVec2; 2],
+        both: Option<&Both>,
+    ) -> Vec<Joint> {
+        if self.rounds.is_empty() {
+            return Vec::new();
         }
+        let mut meeting = Meeting { paths: self, both, joints: Vec::new(), echoes: Vec::new() };
+        let mut outs = TubeGrower::new(self, out, receiver);
+        let new = |tree| TubeGrower::new(self, tree, transmitter);
+        let mut backs = back.as_deref_mut().map(new);
+        loop {
+            let partners = Partners::of(outs.last_level().iter(), both);
+            let more = match &mut backs {
+                None => outs.grow(&partners),
+                Some(backs) => {
+                    let others = Partners::of(backs.last_level().iter(), both);
+                    // Both, always.
+                    outs.grow(&others) | backs.grow(&partners)
+                }
+            };
+            if !more {
+                break;
+            }
+        }
+        let arms = outs.finish();
+        let back_arms = backs.map(TubeGrower::finish);
+        meeting.join(out, &arms, back.zip(back_arms.as_deref()));
+        echoes.append(&mut meeting.echoes);
+        meeting.joints
     }
 
-    /// Whether a cylinder stands in the way from `start` along a leg to `end`.
-    fn hides_leg(&self, tree: &Tree, leg: Leg, start: DVec2, end: DVec2) -> bool {
-        let (mut to, mut run) = (end, leg.run);
-        for wall in tree.walls_back(&self.faces, leg) {
-            let mirror = &self.faces[wall as usize].mirror;
-            let hit = to - mirror.height_m(to) / mirror.normal.dot(run) * run;
-            if self.rounds.hide(hit, to) {
-                return true;
+    /// Each echo of the plan also by way of floor and ceiling, and these by themselves.
+    fn add_images(&self, echoes: &mut Vec<Echo>, apart: DVec2) {
+        let plan = echoes.len();
+        for (image, index) in self.images.iter().zip(1..) {
+            for at in 0..plan {
+                echoes.extend(image.echo(&echoes[at], index, &self.settings));
             }
-            (to, run) = (hit, mirror.turn(run));
+            echoes.extend(image.upright_echo(index, apart, &self.settings));
         }
-        self.rounds.hide(start, to)
-    }
-
-    fn path(&self, trees: &Trees, echo: &Echo) -> EchoPath {
-        EchoPath {
-            length_m: echo.length_m,
-            amplitude: echo.amplitude,
-            phase_rad: echo.phase_rad,
-            departure_rad: echo.departure.to_angle(),
-            arrival_rad: echo.arrival.to_angle(),
-            rise_rad: echo.rise_rad,
-            path: self.way(trees, echo),
-        }
-    }
-
-    /// The reflectors of an echo, in order.
-    fn way(&self, trees: &Trees, echo: &Echo) -> Path {
-        let (tree, home) = (&trees.out, trees.back());
-        let (kind, edge) = match echo.via {
-            Via::Edge { point, .. } => (PathKind::Diffracted, self.edges.edge(point)),
-            Via::Walls { .. } | Via::Cylinders { .. } | Via::Upright => (PathKind::Specular, None),
-            Via::Scatter { .. } => (PathKind::Scattered, None),
-        };
-        let mut walls = match echo.via {
-            Via::Walls { node } => self.met(tree, Part::Flat(Leg { node, run: -echo.arrival })),
-            Via::Upright => SmallVec::new(),
-            Via::Scatter { spot } => {
-                let spot = &tree.spots[spot as usize];
-                let mut walls = self.met(tree, Part::Flat(spot.leg));
-                let back: SmallVec<[Reflector; 4]> = walls.iter().rev().copied().collect();
-                walls.push(Reflector::Wall(spot.wall));
-                walls.extend(back);
-                walls
-            }
-            Via::Cylinders { curved } => self.met(tree, Part::Curved(curved)),
-            Via::Edge { out, back, .. } => {
-                let mut walls = self.met(tree, tree.part(out));
-                walls.extend(self.met(home, home.part(back)).into_iter().rev());
-                walls
-            }
-        };
-        // Floor and ceiling stand after the walls, wherever on the way they are met.
-        if let Some(image) = echo.image.checked_sub(1) {
-            walls.extend(self.images[image as usize].met());
-        }
-        Path { kind, walls, edge }
-    }
-
-    /// What a ray from the start met, in order.
-    fn met(&self, tree: &Tree, part: Part) -> SmallVec<[Reflector; 4]> {
-        let mut met = SmallVec::new();
-        let leg = match part {
-            Part::Flat(leg) => leg,
-            Part::Curved(curved) => {
-                let Curved { view, link, contact_rad } = tree.curved[curved as usize];
-                let view = &tree.to_cylinders[view as usize];
-                let tracer = Tracer::new(self, view, &tree.links, link);
-                met.extend(tracer.surfaces.iter().rev().copied());
-                met.push(Reflector::Cylinder(view.arc.cylinder));
-                tracer.leg(contact_rad)
-            }
-        };
-        met.extend(tree.walls_back(&self.faces, leg).map(Reflector::Wall));
-        met.reverse();
-        met
     }
 }
 
@@ -461,6 +357,8 @@ struct Trees {
     out: Tree,
     /// From the receiver, if it is somewhere else.
     back: Option<Tree>,
+    /// Where ways of both meet at cylinders.
+    joints: Vec<Joint>,
 }
 
 impl Trees {
@@ -472,109 +370,4 @@ impl Trees {
 /// Share of the energy that a material scatters.
 fn scattered(material: &Material) -> f64 {
     material.reflectance.powi(2) * material.roughness
-}
-
-/// An echo path with its way as nodes of the tree.
-#[derive(Debug, Clone, Copy)]
-struct Echo {
-    length_m: f64,
-    amplitude: f64,
-    phase_rad: f64,
-    /// Unit vector in which it leaves.
-    departure: DVec2,
-    /// Unit vector towards where it comes from.
-    arrival: DVec2,
-    /// How far up it leaves and comes from, radians.
-    rise_rad: [f64; 2],
-    /// Its image over floor and ceiling, counted from 1; 0 for a path in the plan.
-    image: u16,
-    via: Via,
-}
-
-/// The way of an echo.
-#[derive(Debug, Clone, Copy)]
-enum Via {
-    Walls {
-        node: u32,
-    },
-    /// `out` and `back` are rays to the edge; see [`Tree::part`].
-    Edge {
-        point: u32,
-        out: u32,
-        back: u32,
-    },
-    /// By [`Tree::curved`].
-    Cylinders {
-        curved: u32,
-    },
-    /// Straight up or down and back.
-    Upright,
-    /// Back from a place of a rough wall, by [`Tree::spots`].
-    Scatter {
-        spot: u32,
-    },
-}
-
-/// A ray from the start by what its walls follow from.
-#[derive(Debug, Clone, Copy)]
-struct Leg {
-    node: u32,
-    run: DVec2,
-}
-
-impl From<&Ray> for Leg {
-    fn from(ray: &Ray) -> Self {
-        Self { node: ray.node, run: ray.run }
-    }
-}
-
-/// A ray from the start: over walls alone, or by way of cylinders.
-#[derive(Debug, Clone, Copy)]
-enum Part {
-    Flat(Leg),
-    /// By its place in [`Tree::curved`].
-    Curved(u32),
-}
-
-impl Echo {
-    /// Whether two echoes are one that touches a corner and was found on both sides of it.
-    fn is_same(&self, other: &Self) -> bool {
-        self.departure.distance_squared(other.departure) < SAME_RAD * SAME_RAD
-            && self.arrival.distance_squared(other.arrival) < SAME_RAD * SAME_RAD
-            && self.image == other.image
-            && std::mem::discriminant(&self.via) == std::mem::discriminant(&other.via)
-    }
-}
-
-/// Echoes by length, each once.
-fn sorted(echoes: &[Echo]) -> Vec<Echo> {
-    // Lengths are positive, so their bits sort like the numbers; places make it stable.
-    let mut order: Vec<(u64, u32)> =
-        echoes.iter().zip(0..).map(|(echo, place)| (echo.length_m.to_bits(), place)).collect();
-    order.sort_unstable();
-    let mut sorted: Vec<Echo> = order.iter().map(|&(_, place)| echoes[place as usize]).collect();
-    drop_repeats(&mut sorted, |echo| echo.length_m, Echo::is_same);
-    sorted
-}
-
-/// Keeps the first of items that are the same and within [`SAME_M`] in length. Sorted by length.
-fn drop_repeats<T: Copy>(
-    items: &mut Vec<T>,
-    length_m: impl Fn(&T) -> f64,
-    same: impl Fn(&T, &T) -> bool,
-) {
-    let mut kept = 0;
-    for i in 0..items.len() {
-        let item = items[i];
-        let near = items[..kept]
-            .iter()
-            .rev()
-            .take_while(|other| length_m(&item) - length_m(other) < SAME_M)
-            .any(|other| same(&item, other));
-        if !near {
-            items[kept] = item;
-            kept += 1;
-        }
-    }
-    items.truncate(kept);
 }

@@ -2,11 +2,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-use smallvec::SmallVec;
+use smallvec::{SmallVec, smallvec};
 
 use super::{
-    beam::{Beam, TIE_M},
+    beam::{Beam, TIE_M, reaches_well},
     mesh::Mesh,
+    trace::View,
 };
 use crate::geometry::DVec2;
 
@@ -23,6 +24,8 @@ pub(super) struct Circle {
     pub(super) center: DVec2,
     pub(super) radius_m: f64,
     pub(super) gain: f64,
+    /// Whether no sound passes above or below.
+    pub(super) is_opaque: bool,
 }
 
 /// The part of a cylinder's surface that is in a triangle.
@@ -67,9 +70,26 @@ impl Rounds {
         self.by_triangle.get(triangle as usize).map_or(&[], |arcs| arcs)
     }
 
-    /// Whether a cylinder stands across the straight way between two points.
-    pub(super) fn hide(&self, from: DVec2, to: DVec2) -> bool {
-        self.circles.iter().any(|circle| circle.meets(from, to))
+    /// What of a beam passes the cylinders in its triangle, from right to left. What they take
+    /// from it goes to `views`.
+    pub(super) fn shade(&self, beam: &Beam, views: &mut Vec<View>) -> SmallVec<[Beam; 2]> {
+        let mut left = smallvec![*beam];
+        let mut arcs: SmallVec<[Arc; 4]> = self.in_triangle(beam.triangle).into();
+        // Of two circles that do not overlap, a ray meets the one first that has the smaller
+        // power: the line of equal power lies between them.
+        let power = |arc: &Arc| self.circles[arc.cylinder as usize].power(beam.image);
+        arcs.sort_by(|one, other| power(one).total_cmp(&power(other)));
+        for arc in &arcs {
+            let circle = &self.circles[arc.cylinder as usize];
+            left = left.iter().flat_map(|beam| circle.shade(beam, arc, views)).collect();
+        }
+        left
+    }
+
+    /// Whether a cylinder stands across the straight way between two points of a triangle.
+    pub(super) fn hide_in(&self, triangle: u32, from: DVec2, to: DVec2) -> bool {
+        let mut circles = self.in_triangle(triangle).iter().map(|arc| arc.cylinder as usize);
+        circles.any(|at| self.circles[at].is_opaque && self.circles[at].meets(from, to))
     }
 }
 
@@ -94,8 +114,46 @@ impl Circle {
         self.center + self.radius_m * DVec2::from_angle(angle_rad)
     }
 
+    /// The square of the length of a tangent from a point.
+    fn power(&self, point: DVec2) -> f64 {
+        point.distance_squared(self.center) - self.radius_m * self.radius_m
+    }
+
+    /// What of a beam passes an arc of this circle, from right to left.
+    fn shade(&self, beam: &Beam, arc: &Arc, views: &mut Vec<View>) -> SmallVec<[Beam; 2]> {
+        let Some(lit) = self.lit_by(beam) else { return smallvec![*beam] };
+        let mut passing = SmallVec::new();
+        let mut rest = *beam;
+        // From right to left places on the circle fall.
+        for span in lit.common(&arc.span).into_iter().rev() {
+            let [mut left, mut right] =
+                [span.from_rad, span.to_rad].map(|at| self.point(at) - beam.image);
+            if span.to_rad == lit.to_rad && !reaches_well(beam.right, right) {
+                right = beam.right;
+            }
+            if span.from_rad == lit.from_rad && !reaches_well(left, beam.left) {
+                left = beam.left;
+            }
+            if !reaches_well(right, left) {
+                continue;
+            }
+            let beam = Beam { right, left, ..rest };
+            views.push(View { cylinder: arc.cylinder, span, beam });
+            if self.is_opaque {
+                if reaches_well(rest.right, right) {
+                    passing.push(Beam { left: right, ..rest });
+                }
+                rest.right = left;
+            }
+        }
+        if reaches_well(rest.right, rest.left) {
+            passing.push(rest);
+        }
+        passing
+    }
+
     /// The part of the surface that a beam lights, as far as its triangle is not asked.
-    pub(super) fn lit_by(&self, beam: &Beam) -> Option<Span> {
+    fn lit_by(&self, beam: &Beam) -> Option<Span> {
         let to_image = beam.image - self.center;
         let sine = self.radius_m / to_image.length();
         if sine >= 1.0 {
@@ -103,11 +161,11 @@ impl Circle {
         }
         let edge = sine.asin();
         let off_axis = |border: DVec2| (-to_image).angle_to(border);
-        let (right, left) = if beam.right == DVec2::ZERO {
-            (-edge, edge)
-        } else {
-            (off_axis(beam.right), off_axis(beam.left))
-        };
+        let (mut right, mut left) = (off_axis(beam.right), off_axis(beam.left));
+        if right > left {
+            // The beam holds the direction away from the circle, and one side of it at most.
+            if left > -edge { right -= TAU } else { left += TAU }
+        }
         if right >= edge || left <= -edge {
             return None;
         }
@@ -145,6 +203,17 @@ impl Circle {
             .map(|(&from_rad, to_rad)| Span { from_rad, to_rad })
             .filter(|span| mesh.holds(triangle, self.point(0.5 * (span.from_rad + span.to_rad))))
             .collect()
+    }
+
+    /// Between which shares of the straight way from one point to another it is inside.
+    pub(super) fn chord(&self, from: DVec2, to: DVec2) -> Option<[f64; 2]> {
+        let run = to - from;
+        let middle = (self.center - from).dot(run) / run.length_squared();
+        let offset_m = (from + middle * run).distance(self.center);
+        let half_m = (self.radius_m * self.radius_m - offset_m * offset_m).max(0.0).sqrt();
+        let half = half_m / run.length();
+        let ends = [(middle - half).max(0.0), (middle + half).min(1.0)];
+        (half_m > TIE_M && ends[0] < ends[1]).then_some(ends)
     }
 
     fn meets(&self, from: DVec2, to: DVec2) -> bool {

@@ -50,7 +50,7 @@ pub(super) struct Lit {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spot {
     pub(super) wall: u32,
-    pub(super) leg: super::Leg,
+    pub(super) leg: super::ways::Leg,
     pub(super) place: DVec2,
 }
 

@@ -6,8 +6,8 @@ use smallvec::SmallVec;
 
 use super::{
     Echo, EchoPath, Paths, Settings, Trees,
-    trains::{Loops, Round, Train},
-    wheel::{Envelope, Spoke, Wheel},
+    trains::{FLOOR_ABOVE, Loops, Round, Train},
+    wheel::{Both, Envelope, Spoke, Wheel},
 };
 use crate::{
     acoustics::{BeamPattern, Disc, Sound},
@@ -26,6 +26,9 @@ pub struct PathEngine {
     pub(super) beam: BeamPattern,
     pub(super) face: Option<Disc>,
     envelope: Envelope,
+    /// What echoes by cylinders are kept by; all are where the axis is tilted, and may be nearer to
+    /// a rising path than its azimuth is.
+    both: Option<Both>,
 }
 
 impl PathEngine {
@@ -33,7 +36,11 @@ impl PathEngine {
     #[must_use]
     pub fn new(scene: &Scene, beam: BeamPattern, face: Option<Disc>, settings: Settings) -> Self {
         let envelope = Envelope::of(&beam);
-        Self { paths: Paths::new(scene, settings), beam, face, envelope }
+        let is_wanted = !scene.cylinders.is_empty() && settings.tilt_rad == 0.0;
+        // A round that the face turns into another loses at least this.
+        let turned = face.map_or(0.0, |face| 2.0 * face.face.reflectance / FLOOR_ABOVE);
+        let both = is_wanted.then(|| Both::of(&envelope, turned));
+        Self { paths: Paths::new(scene, settings), beam, face, envelope, both }
     }
 }
 
@@ -79,7 +86,7 @@ struct PathSurvey<'a> {
 
 impl<'a> PathSurvey<'a> {
     fn new(engine: &'a PathEngine, transmitter: DVec2, receiver: DVec2) -> Self {
-        let (trees, echoes) = engine.paths.echoes(transmitter, receiver);
+        let (trees, echoes) = engine.paths.echoes(transmitter, receiver, engine.both.as_ref());
         let floor = engine.paths.settings.floor;
         let mut spokes: [Vec<Spoke>; REACHES_DEG.len()] = Default::default();
         for (echo, index) in echoes.iter().zip(0..) {

@@ -1,4 +1,6 @@
+mod bodies;
 mod closed_forms;
+mod creeping;
 mod cylinders;
 mod fan;
 mod full_wave;
@@ -14,7 +16,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::*;
-use crate::scene::Wall;
+use crate::{acoustics::edge::EdgeLaw, scan::PathKind, scene::Wall};
 
 pub(super) const LOSSLESS: Settings = Settings {
     max_path_m: 20.0,

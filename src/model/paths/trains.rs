@@ -23,14 +23,15 @@ use num_complex::Complex64;
 use smallvec::{SmallVec, smallvec};
 
 use super::{
-    Echo, SAME_RAD, Settings,
+    Echo, Settings,
+    echo::SAME_RAD,
     wheel::{Envelope, Spoke, Wheel, wrap_once},
 };
 use crate::acoustics::{BeamPattern, Disc, FaceAspect, Sound};
 
 /// Trains are listed from this much above the weakest sound of the survey, which lies 20 dB below
 /// the threshold: only those that can be detected. There are a great many of the others.
-const FLOOR_ABOVE: f64 = 10.0;
+pub(super) const FLOOR_ABOVE: f64 = 10.0;
 
 /// Rounds longer than this in all would not be told apart any more.
 const MOST_ROUNDS: usize = 32;
@@ -96,7 +97,8 @@ impl Loops {
         // A wall nearer than that is not one to see the disc's zones from.
         let far = || {
             let far = |(echo, _): &(&Echo, u32)| {
-                echo.length_m > 2.0 * face.face.radius_m && echo.image == 0
+                let is_level = echo.rise_rad == [0.0; 2];
+                echo.length_m > 2.0 * face.face.radius_m && is_level
             };
             echoes.iter().zip(0..).filter(far)
         };

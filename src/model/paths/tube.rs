@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use super::{Face, Leg, Paths, rounds::Circle, trace::View};
+use super::{Face, Paths, arms::Contact, rounds::Circle, trace::View, ways::Leg};
 use crate::{geometry::DVec2, model::Reflector};
 
 /// Marks a tube that has met its first cylinder only.
@@ -41,6 +41,8 @@ pub(super) struct Front {
     /// its growth a metre: without cylinders `length_m` and 1.
     pub(super) width_m: f64,
     pub(super) growth: f64,
+    /// That angle over the one between their first contacts, seen from the first cylinder's centre.
+    pub(super) rate: f64,
 }
 
 impl Front {
@@ -76,16 +78,20 @@ impl Front {
         Self { along: mirror.turn(self.along), ..hit }
     }
 
-    /// Off the outside of a circle. A ray that misses it by rounding touches it.
-    ///
-    /// The mirror equation in the plane of incidence (Keller and Lewis 1995, for instance): the
-    /// curvature of the front grows by `2 / (r cos i)`.
-    fn off_circle(&self, circle: &Circle) -> Self {
+    /// Moved to the outside of a circle, with the normal there and the cosine of the angle of
+    /// incidence. A ray that misses it by rounding touches it.
+    pub(super) fn onto(&self, circle: &Circle) -> (Self, DVec2, f64) {
         let offset_m = self.offset_m(circle.center);
         let half_chord = circle.radius_m * circle.radius_m - offset_m * offset_m;
         let hit = self.moved(self.ahead_m(circle.center) - half_chord.max(0.0).sqrt());
         let normal = (hit.origin - circle.center).normalize();
-        let cosine = (-normal.dot(hit.along)).max(LEAST_COSINE);
+        (hit, normal, (-normal.dot(hit.along)).max(LEAST_COSINE))
+    }
+
+    /// Off the outside of a circle: the mirror equation in the plane of incidence (Keller and Lewis
+    /// 1995, for instance), by which the curvature of the front grows by `2 / (r cos i)`.
+    fn off_circle(&self, circle: &Circle) -> Self {
+        let (hit, normal, cosine) = self.onto(circle);
         Self {
             along: hit.along + 2.0 * cosine * normal,
             growth: hit.growth + 2.0 * hit.width_m / (circle.radius_m * cosine),
@@ -114,20 +120,21 @@ impl Paths {
 pub(super) struct Tracer<'a> {
     pub(super) paths: &'a Paths,
     pub(super) view: &'a View,
-    pub(super) surfaces: Surfaces,
+    pub(super) surfaces: &'a [Reflector],
+}
+
+/// The surfaces up to a link, in the order in which they are met.
+pub(super) fn surfaces_to(links: &[Link], mut link: u32) -> Surfaces {
+    let mut surfaces = Surfaces::new();
+    while let Some(met) = links.get(link as usize) {
+        surfaces.push(met.surface);
+        link = met.before;
+    }
+    surfaces.reverse();
+    surfaces
 }
 
 impl<'a> Tracer<'a> {
-    pub(super) fn new(paths: &'a Paths, view: &'a View, links: &[Link], mut link: u32) -> Self {
-        let mut surfaces = Surfaces::new();
-        while let Some(met) = links.get(link as usize) {
-            surfaces.push(met.surface);
-            link = met.before;
-        }
-        surfaces.reverse();
-        Self { paths, view, surfaces }
-    }
-
     /// The ray as it leaves its last surface.
     pub(super) fn front(&self, contact_rad: f64) -> Front {
         let first = self.first(contact_rad);
@@ -138,7 +145,7 @@ impl<'a> Tracer<'a> {
     pub(super) fn contacts(&self, contact_rad: f64) -> Vec<DVec2> {
         let mut front = self.first(contact_rad);
         let mut contacts = vec![front.origin];
-        for &surface in &self.surfaces {
+        for &surface in self.surfaces {
             front = self.paths.off(&front, surface);
             contacts.push(front.origin);
         }
@@ -149,6 +156,30 @@ impl<'a> Tracer<'a> {
     pub(super) fn leg(&self, contact_rad: f64) -> Leg {
         let run = self.circle().point(contact_rad) - self.view.beam.image;
         Leg { node: self.view.beam.node, run }
+    }
+
+    /// The direction in which the ray leaves the start.
+    pub(super) fn departure(&self, contact_rad: f64) -> DVec2 {
+        self.view.beam.departure(self.leg(contact_rad).run.normalize_or_zero())
+    }
+
+    /// The ray where it meets the first cylinder.
+    pub(super) fn first_contact(&self, contact_rad: f64) -> Contact {
+        let normal = DVec2::from_angle(contact_rad);
+        let circle = self.circle();
+        let run = circle.center + circle.radius_m * normal - self.view.beam.image;
+        let length_m = run.length();
+        let along = run / length_m;
+        Contact {
+            at_rad: contact_rad,
+            place_rad: contact_rad,
+            place_rate: 1.0,
+            slope: normal.perp_dot(along),
+            cosine: (-normal.dot(along)).max(LEAST_COSINE),
+            length_m,
+            width_m: length_m,
+            growth: 1.0,
+        }
     }
 
     fn first(&self, contact_rad: f64) -> Front {
@@ -165,49 +196,56 @@ impl<'a> Tracer<'a> {
             length_m,
             width_m: length_m,
             growth: 1.0 + 2.0 * length_m / (circle.radius_m * cosine),
+            rate: circle.radius_m * cosine / length_m,
         }
     }
 
     pub(super) fn circle(&self) -> &'a Circle {
-        &self.paths.rounds.circles[self.view.arc.cylinder as usize]
+        &self.paths.rounds.circles[self.view.cylinder as usize]
     }
 }
 
-/// Zero of a function between two places where its signs differ, by false position with the stale
-/// end's weight halved (the Illinois rule), to within `exact` of the function; an end if they do
-/// not differ.
-pub(super) fn zero_between(mut low: f64, mut high: f64, exact: f64, f: impl Fn(f64) -> f64) -> f64 {
-    let (mut at_low, mut at_high) = (f(low), f(high));
+/// Zero of a monotone function between two places where it has the values `at_ends`, whose signs
+/// differ (else the end that is closer to zero), to within `exact` of the function. `f` gives value
+/// and slope: Newton's method, kept between the places by halving.
+pub(super) fn zero_between(
+    [mut low, mut high]: [f64; 2],
+    at_ends: [f64; 2],
+    exact: f64,
+    f: impl Fn(f64) -> (f64, f64),
+) -> f64 {
+    let [at_low, at_high] = at_ends;
     if (at_low < 0.0) == (at_high < 0.0) {
         return if at_low.abs() <= at_high.abs() { low } else { high };
     }
-    let mut low_stayed = None;
+    let mut at = (low * at_high - high * at_low) / (at_high - at_low);
     for _ in 0..MOST_STEPS {
-        let middle = (low * at_high - high * at_low) / (at_high - at_low);
-        let here = f(middle);
-        if here.abs() < exact || middle <= low || middle >= high {
-            return middle.clamp(low, high);
+        if !(low < at && at < high) {
+            at = 0.5 * (low + high);
+            if at <= low || at >= high {
+                break;
+            }
+        }
+        let (here, slope) = f(at);
+        if here.abs() < exact {
+            break;
         }
         if (here < 0.0) == (at_low < 0.0) {
-            (low, at_low) = (middle, here);
-            if low_stayed == Some(false) {
-                at_high *= 0.5;
-            }
-            low_stayed = Some(false);
+            low = at;
         } else {
-            (high, at_high) = (middle, here);
-            if low_stayed == Some(true) {
-                at_low *= 0.5;
-            }
-            low_stayed = Some(true);
+            high = at;
         }
+        let next = at - here / slope;
+        if (next - at).abs() <= f64::EPSILON * at.abs() {
+            break;
+        }
+        at = next;
     }
-    0.5 * (low + high)
+    at
 }
 
 const MOST_STEPS: usize = 100;
 
-/// Places of echoes and of borders between tubes are found to within this, metres: both far below
-/// what counts as a tie.
-pub(super) const ECHO_M: f64 = 1e-13;
-pub(super) const BORDER_M: f64 = 1e-11;
+/// Rays to edges and borders between tubes are found to within this, metres: far below what counts
+/// as a tie.
+pub(super) const EXACT_M: f64 = 1e-12;

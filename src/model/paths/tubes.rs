@@ -1,4 +1,4 @@
-//! Echoes that touch cylinders: tubes of rays, from their first cylinder on.
+//! Tubes of rays, from their first cylinder on.
 //!
 //! A beam that meets a cylinder has no image behind it any more. What is left of it is a tube:
 //! the rays between two border rays, each known by where it touched the first cylinder. Cylinders
@@ -6,41 +6,38 @@
 //! order. So the tube walks the mesh as a beam does, and where a beam finds by a sign on which
 //! side of a corner a ray passes, a tube finds the one ray through it as the zero of a monotone
 //! function. Corners, the tangents of other cylinders, and walls split it; each ray from the start
-//! is in exactly one tube, as it is in one beam. An echo is a tube that holds the receiver, a ray
-//! to an edge one that holds the edge.
+//! is in exactly one tube, as it is in one beam.
+//!
+//! Tubes end as arms at the next cylinder ([`super::arms`]), out of which echoes are made, and from
+//! which the next level of tubes begins; and they hold rays to edges. They are followed as long as
+//! one of both can still be heard.
+
+mod meet;
+mod part;
 
 use smallvec::SmallVec;
 
 use super::{
-    Echo, Paths, Via,
-    beam::{Ray, TIE_M},
+    Paths,
+    arms::{Arm, DIRECT, LOUDER, Leaves, Partners, Strength},
+    beam::Ray,
     mesh::Side,
-    rounds::{Arc, Circle, Span},
+    rounds::Span,
     trace::{Tree, View},
-    tube::{BORDER_M, Curved, ECHO_M, FIRST, Front, Link, Tracer, zero_between},
+    tube::{Curved, FIRST, Front, Link, Surfaces, Tracer, surfaces_to},
 };
 use crate::{
-    geometry::{DVec2, distance_to_segment},
+    geometry::{DVec2, distance_to_segment, wrap_pi},
     model::Reflector,
 };
+use part::{Tube, ray_through, split};
 
-/// A tube's part of a cylinder is split until it turns the rays by no more than twice this,
-/// radians.
-const MOST_TURN_RAD: f64 = 0.7;
+/// Rays that cylinders have turned to edges are followed from this much above the weakest sound
+/// that is asked for, so with 20 dB below the threshold for that, down to the threshold.
+const EDGES_ABOVE: f64 = 10.0;
 
-/// Halvings of a tube at a cylinder, at most: what grazes it is then too weak.
-const MOST_HALVINGS: u32 = 12;
-
-/// Between its borders no ray of a tube is louder than they are by more than this.
-const LOUDER: f64 = 1.6;
-
-/// Most reflections at cylinders on a path. Between a body and a wall that it all but touches
-/// paths with more are without number; here each has spread by a few times the cavity's width.
-const MOST_CONTACTS: u8 = 3;
-
-/// Paths by cylinders are followed from this much above the weakest that is asked for: with 20 dB
-/// below the threshold for that, from 10 dB below it. There are a great many of the others.
-const FLOOR_ABOVE: f64 = 10.0;
+/// An edge sends back half of a mirror's echo at most: what it takes from it at its boundary.
+const EDGE_MOST: f64 = 0.5;
 
 /// Rays to an edge by way of a cylinder.
 #[derive(Debug, Clone, Copy)]
@@ -54,120 +51,140 @@ pub(super) struct BentRay {
     pub(super) radius_m: f64,
 }
 
-/// Rays between two, all of which have met the same surfaces.
-#[derive(Debug, Clone, Copy)]
-struct Tube {
-    view: u32,
-    link: u32,
-    /// The contact of its borders with the first cylinder, in growing order.
-    span: Span,
-    /// The borders as they leave the last surface, in the same order.
-    borders: [Front; 2],
-    /// Whether the ray at `from_rad` is the left border.
-    mirrored: bool,
-    triangle: u32,
-    /// The side it came in by, if it did not start here.
-    side: Option<u8>,
-    gain: f64,
-    order: u16,
-    /// Reflections at cylinders.
-    contacts: u8,
-}
-
-impl Tube {
-    /// The borders, the right one first.
-    fn in_order(&self) -> [&Front; 2] {
-        let [from, to] = &self.borders;
-        if self.mirrored { [to, from] } else { [from, to] }
-    }
-
-    fn halves(&self, at_rad: f64, front: Front) -> [Self; 2] {
-        let Span { from_rad, to_rad } = self.span;
-        let [from, to] = self.borders;
-        let part =
-            |from_rad, to_rad, borders| Self { span: Span { from_rad, to_rad }, borders, ..*self };
-        [part(from_rad, at_rad, [from, front]), part(at_rad, to_rad, [front, to])]
-    }
-}
-
-/// Follows all tubes of a tree.
+/// Follows the tubes of a tree, level by level.
 pub(super) struct TubeGrower<'a> {
     paths: &'a Paths,
-    tree: &'a mut Tree,
-    start: DVec2,
+    pub(super) tree: &'a mut Tree,
     target: DVec2,
-    home: Option<u32>,
     views: Vec<View>,
     waiting: Vec<Tube>,
-    echoes: Vec<Echo>,
+    /// All so far, those of the last level at the end.
+    pub(super) arms: Vec<Arm>,
+    /// Where the last level begins.
+    last: usize,
+    has_edges: bool,
+    /// Largest cylinder, metres.
+    radius_m: f64,
 }
 
 impl<'a> TubeGrower<'a> {
-    /// For the beams from `start` that met cylinders, and echoes to `target`.
-    pub(super) fn new(paths: &'a Paths, tree: &'a mut Tree, [start, target]: [DVec2; 2]) -> Self {
-        let home = paths.mesh.as_ref().and_then(|mesh| mesh.locate(target));
+    /// For the beams that met cylinders, and echoes to `target`. Has the arms of level 0.
+    pub(super) fn new(paths: &'a Paths, tree: &'a mut Tree, target: DVec2) -> Self {
         let views = std::mem::take(&mut tree.to_cylinders);
-        let (waiting, echoes) = (Vec::new(), Vec::new());
-        Self { paths, tree, start, target, home, views, waiting, echoes }
+        let radii = paths.rounds.circles.iter().map(|circle| circle.radius_m);
+        let radius_m = radii.fold(0.0, f64::max);
+        // Where beams find none, tubes are not followed for them.
+        let has_edges = !tree.to_edges.is_empty();
+        let (waiting, arms) = (Vec::new(), Vec::new());
+        let mut grower =
+            Self { paths, tree, target, views, waiting, arms, last: 0, has_edges, radius_m };
+        for view in 0..grower.views.len() as u32 {
+            grower.begin(view);
+        }
+        grower
     }
 
-    /// All echoes that touch cylinders but no edge; rays to edges go to [`Tree::bent_to_edges`].
-    pub(super) fn grow(mut self) -> Vec<Echo> {
-        for view in 0..self.views.len() as u32 {
-            self.begin(view);
+    /// The strongest of the last level.
+    pub(super) fn last_level(&self) -> &[Arm] {
+        &self.arms[self.last..]
+    }
+
+    /// Follows the arms of the last level on to those of the next one, as far as there are
+    /// partners for them. False if there are none left.
+    pub(super) fn grow(&mut self, partners: &Partners) -> bool {
+        let level = self.last..self.arms.len();
+        self.last = self.arms.len();
+        for index in level {
+            self.launch(index, partners);
             while let Some(tube) = self.waiting.pop() {
                 self.follow(&tube);
             }
         }
+        self.last < self.arms.len()
+    }
+
+    /// Gives the views back to the tree, and the arms out.
+    pub(super) fn finish(self) -> Vec<Arm> {
         self.tree.to_cylinders = self.views;
-        self.echoes
+        self.arms
     }
 
     fn begin(&mut self, index: u32) {
-        let View { arc, beam } = self.views[index as usize];
-        let circle = &self.paths.rounds.circles[arc.cylinder as usize];
-        let Some(lit) = circle.lit_by(&beam) else { return };
+        let View { cylinder, span, beam } = self.views[index as usize];
         if !self.paths.settings.allows(beam.order + 1) {
             return;
         }
-        for span in arc.span.common(&lit) {
-            let view = &self.views[index as usize];
-            let tracer = Tracer::new(self.paths, view, &[], FIRST);
-            let tube = Tube {
-                view: index,
-                link: FIRST,
-                span,
-                borders: [tracer.front(span.from_rad), tracer.front(span.to_rad)],
-                mirrored: false,
-                triangle: beam.triangle,
-                side: None,
-                gain: beam.gain * circle.gain,
-                order: beam.order + 1,
-                contacts: 1,
-            };
-            self.split(&tube, circle, 0);
-        }
-    }
-
-    /// Puts a tube that has just met a circle in parts that turn little.
-    fn split(&mut self, tube: &Tube, circle: &Circle, halvings: u32) {
-        let [from, to] = tube.borders;
-        let middle = |front: &Front| front.origin - circle.center;
-        let turn = middle(&from).angle_to(middle(&to)).abs();
-        let opens = from.along.angle_to(to.along).abs();
-        if halvings < MOST_HALVINGS && (turn > MOST_TURN_RAD || opens > 2.0 * MOST_TURN_RAD) {
-            let half = 0.5 * (tube.span.from_rad + tube.span.to_rad);
-            let front = self.tracer(tube).front(half);
-            for part in tube.halves(half, front) {
-                self.split(&part, circle, halvings + 1);
-            }
+        let tracer = Tracer { paths: self.paths, view: &self.views[index as usize], surfaces: &[] };
+        let ends = [span.from_rad, span.to_rad];
+        // As they leave: before its first cylinder a ray has no front.
+        let borders = ends.map(|at| tracer.front(at));
+        let circle = tracer.circle();
+        let nearest_rad = (beam.image - circle.center).to_angle();
+        let ends = ends.map(|at| tracer.first_contact(at));
+        let middle = 0.5 * (span.from_rad + span.to_rad);
+        let away = wrap_pi(nearest_rad - middle).abs();
+        let length_m = if away < 0.5 * (span.to_rad - span.from_rad) {
+            beam.image.distance(circle.center) - circle.radius_m
         } else {
-            self.waiting.push(*tube);
-        }
+            ends[0].length_m.min(ends[1].length_m)
+        };
+        let one_way = [length_m, length_m, 1.0];
+        self.arms.push(Arm {
+            cylinder,
+            view: index,
+            link: DIRECT,
+            surfaces: Surfaces::new(),
+            level: 0,
+            order: beam.order,
+            gain: beam.gain,
+            span,
+            borders,
+            mirrored: true,
+            triangle: beam.triangle,
+            ends,
+            leaves: Leaves::between(tracer.departure(span.from_rad), tracer.departure(span.to_rad)),
+            strength: Strength::of(beam.gain, one_way, self.radius_m, self.paths),
+        });
     }
 
-    fn tracer(&self, tube: &Tube) -> Tracer<'_> {
-        Tracer::new(self.paths, &self.views[tube.view as usize], &self.tree.links, tube.link)
+    /// Sends what an arm's cylinder reflects on its way, if it is worth it.
+    fn launch(&mut self, index: usize, partners: &Partners) {
+        let arm = &self.arms[index];
+        let partner = partners.best(&arm.leaves);
+        let order = arm.order + 1;
+        let is_heard = arm.strength.with(&partner) >= self.paths.settings.round_floor(1).powi(2);
+        if !(is_heard || self.has_edges) || !self.paths.settings.allows(order + 1) {
+            return;
+        }
+        let circle = &self.paths.rounds.circles[arm.cylinder as usize];
+        let surface = Reflector::Cylinder(arm.cylinder);
+        let (link, borders) = if arm.link == DIRECT {
+            (FIRST, arm.borders)
+        } else {
+            self.tree.links.push(Link { surface, before: arm.link });
+            let borders = arm.borders.map(|border| self.paths.off(&border, surface));
+            (self.tree.links.len() as u32 - 1, borders)
+        };
+        let tube = Tube {
+            view: arm.view,
+            link,
+            span: arm.span,
+            borders,
+            mirrored: !arm.mirrored,
+            triangle: arm.triangle,
+            side: None,
+            gain: arm.gain * circle.gain,
+            order,
+            level: arm.level + 1,
+            partner,
+        };
+        let mut surfaces = arm.surfaces.clone();
+        if arm.link != DIRECT {
+            surfaces.push(surface);
+        }
+        let tracer =
+            Tracer { paths: self.paths, view: &self.views[arm.view as usize], surfaces: &surfaces };
+        split(&tube, &tracer, circle, 0, partners, &mut self.waiting);
     }
 
     /// Takes a tube through its triangle: what is in it, what it meets there, where it leaves.
@@ -175,14 +192,14 @@ impl<'a> TubeGrower<'a> {
         if !self.is_worth(tube) {
             return;
         }
-        if self.home == Some(tube.triangle) {
-            self.meet_target(tube);
-        }
-        let mut cuts: SmallVec<[f64; 8]> = self.meet_corners(tube);
-        let hits = self.meet_arcs(tube);
+        let surfaces = surfaces_to(&self.tree.links, tube.link);
+        let paths = self.paths;
+        let view = self.views[tube.view as usize];
+        let tracer = Tracer { paths, view: &view, surfaces: &surfaces };
+        let mut cuts: SmallVec<[f64; 8]> = self.meet_corners(tube, &tracer);
+        let hits = self.meet_arcs(tube, &tracer);
         cuts.extend(hits.iter().flat_map(|span| [span.from_rad, span.to_rad]));
         cuts.sort_by(f64::total_cmp);
-        let tracer = self.tracer(tube);
         let inside = cuts.iter().filter(|&&at| tube.span.from_rad < at && at < tube.span.to_rad);
         let inside = inside.map(|&at| (at, tracer.front(at)));
         let [from, to] = tube.borders;
@@ -194,7 +211,8 @@ impl<'a> TubeGrower<'a> {
             let middle = 0.5 * (span.from_rad + span.to_rad);
             let is_hit = hits.iter().any(|hit| hit.from_rad < middle && middle < hit.to_rad);
             if !is_hit && span.to_rad > span.from_rad {
-                self.leave(&Tube { span, borders: [pair[0].1, pair[1].1], ..*tube }, middle);
+                let part = Tube { span, borders: [pair[0].1, pair[1].1], ..*tube };
+                self.leave(&part, &tracer.front(middle));
             }
         }
     }
@@ -206,16 +224,25 @@ impl<'a> TubeGrower<'a> {
             let [a, b] = self.side_of(tube.triangle, side as usize);
             distance_to_segment(self.target, a, b)
         });
-        let least = |of: fn(&Front) -> f64| of(&tube.borders[0]).min(of(&tube.borders[1]));
-        let length_m = least(|front| front.length_m) + left_m;
-        let width_m = least(|front| front.width_m) + left_m * least(|front| front.growth);
-        let most =
-            tube.gain * settings.air_gain(length_m) * (LOUDER * length_m / width_m).min(1.0).sqrt();
-        length_m <= settings.max_path_m && most >= self.floor()
+        let length_m = tube.least(|front| front.length_m);
+        if length_m + left_m > settings.max_path_m {
+            return false;
+        }
+        let width_m = tube.least(|front| front.width_m);
+        let growth = tube.least(|front| front.growth);
+        let spread = [length_m, width_m, growth];
+        let strength = Strength::of(tube.gain, spread, self.radius_m, self.paths);
+        strength.with(&tube.partner) >= self.paths.settings.round_floor(1).powi(2)
+            || self.has_edges && self.is_worth_an_edge(tube.gain, spread)
     }
 
-    fn floor(&self) -> f64 {
-        FLOOR_ABOVE * self.paths.settings.floor
+    /// Whether an edge could send back enough of rays that have spread so. With any partner the
+    /// power is at most `L / w + 1 / g` of a mirror's, by the same reasoning as for arms.
+    fn is_worth_an_edge(&self, gain: f64, [length_m, width_m, growth]: [f64; 3]) -> bool {
+        let settings = &self.paths.settings;
+        let loss = EDGE_MOST * gain * settings.air_gain(length_m);
+        LOUDER * loss * loss * (length_m / width_m + 1.0 / growth)
+            >= (EDGES_ABOVE * settings.floor).powi(2)
     }
 
     fn side_of(&self, triangle: u32, side: usize) -> [DVec2; 2] {
@@ -223,44 +250,8 @@ impl<'a> TubeGrower<'a> {
         [side, (side + 1) % 3].map(|corner| mesh.corner(triangle, corner))
     }
 
-    /// The ray of the tube through a point; `None` if the point is beside it.
-    fn ray_through(&self, tube: &Tube, point: DVec2) -> Option<(f64, Front)> {
-        let [right, left] = tube.in_order();
-        let is_between = right.offset_m(point) >= -TIE_M && left.offset_m(point) <= TIE_M;
-        if !is_between {
-            return None;
-        }
-        let tracer = self.tracer(tube);
-        let Span { from_rad, to_rad } = tube.span;
-        let at = zero_between(from_rad, to_rad, ECHO_M, |at| tracer.front(at).offset_m(point));
-        let front = tracer.front(at);
-        (front.ahead_m(point) > 0.0).then_some((at, front))
-    }
-
-    fn meet_target(&mut self, tube: &Tube) {
-        let Some((at, front)) = self.ray_through(tube, self.target) else { return };
-        let end = front.moved(front.ahead_m(self.target));
-        let settings = &self.paths.settings;
-        let amplitude =
-            tube.gain * settings.air_gain(end.length_m) * (end.length_m / end.width_m).sqrt();
-        if amplitude < self.floor() || end.length_m > settings.max_path_m {
-            return;
-        }
-        let Some(curved) = self.keep(tube, at, self.target) else { return };
-        self.echoes.push(Echo {
-            length_m: end.length_m,
-            amplitude,
-            phase_rad: 0.0,
-            departure: self.departure(tube, at),
-            arrival: -end.along,
-            rise_rad: [0.0; 2],
-            image: 0,
-            via: Via::Cylinders { curved },
-        });
-    }
-
     /// Rays to the corners of the tube's triangle that are edges, and where corners split it.
-    fn meet_corners(&mut self, tube: &Tube) -> SmallVec<[f64; 8]> {
+    fn meet_corners(&mut self, tube: &Tube, tracer: &Tracer) -> SmallVec<[f64; 8]> {
         let Some(mesh) = &self.paths.mesh else { return SmallVec::new() };
         let corners = mesh.triangles[tube.triangle as usize].corners;
         let far = tube.side.map(|side| (side as usize + 2) % 3);
@@ -270,91 +261,43 @@ impl<'a> TubeGrower<'a> {
                 continue;
             }
             let place = mesh.points[corner as usize];
-            let Some((at, front)) = self.ray_through(tube, place) else { continue };
+            let Some((at, front)) = ray_through(tube, tracer, place) else { continue };
             cuts.push(at);
-            self.meet_edge(tube, corner, at, &front.moved(front.ahead_m(place)));
+            if self.has_edges {
+                self.meet_edge(tube, tracer, corner, at, &front.moved(front.ahead_m(place)));
+            }
         }
         cuts
     }
 
-    fn meet_edge(&mut self, tube: &Tube, point: u32, at: f64, end: &Front) {
-        if !self.paths.edges.answers(point, end.along) {
+    fn meet_edge(&mut self, tube: &Tube, tracer: &Tracer, point: u32, at: f64, end: &Front) {
+        let spread = [end.length_m, end.width_m, end.growth];
+        if !self.paths.edges.answers(point, end.along) || !self.is_worth_an_edge(tube.gain, spread)
+        {
             return;
         }
-        let Some(curved) = self.keep(tube, at, end.origin) else { return };
+        let curved = &mut self.tree.curved;
+        curved.push(Curved { view: tube.view, link: tube.link, contact_rad: at });
         let ray = Ray {
             run: end.length_m * end.along,
-            departure: self.departure(tube, at),
+            departure: tracer.departure(at),
             gain: tube.gain,
-            node: curved,
+            node: curved.len() as u32 - 1,
             order: tube.order,
         };
         let (width_m, radius_m) = (end.width_m, end.radius_m());
         self.tree.bent_to_edges.push(BentRay { point, ray, width_m, radius_m });
     }
 
-    fn departure(&self, tube: &Tube, at: f64) -> DVec2 {
-        let run = self.tracer(tube).leg(at).run;
-        self.views[tube.view as usize].beam.departure(run.normalize_or_zero())
-    }
-
-    /// Writes down the ray that ends at a point; `None` if a cylinder stands in its way.
-    fn keep(&mut self, tube: &Tube, contact_rad: f64, end: DVec2) -> Option<u32> {
-        let tracer = self.tracer(tube);
-        let contacts = tracer.contacts(contact_rad);
-        let hidden = contacts
-            .iter()
-            .zip(contacts.iter().skip(1).chain([&end]))
-            .any(|(from, to)| self.paths.rounds.hide(*from, *to));
-        let leg = tracer.leg(contact_rad);
-        if hidden || self.paths.hides_leg(self.tree, leg, self.start, contacts[0]) {
-            return None;
-        }
-        self.tree.curved.push(Curved { view: tube.view, link: tube.link, contact_rad });
-        Some(self.tree.curved.len() as u32 - 1)
-    }
-
-    /// Sends the parts that meet cylinders in this triangle on their way, and says which they are.
-    fn meet_arcs(&mut self, tube: &Tube) -> SmallVec<[Span; 2]> {
-        let mut hits = SmallVec::new();
-        for &arc in self.paths.rounds.in_triangle(tube.triangle) {
-            let surface = Reflector::Cylinder(arc.cylinder);
-            let tracer = self.tracer(tube);
-            let last = tracer.surfaces.last().copied();
-            let first = Reflector::Cylinder(self.views[tube.view as usize].arc.cylinder);
-            // A circle is convex: what leaves it does not come back to it by itself.
-            if last.unwrap_or(first) == surface {
-                continue;
-            }
-            let circle = &self.paths.rounds.circles[arc.cylinder as usize];
-            let spans = met_spans(tube, &tracer, circle, &arc);
-            for span in spans {
-                hits.push(span);
-                if tube.contacts < MOST_CONTACTS && self.paths.settings.allows(tube.order + 1) {
-                    let part = self.part(tube, span);
-                    let next = self.reflected(&part, surface, circle.gain);
-                    let contacts = tube.contacts + 1;
-                    self.split(&Tube { side: None, contacts, ..next }, circle, 0);
-                }
-            }
-        }
-        hits
-    }
-
-    fn part(&self, tube: &Tube, span: Span) -> Tube {
-        let tracer = self.tracer(tube);
-        let borders = [span.from_rad, span.to_rad].map(|at| tracer.front(at));
-        Tube { span, borders, ..*tube }
-    }
-
-    fn reflected(&mut self, tube: &Tube, surface: Reflector, gain: f64) -> Tube {
+    fn reflected(&mut self, tube: &Tube, wall: u32) -> Tube {
+        let surface = Reflector::Wall(wall);
         let borders = tube.borders.map(|border| self.paths.off(&border, surface));
         let links = &mut self.tree.links;
         links.push(Link { surface, before: tube.link });
         Tube {
             link: links.len() as u32 - 1,
             mirrored: !tube.mirrored,
-            gain: tube.gain * gain,
+            gain: tube.gain * self.paths.faces[wall as usize].gain,
             order: tube.order + 1,
             borders,
             ..*tube
@@ -362,17 +305,16 @@ impl<'a> TubeGrower<'a> {
     }
 
     /// Sends a part on through the side by which its middle ray leaves.
-    fn leave(&mut self, tube: &Tube, middle: f64) {
+    fn leave(&mut self, tube: &Tube, middle: &Front) {
         let Some(mesh) = &self.paths.mesh else { return };
-        let front = self.tracer(tube).front(middle);
         let triangle = &mesh.triangles[tube.triangle as usize];
         let distance_m = |side: usize| {
             let [a, b] = self.side_of(tube.triangle, side);
             let outward = -(b - a).perp();
-            let slant = outward.dot(front.along);
+            let slant = outward.dot(middle.along);
             // A ray that starts on a side by rounding outside leaves by it at once.
             if slant > 0.0 {
-                (outward.dot(a - front.origin) / slant).max(0.0)
+                (outward.dot(a - middle.origin) / slant).max(0.0)
             } else {
                 f64::INFINITY
             }
@@ -387,8 +329,7 @@ impl<'a> TubeGrower<'a> {
             }
             Side::Wall(wall) => {
                 if self.paths.settings.allows(tube.order + 1) {
-                    let gain = self.paths.faces[wall as usize].gain;
-                    let next = self.reflected(tube, Reflector::Wall(wall), gain);
+                    let next = self.reflected(tube, wall);
                     self.waiting.push(Tube { side: Some(side as u8), ..next });
                 }
                 if self.paths.heights.lets_pass(wall)
@@ -400,53 +341,4 @@ impl<'a> TubeGrower<'a> {
             Side::Outside => {}
         }
     }
-}
-
-/// The parts of a tube that meet an arc.
-fn met_spans(tube: &Tube, tracer: &Tracer, circle: &Circle, arc: &Arc) -> SmallVec<[Span; 2]> {
-    let [right, left] = tube.in_order();
-    let Span { from_rad, to_rad } = tube.span;
-    let (r, center) = (circle.radius_m, circle.center);
-    let is_beside = right.offset_m(center) <= -r || left.offset_m(center) >= r;
-    if is_beside {
-        return SmallVec::new();
-    }
-    // Where the rays touch the circle, its centre to their left and to their right.
-    let tangent = |side: f64| {
-        zero_between(from_rad, to_rad, BORDER_M, |at| tracer.front(at).offset_m(center) - side * r)
-    };
-    let ends = [(right, 1.0), (left, -1.0)].map(|(border, side)| {
-        let beyond = side * border.offset_m(center) > r;
-        let own = if std::ptr::eq(border, &tube.borders[0]) { from_rad } else { to_rad };
-        if beyond { tangent(side) } else { own }
-    });
-    // Their contacts: clockwise around the circle from right to left.
-    let contact = |at: f64| {
-        let front = tracer.front(at);
-        let offset_m = front.offset_m(center);
-        let half_chord = (r * r - offset_m * offset_m).max(0.0).sqrt();
-        (front.moved(front.ahead_m(center) - half_chord).origin - center).to_angle()
-    };
-    let last = contact(ends[1]);
-    let turn = (contact(ends[0]) - last).rem_euclid(std::f64::consts::TAU);
-    let lit = Span { from_rad: last, to_rad: last + turn };
-    lit.common(&arc.span)
-        .into_iter()
-        .map(|part| {
-            let at = |angle: f64, end: f64, own: f64| {
-                if angle == own {
-                    return end;
-                }
-                let point = circle.point(angle);
-                zero_between(from_rad, to_rad, BORDER_M, |at| tracer.front(at).offset_m(point))
-            };
-            let one = at(part.from_rad, ends[1], lit.from_rad);
-            let other = at(part.to_rad, ends[0], lit.to_rad);
-            Span { from_rad: one.min(other), to_rad: one.max(other) }
-        })
-        .filter(|span| {
-            let middle = tracer.front(0.5 * (span.from_rad + span.to_rad));
-            span.to_rad > span.from_rad && middle.ahead_m(center) > 0.0
-        })
-        .collect()
 }

@@ -73,14 +73,14 @@ impl Image {
     /// or too weak.
     pub(super) fn echo(&self, plan: &Echo, index: u16, settings: &Settings) -> Option<Echo> {
         // What is scattered goes straight back; it has its own way to floor and ceiling.
-        if matches!(plan.via, Via::Scatter { .. }) {
+        if matches!(plan.via, Via::Scatter { .. } | Via::Rim { .. }) {
             return None;
         }
         let length_m = plan.length_m.hypot(self.rise_m);
         let cosine = plan.length_m / length_m;
         let bending = match plan.via {
             Via::Edge { .. } => cosine.sqrt().recip(),
-            Via::Walls { .. } | Via::Cylinders { .. } | Via::Upright | Via::Scatter { .. } => 1.0,
+            _ => 1.0,
         };
         let amplitude = plan.amplitude * bending * settings.air_gain(length_m - plan.length_m);
         let leaves_rad = self.rise_m.atan2(plan.length_m);

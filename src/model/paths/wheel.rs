@@ -37,6 +37,35 @@ impl Envelope {
     }
 }
 
+/// How strongly an echo can be heard at best that leaves and comes in directions some angle apart,
+/// whatever the azimuth.
+#[derive(Debug)]
+pub(super) struct Both {
+    /// By that angle in steps of the envelope.
+    steps: Vec<f64>,
+    /// Counts at least as much where it matters otherwise: where the face can turn it round.
+    least: f64,
+}
+
+impl Both {
+    pub(super) fn of(envelope: &Envelope, least: f64) -> Self {
+        let one_way = &envelope.0;
+        // Off the axis by so many steps on one side, and by the rest (rounded down) on the other.
+        let best = |apart: usize| {
+            let halves = (0..=apart).map(|one| one_way[one] * one_way[(apart - one).max(1) - 1]);
+            halves.fold(0.0, f64::max)
+        };
+        // Each factor a thousandth more than sampled, for what lies between the samples.
+        Self { steps: (0..ENVELOPE_STEPS).map(|apart| 1.002 * best(apart)).collect(), least }
+    }
+
+    /// For directions `apart_rad` apart, from 0 to pi.
+    pub(super) fn heard(&self, apart_rad: f64) -> f64 {
+        let step = (apart_rad / PI * ENVELOPE_STEPS as f64) as usize;
+        self.steps[step.min(ENVELOPE_STEPS - 1)].max(self.least)
+    }
+}
+
 /// Directions are sorted into this many bins.
 const BINS: usize = 360;
 

@@ -1,0 +1,67 @@
+//! What counts as an echo path.
+
+use crate::acoustics::edge::EdgeLaw;
+
+/// Echoes that touch cylinders more than once are followed from this much above the weakest that is
+/// asked for: with 20 dB below the threshold for that, down to the threshold itself. In a room with
+/// a round body there are a hundred times more of them at each 20 dB less.
+const ROUNDS_ABOVE: f64 = 10.0;
+
+/// Which paths count, and the physics on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Longest path there and back, metres.
+    pub max_path_m: f64,
+    /// Most mirror reflections; `None`: as many as length and amplitude allow.
+    pub max_order: Option<u16>,
+    /// Weakest amplitude, before the beam pattern, relative to a head-on, rigid wall.
+    pub floor: f64,
+    /// What edges send back; `None`: mirror reflections only.
+    pub edge_law: Option<EdgeLaw>,
+    /// Attenuation of the amplitude in air, nepers a metre.
+    pub absorption_np_per_m: f64,
+    /// Wave number `2 pi f / c`, radians a metre.
+    pub wave_number_per_m: f64,
+    /// Height of the transducer in a scene with heights, metres; `None`: see [`usual_z_m`].
+    pub sensor_z_m: Option<f64>,
+    /// How far the transducer's axis points up, radians.
+    pub tilt_rad: f64,
+    /// How high a strip of a rough wall it hears: the integral of the beam pattern's fourth
+    /// power over the rise, radians. 0: rough walls only mirror.
+    pub scatter_height_rad: f64,
+}
+
+/// The height of a transducer of which nothing is said, metres: half a metre above the floor, or
+/// half way up to a low ceiling.
+#[must_use]
+pub fn usual_z_m(floor_z_m: Option<f64>, ceiling_z_m: Option<f64>) -> f64 {
+    let floor_z_m = floor_z_m.or(ceiling_z_m.map(|ceiling| ceiling - 1.0)).unwrap_or(0.0);
+    let middle_m = ceiling_z_m.map_or(f64::INFINITY, |ceiling| 0.5 * (ceiling - floor_z_m));
+    floor_z_m + middle_m.min(0.5)
+}
+
+impl Settings {
+    pub(super) fn allows(&self, order: u16) -> bool {
+        self.max_order.is_none_or(|most| order <= most)
+    }
+
+    /// The length of air that leaves a share `gain` of the amplitude; 0 without absorption.
+    pub(super) fn same_loss_m(&self, gain: f64) -> f64 {
+        if self.absorption_np_per_m > 0.0 { -gain.ln() / self.absorption_np_per_m } else { 0.0 }
+    }
+
+    /// The longest path over perfect walls that is strong enough.
+    pub(super) fn audible_m(&self) -> f64 {
+        if self.absorption_np_per_m > 0.0 { self.same_loss_m(self.floor) } else { self.max_path_m }
+    }
+
+    pub(super) fn air_gain(&self, length_m: f64) -> f64 {
+        (-self.absorption_np_per_m * length_m).exp()
+    }
+
+    /// The weakest echo that is asked for of those whose middle contact with a cylinder has so many
+    /// before it.
+    pub(super) fn round_floor(&self, level: u16) -> f64 {
+        if level == 0 { self.floor } else { ROUNDS_ABOVE * self.floor }
+    }
+}

@@ -1,0 +1,157 @@
+//! Round bodies beside walls, between which sound runs to and fro.
+
+use std::f64::consts::PI;
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::*;
+use crate::{model::Reflector, scene::Cylinder};
+
+fn body(center: DVec2, radius_m: f64) -> Cylinder {
+    let material = Material { reflectance: 1.0, roughness: 0.0 };
+    Cylinder { id: Arc::from("body"), center, radius_m, material, z_m: None }
+}
+
+/// A room of 0.928 m by 0.742 m with a body a hand's width from one wall and all but touching another.
+fn narrow_room() -> Scene {
+    let mut room =
+        polygon(&[[0.0, 0.0], [0.928, 0.0], [0.928, 0.742], [0.0, 0.742]].map(DVec2::from_array));
+    room.cylinders = vec![body(DVec2::new(0.774, 0.245), 0.15)];
+    room
+}
+
+/// Along the normal between wall and body, `n` contacts with the body: width and growth go through
+/// the same flight and turn each time, whose matrix has a closed-form power.
+#[test]
+fn rounds_between_body_and_wall_spread_as_the_power_of_one_round() {
+    let (gap, height, r) = (0.095, 0.085, 0.15);
+    let mut plan = scene(&[[-30.0, 0.0, 30.0, 0.0]]);
+    plan.cylinders = vec![body(DVec2::new(0.0, gap + r), r)];
+    let settings = Settings { max_path_m: 4.0, floor: 1e-5, ..LOSSLESS };
+    let echoes = Paths::new(&plan, settings).enumerate(DVec2::new(0.0, height));
+
+    // Off the body, over to the wall and back: `w += D g`, then `g += 2 w / r`.
+    let flight = 2.0 * gap;
+    let round = [[1.0, flight], [2.0 / r, 1.0 + 2.0 * flight / r]];
+    let mu = (1.0 + flight / r).acosh();
+    let after = |n: i32, [w, g]: [f64; 2]| {
+        let (a, b) =
+            ((f64::from(n) * mu).sinh() / mu.sinh(), (f64::from(n - 1) * mu).sinh() / mu.sinh());
+        [0, 1].map(|i| a * (round[i][0] * w + round[i][1] * g) - b * [w, g][i])
+    };
+    let mut seen = 0;
+    // Away from the body or straight to it, and back from either side.
+    for (out, home) in
+        [(gap - height, gap - height), (gap - height, gap + height), (gap + height, gap + height)]
+    {
+        for n in 1..=9 {
+            let [w, g] = after(n - 1, [out, 1.0 + 2.0 * out / r]);
+            let length_m = out + f64::from(n - 1) * flight + home;
+            let amplitude = (length_m / (w + home * g)).sqrt();
+            let expected = if out == home { 1 } else { 2 };
+            let found: Vec<_> = echoes
+                .iter()
+                .filter(|echo| (echo.length_m - length_m).abs() < 1e-9)
+                .filter(|echo| (echo.amplitude / amplitude - 1.0).abs() < 1e-9)
+                .collect();
+            if amplitude > 1e-4 && length_m <= 4.0 {
+                assert_eq!(found.len(), expected, "{n} contacts, {length_m} m, {amplitude}");
+                seen += 1;
+            }
+        }
+    }
+    assert_eq!(seen, 27);
+}
+
+/// A ray that runs through the room by itself.
+fn crossings(room: &Scene, from: DVec2, angle: f64, reach_m: f64, at: DVec2, radius_m: f64) -> u32 {
+    let round = &room.cylinders[0];
+    let size = DVec2::new(0.928, 0.742);
+    let (mut p, mut d, mut left_m) = (from, DVec2::from_angle(angle), reach_m);
+    let mut count = 0;
+    let mut is_first = true;
+    while left_m > 0.0 {
+        let to_wall = |p: f64, d: f64, size: f64| if d > 0.0 { (size - p) / d } else { -p / d };
+        let (by_x, by_y) = (to_wall(p.x, d.x, size.x), to_wall(p.y, d.y, size.y));
+        let foot = (round.center - p).dot(d);
+        let half = round.radius_m.powi(2) - (round.center - p).perp_dot(d).powi(2);
+        let by_round = if half > 0.0 && foot - half.sqrt() > 1e-9 {
+            foot - half.sqrt()
+        } else {
+            f64::INFINITY
+        };
+        let step = by_x.min(by_y).min(by_round);
+        let ahead = (at - p).dot(d);
+        if !is_first
+            && ahead > 0.0
+            && ahead < step.min(left_m)
+            && (at - p).perp_dot(d).abs() < radius_m
+        {
+            count += 1;
+        }
+        (p, left_m, is_first) = (p + step * d, left_m - step, false);
+        if step == by_round {
+            let normal = (p - round.center).normalize();
+            d -= 2.0 * d.dot(normal) * normal;
+        } else if step == by_x {
+            d.x = -d.x;
+        } else {
+            d.y = -d.y;
+        }
+    }
+    count
+}
+
+/// Energy: of rays sent out at random, as many come by as the strengths of all echoes together say.
+/// A way whose rays have spread to `w` for each radian brings `2 rho / w` of a radian to a place of
+/// radius `rho`.
+#[test]
+fn echoes_bring_as_much_energy_as_random_rays_do() {
+    const RAYS: u32 = 600_000;
+    let (from, at, reach_m, radius_m) = (DVec2::new(0.3, 0.2), DVec2::new(0.25, 0.5), 1.9, 0.005);
+    let room = narrow_room();
+    let settings = Settings { max_path_m: reach_m, floor: 1e-5, ..LOSSLESS };
+    let echoes = Paths::new(&room, settings).enumerate_between(from, at);
+    assert!(echoes.len() > 40, "{}", echoes.len());
+    let share: f64 = echoes.iter().map(|echo| echo.amplitude.powi(2) / echo.length_m).sum();
+    let expected = share * radius_m / PI * f64::from(RAYS);
+    let mut random = Pcg64::seed_from_u64(5);
+    let counted: u32 = (0..RAYS)
+        .map(|_| crossings(&room, from, random.random_range(0.0..TAU), reach_m, at, radius_m))
+        .sum();
+    let off = f64::from(counted) / expected - 1.0;
+    assert!(off.abs() < 0.03, "{counted} rays instead of {expected}");
+}
+
+#[test]
+fn ways_by_a_body_run_backwards_from_receiver_to_transmitter() {
+    let paths = Paths::new(&narrow_room(), Settings { max_path_m: 2.5, floor: 1e-3, ..LOSSLESS });
+    let (t, r) = (DVec2::new(0.3, 0.2), DVec2::new(0.774, 0.05));
+    let (there, back) = (paths.enumerate_between(t, r), paths.enumerate_between(r, t));
+    let strong = |echoes: &[EchoPath]| echoes.iter().filter(|echo| echo.amplitude > 0.0101).count();
+    assert!(strong(&there) > 300, "{}", strong(&there));
+    assert_eq!(strong(&there), strong(&back));
+    for echo in there.iter().filter(|echo| echo.amplitude > 0.0101) {
+        let found = back.iter().any(|other| {
+            other.path.walls.iter().eq(echo.path.walls.iter().rev())
+                && (other.length_m - echo.length_m).abs() < 1e-9
+                && (other.amplitude / echo.amplitude - 1.0).abs() < 1e-6
+        });
+        assert!(found, "no reverse of {echo:?}");
+    }
+}
+
+/// The number of contacts is bounded by what can be heard, not by a constant.
+#[test]
+fn contacts_go_on_as_long_as_they_are_heard() {
+    let most = |floor: f64| {
+        let paths = Paths::new(&narrow_room(), Settings { max_path_m: 3.0, floor, ..LOSSLESS });
+        let at_body = |echo: &EchoPath| {
+            echo.path.walls.iter().filter(|wall| **wall == Reflector::Cylinder(0)).count()
+        };
+        paths.enumerate(DVec2::new(0.774, 0.085)).iter().map(at_body).max().unwrap_or(0)
+    };
+    let (few, more) = (most(1e-2), most(1e-3));
+    assert!(few >= 3 && more >= few + 3, "{few} {more}");
+}

@@ -1,0 +1,127 @@
+//! Where tubes meet cylinders.
+
+use smallvec::SmallVec;
+
+use super::{
+    TubeGrower,
+    part::{Tube, ray_past},
+};
+use crate::{
+    geometry::DVec2,
+    model::{
+        Reflector,
+        paths::{
+            arms::{Arm, Contact, Leaves, Strength},
+            rounds::{Arc, Circle, Span},
+            tube::{Front, Surfaces, Tracer},
+        },
+    },
+};
+
+impl TubeGrower<'_> {
+    /// Makes arms of the parts that meet cylinders in this triangle, and says which can't pass.
+    pub(super) fn meet_arcs(&mut self, tube: &Tube, tracer: &Tracer) -> SmallVec<[Span; 2]> {
+        let mut hits = SmallVec::new();
+        for &arc in self.paths.rounds.in_triangle(tube.triangle) {
+            let surface = Reflector::Cylinder(arc.cylinder);
+            let first = Reflector::Cylinder(tracer.view.cylinder);
+            // A circle is convex: what leaves it does not come back to it by itself.
+            if tracer.surfaces.last().copied().unwrap_or(first) == surface {
+                continue;
+            }
+            let circle = &self.paths.rounds.circles[arc.cylinder as usize];
+            for span in met_spans(tube, tracer, circle, &arc) {
+                if circle.is_opaque {
+                    hits.push(span);
+                }
+                let arm = self.arm(tube, tracer, arc.cylinder, span);
+                self.arms.extend(arm);
+            }
+        }
+        hits
+    }
+
+    /// The arm of a part that meets a cylinder, if it is worth anything.
+    fn arm(&self, tube: &Tube, tracer: &Tracer, cylinder: u32, span: Span) -> Option<Arm> {
+        let settings = &self.paths.settings;
+        let circle = &self.paths.rounds.circles[cylinder as usize];
+        if !settings.allows(tube.order + 1) {
+            return None;
+        }
+        let Span { from_rad, to_rad } = span;
+        let borders = [from_rad, to_rad].map(|at| tracer.front(at));
+        let middle = 0.5 * (from_rad + to_rad);
+        let contact =
+            |front: &Front, at, near| self.paths.contact(front, cylinder, tube.mirrored, at, near);
+        let half = contact(&tracer.front(middle), middle, 0.0);
+        let near = half.place_rad;
+        let mut ends = [(&borders[0], from_rad), (&borders[1], to_rad)]
+            .map(|(front, at)| contact(front, at, near));
+        if !tube.mirrored {
+            ends.reverse();
+        }
+        let least = |of: fn(&Contact) -> f64| of(&ends[0]).min(of(&ends[1])).min(of(&half));
+        let spread = [least(|c| c.length_m), least(|c| c.width_m), least(|c| c.growth)];
+        let strength = Strength::of(tube.gain, spread, self.radius_m, self.paths);
+        let is_worth = strength.with(&tube.partner) >= self.paths.settings.round_floor(1).powi(2)
+            || self.has_edges && self.is_worth_an_edge(tube.gain, spread);
+        let back_m = self.target.distance(circle.center) - circle.radius_m;
+        if !is_worth || spread[0] + back_m.max(0.0) > settings.max_path_m {
+            return None;
+        }
+        Some(Arm {
+            cylinder,
+            view: tube.view,
+            link: tube.link,
+            surfaces: tracer.surfaces.iter().copied().collect::<Surfaces>(),
+            level: tube.level,
+            order: tube.order,
+            gain: tube.gain,
+            span,
+            borders,
+            mirrored: tube.mirrored,
+            triangle: tube.triangle,
+            ends,
+            leaves: Leaves::between(tracer.departure(from_rad), tracer.departure(to_rad)),
+            strength,
+        })
+    }
+}
+
+/// The parts of a tube that meet an arc.
+fn met_spans(tube: &Tube, tracer: &Tracer, circle: &Circle, arc: &Arc) -> SmallVec<[Span; 2]> {
+    let [right, left] = tube.in_order();
+    let Span { from_rad, to_rad } = tube.span;
+    let (r, center) = (circle.radius_m, circle.center);
+    let is_beside = right.offset_m(center) <= -r || left.offset_m(center) >= r;
+    if is_beside {
+        return SmallVec::new();
+    }
+    // Where the rays touch the circle, its centre to their left and to their right.
+    let ends = [(right, 1.0), (left, -1.0)].map(|(border, side)| {
+        let beyond = side * border.offset_m(center) > r;
+        let own = if std::ptr::eq(border, &tube.borders[0]) { from_rad } else { to_rad };
+        if beyond { ray_past(tube, tracer, center, side * r) } else { own }
+    });
+    // Their contacts: clockwise around the circle from right to left.
+    let contact = |at: f64| (tracer.front(at).onto(circle).1).to_angle();
+    let last = contact(ends[1]);
+    let turn = (contact(ends[0]) - last).rem_euclid(std::f64::consts::TAU);
+    let lit = Span { from_rad: last, to_rad: last + turn };
+    lit.common(&arc.span)
+        .into_iter()
+        .map(|part| {
+            let at = |angle: f64, end: f64, own: f64| {
+                let point: DVec2 = circle.point(angle);
+                if angle == own { end } else { ray_past(tube, tracer, point, 0.0) }
+            };
+            let one = at(part.from_rad, ends[1], lit.from_rad);
+            let other = at(part.to_rad, ends[0], lit.to_rad);
+            Span { from_rad: one.min(other), to_rad: one.max(other) }
+        })
+        .filter(|span| {
+            let middle = tracer.front(0.5 * (span.from_rad + span.to_rad));
+            span.to_rad > span.from_rad && middle.ahead_m(center) > 0.0
+        })
+        .collect()
+}
