@@ -18,7 +18,7 @@ use sonard::{
     acoustics::{Air, BeamPattern, Sensor},
     geometry::{DVec2, Pose},
     model::{
-        Engine, EngineKind, Options, Simulator,
+        Engine, EngineKind, Fan, FanSettings, Options, Prediction, Simulator,
         paths::{PathEngine, Paths},
     },
     scan::ScanPlan,
@@ -59,8 +59,6 @@ fn small_room() {
         Options { engine: EngineKind::Paths, max_range_m: Some(10.7), ..Options::default() };
     let paths = simulator(scene.clone(), range);
     println!("simple-room, fig9, 400 azimuths to 10.7 m");
-    let survey = time(|| drop(black_box(paths.station(pose.position()))));
-    report("paths, the survey alone", survey, None);
     let exact = time(|| drop(black_box(paths.predict(&pose, &FULL_SCAN))));
     report("paths, the whole scan", exact, None);
     let engine = PathEngine::new(
@@ -69,6 +67,8 @@ fn small_room() {
         None,
         paths.path_settings(),
     );
+    let survey = time(|| drop(black_box(engine.survey(pose.position()))));
+    report("paths, all echoes to 10.7 m", survey, None);
     let echoes = Paths::new(&scene, paths.path_settings()).enumerate(pose.position());
     let place = engine.survey(pose.position());
     let mut sounds = Vec::new();
@@ -80,20 +80,49 @@ fn small_room() {
             heard += sounds.len();
         }
     });
-    report("paths, listening 400 times", listen, None);
+    report("paths, listening 400 times to all of them", listen, None);
     println!("  {} echo paths, {:.1} sounds a ping", echoes.len(), heard as f64 / 400.0);
-    let ideal = simulator(scene.clone(), Options { ideal_receiver: true, ..range });
+    // The fan knows neither pulses nor the face: it is held to what is left of the same paths.
+    let faceless = Sensor { face: None, ..paths.sensor().clone() };
+    let with = |options| {
+        let made = Simulator::new(scene.clone(), faceless.clone(), Air::default(), options);
+        made.expect("valid options")
+    };
+    let ideal = with(Options { ideal_receiver: true, ..range });
     for ray_spacing_deg in [1.0, 0.1, 0.02] {
-        let options = Options { engine: EngineKind::Fan, ray_spacing_deg, ..range };
-        let fan = simulator(scene.clone(), options);
+        let fan = with(Options { engine: EngineKind::Fan, ray_spacing_deg, ..range });
         let time = time(|| drop(black_box(fan.predict(&pose, &FULL_SCAN))));
-        // The fan knows no pulses: it is held to what an ideal receiver makes of the same paths.
-        let error_mm = 1e3 * range_error_m(&fan, &ideal, &pose);
+        let off = readings_off(&fan, &ideal, &pose);
         report(
-            &format!("fan at {ray_spacing_deg} degrees, off by up to {error_mm:.2} mm"),
+            &format!("fan at {ray_spacing_deg} degrees, {off} readings off by 1 mm"),
             time,
             Some(exact),
         );
+    }
+    let time = time(|| printed_fan(&scene, &paths, &pose));
+    report("the fan as printed, at 0.1 degrees, each ping anew", time, Some(exact));
+}
+
+/// The paper's appendix A as printed: rays over the whole circle for each direction, up to the
+/// first that is heard.
+fn printed_fan(scene: &Scene, simulator: &Simulator, pose: &Pose) {
+    let receiver = simulator.receiver();
+    let beam = BeamPattern::new(simulator.sensor(), simulator.sound_speed_m_s());
+    let frequency_hz = simulator.sensor().frequency_hz;
+    let settings = FanSettings {
+        spacing_rad: 0.1_f64.to_radians(),
+        half_face_m: simulator.sensor().half_width_m(),
+        wavelength_m: simulator.sound_speed_m_s() / frequency_hz,
+        absorption_db_per_m: simulator.air().absorption_db_per_m(frequency_hz),
+        longest_m: 2.0 * receiver.max_range_m,
+        weakest: receiver.threshold,
+        max_order: u32::MAX,
+    };
+    let fan = Fan::new(scene, beam, settings);
+    for i in 0..FULL_SCAN.beams() {
+        let direction_rad = pose.direction_rad(FULL_SCAN.step_deg * f64::from(i));
+        let shortest_m = 2.0 * receiver.min_range_m();
+        black_box(fan.first_echo(pose.position(), direction_rad, shortest_m, receiver.threshold));
     }
 }
 
@@ -128,15 +157,15 @@ fn robot_room() {
     }
 }
 
-/// Largest difference of ranges where both have read the same path.
-fn range_error_m(one: &Simulator, other: &Simulator, pose: &Pose) -> f64 {
+/// How many readings of one differ from the other's by more than a millimetre, or are silent where
+/// it is not.
+fn readings_off(one: &Simulator, other: &Simulator, pose: &Pose) -> usize {
     let readings = one.predict(pose, &FULL_SCAN).into_iter().zip(other.predict(pose, &FULL_SCAN));
-    readings
-        .filter_map(|(one, other)| {
-            let same = one.arrival?.path.walls == other.arrival?.path.walls;
-            same.then_some((one.range_m? - other.range_m?).abs())
-        })
-        .fold(0.0, f64::max)
+    let is_off = |pair: &(Prediction, Prediction)| match (pair.0.range_m, pair.1.range_m) {
+        (Some(one), Some(other)) => (one - other).abs() > 1e-3,
+        (one, other) => one.is_some() != other.is_some(),
+    };
+    readings.filter(is_off).count()
 }
 
 /// All echo paths of a six-walled room to order 8, without loss: `benches/peers/` times the same
@@ -196,13 +225,6 @@ fn building_plans() {
             }
         })
         .each_of(poses.len());
-        let survey = time(|| {
-            for at in &poses {
-                black_box(model.station(*at));
-            }
-        })
-        .each_of(poses.len());
-        report("paths: survey of a pose", survey, None);
         report("paths: scan of 400 azimuths", scan, None);
         report("paths: a ping's share of it", scan.each_of(400), None);
         report("parry: 15 ray casts", cast, Some(scan.each_of(400)));

@@ -1,10 +1,9 @@
 //! The transducer's face as a reflector.
 
-use std::f64::consts::SQRT_2;
-
 use num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use smallvec::{SmallVec, smallvec};
 
 /// A transducer's face and housing as a reflector.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -15,14 +14,6 @@ pub struct Face {
     /// Amplitude that it mirrors, 0 to 1.
     pub reflectance: f64,
 }
-
-/// Nodes and weights of Gauss and Legendre's rule on (0, 1), the half above the middle.
-const NODES: [(f64, f64); 4] = [
-    (0.591_717_321_247_825, 0.181_341_891_689_181),
-    (0.762_766_204_958_164, 0.156_853_322_938_944),
-    (0.898_333_238_706_813, 0.111_190_517_226_687),
-    (0.980_144_928_248_768, 0.050_614_268_145_188),
-];
 
 /// A disc that turns sound back at some frequency.
 ///
@@ -93,24 +84,43 @@ impl Disc {
     }
 }
 
-/// `i p` times the integral over `u = rho^2` from 0 to 1 of `J0(q sqrt(u)) exp(-i p u)`.
+/// `i p` times the integral over `u = rho^2` from 0 to 1 of `J0(q sqrt(u)) exp(-i p u)`, by
+/// Lommel's functions (Born and Wolf, Principles of Optics, 8.8.1, with `u = 2 p`, `v = q`).
 fn zones(p: f64, q: f64) -> Complex64 {
     if q < 1e-9 {
         return Complex64::ONE - Complex64::cis(-p);
     }
-    // Eight nodes resolve a turn of phase or a lobe of J0 each; the lobes crowd at u = 0.
-    let panels = ((p + 0.5 * SQRT_2 * q) / 6.0).ceil().max(1.0);
-    let width = 1.0 / panels;
-    let mut sum = Complex64::ZERO;
-    for panel in 0..panels as u32 {
-        for (node, weight) in NODES {
-            for place in [node, 1.0 - node] {
-                let u = (f64::from(panel) + place) * width;
-                sum += weight * libm::j0(q * u.sqrt()) * Complex64::cis(-p * u);
-            }
-        }
+    // In the geometric shadow one series converges, in the light the other.
+    let is_light = 2.0 * p > q;
+    let ratio = if is_light { q / (2.0 * p) } else { 2.0 * p / q };
+    // Both functions at once: U1 + i U2, or V0 + i V1, with `i^2s = (-1)^s`.
+    let turn = Complex64::new(0.0, ratio);
+    let (mut power, mut sum) = (Complex64::ONE, Complex64::ZERO);
+    for bessel in &bessel(q)[usize::from(!is_light)..] {
+        sum += power * bessel;
+        power *= turn;
     }
-    Complex64::new(0.0, p * width) * sum
+    if is_light {
+        Complex64::cis(0.5 * q * ratio) - Complex64::cis(-p) * sum
+    } else {
+        Complex64::new(0.0, ratio) * Complex64::cis(-p) * sum
+    }
+}
+
+/// Bessel's functions of the first kind of an argument above 0, of orders 0, 1, 2 and so on to where
+/// they are below 1e-9: by the recurrence backwards, and `1 = J0 + 2 (J2 + J4 + ...)` (Abramowitz
+/// and Stegun, 9.1.27, 9.1.46).
+fn bessel(x: f64) -> SmallVec<[f64; 40]> {
+    let last = (1.2 * x) as usize + 18;
+    let mut orders: SmallVec<[f64; 40]> = smallvec![0.0; last + 2];
+    orders[last] = 1e-200;
+    for n in (1..=last).rev() {
+        orders[n - 1] = 2.0 * n as f64 / x * orders[n] - orders[n + 1];
+    }
+    let even: f64 = orders.iter().skip(2).step_by(2).sum();
+    let scale = (orders[0] + 2.0 * even).recip();
+    orders.iter_mut().for_each(|order| *order *= scale);
+    orders
 }
 
 #[cfg(test)]
@@ -136,8 +146,24 @@ mod tests {
             let expected = (Complex64::ONE - Complex64::cis(-p)).norm();
             let found = FACE.reflection(&head_on(near, far)).norm();
             assert!((found - expected).abs() < 1e-12, "{near} {far}");
-            // The quadrature agrees with it just off the axis.
+            // The series agree with it just off the axis.
             assert!((zones(p, 1e-7).norm() - expected).abs() < 1e-9, "{p}");
+        }
+    }
+
+    #[test]
+    fn its_zones_are_the_integral_over_them() {
+        const RINGS: u32 = 4000;
+        for p in [0.01, 0.5, 3.0, 12.0, 40.0] {
+            for q in [1e-7, 0.1, 1.0, 2.0 * p, 2.000_001 * p, 8.0, 30.0, 90.0] {
+                let ring = |ring: u32| {
+                    let u = (f64::from(ring) + 0.5) / f64::from(RINGS);
+                    libm::j0(q * u.sqrt()) * Complex64::cis(-p * u) / f64::from(RINGS)
+                };
+                let expected = Complex64::new(0.0, p) * (0..RINGS).map(ring).sum::<Complex64>();
+                let off = (zones(p, q) - expected).norm();
+                assert!(off < 2e-4 * p.max(1.0), "{p} {q}: {} beside {expected}", zones(p, q));
+            }
         }
     }
 

@@ -16,10 +16,13 @@ use super::{Pulse, Sensor};
 pub struct EchoShape {
     first_us: f64,
     step_us: f64,
+    steps_per_us: f64,
     samples: Vec<Complex64>,
     /// The largest modulus up to each sample, and from each sample on.
     so_far: Vec<f64>,
     to_come: Vec<f64>,
+    /// The fastest that it changes, one a microsecond.
+    steepest: f64,
 }
 
 /// Spacing of the tables, microseconds: 1/45 of a 7 kHz filter's standard deviation.
@@ -76,7 +79,17 @@ impl EchoShape {
         for i in (1..samples.len()).rev() {
             to_come[i - 1] = to_come[i - 1].max(to_come[i]);
         }
-        Self { first_us, step_us, samples, so_far, to_come }
+        let steps = samples.windows(2).map(|pair| (pair[1] - pair[0]).norm());
+        let steepest = steps.fold(0.0, f64::max) / step_us;
+        Self {
+            first_us,
+            step_us,
+            steps_per_us: step_us.recip(),
+            samples,
+            so_far,
+            to_come,
+            steepest,
+        }
     }
 
     fn tabulated(length_us: f64, sigma_us: f64, at: impl Fn(f64) -> Complex64) -> Self {
@@ -94,7 +107,7 @@ impl EchoShape {
     /// The envelope at a time, microseconds.
     #[must_use]
     pub fn at(&self, t_us: f64) -> Complex64 {
-        let place = (t_us - self.first_us) / self.step_us;
+        let place = (t_us - self.first_us) * self.steps_per_us;
         if place < 0.0 || place >= (self.samples.len() - 1) as f64 {
             return Complex64::ZERO;
         }
@@ -120,6 +133,12 @@ impl EchoShape {
     #[must_use]
     pub fn peak(&self) -> f64 {
         self.so_far.last().copied().unwrap_or(0.0)
+    }
+
+    /// The fastest that it changes, one a microsecond.
+    #[must_use]
+    pub fn steepest(&self) -> f64 {
+        self.steepest
     }
 
     /// The largest modulus up to a time.

@@ -201,6 +201,22 @@ impl Receiver {
         self.detection(&mut Hearing::new(self, sounds, incident), latch)
     }
 
+    /// The same if only the sounds up to a length there and back are known, in metres, and whether
+    /// that is enough: longer ones can't change it.
+    #[must_use]
+    pub fn detect_within(
+        &self,
+        length_m: f64,
+        sounds: &[Sound],
+        incident: &dyn Fn(&Sound) -> Option<Incident>,
+        latch: Latch,
+    ) -> (Detection, bool) {
+        let mut hearing = Hearing::new(self, sounds, incident);
+        hearing.hear_within(length_m);
+        let detection = self.detection(&mut hearing, latch);
+        (detection, !hearing.asked_beyond())
+    }
+
     /// The same in noise.
     #[must_use]
     pub fn detect_in_noise(
@@ -293,9 +309,10 @@ impl Receiver {
     /// What came closest within the listening window.
     fn silence(&self, hearing: &mut Hearing) -> Detection {
         let (echoes_us, window_us) = (SmallVec::new(), self.window_us());
+        // More has to be known before anything can be said.
+        let known: &[Sound] = if hearing.asked_beyond() { &[] } else { hearing.sounds };
         let relative = |sound: &Sound| sound.amplitude / self.threshold_at(self.tof_us(sound));
-        let sound = hearing
-            .sounds
+        let sound = known
             .iter()
             .filter(|sound| (self.blanking_us..=window_us).contains(&self.tof_us(sound)))
             .filter(|sound| sound.amplitude > 0.0)

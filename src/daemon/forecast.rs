@@ -11,7 +11,7 @@ use crate::{
     geometry::Pose,
     model::Simulator,
     ranger::{Listening, ScanJob, device_record, provenance},
-    scan::{LOG_FORMAT, ModelRecord, ScanAir, ScanPlan, Session, SimRecord},
+    scan::{LOG_FORMAT, ModelRecord, ScanAir, ScanPlan, SceneRef, Session, SimRecord},
 };
 
 /// What predictions depend on, besides scene and sensor.
@@ -75,7 +75,7 @@ impl Forecast {
             sensor: settings.sensor.clone(),
             array: None,
             air: air.to_record(),
-            scene: settings.scene_ref(),
+            scene: settings.scene.as_deref().map(SceneRef::of),
             model: self.model.clone(),
             collection: None,
         }

@@ -215,7 +215,6 @@ fn first_view(settings: &Settings) -> View {
         device: None,
         provenance: None,
         scanning: settings.keys.scanning.clone(),
-        scene: settings.scene_ref(),
         session: None,
         paused: false,
         requested: 0,

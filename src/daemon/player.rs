@@ -254,7 +254,7 @@ impl Player {
             view.provenance = Some(Provenance::Simulated);
             // Whatever port is configured, none is open.
             view.port.clear();
-            view.mode = desk.settings.keys.scanning.mode;
+            view.scanning = desk.scanning.clone();
             (view.paused, view.requested) = (desk.agenda.is_paused(), desk.agenda.requested());
             (view.next_at, view.pose) = (next_at, desk.pose);
             view.air = desk.air.clone();

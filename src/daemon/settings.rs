@@ -10,7 +10,7 @@ use crate::{
     geometry::Pose,
     model::Options,
     ranger::Motion,
-    scan::{ScanPlan, SceneRef},
+    scan::ScanPlan,
     scene::Scene,
     store::Rotation,
 };
@@ -61,13 +61,6 @@ impl Settings {
             step_deg: plan.step_deg,
             pings_per_stop: plan.pings_per_stop,
         }
-    }
-
-    /// The scene as records name it.
-    #[must_use]
-    pub fn scene_ref(&self) -> Option<SceneRef> {
-        let scene = self.scene.as_ref()?;
-        Some(SceneRef { name: scene.name.clone(), sha256: scene.sha256.clone() })
     }
 
     /// How the motor turns and the ranger listens.

@@ -22,8 +22,8 @@ use crate::{
     config::{Mode, ScanningKeys},
     geometry::Pose,
     scan::{
-        Device, Event, Ping, PingStatus, Provenance, Record, ScanEnd, ScanPlan, ScanStart, SceneRef,
-        Session,
+        Device, Event, Ping, PingStatus, Provenance, Record, ScanEnd, ScanPlan, ScanStart,
+        SceneRef, Session,
     },
     scene::Scene,
 };
@@ -267,7 +267,6 @@ pub(super) struct View {
     pub(super) device: Option<Device>,
     pub(super) provenance: Option<Provenance>,
     pub(super) scanning: ScanningKeys,
-    pub(super) scene: Option<SceneRef>,
     pub(super) session: Option<Arc<Session>>,
     pub(super) paused: bool,
     pub(super) requested: u32,
@@ -411,7 +410,7 @@ impl Shared {
             }),
             plan: view.plan,
             pose: view.pose,
-            scene: view.scene,
+            scene: view.scene.as_deref().map(SceneRef::of),
             air: view.air.status(now),
             log,
             subscribers,

@@ -8,6 +8,7 @@ mod batch;
 mod cone;
 mod fan;
 pub mod paths;
+mod place;
 pub(crate) mod raycast;
 mod simulator;
 mod station;
@@ -96,6 +97,16 @@ pub trait Engine: Send + Sync {
     /// the middle.
     fn survey_pair<'a>(&'a self, transmitter: DVec2, receiver: DVec2) -> Box<dyn Survey + 'a> {
         self.survey(0.5 * (transmitter + receiver))
+    }
+
+    /// The same of paths up to a length there and back alone, in metres, between transmitter and
+    /// receiver; `None` from engines that would gain nothing by it.
+    fn survey_within<'a>(
+        &'a self,
+        _places: [DVec2; 2],
+        _max_path_m: f64,
+    ) -> Option<Box<dyn Survey + 'a>> {
+        None
     }
 }
 

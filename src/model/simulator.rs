@@ -12,6 +12,7 @@ use thiserror::Error;
 use super::{
     Cone, Edge, Engine, Fan, FanSettings, Path, Prediction, Reflector, Station,
     paths::{self, PathEngine},
+    place::Place,
 };
 use crate::{
     acoustics::{
@@ -173,7 +174,8 @@ impl Simulator {
         Ok(Self { scene, sensor, air, options, receiver, scatter_height_rad, engine })
     }
 
-    /// Prepares for firing from `position` (world, metres); the costly part, worth keeping.
+    /// Prepares for firing from `position` (world, metres). The costly part is done at the first
+    /// firing that needs it and kept.
     #[must_use]
     pub fn station(&self, position: DVec2) -> Station<'_> {
         Station::new(self, position)
@@ -270,8 +272,8 @@ impl Simulator {
         &self.scene
     }
 
-    pub(super) fn engine(&self) -> &dyn Engine {
-        self.engine.as_ref()
+    pub(super) fn place(&self, at: [DVec2; 2]) -> Place<'_> {
+        Place::new(self.engine.as_ref(), at, 2.0 * self.receiver.max_range_m)
     }
 
     /// The options.

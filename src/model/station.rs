@@ -2,7 +2,7 @@
 
 use rand::Rng;
 
-use super::{Arrival, Prediction, Simulator, Survey};
+use super::{Arrival, Prediction, Simulator, Survey, place::Place};
 use crate::{
     acoustics::{Detection, EchoTrace, Image, Incidence, Incident, Latch, ReceiverNoise, Sound},
     geometry::{DVec2, wrap_pi},
@@ -15,14 +15,14 @@ pub struct Station<'a> {
     position: DVec2,
     /// Of a transducer on the axis, which stays where it is when it turns; one beside the axis is
     /// somewhere else at each azimuth.
-    survey: Option<Box<dyn Survey + 'a>>,
+    axis: Option<Place<'a>>,
 }
 
 impl<'a> Station<'a> {
     pub(super) fn new(simulator: &'a Simulator, position: DVec2) -> Self {
         let on_axis = simulator.sensor().mounting.is_on_axis();
-        let survey = on_axis.then(|| simulator.engine().survey(position));
-        Self { simulator, position, survey }
+        let axis = on_axis.then(|| simulator.place([position; 2]));
+        Self { simulator, position, axis }
     }
 
     /// The reading of a firing in a world direction, radians counter-clockwise from +x: the first
@@ -39,15 +39,28 @@ impl<'a> Station<'a> {
     }
 
     fn listen(&self, direction_rad: f64, latch: Latch) -> Prediction {
-        self.firing(direction_rad, |firing| {
-            let (receiver, sounds) = (self.simulator.receiver(), firing.sounds());
-            let detection = if receiver.asks_incidents() {
+        let receiver = self.simulator.receiver();
+        let mut sounds = Vec::new();
+        self.at(direction_rad, |place| {
+            let (detection, survey) = place.nearest(|survey, reach_m| {
+                survey.listen(direction_rad, &mut sounds);
+                let firing = Firing { survey, direction_rad };
                 let incident = |sound: &Sound| Some(firing.incident(sound));
-                receiver.detect_at_face(&sounds, &incident, latch)
-            } else {
-                receiver.detect_at_face(&sounds, &|_| None, latch)
-            };
-            firing.prediction(detection)
+                let incident: &dyn Fn(&Sound) -> Option<Incident> =
+                    if receiver.asks_incidents() { &incident } else { &|_| None };
+                receiver.detect_within(reach_m, &sounds, incident, latch)
+            });
+            Firing { survey, direction_rad }.prediction(detection)
+        })
+    }
+
+    /// The same by all echoes at once, however far they come from.
+    #[cfg(test)]
+    pub(super) fn ping_by_all(&self, direction_rad: f64, latch: Latch) -> Prediction {
+        self.firing(direction_rad, |firing| {
+            let incident = |sound: &Sound| Some(firing.incident(sound));
+            let receiver = self.simulator.receiver();
+            firing.prediction(receiver.detect_at_face(&firing.sounds(), &incident, latch))
         })
     }
 
@@ -92,20 +105,18 @@ impl<'a> Station<'a> {
         self.firing(direction_rad, |firing| firing.survey.arrival(direction_rad, sound))
     }
 
-    /// Fires from where the transducer is when it looks into a direction.
+    /// Fires with all echoes from where the transducer is when it looks into a direction.
     fn firing<T>(&self, direction_rad: f64, tell: impl FnOnce(&Firing) -> T) -> T {
-        if let Some(survey) = &self.survey {
-            return tell(&Firing { survey: survey.as_ref(), direction_rad });
+        self.at(direction_rad, |place| tell(&Firing { survey: place.whole(), direction_rad }))
+    }
+
+    /// Goes where the transducer is when it looks into a direction.
+    fn at<T>(&self, direction_rad: f64, tell: impl FnOnce(&Place) -> T) -> T {
+        if let Some(place) = &self.axis {
+            return tell(place);
         }
         let mounting = &self.simulator.sensor().mounting;
-        let [transmitter, receiver] = mounting.places(self.position, direction_rad);
-        let engine = self.simulator.engine();
-        let survey = if transmitter == receiver {
-            engine.survey(transmitter)
-        } else {
-            engine.survey_pair(transmitter, receiver)
-        };
-        tell(&Firing { survey: survey.as_ref(), direction_rad })
+        tell(&self.simulator.place(mounting.places(self.position, direction_rad)))
     }
 }
 

@@ -6,6 +6,7 @@ mod extents;
 mod full_wave;
 mod laws;
 mod phenomena;
+mod reach;
 pub(in crate::model) mod reference;
 mod ways;
 

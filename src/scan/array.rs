@@ -48,7 +48,15 @@ impl ScanStart {
         time: Timestamp,
     ) -> Self {
         let plan = model.array().plan(rounds);
-        Self { scan, time, pose, plan, air: None, provenance: Some(Provenance::Simulated) }
+        Self {
+            scan,
+            time,
+            pose,
+            plan,
+            air: None,
+            provenance: Some(Provenance::Simulated),
+            request: None,
+        }
     }
 }
 

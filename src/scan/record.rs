@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-use crate::{acoustics::Sensor, array::RangerArray, geometry::Pose, scan::ScanPlan};
+use crate::{acoustics::Sensor, array::RangerArray, geometry::Pose, scan::ScanPlan, scene::Scene};
 
 /// Version of the record format, written into every session.
 pub const LOG_FORMAT: u32 = 1;
@@ -129,6 +129,14 @@ pub struct SceneRef {
     pub name: String,
     /// SHA-256 of the file's bytes, hexadecimal.
     pub sha256: String,
+}
+
+impl SceneRef {
+    /// Of a scene.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Self {
+        Self { name: scene.name.clone(), sha256: scene.sha256.clone() }
+    }
 }
 
 /// Which engine predicted, and with what settings.

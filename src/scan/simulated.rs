@@ -64,7 +64,7 @@ impl Session {
             sensor: simulator.sensor().clone(),
             array: None,
             air: simulator.air().to_record(),
-            scene: Some(SceneRef { name: scene.name.clone(), sha256: scene.sha256.clone() }),
+            scene: Some(SceneRef::of(scene)),
             model: Some(simulator.model_record()),
             collection: None,
         }

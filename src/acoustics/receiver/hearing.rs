@@ -5,6 +5,7 @@
 //! where one sound is alone its rise is looked up in the table of the pulse.
 
 use num_complex::Complex64;
+use smallvec::SmallVec;
 
 use super::{Combining, Incident, Receiver, Sound, noise::NoiseTrack};
 use crate::acoustics::{EchoShape, Gain};
@@ -15,6 +16,10 @@ const STEP_US: f64 = 8.0;
 
 /// Longest step while the envelope is above the threshold, microseconds.
 const LONG_STEP_US: f64 = 30.0;
+
+/// Longest step over which the envelope is known to stay below the threshold, microseconds: the gain
+/// rises no more than once meanwhile.
+const LONG_QUIET_US: f64 = 200.0;
 
 /// Sounds that together add less than this part to another's amplitude leave it as it is.
 const NEGLIGIBLE: f64 = 3e-3;
@@ -30,9 +35,16 @@ pub(super) struct Hearing<'a> {
     pub(super) sounds: &'a [Sound],
     incident: &'a dyn Fn(&Sound) -> Option<Incident>,
     noise: Option<&'a NoiseTrack>,
+    /// From then on sounds may begin that were not told.
+    horizon_us: f64,
+    /// Whether anything was asked about that time.
+    asked_beyond: bool,
     /// Sounds that have begun, the first `over` of which are over.
-    parts: Vec<Part>,
+    parts: SmallVec<[Part; 16]>,
     over: usize,
+    /// The sounds that last, by [`Self::lasting`], when it was last found out that
+    /// they have to be watched.
+    watched: Option<(usize, usize)>,
     /// Power of the time by which the gain rises.
     exponent: f64,
     least_threshold: f64,
@@ -42,18 +54,24 @@ pub(super) struct Hearing<'a> {
 
 struct Part {
     tof_us: f64,
-    /// Phase and strength, to be multiplied with the shape and with what the gain adds while it
-    /// sounds.
+    /// To be multiplied with the shape and with what the gain adds while it sounds.
+    size: f64,
+    /// Phase of the carrier.
+    turn_rad: f64,
+    /// Size and phase, once they are wanted.
     field: Complex64,
     /// The most of its modulus.
     strength: f64,
+    /// The most that its shape changes it in a microsecond.
+    steepest: f64,
     /// Its own shape; without it, the pulse's.
     shape: Option<Box<EchoShape>>,
 }
 
 impl Part {
     const fn gone(tof_us: f64) -> Self {
-        Self { tof_us, field: Complex64::ZERO, strength: 0.0, shape: None }
+        let field = Complex64::ZERO;
+        Self { tof_us, size: 0.0, turn_rad: 0.0, field, strength: 0.0, steepest: 0.0, shape: None }
     }
 }
 
@@ -70,8 +88,11 @@ impl<'a> Hearing<'a> {
             sounds,
             incident,
             noise: None,
-            parts: Vec::with_capacity(sounds.len()),
+            horizon_us: f64::INFINITY,
+            asked_beyond: false,
+            parts: SmallVec::new(),
             over: 0,
+            watched: None,
             exponent: match receiver.gain {
                 Gain::Compensating { exponent, .. } => exponent,
                 Gain::Steps { .. } => 0.0,
@@ -89,10 +110,25 @@ impl<'a> Hearing<'a> {
         self
     }
 
+    /// Only the sounds up to a length, metres, are known.
+    pub(super) fn hear_within(&mut self, length_m: f64) {
+        let arrives_us = length_m / self.receiver.sound_speed_m_s * 1e6;
+        self.horizon_us = match self.receiver.combining {
+            Combining::Coherent => arrives_us + self.span_us.0,
+            Combining::Ideal => arrives_us,
+        };
+    }
+
+    /// Whether an answer so far might have been another one if sounds beyond the horizon were
+    /// known.
+    pub(super) const fn asked_beyond(&self) -> bool {
+        self.asked_beyond
+    }
+
     /// Back to the firing.
     pub(super) fn rewind(&mut self) {
         self.parts.clear();
-        self.over = 0;
+        (self.over, self.watched) = (0, None);
     }
 
     /// When ECHO next rises if the detector is ready from `ready_us` on: at once if the envelope is
@@ -111,7 +147,7 @@ impl<'a> Hearing<'a> {
         }
         let t_us = t_us + CYCLE_US;
         self.advance(t_us);
-        let size = |part: &Part| part.field.norm() * self.shape_at(part, t_us).norm();
+        let size = |part: &Part| part.size * modulus(self.shape_at(part, t_us));
         let (place, _) = self.parts[self.over..]
             .iter()
             .enumerate()
@@ -123,7 +159,7 @@ impl<'a> Hearing<'a> {
 
     /// The most of the envelope while a sound lasts that begins at `t_us`.
     pub(super) fn peak(&mut self, t_us: f64, sound: Option<&Sound>) -> f64 {
-        const SAMPLES: u32 = 16;
+        const SAMPLES: u32 = 10;
         if self.receiver.combining == Combining::Ideal || self.is_alone(t_us, sound) {
             return sound.map_or(0.0, |sound| sound.amplitude);
         }
@@ -142,6 +178,11 @@ impl<'a> Hearing<'a> {
     /// Envelope at a time; no earlier time can be asked for afterwards.
     pub(super) fn level(&mut self, t_us: f64) -> f64 {
         self.advance(t_us);
+        for part in &mut self.parts[self.over..] {
+            if part.field == Complex64::ZERO {
+                part.field = Complex64::from_polar(part.size, part.turn_rad);
+            }
+        }
         self.level_of(self.over, t_us)
     }
 
@@ -153,7 +194,7 @@ impl<'a> Hearing<'a> {
     /// The part of a sound in the envelope.
     pub(super) fn share(&self, place: usize, t_us: f64) -> f64 {
         self.parts.get(place).map_or(0.0, |part| {
-            part.field.norm() * self.shape_at(part, t_us).norm() * self.rise_of_gain(t_us)
+            part.size * modulus(self.shape_at(part, t_us)) * self.rise_of_gain(t_us)
         })
     }
 
@@ -181,8 +222,8 @@ impl<'a> Hearing<'a> {
         let (mut t_us, mut here) = (ready_us, self.relative_level(ready_us));
         // How long the envelope has been above, less how long below since.
         let mut charge_us = 0.0_f64;
-        while t_us <= window_us + 2.0 * integration_us {
-            if here < 1.0 && charge_us == 0.0 {
+        while t_us <= window_us + 2.0 * integration_us && !self.asked_beyond {
+            if here < 1.0 && charge_us == 0.0 && self.watched != Some(self.lasting()) {
                 match self.skip(t_us) {
                     Skip::Silence => return None,
                     Skip::Lone { rise_us } => return heard(rise_us),
@@ -190,14 +231,18 @@ impl<'a> Hearing<'a> {
                         (t_us, here) = (later_us, self.relative_level(later_us));
                         continue;
                     }
-                    Skip::To(_) => {}
+                    Skip::To(_) => self.watched = Some(self.lasting()),
                 }
             }
             let wanted_us = integration_us - charge_us;
             if here >= 1.0 && wanted_us <= 0.0 {
                 return heard(t_us - charge_us);
             }
-            let step_us = if here >= 1.0 { wanted_us.clamp(1.0, LONG_STEP_US) } else { STEP_US };
+            let step_us = if here >= 1.0 {
+                wanted_us.clamp(1.0, LONG_STEP_US)
+            } else {
+                self.quiet_us(t_us, here)
+            };
             let next_us = t_us + step_us;
             let next = self.relative_level(next_us);
             let turn_us = if (here >= 1.0) == (next >= 1.0) {
@@ -223,6 +268,9 @@ impl<'a> Hearing<'a> {
         }
         loop {
             self.advance(t_us);
+            if self.asked_beyond {
+                return Skip::Silence;
+            }
             let entry_us = self.next_entry_us();
             let live = &self.parts[self.over..];
             let most: f64 = live.iter().map(|part| part.strength).sum();
@@ -260,12 +308,30 @@ impl<'a> Hearing<'a> {
         }
     }
 
+    /// How long the envelope, which is `here` over the threshold now, certainly stays below it, but
+    /// at least the step at which it is watched.
+    fn quiet_us(&self, t_us: f64, here: f64) -> f64 {
+        // What the gain adds in that time is within the tenth.
+        let grows = 1.1 * self.rise_of_gain(t_us);
+        let live = &self.parts[self.over..];
+        let steepest: f64 = live.iter().map(|part| part.steepest).sum();
+        let threshold = self.receiver.threshold_at(t_us);
+        let entry_us = self.next_entry_us().unwrap_or(f64::INFINITY);
+        let quiet_us = ((1.0 - here) * threshold / (grows * steepest)).min(entry_us - t_us);
+        let is_long = self.noise.is_none() && quiet_us.min(LONG_QUIET_US) > STEP_US;
+        // The threshold drifts up with the range and falls where the gain rises by a step.
+        if is_long && self.receiver.threshold_at(t_us + quiet_us.min(LONG_QUIET_US)) >= threshold {
+            quiet_us.min(LONG_QUIET_US)
+        } else {
+            STEP_US
+        }
+    }
+
     /// When a sound alone passes the threshold after `t_us`, and when it is last above.
     fn lone_rise(&self, part: &Part, t_us: f64) -> Option<(f64, f64)> {
         let at = |offset_us: f64| part.tof_us + offset_us - self.receiver.lead_us;
-        let field = part.field.norm();
         let level_at =
-            |t_us: f64| self.receiver.threshold_at(t_us) / (field * self.rise_of_gain(t_us));
+            |t_us: f64| self.receiver.threshold_at(t_us) / (part.size * self.rise_of_gain(t_us));
         let mut rise_us = part.tof_us;
         // The threshold drifts with the range, and the gain with the time.
         for _ in 0..2 {
@@ -283,11 +349,13 @@ impl<'a> Hearing<'a> {
     }
 
     /// One sound at a time: the first that comes after `ready_us`, or one that lasts then.
-    fn next_rise_of_one(&self, ready_us: f64) -> Option<f64> {
+    fn next_rise_of_one(&mut self, ready_us: f64) -> Option<f64> {
         let receiver = self.receiver;
         let lasts_until_us = |sound: &Sound| receiver.tof_us(sound) + receiver.pulse_us;
-        let sound = self.loud().find(|sound| lasts_until_us(sound) >= ready_us)?;
-        Some(receiver.tof_us(sound).max(ready_us))
+        let found = self.loud().find(|sound| lasts_until_us(sound) >= ready_us);
+        let rise_us = found.map(|sound| receiver.tof_us(sound).max(ready_us));
+        self.asked_beyond |= rise_us.unwrap_or(f64::INFINITY) >= self.horizon_us;
+        rise_us
     }
 
     /// The sound that came at a time, or the strongest of those that last then.
@@ -327,7 +395,7 @@ impl<'a> Hearing<'a> {
             } else {
                 low = (t_us, here);
             }
-            if here.abs() < 1e-6 || high.0 - low.0 < 0.01 {
+            if here.abs() < 1e-4 || high.0 - low.0 < 0.01 {
                 break;
             }
         }
@@ -350,12 +418,12 @@ impl<'a> Hearing<'a> {
             Combining::Coherent => {
                 let sum: Complex64 =
                     live.iter().map(|part| part.field * self.shape_at(part, t_us)).sum();
-                (sum * gain + noise).norm()
+                modulus(sum * gain + noise)
             }
             Combining::Ideal => live
                 .iter()
-                .map(|part| part.field.norm() * self.shape_at(part, t_us).norm() * gain)
-                .fold(noise.norm(), f64::max),
+                .map(|part| part.size * modulus(self.shape_at(part, t_us)) * gain)
+                .fold(modulus(noise), f64::max),
         }
     }
 
@@ -372,9 +440,14 @@ impl<'a> Hearing<'a> {
         if self.exponent == 0.0 { 1.0 } else { t_us.max(1.0).powf(self.exponent) }
     }
 
+    fn lasting(&self) -> (usize, usize) {
+        (self.over, self.parts.len())
+    }
+
     fn next_entry_us(&self) -> Option<f64> {
-        let next = self.sounds.get(self.parts.len())?;
-        Some(self.receiver.tof_us(next) + self.span_us.0)
+        let next = self.sounds.get(self.parts.len());
+        let entry_us = next.map(|next| self.receiver.tof_us(next) + self.span_us.0);
+        entry_us.or_else(|| self.horizon_us.is_finite().then_some(self.horizon_us))
     }
 
     /// Lets sounds enter and leave up to a time.
@@ -388,6 +461,7 @@ impl<'a> Hearing<'a> {
 
     /// Lets sounds enter that begin up to a time; what is over by `now_us` only keeps its place.
     fn enter(&mut self, t_us: f64, now_us: f64) {
+        self.asked_beyond |= t_us >= self.horizon_us;
         while let Some(sound) = self.sounds.get(self.parts.len()) {
             let tof_us = self.receiver.tof_us(sound);
             if tof_us + self.span_us.0 > t_us {
@@ -410,12 +484,24 @@ impl<'a> Hearing<'a> {
             Some((_, None)) => (0.0, None),
             None => (sound.amplitude, None),
         };
-        let turn = sound.phase_rad - receiver.omega * tof_us;
-        let field = Complex64::from_polar(strength / self.rise_of_gain(tof_us), turn);
-        let peak = shape.as_deref().unwrap_or(&receiver.shape).peak();
-        let strength = strength / self.rise_of_gain(tof_us) * peak;
-        Part { tof_us, field, strength, shape }
+        let size = strength / self.rise_of_gain(tof_us);
+        let of = shape.as_deref().unwrap_or(&receiver.shape);
+        Part {
+            tof_us,
+            size,
+            turn_rad: sound.phase_rad - receiver.omega * tof_us,
+            field: Complex64::ZERO,
+            strength: size * of.peak(),
+            steepest: size * of.steepest(),
+            shape,
+        }
     }
+}
+
+/// Without the care that [`Complex64::norm`] takes of numbers beyond 1e150, which costs as much as
+/// all the rest of a sum.
+fn modulus(number: Complex64) -> f64 {
+    number.norm_sqr().sqrt()
 }
 
 /// Where to go on from a time without echo.
@@ -428,13 +514,16 @@ enum Skip {
     To(f64),
 }
 
-/// The least that the threshold in force ever is.
+/// The least that the threshold in force ever is after blanking: it rises with the range within a
+/// step of the gain, so it is least at the start of one.
 fn least_threshold(receiver: &Receiver) -> f64 {
-    let Gain::Steps { steps } = &receiver.gain else { return receiver.threshold };
-    let starts = steps.iter().filter_map(|step| step.until_us);
-    starts
-        .chain([receiver.blanking_us])
-        .filter(|start_us| *start_us >= receiver.blanking_us)
-        .map(|start_us| receiver.threshold_at(start_us))
-        .fold(f64::INFINITY, f64::min)
+    let mut start_us = 0.0_f64;
+    let at_starts = receiver.sensitivity.iter().filter_map(|&(until_us, sensitivity)| {
+        let from_us = start_us.max(receiver.blanking_us);
+        start_us = until_us;
+        (from_us < until_us)
+            .then(|| receiver.threshold * receiver.range_m(from_us).max(1e-3) * sensitivity)
+    });
+    let least = at_starts.fold(f64::INFINITY, f64::min);
+    if least.is_finite() { least } else { receiver.threshold }
 }

@@ -146,10 +146,7 @@ impl Setup {
             sensor: self.sensor.clone(),
             array: None,
             air: self.air.to_record(),
-            scene: Some(SceneRef {
-                name: self.scene.name.clone(),
-                sha256: self.scene.sha256.clone(),
-            }),
+            scene: Some(SceneRef::of(&self.scene)),
             model: Some(self.simulator.model_record()),
             collection: None,
         }

@@ -43,7 +43,6 @@ impl Operator {
             view.device = desk.identity.as_ref().map(device_record);
             view.provenance = desk.identity.as_ref().map(provenance);
             view.scanning = desk.scanning.clone();
-            view.scene = desk.settings.scene_ref();
             (view.paused, view.requested) = (desk.agenda.is_paused(), desk.agenda.requested());
             (view.next_at, view.plan, view.pose) = (next_at, desk.plan, desk.pose);
             view.scene.clone_from(&desk.settings.scene);

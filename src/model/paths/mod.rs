@@ -112,6 +112,8 @@ mod wheel;
 pub use settings::{Settings, usual_z_m};
 pub use survey::PathEngine;
 
+use std::sync::Arc;
+
 use self::{
     arms::Partners,
     echo::{Echo, Via, sorted},
@@ -132,18 +134,18 @@ use crate::{
 };
 
 /// A scene made ready for enumerating echo paths.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Paths {
     settings: Settings,
     /// By wall.
-    faces: Vec<Face>,
-    edges: Edges,
-    rounds: Rounds,
-    heights: Heights,
+    faces: Arc<[Face]>,
+    edges: Arc<Edges>,
+    rounds: Arc<Rounds>,
+    heights: Arc<Heights>,
     /// By floor and ceiling; none in a scene in the plane.
-    images: Vec<Image>,
+    images: Arc<[Image]>,
     /// `None` for a scene with nothing in it.
-    mesh: Option<Mesh>,
+    mesh: Option<Arc<Mesh>>,
 }
 
 /// A wall as beams need it.
@@ -224,13 +226,21 @@ impl Paths {
             edges: settings
                 .edge_law
                 .map(|law| Edges::new(&plan, &segments, &gains, law))
-                .unwrap_or_default(),
-            rounds: Rounds::new(circles, mesh.as_ref()),
-            images: vertical::images(scene.floor_z_m, scene.ceiling_z_m, z_m, settings.max_path_m),
-            heights,
+                .unwrap_or_default()
+                .into(),
+            rounds: Rounds::new(circles, mesh.as_ref()).into(),
+            images: vertical::images(scene.floor_z_m, scene.ceiling_z_m, z_m, settings.max_path_m)
+                .into(),
+            heights: heights.into(),
             settings,
-            mesh,
+            mesh: mesh.map(Arc::new),
         }
+    }
+
+    /// The same for paths up to a length, metres, which is at most the one it was prepared for.
+    fn within(&self, max_path_m: f64) -> Self {
+        let settings = Settings { max_path_m, ..self.settings.clone() };
+        Self { settings, ..self.clone() }
     }
 
     /// All echo paths from a place, shortest first.

@@ -23,7 +23,7 @@
 //! Followed are the ways that go back as they came, mirrors on the way included. What is scattered
 //! more than once is left out.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{PI, SQRT_2, TAU};
 
 use super::{Echo, Face, Paths, Settings, Via, beam::Beam, trace::Tree};
 use crate::geometry::DVec2;
@@ -34,8 +34,11 @@ const PATCH_RAD: f64 = 0.03;
 /// Longest difference of range over a patch, metres: a third of a burst of 16 cycles.
 const PATCH_M: f64 = 0.02;
 
-/// Turns of phase from patch to patch: the golden section, whose multiples spread most evenly.
+/// Turns of phase from patch to patch: the golden section, whose multiples spread most evenly; and
+/// from wall to wall, and from one mirror on the way to the next, the roots of 2 and 3.
 const PHASE_TURNS: f64 = 0.618_033_988_749_895;
+const WALL_TURNS: f64 = SQRT_2;
+const ORDER_TURNS: f64 = 1.732_050_807_568_877;
 
 /// The part of a rough wall that a beam lights.
 #[derive(Debug, Clone, Copy)]
@@ -70,39 +73,81 @@ fn add(paths: &Paths, lit: &Lit, tree: &mut Tree, echoes: &mut Vec<Echo>) {
     let along = face.mirror.normal.perp();
     let height_m = face.mirror.height_m(beam.image).abs();
     let foot_m = along.dot(beam.image);
-    // By angle from the normal, so that patches look alike from the ranger.
+    if height_m <= 0.0 {
+        return;
+    }
+    let rows = Row::new(height_m);
     let angle = |place_m: f64| (place_m - foot_m).atan2(height_m);
     let (from_rad, to_rad) = (angle(low_m), angle(high_m));
-    let mut at_rad = from_rad;
-    while at_rad < to_rad {
-        let range_m = height_m / at_rad.cos();
-        let slope_m = (range_m * at_rad.tan().abs()).max(range_m * PATCH_RAD);
-        let step_rad = PATCH_RAD.min(PATCH_M / slope_m).max(1e-4);
-        let next_rad = (at_rad + step_rad).min(to_rad);
-        let middle_rad = 0.5 * (at_rad + next_rad);
+    let (first, last) = (rows.place(from_rad).floor() as i32, rows.place(to_rad).ceil() as i32);
+    for patch in first..last {
+        let begins_rad = rows.angle_rad(patch.into());
+        let (low_rad, high_rad) =
+            (begins_rad.max(from_rad), rows.angle_rad((patch + 1).into()).min(to_rad));
+        let middle_rad = 0.5 * (low_rad + high_rad);
         let place_m = foot_m + height_m * middle_rad.tan();
         let place = face.mirror.offset_m * face.mirror.normal + place_m * along;
         let run = place - beam.image;
         let length_m = 2.0 * run.length();
-        let share = share(face, middle_rad.cos(), next_rad - at_rad, settings);
+        let share = share(face, middle_rad.cos(), (high_rad - low_rad).max(0.0), settings);
         let amplitude = beam.gain * beam.gain * share.sqrt() * settings.air_gain(length_m);
-        at_rad = next_rad;
         if amplitude < settings.floor || length_m > settings.max_path_m {
             continue;
         }
         let departure = beam.departure(run.normalize_or_zero());
         let number = tree.spots.len() as u32;
         tree.spots.push(Spot { wall, leg: (&beam.ray_to(place)).into(), place });
+        // The powers of two beams' parts of a patch add up if they are a quarter turn apart.
+        let turns = PHASE_TURNS * f64::from(patch)
+            + WALL_TURNS * f64::from(wall)
+            + ORDER_TURNS * f64::from(beam.order)
+            + if begins_rad < from_rad { 0.25 } else { 0.0 };
         echoes.push(Echo {
             length_m,
             amplitude,
-            phase_rad: TAU * (PHASE_TURNS * f64::from(number)).fract() - PI,
+            phase_rad: TAU * turns.rem_euclid(1.0) - PI,
             departure,
             arrival: departure,
             rise_rad: [0.0; 2],
             image: 0,
             via: Via::Scatter { spot: number },
         });
+    }
+}
+
+/// The patches of a wall, numbered from the foot of the perpendicular by angle, so that they look
+/// alike from the ranger, and farther out by range: where each one is does not depend on what of
+/// the wall is lit.
+struct Row {
+    height_m: f64,
+    /// Where the one goes over into the other.
+    turn_rad: f64,
+}
+
+impl Row {
+    fn new(height_m: f64) -> Self {
+        // There both patches are of a size: `h sin a / cos^2 a PATCH_RAD = PATCH_M`.
+        let q = PATCH_M / (PATCH_RAD * height_m);
+        Self { height_m, turn_rad: (2.0 * q / (1.0 + (1.0 + 4.0 * q * q).sqrt())).asin() }
+    }
+
+    /// The number of the patch at an angle from the normal, and how far through it.
+    fn place(&self, angle_rad: f64) -> f64 {
+        let inner = angle_rad.abs().min(self.turn_rad);
+        let outer_m = self.height_m / angle_rad.cos() - self.height_m / inner.cos();
+        (inner / PATCH_RAD + outer_m.max(0.0) / PATCH_M).copysign(angle_rad)
+    }
+
+    /// The other way round.
+    fn angle_rad(&self, place: f64) -> f64 {
+        let turn = self.turn_rad / PATCH_RAD;
+        let outer_m = (place.abs() - turn) * PATCH_M;
+        let angle_rad = if outer_m <= 0.0 {
+            place.abs() * PATCH_RAD
+        } else {
+            (self.height_m / (self.height_m / self.turn_rad.cos() + outer_m)).acos()
+        };
+        angle_rad.copysign(place)
     }
 }
 
@@ -115,6 +160,20 @@ fn share(face: &Face, cosine: f64, angle_rad: f64, settings: &Settings) -> f64 {
 mod tests {
     use super::*;
     use crate::{geometry::Mirror, scene::Material};
+
+    #[test]
+    fn patches_are_small_and_their_numbers_run_on() {
+        for height_m in [0.03, 0.4, 3.0, 9.0] {
+            let row = Row::new(height_m);
+            for patch in -40..40 {
+                let [low, high] = [patch, patch + 1].map(|end| row.angle_rad(f64::from(end)));
+                assert!(low < high && high - low < 1.0001 * PATCH_RAD, "{height_m} {patch}");
+                let range_m = |angle_rad: f64| height_m / angle_rad.cos();
+                assert!((range_m(high) - range_m(low)).abs() < 1.0001 * PATCH_M);
+                assert!((row.place(low) - f64::from(patch)).abs() < 1e-6, "{height_m} {patch}");
+            }
+        }
+    }
 
     /// Mirrored and scattered energy together, the latter summed over the half space.
     #[test]

@@ -61,11 +61,19 @@ impl PathEngine {
 
 impl Engine for PathEngine {
     fn survey<'a>(&'a self, position: DVec2) -> Box<dyn Survey + 'a> {
-        Box::new(PathSurvey::new(self, position, position))
+        self.survey_pair(position, position)
     }
 
     fn survey_pair<'a>(&'a self, transmitter: DVec2, receiver: DVec2) -> Box<dyn Survey + 'a> {
-        Box::new(PathSurvey::new(self, transmitter, receiver))
+        Box::new(PathSurvey::new(self, self.paths.clone(), [transmitter, receiver]))
+    }
+
+    fn survey_within<'a>(
+        &'a self,
+        places: [DVec2; 2],
+        max_path_m: f64,
+    ) -> Option<Box<dyn Survey + 'a>> {
+        Some(Box::new(PathSurvey::new(self, self.paths.within(max_path_m), places)))
     }
 }
 
@@ -75,6 +83,8 @@ const REACHES_DEG: [f64; 5] = [6.0, 10.0, 16.0, 30.0, 180.0];
 /// The echo paths of a place.
 struct PathSurvey<'a> {
     engine: &'a PathEngine,
+    /// The engine's, perhaps for shorter paths.
+    paths: Paths,
     trees: Trees,
     /// Shortest first.
     echoes: Vec<Echo>,
@@ -85,13 +95,13 @@ struct PathSurvey<'a> {
 }
 
 impl<'a> PathSurvey<'a> {
-    fn new(engine: &'a PathEngine, transmitter: DVec2, receiver: DVec2) -> Self {
-        let (trees, echoes) = engine.paths.echoes(transmitter, receiver, engine.both.as_ref());
-        let floor = engine.paths.settings.floor;
+    fn new(engine: &'a PathEngine, paths: Paths, [transmitter, receiver]: [DVec2; 2]) -> Self {
+        let (trees, echoes) = paths.echoes(transmitter, receiver, engine.both.as_ref());
+        let settings = &paths.settings;
         let mut spokes: [Vec<Spoke>; REACHES_DEG.len()] = Default::default();
         for (echo, index) in echoes.iter().zip(0..) {
-            if let Some(mut spoke) = Spoke::of(echo, index, &engine.envelope, floor) {
-                if engine.paths.settings.tilt_rad != 0.0 {
+            if let Some(mut spoke) = Spoke::of(echo, index, &engine.envelope, settings.floor) {
+                if settings.tilt_rad != 0.0 {
                     // A tilted axis may be nearer to a rising path than its azimuth is.
                     spoke.reach_rad = PI;
                 }
@@ -103,24 +113,24 @@ impl<'a> PathSurvey<'a> {
         let wheels = spokes.map(|spokes| Wheel::new(&spokes));
         // Transmitter and receiver apart have a face each, and a tilted one turns sound up or down:
         // what runs between them and the walls is left out.
-        let faces_level = transmitter == receiver && engine.paths.settings.tilt_rad == 0.0;
+        let faces_level = transmitter == receiver && settings.tilt_rad == 0.0;
         let loops = engine
             .face
             .filter(|_| faces_level)
-            .map(|face| Loops::new(face, &echoes, &engine.envelope, &engine.paths.settings));
-        Self { engine, trees, echoes, wheels, loops }
+            .map(|face| Loops::new(face, &echoes, &engine.envelope, settings));
+        Self { engine, paths, trees, echoes, wheels, loops }
     }
 
     /// Echoes by way of the face, in a direction in (-pi, pi].
     fn trains(&self, direction_rad: f64) -> Vec<Train> {
-        let settings = &self.engine.paths.settings;
+        let settings = &self.paths.settings;
         self.loops
             .as_ref()
             .map_or_else(Vec::new, |loops| loops.trains(direction_rad, &self.engine.beam, settings))
     }
 
     fn train_arrival(&self, direction_rad: f64, train: &Train, amplitude: f64) -> Arrival {
-        let paths = &self.engine.paths;
+        let paths = &self.paths;
         let way = |round: &Round| {
             let mut way = paths.path(&self.trees, &self.echoes[round.echo as usize]);
             if round.reversed {
@@ -159,10 +169,10 @@ impl Survey for PathSurvey<'_> {
     fn listen(&self, direction_rad: f64, sounds: &mut Vec<Sound>) {
         sounds.clear();
         let direction_rad = wrap_pi(direction_rad);
-        let (beam, floor) = (&self.engine.beam, self.engine.paths.settings.floor);
+        let (beam, floor) = (&self.engine.beam, self.paths.settings.floor);
         let is_flat = self.engine.is_flat();
         for wheel in &self.wheels {
-            for (spoke, off_rad) in wheel.near(direction_rad) {
+            wheel.near(direction_rad, |spoke, off_rad| {
                 let mut ends = [off_rad + spoke.half_rad, off_rad - spoke.half_rad];
                 if !is_flat {
                     let rise_rad = self.echoes[spoke.echo as usize].rise_rad;
@@ -171,15 +181,10 @@ impl Survey for PathSurvey<'_> {
                 let [leaving, arriving] = ends.map(|angle| beam.one_way(angle));
                 let amplitude = spoke.amplitude * leaving * arriving;
                 if amplitude >= floor {
-                    let echo = &self.echoes[spoke.echo as usize];
-                    sounds.push(Sound {
-                        length_m: echo.length_m,
-                        amplitude,
-                        phase_rad: echo.phase_rad,
-                        index: spoke.echo,
-                    });
+                    let Echo { length_m, phase_rad, .. } = self.echoes[spoke.echo as usize];
+                    sounds.push(Sound { length_m, amplitude, phase_rad, index: spoke.echo });
                 }
-            }
+            });
         }
         // Echoes are numbered by length; trains come after all of them.
         sounds.sort_unstable_by_key(|sound| sound.index);
@@ -198,7 +203,7 @@ impl Survey for PathSurvey<'_> {
             return self.train_arrival(direction_rad, &trains[train], sound.amplitude);
         }
         let echo = &self.echoes[index];
-        let path = self.engine.paths.path(&self.trees, echo);
+        let path = self.paths.path(&self.trees, echo);
         Arrival {
             length_m: path.length_m,
             amplitude: sound.amplitude,

@@ -140,19 +140,27 @@ impl Loops {
         settings: &Settings,
     ) -> Vec<Train> {
         let floor = FLOOR_ABOVE * settings.floor;
-        let mut outs: SmallVec<[(Loop, f64); 16]> = SmallVec::new();
-        for (spoke, _) in self.departures.near(direction_rad) {
+        let mut near: SmallVec<[(&Loop, f64); 16]> = SmallVec::new();
+        self.departures.near(direction_rad, |spoke, _| {
             let round = &self.rounds[spoke.echo as usize];
             let leaves_rad = wrap_once(round.leaves_rad - direction_rad);
             let returns_rad = wrap_once(round.returns_rad - direction_rad);
             if returns_rad.abs() < FRAC_PI_2 {
-                let leaving = spoke.amplitude * beam.one_way(leaves_rad);
-                outs.push((Loop { leaves_rad, returns_rad, ..*round }, leaving));
+                near.push((round, spoke.amplitude * beam.one_way(leaves_rad)));
             }
-        }
+        });
         // Each needs another that it can be joined to.
-        let best = Best::of(outs.iter().map(|(out, leaving)| (out.length_m, *leaving)));
-        outs.retain(|(out, leaving)| best.after(&self.face, out.length_m, *leaving) >= floor);
+        let best = Best::of(near.iter().map(|(out, leaving)| (out.length_m, *leaving)));
+        near.retain(|(out, leaving)| best.after(&self.face, out.length_m, *leaving) >= floor);
+        if near.is_empty() {
+            return Vec::new();
+        }
+        let turned = |&(round, leaving): &(&Loop, f64)| {
+            let leaves_rad = wrap_once(round.leaves_rad - direction_rad);
+            let returns_rad = wrap_once(round.returns_rad - direction_rad);
+            (Loop { leaves_rad, returns_rad, ..*round }, leaving)
+        };
+        let outs: SmallVec<[(Loop, f64); 16]> = near.iter().map(turned).collect();
         let mut search = Search::new(self.face, &outs, floor, settings);
         for (out, leaving) in &outs {
             let strength = out.field / out.field.norm() * leaving / out.length_m;

@@ -132,23 +132,31 @@ impl Wheel {
         Self { spokes: sorted, bins, reach_rad }
     }
 
-    /// The spokes within their reach of a direction in (-pi, pi].
-    pub(super) fn near(&self, direction_rad: f64) -> impl Iterator<Item = (&Spoke, f64)> {
-        let bins = BINS as i64;
-        let (middle, reach) =
-            (bin(direction_rad) as i64, (self.reach_rad / TAU * BINS as f64).ceil() as i64);
-        let (from, to) =
-            if 2 * reach + 1 >= bins { (0, bins) } else { (middle - reach, middle + reach + 1) };
-        let part = move |from: i64, to: i64| {
-            let at = |bin: i64| self.bins[bin.clamp(0, bins) as usize] as usize;
-            &self.spokes[at(from)..at(to)]
+    /// Tells the spokes within their reach of a direction in (-pi, pi], and how far off each is.
+    pub(super) fn near<'a>(&'a self, direction_rad: f64, mut tell: impl FnMut(&'a Spoke, f64)) {
+        if self.spokes.is_empty() {
+            return;
+        }
+        let mut part = |from: i64, to: i64| {
+            let at = |bin: i64| self.bins[bin.clamp(0, BINS as i64) as usize] as usize;
+            for spoke in &self.spokes[at(from)..at(to).max(at(from))] {
+                let off_rad = wrap_once(direction_rad - spoke.middle_rad);
+                if off_rad.abs() <= spoke.reach_rad {
+                    tell(spoke, off_rad);
+                }
+            }
         };
+        let bins = BINS as i64;
+        let middle = bin(direction_rad) as i64;
+        let reach = (self.reach_rad / TAU * BINS as f64).ceil() as i64;
+        if 2 * reach + 1 >= bins {
+            return part(0, bins);
+        }
+        let (from, to) = (middle - reach, middle + reach + 1);
+        part(from, to);
         // What leaves the circle on one side comes in on the other.
-        let wrapped = [part(from + bins, bins), part(from, to), part(0, to - bins)];
-        wrapped.into_iter().flatten().filter_map(move |spoke| {
-            let off_rad = wrap_once(direction_rad - spoke.middle_rad);
-            (off_rad.abs() <= spoke.reach_rad).then_some((spoke, off_rad))
-        })
+        part(from + bins, bins);
+        part(0, to - bins);
     }
 }
 

@@ -102,7 +102,7 @@ impl<'a> Collector<'a> {
             collection: self.id,
             sonard: env!("CARGO_PKG_VERSION").into(),
             keys: serde_json::to_value(&self.loaded.keys).unwrap_or_default(),
-            scene: SceneRef { name: scene.name.clone(), sha256: scene.sha256.clone() },
+            scene: SceneRef::of(scene),
             sensor_sha256,
             poses,
         };

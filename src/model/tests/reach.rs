@@ -1,0 +1,63 @@
+//! Short surveys give what the whole one gives.
+
+use std::sync::Arc;
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use crate::{
+    acoustics::{Air, Latch, Sensor},
+    geometry::DVec2,
+    model::{Options, Simulator},
+    scene::{Scene, shipped},
+};
+
+/// Pings of one station, by the nearest echoes that settle them, beside pings by all echoes.
+fn check(scene: &str, sensor: &str, options: Options) {
+    let text = shipped::text(scene).expect("a shipped scene");
+    let scene = Arc::new(Scene::from_json(text).expect("a valid scene"));
+    let sensor = Sensor::preset(sensor).expect("a preset");
+    let simulator = Simulator::new(scene.clone(), sensor, Air::default(), options).expect("valid");
+    let mut random = Pcg64::seed_from_u64(5);
+    for pose in scene.poses.values() {
+        let off = DVec2::new(random.random_range(-0.02..0.02), random.random_range(-0.02..0.02));
+        let station = simulator.station(pose.position() + off);
+        for _ in 0..20 {
+            let direction_rad = random.random_range(-3.1..3.1);
+            assert_eq!(
+                station.ping(direction_rad),
+                station.ping_by_all(direction_rad, Latch::First),
+                "{} {pose:?} {direction_rad}",
+                scene.name
+            );
+            assert_eq!(
+                station.ping_rearmed(direction_rad),
+                station.ping_by_all(direction_rad, Latch::Rearmed),
+                "{} {pose:?} {direction_rad}",
+                scene.name
+            );
+        }
+    }
+}
+
+#[test]
+fn the_nearest_echoes_settle_what_all_of_them_would() {
+    for scene in [
+        "simple-room",
+        "corridor",
+        "oblique-corner",
+        "echo-traces",
+        "plane-corner-edge",
+        "mcgill-lab",
+    ] {
+        check(scene, "senscomp-6500", Options::default());
+    }
+    check(
+        "simple-room-robot",
+        "senscomp-6500",
+        Options { max_range_m: Some(3.0), ..Options::default() },
+    );
+    check("simple-room", "senscomp-6500", Options { ideal_receiver: true, ..Options::default() });
+    check("plane-corner-edge", "bozma-kuc-60khz", Options::default());
+    check("oblique-corner", "hc-sr04", Options::default());
+}
