@@ -22,6 +22,7 @@ mod operator;
 mod outlet;
 mod player;
 mod settings;
+mod simulation;
 mod status;
 
 use std::sync::Arc;
@@ -38,9 +39,10 @@ pub use journal::{Journal, JournalThread, LogStatus};
 pub use machine::{BackOff, Input, LinkMachine, LinkState, Step, Transition, Trouble};
 pub use operator::OpenPort;
 pub use settings::{Mismatch, Settings, Simulated};
+pub use simulation::{RangerReading, SimulationReport};
 pub use status::{
-    ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, RangerReading, ScanProgress,
-    ScanReport, ScanTotals, ScanningReport, SimulationReport, Status, SubscriberReport,
+    ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, ScanProgress, ScanReport,
+    ScanTotals, ScanningReport, Status, SubscriberReport,
 };
 
 use crate::{

@@ -18,7 +18,8 @@ use super::{
     desk::{Desk, Interrupt},
     machine::LinkState,
     outlet::Outlet,
-    status::{RangerReading, ScanTotals, SimulationReport},
+    simulation::{RangerReading, SimulationReport},
+    status::ScanTotals,
 };
 use crate::{
     geometry::Pose,

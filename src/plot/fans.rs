@@ -47,8 +47,10 @@ impl Fan {
         for beam in &scan.beams {
             let (Some(ranger), Some(name)) = (&beam.transducer, &beam.ranger) else { continue };
             let range_m = beam.range_m.unwrap_or(self.max_range_m);
-            // Where the fan is wide enough, but not so far out that it leaves the picture.
-            let out_m = (0.6 * range_m).min(0.3 * plan.view.size().min_element());
+            // Where the fan is wide enough, but not so far out that it leaves the picture; a silent
+            // one's nearer, where fewer other names are.
+            let share = if beam.range_m.is_some() { 0.3 } else { 0.15 };
+            let out_m = (0.6 * range_m).min(share * plan.view.size().min_element());
             let at = plan.px(ranger.point_at(0.0, out_m)) + Px::new(0.0, 4.0);
             names.text(at, Anchor::Middle, theme::SMALL_PX, name);
         }
