@@ -238,7 +238,7 @@ pub struct ServerKeys {
     /// Who may use the socket: its permissions, octal (restart).
     #[schemars(regex(pattern = "^0?[0-7]{3}$"))]
     pub socket_mode: String,
-    /// TCP address (restart). Anything but loopback needs a token for every request.
+    /// TCP address of API and live page (restart). Off loopback, all data need a token.
     #[schemars(example = "127.0.0.1:8765")]
     pub listen: Option<String>,
     /// File with the token that writes over TCP must show (restart); without one there are no

@@ -15,6 +15,7 @@ export class Refused extends Error {
   }
 }
 
+let wake = () => {};
 let asking = null;
 let declined = false;
 
@@ -44,10 +45,16 @@ export async function follow(path, onLine, onState) {
       if (error instanceof Refused && error.status === 401 && !declined) await askToken(error);
     }
     onState(false);
-    await new Promise((done) => setTimeout(done, wait));
+    await new Promise((done) => {
+      wake = done;
+      setTimeout(done, wait);
+    });
     wait = Math.min(2 * wait, LONGEST_WAIT_MS);
   }
 }
+
+/** Tries the stream again at once: the daemon is known to be back. */
+export const hurry = () => wake();
 
 function send(path, { method = "GET", body, signal } = {}) {
   const headers = {};

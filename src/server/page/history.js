@@ -56,6 +56,7 @@ export class History {
     const whole = await ask(`/v1/scans/${id}`).catch(() => null);
     if (!whole?.start || !whole.pings.length) return;
     this.shown = new Scan(whole.start, whole.session);
+    this.shown.underWay = true;
     this.mark();
     this.onShow(this.shown);
     const turn = ++this.playing;
@@ -67,6 +68,7 @@ export class History {
       const at = (now - began) * Number(this.speed.value);
       while (next < whole.pings.length && dues[next] <= at) this.shown.add(whole.pings[next++]);
       if (next < whole.pings.length) return requestAnimationFrame(step);
+      this.shown.underWay = false;
       if (whole.end) this.shown.finish(whole.end);
       this.onShow(this.shown);
     };

@@ -1,6 +1,6 @@
 // Puts the page together: the live scan or a past one on plan, strip, table and panel.
 
-import { ask, follow } from "./api.js";
+import { ask, follow, hurry } from "./api.js";
 import { BeamPanel, inWords } from "./beam.js";
 import { control } from "./control.js";
 import { History } from "./history.js";
@@ -24,6 +24,10 @@ let session = null;
 let shown = null;
 let selected = null;
 let changed = false;
+/** A scan whose beginning was not heard, and which the log was asked for. */
+let unheard = null;
+let catching = null;
+let again = false;
 
 const plan = new Plan(byId("stage"), select);
 const strip = new Strip(byId("strip"), select);
@@ -75,11 +79,11 @@ function tell() {
   const beyond = plan.beyond();
   setText(byId("beyond"), beyond ? `${beyond} readings lie beyond the view: arrows on its border` : "");
   const progress = byId("progress");
-  progress.hidden = !shown || shown.end !== null;
+  progress.hidden = !shown?.underWay;
   if (!shown) return setText(byId("which"), "no scan yet");
   progress.max = shown.planned;
   progress.value = shown.beams.size;
-  const when = shown === live && !shown.end ? "live" : clock(shown.start.time);
+  const when = shown === live && shown.underWay ? "live" : clock(shown.start.time);
   setText(byId("which"), `${when} · ${shown.beams.size} of ${shown.planned} beams`);
   const other = shown.session?.scene && !plan.sceneFits();
   byId("stage").title = other ? `Taken in the scene ${shown.session.scene.name}, which is not in force: no walls are drawn` : "";
@@ -119,6 +123,7 @@ function take(record) {
       break;
     case "scan_start":
       live = new Scan(record, session);
+      live.underWay = true;
       if (history.shown === null) {
         show(live);
         summary.began(live);
@@ -126,6 +131,10 @@ function take(record) {
       break;
     case "ping":
       if (live?.id === record.scan) live.add(record);
+      else if (unheard !== record.scan) {
+        unheard = record.scan;
+        catchUp();
+      }
       break;
     case "scan_end":
       if (live?.id !== record.scan) break;
@@ -147,18 +156,35 @@ function take(record) {
   }
 }
 
-/** Gets from the log what was not heard live: all of the newest scan so far. */
-async function catchUp() {
+/** Gets from the log what was not heard live; asked while it does, it does so once more. */
+function catchUp() {
+  again = catching !== null;
+  catching ??= readNewest().finally(() => {
+    catching = null;
+    if (again) catchUp();
+  });
+}
+
+/** All of the newest scan so far. */
+async function readNewest() {
   await Promise.all([loadScene(), history.refresh()]);
   const newest = byId("scans-list").querySelector("button")?.dataset.scan;
   if (!newest) return;
-  const whole = await ask(`/v1/scans/${newest}`).catch(() => null);
+  const asked = Promise.all([ask(`/v1/scans/${newest}`), ask("/v1/status")]);
+  const [whole, status] = await asked.catch(() => []);
   if (!whole?.start) return;
-  const since = live?.id === newest ? live.beams : new Map();
+  const heard = live;
+  // A scan that began while the log was read is newer than what was read.
+  if (heard && heard.id !== newest && Date.parse(heard.start.time) > Date.parse(whole.start.time)) return;
   session = whole.session ?? session;
   live = Scan.of(whole);
-  // Readings that came by the stream while the log was read.
-  for (const ping of since.values()) if (!live.beams.has(ping.index)) live.add(ping);
+  if (heard?.id === newest) {
+    // What came by the stream while the log was read.
+    for (const ping of heard.beams.values()) if (!live.beams.has(ping.index)) live.add(ping);
+    if (heard.end && !live.end) live.finish(heard.end);
+  }
+  // One that a killed daemon left in the log has no end and is not under way either.
+  live.underWay = !live.end && status.scan?.scan === live.id;
   if (history.shown === null) {
     show(live);
     summary.shows(live);
@@ -196,8 +222,16 @@ watch((status) => {
   if (version && status && status.sonard !== version) location.reload();
   version ??= status?.sonard;
   // A daemon that is back after a restart has news, whether or not the stream noticed.
-  if (status && !answered) catchUp();
+  if (status && !answered) {
+    hurry();
+    catchUp();
+  }
   answered = status !== null;
 });
-follow("/v1/live/records?format=sse&verdicts=true", take, (there) => there && catchUp());
+follow("/v1/live/records?format=sse&verdicts=true", take, (there) => {
+  if (there) return catchUp();
+  // Whether its scan goes on, the daemon says when it is back.
+  if (live) live.underWay = false;
+  changed = true;
+});
 requestAnimationFrame(frame);

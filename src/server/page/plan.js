@@ -289,7 +289,7 @@ export class Plan {
     const c = this.over;
     this.clear(c);
     if (!this.scan) return;
-    if (!this.scan.end && this.latest) this.drawRay(c, this.latest, this.palette["--quiet"], [2, 5]);
+    if (this.scan.underWay && this.latest) this.drawRay(c, this.latest, this.palette["--quiet"], [2, 5]);
     if (!this.selected) return;
     this.drawRay(c, this.selected, this.palette["--ray"], [6, 4]);
     if (this.way) this.drawWay(c);

@@ -8,6 +8,8 @@ export class Scan {
     this.start = start;
     this.session = session;
     this.end = null;
+    /** Whether more readings are to come. */
+    this.underWay = false;
     this.beams = new Map();
     this.counts = new Map();
     this.added = [];
@@ -36,6 +38,7 @@ export class Scan {
 
   finish(end) {
     this.end = end;
+    this.underWay = false;
   }
 
   /** The reading of a beam, or of the nearest one that there is. */

@@ -20,7 +20,8 @@ export class Summary {
   }
 
   shows(scan) {
-    this.say(scan.end ? `${scan.inWords()}.` : `A scan of ${scan.planned} beams that has not ended.`);
+    const course = scan.end ? "" : scan.underWay ? "Under way: " : "Not ended: ";
+    this.say(`${course}${scan.inWords()}.`);
   }
 
   event({ kind, detail }) {

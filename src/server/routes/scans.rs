@@ -168,9 +168,12 @@ async fn beam(
         Failed::new(StatusCode::NOT_FOUND, "the scan has no such beam", help)
     })?;
     let scene = api.daemon.scene();
-    // One after the other: looking asks the model, which takes its time.
-    let _turn = api.looking.acquire().await;
-    let looking = tokio::task::spawn_blocking(move || look(&view, ping, scene.as_deref()));
+    // One after the other, also when clients leave meanwhile: asking the model takes its time.
+    let turn = Arc::clone(&api.looking).acquire_owned().await;
+    let looking = tokio::task::spawn_blocking(move || {
+        let _turn = turn;
+        look(&view, ping, scene.as_deref())
+    });
     looking.await.map(Json).map_err(|error| broken(&error))
 }
 
