@@ -41,4 +41,8 @@ for pose in a b c d; do
 done
 "$SONARD" simulate --scene simple-room --pose fig9 --out "$work/fig9.jsonl"
 "$SONARD" plot "$work/fig9.jsonl" --azimuth-deg 270 -o "$pictures/simple-room-fig9-way.png"
+
+# One room explored in three ways.
+"$SONARD" explore-benchmark --rooms 2 --out "$work/rooms" >/dev/null
+cp "$work/rooms/room-2/maps.png" "$pictures/explored.png"
 ls -l "$pictures"
