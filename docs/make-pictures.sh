@@ -42,6 +42,10 @@ done
 "$SONARD" simulate --scene simple-room --pose fig9 --out "$work/fig9.jsonl"
 "$SONARD" plot "$work/fig9.jsonl" --azimuth-deg 270 -o "$pictures/simple-room-fig9-way.png"
 
+# One room explored in three ways.
+"$SONARD" explore-benchmark --rooms 2 --out "$work/rooms" >/dev/null
+cp "$work/rooms/room-2/maps.png" "$pictures/explored.png"
+
 # Eight sonars of a Pioneer 3-DX.
 "$SONARD" simulate --array pioneer-8 --scene mcgill-lab --pose fig4 --out "$work/array.jsonl"
 "$SONARD" plot "$work/array.jsonl" -o "$pictures/array-mcgill-lab.png"

@@ -308,7 +308,8 @@ pub(super) fn write_all(
         save(&folder.join(format!("stage-{stage}.png")), &png)?;
     }
     let every = count.div_ceil(MOST_FRAMES);
-    let shown: Vec<usize> = (1..=count).filter(|stop| (count - stop) % every == 0).collect();
+    let shown: Vec<usize> =
+        (1..=count).filter(|stop| (count - stop).is_multiple_of(every)).collect();
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left");
     let bar = ProgressBar::new(shown.len() as u64)
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));

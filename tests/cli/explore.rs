@@ -89,7 +89,7 @@ fn wrong_input_is_refused_with_what_would_be_right() {
         (&["--pose", "fig9"][..], "farther from it"),
         (&["--pose", "0.464,0.371,0", "--standoff", "0"][..], "from 0.4 to 3"),
         (&["--pose", "0.464,0.371,0", "--odometry-noise", "2"][..], "from 0 to 1"),
-        (&["--pose", "0.464,0.371,0", "--logical", "-1"][..], "--logical"),
+        (&["--pose", "0.464,0.371,0", "--logical", "0"][..], "from 0.5 to 20"),
         (&["--pose", "nowhere"][..], "fig9"),
     ] {
         let output = run(&[&scene[..], further].concat());

@@ -111,7 +111,7 @@ fn one_scan_makes_a_map_with_free_space() {
     let out = folder.path().join("map").to_str().expect("plain path").to_owned();
     let of = |logs: &[String]| object(&with("map", logs, &["--out", &out, "--json"]));
     let (one, three) = (of(&logs[..1]), of(&logs));
-    assert_eq!((one["evidence"].as_u64(), three["evidence"].as_u64()), (Some(3), Some(1)));
+    assert_eq!((one["evidence"].as_u64(), three["evidence"].as_u64()), (Some(5), Some(2)));
     let free_m2 = |map: &Value| map["free_cells"].as_f64().expect("a number") * 0.05 * 0.05;
     // The room has 10.8 square metres; one scan hears a good part of it.
     assert!(free_m2(&one) > 2.0, "{one}");
