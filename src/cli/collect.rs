@@ -27,7 +27,7 @@ use super::{
     runtime::{self, Interrupts},
 };
 use crate::{
-    collect::{CollectionKeys, Folder, FolderError, Manifest, read_journal, verify},
+    collect::{CollectionKeys, Folder, FolderError, JOURNAL, Journal, Manifest, verify},
     config::document,
 };
 use load::Loaded;
@@ -155,7 +155,7 @@ fn verify_folder(root: &Path) -> Outcome {
 }
 
 fn missing_manifest(root: &Path, error: &FolderError) -> Failure {
-    let help = if root.join(crate::collect::JOURNAL).exists() {
+    let help = if root.join(JOURNAL).exists() {
         "the collection was broken off before the first scan was whole, or its manifest was removed: \
          start it again, or `sonard collect --report DIR`"
     } else {
@@ -164,13 +164,18 @@ fn missing_manifest(root: &Path, error: &FolderError) -> Failure {
     Failure::input(error, help)
 }
 
-/// Report and manifest of a folder as it is.
+/// Report and manifest of a folder as it is, if nobody collects into it at the moment.
 fn write_report(root: &Path) -> Outcome {
     let folder = Folder::at(root);
-    let help = "give the folder of a collection";
-    let history = read_journal(&folder.journal()).map_err(|error| Failure::input(&error, help))?;
-    report::write(&folder, &history)?;
-    let manifest = Manifest::of(&folder, &history).map_err(|error| refuse(&error))?;
+    if !folder.journal().exists() {
+        return Err(Failure::input(
+            format!("{} is no collection: it has no {JOURNAL}", root.display()),
+            "give the folder of a collection",
+        ));
+    }
+    let journal = Journal::open(&folder.journal()).map_err(|error| refuse(&error))?;
+    report::write(&folder, journal.history())?;
+    let manifest = Manifest::of(&folder, journal.history()).map_err(|error| refuse(&error))?;
     manifest.write(&folder).map_err(|error| refuse(&error))
 }
 

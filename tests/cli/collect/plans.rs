@@ -38,6 +38,13 @@ fn a_plan_becomes_scans_a_report_and_a_manifest_that_notices_any_change() {
     assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
     assert_eq!(case.verify().0, Some(0));
 
+    // Report and manifest can be made anew, and are the same but for their time.
+    let out = case.path("out");
+    let anew = |path: &str| run(&["collect", "--report", path]).status.code();
+    assert_eq!(anew(out.to_str().expect("plain path")), Some(0));
+    assert_eq!((case.text("out/report.md"), case.verify().0), (report, Some(0)));
+    assert_eq!(anew("/nowhere"), Some(2));
+
     for (change, said) in [
         ("scans/p001-r01.jsonl", "p001-r01.jsonl: changed"),
         ("journal.jsonl", "journal.jsonl: changed"),
