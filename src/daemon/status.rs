@@ -22,8 +22,7 @@ use crate::{
     config::{Mode, ScanningKeys},
     geometry::Pose,
     scan::{
-        Device, Event, Ping, Provenance, Record, ScanEnd, ScanPlan, ScanStart,
-        SceneRef, Session,
+        Device, Event, Ping, Provenance, Record, ScanEnd, ScanPlan, ScanStart, SceneRef, Session,
     },
     scene::Scene,
 };

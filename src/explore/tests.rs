@@ -19,8 +19,8 @@ use crate::{
 
 fn simulator(scene: Scene) -> Simulator {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-    // What is heard beyond the logical distance is left out anyway.
-    let options = Options { max_range_m: Some(3.5), ..Options::default() };
+    // As the paper's, and by default those of `sonard explore`.
+    let options = Options { max_range_m: Some(8.0), ..Options::default() };
     Simulator::new(Arc::new(scene), sensor, Air::default(), options).expect("figures")
 }
 
