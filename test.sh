@@ -85,9 +85,6 @@ fi
 step "examples in the documentation"
 cargo test --workspace --doc --quiet
 
-step "tests"
-cargo test --workspace --lib --bins --tests --quiet -- --skip live_page::
-
 if [ "${PAGE:-1}" = 0 ]; then
   step "the live page: LEFT OUT, because PAGE=0"
 else
@@ -95,3 +92,6 @@ else
   step "the live page in $(chromium --version)"
   cargo test --test cli --quiet live_page::
 fi
+
+step "tests"
+cargo test --workspace --lib --bins --tests --quiet -- --skip live_page::
