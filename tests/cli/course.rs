@@ -7,7 +7,7 @@ use tempfile::TempDir;
 
 use crate::common::{run, stderr};
 
-const POSES: [&str; 2] = ["0.774,0.085,90", "0.74,0.1,80"];
+const POSES: [&str; 2] = ["0.774,0.085,270", "0.5,0.2,260"];
 
 /// Runs with an arc of ten beams and gives the records.
 fn simulated(scene: &str, place: [&str; 2]) -> Vec<Value> {
