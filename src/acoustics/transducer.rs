@@ -57,7 +57,7 @@ impl BeamPattern {
         let theta_rad = theta_rad.abs();
         match &self.0 {
             Shape::Table(table) => {
-                let place = theta_rad / STEP_RAD;
+                let place = theta_rad * (1.0 / STEP_RAD);
                 let below = place as usize;
                 let (Some(low), Some(high)) = (table.get(below), table.get(below + 1)) else {
                     return 0.0;
