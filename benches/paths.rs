@@ -21,7 +21,7 @@ use sonard::{
         Engine, EngineKind, Fan, FanSettings, Options, Prediction, Simulator,
         paths::{PathEngine, Paths},
     },
-    scan::ScanPlan,
+    scan::{PingStatus, ScanPlan},
     scene::{Material, Scene, Wall, shipped},
 };
 
@@ -99,30 +99,64 @@ fn small_room() {
             Some(exact),
         );
     }
-    let time = time(|| printed_fan(&scene, &paths, &pose));
-    report("the fan as printed, at 0.1 degrees, each ping anew", time, Some(exact));
+    let truth = ideal.predict(&pose, &FULL_SCAN);
+    for spacing_deg in [1.0, 0.1] {
+        let fan = PrintedFan::new(&scene, &paths, spacing_deg);
+        let (off, echoes) = fan.readings_off(&pose, &truth);
+        let time = time(|| drop(black_box(fan.scan(&pose))));
+        let what = format!("as printed, at {spacing_deg} degrees, {off} of {echoes} echoes off");
+        report(&what, time, Some(exact));
+    }
 }
 
-/// The paper's appendix A as printed: rays over the whole circle for each direction, up to the
-/// first that is heard.
-fn printed_fan(scene: &Scene, simulator: &Simulator, pose: &Pose) {
-    let receiver = simulator.receiver();
-    let beam = BeamPattern::new(simulator.sensor(), simulator.sound_speed_m_s());
-    let frequency_hz = simulator.sensor().frequency_hz;
-    let settings = FanSettings {
-        spacing_rad: 0.1_f64.to_radians(),
-        half_face_m: simulator.sensor().half_width_m(),
-        wavelength_m: simulator.sound_speed_m_s() / frequency_hz,
-        absorption_db_per_m: simulator.air().absorption_db_per_m(frequency_hz),
-        longest_m: 2.0 * receiver.max_range_m,
-        weakest: receiver.threshold,
-        max_order: u32::MAX,
-    };
-    let fan = Fan::new(scene, beam, settings);
-    for i in 0..FULL_SCAN.beams() {
-        let direction_rad = pose.direction_rad(FULL_SCAN.step_deg * f64::from(i));
-        let shortest_m = 2.0 * receiver.min_range_m();
-        black_box(fan.first_echo(pose.position(), direction_rad, shortest_m, receiver.threshold));
+/// The paper's appendix A as printed: rays over the whole circle for each direction anew, up to
+/// the first that is heard.
+struct PrintedFan {
+    fan: Fan,
+    shortest_m: f64,
+    threshold: f64,
+}
+
+impl PrintedFan {
+    fn new(scene: &Scene, simulator: &Simulator, spacing_deg: f64) -> Self {
+        let receiver = simulator.receiver();
+        let beam = BeamPattern::new(simulator.sensor(), simulator.sound_speed_m_s());
+        let frequency_hz = simulator.sensor().frequency_hz;
+        let settings = FanSettings {
+            spacing_rad: spacing_deg.to_radians(),
+            half_face_m: simulator.sensor().half_width_m(),
+            wavelength_m: simulator.sound_speed_m_s() / frequency_hz,
+            absorption_db_per_m: simulator.air().absorption_db_per_m(frequency_hz),
+            longest_m: 2.0 * receiver.max_range_m,
+            weakest: receiver.threshold,
+            max_order: u32::MAX,
+        };
+        let fan = Fan::new(scene, beam, settings);
+        Self { fan, shortest_m: 2.0 * receiver.min_range_m(), threshold: receiver.threshold }
+    }
+
+    /// Ranges, metres.
+    fn scan(&self, pose: &Pose) -> Vec<Option<f64>> {
+        let range_m = |i: u32| {
+            let direction_rad = pose.direction_rad(FULL_SCAN.step_deg * f64::from(i));
+            let Self { fan, shortest_m, threshold } = self;
+            let echo = fan.first_echo(pose.position(), direction_rad, *shortest_m, *threshold);
+            echo.map(|echo| echo.length_m / 2.0)
+        };
+        (0..FULL_SCAN.beams()).map(range_m).collect()
+    }
+
+    /// How many of the echoes that there are it misses or puts a millimetre off, and how many
+    /// there are. It knows no minimum range.
+    fn readings_off(&self, pose: &Pose, truth: &[Prediction]) -> (usize, usize) {
+        let echoes = |prediction: &Prediction| prediction.status == PingStatus::Echo;
+        let is_off = |(mine, truth): &(Option<f64>, &Prediction)| match (mine, truth.range_m) {
+            (Some(mine), Some(range_m)) => (mine - range_m).abs() > 1e-3,
+            _ => true,
+        };
+        let scan = self.scan(pose);
+        let pairs = || scan.iter().copied().zip(truth).filter(|(_, truth)| echoes(truth));
+        (pairs().filter(is_off).count(), pairs().count())
     }
 }
 

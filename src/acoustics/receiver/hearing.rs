@@ -177,11 +177,6 @@ impl<'a> Hearing<'a> {
             .fold(0.0, f64::max)
     }
 
-    /// Envelope over threshold at a time; no earlier time can be asked for afterwards.
-    pub(super) fn relative_level(&mut self, t_us: f64) -> f64 {
-        self.level(t_us) / self.receiver.threshold_at(t_us)
-    }
-
     /// Envelope at a time; no earlier time can be asked for afterwards.
     pub(super) fn level(&mut self, t_us: f64) -> f64 {
         self.advance(t_us);
@@ -324,13 +319,18 @@ fn modulus(number: Complex64) -> f64 {
 /// The least that the threshold in force ever is after blanking: it rises with the range within a
 /// step of the gain, so it is least at the start of one.
 fn least_threshold(receiver: &Receiver) -> f64 {
-    let mut start_us = 0.0_f64;
-    let at_starts = receiver.sensitivity.iter().filter_map(|&(until_us, sensitivity)| {
-        let from_us = start_us.max(receiver.blanking_us);
-        start_us = until_us;
-        (from_us < until_us)
-            .then(|| receiver.threshold * receiver.range_m(from_us).max(1e-3) * sensitivity)
-    });
-    let least = at_starts.fold(f64::INFINITY, f64::min);
-    if least.is_finite() { least } else { receiver.threshold }
+    // As `Receiver::threshold_at` reckons.
+    let least_us = 1e-3 / receiver.range_m(1.0);
+    let (mut from_us, mut least) = (receiver.blanking_us, f64::INFINITY);
+    for &(until_us, sensitivity) in &receiver.sensitivity {
+        if from_us < until_us {
+            least = least.min(from_us.max(least_us) * sensitivity);
+            from_us = until_us;
+        }
+    }
+    if least.is_finite() {
+        receiver.threshold * receiver.range_m(least)
+    } else {
+        receiver.threshold
+    }
 }

@@ -19,40 +19,39 @@ impl Hearing<'_> {
         let integration_us = self.receiver.integration_us;
         let window_us = self.receiver.window_us() + WINDOW_SLACK_US;
         let heard = |rise_us: f64| Some(rise_us.max(ready_us)).filter(|us| *us <= window_us);
-        let (mut t_us, mut here) = (ready_us, self.relative_level(ready_us));
+        let (mut t_us, mut here) = (ready_us, self.standing(ready_us));
         // How long the envelope has been above, less how long below since.
         let mut charge_us = 0.0_f64;
         while t_us <= window_us + 2.0 * integration_us && !self.asked_beyond() {
-            if here < 1.0 && charge_us == 0.0 && self.watched != Some(self.lasting()) {
+            if !here.above && charge_us == 0.0 && self.watched != Some(self.lasting()) {
                 match self.skip(t_us) {
                     Skip::Silence => return None,
                     Skip::Lone { rise_us } => return heard(rise_us),
                     Skip::To(later_us) if later_us > t_us => {
-                        (t_us, here) = (later_us, self.relative_level(later_us));
+                        (t_us, here) = (later_us, self.standing(later_us));
                         continue;
                     }
                     Skip::To(_) => self.watched = Some(self.lasting()),
                 }
             }
             let wanted_us = integration_us - charge_us;
-            if here >= 1.0 && wanted_us <= 0.0 {
+            if here.above && wanted_us <= 0.0 {
                 return heard(t_us - charge_us);
             }
-            let step_us = if here >= 1.0 {
+            let step_us = if here.above {
                 wanted_us.clamp(1.0, LONG_STEP_US)
             } else {
-                self.quiet_us(t_us, here)
+                self.quiet_us(t_us, &here)
             };
             let next_us = t_us + step_us;
-            let next = self.relative_level(next_us);
-            let turn_us = if (here >= 1.0) == (next >= 1.0) {
+            let next = self.standing(next_us);
+            let turn_us = if here.above == next.above {
                 next_us
             } else {
-                self.turn((t_us, here), (next_us, next))
+                self.turn((t_us, here.relative), (next_us, next.relative))
             };
             // Before the turn as it is here, after it as it is next.
-            for (part_us, above) in
-                [(turn_us - t_us, here >= 1.0), (next_us - turn_us, next >= 1.0)]
+            for (part_us, above) in [(turn_us - t_us, here.above), (next_us - turn_us, next.above)]
             {
                 charge_us = (charge_us + if above { part_us } else { -part_us }).max(0.0);
             }
@@ -115,16 +114,25 @@ impl Hearing<'_> {
         Skip::Silence
     }
 
-    /// How long the envelope, which is `here` over the threshold now, certainly stays below it, but
+    /// How the envelope stands to the threshold at a time; no earlier time can be asked for
+    /// afterwards.
+    fn standing(&mut self, t_us: f64) -> Standing {
+        let (level, threshold) = (self.level(t_us), self.receiver.threshold_at(t_us));
+        let relative = level / threshold;
+        Standing { relative, threshold, above: relative >= 1.0 }
+    }
+
+    /// How long the envelope, which stands as `here` now, certainly stays below the threshold, but
     /// at least the step at which it is watched.
-    fn quiet_us(&self, t_us: f64, here: f64) -> f64 {
+    fn quiet_us(&self, t_us: f64, here: &Standing) -> f64 {
         // What the gain adds in that time is within the tenth.
         let grows = 1.1 * self.rise_of_gain(t_us);
         let live = &self.parts[self.over..];
         let steepest: f64 = live.iter().map(|part| part.steepest).sum();
-        let threshold = self.receiver.threshold_at(t_us);
+        let threshold = here.threshold;
         let entry_us = self.next_entry_us().unwrap_or(f64::INFINITY);
-        let quiet_us = ((1.0 - here) * threshold / (grows * steepest)).min(entry_us - t_us);
+        let quiet_us =
+            ((1.0 - here.relative) * threshold / (grows * steepest)).min(entry_us - t_us);
         let is_long = self.noise.is_none() && quiet_us.min(LONG_QUIET_US) > STEP_US;
         // The threshold drifts up with the range and falls where the gain rises by a step.
         if is_long && self.receiver.threshold_at(t_us + quiet_us.min(LONG_QUIET_US)) >= threshold {
@@ -178,12 +186,22 @@ impl Hearing<'_> {
         t_us
     }
 
-    /// The same as [`relative_level`](Self::relative_level) a step or less before the last time
+    /// Envelope over threshold a step or less before the last time
     /// asked for.
     fn relative_level_back(&self, t_us: f64) -> f64 {
         // What was over at the later time may not have been.
         self.level_of(self.over.saturating_sub(8), t_us) / self.receiver.threshold_at(t_us)
     }
+}
+
+/// How the envelope stands to the threshold.
+#[derive(Clone, Copy)]
+struct Standing {
+    /// Envelope over threshold.
+    relative: f64,
+    /// The threshold in force.
+    threshold: f64,
+    above: bool,
 }
 
 /// Where to go on from a time without echo.
