@@ -24,7 +24,7 @@ use super::{
 use crate::{
     geometry::Pose,
     ranger::Sink as _,
-    scan::{EventKind, Ping, Provenance, Record, ScanEnd, ScanStart, Session},
+    scan::{EventKind, Ping, Provenance, Record, STOPPED_ON_REQUEST, ScanEnd, ScanStart, Session},
 };
 use rhythm::Rhythm;
 use stage::{Drive, Stage};
@@ -130,7 +130,7 @@ impl Player {
         }
         if let Some(interrupt) = halted {
             let stopping = interrupt == Interrupt::Shutdown;
-            let why = if stopping { "the daemon is stopping" } else { "stopped on request" };
+            let why = if stopping { "the daemon is stopping" } else { STOPPED_ON_REQUEST };
             self.out.event(EventKind::Stopped, why.to_owned());
         }
         let missing = order.len() as u32 - fired;

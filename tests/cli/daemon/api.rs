@@ -79,7 +79,7 @@ fn the_server_does_what_its_document_says() {
             }
         }
     }
-    assert!(operations >= 23, "{operations} operations");
+    assert!(operations >= 25, "{operations} operations");
     // Refusals are as the document says, too.
     for (method, path, body, status) in [
         ("GET", "/v1/nothing", "", 404),
