@@ -237,6 +237,7 @@ fn first_view(settings: &Settings) -> View {
         line: status::Line::default(),
         scans: ScanTotals::default(),
         clock: ClockReport::default(),
-        simulation: None,
+        // From the first look on: nobody shall take a simulation for a ranger.
+        simulation: settings.simulated.as_ref().map(|one| SimulationReport::of(&one.array)),
     }
 }

@@ -1,4 +1,4 @@
-//! The ranger of a collection: met, carried from pose to pose, lost and found again.
+//! A ranger that the collection itself drives: met, carried from pose to pose, lost and found again.
 
 use std::time::Duration;
 
@@ -26,7 +26,7 @@ enum Kind {
     Emulator { sensor: String, air: [f64; 3], running: Option<Emulator> },
 }
 
-pub(super) struct Device {
+pub(super) struct Own {
     kind: Kind,
     world: MockWorldArgs,
     scene: String,
@@ -34,7 +34,7 @@ pub(super) struct Device {
     ranger: Option<Ranger<SerialStream>>,
 }
 
-impl Device {
+impl Own {
     /// Gets it ready at the first pose; nothing is asked of it yet.
     pub(super) fn new(
         args: &Args,
