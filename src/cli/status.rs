@@ -85,6 +85,9 @@ fn screen(status: &Value, health: &Value) -> String {
     ]);
     let reasons = health["reasons"].as_array().into_iter().flatten();
     lines.extend(reasons.map(|reason| format!("  not well: {}", word(reason))));
+    if let Some(error) = status["air"]["error"].as_str() {
+        lines.push(format!("  the thermometer can't be read: {error}"));
+    }
     if let Some(error) = status["configuration"]["error"].as_str() {
         lines.push(format!("  the last change of the configuration was refused: {error}"));
     }

@@ -67,7 +67,7 @@ pub(super) async fn collect(
 ) -> Outcome {
     let mut collector = Collector::begin(args, loaded, daemon, interrupts).await?;
     let outcome = collector.work().await;
-    collector.bar.finish();
+    collector.bar.hide();
     collector.leave_device().await;
     // However it ended, the manifest says what is there.
     let closed = collector.close(outcome.is_ok());

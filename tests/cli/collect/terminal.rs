@@ -15,7 +15,8 @@ struct Person(PtySession);
 impl Person {
     fn starts(case: &Case) -> Self {
         let arguments = case.arguments(&[]);
-        let command = sonard(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+        let mut command = sonard(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+        command.env("TERM", "xterm");
         let options = Options::new().timeout_ms(Some(60_000)).strip_ansi_escape_codes(true);
         Self(spawn_with_options(command, options).expect("a terminal"))
     }
@@ -55,6 +56,7 @@ fn at_a_terminal_enter_goes_on_and_an_interrupt_can_be_gone_on_from() {
     ada.answers("door:", "open");
     let (said, code) = ada.interrupts_at("put the ranger at fig7");
     assert!(code == 1 && said.contains("1 of 2 scans") && said.contains("stopped"), "{said}");
+    assert!(!said.contains(" beams"), "a bar was drawn over the question: {said:?}");
     assert_eq!(case.files("taking"), Vec::<String>::new());
     assert_eq!(case.manifest()["complete"], false);
 
