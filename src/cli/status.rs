@@ -2,6 +2,7 @@
 
 use std::io::Write as _;
 
+use jiff::Timestamp;
 use serde_json::{Value, json};
 
 use super::{
@@ -98,10 +99,10 @@ fn screen(status: &Value, health: &Value) -> String {
 fn device(status: &Value, health: &Value) -> Vec<String> {
     vec![
         format!(
-            "{} for {} s on {}",
-            word(&status["link"]["state"]).replace('_', " "),
-            figure(&status["uptime_s"]),
+            "{} on {}; the daemon runs for {} s",
+            state(status),
             word(&status["link"]["port"]),
+            figure(&status["uptime_s"]),
         ),
         format!(
             "  device   {} firmware {} ({})",
@@ -131,8 +132,8 @@ fn simulation(status: &Value) -> Vec<String> {
     });
     vec![
         format!(
-            "SIMULATED, nothing measured: {} for {} s",
-            word(&status["link"]["state"]).replace('_', " "),
+            "SIMULATED, nothing measured: {}; the daemon runs for {} s",
+            state(status),
             figure(&status["uptime_s"]),
         ),
         format!(
@@ -149,6 +150,14 @@ fn simulation(status: &Value) -> Vec<String> {
         ),
         format!("  ranges   {} m", readings.collect::<Vec<_>>().join(", ")),
     ]
+}
+
+/// What it is doing or suffering, and for how long.
+fn state(status: &Value) -> String {
+    let link = &status["link"];
+    let since = link["since"].as_str().and_then(|time| time.parse::<Timestamp>().ok());
+    let seconds = since.map(|since| Timestamp::now().duration_since(since).as_secs_f64());
+    format!("{} for {} s", word(&link["state"]).replace('_', " "), figure(&seconds.into()))
 }
 
 fn word(value: &Value) -> String {

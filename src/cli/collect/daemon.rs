@@ -47,8 +47,8 @@ pub(super) struct Status {
     link: Link,
     device: Option<Device>,
     provenance: Option<Provenance>,
-    scanning: ScanningKeysNow,
-    pub(super) air: AirNow,
+    scanning: ScanningNow,
+    air: AirNow,
     simulation: Option<Value>,
     scene: Value,
 }
@@ -60,14 +60,14 @@ struct Link {
 }
 
 #[derive(Deserialize)]
-struct ScanningKeysNow {
+struct ScanningNow {
     mode: Mode,
     every_s: f64,
 }
 
 #[derive(Deserialize)]
-pub(super) struct AirNow {
-    pub(super) temperature_c: f64,
+struct AirNow {
+    temperature_c: f64,
     humidity_percent: f64,
     pressure_kpa: f64,
     source: AirSource,
@@ -142,7 +142,7 @@ impl Daemon {
         air: Option<&AirOrder>,
     ) -> Result<Option<Borrowed>, Failure> {
         let status = self.ready().await?;
-        let ScanningKeysNow { mode, every_s } = status.scanning;
+        let ScanningNow { mode, every_s } = status.scanning;
         let mut before = self.borrowed.clone();
         if mode != Mode::OnRequest {
             before.get_or_insert_default().scanning = Some(ScanningKeys { mode, every_s });
