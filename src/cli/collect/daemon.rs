@@ -126,7 +126,7 @@ impl Daemon {
     }
 
     /// Waits until it has a ranger that can be used.
-    pub(super) async fn meet(&mut self) -> Result<Met, Failure> {
+    pub(super) async fn meet(&self) -> Result<Met, Failure> {
         let status = self.ready().await?;
         match (status.device, status.provenance) {
             (Some(device), Some(provenance)) => Ok(Met { device, provenance }),
@@ -138,7 +138,7 @@ impl Daemon {
     /// scans are held, because only the collection knows where the ranger stands, and the air is
     /// what the plan says, if it says anything.
     pub(super) async fn to_borrow(
-        &mut self,
+        &self,
         air: Option<&AirOrder>,
     ) -> Result<Option<Borrowed>, Failure> {
         let status = self.ready().await?;
@@ -199,7 +199,7 @@ impl Daemon {
 
     /// Has a scan taken into `path`, by a body of `POST /v1/start`.
     pub(super) async fn take(
-        &mut self,
+        &self,
         (wish, of): (&Value, CollectionRef),
         path: &Path,
         bar: &Bar,
@@ -214,7 +214,7 @@ impl Daemon {
                 session.collection = Some(Box::new(of.clone()));
             }
             stopped |= is_stop(&record);
-            sink.record(&record).map_err(taking::refuse)?;
+            sink.record(&record).map_err(|error| taking::refuse(&error))?;
             if matches!(record, Record::ScanEnd(_)) {
                 break;
             }
@@ -226,7 +226,7 @@ impl Daemon {
                 () = self.interrupts.clone().wait() => {
                     // What can't be had any more is in the daemon's log.
                     for record in scans.cancel().await.unwrap_or_default() {
-                        sink.record(&record).map_err(taking::refuse)?;
+                        sink.record(&record).map_err(|error| taking::refuse(&error))?;
                     }
                 }
             }
@@ -238,7 +238,7 @@ impl Daemon {
 
     /// Asks for the scan and waits for its first record; a daemon that restarts meanwhile is asked
     /// again.
-    async fn begin(&mut self, wish: &Value) -> Result<(RequestedScans, Record), Failure> {
+    async fn begin(&self, wish: &Value) -> Result<(RequestedScans, Record), Failure> {
         loop {
             self.ready().await?;
             let mut scans = match RequestedScans::ask(self.client.clone(), wish).await {
@@ -259,7 +259,7 @@ impl Daemon {
     }
 
     async fn first(
-        &mut self,
+        &self,
         scans: &mut RequestedScans,
     ) -> Result<Result<Record, ScansError>, Failure> {
         loop {
@@ -275,7 +275,7 @@ impl Daemon {
     }
 
     /// Waits, for as long as the plan's patience, until the daemon answers and has its ranger.
-    async fn ready(&mut self) -> Result<Status, Failure> {
+    async fn ready(&self) -> Result<Status, Failure> {
         let (until, mut told) = (Instant::now() + self.patience, false);
         loop {
             let failure = match self.look().await {

@@ -12,7 +12,7 @@ use crate::{
 /// Who takes the scans.
 pub(super) enum Device {
     /// The collection itself.
-    Own(Own),
+    Own(Box<Own>),
     /// A daemon that is running already.
     Daemon(Box<Daemon>),
 }

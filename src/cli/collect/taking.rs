@@ -40,7 +40,7 @@ pub(super) async fn take(
     interrupts: &Interrupts,
 ) -> Result<Taken, Failure> {
     let mut sink = Taking::open(path, bar)?;
-    sink.record(&Record::Session(Box::new(session))).map_err(refuse)?;
+    sink.record(&Record::Session(Box::new(session))).map_err(|error| refuse(&error))?;
     let began = Instant::now();
     ranger.reanchor();
     let outcome = ranger.scan(job, &mut sink, interrupts.clone().reason()).await;
@@ -77,19 +77,19 @@ pub(super) struct Taking<'a> {
 
 impl<'a> Taking<'a> {
     pub(super) fn open(path: &Path, bar: &'a Bar) -> Result<Self, Failure> {
-        let log = LogWriter::open(path).map_err(refuse)?.with_sync_interval(SYNC);
+        let log = LogWriter::open(path).map_err(|error| refuse(&error))?.with_sync_interval(SYNC);
         Ok(Self { log, records: Vec::new(), bar })
     }
 
     /// Closes the file; the scan in it, if there is one.
     pub(super) fn close(self) -> Result<Option<ScanView>, Failure> {
-        self.log.close().map_err(refuse)?;
+        self.log.close().map_err(|error| refuse(&error))?;
         Ok(ScanView::from_records(self.records).pop())
     }
 }
 
-pub(super) fn refuse(error: StoreError) -> Failure {
-    Failure::device(&error, error.help())
+pub(super) fn refuse(error: &StoreError) -> Failure {
+    Failure::device(error, error.help())
 }
 
 impl Sink for Taking<'_> {

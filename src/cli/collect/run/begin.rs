@@ -187,7 +187,7 @@ impl<'a> Collector<'a> {
                 let setup = self.setup(first)?;
                 self.carried_to = Some(first);
                 let interrupts = self.interrupts.clone();
-                Device::Own(Own::new(self.args, &self.loaded, &setup, interrupts)?)
+                Device::Own(Box::new(Own::new(self.args, &self.loaded, &setup, interrupts)?))
             }
         };
         let met = device.meet().await;
