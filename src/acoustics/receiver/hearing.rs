@@ -35,13 +35,16 @@ pub(super) struct Hearing<'a> {
     pub(super) sounds: &'a [Sound],
     incident: &'a dyn Fn(&Sound) -> Option<Incident>,
     noise: Option<&'a NoiseTrack>,
+    us_per_m: f64,
     /// From then on sounds may begin that were not told.
     horizon_us: f64,
-    /// Whether anything was asked about that time.
-    asked_beyond: bool,
+    /// The latest time that anything was asked about.
+    asked_us: f64,
     /// Sounds that have begun, the first `over` of which are over.
     parts: SmallVec<[Part; 16]>,
     over: usize,
+    /// How many of them have their fields.
+    summed: usize,
     /// The sounds that last, by [`Self::lasting`], when it was last found out that
     /// they have to be watched.
     watched: Option<(usize, usize)>,
@@ -88,10 +91,12 @@ impl<'a> Hearing<'a> {
             sounds,
             incident,
             noise: None,
+            us_per_m: 1e6 / receiver.sound_speed_m_s,
             horizon_us: f64::INFINITY,
-            asked_beyond: false,
+            asked_us: 0.0,
             parts: SmallVec::new(),
             over: 0,
+            summed: 0,
             watched: None,
             exponent: match receiver.gain {
                 Gain::Compensating { exponent, .. } => exponent,
@@ -112,7 +117,7 @@ impl<'a> Hearing<'a> {
 
     /// Only the sounds up to a length, metres, are known.
     pub(super) fn hear_within(&mut self, length_m: f64) {
-        let arrives_us = length_m / self.receiver.sound_speed_m_s * 1e6;
+        let arrives_us = length_m * self.us_per_m;
         self.horizon_us = match self.receiver.combining {
             Combining::Coherent => arrives_us + self.span_us.0,
             Combining::Ideal => arrives_us,
@@ -121,14 +126,24 @@ impl<'a> Hearing<'a> {
 
     /// Whether an answer so far might have been another one if sounds beyond the horizon were
     /// known.
-    pub(super) const fn asked_beyond(&self) -> bool {
-        self.asked_beyond
+    pub(super) fn asked_beyond(&self) -> bool {
+        self.asked_us >= self.horizon_us
+    }
+
+    /// Length of the longest paths, metres, whose sounds could have made an answer so far another
+    /// one.
+    pub(super) fn needed_m(&self) -> f64 {
+        let begins_us = match self.receiver.combining {
+            Combining::Coherent => self.span_us.0,
+            Combining::Ideal => 0.0,
+        };
+        (self.asked_us - begins_us) / self.us_per_m
     }
 
     /// Back to the firing.
     pub(super) fn rewind(&mut self) {
         self.parts.clear();
-        (self.over, self.watched) = (0, None);
+        (self.over, self.summed, self.watched) = (0, 0, None);
     }
 
     /// When ECHO next rises if the detector is ready from `ready_us` on: at once if the envelope is
@@ -178,11 +193,10 @@ impl<'a> Hearing<'a> {
     /// Envelope at a time; no earlier time can be asked for afterwards.
     pub(super) fn level(&mut self, t_us: f64) -> f64 {
         self.advance(t_us);
-        for part in &mut self.parts[self.over..] {
-            if part.field == Complex64::ZERO {
-                part.field = Complex64::from_polar(part.size, part.turn_rad);
-            }
+        for part in &mut self.parts[self.summed.max(self.over)..] {
+            part.field = Complex64::from_polar(part.size, part.turn_rad);
         }
+        self.summed = self.parts.len();
         self.level_of(self.over, t_us)
     }
 
@@ -210,7 +224,7 @@ impl<'a> Hearing<'a> {
         let others = self.sounds[..self.parts.len()]
             .iter()
             .rev()
-            .take_while(|other| self.receiver.tof_us(other) > first_us);
+            .take_while(|other| self.tof_us(other) > first_us);
         let rest: f64 = others.filter(|other| *other != sound).map(|other| other.amplitude).sum();
         rest < NEGLIGIBLE * sound.amplitude
     }
@@ -222,7 +236,7 @@ impl<'a> Hearing<'a> {
         let (mut t_us, mut here) = (ready_us, self.relative_level(ready_us));
         // How long the envelope has been above, less how long below since.
         let mut charge_us = 0.0_f64;
-        while t_us <= window_us + 2.0 * integration_us && !self.asked_beyond {
+        while t_us <= window_us + 2.0 * integration_us && !self.asked_beyond() {
             if here < 1.0 && charge_us == 0.0 && self.watched != Some(self.lasting()) {
                 match self.skip(t_us) {
                     Skip::Silence => return None,
@@ -268,7 +282,7 @@ impl<'a> Hearing<'a> {
         }
         loop {
             self.advance(t_us);
-            if self.asked_beyond {
+            if self.asked_beyond() {
                 return Skip::Silence;
             }
             let entry_us = self.next_entry_us();
@@ -284,13 +298,14 @@ impl<'a> Hearing<'a> {
                     let end_us = part.tof_us + self.span_us.1 + 1e-3;
                     match entry_us {
                         Some(entry_us) => t_us = entry_us.min(end_us),
-                        None => return Skip::Silence,
+                        None => return self.silence(),
                     }
                     continue;
                 };
                 let done_us = rise_us + self.receiver.integration_us;
                 if entry_us.is_none_or(|entry_us| entry_us > done_us) {
                     if fall_us >= done_us {
+                        self.asked_us = self.asked_us.max(done_us);
                         return Skip::Lone { rise_us };
                     }
                     t_us = part.tof_us + self.span_us.1 + 1e-3;
@@ -303,9 +318,15 @@ impl<'a> Hearing<'a> {
             }
             match entry_us {
                 Some(entry_us) => t_us = entry_us,
-                None => return Skip::Silence,
+                None => return self.silence(),
             }
         }
+    }
+
+    /// Nothing comes any more, which only those know who know all sounds.
+    const fn silence(&mut self) -> Skip {
+        self.asked_us = f64::MAX;
+        Skip::Silence
     }
 
     /// How long the envelope, which is `here` over the threshold now, certainly stays below it, but
@@ -351,10 +372,10 @@ impl<'a> Hearing<'a> {
     /// One sound at a time: the first that comes after `ready_us`, or one that lasts then.
     fn next_rise_of_one(&mut self, ready_us: f64) -> Option<f64> {
         let receiver = self.receiver;
-        let lasts_until_us = |sound: &Sound| receiver.tof_us(sound) + receiver.pulse_us;
+        let lasts_until_us = |sound: &Sound| self.tof_us(sound) + receiver.pulse_us;
         let found = self.loud().find(|sound| lasts_until_us(sound) >= ready_us);
-        let rise_us = found.map(|sound| receiver.tof_us(sound).max(ready_us));
-        self.asked_beyond |= rise_us.unwrap_or(f64::INFINITY) >= self.horizon_us;
+        let rise_us = found.map(|sound| self.tof_us(sound).max(ready_us));
+        self.asked_us = self.asked_us.max(rise_us.unwrap_or(f64::MAX));
         rise_us
     }
 
@@ -362,11 +383,11 @@ impl<'a> Hearing<'a> {
     fn cause_of_one(&self, t_us: f64) -> Option<Sound> {
         let receiver = self.receiver;
         let lasting = || {
-            let begun = self.loud().take_while(|sound| receiver.tof_us(sound) <= t_us);
-            begun.filter(|sound| receiver.tof_us(sound) + receiver.pulse_us >= t_us)
+            let begun = self.loud().take_while(|sound| self.tof_us(sound) <= t_us);
+            begun.filter(|sound| self.tof_us(sound) + receiver.pulse_us >= t_us)
         };
         let strongest = || lasting().max_by(|one, other| one.amplitude.total_cmp(&other.amplitude));
-        lasting().find(|sound| receiver.tof_us(sound) == t_us).or_else(strongest).copied()
+        lasting().find(|sound| self.tof_us(sound) == t_us).or_else(strongest).copied()
     }
 
     /// The sounds that pass the threshold by themselves.
@@ -375,8 +396,8 @@ impl<'a> Hearing<'a> {
         let window_us = receiver.window_us() + WINDOW_SLACK_US;
         self.sounds
             .iter()
-            .take_while(move |sound| receiver.tof_us(sound) <= window_us)
-            .filter(|sound| sound.amplitude >= receiver.threshold_at(receiver.tof_us(sound)))
+            .take_while(move |sound| self.tof_us(sound) <= window_us)
+            .filter(|sound| sound.amplitude >= receiver.threshold_at(self.tof_us(sound)))
     }
 
     /// Where the envelope passes the threshold between two times, by false position on its
@@ -427,6 +448,7 @@ impl<'a> Hearing<'a> {
         }
     }
 
+    #[inline]
     fn shape_at(&self, part: &Part, t_us: f64) -> Complex64 {
         self.shape(part).at(t_us - part.tof_us + self.receiver.lead_us)
     }
@@ -440,13 +462,17 @@ impl<'a> Hearing<'a> {
         if self.exponent == 0.0 { 1.0 } else { t_us.max(1.0).powf(self.exponent) }
     }
 
+    fn tof_us(&self, sound: &Sound) -> f64 {
+        sound.length_m * self.us_per_m
+    }
+
     fn lasting(&self) -> (usize, usize) {
         (self.over, self.parts.len())
     }
 
     fn next_entry_us(&self) -> Option<f64> {
         let next = self.sounds.get(self.parts.len());
-        let entry_us = next.map(|next| self.receiver.tof_us(next) + self.span_us.0);
+        let entry_us = next.map(|next| self.tof_us(next) + self.span_us.0);
         entry_us.or_else(|| self.horizon_us.is_finite().then_some(self.horizon_us))
     }
 
@@ -461,9 +487,9 @@ impl<'a> Hearing<'a> {
 
     /// Lets sounds enter that begin up to a time; what is over by `now_us` only keeps its place.
     fn enter(&mut self, t_us: f64, now_us: f64) {
-        self.asked_beyond |= t_us >= self.horizon_us;
+        self.asked_us = self.asked_us.max(t_us);
         while let Some(sound) = self.sounds.get(self.parts.len()) {
-            let tof_us = self.receiver.tof_us(sound);
+            let tof_us = self.tof_us(sound);
             if tof_us + self.span_us.0 > t_us {
                 break;
             }
