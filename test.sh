@@ -7,7 +7,9 @@
 #                               need Debian's packages (firmware/test.sh)
 #   PAGE=0 ./test.sh            leave the live page out, where there is no Chromium to look at it
 #   AXE=0 ./test.sh             leave axe-core out of that, where there is no npm to get it with
-#   PACKAGE=1 ./test.sh         build, install, upgrade and remove the Debian package, too
+#   FAKETIME=0 ./test.sh        leave the clock that is set out, where there is no libfaketime
+#   PACKAGE=1 ./test.sh         build, install, upgrade and remove the Debian package, too; PACKAGE=all
+#                               also cross-builds that for a Raspberry Pi and runs it in an emulator
 #   SONARD_SOAK_FAULTS=1000 SONARD_KILLS=200 SONARD_COLLECT_KILLS=200 ./test.sh   longer runs of daemon
 #                               and collection among faults
 set -euo pipefail
@@ -63,6 +65,14 @@ else
   firmware/test.sh || fail "firmware or emulator: see above. Where they can't be built, FIRMWARE=0 leaves them out"
 fi
 
+if [ "${FAKETIME:-1}" != 0 ] && ! ls /usr/lib/*/faketime/libfaketime.so.1 >/dev/null 2>&1; then
+  if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
+    apt-get update -qq && apt-get install -y -qq --no-install-recommends libfaketime >/dev/null
+  else
+    fail "libfaketime is missing: sudo apt-get install libfaketime, or leave the test out with FAKETIME=0"
+  fi
+fi
+
 if [ "${PAGE:-1}" != 0 ]; then
   step "a browser for the live page"
   if ! command -v chromium >/dev/null || ! command -v chromedriver >/dev/null; then
@@ -75,11 +85,16 @@ if [ "${PAGE:-1}" != 0 ]; then
   if [ "${AXE:-1}" = 0 ]; then printf 'axe-core: LEFT OUT, because AXE=0\n'; else tests/axe.sh; fi
 fi
 
-if [ "${PACKAGE:-0}" = 1 ]; then
+case ${PACKAGE:-0} in
+1 | all)
   step "the Debian package"
   packaging/test.sh
-else
-  step "the Debian package: left to packaging/test.sh (PACKAGE=1 runs it here)"
+  ;;
+*) step "the Debian package: left to packaging/test.sh (PACKAGE=1 runs it here)" ;;
+esac
+if [ "${PACKAGE:-0}" = all ]; then
+  step "the Debian package for a Raspberry Pi"
+  packaging/test.sh arm64
 fi
 
 step "examples in the documentation"

@@ -15,6 +15,7 @@ need() {
   local program=$1 package=$2
   command -v "$program" >/dev/null && return
   [ "$(id -u)" = 0 ] || fail "$program is missing: sudo apt-get install $package"
+  apt-get update -qq
   apt-get install -y -qq --no-install-recommends "$package" >/dev/null
 }
 

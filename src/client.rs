@@ -1,4 +1,6 @@
-//! A client of the daemon's API, over its unix socket or loopback TCP.
+//! A client of the daemon's API, over its unix socket or TCP.
+
+mod scans;
 
 use std::{io, path::PathBuf, time::Duration};
 
@@ -11,12 +13,15 @@ use hyper::{
     http::request::Builder,
 };
 use hyper_util::rt::TokioIo;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 use thiserror::Error;
 use tokio::{
     net::{TcpStream, UnixStream},
     time::timeout,
 };
+
+pub use scans::{RequestedScans, ScansError};
 
 use crate::server::Problem;
 
@@ -30,6 +35,13 @@ pub enum Place {
     Socket(PathBuf),
     /// At a TCP address, `HOST:PORT`.
     Address(String),
+}
+
+/// Asks one daemon.
+#[derive(Clone)]
+pub struct Client {
+    place: Place,
+    token: Option<String>,
 }
 
 /// Why a daemon did not answer as asked.
@@ -49,6 +61,9 @@ pub enum ClientError {
     /// It speaks something else, or broke off.
     #[error("the daemon's answer can't be read: {0}")]
     Http(#[from] hyper::Error),
+    /// It answers something else than it should.
+    #[error("the daemon's answer can't be read: {0}")]
+    Strange(#[from] serde_json::Error),
     /// It refused.
     #[error("the daemon refused ({status}): {error}")]
     Refused {
@@ -62,6 +77,13 @@ pub enum ClientError {
 }
 
 impl ClientError {
+    /// Whether asking the same again would be refused again.
+    #[must_use]
+    pub fn is_final(&self) -> bool {
+        let passing = [StatusCode::REQUEST_TIMEOUT, StatusCode::TOO_MANY_REQUESTS];
+        matches!(self, Self::Refused { status, .. } if status.is_client_error() && !passing.contains(status))
+    }
+
     /// What a person can do about it.
     #[must_use]
     pub fn help(&self) -> String {
@@ -70,56 +92,96 @@ impl ClientError {
                  --socket or --address say where it is; the socket's group may use it"
                 .into(),
             Self::TooSlow => "look at its messages (`journalctl -u sonard`)".into(),
-            Self::Http(_) => "make sure that it is a sonard of this version".into(),
+            Self::Http(_) | Self::Strange(_) => {
+                "make sure that it is a sonard of this version".into()
+            }
             Self::Refused { help, .. } => help.clone(),
         }
     }
 }
 
-/// Asks for a path; the answer's body can be read as it comes.
-///
-/// # Errors
-/// When nobody answers, or the answer is not of success.
-pub async fn get(place: &Place, path: &str) -> Result<Response<Incoming>, ClientError> {
-    ask(place, Request::get(path), Bytes::new()).await
-}
-
-/// The whole body of an answer.
-///
-/// # Errors
-/// As [`get`].
-pub async fn get_whole(place: &Place, path: &str) -> Result<Bytes, ClientError> {
-    Ok(get(place, path).await?.into_body().collect().await?.to_bytes())
-}
-
-/// Gives an order with a JSON body, and returns the whole answer.
-///
-/// # Errors
-/// As [`get`]; over TCP a daemon takes orders only with its token.
-pub async fn post(place: &Place, path: &str, body: &Value) -> Result<Bytes, ClientError> {
-    let request = Request::post(path).header(header::CONTENT_TYPE, "application/json");
-    let answer = ask(place, request, body.to_string().into()).await?;
-    Ok(answer.into_body().collect().await?.to_bytes())
-}
-
-async fn ask(
-    place: &Place,
-    request: Builder,
-    body: Bytes,
-) -> Result<Response<Incoming>, ClientError> {
-    let begun = timeout(PATIENCE, begin(place, request, body));
-    let response = begun.await.map_err(|_| ClientError::TooSlow)??;
-    let status = response.status();
-    // A daemon that is not well says so with a body that is wanted all the same.
-    if status.is_success() || status == StatusCode::SERVICE_UNAVAILABLE {
-        return Ok(response);
+impl Client {
+    /// A client of the daemon there. Over TCP, orders need the daemon's token, and from another
+    /// computer every question does.
+    #[must_use]
+    pub const fn new(place: Place, token: Option<String>) -> Self {
+        Self { place, token }
     }
-    let body = response.into_body().collect().await?.to_bytes();
-    let Problem { error, help } = serde_json::from_slice(&body).unwrap_or_else(|_| Problem {
-        error: String::from_utf8_lossy(&body).into_owned(),
-        help: "make sure that it is a sonard of this version".into(),
-    });
-    Err(ClientError::Refused { status, error, help })
+
+    /// Asks for a path; the answer's body can be read as it comes.
+    ///
+    /// # Errors
+    /// When nobody answers, or the answer is not of success.
+    pub async fn get(&self, path: &str) -> Result<Response<Incoming>, ClientError> {
+        self.ask(Request::get(path), Bytes::new()).await
+    }
+
+    /// The whole of an answer, which is JSON of this type.
+    ///
+    /// # Errors
+    /// As [`Self::get`], or when it is something else.
+    pub async fn get_json<T: DeserializeOwned>(&self, path: &str) -> Result<T, ClientError> {
+        let body = self.get(path).await?.into_body().collect().await?.to_bytes();
+        Ok(serde_json::from_slice(&body)?)
+    }
+
+    /// Gives an order with a JSON body, and returns the whole answer.
+    ///
+    /// # Errors
+    /// As [`Self::get_json`].
+    pub async fn post<T: DeserializeOwned>(
+        &self,
+        path: &str,
+        body: &Value,
+    ) -> Result<T, ClientError> {
+        self.order(Request::post(path), body).await
+    }
+
+    /// Puts something in force.
+    ///
+    /// # Errors
+    /// As [`Self::get`].
+    pub async fn put(&self, path: &str, body: &Value) -> Result<(), ClientError> {
+        self.order::<Value>(Request::put(path), body).await.map(drop)
+    }
+
+    /// Takes something out of force.
+    ///
+    /// # Errors
+    /// As [`Self::get`].
+    pub async fn delete(&self, path: &str) -> Result<(), ClientError> {
+        self.ask(Request::delete(path), Bytes::new()).await.map(drop)
+    }
+
+    async fn order<T: DeserializeOwned>(
+        &self,
+        request: Builder,
+        body: &Value,
+    ) -> Result<T, ClientError> {
+        let request = request.header(header::CONTENT_TYPE, "application/json");
+        let answer = self.ask(request, body.to_string().into()).await?;
+        Ok(serde_json::from_slice(&answer.into_body().collect().await?.to_bytes())?)
+    }
+
+    async fn ask(&self, request: Builder, body: Bytes) -> Result<Response<Incoming>, ClientError> {
+        let request = match &self.token {
+            Some(token) => request.header(header::AUTHORIZATION, format!("Bearer {token}")),
+            None => request,
+        };
+        let begun = timeout(PATIENCE, begin(&self.place, request, body));
+        let response = begun.await.map_err(|_| ClientError::TooSlow)??;
+        let status = response.status();
+        // A daemon that is not well says so with a body that is wanted all the same.
+        if status.is_success() || status == StatusCode::SERVICE_UNAVAILABLE {
+            return Ok(response);
+        }
+        let body = response.into_body().collect().await?.to_bytes();
+        let Problem { error, help } = serde_json::from_slice(&body).unwrap_or_else(|_| Problem {
+            error: String::from_utf8_lossy(&body).into_owned(),
+            help: "make sure that it is a sonard of this version".into(),
+        });
+        Err(ClientError::Refused { status, error, help })
+    }
 }
 
 async fn begin(

@@ -1,9 +1,12 @@
 //! `sonard collect`.
 
+mod adopt;
 mod bar;
 mod changes;
+mod daemon;
 mod device;
 mod load;
+mod own;
 mod preview;
 mod report;
 mod run;
@@ -23,19 +26,21 @@ use tokio::signal::unix::{SignalKind, signal};
 
 use super::{
     Failure, Outcome,
-    mock_world::MockWorldArgs,
+    daemon::{DaemonArgs, check_scene},
+    mock_world::{self, MockWorldArgs},
     runtime::{self, Interrupts},
 };
 use crate::{
     collect::{CollectionKeys, Folder, FolderError, JOURNAL, Journal, Manifest, verify},
     config::document,
 };
+use daemon::Daemon;
 use load::Loaded;
 
 /// Options of `sonard collect`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
-#[command(group(clap::ArgGroup::new("device").args(["port", "mock", "emulator"])))]
+#[command(group(clap::ArgGroup::new("device").args(["port", "mock", "emulator", "daemon"])))]
 #[command(group(clap::ArgGroup::new("instead").args(["example", "check", "plan_only", "verify", "report"])))]
 pub(super) struct Args {
     /// The plan, a TOML file: `sonard collect --example` prints one with every key explained
@@ -81,6 +86,12 @@ pub(super) struct Args {
     /// Use the firmware's machine code in an emulated board, one for each pose
     #[arg(long)]
     emulator: bool,
+    /// Let a running daemon take the scans, with its own ranger, sensor and motion; its own scans are
+    /// held meanwhile
+    #[arg(long, conflicts_with_all = mock_world::OPTIONS)]
+    daemon: bool,
+    #[command(flatten)]
+    at: DaemonArgs,
     #[command(flatten)]
     world: MockWorldArgs,
 }
@@ -91,7 +102,11 @@ Take scans by a plan: poses, repeats, checks, retakes; over days if need be.
 Each scan is a log of its own; it counts once it is whole and the plan's checks let it pass. What was \
 cut off or refused is kept beside and taken again. An interrupted collection (a signal, a crash, a \
 power cut, a ranger that is gone) goes on where it stopped when it is started again. In the end there \
-are a report with pictures and a manifest with checksums.";
+are a report with pictures and a manifest with checksums.
+
+With --daemon, a running `sonard run` takes the scans, and logs them too. What the plan says nothing \
+about (motion, sensor, air) is as the daemon has it; where it says otherwise it is refused with the \
+key to change. The daemon's own scans are held meanwhile, and go on in the end.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -99,6 +114,7 @@ Examples:
   sonard collect plan.toml --plan-only
   sonard collect plan.toml --mock --out trial
   sonard collect plan.toml --port /dev/ttyACM0
+  sonard collect plan.toml --daemon
   sonard collect --verify collection
   sonard compare collection/scans/*.jsonl
 
@@ -118,19 +134,35 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(root) = &args.report {
         return write_report(root);
     }
-    let loaded = Loaded::new(args)?;
-    if args.check {
-        return say(&loaded.in_words());
-    }
-    if args.plan_only {
-        return say(&preview::of(&loaded, args)?);
-    }
+    let mut loaded = Loaded::new(args)?;
     runtime::new()?.block_on(async {
         let interrupts = Interrupts::listen();
+        let daemon = match args.daemon {
+            true => Some(daemon(args, &mut loaded, interrupts.clone()).await?),
+            false => None,
+        };
+        if args.check {
+            return say(&loaded.in_words());
+        }
+        if args.plan_only {
+            return say(&preview::of(&loaded, args)?);
+        }
         // With a handler, a file that gets too large is an error of the write and not the end.
         let _too_large = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()));
-        run::collect(args, loaded, interrupts).await
+        run::collect(args, loaded, daemon, interrupts).await
     })
+}
+
+/// The daemon that is to take the scans, if it would take those of the plan.
+async fn daemon(
+    args: &Args,
+    loaded: &mut Loaded,
+    interrupts: Interrupts,
+) -> Result<Daemon, Failure> {
+    let (daemon, status) = Daemon::find(args.at.client()?, interrupts).await?;
+    check_scene(status.scene(), &loaded.scene)?;
+    loaded.adopt(&daemon, &status)?;
+    Ok(daemon)
 }
 
 fn verify_folder(root: &Path) -> Outcome {

@@ -13,6 +13,19 @@ use crate::{
     scene::Scene,
 };
 
+/// Names of the options below, for verbs that can do without a mock.
+pub(super) const OPTIONS: [&str; 9] = [
+    "truth",
+    "truth_temperature_c",
+    "realtime",
+    "seed",
+    "faults",
+    "noise_mm",
+    "missed_steps",
+    "mounting_offset_deg",
+    "steps_per_revolution",
+];
+
 /// Options of the mock's world.
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Mock")]

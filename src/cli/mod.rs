@@ -6,6 +6,7 @@ mod array;
 mod board;
 mod collect;
 mod compare;
+mod daemon;
 mod doctor;
 mod explore;
 mod explore_benchmark;

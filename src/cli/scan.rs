@@ -15,7 +15,8 @@ use tokio_serial::SerialStream;
 use super::{
     Failure, Outcome,
     array::NoArray,
-    mock_world::MockWorldArgs,
+    daemon::DaemonArgs,
+    mock_world::{self, MockWorldArgs},
     options::{AirArgs, EngineArgs, SensorArgs},
     place::{AzimuthArgs, PlaceArgs},
     runtime::{self, Interrupts},
@@ -35,7 +36,7 @@ use setup::Setup;
 pub(super) const ATTEMPTS: u8 = 7;
 
 /// What a daemon has of its own, and a scan by it is not told.
-const OF_THE_DAEMON: [&str; 34] = [
+const OF_THE_DAEMON: [&str; 25] = [
     "sensor",
     "short_blanking",
     "blanking_us",
@@ -61,15 +62,6 @@ const OF_THE_DAEMON: [&str; 34] = [
     "max_echoes",
     "speed",
     "acceleration",
-    "truth",
-    "truth_temperature_c",
-    "realtime",
-    "seed",
-    "faults",
-    "noise_mm",
-    "missed_steps",
-    "mounting_offset_deg",
-    "steps_per_revolution",
 ];
 
 /// Options of `sonard scan`.
@@ -87,16 +79,10 @@ pub(super) struct Args {
     #[arg(long)]
     emulator: bool,
     /// Let a running daemon take the scan, with its own ranger, sensor, air and model
-    #[arg(long, conflicts_with_all = OF_THE_DAEMON)]
+    #[arg(long, conflicts_with_all = OF_THE_DAEMON, conflicts_with_all = mock_world::OPTIONS)]
     daemon: bool,
-    /// Unix socket of that daemon
-    #[arg(
-        long,
-        value_name = "PATH",
-        env = "SONARD_SERVER_SOCKET",
-        default_value = "/run/sonard/sonard.sock"
-    )]
-    socket: PathBuf,
+    #[command(flatten)]
+    at: DaemonArgs,
     #[command(flatten)]
     place: PlaceArgs,
     /// Write scan.jsonl, scan.svg and scan.png to this folder instead of records to standard output

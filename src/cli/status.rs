@@ -1,11 +1,15 @@
 //! `sonard status`.
 
-use std::{io::Write as _, path::PathBuf};
+use std::io::Write as _;
 
+use jiff::Timestamp;
 use serde_json::{Value, json};
 
-use super::{Failure, Outcome, runtime};
-use crate::client::{self, ClientError, Place};
+use super::{
+    Failure, Outcome,
+    daemon::{DaemonArgs, refuse},
+    runtime,
+};
 
 /// Options of `sonard status`.
 #[derive(Debug, clap::Args)]
@@ -18,22 +22,6 @@ pub(super) struct Args {
     json: bool,
 }
 
-/// Where the daemon is.
-#[derive(Debug, Clone, clap::Args)]
-pub(super) struct DaemonArgs {
-    /// Unix socket of the daemon
-    #[arg(
-        long,
-        value_name = "PATH",
-        env = "SONARD_SERVER_SOCKET",
-        default_value = "/run/sonard/sonard.sock"
-    )]
-    socket: PathBuf,
-    /// TCP address of the daemon, HOST:PORT, instead of its socket
-    #[arg(long, value_name = "ADDRESS")]
-    address: Option<String>,
-}
-
 const HELP: &str = "\
 Examples:
   sonard status
@@ -41,26 +29,13 @@ Examples:
 
 Exit codes: 0 all is well, 1 something is not, 3 no daemon answers.";
 
-impl DaemonArgs {
-    pub(super) fn place(&self) -> Place {
-        match &self.address {
-            Some(address) => Place::Address(address.clone()),
-            None => Place::Socket(self.socket.clone()),
-        }
-    }
-}
-
 pub(super) fn run(args: &Args) -> Outcome {
-    let place = args.daemon.place();
-    let ask = async |path| -> Result<Value, Failure> {
-        let body = client::get_whole(&place, path).await.map_err(|error| refuse(&error))?;
-        serde_json::from_slice(&body).map_err(|error| {
-            Failure::device(format!("the daemon's answer is no JSON: {error}"), "is it a sonard?")
+    let client = args.daemon.client()?;
+    let (status, health): (Value, Value) = runtime::new()?
+        .block_on(async {
+            Ok((client.get_json("/v1/status").await?, client.get_json("/v1/health").await?))
         })
-    };
-    let (status, health) = runtime::new()?.block_on(async {
-        Ok::<_, Failure>((ask("/v1/status").await?, ask("/v1/health").await?))
-    })?;
+        .map_err(|error| refuse(&error))?;
     let text = match args.json {
         true => format!("{}\n", json!({ "status": status, "health": health })),
         false => screen(&status, &health),
@@ -68,10 +43,6 @@ pub(super) fn run(args: &Args) -> Outcome {
     let written = std::io::stdout().lock().write_all(text.as_bytes());
     written.or_else(|error| Failure::from_write("to standard output", &error))?;
     if health["healthy"] == true { Ok(()) } else { Err(Failure::Found(None)) }
-}
-
-pub(super) fn refuse(error: &ClientError) -> Failure {
-    Failure::device(error, error.help())
 }
 
 /// One screen for a person.
@@ -115,6 +86,9 @@ fn screen(status: &Value, health: &Value) -> String {
     ]);
     let reasons = health["reasons"].as_array().into_iter().flatten();
     lines.extend(reasons.map(|reason| format!("  not well: {}", word(reason))));
+    if let Some(error) = status["air"]["error"].as_str() {
+        lines.push(format!("  the thermometer can't be read: {error}"));
+    }
     if let Some(error) = status["configuration"]["error"].as_str() {
         lines.push(format!("  the last change of the configuration was refused: {error}"));
     }
@@ -125,10 +99,10 @@ fn screen(status: &Value, health: &Value) -> String {
 fn device(status: &Value, health: &Value) -> Vec<String> {
     vec![
         format!(
-            "{} for {} s on {}",
-            word(&status["link"]["state"]).replace('_', " "),
-            figure(&status["uptime_s"]),
+            "{} on {}; the daemon runs for {} s",
+            state(status),
             word(&status["link"]["port"]),
+            figure(&status["uptime_s"]),
         ),
         format!(
             "  device   {} firmware {} ({})",
@@ -158,8 +132,8 @@ fn simulation(status: &Value) -> Vec<String> {
     });
     vec![
         format!(
-            "SIMULATED, nothing measured: {} for {} s",
-            word(&status["link"]["state"]).replace('_', " "),
+            "SIMULATED, nothing measured: {}; the daemon runs for {} s",
+            state(status),
             figure(&status["uptime_s"]),
         ),
         format!(
@@ -176,6 +150,14 @@ fn simulation(status: &Value) -> Vec<String> {
         ),
         format!("  ranges   {} m", readings.collect::<Vec<_>>().join(", ")),
     ]
+}
+
+/// What it is doing or suffering, and for how long.
+fn state(status: &Value) -> String {
+    let link = &status["link"];
+    let since = link["since"].as_str().and_then(|time| time.parse::<Timestamp>().ok());
+    let seconds = since.map(|since| Timestamp::now().duration_since(since).as_secs_f64());
+    format!("{} for {} s", word(&link["state"]).replace('_', " "), figure(&seconds.into()))
 }
 
 fn word(value: &Value) -> String {

@@ -6,13 +6,10 @@ use http_body_util::BodyExt as _;
 
 use super::{
     Failure, Outcome,
+    daemon::{DaemonArgs, refuse},
     runtime::{self, Interrupts},
-    status::{DaemonArgs, refuse},
 };
-use crate::{
-    client,
-    scan::{PingStatus, Provenance, Record, decode_line},
-};
+use crate::scan::{PingStatus, Provenance, Record, decode_line};
 
 /// Options of `sonard watch`.
 #[derive(Debug, clap::Args)]
@@ -56,8 +53,8 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 async fn watch(args: &Args, path: &str) -> Outcome {
-    let mut body =
-        client::get(&args.daemon.place(), path).await.map_err(|error| refuse(&error))?.into_body();
+    let client = args.daemon.client()?;
+    let mut body = client.get(path).await.map_err(|error| refuse(&error))?.into_body();
     let mut rest = Vec::new();
     while let Some(frame) = body.frame().await {
         let frame = frame.map_err(|error| refuse(&error.into()))?;

@@ -20,7 +20,11 @@ use super::{
     order::{Slot, slots},
     poses::NamedPose,
 };
-use crate::scan::{Device, Provenance, SceneRef};
+use crate::{
+    config::ScanningKeys,
+    daemon::AirOrder,
+    scan::{Device, Provenance, SceneRef},
+};
 
 /// One line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -40,6 +44,13 @@ pub enum Entry {
     },
     /// A scan is over, one way or another.
     Take(Box<Take>),
+    /// What the daemon that takes the scans did by itself before that was changed.
+    Borrowed(Borrowed),
+    /// It does that again.
+    GivenBack {
+        /// When.
+        time: Timestamp,
+    },
     /// The scan is not tried again.
     GivenUp {
         /// Which.
@@ -81,6 +92,27 @@ pub struct Started {
     /// What was noted.
     #[serde(default, skip_serializing_if = "Conditions::is_empty")]
     pub conditions: Conditions,
+}
+
+/// What a daemon did by itself before a collection changed it; nothing of what stayed as it was.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Borrowed {
+    /// When it took scans.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scanning: Option<ScanningKeys>,
+    /// In which air.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub air: Option<AirBefore>,
+}
+
+/// The air of a daemon.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AirBefore {
+    /// What its configuration and its thermometer say.
+    Own,
+    /// What a program had said.
+    Given(AirOrder),
 }
 
 /// What became of a scan.
@@ -138,6 +170,8 @@ pub struct History {
     pub takes: Vec<Take>,
     /// Scans that are not tried again.
     pub given_up: BTreeSet<Slot>,
+    /// What was not given back yet.
+    pub borrowed: Option<Borrowed>,
 }
 
 impl History {
@@ -147,6 +181,8 @@ impl History {
             Entry::Started(started) => self.starts.push(*started),
             Entry::Pose { number, pose } => drop(self.poses.insert(number, pose)),
             Entry::Take(take) => self.takes.push(*take),
+            Entry::Borrowed(before) => self.borrowed = Some(before),
+            Entry::GivenBack { .. } => self.borrowed = None,
             Entry::GivenUp { slot, .. } => drop(self.given_up.insert(slot)),
         }
     }

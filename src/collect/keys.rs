@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    config::{DeviceKeys, Form, MotionKeys, PlanKeys, Section, read_sections},
+    config::{DeviceKeys, Form, MotionKeys, PlanKeys, Section, air_section, read_sections},
     model::EngineKind,
 };
 
@@ -29,7 +29,7 @@ pub struct CollectionKeys {
     pub conditions: Conditions,
     /// What is asked for at the terminal and noted.
     pub ask: AskKeys,
-    /// Which ranger; --port, --mock and --emulator go before it.
+    /// Which ranger; --port, --daemon, --mock and --emulator go before it.
     pub device: DeviceKeys,
     /// In what the ranger stands.
     pub place: SceneKeys,
@@ -39,7 +39,8 @@ pub struct CollectionKeys {
     pub plan: PlanKeys,
     /// How the motor turns and the ranger listens.
     pub motion: MotionKeys,
-    /// The air, from which the speed of sound follows.
+    /// The air, from which the speed of sound follows. A thermometer's file is read before and
+    /// after each scan.
     pub air: CollectionAirKeys,
     /// What is looked at after each scan, and what to do about it: note it in the report, retake
     /// the scan, ask at the terminal (without one: stop), or stop.
@@ -177,23 +178,9 @@ pub struct SensorKeys {
     pub engine: EngineKind,
 }
 
-/// The air.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct CollectionAirKeys {
-    /// Temperature, degrees Celsius, where no file gives another.
-    #[schemars(range(min = -20, max = 50))]
-    pub temperature_c: f64,
-    /// Relative humidity, percent.
-    #[schemars(range(min = 0, max = 100))]
-    pub humidity_percent: f64,
-    /// Static pressure, kilopascals.
-    #[schemars(range(min = 60, max = 110))]
-    pub pressure_kpa: f64,
-    /// File of a 1-wire (w1_slave, temperature) or hwmon (temp1_input) thermometer, in
-    /// thousandths of a degree Celsius; read before and after each scan.
-    #[schemars(example = "/sys/bus/w1/devices/28-0316a1d2f8ff/temperature")]
-    pub file: Option<String>,
+air_section! {
+    /// The air. A thermometer's file is read before and after each scan.
+    CollectionAirKeys {}
 }
 
 /// What to do about a scan that a check finds something wrong with.
@@ -293,12 +280,6 @@ impl Default for SensorKeys {
             max_range_m: None,
             engine: EngineKind::default(),
         }
-    }
-}
-
-impl Default for CollectionAirKeys {
-    fn default() -> Self {
-        Self { temperature_c: 20.0, humidity_percent: 50.0, pressure_kpa: 101.325, file: None }
     }
 }
 

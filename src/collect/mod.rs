@@ -24,7 +24,9 @@ mod repeatability;
 
 pub use checks::{Figures, Finding, check, is_cut, verdict};
 pub use folder::{Folder, FolderError, INPUTS, JOURNAL, SCANS, SET_ASIDE, Sealed, sha256, stem};
-pub use journal::{Entry, History, Journal, Outcome, PlanEntry, Started, Take, read_journal};
+pub use journal::{
+    AirBefore, Borrowed, Entry, History, Journal, Outcome, PlanEntry, Started, Take, read_journal,
+};
 pub use keys::{
     Action, AfterRetakes, AirAction, AskKeys, CheckKeys, CollectionAirKeys, CollectionKeys,
     CollectionSection, Conditions, Order, PosesKeys, SceneKeys, SensorKeys,

@@ -6,6 +6,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::air::AirKeys;
 use crate::model::EngineKind;
 
 /// Configuration of `sonard run`.
@@ -167,31 +168,6 @@ pub struct SimulateKeys {
     pub seed: u64,
 }
 
-/// The air, from which the speed of sound follows.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct AirKeys {
-    /// Temperature, degrees Celsius, until a file or the API gives another.
-    #[schemars(range(min = -20, max = 50))]
-    pub temperature_c: f64,
-    /// Relative humidity, percent.
-    #[schemars(range(min = 0, max = 100))]
-    pub humidity_percent: f64,
-    /// Static pressure, kilopascals.
-    #[schemars(range(min = 60, max = 110))]
-    pub pressure_kpa: f64,
-    /// File of a 1-wire (w1_slave, temperature) or hwmon (temp1_input) thermometer, in
-    /// thousandths of a degree Celsius.
-    #[schemars(example = "/sys/bus/w1/devices/28-0316a1d2f8ff/temperature")]
-    pub file: Option<String>,
-    /// How often the file is read, seconds.
-    #[schemars(range(min = 1, max = 3600))]
-    pub every_s: f64,
-    /// A temperature older than this, seconds, is reported as stale.
-    #[schemars(range(min = 1, max = 604_800))]
-    pub max_age_s: f64,
-}
-
 /// Where records are kept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -331,19 +307,6 @@ impl Default for SimulateKeys {
             speed_m_s: 0.3,
             noise_mm: 0.0,
             seed: 1,
-        }
-    }
-}
-
-impl Default for AirKeys {
-    fn default() -> Self {
-        Self {
-            temperature_c: 20.0,
-            humidity_percent: 50.0,
-            pressure_kpa: 101.325,
-            file: None,
-            every_s: 30.0,
-            max_age_s: 600.0,
         }
     }
 }

@@ -4,14 +4,17 @@
 //! such a [`Form`] come the file that documents it ([`document`]), the check of every value with
 //! its place, and the refusal of unknown keys ([`Layers`]).
 
+mod air;
 mod document;
 mod keys;
 mod layers;
 mod schema;
 
+pub use air::AirKeys;
+pub(crate) use air::air_section;
 pub use document::document;
 pub use keys::{
-    AirKeys, DeviceKeys, GpioKeys, Keys, LinkKeys, LogKeys, Mode, ModelKeys, MotionKeys, PlaceKeys,
+    DeviceKeys, GpioKeys, Keys, LinkKeys, LogKeys, Mode, ModelKeys, MotionKeys, PlaceKeys,
     PlanKeys, ScanningKeys, ServerKeys, SimulateKeys,
 };
 pub use layers::{ConfigError, Layers, Origin};

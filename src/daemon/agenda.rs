@@ -30,7 +30,7 @@ pub struct Agenda {
     every: Duration,
     /// Scans asked for and not yet begun: how many of each request.
     asked: VecDeque<(Asked, u32)>,
-    /// Whether the mode's own scans are held until the next start.
+    /// Whether the mode's own scans are held until the next start; kept through changes of the mode.
     paused: bool,
     /// When the schedule's next scan is due.
     due: Duration,
@@ -54,7 +54,7 @@ impl Agenda {
         Self { mode, every, asked: VecDeque::new(), paused: false, due: now }
     }
 
-    /// Another mode; what was asked for stays.
+    /// Another mode; what was asked for stays, and so does a hold.
     pub fn set_mode(&mut self, mode: Mode, every: Duration, now: Duration) {
         if (mode, every) != (self.mode, self.every) {
             (self.mode, self.every, self.due) = (mode, every, now);
@@ -77,10 +77,10 @@ impl Agenda {
         true
     }
 
-    /// Somebody wants no more scans until the next start.
+    /// Somebody wants no more scans until the next start. On request there are none to be held.
     pub fn stop(&mut self) {
         self.asked.clear();
-        self.paused = true;
+        self.paused |= self.mode != Mode::OnRequest;
     }
 
     /// Somebody wants no more scans of a request. Whether any were waiting.
@@ -96,10 +96,10 @@ impl Agenda {
         self.asked.front().map(|(asked, _)| *asked)
     }
 
-    /// Whether somebody stopped the mode's own scans.
+    /// Whether scans of the mode's own are held: now, or as soon as the mode has any.
     #[must_use]
-    pub fn is_paused(&self) -> bool {
-        self.paused && self.mode != Mode::OnRequest
+    pub const fn is_paused(&self) -> bool {
+        self.paused
     }
 
     /// Scans asked for and not yet begun.
@@ -186,6 +186,23 @@ mod tests {
         assert!(agenda.start(asked(None)));
         agenda.begun(s(1));
         assert_eq!((agenda.due(s(1)), agenda.requested()), (Due::Now, 0));
+    }
+
+    #[test]
+    fn a_hold_outlasts_a_change_of_mode_and_on_request_there_is_nothing_to_hold() {
+        let mut agenda = Agenda::new(Mode::OnRequest, s(60), s(0));
+        agenda.stop();
+        assert!(!agenda.is_paused());
+        agenda.set_mode(Mode::Continuous, s(60), s(1));
+        assert_eq!(agenda.due(s(1)), Due::Now, "who stopped a request did not stop this");
+        agenda.stop();
+        agenda.set_mode(Mode::OnRequest, s(60), s(2));
+        assert!(agenda.is_paused());
+        assert!(agenda.start(asked(Some(1))));
+        assert_eq!(agenda.due(s(2)), Due::Now, "a request is served all the same");
+        agenda.begun(s(2));
+        agenda.set_mode(Mode::Continuous, s(60), s(3));
+        assert_eq!((agenda.is_paused(), agenda.due(s(3))), (true, Due::OnRequest));
     }
 
     #[test]

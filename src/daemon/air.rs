@@ -92,10 +92,18 @@ impl AirDesk {
     pub(super) fn read(&mut self, reading: &Reading, now: Instant) {
         match reading {
             Ok(temperature_c) => {
+                if self.error.is_some() {
+                    tracing::info!("the thermometer can be read again");
+                }
                 self.temperature_c = *temperature_c;
                 (self.source, self.at, self.error) = (AirSource::File, Some(now), None);
             }
-            Err(error) => self.error = Some(error.clone()),
+            Err(error) => {
+                if self.error.is_none() {
+                    tracing::warn!("the thermometer can't be read: {error}");
+                }
+                self.error = Some(error.clone());
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! Takes orders: from the API, from signals, from the emergency stop, at any time.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use firmware_protocol::messages::Identity;
 use thiserror::Error;
@@ -15,7 +15,7 @@ use super::{
     agenda::{Agenda, Asked},
     air::{AirDesk, AirOrder, Reading, watch_thermometer},
     journal::Journal,
-    settings::Settings,
+    settings::{Settings, Setup},
     status::ConfigurationReport,
 };
 use crate::{
@@ -45,6 +45,8 @@ pub enum Order {
     Pose(Pose),
     /// The air is like this.
     Air(AirOrder),
+    /// The air is again what the configuration and the thermometer say.
+    OwnAir,
     /// The configuration was read again.
     Reload(Result<Box<Settings>, String>),
 }
@@ -88,6 +90,8 @@ pub(super) enum Interrupt {
 /// What is in force, and the ends of everything that may change it.
 pub(super) struct Desk {
     pub(super) settings: Settings,
+    /// What of them no request can change.
+    pub(super) setup: Arc<Setup>,
     pub(super) plan: ScanPlan,
     pub(super) pose: Pose,
     pub(super) scanning: ScanningKeys,
@@ -118,6 +122,7 @@ impl Desk {
         journal: Journal,
     ) -> Self {
         Self {
+            setup: Arc::new(settings.setup()),
             plan: settings.plan(),
             pose: settings.pose,
             scanning: settings.keys.scanning.clone(),
@@ -191,6 +196,10 @@ impl Desk {
                     help: "temperatures are degrees Celsius, pressures kilopascals".into(),
                 };
                 (outcome.map_err(refuse), Some(Interrupt::Agenda))
+            }
+            Order::OwnAir => {
+                self.take_own_air();
+                (Ok(()), Some(Interrupt::Agenda))
             }
             Order::Reload(Ok(settings)) => (Ok(()), Some(self.reload(*settings))),
             Order::Reload(Err(error)) => {
@@ -276,6 +285,12 @@ impl Desk {
         check_pose(&self.settings, pose)
     }
 
+    /// Forgets what programs said about the air.
+    fn take_own_air(&mut self) {
+        self.air = AirDesk::new(self.settings.keys.air.clone());
+        self.thermometer = watch_thermometer(&self.settings.keys.air);
+    }
+
     /// Takes a new configuration in: what changed in it goes before what programs said.
     fn reload(&mut self, settings: Settings) -> Interrupt {
         let before = std::mem::replace(&mut self.settings, settings);
@@ -291,6 +306,7 @@ impl Desk {
         }
         self.stale |= moved || keys.model != then.model || self.settings.sensor != before.sensor;
         self.stale |= keys.simulate != then.simulate || self.settings.simulated != before.simulated;
+        self.setup = Arc::new(self.settings.setup());
         if keys.air != then.air {
             self.air = AirDesk::new(keys.air.clone());
             self.thermometer = watch_thermometer(&keys.air);

@@ -38,7 +38,7 @@ pub use hub::{Hub, Line, Subscription, Wanted};
 pub use journal::{Journal, JournalThread, LogStatus};
 pub use machine::{BackOff, Input, LinkMachine, LinkState, Step, Transition, Trouble};
 pub use operator::OpenPort;
-pub use settings::{Mismatch, Settings, Simulated};
+pub use settings::{Mismatch, Settings, Setup, Simulated};
 pub use simulation::{RangerReading, SimulationReport};
 pub use status::{
     ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, ScanProgress, ScanReport,
@@ -185,6 +185,12 @@ impl Handle {
         self.shared.view.borrow().scene.clone()
     }
 
+    /// What the configuration in force decides about every scan.
+    #[must_use]
+    pub fn setup(&self) -> Arc<Setup> {
+        Arc::clone(&self.shared.view.borrow().setup)
+    }
+
     /// The session in force in the log, once there was a scan.
     #[must_use]
     pub fn session(&self) -> Option<Arc<Session>> {
@@ -225,11 +231,13 @@ fn first_view(settings: &Settings) -> View {
         plan: settings.plan(),
         pose: settings.pose,
         scene: settings.scene.clone(),
+        setup: Arc::new(settings.setup()),
         air: AirDesk::new(settings.keys.air.clone()),
         configuration: ConfigurationReport::default(),
         line: status::Line::default(),
         scans: ScanTotals::default(),
         clock: ClockReport::default(),
-        simulation: None,
+        // From the first look on: nobody shall take a simulation for a ranger.
+        simulation: settings.simulated.as_ref().map(|one| SimulationReport::of(&one.array)),
     }
 }

@@ -18,13 +18,13 @@ use super::{
     desk::{Desk, Interrupt},
     machine::LinkState,
     outlet::Outlet,
-    simulation::{RangerReading, SimulationReport},
+    simulation::SimulationReport,
     status::ScanTotals,
 };
 use crate::{
     geometry::Pose,
     ranger::Sink as _,
-    scan::{EventKind, Ping, Provenance, Record, ScanEnd, ScanStart, Session},
+    scan::{EventKind, Ping, Provenance, Record, STOPPED_ON_REQUEST, ScanEnd, ScanStart, Session},
 };
 use rhythm::Rhythm;
 use stage::{Drive, Stage};
@@ -130,7 +130,7 @@ impl Player {
         }
         if let Some(interrupt) = halted {
             let stopping = interrupt == Interrupt::Shutdown;
-            let why = if stopping { "the daemon is stopping" } else { "stopped on request" };
+            let why = if stopping { "the daemon is stopping" } else { STOPPED_ON_REQUEST };
             self.out.event(EventKind::Stopped, why.to_owned());
         }
         let missing = order.len() as u32 - fired;
@@ -263,15 +263,11 @@ impl Player {
             view.scans = self.scans;
             let told = desk.settings.simulated.as_ref().map(|simulated| {
                 let array = &simulated.array;
+                let now = SimulationReport::of(array);
                 let before = view.simulation.take().filter(|told| told.is_of(array));
-                let readings = before.map_or_else(|| RangerReading::none(array), |b| b.readings);
-                SimulationReport {
-                    array: array.name.clone(),
-                    interval_ms: array.interval_ms,
-                    driving: drive.is_driving(),
-                    skipped: rhythm.skipped(),
-                    readings,
-                }
+                let readings = before.map_or(now.readings, |before| before.readings);
+                let (driving, skipped) = (drive.is_driving(), rhythm.skipped());
+                SimulationReport { driving, skipped, readings, ..now }
             });
             if let Some(simulated) = &desk.settings.simulated {
                 view.plan = simulated.array.plan(1);

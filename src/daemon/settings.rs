@@ -2,11 +2,14 @@
 
 use std::{sync::Arc, time::Duration};
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::machine::BackOff;
 use crate::{
     acoustics::{Air, Sensor},
     array::{Course, RangerArray},
-    config::Keys,
+    config::{Keys, ModelKeys, MotionKeys},
     geometry::Pose,
     model::Options,
     ranger::Motion,
@@ -37,6 +40,19 @@ pub struct Simulated {
     pub array: Arc<RangerArray>,
     /// The way its robot takes, with times.
     pub course: Option<Arc<Course>>,
+}
+
+/// What the configuration decides about every scan, and no request can change.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Setup {
+    /// The sensor's data.
+    pub sensor: Sensor,
+    /// How echoes are predicted, as configured.
+    pub model: ModelKeys,
+    /// How the motor turns and the ranger listens.
+    pub motion: MotionKeys,
+    /// Whether a thermometer's file is read.
+    pub thermometer: bool,
 }
 
 /// What is wrong with values that are each within their range.
@@ -74,6 +90,17 @@ impl Settings {
             max_echoes: motion.max_echoes,
             speed: motion.speed,
             acceleration: motion.acceleration,
+        }
+    }
+
+    /// What no request can change.
+    #[must_use]
+    pub fn setup(&self) -> Setup {
+        Setup {
+            sensor: self.sensor.clone(),
+            model: self.keys.model.clone(),
+            motion: self.keys.motion.clone(),
+            thermometer: self.keys.air.file.is_some(),
         }
     }
 

@@ -40,6 +40,17 @@ pub struct RangerReading {
 }
 
 impl SimulationReport {
+    /// Of an array that has not fired yet.
+    pub(super) fn of(array: &RangerArray) -> Self {
+        Self {
+            array: array.name.clone(),
+            interval_ms: array.interval_ms,
+            driving: false,
+            skipped: 0,
+            readings: RangerReading::none(array),
+        }
+    }
+
     /// Whether its readings are of an array like this.
     pub(super) fn is_of(&self, array: &RangerArray) -> bool {
         let told = self.readings.iter().map(|reading| (&reading.id, reading.bearing_deg));
@@ -49,7 +60,7 @@ impl SimulationReport {
 
 impl RangerReading {
     /// An array's readings before there are any.
-    pub(super) fn none(array: &RangerArray) -> Vec<Self> {
+    fn none(array: &RangerArray) -> Vec<Self> {
         let none = |ranger: &MountedRanger| Self {
             id: ranger.id.clone(),
             bearing_deg: ranger.bearing_deg,

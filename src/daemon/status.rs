@@ -16,6 +16,7 @@ use super::{
     air::{AirDesk, AirStatus},
     journal::LogStatus,
     machine::LinkState,
+    settings::Setup,
     simulation::SimulationReport,
 };
 use crate::{
@@ -86,7 +87,9 @@ pub struct ScanningReport {
     pub mode: Mode,
     /// From the start of a scan to the start of the next, seconds, when the mode is schedule.
     pub every_s: f64,
-    /// Whether somebody stopped the mode's own scans.
+    /// Whether scans that nobody asked for are held since a stop, until a start without a number;
+    /// a change of the mode does not end that. Scans that are asked for are taken all the same, so
+    /// a stop in on-request mode, which takes no others, holds nothing.
     pub paused: bool,
     /// Scans asked for and not yet begun.
     pub requested: u32,
@@ -222,6 +225,7 @@ pub(super) struct View {
     pub(super) plan: ScanPlan,
     pub(super) pose: Pose,
     pub(super) scene: Option<Arc<Scene>>,
+    pub(super) setup: Arc<Setup>,
     pub(super) air: AirDesk,
     pub(super) configuration: ConfigurationReport,
     pub(super) line: Line,

@@ -12,8 +12,8 @@ pub use codec::{EncodeError, FaultKind, MAX_LINE_BYTES, RecordError, decode_line
 pub use plan::{PlanError, ScanPlan};
 pub use record::{
     AirRecord, AirSource, CollectionRef, Device, Event, EventKind, LOG_FORMAT, ModelRecord,
-    PathKind, PathRecord, Ping, PingStatus, Provenance, Record, ScanAir, ScanEnd, ScanStart,
-    SceneRef, Session, SimRecord,
+    PathKind, PathRecord, Ping, PingStatus, Provenance, Record, STOPPED_ON_REQUEST, ScanAir,
+    ScanEnd, ScanStart, SceneRef, Session, SimRecord,
 };
 pub use remaining::Segment;
 pub use view::ScanView;

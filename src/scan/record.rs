@@ -380,6 +380,9 @@ pub struct Event {
     pub detail: String,
 }
 
+/// What an event says of a scan that somebody told a daemon to stop.
+pub const STOPPED_ON_REQUEST: &str = "stopped on request";
+
 /// Kinds of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

@@ -50,6 +50,14 @@ impl Endpoint {
         Self::new(Method::PUT, MethodFilter::PUT, path, handler, about)
     }
 
+    pub(super) fn delete<H, T>(path: &'static str, handler: H, about: &'static str) -> Self
+    where
+        H: Handler<T, Api>,
+        T: 'static,
+    {
+        Self::new(Method::DELETE, MethodFilter::DELETE, path, handler, about)
+    }
+
     fn new<H, T>(
         method: Method,
         filter: MethodFilter,

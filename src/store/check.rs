@@ -1,14 +1,15 @@
 //! Looks at a whole log and says, line by line, what does not hold.
 
+mod finding;
+mod open_scan;
+
 use std::{
-    collections::{HashMap, HashSet},
-    fmt,
+    collections::HashSet,
     io::{self, BufRead},
     mem,
 };
 
 use jiff::{SignedDuration, Timestamp};
-use serde::Serialize;
 use uuid::Uuid;
 
 use crate::{
@@ -19,6 +20,9 @@ use crate::{
     },
 };
 
+pub use finding::{Finding, FindingKind, Severity, Totals};
+use open_scan::OpenScan;
+
 use super::{Line, read_log};
 
 /// Azimuths are multiples of a motor step; a record may have rounded them, degrees.
@@ -27,95 +31,6 @@ const AZIMUTH_TOLERANCE_DEG: f64 = 1e-3;
 const RESIDUAL_TOLERANCE_M: f64 = 1e-3;
 /// Records of the host and of the device's fitted clock interleave within this.
 const TIME_TOLERANCE: SignedDuration = SignedDuration::from_secs(1);
-
-/// How bad a finding is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Severity {
-    /// Data is damaged, missing or contradicts itself.
-    Problem,
-    /// Worth knowing; the data is consistent.
-    Warning,
-}
-
-/// What kind of thing was found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FindingKind {
-    /// The file holds no line.
-    EmptyLog,
-    /// The last line is cut off in mid-record.
-    TornTail,
-    /// The last record is whole but its newline is missing.
-    NoNewline,
-    /// A line that is not a record.
-    Damaged,
-    /// The log is of a later format than this program knows.
-    NewerFormat,
-    /// A scan before any session.
-    NoSession,
-    /// A ping, or an end, of a scan that was not begun or is over.
-    OutsideScan,
-    /// A scan's identifier begun twice.
-    ScanTwice,
-    /// The plan can't be carried out.
-    BadPlan,
-    /// A beam with two readings.
-    DuplicateBeam,
-    /// A beam that the plan does not have.
-    NoSuchBeam,
-    /// `scan_end` counts otherwise than the lines do.
-    WrongCount,
-    /// A scan without `scan_end`.
-    NotEnded,
-    /// Status, range, prediction and residual of a reading contradict each other.
-    Contradiction,
-    /// A reading's azimuth is not the plan's, or not its ranger's.
-    WrongAzimuth,
-    /// A reading of a ranger that the session's array does not have.
-    UnknownRanger,
-    /// A record older than the one before it.
-    TimeBackwards,
-}
-
-/// Something found in a log.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Finding {
-    /// Number of the line, from 1 (for what is missing at the end: of the last line).
-    pub line: u64,
-    /// How bad it is.
-    pub severity: Severity,
-    /// What kind of thing.
-    pub kind: FindingKind,
-    /// In words.
-    pub detail: String,
-}
-
-impl fmt::Display for Finding {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let warning = if self.severity == Severity::Warning { "warning: " } else { "" };
-        write!(f, "line {}: {warning}{}", self.line, self.detail)
-    }
-}
-
-/// What a log holds, in numbers.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Totals {
-    /// Lines, damaged ones included.
-    pub lines: u64,
-    /// Sessions.
-    pub sessions: u64,
-    /// Scans begun.
-    pub scans: u64,
-    /// Readings.
-    pub pings: u64,
-    /// Events.
-    pub events: u64,
-    /// Findings that make the log not clean.
-    pub problems: u64,
-    /// Findings that do not.
-    pub warnings: u64,
-}
 
 /// Checks a log and hands each finding to `tell`, in the order of the lines.
 ///
@@ -145,19 +60,6 @@ pub struct Checker {
     scan: Option<OpenScan>,
     scans: HashSet<Uuid>,
     latest: Option<Timestamp>,
-}
-
-/// A scan that has begun and not ended.
-#[derive(Debug)]
-struct OpenScan {
-    id: Uuid,
-    line: u64,
-    /// `None` when its `scan_start` is missing.
-    plan: Option<ScanPlan>,
-    /// By beam index: the line of its reading, and whether that came through.
-    beams: HashMap<u32, (u64, bool)>,
-    /// Whether an event in the log accounts for an early end.
-    interrupted: bool,
 }
 
 impl Checker {
@@ -380,39 +282,6 @@ impl Checker {
     }
 }
 
-impl OpenScan {
-    fn new(id: Uuid, line: u64, plan: Option<ScanPlan>) -> Self {
-        Self { id, line, plan, beams: HashMap::new(), interrupted: false }
-    }
-
-    fn not_ended(&self, when: &str) -> String {
-        let Self { id, line, beams, .. } = self;
-        let planned = self.plan.map_or(String::new(), |plan| format!(" of {}", plan.beams()));
-        let count = beams.len();
-        format!("scan {id} (line {line}) has no scan_end {when}: {count}{planned} beams are there")
-    }
-
-    /// A beam whose reading was lost has a line and no reading: both ways of counting it are
-    /// taken, as long as beams and missing ones count it the same way.
-    fn wrong_counts(&self, end: &ScanEnd) -> Vec<String> {
-        let logged = self.beams.len() as u32;
-        let lost = self.beams.values().filter(|(_, came_through)| !came_through).count() as u32;
-        let mut wrong = Vec::new();
-        if ![logged, logged - lost].contains(&end.beams) {
-            wrong.push(format!("scan_end counts {} beams; the log has {logged}", end.beams));
-        }
-        let Some(plan) = self.plan else { return wrong };
-        let absent: Vec<u32> = (0..plan.beams()).filter(|i| !self.beams.contains_key(i)).collect();
-        let missing = absent.len() as u32;
-        if ![missing, missing + lost].contains(&end.missing) {
-            let counts = end.missing;
-            let which = ranges(&absent);
-            wrong.push(format!("scan_end counts {counts} missing; absent are {missing}{which}"));
-        }
-        wrong
-    }
-}
-
 /// Whether two azimuths are not the same, degrees.
 fn is_off(one_deg: f64, other_deg: f64) -> bool {
     let apart_deg = (one_deg - other_deg + 180.0).rem_euclid(360.0) - 180.0;
@@ -448,20 +317,4 @@ fn contradictions(ping: &Ping) -> Vec<String> {
         _ => {}
     }
     found
-}
-
-/// Beam numbers for people: `: 3-7, 12`, cut short after eight runs.
-fn ranges(indices: &[u32]) -> String {
-    let runs: Vec<String> = indices
-        .chunk_by(|a, b| a + 1 == *b)
-        .map(|run| match run {
-            [one] => one.to_string(),
-            _ => format!("{}-{}", run[0], run[run.len() - 1]),
-        })
-        .collect();
-    match runs.len() {
-        0 => String::new(),
-        1..=8 => format!(": {}", runs.join(", ")),
-        more => format!(": {} and {} more runs", runs[..8].join(", "), more - 8),
-    }
 }

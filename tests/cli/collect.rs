@@ -1,9 +1,11 @@
 //! `sonard collect` as a researcher meets it: a plan, a folder, and whatever happens meanwhile.
 
+mod by_daemon;
 mod checks;
 mod interrupted;
 mod plans;
 mod poses;
+mod terminal;
 
 use std::{
     collections::BTreeMap,
@@ -63,7 +65,7 @@ impl Case {
         let path = |path: &Path| path.to_str().expect("plain path").to_owned();
         let mut arguments = vec!["collect".into(), path(&plan), "--out".into(), path(&out)];
         arguments.extend(further.iter().map(|&one| one.to_owned()));
-        if !further.contains(&"--port") {
+        if !further.contains(&"--port") && !further.contains(&"--daemon") {
             arguments.push("--mock".into());
         }
         arguments

@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use board_config::{ALWAYS, Config};
+/// Those of the scenarios that every board goes through.
+pub use firmware_protocol::conformance::scenarios::SETTINGS;
 use firmware_protocol::host::{Command, HostEvent};
-use firmware_protocol::messages::{Blanking, Capabilities, Reading, Settings};
+use firmware_protocol::messages::{Capabilities, Reading, Settings};
 use sonard_emulator::{Bench, Commanded, Emulator, Surroundings};
 
 /// The firmware, as `test.sh` builds it.
@@ -30,19 +32,6 @@ pub fn config() -> Config {
             .with(Capabilities::EMERGENCY_STOP)
             .with(Capabilities::EMULATED),
         options: 0,
-    }
-}
-
-pub const fn settings() -> Settings {
-    Settings {
-        window_ticks: 48_000,
-        min_interval_ticks: 0,
-        settle_ticks: 4_000,
-        max_echoes: 1,
-        blanking: Blanking::Internal,
-        speed: 800,
-        acceleration: 40_000,
-        hold_s: 0,
     }
 }
 

@@ -1,6 +1,6 @@
 //! Times of flight, to the tick of 0.5 us.
 
-use crate::common::{commanded, readings, ready, settings};
+use crate::common::{SETTINGS, commanded, readings, ready};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{Blanking, ReadingStatus, Settings};
 use sonard_emulator::{CYCLES_PER_TICK, HZ};
@@ -11,7 +11,7 @@ const SHORT: Settings = Settings {
     window_ticks: 124_000,
     blanking: Blanking::Short { ticks: 1_000 },
     settle_ticks: 0,
-    ..settings()
+    ..SETTINGS
 };
 
 #[test]
@@ -43,7 +43,7 @@ fn from_1_to_60_ms_at_every_phase_of_the_prescaler_within_a_tick() {
 
 #[test]
 fn the_time_of_firing_is_the_devices_own_time_of_init() {
-    let mut bench = ready(commanded(&[5 * MS]), settings());
+    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
     bench.device.take_init_rises();
     let mut offsets = Vec::new();
     for _ in 0..50 {
@@ -99,7 +99,7 @@ fn several_echoes_come_within_two_ticks() {
 
 #[test]
 fn only_as_many_echoes_as_asked_for_and_none_behind_the_window() {
-    let two = Settings { max_echoes: 2, ..settings() };
+    let two = Settings { max_echoes: 2, ..SETTINGS };
     let mut bench = ready(commanded(&[4 * MS, 6 * MS, 8 * MS]), two);
     let events = bench.perform(Command::Ping, 2.0).expect("pings");
     assert_eq!(readings(&events)[0].echoes[..], [8_000, 12_000]);
@@ -112,7 +112,7 @@ fn only_as_many_echoes_as_asked_for_and_none_behind_the_window() {
 #[test]
 fn internal_blanking_keeps_the_module_deaf_and_a_short_one_does_not() {
     let near = commanded(&[MS + MS / 2]);
-    let mut bench = ready(near.clone(), settings());
+    let mut bench = ready(near.clone(), SETTINGS);
     let events = bench.perform(Command::Ping, 2.0).expect("pings");
     assert_eq!(readings(&events)[0].status, ReadingStatus::NoEcho);
     let mut bench = ready(near, SHORT);
@@ -122,7 +122,7 @@ fn internal_blanking_keeps_the_module_deaf_and_a_short_one_does_not() {
 
 #[test]
 fn a_module_whose_echo_hangs_high_is_not_fired() {
-    let mut bench = ready(commanded(&[5 * MS]), settings());
+    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
     bench.device.take_init_rises();
     bench.device.stick_echo(true);
     let events = bench.perform(Command::Ping, 2.0).expect("is told");

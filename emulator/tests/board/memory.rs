@@ -2,7 +2,7 @@
 
 use std::process::Command as Process;
 
-use crate::common::{commanded, elf, ready, settings};
+use crate::common::{SETTINGS, commanded, elf, ready};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{Blanking, Settings, Sweep};
 use rand::{Rng as _, SeedableRng as _};
@@ -34,7 +34,7 @@ fn deepest_stack() -> usize {
         blanking: Blanking::Short { ticks: 1_000 },
         speed: 10_000,
         acceleration: 200_000,
-        ..settings()
+        ..SETTINGS
     };
     let echoes: Vec<u64> = (2..10).map(|ms| ms * HZ / 1000).collect();
     let mut bench = ready(commanded(&echoes), many);

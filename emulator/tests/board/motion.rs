@@ -1,6 +1,6 @@
 //! The motor: steps counted at the pins, times against the trapezoid, the index, the brake.
 
-use crate::common::{commanded, ready, settings};
+use crate::common::{SETTINGS, commanded, ready};
 use firmware_protocol::host::{Command, HostEvent, Outcome};
 use firmware_protocol::messages::Settings;
 use rand::{RngExt as _, SeedableRng as _};
@@ -8,7 +8,7 @@ use sonard::motion::Trapezoid;
 use sonard_emulator::{Commanded, HZ};
 
 const QUICK: Settings =
-    Settings { speed: 4_000, acceleration: 200_000, settle_ticks: 0, ..settings() };
+    Settings { speed: 4_000, acceleration: 200_000, settle_ticks: 0, ..SETTINGS };
 
 #[test]
 fn ten_thousand_random_moves_are_exact_to_the_step() {
@@ -73,7 +73,7 @@ fn pulses_follow_the_trapezoid() {
 
 #[test]
 fn a_stop_brakes_and_keeps_the_position() {
-    let slow = Settings { speed: 1_000, acceleration: 5_000, ..settings() };
+    let slow = Settings { speed: 1_000, acceleration: 5_000, ..SETTINGS };
     let mut bench = ready(commanded(&[]), slow);
     for wait_s in [0.001, 0.02, 0.1, 0.5] {
         bench.perform(Command::MoveTo { step: 0 }, 60.0).expect("moves");

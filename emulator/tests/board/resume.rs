@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::common::{commanded, config, elf, settings};
+use crate::common::{SETTINGS, commanded, config, elf};
 use firmware_protocol::host::HostConfig;
 use firmware_protocol::messages::Settings;
 use sonard::geometry::Pose;
@@ -61,7 +61,7 @@ async fn take(port: &str) -> (ScanSummary, Vec<Record>) {
     let job = ScanJob {
         pose: Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 },
         plan: ScanPlan { to_deg: f64::from(BEAMS) * 0.9, ..ScanPlan::default() },
-        settings: Settings { window_ticks: 20_000, ..settings() },
+        settings: Settings { window_ticks: 20_000, ..SETTINGS },
         sound_speed_m_s: 343.4,
         air: None,
         request: None,

@@ -1,6 +1,6 @@
 //! What happens when something goes wrong: on the line, with the host, with the chip.
 
-use crate::common::{commanded, readings, ready, settings};
+use crate::common::{SETTINGS, commanded, readings, ready};
 use firmware_protocol::host::{Command, HostError, HostEvent, Outcome};
 use firmware_protocol::messages::{FaultKind, ResetCause, Settings, Status, Sweep};
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
@@ -19,7 +19,7 @@ const LONG: Sweep = Sweep {
 
 /// In the middle of a sweep.
 fn sweeping() -> Bench {
-    let mut bench = ready(commanded(&[5 * MS]), settings());
+    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
     bench.start(Command::Sweep(LONG)).expect("begins");
     bench.run(1.0).expect("sweeps");
     assert!(readings(bench.events()).len() > 10);
@@ -59,7 +59,7 @@ fn reset_cause(bench: &mut Bench) -> ResetCause {
 #[test]
 fn noise_at_line_speed_for_a_minute_never_wedges_it() {
     let mut random = rand_pcg::Pcg64::seed_from_u64(9);
-    let mut bench = ready(commanded(&[5 * MS]), settings());
+    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
     // Frames to damage: what the host says to begin a sweep, caught on the line.
     bench.host.start(bench.device.now_us(), Command::Status).expect("begins");
     let frame = bench.host.poll_transmit().expect("a frame").to_vec();
@@ -109,7 +109,7 @@ fn noise_at_line_speed_for_a_minute_never_wedges_it() {
 
 #[test]
 fn a_sweep_goes_on_through_noise_between_its_frames() {
-    let mut bench = ready(commanded(&[5 * MS]), settings());
+    let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
     let mut random = rand_pcg::Pcg64::seed_from_u64(2);
     bench.start(Command::Sweep(Sweep { stops: 100, ..LONG })).expect("begins");
     for _ in 0..200 {
@@ -156,7 +156,7 @@ fn a_reset_in_the_middle_is_noticed_and_the_device_can_be_used_again() {
         assert!(bench.events().contains(&HostEvent::Rebooted { old, new }), "{cause:?}");
         assert_eq!(bench.take_events(), Err(BenchError::Host(HostError::Rebooted)));
         assert_eq!(reset_cause(&mut bench), told);
-        for command in [Command::Configure(settings()), Command::Home, Command::Ping] {
+        for command in [Command::Configure(SETTINGS), Command::Home, Command::Ping] {
             bench.perform(command, 20.0).expect("goes on");
         }
     }
@@ -177,7 +177,7 @@ fn a_firmware_that_hangs_is_restarted_by_the_watchdog() {
 
 #[test]
 fn a_restart_on_request_says_so_and_every_boot_has_its_own_number() {
-    let mut bench = ready(commanded(&[]), settings());
+    let mut bench = ready(commanded(&[]), SETTINGS);
     let mut boots = vec![bench.host.identity().expect("known").boot];
     for _ in 0..40 {
         bench.perform(Command::Reset, 5.0).expect("restarts");
@@ -209,7 +209,7 @@ fn the_emergency_stop_ends_everything_at_once_and_keeps_it_so() {
 
 #[test]
 fn idle_coils_are_released_after_silence() {
-    let mut bench = ready(commanded(&[]), Settings { hold_s: 2, ..settings() });
+    let mut bench = ready(commanded(&[]), Settings { hold_s: 2, ..SETTINGS });
     bench.run(1.5).expect("runs");
     assert!(bench.device.holds_coils());
     bench.run(1.0).expect("runs");

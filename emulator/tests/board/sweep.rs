@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::common::{readings, ready, settings};
+use crate::common::{SETTINGS, readings, ready};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{ReadingStatus, Settings, Sweep, limits::TICK_HZ};
 use sonard::acoustics::{Air, Sensor};
@@ -33,7 +33,7 @@ const PLAN: Sweep =
 
 /// Four metres there and back at 343.4 m/s, and 5 ms of rest.
 const FOUR_METRES: Settings =
-    Settings { window_ticks: 46_600, settle_ticks: 10_000, max_echoes: 3, ..settings() };
+    Settings { window_ticks: 46_600, settle_ticks: 10_000, max_echoes: 3, ..SETTINGS };
 
 #[test]
 fn a_sweep_of_400_beams_takes_what_physics_takes() {

@@ -1,6 +1,6 @@
 //! The world around the chip: a motor with limits, and a supply that sags.
 
-use crate::common::{commanded, readings, ready, settings};
+use crate::common::{SETTINGS, commanded, readings, ready};
 use firmware_protocol::host::{Command, HostError, HostEvent, Outcome};
 use firmware_protocol::messages::{ResetCause, Settings, Sweep};
 use sonard_emulator::{Bench, BenchError, HZ, MotorLimits};
@@ -9,11 +9,11 @@ const MS: u64 = HZ / 1000;
 
 /// Nearly three turns at such a speed, and then home: how many steps the motor was off.
 fn drift_after_a_turn(speed: u16, acceleration: u32) -> i32 {
-    let mut bench = ready(commanded(&[]), Settings { speed, acceleration, ..settings() });
+    let mut bench = ready(commanded(&[]), Settings { speed, acceleration, ..SETTINGS });
     bench.device.set_motor(Some(MotorLimits::typical()));
     bench.perform(Command::MoveTo { step: 1_150 }, 20.0).expect("moves, as far as it knows");
     // Slowly, so that the search itself misses nothing.
-    bench.perform(Command::Configure(settings()), 2.0).expect("is set");
+    bench.perform(Command::Configure(SETTINGS), 2.0).expect("is set");
     let events = bench.perform(Command::Home, 20.0).expect("homes");
     let drift = events.iter().find_map(|event| match event {
         HostEvent::Done(Outcome::Homed { drift_steps }) => Some(*drift_steps),
@@ -47,7 +47,7 @@ fn cause(bench: &mut Bench) -> ResetCause {
 #[test]
 fn a_dip_of_the_supply_restarts_it_with_another_number_and_its_cause() {
     for milliseconds in [1, 20, 700] {
-        let mut bench = ready(commanded(&[5 * MS]), settings());
+        let mut bench = ready(commanded(&[5 * MS]), SETTINGS);
         let old = bench.host.identity().expect("known").boot;
         let plan = Sweep {
             sweep: 1,
@@ -68,7 +68,7 @@ fn a_dip_of_the_supply_restarts_it_with_another_number_and_its_cause() {
         assert_eq!(bench.take_events(), Err(BenchError::Host(HostError::Rebooted)));
         assert_eq!(cause(&mut bench), ResetCause::BrownOut);
         assert_ne!(bench.host.identity().expect("known").boot, old);
-        for command in [Command::Configure(settings()), Command::Home, Command::Ping] {
+        for command in [Command::Configure(SETTINGS), Command::Home, Command::Ping] {
             bench.perform(command, 20.0).expect("goes on");
         }
     }

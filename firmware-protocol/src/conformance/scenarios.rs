@@ -14,7 +14,7 @@ use crate::messages::{
 };
 
 /// 24 ms of listening, 2 ms of rest.
-const SETTINGS: Settings = Settings {
+pub const SETTINGS: Settings = Settings {
     window_ticks: 48_000,
     min_interval_ticks: 0,
     settle_ticks: 4_000,

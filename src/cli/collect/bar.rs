@@ -28,6 +28,9 @@ impl Bar {
 
     /// A scan begins: so many are done, of so many.
     pub(super) fn begin(&mut self, doing: &str, done: u32, of: u32) {
+        if self.bar.is_finished() {
+            self.bar.reset();
+        }
         self.bar.set_length(u64::from(of) * u64::from(self.beams_a_scan));
         self.bar.set_position(u64::from(done) * u64::from(self.beams_a_scan));
         let left = human(self.left_s(of.saturating_sub(done)));
@@ -60,13 +63,9 @@ impl Bar {
         self.bar.suspend(|| anstream::eprintln!("{line}"));
     }
 
-    /// Takes the bar away while somebody is asked.
+    /// Takes the bar away, for a question or for good, until the next scan begins: drawn again
+    /// earlier, it would be drawn over the question.
     pub(super) fn hide(&self) {
-        self.bar.finish_and_clear();
-        self.bar.reset();
-    }
-
-    pub(super) fn finish(&self) {
         self.bar.finish_and_clear();
     }
 }

@@ -41,6 +41,12 @@ pub(super) struct Loaded {
     pub(super) sensor: Sensor,
     pub(super) poses: Poses,
     pub(super) plan: ScanPlan,
+    /// Motor steps a turn.
+    pub(super) steps_per_revolution: u16,
+    /// Where the keys were given.
+    pub(super) layers: Layers<CollectionKeys>,
+    /// The plan's file, as errors call it.
+    pub(super) name: String,
 }
 
 impl Loaded {
@@ -62,7 +68,7 @@ impl Loaded {
         let at = Places { layers: &layers, file: &name };
         let scene_text = scene_file::read(&keys.place.scene)?;
         let scene = Arc::new(scene_file::load(&keys.place.scene)?);
-        let sensor = sensor(&keys, &at)?;
+        let sensor = sensor(load_sensor(&keys.sensor.sensor)?, &keys, &at)?;
         let plan = scan_plan(&keys, &at)?;
         air(&keys, keys.air.temperature_c)
             .map_err(|error| at.refuse("air", "temperature_c", error))?;
@@ -77,17 +83,29 @@ impl Loaded {
                 ),
             ));
         }
-        if args.port.is_none() && !args.mock && !args.emulator && keys.device.port.is_none() {
-            let needed = !(args.check || args.plan_only);
-            if needed {
-                return Err(Failure::input(
-                    "no device: the plan has no device.port",
-                    "set device.port, give --port, or use --mock to try without one",
-                ));
-            }
+        let given = args.port.is_some() || args.mock || args.emulator || args.daemon;
+        let needed = !(args.check || args.plan_only);
+        if needed && !given && keys.device.port.is_none() {
+            return Err(Failure::input(
+                "no device: the plan has no device.port",
+                "set device.port, give --port or --daemon, or use --mock to try without one",
+            ));
         }
         let folder = args.out.clone().unwrap_or_else(|| PathBuf::from(&keys.collection.folder));
-        Ok(Self { keys, text, folder, scene, scene_text, sensor, poses, plan })
+        let steps_per_revolution = args.world.steps_per_revolution();
+        Ok(Self {
+            keys,
+            text,
+            folder,
+            scene,
+            scene_text,
+            sensor,
+            poses,
+            plan,
+            steps_per_revolution,
+            layers,
+            name,
+        })
     }
 
     /// What is measured at a pose in this air.
@@ -174,9 +192,9 @@ impl Fault {
 }
 
 /// Where values were given.
-struct Places<'a> {
-    layers: &'a Layers<CollectionKeys>,
-    file: &'a str,
+pub(super) struct Places<'a> {
+    pub(super) layers: &'a Layers<CollectionKeys>,
+    pub(super) file: &'a str,
 }
 
 impl Places<'_> {
@@ -206,9 +224,13 @@ fn scan_plan(keys: &CollectionKeys, at: &Places<'_>) -> Result<ScanPlan, Failure
     Ok(plan)
 }
 
-fn sensor(keys: &CollectionKeys, at: &Places<'_>) -> Result<Sensor, Failure> {
+/// A sensor as the plan changes it.
+pub(super) fn sensor(
+    mut sensor: Sensor,
+    keys: &CollectionKeys,
+    at: &Places<'_>,
+) -> Result<Sensor, Failure> {
     let keys = &keys.sensor;
-    let mut sensor = load_sensor(&keys.sensor)?;
     if keys.short_blanking {
         sensor.blanking_us = sensor.short_blanking_us.ok_or_else(|| {
             let message = format!("{} has no short_blanking_us", sensor.name);

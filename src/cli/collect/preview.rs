@@ -20,9 +20,9 @@ use crate::{
 const PING_BYTES: f64 = 540.0;
 const SCAN_BYTES: f64 = 5_000.0;
 
-/// The time of one scan with the plan's settings, by a device with every capability and so many
-/// motor steps a turn.
-pub(super) fn budget(loaded: &Loaded, steps_per_revolution: u16) -> Result<Budget, Failure> {
+/// The time of one scan with the plan's settings, by a device with every capability.
+pub(super) fn budget(loaded: &Loaded) -> Result<Budget, Failure> {
+    let steps_per_revolution = loaded.steps_per_revolution;
     let motor = loaded.plan.motor_steps(steps_per_revolution.into()).map_err(|error| {
         Failure::input(error, "give plan.from_deg and plan.step_deg on the motor's steps")
     })?;
@@ -43,7 +43,7 @@ pub(super) fn disk_bytes(loaded: &Loaded, scans: u32) -> f64 {
 
 /// The estimate as text, or as one JSON object.
 pub(super) fn of(loaded: &Loaded, args: &Args) -> Result<String, Failure> {
-    let scan = budget(loaded, args.world.steps_per_revolution())?;
+    let scan = budget(loaded)?;
     let collection = &loaded.keys.collection;
     let poses = loaded.pose_count();
     let scans = poses.map(|poses| poses.saturating_mul(collection.repeats));

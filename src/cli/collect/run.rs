@@ -2,6 +2,7 @@
 
 mod begin;
 mod judge;
+mod measure;
 
 use std::{
     collections::{BTreeMap, HashMap},
@@ -10,24 +11,14 @@ use std::{
 };
 
 use super::{
-    Args,
-    bar::Bar,
-    device::Device,
-    load::Loaded,
-    preview, refuse, report,
-    source::Source,
-    taking::{self, Taken},
-    terminal::Terminal,
-    thermometer::Thermometer,
+    Args, bar::Bar, daemon::Daemon, device::Device, load::Loaded, preview, refuse, report,
+    source::Source, terminal::Terminal, thermometer::Thermometer,
 };
 use crate::{
     acoustics::Air,
     cli::{Failure, Outcome, runtime::Interrupts, scan::setup::Setup},
-    collect::{
-        AfterRetakes, AirAction, Conditions, Entry, Folder, Journal, Manifest, NamedPose, Slot,
-    },
-    ranger::ScanJob,
-    scan::{AirSource, CollectionRef, ScanAir, Session},
+    collect::{AfterRetakes, Conditions, Entry, Folder, Journal, Manifest, NamedPose, Slot},
+    scan::CollectionRef,
 };
 use uuid::Uuid;
 
@@ -68,13 +59,16 @@ enum Next {
 }
 
 /// Collects until every scan is there, something can't be mended, or somebody interrupts.
-pub(super) async fn collect(args: &Args, loaded: Loaded, interrupts: Interrupts) -> Outcome {
-    let mut collector = Collector::begin(args, loaded, interrupts).await?;
+pub(super) async fn collect(
+    args: &Args,
+    loaded: Loaded,
+    daemon: Option<Daemon>,
+    interrupts: Interrupts,
+) -> Outcome {
+    let mut collector = Collector::begin(args, loaded, daemon, interrupts).await?;
     let outcome = collector.work().await;
-    collector.bar.finish();
-    if let Some(device) = collector.device.take() {
-        device.close().await;
-    }
+    collector.bar.hide();
+    collector.leave_device().await;
     // However it ended, the manifest says what is there.
     let closed = collector.close(outcome.is_ok());
     outcome?;
@@ -176,7 +170,7 @@ impl Collector<'_> {
 
     /// Carries a ranger that is no real one.
     fn carry_to(&mut self, number: u32) -> Outcome {
-        if self.carried_to == Some(number) {
+        if self.carried_to == Some(number) || matches!(self.device, Some(Device::Daemon(_))) {
             return Ok(());
         }
         let setup = self.setup(number)?;
@@ -199,85 +193,6 @@ impl Collector<'_> {
             pose.conditions.insert(key, answer.unwrap_or_default().into());
         }
         self.note(Entry::Pose { number, pose })
-    }
-
-    /// Looks at the thermometer before a scan, and does what the plan wants when the air is no
-    /// longer that of the session.
-    async fn follow_air(&mut self) -> Outcome {
-        let Some(now_c) = self.temperature().await else { return Ok(()) };
-        let keys = &self.loaded.keys.checks;
-        let drift_c = now_c - self.air.temperature_c();
-        if drift_c.abs() <= keys.max_temperature_drift_c {
-            return Ok(());
-        }
-        let said = format!("the air is {now_c:.2} C, {drift_c:+.2} C from the session's");
-        match keys.on_temperature_drift {
-            AirAction::Note => self.bar.say(&format!("warning: {said}")),
-            AirAction::Stop => return Err(Failure::Found(Some(format!("stopped: {said}")))),
-            AirAction::NewSession => {
-                self.bar.say(&format!("{said}: from here on it is predicted and ranged with that"));
-                self.air = self.loaded.air(now_c)?;
-                self.setups.clear();
-                // A mock's air is what the thermometer says, unless it has a truth of its own.
-                self.carried_to = None;
-            }
-        }
-        Ok(())
-    }
-
-    /// Takes a scan; beside it, by how much the air changed meanwhile.
-    async fn take(&mut self, slot: Slot) -> Result<(Taken, Option<f64>), Failure> {
-        let setup = self.setup(slot.pose)?;
-        let history = self.journal.history();
-        let (done, of) = (history.accepted().count() as u32, history.wanted().len() as u32);
-        let label = self.pose(slot.pose).label();
-        self.bar.begin(&format!("{label}, scan {} of {of}", done + 1), done, of);
-        let before_c = self.temperature().await;
-        let air = before_c.map(|_| ScanAir {
-            temperature_c: self.air.temperature_c(),
-            sound_speed_m_s: self.air.sound_speed_m_s(),
-            source: AirSource::File,
-            age_s: Some(0.0),
-        });
-        let of = self.collection_ref(slot);
-        let patience = Duration::from_secs_f64(self.loaded.keys.collection.patience_s);
-        let Some(device) = &mut self.device else {
-            return Err(Failure::device("there is no device", "this is a fault of the program"));
-        };
-        let ranger = device.find(patience).await?;
-        let identity = *ranger.identity();
-        let job = ScanJob { air, ..setup.job(&identity)? };
-        let session = Session { collection: Some(Box::new(of)), ..setup.session(&identity) };
-        let path = self.folder.taking(slot);
-        let taken =
-            taking::take(ranger, (&job, session), &path, &self.bar, &self.interrupts).await?;
-        if taken.lost.is_some() {
-            device.lose();
-        }
-        let after_c = self.temperature().await;
-        let change_c = before_c.zip(after_c).map(|(before_c, after_c)| after_c - before_c);
-        Ok((taken, change_c))
-    }
-
-    /// The temperature now, if there is a thermometer that can be read.
-    async fn temperature(&self) -> Option<f64> {
-        match self.thermometer.read().await {
-            Ok(temperature_c) => temperature_c,
-            Err(error) => {
-                self.bar.say(&format!("warning: the thermometer can't be read: {error}"));
-                None
-            }
-        }
-    }
-
-    /// What is to be measured at a pose, with the model's predictions in the air of the session.
-    fn setup(&mut self, number: u32) -> Result<Arc<Setup>, Failure> {
-        if let Some(setup) = self.setups.get(&number) {
-            return Ok(Arc::clone(setup));
-        }
-        let setup = Arc::new(Setup::of(self.loaded.wish(&self.pose(number), self.air))?);
-        self.setups.insert(number, Arc::clone(&setup));
-        Ok(setup)
     }
 
     fn pose(&self, number: u32) -> NamedPose {

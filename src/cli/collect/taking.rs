@@ -23,6 +23,8 @@ pub(super) struct Taken {
     pub(super) view: Option<ScanView>,
     /// Why the device gave up, if it did.
     pub(super) lost: Option<Failure>,
+    /// Whether somebody told the daemon that took it to stop.
+    pub(super) stopped: bool,
     pub(super) wall_s: f64,
 }
 
@@ -37,10 +39,8 @@ pub(super) async fn take(
     bar: &Bar,
     interrupts: &Interrupts,
 ) -> Result<Taken, Failure> {
-    let refuse = |error: StoreError| Failure::device(&error, error.help());
-    let log = LogWriter::open(path).map_err(refuse)?.with_sync_interval(SYNC);
-    let mut sink = Taking { log, records: Vec::new(), bar };
-    sink.record(&Record::Session(Box::new(session))).map_err(refuse)?;
+    let mut sink = Taking::open(path, bar)?;
+    sink.record(&Record::Session(Box::new(session))).map_err(|error| refuse(&error))?;
     let began = Instant::now();
     ranger.reanchor();
     let outcome = ranger.scan(job, &mut sink, interrupts.clone().reason()).await;
@@ -50,9 +50,7 @@ pub(super) async fn take(
         Err(error @ ScanError::Device(_)) => Some(scan_failure(error)),
         Err(error) => return Err(scan_failure(error)),
     };
-    sink.log.close().map_err(refuse)?;
-    let view = ScanView::from_records(sink.records).pop();
-    Ok(Taken { view, lost, wall_s })
+    Ok(Taken { view: sink.close()?, lost, stopped: false, wall_s })
 }
 
 /// Marks the end of a file that does not count, so that it says so itself.
@@ -70,10 +68,28 @@ pub(super) fn mark(path: &Path, why: &str) -> Result<(), Failure> {
         .map_err(|error| Failure::device(&error, error.help()))
 }
 
-struct Taking<'a> {
+/// A scan's file while it is written, with what was written.
+pub(super) struct Taking<'a> {
     log: LogWriter,
     records: Vec<Record>,
     bar: &'a Bar,
+}
+
+impl<'a> Taking<'a> {
+    pub(super) fn open(path: &Path, bar: &'a Bar) -> Result<Self, Failure> {
+        let log = LogWriter::open(path).map_err(|error| refuse(&error))?.with_sync_interval(SYNC);
+        Ok(Self { log, records: Vec::new(), bar })
+    }
+
+    /// Closes the file; the scan in it, if there is one.
+    pub(super) fn close(self) -> Result<Option<ScanView>, Failure> {
+        self.log.close().map_err(|error| refuse(&error))?;
+        Ok(ScanView::from_records(self.records).pop())
+    }
+}
+
+pub(super) fn refuse(error: &StoreError) -> Failure {
+    Failure::device(error, error.help())
 }
 
 impl Sink for Taking<'_> {

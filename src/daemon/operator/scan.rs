@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     ranger::{Ranger, ScanError, ScanJob, ScanSummary},
-    scan::{EventKind, Record, Session},
+    scan::{EventKind, Record, STOPPED_ON_REQUEST, Session},
 };
 
 /// A wall clock that moved by more than this against the one that never jumps was set.
@@ -140,7 +140,7 @@ impl Operator {
             };
             let why = match interrupt {
                 Interrupt::Shutdown => "the daemon is stopping",
-                Interrupt::Stop => "stopped on request",
+                Interrupt::Stop => STOPPED_ON_REQUEST,
                 Interrupt::EmergencyStop(true) => "the emergency stop was pressed",
                 Interrupt::PortChanged => "another port is to be used",
                 Interrupt::Log if !self.out.journal.is_well() => "the log can't be written",

@@ -1,5 +1,7 @@
 //! What others get to know.
 
+use std::sync::Arc;
+
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
@@ -46,6 +48,7 @@ impl Operator {
             (view.paused, view.requested) = (desk.agenda.is_paused(), desk.agenda.requested());
             (view.next_at, view.plan, view.pose) = (next_at, desk.plan, desk.pose);
             view.scene.clone_from(&desk.settings.scene);
+            view.setup = Arc::clone(&desk.setup);
             view.air = desk.air.clone();
             view.configuration = desk.configuration.clone();
             view.line.clone_from(&self.line_figures);

@@ -95,6 +95,12 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
         Endpoint::put("/v1/air", air, "The air is like this")
             .takes::<AirOrder>()
             .answers::<Accepted>(202, taken),
+        Endpoint::delete(
+            "/v1/air",
+            own_air,
+            "The air is again what the configuration and the thermometer say",
+        )
+        .answers::<Accepted>(202, taken),
     ]
 }
 
@@ -139,6 +145,10 @@ async fn pose(State(api): State<Api>, Body(pose): Body<Pose>) -> Answer {
 
 async fn air(State(api): State<Api>, Body(order): Body<AirOrder>) -> Answer {
     carry_out(&api, Order::Air(order)).await
+}
+
+async fn own_air(State(api): State<Api>) -> Answer {
+    carry_out(&api, Order::OwnAir).await
 }
 
 async fn carry_out(api: &Api, order: Order) -> Answer {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use axum::{Json, extract::State, http::StatusCode};
 
 use crate::{
-    daemon::{AirStatus, Health, ScanReport, Status},
+    daemon::{AirStatus, Health, ScanReport, Setup, Status},
     geometry::Pose,
     scan::{ScanPlan, Session},
     server::{Api, answer::Failed, openapi::Endpoint},
@@ -26,6 +26,8 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
             "What is true for the scans now: device, sensor, model",
         )
         .answers::<Session>(200, "The session"),
+        Endpoint::get("/v1/setup", setup, "What the configuration decides about every scan")
+            .answers::<Setup>(200, "The setup"),
         Endpoint::get("/v1/plan", plan, "The azimuths of the next scan")
             .answers::<ScanPlan>(200, "The plan"),
         Endpoint::get("/v1/pose", pose, "Where the ranger stands").answers::<Pose>(200, "The pose"),
@@ -56,6 +58,10 @@ async fn session(State(api): State<Api>) -> Result<Json<Arc<Session>>, Failed> {
         let help = "a session begins with the first scan: POST /v1/start";
         Failed::new(StatusCode::NOT_FOUND, "there is no session yet", help)
     })
+}
+
+async fn setup(State(api): State<Api>) -> Json<Arc<Setup>> {
+    Json(api.daemon.setup())
 }
 
 async fn plan(State(api): State<Api>) -> Json<ScanPlan> {

@@ -79,7 +79,7 @@ fn the_server_does_what_its_document_says() {
             }
         }
     }
-    assert!(operations >= 23, "{operations} operations");
+    assert!(operations >= 25, "{operations} operations");
     // Refusals are as the document says, too.
     for (method, path, body, status) in [
         ("GET", "/v1/nothing", "", 404),
@@ -254,7 +254,8 @@ fn status_and_watch_are_clients() {
     let socket = folder.path().join("s").display().to_string();
     let status = run(&["status", "--socket", &socket]);
     assert_eq!(status.status.code(), Some(0), "{}", stderr(&status));
-    assert!(String::from_utf8_lossy(&status.stdout).contains("MOCK-00001"));
+    let screen = String::from_utf8_lossy(&status.stdout).into_owned();
+    assert!(screen.starts_with("ready for ") && screen.contains("MOCK-00001"), "{screen}");
     let json = run(&["status", "--socket", &socket, "--json"]);
     let json: Value = serde_json::from_slice(&json.stdout).expect("one object");
     assert_eq!(json["status"]["link"]["state"], "ready");

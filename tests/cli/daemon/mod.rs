@@ -3,6 +3,7 @@
 mod access;
 mod api;
 mod board;
+mod clock;
 mod configuration;
 mod faults;
 mod kill;

@@ -73,6 +73,62 @@ fn a_scan_through_a_busy_daemon_has_its_own_plan_and_leaves_the_daemons_alone() 
 }
 
 #[test]
+fn over_tcp_a_scan_needs_the_token_and_a_look_does_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let token = folder.path().join("token");
+    std::fs::write(&token, "correct horse battery\n").expect("writable");
+    let token = token.to_str().expect("plain path").to_owned();
+    let token_key = format!("server.token_file={token}");
+    let tcp = ["--set", "server.listen=127.0.0.1:0", "--set", &token_key];
+    let daemon = Daemon::start_mock(folder.path(), &[&SHORT[..], &tcp].concat());
+    daemon.wait_for("ready");
+    let address = daemon.address();
+    let ask = |arguments: &[&str]| {
+        let command = [arguments, &["--address", &address]].concat();
+        let output = sonard(&command).env_remove("SONARD_SERVER_TOKEN_FILE").output();
+        let output = output.expect("it runs");
+        let said = stderr(&output).split_whitespace().collect::<Vec<_>>().join(" ");
+        (output.status.code(), said, String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let (code, said, status) = ask(&["status"]);
+    assert!(code == Some(0) && status.contains("MOCK-00001"), "{said}");
+    let scan = ["scan", "--daemon", "--scene", "simple-room", "--pose", "fig7", "--to-deg", "36"];
+    let (code, said, _) = ask(&scan);
+    assert!(code == Some(3) && said.contains("token is missing or wrong"), "{said}");
+    let (code, said, log) = ask(&[&scan[..], &["--token-file", &token]].concat());
+    assert_eq!(code, Some(0), "{said}");
+    Log::parse(&log).assert_each_beam_once(40);
+    for (wrong, part) in [
+        (&["--address", "localhost:1", "--token-file", "/nowhere"][..], "cannot read the token"),
+        (&["--address", "https://robot.local/"], "plain HTTP"),
+    ] {
+        let output = sonard(&["status"]).args(wrong).output().expect("it runs");
+        let said = stderr(&output).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(output.status.code() == Some(2) && said.contains(part), "{said}");
+    }
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn air_from_a_program_is_forgotten_on_request() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    assert_eq!(daemon.send("PUT", "/v1/air", r#"{"temperature_c":25}"#).status, 202);
+    wait_until("the air", || daemon.get("/v1/air").json()["source"] == "api");
+    assert_eq!(daemon.send("DELETE", "/v1/air", "").status, 202);
+    wait_until("its own air", || daemon.get("/v1/air").json()["source"] == "configuration");
+    let air = daemon.get("/v1/air").json();
+    assert_eq!((&air["temperature_c"], &air["age_s"]), (&json!(20.0), &Value::Null));
+    let setup = daemon.get("/v1/setup").json();
+    assert_eq!(setup["model"]["max_range_m"], 2.0);
+    assert_eq!(
+        (&setup["sensor"]["name"], &setup["thermometer"]),
+        (&json!("senscomp-6500"), &json!(false))
+    );
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
 fn an_interrupt_and_a_stop_end_the_wait_for_a_scan() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &SHORT);

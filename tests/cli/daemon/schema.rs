@@ -34,6 +34,7 @@ fn check(schema: &Value, document: &Value, value: &Value, at: &str, found: &mut 
         "format",
         "title",
         "default",
+        "examples",
         "$schema",
     ];
     for word in schema.as_object().into_iter().flat_map(|schema| schema.keys()) {

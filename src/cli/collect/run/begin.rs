@@ -1,21 +1,33 @@
 //! The beginning of a run: the journal, the plan it knows, what was left over, the device.
 
-use std::collections::{BTreeMap, HashMap};
+use std::{
+    collections::{BTreeMap, HashMap},
+    time::Duration,
+};
 
 use jiff::Timestamp;
 use uuid::Uuid;
 
 use super::{
     super::{
-        Args, bar::Bar, changes, device::Device, load::Loaded, load::Poses, preview, refuse,
-        source::Source, terminal::Terminal, thermometer::Thermometer,
+        Args,
+        bar::Bar,
+        changes,
+        daemon::Daemon,
+        device::{Device, Met},
+        load::Loaded,
+        load::Poses,
+        own::Own,
+        preview, refuse,
+        source::Source,
+        terminal::Terminal,
+        thermometer::Thermometer,
     },
     Collector, warn_of_disk,
 };
 use crate::{
     cli::{Failure, Outcome, runtime::Interrupts},
     collect::{Conditions, Entry, Folder, INPUTS, Journal, PlanEntry, Started, numbers_of, sha256},
-    ranger::{device_record, provenance},
     scan::SceneRef,
 };
 
@@ -23,6 +35,7 @@ impl<'a> Collector<'a> {
     pub(super) async fn begin(
         args: &'a Args,
         loaded: Loaded,
+        mut daemon: Option<Daemon>,
         interrupts: Interrupts,
     ) -> Result<Self, Failure> {
         let thermometer = Thermometer::new(loaded.keys.air.file.as_deref());
@@ -32,11 +45,19 @@ impl<'a> Collector<'a> {
                 "correct air.file in the plan, or leave it out",
             )
         })?;
-        let air = loaded.air(measured_c.unwrap_or(loaded.keys.air.temperature_c))?;
+        let told_c = match &daemon {
+            Some(daemon) if !loaded.gives_air() => daemon.temperature_c().await,
+            _ => measured_c,
+        };
+        let air = loaded.air(told_c.unwrap_or(loaded.keys.air.temperature_c))?;
         let folder = Folder::open(&loaded.folder).map_err(|error| refuse(&error))?;
         let journal = Journal::open(&folder.journal()).map_err(|error| refuse(&error))?;
         let id = journal.history().plans.last().map_or_else(Uuid::new_v4, |plan| plan.collection);
-        let scan_s = preview::budget(&loaded, args.world.steps_per_revolution())?.total_s();
+        let scan_s = preview::budget(&loaded)?.total_s();
+        if let Some(daemon) = &mut daemon {
+            let patience = Duration::from_secs_f64(loaded.keys.collection.patience_s);
+            daemon.go_on(patience, journal.history().borrowed.clone());
+        }
         let mut collector = Self {
             args,
             source: Source::of(&loaded.poses),
@@ -49,7 +70,7 @@ impl<'a> Collector<'a> {
             interrupts,
             terminal: Terminal::default(),
             setups: HashMap::new(),
-            device: None,
+            device: daemon.map(|daemon| Device::Daemon(Box::new(daemon))),
             here: None,
             carried_to: None,
             refused: BTreeMap::new(),
@@ -160,20 +181,22 @@ impl<'a> Collector<'a> {
                 self.journal.history().wanted().first().map_or(1, |slot| slot.pose)
             }
         };
-        let setup = self.setup(first)?;
-        let mut device = Device::new(self.args, &self.loaded, &setup, self.interrupts.clone())?;
-        self.carried_to = Some(first);
-        let ranger = device.meet().await?;
-        let identity = *ranger.identity();
-        self.device = Some(device);
-        self.check_device(&device_record(&identity).serial)?;
-        self.ask_at_start().await?;
-        let started = Started {
-            time: Timestamp::now(),
-            device: device_record(&identity),
-            provenance: provenance(&identity),
-            conditions: self.conditions.clone(),
+        let mut device = match self.device.take() {
+            Some(device) => device,
+            None => {
+                let setup = self.setup(first)?;
+                self.carried_to = Some(first);
+                let interrupts = self.interrupts.clone();
+                Device::Own(Box::new(Own::new(self.args, &self.loaded, &setup, interrupts)?))
+            }
         };
+        let met = device.meet().await;
+        self.device = Some(device);
+        let Met { device, provenance } = met?;
+        self.check_device(&device.serial)?;
+        self.ask_at_start().await?;
+        let time = Timestamp::now();
+        let started = Started { time, device, provenance, conditions: self.conditions.clone() };
         self.note(Entry::Started(Box::new(started)))
     }
 

@@ -21,11 +21,14 @@ impl Collector<'_> {
         slot: Slot,
         (taken, change_c): (Taken, Option<f64>),
     ) -> Result<Next, Failure> {
-        let Taken { view, lost, wall_s } = taken;
+        let Taken { view, lost, stopped, wall_s } = taken;
         let Some(view) = view.filter(|view| !is_cut(view)) else {
             self.set_aside(slot, None, Outcome::Cut, Vec::new(), "it was broken off")?;
             if self.interrupts.happened() {
                 return Ok(Next::Stop("stopped on request".into()));
+            }
+            if stopped {
+                return Ok(Next::Stop("the daemon was told to stop".into()));
             }
             if let Some(Failure::Device(report)) = &lost {
                 self.bar.say(&format!("the ranger was lost: {report}"));

@@ -1,0 +1,345 @@
+//! A daemon that takes the scans of a collection: asked for each with its pose and plan, and left as
+//! it was found.
+
+use std::{path::Path, time::Duration};
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+use tokio::time::{Instant, sleep};
+
+use super::{
+    bar::Bar,
+    device::Met,
+    taking::{self, Taken, Taking},
+};
+use crate::{
+    cli::{
+        Failure,
+        daemon::{refuse, refuse_scans},
+        runtime::Interrupts,
+    },
+    client::{Client, RequestedScans, ScansError},
+    collect::{AirBefore, Borrowed},
+    config::{Mode, ScanningKeys},
+    daemon::{AirOrder, Setup},
+    ranger::Sink as _,
+    scan::{AirSource, CollectionRef, Device, EventKind, Provenance, Record, STOPPED_ON_REQUEST},
+};
+
+const WAIT: Duration = Duration::from_secs(1);
+/// How often it is looked whether a daemon that has not begun yet can scan at all.
+const LOOK: Duration = Duration::from_secs(5);
+
+/// A daemon, and what a collection wants of it.
+pub(super) struct Daemon {
+    client: Client,
+    /// What it decided about every scan when the collection began.
+    setup: Setup,
+    patience: Duration,
+    interrupts: Interrupts,
+    /// What it did by itself before, as far as that was changed.
+    borrowed: Option<Borrowed>,
+}
+
+/// What of its status matters here.
+#[derive(Deserialize)]
+pub(super) struct Status {
+    link: Link,
+    device: Option<Device>,
+    provenance: Option<Provenance>,
+    scanning: ScanningNow,
+    air: AirNow,
+    simulation: Option<Value>,
+    scene: Value,
+}
+
+#[derive(Deserialize)]
+struct Link {
+    state: String,
+    trouble: Option<String>,
+}
+
+#[derive(Deserialize)]
+struct ScanningNow {
+    mode: Mode,
+    every_s: f64,
+}
+
+#[derive(Deserialize)]
+struct AirNow {
+    temperature_c: f64,
+    humidity_percent: f64,
+    pressure_kpa: f64,
+    source: AirSource,
+}
+
+impl Status {
+    /// The scene that it predicts in.
+    pub(super) const fn scene(&self) -> &Value {
+        &self.scene
+    }
+
+    fn is_up(&self) -> bool {
+        matches!(self.link.state.as_str(), "ready" | "scanning")
+    }
+
+    /// Motor steps a turn, once the ranger told them.
+    pub(super) fn steps_per_revolution(&self) -> Option<u16> {
+        self.device.as_ref().and_then(|device| device.steps_per_revolution.try_into().ok())
+    }
+
+    fn trouble(&self) -> Failure {
+        let trouble = self.link.trouble.as_deref().unwrap_or("no more is known");
+        Failure::device(
+            format!("the daemon has no ranger, it is {}: {trouble}", self.link.state),
+            "see `sonard status`; the collection goes on where it stopped when it is started again",
+        )
+    }
+}
+
+impl Daemon {
+    /// Looks at a daemon, and changes nothing of it yet.
+    pub(super) async fn find(
+        client: Client,
+        interrupts: Interrupts,
+    ) -> Result<(Self, Status), Failure> {
+        let refuse = |error| refuse(&error);
+        let status: Status = client.get_json("/v1/status").await.map_err(refuse)?;
+        if status.simulation.is_some() {
+            return Err(Failure::input(
+                "the daemon plays an array and measures nothing",
+                "collect by a daemon that drives a ranger, or see `sonard simulate --array`",
+            ));
+        }
+        let setup = client.get_json("/v1/setup").await.map_err(refuse)?;
+        let patience = Duration::ZERO;
+        Ok((Self { client, setup, patience, interrupts, borrowed: None }, status))
+    }
+
+    pub(super) const fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// Goes on where an earlier run left it.
+    pub(super) fn go_on(&mut self, patience: Duration, borrowed: Option<Borrowed>) {
+        (self.patience, self.borrowed) = (patience, borrowed);
+    }
+
+    /// Waits until it has a ranger that can be used.
+    pub(super) async fn meet(&self) -> Result<Met, Failure> {
+        let status = self.ready().await?;
+        match (status.device, status.provenance) {
+            (Some(device), Some(provenance)) => Ok(Met { device, provenance }),
+            _ => Err(Failure::device("the daemon does not know its ranger", "see `sonard status`")),
+        }
+    }
+
+    /// What is about to be changed of what it does by itself, beyond what is known already: its own
+    /// scans are held, because only the collection knows where the ranger stands, and the air is
+    /// what the plan says, if it says anything.
+    pub(super) async fn to_borrow(
+        &self,
+        air: Option<&AirOrder>,
+    ) -> Result<Option<Borrowed>, Failure> {
+        let status = self.ready().await?;
+        let ScanningNow { mode, every_s } = status.scanning;
+        let mut before = self.borrowed.clone();
+        if mode != Mode::OnRequest {
+            before.get_or_insert_default().scanning = Some(ScanningKeys { mode, every_s });
+        }
+        if air.is_some_and(|air| !status.air.is(air)) {
+            // Air that this collection gave earlier is not the daemon's own.
+            let own = || match status.air.source {
+                AirSource::Api => AirBefore::Given(status.air.order()),
+                _ => AirBefore::Own,
+            };
+            before.get_or_insert_default().air.get_or_insert_with(own);
+        }
+        Ok(before.filter(|before| Some(before) != self.borrowed.as_ref()))
+    }
+
+    /// Lets the collection decide when scans are taken, and in which air.
+    pub(super) async fn borrow(
+        &mut self,
+        before: Option<Borrowed>,
+        air: Option<&AirOrder>,
+    ) -> Result<(), Failure> {
+        if before.is_some() {
+            self.borrowed = before;
+        }
+        self.put("/v1/scanning", &json!({ "mode": Mode::OnRequest })).await?;
+        let status: Status = self.client.get_json("/v1/status").await.map_err(|e| refuse(&e))?;
+        match air.filter(|air| !status.air.is(air)) {
+            Some(air) => self.put("/v1/air", &json!(air)).await,
+            None => Ok(()),
+        }
+    }
+
+    /// Leaves it as it was found; whether there was anything to give back.
+    pub(super) async fn give_back(&mut self) -> Result<bool, Failure> {
+        let Some(before) = self.borrowed.take() else { return Ok(false) };
+        if let Some(scanning) = before.scanning {
+            self.put("/v1/scanning", &json!(scanning)).await?;
+        }
+        match before.air {
+            Some(AirBefore::Given(air)) => self.put("/v1/air", &json!(air)).await?,
+            Some(AirBefore::Own) => {
+                self.client.delete("/v1/air").await.map_err(|error| refuse(&error))?;
+            }
+            None => {}
+        }
+        Ok(true)
+    }
+
+    /// The temperature that somebody measured for it, degrees Celsius.
+    pub(super) async fn temperature_c(&self) -> Option<f64> {
+        let air: AirNow = self.client.get_json("/v1/air").await.ok()?;
+        (air.source != AirSource::Configuration).then_some(air.temperature_c)
+    }
+
+    /// Has a scan taken into `path`, by a body of `POST /v1/start`.
+    pub(super) async fn take(
+        &self,
+        (wish, of): (&Value, CollectionRef),
+        path: &Path,
+        bar: &Bar,
+    ) -> Result<Taken, Failure> {
+        let (mut scans, first) = self.begin(wish).await?;
+        let began = Instant::now();
+        let mut sink = Taking::open(path, bar)?;
+        let (mut lost, mut stopped) = (None, false);
+        let mut next = Some(first);
+        while let Some(mut record) = next.take() {
+            if let Record::Session(session) = &mut record {
+                session.collection = Some(Box::new(of.clone()));
+            }
+            stopped |= is_stop(&record);
+            sink.record(&record).map_err(|error| taking::refuse(&error))?;
+            if matches!(record, Record::ScanEnd(_)) {
+                break;
+            }
+            tokio::select! {
+                record = scans.next() => match record {
+                    Ok(record) => next = Some(record),
+                    Err(error) => lost = Some(refuse_scans(&error)),
+                },
+                () = self.interrupts.clone().wait() => {
+                    // What can't be had any more is in the daemon's log.
+                    for record in scans.cancel().await.unwrap_or_default() {
+                        sink.record(&record).map_err(|error| taking::refuse(&error))?;
+                    }
+                }
+            }
+        }
+        let wall_s = began.elapsed().as_secs_f64();
+        let stopped = stopped && !self.interrupts.happened();
+        Ok(Taken { view: sink.close()?, lost, stopped, wall_s })
+    }
+
+    /// Asks for the scan and waits for its first record; a daemon that restarts meanwhile is asked
+    /// again.
+    async fn begin(&self, wish: &Value) -> Result<(RequestedScans, Record), Failure> {
+        loop {
+            self.ready().await?;
+            let mut scans = match RequestedScans::ask(self.client.clone(), wish).await {
+                Ok(scans) => scans,
+                Err(error) if error.is_final() => return Err(refuse(&error)),
+                Err(_) => continue,
+            };
+            match self.first(&mut scans).await? {
+                Ok(record) => return Ok((scans, record)),
+                Err(error @ ScansError::Forgotten(_)) => {
+                    return Err(Failure::Found(Some(format!(
+                        "{error}\nstart it again with the same plan: it goes on where it stopped"
+                    ))));
+                }
+                Err(_) => {}
+            }
+        }
+    }
+
+    async fn first(
+        &self,
+        scans: &mut RequestedScans,
+    ) -> Result<Result<Record, ScansError>, Failure> {
+        loop {
+            tokio::select! {
+                record = scans.next() => return Ok(record),
+                () = sleep(LOOK) => drop(self.ready().await?),
+                () = self.interrupts.clone().wait() => {
+                    drop(scans.cancel().await);
+                    return Err(stopped());
+                }
+            }
+        }
+    }
+
+    /// Waits, for as long as the plan's patience, until the daemon answers and has its ranger.
+    async fn ready(&self) -> Result<Status, Failure> {
+        let (until, mut told) = (Instant::now() + self.patience, false);
+        loop {
+            let failure = match self.look().await {
+                Ok(status) if status.is_up() => return Ok(status),
+                Ok(status) => status.trouble(),
+                Err(failure @ Failure::Device(_)) => failure,
+                Err(failure) => return Err(failure),
+            };
+            if Instant::now() + WAIT > until {
+                return Err(failure);
+            }
+            if let (Failure::Device(report), false) = (&failure, std::mem::replace(&mut told, true))
+            {
+                anstream::eprintln!("waiting: {report}");
+            }
+            tokio::select! {
+                () = sleep(WAIT) => {}
+                () = self.interrupts.clone().wait() => return Err(stopped()),
+            }
+        }
+    }
+
+    async fn look(&self) -> Result<Status, Failure> {
+        let refuse = |error| refuse(&error);
+        let setup: Setup = self.client.get_json("/v1/setup").await.map_err(refuse)?;
+        if setup != self.setup {
+            return Err(Failure::input(
+                "the daemon's sensor, model or motion is not what it was when this began",
+                "put its configuration back, or start the collection again: it says what changed",
+            ));
+        }
+        self.client.get_json("/v1/status").await.map_err(refuse)
+    }
+
+    async fn put(&self, path: &str, body: &Value) -> Result<(), Failure> {
+        self.client.put(path, body).await.map_err(|error| refuse(&error))
+    }
+}
+
+impl AirNow {
+    /// Whether that is the air in force, by a program's word.
+    fn is(&self, order: &AirOrder) -> bool {
+        let same = |wanted: Option<f64>, now: f64| wanted.is_none_or(|wanted| wanted == now);
+        self.source == AirSource::Api
+            && self.temperature_c == order.temperature_c
+            && same(order.humidity_percent, self.humidity_percent)
+            && same(order.pressure_kpa, self.pressure_kpa)
+    }
+
+    const fn order(&self) -> AirOrder {
+        AirOrder {
+            temperature_c: self.temperature_c,
+            humidity_percent: Some(self.humidity_percent),
+            pressure_kpa: Some(self.pressure_kpa),
+        }
+    }
+}
+
+/// Whether somebody told the daemon to end the scan.
+fn is_stop(record: &Record) -> bool {
+    let Record::Event(event) = record else { return false };
+    event.kind == EventKind::Stopped && event.detail.contains(STOPPED_ON_REQUEST)
+}
+
+fn stopped() -> Failure {
+    Failure::Found(Some("stopped on request".into()))
+}

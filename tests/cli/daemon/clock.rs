@@ -1,0 +1,58 @@
+//! The computer's wall clock is set while the daemon runs. `libfaketime` stands between it and the
+//! clock; without that library, `FAKETIME=0` leaves the test out.
+
+use std::{env, fs, path::PathBuf};
+
+use super::{Daemon, clean_log};
+use crate::common::{sonard, wait_until};
+
+/// Where Debian puts it, on any architecture.
+fn library() -> PathBuf {
+    let folders = fs::read_dir("/usr/lib").expect("a folder").flatten();
+    let mut places = folders.map(|folder| folder.path().join("faketime/libfaketime.so.1"));
+    places.find(|place| place.exists()).expect(
+        "libfaketime is missing: sudo apt-get install libfaketime, or leave this out by FAKETIME=0",
+    )
+}
+
+#[test]
+fn a_clock_that_is_set_is_noted_and_costs_no_beam() {
+    if env::var("FAKETIME").is_ok_and(|wanted| wanted == "0") {
+        return eprintln!("LEFT OUT, because FAKETIME=0");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let offset = folder.path().join("offset");
+    fs::write(&offset, "+0").expect("writable");
+    let mut command = sonard(&[]);
+    command
+        .env("LD_PRELOAD", library())
+        .env("FAKETIME_TIMESTAMP_FILE", &offset)
+        .env("FAKETIME_NO_CACHE", "1")
+        // The clock that never jumps doesn't.
+        .env("FAKETIME_DONT_FAKE_MONOTONIC", "1");
+    let mock = ["--mock", "--scene", "simple-room", "--pose", "fig9"];
+    let short = ["plan.to_deg=36", "plan.step_deg=3.6", "model.max_range_m=1"];
+    let settings = ["scanning.mode=continuous"].into_iter().chain(short);
+    let settings: Vec<_> = settings.flat_map(|setting| ["--set", setting]).collect();
+    let daemon = Daemon::start_as(command, folder.path(), &[&mock[..], &settings].concat());
+    daemon.wait_for_scans(2);
+    for (steps, offset_s) in [(1, "+3600"), (2, "-3600")] {
+        fs::write(&offset, offset_s).expect("writable");
+        wait_until("the note", || daemon.health()["clock"]["steps"] == steps);
+        let before = daemon.health()["scans"]["completed"].as_u64().expect("a count");
+        daemon.wait_for_scans(before + 2);
+    }
+    assert_eq!(daemon.health()["scans"]["failed"], 0);
+    assert_eq!(daemon.stop(), Some(0));
+    let log = clean_log(folder.path());
+    let steps: Vec<_> =
+        log.events().into_iter().filter(|event| event.contains("clock_step")).collect();
+    assert!(
+        steps.len() == 2 && steps[0].contains("+3600.0") && steps[1].contains("-7200.0"),
+        "{steps:?}"
+    );
+    for end in log.of_type("scan_end") {
+        let beams = log.pings().iter().filter(|ping| ping["scan"] == end["scan"]).count() as u64;
+        assert_eq!(beams, end["beams"].as_u64().expect("a count"), "{end}");
+    }
+}
