@@ -180,6 +180,7 @@ fn l_room() {
         max_order: Some(8),
         floor: 1e-6,
         edge_law: None,
+        double_diffraction: false,
         absorption_np_per_m: 0.0,
         wave_number_per_m: TAU * 49_400.0 / 343.2,
         sensor_z_m: None,

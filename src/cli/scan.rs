@@ -35,7 +35,7 @@ use setup::Setup;
 pub(super) const ATTEMPTS: u8 = 7;
 
 /// What a daemon has of its own, and a scan by it is not told.
-const OF_THE_DAEMON: [&str; 34] = [
+const OF_THE_DAEMON: [&str; 35] = [
     "sensor",
     "short_blanking",
     "blanking_us",
@@ -53,6 +53,7 @@ const OF_THE_DAEMON: [&str; 34] = [
     "lossless",
     "max_order",
     "edge_law",
+    "double_diffraction",
     "ray_spacing_deg",
     "aperture_deg",
     "window_ms",

@@ -1,11 +1,14 @@
 //! The way of an echo through the floor plan, as points.
 //!
-//! A path's walls and edge say what the sound met and in which order; where it met them follows
+//! A path's walls and edges say what the sound met and in which order; where it met them follows
 //! from mirror images, so a way can be drawn from a log's record as well as from an arrival.
 
 use smallvec::SmallVec;
 
-use super::{Edge, Path, Reflector, simulator::FACE_NAME};
+use super::{
+    Bend, Edge, Path, Reflector,
+    simulator::{CEILING_NAME, FACE_NAME, FLOOR_NAME},
+};
 use crate::{
     geometry::{DVec2, Mirror},
     scan::{PathKind, PathRecord},
@@ -26,30 +29,34 @@ const CLOSE_M: f64 = 1e-7;
 const MOST_ROUNDS: usize = 500;
 
 impl Path {
-    /// The points of the way from a ranger at `position` and back to it, in order: the ranger, each
-    /// reflection and the edge, the ranger. Round an edge the way may be the one run through
+    /// The points of the way from a ranger at `position` and back to it, in order and in the plan: the
+    /// ranger, each reflection and edge, the ranger. Round an edge the way may be the one run through
     /// backwards, which meets the same walls in the same order and arrives at the same time. `None`
-    /// if there is no such way of `length_m` metres in this scene, and for what a rough wall
-    /// scattered: which part of it did is not in a record.
+    /// if there is no such way of `length_m` metres in this scene (up or down as well, in the plan it is
+    /// shorter), and for what a rough wall scattered: which part of it did is not in a record.
     #[must_use]
     pub fn points(&self, scene: &Scene, position: DVec2, length_m: f64) -> Option<Vec<DVec2>> {
         if self.kind == PathKind::Scattered {
             return None;
         }
-        let edge = match self.edge {
-            Some(edge) => Some(edge.place(scene)?),
-            None => None,
-        };
-        let way = Way { scene, from: position, length_m };
+        let is_upright = |wall: &Reflector| !matches!(wall, Reflector::Floor | Reflector::Ceiling);
+        let walls: SmallVec<[Reflector; 8]> =
+            self.walls.iter().copied().filter(is_upright).collect();
+        let mut edges: SmallVec<[DVec2; 2]> = SmallVec::new();
+        for bend in &self.bends {
+            // Over a level edge the way in the plan is a mirror's.
+            if let Bend::Upright(edge) = bend {
+                edges.push(edge.place(scene)?);
+            }
+        }
+        let rises = walls.len() < self.walls.len() || edges.len() < self.bends.len();
+        let way = Way { scene, from: position, length_m, rises };
         // The transducer's face sends the sound off again from where it started.
-        let rounds: Vec<&[Reflector]> = self.walls.split(|wall| *wall == Reflector::Face).collect();
-        let Some(edge) = edge else { return way.whole(&rounds, None) };
-        // The record does not say where among the walls the edge was met.
-        let places = rounds
-            .iter()
-            .enumerate()
-            .flat_map(|(round, walls)| (0..=walls.len()).map(move |split| (round, split)));
-        places.into_iter().find_map(|(round, split)| way.whole(&rounds, Some((edge, round, split))))
+        let mut rounds = walls.split(|wall| *wall == Reflector::Face);
+        let first = rounds.next().unwrap_or_default();
+        let rounds: SmallVec<[&[Reflector]; 4]> = rounds.collect();
+        let mut points = vec![position];
+        way.follow(&mut points, first, &rounds, &edges).then_some(points)
     }
 
     /// The path of a log's record in its scene; `None` if the scene lacks one of its names.
@@ -57,11 +64,9 @@ impl Path {
     pub fn from_record(record: &PathRecord, scene: &Scene) -> Option<Self> {
         let walls: Option<SmallVec<[Reflector; 4]>> =
             record.walls.iter().map(|name| reflector(scene, name)).collect();
-        let edge = match &record.edge {
-            Some(name) => Some(edge(scene, name)?),
-            None => None,
-        };
-        Some(Self { kind: record.kind, walls: walls?, edge })
+        let names = record.edge.iter().chain(&record.second_edge);
+        let bends: Option<SmallVec<[Bend; 2]>> = names.map(|name| bend(scene, name)).collect();
+        Some(Self { kind: record.kind, walls: walls?, bends: bends? })
     }
 }
 
@@ -80,14 +85,18 @@ fn reflector(scene: &Scene, name: &str) -> Option<Reflector> {
     let cylinder = || scene.cylinders.iter().position(|cylinder| &*cylinder.id == name);
     wall.map(|index| Reflector::Wall(index as u32))
         .or_else(|| cylinder().map(|index| Reflector::Cylinder(index as u32)))
+        .or_else(|| (name == FLOOR_NAME).then_some(Reflector::Floor))
+        .or_else(|| (name == CEILING_NAME).then_some(Reflector::Ceiling))
 }
 
-fn edge(scene: &Scene, name: &str) -> Option<Edge> {
+fn bend(scene: &Scene, name: &str) -> Option<Bend> {
     let (wall, end) = name.rsplit_once('.')?;
     let wall = scene.walls.iter().position(|known| &*known.id == wall)? as u32;
     match end {
-        "a" => Some(Edge { wall, at_b: false }),
-        "b" => Some(Edge { wall, at_b: true }),
+        "a" => Some(Bend::Upright(Edge { wall, at_b: false })),
+        "b" => Some(Bend::Upright(Edge { wall, at_b: true })),
+        "top" => Some(Bend::Level { wall, is_upper: true }),
+        "bottom" => Some(Bend::Level { wall, is_upper: false }),
         _ => None,
     }
 }
@@ -96,32 +105,43 @@ struct Way<'a> {
     scene: &'a Scene,
     from: DVec2,
     length_m: f64,
+    /// Whether it also runs up or down, and so is longer than in the plan.
+    rises: bool,
 }
 
 impl Way<'_> {
-    /// All rounds one after the other; the edge lies in one of them, after so many of its walls.
-    fn whole(
+    /// Goes on from the last of the points over the walls left of a round and the edges left, then all
+    /// later rounds. Where among the walls an edge was met is not said, so all places are tried.
+    /// False, with the points as they were, if there is no such way.
+    fn follow(
         &self,
+        points: &mut Vec<DVec2>,
+        walls: &[Reflector],
         rounds: &[&[Reflector]],
-        edge: Option<(DVec2, usize, usize)>,
-    ) -> Option<Vec<DVec2>> {
-        let mut points = vec![self.from];
-        for (number, walls) in rounds.iter().enumerate() {
-            let round = match edge {
-                Some((edge, round, split)) if round == number => {
-                    self.around(edge, walls.split_at(split))?
+        edges: &[DVec2],
+    ) -> bool {
+        let (known, at) = (points.len(), points.last().copied().unwrap_or(self.from));
+        if let [edge, later @ ..] = edges {
+            for (out, rest) in (0..=walls.len()).map(|split| walls.split_at(split)) {
+                if let Some(leg) = self.leg(at, *edge, out) {
+                    points.extend(leg.into_iter().skip(1));
+                    if self.follow(points, rest, rounds, later) {
+                        return true;
+                    }
+                    points.truncate(known);
                 }
-                _ => self.leg(self.from, self.from, walls)?,
-            };
-            points.extend(round.into_iter().skip(1));
+            }
         }
-        self.has_length(&points).then_some(points)
-    }
-
-    fn around(&self, edge: DVec2, (out, back): (&[Reflector], &[Reflector])) -> Option<Vec<DVec2>> {
-        let mut points = self.leg(self.from, edge, out)?;
-        points.extend(self.leg(edge, self.from, back)?.into_iter().skip(1));
-        Some(points)
+        let Some(home) = self.leg(at, self.from, walls) else { return false };
+        points.extend(home.into_iter().skip(1));
+        let is_whole = match rounds {
+            [] => edges.is_empty() && self.has_length(points),
+            [next, more @ ..] => self.follow(points, next, more, edges),
+        };
+        if !is_whole {
+            points.truncate(known);
+        }
+        is_whole
     }
 
     /// From one point to another over these reflectors.
@@ -199,7 +219,8 @@ impl Way<'_> {
 
     fn has_length(&self, points: &[DVec2]) -> bool {
         let length_m: f64 = points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
-        (length_m - self.length_m).abs() < SAME_LENGTH_M
+        let more_m = self.length_m - length_m;
+        more_m.abs() < SAME_LENGTH_M || self.rises && more_m > 0.0
     }
 }
 

@@ -183,6 +183,7 @@ fn predict(pose: &Pose, azimuth_deg: f64) -> SimRecord {
             order: *order,
             walls: (0..*order).map(|i| ["south", "north"][i as usize % 2].into()).collect(),
             edge: None,
+            second_edge: None,
             length_m: *length_m,
         }),
     }

@@ -35,6 +35,10 @@ pub(super) enum Via {
         out: u32,
         back: u32,
     },
+    /// By two edges, in [`super::Trees::bridged`].
+    Edges {
+        way: u32,
+    },
     /// By the contact in its middle, in [`super::Trees::joints`].
     Cylinder {
         joint: u32,
@@ -58,6 +62,8 @@ impl Echo {
             && self.arrival.distance_squared(other.arrival) < SAME_RAD * SAME_RAD
             && self.image == other.image
             && std::mem::discriminant(&self.via) == std::mem::discriminant(&other.via)
+            // Between two edges there may be several ways of one length; none was found twice.
+            && !matches!(self.via, Via::Edges { .. })
     }
 }
 

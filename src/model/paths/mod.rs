@@ -42,7 +42,8 @@
 //! Sound bends at free ends and at corners that are not `pi / m`. By reciprocity the ways back
 //! from an edge are the ways to it, so the one-way rays to each edge, from the same tree,
 //! give all echoes with one diffraction and any reflections before and after: every pair of a way
-//! out and a way back (`edges`). How much comes back says [`crate::acoustics::edge`].
+//! out and a way back (`edges`). How much comes back says [`crate::acoustics::edge`]. On request
+//! ([`Settings::double_diffraction`]) sound is also followed from one edge to another (`bridges`).
 //!
 //! # Cylinders
 //!
@@ -89,6 +90,7 @@
 
 mod arms;
 mod beam;
+mod bridges;
 mod echo;
 mod edges;
 mod heights;
@@ -116,6 +118,7 @@ use std::sync::Arc;
 
 use self::{
     arms::Partners,
+    bridges::{Bridged, Bridges},
     echo::{Echo, Via, sorted},
     edges::Edges,
     heights::Heights,
@@ -140,6 +143,8 @@ pub struct Paths {
     /// By wall.
     faces: Arc<[Face]>,
     edges: Arc<Edges>,
+    /// Empty without double diffraction.
+    bridges: Arc<Bridges>,
     rounds: Arc<Rounds>,
     heights: Arc<Heights>,
     /// By floor and ceiling; none in a scene in the plane.
@@ -228,6 +233,12 @@ impl Paths {
                 .map(|law| Edges::new(&plan, &segments, &gains, law))
                 .unwrap_or_default()
                 .into(),
+            bridges: mesh
+                .as_ref()
+                .filter(|_| settings.double_diffraction)
+                .map(|mesh| Bridges::new(mesh, &settings))
+                .unwrap_or_default()
+                .into(),
             rounds: Rounds::new(circles, mesh.as_ref()).into(),
             images: vertical::images(scene.floor_z_m, scene.ceiling_z_m, z_m, settings.max_path_m)
                 .into(),
@@ -275,9 +286,10 @@ impl Paths {
         }
         let joints =
             self.add_rounds(&mut echoes, &mut out, back.as_mut(), [transmitter, receiver], both);
-        let mut trees = Trees { out, back, joints };
+        let mut trees = Trees { out, back, joints, bridged: Vec::new() };
         if let Some(law) = self.settings.edge_law {
             echoes.extend(self.edges.echoes(&mut trees, law, &self.settings));
+            echoes.extend(bridges::echoes(self, &mut trees, law));
         }
         self.add_images(&mut echoes, receiver - transmitter);
         self.retain_clear(&trees, &mut echoes, [transmitter, receiver]);
@@ -369,6 +381,8 @@ struct Trees {
     back: Option<Tree>,
     /// Where ways of both meet at cylinders.
     joints: Vec<Joint>,
+    /// By way of two edges.
+    bridged: Vec<Bridged>,
 }
 
 impl Trees {

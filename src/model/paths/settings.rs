@@ -18,6 +18,8 @@ pub struct Settings {
     pub floor: f64,
     /// What edges send back; `None`: mirror reflections only.
     pub edge_law: Option<EdgeLaw>,
+    /// Also sound that bends at two edges, by the same law at each.
+    pub double_diffraction: bool,
     /// Attenuation of the amplitude in air, nepers a metre.
     pub absorption_np_per_m: f64,
     /// Wave number `2 pi f / c`, radians a metre.

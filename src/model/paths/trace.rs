@@ -71,6 +71,15 @@ impl Tree {
         Grower::new(paths, mesh, start, target, home).grow(first)
     }
 
+    /// All beams from a point of the mesh, whose triangles these are, for the rays in them to edges.
+    pub(super) fn grow_from_corner(paths: &Paths, point: u32, around: &[(u32, u8)]) -> Self {
+        let Some(mesh) = &paths.mesh else { return Self::default() };
+        let Some(&(home, _)) = around.first() else { return Self::default() };
+        let start = mesh.points[point as usize];
+        let tree = Grower::new(paths, mesh, start, start, home).grow_from_corner(around);
+        Self { nodes: tree.nodes, to_edges: tree.to_edges, ..Self::default() }
+    }
+
     /// A ray to an edge by its number: those over walls alone first, then those by cylinders.
     pub(super) fn part(&self, ray: u32) -> Part {
         let ray = ray as usize;

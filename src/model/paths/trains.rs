@@ -311,6 +311,7 @@ mod tests {
             max_order: None,
             floor: 1e-3,
             edge_law: None,
+            double_diffraction: false,
             absorption_np_per_m: 0.0,
             wave_number_per_m: DISC.wave_number_per_m,
             sensor_z_m: None,

@@ -9,7 +9,7 @@
 //! What the plan says of amplitudes stays: cylinders spread sound in the plan alone. Of an edge,
 //! Kouyoumjian and Pathak's coefficient grows by `1 / sin b` for a ray that is `b` off the
 //! edge's direction, and the field by the square root of that; the small part of it that shifts the
-//! transition (its distance parameter falls by `sin b`) is left out.
+//! transition (its distance parameter falls by `sin b`) is left out. At two edges it grows twice.
 
 use smallvec::SmallVec;
 
@@ -80,6 +80,7 @@ impl Image {
         let cosine = plan.length_m / length_m;
         let bending = match plan.via {
             Via::Edge { .. } => cosine.sqrt().recip(),
+            Via::Edges { .. } => cosine.recip(),
             _ => 1.0,
         };
         let amplitude = plan.amplitude * bending * settings.air_gain(length_m - plan.length_m);

@@ -200,7 +200,7 @@ fn a_huge_cylinder_is_a_wall() {
         let is_same = |one: &&EchoPath| {
             (one.length_m - other.length_m).abs() < 1e-3
                 && (one.amplitude - other.amplitude).abs() < 1e-2 * other.amplitude
-                && one.path.edge == other.path.edge
+                && one.path.bends == other.path.bends
                 && one.path.walls.len() == other.path.walls.len()
         };
         assert!(round.iter().any(|one| is_same(&one)), "{other:?}");
@@ -226,7 +226,7 @@ fn edges_answer_by_way_of_cylinders() {
         .fold(f64::INFINITY, f64::min);
     let bent: Vec<_> = echoes
         .iter()
-        .filter(|echo| echo.path.edge.is_some_and(|edge| !edge.at_b))
+        .filter(|echo| matches!(echo.path.bends[..], [Bend::Upright(edge)] if !edge.at_b))
         .map(|echo| (echo.length_m, echo.path.walls.len()))
         .collect();
     for (expected, count) in [(2.4, 1), (1.2 + by, 2), (2.0 * by, 1)] {

@@ -142,7 +142,7 @@ fn low_wall() -> Scene {
 fn rims(plan: &Scene, at: DVec2, z_m: f64) -> Vec<EchoPath> {
     let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..at_height(z_m) };
     let mut echoes = Paths::new(plan, settings).enumerate(at);
-    echoes.retain(|echo| echo.path.kind == PathKind::Diffracted && echo.path.edge.is_none());
+    echoes.retain(|echo| matches!(echo.path.bends[..], [Bend::Level { .. }]));
     echoes
 }
 

@@ -56,7 +56,31 @@ impl<'a> Grower<'a> {
 
     /// All beams of a start in a triangle.
     pub(super) fn grow(mut self, triangle: u32) -> Tree {
-        let first = Beam {
+        self.look_around(self.first(triangle), None);
+        self.finish()
+    }
+
+    /// All beams of a start that is a corner of these triangles. To another corner and back it is no
+    /// longer than by it to any receiver, for which there is a way to and from both.
+    pub(super) fn grow_from_corner(mut self, around: &[(u32, u8)]) -> Tree {
+        for &(triangle, corner) in around {
+            let first = self.first(triangle);
+            let side = (corner as usize + 1) % 3;
+            let ends = [side, (side + 1) % 3];
+            for end in ends {
+                self.meet_near_edge(&first, self.mesh.triangles[triangle as usize].corners[end]);
+            }
+            let [right, left] = ends.map(|end| self.mesh.corner(triangle, end) - self.start);
+            for part in self.shaded(Beam { right, left, ..first }) {
+                let beam = self.leave(part, side);
+                self.follow(beam);
+            }
+        }
+        self.finish()
+    }
+
+    fn first(&self, triangle: u32) -> Beam {
+        Beam {
             image: self.start,
             right: DVec2::ZERO,
             left: DVec2::ZERO,
@@ -68,8 +92,11 @@ impl<'a> Grower<'a> {
             side: 0,
             mirrored: false,
             order: 0,
-        };
-        self.look_around(first, None);
+        }
+    }
+
+    /// Follows the beams order by order.
+    fn finish(mut self) -> Tree {
         let mut beams = Vec::new();
         while !self.next.is_empty() {
             std::mem::swap(&mut beams, &mut self.next);
