@@ -36,6 +36,17 @@ impl Path {
     /// shorter), and for what a rough wall scattered: which part of it did is not in a record.
     #[must_use]
     pub fn points(&self, scene: &Scene, position: DVec2, length_m: f64) -> Option<Vec<DVec2>> {
+        self.points_between(scene, [position; 2], length_m)
+    }
+
+    /// The same from a transmitter to a receiver.
+    #[must_use]
+    pub fn points_between(
+        &self,
+        scene: &Scene,
+        [from, to]: [DVec2; 2],
+        length_m: f64,
+    ) -> Option<Vec<DVec2>> {
         if self.kind == PathKind::Scattered {
             return None;
         }
@@ -50,12 +61,12 @@ impl Path {
             }
         }
         let rises = walls.len() < self.walls.len() || edges.len() < self.bends.len();
-        let way = Way { scene, from: position, length_m, rises };
+        let way = Way { scene, from, to, length_m, rises };
         // The transducer's face sends the sound off again from where it started.
         let mut rounds = walls.split(|wall| *wall == Reflector::Face);
         let first = rounds.next().unwrap_or_default();
         let rounds: SmallVec<[&[Reflector]; 4]> = rounds.collect();
-        let mut points = vec![position];
+        let mut points = vec![from];
         way.follow(&mut points, first, &rounds, &edges).then_some(points)
     }
 
@@ -104,6 +115,7 @@ fn bend(scene: &Scene, name: &str) -> Option<Bend> {
 struct Way<'a> {
     scene: &'a Scene,
     from: DVec2,
+    to: DVec2,
     length_m: f64,
     /// Whether it also runs up or down, and so is longer than in the plan.
     rises: bool,
@@ -132,7 +144,7 @@ impl Way<'_> {
                 }
             }
         }
-        let Some(home) = self.leg(at, self.from, walls) else { return false };
+        let Some(home) = self.leg(at, self.to, walls) else { return false };
         points.extend(home.into_iter().skip(1));
         let is_whole = match rounds {
             [] => edges.is_empty() && self.has_length(points),

@@ -37,8 +37,8 @@ use smallvec::SmallVec;
 use super::{
     Echo, Paths, Settings, Trees, Via,
     beam::Ray,
-    echo::drop_repeats,
-    edges::{Arm, Corner, Facing, Flank, is_same_departure},
+    echo::SAME_M,
+    edges::{ALONG_RAD, Arm, Corner, Facing, Flank, is_same_departure},
     mesh::Mesh,
     trace::Tree,
 };
@@ -47,10 +47,20 @@ use crate::acoustics::edge::{Aspect, EdgeLaw};
 /// Trees of beams from the edges of a scene, by point.
 #[derive(Debug, Default)]
 pub(super) struct Bridges {
-    trees: Vec<OnceLock<Tree>>,
+    spans: Vec<OnceLock<Spans>>,
     /// The triangles around each point and which corner of each it is, counter-clockwise.
     around: Vec<SmallVec<[(u32, u8); 6]>>,
     max_path_m: f64,
+}
+
+/// The rays from an edge to edges.
+#[derive(Debug)]
+struct Spans {
+    /// Its `to_edges` lie side by side by edge, shortest first.
+    tree: Tree,
+    /// Of each ray, whether it left in the air on its left and on its right: along a wall it may have
+    /// gone on one side only.
+    flanks: Vec<[bool; 2]>,
 }
 
 /// A way by two edges.
@@ -67,35 +77,73 @@ pub(super) struct Bridged {
 
 impl Bridges {
     pub(super) fn new(mesh: &Mesh, settings: &Settings) -> Self {
-        let trees = mesh.points.iter().map(|_| OnceLock::new()).collect();
-        Self { trees, around: mesh.around_points(), max_path_m: settings.max_path_m }
+        let spans = mesh.points.iter().map(|_| OnceLock::new()).collect();
+        Self { spans, around: mesh.around_points(), max_path_m: settings.max_path_m }
     }
 
-    /// The rays from an edge to edges, side by side by edge, shortest first.
+    /// The rays from an edge to edges.
     pub(super) fn tree(&self, paths: &Paths, point: u32) -> &Tree {
+        &self.spans(paths, point).tree
+    }
+
+    fn spans(&self, paths: &Paths, point: u32) -> &Spans {
         let grow = || {
             let paths = paths.within(self.max_path_m);
-            let mut tree = Tree::grow_from_corner(&paths, point, &self.around[point as usize]);
-            sort_rays(&mut tree.to_edges);
-            tree
+            Spans::grow(&paths, point, &self.around[point as usize])
         };
-        self.trees[point as usize].get_or_init(grow)
+        self.spans[point as usize].get_or_init(grow)
     }
 }
 
-/// By edge and length, each once: a ray that touches a corner is found on both sides of it.
-fn sort_rays(rays: &mut Vec<(u32, Ray)>) {
-    rays.sort_by(|(one, a), (other, b)| {
-        one.cmp(other).then(a.run.length_squared().total_cmp(&b.run.length_squared()))
-    });
-    let same = |a: &(u32, Ray), b: &(u32, Ray)| a.0 == b.0 && is_same_departure(&a.1, &b.1);
-    let mut sorted = Vec::with_capacity(rays.len());
-    for of_edge in rays.chunk_by(|a, b| a.0 == b.0) {
-        let mut of_edge = of_edge.to_vec();
-        drop_repeats(&mut of_edge, |(_, ray)| ray.run.length(), same);
-        sorted.append(&mut of_edge);
+impl Spans {
+    fn grow(paths: &Paths, point: u32, around: &[(u32, u8)]) -> Self {
+        let mut tree = Tree::grow_from_corner(paths, point, around);
+        let rays = std::mem::take(&mut tree.to_edges);
+        let side = |ray: &Ray| {
+            let (triangle, corner) = *around.get(tree.root_slot(&paths.faces, ray.into()))?;
+            let mesh = paths.mesh.as_ref()?;
+            let place = mesh.corner(triangle, corner as usize);
+            // What runs along its right border has it on the left.
+            Some([1, 2].map(|next| {
+                let border = mesh.corner(triangle, (corner as usize + next) % 3) - place;
+                let off_m = border.perp_dot(ray.departure).abs();
+                border.dot(ray.departure) > 0.0 && off_m <= ALONG_RAD * border.length()
+            }))
+        };
+        let mut found: Vec<(u32, Ray, [bool; 2])> = rays
+            .iter()
+            .map(|(edge, ray)| (*edge, *ray, side(ray).unwrap_or_default()))
+            .collect();
+        found.sort_by(|(one, a, _), (other, b, _)| {
+            one.cmp(other).then(a.run.length_squared().total_cmp(&b.run.length_squared()))
+        });
+        let mut flanks: Vec<[bool; 2]> = Vec::with_capacity(found.len());
+        for (edge, ray, sides) in found {
+            match known(&tree.to_edges, edge, &ray) {
+                // One that touches a corner, or runs along a wall, is found on both sides of it.
+                Some(place) => {
+                    let known = &mut flanks[place];
+                    *known = [known[0] | sides[0], known[1] | sides[1]];
+                }
+                None => {
+                    tree.to_edges.push((edge, ray));
+                    flanks.push(sides);
+                }
+            }
+        }
+        Self { tree, flanks }
     }
-    *rays = sorted;
+}
+
+/// Where among rays that are sorted by edge and length one is already.
+fn known(rays: &[(u32, Ray)], edge: u32, ray: &Ray) -> Option<usize> {
+    let length_m = ray.run.length();
+    rays.iter()
+        .enumerate()
+        .rev()
+        .take_while(|(_, (to, other))| *to == edge && length_m - other.run.length() < SAME_M)
+        .find(|(_, (_, other))| is_same_departure(ray, other))
+        .map(|(place, _)| place)
 }
 
 /// All echoes by way of two edges; their ways go to [`Trees::bridged`]. The trees are sorted by edge.
@@ -108,11 +156,12 @@ pub(super) fn echoes(paths: &Paths, trees: &mut Trees, law: EdgeLaw) -> Vec<Echo
     let apart = trees.back.as_ref().map(|back| arms(paths, back));
     let backs = apart.as_ref().unwrap_or(&outs);
     for (first, corner, outs) in &outs {
-        let between = paths.bridges.tree(paths, *first);
+        let Spans { tree, flanks } = paths.bridges.spans(paths, *first);
         for (second, far_corner, backs) in backs {
-            let (from, rays) = between.flat_to(*second);
+            let (from, rays) = tree.flat_to(*second);
             for (leg, (_, ray)) in (from..).zip(rays) {
-                let bridge = Bridge { points: [*first, *second], leg, ray };
+                let flanks = flanks[leg as usize];
+                let bridge = Bridge { points: [*first, *second], leg, ray, flanks };
                 if !found.join(&bridge, [corner, far_corner], [outs, backs]) {
                     break;
                 }
@@ -135,6 +184,8 @@ struct Bridge<'a> {
     points: [u32; 2],
     leg: u32,
     ray: &'a Ray,
+    /// See [`Spans`].
+    flanks: [bool; 2],
 }
 
 struct Found<'a> {
@@ -163,7 +214,7 @@ impl Found<'_> {
         if out.length_m + leg_m + back.length_m > self.settings.max_path_m {
             return false;
         }
-        let passages = self.passages(bridge.ray, corners);
+        let passages = self.passages(bridge, corners);
         let passed = |end: usize, arms: &[Arm]| -> Vec<Passed> {
             arms.iter().map(|arm| self.passed(corners[end], end, arm, &passages, leg_m)).collect()
         };
@@ -210,8 +261,14 @@ impl Found<'_> {
     }
 
     /// The sides on which a ray runs from one corner to another: one, or along a wall's faces two.
-    fn passages(&self, ray: &Ray, corners: [&Corner; 2]) -> SmallVec<[Passage; 2]> {
-        let [here, there] = [corners[0].facings(ray.departure), corners[1].facings(-ray.run)];
+    fn passages(&self, bridge: &Bridge, corners: [&Corner; 2]) -> SmallVec<[Passage; 2]> {
+        let ray = bridge.ray;
+        let [mut here, there] = [corners[0].facings(ray.departure), corners[1].facings(-ray.run)];
+        here.retain(|facing| match facing.flank {
+            Flank::Open => true,
+            Flank::Left => bridge.flanks[0],
+            Flank::Right => bridge.flanks[1],
+        });
         // Seen from the far end left is right, and through an odd number of mirrors right is left.
         let is_turned = ray.order.is_multiple_of(2);
         let fits = |one: &Facing, other: &Facing| match (one.flank, other.flank) {

@@ -3,7 +3,7 @@
 use crate::geometry::DVec2;
 
 /// Echoes that agree in length and both directions to within this are one, metres and radians.
-const SAME_M: f64 = 1e-8;
+pub(super) const SAME_M: f64 = 1e-8;
 pub(super) const SAME_RAD: f64 = 1e-9;
 
 /// An echo path with its way as nodes of the tree.

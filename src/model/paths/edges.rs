@@ -22,7 +22,7 @@ const GRAZING_RAD: f64 = 1e-9;
 
 /// Between edges a leg counts as along a wall's face to within this, radians: their places may have
 /// been moved a little off the wall's line to where walls meet.
-const ALONG_RAD: f64 = 1e-6;
+pub(super) const ALONG_RAD: f64 = 1e-6;
 
 /// The edges of a scene, by point of its arrangement.
 #[derive(Debug, Default)]

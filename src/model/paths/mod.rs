@@ -127,7 +127,7 @@ use self::{
     rounds::{Circle, Rounds},
     trace::Tree,
     tubes::TubeGrower,
-    vertical::Image,
+    vertical::{Image, Level},
     wheel::Both,
 };
 use crate::{
@@ -240,8 +240,13 @@ impl Paths {
                 .unwrap_or_default()
                 .into(),
             rounds: Rounds::new(circles, mesh.as_ref()).into(),
-            images: vertical::images(scene.floor_z_m, scene.ceiling_z_m, z_m, settings.max_path_m)
-                .into(),
+            images: vertical::images(
+                level(scene.floor_z_m, &scene.floor_material),
+                level(scene.ceiling_z_m, &scene.ceiling_material),
+                z_m,
+                &settings,
+            )
+            .into(),
             heights: heights.into(),
             settings,
             mesh: mesh.map(Arc::new),
@@ -364,6 +369,11 @@ impl Paths {
             echoes.extend(image.upright_echo(index, apart, &self.settings));
         }
     }
+}
+
+/// Floor or ceiling, if there is one.
+fn level(z_m: Option<f64>, material: &Material) -> Option<Level> {
+    Some(Level { z_m: z_m?, gain: mirror_gain(material) })
 }
 
 /// Amplitude of a material's mirror reflection: a rough surface scatters a share of the energy

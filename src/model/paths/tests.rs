@@ -21,7 +21,7 @@ use crate::{
     acoustics::edge::EdgeLaw,
     model::{Bend, Edge},
     scan::PathKind,
-    scene::Wall,
+    scene::{Material, Wall},
 };
 
 pub(super) const LOSSLESS: Settings = Settings {
@@ -54,6 +54,8 @@ fn scene(walls: &[[f64; 4]]) -> Scene {
         cylinders: Vec::new(),
         floor_z_m: None,
         ceiling_z_m: None,
+        floor_material: Material::RIGID,
+        ceiling_material: Material::RIGID,
         poses: Default::default(),
         robot: None,
         sha256: String::new(),

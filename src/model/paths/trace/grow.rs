@@ -16,8 +16,9 @@ use crate::{
 /// No scene keeps a beam this long; it stops one that rounding has caught.
 const MOST_REFLECTIONS: u16 = 4096;
 
-/// Marks a beam without a reflection.
-const ROOT: u32 = u32::MAX;
+/// Marks a beam without a reflection. Below it are as many as there are triangles around a corner, for
+/// the beams in each.
+pub(super) const ROOT: u32 = u32::MAX;
 
 /// Works order by order: beams of one order lie side by side, counter-clockwise by departure, so
 /// that beams which a corner has split and brought to the same image again stand next to each
@@ -63,8 +64,8 @@ impl<'a> Grower<'a> {
     /// All beams of a start that is a corner of these triangles. To another corner and back it is no
     /// longer than by it to any receiver, for which there is a way to and from both.
     pub(super) fn grow_from_corner(mut self, around: &[(u32, u8)]) -> Tree {
-        for &(triangle, corner) in around {
-            let first = self.first(triangle);
+        for (&(triangle, corner), slot) in around.iter().zip(0..) {
+            let first = Beam { node: ROOT - slot, ..self.first(triangle) };
             let side = (corner as usize + 1) % 3;
             let ends = [side, (side + 1) % 3];
             for end in ends {
