@@ -179,6 +179,7 @@ fn l_room() {
         max_path_m: 200.0,
         max_order: Some(8),
         floor: 1e-6,
+        rounds_above: 1.0,
         edge_law: None,
         double_diffraction: false,
         absorption_np_per_m: 0.0,

@@ -379,6 +379,7 @@ fn path_settings(
         max_path_m: 2.0 * receiver.max_range_m,
         max_order: options.max_order.map(|order| order.try_into().unwrap_or(u16::MAX)),
         floor: receiver.threshold * 10f64.powf(-PATHS_KEPT_DB / 20.0),
+        rounds_above: paths::ROUNDS_ABOVE,
         edge_law: Some(law),
         double_diffraction: options.double_diffraction,
         absorption_np_per_m: absorption_db_per_m(sensor, air, options) / (20.0 * LOG10_E),

@@ -7,6 +7,7 @@ use smallvec::SmallVec;
 
 use super::{
     Bend, Edge, Path, Reflector,
+    paths::usual_z_m,
     simulator::{CEILING_NAME, FACE_NAME, FLOOR_NAME},
 };
 use crate::{
@@ -36,23 +37,23 @@ impl Path {
     /// shorter), and for what a rough wall scattered: which part of it did is not in a record.
     #[must_use]
     pub fn points(&self, scene: &Scene, position: DVec2, length_m: f64) -> Option<Vec<DVec2>> {
-        self.points_between(scene, [position; 2], length_m)
+        self.points_between(scene, [position; 2], None, length_m)
     }
 
-    /// The same from a transmitter to a receiver.
+    /// The same from a transmitter to a receiver, at a height in metres if not at [`usual_z_m`].
     #[must_use]
     pub fn points_between(
         &self,
         scene: &Scene,
         [from, to]: [DVec2; 2],
+        z_m: Option<f64>,
         length_m: f64,
     ) -> Option<Vec<DVec2>> {
         if self.kind == PathKind::Scattered {
             return None;
         }
-        let is_upright = |wall: &Reflector| !matches!(wall, Reflector::Floor | Reflector::Ceiling);
         let walls: SmallVec<[Reflector; 8]> =
-            self.walls.iter().copied().filter(is_upright).collect();
+            self.walls.iter().copied().filter(|wall| is_upright(wall)).collect();
         let mut edges: SmallVec<[DVec2; 2]> = SmallVec::new();
         for bend in &self.bends {
             // Over a level edge the way in the plan is a mirror's.
@@ -60,14 +61,34 @@ impl Path {
                 edges.push(edge.place(scene)?);
             }
         }
-        let rises = walls.len() < self.walls.len() || edges.len() < self.bends.len();
-        let way = Way { scene, from, to, length_m, rises };
+        let z_m = z_m.unwrap_or_else(|| usual_z_m(scene.floor_z_m, scene.ceiling_z_m));
+        let rise_m = self.rise_m(scene, z_m)?;
+        let plan_m = (length_m * length_m - rise_m * rise_m).max(0.0).sqrt();
+        let way = Way { scene, from, to, plan_m };
         // The transducer's face sends the sound off again from where it started.
         let mut rounds = walls.split(|wall| *wall == Reflector::Face);
         let first = rounds.next().unwrap_or_default();
         let rounds: SmallVec<[&[Reflector]; 4]> = rounds.collect();
         let mut points = vec![from];
         way.follow(&mut points, first, &rounds, &edges).then_some(points)
+    }
+
+    /// How much higher or lower it ends if floor and ceiling are windows, and a level edge a mirror,
+    /// metres; `None` if the scene has none of these.
+    fn rise_m(&self, scene: &Scene, z_m: f64) -> Option<f64> {
+        for bend in &self.bends {
+            if let Bend::Level { wall, is_upper } = *bend {
+                let limits = scene.walls.get(wall as usize)?.z_m?;
+                return Some(2.0 * (limits[usize::from(is_upper)] - z_m));
+            }
+        }
+        let mut image_z_m = z_m;
+        for level in self.walls.iter().filter(|wall| !is_upright(wall)) {
+            let mirror_z_m =
+                if *level == Reflector::Floor { scene.floor_z_m? } else { scene.ceiling_z_m? };
+            image_z_m = 2.0 * mirror_z_m - image_z_m;
+        }
+        Some(image_z_m - z_m)
     }
 
     /// The path of a log's record in its scene; `None` if the scene lacks one of its names.
@@ -116,9 +137,12 @@ struct Way<'a> {
     scene: &'a Scene,
     from: DVec2,
     to: DVec2,
-    length_m: f64,
-    /// Whether it also runs up or down, and so is longer than in the plan.
-    rises: bool,
+    /// Its length in the plan, metres.
+    plan_m: f64,
+}
+
+const fn is_upright(reflector: &Reflector) -> bool {
+    !matches!(reflector, Reflector::Floor | Reflector::Ceiling)
 }
 
 impl Way<'_> {
@@ -231,8 +255,7 @@ impl Way<'_> {
 
     fn has_length(&self, points: &[DVec2]) -> bool {
         let length_m: f64 = points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
-        let more_m = self.length_m - length_m;
-        more_m.abs() < SAME_LENGTH_M || self.rises && more_m > 0.0
+        (length_m - self.plan_m).abs() < SAME_LENGTH_M
     }
 }
 

@@ -92,11 +92,14 @@ CASES = {
         np.array([-0.15, 0.01]),
         arc(np.array([0.0, 0.0]), 0.2, 110, 0, 111),
     ),
-    # Two prongs with air between; their sharp edges see each other straight and by the notch.
-    "prongs": (
-        [[(-0.1, -0.3), (0.25, -0.3), (0.15, 0.0), (0.075, -0.15), (0.0, 0.0)]],
-        np.array([-0.2, -0.15]),
-        arc(np.array([0.15, 0.0]), 0.2, 100, -50, 151),
+    # Two leaning blades; their sharp edges see each other straight over the air between.
+    "blades": (
+        [
+            [(-0.09, -0.25), (-0.05, -0.25), (0.0, 0.0)],
+            [(0.2, -0.25), (0.24, -0.25), (0.15, 0.0)],
+        ],
+        np.array([-0.25, -0.2]),
+        arc(np.array([0.15, 0.0]), 0.2, 100, -20, 121),
     ),
     # The same box, with the transmitter all but in line with two corners.
     "box-in-line": (

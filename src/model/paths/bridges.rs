@@ -44,6 +44,9 @@ use super::{
 };
 use crate::acoustics::edge::{Aspect, EdgeLaw};
 
+/// Past the width of a tie at a boundary, radians.
+const INTO_SHADOW_RAD: f64 = 2e-9;
+
 /// Trees of beams from the edges of a scene, by point.
 #[derive(Debug, Default)]
 pub(super) struct Bridges {
@@ -110,10 +113,8 @@ impl Spans {
                 border.dot(ray.departure) > 0.0 && off_m <= ALONG_RAD * border.length()
             }))
         };
-        let mut found: Vec<(u32, Ray, [bool; 2])> = rays
-            .iter()
-            .map(|(edge, ray)| (*edge, *ray, side(ray).unwrap_or_default()))
-            .collect();
+        let mut found: Vec<(u32, Ray, [bool; 2])> =
+            rays.iter().map(|(edge, ray)| (*edge, *ray, side(ray).unwrap_or_default())).collect();
         found.sort_by(|(one, a, _), (other, b, _)| {
             one.cmp(other).then(a.run.length_squared().total_cmp(&b.run.length_squared()))
         });
@@ -309,7 +310,14 @@ impl Found<'_> {
             if facing.sector != arm.sector {
                 return Complex64::ZERO;
             }
-            let aspect = Aspect { in_rad: arm.from_rad, out_rad: facing.from_rad, distance_m };
+            // Where an arm goes on along the wall the near end counts as in the shadow: what the far
+            // end sends straight on is not counted there either.
+            let in_rad = match facing.flank {
+                Flank::Open => arm.from_rad,
+                Flank::Left => arm.from_rad + INTO_SHADOW_RAD,
+                Flank::Right => arm.from_rad - INTO_SHADOW_RAD,
+            };
+            let aspect = Aspect { in_rad, out_rad: facing.from_rad, distance_m };
             let wedge = corner.wedge(arm.sector);
             arm.ray.gain * self.law.echo(wedge, &aspect, self.settings.wave_number_per_m)
         };

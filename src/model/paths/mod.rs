@@ -111,7 +111,7 @@ mod vertical;
 mod ways;
 mod wheel;
 
-pub use settings::{Settings, usual_z_m};
+pub use settings::{ROUNDS_ABOVE, Settings, usual_z_m};
 pub use survey::PathEngine;
 
 use std::sync::Arc;

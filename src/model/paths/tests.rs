@@ -28,6 +28,7 @@ pub(super) const LOSSLESS: Settings = Settings {
     max_path_m: 20.0,
     max_order: None,
     floor: 1e-4,
+    rounds_above: ROUNDS_ABOVE,
     edge_law: None,
     double_diffraction: false,
     absorption_np_per_m: 0.0,

@@ -46,7 +46,8 @@ pub(super) fn images(
     let reach_m = settings.max_path_m;
     let below = floor.map(|floor| z_m - floor.z_m);
     let above = ceiling.map(|ceiling| ceiling.z_m - z_m);
-    let [at_floor, at_ceiling] = [floor, ceiling].map(|level| level.map_or(1.0, |level| level.gain));
+    let [at_floor, at_ceiling] =
+        [floor, ceiling].map(|level| level.map_or(1.0, |level| level.gain));
     let mut images = Vec::new();
     let mut add = |rise_m: f64, bounces: u16| {
         // In turn, beginning with the one that is nearer on the way there.
@@ -100,10 +101,8 @@ impl Image {
             Via::Edges { .. } => cosine.recip(),
             _ => 1.0,
         };
-        let amplitude = plan.amplitude
-            * self.gain
-            * bending
-            * settings.air_gain(length_m - plan.length_m);
+        let amplitude =
+            plan.amplitude * self.gain * bending * settings.air_gain(length_m - plan.length_m);
         let leaves_rad = self.rise_m.atan2(plan.length_m);
         // After an even number of reflections it still runs the way it left, and comes from the
         // other side.

@@ -3,7 +3,11 @@
 use std::f64::consts::TAU;
 
 use super::*;
-use crate::{model::Reflector, scene::Cylinder};
+use crate::{
+    acoustics::{Air, BeamPattern, Sensor},
+    model::{Engine, Options, Reflector, Simulator},
+    scene::Cylinder,
+};
 
 fn cylinder(x: f64, y: f64, radius_m: f64) -> Cylinder {
     Cylinder {
@@ -233,4 +237,40 @@ fn edges_answer_by_way_of_cylinders() {
         let found = bent.iter().filter(|echo| (echo.0 - expected).abs() < 1e-9).count();
         assert_eq!(found, count, "{expected}: {bent:?}");
     }
+}
+
+/// Echoes of more than one contact are not followed below the threshold, where there are very many. How
+/// much what the receiver reads depends on them, beside a round body, from all echoes down to
+/// 20 dB below: `cargo test --lib left_out -- --nocapture` tells.
+#[test]
+fn few_readings_depend_on_what_is_left_out_below_the_threshold() {
+    let text = crate::scene::shipped::text("simple-room-robot").expect("shipped");
+    let room = Scene::from_json(text).expect("valid");
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    let options = Options { max_range_m: Some(1.5), ..Options::default() };
+    let (mut differ, mut all) = (Vec::new(), 0);
+    for pose in room.poses.values() {
+        let plan = Arc::new(room.with_robot_at(pose));
+        let simulator = Simulator::new(plan.clone(), sensor.clone(), Air::default(), options)
+            .expect("valid options");
+        let beam = BeamPattern::new(&sensor, simulator.sound_speed_m_s());
+        let engines = [ROUNDS_ABOVE, 1.0].map(|rounds_above| {
+            let settings = Settings { rounds_above, ..simulator.path_settings() };
+            PathEngine::new(&plan, beam.clone(), None, settings)
+        });
+        let surveys = engines.each_ref().map(|engine| engine.survey(pose.position()));
+        for azimuth in 0..120 {
+            let [some, every] = surveys.each_ref().map(|survey| {
+                let mut sounds = Vec::new();
+                survey.listen(pose.direction_rad(3.0 * f64::from(azimuth)), &mut sounds);
+                simulator.receiver().detect(&sounds)
+            });
+            all += 1;
+            let off_m = some.range_m.zip(every.range_m).map(|(one, other)| (one - other).abs());
+            if some.status != every.status || off_m.is_some_and(|off_m| off_m > 1e-3) {
+                differ.push((azimuth, some.range_m, every.range_m));
+            }
+        }
+    }
+    println!("{} of {all} readings differ: {differ:?}", differ.len());
 }
