@@ -66,17 +66,6 @@ fn error(scene: &Scene, spacing_deg: f64) -> Result<f64, Box<dyn Error>> {
             let direction_rad = pose.direction_rad(STEP_DEG * f64::from(azimuth) + 1.0);
             let (exact, fan) = (exact.arrivals(direction_rad), fan.arrivals(direction_rad));
             let missing = lacks(&exact, &fan) + lacks(&fan, &exact);
-            if missing > 0 && spacing_deg < 0.5 && scene.robot.is_none() {
-                println!("{} {spacing_deg} {azimuth}", scene.name);
-                for (name, of) in [("exact", &exact), ("fan", &fan)] {
-                    for e in of.iter().filter(|e| e.amplitude > 0.01) {
-                        println!(
-                            "  {name} {:.5} {:.5} {:.4} {:?}",
-                            e.length_m, e.amplitude, e.departure_rad, e.path.walls
-                        );
-                    }
-                }
-            }
             differ += missing;
             all += exact.iter().filter(|echo| is_loud(echo)).count();
         }

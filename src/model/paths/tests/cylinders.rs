@@ -239,9 +239,10 @@ fn edges_answer_by_way_of_cylinders() {
     }
 }
 
-/// Echoes of more than one contact are not followed below the threshold, where there are very many. How
-/// much what the receiver reads depends on them, beside a round body, from all echoes down to
-/// 20 dB below: `cargo test --lib left_out -- --nocapture` tells.
+/// Echoes of more than one contact are not followed below the threshold, where there are very many. So
+/// many of them sound together beside a round body that one firing in eight, 85 mm before a wall, would
+/// read otherwise with those down to 20 dB below: mostly the minimum range for an echo a little beyond
+/// it. The readings: `cargo test --lib left_out -- --nocapture`.
 #[test]
 fn few_readings_depend_on_what_is_left_out_below_the_threshold() {
     let text = crate::scene::shipped::text("simple-room-robot").expect("shipped");
@@ -273,4 +274,5 @@ fn few_readings_depend_on_what_is_left_out_below_the_threshold() {
         }
     }
     println!("{} of {all} readings differ: {differ:?}", differ.len());
+    assert!(8 * differ.len() <= all, "{} of {all}", differ.len());
 }

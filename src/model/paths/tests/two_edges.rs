@@ -85,9 +85,10 @@ fn field(plan: &Scene, paths: &Paths, source: DVec2, at: DVec2) -> Complex64 {
     if is_hidden { bent } else { bent + wave(source.distance(at), 1.0, 0.0) }
 }
 
-/// Against boundary integrals (tests/peers/two_edges.py): in the shadow, where sound has bent twice
-/// and more, the product of coefficients is right to a few percent as long as the edges are not in line
-/// with the transmitter; without it nothing is there. The figures:
+/// Against boundary integrals (tests/peers/two_edges.py). In the shadow of a thick wall there is
+/// nothing without double diffraction, and with it the field is right to 2 %, or where both edges are
+/// all but in line with the transmitter to 15 %. Behind two blades it takes away most of the error; what
+/// is left comes from below, round four edges. The figures:
 /// `cargo test --lib two_edges -- --nocapture`
 #[test]
 fn the_field_behind_two_edges_is_that_of_boundary_integrals() {
@@ -95,18 +96,25 @@ fn the_field_behind_two_edges_is_that_of_boundary_integrals() {
     for case in &vectors.cases {
         let [once, twice] = [false, true].map(|double| {
             let mut errors = case.errors(&vectors.settings(double));
-            if std::env::var_os("SONARD_VERBOSE").is_some() {
-                for (at, known, error) in &errors {
-                    println!("{} {double} {at} {known:.5} {error:.5}", case.name);
-                }
-            }
             errors.retain(|(_, known, _)| *known < SHADOW);
+            assert!(errors.len() > 20);
+            let all: Vec<f64> = errors.iter().map(|(_, _, error)| *error).collect();
             let shares: Vec<f64> = errors.iter().map(|(_, known, error)| error / known).collect();
-            let quantiles = [0.5, 0.9, 1.0].map(|part| quantile(&shares, part));
-            println!("{}, {double}: {} receivers, {quantiles:.3?}", case.name, shares.len());
+            let quantiles = [all, shares].map(|of| [0.5, 0.9, 1.0].map(|part| quantile(&of, part)));
+            println!(
+                "{}, {double}: {} receivers, error (median, 90 %, most) {:.4?}, share {:.3?}",
+                case.name,
+                errors.len(),
+                quantiles[0],
+                quantiles[1]
+            );
             quantiles
         });
-        let _ = (once, twice);
+        match case.name.as_str() {
+            "box" => assert!(once[1][0] > 0.99 && twice[1][2] < 0.03),
+            "box-in-line" => assert!(once[1][0] > 0.99 && twice[1][2] < 0.16),
+            _ => assert!(twice[0][0] < 0.5 * once[0][0] && twice[0][2] < 0.02),
+        }
     }
 }
 
