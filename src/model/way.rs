@@ -53,7 +53,7 @@ impl Path {
             return None;
         }
         let walls: SmallVec<[Reflector; 8]> =
-            self.walls.iter().copied().filter(|wall| is_upright(wall)).collect();
+            self.walls.iter().copied().filter(is_upright).collect();
         let mut edges: SmallVec<[DVec2; 2]> = SmallVec::new();
         for bend in &self.bends {
             // Over a level edge the way in the plan is a mirror's.

@@ -47,7 +47,7 @@ fn lengths_are_those_of_both_ways() {
     ] {
         let found: Vec<_> = echoes
             .iter()
-            .filter(|echo| echo.path.walls[..] == walls[..] && !echo.path.bends.is_empty() == bent)
+            .filter(|echo| echo.path.walls[..] == walls[..] && echo.path.bends.is_empty() != bent)
             .filter(|echo| (echo.length_m - expected).abs() < 1e-9)
             .collect();
         assert_eq!(found.len(), 1, "{walls:?} {expected}: {echoes:#?}");
