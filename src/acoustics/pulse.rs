@@ -106,6 +106,7 @@ impl EchoShape {
 
     /// The envelope at a time, microseconds.
     #[must_use]
+    #[inline]
     pub fn at(&self, t_us: f64) -> Complex64 {
         let place = (t_us - self.first_us) * self.steps_per_us;
         if place < 0.0 || place >= (self.samples.len() - 1) as f64 {

@@ -198,11 +198,11 @@ impl Receiver {
         incident: &dyn Fn(&Sound) -> Option<Incident>,
         latch: Latch,
     ) -> Detection {
-        self.detection(&mut Hearing::new(self, sounds, incident), latch)
+        self.detect_within(f64::INFINITY, sounds, incident, latch).0
     }
 
-    /// The same if only the sounds up to a length there and back are known, in metres, and whether
-    /// that is enough: longer ones can't change it.
+    /// The same if only the sounds up to a length there and back are known, in metres. If longer
+    /// ones can't change it, also the length, at most that one, beyond which they couldn't.
     #[must_use]
     pub fn detect_within(
         &self,
@@ -210,11 +210,12 @@ impl Receiver {
         sounds: &[Sound],
         incident: &dyn Fn(&Sound) -> Option<Incident>,
         latch: Latch,
-    ) -> (Detection, bool) {
+    ) -> (Detection, Option<f64>) {
         let mut hearing = Hearing::new(self, sounds, incident);
         hearing.hear_within(length_m);
         let detection = self.detection(&mut hearing, latch);
-        (detection, !hearing.asked_beyond())
+        let needed_m = (!hearing.asked_beyond()).then(|| hearing.needed_m());
+        (detection, needed_m)
     }
 
     /// The same in noise.

@@ -57,7 +57,7 @@ impl BeamPattern {
         let theta_rad = theta_rad.abs();
         match &self.0 {
             Shape::Table(table) => {
-                let place = theta_rad / STEP_RAD;
+                let place = theta_rad * (1.0 / STEP_RAD);
                 let below = place as usize;
                 let (Some(low), Some(high)) = (table.get(below), table.get(below + 1)) else {
                     return 0.0;
@@ -85,16 +85,19 @@ impl BeamPattern {
     /// (between 0 and 1); 90 degrees if it never is.
     #[must_use]
     pub fn angle_at(&self, level: f64) -> f64 {
-        let ahead = (FRAC_PI_2 / STEP_RAD).round() as usize;
-        let Some(first) = (1..=ahead).find(|&i| self.one_way(i as f64 * STEP_RAD) <= level) else {
-            return FRAC_PI_2;
-        };
-        let (mut inside, mut outside) = ((first - 1) as f64 * STEP_RAD, first as f64 * STEP_RAD);
-        for _ in 0..40 {
-            let middle = (inside + outside) / 2.0;
-            if self.one_way(middle) <= level { outside = middle } else { inside = middle }
+        match &self.0 {
+            Shape::Table(table) => {
+                let falls = |pair: &[f64]| pair[1] <= level;
+                let Some(at) = table.windows(2).position(falls) else { return FRAC_PI_2 };
+                // Between entries the pattern is the straight line that `one_way` draws.
+                let [low, high] = [table[at], table[at + 1]];
+                let part = if low > high { ((low - level) / (low - high)).max(0.0) } else { 0.0 };
+                ((at as f64 + part) * STEP_RAD).min(FRAC_PI_2)
+            }
+            Shape::Gaussian { half_angle_rad } => {
+                (half_angle_rad * (-level.min(1.0).ln() / 2.0).sqrt()).min(FRAC_PI_2)
+            }
         }
-        outside
     }
 }
 
@@ -240,6 +243,21 @@ mod tests {
 
     fn ka(sound_speed_m_s: f64) -> f64 {
         TAU * 49.4e3 / sound_speed_m_s * RADIUS_M
+    }
+
+    #[test]
+    fn the_angle_at_a_level_is_where_the_pattern_first_falls_to_it() {
+        for name in Sensor::preset_names() {
+            let beam = BeamPattern::new(&preset(name), SPEED_M_S);
+            for level in [1e-12, 0.001, 0.0203, 0.1, 0.5, 0.9, 0.999_999] {
+                let angle_rad = beam.angle_at(level);
+                let off = beam.one_way(angle_rad) - level;
+                assert!(off.abs() < 1e-9 || angle_rad == FRAC_PI_2, "{name} {level}: {off}");
+                let before = (0..100).map(|i| beam.one_way(f64::from(i) / 100.0 * angle_rad));
+                assert!(before.fold(1.0, f64::min) >= level - 1e-9, "{name} {level}");
+            }
+            assert_eq!([beam.angle_at(1.0), beam.angle_at(2.0)], [0.0; 2], "{name}");
+        }
     }
 
     #[test]

@@ -7,17 +7,18 @@ use std::{
     sync::Arc,
 };
 
-use indicatif::{ProgressBar, ProgressStyle};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use serde::Serialize;
 
 use super::{
     Failure, Outcome,
+    answer::answer,
     lines::record,
-    map::save,
+    map_file::save,
     options::{AirArgs, SensorArgs},
     place::PlaceArgs,
+    progress,
 };
 use crate::{
     explore::{
@@ -139,15 +140,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(folder) = &args.out {
         write_all(folder, &made, sensing, scene)?;
     }
-    let mut out = io::stdout().lock();
-    let printed = if args.json {
-        serde_json::to_writer(&mut out, &summary)
-            .map_err(io::Error::from)
-            .and_then(|()| writeln!(out))
-    } else {
-        summary.print(&mut out)
-    };
-    printed.or_else(|error| Failure::from_write("standard output", &error))?;
+    answer(args.json, [&summary], |out| summary.print(out))?;
     if made.finished {
         return Ok(());
     }
@@ -310,9 +303,7 @@ pub(super) fn write_all(
     let every = count.div_ceil(MOST_FRAMES);
     let shown: Vec<usize> =
         (1..=count).filter(|stop| (count - stop).is_multiple_of(every)).collect();
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left");
-    let bar = ProgressBar::new(shown.len() as u64)
-        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let bar = progress::bar(shown.len() as u64, "frames");
     let frames = shown.iter().map(|stops| draw(*stops)).inspect(|_| bar.inc(1));
     let animation = animate(frames, shown.len(), FRAME_PX, FRAME_MS).map_err(refuse)?;
     bar.finish_and_clear();

@@ -7,7 +7,7 @@ use std::{
 };
 
 use comfy_table::{CellAlignment, Table};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
@@ -15,9 +15,11 @@ use serde::Serialize;
 
 use super::{
     Failure, Outcome,
+    answer::answer,
     compare::RULED,
     explore::{RobotArgs, Summary, explored, write_all},
-    map::save,
+    map_file::save,
+    progress,
 };
 use crate::{
     acoustics::{Air, Sensor},
@@ -69,24 +71,12 @@ struct Row {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let bar = ProgressBar::new(u64::from(args.rooms)).with_style(
-        ProgressStyle::with_template("{bar:40} {pos}/{len} rooms, {eta} left")
-            .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
+    let bar = progress::bar(u64::from(args.rooms), "rooms");
     let of_rooms: Result<Vec<Vec<Row>>, Failure> =
         (0..args.rooms).into_par_iter().map(|number| room(args, number, &bar)).collect();
     bar.finish_and_clear();
     let rows: Vec<Row> = of_rooms?.into_iter().flatten().collect();
-    let mut out = io::stdout().lock();
-    let printed = if args.json {
-        rows.iter().try_for_each(|row| {
-            serde_json::to_writer(&mut out, row)?;
-            writeln!(out)
-        })
-    } else {
-        print(&mut out, &rows)
-    };
-    printed.or_else(|error| Failure::from_write("standard output", &error))
+    answer(args.json, &rows, |out| print(out, &rows))
 }
 
 /// One room, explored in each way.

@@ -9,6 +9,7 @@ use comfy_table::{CellAlignment, Table};
 
 use super::{
     Failure, Outcome,
+    answer::answer,
     compare::RULED,
     picture::{PictureArgs, scene_for},
     sweeps::for_each_sweep,
@@ -79,16 +80,7 @@ Exit codes: 0 done, also if nothing was found, 2 wrong usage or input, 3 a pictu
 pub(super) fn run(args: &Args) -> Outcome {
     let targets = args.picture.targets()?;
     let (scans, features) = find(args)?;
-    let mut out = io::stdout().lock();
-    let printed = if args.json {
-        features.iter().try_for_each(|feature| {
-            serde_json::to_writer(&mut out, feature)?;
-            writeln!(out)
-        })
-    } else {
-        print(&mut out, &features)
-    };
-    printed.or_else(|error| Failure::from_write("standard output", &error))?;
+    answer(args.json, &features, |out| print(out, &features))?;
     if targets.is_empty() {
         return Ok(());
     }

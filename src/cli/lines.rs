@@ -9,6 +9,7 @@ use std::{
 
 use super::{
     Failure, Outcome,
+    answer::answer,
     picture::{PictureArgs, scene_for},
     sweeps::for_each_sweep,
 };
@@ -72,16 +73,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let targets = args.picture.targets()?;
     let (scans, map, left_out) = read(args)?;
-    let mut out = io::stdout().lock();
-    let printed = if args.json {
-        map.lines().iter().try_for_each(|line| {
-            serde_json::to_writer(&mut out, &record(line))?;
-            writeln!(out)
-        })
-    } else {
-        print(&mut out, &map, left_out)
-    };
-    printed.or_else(|error| Failure::from_write("standard output", &error))?;
+    answer(args.json, map.lines().iter().map(record), |out| print(out, &map, left_out))?;
     if targets.is_empty() {
         return Ok(());
     }
@@ -92,17 +84,22 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 fn read(args: &Args) -> Result<(Vec<ScanView>, LineMap, usize), Failure> {
     let settings = LineMapSettings { logical_m: args.logical, ..LineMapSettings::default() };
-    let (mut scans, mut map, mut left_out) = (Vec::new(), LineMap::new(settings), 0);
+    let (mut scans, mut map) = (Vec::new(), LineMap::new(settings));
+    let (mut count, mut left_out) = (0_usize, 0);
     for_each_sweep(&args.logs, |scan, sweep| {
         left_out += map.add_sonar(&sweep);
-        scans.push(scan);
+        count += 1;
+        // A picture shows all readings; without one they need not stay in memory.
+        if !args.picture.out.is_empty() {
+            scans.push(scan);
+        }
     })?;
     for file in &args.laser {
         for scan in laser::load(file)? {
             map.add_laser(&scan);
         }
     }
-    if scans.is_empty() && args.laser.is_empty() {
+    if count == 0 && args.laser.is_empty() {
         return Err(Failure::input(
             "there is no scan with its pose to map",
             "give logs as `sonard scan` or `sonard simulate` writes them",

@@ -6,15 +6,17 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::{Failure, Outcome, scene_file, sweeps::for_each_sweep};
+use super::{
+    Failure, Outcome, answer::answer, map_file, map_file::save, progress, scene_file,
+    sweeps::for_each_sweep,
+};
 use crate::{
     geometry::DVec2,
     interpret::{
         Extents, Heard, Sweep,
-        grid::{BeamModel, GaussianBeam, Grid, GridShape, MapYaml, PhysicalBeam, Trust, to_pgm},
+        grid::{BeamModel, GaussianBeam, Grid, GridShape, PhysicalBeam, Trust},
         prediction::{FeaturePrediction, PredictionSettings, Worth},
     },
     plot::draw_map,
@@ -52,6 +54,9 @@ pub(super) struct Args {
     /// Map this region: X0,Y0,X1,Y1 in metres [default: around what was seen]
     #[arg(long, value_name = "REGION", allow_hyphen_values = true, value_parser = region)]
     region: Option<[f64; 4]>,
+    /// Add to this map, a folder or its .yaml, on its own cells
+    #[arg(long, value_name = "MAP", conflicts_with_all = ["region", "resolution"])]
+    onto: Option<PathBuf>,
     /// Beam width, degrees [default: that of a plane's arc; of an array, 25]
     #[arg(long, value_name = "DEG")]
     beam_deg: Option<f64>,
@@ -65,7 +70,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "C", default_value_t = LEAST_CONFIDENCE)]
     least_confidence: f64,
     /// Count each scan so many times [default: 5 over the number of scans, rounded up: few scans
-    /// would leave every cell undecided]
+    /// would leave every cell undecided; 1 with --onto]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=20))]
     evidence: Option<u8>,
     /// Write the confidence of every reading to this file, one JSON object a line
@@ -111,6 +116,7 @@ const HELP: &str = "\
 Examples:
   sonard map run/*.jsonl --out map
   sonard map scan.jsonl --out map --feature-prediction off --resolution 0.02 --json
+  sonard map today.jsonl --onto map --out map-today
   sonard map-score map simple-room
 
 A confidence is 0.5 where nothing speaks against a reading and less where something does; clear_m \
@@ -130,7 +136,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     if !(max_range_m.is_finite() && max_range_m > 0.0) {
         return Err(refuse(&format!("--max-range {max_range_m}: give a length greater than 0")));
     }
-    let shape = shape(args, &taken, max_range_m)?;
+    let begun = match &args.onto {
+        Some(map) => map_file::read(map)?,
+        None => Grid::new(shape(args, &taken, max_range_m)?),
+    };
     let (model, prediction) = models(args, extents, max_range_m, session.array.is_some());
     let scene = args.scene.as_deref().map(scene_file::load).transpose()?;
     fs::create_dir_all(&args.out).map_err(|error| {
@@ -140,34 +149,24 @@ pub(super) fn run(args: &Args) -> Outcome {
         )
     })?;
 
-    let mapped = map(args, &taken, shape, &model, prediction)?;
+    let mapped = map(args, &taken, begun, &model, prediction)?;
     let way: Vec<DVec2> = taken.iter().map(|(_, sweep)| sweep.pose.position()).collect();
     let png = draw_map(&mapped.grid, scene.as_ref(), &way, 4).map_err(|error| refuse(&error))?;
-    for (name, bytes) in [
-        ("map.pgm", to_pgm(&mapped.grid)),
-        ("map.yaml", MapYaml::of(&shape, "map.pgm").to_text().into_bytes()),
-        ("map.png", png),
-    ] {
-        save(&args.out.join(name), &bytes)?;
-    }
+    map_file::write(&args.out, &mapped.grid)?;
+    save(&args.out.join("map.png"), &png)?;
     let summary = mapped.summary(args, &taken);
-    let mut out = io::stdout().lock();
-    let printed = if args.json {
-        serde_json::to_writer(&mut out, &summary)
-            .map_err(io::Error::from)
-            .and_then(|()| writeln!(out))
-    } else {
-        summary.print(&mut out)
-    };
-    printed.or_else(|error| Failure::from_write("standard output", &error))
+    answer(args.json, [&summary], |out| summary.print(out))
 }
 
 impl Args {
     /// How often each of so many scans counts. A reading's odds are set for maps of many scans: one
     /// scan brings a cell before it from 0.5 to about 0.41, four to 0.19, which map_server calls free.
     fn evidence(&self, scans: usize) -> u8 {
-        let by_default = ENOUGH_SCANS.div_ceil(scans.clamp(1, ENOUGH_SCANS));
-        self.evidence.unwrap_or(by_default as u8)
+        let by_default = match self.onto {
+            Some(_) => 1,
+            None => ENOUGH_SCANS.div_ceil(scans.clamp(1, ENOUGH_SCANS)) as u8,
+        };
+        self.evidence.unwrap_or(by_default)
     }
 }
 
@@ -256,18 +255,16 @@ struct Mapped {
 fn map(
     args: &Args,
     taken: &[(uuid::Uuid, Sweep)],
-    shape: GridShape,
+    grid: Grid,
     model: &BeamModel,
     prediction: PredictionSettings,
 ) -> Result<Mapped, Failure> {
     let trust = Trust { least_confidence: args.least_confidence, keep_clear: true };
     let mut predictor = FeaturePrediction::new(prediction);
     let mut confidences = Vec::new();
-    let mut mapped =
-        Mapped { grid: Grid::new(shape), readings: 0, left_out: 0, outside: 0, confidence: 0.0 };
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} scans, {eta} left");
-    let bar = ProgressBar::new(taken.len() as u64)
-        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let shape = *grid.shape();
+    let mut mapped = Mapped { grid, readings: 0, left_out: 0, outside: 0, confidence: 0.0 };
+    let bar = progress::bar(taken.len() as u64, "scans");
     for (scan, sweep) in taken {
         let worths = match args.feature_prediction {
             Switch::On => Some(predictor.assess(sweep)),
@@ -382,16 +379,6 @@ impl Summary<'_> {
         }
         Ok(())
     }
-}
-
-/// Writes a whole file.
-pub(super) fn save(path: &Path, bytes: &[u8]) -> Outcome {
-    fs::write(path, bytes).map_err(|error| {
-        Failure::device(
-            format!("cannot write {}: {error}", path.display()),
-            "check that its folder exists, may be written to and has room",
-        )
-    })
 }
 
 fn region(text: &str) -> Result<[f64; 4], String> {

@@ -11,15 +11,17 @@ use std::{
 };
 
 use comfy_table::{CellAlignment, Table};
-use indicatif::{ProgressBar, ProgressStyle};
+
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use serde::Serialize;
 
 use super::{
     Failure, Outcome,
+    answer::answer,
     compare::RULED,
     map::{EXTEND_M, LEAST_CONFIDENCE},
+    progress,
 };
 use crate::{
     acoustics::{Air, Sensor},
@@ -130,25 +132,13 @@ pub(super) fn run(args: &Args) -> Outcome {
         })?;
     }
     let rows = trials(args)?;
-    let mut out = io::stdout().lock();
-    let printed = if args.json {
-        rows.iter().try_for_each(|row| {
-            serde_json::to_writer(&mut out, row)?;
-            writeln!(out)
-        })
-    } else {
-        print(&mut out, &rows)
-    };
-    printed.or_else(|error| Failure::from_write("standard output", &error))
+    answer(args.json, &rows, |out| print(out, &rows))
 }
 
 /// All courses, on as many threads as there are cores.
 fn trials(args: &Args) -> Result<Vec<Row>, Failure> {
     let count = args.maps as usize;
-    let bar = ProgressBar::new(count as u64).with_style(
-        ProgressStyle::with_template("{bar:40} {pos}/{len} courses, {eta} left")
-            .unwrap_or_else(|_| ProgressStyle::default_bar()),
-    );
+    let bar = progress::bar(count as u64, "courses");
     let (next, rows) = (AtomicUsize::new(0), Mutex::new(Vec::with_capacity(count)));
     let failure = Mutex::new(None);
     let threads = std::thread::available_parallelism().map_or(1, usize::from);

@@ -6,12 +6,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{Failure, Outcome, map::save, scene_file};
+use super::{Failure, Outcome, answer::answer, map_file, scene_file};
 use crate::{
     geometry::{DVec2, Pose},
-    interpret::grid::{
-        Grid, GridShape, MapScore, MapYaml, PathSettings, from_pgm, ideal, score, to_pgm,
-    },
+    interpret::grid::{Grid, GridShape, MapScore, PathSettings, ideal, score},
 };
 
 /// Options of `sonard map-score`.
@@ -59,9 +57,9 @@ pub(super) fn run(args: &Args) -> Outcome {
             "give a length in metres, greater than 0",
         ));
     }
-    let map = read(&args.map)?;
+    let map = map_file::read(&args.map)?;
     let ideal = if is_map(Path::new(&args.ideal)) {
-        read(Path::new(&args.ideal))?
+        map_file::read(Path::new(&args.ideal))?
     } else {
         drawn(&args.ideal, *map.shape())?
     };
@@ -72,44 +70,19 @@ pub(super) fn run(args: &Args) -> Outcome {
                 "give a folder that you may write to",
             )
         })?;
-        save(&folder.join("map.pgm"), &to_pgm(&ideal))?;
-        let yaml = MapYaml::of(ideal.shape(), "map.pgm").to_text();
-        save(&folder.join("map.yaml"), yaml.as_bytes())?;
+        map_file::write(folder, &ideal)?;
     }
     let settings = PathSettings { spacing_m: args.spacing, ..PathSettings::default() };
     let found = score(&map, &ideal, &settings).map_err(|error| {
         Failure::input(error, "give maps of one region and resolution (sonard map --region)")
     })?;
-    let mut out = io::stdout().lock();
-    let printed = if args.json {
-        serde_json::to_writer(&mut out, &found)
-            .map_err(io::Error::from)
-            .and_then(|()| writeln!(out))
-    } else {
-        print(&mut out, &found)
-    };
-    printed.or_else(|error| Failure::from_write("standard output", &error))
+    answer(args.json, [&found], |out| print(out, &found))
 }
 
 /// Whether a name is that of a map rather than of a scene.
 fn is_map(path: &Path) -> bool {
     let yaml = path.extension().is_some_and(|extension| extension == "yaml" || extension == "yml");
     yaml || path.join("map.yaml").is_file()
-}
-
-fn read(path: &Path) -> Result<Grid, Failure> {
-    let yaml_path = if path.is_dir() { path.join("map.yaml") } else { path.to_path_buf() };
-    let refuse = |path: &Path, error: &dyn std::fmt::Display| {
-        Failure::input(
-            format!("{}: {error}", path.display()),
-            "give a map as `sonard map` writes it: map.yaml beside map.pgm",
-        )
-    };
-    let text = fs::read_to_string(&yaml_path).map_err(|error| refuse(&yaml_path, &error))?;
-    let yaml = MapYaml::from_text(&text).map_err(|error| refuse(&yaml_path, &error))?;
-    let image_path = yaml_path.parent().unwrap_or(Path::new("")).join(&yaml.image);
-    let bytes = fs::read(&image_path).map_err(|error| refuse(&image_path, &error))?;
-    from_pgm(&bytes, &yaml).map_err(|error| refuse(&image_path, &error))
 }
 
 fn drawn(name: &str, shape: GridShape) -> Result<Grid, Failure> {

@@ -1,5 +1,6 @@
 //! The command line: one file a verb.
 
+mod answer;
 mod array;
 #[cfg(feature = "pi")]
 mod board;
@@ -15,6 +16,7 @@ mod lines;
 mod log;
 mod map;
 mod map_benchmark;
+mod map_file;
 mod map_score;
 mod mock;
 mod mock_world;
@@ -23,6 +25,7 @@ mod paths;
 mod picture;
 mod place;
 mod plot;
+mod progress;
 mod run;
 mod runtime;
 mod scan;

@@ -11,7 +11,7 @@ use crate::{
     plot::{MAX_WIDTH_PX, Picture},
     scan::ScanView,
     scene::{Scene, shipped},
-    store::Loaded,
+    store::LineError,
 };
 
 /// Which pictures.
@@ -92,13 +92,13 @@ fn target(path: &Path) -> Result<Target, Failure> {
 }
 
 /// Names the lines of a log that could not be read.
-pub(super) fn warn_of_damage(log: &Path, loaded: &Loaded) {
+pub(super) fn warn_of_damage(log: &Path, damaged: &[LineError]) {
     const SHOWN: usize = 5;
-    for error in loaded.damaged.iter().take(SHOWN) {
+    for error in damaged.iter().take(SHOWN) {
         anstream::eprintln!("warning: {}: {error}; the line is left out", log.display());
     }
-    if loaded.damaged.len() > SHOWN {
-        let more = loaded.damaged.len() - SHOWN;
+    if damaged.len() > SHOWN {
+        let more = damaged.len() - SHOWN;
         anstream::eprintln!("warning: {more} more damaged lines; see `sonard log verify`");
     }
 }

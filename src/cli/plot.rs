@@ -80,7 +80,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let targets = targets(&args.picture)?;
     let log = &args.log;
     let loaded = load(log).map_err(|error| Failure::input(&error, error.help()))?;
-    warn_of_damage(log, &loaded);
+    warn_of_damage(log, &loaded.damaged);
     let views = choose(ScanView::from_records(loaded.records), log, &args.scan)?;
     let scene = scene_for(&views, args.scene.as_deref())?;
     let beam = args.beam.map(way::Beam::Index).or(args.azimuth_deg.map(way::Beam::Azimuth));

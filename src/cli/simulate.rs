@@ -7,10 +7,9 @@ use std::{
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
     sync::Arc,
-    time::Duration,
 };
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::ProgressBar;
 use jiff::Timestamp;
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
@@ -18,9 +17,10 @@ use uuid::Uuid;
 
 use super::{
     Failure, Outcome,
+    array::load_course,
     options::{AirArgs, EngineArgs, SensorArgs},
     place::AzimuthArgs,
-    scene_file,
+    progress, scene_file,
 };
 use crate::{
     acoustics::ReceiverNoise,
@@ -47,6 +47,10 @@ pub(super) struct Args {
         required_unless_present = "poses"
     )]
     pose: Option<String>,
+    /// Poses one after the other, a scan at each: a file with one a line, as {"x_m": 1.0,
+    /// "y_m": 2.0, "heading_deg": 90.0}
+    #[arg(long, value_name = "FILE", conflicts_with = "pose")]
+    poses: Option<PathBuf>,
     #[command(flatten)]
     array: ArrayArgs,
     #[command(flatten)]
@@ -113,6 +117,7 @@ Examples:
   sonard simulate --scene corridor --pose 1,0.4,0 --engine cone --max-range 4 | sonard plot -
   sonard simulate --scene my-room.json --pose 1.2,0.8,90 --temperature-c 5 --lossless
   sonard simulate --scene two-surface-room --pose 1.2,1,30 --array pioneer-8 | sonard plot - -o a.svg
+  sonard simulate --scene mcgill-lab --poses way.jsonl --out course.jsonl
   sonard simulate --scene corridor --poses way.jsonl --array ring-12 --rounds 15 > ring.jsonl
 
 Exit codes: 0 done, 2 wrong usage or input, 3 a disk that gave up.";
@@ -122,9 +127,16 @@ pub(super) fn run(args: &Args) -> Outcome {
         return array::run(args, name);
     }
     let scene = scene_file::load(&args.scene)?;
-    let pose = scene_file::pose(&scene, args.pose.as_deref().unwrap_or_default())?;
+    let poses = poses(args, &scene)?;
+    for (number, pose) in (1..).zip(&poses) {
+        scene.check_pose(pose).map_err(|error| refuse_pose(args, number, &error, error.help()))?;
+    }
     let plan = args.azimuths.plan(1)?;
-    let simulator = simulator(args, &scene, &pose)?;
+    // A robot's body stands among the reflectors, so that each pose has its own.
+    let shared = match scene.robot {
+        Some(_) => None,
+        None => Some(simulator(args, &scene, &poses[0])?),
+    };
     let noise = args.noise.noise()?;
     let (what, mut out) = open(args.out.as_deref())?;
     let mut rng = Pcg64::seed_from_u64(args.noise.seed);
@@ -132,8 +144,44 @@ pub(super) fn run(args: &Args) -> Outcome {
         Some(noise) => station.ping_in_noise(direction_rad, noise, &mut rng),
         None => station.ping(direction_rad),
     };
-    write(&mut out, &simulator, &pose, &plan, &mut ping)
-        .or_else(|error| Failure::from_write(&what, &error))
+    let bar = progress::bar(u64::from(plan.stops()) * poses.len() as u64, "beams");
+    for (number, pose) in poses.iter().enumerate() {
+        let own = match shared {
+            Some(_) => None,
+            None => Some(simulator(args, &scene, pose)?),
+        };
+        let Some(simulator) = shared.as_ref().or(own.as_ref()) else { break };
+        let session = (number == 0 || own.is_some()).then_some(simulator);
+        let written = session.map_or(Ok(()), |simulator| write_session(&mut out, simulator));
+        if let Err(error) =
+            written.and_then(|()| write(&mut out, simulator, pose, &plan, &mut ping, &bar))
+        {
+            bar.finish_and_clear();
+            return Failure::from_write(&what, &error);
+        }
+    }
+    bar.finish_and_clear();
+    out.flush().or_else(|error| Failure::from_write(&what, &error))
+}
+
+/// The pose asked for, or those of a file.
+fn poses(args: &Args, scene: &Scene) -> Result<Vec<Pose>, Failure> {
+    if let Some(file) = &args.poses {
+        return Ok(load_course(file)?.poses().to_vec());
+    }
+    let pose = scene.pose(args.pose.as_deref().unwrap_or_default());
+    Ok(vec![pose.map_err(|error| Failure::input(&error, error.help()))?])
+}
+
+/// Names the pose by its number in the file, if it is from one.
+fn refuse_pose(
+    args: &Args,
+    number: usize,
+    error: &dyn std::fmt::Display,
+    help: impl std::fmt::Display,
+) -> Failure {
+    let which = args.poses.as_ref().map(|file| format!("{}: pose {number}: ", file.display()));
+    Failure::input(format!("{}{error}", which.unwrap_or_default()), help)
 }
 
 /// Where the records go, and its name.
@@ -150,12 +198,15 @@ fn open(path: Option<&Path>) -> Result<(String, Box<dyn Write>), Failure> {
     Ok((path.display().to_string(), Box::new(BufWriter::new(file))))
 }
 
-/// The simulator for this pose: a robot's body stands among the reflectors.
 fn simulator(args: &Args, scene: &Scene, pose: &Pose) -> Result<Simulator, Failure> {
     let (sensor, air) = (args.sensor.sensor()?, args.air.air()?);
     let options = args.engine.options()?;
     Simulator::new(Arc::new(scene.with_robot_at(pose)), sensor, air, options)
         .map_err(|error| Failure::input(error, "see `sonard simulate --help`"))
+}
+
+fn write_session(out: &mut dyn Write, simulator: &Simulator) -> io::Result<()> {
+    put(out, &Record::Session(Box::new(Session::simulated(simulator, Timestamp::now()))))
 }
 
 fn write(
@@ -164,14 +215,10 @@ fn write(
     pose: &Pose,
     plan: &ScanPlan,
     predict: &mut dyn FnMut(&Station, f64) -> Prediction,
+    bar: &ProgressBar,
 ) -> io::Result<()> {
     let scan = Uuid::new_v4();
-    let mut put = |record: &Record| {
-        serde_json::to_writer(&mut *out, record)?;
-        out.write_all(b"\n")
-    };
-    put(&Record::Session(Box::new(Session::simulated(simulator, Timestamp::now()))))?;
-    put(&Record::ScanStart(ScanStart {
+    let start = ScanStart {
         scan,
         time: Timestamp::now(),
         pose: *pose,
@@ -179,35 +226,22 @@ fn write(
         air: None,
         provenance: None,
         request: None,
-    }))?;
-    let progress = progress(plan.stops().into());
+    };
+    put(out, &Record::ScanStart(start))?;
     let station = simulator.station(pose.position());
     for index in 0..plan.stops() {
         let azimuth_deg = plan.azimuth_deg(index);
         let prediction = predict(&station, pose.direction_rad(azimuth_deg));
         let ping = Ping::simulated(simulator, scan, index, azimuth_deg, &prediction);
-        put(&Record::Ping(Box::new(ping)))?;
-        progress.inc(1);
+        put(out, &Record::Ping(Box::new(ping)))?;
+        bar.inc(1);
     }
-    progress.finish_and_clear();
     let end = ScanEnd::simulated(simulator, scan, plan.stops(), Timestamp::now());
-    put(&Record::ScanEnd(end))?;
-    out.flush()
+    put(out, &Record::ScanEnd(end))
 }
 
-/// A bar on the terminal, drawn from the first second on.
-fn progress(beams: u64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} beams, {eta} left")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    // Draw calls come a few times a second; the first second is left without any.
-    let bar =
-        ProgressBar::with_draw_target(Some(beams), ProgressDrawTarget::hidden()).with_style(style);
-    let shown = bar.clone();
-    std::thread::spawn(move || {
-        std::thread::sleep(Duration::from_secs(1));
-        if !shown.is_finished() {
-            shown.set_draw_target(ProgressDrawTarget::stderr());
-        }
-    });
-    bar
+/// Writes a record as one line.
+fn put(out: &mut dyn Write, record: &Record) -> io::Result<()> {
+    serde_json::to_writer(&mut *out, record)?;
+    out.write_all(b"\n")
 }

@@ -18,6 +18,9 @@ pub struct Station<'a> {
     axis: Option<Place<'a>>,
 }
 
+/// A firing that hears more has to make room for them.
+const USUAL_SOUNDS: usize = 64;
+
 impl<'a> Station<'a> {
     pub(super) fn new(simulator: &'a Simulator, position: DVec2) -> Self {
         let on_axis = simulator.sensor().mounting.is_on_axis();
@@ -40,7 +43,7 @@ impl<'a> Station<'a> {
 
     fn listen(&self, direction_rad: f64, latch: Latch) -> Prediction {
         let receiver = self.simulator.receiver();
-        let mut sounds = Vec::new();
+        let mut sounds = Vec::with_capacity(USUAL_SOUNDS);
         self.at(direction_rad, |place| {
             let (detection, survey) = place.nearest(|survey, reach_m| {
                 survey.listen(direction_rad, &mut sounds);

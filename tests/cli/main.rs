@@ -4,6 +4,7 @@
 mod array;
 mod collect;
 mod common;
+mod course;
 mod daemon;
 mod degenerate;
 mod doctor;

@@ -231,3 +231,24 @@ fn wrong_input_is_refused_with_what_would_be_right() {
         assert!(stderr(&output).replace('\n', " ").contains(words), "{words}: {}", stderr(&output));
     }
 }
+
+#[test]
+fn a_map_goes_on_from_another() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let logs = logs(folder.path());
+    let path = |name: &str| folder.path().join(name).to_str().expect("plain path").to_owned();
+    let (first, both) = (path("first"), path("both"));
+    let alone = ["--out", &first, "--region", "-1,-1,4,4", "--evidence", "1", "--json"];
+    let of_one = object(&with("map", &logs[..1], &alone));
+    let went_on = object(&with("map", &logs[1..], &["--onto", &first, "--out", &both, "--json"]));
+    for kept in ["width", "height", "origin_m", "resolution_m"] {
+        assert_eq!(of_one[kept], went_on[kept], "{kept}");
+    }
+    assert_eq!(went_on["evidence"].as_u64(), Some(1), "what a map says is not said again");
+    let unknown = |map: &Value| map["unknown_cells"].as_u64().expect("a count");
+    assert!(unknown(&went_on) < unknown(&of_one), "{of_one} {went_on}");
+
+    let refused = run(&with("map", &logs, &["--onto", &path("nowhere"), "--out", &both]));
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("nowhere"), "{}", stderr(&refused));
+}

@@ -4,22 +4,14 @@
 //! between are summed. Where their strengths together can't reach the threshold nothing is summed;
 //! where one sound is alone its rise is looked up in the table of the pulse.
 
+mod ideal;
+mod rise;
+
 use num_complex::Complex64;
 use smallvec::SmallVec;
 
 use super::{Combining, Incident, Receiver, Sound, noise::NoiseTrack};
 use crate::acoustics::{EchoShape, Gain};
-
-/// Steps at which an envelope is watched, microseconds: a third of the standard deviation of a
-/// 7 kHz filter's response, below which nothing rises.
-const STEP_US: f64 = 8.0;
-
-/// Longest step while the envelope is above the threshold, microseconds.
-const LONG_STEP_US: f64 = 30.0;
-
-/// Longest step over which the envelope is known to stay below the threshold, microseconds: the gain
-/// rises no more than once meanwhile.
-const LONG_QUIET_US: f64 = 200.0;
 
 /// Sounds that together add less than this part to another's amplitude leave it as it is.
 const NEGLIGIBLE: f64 = 3e-3;
@@ -35,13 +27,16 @@ pub(super) struct Hearing<'a> {
     pub(super) sounds: &'a [Sound],
     incident: &'a dyn Fn(&Sound) -> Option<Incident>,
     noise: Option<&'a NoiseTrack>,
+    us_per_m: f64,
     /// From then on sounds may begin that were not told.
     horizon_us: f64,
-    /// Whether anything was asked about that time.
-    asked_beyond: bool,
+    /// The latest time that anything was asked about.
+    asked_us: f64,
     /// Sounds that have begun, the first `over` of which are over.
     parts: SmallVec<[Part; 16]>,
     over: usize,
+    /// How many of them have their fields.
+    summed: usize,
     /// The sounds that last, by [`Self::lasting`], when it was last found out that
     /// they have to be watched.
     watched: Option<(usize, usize)>,
@@ -88,10 +83,12 @@ impl<'a> Hearing<'a> {
             sounds,
             incident,
             noise: None,
+            us_per_m: 1e6 / receiver.sound_speed_m_s,
             horizon_us: f64::INFINITY,
-            asked_beyond: false,
+            asked_us: 0.0,
             parts: SmallVec::new(),
             over: 0,
+            summed: 0,
             watched: None,
             exponent: match receiver.gain {
                 Gain::Compensating { exponent, .. } => exponent,
@@ -112,7 +109,7 @@ impl<'a> Hearing<'a> {
 
     /// Only the sounds up to a length, metres, are known.
     pub(super) fn hear_within(&mut self, length_m: f64) {
-        let arrives_us = length_m / self.receiver.sound_speed_m_s * 1e6;
+        let arrives_us = length_m * self.us_per_m;
         self.horizon_us = match self.receiver.combining {
             Combining::Coherent => arrives_us + self.span_us.0,
             Combining::Ideal => arrives_us,
@@ -121,14 +118,24 @@ impl<'a> Hearing<'a> {
 
     /// Whether an answer so far might have been another one if sounds beyond the horizon were
     /// known.
-    pub(super) const fn asked_beyond(&self) -> bool {
-        self.asked_beyond
+    pub(super) fn asked_beyond(&self) -> bool {
+        self.asked_us >= self.horizon_us
+    }
+
+    /// Length of the longest paths, metres, whose sounds could have made an answer so far another
+    /// one.
+    pub(super) fn needed_m(&self) -> f64 {
+        let begins_us = match self.receiver.combining {
+            Combining::Coherent => self.span_us.0,
+            Combining::Ideal => 0.0,
+        };
+        (self.asked_us - begins_us) / self.us_per_m
     }
 
     /// Back to the firing.
     pub(super) fn rewind(&mut self) {
         self.parts.clear();
-        (self.over, self.watched) = (0, None);
+        (self.over, self.summed, self.watched) = (0, 0, None);
     }
 
     /// When ECHO next rises if the detector is ready from `ready_us` on: at once if the envelope is
@@ -178,11 +185,10 @@ impl<'a> Hearing<'a> {
     /// Envelope at a time; no earlier time can be asked for afterwards.
     pub(super) fn level(&mut self, t_us: f64) -> f64 {
         self.advance(t_us);
-        for part in &mut self.parts[self.over..] {
-            if part.field == Complex64::ZERO {
-                part.field = Complex64::from_polar(part.size, part.turn_rad);
-            }
+        for part in &mut self.parts[self.summed.max(self.over)..] {
+            part.field = Complex64::from_polar(part.size, part.turn_rad);
         }
+        self.summed = self.parts.len();
         self.level_of(self.over, t_us)
     }
 
@@ -210,203 +216,9 @@ impl<'a> Hearing<'a> {
         let others = self.sounds[..self.parts.len()]
             .iter()
             .rev()
-            .take_while(|other| self.receiver.tof_us(other) > first_us);
+            .take_while(|other| self.tof_us(other) > first_us);
         let rest: f64 = others.filter(|other| *other != sound).map(|other| other.amplitude).sum();
         rest < NEGLIGIBLE * sound.amplitude
-    }
-
-    fn next_rise_of_sum(&mut self, ready_us: f64) -> Option<f64> {
-        let integration_us = self.receiver.integration_us;
-        let window_us = self.receiver.window_us() + WINDOW_SLACK_US;
-        let heard = |rise_us: f64| Some(rise_us.max(ready_us)).filter(|us| *us <= window_us);
-        let (mut t_us, mut here) = (ready_us, self.relative_level(ready_us));
-        // How long the envelope has been above, less how long below since.
-        let mut charge_us = 0.0_f64;
-        while t_us <= window_us + 2.0 * integration_us && !self.asked_beyond {
-            if here < 1.0 && charge_us == 0.0 && self.watched != Some(self.lasting()) {
-                match self.skip(t_us) {
-                    Skip::Silence => return None,
-                    Skip::Lone { rise_us } => return heard(rise_us),
-                    Skip::To(later_us) if later_us > t_us => {
-                        (t_us, here) = (later_us, self.relative_level(later_us));
-                        continue;
-                    }
-                    Skip::To(_) => self.watched = Some(self.lasting()),
-                }
-            }
-            let wanted_us = integration_us - charge_us;
-            if here >= 1.0 && wanted_us <= 0.0 {
-                return heard(t_us - charge_us);
-            }
-            let step_us = if here >= 1.0 {
-                wanted_us.clamp(1.0, LONG_STEP_US)
-            } else {
-                self.quiet_us(t_us, here)
-            };
-            let next_us = t_us + step_us;
-            let next = self.relative_level(next_us);
-            let turn_us = if (here >= 1.0) == (next >= 1.0) {
-                next_us
-            } else {
-                self.turn((t_us, here), (next_us, next))
-            };
-            // Before the turn as it is here, after it as it is next.
-            for (part_us, above) in
-                [(turn_us - t_us, here >= 1.0), (next_us - turn_us, next >= 1.0)]
-            {
-                charge_us = (charge_us + if above { part_us } else { -part_us }).max(0.0);
-            }
-            (t_us, here) = (next_us, next);
-        }
-        None
-    }
-
-    /// From a time at which the envelope is below the threshold: the next one at which it may pass.
-    fn skip(&mut self, mut t_us: f64) -> Skip {
-        if self.noise.is_some() {
-            return Skip::To(t_us);
-        }
-        loop {
-            self.advance(t_us);
-            if self.asked_beyond {
-                return Skip::Silence;
-            }
-            let entry_us = self.next_entry_us();
-            let live = &self.parts[self.over..];
-            let most: f64 = live.iter().map(|part| part.strength).sum();
-            if most * self.rise_of_gain(t_us).max(1.0) >= self.least_threshold {
-                let [part] = live else { return Skip::To(t_us) };
-                if self.gain_steps_during(part) {
-                    return Skip::To(t_us);
-                }
-                let Some((rise_us, fall_us)) = self.lone_rise(part, t_us) else {
-                    // It has passed already, or never does.
-                    let end_us = part.tof_us + self.span_us.1 + 1e-3;
-                    match entry_us {
-                        Some(entry_us) => t_us = entry_us.min(end_us),
-                        None => return Skip::Silence,
-                    }
-                    continue;
-                };
-                let done_us = rise_us + self.receiver.integration_us;
-                if entry_us.is_none_or(|entry_us| entry_us > done_us) {
-                    if fall_us >= done_us {
-                        return Skip::Lone { rise_us };
-                    }
-                    t_us = part.tof_us + self.span_us.1 + 1e-3;
-                    if let Some(entry_us) = entry_us {
-                        t_us = t_us.min(entry_us);
-                    }
-                    continue;
-                }
-                return Skip::To(t_us.max(rise_us.min(entry_us.unwrap_or(rise_us)) - STEP_US));
-            }
-            match entry_us {
-                Some(entry_us) => t_us = entry_us,
-                None => return Skip::Silence,
-            }
-        }
-    }
-
-    /// How long the envelope, which is `here` over the threshold now, certainly stays below it, but
-    /// at least the step at which it is watched.
-    fn quiet_us(&self, t_us: f64, here: f64) -> f64 {
-        // What the gain adds in that time is within the tenth.
-        let grows = 1.1 * self.rise_of_gain(t_us);
-        let live = &self.parts[self.over..];
-        let steepest: f64 = live.iter().map(|part| part.steepest).sum();
-        let threshold = self.receiver.threshold_at(t_us);
-        let entry_us = self.next_entry_us().unwrap_or(f64::INFINITY);
-        let quiet_us = ((1.0 - here) * threshold / (grows * steepest)).min(entry_us - t_us);
-        let is_long = self.noise.is_none() && quiet_us.min(LONG_QUIET_US) > STEP_US;
-        // The threshold drifts up with the range and falls where the gain rises by a step.
-        if is_long && self.receiver.threshold_at(t_us + quiet_us.min(LONG_QUIET_US)) >= threshold {
-            quiet_us.min(LONG_QUIET_US)
-        } else {
-            STEP_US
-        }
-    }
-
-    /// When a sound alone passes the threshold after `t_us`, and when it is last above.
-    fn lone_rise(&self, part: &Part, t_us: f64) -> Option<(f64, f64)> {
-        let at = |offset_us: f64| part.tof_us + offset_us - self.receiver.lead_us;
-        let level_at =
-            |t_us: f64| self.receiver.threshold_at(t_us) / (part.size * self.rise_of_gain(t_us));
-        let mut rise_us = part.tof_us;
-        // The threshold drifts with the range, and the gain with the time.
-        for _ in 0..2 {
-            rise_us = at(self.shape(part).rise_us(level_at(rise_us))?);
-        }
-        let fall_us = at(self.shape(part).fall_us(level_at(rise_us))?);
-        (rise_us >= t_us).then_some((rise_us, fall_us))
-    }
-
-    /// Whether the gain rises by a step while a sound lasts.
-    fn gain_steps_during(&self, part: &Part) -> bool {
-        let Gain::Steps { steps } = &self.receiver.gain else { return false };
-        let lasts = part.tof_us + self.span_us.0..part.tof_us + self.span_us.1;
-        steps.iter().filter_map(|step| step.until_us).any(|until_us| lasts.contains(&until_us))
-    }
-
-    /// One sound at a time: the first that comes after `ready_us`, or one that lasts then.
-    fn next_rise_of_one(&mut self, ready_us: f64) -> Option<f64> {
-        let receiver = self.receiver;
-        let lasts_until_us = |sound: &Sound| receiver.tof_us(sound) + receiver.pulse_us;
-        let found = self.loud().find(|sound| lasts_until_us(sound) >= ready_us);
-        let rise_us = found.map(|sound| receiver.tof_us(sound).max(ready_us));
-        self.asked_beyond |= rise_us.unwrap_or(f64::INFINITY) >= self.horizon_us;
-        rise_us
-    }
-
-    /// The sound that came at a time, or the strongest of those that last then.
-    fn cause_of_one(&self, t_us: f64) -> Option<Sound> {
-        let receiver = self.receiver;
-        let lasting = || {
-            let begun = self.loud().take_while(|sound| receiver.tof_us(sound) <= t_us);
-            begun.filter(|sound| receiver.tof_us(sound) + receiver.pulse_us >= t_us)
-        };
-        let strongest = || lasting().max_by(|one, other| one.amplitude.total_cmp(&other.amplitude));
-        lasting().find(|sound| receiver.tof_us(sound) == t_us).or_else(strongest).copied()
-    }
-
-    /// The sounds that pass the threshold by themselves.
-    fn loud(&self) -> impl Iterator<Item = &Sound> {
-        let receiver = self.receiver;
-        let window_us = receiver.window_us() + WINDOW_SLACK_US;
-        self.sounds
-            .iter()
-            .take_while(move |sound| receiver.tof_us(sound) <= window_us)
-            .filter(|sound| sound.amplitude >= receiver.threshold_at(receiver.tof_us(sound)))
-    }
-
-    /// Where the envelope passes the threshold between two times, by false position on its
-    /// logarithm, which is nearly straight.
-    fn turn(&self, from: (f64, f64), to: (f64, f64)) -> f64 {
-        let (mut low, mut high) = ((from.0, from.1.max(1e-9).ln()), (to.0, to.1.max(1e-9).ln()));
-        let rises = high.1 >= 0.0;
-        let mut t_us = low.0;
-        for round in 0..16 {
-            // Where the gain rises by a step there is a jump, which only halving finds.
-            let share = if round < 4 { low.1 / (low.1 - high.1) } else { 0.5 };
-            t_us = low.0 + share * (high.0 - low.0);
-            let here = self.relative_level_back(t_us).max(1e-9).ln();
-            if (here >= 0.0) == rises {
-                high = (t_us, here);
-            } else {
-                low = (t_us, here);
-            }
-            if here.abs() < 1e-4 || high.0 - low.0 < 0.01 {
-                break;
-            }
-        }
-        t_us
-    }
-
-    /// The same as [`relative_level`](Self::relative_level) a step or less before the last time
-    /// asked for.
-    fn relative_level_back(&self, t_us: f64) -> f64 {
-        // What was over at the later time may not have been.
-        self.level_of(self.over.saturating_sub(8), t_us) / self.receiver.threshold_at(t_us)
     }
 
     /// Envelope of the parts from a place on.
@@ -427,6 +239,7 @@ impl<'a> Hearing<'a> {
         }
     }
 
+    #[inline]
     fn shape_at(&self, part: &Part, t_us: f64) -> Complex64 {
         self.shape(part).at(t_us - part.tof_us + self.receiver.lead_us)
     }
@@ -440,13 +253,17 @@ impl<'a> Hearing<'a> {
         if self.exponent == 0.0 { 1.0 } else { t_us.max(1.0).powf(self.exponent) }
     }
 
+    fn tof_us(&self, sound: &Sound) -> f64 {
+        sound.length_m * self.us_per_m
+    }
+
     fn lasting(&self) -> (usize, usize) {
         (self.over, self.parts.len())
     }
 
     fn next_entry_us(&self) -> Option<f64> {
         let next = self.sounds.get(self.parts.len());
-        let entry_us = next.map(|next| self.receiver.tof_us(next) + self.span_us.0);
+        let entry_us = next.map(|next| self.tof_us(next) + self.span_us.0);
         entry_us.or_else(|| self.horizon_us.is_finite().then_some(self.horizon_us))
     }
 
@@ -461,9 +278,9 @@ impl<'a> Hearing<'a> {
 
     /// Lets sounds enter that begin up to a time; what is over by `now_us` only keeps its place.
     fn enter(&mut self, t_us: f64, now_us: f64) {
-        self.asked_beyond |= t_us >= self.horizon_us;
+        self.asked_us = self.asked_us.max(t_us);
         while let Some(sound) = self.sounds.get(self.parts.len()) {
-            let tof_us = self.receiver.tof_us(sound);
+            let tof_us = self.tof_us(sound);
             if tof_us + self.span_us.0 > t_us {
                 break;
             }
@@ -502,16 +319,6 @@ impl<'a> Hearing<'a> {
 /// all the rest of a sum.
 fn modulus(number: Complex64) -> f64 {
     number.norm_sqr().sqrt()
-}
-
-/// Where to go on from a time without echo.
-enum Skip {
-    /// Nothing more will come.
-    Silence,
-    /// One sound, alone, passes the threshold.
-    Lone { rise_us: f64 },
-    /// Here the envelope has to be watched.
-    To(f64),
 }
 
 /// The least that the threshold in force ever is after blanking: it rises with the range within a

@@ -10,7 +10,8 @@ use std::{
 use uuid::Uuid;
 
 use super::super::{
-    map::{EXTEND_M, MAX_RANGE_M, save},
+    map::{EXTEND_M, MAX_RANGE_M},
+    map_file::save,
     picture::warn_of_damage,
 };
 use super::{Failure, Outcome};
@@ -69,7 +70,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         ));
     }
     let loaded = load(&args.log).map_err(|error| Failure::input(&error, error.help()))?;
-    warn_of_damage(&args.log, &loaded);
+    warn_of_damage(&args.log, &loaded.damaged);
     let confidences = confidences(args, &loaded.records)?;
     if confidences.is_empty() {
         return Err(Failure::input(

@@ -1,20 +1,16 @@
 //! `sonard simulate --array`: rounds of an array's rangers at one pose or many.
 
-use std::{io, io::Write, path::PathBuf, sync::Arc};
+use std::{io, io::Write, sync::Arc};
 
 use jiff::Timestamp;
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use uuid::Uuid;
 
-use super::{Args, open, progress};
+use super::{Args, open, poses, put, refuse_pose};
 use crate::{
     acoustics::ReceiverNoise,
-    cli::{
-        Failure, Outcome,
-        array::{load_array, load_course},
-        scene_file,
-    },
+    cli::{Failure, Outcome, array::load_array, progress, scene_file},
     geometry::{Pose, wrap_360},
     model::{ArrayModel, ArrayStand, ModelError},
     scan::{Ping, Record, ScanEnd, ScanStart, Session},
@@ -28,10 +24,6 @@ pub(super) struct ArrayArgs {
     /// ring-12), or a file with an array's data; the pose is then the robot's
     #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["from_deg", "to_deg", "step_deg"])]
     pub(super) array: Option<String>,
-    /// Poses of the robot, a scan each: a file with one a line, as {"x_m": 1.0, "y_m": 2.0,
-    /// "heading_deg": 90.0}
-    #[arg(long, value_name = "FILE", requires = "array", conflicts_with = "pose")]
-    pub(super) poses: Option<PathBuf>,
     /// Rounds at each pose, between which the robot turns in place: of an even ring, so that
     /// directions are spread evenly
     #[arg(long, value_name = "N", requires = "array", default_value_t = 1,
@@ -45,11 +37,9 @@ pub(super) fn run(args: &Args, name: &str) -> Outcome {
     let poses = poses(args, &scene)?;
     let rounds: Vec<Vec<Pose>> = poses.iter().map(|pose| turned(args, *pose, &array)).collect();
     for (number, pose) in (1..).zip(&rounds).flat_map(|(n, all)| all.iter().map(move |p| (n, p))) {
-        array.check_pose(&scene, pose).map_err(|error| {
-            let which = args.array.poses.as_ref().map(|file| format!("{}: ", file.display()));
-            let which = which.map(|file| format!("{file}pose {number}: ")).unwrap_or_default();
-            Failure::input(format!("{which}{error}"), error.help())
-        })?;
+        array
+            .check_pose(&scene, pose)
+            .map_err(|error| refuse_pose(args, number, &error, error.help()))?;
     }
     let (sensor, air) = (args.sensor.sensor_or(&array.sensor)?, args.air.air()?);
     let model = ArrayModel::new(Arc::new(array), &scene, sensor, air, args.engine.options()?)
@@ -61,16 +51,6 @@ pub(super) fn run(args: &Args, name: &str) -> Outcome {
         Ok(()) => Ok(()),
         Err(Stop::Model(error)) => Err(refuse(&error)),
         Err(Stop::Write(error)) => Failure::from_write(&what, &error),
-    }
-}
-
-fn poses(args: &Args, scene: &crate::scene::Scene) -> Result<Vec<Pose>, Failure> {
-    match (&args.array.poses, &args.pose) {
-        (Some(file), _) => Ok(load_course(file)?.poses().to_vec()),
-        (None, pose) => {
-            let pose = scene.pose(pose.as_deref().unwrap_or_default());
-            Ok(vec![pose.map_err(|error| Failure::input(&error, error.help()))?])
-        }
     }
 }
 
@@ -112,7 +92,7 @@ impl Player<'_> {
         put(out, &Record::Session(Box::new(Session::of_array(self.model, Timestamp::now()))))?;
         let firings =
             self.model.array().round().count() * places.iter().map(Vec::len).sum::<usize>();
-        let progress = progress(firings as u64);
+        let progress = progress::bar(firings as u64, "beams");
         for rounds in places {
             let Some(first) = rounds.first() else { continue };
             let (scan, count) = (Uuid::new_v4(), rounds.len() as u32);
@@ -142,9 +122,4 @@ impl Player<'_> {
             None => stand.ping(ranger),
         }
     }
-}
-
-fn put(out: &mut dyn Write, record: &Record) -> io::Result<()> {
-    serde_json::to_writer(&mut *out, record)?;
-    out.write_all(b"\n")
 }

@@ -56,36 +56,9 @@ impl Line {
         self.a.distance(self.b)
     }
 
-    /// Angle between a direction and the normal, on whichever side, radians up to a quarter turn.
-    #[must_use]
-    pub fn angle_from(&self, direction_rad: f64) -> f64 {
-        let angle = between_rad(direction_rad, self.normal_rad);
-        angle.min(std::f64::consts::PI - angle)
-    }
-
-    /// Distance from a point along a unit direction to the crossing with this line, metres.
-    #[must_use]
-    pub fn crossing_m(&self, from: DVec2, direction: DVec2) -> Option<f64> {
-        self.extended_crossing_m(from, direction, 0.0)
-    }
-
-    /// The same as if the line went on beyond both ends by so many metres.
-    pub(super) fn extended_crossing_m(
-        &self,
-        from: DVec2,
-        direction: DVec2,
-        extend_m: f64,
-    ) -> Option<f64> {
-        let along = self.b - self.a;
-        let across = direction.perp_dot(along);
-        if across == 0.0 {
-            return None;
-        }
-        let to_a = self.a - from;
-        let distance_m = to_a.perp_dot(along) / across;
-        let share = to_a.perp_dot(direction) / across;
-        let beyond = extend_m / along.length();
-        (distance_m > 0.0 && (-beyond..=1.0 + beyond).contains(&share)).then_some(distance_m)
+    /// Whether it stands on this reading of the present set.
+    pub(super) fn explains(&self, reading: u32) -> bool {
+        self.readings.binary_search(&reading).is_ok()
     }
 
     /// Whether two may be the same wall: directions of the normal in common, and near (step 2).

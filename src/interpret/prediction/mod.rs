@@ -8,6 +8,7 @@
 
 mod confidence;
 mod line;
+mod obstacle;
 
 #[cfg(test)]
 mod tests;
@@ -15,6 +16,7 @@ mod tests;
 pub use confidence::{combine, of_angle, of_distance};
 pub use line::Line;
 
+use self::obstacle::Obstacle;
 use crate::{
     geometry::{DVec2, wrap_pi},
     interpret::{Heard, Sweep},
@@ -129,7 +131,8 @@ impl FeaturePrediction {
             self.keep(line, robot);
         }
         self.local.retain(|line| line.seen_from.distance(robot) <= self.settings.forget_m);
-        let worths = beams.iter().map(|beam| self.worth(beam, &self.local)).collect();
+        let local = self.obstacles(&self.local);
+        let worths = beams.iter().map(|beam| self.worth(beam, &local)).collect();
         self.split_unseen(&beams);
         worths
     }
@@ -184,13 +187,13 @@ impl FeaturePrediction {
 
     /// Step 3: what one beam alone saw, and what others speak against, goes.
     fn drop_doubtful(&self, beams: &[Ray], seen: &mut Vec<Line>) {
+        let maps = [self.obstacles(seen), self.obstacles(&self.local)];
         let doubtful: Vec<bool> = seen
             .iter()
             .map(|line| {
                 let [only] = line.readings.as_slice() else { return false };
                 let beam = &beams[*only as usize];
-                [seen.as_slice(), self.local.as_slice()]
-                    .into_iter()
+                maps.iter()
                     .any(|map| self.worth(beam, map).confidence < self.settings.least_confidence)
             })
             .collect();
@@ -198,32 +201,44 @@ impl FeaturePrediction {
         seen.retain(|_| !doubts.next().unwrap_or(false));
     }
 
-    /// Step 4: a feature refines one of the local map, or joins it.
+    /// Step 4: a feature refines those of the local map that it may be one with, or joins it.
+    ///
+    /// It may bring several together, such as the parts of one that was split between: left
+    /// side by side they would speak against a reading twice, and become more with every set.
     fn keep(&mut self, mut line: Line, robot: DVec2) {
         line.settle(robot);
         let Self { settings, local } = self;
-        match local.iter_mut().find(|old| old.is_similar(&line, settings.near_m, settings.gap_m)) {
-            Some(old) => {
-                old.merge(&line);
-                old.settle(robot);
-            }
-            None => local.push(line),
+        let (near_m, gap_m) = (settings.near_m, settings.gap_m);
+        while let Some(at) = local.iter().position(|old| old.is_similar(&line, near_m, gap_m)) {
+            let mut old = local.swap_remove(at);
+            old.merge(&line);
+            old.settle(robot);
+            line = old;
         }
+        local.push(line);
+    }
+
+    fn obstacles<'a>(&self, map: &'a [Line]) -> Vec<Obstacle<'a>> {
+        Obstacle::all(map, self.settings.extend_m)
     }
 
     /// What a map's features make of a reading.
-    fn worth(&self, beam: &Ray, map: &[Line]) -> Worth {
+    fn worth(&self, beam: &Ray, map: &[Obstacle]) -> Worth {
         let omega_rad = self.settings.omega_deg.to_radians();
+        let (cos_omega, far_m) = (omega_rad.cos(), beam.range_m - self.settings.near_m);
         let mut worth = NEUTRAL;
-        for line in map {
-            let theta_rad = line.angle_from(beam.axis_rad);
-            let hidden = theta_rad > omega_rad && line.support >= EXTENDED_SUPPORT;
-            let extend_m = if hidden { self.settings.extend_m } else { 0.0 };
-            let Some(crossing_m) = self.contradicts(line, beam, extend_m) else { continue };
-            let confidence = if theta_rad <= omega_rad {
-                of_angle(theta_rad / omega_rad)
-            } else {
+        for obstacle in map {
+            let cos_theta = obstacle.cos_to(beam.axis());
+            let hidden = cos_theta < cos_omega;
+            let extended = hidden && obstacle.line.support >= EXTENDED_SUPPORT;
+            let Some(crossing_m) = obstacle.crossing_m(beam, far_m, extended) else { continue };
+            if obstacle.line.explains(beam.index) {
+                continue;
+            }
+            let confidence = if hidden {
                 of_distance(crossing_m / beam.range_m, self.settings.exponent)
+            } else {
+                of_angle(cos_theta.acos() / omega_rad)
             };
             worth.confidence = combine(worth.confidence, confidence);
             worth.clear_m = Some(worth.clear_m.map_or(crossing_m, |clear| clear.min(crossing_m)));
@@ -231,40 +246,33 @@ impl FeaturePrediction {
         worth
     }
 
-    /// Where a beam crosses a feature that it did not report, metres from the ranger.
-    fn contradicts(&self, line: &Line, beam: &Ray, extend_m: f64) -> Option<f64> {
-        if line.readings.binary_search(&beam.index).is_ok() {
-            return None;
-        }
-        let far_m = beam.range_m - self.settings.near_m;
-        beam.sides
-            .iter()
-            .filter_map(|direction| line.extended_crossing_m(beam.from, *direction, extend_m))
-            .filter(|crossing_m| *crossing_m < far_m)
-            .min_by(f64::total_cmp)
-    }
-
     /// Step 6: features that should have been heard and were not are split there.
     fn split_unseen(&mut self, beams: &[Ray]) {
-        let omega_rad = self.settings.omega_deg.to_radians();
-        for beam in beams {
-            let mut at = 0;
-            while at < self.local.len() {
-                let line = &self.local[at];
-                let axis = DVec2::from_angle(beam.axis_rad);
-                let crossing = line.crossing_m(beam.from, axis).filter(|crossing_m| {
-                    line.readings.binary_search(&beam.index).is_err()
-                        && *crossing_m < beam.range_m - self.settings.near_m
-                        && line.angle_from(beam.axis_rad) <= omega_rad
-                });
-                let Some(crossing_m) = crossing else {
-                    at += 1;
-                    continue;
-                };
-                let parts = line.split(beam.from + crossing_m * axis, self.settings.shorten_m);
-                self.local.swap_remove(at);
-                let long = |part: &Line| part.length_m() >= self.settings.least_length_m;
-                self.local.extend(parts.into_iter().filter(long));
+        let unsplit = std::mem::take(&mut self.local);
+        for line in unsplit {
+            self.split_from(beams, line);
+        }
+    }
+
+    /// Splits a feature at the first of the beams that should have heard it, and its parts at
+    /// those after that; what is left goes into the local map.
+    fn split_from(&mut self, beams: &[Ray], line: Line) {
+        let cos_omega = self.settings.omega_deg.to_radians().cos();
+        let obstacle = Obstacle::new(&line, 0.0);
+        let unheard = |beam: &Ray| {
+            let far_m = beam.range_m - self.settings.near_m;
+            let crossing_m = obstacle.crossing_of_axis_m(beam, far_m)?;
+            let audible = obstacle.cos_to(beam.axis()) >= cos_omega;
+            (audible && !line.explains(beam.index)).then(|| beam.from + crossing_m * beam.axis())
+        };
+        let split = (1..).zip(beams).find_map(|(next, beam)| Some((next, unheard(beam)?)));
+        let Some((next, at)) = split else {
+            self.local.push(line);
+            return;
+        };
+        for part in line.split(at, self.settings.shorten_m) {
+            if part.length_m() >= self.settings.least_length_m {
+                self.split_from(&beams[next..], part);
             }
         }
     }
@@ -280,6 +288,12 @@ struct Ray {
     sides: [DVec2; 3],
     range_m: f64,
     echo: bool,
+}
+
+impl Ray {
+    const fn axis(&self) -> DVec2 {
+        self.sides[0]
+    }
 }
 
 /// The smaller angle between two directions, radians.

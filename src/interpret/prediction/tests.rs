@@ -98,6 +98,17 @@ fn an_unheard_wall_is_split_and_its_stubs_go() {
 }
 
 #[test]
+fn a_wall_lost_and_seen_again_stays_one_feature() {
+    let mut prediction = prediction();
+    for _ in 0..30 {
+        prediction.assess(&ring(ORIGIN, &[(15.0, 1.0), (0.0, 1.0), (345.0, 1.0)]));
+        assert_eq!(prediction.local().len(), 1, "both parts are of the wall that is seen");
+        prediction.assess(&ring(ORIGIN, &[(0.0, 0.0)]));
+        assert_eq!(prediction.local().len(), 2, "it is split where it is not heard");
+    }
+}
+
+#[test]
 fn the_far_past_is_forgotten() {
     let mut prediction = prediction();
     prediction.assess(&ring(ORIGIN, &[(0.0, 1.0)]));

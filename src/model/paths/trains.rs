@@ -161,12 +161,7 @@ impl Loops {
             (Loop { leaves_rad, returns_rad, ..*round }, leaving)
         };
         let outs: SmallVec<[(Loop, f64); 16]> = near.iter().map(turned).collect();
-        let mut search = Search::new(self.face, &outs, floor, settings);
-        for (out, leaving) in &outs {
-            let strength = out.field / out.field.norm() * leaving / out.length_m;
-            search.extend(&smallvec![out.round], out, strength, out.length_m);
-        }
-        search.found
+        Search::new(self.face, &outs, floor, settings).run()
     }
 }
 
@@ -206,26 +201,50 @@ struct Search<'a> {
     settings: &'a Settings,
     floor: f64,
     best: Best,
-    /// Rounds that come back within the beam, weighed with it: the ways out run backwards.
-    ends: Vec<(Loop, f64)>,
-    /// Rounds that leave or come back within the beam.
-    middles: Vec<Loop>,
+    /// The ways out run backwards, which a row may end with, and then the ways out themselves.
+    rounds: Vec<Loop>,
+    /// What the beam pattern makes of each ending.
+    weights: Vec<f64>,
+    /// Rounds that leave or come back within the beam, by their place.
+    middles: Vec<usize>,
+    /// What the disc makes of each round into each, once it is known: rows meet the same pairs
+    /// again and again.
+    passages_m: Vec<Option<Complex64>>,
     found: Vec<Train>,
 }
 
 impl<'a> Search<'a> {
     fn new(face: Disc, outs: &[(Loop, f64)], floor: f64, settings: &'a Settings) -> Self {
-        let backwards = |round: &Loop| Loop {
+        let backwards = |(round, _): &(Loop, f64)| Loop {
             round: Round { echo: round.round.echo, reversed: !round.own_reverse },
             leaves_rad: round.returns_rad,
             returns_rad: round.leaves_rad,
             ..*round
         };
-        let best = Best::of(outs.iter().map(|(out, weight)| (out.length_m, *weight)));
-        let ends: Vec<_> = outs.iter().map(|(out, weight)| (backwards(out), *weight)).collect();
-        let others = outs.iter().filter(|(out, _)| !out.own_reverse).map(|(out, _)| *out);
-        let middles = ends.iter().map(|(end, _)| *end).chain(others).collect();
-        Self { face, settings, floor, best, ends, middles, found: Vec::new() }
+        let count = outs.len();
+        let others = (0..count).filter(|at| !outs[*at].0.own_reverse).map(|at| count + at);
+        Self {
+            face,
+            settings,
+            floor,
+            best: Best::of(outs.iter().map(|(out, weight)| (out.length_m, *weight))),
+            rounds: outs.iter().map(backwards).chain(outs.iter().map(|(out, _)| *out)).collect(),
+            weights: outs.iter().map(|(_, weight)| *weight).collect(),
+            middles: (0..count).chain(others).collect(),
+            passages_m: vec![None; 4 * count * count],
+            found: Vec::new(),
+        }
+    }
+
+    /// All rows.
+    fn run(mut self) -> Vec<Train> {
+        for (at, leaving) in self.weights.clone().into_iter().enumerate() {
+            let first = self.weights.len() + at;
+            let out = self.rounds[first];
+            let strength = out.field / out.field.norm() * leaving / out.length_m;
+            self.extend(&smallvec![out.round], first, strength, out.length_m);
+        }
+        self.found
     }
 
     /// Ends a row of rounds, and goes on with it. `strength` is its field over its spreading,
@@ -233,7 +252,7 @@ impl<'a> Search<'a> {
     fn extend(
         &mut self,
         rounds: &SmallVec<[Round; 4]>,
-        last: &Loop,
+        last: usize,
         strength: Complex64,
         length_m: f64,
     ) {
@@ -243,15 +262,15 @@ impl<'a> Search<'a> {
         if too_many || bound * self.best.beside(length_m) < self.floor {
             return;
         }
-        for at in 0..self.ends.len() {
-            let (end, weight) = &self.ends[at];
+        for at in 0..self.weights.len() {
+            let (end, weight) = (self.rounds[at], self.weights[at]);
             let total_m = length_m + end.length_m;
             if bound * weight / end.length_m * total_m < self.floor
                 || total_m > self.settings.max_path_m
             {
                 continue;
             }
-            let field = strength * self.passage_m(last, end) * end.field / end.field.norm()
+            let field = strength * self.passage_m(last, at) * end.field / end.field.norm()
                 * (weight / end.length_m * total_m);
             if field.norm() >= self.floor {
                 let mut rounds = rounds.clone();
@@ -260,8 +279,9 @@ impl<'a> Search<'a> {
                 self.found.push(Train { rounds, length_m: total_m, phase_rad, amplitude });
             }
         }
-        for at in 0..self.middles.len() {
-            let middle = self.middles[at];
+        for place in 0..self.middles.len() {
+            let at = self.middles[place];
+            let middle = self.rounds[at];
             let total_m = length_m + middle.length_m;
             let per_m = middle.field.norm() / middle.length_m;
             if bound * per_m * disc_m * self.best.beside(total_m) < self.floor
@@ -271,21 +291,26 @@ impl<'a> Search<'a> {
             }
             let mut rounds = rounds.clone();
             rounds.push(middle.round);
-            let next = strength * self.passage_m(last, &middle) * middle.field / middle.length_m;
-            self.extend(&rounds, &middle, next, total_m);
+            let next = strength * self.passage_m(last, at) * middle.field / middle.length_m;
+            self.extend(&rounds, at, next, total_m);
         }
     }
 
     /// How strongly the disc scatters from one round into the next, metres.
-    fn passage_m(&self, last: &Loop, next: &Loop) -> Complex64 {
-        let aspect = FaceAspect {
-            in_m: last.length_m,
-            out_m: next.length_m,
-            in_rad: last.returns_rad,
-            out_rad: next.leaves_rad,
-        };
-        let apart = last.length_m * next.length_m / (last.length_m + next.length_m);
-        apart * self.face.reflection(&aspect)
+    fn passage_m(&mut self, last: usize, next: usize) -> Complex64 {
+        let [from, to] = [last, next].map(|at| &self.rounds[at]);
+        let face = self.face;
+        let of_pair = &mut self.passages_m[last * self.rounds.len() + next];
+        *of_pair.get_or_insert_with(|| {
+            let aspect = FaceAspect {
+                in_m: from.length_m,
+                out_m: to.length_m,
+                in_rad: from.returns_rad,
+                out_rad: to.leaves_rad,
+            };
+            let apart = from.length_m * to.length_m / (from.length_m + to.length_m);
+            apart * face.reflection(&aspect)
+        })
     }
 }
 

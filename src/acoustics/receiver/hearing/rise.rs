@@ -1,0 +1,197 @@
+//! When the envelope of all sounds together has been above the threshold for long enough.
+
+use super::{Hearing, Part, WINDOW_SLACK_US};
+use crate::acoustics::Gain;
+
+/// Steps at which an envelope is watched, microseconds: a third of the standard deviation of a
+/// 7 kHz filter's response, below which nothing rises.
+const STEP_US: f64 = 8.0;
+
+/// Longest step while the envelope is above the threshold, microseconds.
+const LONG_STEP_US: f64 = 30.0;
+
+/// Longest step over which the envelope is known to stay below the threshold, microseconds: the gain
+/// rises no more than once meanwhile.
+const LONG_QUIET_US: f64 = 200.0;
+
+impl Hearing<'_> {
+    pub(super) fn next_rise_of_sum(&mut self, ready_us: f64) -> Option<f64> {
+        let integration_us = self.receiver.integration_us;
+        let window_us = self.receiver.window_us() + WINDOW_SLACK_US;
+        let heard = |rise_us: f64| Some(rise_us.max(ready_us)).filter(|us| *us <= window_us);
+        let (mut t_us, mut here) = (ready_us, self.relative_level(ready_us));
+        // How long the envelope has been above, less how long below since.
+        let mut charge_us = 0.0_f64;
+        while t_us <= window_us + 2.0 * integration_us && !self.asked_beyond() {
+            if here < 1.0 && charge_us == 0.0 && self.watched != Some(self.lasting()) {
+                match self.skip(t_us) {
+                    Skip::Silence => return None,
+                    Skip::Lone { rise_us } => return heard(rise_us),
+                    Skip::To(later_us) if later_us > t_us => {
+                        (t_us, here) = (later_us, self.relative_level(later_us));
+                        continue;
+                    }
+                    Skip::To(_) => self.watched = Some(self.lasting()),
+                }
+            }
+            let wanted_us = integration_us - charge_us;
+            if here >= 1.0 && wanted_us <= 0.0 {
+                return heard(t_us - charge_us);
+            }
+            let step_us = if here >= 1.0 {
+                wanted_us.clamp(1.0, LONG_STEP_US)
+            } else {
+                self.quiet_us(t_us, here)
+            };
+            let next_us = t_us + step_us;
+            let next = self.relative_level(next_us);
+            let turn_us = if (here >= 1.0) == (next >= 1.0) {
+                next_us
+            } else {
+                self.turn((t_us, here), (next_us, next))
+            };
+            // Before the turn as it is here, after it as it is next.
+            for (part_us, above) in
+                [(turn_us - t_us, here >= 1.0), (next_us - turn_us, next >= 1.0)]
+            {
+                charge_us = (charge_us + if above { part_us } else { -part_us }).max(0.0);
+            }
+            (t_us, here) = (next_us, next);
+        }
+        None
+    }
+
+    /// From a time at which the envelope is below the threshold: the next one at which it may pass.
+    fn skip(&mut self, mut t_us: f64) -> Skip {
+        if self.noise.is_some() {
+            return Skip::To(t_us);
+        }
+        loop {
+            self.advance(t_us);
+            if self.asked_beyond() {
+                return Skip::Silence;
+            }
+            let entry_us = self.next_entry_us();
+            let live = &self.parts[self.over..];
+            let most: f64 = live.iter().map(|part| part.strength).sum();
+            if most * self.rise_of_gain(t_us).max(1.0) >= self.least_threshold {
+                let [part] = live else { return Skip::To(t_us) };
+                if self.gain_steps_during(part) {
+                    return Skip::To(t_us);
+                }
+                let Some((rise_us, fall_us)) = self.lone_rise(part, t_us) else {
+                    // It has passed already, or never does.
+                    let end_us = part.tof_us + self.span_us.1 + 1e-3;
+                    match entry_us {
+                        Some(entry_us) => t_us = entry_us.min(end_us),
+                        None => return self.silence(),
+                    }
+                    continue;
+                };
+                let done_us = rise_us + self.receiver.integration_us;
+                if entry_us.is_none_or(|entry_us| entry_us > done_us) {
+                    if fall_us >= done_us {
+                        self.asked_us = self.asked_us.max(done_us);
+                        return Skip::Lone { rise_us };
+                    }
+                    t_us = part.tof_us + self.span_us.1 + 1e-3;
+                    if let Some(entry_us) = entry_us {
+                        t_us = t_us.min(entry_us);
+                    }
+                    continue;
+                }
+                return Skip::To(t_us.max(rise_us.min(entry_us.unwrap_or(rise_us)) - STEP_US));
+            }
+            match entry_us {
+                Some(entry_us) => t_us = entry_us,
+                None => return self.silence(),
+            }
+        }
+    }
+
+    /// Nothing comes any more, which only those know who know all sounds.
+    const fn silence(&mut self) -> Skip {
+        self.asked_us = f64::MAX;
+        Skip::Silence
+    }
+
+    /// How long the envelope, which is `here` over the threshold now, certainly stays below it, but
+    /// at least the step at which it is watched.
+    fn quiet_us(&self, t_us: f64, here: f64) -> f64 {
+        // What the gain adds in that time is within the tenth.
+        let grows = 1.1 * self.rise_of_gain(t_us);
+        let live = &self.parts[self.over..];
+        let steepest: f64 = live.iter().map(|part| part.steepest).sum();
+        let threshold = self.receiver.threshold_at(t_us);
+        let entry_us = self.next_entry_us().unwrap_or(f64::INFINITY);
+        let quiet_us = ((1.0 - here) * threshold / (grows * steepest)).min(entry_us - t_us);
+        let is_long = self.noise.is_none() && quiet_us.min(LONG_QUIET_US) > STEP_US;
+        // The threshold drifts up with the range and falls where the gain rises by a step.
+        if is_long && self.receiver.threshold_at(t_us + quiet_us.min(LONG_QUIET_US)) >= threshold {
+            quiet_us.min(LONG_QUIET_US)
+        } else {
+            STEP_US
+        }
+    }
+
+    /// When a sound alone passes the threshold after `t_us`, and when it is last above.
+    fn lone_rise(&self, part: &Part, t_us: f64) -> Option<(f64, f64)> {
+        let at = |offset_us: f64| part.tof_us + offset_us - self.receiver.lead_us;
+        let level_at =
+            |t_us: f64| self.receiver.threshold_at(t_us) / (part.size * self.rise_of_gain(t_us));
+        let mut rise_us = part.tof_us;
+        // The threshold drifts with the range, and the gain with the time.
+        for _ in 0..2 {
+            rise_us = at(self.shape(part).rise_us(level_at(rise_us))?);
+        }
+        let fall_us = at(self.shape(part).fall_us(level_at(rise_us))?);
+        (rise_us >= t_us).then_some((rise_us, fall_us))
+    }
+
+    /// Whether the gain rises by a step while a sound lasts.
+    fn gain_steps_during(&self, part: &Part) -> bool {
+        let Gain::Steps { steps } = &self.receiver.gain else { return false };
+        let lasts = part.tof_us + self.span_us.0..part.tof_us + self.span_us.1;
+        steps.iter().filter_map(|step| step.until_us).any(|until_us| lasts.contains(&until_us))
+    }
+
+    /// Where the envelope passes the threshold between two times, by false position on its
+    /// logarithm, which is nearly straight.
+    fn turn(&self, from: (f64, f64), to: (f64, f64)) -> f64 {
+        let (mut low, mut high) = ((from.0, from.1.max(1e-9).ln()), (to.0, to.1.max(1e-9).ln()));
+        let rises = high.1 >= 0.0;
+        let mut t_us = low.0;
+        for round in 0..16 {
+            // Where the gain rises by a step there is a jump, which only halving finds.
+            let share = if round < 4 { low.1 / (low.1 - high.1) } else { 0.5 };
+            t_us = low.0 + share * (high.0 - low.0);
+            let here = self.relative_level_back(t_us).max(1e-9).ln();
+            if (here >= 0.0) == rises {
+                high = (t_us, here);
+            } else {
+                low = (t_us, here);
+            }
+            if here.abs() < 1e-4 || high.0 - low.0 < 0.01 {
+                break;
+            }
+        }
+        t_us
+    }
+
+    /// The same as [`relative_level`](Self::relative_level) a step or less before the last time
+    /// asked for.
+    fn relative_level_back(&self, t_us: f64) -> f64 {
+        // What was over at the later time may not have been.
+        self.level_of(self.over.saturating_sub(8), t_us) / self.receiver.threshold_at(t_us)
+    }
+}
+
+/// Where to go on from a time without echo.
+enum Skip {
+    /// Nothing more will come.
+    Silence,
+    /// One sound, alone, passes the threshold.
+    Lone { rise_us: f64 },
+    /// Here the envelope has to be watched.
+    To(f64),
+}

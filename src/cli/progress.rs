@@ -1,0 +1,37 @@
+//! Progress bars of long work; a terminal shows them, a file or pipe does not.
+
+use std::{fs, io::BufRead, path::Path, thread, time::Duration};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// Logs shorter than this are read before a bar could be seen, bytes.
+const LONG_LOG_BYTES: u64 = 16 << 20;
+
+/// Of so many `things` (a word in the plural); drawn from the first second on.
+pub(super) fn bar(of: u64, things: &str) -> ProgressBar {
+    let bar = styled(of, &format!("{{bar:40}} {{pos}}/{{len}} {things}, {{eta}} left"));
+    bar.set_draw_target(ProgressDrawTarget::hidden());
+    let shown = bar.clone();
+    thread::spawn(move || {
+        thread::sleep(Duration::from_secs(1));
+        if !shown.is_finished() {
+            shown.set_draw_target(ProgressDrawTarget::stderr());
+        }
+    });
+    bar
+}
+
+/// A reader of a log that shows how much of it has been read.
+pub(super) fn reading(log: &Path, reader: impl BufRead) -> impl BufRead {
+    let bytes = fs::metadata(log).map_or(0, |file| file.len());
+    let bar = match bytes >= LONG_LOG_BYTES {
+        true => styled(bytes, "{bar:40} {bytes}/{total_bytes} read, {eta} left"),
+        false => ProgressBar::hidden(),
+    };
+    bar.wrap_read(reader)
+}
+
+fn styled(of: u64, template: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template(template);
+    ProgressBar::new(of).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
