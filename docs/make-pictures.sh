@@ -35,6 +35,9 @@ two-surface-room middle 1.8
 corridor beside-wall 1.8
 EOF
 
+# How the fan of rays comes closer to the exact paths.
+cargo run --release --quiet --example fan_convergence -- "$pictures/fan-convergence.png"
+
 # Figure 2's echo traces, and the way to the false lower wall of figure 9.
 for pose in a b c d; do
   "$SONARD" trace --scene echo-traces --pose "$pose" --until 3 -o "$pictures/echo-trace-$pose.png"

@@ -81,6 +81,9 @@ pub(super) struct EngineArgs {
     /// How edges diffract [default: the sensor's, or utd; `fan` has kuc-siegel only]
     #[arg(long, value_enum)]
     edge_law: Option<EdgeLaw>,
+    /// Also follow sound that bends at two edges (`paths`)
+    #[arg(long)]
+    double_diffraction: bool,
     /// Angle between the rays of `fan`, degrees
     #[arg(long, value_name = "DEG", default_value_t = Options::default().ray_spacing_deg)]
     ray_spacing_deg: f64,
@@ -243,6 +246,12 @@ impl EngineArgs {
                 "leave --edge-law out, or use --engine paths",
             ));
         }
+        if engine != EngineKind::Paths && self.double_diffraction {
+            return Err(Failure::input(
+                "--double-diffraction: only `paths` follows sound round two edges",
+                "leave it out, or use --engine paths",
+            ));
+        }
         Ok(Options {
             engine,
             response: self.response.map(|response| match response {
@@ -255,6 +264,7 @@ impl EngineArgs {
             lossless: self.lossless,
             max_order: self.max_order,
             edge_law: self.edge_law.map(EdgeLaw::kind),
+            double_diffraction: self.double_diffraction,
             ray_spacing_deg: self.ray_spacing_deg,
             aperture_deg: self.aperture_deg,
             ..Options::default()

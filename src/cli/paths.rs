@@ -40,6 +40,9 @@ pub(super) struct Args {
     /// How edges diffract [default: the sensor's, or utd]
     #[arg(long, value_enum)]
     edge_law: Option<EdgeLaw>,
+    /// Also list sound that bends at two edges
+    #[arg(long)]
+    double_diffraction: bool,
     /// Leave out the absorption of the air
     #[arg(long)]
     lossless: bool,
@@ -55,7 +58,8 @@ pub(super) struct Args {
 pub(super) const ABOUT: &str = "\
 List the ways that echoes take from a place, shortest first.
 
-All mirror reflections, and one diffraction with any reflections before and after. The amplitude \
+All mirror reflections, and one diffraction (two with --double-diffraction) with any reflections before \
+and after. The amplitude \
 counts reflectances, edges, curvature and absorption but no beam pattern: what the echo would be \
 if the ranger faced it both on leaving and on arriving. A path that can be run through in both \
 directions is listed twice, with departure and arrival swapped.";
@@ -76,6 +80,8 @@ struct PathLine {
     order: u32,
     walls: Vec<String>,
     edge: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    second_edge: Option<String>,
     departure_deg: f64,
     arrival_deg: f64,
     amplitude: f64,
@@ -96,6 +102,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         max_range_m: args.max_range,
         max_order: args.max_order,
         edge_law: args.edge_law.map(EdgeLaw::kind),
+        double_diffraction: args.double_diffraction,
         lossless: args.lossless,
         ..Options::default()
     };
@@ -119,6 +126,7 @@ fn line(simulator: &Simulator, path: &EchoPath) -> PathLine {
         order: record.order,
         walls: record.walls,
         edge: record.edge,
+        second_edge: record.second_edge,
         departure_deg: degrees(path.departure_rad),
         arrival_deg: degrees(path.arrival_rad),
         amplitude: path.amplitude,

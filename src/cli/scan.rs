@@ -36,7 +36,7 @@ use setup::Setup;
 pub(super) const ATTEMPTS: u8 = 7;
 
 /// What a daemon has of its own, and a scan by it is not told.
-const OF_THE_DAEMON: [&str; 25] = [
+const OF_THE_DAEMON: [&str; 26] = [
     "sensor",
     "short_blanking",
     "blanking_us",
@@ -54,6 +54,7 @@ const OF_THE_DAEMON: [&str; 25] = [
     "lossless",
     "max_order",
     "edge_law",
+    "double_diffraction",
     "ray_spacing_deg",
     "aperture_deg",
     "window_ms",

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use smallvec::smallvec;
+use smallvec::{SmallVec, smallvec};
 
 use super::{Arrival, Engine, Path, Survey, raycast::Reflectors};
 use crate::{
@@ -71,7 +71,11 @@ impl ConeSurvey<'_> {
             phase_rad: 0.0,
             departure_rad: ray_rad,
             arrival_rad: ray_rad,
-            path: Path { kind: PathKind::Specular, walls: smallvec![hit.reflector], edge: None },
+            path: Path {
+                kind: PathKind::Specular,
+                walls: smallvec![hit.reflector],
+                bends: SmallVec::new(),
+            },
         })
     }
 }

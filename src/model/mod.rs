@@ -60,8 +60,8 @@ pub struct Path {
     pub kind: PathKind,
     /// Reflectors met, in order.
     pub walls: SmallVec<[Reflector; 4]>,
-    /// The edge it bent at.
-    pub edge: Option<Edge>,
+    /// The edges it bent at, in order.
+    pub bends: SmallVec<[Bend; 2]>,
 }
 
 /// A reflector of the scene.
@@ -77,6 +77,20 @@ pub enum Reflector {
     Floor,
     /// Its ceiling.
     Ceiling,
+}
+
+/// An edge of a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Bend {
+    /// An upright one: where walls end or meet.
+    Upright(Edge),
+    /// A level one of a wall that ends below the ceiling or above the floor.
+    Level {
+        /// Index into `scene.walls`.
+        wall: u32,
+        /// Whether it is the wall's upper one (else the lower).
+        is_upper: bool,
+    },
 }
 
 /// An end of a wall.

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    Cone, Edge, Engine, Fan, FanSettings, Path, Prediction, Reflector, Station,
+    Bend, Cone, Edge, Engine, Fan, FanSettings, Path, Prediction, Reflector, Station,
     paths::{self, PathEngine},
     place::Place,
 };
@@ -33,6 +33,10 @@ const PATHS_KEPT_DB: f64 = 20.0;
 
 /// What the transducer's own face is called among the walls of a path.
 pub(super) const FACE_NAME: &str = "transducer";
+
+/// The same of a room's floor and ceiling.
+pub(super) const FLOOR_NAME: &str = "floor";
+pub(super) const CEILING_NAME: &str = "ceiling";
 
 /// Bozma and Kuc's scattering strength of the right-angled edge that they scanned.
 const SIGMA_E: f64 = 0.095;
@@ -85,6 +89,9 @@ pub struct Options {
     pub max_order: Option<u32>,
     /// What edges send back (`paths`; without it, the sensor's law). `fan` has Kuc and Siegel's law only.
     pub edge_law: Option<EdgeLawKind>,
+    /// Also sound that bends at two edges (`paths`).
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub double_diffraction: bool,
     /// Angle between the rays of `fan`, degrees. The default reads the same as a finer fan in
     /// every shipped scene as long as no round body is met (there is a test).
     pub ray_spacing_deg: f64,
@@ -104,6 +111,7 @@ impl Default for Options {
             lossless: false,
             max_order: None,
             edge_law: None,
+            double_diffraction: false,
             ray_spacing_deg: 0.05,
             aperture_deg: None,
         }
@@ -213,7 +221,8 @@ impl Simulator {
             kind: path.kind,
             order: path.walls.len() as u32,
             walls: path.walls.iter().map(|wall| self.reflector_name(*wall)).collect(),
-            edge: path.edge.map(|edge| self.edge_name(edge)),
+            edge: path.bends.first().map(|bend| self.bend_name(*bend)),
+            second_edge: path.bends.get(1).map(|bend| self.bend_name(*bend)),
             length_m,
         }
     }
@@ -287,14 +296,19 @@ impl Simulator {
             Reflector::Wall(index) => self.scene.walls[index as usize].id.to_string(),
             Reflector::Cylinder(index) => self.scene.cylinders[index as usize].id.to_string(),
             Reflector::Face => FACE_NAME.to_owned(),
-            Reflector::Floor => "floor".to_owned(),
-            Reflector::Ceiling => "ceiling".to_owned(),
+            Reflector::Floor => FLOOR_NAME.to_owned(),
+            Reflector::Ceiling => CEILING_NAME.to_owned(),
         }
     }
 
-    fn edge_name(&self, edge: Edge) -> String {
-        let end = if edge.at_b { "b" } else { "a" };
-        format!("{}.{end}", self.scene.walls[edge.wall as usize].id)
+    fn bend_name(&self, bend: Bend) -> String {
+        let (wall, end) = match bend {
+            Bend::Upright(Edge { wall, at_b: false }) => (wall, "a"),
+            Bend::Upright(Edge { wall, at_b: true }) => (wall, "b"),
+            Bend::Level { wall, is_upper: true } => (wall, "top"),
+            Bend::Level { wall, is_upper: false } => (wall, "bottom"),
+        };
+        format!("{}.{end}", self.scene.walls[wall as usize].id)
     }
 }
 
@@ -365,7 +379,9 @@ fn path_settings(
         max_path_m: 2.0 * receiver.max_range_m,
         max_order: options.max_order.map(|order| order.try_into().unwrap_or(u16::MAX)),
         floor: receiver.threshold * 10f64.powf(-PATHS_KEPT_DB / 20.0),
+        rounds_above: paths::ROUNDS_ABOVE,
         edge_law: Some(law),
+        double_diffraction: options.double_diffraction,
         absorption_np_per_m: absorption_db_per_m(sensor, air, options) / (20.0 * LOG10_E),
         wave_number_per_m,
         sensor_z_m: sensor.mounting.z_m,

@@ -31,6 +31,7 @@ const BARE: Options = Options {
     lossless: true,
     max_order: None,
     edge_law: None,
+    double_diffraction: false,
     ray_spacing_deg: 0.1,
     aperture_deg: None,
 };

@@ -1,11 +1,15 @@
 //! The way of an echo through the floor plan, as points.
 //!
-//! A path's walls and edge say what the sound met and in which order; where it met them follows
+//! A path's walls and edges say what the sound met and in which order; where it met them follows
 //! from mirror images, so a way can be drawn from a log's record as well as from an arrival.
 
 use smallvec::SmallVec;
 
-use super::{Edge, Path, Reflector, simulator::FACE_NAME};
+use super::{
+    Bend, Edge, Path, Reflector,
+    paths::usual_z_m,
+    simulator::{CEILING_NAME, FACE_NAME, FLOOR_NAME},
+};
 use crate::{
     geometry::{DVec2, Mirror},
     scan::{PathKind, PathRecord},
@@ -26,30 +30,65 @@ const CLOSE_M: f64 = 1e-7;
 const MOST_ROUNDS: usize = 500;
 
 impl Path {
-    /// The points of the way from a ranger at `position` and back to it, in order: the ranger, each
-    /// reflection and the edge, the ranger. Round an edge the way may be the one run through
+    /// The points of the way from a ranger at `position` and back to it, in order and in the plan: the
+    /// ranger, each reflection and edge, the ranger. Round an edge the way may be the one run through
     /// backwards, which meets the same walls in the same order and arrives at the same time. `None`
-    /// if there is no such way of `length_m` metres in this scene, and for what a rough wall
-    /// scattered: which part of it did is not in a record.
+    /// if there is no such way of `length_m` metres in this scene (up or down as well, in the plan it is
+    /// shorter), and for what a rough wall scattered: which part of it did is not in a record.
     #[must_use]
     pub fn points(&self, scene: &Scene, position: DVec2, length_m: f64) -> Option<Vec<DVec2>> {
+        self.points_between(scene, [position; 2], None, length_m)
+    }
+
+    /// The same from a transmitter to a receiver, at a height in metres if not at [`usual_z_m`].
+    #[must_use]
+    pub fn points_between(
+        &self,
+        scene: &Scene,
+        [from, to]: [DVec2; 2],
+        z_m: Option<f64>,
+        length_m: f64,
+    ) -> Option<Vec<DVec2>> {
         if self.kind == PathKind::Scattered {
             return None;
         }
-        let edge = match self.edge {
-            Some(edge) => Some(edge.place(scene)?),
-            None => None,
-        };
-        let way = Way { scene, from: position, length_m };
+        let walls: SmallVec<[Reflector; 8]> =
+            self.walls.iter().copied().filter(is_upright).collect();
+        let mut edges: SmallVec<[DVec2; 2]> = SmallVec::new();
+        for bend in &self.bends {
+            // Over a level edge the way in the plan is a mirror's.
+            if let Bend::Upright(edge) = bend {
+                edges.push(edge.place(scene)?);
+            }
+        }
+        let z_m = z_m.unwrap_or_else(|| usual_z_m(scene.floor_z_m, scene.ceiling_z_m));
+        let rise_m = self.rise_m(scene, z_m)?;
+        let plan_m = (length_m * length_m - rise_m * rise_m).max(0.0).sqrt();
+        let way = Way { scene, from, to, plan_m };
         // The transducer's face sends the sound off again from where it started.
-        let rounds: Vec<&[Reflector]> = self.walls.split(|wall| *wall == Reflector::Face).collect();
-        let Some(edge) = edge else { return way.whole(&rounds, None) };
-        // The record does not say where among the walls the edge was met.
-        let places = rounds
-            .iter()
-            .enumerate()
-            .flat_map(|(round, walls)| (0..=walls.len()).map(move |split| (round, split)));
-        places.into_iter().find_map(|(round, split)| way.whole(&rounds, Some((edge, round, split))))
+        let mut rounds = walls.split(|wall| *wall == Reflector::Face);
+        let first = rounds.next().unwrap_or_default();
+        let rounds: SmallVec<[&[Reflector]; 4]> = rounds.collect();
+        let mut points = vec![from];
+        way.follow(&mut points, first, &rounds, &edges).then_some(points)
+    }
+
+    /// How much higher or lower it ends if floor and ceiling are windows, and a level edge a mirror,
+    /// metres; `None` if the scene has none of these.
+    fn rise_m(&self, scene: &Scene, z_m: f64) -> Option<f64> {
+        for bend in &self.bends {
+            if let Bend::Level { wall, is_upper } = *bend {
+                let limits = scene.walls.get(wall as usize)?.z_m?;
+                return Some(2.0 * (limits[usize::from(is_upper)] - z_m));
+            }
+        }
+        let mut image_z_m = z_m;
+        for level in self.walls.iter().filter(|wall| !is_upright(wall)) {
+            let mirror_z_m =
+                if *level == Reflector::Floor { scene.floor_z_m? } else { scene.ceiling_z_m? };
+            image_z_m = 2.0 * mirror_z_m - image_z_m;
+        }
+        Some(image_z_m - z_m)
     }
 
     /// The path of a log's record in its scene; `None` if the scene lacks one of its names.
@@ -57,11 +96,9 @@ impl Path {
     pub fn from_record(record: &PathRecord, scene: &Scene) -> Option<Self> {
         let walls: Option<SmallVec<[Reflector; 4]>> =
             record.walls.iter().map(|name| reflector(scene, name)).collect();
-        let edge = match &record.edge {
-            Some(name) => Some(edge(scene, name)?),
-            None => None,
-        };
-        Some(Self { kind: record.kind, walls: walls?, edge })
+        let names = record.edge.iter().chain(&record.second_edge);
+        let bends: Option<SmallVec<[Bend; 2]>> = names.map(|name| bend(scene, name)).collect();
+        Some(Self { kind: record.kind, walls: walls?, bends: bends? })
     }
 }
 
@@ -80,14 +117,18 @@ fn reflector(scene: &Scene, name: &str) -> Option<Reflector> {
     let cylinder = || scene.cylinders.iter().position(|cylinder| &*cylinder.id == name);
     wall.map(|index| Reflector::Wall(index as u32))
         .or_else(|| cylinder().map(|index| Reflector::Cylinder(index as u32)))
+        .or_else(|| (name == FLOOR_NAME).then_some(Reflector::Floor))
+        .or_else(|| (name == CEILING_NAME).then_some(Reflector::Ceiling))
 }
 
-fn edge(scene: &Scene, name: &str) -> Option<Edge> {
+fn bend(scene: &Scene, name: &str) -> Option<Bend> {
     let (wall, end) = name.rsplit_once('.')?;
     let wall = scene.walls.iter().position(|known| &*known.id == wall)? as u32;
     match end {
-        "a" => Some(Edge { wall, at_b: false }),
-        "b" => Some(Edge { wall, at_b: true }),
+        "a" => Some(Bend::Upright(Edge { wall, at_b: false })),
+        "b" => Some(Bend::Upright(Edge { wall, at_b: true })),
+        "top" => Some(Bend::Level { wall, is_upper: true }),
+        "bottom" => Some(Bend::Level { wall, is_upper: false }),
         _ => None,
     }
 }
@@ -95,33 +136,48 @@ fn edge(scene: &Scene, name: &str) -> Option<Edge> {
 struct Way<'a> {
     scene: &'a Scene,
     from: DVec2,
-    length_m: f64,
+    to: DVec2,
+    /// Its length in the plan, metres.
+    plan_m: f64,
+}
+
+const fn is_upright(reflector: &Reflector) -> bool {
+    !matches!(reflector, Reflector::Floor | Reflector::Ceiling)
 }
 
 impl Way<'_> {
-    /// All rounds one after the other; the edge lies in one of them, after so many of its walls.
-    fn whole(
+    /// Goes on from the last of the points over the walls left of a round and the edges left, then all
+    /// later rounds. Where among the walls an edge was met is not said, so all places are tried.
+    /// False, with the points as they were, if there is no such way.
+    fn follow(
         &self,
+        points: &mut Vec<DVec2>,
+        walls: &[Reflector],
         rounds: &[&[Reflector]],
-        edge: Option<(DVec2, usize, usize)>,
-    ) -> Option<Vec<DVec2>> {
-        let mut points = vec![self.from];
-        for (number, walls) in rounds.iter().enumerate() {
-            let round = match edge {
-                Some((edge, round, split)) if round == number => {
-                    self.around(edge, walls.split_at(split))?
+        edges: &[DVec2],
+    ) -> bool {
+        let (known, at) = (points.len(), points.last().copied().unwrap_or(self.from));
+        if let [edge, later @ ..] = edges {
+            for (out, rest) in (0..=walls.len()).map(|split| walls.split_at(split)) {
+                if let Some(leg) = self.leg(at, *edge, out) {
+                    points.extend(leg.into_iter().skip(1));
+                    if self.follow(points, rest, rounds, later) {
+                        return true;
+                    }
+                    points.truncate(known);
                 }
-                _ => self.leg(self.from, self.from, walls)?,
-            };
-            points.extend(round.into_iter().skip(1));
+            }
         }
-        self.has_length(&points).then_some(points)
-    }
-
-    fn around(&self, edge: DVec2, (out, back): (&[Reflector], &[Reflector])) -> Option<Vec<DVec2>> {
-        let mut points = self.leg(self.from, edge, out)?;
-        points.extend(self.leg(edge, self.from, back)?.into_iter().skip(1));
-        Some(points)
+        let Some(home) = self.leg(at, self.to, walls) else { return false };
+        points.extend(home.into_iter().skip(1));
+        let is_whole = match rounds {
+            [] => edges.is_empty() && self.has_length(points),
+            [next, more @ ..] => self.follow(points, next, more, edges),
+        };
+        if !is_whole {
+            points.truncate(known);
+        }
+        is_whole
     }
 
     /// From one point to another over these reflectors.
@@ -199,7 +255,7 @@ impl Way<'_> {
 
     fn has_length(&self, points: &[DVec2]) -> bool {
         let length_m: f64 = points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
-        (length_m - self.length_m).abs() < SAME_LENGTH_M
+        (length_m - self.plan_m).abs() < SAME_LENGTH_M
     }
 }
 

@@ -40,6 +40,8 @@ pub(super) fn room() -> Scene {
         cylinders: Vec::new(),
         floor_z_m: None,
         ceiling_z_m: None,
+        floor_material: Material::RIGID,
+        ceiling_material: Material::RIGID,
         poses: BTreeMap::from([
             ("fig7".into(), Pose { x_m: 0.834, y_m: 0.345, heading_deg: 0.0 }),
             ("fig9".into(), Pose { x_m: 0.774, y_m: 0.085, heading_deg: 0.0 }),
@@ -183,6 +185,7 @@ fn predict(pose: &Pose, azimuth_deg: f64) -> SimRecord {
             order: *order,
             walls: (0..*order).map(|i| ["south", "north"][i as usize % 2].into()).collect(),
             edge: None,
+            second_edge: None,
             length_m: *length_m,
         }),
     }

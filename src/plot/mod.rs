@@ -7,6 +7,7 @@ mod animation;
 mod canvas;
 mod caption;
 mod confidence;
+mod convergence;
 mod explore;
 mod fans;
 mod features;
@@ -43,6 +44,7 @@ mod tests;
 
 pub use animation::animate;
 pub use confidence::draw_confidence;
+pub use convergence::{Convergence, draw_convergence};
 pub use explore::{draw_exploration, draw_explorations};
 pub use features::draw_features;
 pub use lines::draw_lines;

@@ -82,7 +82,7 @@ impl Kind {
 pub(super) struct Reading {
     /// Azimuth from the scan's heading, degrees.
     pub(super) azimuth_deg: f64,
-    /// Of a ranger of an array: where it stood and looked.
+    /// Of a ranger of an array, or beside its axis: where it stood and looked.
     pub(super) transducer: Option<Pose>,
     /// Its name.
     pub(super) ranger: Option<String>,
@@ -176,6 +176,14 @@ fn min_range_m(session: &Session) -> Option<f64> {
     length(Some(session.air.sound_speed_m_s * blanking_us * 1e-6 / 2.0))
 }
 
+/// Whether the transducer turns beside its axis.
+fn is_beside(view: &ScanView) -> bool {
+    view.session.as_ref().is_some_and(|session| {
+        let mounting = &session.sensor.mounting;
+        mounting.ahead_m != 0.0 || mounting.left_m != 0.0
+    })
+}
+
 /// The beam's width and reach, for the session of an array.
 fn fan(session: &Session) -> Option<Fan> {
     session.array.as_ref()?;
@@ -188,10 +196,10 @@ fn fan(session: &Session) -> Option<Fan> {
     Some(Fan { half_rad: BeamPattern::new(sensor, speed_m_s).angle_at(0.5), max_range_m })
 }
 
-/// A reading of an array with its transducer's place, and its azimuth as seen from the scan's.
+/// A reading of an array, or of a ranger beside its axis, with its transducer's place, and its azimuth as seen from the scan's.
 fn mounted(view: &ScanView, ping: &Ping, reading: Reading) -> Reading {
     let transducer = view.transducer(ping).filter(|pose| {
-        (ping.ranger.is_some() || ping.pose.is_some())
+        (ping.ranger.is_some() || ping.pose.is_some() || is_beside(view))
             && pose.position().is_finite()
             && pose.heading_deg.is_finite()
     });

@@ -282,7 +282,7 @@ prop_compose! {
         length_m in any_number(),
     ) -> SimRecord {
         let kind = if order == 4 { PathKind::Diffracted } else { PathKind::Specular };
-        let path = PathRecord { kind, order, walls: vec!["south".into()], edge: None, length_m };
+        let path = PathRecord { kind, order, walls: vec!["south".into()], edge: None, second_edge: None, length_m };
         SimRecord { status, range_m, amplitude: margin_db, margin_db, path: Some(path) }
     }
 }

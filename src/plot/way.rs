@@ -25,7 +25,9 @@ pub struct WayView<'a> {
     pub scene: &'a Scene,
     /// Where the ranger stands.
     pub pose: Pose,
-    /// Where it looks, degrees from the heading.
+    /// Where the transducer itself is; its heading is the way it looks.
+    pub looks: Pose,
+    /// That way, degrees from the scan's heading.
     pub azimuth_deg: f64,
     /// What was read, metres.
     pub range_m: Option<f64>,
@@ -75,7 +77,7 @@ const fn line(colour: &'static str, dash: &'static str) -> Sample {
 
 /// The way and the reading with some room around; of the room what is near.
 fn region(view: &WayView) -> Bounds {
-    let read = view.range_m.map(|range_m| view.pose.point_at(view.azimuth_deg, range_m));
+    let read = view.range_m.map(|range_m| view.looks.point_at(0.0, range_m));
     let here = [view.pose.position()].into_iter().chain(read).chain(view.points.iter().copied());
     let way = Bounds::around(here).unwrap_or(Bounds { min: DVec2::ZERO, max: DVec2::ONE });
     let reach = way.size().max_element().max(0.1);
@@ -86,8 +88,8 @@ fn region(view: &WayView) -> Bounds {
 
 fn beam(view: &WayView, plan: &Plan) -> Layer {
     let reach_m = view.range_m.unwrap_or_else(|| plan.view.size().max_element());
-    let from = plan.px(view.pose.position());
-    let to = view.pose.point_at(view.azimuth_deg, reach_m);
+    let from = plan.px(view.looks.position());
+    let to = view.looks.point_at(0.0, reach_m);
     let mut layer = Layer::new("axis").stroked(theme::SKY, 2.0).with("stroke-dasharray", "5 4");
     layer.line(from, plan.px(to));
     let mut ring = Layer::new("reading").stroked(theme::BLUE, 1.6);

@@ -5,20 +5,32 @@ use uuid::Uuid;
 
 use super::{Ping, Provenance, ScanEnd, ScanStart, ScanView, Session};
 use crate::{
-    geometry::Pose,
+    geometry::{DVec2, Pose},
     model::{ArrayModel, ArrayStand, Prediction},
 };
 
 impl ScanView {
-    /// Where a reading's transducer stood, and which way it looked (its heading); `None` if the log
-    /// does not say.
+    /// Where a reading's transducer stood, and which way it looked (its heading): in an array at its
+    /// ranger's place, on a stepper where the mounting has its face beside the axis; between transmitter
+    /// and receiver if they are apart. `None` if the log does not say.
     #[must_use]
     pub fn transducer(&self, ping: &Ping) -> Option<Pose> {
         let robot = ping.pose.or_else(|| self.pose())?;
         let heading_deg = robot.heading_deg + ping.azimuth_deg;
-        let Some(id) = &ping.ranger else { return Some(Pose { heading_deg, ..robot }) };
+        let Some(id) = &ping.ranger else {
+            let at = self.ends(&robot, ping.azimuth_deg);
+            let [x_m, y_m] = (0.5 * (at[0] + at[1])).to_array();
+            return Some(Pose { x_m, y_m, heading_deg });
+        };
         let array = self.session.as_ref()?.array.as_ref()?;
         Some(Pose { heading_deg, ..array.ranger(id)?.pose_on(&robot) })
+    }
+
+    /// Where the transmitter and the receiver of a ranger on a stepper are at an azimuth, degrees.
+    #[must_use]
+    pub fn ends(&self, axis: &Pose, azimuth_deg: f64) -> [DVec2; 2] {
+        let mounting = self.session.as_ref().map(|session| session.sensor.mounting);
+        mounting.unwrap_or_default().places(axis.position(), axis.direction_rad(azimuth_deg))
     }
 
     /// Whether it is of an array and not of a stepper's ranger.

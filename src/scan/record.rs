@@ -320,23 +320,37 @@ pub struct PathRecord {
     pub order: u32,
     /// Names of the walls in the order they were met.
     pub walls: Vec<String>,
-    /// The edge it bent at, if any.
+    /// The edge it bent at, if any: `WALL.a` and `WALL.b` are the upright ones at the ends of a wall,
+    /// `WALL.top` and `WALL.bottom` the level ones of a wall that ends below or above.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edge: Option<String>,
+    /// The edge it bent at after that: with double diffraction, or after the transducer's face sent it
+    /// round again.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub second_edge: Option<String>,
     /// Length there and back, metres.
     pub length_m: f64,
 }
 
 impl PathRecord {
-    /// The walls in order; for a bent path the edge in front.
+    /// The walls in order; for a bent path its edges in front.
     #[must_use]
     pub fn in_words(&self) -> String {
         let walls = self.walls.join(", ");
-        match &self.edge {
-            Some(edge) if walls.is_empty() => format!("edge {edge}"),
-            Some(edge) => format!("edge {edge} by {walls}"),
+        match self.edges_in_words() {
+            Some(edges) if walls.is_empty() => edges,
+            Some(edges) => format!("{edges} by {walls}"),
             None => walls,
         }
+    }
+
+    /// `edge a`, or `edges a and b`; `None` for a path that did not bend.
+    #[must_use]
+    pub fn edges_in_words(&self) -> Option<String> {
+        Some(match (self.edge.as_ref()?, &self.second_edge) {
+            (edge, None) => format!("edge {edge}"),
+            (edge, Some(second)) => format!("edges {edge} and {second}"),
+        })
     }
 }
 

@@ -42,6 +42,12 @@ pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
     }
     let robot = file.robot.map(|robot| rules.robot(robot, &root.key("robot"))).transpose()?;
     floor_below_ceiling(file.floor_z_m, file.ceiling_z_m, &root)?;
+    let [floor_material, ceiling_material] = [
+        ("floor_material", &file.floor_material, "floor_z_m", file.floor_z_m),
+        ("ceiling_material", &file.ceiling_material, "ceiling_z_m", file.ceiling_z_m),
+    ]
+    .map(|level| rules.level(level, &root));
+    let (floor_material, ceiling_material) = (floor_material?, ceiling_material?);
     let scene = Scene {
         name: file.name,
         source: file.source,
@@ -51,6 +57,8 @@ pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
         cylinders,
         floor_z_m: file.floor_z_m,
         ceiling_z_m: file.ceiling_z_m,
+        floor_material,
+        ceiling_material,
         poses: file.poses,
         robot,
         sha256: Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect(),
@@ -116,9 +124,26 @@ impl Rules {
         })
     }
 
+    /// The material of floor or ceiling, which have to have a height.
+    fn level(
+        &self,
+        (field, name, height, z_m): (&str, &Option<String>, &'static str, Option<f64>),
+        root: &JsonPath,
+    ) -> Result<Material, Fault> {
+        let Some(name) = name else { return Ok(Material::RIGID) };
+        if z_m.is_none() {
+            return fault(&root.key(field), SceneProblem::NoSuchLevel(height));
+        }
+        self.material_at(name, root.key(field))
+    }
+
     fn material(&self, name: &str, path: &JsonPath) -> Result<Material, Fault> {
+        self.material_at(name, path.key("material"))
+    }
+
+    fn material_at(&self, name: &str, path: JsonPath) -> Result<Material, Fault> {
         self.materials.get(name).copied().ok_or_else(|| Fault {
-            path: path.key("material"),
+            path,
             part: Part::Value,
             problem: SceneProblem::UnknownMaterial {
                 name: name.to_owned(),

@@ -176,6 +176,9 @@ pub enum SceneProblem {
         /// Metres.
         upper: f64,
     },
+    /// A material of a floor or ceiling that is not there; holds the field of its height.
+    #[error("there is none: the scene has no {0}")]
+    NoSuchLevel(&'static str),
     /// A named pose where no ranger can stand.
     #[error(transparent)]
     Pose(#[from] PoseError),
@@ -244,6 +247,9 @@ impl SceneProblem {
             }
             Self::Share { .. } => "use a number from 0 to 1".to_owned(),
             Self::HeightsReversed { .. } => "write the lower height first, in metres".to_owned(),
+            Self::NoSuchLevel(height) => {
+                format!("give its height as `{height}`, in metres, or leave the material out")
+            }
             Self::Pose(error) => error.help(),
         }
     }

@@ -41,9 +41,15 @@ pub(super) struct SceneFile {
     /// Height of the floor, metres. Leave it out for a scene in the plane.
     #[serde(default)]
     pub(super) floor_z_m: Option<f64>,
+    /// Name of the floor's material. Without it the floor is a perfect mirror.
+    #[serde(default)]
+    pub(super) floor_material: Option<String>,
     /// Height of the ceiling, metres; above `floor_z_m`.
     #[serde(default)]
     pub(super) ceiling_z_m: Option<f64>,
+    /// Name of the ceiling's material. Without it the ceiling is a perfect mirror.
+    #[serde(default)]
+    pub(super) ceiling_material: Option<String>,
     /// Named poses of the ranger: where its rotation axis stands and where azimuth 0 points.
     #[serde(default)]
     pub(super) poses: BTreeMap<String, Pose>,

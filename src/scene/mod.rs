@@ -48,6 +48,10 @@ pub struct Scene {
     pub floor_z_m: Option<f64>,
     /// Height of the ceiling, metres.
     pub ceiling_z_m: Option<f64>,
+    /// The floor's surface; what it scatters is lost to the model.
+    pub floor_material: Material,
+    /// The ceiling's.
+    pub ceiling_material: Material,
     /// Named poses of the ranger.
     pub poses: BTreeMap<String, Pose>,
     /// Body of the robot that carries the ranger; see [`Scene::with_robot_at`].
@@ -88,6 +92,11 @@ pub struct Material {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub roughness: f64,
+}
+
+impl Material {
+    /// A perfect mirror.
+    pub const RIGID: Self = Self { reflectance: 1.0, roughness: 0.0 };
 }
 
 /// A flat reflector: one segment of the floor plan. Both faces reflect.

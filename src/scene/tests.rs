@@ -47,6 +47,11 @@ fn a_scene_is_read_with_its_polylines_cut_into_segments() {
     assert_eq!(closing.z_m, Some([0.0, 1.0]));
     assert_eq!(scene.walls[0].material, Material { reflectance: 0.9, roughness: 0.0 });
     assert_eq!((scene.floor_z_m, scene.ceiling_z_m), (Some(0.0), Some(2.5)));
+    assert_eq!([scene.floor_material, scene.ceiling_material], [Material::RIGID; 2]);
+    let with_carpet =
+        GOOD.replace(r#""floor_z_m": 0,"#, r#""floor_z_m": 0, "floor_material": "board","#);
+    let carpeted = Scene::from_json(&with_carpet).expect("a floor of board");
+    assert_eq!(carpeted.floor_material, scene.walls[0].material);
     assert_eq!(scene.poses["desk"], Pose { x_m: 3.5, y_m: 0.5, heading_deg: 0.0 });
 }
 
@@ -114,6 +119,8 @@ fn rules_of_scenes_are_kept() {
     check("[4, 3]", "[4, 3000]", "3000", "walls[1].polyline[1][1]: 3000 m is out of bounds", "millimetres");
     check("0.1", "-0.1", "-0.1", "cylinders[0].radius_m: a radius of -0.1 m", "greater than 0");
     check("0.9", "1.2", "1.2", "materials.board.reflectance: reflectance is 1.2", "0 to 1");
+    check(r#""ceiling_z_m": 2.5"#, r#""ceiling_material": "board""#, r#""board""#, "ceiling_material: there is none", "give its height as `ceiling_z_m`");
+    check(r#""floor_z_m": 0"#, r#""floor_z_m": 0, "floor_material": "bord""#, r#""bord""#, "floor_material: there is no material `bord`", "did you mean `board`?");
     check(r#""ceiling_z_m": 2.5"#, r#""ceiling_z_m": -1"#, "-1", "ceiling_z_m: ceiling_z_m (-1 m) is not above floor_z_m (0 m)", "");
     check("[0, 1]", "[1, 0]", "[1, 0]", "walls[2].z_m: the upper height (0 m) is not above", "lower height first");
     check(r#""desk""#, r#""a,b""#, r#""a,b""#, "poses.a,b: the pose name", "comma");

@@ -165,9 +165,9 @@ fn millimetres(value_m: Option<f64>) -> String {
 /// A path in words: `3 reflections: south north south`.
 pub(in crate::cli) fn path_text(path: &PathRecord) -> String {
     let walls = path.walls.join(" ");
-    match (path.kind, &path.edge) {
-        (PathKind::Diffracted, Some(edge)) if walls.is_empty() => format!("edge {edge}"),
-        (PathKind::Diffracted, Some(edge)) => format!("edge {edge}, by {walls}"),
+    match (path.kind, path.edges_in_words()) {
+        (PathKind::Diffracted, Some(edges)) if walls.is_empty() => edges,
+        (PathKind::Diffracted, Some(edges)) => format!("{edges}, by {walls}"),
         (PathKind::Diffracted, None) => format!("edge, by {walls}"),
         (PathKind::Scattered, _) => format!("scattered by {walls}"),
         (PathKind::Specular, _) => match path.order {

@@ -41,8 +41,14 @@ pub(super) fn draw(
         )
     })?;
     let whole = scene.with_robot_at(&pose);
+    let looks = view.transducer(ping).unwrap_or(pose);
+    let z_m = view.session.as_ref().and_then(|session| session.sensor.mounting.z_m);
+    let ends = match ping.ranger {
+        Some(_) => [looks.position(); 2],
+        None => view.ends(&ping.pose.unwrap_or(pose), azimuth_deg),
+    };
     let points = Path::from_record(record, &whole)
-        .and_then(|path| path.points(&whole, pose.position(), record.length_m))
+        .and_then(|path| path.points_between(&whole, ends, z_m, record.length_m))
         .ok_or_else(|| {
             Failure::input(
                 format!("beam {index}: the scene has no way over {}", record.in_words()),
@@ -54,6 +60,7 @@ pub(super) fn draw(
         lines: vec![reading(ping), by(record)],
         scene,
         pose,
+        looks,
         azimuth_deg,
         range_m: ping.range_m,
         points,

@@ -139,6 +139,8 @@ impl World {
             cylinders: Vec::new(),
             floor_z_m: None,
             ceiling_z_m: None,
+            floor_material: Material::RIGID,
+            ceiling_material: Material::RIGID,
             poses: BTreeMap::new(),
             robot: None,
             sha256: String::new(),

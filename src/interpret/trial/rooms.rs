@@ -107,6 +107,8 @@ impl Room {
             cylinders: Vec::new(),
             floor_z_m: None,
             ceiling_z_m: None,
+            floor_material: Material::RIGID,
+            ceiling_material: Material::RIGID,
             poses: BTreeMap::from([(
                 "start".to_owned(),
                 Pose { x_m: start.x, y_m: start.y, heading_deg: 0.0 },

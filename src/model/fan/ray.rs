@@ -1,12 +1,12 @@
 //! One ray of the fan and what it brings to the receiver.
 
-use smallvec::SmallVec;
+use smallvec::{SmallVec, smallvec};
 
 use super::Fan;
 use crate::{
     acoustics::BeamPattern,
     geometry::{DVec2, wrap_pi},
-    model::{Arrival, Edge, Path, Reflector, raycast::Hit},
+    model::{Arrival, Bend, Edge, Path, Reflector, raycast::Hit},
     scan::PathKind,
 };
 
@@ -94,7 +94,8 @@ impl Ray {
         if target.length_m > fan.settings.longest_m || gain < fan.settings.weakest {
             return None;
         }
-        let path = Path { kind: PathKind::Specular, walls: self.walls.clone(), edge: None };
+        let path =
+            Path { kind: PathKind::Specular, walls: self.walls.clone(), bends: SmallVec::new() };
         Some(Candidate {
             length_m: target.length_m,
             gain,
@@ -140,7 +141,11 @@ impl Ray {
         if !matters || !fan.reflectors.sees(position, point) {
             return None;
         }
-        let path = Path { kind: PathKind::Diffracted, walls: self.walls.clone(), edge: Some(edge) };
+        let path = Path {
+            kind: PathKind::Diffracted,
+            walls: self.walls.clone(),
+            bends: smallvec![Bend::Upright(edge)],
+        };
         Some(Candidate {
             length_m,
             gain,

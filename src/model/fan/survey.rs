@@ -47,7 +47,7 @@ impl<'a> FanSurvey<'a> {
             one.length_m
                 .total_cmp(&other.length_m)
                 .then_with(by_path)
-                .then_with(|| one.path.edge.cmp(&other.path.edge))
+                .then_with(|| one.path.bends.cmp(&other.path.bends))
         });
         let weighings = candidates.iter().map(Candidate::weighing).collect();
         Self { fan, candidates, weighings }

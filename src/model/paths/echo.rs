@@ -3,7 +3,7 @@
 use crate::geometry::DVec2;
 
 /// Echoes that agree in length and both directions to within this are one, metres and radians.
-const SAME_M: f64 = 1e-8;
+pub(super) const SAME_M: f64 = 1e-8;
 pub(super) const SAME_RAD: f64 = 1e-9;
 
 /// An echo path with its way as nodes of the tree.
@@ -35,6 +35,10 @@ pub(super) enum Via {
         out: u32,
         back: u32,
     },
+    /// By two edges, in [`super::Trees::bridged`].
+    Edges {
+        way: u32,
+    },
     /// By the contact in its middle, in [`super::Trees::joints`].
     Cylinder {
         joint: u32,
@@ -58,6 +62,8 @@ impl Echo {
             && self.arrival.distance_squared(other.arrival) < SAME_RAD * SAME_RAD
             && self.image == other.image
             && std::mem::discriminant(&self.via) == std::mem::discriminant(&other.via)
+            // Between two edges there may be several ways of one length; none was found twice.
+            && !matches!(self.via, Via::Edges { .. })
     }
 }
 

@@ -7,7 +7,7 @@ use smallvec::SmallVec;
 
 use super::{
     Echo, Settings, Trees, Via,
-    beam::Ray,
+    beam::{Ray, TIE_M},
     echo::{SAME_RAD, drop_repeats},
     trace::Tree,
 };
@@ -20,6 +20,10 @@ use crate::{
 /// Legs along a wall's face belong to the wall's near end, radians.
 const GRAZING_RAD: f64 = 1e-9;
 
+/// Between edges a leg counts as along a wall's face to within this, radians: their places may have
+/// been moved a little off the wall's line to where walls meet.
+pub(super) const ALONG_RAD: f64 = 1e-6;
+
 /// The edges of a scene, by point of its arrangement.
 #[derive(Debug, Default)]
 pub(super) struct Edges {
@@ -28,7 +32,7 @@ pub(super) struct Edges {
 
 /// A point where at least one wall ends and from which sound bends.
 #[derive(Debug)]
-struct Corner {
+pub(super) struct Corner {
     place: DVec2,
     edge: Edge,
     /// Counter-clockwise around the point.
@@ -55,18 +59,40 @@ struct Bending<'a> {
 
 /// A ray to an edge as the edge sees it.
 #[derive(Clone, Copy)]
-struct Arm<'a> {
-    ray: &'a Ray,
+pub(super) struct Arm<'a> {
+    pub(super) ray: &'a Ray,
     /// See [`Tree::part`].
-    number: u32,
-    length_m: f64,
+    pub(super) number: u32,
+    pub(super) length_m: f64,
     /// Width of the ray tube at the edge, metres: without cylinders its length.
-    width_m: f64,
+    pub(super) width_m: f64,
     /// Radius of curvature of the wave front at the edge, metres: without cylinders its length.
-    radius_m: f64,
-    sector: usize,
+    pub(super) radius_m: f64,
+    pub(super) sector: usize,
     /// Direction from the edge towards the source, from the sector's first wall, radians.
-    from_rad: f64,
+    pub(super) from_rad: f64,
+}
+
+/// A direction from an edge.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Facing {
+    pub(super) sector: usize,
+    /// From the sector's first wall, radians.
+    pub(super) from_rad: f64,
+    pub(super) flank: Flank,
+    /// Of the wall along which it runs.
+    pub(super) face_reflectance: Option<f64>,
+}
+
+/// On which side of a direction its air lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Flank {
+    /// On both.
+    Open,
+    /// Along a wall's face, on the left.
+    Left,
+    /// The same, on the right.
+    Right,
 }
 
 impl Edges {
@@ -107,6 +133,11 @@ impl Edges {
         Some(self.points.get(point as usize)?.as_ref()?.edge)
     }
 
+    /// The edge at a point, if there is one.
+    pub(super) fn corner(&self, point: u32) -> Option<&Corner> {
+        self.points.get(point as usize)?.as_ref()
+    }
+
     pub(super) fn place(&self, point: u32) -> Option<DVec2> {
         Some(self.points.get(point as usize)?.as_ref()?.place)
     }
@@ -137,8 +168,9 @@ impl Sector {
     /// the beams that pass a room's corner.
     fn sees(&self, from: DVec2) -> bool {
         let [first, second] = self.faces;
-        let from_first = first.perp_dot(from) >= 0.0;
-        let from_second = from.perp_dot(second) >= 0.0;
+        // Along a wall counts as seen.
+        let from_first = first.perp_dot(from) >= -TIE_M;
+        let from_second = from.perp_dot(second) >= -TIE_M;
         // In more than half a turn, to be on either wall's side is enough.
         let is_in = if self.wedge.is_convex() {
             from_first || from_second
@@ -151,7 +183,7 @@ impl Sector {
 
 impl Corner {
     /// The rays of a tree to this point, by length, each once.
-    fn arms<'a>(&self, tree: &'a Tree, point: u32) -> Vec<Arm<'a>> {
+    pub(super) fn arms<'a>(&self, tree: &'a Tree, point: u32) -> Vec<Arm<'a>> {
         let (first, flat) = tree.flat_to(point);
         let (first_bent, bent) = tree.bent_to(point);
         let flat = (first..).zip(flat).filter_map(|(number, (_, ray))| {
@@ -165,6 +197,43 @@ impl Corner {
         arms.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
         drop_repeats(&mut arms, |leg| leg.length_m, Arm::is_same);
         arms
+    }
+
+    pub(super) fn wedge(&self, sector: usize) -> &Wedge {
+        &self.sectors[sector].wedge
+    }
+
+    /// Where a direction from the edge leads: into one sector, or along a wall into those on both
+    /// sides of it.
+    pub(super) fn facings(&self, direction: DVec2) -> SmallVec<[Facing; 2]> {
+        let direction_rad = direction.to_angle();
+        let facing = |(sector, air): (usize, &Sector)| {
+            let Wedge { opening_rad, reflectance } = air.wedge;
+            // From just below 0, so that rounding does not take it a turn round.
+            let from_rad = (direction_rad - air.from_rad + ALONG_RAD).rem_euclid(TAU) - ALONG_RAD;
+            let at = |from_rad, flank, face_reflectance| Facing {
+                sector,
+                from_rad,
+                flank,
+                face_reflectance,
+            };
+            let [first, second] = reflectance.map(Some);
+            let mut found: SmallVec<[Facing; 2]> = SmallVec::new();
+            if from_rad < ALONG_RAD {
+                found.push(at(0.0, Flank::Left, first));
+            } else if from_rad < opening_rad - ALONG_RAD {
+                found.push(at(from_rad, Flank::Open, None));
+            }
+            // All around a free end both faces are the same direction.
+            let is_last = (from_rad - opening_rad).abs() <= ALONG_RAD
+                || opening_rad == TAU && from_rad < ALONG_RAD;
+            if is_last {
+                found.push(at(opening_rad, Flank::Right, second));
+            }
+            found
+        };
+        let answering = self.sectors.iter().enumerate().filter(|(_, sector)| sector.answers);
+        answering.flat_map(facing).collect()
     }
 
     /// Out on one ray and back on another or the same: each pair in both directions.
@@ -281,8 +350,13 @@ impl Arm<'_> {
 
     /// Whether two arms are one that touches a corner on its way and was found on both sides.
     fn is_same(&self, other: &Self) -> bool {
-        self.ray.departure.distance_squared(other.ray.departure) < SAME_RAD * SAME_RAD
+        is_same_departure(self.ray, other.ray)
     }
+}
+
+/// Whether two rays from one place, of one length, leave it in one direction.
+pub(super) fn is_same_departure(one: &Ray, other: &Ray) -> bool {
+    one.departure.distance_squared(other.departure) < SAME_RAD * SAME_RAD
 }
 
 fn end_at(walls: &[(DVec2, DVec2)], index: u32, place: DVec2) -> Option<Edge> {

@@ -2,6 +2,7 @@
 //! the order in which sound meets them.
 
 use rstar::{RTree, primitives::GeomWithData};
+use smallvec::SmallVec;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
 use crate::geometry::{Arrangement, DVec2, distance_to_segment};
@@ -113,6 +114,23 @@ impl Mesh {
             }
         }
         found
+    }
+
+    /// The triangles around each point, counter-clockwise, and which of their corners it is.
+    pub(super) fn around_points(&self) -> Vec<SmallVec<[(u32, u8); 6]>> {
+        let mut around: Vec<SmallVec<[(u32, u8); 6]>> = vec![SmallVec::new(); self.points.len()];
+        for (triangle, index) in self.triangles.iter().zip(0..) {
+            for (point, corner) in triangle.corners.into_iter().zip(0..) {
+                around[point as usize].push((index, corner));
+            }
+        }
+        for (triangles, &at) in around.iter_mut().zip(&self.points) {
+            let direction = |&(t, corner): &(u32, u8)| {
+                (self.corner(t, (corner as usize + 1) % 3) - at).to_angle()
+            };
+            triangles.sort_by(|a, b| direction(a).total_cmp(&direction(b)));
+        }
+        around
     }
 
     fn is_beyond(&self, triangle: u32, side: usize, point: DVec2) -> bool {

@@ -42,7 +42,8 @@
 //! Sound bends at free ends and at corners that are not `pi / m`. By reciprocity the ways back
 //! from an edge are the ways to it, so the one-way rays to each edge, from the same tree,
 //! give all echoes with one diffraction and any reflections before and after: every pair of a way
-//! out and a way back (`edges`). How much comes back says [`crate::acoustics::edge`].
+//! out and a way back (`edges`). How much comes back says [`crate::acoustics::edge`]. On request
+//! ([`Settings::double_diffraction`]) sound is also followed from one edge to another (`bridges`).
 //!
 //! # Cylinders
 //!
@@ -89,6 +90,7 @@
 
 mod arms;
 mod beam;
+mod bridges;
 mod echo;
 mod edges;
 mod heights;
@@ -109,13 +111,14 @@ mod vertical;
 mod ways;
 mod wheel;
 
-pub use settings::{Settings, usual_z_m};
+pub use settings::{ROUNDS_ABOVE, Settings, usual_z_m};
 pub use survey::PathEngine;
 
 use std::sync::Arc;
 
 use self::{
     arms::Partners,
+    bridges::{Bridged, Bridges},
     echo::{Echo, Via, sorted},
     edges::Edges,
     heights::Heights,
@@ -124,7 +127,7 @@ use self::{
     rounds::{Circle, Rounds},
     trace::Tree,
     tubes::TubeGrower,
-    vertical::Image,
+    vertical::{Image, Level},
     wheel::Both,
 };
 use crate::{
@@ -140,6 +143,8 @@ pub struct Paths {
     /// By wall.
     faces: Arc<[Face]>,
     edges: Arc<Edges>,
+    /// Empty without double diffraction.
+    bridges: Arc<Bridges>,
     rounds: Arc<Rounds>,
     heights: Arc<Heights>,
     /// By floor and ceiling; none in a scene in the plane.
@@ -228,9 +233,20 @@ impl Paths {
                 .map(|law| Edges::new(&plan, &segments, &gains, law))
                 .unwrap_or_default()
                 .into(),
-            rounds: Rounds::new(circles, mesh.as_ref()).into(),
-            images: vertical::images(scene.floor_z_m, scene.ceiling_z_m, z_m, settings.max_path_m)
+            bridges: mesh
+                .as_ref()
+                .filter(|_| settings.double_diffraction)
+                .map(|mesh| Bridges::new(mesh, &settings))
+                .unwrap_or_default()
                 .into(),
+            rounds: Rounds::new(circles, mesh.as_ref()).into(),
+            images: vertical::images(
+                level(scene.floor_z_m, &scene.floor_material),
+                level(scene.ceiling_z_m, &scene.ceiling_material),
+                z_m,
+                &settings,
+            )
+            .into(),
             heights: heights.into(),
             settings,
             mesh: mesh.map(Arc::new),
@@ -275,9 +291,10 @@ impl Paths {
         }
         let joints =
             self.add_rounds(&mut echoes, &mut out, back.as_mut(), [transmitter, receiver], both);
-        let mut trees = Trees { out, back, joints };
+        let mut trees = Trees { out, back, joints, bridged: Vec::new() };
         if let Some(law) = self.settings.edge_law {
             echoes.extend(self.edges.echoes(&mut trees, law, &self.settings));
+            echoes.extend(bridges::echoes(self, &mut trees, law));
         }
         self.add_images(&mut echoes, receiver - transmitter);
         self.retain_clear(&trees, &mut echoes, [transmitter, receiver]);
@@ -354,6 +371,11 @@ impl Paths {
     }
 }
 
+/// Floor or ceiling, if there is one.
+fn level(z_m: Option<f64>, material: &Material) -> Option<Level> {
+    Some(Level { z_m: z_m?, gain: mirror_gain(material) })
+}
+
 /// Amplitude of a material's mirror reflection: a rough surface scatters a share of the energy
 /// that it does not absorb.
 fn mirror_gain(material: &Material) -> f64 {
@@ -369,6 +391,8 @@ struct Trees {
     back: Option<Tree>,
     /// Where ways of both meet at cylinders.
     joints: Vec<Joint>,
+    /// By way of two edges.
+    bridged: Vec<Bridged>,
 }
 
 impl Trees {

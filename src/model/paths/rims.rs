@@ -30,6 +30,8 @@ use crate::{
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rim {
     pub(super) wall: u32,
+    /// Whether it is the wall's upper one.
+    pub(super) is_upper: bool,
     pub(super) leg: Leg,
     pub(super) place: DVec2,
 }
@@ -46,8 +48,8 @@ pub(super) fn echoes(paths: &Paths, tree: &mut Tree, start: DVec2, law: EdgeLaw)
         }
         let place = beam.image - mirror.height_m(beam.image) * mirror.normal;
         let ray = beam.ray_to(place);
-        let rim = Rim { wall, leg: (&ray).into(), place };
         for (rise_m, is_upper) in paths.heights.rims(wall) {
+            let rim = Rim { wall, is_upper, leg: (&ray).into(), place };
             let number = tree.rims.len() as u32;
             let Some(echo) = echo(paths, lit, place - beam.image, rise_m, is_upper, law) else {
                 continue;

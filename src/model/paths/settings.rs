@@ -2,10 +2,10 @@
 
 use crate::acoustics::edge::EdgeLaw;
 
-/// Echoes that touch cylinders more than once are followed from this much above the weakest that is
-/// asked for: with 20 dB below the threshold for that, down to the threshold itself. In a room with
-/// a round body there are a hundred times more of them at each 20 dB less.
-const ROUNDS_ABOVE: f64 = 10.0;
+/// Usual [`Settings::rounds_above`]: with 20 dB below the threshold for the weakest, down to the
+/// threshold itself. In a room with a round body there are a hundred times more of them at each 20 dB
+/// less.
+pub const ROUNDS_ABOVE: f64 = 10.0;
 
 /// Which paths count, and the physics on the way.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,8 +16,13 @@ pub struct Settings {
     pub max_order: Option<u16>,
     /// Weakest amplitude, before the beam pattern, relative to a head-on, rigid wall.
     pub floor: f64,
+    /// How many times `floor` echoes that touch cylinders more than once are followed down to; see
+    /// [`ROUNDS_ABOVE`]. 1: as far as all others.
+    pub rounds_above: f64,
     /// What edges send back; `None`: mirror reflections only.
     pub edge_law: Option<EdgeLaw>,
+    /// Also sound that bends at two edges, by the same law at each.
+    pub double_diffraction: bool,
     /// Attenuation of the amplitude in air, nepers a metre.
     pub absorption_np_per_m: f64,
     /// Wave number `2 pi f / c`, radians a metre.
@@ -62,6 +67,6 @@ impl Settings {
     /// The weakest echo that is asked for of those whose middle contact with a cylinder has so many
     /// before it.
     pub(super) fn round_floor(&self, level: u16) -> f64 {
-        if level == 0 { self.floor } else { ROUNDS_ABOVE * self.floor }
+        if level == 0 { self.floor } else { self.rounds_above * self.floor }
     }
 }

@@ -12,7 +12,7 @@ use super::{
 use crate::{
     acoustics::{BeamPattern, Disc, Sound},
     geometry::{DVec2, wrap_pi},
-    model::{Arrival, Engine, Path, Reflector, Survey},
+    model::{Arrival, Bend, Engine, Path, Reflector, Survey},
     scan::PathKind,
     scene::Scene,
 };
@@ -140,8 +140,9 @@ impl<'a> PathSurvey<'a> {
             way
         };
         let ways: Vec<EchoPath> = train.rounds.iter().map(way).collect();
-        let bent = ways.iter().find_map(|way| way.path.edge);
-        let kind = if bent.is_some() { PathKind::Diffracted } else { PathKind::Specular };
+        let bends: SmallVec<[Bend; 2]> =
+            ways.iter().flat_map(|way| way.path.bends.iter().copied()).collect();
+        let kind = if bends.is_empty() { PathKind::Specular } else { PathKind::Diffracted };
         let mut walls = SmallVec::new();
         for way in &ways {
             if !walls.is_empty() {
@@ -160,7 +161,7 @@ impl<'a> PathSurvey<'a> {
             phase_rad: train.phase_rad,
             departure_rad,
             arrival_rad,
-            path: Path { kind, walls, edge: bent },
+            path: Path { kind, walls, bends },
         }
     }
 }

@@ -8,6 +8,7 @@ mod laws;
 mod pairs;
 mod peers;
 mod rough;
+mod two_edges;
 mod vertical;
 
 use std::{f64::consts::TAU, sync::Arc};
@@ -16,13 +17,20 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::*;
-use crate::{acoustics::edge::EdgeLaw, scan::PathKind, scene::Wall};
+use crate::{
+    acoustics::edge::EdgeLaw,
+    model::{Bend, Edge},
+    scan::PathKind,
+    scene::{Material, Wall},
+};
 
 pub(super) const LOSSLESS: Settings = Settings {
     max_path_m: 20.0,
     max_order: None,
     floor: 1e-4,
+    rounds_above: ROUNDS_ABOVE,
     edge_law: None,
+    double_diffraction: false,
     absorption_np_per_m: 0.0,
     wave_number_per_m: TAU * 49_400.0 / 343.2,
     sensor_z_m: None,
@@ -47,6 +55,8 @@ fn scene(walls: &[[f64; 4]]) -> Scene {
         cylinders: Vec::new(),
         floor_z_m: None,
         ceiling_z_m: None,
+        floor_material: Material::RIGID,
+        ceiling_material: Material::RIGID,
         poses: Default::default(),
         robot: None,
         sha256: String::new(),

@@ -14,7 +14,7 @@ use crate::geometry::DVec2;
 
 mod grow;
 
-use grow::Grower;
+use grow::{Grower, ROOT};
 
 /// What the beams from one place have met.
 #[derive(Debug, Default)]
@@ -71,6 +71,15 @@ impl Tree {
         Grower::new(paths, mesh, start, target, home).grow(first)
     }
 
+    /// All beams from a point of the mesh, whose triangles these are, for the rays in them to edges.
+    pub(super) fn grow_from_corner(paths: &Paths, point: u32, around: &[(u32, u8)]) -> Self {
+        let Some(mesh) = &paths.mesh else { return Self::default() };
+        let Some(&(home, _)) = around.first() else { return Self::default() };
+        let start = mesh.points[point as usize];
+        let tree = Grower::new(paths, mesh, start, start, home).grow_from_corner(around);
+        Self { nodes: tree.nodes, to_edges: tree.to_edges, ..Self::default() }
+    }
+
     /// A ray to an edge by its number: those over walls alone first, then those by cylinders.
     pub(super) fn part(&self, ray: u32) -> Part {
         let ray = ray as usize;
@@ -111,6 +120,23 @@ impl Tree {
         let from = bent.partition_point(|ray| ray.point < point);
         let count = bent[from..].partition_point(|ray| ray.point == point);
         ((self.to_edges.len() + from) as u32, &bent[from..from + count])
+    }
+
+    /// In which of the triangles around the corner that it grew from a ray began.
+    pub(super) fn root_slot(&self, faces: &[Face], leg: Leg) -> usize {
+        let (mut at, mut run) = (leg.node, leg.run);
+        while let Some(node) = self.nodes.get(at as usize) {
+            match *node {
+                Node::Joint { border, left, right } => {
+                    at = if border.perp_dot(run) >= 0.0 { left } else { right };
+                }
+                Node::Wall { wall, before } => {
+                    at = before;
+                    run = faces[wall as usize].mirror.turn(run);
+                }
+            }
+        }
+        (ROOT - at) as usize
     }
 
     /// The walls that a ray met, last one first.

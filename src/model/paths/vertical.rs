@@ -9,7 +9,7 @@
 //! What the plan says of amplitudes stays: cylinders spread sound in the plan alone. Of an edge,
 //! Kouyoumjian and Pathak's coefficient grows by `1 / sin b` for a ray that is `b` off the
 //! edge's direction, and the field by the square root of that; the small part of it that shifts the
-//! transition (its distance parameter falls by `sin b`) is left out.
+//! transition (its distance parameter falls by `sin b`) is left out. At two edges it grows twice.
 
 use smallvec::SmallVec;
 
@@ -23,21 +23,39 @@ pub(super) struct Image {
     pub(super) rise_m: f64,
     /// Reflections at floor and ceiling.
     pub(super) bounces: u16,
+    /// What these leave of the amplitude.
+    gain: f64,
 }
 
-/// The images within reach; the ranger itself is not among them.
+/// Floor or ceiling.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Level {
+    pub(super) z_m: f64,
+    /// See [`super::mirror_gain`].
+    pub(super) gain: f64,
+}
+
+/// The images within reach that give an echo above the floor of the settings; the ranger itself is
+/// not among them.
 pub(super) fn images(
-    floor_z_m: Option<f64>,
-    ceiling_z_m: Option<f64>,
+    floor: Option<Level>,
+    ceiling: Option<Level>,
     z_m: f64,
-    reach_m: f64,
+    settings: &Settings,
 ) -> Vec<Image> {
-    let below = floor_z_m.map(|floor| z_m - floor);
-    let above = ceiling_z_m.map(|ceiling| ceiling - z_m);
+    let reach_m = settings.max_path_m;
+    let below = floor.map(|floor| z_m - floor.z_m);
+    let above = ceiling.map(|ceiling| ceiling.z_m - z_m);
+    let [at_floor, at_ceiling] =
+        [floor, ceiling].map(|level| level.map_or(1.0, |level| level.gain));
     let mut images = Vec::new();
-    let mut add = |rise_m: f64, bounces| {
-        if rise_m.abs() <= reach_m {
-            images.push(Image { rise_m, bounces });
+    let mut add = |rise_m: f64, bounces: u16| {
+        // In turn, beginning with the one that is nearer on the way there.
+        let (first, second) = (i32::from(bounces.div_ceil(2)), i32::from(bounces / 2));
+        let (floors, ceilings) = if rise_m < 0.0 { (first, second) } else { (second, first) };
+        let gain = at_floor.powi(floors) * at_ceiling.powi(ceilings);
+        if rise_m.abs() <= reach_m && gain >= settings.floor {
+            images.push(Image { rise_m, bounces, gain });
         }
     };
     match (below, above) {
@@ -80,9 +98,11 @@ impl Image {
         let cosine = plan.length_m / length_m;
         let bending = match plan.via {
             Via::Edge { .. } => cosine.sqrt().recip(),
+            Via::Edges { .. } => cosine.recip(),
             _ => 1.0,
         };
-        let amplitude = plan.amplitude * bending * settings.air_gain(length_m - plan.length_m);
+        let amplitude =
+            plan.amplitude * self.gain * bending * settings.air_gain(length_m - plan.length_m);
         let leaves_rad = self.rise_m.atan2(plan.length_m);
         // After an even number of reflections it still runs the way it left, and comes from the
         // other side.

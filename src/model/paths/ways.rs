@@ -1,17 +1,19 @@
 //! The ways of echoes: what they meet, and where.
 
-use smallvec::SmallVec;
+use smallvec::{SmallVec, smallvec};
 
 use super::{
     Echo, EchoPath, Paths, Trees, Via,
     beam::Ray,
+    bridges::Bridged,
     joints::Joint,
+    rims::Rim,
     trace::Tree,
     tube::{Curved, Tracer, surfaces_to},
 };
 use crate::{
     geometry::DVec2,
-    model::{Path, Reflector},
+    model::{Bend, Path, Reflector},
     scan::PathKind,
 };
 
@@ -55,11 +57,10 @@ impl Paths {
     /// The reflectors of an echo, in order.
     fn way(&self, trees: &Trees, echo: &Echo) -> Path {
         let (tree, home) = (&trees.out, trees.back());
-        let (kind, edge) = match echo.via {
-            Via::Edge { point, .. } => (PathKind::Diffracted, self.edges.edge(point)),
-            Via::Rim { .. } => (PathKind::Diffracted, None),
-            Via::Walls { .. } | Via::Cylinder { .. } | Via::Upright => (PathKind::Specular, None),
-            Via::Scatter { .. } => (PathKind::Scattered, None),
+        let kind = match echo.via {
+            Via::Edge { .. } | Via::Edges { .. } | Via::Rim { .. } => PathKind::Diffracted,
+            Via::Walls { .. } | Via::Cylinder { .. } | Via::Upright => PathKind::Specular,
+            Via::Scatter { .. } => PathKind::Scattered,
         };
         let mut walls = match echo.via {
             Via::Walls { node } => self.met(tree, Part::Flat(Leg { node, run: -echo.arrival })),
@@ -79,6 +80,14 @@ impl Paths {
                 walls.extend(self.met(home, back).into_iter().rev());
                 walls
             }
+            Via::Edges { way } => {
+                let Bridged { points: [first, _], leg, out, back } = trees.bridged[way as usize];
+                let mut walls = self.met(tree, tree.part(out));
+                let between = self.bridges.tree(self, first);
+                walls.extend(self.met(between, between.part(leg)));
+                walls.extend(self.met(home, home.part(back)).into_iter().rev());
+                walls
+            }
             Via::Edge { out, back, .. } => {
                 let mut walls = self.met(tree, tree.part(out));
                 walls.extend(self.met(home, home.part(back)).into_iter().rev());
@@ -89,7 +98,23 @@ impl Paths {
         if let Some(image) = echo.image.checked_sub(1) {
             walls.extend(self.images[image as usize].met());
         }
-        Path { kind, walls, edge }
+        Path { kind, walls, bends: self.bends(trees, echo) }
+    }
+
+    fn bends(&self, trees: &Trees, echo: &Echo) -> SmallVec<[Bend; 2]> {
+        let upright = |point| self.edges.edge(point).map(Bend::Upright);
+        match echo.via {
+            Via::Edge { point, .. } => upright(point).into_iter().collect(),
+            Via::Edges { way } => {
+                let points = trees.bridged[way as usize].points;
+                points.into_iter().filter_map(upright).collect()
+            }
+            Via::Rim { rim } => {
+                let Rim { wall, is_upper, .. } = trees.out.rims[rim as usize];
+                smallvec![Bend::Level { wall, is_upper }]
+            }
+            _ => SmallVec::new(),
+        }
     }
 
     /// The reflectors of a way that comes back from a wall as it went.
@@ -146,6 +171,7 @@ impl Paths {
                 contacts.extend(back.into_iter().rev());
                 contacts
             }
+            Via::Edges { way } => self.bridged_contacts(trees, &trees.bridged[way as usize]),
             Via::Edge { point, out, back } => {
                 let Some(place) = self.edges.place(point) else { return Contacts::new() };
                 let (there, here) = (&trees.out, trees.back());
@@ -157,6 +183,22 @@ impl Paths {
                 contacts
             }
         }
+    }
+
+    fn bridged_contacts(&self, trees: &Trees, way: &Bridged) -> Contacts {
+        let Bridged { points: [first, second], leg, out, back } = *way;
+        let places = [first, second].map(|point| self.edges.place(point));
+        let [Some(here), Some(there)] = places else { return Contacts::new() };
+        let at =
+            |point, place| self.edges.edge(point).map(|edge| (place, Reflector::Wall(edge.wall)));
+        let mut contacts = self.part_contacts(&trees.out, trees.out.part(out), here);
+        contacts.extend(at(first, here));
+        let between = self.bridges.tree(self, first);
+        contacts.extend(self.part_contacts(between, between.part(leg), there));
+        contacts.extend(at(second, there));
+        let back = self.part_contacts(trees.back(), trees.back().part(back), there);
+        contacts.extend(back.into_iter().rev());
+        contacts
     }
 
     pub(super) fn part_contacts(&self, tree: &Tree, part: Part, end: DVec2) -> Contacts {

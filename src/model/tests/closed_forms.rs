@@ -1,7 +1,11 @@
 //! Single reflectors, whose echoes are known exactly.
 
 use super::*;
-use crate::{acoustics::BeamPattern, model::Edge, scan::PingStatus};
+use crate::{
+    acoustics::BeamPattern,
+    model::{Bend, Edge},
+    scan::PingStatus,
+};
 
 const SPACINGS_DEG: [f64; 3] = [0.4, 0.2, 0.05];
 
@@ -89,7 +93,9 @@ fn a_free_end_returns_kuc_and_siegels_share_of_a_plane() {
         let tilted = wall("w", end, (range_m + 0.5, 0.9), 1.0);
         let all = arrivals(scene(vec![tilted]), BARE, DVec2::ZERO, 0.0);
         let found = of_kind(&all, PathKind::Diffracted)
-            .find(|arrival| arrival.path.edge == Some(Edge { wall: 0, at_b: false }))
+            .find(|arrival| {
+                arrival.path.bends[..] == [Bend::Upright(Edge { wall: 0, at_b: false })]
+            })
             .expect("the end is heard");
         let wavelength_m = Air::default().sound_speed_m_s() / 49.4e3;
         let expected = 1.0 / (std::f64::consts::TAU * (range_m / wavelength_m).sqrt());
@@ -105,7 +111,8 @@ fn an_end_out_of_sight_is_silent() {
         wall("screen", (0.5, -0.4), (0.5, 0.4), 1.0),
     ];
     let all = arrivals(scene(walls), BARE, DVec2::ZERO, 0.0);
-    assert!(of_kind(&all, PathKind::Diffracted).all(|a| a.path.edge.map(|e| e.wall) == Some(1)));
+    let of_second = |a: &Arrival| matches!(a.path.bends[..], [Bend::Upright(e)] if e.wall == 1);
+    assert!(of_kind(&all, PathKind::Diffracted).all(of_second));
 }
 
 /// A cylinder of radius r at distance d spreads a head-on echo to `sqrt(r / (r + d))` of a

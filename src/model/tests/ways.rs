@@ -40,9 +40,9 @@ fn every_path_of_every_shipped_scene_has_its_way() {
                 let fits = |(out, back): &(f64, f64)| {
                     wrap_pi(leaves - out).abs() < 1e-3 && wrap_pi(comes - back).abs() < 1e-3
                 };
-                let known = if echo.path.edge.is_some() { 2 } else { 1 };
+                let known = if echo.path.bends.is_empty() { 1 } else { 2 };
                 assert!(ends[..known].iter().any(fits), "{name} {record:?}");
-                if echo.path.edge.is_none() {
+                if echo.path.bends.is_empty() {
                     mirrors(&scene, &echo.path, &points);
                 }
                 drawn += 1;
@@ -50,6 +50,46 @@ fn every_path_of_every_shipped_scene_has_its_way() {
         }
     }
     assert!(drawn > 1000, "{drawn}");
+}
+
+/// Ways up and down, over the rim of a low wall and round two edges, as the plan shows them; also for a
+/// record that came from a log.
+#[test]
+fn ways_in_space_and_by_two_edges_are_drawn_in_the_plan() {
+    let mut room = scene(vec![
+        wall("low", (-2.0, 1.0), (2.0, 1.0), 1.0),
+        wall("screen", (0.6, -0.9), (0.6, 0.3), 1.0),
+        wall("plate", (-0.2, -0.5), (0.15, -0.55), 1.0),
+    ]);
+    room.floor_z_m = Some(0.0);
+    room.walls[0].z_m = Some([0.0, 0.3]);
+    let room = Arc::new(room);
+    let mut sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    sensor.mounting.z_m = Some(0.5);
+    let options =
+        Options { max_range_m: Some(1.5), double_diffraction: true, ..Options::default() };
+    let simulator = Simulator::new(room.clone(), sensor, Air::default(), options).expect("options");
+    let at = DVec2::new(0.1, 0.0);
+    let settings = crate::model::paths::Settings { floor: 1e-4, ..simulator.path_settings() };
+    let echoes = Paths::new(&room, settings).enumerate(at);
+    let [mut rims, mut floors, mut twice] = [0; 3];
+    for echo in &echoes {
+        let record = simulator.path_record(&echo.path, echo.length_m);
+        assert_eq!(Path::from_record(&record, &room).as_ref(), Some(&echo.path), "{record:?}");
+        let upright = echo.path.walls.iter().all(|wall| *wall == Reflector::Floor);
+        if upright && echo.path.bends.is_empty() {
+            continue;
+        }
+        let points = echo.path.points(&room, at, echo.length_m);
+        let points = points.unwrap_or_else(|| panic!("no way for {record:?}"));
+        let plan_m: f64 = points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+        let rise_m = echo.rise_rad[0].sin() * echo.length_m;
+        assert!((plan_m.hypot(rise_m) - echo.length_m).abs() < 1e-6, "{record:?}");
+        rims += usize::from(record.edge.as_deref() == Some("low.top"));
+        floors += usize::from(record.walls.iter().any(|name| name == "floor"));
+        twice += usize::from(record.second_edge.is_some());
+    }
+    assert!(rims == 1 && floors > 2 && twice > 2, "{rims} {floors} {twice}");
 }
 
 fn mirrors(scene: &Scene, path: &Path, points: &[DVec2]) {
@@ -72,7 +112,7 @@ fn no_way_is_made_up() {
     let path = Path {
         kind: PathKind::Specular,
         walls: [Reflector::Wall(0)].into_iter().collect(),
-        edge: None,
+        bends: Default::default(),
     };
     let at = DVec2::new(0.774, 0.085);
     assert!(path.points(&room, at, 0.17).is_some());

@@ -15,7 +15,8 @@ export function path(record) {
   if (!record) return "nothing came near";
   const walls = record.walls.join(", ");
   if (!record.edge) return record.kind === "scattered" ? `scattered by ${walls}` : walls;
-  return walls ? `edge ${record.edge} by ${walls}` : `edge ${record.edge}`;
+  const edges = record.second_edge ? `edges ${record.edge} and ${record.second_edge}` : `edge ${record.edge}`;
+  return walls ? `${edges} by ${walls}` : edges;
 }
 
 const STATES = {

@@ -105,6 +105,7 @@ fn an_edge_seen_along_its_wall_answers() {
     let settings = Settings { edge_law: Some(EdgeLaw::KucSiegel), ..LOSSLESS };
     let echoes = Paths::new(&wall, settings).enumerate(DVec2::new(-0.5, 0.0));
     assert_eq!(echoes.len(), 1);
-    assert_eq!(echoes[0].path.edge, Some(crate::model::Edge { wall: 0, at_b: false }));
+    let end = Bend::Upright(Edge { wall: 0, at_b: false });
+    assert_eq!(echoes[0].path.bends[..], [end]);
     assert!((echoes[0].length_m - 1.0).abs() < 1e-12);
 }

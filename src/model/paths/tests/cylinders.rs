@@ -3,7 +3,11 @@
 use std::f64::consts::TAU;
 
 use super::*;
-use crate::{model::Reflector, scene::Cylinder};
+use crate::{
+    acoustics::{Air, BeamPattern, Sensor},
+    model::{Engine, Options, Reflector, Simulator},
+    scene::Cylinder,
+};
 
 fn cylinder(x: f64, y: f64, radius_m: f64) -> Cylinder {
     Cylinder {
@@ -200,7 +204,7 @@ fn a_huge_cylinder_is_a_wall() {
         let is_same = |one: &&EchoPath| {
             (one.length_m - other.length_m).abs() < 1e-3
                 && (one.amplitude - other.amplitude).abs() < 1e-2 * other.amplitude
-                && one.path.edge == other.path.edge
+                && one.path.bends == other.path.bends
                 && one.path.walls.len() == other.path.walls.len()
         };
         assert!(round.iter().any(|one| is_same(&one)), "{other:?}");
@@ -226,11 +230,49 @@ fn edges_answer_by_way_of_cylinders() {
         .fold(f64::INFINITY, f64::min);
     let bent: Vec<_> = echoes
         .iter()
-        .filter(|echo| echo.path.edge.is_some_and(|edge| !edge.at_b))
+        .filter(|echo| matches!(echo.path.bends[..], [Bend::Upright(edge)] if !edge.at_b))
         .map(|echo| (echo.length_m, echo.path.walls.len()))
         .collect();
     for (expected, count) in [(2.4, 1), (1.2 + by, 2), (2.0 * by, 1)] {
         let found = bent.iter().filter(|echo| (echo.0 - expected).abs() < 1e-9).count();
         assert_eq!(found, count, "{expected}: {bent:?}");
     }
+}
+
+/// Echoes of more than one contact are not followed below the threshold, where there are very many. So
+/// many of them sound together beside a round body that one firing in eight, 85 mm before a wall, would
+/// read otherwise with those down to 20 dB below: mostly the minimum range for an echo a little beyond
+/// it. The readings: `cargo test --lib left_out -- --nocapture`.
+#[test]
+fn few_readings_depend_on_what_is_left_out_below_the_threshold() {
+    let text = crate::scene::shipped::text("simple-room-robot").expect("shipped");
+    let room = Scene::from_json(text).expect("valid");
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    let options = Options { max_range_m: Some(1.5), ..Options::default() };
+    let (mut differ, mut all) = (Vec::new(), 0);
+    for pose in room.poses.values() {
+        let plan = Arc::new(room.with_robot_at(pose));
+        let simulator = Simulator::new(plan.clone(), sensor.clone(), Air::default(), options)
+            .expect("valid options");
+        let beam = BeamPattern::new(&sensor, simulator.sound_speed_m_s());
+        let engines = [ROUNDS_ABOVE, 1.0].map(|rounds_above| {
+            let settings = Settings { rounds_above, ..simulator.path_settings() };
+            PathEngine::new(&plan, beam.clone(), None, settings)
+        });
+        let surveys = engines.each_ref().map(|engine| engine.survey(pose.position()));
+        for azimuth in 0..120 {
+            let [some, every] = surveys.each_ref().map(|survey| {
+                let mut sounds = Vec::new();
+                survey.listen(pose.direction_rad(3.0 * f64::from(azimuth)), &mut sounds);
+                simulator.receiver().detect(&sounds)
+            });
+            all += 1;
+            let off_m = some.range_m.zip(every.range_m).map(|(one, other)| (one - other).abs());
+            if some.status != every.status || off_m.is_some_and(|off_m| off_m > 1e-3) {
+                differ.push((azimuth, some.range_m, every.range_m));
+            }
+        }
+    }
+    println!("{} of {all} readings differ: {differ:?}", differ.len());
+    assert!(8 * differ.len() <= all, "{} of {all}", differ.len());
 }

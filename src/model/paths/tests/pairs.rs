@@ -47,7 +47,7 @@ fn lengths_are_those_of_both_ways() {
     ] {
         let found: Vec<_> = echoes
             .iter()
-            .filter(|echo| echo.path.walls[..] == walls[..] && echo.path.edge.is_some() == bent)
+            .filter(|echo| echo.path.walls[..] == walls[..] && echo.path.bends.is_empty() != bent)
             .filter(|echo| (echo.length_m - expected).abs() < 1e-9)
             .collect();
         assert_eq!(found.len(), 1, "{walls:?} {expected}: {echoes:#?}");
@@ -68,7 +68,7 @@ fn the_same_way_back_from_receiver_to_transmitter() {
         walls.reverse();
         let found = back.iter().any(|other| {
             other.path.walls == walls
-                && other.path.edge == echo.path.edge
+                && other.path.bends == echo.path.bends
                 && (other.length_m - echo.length_m).abs() < 1e-9
                 && (other.amplitude - echo.amplitude).abs() < 1e-6 * echo.amplitude
                 && crate::geometry::wrap_pi(other.departure_rad - echo.arrival_rad).abs() < 1e-7

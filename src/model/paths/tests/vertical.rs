@@ -64,6 +64,47 @@ fn in_a_box_the_echoes_are_the_lattice_in_space() {
     }
 }
 
+/// Each reflection leaves what its material does, in the wall-floor corner and on any way.
+#[test]
+fn floor_and_ceiling_leave_what_their_materials_do() {
+    let corners = [[0.0, 0.0], [1.3, 0.0], [1.3, 0.9], [0.0, 0.9]].map(DVec2::from_array);
+    let mut room = polygon(&corners);
+    (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(1.1));
+    let material = |reflectance, roughness| Material { reflectance, roughness };
+    room.floor_material = material(0.5, 0.0);
+    room.ceiling_material = material(0.9, 0.19);
+    for wall in &mut room.walls {
+        wall.material = material(0.8, 0.0);
+    }
+    let settings = Settings { max_path_m: 6.0, floor: 0.02, ..at_height(0.3) };
+    let echoes = Paths::new(&room, settings.clone()).enumerate(DVec2::new(0.4, 0.25));
+    for echo in &echoes {
+        let gains = echo.path.walls.iter().map(|met| match met {
+            Reflector::Floor => 0.5,
+            Reflector::Ceiling => 0.81,
+            _ => 0.8,
+        });
+        let all: f64 = gains.product();
+        assert!((echo.amplitude / all - 1.0).abs() < 1e-12, "{echo:?}");
+    }
+    let corner = echoes.iter().find(|e| e.path.walls[..] == [Reflector::Wall(3), Reflector::Floor]);
+    assert!((corner.expect("the corner").amplitude - 0.4).abs() < 1e-12);
+    // None is left out but for its weakness.
+    let rigid = Scene {
+        floor_material: Material::RIGID,
+        ceiling_material: Material::RIGID,
+        ..room.clone()
+    };
+    let all =
+        Paths::new(&rigid, Settings { floor: 1e-4, ..settings }).enumerate(DVec2::new(0.4, 0.25));
+    let strong = all.iter().filter(|echo| {
+        let hits = |level| echo.path.walls.iter().filter(|met| **met == level).count() as i32;
+        let left = 0.5_f64.powi(hits(Reflector::Floor)) * 0.81_f64.powi(hits(Reflector::Ceiling));
+        echo.amplitude * left >= 0.02
+    });
+    assert_eq!(strong.count(), echoes.len());
+}
+
 /// The weight is the beam pattern's at the angle in space.
 #[test]
 fn the_beam_is_weighed_in_space_and_a_tilt_finds_the_floor() {
@@ -142,7 +183,7 @@ fn low_wall() -> Scene {
 fn rims(plan: &Scene, at: DVec2, z_m: f64) -> Vec<EchoPath> {
     let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..at_height(z_m) };
     let mut echoes = Paths::new(plan, settings).enumerate(at);
-    echoes.retain(|echo| echo.path.kind == PathKind::Diffracted && echo.path.edge.is_none());
+    echoes.retain(|echo| matches!(echo.path.bends[..], [Bend::Level { .. }]));
     echoes
 }
 

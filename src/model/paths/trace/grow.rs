@@ -16,8 +16,9 @@ use crate::{
 /// No scene keeps a beam this long; it stops one that rounding has caught.
 const MOST_REFLECTIONS: u16 = 4096;
 
-/// Marks a beam without a reflection.
-const ROOT: u32 = u32::MAX;
+/// Marks a beam without a reflection. Below it are as many as there are triangles around a corner, for
+/// the beams in each.
+pub(super) const ROOT: u32 = u32::MAX;
 
 /// Works order by order: beams of one order lie side by side, counter-clockwise by departure, so
 /// that beams which a corner has split and brought to the same image again stand next to each
@@ -56,7 +57,31 @@ impl<'a> Grower<'a> {
 
     /// All beams of a start in a triangle.
     pub(super) fn grow(mut self, triangle: u32) -> Tree {
-        let first = Beam {
+        self.look_around(self.first(triangle), None);
+        self.finish()
+    }
+
+    /// All beams of a start that is a corner of these triangles. To another corner and back it is no
+    /// longer than by it to any receiver, for which there is a way to and from both.
+    pub(super) fn grow_from_corner(mut self, around: &[(u32, u8)]) -> Tree {
+        for (&(triangle, corner), slot) in around.iter().zip(0..) {
+            let first = Beam { node: ROOT - slot, ..self.first(triangle) };
+            let side = (corner as usize + 1) % 3;
+            let ends = [side, (side + 1) % 3];
+            for end in ends {
+                self.meet_near_edge(&first, self.mesh.triangles[triangle as usize].corners[end]);
+            }
+            let [right, left] = ends.map(|end| self.mesh.corner(triangle, end) - self.start);
+            for part in self.shaded(Beam { right, left, ..first }) {
+                let beam = self.leave(part, side);
+                self.follow(beam);
+            }
+        }
+        self.finish()
+    }
+
+    fn first(&self, triangle: u32) -> Beam {
+        Beam {
             image: self.start,
             right: DVec2::ZERO,
             left: DVec2::ZERO,
@@ -68,8 +93,11 @@ impl<'a> Grower<'a> {
             side: 0,
             mirrored: false,
             order: 0,
-        };
-        self.look_around(first, None);
+        }
+    }
+
+    /// Follows the beams order by order.
+    fn finish(mut self) -> Tree {
         let mut beams = Vec::new();
         while !self.next.is_empty() {
             std::mem::swap(&mut beams, &mut self.next);

@@ -1,0 +1,58 @@
+//! Where a transducer sits.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{SensorError, figures::within};
+use crate::geometry::DVec2;
+
+/// Where the transducer sits on the rotation axis, and turns with it.
+///
+/// Ranges are measured from the face, or from the middle between transmitter and receiver: half
+/// the way of the sound. What is met ahead lies `ahead_m` farther from the axis.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Mounting {
+    /// The middle of the face in front of the axis, metres.
+    pub ahead_m: f64,
+    /// The same to the left of it, metres.
+    pub left_m: f64,
+    /// Transmitter and receiver side by side, their middles this far apart, metres: the
+    /// transmitter on the left. 0 for a transducer that does both.
+    pub separation_m: f64,
+    /// Height of its middle in a scene with heights, metres.
+    pub z_m: Option<f64>,
+    /// How far its axis points up, degrees.
+    pub tilt_deg: f64,
+}
+
+impl Mounting {
+    /// Transmitter and receiver with the axis at `axis`, looking into `direction_rad`.
+    #[must_use]
+    pub fn places(&self, axis: DVec2, direction_rad: f64) -> [DVec2; 2] {
+        let turn = DVec2::from_angle(direction_rad);
+        [0.5, -0.5].map(|side| {
+            let left_m = self.left_m + side * self.separation_m;
+            axis + turn.rotate(DVec2::new(self.ahead_m, left_m))
+        })
+    }
+
+    pub(super) fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Whether it is one transducer on the axis itself, so that turning does not move it.
+    #[must_use]
+    pub fn is_on_axis(&self) -> bool {
+        self.ahead_m == 0.0 && self.left_m == 0.0 && self.separation_m == 0.0
+    }
+
+    pub(super) fn check(&self) -> Result<(), SensorError> {
+        let Self { ahead_m, left_m, separation_m, z_m, tilt_deg } = *self;
+        within("mounting.ahead_m", ahead_m, 1.0, "from -1 to 1 metre")?;
+        within("mounting.left_m", left_m, 1.0, "from -1 to 1 metre")?;
+        within("mounting.separation_m", separation_m, 1.0, "from -1 to 1 metre")?;
+        within("mounting.z_m", z_m.unwrap_or(0.0), 1000.0, "from -1000 to 1000 metres")?;
+        within("mounting.tilt_deg", tilt_deg, 90.0, "from -90 to 90 degrees")
+    }
+}

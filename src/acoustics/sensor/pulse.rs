@@ -1,0 +1,62 @@
+//! What a ranger sends, as its data say.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{SensorError, figures::positive};
+
+/// What the ranger sends.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "shape", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Pulse {
+    /// So many cycles of the carrier at full strength, as transducer and receiver pass them.
+    Burst {
+        /// Number of cycles.
+        cycles: f64,
+        /// Standard deviation of the Gaussian band filter that transducer and receiver are
+        /// together, hertz.
+        bandwidth_hz: f64,
+    },
+    /// A sine under a Gaussian envelope.
+    Gaussian {
+        /// Standard deviation of the envelope, microseconds.
+        sigma_us: f64,
+    },
+    /// Bursts of several frequencies, one after the other.
+    Chirp {
+        /// The bursts in order.
+        parts: Vec<ChirpPart>,
+        /// As for a burst; centred on the sensor's `frequency_hz`.
+        bandwidth_hz: f64,
+    },
+}
+
+/// One frequency of a chirp.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ChirpPart {
+    /// Number of cycles.
+    pub cycles: f64,
+    /// Frequency, hertz.
+    pub frequency_hz: f64,
+}
+
+impl Pulse {
+    pub(super) fn check(&self) -> Result<(), SensorError> {
+        match self {
+            Self::Burst { cycles, bandwidth_hz } => {
+                positive("pulse.cycles", *cycles)?;
+                positive("pulse.bandwidth_hz", *bandwidth_hz)
+            }
+            Self::Gaussian { sigma_us } => positive("pulse.sigma_us", *sigma_us),
+            Self::Chirp { parts, bandwidth_hz } => {
+                positive("pulse.parts (how many)", parts.len() as f64)?;
+                for part in parts {
+                    positive("pulse.parts.cycles", part.cycles)?;
+                    positive("pulse.parts.frequency_hz", part.frequency_hz)?;
+                }
+                positive("pulse.bandwidth_hz", *bandwidth_hz)
+            }
+        }
+    }
+}
