@@ -61,12 +61,14 @@ impl Disc {
     /// Legs of at least `a`; at the rim of a disc smaller than a wavelength it is an estimate.
     #[must_use]
     pub fn reflection(&self, aspect: &FaceAspect) -> Complex64 {
-        let cosine = 0.5 * (aspect.in_rad.cos() + aspect.out_rad.cos());
-        if aspect.in_rad.cos() <= 0.0 || aspect.out_rad.cos() <= 0.0 {
+        let (in_sin, in_cos) = aspect.in_rad.sin_cos();
+        let (out_sin, out_cos) = aspect.out_rad.sin_cos();
+        if in_cos <= 0.0 || out_cos <= 0.0 {
             return Complex64::ZERO;
         }
+        let cosine = 0.5 * (in_cos + out_cos);
         let p = self.zone_m() * (1.0 / aspect.in_m + 1.0 / aspect.out_m) * cosine;
-        let slant = aspect.in_rad.sin() + aspect.out_rad.sin();
+        let slant = in_sin + out_sin;
         let q = self.wave_number_per_m * self.face.radius_m * slant.abs();
         self.face.reflectance * zones(p, q)
     }
@@ -114,8 +116,9 @@ fn bessel(x: f64) -> SmallVec<[f64; 40]> {
     let last = (1.2 * x) as usize + 18;
     let mut orders: SmallVec<[f64; 40]> = smallvec![0.0; last + 2];
     orders[last] = 1e-200;
+    let step = 2.0 / x;
     for n in (1..=last).rev() {
-        orders[n - 1] = 2.0 * n as f64 / x * orders[n] - orders[n + 1];
+        orders[n - 1] = n as f64 * step * orders[n] - orders[n + 1];
     }
     let even: f64 = orders.iter().skip(2).step_by(2).sum();
     let scale = (orders[0] + 2.0 * even).recip();

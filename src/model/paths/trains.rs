@@ -73,7 +73,9 @@ struct Loop {
     leaves_rad: f64,
     returns_rad: f64,
     length_m: f64,
-    field: Complex64,
+    /// Its strength and phase, apart.
+    amplitude: f64,
+    phase: Complex64,
     /// Whether it is its own reverse.
     own_reverse: bool,
 }
@@ -125,7 +127,8 @@ impl Loops {
                 leaves_rad,
                 returns_rad: echo.arrival.to_angle(),
                 length_m: echo.length_m,
-                field: Complex64::from_polar(echo.amplitude, echo.phase_rad),
+                amplitude: echo.amplitude,
+                phase: Complex64::cis(echo.phase_rad),
                 own_reverse: echo.departure.distance(echo.arrival) < SAME_RAD,
             });
         }
@@ -241,7 +244,7 @@ impl<'a> Search<'a> {
         for (at, leaving) in self.weights.clone().into_iter().enumerate() {
             let first = self.weights.len() + at;
             let out = self.rounds[first];
-            let strength = out.field / out.field.norm() * leaving / out.length_m;
+            let strength = out.phase * (leaving / out.length_m);
             self.extend(&smallvec![out.round], first, strength, out.length_m);
         }
         self.found
@@ -270,8 +273,8 @@ impl<'a> Search<'a> {
             {
                 continue;
             }
-            let field = strength * self.passage_m(last, at) * end.field / end.field.norm()
-                * (weight / end.length_m * total_m);
+            let field =
+                strength * self.passage_m(last, at) * end.phase * (weight / end.length_m * total_m);
             if field.norm() >= self.floor {
                 let mut rounds = rounds.clone();
                 rounds.push(end.round);
@@ -283,7 +286,7 @@ impl<'a> Search<'a> {
             let at = self.middles[place];
             let middle = self.rounds[at];
             let total_m = length_m + middle.length_m;
-            let per_m = middle.field.norm() / middle.length_m;
+            let per_m = middle.amplitude / middle.length_m;
             if bound * per_m * disc_m * self.best.beside(total_m) < self.floor
                 || total_m >= self.settings.max_path_m
             {
@@ -291,7 +294,7 @@ impl<'a> Search<'a> {
             }
             let mut rounds = rounds.clone();
             rounds.push(middle.round);
-            let next = strength * self.passage_m(last, at) * middle.field / middle.length_m;
+            let next = strength * self.passage_m(last, at) * middle.phase * per_m;
             self.extend(&rounds, at, next, total_m);
         }
     }
