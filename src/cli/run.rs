@@ -3,10 +3,13 @@
 mod load;
 mod mock;
 
-use std::{io::IsTerminal as _, path::PathBuf};
+use std::{
+    io::{self, IsTerminal as _},
+    path::PathBuf,
+};
 
 use rustix::process::Signal;
-use tokio::signal::unix::{SignalKind, signal};
+use tokio::signal::unix::{Signal as Hangups, SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 use tracing_subscriber::EnvFilter;
 
@@ -134,6 +137,9 @@ pub(super) fn run(args: Args) -> Outcome {
 async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Outcome {
     // With a handler, a file that gets too large is an error of the write and not the end.
     let _too_large = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()));
+    // Whoever sees that it answers may send one: until there is a handler it would end the process,
+    // or be lost where whoever started it ignores hangups.
+    let hangups = signal(SignalKind::hangup());
     let keys = &settings.keys;
     let board = match settings.simulated {
         // What is made up touches no pins.
@@ -160,7 +166,7 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
         None => daemon::prepare_simulated(journal, settings),
     };
     let server = Server::new(handle.clone(), log_folder, access, &server_keys);
-    let reloading = tokio::spawn(reload_on_hangup(loader, handle));
+    let reloading = tokio::spawn(reload_on_hangup(loader, handle, hangups));
     let ended = CancellationToken::new();
     let serving = tokio::spawn(server.run(listeners, ended.clone().cancelled_owned()));
     daemon.run(interrupts.wait()).await;
@@ -207,8 +213,8 @@ fn access(settings: &Settings, listeners: &Listeners) -> Result<Access, Failure>
 }
 
 /// Reads the configuration again at each SIGHUP.
-async fn reload_on_hangup(mut loader: Loader, daemon: Handle) {
-    let Ok(mut hangups) = signal(SignalKind::hangup()) else { return };
+async fn reload_on_hangup(mut loader: Loader, daemon: Handle, hangups: io::Result<Hangups>) {
+    let Ok(mut hangups) = hangups else { return };
     while hangups.recv().await.is_some() {
         let loaded = loader.load().map(Box::new).map_err(|failure| load::words(&failure));
         match &loaded {
