@@ -354,7 +354,11 @@ impl Receiver {
     }
 
     fn tof_us(&self, sound: &Sound) -> f64 {
-        sound.length_m / self.sound_speed_m_s * 1e6
+        self.arrives_us(sound.length_m)
+    }
+
+    fn arrives_us(&self, length_m: f64) -> f64 {
+        length_m / self.sound_speed_m_s * 1e6
     }
 }
 

@@ -1,7 +1,6 @@
 //! `sonard explore`.
 
 use std::{
-    fs,
     io::{self, Write},
     path::{Path, PathBuf},
     sync::Arc,
@@ -14,8 +13,8 @@ use serde::Serialize;
 use super::{
     Failure, Outcome,
     answer::answer,
+    files::{make_folder, save},
     lines::record,
-    map_file::save,
     options::{AirArgs, SensorArgs},
     place::PlaceArgs,
     progress,
@@ -281,12 +280,7 @@ pub(super) fn write_all(
     sensing: Sensing,
     scene: &Scene,
 ) -> Outcome {
-    fs::create_dir_all(folder).map_err(|error| {
-        Failure::input(
-            format!("cannot make the folder {}: {error}", folder.display()),
-            "give a folder that you may write to",
-        )
-    })?;
+    make_folder(folder)?;
     let refuse = |error: PlotError| Failure::device(error, "this scene can't be drawn");
     save(&folder.join("lines.jsonl"), &json_lines(made.lines().iter().map(record)))?;
     let laser = made.stops.iter().flat_map(|stop| &stop.laser).map(serde_json::to_value);

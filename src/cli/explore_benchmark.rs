@@ -18,7 +18,7 @@ use super::{
     answer::answer,
     compare::RULED,
     explore::{RobotArgs, Summary, explored, write_all},
-    map_file::save,
+    files::save,
     progress,
 };
 use crate::{

@@ -30,6 +30,11 @@ impl Failure {
         Self::Device(miette::miette!(help = help.to_string(), "{message}"))
     }
 
+    /// Somebody did not want the rest.
+    pub(super) fn stopped() -> Self {
+        Self::Found(Some("stopped on request".into()))
+    }
+
     /// A failed write to standard output or a file; a reader that went away is no failure.
     ///
     /// # Errors

@@ -1,7 +1,6 @@
 //! `sonard map`.
 
 use std::{
-    fs,
     io::{self, Write},
     path::{Path, PathBuf},
 };
@@ -9,7 +8,10 @@ use std::{
 use serde::Serialize;
 
 use super::{
-    Failure, Outcome, answer::answer, map_file, map_file::save, progress, scene_file,
+    Failure, Outcome,
+    answer::answer,
+    files::{make_folder, save},
+    map_file, progress, scene_file,
     sweeps::for_each_sweep,
 };
 use crate::{
@@ -142,12 +144,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     };
     let (model, prediction) = models(args, extents, max_range_m, session.array.is_some());
     let scene = args.scene.as_deref().map(scene_file::load).transpose()?;
-    fs::create_dir_all(&args.out).map_err(|error| {
-        Failure::input(
-            format!("cannot make the folder {}: {error}", args.out.display()),
-            "give a folder that you may write to",
-        )
-    })?;
+    make_folder(&args.out)?;
 
     let mapped = map(args, &taken, begun, &model, prediction)?;
     let way: Vec<DVec2> = taken.iter().map(|(_, sweep)| sweep.pose.position()).collect();

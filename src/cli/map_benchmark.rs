@@ -20,6 +20,7 @@ use super::{
     Failure, Outcome,
     answer::answer,
     compare::RULED,
+    files::make_folder,
     map::{EXTEND_M, LEAST_CONFIDENCE},
     progress,
 };
@@ -124,12 +125,7 @@ struct Row {
 
 pub(super) fn run(args: &Args) -> Outcome {
     if let Some(folder) = &args.out {
-        fs::create_dir_all(folder).map_err(|error| {
-            Failure::input(
-                format!("cannot make the folder {}: {error}", folder.display()),
-                "give a folder that you may write to",
-            )
-        })?;
+        make_folder(folder)?;
     }
     let rows = trials(args)?;
     answer(args.json, &rows, |out| print(out, &rows))

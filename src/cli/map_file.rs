@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use super::{Failure, Outcome};
+use super::{Failure, Outcome, files::save};
 use crate::interpret::grid::{Grid, MapYaml, from_pgm, to_pgm};
 
 /// A map by its description, or by the folder that holds `map.yaml`.
@@ -25,14 +25,4 @@ pub(super) fn read(path: &Path) -> Result<Grid, Failure> {
 pub(super) fn write(folder: &Path, grid: &Grid) -> Outcome {
     save(&folder.join("map.pgm"), &to_pgm(grid))?;
     save(&folder.join("map.yaml"), MapYaml::of(grid.shape(), "map.pgm").to_text().as_bytes())
-}
-
-/// Writes a whole file.
-pub(super) fn save(path: &Path, bytes: &[u8]) -> Outcome {
-    fs::write(path, bytes).map_err(|error| {
-        Failure::device(
-            format!("cannot write {}: {error}", path.display()),
-            "check that its folder exists, may be written to and has room",
-        )
-    })
 }

@@ -1,12 +1,11 @@
 //! `sonard map-score`.
 
 use std::{
-    fs,
     io::{self, Write},
     path::{Path, PathBuf},
 };
 
-use super::{Failure, Outcome, answer::answer, map_file, scene_file};
+use super::{Failure, Outcome, answer::answer, files::make_folder, map_file, scene_file};
 use crate::{
     geometry::{DVec2, Pose},
     interpret::grid::{Grid, GridShape, MapScore, PathSettings, ideal, score},
@@ -64,12 +63,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         drawn(&args.ideal, *map.shape())?
     };
     if let Some(folder) = &args.save_ideal {
-        fs::create_dir_all(folder).map_err(|error| {
-            Failure::input(
-                format!("cannot make the folder {}: {error}", folder.display()),
-                "give a folder that you may write to",
-            )
-        })?;
+        make_folder(folder)?;
         map_file::write(folder, &ideal)?;
     }
     let settings = PathSettings { spacing_m: args.spacing, ..PathSettings::default() };

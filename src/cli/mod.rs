@@ -11,6 +11,7 @@ mod doctor;
 mod explore;
 mod explore_benchmark;
 mod failure;
+mod files;
 mod generate;
 mod interpret;
 mod lines;

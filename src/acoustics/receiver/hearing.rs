@@ -27,7 +27,6 @@ pub(super) struct Hearing<'a> {
     pub(super) sounds: &'a [Sound],
     incident: &'a dyn Fn(&Sound) -> Option<Incident>,
     noise: Option<&'a NoiseTrack>,
-    us_per_m: f64,
     /// From then on sounds may begin that were not told.
     horizon_us: f64,
     /// The latest time that anything was asked about.
@@ -83,7 +82,6 @@ impl<'a> Hearing<'a> {
             sounds,
             incident,
             noise: None,
-            us_per_m: 1e6 / receiver.sound_speed_m_s,
             horizon_us: f64::INFINITY,
             asked_us: 0.0,
             parts: SmallVec::new(),
@@ -109,7 +107,7 @@ impl<'a> Hearing<'a> {
 
     /// Only the sounds up to a length, metres, are known.
     pub(super) fn hear_within(&mut self, length_m: f64) {
-        let arrives_us = length_m * self.us_per_m;
+        let arrives_us = self.receiver.arrives_us(length_m);
         self.horizon_us = match self.receiver.combining {
             Combining::Coherent => arrives_us + self.span_us.0,
             Combining::Ideal => arrives_us,
@@ -129,7 +127,7 @@ impl<'a> Hearing<'a> {
             Combining::Coherent => self.span_us.0,
             Combining::Ideal => 0.0,
         };
-        (self.asked_us - begins_us) / self.us_per_m
+        (self.asked_us - begins_us) * 1e-6 * self.receiver.sound_speed_m_s
     }
 
     /// Back to the firing.
@@ -211,7 +209,7 @@ impl<'a> Hearing<'a> {
         let others = self.sounds[..self.parts.len()]
             .iter()
             .rev()
-            .take_while(|other| self.tof_us(other) > first_us);
+            .take_while(|other| self.receiver.tof_us(other) > first_us);
         let rest: f64 = others.filter(|other| *other != sound).map(|other| other.amplitude).sum();
         rest < NEGLIGIBLE * sound.amplitude
     }
@@ -248,17 +246,13 @@ impl<'a> Hearing<'a> {
         if self.exponent == 0.0 { 1.0 } else { t_us.max(1.0).powf(self.exponent) }
     }
 
-    fn tof_us(&self, sound: &Sound) -> f64 {
-        sound.length_m * self.us_per_m
-    }
-
     fn lasting(&self) -> (usize, usize) {
         (self.over, self.parts.len())
     }
 
     fn next_entry_us(&self) -> Option<f64> {
         let next = self.sounds.get(self.parts.len());
-        let entry_us = next.map(|next| self.tof_us(next) + self.span_us.0);
+        let entry_us = next.map(|next| self.receiver.tof_us(next) + self.span_us.0);
         entry_us.or_else(|| self.horizon_us.is_finite().then_some(self.horizon_us))
     }
 
@@ -275,7 +269,7 @@ impl<'a> Hearing<'a> {
     fn enter(&mut self, t_us: f64, now_us: f64) {
         self.asked_us = self.asked_us.max(t_us);
         while let Some(sound) = self.sounds.get(self.parts.len()) {
-            let tof_us = self.tof_us(sound);
+            let tof_us = self.receiver.tof_us(sound);
             if tof_us + self.span_us.0 > t_us {
                 break;
             }

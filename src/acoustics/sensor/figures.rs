@@ -3,11 +3,7 @@
 use super::SensorError;
 
 pub(super) fn positive(field: &'static str, value: f64) -> Result<(), SensorError> {
-    if value.is_finite() && value > 0.0 {
-        Ok(())
-    } else {
-        Err(SensorError::Figure { field, value, expected: "a finite number greater than 0" })
-    }
+    hold(value.is_finite() && value > 0.0, field, value, "a finite number greater than 0")
 }
 
 pub(super) fn within_half_turn(
@@ -15,20 +11,12 @@ pub(super) fn within_half_turn(
     value: f64,
     from: f64,
 ) -> Result<(), SensorError> {
-    if (from..=180.0).contains(&value) {
-        Ok(())
-    } else {
-        let expected = "up to 180 degrees, and none_beyond_deg at least full_within_deg";
-        Err(SensorError::Figure { field, value, expected })
-    }
+    let expected = "up to 180 degrees, and none_beyond_deg at least full_within_deg";
+    hold((from..=180.0).contains(&value), field, value, expected)
 }
 
 pub(super) fn not_negative(field: &'static str, value: f64) -> Result<(), SensorError> {
-    if value.is_finite() && value >= 0.0 {
-        Ok(())
-    } else {
-        Err(SensorError::Figure { field, value, expected: "a finite number, 0 or more" })
-    }
+    hold(value.is_finite() && value >= 0.0, field, value, "a finite number, 0 or more")
 }
 
 pub(super) fn within(
@@ -37,13 +25,18 @@ pub(super) fn within(
     most: f64,
     expected: &'static str,
 ) -> Result<(), SensorError> {
-    if value.abs() <= most { Ok(()) } else { Err(SensorError::Figure { field, value, expected }) }
+    hold(value.abs() <= most, field, value, expected)
 }
 
 pub(super) fn at_most_1(field: &'static str, value: f64) -> Result<(), SensorError> {
-    if (0.0..=1.0).contains(&value) {
-        Ok(())
-    } else {
-        Err(SensorError::Figure { field, value, expected: "from 0 to 1" })
-    }
+    hold((0.0..=1.0).contains(&value), field, value, "from 0 to 1")
+}
+
+fn hold(
+    holds: bool,
+    field: &'static str,
+    value: f64,
+    expected: &'static str,
+) -> Result<(), SensorError> {
+    if holds { Ok(()) } else { Err(SensorError::Figure { field, value, expected }) }
 }

@@ -268,7 +268,7 @@ impl Daemon {
                 () = sleep(LOOK) => drop(self.ready().await?),
                 () = self.interrupts.clone().wait() => {
                     drop(scans.cancel().await);
-                    return Err(stopped());
+                    return Err(Failure::stopped());
                 }
             }
         }
@@ -293,7 +293,7 @@ impl Daemon {
             }
             tokio::select! {
                 () = sleep(WAIT) => {}
-                () = self.interrupts.clone().wait() => return Err(stopped()),
+                () = self.interrupts.clone().wait() => return Err(Failure::stopped()),
             }
         }
     }
@@ -338,8 +338,4 @@ impl AirNow {
 fn is_stop(record: &Record) -> bool {
     let Record::Event(event) = record else { return false };
     event.kind == EventKind::Stopped && event.detail.contains(STOPPED_ON_REQUEST)
-}
-
-fn stopped() -> Failure {
-    Failure::Found(Some("stopped on request".into()))
 }

@@ -116,7 +116,7 @@ impl Own {
             tokio::select! {
                 () = sleep(wait) => {}
                 () = self.interrupts.clone().wait() => {
-                    return Err(Failure::Found(Some("stopped on request".into())));
+                    return Err(Failure::stopped());
                 }
             }
             wait = (wait * 2).min(WAIT_MAX);

@@ -144,7 +144,7 @@ impl Collector<'_> {
         tokio::select! {
             () = tokio::time::sleep(pause) => Ok(()),
             () = self.interrupts.clone().wait() => {
-                Err(Failure::Found(Some("stopped on request".into())))
+                Err(Failure::stopped())
             }
         }
     }

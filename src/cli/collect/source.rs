@@ -76,7 +76,7 @@ impl Source {
                 let output = tokio::task::spawn_blocking(move || run_once(&ran, number));
                 let text = tokio::select! {
                     output = output => output.unwrap_or_else(|error| Err(error.to_string())),
-                    () = interrupts.clone().wait() => return Err(stopped()),
+                    () = interrupts.clone().wait() => return Err(Failure::stopped()),
                 };
                 let text = text.map_err(|why| failed(command, &why))?;
                 parse(command, text.trim(), scene)
@@ -88,7 +88,7 @@ impl Source {
                 let Some(stream) = running else { return Ok(None) };
                 let line = tokio::select! {
                     line = stream.lines.recv() => line,
-                    () = interrupts.clone().wait() => return Err(stopped()),
+                    () = interrupts.clone().wait() => return Err(Failure::stopped()),
                 };
                 match line {
                     Some(line) => parse(command, line.trim(), scene),
@@ -177,8 +177,4 @@ fn failed(command: &str, why: &str) -> Failure {
         format!("`{command}`, which is to give poses, failed: {why}"),
         "run it by itself; what was collected is kept, and the collection goes on when started again",
     )
-}
-
-fn stopped() -> Failure {
-    Failure::Found(Some("stopped on request".into()))
 }

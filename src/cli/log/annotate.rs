@@ -10,8 +10,8 @@ use std::{
 use uuid::Uuid;
 
 use super::super::{
+    files::save,
     map::{EXTEND_M, MAX_RANGE_M},
-    map_file::save,
     picture::warn_of_damage,
 };
 use super::{Failure, Outcome};

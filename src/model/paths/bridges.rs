@@ -38,7 +38,7 @@ use super::{
     Echo, Paths, Settings, Trees, Via,
     beam::Ray,
     echo::SAME_M,
-    edges::{ALONG_RAD, Arm, Corner, Facing, Flank, is_same_departure},
+    edges::{ALONG_RAD, Arm, Corner, Facing, Flank, distance_parameter_m, is_same_departure},
     mesh::Mesh,
     trace::Tree,
 };
@@ -304,7 +304,7 @@ impl Found<'_> {
         passages: &[Passage],
         leg_m: f64,
     ) -> Passed {
-        let distance_m = arm.radius_m * leg_m / (arm.radius_m + leg_m);
+        let distance_m = distance_parameter_m(arm.radius_m, leg_m);
         let through = |passage: &Passage| {
             let facing = &passage.ends[end];
             if facing.sector != arm.sector {
@@ -328,7 +328,7 @@ impl Found<'_> {
 /// The legs' spreading beside a straight way's and the roots of the distance parameters:
 /// `sqrt(L1 L2 (s' + t + s) / (w' t w))` for arms that cylinders have widened to `w'` and `w`.
 fn spreading(out: &Arm, back: &Arm, leg_m: f64) -> f64 {
-    let distance_m = |arm: &Arm| arm.radius_m * leg_m / (arm.radius_m + leg_m);
+    let distance_m = |arm: &Arm| distance_parameter_m(arm.radius_m, leg_m);
     let length_m = out.length_m + leg_m + back.length_m;
     let widths = out.width_m * leg_m * back.width_m;
     (distance_m(out) * distance_m(back) * length_m / widths).sqrt()

@@ -326,7 +326,7 @@ impl Bending<'_> {
         let aspect = Aspect {
             in_rad: out.from_rad,
             out_rad: back.from_rad,
-            distance_m: out.radius_m * back.radius_m / (out.radius_m + back.radius_m),
+            distance_m: distance_parameter_m(out.radius_m, back.radius_m),
         };
         let strength = strength * out.spreading(back, &aspect);
         let k = settings.wave_number_per_m;
@@ -352,6 +352,12 @@ impl Arm<'_> {
     fn is_same(&self, other: &Self) -> bool {
         is_same_departure(self.ray, other.ray)
     }
+}
+
+/// Kouyoumjian and Pathak's distance parameter of a front of one radius that goes on from an edge for
+/// the other, metres.
+pub(super) fn distance_parameter_m(one_m: f64, other_m: f64) -> f64 {
+    one_m * other_m / (one_m + other_m)
 }
 
 /// Whether two rays from one place, of one length, leave it in one direction.

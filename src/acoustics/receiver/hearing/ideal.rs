@@ -7,9 +7,9 @@ impl Hearing<'_> {
     /// One sound at a time: the first that comes after `ready_us`, or one that lasts then.
     pub(super) fn next_rise_of_one(&mut self, ready_us: f64) -> Option<f64> {
         let receiver = self.receiver;
-        let lasts_until_us = |sound: &Sound| self.tof_us(sound) + receiver.pulse_us;
+        let lasts_until_us = |sound: &Sound| receiver.tof_us(sound) + receiver.pulse_us;
         let found = self.loud().find(|sound| lasts_until_us(sound) >= ready_us);
-        let rise_us = found.map(|sound| self.tof_us(sound).max(ready_us));
+        let rise_us = found.map(|sound| receiver.tof_us(sound).max(ready_us));
         self.asked_us = self.asked_us.max(rise_us.unwrap_or(f64::MAX));
         rise_us
     }
@@ -18,11 +18,11 @@ impl Hearing<'_> {
     pub(super) fn cause_of_one(&self, t_us: f64) -> Option<Sound> {
         let receiver = self.receiver;
         let lasting = || {
-            let begun = self.loud().take_while(|sound| self.tof_us(sound) <= t_us);
-            begun.filter(|sound| self.tof_us(sound) + receiver.pulse_us >= t_us)
+            let begun = self.loud().take_while(|sound| receiver.tof_us(sound) <= t_us);
+            begun.filter(|sound| receiver.tof_us(sound) + receiver.pulse_us >= t_us)
         };
         let strongest = || lasting().max_by(|one, other| one.amplitude.total_cmp(&other.amplitude));
-        lasting().find(|sound| self.tof_us(sound) == t_us).or_else(strongest).copied()
+        lasting().find(|sound| receiver.tof_us(sound) == t_us).or_else(strongest).copied()
     }
 
     /// The sounds that pass the threshold by themselves.
@@ -31,7 +31,7 @@ impl Hearing<'_> {
         let window_us = receiver.window_us() + WINDOW_SLACK_US;
         self.sounds
             .iter()
-            .take_while(move |sound| self.tof_us(sound) <= window_us)
-            .filter(|sound| sound.amplitude >= receiver.threshold_at(self.tof_us(sound)))
+            .take_while(move |sound| receiver.tof_us(sound) <= window_us)
+            .filter(|sound| sound.amplitude >= receiver.threshold_at(receiver.tof_us(sound)))
     }
 }

@@ -23,7 +23,7 @@ impl Hearing<'_> {
         // How long the envelope has been above, less how long below since.
         let mut charge_us = 0.0_f64;
         while t_us <= window_us + 2.0 * integration_us && !self.asked_beyond() {
-            if !here.above && charge_us == 0.0 && self.watched != Some(self.lasting()) {
+            if !here.is_above() && charge_us == 0.0 && self.watched != Some(self.lasting()) {
                 match self.skip(t_us) {
                     Skip::Silence => return None,
                     Skip::Lone { rise_us } => return heard(rise_us),
@@ -35,23 +35,24 @@ impl Hearing<'_> {
                 }
             }
             let wanted_us = integration_us - charge_us;
-            if here.above && wanted_us <= 0.0 {
+            if here.is_above() && wanted_us <= 0.0 {
                 return heard(t_us - charge_us);
             }
-            let step_us = if here.above {
+            let step_us = if here.is_above() {
                 wanted_us.clamp(1.0, LONG_STEP_US)
             } else {
                 self.quiet_us(t_us, &here)
             };
             let next_us = t_us + step_us;
             let next = self.standing(next_us);
-            let turn_us = if here.above == next.above {
+            let turn_us = if here.is_above() == next.is_above() {
                 next_us
             } else {
                 self.turn((t_us, here.relative), (next_us, next.relative))
             };
             // Before the turn as it is here, after it as it is next.
-            for (part_us, above) in [(turn_us - t_us, here.above), (next_us - turn_us, next.above)]
+            for (part_us, above) in
+                [(turn_us - t_us, here.is_above()), (next_us - turn_us, next.is_above())]
             {
                 charge_us = (charge_us + if above { part_us } else { -part_us }).max(0.0);
             }
@@ -118,8 +119,7 @@ impl Hearing<'_> {
     /// afterwards.
     fn standing(&mut self, t_us: f64) -> Standing {
         let (level, threshold) = (self.level(t_us), self.receiver.threshold_at(t_us));
-        let relative = level / threshold;
-        Standing { relative, threshold, above: relative >= 1.0 }
+        Standing { relative: level / threshold, threshold }
     }
 
     /// How long the envelope, which stands as `here` now, certainly stays below the threshold, but
@@ -186,8 +186,7 @@ impl Hearing<'_> {
         t_us
     }
 
-    /// Envelope over threshold a step or less before the last time
-    /// asked for.
+    /// Envelope over threshold a step or less before the last time asked for.
     fn relative_level_back(&self, t_us: f64) -> f64 {
         // What was over at the later time may not have been.
         self.level_of(self.over.saturating_sub(8), t_us) / self.receiver.threshold_at(t_us)
@@ -201,7 +200,12 @@ struct Standing {
     relative: f64,
     /// The threshold in force.
     threshold: f64,
-    above: bool,
+}
+
+impl Standing {
+    fn is_above(&self) -> bool {
+        self.relative >= 1.0
+    }
 }
 
 /// Where to go on from a time without echo.
