@@ -380,6 +380,9 @@ fn path_settings(
         max_order: options.max_order.map(|order| order.try_into().unwrap_or(u16::MAX)),
         floor: receiver.threshold * 10f64.powf(-PATHS_KEPT_DB / 20.0),
         rounds_above: paths::ROUNDS_ABOVE,
+        crowded_m: (receiver.blanking_us + receiver.integration_us)
+            * 1e-6
+            * receiver.sound_speed_m_s,
         edge_law: Some(law),
         double_diffraction: options.double_diffraction,
         absorption_np_per_m: absorption_db_per_m(sensor, air, options) / (20.0 * LOG10_E),

@@ -54,6 +54,8 @@ pub(super) struct Arm {
     /// Its ends here, by place.
     pub(super) ends: [Contact; 2],
     pub(super) leaves: Leaves,
+    /// Its shortest ray comes this far, metres.
+    pub(super) least_m: f64,
     pub(super) strength: Strength,
 }
 

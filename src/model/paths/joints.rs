@@ -113,21 +113,23 @@ impl Meeting<'_> {
         found: &mut Vec<Pair>,
     ) {
         let arm = &out.arms[number as usize];
-        let floor = self.paths.settings.round_floor(arm.level).powi(2);
+        let floor = |other_m: f64| {
+            self.paths.settings.round_floor(arm.level, arm.least_m + other_m).powi(2)
+        };
         let tracer = ArmTracer::new(self.paths, out.views, arm);
         for sheaf in sheaves {
             let most = arm.strength.with(&sheaf.most) * self.heard(&arm.leaves, &sheaf.leaves);
-            if most < floor {
+            if most < floor(sheaf.least_m) {
                 continue;
             }
             for &other in sheaf.arms.iter().filter(|&&other| !once || other >= number) {
                 let other = &back.arms[other as usize];
                 // Sorted by `x`.
                 let most = Strength { x: other.strength.x, ..sheaf.most };
-                if arm.strength.with(&most) < floor {
+                if arm.strength.with(&most) < floor(sheaf.least_m) {
                     break;
                 }
-                if self.may_meet(arm, other, floor) {
+                if self.may_meet(arm, other, floor(other.least_m)) {
                     let other = ArmTracer::new(self.paths, back.views, other);
                     found.extend(self.pair(&tracer, &other));
                 }
@@ -153,7 +155,6 @@ impl Meeting<'_> {
     fn pair(&self, out: &ArmTracer, back: &ArmTracer) -> Option<Pair> {
         let settings = &self.paths.settings;
         let circle = &self.paths.rounds.circles[out.arm.cylinder as usize];
-        let floor = self.paths.settings.round_floor(out.arm.level);
         let gain = out.arm.gain * back.arm.gain * circle.gain;
         let (contacts, place_rad) = meet(out, back, circle.radius_m)?;
         let [one, other] = &contacts;
@@ -163,6 +164,7 @@ impl Meeting<'_> {
         let amplitude = self.amplitude(&contacts, circle, gain);
         let leaves = [out.departure(one.at_rad), back.departure(other.at_rad)];
         let heard = self.both.map_or(1.0, |both| both.heard(leaves[0].angle_to(leaves[1]).abs()));
+        let floor = settings.round_floor(out.arm.level, length_m);
         let fits = length_m <= settings.max_path_m && amplitude * heard >= floor;
         fits.then_some(Pair {
             cylinder: out.arm.cylinder,
@@ -229,6 +231,8 @@ struct Sheaf {
     leaves: Leaves,
     /// The most of `x` and of `y`.
     most: Strength,
+    /// The shortest one's length, metres.
+    least_m: f64,
 }
 
 /// How far apart departures in a sheaf are, radians.
@@ -269,7 +273,8 @@ impl Sheaf {
         };
         let half_rad = each().map(reach).fold(0.0, f64::max);
         let most = each().map(|arm| arm.strength).fold(Strength::default(), Strength::max);
-        Self { arms: arms.to_vec(), leaves: Leaves { half_rad, ..first }, most }
+        let least_m = each().map(|arm| arm.least_m).fold(f64::INFINITY, f64::min);
+        Self { arms: arms.to_vec(), leaves: Leaves { half_rad, ..first }, most, least_m }
     }
 }
 

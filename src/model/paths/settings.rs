@@ -19,6 +19,9 @@ pub struct Settings {
     /// How many times `floor` echoes that touch cylinders more than once are followed down to; see
     /// [`ROUNDS_ABOVE`]. 1: as far as all others.
     pub rounds_above: f64,
+    /// Longest path, metres, up to which these too are followed down to `floor`: where all that came
+    /// back so far may still sound together when the receiver opens.
+    pub crowded_m: f64,
     /// What edges send back; `None`: mirror reflections only.
     pub edge_law: Option<EdgeLaw>,
     /// Also sound that bends at two edges, by the same law at each.
@@ -64,9 +67,13 @@ impl Settings {
         (-self.absorption_np_per_m * length_m).exp()
     }
 
-    /// The weakest echo that is asked for of those whose middle contact with a cylinder has so many
-    /// before it.
-    pub(super) fn round_floor(&self, level: u16) -> f64 {
-        if level == 0 { self.floor } else { self.rounds_above * self.floor }
+    /// The weakest echo that is asked for of those of at least this length whose middle contact with a
+    /// cylinder has so many before it.
+    pub(super) fn round_floor(&self, level: u16, least_m: f64) -> f64 {
+        if level == 0 || least_m <= self.crowded_m {
+            self.floor
+        } else {
+            self.rounds_above * self.floor
+        }
     }
 }

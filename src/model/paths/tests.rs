@@ -29,6 +29,7 @@ pub(super) const LOSSLESS: Settings = Settings {
     max_order: None,
     floor: 1e-4,
     rounds_above: ROUNDS_ABOVE,
+    crowded_m: 0.0,
     edge_law: None,
     double_diffraction: false,
     absorption_np_per_m: 0.0,

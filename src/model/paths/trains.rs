@@ -339,6 +339,7 @@ mod tests {
             max_order: None,
             floor: 1e-3,
             rounds_above: 1.0,
+            crowded_m: 0.0,
             edge_law: None,
             double_diffraction: false,
             absorption_np_per_m: 0.0,

@@ -22,7 +22,7 @@ use super::{
     arms::{Arm, DIRECT, LOUDER, Leaves, Partners, Strength},
     beam::Ray,
     mesh::Side,
-    rounds::Span,
+    rounds::{Circle, Span},
     trace::{Tree, View},
     tube::{Curved, FIRST, Front, Link, Surfaces, Tracer, surfaces_to},
 };
@@ -143,6 +143,7 @@ impl<'a> TubeGrower<'a> {
             triangle: beam.triangle,
             ends,
             leaves: Leaves::between(tracer.departure(span.from_rad), tracer.departure(span.to_rad)),
+            least_m: length_m,
             strength: Strength::of(beam.gain, one_way, self.radius_m, self.paths),
         });
     }
@@ -152,11 +153,12 @@ impl<'a> TubeGrower<'a> {
         let arm = &self.arms[index];
         let partner = partners.best(&arm.leaves);
         let order = arm.order + 1;
-        let is_heard = arm.strength.with(&partner) >= self.paths.settings.round_floor(1).powi(2);
+        let circle = &self.paths.rounds.circles[arm.cylinder as usize];
+        let floor = self.paths.settings.round_floor(1, arm.least_m + self.back_m(circle));
+        let is_heard = arm.strength.with(&partner) >= floor.powi(2);
         if !(is_heard || self.has_edges) || !self.paths.settings.allows(order + 1) {
             return;
         }
-        let circle = &self.paths.rounds.circles[arm.cylinder as usize];
         let surface = Reflector::Cylinder(arm.cylinder);
         let (link, borders) = if arm.link == DIRECT {
             (FIRST, arm.borders)
@@ -225,14 +227,15 @@ impl<'a> TubeGrower<'a> {
             distance_to_segment(self.target, a, b)
         });
         let length_m = tube.least(|front| front.length_m);
-        if length_m + left_m > settings.max_path_m {
+        let least_m = length_m + left_m;
+        if least_m > settings.max_path_m {
             return false;
         }
         let width_m = tube.least(|front| front.width_m);
         let growth = tube.least(|front| front.growth);
         let spread = [length_m, width_m, growth];
         let strength = Strength::of(tube.gain, spread, self.radius_m, self.paths);
-        strength.with(&tube.partner) >= self.paths.settings.round_floor(1).powi(2)
+        strength.with(&tube.partner) >= settings.round_floor(1, least_m).powi(2)
             || self.has_edges && self.is_worth_an_edge(tube.gain, spread)
     }
 
@@ -243,6 +246,11 @@ impl<'a> TubeGrower<'a> {
         let loss = EDGE_MOST * gain * settings.air_gain(length_m);
         LOUDER * loss * loss * (length_m / width_m + 1.0 / growth)
             >= (EDGES_ABOVE * settings.floor).powi(2)
+    }
+
+    /// The shortest way back from a cylinder, metres.
+    fn back_m(&self, circle: &Circle) -> f64 {
+        (self.target.distance(circle.center) - circle.radius_m).max(0.0)
     }
 
     fn side_of(&self, triangle: u32, side: usize) -> [DVec2; 2] {

@@ -239,10 +239,10 @@ fn edges_answer_by_way_of_cylinders() {
     }
 }
 
-/// Echoes of more than one contact are not followed below the threshold, where there are very many. So
-/// many of them sound together beside a round body that one firing in eight, 85 mm before a wall, would
-/// read otherwise with those down to 20 dB below: mostly the minimum range for an echo a little beyond
-/// it. The readings: `cargo test --lib left_out -- --nocapture`.
+/// Echoes of more than one contact, of which there are very many, are followed below the threshold only
+/// until the receiver opens. With all of them one firing in thirty, 85 mm before a wall and beside a
+/// round body, would read otherwise; with none it were one in eight, mostly the minimum range for an
+/// echo a little beyond it. The readings: `cargo test --lib left_out -- --nocapture`.
 #[test]
 fn few_readings_depend_on_what_is_left_out_below_the_threshold() {
     let text = crate::scene::shipped::text("simple-room-robot").expect("shipped");
@@ -255,10 +255,9 @@ fn few_readings_depend_on_what_is_left_out_below_the_threshold() {
         let simulator = Simulator::new(plan.clone(), sensor.clone(), Air::default(), options)
             .expect("valid options");
         let beam = BeamPattern::new(&sensor, simulator.sound_speed_m_s());
-        let engines = [ROUNDS_ABOVE, 1.0].map(|rounds_above| {
-            let settings = Settings { rounds_above, ..simulator.path_settings() };
-            PathEngine::new(&plan, beam.clone(), None, settings)
-        });
+        let own = simulator.path_settings();
+        let engines = [own.clone(), Settings { rounds_above: 1.0, ..own }]
+            .map(|settings| PathEngine::new(&plan, beam.clone(), None, settings));
         let surveys = engines.each_ref().map(|engine| engine.survey(pose.position()));
         for azimuth in 0..120 {
             let [some, every] = surveys.each_ref().map(|survey| {
@@ -274,5 +273,5 @@ fn few_readings_depend_on_what_is_left_out_below_the_threshold() {
         }
     }
     println!("{} of {all} readings differ: {differ:?}", differ.len());
-    assert!(8 * differ.len() <= all, "{} of {all}", differ.len());
+    assert!(30 * differ.len() <= all, "{} of {all}", differ.len());
 }

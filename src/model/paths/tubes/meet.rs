@@ -63,10 +63,10 @@ impl TubeGrower<'_> {
         let least = |of: fn(&Contact) -> f64| of(&ends[0]).min(of(&ends[1])).min(of(&half));
         let spread = [least(|c| c.length_m), least(|c| c.width_m), least(|c| c.growth)];
         let strength = Strength::of(tube.gain, spread, self.radius_m, self.paths);
-        let is_worth = strength.with(&tube.partner) >= self.paths.settings.round_floor(1).powi(2)
+        let least_m = spread[0] + self.back_m(circle);
+        let is_worth = strength.with(&tube.partner) >= settings.round_floor(1, least_m).powi(2)
             || self.has_edges && self.is_worth_an_edge(tube.gain, spread);
-        let back_m = self.target.distance(circle.center) - circle.radius_m;
-        if !is_worth || spread[0] + back_m.max(0.0) > settings.max_path_m {
+        if !is_worth || least_m > settings.max_path_m {
             return None;
         }
         Some(Arm {
@@ -83,6 +83,7 @@ impl TubeGrower<'_> {
             triangle: tube.triangle,
             ends,
             leaves: Leaves::between(tracer.departure(from_rad), tracer.departure(to_rad)),
+            least_m: spread[0],
             strength,
         })
     }
