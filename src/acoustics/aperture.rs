@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use super::{Aperture, EchoShape, Gain, Pulse, Sensor, pulse::filter_sigma_us};
+use super::{Aperture, EchoShape, Gain, Pulse, Sensor, edge::EdgeView, pulse::filter_sigma_us};
 
 /// Points across a face: enough for a phase that runs over 40 radians.
 const POINTS: usize = 24;
@@ -55,14 +55,16 @@ pub struct Incidence {
 }
 
 /// The face as it is seen over an echo's way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Image {
     /// Over an even number of mirrors: the right way round.
     Upright,
     /// Over an odd number of mirrors: left and right swapped.
     Swapped,
-    /// Round an edge, which forgets where on the face the sound left.
+    /// Off a place that forgets where on the face the sound left.
     Lost,
+    /// Round an edge, which forgets it too, but is seen otherwise from every point of the face.
+    Bent(EdgeView),
 }
 
 impl ApertureResponse {
@@ -138,7 +140,7 @@ impl ApertureResponse {
     ///
     /// Where the ways part into a sum over departure and one over arrival (no curvature, or an edge
     /// between) a grid of delays would do; the pairs are few enough to be taken one by one.
-    fn leads_m(&self, incidence: &Incidence) -> Vec<(f64, f64)> {
+    fn leads_m(&self, incidence: &Incidence) -> Vec<(f64, Complex64)> {
         let Incidence { leaving_rad, arriving_rad, length_m, image } = *incidence;
         let curved = matches!(self.aperture, Aperture::Line { .. });
         let bend_m = |x: f64, y: f64| match image {
@@ -146,13 +148,18 @@ impl ApertureResponse {
             Image::Upright => (x + y).powi(2) / (2.0 * length_m),
             Image::Swapped => (x - y).powi(2) / (2.0 * length_m),
             Image::Lost => (x * x + y * y) / length_m,
+            Image::Bent(edge) => edge.bend_m(x, y),
+        };
+        let seen = |x: f64, y: f64| match image {
+            Image::Bent(edge) => edge.share(x, y),
+            _ => Complex64::ONE,
         };
         let mut leads = Vec::with_capacity(self.points.len() * self.points.len());
         for &(u, share_u) in &self.points {
             for &(v, share_v) in &self.points {
-                let bend_m = bend_m(u * leaving_rad.cos(), v * arriving_rad.cos());
-                let lead_m = u * leaving_rad.sin() + v * arriving_rad.sin() - bend_m;
-                leads.push((lead_m, share_u * share_v));
+                let (x, y) = (u * leaving_rad.cos(), v * arriving_rad.cos());
+                let lead_m = u * leaving_rad.sin() + v * arriving_rad.sin() - bend_m(x, y);
+                leads.push((lead_m, share_u * share_v * seen(x, y)));
             }
         }
         leads

@@ -11,6 +11,8 @@ use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 use num_complex::Complex64;
 
+pub use view::EdgeView;
+
 /// How strong the echo of an edge is.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum EdgeLaw {
@@ -61,7 +63,7 @@ impl EdgeLaw {
     pub fn echo(&self, wedge: &Wedge, aspect: &Aspect, wave_number_per_m: f64) -> Complex64 {
         let range_m = 2.0 * aspect.distance_m;
         let level = match *self {
-            Self::Utd => return wedge.uniform(aspect, wave_number_per_m),
+            Self::Utd => return wedge.uniform(aspect, aspect, wave_number_per_m),
             Self::KucSiegel => kuc_siegel(range_m, TAU / wave_number_per_m),
             Self::BozmaKuc { sigma, far_field_m } => bozma_kuc(range_m, sigma, far_field_m),
         };
@@ -136,14 +138,18 @@ impl Wedge {
     /// reflectances that made the image, so that the sum stays continuous for walls that absorb
     /// too (after Luebbers, IEEE Trans. Antennas Propag. 32, 1984). Error below 1 % from half
     /// a wavelength off the edge, without multiple diffraction between near edges.
-    fn uniform(&self, aspect: &Aspect, wave_number_per_m: f64) -> Complex64 {
+    ///
+    /// Between `from` and `aspect` the coefficient runs on without the jumps that it has where an image
+    /// comes into sight: the field there beside images as they are seen at `from`. The same twice
+    /// gives the coefficient itself.
+    fn uniform(&self, aspect: &Aspect, from: &Aspect, wave_number_per_m: f64) -> Complex64 {
         if self.is_regular() {
             return Complex64::ZERO;
         }
         let n = self.opening_rad / PI;
         let kl = wave_number_per_m * aspect.distance_m;
         let sum: Complex64 = self
-            .images(aspect)
+            .images(aspect, from)
             .iter()
             .map(|image| image.reflectance * image.cotangent_term(n, kl))
             .sum();
@@ -162,22 +168,25 @@ impl Wedge {
             let far = 1.0 / (image.past_rad / (2.0 * n)).tan().abs() / scale;
             image.reflectance * far.min(0.5)
         };
-        self.images(aspect).iter().map(share).sum()
+        self.images(aspect, aspect).iter().map(share).sum()
     }
 
-    /// The images whose boundaries are nearest on each side, for the source and its first image.
-    fn images(&self, aspect: &Aspect) -> [Image; 4] {
+    /// The images whose boundaries are nearest on each side of `from`, for the source and its first
+    /// image.
+    fn images(&self, aspect: &Aspect, from: &Aspect) -> [Image; 4] {
         let turn = 2.0 * self.opening_rad;
-        let image = |beta: f64, side: f64, mirrored: bool| {
-            let place = PI + side * beta;
-            let count = (place / turn).round();
+        let image = |[here, there]: [f64; 2], side: f64, mirrored: bool| {
+            let count = ((PI + side * there) / turn).round();
+            let past_rad = |beta: f64| PI + side * beta - count * turn;
             let number = (side * count) as i32;
             Image {
-                past_rad: place - count * turn,
+                past_rad: past_rad(here),
+                is_lit: past_rad(there) > -ON_BOUNDARY_RAD,
                 reflectance: self.image_reflectance(number, mirrored),
             }
         };
-        let (difference, sum) = (aspect.out_rad - aspect.in_rad, aspect.out_rad + aspect.in_rad);
+        let difference = [aspect, from].map(|at| at.out_rad - at.in_rad);
+        let sum = [aspect, from].map(|at| at.out_rad + at.in_rad);
         [
             image(difference, 1.0, false),
             image(difference, -1.0, false),
@@ -202,6 +211,8 @@ impl Wedge {
 struct Image {
     /// How far the receiver is past the boundary of the image's light, on the lit side, radians.
     past_rad: f64,
+    /// Whether the image counts as seen.
+    is_lit: bool,
     /// Strength of the image.
     reflectance: f64,
 }
@@ -209,11 +220,18 @@ struct Image {
 impl Image {
     /// `cot((pi +- beta) / 2n) F(k L a(beta))`, with its limit on the boundary (equations 25, 33).
     fn cotangent_term(&self, n: f64, kl: f64) -> Complex64 {
+        let side = if self.is_lit { 1.0 } else { -1.0 };
         if self.past_rad.abs() < ON_BOUNDARY_RAD {
-            return n * (TAU * kl).sqrt() * Complex64::cis(FRAC_PI_4);
+            return side * n * (TAU * kl).sqrt() * Complex64::cis(FRAC_PI_4);
         }
-        let a = 2.0 * (self.past_rad / 2.0).sin().powi(2);
-        transition(kl * a) / (self.past_rad / (2.0 * n)).tan()
+        let x = kl * 2.0 * (self.past_rad / 2.0).sin().powi(2);
+        let cotangent = (self.past_rad / (2.0 * n)).tan().recip();
+        let term = transition(x) * cotangent;
+        if (self.past_rad > 0.0) == self.is_lit {
+            return term;
+        }
+        // Past the boundary: Fresnel's integral from the other end.
+        term + side * 2.0 * (PI * x).sqrt() * cotangent.abs() * Complex64::cis(FRAC_PI_4 + x)
     }
 }
 
@@ -247,6 +265,8 @@ fn transition_fraction(x: f64, ix: Complex64) -> Complex64 {
     }
     2.0 * ix / (2.0 * ix + 1.0 - rest)
 }
+
+mod view;
 
 #[cfg(test)]
 mod tests;

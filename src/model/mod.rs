@@ -27,7 +27,7 @@ pub use crate::acoustics::EdgeLawKind;
 use smallvec::SmallVec;
 
 use crate::{
-    acoustics::Sound,
+    acoustics::{Sound, edge::EdgeView},
     geometry::DVec2,
     scan::{PathKind, PingStatus},
 };
@@ -135,6 +135,12 @@ pub trait Survey: Send + Sync {
 
     /// The full account of a sound that [`listen`](Self::listen) gave for the same direction.
     fn arrival(&self, direction_rad: f64, sound: &Sound) -> Arrival;
+
+    /// How the edge of a sound looks from the face; `None` of others, and from engines and laws that do
+    /// not say.
+    fn edge(&self, _sound: &Sound) -> Option<EdgeView> {
+        None
+    }
 
     /// Every arrival of a firing, shortest path first.
     fn arrivals(&self, direction_rad: f64) -> Vec<Arrival> {

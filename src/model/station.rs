@@ -139,7 +139,8 @@ impl Firing<'_> {
     fn incident(&self, sound: &Sound) -> Incident {
         let arrival = self.survey.arrival(self.direction_rad, sound);
         let image = match arrival.path.kind {
-            PathKind::Diffracted | PathKind::Scattered => Image::Lost,
+            PathKind::Diffracted => self.survey.edge(sound).map_or(Image::Lost, Image::Bent),
+            PathKind::Scattered => Image::Lost,
             PathKind::Specular if arrival.path.walls.len() % 2 == 1 => Image::Swapped,
             PathKind::Specular => Image::Upright,
         };

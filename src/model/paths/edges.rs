@@ -12,7 +12,7 @@ use super::{
     trace::Tree,
 };
 use crate::{
-    acoustics::edge::{Aspect, EdgeLaw, Wedge},
+    acoustics::edge::{Aspect, EdgeLaw, EdgeView, Wedge},
     geometry::{Arrangement, DVec2, SNAP_M},
     model::Edge,
 };
@@ -140,6 +140,26 @@ impl Edges {
 
     pub(super) fn place(&self, point: u32) -> Option<DVec2> {
         Some(self.points.get(point as usize)?.as_ref()?.place)
+    }
+
+    /// How the edge of an echo that bends at no other looks from where it begins and ends; `None` of
+    /// other echoes, by way of a cylinder, and by laws that know no aspect.
+    pub(super) fn view(&self, trees: &Trees, echo: &Echo, settings: &Settings) -> Option<EdgeView> {
+        let Via::Edge { point, out, back } = echo.via else { return None };
+        let corner = self.corner(point).filter(|_| settings.edge_law == Some(EdgeLaw::Utd))?;
+        let rays = [trees.out.flat_ray(out)?, trees.back().flat_ray(back)?];
+        let [out, back] = rays.map(|ray| {
+            let length_m = ray.run.length();
+            corner.arm(ray, 0, length_m, length_m)
+        });
+        let (out, back) = (out?, back?);
+        Some(EdgeView {
+            wedge: *corner.wedge(out.sector),
+            aspect: out.aspect(&back),
+            wave_number_per_m: settings.wave_number_per_m,
+            legs_m: [out.length_m, back.length_m],
+            swapped: rays.map(|ray| ray.order % 2 == 1),
+        })
     }
 
     /// All echoes that bend once: out on one ray to an edge, back on another or the same.
@@ -323,11 +343,7 @@ impl Bending<'_> {
             return None;
         }
         let wedge = &corner.sectors[out.sector].wedge;
-        let aspect = Aspect {
-            in_rad: out.from_rad,
-            out_rad: back.from_rad,
-            distance_m: distance_parameter_m(out.radius_m, back.radius_m),
-        };
+        let aspect = out.aspect(back);
         let strength = strength * out.spreading(back, &aspect);
         let k = settings.wave_number_per_m;
         if strength * law.bound(wedge, &aspect, k) < settings.floor {
@@ -339,6 +355,15 @@ impl Bending<'_> {
 }
 
 impl Arm<'_> {
+    /// In on this one, out on another.
+    fn aspect(&self, back: &Self) -> Aspect {
+        Aspect {
+            in_rad: self.from_rad,
+            out_rad: back.from_rad,
+            distance_m: distance_parameter_m(self.radius_m, back.radius_m),
+        }
+    }
+
     /// What cylinders on the way leave of the field at an edge, beside fronts that flat walls
     /// turned: these fall by `sqrt((s + s') / (s s'))`, and the distance parameter of the
     /// transition is that of the fronts' radii of curvature in the plane (Kouyoumjian and Pathak

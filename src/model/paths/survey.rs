@@ -10,7 +10,7 @@ use super::{
     wheel::{Both, Envelope, Spoke, Wheel},
 };
 use crate::{
-    acoustics::{BeamPattern, Disc, Sound},
+    acoustics::{BeamPattern, Disc, Sound, edge::EdgeView},
     geometry::{DVec2, wrap_pi},
     model::{Arrival, Bend, Engine, Path, Reflector, Survey},
     scan::PathKind,
@@ -195,6 +195,11 @@ impl Survey for PathSurvey<'_> {
             sounds.extend(trains.iter().zip(numbers).map(|(train, index)| train.sound(index)));
             sounds.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
         }
+    }
+
+    fn edge(&self, sound: &Sound) -> Option<EdgeView> {
+        let echo = self.echoes.get(sound.index as usize)?;
+        self.paths.edges.view(&self.trees, echo, &self.paths.settings)
     }
 
     fn arrival(&self, direction_rad: f64, sound: &Sound) -> Arrival {

@@ -89,6 +89,11 @@ impl Tree {
         }
     }
 
+    /// A ray to an edge over walls alone.
+    pub(super) fn flat_ray(&self, ray: u32) -> Option<&Ray> {
+        self.to_edges.get(ray as usize).map(|(_, ray)| ray)
+    }
+
     /// Puts the rays to each edge side by side.
     pub(super) fn sort_by_edge(&mut self) {
         self.to_edges.sort_by_key(|(point, _)| *point);

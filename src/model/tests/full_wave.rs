@@ -121,7 +121,15 @@ fn kind(found: &Prediction) -> usize {
 
 #[test]
 fn ranges_are_those_of_the_full_wave_reference() {
-    let reference = Reference::load();
+    ranges_agree(&Reference::given());
+}
+
+#[test]
+fn ranges_of_whole_bodies_are_those_of_boundary_integrals() {
+    ranges_agree(&Reference::bodies());
+}
+
+fn ranges_agree(reference: &Reference) {
     let mut score = Score::default();
     for (name, of) in &reference.scenes {
         for tau in ["0.02", "0.05", "0.1"] {

@@ -1,4 +1,5 @@
-//! The full-wave reference scans (tests/data/fullwave/README.md).
+//! The full-wave reference scans (tests/data/fullwave/README.md), and more of the same kind, of whole
+//! bodies, by boundary integrals (tests/peers/full_wave.py).
 
 use std::collections::BTreeMap;
 
@@ -37,8 +38,16 @@ pub(in crate::model) struct Crossing {
 }
 
 impl Reference {
-    pub(in crate::model) fn load() -> Self {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/fullwave/reference.json");
+    pub(in crate::model) fn given() -> Self {
+        Self::load("fullwave/reference.json")
+    }
+
+    pub(in crate::model) fn bodies() -> Self {
+        Self::load("peers/full_wave.json")
+    }
+
+    fn load(name: &str) -> Self {
+        let path = format!("{}/tests/data/{name}", env!("CARGO_MANIFEST_DIR"));
         let text = std::fs::read_to_string(path).expect("the reference");
         serde_json::from_str(&text).expect("the reference")
     }

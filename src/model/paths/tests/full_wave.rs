@@ -6,6 +6,7 @@
 use num_complex::Complex64;
 
 use super::*;
+use crate::acoustics::edge::EdgeView;
 use crate::model::tests::reference::{Reference, ReferenceScene};
 
 /// Standard deviation of the band, and the part of it that counts, hertz.
@@ -25,11 +26,17 @@ struct Chain {
     f0: f64,
     half_width_m: f64,
     /// By frequency: the echoes, always the same ones.
-    echoes: Vec<(f64, Vec<EchoPath>)>,
+    echoes: Vec<(f64, Vec<Heard>)>,
+}
+
+/// An echo, and how its edge looks from the face.
+struct Heard {
+    echo: EchoPath,
+    edge: Option<EdgeView>,
 }
 
 impl Chain {
-    fn new(reference: &Reference, scene_of: &ReferenceScene) -> Self {
+    fn new(reference: &Reference, scene_of: &ReferenceScene, double_diffraction: bool) -> Self {
         let plan = scene(&scene_of.segments);
         let at = DVec2::from_array(scene_of.sensor);
         let steps = (2.0 * BAND_HZ / STEP_HZ) as i32;
@@ -40,10 +47,17 @@ impl Chain {
                     max_path_m: 4.1,
                     floor: 1e-5,
                     edge_law: Some(EdgeLaw::Utd),
+                    double_diffraction,
                     wave_number_per_m: TAU * f / reference.c,
                     ..LOSSLESS
                 };
-                (f, Paths::new(&plan, settings).enumerate(at))
+                let paths = Paths::new(&plan, settings);
+                let (trees, echoes) = paths.echoes(at, at, None);
+                let heard = |echo: &Echo| Heard {
+                    echo: paths.path(&trees, echo),
+                    edge: paths.edges.view(&trees, echo, &paths.settings),
+                };
+                (f, echoes.iter().map(heard).collect())
             })
             .collect();
         let (c, f0) = (reference.c, reference.f0);
@@ -53,7 +67,7 @@ impl Chain {
     /// The beam of the line aperture on both ways, facing `azimuth_rad`: every point of it sends
     /// to every point of it. Far away that is `sin(x)/x` twice; at these ranges the front's
     /// curvature still fills the pattern's nulls (Fresnel's approximation).
-    fn beam(&self, f: f64, echo: &EchoPath, azimuth_rad: f64) -> Complex64 {
+    fn beam(&self, f: f64, Heard { echo, edge }: &Heard, azimuth_rad: f64) -> Complex64 {
         let (leaving, arriving) =
             (echo.departure_rad - azimuth_rad, echo.arrival_rad - azimuth_rad);
         let taper = taper(leaving) * taper(arriving);
@@ -62,7 +76,7 @@ impl Chain {
         }
         let k = TAU * f / self.c;
         // Seen through an odd number of mirrors the aperture is mirrored; an edge forgets where
-        // on the aperture the sound left.
+        // on the aperture the sound left, but looks otherwise from each place.
         let bent = echo.path.kind == PathKind::Diffracted;
         let side = if echo.path.walls.len() % 2 == 1 { -1.0 } else { 1.0 };
         let point = |i: i32| self.half_width_m * (f64::from(2 * i + 1) / f64::from(POINTS) - 1.0);
@@ -75,7 +89,8 @@ impl Chain {
                 } else {
                     (x + side * y).powi(2) / (2.0 * echo.length_m)
                 };
-                sum += Complex64::cis(k * (u * leaving.sin() + v * arriving.sin() - curved));
+                let seen = edge.map_or(Complex64::ONE, |edge| edge.share(x, y));
+                sum += seen * Complex64::cis(k * (u * leaving.sin() + v * arriving.sin() - curved));
             }
         }
         sum * taper / f64::from(POINTS * POINTS)
@@ -83,11 +98,12 @@ impl Chain {
 
     /// Field of each echo at each frequency, as the aperture facing `azimuth_rad` weighs it.
     fn spectrum(&self, azimuth_rad: f64) -> Vec<(f64, Vec<Complex64>)> {
-        let weighed = |f: f64, echo: &EchoPath| {
-            Complex64::from_polar(echo.amplitude, echo.phase_rad) * self.beam(f, echo, azimuth_rad)
+        let weighed = |f: f64, heard: &Heard| {
+            let Heard { echo, .. } = heard;
+            Complex64::from_polar(echo.amplitude, echo.phase_rad) * self.beam(f, heard, azimuth_rad)
         };
-        let at = |(f, echoes): &(f64, Vec<EchoPath>)| {
-            (*f, echoes.iter().map(|echo| weighed(*f, echo)).collect())
+        let at = |(f, echoes): &(f64, Vec<Heard>)| {
+            (*f, echoes.iter().map(|heard| weighed(*f, heard)).collect())
         };
         self.echoes.iter().map(at).collect()
     }
@@ -96,7 +112,7 @@ impl Chain {
     /// the largest there.
     fn peaks(&self, azimuth_rad: f64) -> Vec<(f64, f64, bool)> {
         let spectrum = self.spectrum(azimuth_rad);
-        let lengths: Vec<f64> = self.echoes[0].1.iter().map(|echo| echo.length_m).collect();
+        let lengths: Vec<f64> = self.echoes[0].1.iter().map(|heard| heard.echo.length_m).collect();
         let middle = &spectrum[spectrum.len() / 2].1;
         let Some(first) = lengths.first() else { return Vec::new() };
         let count = ((lengths[lengths.len() - 1] - first + 0.1) / STEP_M) as usize;
@@ -115,7 +131,7 @@ impl Chain {
                     .filter(|&e| (lengths[e] - place(i)).abs() < 0.015)
                     .max_by(|&a, &b| middle[a].norm().total_cmp(&middle[b].norm()));
                 let bent = strongest
-                    .is_some_and(|e| self.echoes[0].1[e].path.kind == PathKind::Diffracted);
+                    .is_some_and(|e| self.echoes[0].1[e].echo.path.kind == PathKind::Diffracted);
                 (place(i), heights[i], bent)
             })
             .collect()
@@ -190,9 +206,9 @@ impl Errors {
     }
 }
 
-fn compare(reference: &Reference, name: &str) -> [Errors; 2] {
+fn compare(reference: &Reference, name: &str, double_diffraction: bool) -> [Errors; 2] {
     let scene_of = &reference.scenes[name];
-    let chain = Chain::new(reference, scene_of);
+    let chain = Chain::new(reference, scene_of, double_diffraction);
     let mut errors = [Errors::default(), Errors::default()];
     for beam in &scene_of.scan {
         let peaks = chain.peaks(beam.azimuth.to_radians());
@@ -229,10 +245,18 @@ fn compare(reference: &Reference, name: &str) -> [Errors; 2] {
 
 #[test]
 fn arrivals_are_those_of_the_full_wave_reference() {
-    let reference = Reference::load();
+    arrivals_agree(&Reference::given(), false);
+}
+
+#[test]
+fn arrivals_from_whole_bodies_are_those_of_boundary_integrals() {
+    arrivals_agree(&Reference::bodies(), std::env::var("DD").is_ok());
+}
+
+fn arrivals_agree(reference: &Reference, double_diffraction: bool) {
     let mut all = [Errors::default(), Errors::default()];
     for name in reference.scenes.keys() {
-        let errors = compare(&reference, name);
+        let errors = compare(reference, name, double_diffraction);
         for (kind, mut errors) in errors.into_iter().enumerate() {
             if !errors.range_mm.is_empty() {
                 errors.report(&format!("{name}, {}", ["mirrored", "bent"][kind]));
