@@ -169,7 +169,8 @@ impl Simulator {
                     path_settings(&sensor, &air, &options, &receiver, scatter_height_rad);
                 let wave_number_per_m = settings.wave_number_per_m;
                 let face = sensor.face.map(|face| Disc { face, wave_number_per_m });
-                Box::new(PathEngine::new(&scene, beam, face, settings))
+                let engine = PathEngine::new(&scene, beam, face, settings);
+                Box::new(engine.through_nulls(receiver.asks_incidents()))
             }
             EngineKind::Fan => {
                 Box::new(Fan::new(&scene, beam, fan_settings(&sensor, &air, &options, &receiver)))

@@ -29,6 +29,8 @@ pub struct PathEngine {
     /// What echoes by cylinders are kept by; all are where the axis is tilted, and may be nearer to
     /// a rising path than its azimuth is.
     both: Option<Both>,
+    /// See [`Self::through_nulls`].
+    through_nulls: bool,
 }
 
 impl PathEngine {
@@ -40,11 +42,17 @@ impl PathEngine {
         // A round that the face turns into another loses at least this.
         let turned = face.map_or(0.0, |face| 2.0 * face.face.reflectance / FLOOR_ABOVE);
         let both = is_wanted.then(|| Both::of(&envelope, turned));
-        Self { paths: Paths::new(scene, settings), beam, face, envelope, both }
+        let paths = Paths::new(scene, settings);
+        Self { paths, beam, face, envelope, both, through_nulls: false }
     }
-}
 
-impl PathEngine {
+    /// Gives also what a steady tone could not be heard of because it falls into a null of the beam
+    /// pattern: what the full response of the face to a pulse still hears.
+    #[must_use]
+    pub fn through_nulls(self, through_nulls: bool) -> Self {
+        Self { through_nulls, ..self }
+    }
+
     /// Whether all sound stays in the plane of the scan.
     fn is_flat(&self) -> bool {
         self.paths.images.is_empty() && self.paths.settings.tilt_rad == 0.0
@@ -181,7 +189,12 @@ impl Survey for PathSurvey<'_> {
                 }
                 let [leaving, arriving] = ends.map(|angle| beam.one_way(angle));
                 let amplitude = spoke.amplitude * leaving * arriving;
-                if amplitude >= floor {
+                let most = if self.engine.through_nulls {
+                    spoke.amplitude * self.engine.envelope.beyond(&ends)
+                } else {
+                    amplitude
+                };
+                if most >= floor {
                     let Echo { length_m, phase_rad, .. } = self.echoes[spoke.echo as usize];
                     sounds.push(Sound { length_m, amplitude, phase_rad, index: spoke.echo });
                 }

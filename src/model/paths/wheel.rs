@@ -29,6 +29,12 @@ impl Envelope {
         Self(steps)
     }
 
+    /// The strongest of an echo with both ends so far off the axis or farther, radians.
+    pub(super) fn beyond(&self, ends_rad: &[f64; 2]) -> f64 {
+        let step = |end: f64| (wrap_pi(end).abs() / PI * ENVELOPE_STEPS as f64) as usize;
+        ends_rad.iter().map(|&end| self.0[step(end).min(ENVELOPE_STEPS - 1)]).product()
+    }
+
     /// The angle beyond which the pattern stays below `level`, rounded up to a step, radians.
     pub(super) fn reach_rad(&self, level: f64) -> f64 {
         // A thousandth more than sampled, for what lies between the samples.

@@ -1,5 +1,6 @@
-//! Against the full-wave scans (tests/data/fullwave/README.md): the receiver's first crossing on the
-//! sum of all echoes, and the height of the hump that crosses.
+//! Against the full-wave scans (tests/data/fullwave/README.md, and those of whole bodies by
+//! tests/peers/full_wave.py): the receiver's first crossing on the sum of all echoes, and the height of
+//! the hump that crosses.
 //!
 //! The figures, mirrored and bent echoes apart:
 //! `cargo test --lib tests::full_wave -- --nocapture`
@@ -24,7 +25,7 @@ impl Crossing {
 /// threshold; on a steep slope they differ by half a millimetre.
 const FRAGILE_M: f64 = 3e-3;
 
-fn simulator_of(of: &ReferenceScene, c: f64, threshold: f64) -> Simulator {
+fn simulator_of(of: &ReferenceScene, c: f64, options: Options) -> Simulator {
     let walls = of
         .segments
         .iter()
@@ -32,7 +33,6 @@ fn simulator_of(of: &ReferenceScene, c: f64, threshold: f64) -> Simulator {
         .map(|(i, s)| wall(&format!("w{i}"), (s[0], s[1]), (s[2], s[3]), 1.0))
         .collect();
     let air = Air::default().with_sound_speed(c).expect("a speed");
-    let options = Options { threshold: Some(threshold), lossless: true, ..Options::default() };
     let sensor = Sensor::preset("fullwave-line").expect("a preset");
     Simulator::new(Arc::new(scene(walls)), sensor, air, options).expect("good options")
 }
@@ -121,19 +121,24 @@ fn kind(found: &Prediction) -> usize {
 
 #[test]
 fn ranges_are_those_of_the_full_wave_reference() {
-    ranges_agree(&Reference::given());
+    // The reference's own error bars are 0.5 mm, and 0.5 dB for the ends of plates.
+    ranges_agree(&Reference::given(), false, 0.5);
 }
 
+/// Round whole bodies and in notches sound bends twice too.
 #[test]
 fn ranges_of_whole_bodies_are_those_of_boundary_integrals() {
-    ranges_agree(&Reference::bodies());
+    ranges_agree(&Reference::bodies(), true, 1.0);
 }
 
-fn ranges_agree(reference: &Reference) {
+fn ranges_agree(reference: &Reference, double_diffraction: bool, most_db: f64) {
     let mut score = Score::default();
     for (name, of) in &reference.scenes {
         for tau in ["0.02", "0.05", "0.1"] {
-            let simulator = simulator_of(of, reference.c, tau.parse().expect("a number"));
+            let threshold = Some(tau.parse().expect("a number"));
+            let lossless =
+                Options { threshold, lossless: true, double_diffraction, ..Options::default() };
+            let simulator = simulator_of(of, reference.c, lossless);
             let station = simulator.station(DVec2::from_array(of.sensor));
             for beam in &of.scan {
                 let found = station.ping(beam.azimuth.to_radians());
@@ -151,9 +156,8 @@ fn ranges_agree(reference: &Reference) {
     bent.report("bent");
     assert_eq!(score.disagree, 0);
     assert!(mirrored.range_mm.len() > 100 && bent.range_mm.len() > 20);
-    // The reference's own error bars are 0.5 mm, and 0.5 dB for the ends of plates.
     for errors in [mirrored, bent] {
         assert!(Errors::quantile(&errors.range_mm, 1.0) < 1.0);
-        assert!(Errors::quantile(&errors.amplitude_db, 1.0) < 0.5);
+        assert!(Errors::quantile(&errors.amplitude_db, 1.0) < most_db);
     }
 }
