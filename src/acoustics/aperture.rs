@@ -13,6 +13,9 @@ use super::{Aperture, EchoShape, Gain, Pulse, Sensor, edge::EdgeView, pulse::fil
 /// Points across a face: enough for a phase that runs over 40 radians.
 const POINTS: usize = 24;
 
+/// Points up and down a disc's chords: enough for five radians.
+const HEIGHT_POINTS: usize = 8;
+
 /// Standard deviations of the band that are kept on each side of the carrier.
 const BAND_SIGMAS: f64 = 4.0;
 
@@ -21,10 +24,11 @@ const STEP_US: f64 = 2.0;
 
 /// Response of the whole face, on sending and on receiving, to the sensor's own pulse.
 ///
-/// A disc is Kuc and Siegel's: [`kuc_siegel_response`](super::kuc_siegel_response) of departure and
-/// of arrival, both convolved with the pulse; valid well beyond `a^2 / lambda`. A line aperture is
-/// summed point by point with the curvature of the wave front at finite range (Fresnel's
+/// Summed point by point with the curvature of the wave front at finite range (Fresnel's
 /// approximation), which fills the nulls of the pattern at ranges below some tens of `a^2 / lambda`.
+/// Well beyond them a disc is Kuc and Siegel's: [`kuc_siegel_response`](super::kuc_siegel_response) of
+/// departure and of arrival, both convolved with the pulse. What a disc's height adds to the curvature
+/// is taken at the carrier's frequency.
 #[derive(Debug, Clone)]
 pub struct ApertureResponse {
     aperture: Aperture,
@@ -142,9 +146,7 @@ impl ApertureResponse {
     /// between) a grid of delays would do; the pairs are few enough to be taken one by one.
     fn leads_m(&self, incidence: &Incidence) -> Vec<(f64, Complex64)> {
         let Incidence { leaving_rad, arriving_rad, length_m, image } = *incidence;
-        let curved = matches!(self.aperture, Aperture::Line { .. });
         let bend_m = |x: f64, y: f64| match image {
-            _ if !curved => 0.0,
             Image::Upright => (x + y).powi(2) / (2.0 * length_m),
             Image::Swapped => (x - y).powi(2) / (2.0 * length_m),
             Image::Lost => (x * x + y * y) / length_m,
@@ -154,15 +156,48 @@ impl ApertureResponse {
             Image::Bent(edge) => edge.share(x, y),
             _ => Complex64::ONE,
         };
+        let heights = self.heights(length_m);
         let mut leads = Vec::with_capacity(self.points.len() * self.points.len());
-        for &(u, share_u) in &self.points {
-            for &(v, share_v) in &self.points {
+        for (&(u, share_u), heights) in self.points.iter().zip(&heights) {
+            for (&(v, share_v), height) in self.points.iter().zip(heights) {
                 let (x, y) = (u * leaving_rad.cos(), v * arriving_rad.cos());
                 let lead_m = u * leaving_rad.sin() + v * arriving_rad.sin() - bend_m(x, y);
-                leads.push((lead_m, share_u * share_v * seen(x, y)));
+                leads.push((lead_m, share_u * share_v * seen(x, y) * height));
             }
         }
         leads
+    }
+
+    /// For each pair of points across a disc what is left of the sound between the chords through them
+    /// over a way of `length_m`, because they have a height: the mean of `exp(-i k (z - z')^2 / (2 L))`.
+    fn heights(&self, length_m: f64) -> Vec<Vec<Complex64>> {
+        let count = self.points.len();
+        let Aperture::Piston { radius_m } = self.aperture else {
+            return vec![vec![Complex64::ONE; count]; count];
+        };
+        let bend = PI * self.carrier_hz / self.sound_speed_m_s / length_m;
+        let nodes = gauss_legendre(HEIGHT_POINTS);
+        let between = |one_m: f64, other_m: f64| -> Complex64 {
+            let pairs = nodes.iter().flat_map(|one| nodes.iter().map(move |other| (one, other)));
+            let part = |(&(z, share), &(other_z, other_share)): (&(f64, f64), &(f64, f64))| {
+                let apart_m = one_m * z - other_m * other_z;
+                0.25 * share * other_share * Complex64::cis(-bend * apart_m * apart_m)
+            };
+            pairs.map(part).sum()
+        };
+        let halves: Vec<f64> = self
+            .points
+            .iter()
+            .map(|(u, _)| (radius_m * radius_m - u * u).max(0.0).sqrt())
+            .collect();
+        // Chords left and right of the middle are alike.
+        let half = count.div_ceil(2);
+        let row = |i: usize| -> Vec<Complex64> {
+            let part: Vec<_> = (0..half).map(|j| between(halves[i], halves[j])).collect();
+            (0..count).map(|j| part[j.min(count - 1 - j)]).collect()
+        };
+        let rows: Vec<_> = (0..half).map(row).collect();
+        (0..count).map(|i| rows[i.min(count - 1 - i)].clone()).collect()
     }
 }
 
@@ -297,6 +332,35 @@ mod tests {
                 }
             }
             assert!((echo.at(t_us) - sum).norm() < 5e-4, "{t_us}: {} {sum}", echo.at(t_us));
+        }
+    }
+
+    /// Two equal discs face to face (a disc and its mirror image), at one frequency: Rogers and Van Buren,
+    /// "An exact expression for the Lommel diffraction correction integral", JASA 55 (1974),
+    /// `1 - exp(-i x) (J0(x) + i J1(x))` with `x = k a^2 / z`.
+    #[test]
+    fn a_disc_before_a_near_mirror_is_lommels() {
+        let sensor = preset("senscomp-6500");
+        let Aperture::Piston { radius_m } = sensor.aperture else { panic!("a disc") };
+        let response = ApertureResponse::new(&sensor, SPEED_M_S).expect("a face");
+        let k = TAU * sensor.frequency_hz / SPEED_M_S;
+        // Bessel's integral, exact to rounding on a periodic grid.
+        let bessel = |n: f64, x: f64| {
+            let at = |i: u32| PI * (f64::from(i) + 0.5) / 200.0;
+            (0..200).map(|i| (n * at(i) - x * at(i).sin()).cos()).sum::<f64>() / 200.0
+        };
+        for length_m in [0.188, 0.3, 0.6, 1.2, 4.0] {
+            let head_on =
+                Incidence { leaving_rad: 0.0, arriving_rad: 0.0, length_m, image: Image::Swapped };
+            let leads = response.leads_m(&head_on);
+            let face: Complex64 =
+                leads.iter().map(|(m, share)| share * Complex64::cis(k * m)).sum();
+            let x = k * radius_m * radius_m / length_m;
+            let bessels = Complex64::new(bessel(0.0, x), bessel(1.0, x));
+            let lommel = Complex64::ONE - Complex64::cis(-x) * bessels;
+            // Lommel's is beside a plane wave, ours beside a point's, which is `x / 2` of that.
+            let error = face.norm() - 2.0 * lommel.norm() / x;
+            assert!(error.abs() < 1e-5, "{length_m}: {error}");
         }
     }
 

@@ -61,8 +61,10 @@ const CHECK_ABOUT: &str = "\
 Check a scene file and say in a line what it holds.
 
 A scene is a floor plan in JSON: materials with their reflectance, walls (from one point to \
-another, or a polyline), cylinders, and named poses of the ranger. Lengths are metres, angles \
-degrees counter-clockwise from +x. A fault is shown at its line and column, with what would be \
+another, or a polyline), cylinders, and named poses of the ranger. With floor_z_m and ceiling_z_m \
+it has a height: these reflect too, as floor_material and ceiling_material say (rigid without), \
+and walls and cylinders may end below or above (z_m). Lengths are metres, angles degrees \
+counter-clockwise from +x. A fault is shown at its line and column, with what would be \
 right, and the exit code is 2.";
 
 const CHECK_EXAMPLES: &str = r#"Examples:
@@ -82,7 +84,7 @@ Draw a scene's floor plan as SVG or PNG.
 
 Shows the walls by material with their ids, cylinders, the poses with an arrow along azimuth 0, \
 the robot's body where the scene has one, a scale in metres, and what the scene says of its \
-source and of what is approximate.";
+source and of what is approximate. Heights, and what floor and ceiling are made of, are not drawn.";
 
 const DRAW_EXAMPLES: &str = "\
 Examples:

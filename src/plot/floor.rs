@@ -63,7 +63,11 @@ impl Floor<'_> {
             .stroked(theme::PURPLE, 1.0)
             .with("stroke-dasharray", MIN_RANGE_DASH);
         if let Some(range_m) = self.scan.min_range_m {
-            layer.circle(self.plan.px(self.pose.position()), self.plan.length_px(range_m));
+            // A transducer beside its axis goes round it too.
+            let axis = self.pose.position();
+            let from_axis_m = |beam: &Reading| beam.point(&self.pose, range_m).distance(axis);
+            let radius_m = self.scan.beams.first().map_or(range_m, from_axis_m);
+            layer.circle(self.plan.px(axis), self.plan.length_px(radius_m));
         }
         layer
     }
