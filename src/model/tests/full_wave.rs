@@ -102,11 +102,14 @@ impl Score {
         }
     }
 
-    /// The hump that crosses, against the reference's.
+    /// The hump that crosses, against the reference's; not where it has several maxima, of which
+    /// `found` names the highest.
     fn height(&mut self, peaks: &[(f64, f64)], c: f64, found: &Prediction) {
         let Some(range_m) = found.range_m else { return };
         let since_s = |time_s: f64| time_s - 2.0 * range_m / c;
-        if let Some(peak) = peaks.iter().find(|peak| (0.0..420e-6).contains(&since_s(peak.0))) {
+        let is_near = |peak: &&(f64, f64)| (-50e-6..420e-6).contains(&since_s(peak.0));
+        let near: Vec<_> = peaks.iter().filter(is_near).collect();
+        if let [peak] = near[..] {
             let amplitude = found.amplitude.expect("an amplitude");
             self.errors[kind(found)].amplitude_db.push(20.0 * (amplitude / peak.1).log10());
         }
