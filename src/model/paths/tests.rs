@@ -7,6 +7,7 @@ mod full_wave;
 mod laws;
 mod pairs;
 mod peers;
+mod rims;
 mod rough;
 mod two_edges;
 mod vertical;
