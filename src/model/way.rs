@@ -64,7 +64,8 @@ impl Path {
         for bend in &self.bends {
             match *bend {
                 Bend::Upright(edge) => edges.push(edge.place(scene)?),
-                // In a train it lies as high as the ranger, where the way in the plan is a mirror's.
+                // In a train it lies as high as the ranger, where the way in the plan is a mirror's (or
+                // runs straight over it, and is not drawn).
                 Bend::Level { .. } if walls.contains(&Reflector::Face) => {}
                 Bend::Level { wall, is_upper } => {
                     let rim_z_m = scene.walls.get(wall as usize)?.z_m?[usize::from(is_upper)];

@@ -73,8 +73,8 @@
 //! # Heights
 //!
 //! Walls are upright: what floor and ceiling add to the paths of the plan, and what low walls take
-//! away, is worked out after them (`vertical`, `heights`). A low wall's upper edge answers from the
-//! foot of the perpendicular (`rims`).
+//! away, is worked out after them (`vertical`, `heights`). At the level edges of such walls sound bends
+//! as at upright ones: every way out with every way back, by walls, floor and ceiling (`rims`).
 //!
 //! # The transducer's face
 //!

@@ -28,7 +28,9 @@
 //! without an aspect are for head-on sound and know no slant; they get the same `L`, by which they too
 //! grow as `1 / sqrt(sin b)`.
 //!
-//! Left out are ways by cylinders to a rim, what bends at two, and the corners where rims end.
+//! Left out are ways by cylinders to a rim, the points where rims end, and what bends at two. Where sound
+//! grazes a rim on its way out and on its way back, as it does straight over a low wall and back, both halves
+//! are taken away, where less would be.
 
 use std::f64::consts::TAU;
 

@@ -61,7 +61,7 @@ fn ways_in_space_and_by_two_edges_are_drawn_in_the_plan() {
         wall("screen", (0.6, -0.9), (0.6, 0.3), 1.0),
         wall("plate", (-0.2, -0.5), (0.15, -0.55), 1.0),
     ]);
-    room.floor_z_m = Some(0.0);
+    (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(1.1));
     room.walls[0].z_m = Some([0.0, 0.3]);
     let room = Arc::new(room);
     let mut sensor = Sensor::preset("senscomp-6500").expect("a preset");
@@ -76,7 +76,8 @@ fn ways_in_space_and_by_two_edges_are_drawn_in_the_plan() {
     for echo in &echoes {
         let record = simulator.path_record(&echo.path, echo.length_m);
         assert_eq!(Path::from_record(&record, &room).as_ref(), Some(&echo.path), "{record:?}");
-        let upright = echo.path.walls.iter().all(|wall| *wall == Reflector::Floor);
+        let is_level = |met: &Reflector| matches!(met, Reflector::Floor | Reflector::Ceiling);
+        let upright = echo.path.walls.iter().all(is_level);
         if upright && echo.path.bends.is_empty() {
             continue;
         }
@@ -101,7 +102,7 @@ fn ways_in_space_and_by_two_edges_are_drawn_in_the_plan() {
         floors += usize::from(record.walls.iter().any(|name| name == "floor"));
         twice += usize::from(record.second_edge.is_some());
     }
-    assert!(rims > 10 && floors > 2 && twice > 2, "{rims} {floors} {twice}");
+    assert!(rims >= 4 && floors > 2 && twice > 2, "{rims} {floors} {twice}");
 }
 
 fn mirrors(scene: &Scene, path: &Path, points: &[DVec2]) {

@@ -94,7 +94,7 @@ fn hankel(z: Complex64) -> Complex64 {
 #[test]
 fn the_exact_field_has_its_limits() {
     let source = Spot { off_m: 0.9, around_rad: 1.1, along_m: 0.0 };
-    let near = Spot { off_m: 1e-9, around_rad: 2.0, along_m: 0.6 };
+    let near = Spot { off_m: 1e-12, around_rad: 2.0, along_m: 0.6 };
     let all: Complex64 = macdonald(source, near).iter().flatten().sum();
     let distance_m = 0.9_f64.hypot(0.6);
     let free = Complex64::cis(-K * distance_m) / distance_m;
@@ -149,7 +149,7 @@ fn over_a_half_plane_the_field_is_macdonalds() {
             let found = parts[0][0] + echoes.iter().map(pressure).sum::<Complex64>();
             let off = (found - exact).norm() * source.distance(target);
             worst = worst.max(off);
-            assert!(off < 0.01, "{target} {above_m}: {found} {exact}");
+            assert!(off < 2e-4, "{target} {above_m}: {found} {exact}");
         }
     }
     println!("at most {worst:.1e} of the straight sound");
@@ -235,8 +235,12 @@ fn by_the_floor_a_rim_is_seen_from_an_image() {
         echoes.retain(is_rim);
         assert_eq!(echoes.len(), 4, "{echoes:?}");
         for echo in &echoes {
-            let out_below = echo.rise_rad[0] == -((z_m + top) / d).atan();
-            let back_below = echo.rise_rad[1] == -((z_m + top) / d).atan();
+            let (floor_rad, rim_rad) = (-((z_m + top) / d).atan(), ((top - z_m) / d).atan());
+            let [out_below, back_below] = echo.rise_rad.map(|rise_rad| {
+                let is_near = |rad: f64| (rise_rad - rad).abs() < 1e-12;
+                assert!(is_near(floor_rad) || is_near(rim_rad), "{echo:?}");
+                is_near(floor_rad)
+            });
             let spot = |below: bool| Spot::above(at, if below { -z_m } else { z_m } - top);
             let exact: Complex64 =
                 macdonald(spot(out_below), spot(back_below)).iter().map(|part| part[1]).sum();
@@ -360,7 +364,7 @@ fn receiver_and_transmitter_may_change_places() {
         std::mem::swap(&mut echo.departure_rad, &mut echo.arrival_rad);
         echo.rise_rad.reverse();
     }
-    assert!(there.len() > 100, "{}", there.len());
+    assert!(there.len() > 30, "{}", there.len());
     assert_same(&there, &answers(&back, |angle| angle));
     // From one place each way is heard in both directions.
     let here = paths.enumerate(T);
@@ -430,10 +434,10 @@ fn a_rim_in_pieces_is_one() {
 }
 
 /// The heights at which mirrored ways begin or end, and how far the sum of all sound jumps there.
-fn jumps(plan: &Scene, heights_m: [f64; 2]) -> Vec<(f64, f64, f64)> {
+fn jumps(plan: &Scene, heights_m: [f64; 2], [from, to]: [DVec2; 2]) -> Vec<(f64, f64, f64)> {
     let echoes = |z_m: f64| {
-        let settings = Settings { max_order: Some(3), floor: 1e-6, ..at_height(z_m) };
-        Paths::new(plan, settings).enumerate(DVec2::ZERO)
+        let settings = Settings { max_order: Some(2), floor: 1e-6, ..at_height(z_m) };
+        Paths::new(plan, settings).enumerate_between(from, to)
     };
     // Long ways fade, so that none comes into reach at once.
     let fade = |length_m: f64| 0.5 + 0.5 * (PI * (length_m / 6.0).min(1.0)).cos();
@@ -482,17 +486,24 @@ fn jumps(plan: &Scene, heights_m: [f64; 2]) -> Vec<(f64, f64, f64)> {
 }
 
 /// Where sound begins to pass over a low wall, on its way out or back, by the floor or not, rims take over
-/// by halves.
+/// by halves. What grazes the wall both ways at once would bend twice there, and what is left of its jump
+/// is of that size.
 #[test]
 fn sound_over_a_low_wall_begins_gradually() {
     let mut room = scene(&[[-9.0, 0.6, 9.0, 0.6], [-9.0, 1.5, 9.0, 1.5]]);
     room.floor_z_m = Some(0.0);
     room.walls[0].z_m = Some([0.0, 0.3]);
-    let found = jumps(&room, [0.2137, 1.4]);
-    println!("{found:.3?}");
-    assert!(found.len() >= 3, "{found:?}");
-    for (z_m, alone, jump) in found {
-        assert!(alone > 0.2, "{z_m} {alone}");
-        assert!(jump < 0.03, "a jump of {jump} at {z_m}");
+    let [here, beside] = [DVec2::ZERO, DVec2::new(0.5, -0.35)];
+    let apart = jumps(&room, [0.3137, 1.4], [here, beside]);
+    println!("apart: {apart:.4?}");
+    assert!(apart.len() >= 2, "{apart:?}");
+    for (z_m, alone, jump) in apart {
+        assert!(alone > 0.05 && jump < 0.01, "a jump of {jump} for {alone} at {z_m}");
+    }
+    let twice = jumps(&room, [0.2137, 1.4], [here, here]);
+    println!("one place: {twice:.4?}");
+    assert!(twice.len() >= 2, "{twice:?}");
+    for (z_m, alone, jump) in twice {
+        assert!(alone > 0.05 && jump < 0.1 * alone, "a jump of {jump} for {alone} at {z_m}");
     }
 }

@@ -192,3 +192,32 @@ fn a_low_cylinder_hides_only_what_is_behind_it() {
     assert_eq!(level(0.4), [Reflector::Cylinder(0)]);
     assert_eq!(level(0.6), [Reflector::Wall(0)]);
 }
+
+/// The far wall of a corner is touched there by what comes to it, and is not in its way.
+#[test]
+fn corners_of_low_walls_answer_as_those_of_high_ones() {
+    for turn in 0..12 {
+        let frame = DVec2::from_angle(0.5 * f64::from(turn));
+        let [corner, one, other] =
+            [DVec2::ZERO, DVec2::new(-1.0, 0.0), DVec2::new(0.0, 1.0)].map(|p| frame.rotate(p));
+        let mut plan =
+            scene(&[[one.x, one.y, corner.x, corner.y], [corner.x, corner.y, other.x, other.y]]);
+        plan.floor_z_m = Some(0.0);
+        let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..at_height(0.3) };
+        let level = |plan: &Scene, at: DVec2| -> Vec<f64> {
+            let mut echoes = Paths::new(plan, settings.clone()).enumerate(frame.rotate(at));
+            let is_rim = |bend: &Bend| matches!(bend, Bend::Level { .. });
+            echoes.retain(|e| e.rise_rad == [0.0; 2] && !e.path.bends.iter().any(is_rim));
+            echoes.iter().map(|echo| echo.length_m).collect()
+        };
+        for at in [DVec2::new(-0.4, 0.3), DVec2::new(0.4, -0.3)] {
+            plan.walls.iter_mut().for_each(|wall| wall.z_m = None);
+            let high = level(&plan, at);
+            plan.walls.iter_mut().for_each(|wall| wall.z_m = Some([0.0, 0.5]));
+            let low = level(&plan, at);
+            // No way round or over a wall that sound does not pass at this height.
+            assert!(high.iter().any(|length_m| (length_m - 1.0).abs() < 1e-9), "{high:?}");
+            assert_eq!(low.len(), high.len(), "{low:?} {high:?}");
+        }
+    }
+}
