@@ -34,9 +34,11 @@
 
 use std::f64::consts::TAU;
 
+use num_complex::Complex64;
+
 use super::{
     Echo, Paths, Trees, Via,
-    beam::TIE_M,
+    beam::{Ray, TIE_M},
     echo::{SAME_M, SAME_RAD, drop_repeats},
     edges::distance_parameter_m,
     heights::Ends,
@@ -247,19 +249,45 @@ impl Search<'_> {
         out.least_m + back.least_m > self.paths.settings.max_path_m
     }
 
-    /// The way on Keller's cone, if both arms light the place where it bends, nothing is in its way and
-    /// it is strong enough.
+    /// The way on Keller's cone, if both arms light the place where it bends, it is strong enough and
+    /// nothing is in its way.
     fn way(&self, out: &Arm, back: &Arm) -> Option<(Echo, Rim)> {
-        let settings = &self.paths.settings;
         let across_m = out.off_m + back.off_m;
         let place_m = (out.foot_m * back.off_m + back.foot_m * out.off_m) / across_m;
         if !(out.lights(place_m) && back.lights(place_m)) {
             return None;
         }
         let length_m = across_m.hypot(out.foot_m - back.foot_m);
-        if length_m > settings.max_path_m
-            || !settings.allows(out.lit.beam.order + back.lit.beam.order)
+        let field = self.field(out, back, length_m)?;
+        let place = self.line.place(place_m);
+        let [to, from] = [out, back].map(|arm| arm.lit.beam.ray_to(place));
+        let legs = [Leg::from(&to), Leg::from(&from)];
+        let trees = self.trees;
+        if !(self.is_clear(&trees.out, self.starts[0], out, legs[0], place)
+            && self.is_clear(trees.back(), self.starts[1], back, legs[1], place))
         {
+            return None;
+        }
+        let rise_rad = |arm: &Arm, ray: &Ray| arm.climb_m.atan2(ray.run.length());
+        let echo = Echo {
+            length_m,
+            amplitude: field.norm(),
+            phase_rad: field.arg(),
+            departure: to.departure,
+            arrival: from.departure,
+            rise_rad: [rise_rad(out, &to), rise_rad(back, &from)],
+            image: 0,
+            via: Via::Rim { rim: 0 },
+        };
+        let Line { wall, is_upper, .. } = self.line;
+        Some((echo, Rim { wall, is_upper, legs, images: [out.image, back.image] }))
+    }
+
+    /// Relative field of such a way, `None` if it is below the floor or longer than any that is asked for.
+    fn field(&self, out: &Arm, back: &Arm, length_m: f64) -> Option<Complex64> {
+        let settings = &self.paths.settings;
+        let order = out.lit.beam.order + back.lit.beam.order;
+        if length_m > settings.max_path_m || !settings.allows(order) {
             return None;
         }
         let strength = out.gain * back.gain * settings.air_gain(length_m);
@@ -267,47 +295,25 @@ impl Search<'_> {
         if 2.0 * strength < settings.floor {
             return None;
         }
+        let slant = (out.off_m + back.off_m) / length_m;
         let aspect = Aspect {
             in_rad: out.around_rad,
             out_rad: back.around_rad,
-            distance_m: distance_parameter_m(out.off_m, back.off_m) * across_m / length_m,
+            distance_m: distance_parameter_m(out.off_m, back.off_m) * slant,
         };
         let (wedge, k) = (&self.line.wedge, settings.wave_number_per_m);
         if strength * self.law.bound(wedge, &aspect, k) < settings.floor {
             return None;
         }
         let field = strength * self.law.echo(wedge, &aspect, k);
-        if field.norm() < settings.floor {
-            return None;
-        }
-        let place = self.line.place(place_m);
-        let rays = [out, back].map(|arm| arm.lit.beam.ray_to(place));
-        let legs = [0, 1].map(|end| Leg::from(&rays[end]));
-        let is_clear = self.is_clear(&self.trees.out, 0, out, legs[0], place)
-            && self.is_clear(self.trees.back(), 1, back, legs[1], place);
-        let Line { wall, is_upper, .. } = self.line;
-        let echo = Echo {
-            length_m,
-            amplitude: field.norm(),
-            phase_rad: field.arg(),
-            departure: rays[0].departure,
-            arrival: rays[1].departure,
-            rise_rad: [
-                out.climb_m.atan2(rays[0].run.length()),
-                back.climb_m.atan2(rays[1].run.length()),
-            ],
-            image: 0,
-            via: Via::Rim { rim: 0 },
-        };
-        let images = [out.image, back.image];
-        is_clear.then_some((echo, Rim { wall, is_upper, legs, images }))
+        (field.norm() >= settings.floor).then_some(field)
     }
 
     /// Whether nothing stands in the way of a leg from one of the starts.
-    fn is_clear(&self, tree: &Tree, start: usize, arm: &Arm, leg: Leg, place: DVec2) -> bool {
+    fn is_clear(&self, tree: &Tree, start: DVec2, arm: &Arm, leg: Leg, place: DVec2) -> bool {
         let mut contacts = self.paths.part_contacts(tree, Part::Flat(leg), place);
         contacts.push((place, Reflector::Wall(self.line.wall)));
-        let ends = Ends { start: self.starts[start], end: None, rise_m: arm.climb_m };
+        let ends = Ends { start, end: None, rise_m: arm.climb_m };
         self.paths.is_way_clear(&contacts, &ends)
     }
 }

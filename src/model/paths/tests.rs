@@ -4,6 +4,7 @@ mod creeping;
 mod cylinders;
 mod fan;
 mod full_wave;
+mod half_plane;
 mod laws;
 mod pairs;
 mod peers;
