@@ -54,41 +54,31 @@ impl Path {
         }
         let walls: SmallVec<[Reflector; 8]> =
             self.walls.iter().copied().filter(is_upright).collect();
-        let mut edges: SmallVec<[DVec2; 2]> = SmallVec::new();
-        for bend in &self.bends {
-            // Over a level edge the way in the plan is a mirror's.
-            if let Bend::Upright(edge) = bend {
-                edges.push(edge.place(scene)?);
-            }
-        }
+        let levels: SmallVec<[Reflector; 4]> =
+            self.walls.iter().copied().filter(|met| !is_upright(met)).collect();
         let z_m = z_m.unwrap_or_else(|| usual_z_m(scene.floor_z_m, scene.ceiling_z_m));
-        let rise_m = self.rise_m(scene, z_m)?;
+        let rise_m = level_image_m(scene, z_m, levels.iter())? - z_m;
         let plan_m = (length_m * length_m - rise_m * rise_m).max(0.0).sqrt();
         let way = Way { scene, from, to, plan_m };
+        let mut edges: SmallVec<[DVec2; 2]> = SmallVec::new();
+        for bend in &self.bends {
+            match *bend {
+                Bend::Upright(edge) => edges.push(edge.place(scene)?),
+                // In a train it lies as high as the ranger, where the way in the plan is a mirror's (or
+                // runs straight over it, and is not drawn).
+                Bend::Level { .. } if walls.contains(&Reflector::Face) => {}
+                Bend::Level { wall, is_upper } => {
+                    let rim_z_m = scene.walls.get(wall as usize)?.z_m?[usize::from(is_upper)];
+                    return Over { way, z_m, length_m, wall, rim_z_m }.points(&walls, &levels);
+                }
+            }
+        }
         // The transducer's face sends the sound off again from where it started.
         let mut rounds = walls.split(|wall| *wall == Reflector::Face);
         let first = rounds.next().unwrap_or_default();
         let rounds: SmallVec<[&[Reflector]; 4]> = rounds.collect();
         let mut points = vec![from];
         way.follow(&mut points, first, &rounds, &edges).then_some(points)
-    }
-
-    /// How much higher or lower it ends if floor and ceiling are windows, and a level edge a mirror,
-    /// metres; `None` if the scene has none of these.
-    fn rise_m(&self, scene: &Scene, z_m: f64) -> Option<f64> {
-        for bend in &self.bends {
-            if let Bend::Level { wall, is_upper } = *bend {
-                let limits = scene.walls.get(wall as usize)?.z_m?;
-                return Some(2.0 * (limits[usize::from(is_upper)] - z_m));
-            }
-        }
-        let mut image_z_m = z_m;
-        for level in self.walls.iter().filter(|wall| !is_upright(wall)) {
-            let mirror_z_m =
-                if *level == Reflector::Floor { scene.floor_z_m? } else { scene.ceiling_z_m? };
-            image_z_m = 2.0 * mirror_z_m - image_z_m;
-        }
-        Some(image_z_m - z_m)
     }
 
     /// The path of a log's record in its scene; `None` if the scene lacks one of its names.
@@ -133,6 +123,73 @@ fn bend(scene: &Scene, name: &str) -> Option<Bend> {
     }
 }
 
+/// The height of an image of what stands at `z_m` in floor and ceiling, one after the other; `None` if
+/// the scene has no such thing.
+fn level_image_m<'a>(
+    scene: &Scene,
+    z_m: f64,
+    mut levels: impl Iterator<Item = &'a Reflector>,
+) -> Option<f64> {
+    levels.try_fold(z_m, |image_z_m, level| {
+        let mirror_z_m =
+            if *level == Reflector::Floor { scene.floor_z_m? } else { scene.ceiling_z_m? };
+        Some(2.0 * mirror_z_m - image_z_m)
+    })
+}
+
+/// A way that bends at a level edge.
+struct Over<'a> {
+    way: Way<'a>,
+    /// The ranger's height and that of the edge, metres.
+    z_m: f64,
+    rim_z_m: f64,
+    wall: u32,
+    length_m: f64,
+}
+
+impl Over<'_> {
+    /// Its wall stands among the others where the way bends; how many of the levels are met before that
+    /// is not said, so all splits are tried.
+    fn points(&self, walls: &[Reflector], levels: &[Reflector]) -> Option<Vec<DVec2>> {
+        let own = walls.iter().enumerate().filter(|(_, met)| **met == Reflector::Wall(self.wall));
+        let splits = own.flat_map(|(at, _)| (0..=levels.len()).map(move |split| (at, split)));
+        splits.into_iter().find_map(|(at, split)| {
+            let (out, back) = (&walls[..at], &walls[at + 1..]);
+            let place = self.place([out, back], levels.split_at(split).into())?;
+            let mut points = self.way.leg(self.way.from, place, out)?;
+            points.extend(self.way.leg(place, self.way.to, back)?.into_iter().skip(1));
+            Some(points)
+        })
+    }
+
+    /// Where on its wall such a way bends (Keller's cone, as in `paths::rims`), if it is as long as stated.
+    fn place(&self, walls: [&[Reflector]; 2], levels: [&[Reflector]; 2]) -> Option<DVec2> {
+        let Way { scene, from, to, .. } = self.way;
+        let takes_turns = |levels: &&[Reflector]| levels.windows(2).all(|pair| pair[0] != pair[1]);
+        if !levels.iter().all(takes_turns) {
+            return None;
+        }
+        let backwards: SmallVec<[Reflector; 8]> = walls[1].iter().rev().copied().collect();
+        let images = [self.way.image(from, walls[0])?, self.way.image(to, &backwards)?];
+        let heights_m = [
+            level_image_m(scene, self.z_m, levels[0].iter())?,
+            level_image_m(scene, self.z_m, levels[1].iter().rev())?,
+        ];
+        let (a, b) = self.way.wall(Reflector::Wall(self.wall))?;
+        let line = Mirror::through(a, b);
+        let off_m =
+            [0, 1].map(|end| line.height_m(images[end]).hypot(heights_m[end] - self.rim_z_m));
+        let along = (b - a).normalize_or_zero();
+        let foot_m = images.map(|image| along.dot(image - a));
+        let length_m = (off_m[0] + off_m[1]).hypot(foot_m[0] - foot_m[1]);
+        let place_m = (foot_m[0] * off_m[1] + foot_m[1] * off_m[0]) / (off_m[0] + off_m[1]);
+        let is_it = (length_m - self.length_m).abs() < SAME_LENGTH_M
+            && (-BEYOND_END_M..=a.distance(b) + BEYOND_END_M).contains(&place_m);
+        is_it.then(|| a + place_m * along)
+    }
+}
+
+#[derive(Clone, Copy)]
 struct Way<'a> {
     scene: &'a Scene,
     from: DVec2,

@@ -49,7 +49,7 @@ pub(super) enum Via {
     Scatter {
         spot: u32,
     },
-    /// Back from the rim of a wall, by [`super::trace::Tree::rims`].
+    /// By the rim of a wall, in [`super::Trees::rims`].
     Rim {
         rim: u32,
     },
@@ -62,8 +62,9 @@ impl Echo {
             && self.arrival.distance_squared(other.arrival) < SAME_RAD * SAME_RAD
             && self.image == other.image
             && std::mem::discriminant(&self.via) == std::mem::discriminant(&other.via)
-            // Between two edges there may be several ways of one length; none was found twice.
-            && !matches!(self.via, Via::Edges { .. })
+            // Between two edges, and over rims, there may be several ways of one length; none is here
+            // twice.
+            && !matches!(self.via, Via::Edges { .. } | Via::Rim { .. })
     }
 }
 

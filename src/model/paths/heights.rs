@@ -5,8 +5,17 @@
 //! and pass it, and a path counts if it meets its walls where they stand and the others where they
 //! do not. What their upper and lower edges bend comes on its own (`rims`).
 
+use rstar::{
+    AABB, RTree,
+    primitives::{GeomWithData, Rectangle},
+};
+
 use super::{Echo, Paths, Trees, beam::TIE_M};
-use crate::{geometry::DVec2, model::Reflector, scene::Scene};
+use crate::{
+    geometry::{DVec2, SNAP_M},
+    model::Reflector,
+    scene::Scene,
+};
 
 /// Heights of a scene around a ranger.
 #[derive(Debug, Default)]
@@ -18,9 +27,12 @@ pub(super) struct Heights {
     /// By wall and by cylinder, from and to where; without limits `None`.
     walls: Vec<Option<[f64; 2]>>,
     cylinders: Vec<Option<[f64; 2]>>,
-    /// Walls with limits, and their ends in the plan.
-    limited: Vec<(u32, [DVec2; 2])>,
+    /// Walls with limits, with their ends in the plan.
+    limited: RTree<Limited>,
 }
+
+/// A wall with limits, in the box around it.
+type Limited = GeomWithData<Rectangle<[f64; 2]>, (u32, [DVec2; 2])>;
 
 impl Heights {
     pub(super) fn new(scene: &Scene, segments: &[(DVec2, DVec2)], z_m: f64) -> Self {
@@ -28,7 +40,11 @@ impl Heights {
         let limited = (0..)
             .zip(&walls)
             .filter(|(_, limits)| limits.is_some())
-            .map(|(wall, _)| (wall, <[DVec2; 2]>::from(segments[wall as usize])))
+            .map(|(wall, _)| {
+                let (a, b) = segments[wall as usize];
+                let around = Rectangle::from_corners(a.to_array(), b.to_array());
+                Limited::new(around, (wall, [a, b]))
+            })
             .collect();
         Self {
             floor_z_m: scene.floor_z_m,
@@ -36,7 +52,7 @@ impl Heights {
             z_m,
             walls,
             cylinders: scene.cylinders.iter().map(|cylinder| cylinder.z_m).collect(),
-            limited,
+            limited: RTree::bulk_load(limited),
         }
     }
 
@@ -63,18 +79,31 @@ impl Heights {
     /// How far above the ranger the level edges of a wall with limits are, metres, and whether each is
     /// its upper one. Where it stands on the floor or reaches the ceiling it has none.
     pub(super) fn rims(&self, wall: u32) -> impl Iterator<Item = (f64, bool)> {
-        let [from_m, to_m] = self.walls[wall as usize].unwrap_or_default();
+        let limits = self.walls[wall as usize].unwrap_or_default();
+        let has = self.has_rims(limits);
+        let rim = move |end: usize| has[end].then_some((limits[end] - self.z_m, end == 1));
+        [0, 1].into_iter().filter_map(rim)
+    }
+
+    /// Whether what stands between such heights ends above the floor, and below the ceiling.
+    fn has_rims(&self, [from_m, to_m]: [f64; 2]) -> [bool; 2] {
         let lower = self.floor_z_m.is_none_or(|floor| from_m > floor);
         let upper = self.ceiling_z_m.is_none_or(|ceiling| to_m < ceiling);
-        let lower = lower.then_some((from_m - self.z_m, false));
-        let upper = upper.then_some((to_m - self.z_m, true));
-        lower.into_iter().chain(upper)
+        [lower, upper]
     }
 
     /// Whether paths have to be asked where they meet things.
     fn matter(&self) -> bool {
         let low_round = self.cylinders.iter().any(Option::is_some);
-        self.rises() && (low_round || !self.limited.is_empty())
+        self.rises() && (low_round || self.limited.size() > 0)
+    }
+
+    /// Whether a wall with limits stands in the way of what crosses its line at a height. On a rim it
+    /// does not: there the whole way counts, of which the rim's echo takes half away.
+    fn stands_at(&self, wall: u32, z_m: f64) -> bool {
+        let [from_m, to_m] = self.walls[wall as usize].unwrap_or_default();
+        let [lower, upper] = self.has_rims([from_m, to_m]);
+        (!lower || z_m > from_m + TIE_M) && (!upper || z_m < to_m - TIE_M)
     }
 
     fn limits(&self, reflector: Reflector) -> Option<[f64; 2]> {
@@ -145,9 +174,7 @@ impl Paths {
     }
 
     fn is_clear(&self, trees: &Trees, echo: &Echo, start: DVec2, target: DVec2) -> bool {
-        let image = echo.image.checked_sub(1).map(|image| self.images[image as usize]);
-        let rise_m = image.map_or(0.0, |image| image.rise_m);
-        let ends = Ends { start, end: Some(target), rise_m };
+        let ends = Ends { start, end: Some(target), rise_m: self.image(echo.image).rise_m };
         self.is_way_clear(&self.contacts(trees, echo, target), &ends)
     }
 
@@ -191,11 +218,12 @@ impl Paths {
         z_at: impl Fn(f64) -> f64,
     ) -> bool {
         let heights = &self.heights;
-        let by_wall = heights.limited.iter().any(|&(wall, ends)| {
+        let around = AABB::from_corners(from.to_array(), to.to_array());
+        let by_wall = heights.limited.locate_in_envelope_intersecting(around).any(|near| {
+            let (wall, ends) = near.data;
             !own.contains(&Some(Reflector::Wall(wall)))
-                && crossing(from, to, ends).is_some_and(|share| {
-                    holds(heights.walls[wall as usize], heights.folded_m(z_at(share)))
-                })
+                && crossing(from, to, ends)
+                    .is_some_and(|share| heights.stands_at(wall, heights.folded_m(z_at(share))))
         });
         let by_cylinder = || {
             self.rounds.circles.iter().zip(0..).any(|(circle, cylinder)| {
@@ -219,11 +247,13 @@ pub(super) struct Ends {
     pub(super) rise_m: f64,
 }
 
-/// Where on the way from `from` to `to` a segment is crossed, as a share of it.
+/// Where on the way from `from` to `to` a segment is crossed, as a share of it; none at its very ends,
+/// where it comes to a corner of which that segment is the other wall.
 fn crossing(from: DVec2, to: DVec2, [a, b]: [DVec2; 2]) -> Option<f64> {
     let (run, along) = (to - from, b - a);
     let slant = run.perp_dot(along);
     let share = (a - from).perp_dot(along) / slant;
     let place = (a - from).perp_dot(run) / slant;
-    ((0.0..=1.0).contains(&share) && (0.0..=1.0).contains(&place)).then_some(share)
+    let off_ends_m = share.min(1.0 - share) * run.length();
+    (off_ends_m > 2.0 * SNAP_M && (0.0..=1.0).contains(&place)).then_some(share)
 }

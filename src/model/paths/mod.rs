@@ -73,8 +73,8 @@
 //! # Heights
 //!
 //! Walls are upright: what floor and ceiling add to the paths of the plan, and what low walls take
-//! away, is worked out after them (`vertical`, `heights`). A low wall's upper edge answers from the
-//! foot of the perpendicular (`rims`).
+//! away, is worked out after them (`vertical`, `heights`). At the level edges of such walls sound bends
+//! as at upright ones: every way out with every way back, by walls, floor and ceiling (`rims`).
 //!
 //! # The transducer's face
 //!
@@ -124,6 +124,7 @@ use self::{
     heights::Heights,
     joints::{Joint, Meeting},
     mesh::Mesh,
+    rims::Rim,
     rounds::{Circle, Rounds},
     trace::Tree,
     tubes::TubeGrower,
@@ -291,15 +292,15 @@ impl Paths {
         }
         let joints =
             self.add_rounds(&mut echoes, &mut out, back.as_mut(), [transmitter, receiver], both);
-        let mut trees = Trees { out, back, joints, bridged: Vec::new() };
+        let mut trees = Trees { out, back, joints, bridged: Vec::new(), rims: Vec::new() };
         if let Some(law) = self.settings.edge_law {
             echoes.extend(self.edges.echoes(&mut trees, law, &self.settings));
             echoes.extend(bridges::echoes(self, &mut trees, law));
         }
         self.add_images(&mut echoes, receiver - transmitter);
         self.retain_clear(&trees, &mut echoes, [transmitter, receiver]);
-        if let Some(law) = self.settings.edge_law.filter(|_| !apart) {
-            echoes.extend(rims::echoes(self, &mut trees.out, transmitter, law));
+        if let Some(law) = self.settings.edge_law {
+            echoes.extend(rims::echoes(self, &mut trees, [transmitter, receiver], law));
         }
         (trees, sorted(&echoes))
     }
@@ -359,6 +360,11 @@ impl Paths {
         meeting.joints
     }
 
+    /// An image over floor and ceiling by its number in [`Echo::image`].
+    fn image(&self, number: u16) -> Image {
+        number.checked_sub(1).map_or(Image::NONE, |image| self.images[image as usize])
+    }
+
     /// Each echo of the plan also by way of floor and ceiling, and these by themselves.
     fn add_images(&self, echoes: &mut Vec<Echo>, apart: DVec2) {
         let plan = echoes.len();
@@ -393,6 +399,8 @@ struct Trees {
     joints: Vec<Joint>,
     /// By way of two edges.
     bridged: Vec<Bridged>,
+    /// By way of level edges.
+    rims: Vec<Rim>,
 }
 
 impl Trees {

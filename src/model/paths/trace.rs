@@ -3,7 +3,6 @@
 use super::{
     Face, Paths,
     beam::{Beam, Ray},
-    rims::Rim,
     rounds::Span,
     scatter::{Lit, Spot},
     tube::{Curved, Link},
@@ -30,10 +29,8 @@ pub(super) struct Tree {
     pub(super) lit: Vec<Lit>,
     /// Where rough walls send sound back.
     pub(super) spots: Vec<Spot>,
-    /// Walls with limits where beams come to them, until they have become `rims`.
+    /// Walls with limits where beams come to them, until their rims have been asked.
     pub(super) passed: Vec<Lit>,
-    /// Where their rims send sound back.
-    pub(super) rims: Vec<Rim>,
     /// What tubes have met after their first cylinders.
     pub(super) links: Vec<Link>,
     /// Rays by way of cylinders that end at the receiver or at an edge.

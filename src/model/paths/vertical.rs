@@ -24,7 +24,7 @@ pub(super) struct Image {
     /// Reflections at floor and ceiling.
     pub(super) bounces: u16,
     /// What these leave of the amplitude.
-    gain: f64,
+    pub(super) gain: f64,
 }
 
 /// Floor or ceiling.
@@ -79,6 +79,9 @@ pub(super) fn images(
 }
 
 impl Image {
+    /// The ranger itself.
+    pub(super) const NONE: Self = Self { rise_m: 0.0, bounces: 0, gain: 1.0 };
+
     /// Floor and ceiling in the order in which they are met.
     pub(super) fn met(&self) -> SmallVec<[Reflector; 4]> {
         let first = u16::from(self.rise_m > 0.0);
@@ -90,7 +93,7 @@ impl Image {
     /// An echo of the plan by way of this image, which is number `index`; `None` if it is too long
     /// or too weak.
     pub(super) fn echo(&self, plan: &Echo, index: u16, settings: &Settings) -> Option<Echo> {
-        // What is scattered goes straight back; it has its own way to floor and ceiling.
+        // What is scattered goes straight back; rims have their own ways to floor and ceiling.
         if matches!(plan.via, Via::Scatter { .. } | Via::Rim { .. }) {
             return None;
         }

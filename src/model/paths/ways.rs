@@ -70,8 +70,11 @@ impl Paths {
                 self.there_and_back(tree, spot.leg, spot.wall)
             }
             Via::Rim { rim } => {
-                let rim = &tree.rims[rim as usize];
-                self.there_and_back(tree, rim.leg, rim.wall)
+                let Rim { wall, legs: [out, back], .. } = trees.rims[rim as usize];
+                let mut walls = self.met(tree, Part::Flat(out));
+                walls.push(Reflector::Wall(wall));
+                walls.extend(self.met(home, Part::Flat(back)).into_iter().rev());
+                walls
             }
             Via::Cylinder { joint } => {
                 let Joint { cylinder, out, back, .. } = trees.joints[joint as usize];
@@ -95,8 +98,13 @@ impl Paths {
             }
         };
         // Floor and ceiling stand after the walls, wherever on the way they are met.
-        if let Some(image) = echo.image.checked_sub(1) {
-            walls.extend(self.images[image as usize].met());
+        match echo.via {
+            Via::Rim { rim } => {
+                let [out, back] = trees.rims[rim as usize].images.map(|image| self.image(image));
+                walls.extend(out.met().into_iter().rev());
+                walls.extend(back.met());
+            }
+            _ => walls.extend(self.image(echo.image).met()),
         }
         Path { kind, walls, bends: self.bends(trees, echo) }
     }
@@ -110,7 +118,7 @@ impl Paths {
                 points.into_iter().filter_map(upright).collect()
             }
             Via::Rim { rim } => {
-                let Rim { wall, is_upper, .. } = trees.out.rims[rim as usize];
+                let Rim { wall, is_upper, .. } = trees.rims[rim as usize];
                 smallvec![Bend::Level { wall, is_upper }]
             }
             _ => SmallVec::new(),

@@ -61,7 +61,7 @@ fn ways_in_space_and_by_two_edges_are_drawn_in_the_plan() {
         wall("screen", (0.6, -0.9), (0.6, 0.3), 1.0),
         wall("plate", (-0.2, -0.5), (0.15, -0.55), 1.0),
     ]);
-    room.floor_z_m = Some(0.0);
+    (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(1.1));
     room.walls[0].z_m = Some([0.0, 0.3]);
     let room = Arc::new(room);
     let mut sensor = Sensor::preset("senscomp-6500").expect("a preset");
@@ -76,20 +76,33 @@ fn ways_in_space_and_by_two_edges_are_drawn_in_the_plan() {
     for echo in &echoes {
         let record = simulator.path_record(&echo.path, echo.length_m);
         assert_eq!(Path::from_record(&record, &room).as_ref(), Some(&echo.path), "{record:?}");
-        let upright = echo.path.walls.iter().all(|wall| *wall == Reflector::Floor);
+        let is_level = |met: &Reflector| matches!(met, Reflector::Floor | Reflector::Ceiling);
+        let upright = echo.path.walls.iter().all(is_level);
         if upright && echo.path.bends.is_empty() {
             continue;
         }
         let points = echo.path.points(&room, at, echo.length_m);
         let points = points.unwrap_or_else(|| panic!("no way for {record:?}"));
-        let plan_m: f64 = points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
-        let rise_m = echo.rise_rad[0].sin() * echo.length_m;
-        assert!((plan_m.hypot(rise_m) - echo.length_m).abs() < 1e-6, "{record:?}");
-        rims += usize::from(record.edge.as_deref() == Some("low.top"));
+        let run_m = |points: &[DVec2]| -> f64 {
+            points.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
+        };
+        if record.edge.as_deref() == Some("low.top") {
+            // As steep as it leaves up to the edge, as steep as it comes from there on.
+            let [up, down] = echo.rise_rad.map(f64::cos);
+            let bends = |at: &usize| {
+                let (out, back) = (run_m(&points[..=*at]) / up, run_m(&points[*at..]) / down);
+                (out + back - echo.length_m).abs() < 1e-6
+            };
+            assert!((1..points.len() - 1).any(|at| bends(&at)), "{record:?} {points:?}");
+            rims += 1;
+        } else {
+            let rise_m = echo.rise_rad[0].sin() * echo.length_m;
+            assert!((run_m(&points).hypot(rise_m) - echo.length_m).abs() < 1e-6, "{record:?}");
+        }
         floors += usize::from(record.walls.iter().any(|name| name == "floor"));
         twice += usize::from(record.second_edge.is_some());
     }
-    assert!(rims == 1 && floors > 2 && twice > 2, "{rims} {floors} {twice}");
+    assert!(rims >= 4 && floors > 2 && twice > 2, "{rims} {floors} {twice}");
 }
 
 fn mirrors(scene: &Scene, path: &Path, points: &[DVec2]) {

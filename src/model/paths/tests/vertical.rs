@@ -172,81 +172,6 @@ fn a_low_wall_is_missed_above_and_bars_the_way_below() {
     assert!(all.contains(&vec![high, floor]), "{all:?}");
 }
 
-/// A wall from the floor to 0.3 m, 1 m away.
-fn low_wall() -> Scene {
-    let mut plan = scene(&[[-2.0, 1.0, 2.0, 1.0]]);
-    plan.floor_z_m = Some(0.0);
-    plan.walls[0].z_m = Some([0.0, 0.3]);
-    plan
-}
-
-fn rims(plan: &Scene, at: DVec2, z_m: f64) -> Vec<EchoPath> {
-    let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..at_height(z_m) };
-    let mut echoes = Paths::new(plan, settings).enumerate(at);
-    echoes.retain(|echo| matches!(echo.path.bends[..], [Bend::Level { .. }]));
-    echoes
-}
-
-/// Keller's coefficient of a half plane, straight back at `theta` from its face:
-/// `(1 + 1 / cos theta) / (2 sqrt(2 pi k))`, over `sqrt(s / 2)`; 1962, equation (14) for a rigid one.
-#[test]
-fn the_upper_edge_of_a_low_wall_answers_from_the_foot_of_the_perpendicular() {
-    for (z_m, exact) in [(0.9, 3e-3), (1.3, 3e-3), (0.5, 3e-2)] {
-        let found = rims(&low_wall(), DVec2::new(0.4, 0.0), z_m);
-        assert_eq!(found.len(), 1, "{found:?}");
-        let distance_m = 1_f64.hypot(z_m - 0.3);
-        assert!((found[0].length_m - 2.0 * distance_m).abs() < 1e-12);
-        assert!((found[0].rise_rad[0] + (z_m - 0.3).atan()).abs() < 1e-12);
-        assert!((found[0].departure_rad - FRAC_PI_2).abs() < 1e-9);
-        assert_eq!(found[0].path.walls[..], [Reflector::Wall(0)]);
-        let cosine = -(z_m - 0.3) / distance_m;
-        let k = LOSSLESS.wave_number_per_m;
-        let keller = (1.0 + 1.0 / cosine).abs() / (2.0 * (TAU * k * 0.5 * distance_m).sqrt());
-        assert!((found[0].amplitude / keller - 1.0).abs() < exact, "{z_m}: {found:?} {keller}");
-    }
-    // Not beyond the wall's end, and not over a wall as high as the ranger.
-    assert!(rims(&low_wall(), DVec2::new(2.1, 0.0), 0.9).is_empty());
-    let mut hidden = low_wall();
-    hidden.walls.push(Wall {
-        a: DVec2::new(-2.0, 0.5),
-        b: DVec2::new(2.0, 0.5),
-        z_m: Some([0.0, 0.89]),
-        ..hidden.walls[0].clone()
-    });
-    let found = rims(&hidden, DVec2::new(0.4, 0.0), 0.9);
-    assert_eq!(
-        found.iter().map(|echo| echo.path.walls[0]).collect::<Vec<_>>(),
-        [Reflector::Wall(1)]
-    );
-}
-
-/// The ranger rises past the edge: the wall's echo ends, and with the edge's nothing jumps.
-#[test]
-fn a_wall_ends_gradually_at_its_upper_edge() {
-    let k = LOSSLESS.wave_number_per_m;
-    let field = |z_m: f64| {
-        let settings = Settings { max_path_m: 2.3, edge_law: Some(EdgeLaw::Utd), ..at_height(z_m) };
-        let echoes = Paths::new(&low_wall(), settings).enumerate(DVec2::ZERO);
-        // Without what comes by the floor.
-        let level = echoes.iter().filter(|echo| !echo.path.walls.contains(&Reflector::Floor));
-        level
-            .map(|e| {
-                num_complex::Complex64::from_polar(
-                    e.amplitude,
-                    e.phase_rad - k * (e.length_m - 2.0),
-                )
-            })
-            .sum::<num_complex::Complex64>()
-    };
-    let fields: Vec<_> = (0..=400).map(|i| field(0.2 + 0.0005 * f64::from(i))).collect();
-    for (i, pair) in fields.windows(2).enumerate() {
-        let step = (pair[1] - pair[0]).norm();
-        assert!(step < 0.03, "a jump of {step} at {}", 0.2 + 0.0005 * i as f64);
-    }
-    assert!((fields[200].norm() - 0.5).abs() < 0.01, "{}", fields[200]);
-    assert!(fields[400].norm() < 0.1 && (fields[0].norm() - 1.0).abs() < 0.15);
-}
-
 /// A low post hides what is behind it from a ranger at its height, not from one above.
 #[test]
 fn a_low_cylinder_hides_only_what_is_behind_it() {
@@ -266,4 +191,33 @@ fn a_low_cylinder_hides_only_what_is_behind_it() {
     };
     assert_eq!(level(0.4), [Reflector::Cylinder(0)]);
     assert_eq!(level(0.6), [Reflector::Wall(0)]);
+}
+
+/// The far wall of a corner is touched there by what comes to it, and is not in its way.
+#[test]
+fn corners_of_low_walls_answer_as_those_of_high_ones() {
+    for turn in 0..12 {
+        let frame = DVec2::from_angle(0.5 * f64::from(turn));
+        let [corner, one, other] =
+            [DVec2::ZERO, DVec2::new(-1.0, 0.0), DVec2::new(0.0, 1.0)].map(|p| frame.rotate(p));
+        let mut plan =
+            scene(&[[one.x, one.y, corner.x, corner.y], [corner.x, corner.y, other.x, other.y]]);
+        plan.floor_z_m = Some(0.0);
+        let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..at_height(0.3) };
+        let level = |plan: &Scene, at: DVec2| -> Vec<f64> {
+            let mut echoes = Paths::new(plan, settings.clone()).enumerate(frame.rotate(at));
+            let is_rim = |bend: &Bend| matches!(bend, Bend::Level { .. });
+            echoes.retain(|e| e.rise_rad == [0.0; 2] && !e.path.bends.iter().any(is_rim));
+            echoes.iter().map(|echo| echo.length_m).collect()
+        };
+        for at in [DVec2::new(-0.4, 0.3), DVec2::new(0.4, -0.3)] {
+            plan.walls.iter_mut().for_each(|wall| wall.z_m = None);
+            let high = level(&plan, at);
+            plan.walls.iter_mut().for_each(|wall| wall.z_m = Some([0.0, 0.5]));
+            let low = level(&plan, at);
+            // No way round or over a wall that sound does not pass at this height.
+            assert!(high.iter().any(|length_m| (length_m - 1.0).abs() < 1e-9), "{high:?}");
+            assert_eq!(low.len(), high.len(), "{low:?} {high:?}");
+        }
+    }
 }
