@@ -215,6 +215,7 @@ fn l_room() {
         max_order: Some(8),
         floor: 1e-6,
         rounds_above: 1.0,
+        crowded_m: 0.0,
         edge_law: None,
         double_diffraction: false,
         absorption_np_per_m: 0.0,
