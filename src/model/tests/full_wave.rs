@@ -109,7 +109,9 @@ impl Score {
         let since_s = |time_s: f64| time_s - 2.0 * range_m / c;
         let is_near = |peak: &&(f64, f64)| (-50e-6..420e-6).contains(&since_s(peak.0));
         let near: Vec<_> = peaks.iter().filter(is_near).collect();
-        if let [peak] = near[..] {
+        if let [peak] = near[..]
+            && since_s(peak.0) >= 0.0
+        {
             let amplitude = found.amplitude.expect("an amplitude");
             self.errors[kind(found)].amplitude_db.push(20.0 * (amplitude / peak.1).log10());
         }
