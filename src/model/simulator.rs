@@ -1,35 +1,26 @@
 //! Engine and receiver joined: what the ranger reads.
 
-use std::{
-    f64::consts::{LOG10_E, TAU},
-    sync::Arc,
-};
+use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    Bend, Cone, Edge, Engine, Fan, FanSettings, Path, Prediction, Reflector, Station,
+    Bend, Cone, Edge, Engine, Fan, Path, Prediction, Reflector, Station,
     paths::{self, PathEngine},
     place::Place,
 };
 use crate::{
-    acoustics::{
-        Air, BeamPattern, Combining, Disc, EdgeLawKind, Receiver, Response, Sensor, SensorError,
-        edge::EdgeLaw,
-    },
+    acoustics::{Air, BeamPattern, Disc, EdgeLawKind, Receiver, Response, Sensor, SensorError},
     geometry::{DVec2, Pose},
     scan::{ModelRecord, PathRecord, ScanPlan, SimRecord},
     scene::Scene,
 };
 
-/// Paths this far below the threshold are given up, decibels: a silence is still explained by
-/// what came within that.
-const MARGIN_KEPT_DB: f64 = 40.0;
+mod settings;
 
-/// The same for `paths`, which would find a great many more down there.
-const PATHS_KEPT_DB: f64 = 20.0;
+use settings::{fan_settings, path_settings, receiver};
 
 /// What the transducer's own face is called among the walls of a path.
 pub(super) const FACE_NAME: &str = "transducer";
@@ -37,9 +28,6 @@ pub(super) const FACE_NAME: &str = "transducer";
 /// The same of a room's floor and ceiling.
 pub(super) const FLOOR_NAME: &str = "floor";
 pub(super) const CEILING_NAME: &str = "ceiling";
-
-/// Bozma and Kuc's scattering strength of the right-angled edge that they scanned.
-const SIGMA_E: f64 = 0.095;
 
 /// How echoes are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -344,71 +332,5 @@ impl Options {
             within("aperture_deg", aperture_deg, 0.0, 180.0, "from 0 to 180 degrees")?;
         }
         within("ray_spacing_deg", self.ray_spacing_deg, 1e-4, 5.0, "from 0.0001 to 5 degrees")
-    }
-}
-
-/// The sensor's receiver with the options applied. Only `paths` knows phases.
-fn receiver(sensor: &Sensor, air: &Air, options: &Options) -> Receiver {
-    let sensor = Sensor { response: options.response.unwrap_or(sensor.response), ..sensor.clone() };
-    let mut receiver = Receiver::new(&sensor, air.sound_speed_m_s())
-        .with_threshold(options.threshold.unwrap_or(sensor.threshold));
-    receiver.blanking_us = options.blanking_us.unwrap_or(sensor.blanking_us);
-    receiver.max_range_m = options.max_range_m.unwrap_or(sensor.max_range_m);
-    if options.ideal_receiver || options.engine != EngineKind::Paths {
-        receiver.combining = Combining::Ideal;
-    }
-    receiver
-}
-
-fn path_settings(
-    sensor: &Sensor,
-    air: &Air,
-    options: &Options,
-    receiver: &Receiver,
-    scatter_height_rad: f64,
-) -> paths::Settings {
-    let wave_number_per_m = TAU * sensor.frequency_hz / receiver.sound_speed_m_s;
-    let law = match options.edge_law.or(sensor.edge_law) {
-        None | Some(EdgeLawKind::Utd) => EdgeLaw::Utd,
-        Some(EdgeLawKind::KucSiegel) => EdgeLaw::KucSiegel,
-        Some(EdgeLawKind::BozmaKuc) => EdgeLaw::BozmaKuc {
-            sigma: SIGMA_E,
-            far_field_m: sensor.half_width_m().powi(2) * wave_number_per_m / TAU,
-        },
-    };
-    paths::Settings {
-        max_path_m: 2.0 * receiver.max_range_m,
-        max_order: options.max_order.map(|order| order.try_into().unwrap_or(u16::MAX)),
-        floor: receiver.threshold * 10f64.powf(-PATHS_KEPT_DB / 20.0),
-        rounds_above: paths::ROUNDS_ABOVE,
-        crowded_m: (receiver.blanking_us + receiver.integration_us)
-            * 1e-6
-            * receiver.sound_speed_m_s,
-        edge_law: Some(law),
-        double_diffraction: options.double_diffraction,
-        absorption_np_per_m: absorption_db_per_m(sensor, air, options) / (20.0 * LOG10_E),
-        wave_number_per_m,
-        sensor_z_m: sensor.mounting.z_m,
-        tilt_rad: sensor.mounting.tilt_deg.to_radians(),
-        scatter_height_rad,
-    }
-}
-
-fn absorption_db_per_m(sensor: &Sensor, air: &Air, options: &Options) -> f64 {
-    if options.lossless || sensor.gain.makes_up_for_air() {
-        return 0.0;
-    }
-    air.absorption_db_per_m(sensor.frequency_hz)
-}
-
-fn fan_settings(sensor: &Sensor, air: &Air, options: &Options, receiver: &Receiver) -> FanSettings {
-    FanSettings {
-        spacing_rad: options.ray_spacing_deg.to_radians(),
-        half_face_m: sensor.half_width_m(),
-        wavelength_m: receiver.sound_speed_m_s / sensor.frequency_hz,
-        absorption_db_per_m: absorption_db_per_m(sensor, air, options),
-        longest_m: 2.0 * receiver.max_range_m,
-        weakest: receiver.threshold * 10f64.powf(-MARGIN_KEPT_DB / 20.0),
-        max_order: options.max_order.unwrap_or(u32::MAX),
     }
 }

@@ -167,3 +167,50 @@ fn transition_function_is_its_integral() {
         );
     }
 }
+
+/// A wall that ends 6 mm beside the foot of the perpendicular: from most of a face 38 mm wide it is seen
+/// head-on, from the rest it is not.
+fn near_the_end() -> EdgeView {
+    let (range_m, beside_m) = (0.6, 0.006_f64);
+    let seen_rad = PI / 2.0 - (beside_m / range_m).asin();
+    EdgeView {
+        wedge: half_plane(),
+        aspect: back(range_m, seen_rad.to_degrees()),
+        wave_number_per_m: K,
+        legs_m: [range_m; 2],
+        swapped: [false; 2],
+    }
+}
+
+fn at(view: &EdgeView, left_m: f64) -> Complex64 {
+    EdgeLaw::Utd.echo(&view.wedge, &view.aspect_from(left_m, left_m), view.wave_number_per_m)
+}
+
+/// Where the face sees the wall as its middle does, what it sees of the edge is the coefficient; where it
+/// does not, the mirrored echo that is counted nevertheless is taken away.
+#[test]
+fn a_view_runs_on_where_the_walls_echo_ends() {
+    let view = near_the_end();
+    let middle = at(&view, 0.0);
+    for left_mm in -19..=19 {
+        let left_m = 1e-3 * f64::from(left_mm);
+        let too_much = at(&view, left_m) - view.share(left_m, left_m) * middle;
+        // The edge is seen under a larger angle from farther right.
+        let expected = if left_mm < -6 { 1.0 } else { 0.0 };
+        assert!(
+            left_mm == -6 || (too_much.norm() - expected).abs() < 1e-3,
+            "{left_mm}: {too_much}"
+        );
+    }
+}
+
+#[test]
+fn a_view_has_no_jumps() {
+    let view = near_the_end();
+    let shares: Vec<Complex64> =
+        (-190..=190).map(|i| view.share(1e-4 * f64::from(i), 1e-4 * f64::from(i))).collect();
+    for pair in shares.windows(2) {
+        assert!((pair[1] - pair[0]).norm() < 0.02, "{pair:?}");
+    }
+    assert!((shares[190] - 1.0).norm() < 1e-12);
+}

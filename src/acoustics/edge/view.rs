@@ -30,15 +30,14 @@ impl EdgeView {
     /// is `heard_m` to the left as one looks along the way back.
     #[must_use]
     pub fn share(&self, sent_m: f64, heard_m: f64) -> Complex64 {
-        let aspect = Aspect {
-            in_rad: self.seen_rad(self.aspect.in_rad, 0, sent_m),
-            out_rad: self.seen_rad(self.aspect.out_rad, 1, heard_m),
-            ..self.aspect
-        };
         let field =
             |aspect: &Aspect| self.wedge.uniform(aspect, &self.aspect, self.wave_number_per_m);
         let middle = field(&self.aspect);
-        if middle == Complex64::ZERO { Complex64::ONE } else { field(&aspect) / middle }
+        if middle == Complex64::ZERO {
+            Complex64::ONE
+        } else {
+            field(&self.aspect_from(sent_m, heard_m)) / middle
+        }
     }
 
     /// By how much longer the ways are, metres, to second order: what distance adds to the slant.
@@ -46,6 +45,15 @@ impl EdgeView {
     pub fn bend_m(&self, sent_m: f64, heard_m: f64) -> f64 {
         let [out_m, back_m] = self.legs_m;
         sent_m * sent_m / (2.0 * out_m) + heard_m * heard_m / (2.0 * back_m)
+    }
+
+    /// As the edge is seen from two such points, at the same distance parameter.
+    pub(super) fn aspect_from(&self, sent_m: f64, heard_m: f64) -> Aspect {
+        Aspect {
+            in_rad: self.seen_rad(self.aspect.in_rad, 0, sent_m),
+            out_rad: self.seen_rad(self.aspect.out_rad, 1, heard_m),
+            ..self.aspect
+        }
     }
 
     /// Where a point to the left of the face's middle is seen from the edge, at the end of a leg.
