@@ -152,10 +152,11 @@ impl ApertureResponse {
             Image::Lost => (x * x + y * y) / length_m,
             Image::Bent(edge) => edge.bend_m(x, y),
         };
-        let seen = |x: f64, y: f64| match image {
-            Image::Bent(edge) => edge.share(x, y),
-            _ => Complex64::ONE,
+        let shares = match image {
+            Image::Bent(edge) => Some(edge.shares()),
+            _ => None,
         };
+        let seen = |x: f64, y: f64| shares.as_ref().map_or(Complex64::ONE, |share| share(x, y));
         let heights = self.heights(length_m);
         let mut leads = Vec::with_capacity(self.points.len() * self.points.len());
         for (&(u, share_u), heights) in self.points.iter().zip(&heights) {

@@ -26,17 +26,18 @@ pub struct EdgeView {
 
 impl EdgeView {
     /// Field beside that from middle to middle, without the difference of the ways' lengths: from a point
-    /// of the face that is `sent_m` metres to the left as one looks out along the way, back to one that
-    /// is `heard_m` to the left as one looks along the way back.
-    #[must_use]
-    pub fn share(&self, sent_m: f64, heard_m: f64) -> Complex64 {
+    /// of the face so many metres to the left, as one looks to where the sound goes, back to one so many
+    /// to the left, as one looks to where it comes from.
+    pub fn shares(&self) -> impl Fn(f64, f64) -> Complex64 + use<> {
+        let view = *self;
         let field =
-            |aspect: &Aspect| self.wedge.uniform(aspect, &self.aspect, self.wave_number_per_m);
-        let middle = field(&self.aspect);
-        if middle == Complex64::ZERO {
-            Complex64::ONE
-        } else {
-            field(&self.aspect_from(sent_m, heard_m)) / middle
+            move |aspect: &Aspect| view.wedge.uniform(aspect, &view.aspect, view.wave_number_per_m);
+        let middle = field(&view.aspect);
+        move |sent_m, heard_m| {
+            if middle == Complex64::ZERO {
+                return Complex64::ONE;
+            }
+            field(&view.aspect_from(sent_m, heard_m)) / middle
         }
     }
 

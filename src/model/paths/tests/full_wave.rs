@@ -80,6 +80,7 @@ impl Chain {
         let bent = echo.path.kind == PathKind::Diffracted;
         let side = if echo.path.walls.len() % 2 == 1 { -1.0 } else { 1.0 };
         let point = |i: i32| self.half_width_m * (f64::from(2 * i + 1) / f64::from(POINTS) - 1.0);
+        let shares = edge.map(|edge| edge.shares());
         let mut sum = Complex64::ZERO;
         for u in (0..POINTS).map(point) {
             for v in (0..POINTS).map(point) {
@@ -89,7 +90,7 @@ impl Chain {
                 } else {
                     (x + side * y).powi(2) / (2.0 * echo.length_m)
                 };
-                let seen = edge.map_or(Complex64::ONE, |edge| edge.share(x, y));
+                let seen = shares.as_ref().map_or(Complex64::ONE, |share| share(x, y));
                 sum += seen * Complex64::cis(k * (u * leaving.sin() + v * arriving.sin() - curved));
             }
         }
