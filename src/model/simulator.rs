@@ -68,8 +68,9 @@ pub struct Options {
     pub blanking_us: Option<f64>,
     /// How the face answers to a pulse.
     pub response: Option<Response>,
-    /// Detect one sound at a time, and time it by its path alone ([`Combining::Ideal`]); engines
-    /// other than `paths` know no phases and always do.
+    /// Detect one sound at a time, and time it by its path alone
+    /// ([`Combining::Ideal`](crate::acoustics::Combining::Ideal)); engines other than `paths` know no
+    /// phases and always do.
     pub ideal_receiver: bool,
     /// Leave out the absorption of the air.
     pub lossless: bool,
