@@ -22,6 +22,8 @@ pub struct Arrangement {
     pub points: Vec<DVec2>,
     /// What is left of the segments; no two between the same points.
     pub pieces: Vec<Piece>,
+    /// Pieces that lie on one of these, of segments given later.
+    pub covered: Vec<Piece>,
 }
 
 /// A part of a segment between two points of an [`Arrangement`].
@@ -132,7 +134,7 @@ fn cuts(parts: &[Part]) -> Vec<Vec<DVec2>> {
     cuts
 }
 
-/// Makes ends that are closer than [`SNAP_M`] one point, and drops pieces that lie on others.
+/// Makes ends that are closer than [`SNAP_M`] one point, and puts pieces that lie on others aside.
 fn join(parts: &[Part]) -> Arrangement {
     let ends: Vec<DVec2> = parts.iter().flat_map(|part| [part.a, part.b]).collect();
     let tree = RTree::bulk_load(
@@ -155,8 +157,14 @@ fn join(parts: &[Part]) -> Arrangement {
     let mut seen = HashMap::new();
     for (i, part) in parts.iter().enumerate() {
         let [a, b] = [point_of[2 * i], point_of[2 * i + 1]];
-        if a != b && seen.insert((a.min(b), a.max(b)), ()).is_none() {
-            result.pieces.push(Piece { ends: [a, b], segment: part.segment });
+        if a == b {
+            continue;
+        }
+        let piece = Piece { ends: [a, b], segment: part.segment };
+        if seen.insert((a.min(b), a.max(b)), ()).is_none() {
+            result.pieces.push(piece);
+        } else {
+            result.covered.push(piece);
         }
     }
     result

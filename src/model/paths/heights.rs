@@ -5,6 +5,8 @@
 //! and pass it, and a path counts if it meets its walls where they stand and the others where they
 //! do not. What their upper and lower edges bend comes on its own (`rims`).
 
+use std::collections::{HashMap, HashSet};
+
 use rstar::{
     AABB, RTree,
     primitives::{GeomWithData, Rectangle},
@@ -12,7 +14,7 @@ use rstar::{
 
 use super::{Echo, Paths, Trees, beam::TIE_M};
 use crate::{
-    geometry::{DVec2, SNAP_M},
+    geometry::{Arrangement, DVec2, SNAP_M},
     model::Reflector,
     scene::Scene,
 };
@@ -74,6 +76,36 @@ impl Heights {
     /// Whether sound can pass a wall below or above.
     pub(super) fn lets_pass(&self, wall: u32) -> bool {
         self.rises() && self.walls[wall as usize].is_some()
+    }
+
+    /// Walls that stand above or below the one that the plan knows at the same place, by the ends of their
+    /// pieces, smaller number first. Of walls that share heights there the one given first counts.
+    pub(super) fn stacked(&self, plan: &Arrangement) -> HashMap<[u32; 2], Vec<u32>> {
+        if !self.rises() || plan.covered.is_empty() {
+            return HashMap::new();
+        }
+        let sorted = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
+        let covered: HashSet<_> = plan.covered.iter().map(|piece| sorted(piece.ends)).collect();
+        let mut stacks: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
+        for piece in plan.pieces.iter().chain(&plan.covered) {
+            let ends = sorted(piece.ends);
+            if !covered.contains(&ends) {
+                continue;
+            }
+            let stack = stacks.entry(ends).or_default();
+            if stack.iter().all(|&wall| self.are_apart(wall, piece.segment)) {
+                stack.push(piece.segment);
+            }
+        }
+        for stack in stacks.values_mut() {
+            stack.remove(0);
+        }
+        stacks
+    }
+
+    fn are_apart(&self, one: u32, other: u32) -> bool {
+        let [one, other] = [one, other].map(|wall| self.walls[wall as usize]);
+        one.zip(other).is_some_and(|([a, b], [c, d])| b <= c || d <= a)
     }
 
     /// How far above the ranger the level edges of a wall with limits are, metres, and whether each is

@@ -1,6 +1,8 @@
 //! A scene's floor plan as triangles: whoever walks from triangle to triangle meets walls in
 //! the order in which sound meets them.
 
+use std::collections::HashMap;
+
 use rstar::{RTree, primitives::GeomWithData};
 use smallvec::SmallVec;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
@@ -15,6 +17,8 @@ pub(super) struct Mesh {
     pub(super) triangles: Vec<Triangle>,
     /// For each triangle what is behind its sides, walls or not; `u32::MAX` at the box.
     across: Vec<[u32; 3]>,
+    /// Walls that stand above or below another at the same place, by its ends, smaller number first.
+    stacked: HashMap<[u32; 2], Vec<u32>>,
     /// Some triangle at each point.
     near: RTree<GeomWithData<[f64; 2], u32>>,
 }
@@ -41,7 +45,12 @@ pub(super) enum Side {
 impl Mesh {
     /// Triangulates the walls in a box that is `margin_m` wider than they are. `None` if there
     /// are no walls and `extra` points, which the box has to hold too.
-    pub(super) fn new(plan: &Arrangement, extra: &[DVec2], margin_m: f64) -> Option<Self> {
+    pub(super) fn new(
+        plan: &Arrangement,
+        stacked: HashMap<[u32; 2], Vec<u32>>,
+        extra: &[DVec2],
+        margin_m: f64,
+    ) -> Option<Self> {
         let all = || plan.points.iter().chain(extra).copied();
         let low = all().reduce(DVec2::min)? - margin_m;
         let high = all().reduce(DVec2::max)? + margin_m;
@@ -58,7 +67,7 @@ impl Mesh {
         let near = points.iter().zip(of_point).map(|(p, t)| GeomWithData::new(p.to_array(), t));
         let near = RTree::bulk_load(near.collect());
         let across = cdt.inner_faces().map(|face| face.adjacent_edges().map(behind)).collect();
-        Some(Self { points, triangles, across, near })
+        Some(Self { points, triangles, across, stacked, near })
     }
 
     /// The triangle behind a side, wall or not, and which of its sides that is.
@@ -68,6 +77,16 @@ impl Mesh {
         let corners = self.triangles.get(other as usize)?.corners;
         let side = corners.iter().position(|&corner| corner == end)?;
         Some((other, side as u8))
+    }
+
+    /// The walls that stand above or below the one in a side.
+    pub(super) fn stacked(&self, triangle: u32, side: usize) -> &[u32] {
+        if self.stacked.is_empty() {
+            return &[];
+        }
+        let corners = self.triangles[triangle as usize].corners;
+        let [a, b] = [corners[side], corners[(side + 1) % 3]];
+        self.stacked.get(&[a.min(b), a.max(b)]).map_or(&[], Vec::as_slice)
     }
 
     /// A corner of a triangle.
@@ -161,7 +180,7 @@ fn behind(edge: Edge) -> u32 {
 }
 
 fn triangles(cdt: &Cdt, plan: &Arrangement) -> Vec<Triangle> {
-    let wall_of: std::collections::HashMap<[u32; 2], u32> = plan
+    let wall_of: HashMap<[u32; 2], u32> = plan
         .pieces
         .iter()
         .flat_map(|piece| {
@@ -201,7 +220,7 @@ mod tests {
             .iter()
             .map(|&[ax, ay, bx, by]| (DVec2::new(ax, ay), DVec2::new(bx, by)))
             .collect();
-        Mesh::new(&Arrangement::of(&segments), &[], 10.0).expect("walls")
+        Mesh::new(&Arrangement::of(&segments), HashMap::new(), &[], 10.0).expect("walls")
     }
 
     #[test]

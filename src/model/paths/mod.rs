@@ -211,7 +211,8 @@ impl Paths {
             .flat_map(|c| [c.center - c.radius_m, c.center + c.radius_m])
             .collect();
         // From outside the box no echo is short enough.
-        let mesh = Mesh::new(&plan, &extra, 0.5 * settings.max_path_m + 1.0);
+        let mesh =
+            Mesh::new(&plan, heights.stacked(&plan), &extra, 0.5 * settings.max_path_m + 1.0);
         let face = |((&(a, b), &gain), wall): ((&(DVec2, DVec2), &f64), &Wall)| {
             let scatter = scattered(&wall.material);
             let mirror = Mirror::through(a, b);

@@ -10,6 +10,7 @@ mod pairs;
 mod peers;
 mod rims;
 mod rough;
+mod stacked;
 mod two_edges;
 mod vertical;
 

@@ -336,9 +336,12 @@ impl<'a> TubeGrower<'a> {
                 self.waiting.push(Tube { triangle, side: Some(side), ..*tube });
             }
             Side::Wall(wall) => {
-                if self.paths.settings.allows(tube.order + 1) {
-                    let next = self.reflected(tube, wall);
-                    self.waiting.push(Tube { side: Some(side as u8), ..next });
+                let stacked = mesh.stacked(tube.triangle, side).iter().copied();
+                for wall in std::iter::once(wall).chain(stacked) {
+                    if self.paths.settings.allows(tube.order + 1) {
+                        let next = self.reflected(tube, wall);
+                        self.waiting.push(Tube { side: Some(side as u8), ..next });
+                    }
                 }
                 if self.paths.heights.lets_pass(wall)
                     && let Some((triangle, side)) = mesh.beyond(tube.triangle, side)

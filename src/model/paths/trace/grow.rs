@@ -38,6 +38,8 @@ pub(super) struct Grower<'a> {
     parts: Vec<(Beam, Option<usize>)>,
     /// Beams of the next order.
     next: Vec<Beam>,
+    /// The same by walls that stand above or below others; these are not joined.
+    stacked: Vec<Beam>,
     tree: Tree,
 }
 
@@ -51,8 +53,9 @@ impl<'a> Grower<'a> {
     ) -> Self {
         let most_reflections =
             paths.settings.max_order.unwrap_or(MOST_REFLECTIONS).min(MOST_REFLECTIONS);
-        let (parts, next, tree) = (Vec::new(), Vec::new(), Tree::default());
-        Self { paths, mesh, start, target, home, most_reflections, parts, next, tree }
+        let (parts, next, stacked) = Default::default();
+        let tree = Tree::default();
+        Self { paths, mesh, start, target, home, most_reflections, parts, next, stacked, tree }
     }
 
     /// All beams of a start in a triangle.
@@ -99,8 +102,12 @@ impl<'a> Grower<'a> {
     /// Follows the beams order by order.
     fn finish(mut self) -> Tree {
         let mut beams = Vec::new();
-        while !self.next.is_empty() {
+        loop {
             std::mem::swap(&mut beams, &mut self.next);
+            beams.append(&mut self.stacked);
+            if beams.is_empty() {
+                break;
+            }
             for beam in beams.drain(..) {
                 self.follow(Some(beam));
             }
@@ -212,6 +219,10 @@ impl<'a> Grower<'a> {
             }
             Side::Wall(wall) => {
                 self.reflect(&beam, wall, side);
+                for &other in self.mesh.stacked(beam.triangle, side) {
+                    let next = self.reflected(&beam, other, side);
+                    self.stacked.extend(next);
+                }
                 if !self.paths.heights.lets_pass(wall) {
                     return None;
                 }
@@ -242,6 +253,23 @@ impl<'a> Grower<'a> {
     }
 
     fn reflect(&mut self, beam: &Beam, wall: u32, side: usize) {
+        let Some(next) = self.reflected(beam, wall, side) else { return };
+        if let Some(last) = self.next.last_mut() {
+            let border = if next.mirrored { next.left } else { next.right };
+            if last.join(&next) {
+                let nodes = &mut self.tree.nodes;
+                let (left, right) =
+                    if next.mirrored { (last.node, next.node) } else { (next.node, last.node) };
+                nodes.push(Node::Joint { border, left, right });
+                last.node = next.node + 1;
+                return;
+            }
+        }
+        self.next.push(next);
+    }
+
+    /// What a wall sends back of a beam, if an echo can come of it.
+    fn reflected(&mut self, beam: &Beam, wall: u32, side: usize) -> Option<Beam> {
         let face = &self.paths.faces[wall as usize];
         if face.scatter > 0.0 && self.paths.settings.scatter_height_rad > 0.0 {
             let span_m = self.lit_span_m(beam, face, side);
@@ -253,7 +281,7 @@ impl<'a> Grower<'a> {
         }
         let gain = beam.gain * face.gain;
         if beam.order >= self.most_reflections || gain < self.paths.settings.floor {
-            return;
+            return None;
         }
         let next = Beam {
             gain,
@@ -262,22 +290,11 @@ impl<'a> Grower<'a> {
             ..beam.reflected(&face.mirror, face.rotor)
         };
         if self.least_path_m(beam, &next, face, side) > self.longest_m(&next) {
-            return;
+            return None;
         }
         let nodes = &mut self.tree.nodes;
         nodes.push(Node::Wall { wall, before: beam.node });
-        let node = nodes.len() as u32 - 1;
-        if let Some(last) = self.next.last_mut() {
-            let border = if next.mirrored { next.left } else { next.right };
-            if last.join(&next) {
-                let (left, right) =
-                    if next.mirrored { (last.node, node) } else { (node, last.node) };
-                nodes.push(Node::Joint { border, left, right });
-                last.node = node + 1;
-                return;
-            }
-        }
-        self.next.push(Beam { node, ..next });
+        Some(Beam { node: nodes.len() as u32 - 1, ..next })
     }
 
     /// Length of the shortest way from the beam's image to its part of a wall and straight back
