@@ -11,6 +11,7 @@ the aperture hears of a body follows by reciprocity from the field on its surfac
 how far the same chain is from the table of head-on walls, and what finer panels change.
 """
 
+import functools
 import json
 import pathlib
 import sys
@@ -20,7 +21,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.signal import find_peaks
 from scipy.special import hankel1
 
-from two_edges import surface
+from two_edges import gaps, surface
 
 C, F0, CYCLES, HALF_M, SIGMA_HZ = 343.2, 49_400.0, 16, 0.0192, 7_000.0
 STEP_HZ = 250.0  # A window of 4 ms, 1.37 m of way.
@@ -103,12 +104,6 @@ class Chain:
         return sent * weight, heard * weight[: len(self.points)]
 
 
-def gaps(targets, points, normals):
-    gap = targets[:, None, :] - points[None, :, :]
-    r = np.maximum(np.linalg.norm(gap, axis=2), 1e-300)
-    return r, np.einsum("ijk,jk->ij", gap, normals) / r
-
-
 def inner_points(body, count, rng):
     corners = np.array(body)
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -166,6 +161,7 @@ def maxima(times_s, envelope):
     return [[round(float(times_s[i]), 6), round(float(envelope[i]), 5)] for i in at[keep]]
 
 
+@functools.cache
 def lead_m(tau, unit_burst):
     times_s = np.arange(5e-3, 7e-3, TIME_STEP_S)
     burst = envelopes(head_on(1.0), times_s)[0] / unit_burst
@@ -187,7 +183,7 @@ def beam(azimuth, spectrum, times_s, units):
 
 
 BOX = [(0, -0.12), (0.12, -0.12), (0.12, 0.12), (0, 0.12)]
-THIRD = 0.25 * np.sqrt(3)
+LONG = 0.2 * np.sqrt(3)
 SCENES = {
     "box-10": ("a box, 0.24 by 0.12 m, its long face turned by 10 degrees", [
         turned([(x + 0.6, y) for x, y in BOX], 10, (0.6, 0)),
@@ -195,9 +191,8 @@ SCENES = {
     "box-40": ("the same, turned by 40 degrees: two faces in sight", [
         turned([(x + 0.6, y) for x, y in BOX], 40, (0.66, 0)),
     ]),
-    "wedge-60": ("a corner of 60 degrees, pointing at the ranger but for 15 degrees", [
-        turned([(0.5, 0), (0.5 + 0.2 * THIRD / 0.25, -0.1), (0.5 + 0.2 * THIRD / 0.25, 0.1)], 15,
-               (0.5, 0)),
+    "wedge-32": ("a corner of 32 degrees, pointing at the ranger but for 15 degrees", [
+        turned([(0.5, 0), (0.5 + LONG, -0.1), (0.5 + LONG, 0.1)], 15, (0.5, 0)),
     ]),
     "notch-75": ("a notch of 75 degrees in a block", [
         turned([(0.55, -0.14), (0.8, -0.14), (0.8, 0.14), (0.55, 0.14), (0.55, 0.1),

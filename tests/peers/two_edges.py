@@ -53,10 +53,15 @@ def surface(bodies, longest_m, steps=9):
     return [np.concatenate(part) for part in (points, normals, weights, sides)]
 
 
-def double_layer(targets, points, normals, weights):
+def gaps(targets, points, normals):
+    """Distances from points to targets, and cosines of their angles with the normals."""
     gap = targets[:, None, :] - points[None, :, :]
     r = np.maximum(np.linalg.norm(gap, axis=2), 1e-300)
-    cosine = np.einsum("ijk,jk->ij", gap, normals) / r
+    return r, np.einsum("ijk,jk->ij", gap, normals) / r
+
+
+def double_layer(targets, points, normals, weights):
+    r, cosine = gaps(targets, points, normals)
     return 0.25j * K * hankel1(1, K * r) * cosine * weights
 
 
