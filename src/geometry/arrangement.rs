@@ -1,6 +1,6 @@
 //! Segments cut where they meet, so that they touch at their ends only.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use rstar::{
     AABB, RTree,
@@ -22,8 +22,8 @@ pub struct Arrangement {
     pub points: Vec<DVec2>,
     /// What is left of the segments; no two between the same points.
     pub pieces: Vec<Piece>,
-    /// Pieces that lie on one of these, of segments given later.
-    pub covered: Vec<Piece>,
+    /// Segments that lie on one of these and were given later, by [`between`] its ends.
+    pub covered: HashMap<[u32; 2], Vec<u32>>,
 }
 
 /// A part of a segment between two points of an [`Arrangement`].
@@ -33,6 +33,12 @@ pub struct Piece {
     pub ends: [u32; 2],
     /// Index of the segment.
     pub segment: u32,
+}
+
+/// A piece's name, whichever its direction: the indices of its ends, the smaller one first.
+#[must_use]
+pub fn between([a, b]: [u32; 2]) -> [u32; 2] {
+    [a.min(b), a.max(b)]
 }
 
 impl Arrangement {
@@ -154,17 +160,16 @@ fn join(parts: &[Part]) -> Arrangement {
             }
         }
     }
-    let mut seen = HashMap::new();
+    let mut seen = HashSet::new();
     for (i, part) in parts.iter().enumerate() {
-        let [a, b] = [point_of[2 * i], point_of[2 * i + 1]];
-        if a == b {
+        let ends = [point_of[2 * i], point_of[2 * i + 1]];
+        if ends[0] == ends[1] {
             continue;
         }
-        let piece = Piece { ends: [a, b], segment: part.segment };
-        if seen.insert((a.min(b), a.max(b)), ()).is_none() {
-            result.pieces.push(piece);
+        if seen.insert(between(ends)) {
+            result.pieces.push(Piece { ends, segment: part.segment });
         } else {
-            result.covered.push(piece);
+            result.covered.entry(between(ends)).or_default().push(part.segment);
         }
     }
     result

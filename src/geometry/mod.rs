@@ -4,7 +4,7 @@ mod arrangement;
 mod mirror;
 mod square;
 
-pub use arrangement::{Arrangement, Piece, SNAP_M};
+pub use arrangement::{Arrangement, Piece, SNAP_M, between};
 pub use glam::DVec2;
 pub use mirror::Mirror;
 use schemars::JsonSchema;

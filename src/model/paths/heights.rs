@@ -5,7 +5,7 @@
 //! and pass it, and a path counts if it meets its walls where they stand and the others where they
 //! do not. What their upper and lower edges bend comes on its own (`rims`).
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use rstar::{
     AABB, RTree,
@@ -14,7 +14,7 @@ use rstar::{
 
 use super::{Echo, Paths, Trees, beam::TIE_M};
 use crate::{
-    geometry::{Arrangement, DVec2, SNAP_M},
+    geometry::{Arrangement, DVec2, Piece, SNAP_M, between},
     model::Reflector,
     scene::Scene,
 };
@@ -78,29 +78,23 @@ impl Heights {
         self.rises() && self.walls[wall as usize].is_some()
     }
 
-    /// Walls that stand above or below the one that the plan knows at the same place, by the ends of their
-    /// pieces, smaller number first. Of walls that share heights there the one given first counts.
+    /// Walls that stand above or below the one that the plan knows at the same place, by [`between`] their
+    /// ends. Of walls that share heights there the one given first counts.
     pub(super) fn stacked(&self, plan: &Arrangement) -> HashMap<[u32; 2], Vec<u32>> {
-        if !self.rises() || plan.covered.is_empty() {
+        if !self.rises() {
             return HashMap::new();
         }
-        let sorted = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
-        let covered: HashSet<_> = plan.covered.iter().map(|piece| sorted(piece.ends)).collect();
-        let mut stacks: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
-        for piece in plan.pieces.iter().chain(&plan.covered) {
-            let ends = sorted(piece.ends);
-            if !covered.contains(&ends) {
-                continue;
+        let others = |piece: &Piece| {
+            let ends = between(piece.ends);
+            let mut stack = vec![piece.segment];
+            for &wall in plan.covered.get(&ends)? {
+                if stack.iter().all(|&other| self.are_apart(wall, other)) {
+                    stack.push(wall);
+                }
             }
-            let stack = stacks.entry(ends).or_default();
-            if stack.iter().all(|&wall| self.are_apart(wall, piece.segment)) {
-                stack.push(piece.segment);
-            }
-        }
-        for stack in stacks.values_mut() {
-            stack.remove(0);
-        }
-        stacks
+            Some((ends, stack.split_off(1)))
+        };
+        plan.pieces.iter().filter_map(others).collect()
     }
 
     fn are_apart(&self, one: u32, other: u32) -> bool {

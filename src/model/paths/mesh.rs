@@ -7,7 +7,7 @@ use rstar::{RTree, primitives::GeomWithData};
 use smallvec::SmallVec;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
-use crate::geometry::{Arrangement, DVec2, distance_to_segment};
+use crate::geometry::{Arrangement, DVec2, between, distance_to_segment};
 
 /// Triangles between the walls, inside a box around the scene.
 #[derive(Debug)]
@@ -17,7 +17,7 @@ pub(super) struct Mesh {
     pub(super) triangles: Vec<Triangle>,
     /// For each triangle what is behind its sides, walls or not; `u32::MAX` at the box.
     across: Vec<[u32; 3]>,
-    /// Walls that stand above or below another at the same place, by its ends, smaller number first.
+    /// Walls that stand above or below another at the same place, by [`between`] its ends.
     stacked: HashMap<[u32; 2], Vec<u32>>,
     /// Some triangle at each point.
     near: RTree<GeomWithData<[f64; 2], u32>>,
@@ -85,8 +85,8 @@ impl Mesh {
             return &[];
         }
         let corners = self.triangles[triangle as usize].corners;
-        let [a, b] = [corners[side], corners[(side + 1) % 3]];
-        self.stacked.get(&[a.min(b), a.max(b)]).map_or(&[], Vec::as_slice)
+        let ends = [corners[side], corners[(side + 1) % 3]];
+        self.stacked.get(&between(ends)).map_or(&[], Vec::as_slice)
     }
 
     /// A corner of a triangle.
@@ -180,18 +180,12 @@ fn behind(edge: Edge) -> u32 {
 }
 
 fn triangles(cdt: &Cdt, plan: &Arrangement) -> Vec<Triangle> {
-    let wall_of: HashMap<[u32; 2], u32> = plan
-        .pieces
-        .iter()
-        .flat_map(|piece| {
-            let [a, b] = piece.ends;
-            [([a, b], piece.segment), ([b, a], piece.segment)]
-        })
-        .collect();
+    let wall_of: HashMap<[u32; 2], u32> =
+        plan.pieces.iter().map(|piece| (between(piece.ends), piece.segment)).collect();
     let side = |edge: Edge| {
-        let [a, b] = edge.vertices().map(|vertex| vertex.index() as u32);
+        let ends = edge.vertices().map(|vertex| vertex.index() as u32);
         if edge.is_constraint_edge()
-            && let Some(&wall) = wall_of.get(&[a, b])
+            && let Some(&wall) = wall_of.get(&between(ends))
         {
             return Side::Wall(wall);
         }

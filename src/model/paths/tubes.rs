@@ -336,9 +336,9 @@ impl<'a> TubeGrower<'a> {
                 self.waiting.push(Tube { triangle, side: Some(side), ..*tube });
             }
             Side::Wall(wall) => {
-                let stacked = mesh.stacked(tube.triangle, side).iter().copied();
-                for wall in std::iter::once(wall).chain(stacked) {
-                    if self.paths.settings.allows(tube.order + 1) {
+                if self.paths.settings.allows(tube.order + 1) {
+                    let stacked = mesh.stacked(tube.triangle, side).iter().copied();
+                    for wall in std::iter::once(wall).chain(stacked) {
                         let next = self.reflected(tube, wall);
                         self.waiting.push(Tube { side: Some(side as u8), ..next });
                     }

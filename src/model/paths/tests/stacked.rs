@@ -65,7 +65,10 @@ fn which_is_named_first_does_not_matter() {
             let (one, other) = (sorted(&one, law), sorted(&other, law));
             assert_eq!(one.len(), other.len(), "{z_m}");
             for (a, b) in one.iter().zip(&other) {
-                assert!((a[0] - b[0]).abs() < 1e-9, "{z_m}: {a:?} {b:?}");
+                assert!(
+                    (a[0] - b[0]).abs() < 1e-9 && (a[1] - b[1]).abs() < 1e-9,
+                    "{z_m}: {a:?} {b:?}"
+                );
             }
         }
     }
