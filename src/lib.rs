@@ -39,18 +39,11 @@
 //! keeps a collection of scans that is taken over days.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
-pub mod acoustics;
-pub mod array;
-pub mod compare;
-pub mod explore;
-pub mod geometry;
-pub mod interpret;
-pub mod model;
-pub mod motion;
+pub use sonard_interpret::{compare, explore, interpret};
+pub use sonard_model::{acoustics, array, geometry, model, motion, scene};
 #[cfg(feature = "plot")]
-pub mod plot;
-pub mod scan;
-pub mod scene;
+pub use sonard_plot as plot;
+pub use sonard_records as scan;
 
 #[cfg(feature = "daemon")]
 pub mod board;

@@ -100,15 +100,16 @@ fn rounded(value: f64) -> f64 {
 const PLAN: ScanPlan = ScanPlan { from_deg: 0.0, to_deg: 360.0, step_deg: 7.2, pings_per_stop: 1 };
 
 fn turns(scene_name: &str, text: &str) -> Vec<Turn> {
-    let scene = Arc::new(Scene::from_json(text).unwrap());
+    let scene = Arc::new(Scene::from_json(text).expect("golden predictions"));
     let air = Air::default();
     let mut turns = Vec::new();
     for sensor_name in Sensor::preset_names() {
         for engine in [EngineKind::Paths, EngineKind::Fan, EngineKind::Cone] {
-            let sensor = Sensor::preset(sensor_name).unwrap();
+            let sensor = Sensor::preset(sensor_name).expect("golden predictions");
             // The default spacing is fifty times as slow and reads the same.
             let options = Options { engine, ray_spacing_deg: 1.0, ..Options::default() };
-            let simulator = Simulator::new(Arc::clone(&scene), sensor, air, options).unwrap();
+            let simulator = Simulator::new(Arc::clone(&scene), sensor, air, options)
+                .expect("golden predictions");
             for (pose_name, pose) in &scene.poses {
                 let predictions = simulator.predict(pose, &PLAN);
                 turns.push(Turn::of([scene_name, pose_name, sensor_name], engine, &predictions));
@@ -119,11 +120,11 @@ fn turns(scene_name: &str, text: &str) -> Vec<Turn> {
 }
 
 fn check(scene: &str) {
-    let text = shipped::text(scene).unwrap();
+    let text = shipped::text(scene).expect("golden predictions");
     let kept: Vec<Turn> = std::fs::read_to_string(FILE)
-        .unwrap()
+        .expect("golden predictions")
         .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
+        .map(|line| serde_json::from_str(line).expect("golden predictions"))
         .filter(|turn: &Turn| turn.scene == scene)
         .collect();
     let turns = turns(scene, text);
@@ -149,8 +150,8 @@ macro_rules! scenes {
             assert_eq!(here, shipped);
             if std::env::var("SONARD_GOLDEN").is_ok_and(|value| value == "write") {
                 let turns = shipped::SCENES.iter().flat_map(|(name, text)| turns(name, text));
-                let lines = turns.map(|turn| serde_json::to_string(&turn).unwrap() + "\n");
-                std::fs::write(FILE, lines.collect::<String>()).unwrap();
+                let lines = turns.map(|turn| serde_json::to_string(&turn).expect("golden predictions") + "\n");
+                std::fs::write(FILE, lines.collect::<String>()).expect("golden predictions");
             }
         }
     };

@@ -19,7 +19,7 @@ use crate::{
         Options, Simulator,
         paths::{EchoPath, Paths},
     },
-    scan::PathKind,
+    scan::{PathKind, PathRecord},
 };
 
 /// Options of `sonard paths`.
@@ -118,7 +118,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 fn line(simulator: &Simulator, path: &EchoPath) -> PathLine {
-    let record = simulator.path_record(&path.path, path.length_m);
+    let record = PathRecord::of(simulator.scene(), &path.path, path.length_m);
     PathLine {
         way: record.in_words(),
         length_m: path.length_m,

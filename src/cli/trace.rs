@@ -152,7 +152,7 @@ impl<'a> Firing<'a> {
         let trace = station.trace(direction_rad, args.until.unwrap_or_else(whole), args.step_us);
         let record = |sound| {
             let arrival = Station::arrival(&station, direction_rad, sound);
-            simulator.path_record(&arrival.path, arrival.length_m)
+            PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m)
         };
         let paths = trace.humps.iter().map(|hump| record(&hump.sound)).collect();
         let path = trace.detection.sound.as_ref().map(record);

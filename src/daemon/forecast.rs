@@ -74,7 +74,7 @@ impl Forecast {
             device: Some(device_record(identity)),
             sensor: settings.sensor.clone(),
             array: None,
-            air: air.to_record(),
+            air: air.into(),
             scene: settings.scene.as_deref().map(SceneRef::of),
             model: self.model.clone(),
             collection: None,
@@ -110,8 +110,8 @@ pub(super) fn predict(
             // All firings at a stop have the same prediction.
             let stops = ScanPlan { pings_per_stop: 1, ..plan };
             let predictions = simulator.predict(&pose, &stops);
-            let records = predictions.iter().map(|one| simulator.record(one)).collect();
-            Ok((records, Some(simulator.model_record())))
+            let records = predictions.iter().map(|one| SimRecord::of(&simulator, one)).collect();
+            Ok((records, Some(ModelRecord::from(simulator.options()))))
         });
         predicting.await.map_err(|error| format!("the model failed: {error}"))?
     }

@@ -15,7 +15,7 @@ fn log() -> String {
     let air = Air::new(20.0, 50.0, 101.325).expect("ordinary air");
     let session = serde_json::json!({
         "type": "session", "format": 1, "started": "2026-01-01T00:00:00Z", "sonard": "0.1.0",
-        "provenance": "mock", "device": null, "air": air.to_record(),
+        "provenance": "mock", "device": null, "air": sonard::scan::AirRecord::from(&air),
         "sensor": Sensor::preset("senscomp-6500").expect("a preset"),
         "scene": {"name": "simple-room", "sha256": "0"}, "model": {"engine": "fan"}
     });

@@ -35,7 +35,7 @@ pub(super) fn predict(log: &Path, scans: &mut [ScanView], scene: &Scene) -> Resu
             let station = simulator.station(pose.position());
             for ping in &mut scan.pings {
                 let prediction = station.ping(pose.direction_rad(ping.azimuth_deg));
-                set_beside(ping, simulator.record(&prediction));
+                set_beside(ping, SimRecord::of(&simulator, &prediction));
             }
             continue;
         };
@@ -61,7 +61,7 @@ fn predict_array(scan: &mut ScanView, pose: &Pose, model: &ArrayModel) -> Result
         let pose = ping.pose.unwrap_or(*pose);
         model.array().check_pose(model.scene(), &pose).map_err(refuse_pose)?;
         let stand = model.at(pose).map_err(refuse)?;
-        set_beside(ping, stand.simulator(ranger).record(&stand.ping(ranger)));
+        set_beside(ping, SimRecord::of(stand.simulator(ranger), &stand.ping(ranger)));
     }
     Ok(())
 }
@@ -98,9 +98,9 @@ fn refuse(log: &Path, error: &dyn std::fmt::Display) -> Failure {
 
 /// The air and the settings of the model that a session's readings were predicted with.
 fn conditions(log: &Path, session: &Session) -> Result<(Air, Options), Failure> {
-    let air = Air::from_record(&session.air).map_err(|error| refuse(log, &error))?;
+    let air = Air::try_from(&session.air).map_err(|error| refuse(log, &error))?;
     let options = session.model.as_ref().map_or_else(Options::default, |model| {
-        Options::from_record(model).unwrap_or_else(|| {
+        model.options().unwrap_or_else(|| {
             let engine = EngineKind::default().name();
             let had = &model.engine;
             anstream::eprintln!(

@@ -3,7 +3,6 @@
 use crate::{
     cli::Failure,
     geometry::wrap_pi,
-    model::Path,
     plot::{Picture, WayView, draw_way},
     scan::{PathRecord, Ping, PingStatus, ScanView},
     scene::Scene,
@@ -47,7 +46,8 @@ pub(super) fn draw(
         Some(_) => [looks.position(); 2],
         None => view.ends(&ping.pose.unwrap_or(pose), azimuth_deg),
     };
-    let points = Path::from_record(record, &whole)
+    let points = record
+        .path(&whole)
         .and_then(|path| path.points_between(&whole, ends, z_m, record.length_m))
         .ok_or_else(|| {
             Failure::input(

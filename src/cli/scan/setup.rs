@@ -12,7 +12,7 @@ use crate::{
     geometry::Pose,
     model::{Options, Simulator},
     ranger::{Listening, Motion, ScanJob, device_record, provenance},
-    scan::{LOG_FORMAT, ScanPlan, SceneRef, Session, SimRecord},
+    scan::{AirRecord, LOG_FORMAT, ModelRecord, ScanPlan, SceneRef, Session, SimRecord},
     scene::Scene,
 };
 
@@ -70,7 +70,7 @@ impl Setup {
         let predictions = simulator
             .predict(&pose, &stops)
             .iter()
-            .map(|prediction| simulator.record(prediction))
+            .map(|prediction| SimRecord::of(&simulator, prediction))
             .collect();
         Ok(Self {
             pose,
@@ -145,9 +145,9 @@ impl Setup {
             device: Some(device_record(identity)),
             sensor: self.sensor.clone(),
             array: None,
-            air: self.air.to_record(),
+            air: AirRecord::from(&self.air),
             scene: Some(SceneRef::of(&self.scene)),
-            model: Some(self.simulator.model_record()),
+            model: Some(ModelRecord::from(self.simulator.options())),
             collection: None,
         }
     }

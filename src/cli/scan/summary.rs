@@ -71,7 +71,7 @@ fn beams(summary: &ScanSummary, view: Option<&ScanView>) -> String {
 }
 
 fn agreement(comparison: &Comparison, setup: &Setup) -> String {
-    let engine = setup.simulator.model_record().engine;
+    let engine = setup.simulator.options().engine.name();
     let mm = |metres: Option<f64>| {
         metres.map_or_else(|| "-".into(), |metres| format!("{:.1} mm", metres * 1e3))
     };

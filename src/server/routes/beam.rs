@@ -12,7 +12,7 @@ use super::{
 use crate::{
     acoustics::{Air, Hump},
     geometry::Pose,
-    model::{Options, Path, Simulator, Station},
+    model::{Options, Simulator, Station},
     scan::{PathRecord, Ping, ScanView, Session},
     scene::Scene,
 };
@@ -112,7 +112,7 @@ fn ask_model(
         return Err(format!("the scan was taken in another scene, {}", taken_in.name));
     }
     let model = session.model.as_ref().ok_or("the scan was taken without a model")?;
-    let options = Options::from_record(model).ok_or("the scan's model is unknown here")?;
+    let options = model.options().ok_or("the scan's model is unknown here")?;
     let air = air(view, session).map_err(|error| error.to_string())?;
     let scene = Arc::new(scene.with_robot_at(&pose));
     let heard_m = [ping.range_m, ping.sim.as_ref().and_then(|sim| sim.range_m)];
@@ -133,7 +133,7 @@ fn air(view: &ScanView, session: &Session) -> Result<Air, crate::acoustics::AirE
         Some(scan) => {
             Air::new(scan.temperature_c, session.air.humidity_percent, session.air.pressure_kpa)
         }
-        None => Air::from_record(&session.air),
+        None => Air::try_from(&session.air),
     }
 }
 
@@ -149,7 +149,7 @@ fn humps(simulator: &Simulator, pose: &Pose, azimuth_deg: f64, until_m: f64) -> 
     loudest.sort_by(|one, other| one.tof_us.total_cmp(&other.tof_us));
     let line = |hump: &Hump| {
         let arrival = Station::arrival(&station, direction_rad, &hump.sound);
-        let path = simulator.path_record(&arrival.path, arrival.length_m);
+        let path = PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m);
         HumpLine {
             tof_us: hump.tof_us,
             range_m: arrival.length_m / 2.0,
@@ -163,7 +163,7 @@ fn humps(simulator: &Simulator, pose: &Pose, azimuth_deg: f64, until_m: f64) -> 
 }
 
 fn way(scene: &Scene, pose: &Pose, record: &PathRecord) -> Option<Vec<Point>> {
-    let path = Path::from_record(record, scene)?;
+    let path = record.path(scene)?;
     let points = path.points(scene, pose.position(), record.length_m)?;
     Some(points.into_iter().map(point).collect())
 }

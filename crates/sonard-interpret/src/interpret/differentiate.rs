@@ -1,0 +1,438 @@
+//! Which regions are planes, corners and edges.
+
+use uuid::Uuid;
+
+use super::{
+    Extents, Feature, FeatureKind, Probabilities, Reason, Region, Settings, Sweep, UniformSum,
+    next::propose, regions,
+};
+use sonard_model::geometry::{DVec2, wrap_pi};
+
+/// Prior probability that an arc is none of the three; its extent may then be anything up to
+/// [`OTHER_EXTENT_DEG`], and its `beta` too.
+const OTHER: f64 = 0.02;
+const OTHER_EXTENT_DEG: f64 = 60.0;
+
+/// So many scattering strengths, and reflectances, are the densities averaged over.
+const STRENGTHS: usize = 16;
+
+/// Standard deviations that count as certainty where there is noise.
+const CERTAIN: f64 = 2.58;
+
+/// Rounding of angles, degrees.
+pub(super) const ROUNDING_DEG: f64 = 1e-9;
+
+/// An arc of one scan.
+#[derive(Debug, Clone)]
+pub(super) struct Arc {
+    /// Which scan.
+    pub(super) scan: usize,
+    /// Where it was seen from, world, metres.
+    pub(super) from: DVec2,
+    /// Heading there, degrees.
+    pub(super) heading_deg: f64,
+    pub(super) region: Region,
+    /// World direction of its middle, radians.
+    pub(super) bearing_rad: f64,
+    /// Standard deviation of each border, degrees.
+    pub(super) border_sigma_deg: f64,
+    /// Likelihoods of its extent for a plane or corner and for an edge.
+    extent_likelihood: [f64; 2],
+}
+
+/// Interprets scans taken with one sensor from one place or more.
+///
+/// `scans` are the sweeps with the ids of their scans, in the order they were taken; `extents`
+/// is the sensor's. An element that was seen in several scans is one feature, of the first.
+#[must_use]
+pub fn interpret(scans: &[(Uuid, Sweep)], extents: &Extents, settings: &Settings) -> Vec<Feature> {
+    let arcs: Vec<Arc> = scans
+        .iter()
+        .enumerate()
+        .flat_map(|(scan, (_, sweep))| {
+            let found = regions(sweep, settings).into_iter();
+            found.map(move |region| Arc::new(scan, sweep, region, extents, settings))
+        })
+        .collect();
+    let places: Vec<DVec2> = scans.iter().map(|(_, sweep)| sweep.pose.position()).collect();
+    let mut taken = vec![false; arcs.len()];
+    let mut features = Vec::new();
+    let mut sources = Vec::new();
+    for at in 0..arcs.len() {
+        if taken[at] {
+            continue;
+        }
+        let verdict = Verdict::of(at, &arcs, &places, &mut taken, extents, settings);
+        features.push(verdict.feature(&arcs[at], scans, extents, settings));
+        sources.push(&arcs[at]);
+    }
+    propose(&sources, &mut features, extents, settings);
+    features
+}
+
+impl Arc {
+    fn new(
+        scan: usize,
+        sweep: &Sweep,
+        region: Region,
+        extents: &Extents,
+        settings: &Settings,
+    ) -> Self {
+        let noise = settings.noise;
+        let border = extents.border_sigma_deg(region.extent_deg(), noise.amplitude);
+        let border_sigma_deg = border.hypot(noise.azimuth_deg);
+        let extent_likelihood = region.range_m.map_or([0.0; 2], |range_m| {
+            let error = UniformSum::of_extent(region.gaps_deg, border_sigma_deg);
+            let (seen_deg, least) = (region.extent_deg(), extents.least_heard(range_m));
+            let [edge_least, plane_least] = [least / extents.edge_level(range_m, 1.0), least];
+            [
+                mean_density(
+                    &error,
+                    seen_deg,
+                    settings.reflectance_range,
+                    plane_least,
+                    |strength| extents.plane_corner_deg(range_m, strength),
+                ),
+                mean_density(&error, seen_deg, settings.sigma_e_range, edge_least, |strength| {
+                    extents.edge_deg(range_m, strength)
+                }),
+            ]
+        });
+        Self {
+            scan,
+            from: sweep.pose.position(),
+            heading_deg: sweep.pose.heading_deg,
+            bearing_rad: sweep.pose.direction_rad(region.bearing_deg()),
+            region,
+            border_sigma_deg,
+            extent_likelihood,
+        }
+    }
+
+    /// The middle of the arc, world, metres.
+    pub(super) fn point(&self) -> Option<DVec2> {
+        let range_m = self.region.range_m?;
+        Some(self.from + range_m * DVec2::from_angle(self.bearing_rad))
+    }
+
+    /// Whether its extent is rather an edge's than a plane's or corner's (18).
+    fn is_edge(&self) -> bool {
+        let [of_plane_corner, of_edge] = self.extent_likelihood;
+        of_edge > of_plane_corner
+    }
+
+    /// Why the arc by itself can't be told, if so.
+    fn fault(&self) -> Option<Reason> {
+        let sides = self.region.sides;
+        if self.region.range_m.is_none() {
+            Some(Reason::MinRange)
+        } else if sides.contains(&super::Side::Covered) {
+            Some(Reason::Interference)
+        } else if sides.contains(&super::Side::Cut) {
+            Some(Reason::CutOff)
+        } else {
+            None
+        }
+    }
+}
+
+/// Mean density of a measured extent over strengths from `low` to `high`, all of them equally
+/// likely as far as they are heard at all: from `least` on.
+fn mean_density(
+    error: &UniformSum,
+    seen_deg: f64,
+    [low, high]: [f64; 2],
+    least: f64,
+    true_deg: impl Fn(f64) -> f64,
+) -> f64 {
+    let from = low.max(least);
+    if from >= high {
+        return 0.0;
+    }
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for i in 0..STRENGTHS {
+        // The extent grows like a root from where it begins to be heard, so strengths are taken
+        // closer together there.
+        let part = (i as f64 + 0.5) / STRENGTHS as f64;
+        let extent_deg = true_deg(from + (high - from) * part * part);
+        sum += part * error.density(seen_deg - extent_deg);
+        weights += part;
+    }
+    sum / weights
+}
+
+/// What a second place tells about an arc.
+#[derive(Debug, Clone, Copy)]
+struct Second {
+    arc: usize,
+    scan: usize,
+    beta_deg: f64,
+    beta_corner_deg: f64,
+    /// Likelihoods of beta for a plane, and for a corner or edge.
+    likelihood: [f64; 2],
+    /// Whether the two can be told apart from there (25).
+    decides: bool,
+}
+
+/// What is found about an arc.
+struct Verdict {
+    reason: Option<Reason>,
+    probabilities: Probabilities,
+    second: Option<Second>,
+}
+
+impl Verdict {
+    /// Looks at an arc and at those of other scans that are of the same element, which it takes.
+    fn of(
+        at: usize,
+        arcs: &[Arc],
+        places: &[DVec2],
+        taken: &mut [bool],
+        extents: &Extents,
+        settings: &Settings,
+    ) -> Self {
+        let arc = &arcs[at];
+        if let Some(reason) = arc.fault() {
+            return Self {
+                reason: Some(reason),
+                probabilities: Probabilities::default(),
+                second: None,
+            };
+        }
+        let (mut seconds, mut why_not) = (Vec::new(), None);
+        for (scan, &place) in places.iter().enumerate().filter(|(scan, _)| *scan != arc.scan) {
+            let Some(expected) = Expected::at(arc, place) else { continue };
+            match expected.find(arc, scan, arcs, taken, extents, settings) {
+                Ok(Some(second)) => seconds.push(second),
+                Ok(None) => {}
+                Err(reason) => why_not = Some(reason),
+            }
+        }
+        for second in &seconds {
+            taken[second.arc] = true;
+        }
+        let probabilities = probabilities(arc, &seconds);
+        let second = seconds.iter().copied().max_by(|a, b| {
+            (a.decides, a.beta_corner_deg)
+                .partial_cmp(&(b.decides, b.beta_corner_deg))
+                .unwrap_or(std::cmp::Ordering::Equal)
+        });
+        let reason = open_reason(&probabilities, second.as_ref(), why_not, settings);
+        Self { reason, probabilities, second }
+    }
+
+    fn feature(
+        &self,
+        arc: &Arc,
+        scans: &[(Uuid, Sweep)],
+        extents: &Extents,
+        settings: &Settings,
+    ) -> Feature {
+        let range_m = arc.region.range_m;
+        let (best, confidence) = self.probabilities.best();
+        let point = arc.point();
+        let second = self.second;
+        Feature {
+            kind: if self.reason.is_some() { FeatureKind::Unresolved } else { best },
+            x_m: point.map(|point| point.x),
+            y_m: point.map(|point| point.y),
+            bearing_deg: arc.region.bearing_deg(),
+            range_m,
+            extent_deg: arc.region.extent_deg(),
+            beta_deg: second.map(|second| second.beta_deg),
+            confidence,
+            beams: arc.region.beams,
+            reason: self.reason,
+            probabilities: self.probabilities,
+            extent_plane_corner_deg: range_m.map(|r| extents.plane_corner_deg(r, 1.0)),
+            extent_edge_deg: range_m.map(|r| extents.edge_deg(r, settings.sigma_e)),
+            boundary_deg: range_m.map(|r| extents.boundary_deg(r, settings.sigma_e)),
+            beta_corner_deg: second.map(|second| second.beta_corner_deg),
+            next: None,
+            scan: scans[arc.scan].0,
+            second_scan: second.map(|second| scans[second.scan].0),
+        }
+    }
+}
+
+/// Where an element should be found from another place.
+pub(super) struct Expected {
+    /// From a plane, and from a corner or edge, metres.
+    ranges_m: [f64; 2],
+    /// Change of direction of a corner or edge, degrees, 0 or more (22a, for any direction of
+    /// travel).
+    pub(super) beta_corner_deg: f64,
+    /// 1 if a corner's direction turns clockwise, else -1.
+    side: f64,
+    /// By how much an error of the direction from the first place moves that of a corner from
+    /// this one.
+    gain: f64,
+}
+
+impl Expected {
+    pub(super) fn at(arc: &Arc, place: DVec2) -> Option<Self> {
+        let (range_m, point) = (arc.region.range_m?, arc.point()?);
+        let travel = place - arc.from;
+        let to_point = point - place;
+        let turn_rad = wrap_pi(arc.bearing_rad - to_point.to_angle());
+        let plane_m = range_m - travel.dot(DVec2::from_angle(arc.bearing_rad));
+        Some(Self {
+            ranges_m: [plane_m, to_point.length()],
+            beta_corner_deg: turn_rad.abs().to_degrees(),
+            side: if turn_rad < 0.0 { -1.0 } else { 1.0 },
+            gain: range_m * to_point.dot(DVec2::from_angle(arc.bearing_rad))
+                / to_point.length_squared(),
+        })
+    }
+
+    /// The arc of the same element in another scan; `None` if that scan has nothing there and the
+    /// element may still be known from one scan.
+    ///
+    /// A plane is seen in the same direction from everywhere; corners and edges stay where they are
+    /// (figure 6). What lies from the one prediction to the other, and as far beyond as errors
+    /// reach, may be it.
+    fn find(
+        &self,
+        arc: &Arc,
+        scan: usize,
+        arcs: &[Arc],
+        taken: &[bool],
+        extents: &Extents,
+        settings: &Settings,
+    ) -> Result<Option<Second>, Reason> {
+        let mut fitting = Vec::new();
+        let mut faulty = None;
+        for (index, other) in arcs.iter().enumerate().filter(|(_, other)| other.scan == scan) {
+            if taken[index] || !self.range_fits(other, settings.depth_tolerance_m) {
+                continue;
+            }
+            let [as_plane, as_corner] = self.errors(
+                arc,
+                (other.region.gaps_deg, other.border_sigma_deg),
+                settings.noise.heading_deg,
+            );
+            let beta_deg = self.beta_deg(arc, other);
+            let corner_deg = self.beta_corner_deg;
+            let least_deg = match arc.is_edge() {
+                true => corner_deg - as_corner.reach(CERTAIN),
+                false => -as_plane.reach(CERTAIN),
+            };
+            let most_deg = corner_deg + as_corner.reach(CERTAIN);
+            if !(least_deg - ROUNDING_DEG..=most_deg + ROUNDING_DEG).contains(&beta_deg) {
+                continue;
+            }
+            match other.fault() {
+                Some(reason) => faulty = Some(reason),
+                None if other.is_edge() == arc.is_edge() => fitting.push(Second {
+                    arc: index,
+                    scan,
+                    beta_deg,
+                    beta_corner_deg: corner_deg,
+                    likelihood: [
+                        as_plane.density(beta_deg),
+                        as_corner.density(beta_deg - corner_deg),
+                    ],
+                    decides: corner_deg >= apart(&as_plane, &as_corner) - ROUNDING_DEG,
+                }),
+                None => {}
+            }
+        }
+        match (fitting.as_slice(), faulty) {
+            ([second], _) => Ok(Some(*second)),
+            ([], Some(reason)) => Err(reason),
+            ([], None) if self.is_out_of_reach(extents) => Ok(None),
+            ([], None) => Err(Reason::Lost),
+            _ => Err(Reason::Ambiguous),
+        }
+    }
+
+    /// Errors of `beta` if the element is a plane, and if it is a corner or edge, for the gaps
+    /// and the deviation of the borders with which the other place sees it.
+    ///
+    /// The paper's density (23) is both, for it takes the corner's expected `beta` as given; it
+    /// follows from the measured direction, which counts where the other place is much nearer.
+    fn errors(
+        &self,
+        arc: &Arc,
+        (gaps_deg, sigma_deg): ([f64; 2], f64),
+        heading_deg: f64,
+    ) -> [UniformSum; 2] {
+        [1.0, self.gain.abs()].map(|gain| {
+            let first_deg = arc.region.gaps_deg.map(|gap| gain * gap);
+            let sigmas = [gain * arc.border_sigma_deg, sigma_deg];
+            UniformSum::of_beta([first_deg, gaps_deg], sigmas, heading_deg)
+        })
+    }
+
+    /// The least `beta` of a corner that tells it from a plane, if the place sees the element as
+    /// the first did, degrees: (25), and with noise what their section IX asks for.
+    pub(super) fn least_beta_deg(&self, arc: &Arc, settings: &Settings) -> f64 {
+        let as_before = (arc.region.gaps_deg, arc.border_sigma_deg);
+        let [as_plane, as_corner] = self.errors(arc, as_before, settings.noise.heading_deg);
+        apart(&as_plane, &as_corner)
+    }
+
+    fn range_fits(&self, other: &Arc, tolerance_m: f64) -> bool {
+        let [plane_m, point_m] = self.ranges_m;
+        let wanted = plane_m.min(point_m) - tolerance_m..=plane_m.max(point_m) + tolerance_m;
+        other.region.range_m.is_some_and(|range_m| wanted.contains(&range_m))
+    }
+
+    fn beta_deg(&self, arc: &Arc, other: &Arc) -> f64 {
+        self.side * wrap_pi(arc.bearing_rad - other.bearing_rad).to_degrees()
+    }
+
+    pub(super) const fn ranges_m(&self) -> [f64; 2] {
+        self.ranges_m
+    }
+
+    pub(super) fn is_out_of_reach(&self, extents: &Extents) -> bool {
+        self.ranges_m.iter().any(|m| !(extents.min_range_m..=extents.max_range_m).contains(m))
+    }
+}
+
+/// How far apart two values must be for their errors never to meet.
+fn apart(one: &UniformSum, other: &UniformSum) -> f64 {
+    one.reach(CERTAIN) + other.reach(CERTAIN)
+}
+
+fn probabilities(arc: &Arc, seconds: &[Second]) -> Probabilities {
+    let [of_plane_corner, of_edge] = arc.extent_likelihood;
+    let [mut plane, mut corner, mut edge] = [of_plane_corner, of_plane_corner, of_edge];
+    let mut other = 1.0 / OTHER_EXTENT_DEG;
+    for second in seconds {
+        let [as_plane, as_corner] = second.likelihood;
+        plane *= as_plane;
+        corner *= as_corner;
+        edge *= as_corner;
+        other /= OTHER_EXTENT_DEG;
+    }
+    let known = (1.0 - OTHER) / 3.0;
+    let all = known * (plane + corner + edge) + OTHER * other;
+    Probabilities {
+        plane: known * plane / all,
+        corner: known * corner / all,
+        edge: known * edge / all,
+    }
+}
+
+/// Why the kind stays open, if it does.
+fn open_reason(
+    probabilities: &Probabilities,
+    second: Option<&Second>,
+    why_not: Option<Reason>,
+    settings: &Settings,
+) -> Option<Reason> {
+    let Probabilities { plane, corner, edge } = *probabilities;
+    let least = settings.min_confidence;
+    if edge >= least {
+        return None;
+    }
+    match second {
+        _ if plane + corner < least && second.is_none() => Some(Reason::Extent),
+        None => Some(why_not.unwrap_or(Reason::SecondPosition)),
+        Some(second) if !second.decides => Some(Reason::Translation),
+        Some(_) if plane.max(corner) >= least => None,
+        Some(_) => Some(Reason::Ambiguous),
+    }
+}

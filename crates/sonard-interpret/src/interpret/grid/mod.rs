@@ -1,0 +1,205 @@
+//! Occupancy grids.
+//!
+//! A grid holds for each cell the logarithm of the odds that it is occupied, 0 where nothing is
+//! known (H. P. Moravec and A. Elfes, "High resolution maps from wide angle sonar", ICRA 1985).
+//! A set of readings is added as one: its beams fill a table by direction and distance from the
+//! ranger, and each cell in reach takes its entry.
+
+mod beam_model;
+mod ideal;
+mod image;
+mod polar;
+mod score;
+
+#[cfg(test)]
+mod tests;
+
+pub use beam_model::{BeamModel, GaussianBeam, PhysicalBeam};
+pub use ideal::ideal;
+pub use image::{ImageError, MapYaml, from_pgm, to_pgm};
+pub use score::{MapScore, PathSettings, ScoreError, score};
+
+use thiserror::Error;
+
+use super::{Sweep, prediction::Worth};
+use sonard_model::geometry::DVec2;
+
+/// Most cells of a grid: 256 MB.
+const MOST_CELLS: u64 = 1 << 26;
+
+/// Odds don't leave 1 : 1000 to 1000 : 1, so that a cell can still change its mind.
+const MOST_LOG_ODDS: f32 = 6.9;
+
+/// Where a grid lies and how fine it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GridShape {
+    /// World place of the lower left corner, metres.
+    pub origin: DVec2,
+    /// Side of a cell, metres.
+    pub resolution_m: f64,
+    /// Cells in x.
+    pub width: usize,
+    /// Cells in y.
+    pub height: usize,
+}
+
+/// Why there is no such grid.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum GridError {
+    /// Cells without size.
+    #[error("a resolution of {0} m makes no grid: it must be a finite length greater than 0")]
+    Resolution(f64),
+    /// Nothing to cover.
+    #[error("the region from ({}, {}) to ({}, {}) m has no area", low[0], low[1], high[0], high[1])]
+    Empty {
+        /// Lower left corner, metres.
+        low: [f64; 2],
+        /// Upper right corner, metres.
+        high: [f64; 2],
+    },
+    /// More than memory should be spent on.
+    #[error(
+        "{cells} cells are too many (at most {MOST_CELLS}): choose a coarser resolution or a smaller region"
+    )]
+    TooLarge {
+        /// How many it would have.
+        cells: u64,
+    },
+}
+
+impl GridShape {
+    /// The grid of this resolution over a region.
+    ///
+    /// # Errors
+    /// When the region or the resolution is not finite and positive, or cells are too many.
+    pub fn covering(low: DVec2, high: DVec2, resolution_m: f64) -> Result<Self, GridError> {
+        if !(resolution_m.is_finite() && resolution_m > 0.0) {
+            return Err(GridError::Resolution(resolution_m));
+        }
+        let size = (high - low) / resolution_m;
+        if !size.is_finite() || size.min_element() <= 0.0 {
+            return Err(GridError::Empty { low: low.into(), high: high.into() });
+        }
+        // A region that is a whole number of cells must not get one more by rounding.
+        let count = |cells: f64| (cells - 1e-6).ceil().max(1.0);
+        let cells = count(size.x) * count(size.y);
+        if cells > MOST_CELLS as f64 {
+            return Err(GridError::TooLarge { cells: cells as u64 });
+        }
+        let (width, height) = (count(size.x) as usize, count(size.y) as usize);
+        Ok(Self { origin: low, resolution_m, width, height })
+    }
+
+    /// How many cells it has.
+    #[must_use]
+    pub const fn cells(&self) -> usize {
+        self.width * self.height
+    }
+
+    /// Middle of a cell, world, metres.
+    #[must_use]
+    pub fn center(&self, column: usize, row: usize) -> DVec2 {
+        self.origin + self.resolution_m * DVec2::new(column as f64 + 0.5, row as f64 + 0.5)
+    }
+
+    /// Index of the cell that holds a point.
+    #[must_use]
+    pub fn index_at(&self, point: DVec2) -> Option<usize> {
+        let place = (point - self.origin) / self.resolution_m;
+        let inside = place.min_element() >= 0.0
+            && place.x < self.width as f64
+            && place.y < self.height as f64;
+        inside.then(|| place.y as usize * self.width + place.x as usize)
+    }
+}
+
+/// A map: for each cell how likely it is occupied.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    shape: GridShape,
+    /// Row by row from the lower left corner.
+    log_odds: Vec<f32>,
+}
+
+/// How readings of little confidence are used (step 7 of Feature Prediction).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trust {
+    /// Readings below this confidence are left out.
+    pub least_confidence: f64,
+    /// Whether what lies before the feature that contradicts a reading is taken at full weight.
+    pub keep_clear: bool,
+}
+
+impl Default for Trust {
+    fn default() -> Self {
+        Self { least_confidence: 0.0, keep_clear: true }
+    }
+}
+
+impl Grid {
+    /// A map in which nothing is known.
+    #[must_use]
+    pub fn new(shape: GridShape) -> Self {
+        Self { shape, log_odds: vec![0.0; shape.cells()] }
+    }
+
+    /// A map of given probabilities, row by row from the lower left; too few are followed by
+    /// unknown cells.
+    #[must_use]
+    pub fn of_probabilities(shape: GridShape, probabilities: &[f64]) -> Self {
+        let log_odds = |p: &f64| {
+            let p = p.clamp(1e-9, 1.0 - 1e-9);
+            ((p / (1.0 - p)).ln() as f32).clamp(-MOST_LOG_ODDS, MOST_LOG_ODDS)
+        };
+        let mut grid = Self::new(shape);
+        for (cell, p) in grid.log_odds.iter_mut().zip(probabilities) {
+            *cell = log_odds(p);
+        }
+        grid
+    }
+
+    /// Where it lies and how fine it is.
+    #[must_use]
+    pub const fn shape(&self) -> &GridShape {
+        &self.shape
+    }
+
+    /// Probability that a cell is occupied, by its index; 0.5 where nothing is known.
+    #[must_use]
+    pub fn probability(&self, index: usize) -> f64 {
+        1.0 / (1.0 + f64::from(-self.log_odds[index]).exp())
+    }
+
+    /// Probabilities of all cells, row by row from the lower left.
+    pub fn probabilities(&self) -> impl Iterator<Item = f64> {
+        (0..self.log_odds.len()).map(|index| self.probability(index))
+    }
+
+    /// Adds a set of readings; `worths` are theirs, without which all are believed. Returns how
+    /// many readings were left out for want of confidence.
+    pub fn add(
+        &mut self,
+        sweep: &Sweep,
+        worths: Option<&[Worth]>,
+        model: &BeamModel,
+        trust: &Trust,
+    ) -> usize {
+        let cell_m = self.shape.resolution_m;
+        // Rangers of an array hear from where they are: a table for each place.
+        let mut places: Vec<DVec2> = Vec::new();
+        for beam in &sweep.beams {
+            if !places.contains(&beam.mount) {
+                places.push(beam.mount);
+            }
+        }
+        let mut left_out = 0;
+        for mount in places {
+            let table = polar::Table::of(sweep, mount, worths, model, trust, cell_m);
+            let turn = DVec2::from_angle(sweep.pose.direction_rad(0.0));
+            let from = sweep.pose.position() + turn.rotate(mount);
+            table.add_to(&self.shape, from, &mut self.log_odds);
+            left_out += table.left_out;
+        }
+        left_out
+    }
+}

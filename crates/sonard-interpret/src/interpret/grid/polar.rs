@@ -1,0 +1,213 @@
+//! A set of readings by direction and distance from the ranger.
+
+use std::f64::consts::TAU;
+
+use super::{BeamModel, GridShape, MOST_LOG_ODDS, Trust};
+use crate::interpret::{Beam, Heard, Sweep, prediction::Worth};
+use sonard_model::geometry::DVec2;
+
+/// Directions of the table: 0.75 degrees each, finer than the motor's steps.
+const DIRECTIONS: usize = 480;
+
+/// Ranges reach this many standard deviations beyond the reading.
+const REACH_SIGMAS: f64 = 3.0;
+
+/// What all readings of a set say together.
+pub(super) struct Table {
+    /// For each direction, distances from 0 in steps of a cell.
+    log_odds: Vec<f32>,
+    distances: usize,
+    /// For each direction the number of distances that something is said of.
+    reach: Vec<usize>,
+    cell_m: f64,
+    /// Readings not believed.
+    pub(super) left_out: usize,
+}
+
+impl Table {
+    /// Of the readings of a set that were taken at one place on the robot.
+    pub(super) fn of(
+        sweep: &Sweep,
+        mount: DVec2,
+        worths: Option<&[Worth]>,
+        model: &BeamModel,
+        trust: &Trust,
+        cell_m: f64,
+    ) -> Self {
+        let longest_m = model.max_range_m() + 0.2;
+        let distances = (longest_m / cell_m).ceil() as usize + 1;
+        let mut table = Self {
+            log_odds: vec![0.0; DIRECTIONS * distances],
+            distances,
+            reach: vec![0; DIRECTIONS],
+            cell_m,
+            left_out: 0,
+        };
+        // Beams that overlap hear the same things: together they count as much as beams side by
+        // side.
+        let share = (sweep.step_deg / model.width_deg()).clamp(0.0, 1.0);
+        let mut profiles = [vec![0.0; distances], vec![0.0; distances]];
+        let here = |(_, beam): &(usize, &Beam)| beam.mount == mount;
+        for (at, beam) in sweep.beams.iter().enumerate().filter(here) {
+            let worth = worths.and_then(|worths| worths.get(at));
+            let (range_m, echo) = match beam.heard {
+                Heard::Echo(range_m) if range_m <= model.max_range_m() => (range_m, true),
+                Heard::Echo(_) | Heard::Silent => (model.max_range_m(), false),
+                Heard::Near => continue,
+            };
+            if worth.is_some_and(|worth| worth.confidence < trust.least_confidence) {
+                table.left_out += 1;
+                if !trust.keep_clear {
+                    continue;
+                }
+            }
+            let reading = Reading { range_m, echo, share, worth, trust };
+            let axis_rad = sweep.pose.direction_rad(beam.azimuth_deg);
+            table.add(&reading, axis_rad, model, &mut profiles);
+        }
+        table
+    }
+
+    fn add(
+        &mut self,
+        reading: &Reading<'_>,
+        axis_rad: f64,
+        model: &BeamModel,
+        [free, occupied]: &mut [Vec<f32>; 2],
+    ) {
+        let said = model.say(reading.range_m, self.cell_m);
+        let end_m = reading.range_m + REACH_SIGMAS * said.range_sigma_m;
+        let count = ((end_m / self.cell_m).ceil() as usize).min(self.distances);
+        for distance in 0..count {
+            let distance_m = (distance as f64 + 0.5) * self.cell_m;
+            let weight = reading.share * reading.weight(distance_m);
+            let off = (distance_m - reading.range_m) / said.range_sigma_m;
+            let there = if reading.echo { (-0.5 * off * off).exp() } else { 0.0 };
+            // Moravec and Elfes: the nearer the reading, the less sure that space is free.
+            let share = distance_m / reading.range_m;
+            let before = (1.0 - share * share).max(0.0);
+            free[distance] = (weight * said.free * before) as f32;
+            occupied[distance] = (weight * said.occupied * there) as f32;
+        }
+        let bin_rad = TAU / DIRECTIONS as f64;
+        let first = ((axis_rad - said.half_rad) / bin_rad).ceil() as i64;
+        let last = ((axis_rad + said.half_rad) / bin_rad).floor() as i64;
+        for bin in first..=last.min(first + DIRECTIONS as i64 - 1) {
+            let off_rad = bin as f64 * bin_rad - axis_rad;
+            let [of_free, of_occupied] = model.off_axis(off_rad, said.half_rad).map(|g| g as f32);
+            let direction = bin.rem_euclid(DIRECTIONS as i64) as usize;
+            let row = &mut self.log_odds[direction * self.distances..][..count];
+            for ((cell, free), occupied) in row.iter_mut().zip(&*free).zip(&*occupied) {
+                *cell += of_free * free + of_occupied * occupied;
+            }
+            self.reach[direction] = self.reach[direction].max(count);
+        }
+    }
+
+    /// Adds each entry to the cells it is about, around `from`.
+    pub(super) fn add_to(&self, shape: &GridShape, from: DVec2, cells: &mut [f32]) {
+        let place = (from - shape.origin) / shape.resolution_m;
+        if !place.is_finite() {
+            return;
+        }
+        let [low, high] = self.box_in_cells(shape).map(|corner| place + corner);
+        let range = |low: f64, high: f64, count: usize| {
+            let within = |cell: f64| cell.clamp(0.0, count as f64) as usize;
+            within(low.floor())..within(high.ceil())
+        };
+        let columns = range(low.x, high.x, shape.width);
+        let per_radian = DIRECTIONS as f32 / TAU as f32;
+        for row in range(low.y, high.y, shape.height) {
+            let dy = (row as f64 + 0.5 - place.y) as f32;
+            let line = &mut cells[row * shape.width..][..shape.width];
+            for column in columns.clone() {
+                let dx = (column as f64 + 0.5 - place.x) as f32;
+                let distance = (dx * dx + dy * dy).sqrt() as usize;
+                if distance >= self.distances {
+                    continue;
+                }
+                let turn = angle(dy, dx) * per_radian + 0.5 + DIRECTIONS as f32;
+                let direction = turn as usize % DIRECTIONS;
+                let said = self.log_odds[direction * self.distances + distance];
+                let cell = &mut line[column];
+                *cell = (*cell + said).clamp(-MOST_LOG_ODDS, MOST_LOG_ODDS);
+            }
+        }
+    }
+}
+
+impl Table {
+    /// Lower left and upper right corner of what something is said of, from the place of the
+    /// ranger, cells.
+    fn box_in_cells(&self, shape: &GridShape) -> [DVec2; 2] {
+        let bin_rad = TAU / DIRECTIONS as f64;
+        let told = self.reach.iter().enumerate().filter(|(_, reach)| **reach > 0);
+        let sides = told.flat_map(|(direction, reach)| {
+            let reach = *reach as f64 * self.cell_m / shape.resolution_m;
+            // A direction's entry is for half a direction to each side of it.
+            [-0.5, 0.5].map(|off| reach * DVec2::from_angle((direction as f64 + off) * bin_rad))
+        });
+        let corners = sides.fold([DVec2::ZERO; 2], |[low, high], at| [low.min(at), high.max(at)]);
+        // An arc reaches a little beyond its ends.
+        [corners[0] - 1.0, corners[1] + 1.0]
+    }
+}
+
+/// A reading and how far it is believed.
+struct Reading<'a> {
+    range_m: f64,
+    echo: bool,
+    share: f64,
+    worth: Option<&'a Worth>,
+    trust: &'a Trust,
+}
+
+impl Reading<'_> {
+    /// What it counts at a distance: 1 where nothing speaks against it, 0 without confidence.
+    fn weight(&self, distance_m: f64) -> f64 {
+        let Some(worth) = self.worth else { return 1.0 };
+        if self.trust.keep_clear && worth.clear_m.is_some_and(|clear_m| distance_m < clear_m) {
+            return 1.0;
+        }
+        if worth.confidence < self.trust.least_confidence {
+            return 0.0;
+        }
+        (2.0 * worth.confidence).clamp(0.0, 1.0)
+    }
+}
+
+/// The angle of a vector, radians, to 0.0004: a hundredth of a table's direction.
+///
+/// Rational approximation of the arctangent on [0, 1] after S. Rajan and others, "Efficient
+/// approximations for the arctangent function", IEEE Signal Processing Magazine 23 (2006).
+fn angle(y: f32, x: f32) -> f32 {
+    use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+    let (small, large) = (x.abs().min(y.abs()), x.abs().max(y.abs()));
+    if large == 0.0 {
+        return 0.0;
+    }
+    let ratio = small / large;
+    let mut angle = ratio * (FRAC_PI_4 - (ratio - 1.0) * (0.2447 + 0.0663 * ratio));
+    if y.abs() > x.abs() {
+        angle = FRAC_PI_2 - angle;
+    }
+    if x < 0.0 {
+        angle = PI - angle;
+    }
+    if y < 0.0 { -angle } else { angle }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::angle;
+
+    #[test]
+    fn the_quick_angle_is_close_enough() {
+        for i in -3600..3600 {
+            let exact = f64::from(i) * 0.05_f64.to_radians();
+            let quick = angle(exact.sin() as f32, exact.cos() as f32);
+            let off = sonard_model::geometry::wrap_pi(f64::from(quick) - exact).abs();
+            assert!(off < 0.0016, "{exact}: {off}");
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! Grids, their files and their scores.
+
+use super::{
+    BeamModel, GaussianBeam, Grid, GridError, GridShape, ImageError, MapYaml, PathSettings,
+    PhysicalBeam, Trust, from_pgm, ideal, score, to_pgm,
+};
+use crate::interpret::{Beam, Extents, Heard, Sweep, prediction::Worth};
+use sonard_model::{
+    acoustics::{Air, Sensor},
+    geometry::{DVec2, Pose},
+    scene::{Scene, shipped},
+};
+
+fn shape(side_m: f64, resolution_m: f64) -> GridShape {
+    GridShape::covering(DVec2::ZERO, DVec2::splat(side_m), resolution_m).expect("a grid")
+}
+
+fn gaussian() -> BeamModel {
+    BeamModel::Gaussian(GaussianBeam::new(20.0, 5.0))
+}
+
+/// One beam along +x from (1, 2).
+fn beam(heard: Heard) -> Sweep {
+    let beams = vec![Beam { azimuth_deg: 0.0, index: 0, heard, mount: DVec2::ZERO }];
+    let pose = Pose { x_m: 1.0, y_m: 2.0, heading_deg: 0.0 };
+    Sweep { pose, step_deg: 25.0, beams, closed: false }
+}
+
+fn at(grid: &Grid, x: f64, y: f64) -> f64 {
+    grid.probability(grid.shape().index_at(DVec2::new(x, y)).expect("inside"))
+}
+
+#[test]
+fn an_echo_frees_what_is_before_it_and_fills_what_is_there() {
+    let extents =
+        Extents::new(&Sensor::preset("senscomp-6500").expect("a preset"), &Air::default(), false)
+            .expect("figures");
+    for model in [gaussian(), BeamModel::Physical(Box::new(PhysicalBeam::new(extents, 5.0)))] {
+        let mut grid = Grid::new(shape(5.0, 0.05));
+        grid.add(&beam(Heard::Echo(2.0)), None, &model, &Trust::default());
+        assert!(at(&grid, 2.0, 2.0) < 0.5, "free before");
+        assert!(at(&grid, 3.0, 2.0) > 0.5, "occupied there");
+        assert_eq!(at(&grid, 4.0, 2.0), 0.5, "unknown behind");
+        assert_eq!(at(&grid, 2.0, 3.0), 0.5, "unknown beside");
+        assert_eq!(at(&grid, 0.5, 2.0), 0.5, "unknown at the back");
+    }
+}
+
+#[test]
+fn doubted_readings_count_up_to_what_contradicts_them_only() {
+    let worth = Worth { confidence: 0.1, clear_m: Some(1.0) };
+    let mut believed = Grid::new(shape(5.0, 0.05));
+    believed.add(&beam(Heard::Echo(2.0)), None, &gaussian(), &Trust::default());
+    let add = |trust: Trust| {
+        let mut grid = Grid::new(shape(5.0, 0.05));
+        let left_out = grid.add(&beam(Heard::Echo(2.0)), Some(&[worth]), &gaussian(), &trust);
+        (grid, left_out)
+    };
+    let (kept, _) = add(Trust { least_confidence: 0.0, keep_clear: true });
+    assert_eq!(at(&kept, 1.5, 2.0), at(&believed, 1.5, 2.0));
+    assert!(at(&kept, 2.5, 2.0) > at(&believed, 2.5, 2.0));
+    let (dropped, left_out) = add(Trust { least_confidence: 0.3, keep_clear: true });
+    assert_eq!((left_out, at(&dropped, 2.5, 2.0)), (1, 0.5));
+    let (without, _) = add(Trust { least_confidence: 0.3, keep_clear: false });
+    assert_eq!(without, Grid::new(shape(5.0, 0.05)));
+}
+
+#[test]
+fn poses_outside_and_without_place_change_nothing_or_what_they_reach() {
+    let mut grid = Grid::new(shape(5.0, 0.05));
+    let mut outside = beam(Heard::Echo(2.0));
+    outside.pose.x_m = -1.0;
+    grid.add(&outside, None, &gaussian(), &Trust::default());
+    assert!(at(&grid, 0.5, 2.0) < 0.5, "reached from outside");
+    let before = grid.clone();
+    outside.pose.x_m = 1e6;
+    grid.add(&outside, None, &gaussian(), &Trust::default());
+    assert_eq!(grid, before);
+}
+
+#[test]
+fn impossible_grids_are_refused() {
+    let covering = |side_m: f64, resolution_m: f64| {
+        GridShape::covering(DVec2::ZERO, DVec2::splat(side_m), resolution_m)
+    };
+    assert!(matches!(covering(1.0, 0.0), Err(GridError::Resolution(_))));
+    assert!(matches!(covering(1.0, f64::NAN), Err(GridError::Resolution(_))));
+    assert!(matches!(covering(-1.0, 0.1), Err(GridError::Empty { .. })));
+    assert!(matches!(covering(f64::NAN, 0.1), Err(GridError::Empty { .. })));
+    assert!(matches!(covering(1e6, 0.001), Err(GridError::TooLarge { .. })));
+    assert_eq!(covering(10.0, 0.02).map(|shape| shape.cells()), Ok(250_000));
+}
+
+#[test]
+fn the_pair_of_files_gives_the_map_back() {
+    let mut grid = Grid::new(shape(3.0, 0.05));
+    grid.add(&beam(Heard::Echo(1.0)), None, &gaussian(), &Trust::default());
+    let yaml = MapYaml::of(grid.shape(), "map.pgm");
+    let read = MapYaml::from_text(&yaml.to_text()).expect("a description");
+    assert_eq!(read, yaml);
+    let back = from_pgm(&to_pgm(&grid), &read).expect("a map");
+    for (one, other) in grid.probabilities().zip(back.probabilities()) {
+        assert!((one - other).abs() < 1.0 / 255.0, "{one} {other}");
+    }
+    // A comment and a line more, as other programs write them.
+    let pgm = to_pgm(&grid);
+    let other = [b"P5\n# made by hand\n60 60 255\n".as_slice(), &pgm[13..]].concat();
+    assert_eq!(from_pgm(&other, &read).map(|grid| *grid.shape()), Ok(*back.shape()));
+}
+
+#[test]
+fn damaged_files_are_named() {
+    let grid = Grid::new(shape(1.0, 0.1));
+    let (pgm, yaml) = (to_pgm(&grid), MapYaml::of(grid.shape(), "map.pgm"));
+    for cut in 0..pgm.len() {
+        assert!(matches!(from_pgm(&pgm[..cut], &yaml), Err(ImageError::Image { .. })), "{cut}");
+    }
+    for (text, part) in [
+        ("image: a.pgm\nresolution: 0.1\n", "`origin:` is missing"),
+        ("image: a.pgm\nresolution: x\norigin: [0, 0, 0]", "line 2: `x` is not a number"),
+        ("image: a.pgm\nresolution: 1\norigin: [0, 0]", "line 3"),
+    ] {
+        let error = MapYaml::from_text(text).expect_err(part).to_string();
+        assert!(error.contains(part), "{error}");
+    }
+    let zero = MapYaml { resolution: 0.0, ..yaml };
+    assert!(matches!(from_pgm(&pgm, &zero), Err(ImageError::Grid(_))));
+}
+
+fn room() -> (Scene, Grid) {
+    let text = shipped::text("two-surface-room").expect("shipped");
+    let scene = Scene::from_json(text).expect("a scene");
+    let shape =
+        GridShape::covering(DVec2::splat(-0.5), DVec2::new(4.1, 3.5), 0.05).expect("a grid");
+    let ideal = ideal(&scene, shape, &[DVec2::new(1.2, 1.0)]);
+    (scene, ideal)
+}
+
+#[test]
+fn ideal_maps_are_closed() {
+    let (_, ideal) = room();
+    assert_eq!(at(&ideal, -0.3, 1.0), 0.5, "outside is unknown");
+    assert_eq!(at(&ideal, 3.0, 2.5), 0.5, "behind the ledge too");
+    assert!(at(&ideal, 3.0, 0.5) < 0.01 && at(&ideal, 0.01, 1.0) > 0.99);
+    let free_m2 = ideal.probabilities().filter(|p| *p < 0.5).count() as f64 * 0.05 * 0.05;
+    // 3.6 x 1.6 + 2.2 x 1.4 m, less at most a cell along all 13.2 m of wall.
+    assert!((8.84 - 13.2 * 0.05..8.84).contains(&free_m2), "{free_m2}");
+}
+
+#[test]
+fn the_ideal_map_is_perfect_and_an_unknown_one_is_scored_by_hand() {
+    let (_, ideal) = room();
+    let perfect = score(&ideal, &ideal, &PathSettings::default()).expect("one shape");
+    assert!((perfect.correlation_percent.expect("it varies") - 100.0).abs() < 1e-9);
+    assert_eq!(perfect.map_score_percent, 0.0);
+    assert_eq!(perfect.false_positive_paths_percent, Some(0.0));
+    assert!(perfect.paths > 100);
+
+    let unknown = Grid::new(*ideal.shape());
+    let blind = score(&unknown, &ideal, &PathSettings::default()).expect("one shape");
+    assert_eq!((blind.correlation_percent, blind.false_positive_paths_percent), (None, None));
+    let cells = ideal.shape().cells() as f64;
+    let known = ideal.probabilities().filter(|p| *p != 0.5).count() as f64;
+    let walls = ideal.probabilities().filter(|p| *p > 0.5).count() as f64;
+    assert!((blind.map_score_percent - 25.0 * known / cells).abs() < 0.1);
+    assert!((blind.map_score_occupied_percent - 25.0 * walls / cells).abs() < 0.01);
+}
+
+#[test]
+fn ways_through_a_wall_that_the_map_lacks_are_false() {
+    // Two rooms of equal size; the map does not know the wall between them.
+    let shape = shape(4.0, 0.1);
+    let cells = |wall: bool| -> Vec<f64> {
+        (0..shape.cells())
+            .map(|at| if wall && at % shape.width == 20 { 1.0 } else { 0.0 })
+            .collect()
+    };
+    let ideal = Grid::of_probabilities(shape, &cells(true));
+    let map = Grid::of_probabilities(shape, &cells(false));
+    let settings = PathSettings { spacing_m: 1.0, most_starts: 100, free_below: 0.45 };
+    let found = score(&map, &ideal, &settings).expect("one shape");
+    // 16 places, 8 on each side: 120 pairs, 64 of them across.
+    assert_eq!(found.paths, 120);
+    assert!(
+        (found.false_positive_paths_percent.expect("ways") - 100.0 * 64.0 / 120.0).abs() < 1e-9
+    );
+}
+
+#[test]
+fn maps_of_different_places_are_not_compared() {
+    let one = Grid::new(shape(1.0, 0.1));
+    let other = Grid::new(shape(2.0, 0.1));
+    let error = score(&one, &other, &PathSettings::default()).expect_err("they differ").to_string();
+    assert!(error.contains("10x10") && error.contains("20x20"), "{error}");
+}

@@ -1,0 +1,123 @@
+//! Segments fitted to points by split and merge.
+
+use sonard_model::geometry::DVec2;
+
+/// How segments are fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitSettings {
+    /// A point may be this far from its segment, metres.
+    pub tolerance_m: f64,
+    /// A segment has at least so many points.
+    pub least_points: usize,
+    /// And at least this length, metres.
+    pub least_length_m: f64,
+}
+
+impl Default for FitSettings {
+    fn default() -> Self {
+        Self { tolerance_m: 0.03, least_points: 3, least_length_m: 0.05 }
+    }
+}
+
+/// A fitted segment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Segment {
+    /// Its ends, in the order of the points.
+    pub ends: [DVec2; 2],
+    /// Confidence from 0 to 1: `(1 - rms / tolerance) (1 - 2 / n)` for n points that are off by
+    /// `rms`. The paper's own measure is in a report that it only cites.
+    pub confidence: f64,
+    /// The first of the points it stands on, counted among those that are finite.
+    pub from: usize,
+    /// How many points it stands on.
+    pub points: usize,
+}
+
+/// Fits segments to points in the order in which they lie along the walls (a scan's order).
+///
+/// Split: a run whose farthest point from the line through its ends is off by more than the
+/// tolerance is cut there. Merge: neighbouring runs that one line fits are put together.
+#[must_use]
+pub fn fit(points: &[DVec2], settings: &FitSettings) -> Vec<Segment> {
+    let points: Vec<DVec2> = points.iter().copied().filter(|point| point.is_finite()).collect();
+    let mut cuts = Vec::new();
+    split(&points, 0, settings, &mut cuts);
+    let runs = join(&points, &cuts, settings);
+    runs.into_iter()
+        .filter(|(from, to)| to - from >= settings.least_points.max(2))
+        .filter_map(|(from, to)| segment(&points[from..to], from, settings))
+        .collect()
+}
+
+/// Notes where runs begin, in rising order.
+fn split(points: &[DVec2], from: usize, settings: &FitSettings, cuts: &mut Vec<usize>) {
+    let (Some(&first), Some(&last)) = (points.first(), points.last()) else { return };
+    let along = (last - first).normalize_or_zero();
+    let off = |point: &DVec2| match along {
+        DVec2::ZERO => point.distance(first),
+        _ => along.perp_dot(*point - first).abs(),
+    };
+    let farthest = (1..points.len().saturating_sub(1))
+        .max_by(|a, b| off(&points[*a]).total_cmp(&off(&points[*b])));
+    match farthest.filter(|at| off(&points[*at]) > settings.tolerance_m) {
+        Some(at) => {
+            split(&points[..at], from, settings, cuts);
+            split(&points[at..], from + at, settings, cuts);
+        }
+        None => cuts.push(from),
+    }
+}
+
+/// Runs from the cuts; neighbours that one line fits are one.
+fn join(points: &[DVec2], cuts: &[usize], settings: &FitSettings) -> Vec<(usize, usize)> {
+    let ends = cuts.iter().skip(1).copied().chain([points.len()]);
+    let mut runs: Vec<(usize, usize)> = Vec::new();
+    for (from, to) in cuts.iter().copied().zip(ends) {
+        match runs.last_mut() {
+            Some(last) if fits(&points[last.0..to], settings.tolerance_m) => last.1 = to,
+            _ => runs.push((from, to)),
+        }
+    }
+    runs
+}
+
+fn fits(points: &[DVec2], tolerance_m: f64) -> bool {
+    let (middle, along) = line(points);
+    points.iter().all(|point| along.perp_dot(*point - middle).abs() <= tolerance_m)
+}
+
+fn segment(points: &[DVec2], from: usize, settings: &FitSettings) -> Option<Segment> {
+    let (middle, along) = line(points);
+    let place = |point: &DVec2| along.dot(*point - middle);
+    let (low, high) = points
+        .iter()
+        .map(place)
+        .fold((f64::MAX, f64::MIN), |(low, high), at| (low.min(at), high.max(at)));
+    let forward = points.first().zip(points.last()).is_none_or(|(a, b)| place(a) <= place(b));
+    let ends = [middle + low * along, middle + high * along];
+    let count = points.len() as f64;
+    let square: f64 = points.iter().map(|point| along.perp_dot(*point - middle).powi(2)).sum();
+    let rms_m = (square / count).sqrt();
+    let confidence = (1.0 - rms_m / settings.tolerance_m).clamp(0.0, 1.0) * (1.0 - 2.0 / count);
+    (high - low >= settings.least_length_m).then_some(Segment {
+        ends: if forward { ends } else { [ends[1], ends[0]] },
+        confidence,
+        from,
+        points: points.len(),
+    })
+}
+
+/// The line from which the squared distances are least: its middle and direction.
+fn line(points: &[DVec2]) -> (DVec2, DVec2) {
+    let count = points.len().max(1) as f64;
+    let middle = points.iter().sum::<DVec2>() / count;
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for point in points {
+        let off = *point - middle;
+        xx += off.x * off.x;
+        xy += off.x * off.y;
+        yy += off.y * off.y;
+    }
+    // The main axis of the scatter is at half the angle of its second moment.
+    (middle, DVec2::from_angle((2.0 * xy).atan2(xx - yy) / 2.0))
+}

@@ -1,0 +1,150 @@
+//! A predicted feature: a straight piece of wall.
+
+use super::between_rad;
+use sonard_model::geometry::{DVec2, wrap_pi};
+
+/// Normals this far apart may still be one wall's, radians: what a heading may be off.
+const NORMAL_TOLERANCE_RAD: f64 = 0.05;
+
+/// A straight piece of wall with the directions that its normal may have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line {
+    /// One end, metres.
+    pub a: DVec2,
+    /// The other end, metres.
+    pub b: DVec2,
+    /// World direction of its normal away from the ranger, radians.
+    pub normal_rad: f64,
+    /// How far the normal may be from that to both sides, radians.
+    pub spread_rad: f64,
+    /// How many readings it stands on.
+    pub support: f64,
+    /// Where the robot was when it was last seen.
+    pub seen_from: DVec2,
+    /// Readings of the present set that it explains, in rising order.
+    pub readings: Vec<u32>,
+    /// Ranger and mean range, as long as it stands on one set of readings.
+    reference: Option<(DVec2, f64)>,
+}
+
+impl Line {
+    /// Across the beam at its reading, as long as the beam is wide there (step 1); its normal may
+    /// be off the beam's axis by what a feature that is heard may be.
+    pub(super) fn of_reading(
+        (index, from, axis_rad, range_m): (u32, DVec2, f64, f64),
+        half_rad: f64,
+        spread_rad: f64,
+    ) -> Self {
+        let axis = DVec2::from_angle(axis_rad);
+        let across = range_m * half_rad.tan() * axis.perp();
+        let middle = from + range_m * axis;
+        Self {
+            a: middle - across,
+            b: middle + across,
+            normal_rad: axis_rad,
+            spread_rad,
+            support: 1.0,
+            seen_from: from,
+            readings: vec![index],
+            reference: Some((from, range_m)),
+        }
+    }
+
+    /// Length, metres.
+    #[must_use]
+    pub fn length_m(&self) -> f64 {
+        self.a.distance(self.b)
+    }
+
+    /// Whether it stands on this reading of the present set.
+    pub(super) fn explains(&self, reading: u32) -> bool {
+        self.readings.binary_search(&reading).is_ok()
+    }
+
+    /// Whether two may be the same wall: directions of the normal in common, and near (step 2).
+    pub(super) fn is_similar(&self, other: &Self, near_m: f64, gap_m: f64) -> bool {
+        let apart_rad = between_rad(self.normal_rad, other.normal_rad);
+        if apart_rad > self.spread_rad + other.spread_rad + NORMAL_TOLERANCE_RAD {
+            return false;
+        }
+        let (normal_rad, _) = self.common_normal(other);
+        let normal = DVec2::from_angle(normal_rad);
+        if (self.offset_m(normal) - other.offset_m(normal)).abs() > near_m {
+            return false;
+        }
+        let ([low, high], [other_low, other_high]) = (self.span(normal), other.span(normal));
+        (other_low - high).max(low - other_high) <= gap_m
+    }
+
+    /// Takes `other` in: the directions they have in common, the mean place, the whole length.
+    pub(super) fn merge(&mut self, other: &Self) {
+        let (normal_rad, spread_rad) = self.common_normal(other);
+        let normal = DVec2::from_angle(normal_rad);
+        let support = self.support + other.support;
+        let mean = |one: f64, two: f64| (one * self.support + two * other.support) / support;
+        let offset_m = mean(self.offset_m(normal), other.offset_m(normal));
+        let ([low, high], [other_low, other_high]) = (self.span(normal), other.span(normal));
+        self.reference = match (self.reference, other.reference) {
+            (Some((from, one)), Some((_, two))) if self.seen_from == other.seen_from => {
+                Some((from, mean(one, two)))
+            }
+            _ => None,
+        };
+        let place = |along_m: f64| offset_m * normal + along_m * normal.perp();
+        (self.a, self.b) = (place(low.min(other_low)), place(high.max(other_high)));
+        (self.normal_rad, self.spread_rad) = (normal_rad, spread_rad);
+        self.support = support;
+        self.seen_from = other.seen_from;
+        self.readings.extend_from_slice(&other.readings);
+        self.readings.sort_unstable();
+    }
+
+    /// From now on it stands where it is, whatever its normal is refined to.
+    pub(super) fn settle(&mut self, robot: DVec2) {
+        let normal = DVec2::from_angle(self.normal_rad);
+        let (offset_m, [low, high]) = (self.offset_m(normal), self.span(normal));
+        self.a = offset_m * normal + low * normal.perp();
+        self.b = offset_m * normal + high * normal.perp();
+        self.reference = None;
+        self.seen_from = robot;
+        // What many readings agree on is not turned over by the next few.
+        self.support = self.support.min(50.0);
+    }
+
+    /// The parts on both sides of a point, each shortened there.
+    pub(super) fn split(&self, at: DVec2, shorten_m: f64) -> [Self; 2] {
+        let along = (self.b - self.a).normalize_or_zero();
+        let part = |a: DVec2, b: DVec2| {
+            let forward = (b - a).dot(along) > 0.0;
+            let b = if forward { b } else { a };
+            Self { a, b, ..self.clone() }
+        };
+        [part(self.a, at - shorten_m * along), part(at + shorten_m * along, self.b)]
+    }
+
+    /// The middle of the directions that both normals may have, and half their width; between
+    /// the two where there is none.
+    fn common_normal(&self, other: &Self) -> (f64, f64) {
+        let turn = wrap_pi(other.normal_rad - self.normal_rad);
+        let low = (-self.spread_rad).max(turn - other.spread_rad);
+        let high = self.spread_rad.min(turn + other.spread_rad);
+        let middle = self.normal_rad + (low + high) / 2.0;
+        (wrap_pi(middle), ((high - low) / 2.0).max(0.0))
+    }
+
+    /// Distance from the world's origin along a normal: an echo's wall is at the echo's range
+    /// along the wall's normal, whichever beam heard it.
+    fn offset_m(&self, normal: DVec2) -> f64 {
+        match self.reference {
+            Some((from, range_m)) => normal.dot(from) + range_m,
+            None => normal.dot(self.a + self.b) / 2.0,
+        }
+    }
+
+    /// From where to where it reaches across a normal, metres.
+    fn span(&self, normal: DVec2) -> [f64; 2] {
+        let along = normal.perp();
+        let (a, b) = (along.dot(self.a), along.dot(self.b));
+        [a.min(b), a.max(b)]
+    }
+}

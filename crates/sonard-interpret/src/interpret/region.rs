@@ -1,0 +1,175 @@
+//! Regions of constant depth.
+
+use super::{Heard, Settings, Sweep};
+use crate::compare::quantile;
+use sonard_model::geometry::wrap_360;
+
+/// What ends a region on one side.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Silence or something farther: the element's own echo ended here.
+    Own,
+    /// Something nearer, whose echo came first.
+    Covered,
+    /// The end of the scan, or of what was measured of it.
+    Cut,
+}
+
+/// Neighbouring beams with one range.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Region {
+    /// Indices in the plan of its first and last beam, counter-clockwise.
+    pub beams: [u32; 2],
+    /// Azimuths of its first and last beam, degrees; the last may be 360 or more.
+    pub azimuths_deg: [f64; 2],
+    /// From the beam before the first one to it, and from the last to the one after it, degrees.
+    pub gaps_deg: [f64; 2],
+    /// What ends it on both sides.
+    pub sides: [Side; 2],
+    /// Median range, metres; `None`: sound was there when the receiver opened.
+    pub range_m: Option<f64>,
+    /// How many beams it has.
+    pub count: usize,
+}
+
+impl Region {
+    /// Azimuth of its middle, the estimate of `theta_N`, degrees in [0, 360) (10), (11).
+    #[must_use]
+    pub fn bearing_deg(&self) -> f64 {
+        let [start, end] = self.borders_deg();
+        wrap_360((start + end) / 2.0)
+    }
+
+    /// Its estimated angular extent, degrees (13).
+    #[must_use]
+    pub fn extent_deg(&self) -> f64 {
+        let [start, end] = self.borders_deg();
+        end - start
+    }
+
+    /// Whether both borders are the element's own.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.sides == [Side::Own; 2]
+    }
+
+    /// The middles of the gaps in which it begins and ends (11).
+    fn borders_deg(&self) -> [f64; 2] {
+        let ([first, last], [before, after]) = (self.azimuths_deg, self.gaps_deg);
+        [first - before / 2.0, last + after / 2.0]
+    }
+}
+
+/// Finds the regions of constant depth of a scan, in order of azimuth.
+///
+/// A beam belongs to a region when its range is within the settings' tolerance of the region's
+/// mean; a few odd beams inside one are passed over. Silence makes no region.
+#[must_use]
+pub fn regions(sweep: &Sweep, settings: &Settings) -> Vec<Region> {
+    let finder = Finder { sweep, tolerance_m: settings.depth_tolerance_m };
+    let count = sweep.beams.len();
+    let start = (0..count).find(|&at| finder.begins(at)).unwrap_or(0);
+    let mut found = Vec::new();
+    let mut done = 0;
+    while done < count {
+        let first = start + done;
+        let last = finder.last_of(first, count - done, settings.most_holes);
+        if !matches!(finder.heard(first), Heard::Silent) {
+            found.push(finder.region(first, last));
+        }
+        done += last - first + 1;
+    }
+    found.sort_by(|a, b| a.azimuths_deg[0].total_cmp(&b.azimuths_deg[0]));
+    found
+}
+
+/// Places of beams run on past the end of a closed sweep.
+struct Finder<'a> {
+    sweep: &'a Sweep,
+    tolerance_m: f64,
+}
+
+impl Finder<'_> {
+    fn heard(&self, at: usize) -> Heard {
+        self.sweep.beams[at % self.sweep.beams.len()].heard
+    }
+
+    fn gap_before_deg(&self, at: usize) -> Option<f64> {
+        self.sweep.gap_before_deg(at % self.sweep.beams.len())
+    }
+
+    /// Whether the beam does not go on from the one before it.
+    fn begins(&self, at: usize) -> bool {
+        let before = self.heard(at + self.sweep.beams.len() - 1);
+        self.gap_before_deg(at).is_none() || !self.same(before, self.heard(at))
+    }
+
+    fn same(&self, one: Heard, other: Heard) -> bool {
+        match (one, other) {
+            (Heard::Echo(a), Heard::Echo(b)) => (a - b).abs() <= self.tolerance_m,
+            (Heard::Near, Heard::Near) | (Heard::Silent, Heard::Silent) => true,
+            _ => false,
+        }
+    }
+
+    /// The last beam of the region that begins at `first`, among the next `most` beams.
+    fn last_of(&self, first: usize, most: usize, most_holes: usize) -> usize {
+        let (mut last, mut at) = (first, first + 1);
+        let (mut sum_m, mut members) = (0.0, 0.0);
+        if let Heard::Echo(range_m) = self.heard(first) {
+            (sum_m, members) = (range_m, 1.0);
+        }
+        let bridged = if matches!(self.heard(first), Heard::Echo(_)) { most_holes } else { 0 };
+        while at < first + most && at - last <= bridged + 1 && self.gap_before_deg(at).is_some() {
+            let mean = match self.heard(first) {
+                Heard::Echo(_) => Heard::Echo(sum_m / members),
+                other => other,
+            };
+            if self.same(mean, self.heard(at)) {
+                last = at;
+                if let Heard::Echo(range_m) = self.heard(at) {
+                    (sum_m, members) = (sum_m + range_m, members + 1.0);
+                }
+            }
+            at += 1;
+        }
+        last
+    }
+
+    fn region(&self, first: usize, last: usize) -> Region {
+        let beams = &self.sweep.beams;
+        let beam = |at: usize| beams[at % beams.len()];
+        let turned = |at: usize| beam(at).azimuth_deg + if at >= beams.len() { 360.0 } else { 0.0 };
+        let ranges: Vec<f64> = (first..=last)
+            .filter_map(|at| match self.heard(at) {
+                Heard::Echo(range_m) => Some(range_m),
+                _ => None,
+            })
+            .collect();
+        let range_m = match self.heard(first) {
+            Heard::Echo(_) => quantile(ranges, 0.5),
+            _ => None,
+        };
+        let whole_turn = last - first + 1 == beams.len() && self.sweep.closed;
+        let side = |outside: usize, gap_deg: Option<f64>| match (gap_deg, self.heard(outside)) {
+            _ if whole_turn => (Side::Cut, self.sweep.step_deg),
+            (None, _) => (Side::Cut, self.sweep.step_deg),
+            (Some(gap), Heard::Near) => (Side::Covered, gap),
+            (Some(gap), Heard::Echo(other)) if range_m.is_some_and(|here| other < here) => {
+                (Side::Covered, gap)
+            }
+            (Some(gap), _) => (Side::Own, gap),
+        };
+        let before = side(first + beams.len() - 1, self.gap_before_deg(first));
+        let after = side(last + 1, self.gap_before_deg(last + 1));
+        let shift = if first >= beams.len() { 360.0 } else { 0.0 };
+        Region {
+            beams: [beam(first).index, beam(last).index],
+            azimuths_deg: [turned(first) - shift, turned(last) - shift],
+            gaps_deg: [before.1, after.1],
+            sides: [before.0, after.0],
+            range_m,
+            count: last - first + 1,
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! Interpretation against the paper's figures, its densities, and random worlds.
+
+mod degenerate;
+mod densities;
+mod paper;
+mod worlds;
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+use uuid::Uuid;
+
+use super::{Extents, Feature, Settings, Sweep, interpret};
+use sonard_model::{
+    acoustics::{Air, Sensor},
+    geometry::Pose,
+    model::{EdgeLawKind, Options, Simulator},
+    scene::Scene,
+};
+use sonard_records::{ScanPlan, ScanView};
+
+/// The model as the paper has it: its sensor, whose gain makes up for the air and whose detector
+/// knows no time walk, and its edges.
+fn simulator(scene: Arc<Scene>) -> Simulator {
+    let sensor = Sensor::preset("bozma-kuc-60khz").expect("a preset");
+    let options = Options {
+        lossless: true,
+        edge_law: Some(EdgeLawKind::BozmaKuc),
+        ideal_receiver: true,
+        ..Options::default()
+    };
+    Simulator::new(scene, sensor, Air::default(), options).expect("sensible figures")
+}
+
+fn scan(simulator: &Simulator, number: u128, pose: &Pose) -> ScanView {
+    let (id, plan) = (Uuid::from_u128(number), ScanPlan::default());
+    ScanView::simulated(simulator, id, pose, &plan, Timestamp::UNIX_EPOCH)
+}
+
+fn features(scans: &[ScanView], settings: &Settings) -> Vec<Feature> {
+    let session = scans[0].session.as_ref().expect("a session");
+    let extents = Extents::of_session(session).expect("sensible figures");
+    let sweeps: Vec<_> =
+        scans.iter().map(|scan| (scan.scan, Sweep::of(scan).expect("a sweep"))).collect();
+    interpret(&sweeps, &extents, settings)
+}

@@ -1,0 +1,108 @@
+//! Input that holds nothing, or not enough.
+
+use uuid::Uuid;
+
+use super::{features, scan, simulator};
+use crate::interpret::{
+    Extents, FeatureKind, Heard, Reason, Settings, Sweep, SweepError, interpret,
+};
+use sonard_model::{
+    geometry::Pose,
+    scene::{Scene, shipped},
+};
+use sonard_records::{PingStatus, ScanView};
+
+fn fig13() -> ScanView {
+    let text = shipped::text("plane-corner-edge").expect("shipped");
+    let scene = std::sync::Arc::new(Scene::from_json(text).expect("a scene"));
+    let pose = scene.pose("fig13").expect("a pose");
+    scan(&simulator(scene), 1, &pose)
+}
+
+#[test]
+fn too_little_is_said_so() {
+    let whole = fig13();
+    assert_eq!(Sweep::of(&ScanView { start: None, ..whole.clone() }), Err(SweepError::NoPose));
+    let one = ScanView { pings: whole.pings[..1].to_vec(), ..whole.clone() };
+    assert_eq!(Sweep::of(&one), Err(SweepError::TooFew(1)));
+    let mut nowhere = whole;
+    if let Some(start) = &mut nowhere.start {
+        start.pose = Pose { x_m: f64::NAN, y_m: 0.0, heading_deg: 0.0 };
+    }
+    assert!(matches!(Sweep::of(&nowhere), Err(SweepError::BadPose { .. })));
+}
+
+#[test]
+fn silence_has_no_features() {
+    let mut silent = fig13();
+    for ping in &mut silent.pings {
+        (ping.status, ping.range_m) = (PingStatus::NoEcho, None);
+    }
+    assert_eq!(features(&[silent], &Settings::default()), []);
+    assert_eq!(interpret(&[], &extents(), &Settings::default()), []);
+}
+
+fn extents() -> Extents {
+    Extents::of_session(fig13().session.as_ref().expect("a session")).expect("figures")
+}
+
+#[test]
+fn readings_that_are_no_numbers_count_as_lost() {
+    let mut scan = fig13();
+    let expected = features(std::slice::from_ref(&scan), &Settings::default()).len();
+    scan.pings[5].range_m = Some(f64::NAN);
+    scan.pings[80].azimuth_deg = f64::INFINITY;
+    scan.pings[150].status = PingStatus::LinkLost;
+    scan.pings[160].range_m = Some(-3.0);
+    let sweep = Sweep::of(&scan).expect("a sweep");
+    assert_eq!(sweep.beams.len(), 397);
+    assert!(!sweep.beams.iter().any(|beam| matches!(beam.heard, Heard::Echo(m) if m.is_nan())));
+    assert_eq!(features(&[scan], &Settings::default()).len(), expected);
+}
+
+#[test]
+fn a_second_scan_from_the_same_place_does_not_decide() {
+    let (one, mut two) = (fig13(), fig13());
+    two.scan = Uuid::from_u128(2);
+    let features = features(&[one, two], &Settings::default());
+    assert_eq!(features.len(), 6);
+    for feature in features.iter().filter(|feature| feature.extent_deg > 15.0) {
+        assert_eq!(feature.kind, FeatureKind::Unresolved);
+        assert_eq!(feature.reason, Some(Reason::Translation));
+        assert!(feature.next.is_some());
+    }
+}
+
+#[test]
+fn a_circle_around_the_ranger_is_no_arc() {
+    let mut round = fig13();
+    for ping in &mut round.pings {
+        (ping.status, ping.range_m) = (PingStatus::Echo, Some(1.0));
+    }
+    let features = features(&[round], &Settings::default());
+    assert_eq!(features.len(), 1);
+    assert_eq!(
+        (features[0].kind, features[0].reason),
+        (FeatureKind::Unresolved, Some(Reason::CutOff))
+    );
+}
+
+#[test]
+fn a_part_of_a_turn_cuts_off_what_lies_at_its_ends() {
+    let mut part = fig13();
+    part.pings.retain(|ping| ping.azimuth_deg < 75.0);
+    let features = features(&[part], &Settings::default());
+    let reasons: Vec<_> = features.iter().map(|feature| feature.reason).collect();
+    assert_eq!(reasons, [Some(Reason::CutOff), None, Some(Reason::CutOff)]);
+}
+
+#[test]
+fn what_covers_an_arc_is_noticed() {
+    let mut covered = fig13();
+    for ping in &mut covered.pings[90..100] {
+        (ping.status, ping.range_m) = (PingStatus::Echo, Some(0.3));
+    }
+    let features = features(&[covered], &Settings::default());
+    let plane = features.iter().find(|f| f.range_m.is_some_and(|m| (m - 0.7).abs() < 1e-3));
+    assert_eq!(plane.and_then(|plane| plane.reason), Some(Reason::Interference));
+}

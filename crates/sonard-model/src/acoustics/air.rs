@@ -1,0 +1,183 @@
+//! Air: speed of sound and absorption from temperature, humidity and pressure.
+
+use thiserror::Error;
+
+/// Mole fraction of carbon dioxide assumed throughout.
+const CARBON_DIOXIDE: f64 = 0.0004;
+const ZERO_CELSIUS_K: f64 = 273.15;
+
+/// The state of the air.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Air {
+    temperature_c: f64,
+    humidity_percent: f64,
+    pressure_kpa: f64,
+    sound_speed_override_m_s: Option<f64>,
+}
+
+/// A state of the air that the formulas do not cover.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error("{field} is {value}: it must be from {min} to {max}")]
+pub struct AirError {
+    /// Which quantity.
+    pub field: &'static str,
+    /// What was given.
+    pub value: f64,
+    /// Least value allowed.
+    pub min: f64,
+    /// Greatest value allowed.
+    pub max: f64,
+}
+
+impl Default for Air {
+    /// 20 degrees Celsius, 50 percent, one standard atmosphere.
+    fn default() -> Self {
+        Self {
+            temperature_c: 20.0,
+            humidity_percent: 50.0,
+            pressure_kpa: 101.325,
+            sound_speed_override_m_s: None,
+        }
+    }
+}
+
+impl Air {
+    /// Air of a temperature (degrees Celsius, -20 to 50), relative humidity (percent, 0 to 100)
+    /// and static pressure (kilopascals, 60 to 110).
+    ///
+    /// Cramer states his fit for 0 to 30 degrees and 75 to 102 kPa and ISO 9613-1 covers -20 to
+    /// 50 degrees; outside Cramer's range the speed is an extrapolation.
+    ///
+    /// # Errors
+    /// When one of them is out of range or not a number.
+    pub fn new(
+        temperature_c: f64,
+        humidity_percent: f64,
+        pressure_kpa: f64,
+    ) -> Result<Self, AirError> {
+        check("temperature_c", temperature_c, -20.0, 50.0)?;
+        check("humidity_percent", humidity_percent, 0.0, 100.0)?;
+        check("pressure_kpa", pressure_kpa, 60.0, 110.0)?;
+        Ok(Self { temperature_c, humidity_percent, pressure_kpa, sound_speed_override_m_s: None })
+    }
+
+    /// The same air with the speed of sound given (metres a second, 200 to 500) instead of
+    /// computed; absorption still follows from the air's state.
+    ///
+    /// # Errors
+    /// When the speed is out of range or not a number.
+    pub fn with_sound_speed(self, sound_speed_m_s: f64) -> Result<Self, AirError> {
+        check("sound_speed_m_s", sound_speed_m_s, 200.0, 500.0)?;
+        Ok(Self { sound_speed_override_m_s: Some(sound_speed_m_s), ..self })
+    }
+
+    /// Temperature, degrees Celsius.
+    #[must_use]
+    pub const fn temperature_c(&self) -> f64 {
+        self.temperature_c
+    }
+
+    /// Relative humidity, percent.
+    #[must_use]
+    pub const fn humidity_percent(&self) -> f64 {
+        self.humidity_percent
+    }
+
+    /// Static pressure, kilopascals.
+    #[must_use]
+    pub const fn pressure_kpa(&self) -> f64 {
+        self.pressure_kpa
+    }
+
+    /// Speed of sound, metres a second: the one given, else Cramer's.
+    #[must_use]
+    pub fn sound_speed_m_s(&self) -> f64 {
+        self.sound_speed_override_m_s.unwrap_or_else(|| {
+            cramer_m_s(self.temperature_c, self.humidity_percent / 100.0, self.pressure_kpa * 1e3)
+        })
+    }
+
+    /// Pure-tone absorption, decibels a metre, at a frequency in hertz.
+    ///
+    /// ISO 9613-1:1993, equations (3) to (5) and annex B; stated accuracy 10 percent for -20 to
+    /// 50 degrees Celsius and frequency over pressure up to 10 MHz/atm at usual humidities.
+    #[must_use]
+    pub fn absorption_db_per_m(&self, frequency_hz: f64) -> f64 {
+        let pressure = self.pressure_kpa / 101.325;
+        let temperature_k = self.temperature_c + ZERO_CELSIUS_K;
+        let relative_k = temperature_k / 293.15;
+        let saturation = 10f64.powf(-6.8346 * (273.16 / temperature_k).powf(1.261) + 4.6151);
+        let vapour_percent = self.humidity_percent * saturation / pressure;
+        let oxygen_hz = pressure
+            * (24.0 + 4.04e4 * vapour_percent * (0.02 + vapour_percent) / (0.391 + vapour_percent));
+        let nitrogen_hz = pressure / relative_k.sqrt()
+            * (9.0 + 280.0 * vapour_percent * (-4.170 * (relative_k.powf(-1.0 / 3.0) - 1.0)).exp());
+        let square = frequency_hz * frequency_hz;
+        let classical = 1.84e-11 / pressure * relative_k.sqrt();
+        let relaxation = 0.01275 * (-2239.1 / temperature_k).exp()
+            / (oxygen_hz + square / oxygen_hz)
+            + 0.1068 * (-3352.0 / temperature_k).exp() / (nitrogen_hz + square / nitrogen_hz);
+        8.686 * square * (classical + relaxation * relative_k.powf(-2.5))
+    }
+}
+
+fn check(field: &'static str, value: f64, min: f64, max: f64) -> Result<(), AirError> {
+    if (min..=max).contains(&value) { Ok(()) } else { Err(AirError { field, value, min, max }) }
+}
+
+/// Speed of sound, metres a second, for a temperature in degrees Celsius, a relative humidity
+/// from 0 to 1 and a pressure in pascals.
+///
+/// Cramer, "The variation of the specific heat ratio and the speed of sound in air with
+/// temperature, pressure, humidity, and CO2 concentration", JASA 93 (1993), equation (15), with
+/// the saturation pressure of Giacomo (1981).
+fn cramer_m_s(t: f64, humidity: f64, p: f64) -> f64 {
+    let kelvin = t + ZERO_CELSIUS_K;
+    let enhancement = 1.00062 + 3.14e-8 * p + 5.6e-7 * t * t;
+    let saturation = (1.2811805e-5 * kelvin * kelvin - 1.9509874e-2 * kelvin + 34.04926034
+        - 6.3536311e3 / kelvin)
+        .exp();
+    let water = humidity * enhancement * saturation / p;
+    let dioxide = CARBON_DIOXIDE;
+    331.5024 + 0.603055 * t - 0.000528 * t * t
+        + (51.471935 + 0.1495874 * t - 0.000782 * t * t) * water
+        + (-1.82e-7 + 3.73e-8 * t - 2.93e-10 * t * t) * p
+        + (-85.20931 - 0.228525 * t + 5.91e-5 * t * t) * dioxide
+        - 2.835149 * water * water
+        - 2.15e-13 * p * p
+        + 29.179762 * dioxide * dioxide
+        + 0.000486 * water * p * dioxide
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn speed_of_sound_matches_cramers_table_to_its_digits() {
+        for (humidity_percent, expected) in [(0.0, 343.36), (50.0, 343.99), (100.0, 344.61)] {
+            let air = Air::new(20.0, humidity_percent, 101.325).expect("in range");
+            assert!((air.sound_speed_m_s() - expected).abs() < 0.005, "{humidity_percent} %");
+        }
+    }
+
+    #[test]
+    fn absorption_matches_iso_9613_to_its_digits() {
+        for (frequency_hz, expected) in [(49.4e3, 1.641), (50e3, 1.661), (60e3, 1.980)] {
+            let absorption = Air::default().absorption_db_per_m(frequency_hz);
+            assert!((absorption - expected).abs() < 5e-4, "{frequency_hz} Hz: {absorption}");
+        }
+    }
+
+    #[test]
+    fn air_out_of_range_is_named() {
+        for (air, field) in [
+            (Air::new(51.0, 50.0, 101.0), "temperature_c"),
+            (Air::new(20.0, f64::NAN, 101.0), "humidity_percent"),
+            (Air::new(20.0, 50.0, 101_325.0), "pressure_kpa"),
+            (Air::default().with_sound_speed(0.0), "sound_speed_m_s"),
+        ] {
+            assert_eq!(air.map_err(|error| error.field), Err(field));
+        }
+    }
+}

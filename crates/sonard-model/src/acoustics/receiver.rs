@@ -1,0 +1,383 @@
+//! The receiver: which of the sounds at the transducer's face raise ECHO, and when.
+//!
+//! # When
+//!
+//! A pulse rises over some tens of microseconds, so ECHO rises before or after the sound's nominal
+//! arrival, depending on how far it passes the threshold. What is the same for all echoes is
+//! calibration's business and left out here: times are counted so that a head-on, perfectly
+//! reflecting wall is timed by its path alone, and its range is its distance. A weaker echo is
+//! late against that: with the 6500's 16 cycles and 7 kHz of bandwidth 1.3 mm of range at half the
+//! amplitude, 7 mm at a tenth of it (time walk).
+//!
+//! # What
+//!
+//! Sounds that overlap add up with their phases. The detector watches the envelope of the sum
+//! against the threshold that the gain of the moment makes of the sensor's. An envelope has to stay
+//! above for the sensor's integration time; the time that takes is the same for all echoes and
+//! left out as well.
+
+mod hearing;
+mod noise;
+mod trace;
+
+#[cfg(test)]
+mod tests;
+
+use std::f64::consts::TAU;
+
+use smallvec::SmallVec;
+
+pub use self::{
+    noise::ReceiverNoise,
+    trace::{EchoTrace, Hump, TracePoint},
+};
+
+use self::hearing::Hearing;
+use super::{ApertureResponse, EchoShape, Gain, GainStep, Incidence, Response, Sensor};
+use crate::reading::PingStatus;
+
+/// Most echoes a firing reports.
+const MOST_ECHOES: usize = 8;
+
+/// Whether ECHO is made ready again after it has risen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Latch {
+    /// It stays up until the next firing: only the first echo is timed.
+    #[default]
+    First,
+    /// A pulse on BLNK lets it fall after each echo, up to eight times.
+    Rearmed,
+}
+
+/// ECHO this soon after the end of blanking counts as raised by sound already there,
+/// microseconds: about one cycle at 50 kHz, 3.4 mm of range.
+const BLANKING_TOLERANCE_US: f64 = 20.0;
+
+/// A sound at the transducer's face, reduced to what the receiver notices.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sound {
+    /// Length of its path there and back, metres.
+    pub length_m: f64,
+    /// Strength after gain compensation and the beam pattern on both ways; a head-on, perfectly
+    /// reflecting wall without absorption gives 1.
+    pub amplitude: f64,
+    /// Phase of the carrier beside that of the way, for `exp(+i omega t)`, radians.
+    pub phase_rad: f64,
+    /// Which of the sender's paths it took; meaningless to the receiver.
+    pub index: u32,
+}
+
+/// How sounds are heard.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Combining {
+    /// As pulses that rise and fall and, where they overlap, add up with their phases.
+    #[default]
+    Coherent,
+    /// One at a time, each as strong at once as it will ever be, for as long as the pulse
+    /// nominally lasts: the limit of a wide band, for models that know no phases. The range is half
+    /// the path, exactly.
+    Ideal,
+}
+
+/// A detector with a threshold that opens after the blanking.
+#[derive(Debug, Clone)]
+pub struct Receiver {
+    /// From firing until it listens, microseconds.
+    pub blanking_us: f64,
+    /// How long it is held after an echo, microseconds.
+    pub rearm_us: f64,
+    /// How long the envelope has to stay above the threshold, microseconds.
+    pub integration_us: f64,
+    /// Least amplitude it notices where the gain makes up for the spreading.
+    pub threshold: f64,
+    /// Speed of sound, metres a second.
+    pub sound_speed_m_s: f64,
+    /// Half the longest path it waits for, metres.
+    pub max_range_m: f64,
+    /// How sounds are heard.
+    pub combining: Combining,
+    gain: Gain,
+    /// By step of the gain: its end, and what it makes of the threshold at 1 m.
+    sensitivity: SmallVec<[(f64, f64); 12]>,
+    /// Carrier, radians a microsecond.
+    omega: f64,
+    /// How long the pulse nominally lasts, microseconds.
+    pulse_us: f64,
+    shape: EchoShape,
+    response: Option<ApertureResponse>,
+    noise_sigma_us: f64,
+    /// When the reference echo passes the threshold, from its nominal onset, microseconds.
+    lead_us: f64,
+}
+
+/// What the full response of the face needs to know of a sound.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Incident {
+    /// Strength before the beam pattern.
+    pub strength: f64,
+    /// How it meets the face.
+    pub incidence: Incidence,
+}
+
+/// What the receiver makes of a firing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detection {
+    /// `Echo`, `NoEcho` or `MinRange`.
+    pub status: PingStatus,
+    /// Half the detected path; for `MinRange` the range of the end of blanking; metres.
+    pub range_m: Option<f64>,
+    /// The sound that drove the detector, if it was sound; for `NoEcho` the one that came closest.
+    pub sound: Option<Sound>,
+    /// The most that the envelope reached with it, all sounds together.
+    pub amplitude: Option<f64>,
+    /// The same above the threshold in force, decibels.
+    pub margin_db: Option<f64>,
+    /// Times at which ECHO rises, microseconds after firing.
+    pub echoes_us: SmallVec<[f64; MOST_ECHOES]>,
+}
+
+impl Receiver {
+    /// The receiver of a sensor at a speed of sound in metres a second.
+    #[must_use]
+    pub fn new(sensor: &Sensor, sound_speed_m_s: f64) -> Self {
+        let shape = EchoShape::of(sensor);
+        let response = (sensor.response == Response::Full)
+            .then(|| ApertureResponse::new(sensor, sound_speed_m_s))
+            .flatten();
+        Self {
+            blanking_us: sensor.blanking_us,
+            rearm_us: sensor.rearm_us,
+            integration_us: sensor.integration_us,
+            threshold: sensor.threshold,
+            sound_speed_m_s,
+            max_range_m: sensor.max_range_m,
+            combining: Combining::Coherent,
+            sensitivity: sensitivity(&sensor.gain),
+            gain: sensor.gain.clone(),
+            omega: 1e-6 * TAU * sensor.frequency_hz,
+            pulse_us: 1e6 * sensor.pulse_s(),
+            shape,
+            response,
+            noise_sigma_us: noise::sigma_us(sensor),
+            lead_us: 0.0,
+        }
+        .with_threshold(sensor.threshold)
+    }
+
+    /// With another threshold, and the bias that goes with it left out of all times.
+    #[must_use]
+    pub fn with_threshold(mut self, threshold: f64) -> Self {
+        self.threshold = threshold;
+        self.lead_us = self.reference_echo().rise_us(threshold).unwrap_or(0.0);
+        self
+    }
+
+    /// Whether it needs an [`Incident`] for each sound.
+    #[must_use]
+    pub const fn asks_incidents(&self) -> bool {
+        self.response.is_some() && matches!(self.combining, Combining::Coherent)
+    }
+
+    /// Listens to the sounds of one firing, which come in order of their length, and is made ready
+    /// again after each echo.
+    ///
+    /// A sound that begins before the detector is ready and still lasts then raises ECHO at that
+    /// moment: at the end of blanking that is the minimum range, whatever is really there. A
+    /// sound that is over by then is lost.
+    #[must_use]
+    pub fn detect(&self, sounds: &[Sound]) -> Detection {
+        self.detection(&mut Hearing::new(self, sounds, &|_| None), Latch::Rearmed)
+    }
+
+    /// The same with the face's full response, if the sensor asks for it: `incident` tells how a
+    /// sound meets the face, and a sound of which it tells nothing is taken by its amplitude.
+    #[must_use]
+    pub fn detect_at_face(
+        &self,
+        sounds: &[Sound],
+        incident: &dyn Fn(&Sound) -> Option<Incident>,
+        latch: Latch,
+    ) -> Detection {
+        self.detect_within(f64::INFINITY, sounds, incident, latch).0
+    }
+
+    /// The same if only the sounds up to a length there and back are known, in metres. If longer
+    /// ones can't change it, also the length, at most that one, beyond which they couldn't.
+    #[must_use]
+    pub fn detect_within(
+        &self,
+        length_m: f64,
+        sounds: &[Sound],
+        incident: &dyn Fn(&Sound) -> Option<Incident>,
+        latch: Latch,
+    ) -> (Detection, Option<f64>) {
+        let mut hearing = Hearing::new(self, sounds, incident);
+        hearing.hear_within(length_m);
+        let detection = self.detection(&mut hearing, latch);
+        let needed_m = (!hearing.asked_beyond()).then(|| hearing.needed_m());
+        (detection, needed_m)
+    }
+
+    /// The same in noise.
+    #[must_use]
+    pub fn detect_in_noise(
+        &self,
+        sounds: &[Sound],
+        incident: &dyn Fn(&Sound) -> Option<Incident>,
+        noise: &ReceiverNoise,
+        rng: &mut impl rand::Rng,
+    ) -> Detection {
+        let track = noise.track(self, rng);
+        let mut detection = self
+            .detection(&mut Hearing::new(self, sounds, incident).in_noise(&track), Latch::Rearmed);
+        for (i, echo_us) in detection.echoes_us.iter_mut().enumerate() {
+            let jitter_us = noise.jitter(rng);
+            if i > 0 || detection.status != PingStatus::MinRange {
+                *echo_us += jitter_us;
+            }
+        }
+        if detection.status == PingStatus::Echo {
+            detection.range_m = detection.echoes_us.first().map(|echo_us| self.range_m(*echo_us));
+        }
+        detection
+    }
+
+    /// The range that belongs to the end of blanking, metres.
+    #[must_use]
+    pub fn min_range_m(&self) -> f64 {
+        self.range_m(self.blanking_us)
+    }
+
+    /// How long it listens, microseconds after firing.
+    #[must_use]
+    pub fn window_us(&self) -> f64 {
+        2e6 * self.max_range_m / self.sound_speed_m_s
+    }
+
+    /// The least amplitude noticed at a time after firing, microseconds.
+    #[must_use]
+    pub fn threshold_at(&self, t_us: f64) -> f64 {
+        let step = self.sensitivity.iter().find(|step| t_us < step.0).or(self.sensitivity.last());
+        step.map_or(self.threshold, |step| self.threshold * self.range_m(t_us).max(1e-3) * step.1)
+    }
+
+    /// Gain at a time after firing, decibels above what makes up for the spreading from a wall
+    /// at 1 m.
+    #[must_use]
+    pub fn gain_db(&self, t_us: f64) -> f64 {
+        match &self.gain {
+            Gain::Compensating { .. } => 20.0 * self.range_m(t_us).max(1e-3).log10(),
+            Gain::Steps { steps } => steps
+                .iter()
+                .find(|step| step.until_us.is_none_or(|until_us| t_us < until_us))
+                .or(steps.last())
+                .map_or(0.0, |step| step.gain_db),
+        }
+    }
+
+    fn detection(&self, hearing: &mut Hearing, latch: Latch) -> Detection {
+        let mut echoes_us = SmallVec::new();
+        let Some(first_us) = hearing.next_rise(self.blanking_us) else {
+            return self.silence(hearing);
+        };
+        let already_there = first_us <= self.blanking_us + 1e-6;
+        let cause = hearing.cause(first_us);
+        let peak = if already_there {
+            hearing.level(first_us)
+        } else {
+            hearing.peak(first_us, cause.as_ref())
+        };
+        let mut last_us = first_us;
+        echoes_us.push(first_us);
+        while latch == Latch::Rearmed
+            && echoes_us.len() < MOST_ECHOES
+            && let Some(next_us) = hearing.next_rise(last_us + self.rearm_us)
+        {
+            echoes_us.push(next_us);
+            last_us = next_us;
+        }
+        let status = if already_there { PingStatus::MinRange } else { PingStatus::Echo };
+        Detection {
+            status,
+            range_m: Some(self.range_m(first_us)),
+            sound: cause,
+            amplitude: Some(peak),
+            margin_db: Some(20.0 * (peak / self.threshold_at(first_us)).log10()),
+            echoes_us,
+        }
+    }
+
+    /// What came closest within the listening window.
+    fn silence(&self, hearing: &mut Hearing) -> Detection {
+        let (echoes_us, window_us) = (SmallVec::new(), self.window_us());
+        // More has to be known before anything can be said.
+        let known: &[Sound] = if hearing.asked_beyond() { &[] } else { hearing.sounds };
+        let relative = |sound: &Sound| sound.amplitude / self.threshold_at(self.tof_us(sound));
+        let sound = known
+            .iter()
+            .filter(|sound| (self.blanking_us..=window_us).contains(&self.tof_us(sound)))
+            .filter(|sound| sound.amplitude > 0.0)
+            .max_by(|one, other| relative(one).total_cmp(&relative(other)))
+            .copied();
+        let peak = sound.map(|sound| {
+            hearing.rewind();
+            hearing.peak(self.tof_us(&sound), Some(&sound))
+        });
+        Detection {
+            status: PingStatus::NoEcho,
+            range_m: None,
+            sound,
+            amplitude: peak,
+            // It may have been strong enough, but not for long enough.
+            margin_db: sound.zip(peak).map(|(sound, peak)| {
+                let threshold = self.threshold_at(self.tof_us(&sound));
+                (20.0 * (peak / threshold).log10()).min(0.0)
+            }),
+            echoes_us,
+        }
+    }
+
+    /// The echo that is timed without bias: a head-on, perfectly reflecting wall at 1 m.
+    fn reference_echo(&self) -> EchoShape {
+        let head_on = Incidence {
+            leaving_rad: 0.0,
+            arriving_rad: 0.0,
+            length_m: 2.0,
+            image: super::Image::Swapped,
+        };
+        let full = self.response.as_ref().and_then(|response| response.echo(&head_on));
+        full.unwrap_or_else(|| self.shape.clone())
+    }
+
+    fn range_m(&self, t_us: f64) -> f64 {
+        self.sound_speed_m_s * t_us * 1e-6 / 2.0
+    }
+
+    fn tof_us(&self, sound: &Sound) -> f64 {
+        self.arrives_us(sound.length_m)
+    }
+
+    fn arrives_us(&self, length_m: f64) -> f64 {
+        length_m / self.sound_speed_m_s * 1e6
+    }
+}
+
+/// The ends of the gain's steps, microseconds, and the reciprocals of their gains.
+fn sensitivity(gain: &Gain) -> SmallVec<[(f64, f64); 12]> {
+    let Gain::Steps { steps } = gain else { return SmallVec::new() };
+    let end_us = |step: &GainStep| step.until_us.unwrap_or(f64::INFINITY);
+    steps.iter().map(|step| (end_us(step), 10f64.powf(-step.gain_db / 20.0))).collect()
+}
+
+/// The status of a measured reading from its first time of flight, microseconds, if any.
+///
+/// ECHO within one carrier cycle (20 us) of the end of blanking was raised by sound already
+/// there: a real echo that begins in that span can't be told from it.
+#[must_use]
+pub fn classify_tof(tof_us: Option<f64>, blanking_us: f64) -> PingStatus {
+    match tof_us {
+        None => PingStatus::NoEcho,
+        Some(tof_us) if tof_us <= blanking_us + BLANKING_TOLERANCE_US => PingStatus::MinRange,
+        Some(_) => PingStatus::Echo,
+    }
+}

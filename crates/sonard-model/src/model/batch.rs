@@ -1,0 +1,66 @@
+//! Many poses at once.
+
+use rayon::prelude::*;
+
+use super::{Prediction, Simulator};
+use crate::{geometry::Pose, plan::ScanPlan};
+
+impl Simulator {
+    /// [`predict`](Self::predict) for each pose, on all cores; the results are those of one core, in
+    /// the order of the poses.
+    ///
+    /// The scene is the same for all poses: a robot's body has to stand in it already, so for poses
+    /// of a robot make a simulator each.
+    #[must_use]
+    pub fn predict_many(&self, poses: &[Pose], plan: &ScanPlan) -> Vec<Vec<Prediction>> {
+        poses.par_iter().map(|pose| self.predict(pose, plan)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{
+        acoustics::{Air, BeamPattern, EchoTrace, Receiver, ReceiverNoise, Sensor},
+        model::{Options, Path, Station, paths::Paths},
+        scene::{Scene, shipped},
+    };
+
+    #[test]
+    fn many_poses_give_what_each_gives_alone_in_their_order() {
+        let text = shipped::text("two-surface-room").expect("shipped");
+        let scene = Arc::new(Scene::from_json(text).expect("a scene"));
+        let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+        let options = Options { max_range_m: Some(3.0), ..Options::default() };
+        let simulator = Simulator::new(scene, sensor, Air::default(), options).expect("options");
+        let pose = |i: i32| Pose {
+            x_m: 0.3 + 0.25 * f64::from(i % 5),
+            y_m: 0.3 + 0.3 * f64::from(i / 5),
+            heading_deg: 7.0 * f64::from(i),
+        };
+        let poses: Vec<Pose> = (0..20).map(pose).collect();
+        let plan = ScanPlan { step_deg: 9.0, ..ScanPlan::default() };
+        let together = simulator.predict_many(&poses, &plan);
+        let alone: Vec<_> = poses.iter().map(|pose| simulator.predict(pose, &plan)).collect();
+        assert_eq!(together, alone);
+    }
+
+    #[test]
+    fn the_model_can_be_shared_between_threads() {
+        const fn shared<T: Send + Sync>() {}
+        shared::<Scene>();
+        shared::<Sensor>();
+        shared::<Air>();
+        shared::<BeamPattern>();
+        shared::<Receiver>();
+        shared::<ReceiverNoise>();
+        shared::<EchoTrace>();
+        shared::<Simulator>();
+        shared::<Station<'_>>();
+        shared::<Prediction>();
+        shared::<Path>();
+        shared::<Paths>();
+    }
+}

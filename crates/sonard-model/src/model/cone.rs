@@ -1,0 +1,99 @@
+//! The naive model: the nearest hit of a few rays within an aperture.
+
+use std::sync::Arc;
+
+use smallvec::{SmallVec, smallvec};
+
+use super::{Arrival, Engine, Path, Survey, raycast::Reflectors};
+use crate::{
+    acoustics::Sound,
+    geometry::{DVec2, wrap_pi},
+    reading::PathKind,
+    scene::Scene,
+};
+
+/// Angle between rays, degrees.
+const SPACING_DEG: f64 = 1.0;
+
+/// One ray a degree within the aperture, and the nearest hit of all of them: Arrabales' simulated
+/// sonar array, and what most robot simulators do.
+///
+/// No mirror reflection, no beam pattern, no absorption: whatever is hit answers with amplitude
+/// 1. Noise, if wanted, is the caller's to add.
+#[derive(Debug)]
+pub struct Cone {
+    reflectors: Reflectors,
+    /// Rays, as angles from the axis, radians.
+    offsets_rad: Arc<[f64]>,
+}
+
+impl Cone {
+    /// For a scene and a full aperture in degrees.
+    #[must_use]
+    pub fn new(scene: &Scene, aperture_deg: f64) -> Self {
+        let gaps = (aperture_deg / SPACING_DEG + 1e-9).floor();
+        let offsets_rad = (0..=gaps as u32)
+            .map(|i| ((f64::from(i) - gaps / 2.0) * SPACING_DEG).to_radians())
+            .collect();
+        Self { reflectors: Reflectors::new(scene), offsets_rad }
+    }
+}
+
+impl Engine for Cone {
+    fn survey<'a>(&'a self, position: DVec2) -> Box<dyn Survey + 'a> {
+        Box::new(ConeSurvey { cone: self, position })
+    }
+}
+
+struct ConeSurvey<'a> {
+    cone: &'a Cone,
+    position: DVec2,
+}
+
+impl ConeSurvey<'_> {
+    fn nearest(&self, direction_rad: f64) -> Option<Arrival> {
+        let cast = |offset_rad: &f64| {
+            let ray_rad = wrap_pi(direction_rad + offset_rad);
+            let ray = DVec2::from_angle(ray_rad);
+            let hit = self.cone.reflectors.nearest(self.position, ray, None)?;
+            Some((hit, ray_rad))
+        };
+        let (hit, ray_rad) = self
+            .cone
+            .offsets_rad
+            .iter()
+            .filter_map(cast)
+            .min_by(|one, other| one.0.distance_m.total_cmp(&other.0.distance_m))?;
+        Some(Arrival {
+            length_m: 2.0 * hit.distance_m,
+            amplitude: 1.0,
+            path_amplitude: 1.0,
+            phase_rad: 0.0,
+            departure_rad: ray_rad,
+            arrival_rad: ray_rad,
+            path: Path {
+                kind: PathKind::Specular,
+                walls: smallvec![hit.reflector],
+                bends: SmallVec::new(),
+            },
+        })
+    }
+}
+
+impl Survey for ConeSurvey<'_> {
+    fn listen(&self, direction_rad: f64, sounds: &mut Vec<Sound>) {
+        sounds.clear();
+        sounds.extend(self.nearest(direction_rad).map(|arrival| Sound {
+            length_m: arrival.length_m,
+            amplitude: arrival.amplitude,
+            phase_rad: arrival.phase_rad,
+            index: 0,
+        }));
+    }
+
+    /// # Panics
+    /// If `sound` is not of this survey and direction.
+    fn arrival(&self, direction_rad: f64, _sound: &Sound) -> Arrival {
+        self.nearest(direction_rad).expect("a sound was heard in this direction")
+    }
+}

@@ -1,0 +1,270 @@
+//! One ray of the fan and what it brings to the receiver.
+
+use smallvec::{SmallVec, smallvec};
+
+use super::Fan;
+use crate::{
+    acoustics::BeamPattern,
+    geometry::{DVec2, wrap_pi},
+    model::{Arrival, Bend, Edge, Path, Reflector, raycast::Hit},
+    reading::PathKind,
+};
+
+/// A ray this close to a wall's end, metres, is dropped after the end has diffracted it: which
+/// of the walls that meet there it hits is a matter of rounding, and its neighbours tell.
+const VERTEX_M: f64 = 1e-7;
+
+/// A ray on its way, at the last surface it met.
+#[derive(Debug)]
+pub(super) struct Ray {
+    origin: DVec2,
+    direction: DVec2,
+    departure_rad: f64,
+    /// Length of the path so far, metres.
+    travelled_m: f64,
+    /// Product of the mirrored amplitudes so far.
+    gain: f64,
+    /// Distance to the neighbouring ray over the angle between them at departure, metres, and
+    /// its growth per metre: without curved surfaces `travelled_m` and 1.
+    width_m: f64,
+    growth: f64,
+    /// 1 as long as the neighbour to the left at departure is to the left, else -1.
+    handedness: f64,
+    walls: SmallVec<[Reflector; 4]>,
+}
+
+/// A path to the receiver, before the beam pattern.
+#[derive(Debug, Clone)]
+pub(super) struct Candidate {
+    pub(super) length_m: f64,
+    /// Amplitude without the beam pattern.
+    pub(super) gain: f64,
+    pub(super) departure_rad: f64,
+    pub(super) arrival_rad: f64,
+    /// How far the ray passed from what it stands for: the receiver's centre, or the edge.
+    pub(super) miss_m: f64,
+    /// Which part of its half-length the receiver segment must show to the ray to be met.
+    pub(super) share: f64,
+    pub(super) path: Path,
+}
+
+impl Ray {
+    pub(super) fn new(origin: DVec2, departure_rad: f64) -> Self {
+        Self {
+            origin,
+            direction: DVec2::from_angle(departure_rad),
+            departure_rad,
+            travelled_m: 0.0,
+            gain: 1.0,
+            width_m: 0.0,
+            growth: 1.0,
+            handedness: 1.0,
+            walls: SmallVec::new(),
+        }
+    }
+
+    pub(super) const fn travelled_m(&self) -> f64 {
+        self.travelled_m
+    }
+
+    /// The next leg: what it brings to a receiver at `position`, if it passes there, and where
+    /// it ends, if it meets something.
+    pub(super) fn advance(&self, fan: &Fan, position: DVec2) -> (Option<Candidate>, Option<Hit>) {
+        let leaving = self.walls.last().copied();
+        let hit = fan.reflectors.nearest(self.origin, self.direction, leaving);
+        let end_m = hit.map_or(f64::INFINITY, |hit| hit.distance_m);
+        (self.receive(fan, position, end_m), hit)
+    }
+
+    /// Meets the receiver, if it comes by on a leg that ends after `end_m`.
+    ///
+    /// The receiver is a segment across the azimuth as long as the face is wide plus the spacing
+    /// of the rays here; whether it is met at a given azimuth is asked later, by `share`.
+    fn receive(&self, fan: &Fan, position: DVec2, end_m: f64) -> Option<Candidate> {
+        let to_center = position - self.origin;
+        let foot_m = to_center.dot(self.direction);
+        let target = self.aim(to_center);
+        let (_, spacing_rad) = fan.settings.rays();
+        let half_m = fan.settings.half_face_m + 0.5 * spacing_rad * target.width_m.abs();
+        let outgoing = self.walls.is_empty();
+        if outgoing || foot_m <= 0.0 || foot_m >= end_m || target.offset_m.abs() > half_m {
+            return None;
+        }
+        let gain = self.gain * target.tube_gain() * fan.settings.through_air(target.length_m);
+        if target.length_m > fan.settings.longest_m || gain < fan.settings.weakest {
+            return None;
+        }
+        let path =
+            Path { kind: PathKind::Specular, walls: self.walls.clone(), bends: SmallVec::new() };
+        Some(Candidate {
+            length_m: target.length_m,
+            gain,
+            departure_rad: self.departure_rad + self.handedness * target.departure_turn_rad(),
+            arrival_rad: (-self.direction).to_angle() + target.arrival_turn_rad(),
+            miss_m: target.offset_m.abs(),
+            share: target.offset_m.abs() / half_m,
+            path,
+        })
+    }
+
+    /// Diffracted rays from the ends of the wall that are within one ray spacing of the hit,
+    /// each straight to the receiver if it can be seen from there.
+    pub(super) fn diffract(
+        &self,
+        hit: &Hit,
+        fan: &Fan,
+        position: DVec2,
+    ) -> SmallVec<[Candidate; 2]> {
+        let Reflector::Wall(wall) = hit.reflector else { return SmallVec::new() };
+        fan.joints.known[wall as usize]
+            .iter()
+            .filter_map(|&edge| self.diffract_at(edge, fan, position))
+            .collect()
+    }
+
+    fn diffract_at(&self, edge: Edge, fan: &Fan, position: DVec2) -> Option<Candidate> {
+        let settings = &fan.settings;
+        let point = fan.reflectors.edge_point(edge);
+        let target = self.aim(point - self.origin);
+        let (_, spacing_rad) = settings.rays();
+        if target.offset_m.abs() > spacing_rad * target.width_m.abs() {
+            return None;
+        }
+        let back_m = position.distance(point);
+        let length_m = target.length_m + back_m;
+        let gain = self.gain
+            * target.tube_gain()
+            * fan.joints.mirror[&edge]
+            * settings.edge_ratio(target.length_m, back_m)
+            * settings.through_air(length_m);
+        let matters = length_m <= settings.longest_m && gain >= settings.weakest;
+        if !matters || !fan.reflectors.sees(position, point) {
+            return None;
+        }
+        let path = Path {
+            kind: PathKind::Diffracted,
+            walls: self.walls.clone(),
+            bends: smallvec![Bend::Upright(edge)],
+        };
+        Some(Candidate {
+            length_m,
+            gain,
+            departure_rad: self.departure_rad + self.handedness * target.departure_turn_rad(),
+            arrival_rad: (point - position).to_angle(),
+            miss_m: target.offset_m.abs(),
+            share: 0.0,
+            path,
+        })
+    }
+
+    /// Leaves the surface it hit; `false` if the ray ends there.
+    pub(super) fn reflect(&mut self, hit: &Hit, fan: &Fan) -> bool {
+        let settings = &fan.settings;
+        self.origin += hit.distance_m * self.direction;
+        self.travelled_m += hit.distance_m;
+        self.width_m += hit.distance_m * self.growth;
+        self.gain *= fan.reflectors.mirror(hit.reflector);
+        if let Some(radius_m) = fan.reflectors.radius_m(hit.reflector) {
+            // Mirror equation for an oblique ray in the plane of incidence: the wave front's
+            // curvature grows by 2 / (r cos i), and less from inside the cylinder.
+            let toward = -self.direction.dot(hit.normal);
+            self.growth += 2.0 * self.width_m / (radius_m * toward);
+        }
+        self.direction -= 2.0 * self.direction.dot(hit.normal) * hit.normal;
+        self.handedness = -self.handedness;
+        self.walls.push(hit.reflector);
+        let left = self.gain * settings.through_air(self.travelled_m);
+        hit.from_end_m > VERTEX_M
+            && self.walls.len() <= settings.max_order as usize
+            && self.travelled_m <= settings.longest_m
+            && left >= settings.weakest
+    }
+
+    /// The neighbouring ray that passes exactly through a point at `way` from the origin.
+    fn aim(&self, way: DVec2) -> Aim {
+        let foot_m = way.dot(self.direction);
+        let offset_m = self.direction.perp_dot(way);
+        let width_m = self.width_m + self.growth * foot_m;
+        // Radius of curvature of the wave front; its centre is the image of the source.
+        let radius_m = width_m / self.growth;
+        let slack_m = radius_m.signum() * radius_m.hypot(offset_m) - radius_m;
+        let ray_m = self.travelled_m + foot_m;
+        Aim { length_m: ray_m + slack_m, ray_m, offset_m, width_m, radius_m }
+    }
+}
+
+struct Aim {
+    /// From the source to the point, metres.
+    length_m: f64,
+    /// From the source along the ray itself, as far as abreast of the point, metres.
+    ray_m: f64,
+    /// Of the point from the ray, positive to the left, metres.
+    offset_m: f64,
+    width_m: f64,
+    radius_m: f64,
+}
+
+impl Aim {
+    /// Amplitude relative to a wave that met flat walls only: in the plane it spreads over
+    /// `width_m` where that one spreads over `ray_m`.
+    fn tube_gain(&self) -> f64 {
+        (self.ray_m / self.width_m.abs().max(1e-3)).sqrt()
+    }
+
+    fn departure_turn_rad(&self) -> f64 {
+        (self.offset_m / self.width_m).atan()
+    }
+
+    fn arrival_turn_rad(&self) -> f64 {
+        (self.offset_m / self.radius_m).atan()
+    }
+}
+
+impl Candidate {
+    /// The arrival, with the amplitude it has at some azimuth.
+    pub(super) fn arrival(&self, amplitude: f64) -> Arrival {
+        Arrival {
+            length_m: self.length_m,
+            amplitude,
+            path_amplitude: self.gain,
+            phase_rad: 0.0,
+            departure_rad: wrap_pi(self.departure_rad),
+            arrival_rad: wrap_pi(self.arrival_rad),
+            path: self.path.clone(),
+        }
+    }
+
+    pub(super) fn weighing(&self) -> Weighing {
+        Weighing {
+            length_m: self.length_m,
+            gain: self.gain,
+            share: self.share,
+            departure: DVec2::from_angle(self.departure_rad),
+            arrival: DVec2::from_angle(self.arrival_rad),
+        }
+    }
+}
+
+/// What it takes to weight a candidate with the beam pattern.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Weighing {
+    pub(super) length_m: f64,
+    gain: f64,
+    share: f64,
+    departure: DVec2,
+    arrival: DVec2,
+}
+
+impl Weighing {
+    /// Amplitude at a transducer that faces this way; 0 if the ray does not meet its face.
+    pub(super) fn amplitude(&self, beam: &BeamPattern, facing: DVec2) -> f64 {
+        let arriving = facing.dot(self.arrival);
+        // The segment turns with the transducer: seen at an angle it is shorter. Nothing leaves
+        // or arrives behind it.
+        if arriving <= self.share || facing.dot(self.departure) <= 0.0 {
+            return 0.0;
+        }
+        let one_way = |way: DVec2| beam.one_way(facing.perp_dot(way).atan2(facing.dot(way)));
+        self.gain * one_way(self.departure) * one_way(self.arrival)
+    }
+}

@@ -1,0 +1,79 @@
+//! The engines against closed forms, laws, and the phenomena of Dudek, Jenkin, Milios and Wilkes.
+
+mod array;
+mod closed_forms;
+mod extents;
+mod full_wave;
+mod laws;
+mod phenomena;
+mod reach;
+pub(in crate::model) mod reference;
+mod ways;
+
+use std::sync::Arc;
+
+use super::{Arrival, EngineKind, Options, Simulator};
+use crate::{
+    acoustics::{Air, Sensor},
+    geometry::{DVec2, Pose},
+    reading::PathKind,
+    scene::{Cylinder, Material, Scene, Wall, shipped},
+};
+
+/// Free space without blanking or absorption: geometry alone.
+const BARE: Options = Options {
+    engine: EngineKind::Fan,
+    max_range_m: None,
+    threshold: None,
+    blanking_us: Some(0.0),
+    response: None,
+    ideal_receiver: true,
+    lossless: true,
+    max_order: None,
+    edge_law: None,
+    double_diffraction: false,
+    ray_spacing_deg: 0.1,
+    aperture_deg: None,
+};
+
+fn shipped_scene(name: &str) -> Scene {
+    Scene::from_json(shipped::text(name).expect(name)).expect(name)
+}
+
+fn wall(id: &str, a: (f64, f64), b: (f64, f64), reflectance: f64) -> Wall {
+    let material = Material { reflectance, roughness: 0.0 };
+    Wall { id: id.into(), a: a.into(), b: b.into(), material, z_m: None }
+}
+
+fn cylinder(center: (f64, f64), radius_m: f64) -> Cylinder {
+    let material = Material { reflectance: 1.0, roughness: 0.0 };
+    Cylinder { id: "post".into(), center: center.into(), radius_m, material, z_m: None }
+}
+
+fn scene(walls: Vec<Wall>) -> Scene {
+    let mut scene = shipped_scene("simple-room");
+    scene.walls = walls;
+    scene.robot = None;
+    scene
+}
+
+fn simulator(scene: Scene, options: Options) -> Simulator {
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    Simulator::new(Arc::new(scene), sensor, Air::default(), options).expect("good options")
+}
+
+fn arrivals(scene: Scene, options: Options, from: DVec2, direction_deg: f64) -> Vec<Arrival> {
+    simulator(scene, options).station(from).arrivals(direction_deg.to_radians())
+}
+
+fn of_kind(arrivals: &[Arrival], kind: PathKind) -> impl Iterator<Item = &Arrival> {
+    arrivals.iter().filter(move |arrival| arrival.path.kind == kind)
+}
+
+fn pose(scene: &Scene, name: &str) -> Pose {
+    scene.poses[name]
+}
+
+fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
+    assert!((found - expected).abs() <= tolerance, "{what}: {found} instead of {expected}");
+}

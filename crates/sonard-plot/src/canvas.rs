@@ -1,0 +1,317 @@
+//! Marks on the page, in pixels from its upper left corner.
+//!
+//! Everything drawn goes through here: coordinates that are no numbers or far off the page, and
+//! characters that XML does not allow, stop at this door.
+
+use std::fmt::Write as _;
+
+use svg::node::{
+    Text as TextNode,
+    element::{Circle, Element, Group, Line, Path, Rectangle, Title},
+};
+
+use super::theme;
+use sonard_model::geometry::DVec2;
+
+/// A point on the page, pixels, y down.
+pub(super) type Px = DVec2;
+
+/// A rectangle on the page.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rect {
+    pub(super) left: f64,
+    pub(super) top: f64,
+    pub(super) right: f64,
+    pub(super) bottom: f64,
+}
+
+impl Rect {
+    pub(super) fn new(left: f64, top: f64, width: f64, height: f64) -> Self {
+        Self { left, top, right: left + width, bottom: top + height }
+    }
+
+    pub(super) fn width(&self) -> f64 {
+        self.right - self.left
+    }
+
+    pub(super) fn height(&self) -> f64 {
+        self.bottom - self.top
+    }
+
+    pub(super) fn center(&self) -> Px {
+        Px::new((self.left + self.right) / 2.0, (self.top + self.bottom) / 2.0)
+    }
+
+    pub(super) fn contains(&self, at: Px) -> bool {
+        (self.left..=self.right).contains(&at.x) && (self.top..=self.bottom).contains(&at.y)
+    }
+
+    pub(super) fn encloses(&self, other: &Self) -> bool {
+        self.left <= other.left
+            && self.top <= other.top
+            && other.right <= self.right
+            && other.bottom <= self.bottom
+    }
+
+    pub(super) fn meets(&self, other: &Self) -> bool {
+        self.left < other.right
+            && other.left < self.right
+            && self.top < other.bottom
+            && other.top < self.bottom
+    }
+}
+
+/// Which part of a text stands at the point given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+/// Shapes of marks; each kind of reading has its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Shape {
+    Dot,
+    Square,
+    Triangle,
+    Diamond,
+    Cross,
+}
+
+/// A group of marks that share attributes.
+#[derive(Debug, Clone)]
+pub(super) struct Layer {
+    group: Group,
+}
+
+impl Layer {
+    /// A layer that can be found by its class.
+    pub(super) fn new(class: &str) -> Self {
+        Self { group: Group::new().set("class", class) }
+    }
+
+    /// Sets an attribute that its marks inherit.
+    pub(super) fn with(mut self, name: &str, value: impl Into<svg::node::Value>) -> Self {
+        self.group = self.group.set(name, value);
+        self
+    }
+
+    /// Lines of this colour and width, no filling.
+    pub(super) fn stroked(self, colour: &str, width_px: f64) -> Self {
+        self.with("stroke", colour).with("stroke-width", width_px).with("fill", "none")
+    }
+
+    /// Texts with a white rim, to be read over marks and lines.
+    pub(super) fn haloed(self) -> Self {
+        self.with("stroke", theme::PAPER)
+            .with("stroke-width", 3.0)
+            .with("stroke-linejoin", "round")
+            .with("paint-order", "stroke")
+    }
+
+    pub(super) fn add(&mut self, layer: Self) {
+        self.node(layer.group);
+    }
+
+    pub(super) fn extend(&mut self, layers: impl IntoIterator<Item = Self>) {
+        for layer in layers {
+            self.add(layer);
+        }
+    }
+
+    pub(super) fn into_group(self) -> Group {
+        self.group
+    }
+
+    fn node(&mut self, node: impl Into<Box<dyn svg::node::Node>>) {
+        svg::node::Node::append(&mut self.group, node);
+    }
+
+    pub(super) fn line(&mut self, from: Px, to: Px) {
+        let line = Line::new()
+            .set("x1", tidy(from.x))
+            .set("y1", tidy(from.y))
+            .set("x2", tidy(to.x))
+            .set("y2", tidy(to.y));
+        self.node(line);
+    }
+
+    pub(super) fn circle(&mut self, center: Px, radius_px: f64) {
+        let circle = Circle::new()
+            .set("cx", tidy(center.x))
+            .set("cy", tidy(center.y))
+            .set("r", tidy(radius_px.max(0.0)));
+        self.node(circle);
+    }
+
+    pub(super) fn rect(&mut self, rect: Rect, radius_px: f64) {
+        let rect = Rectangle::new()
+            .set("x", tidy(rect.left))
+            .set("y", tidy(rect.top))
+            .set("width", tidy(rect.width().max(0.0)))
+            .set("height", tidy(rect.height().max(0.0)))
+            .set("rx", radius_px);
+        self.node(rect);
+    }
+
+    /// Open lines through the points of each run, as one path; runs of one point are left out.
+    pub(super) fn runs<R: AsRef<[Px]>>(&mut self, runs: impl IntoIterator<Item = R>) {
+        let mut data = String::new();
+        for run in runs {
+            let run = run.as_ref();
+            if run.len() > 1 {
+                trace(&mut data, run);
+            }
+        }
+        if !data.is_empty() {
+            self.node(Path::new().set("d", data));
+        }
+    }
+
+    /// A closed shape.
+    pub(super) fn polygon(&mut self, points: &[Px]) {
+        self.node(closed(points));
+    }
+
+    /// A closed shape with a text that a viewer shows when it is pointed at.
+    pub(super) fn polygon_with_hint(&mut self, points: &[Px], hint: &str) {
+        self.node(with_hint(closed(points).into(), hint));
+    }
+
+    /// A mark of about this radius, with a text that a viewer shows when it is pointed at.
+    pub(super) fn mark(&mut self, shape: Shape, at: Px, radius_px: f64, hint: Option<&str>) {
+        let node = mark(shape, at, radius_px);
+        self.node(match hint {
+            Some(hint) => with_hint(node, hint),
+            None => node,
+        });
+    }
+
+    /// A line of text; `at` is on its base line.
+    pub(super) fn text(&mut self, at: Px, anchor: Anchor, size_px: f64, text: &str) {
+        self.node(text_element(at, anchor, size_px, text));
+    }
+
+    /// A line of text turned about `at` by so many degrees clockwise.
+    pub(super) fn turned_text(&mut self, at: Px, turn_deg: f64, size_px: f64, text: &str) {
+        let mut element = text_element(at, Anchor::Middle, size_px, text);
+        let turn = format!("rotate({} {} {})", tidy(turn_deg), tidy(at.x), tidy(at.y));
+        element.get_attributes_mut().insert("transform".into(), turn.into());
+        self.node(element);
+    }
+
+    /// Shows only what lies inside `rect` of everything in this layer.
+    pub(super) fn clipped(mut self, id: &str, rect: Rect) -> Self {
+        let window = Rectangle::new()
+            .set("x", tidy(rect.left))
+            .set("y", tidy(rect.top))
+            .set("width", tidy(rect.width()))
+            .set("height", tidy(rect.height()));
+        let clip = svg::node::element::ClipPath::new().set("id", id).add(window);
+        self.node(clip);
+        self.with("clip-path", format!("url(#{id})"))
+    }
+}
+
+fn mark(shape: Shape, at: Px, r: f64) -> Element {
+    let polygon = |corners: &[(f64, f64)]| {
+        let points: Vec<Px> = corners.iter().map(|(x, y)| at + r * Px::new(*x, *y)).collect();
+        closed(&points).into()
+    };
+    match shape {
+        Shape::Dot => {
+            Circle::new().set("cx", tidy(at.x)).set("cy", tidy(at.y)).set("r", tidy(r)).into()
+        }
+        Shape::Square => polygon(&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]),
+        Shape::Triangle => polygon(&[(0.0, -1.3), (1.15, 0.8), (-1.15, 0.8)]),
+        Shape::Diamond => polygon(&[(0.0, -1.35), (1.35, 0.0), (0.0, 1.35), (-1.35, 0.0)]),
+        Shape::Cross => {
+            let (w, l) = (0.35, 1.25);
+            let arm = |s: f64, t: f64| ((s - t) * 0.7, (s + t) * 0.7);
+            polygon(&[
+                arm(l, w),
+                arm(w, w),
+                arm(w, l),
+                arm(-w, l),
+                arm(-w, w),
+                arm(-l, w),
+                arm(-l, -w),
+                arm(-w, -w),
+                arm(-w, -l),
+                arm(w, -l),
+                arm(w, -w),
+                arm(l, -w),
+            ])
+        }
+    }
+}
+
+fn closed(points: &[Px]) -> Path {
+    let mut data = String::new();
+    trace(&mut data, points);
+    data.push('Z');
+    Path::new().set("d", data)
+}
+
+fn with_hint(mut node: Element, hint: &str) -> Element {
+    svg::node::Node::append(&mut node, Title::new(printable(hint)));
+    node
+}
+
+fn text_element(at: Px, anchor: Anchor, size_px: f64, text: &str) -> Element {
+    let mut element = Element::new("text");
+    let attributes = element.get_attributes_mut();
+    attributes.insert("x".into(), tidy(at.x).into());
+    attributes.insert("y".into(), tidy(at.y).into());
+    if size_px != theme::TEXT_PX {
+        attributes.insert("font-size".into(), size_px.into());
+    }
+    match anchor {
+        Anchor::Start => {}
+        Anchor::Middle => drop(attributes.insert("text-anchor".into(), "middle".into())),
+        Anchor::End => drop(attributes.insert("text-anchor".into(), "end".into())),
+    }
+    svg::node::Node::append(&mut element, TextNode::new(printable(text)));
+    element
+}
+
+fn trace(data: &mut String, points: &[Px]) {
+    for (i, point) in points.iter().enumerate() {
+        let letter = if i == 0 { 'M' } else { 'L' };
+        // Writing to a String does not fail.
+        let _ = write!(data, "{letter}{} {}", tidy(point.x), tidy(point.y));
+    }
+}
+
+/// Hundredths of a pixel, within reach of the page: renderers count in 32 bits.
+fn tidy(value: f64) -> f64 {
+    const FAR_PX: f64 = 1e5;
+    if value.is_nan() {
+        return -FAR_PX;
+    }
+    // Adding zero makes -0 plain.
+    (value.clamp(-FAR_PX, FAR_PX) * 100.0).round() / 100.0 + 0.0
+}
+
+/// The text without what XML 1.0 has no place for, even escaped.
+fn printable(text: &str) -> String {
+    text.chars()
+        .map(|c| match c {
+            '\t' | '\n' => ' ',
+            c if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => '\u{fffd}',
+            c => c,
+        })
+        .collect()
+}
+
+/// About how wide a text is. Viewers choose the font, so this errs to the wide side.
+pub(super) fn text_width_px(text: &str, size_px: f64) -> f64 {
+    textwrap::core::display_width(text) as f64 * size_px * 0.52
+}
+
+/// The text in lines that fit the width.
+pub(super) fn wrap(text: &str, size_px: f64, width_px: f64) -> Vec<String> {
+    let columns = (width_px / (size_px * 0.52)).max(8.0) as usize;
+    textwrap::wrap(text, columns).into_iter().map(std::borrow::Cow::into_owned).collect()
+}

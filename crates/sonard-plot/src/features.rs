@@ -1,0 +1,172 @@
+//! The floor plan with what a scan was interpreted as.
+
+use super::{
+    canvas::{Anchor, Layer, Px, Shape},
+    keys,
+    labels::Labels,
+    legend::{Entry, Sample},
+    overlay,
+    picture::Picture,
+    plan::Plan,
+    theme, words,
+};
+use sonard_interpret::interpret::{Feature, FeatureKind};
+use sonard_model::{
+    geometry::{DVec2, Pose},
+    scene::Scene,
+};
+use sonard_records::ScanView;
+
+const KINDS: [FeatureKind; 4] =
+    [FeatureKind::Plane, FeatureKind::Corner, FeatureKind::Edge, FeatureKind::Unresolved];
+
+/// Draws what scans were interpreted as: each feature's arc in the colour and with the mark of
+/// its kind, on the floor plan with the readings as small dots; an arrow leads to the place that
+/// a next scan is proposed from.
+#[must_use]
+pub fn draw_features(scans: &[ScanView], scene: Option<&Scene>, features: &[Feature]) -> Picture {
+    let over = |plan: &Plan| {
+        let arcs = features.iter().map(|feature| arc(plan, scans, feature));
+        arcs.chain([next_places(plan, scans, features)]).collect()
+    };
+    let beside = |plan: &Plan| Some(names(plan, scans, features));
+    overlay::draw(scans, scene, counts(features), &[], over, beside, &entries(features, scene))
+}
+
+/// How many of each kind there are.
+fn counts(features: &[Feature]) -> String {
+    let parts: Vec<String> = KINDS
+        .iter()
+        .map(|kind| (features.iter().filter(|f| f.kind == *kind).count(), name(*kind)))
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, name)| format!("{count} {name}"))
+        .collect();
+    if parts.is_empty() { "no feature".to_owned() } else { format!("found: {}", parts.join(", ")) }
+}
+
+const fn name(kind: FeatureKind) -> &'static str {
+    match kind {
+        FeatureKind::Plane => "plane",
+        FeatureKind::Corner => "corner",
+        FeatureKind::Edge => "edge",
+        FeatureKind::Unresolved => "unresolved",
+    }
+}
+
+const fn colour(kind: FeatureKind) -> &'static str {
+    match kind {
+        FeatureKind::Plane => theme::BLUE,
+        FeatureKind::Corner => theme::VERMILLION,
+        FeatureKind::Edge => theme::GREEN,
+        FeatureKind::Unresolved => theme::PURPLE,
+    }
+}
+
+const fn shape(kind: FeatureKind) -> Shape {
+    match kind {
+        FeatureKind::Plane => Shape::Square,
+        FeatureKind::Corner => Shape::Triangle,
+        FeatureKind::Edge => Shape::Diamond,
+        FeatureKind::Unresolved => Shape::Cross,
+    }
+}
+
+fn entries(features: &[Feature], scene: Option<&Scene>) -> Vec<Entry> {
+    let present = KINDS.into_iter().filter(|kind| features.iter().any(|f| f.kind == *kind));
+    let kinds = present.map(|kind| {
+        Entry::new(Sample::Mark { shape: shape(kind), colour: colour(kind) }, name(kind))
+    });
+    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::SILENT };
+    let next = Sample::Line { colour: theme::ORANGE, width_px: 2.0, dash: "none" };
+    let proposes = features.iter().any(|feature| feature.next.is_some());
+    kinds
+        .chain([Entry::new(dot, "reading")])
+        .chain(proposes.then(|| Entry::new(next, "way to the next scan")))
+        .chain(scene.map(keys::materials).into_iter().flatten())
+        .collect()
+}
+
+/// Where the scan that a feature belongs to was taken.
+fn pose_of(scans: &[ScanView], feature: &Feature) -> Option<Pose> {
+    scans.iter().find(|scan| scan.scan == feature.scan).and_then(words::pose_of)
+}
+
+fn arc(plan: &Plan, scans: &[ScanView], feature: &Feature) -> Layer {
+    let colour = colour(feature.kind);
+    let mut layer = Layer::new("feature").stroked(colour, 2.6);
+    let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) else {
+        return layer;
+    };
+    let half_deg = feature.extent_deg / 2.0;
+    let points: Vec<Px> = (-8..=8)
+        .map(|i| {
+            let azimuth_deg = feature.bearing_deg + half_deg * f64::from(i) / 8.0;
+            plan.px(pose.point_at(azimuth_deg, range_m))
+        })
+        .collect();
+    layer.runs([points]);
+    let mut solid = Layer::new("mark").with("fill", colour).with("stroke", theme::PAPER);
+    let at = plan.px(pose.point_at(feature.bearing_deg, range_m));
+    solid.mark(shape(feature.kind), at, 6.0, Some(&hint(feature)));
+    layer.add(solid);
+    layer
+}
+
+fn hint(feature: &Feature) -> String {
+    let reason = feature.reason.map(|reason| format!(" ({reason:?})")).unwrap_or_default();
+    format!(
+        "{}{reason}: extent {:.1}\u{b0}, confidence {:.3}",
+        name(feature.kind),
+        feature.extent_deg,
+        feature.confidence
+    )
+}
+
+/// Extent and, where there is one, beta beside each mark.
+fn names(plan: &Plan, scans: &[ScanView], features: &[Feature]) -> Layer {
+    let mut labels = Labels::new(plan.panel);
+    let mut layer = Layer::new("names").haloed();
+    for feature in features {
+        let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) else {
+            continue;
+        };
+        let at = plan.px(pose.point_at(feature.bearing_deg, range_m));
+        let beta = feature.beta_deg.map(|beta| format!(", \u{3b2} {:.1}\u{b0}", plain(beta, 10.0)));
+        let text = format!(
+            "{} {:.1}\u{b0}{}",
+            name(feature.kind),
+            feature.extent_deg,
+            beta.unwrap_or_default()
+        );
+        let places = [
+            (Px::new(11.0, -8.0), Anchor::Start),
+            (Px::new(11.0, 16.0), Anchor::Start),
+            (Px::new(-11.0, -8.0), Anchor::End),
+            (Px::new(-11.0, 16.0), Anchor::End),
+        ];
+        let free = places
+            .into_iter()
+            .find(|(shift, anchor)| labels.place(at + *shift, *anchor, theme::SMALL_PX, &text));
+        if let Some((shift, anchor)) = free {
+            layer.text(at + shift, anchor, theme::SMALL_PX, &text);
+        }
+    }
+    layer
+}
+
+/// Without a minus sign before a zero.
+fn plain(value: f64, digits: f64) -> f64 {
+    (value * digits).round() / digits + 0.0
+}
+
+fn next_places(plan: &Plan, scans: &[ScanView], features: &[Feature]) -> Layer {
+    let mut layer = Layer::new("next").stroked(theme::ORANGE, 2.0);
+    for feature in features {
+        if let (Some(pose), Some(next)) = (pose_of(scans, feature), feature.next) {
+            let to = plan.px(DVec2::new(next.x_m, next.y_m));
+            layer.line(plan.px(pose.position()), to);
+            layer.circle(to, 4.0);
+        }
+    }
+    layer
+}

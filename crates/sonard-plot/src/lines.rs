@@ -1,0 +1,64 @@
+//! The floor plan with the lines fitted to scans.
+
+use super::{
+    canvas::{Layer, Shape},
+    keys,
+    legend::{Entry, Sample},
+    overlay,
+    picture::Picture,
+    plan::Plan,
+    theme,
+};
+use sonard_interpret::interpret::lines::{LineKind, MapLine};
+use sonard_model::{geometry::DVec2, scene::Scene};
+use sonard_records::ScanView;
+
+const KINDS: [(LineKind, &str, &str); 3] = [
+    (LineKind::Sonar, "sonar line", theme::BLUE),
+    (LineKind::Laser, "laser line", theme::VERMILLION),
+    (LineKind::Complex, "complex line", theme::GREEN),
+];
+
+/// Draws a line map over the readings: lines in the colour of what they were made of, fainter the
+/// less confident they are; ends are dots where they are confirmed.
+#[must_use]
+pub fn draw_lines(scans: &[ScanView], scene: Option<&Scene>, lines: &[MapLine]) -> Picture {
+    let samples = entries(lines);
+    let dot = Sample::Mark { shape: Shape::Dot, colour: theme::SILENT };
+    let entries: Vec<Entry> = samples
+        .into_iter()
+        .chain([Entry::new(dot, "reading")])
+        .chain(scene.map(keys::materials).into_iter().flatten())
+        .collect();
+    let finding = format!("{} lines", lines.len());
+    let draw = |plan: &Plan| lines.iter().map(|line| layer(plan, line)).collect();
+    let ends: Vec<DVec2> = lines.iter().flat_map(|line| line.ends).collect();
+    overlay::draw(scans, scene, finding, &ends, draw, |_| None, &entries)
+}
+
+/// A legend's entry for each kind of line that there is.
+pub(super) fn entries<'a>(lines: impl IntoIterator<Item = &'a MapLine>) -> Vec<Entry> {
+    let present: Vec<LineKind> = lines.into_iter().map(|line| line.kind).collect();
+    let kinds = KINDS.iter().filter(|(kind, ..)| present.contains(kind));
+    let sample = |colour| Sample::Line { colour, width_px: 2.6, dash: "none" };
+    kinds.map(|(_, name, colour)| Entry::new(sample(colour), *name)).collect()
+}
+
+/// One line and its confirmed ends.
+pub(super) fn layer(plan: &Plan, line: &MapLine) -> Layer {
+    let colour = KINDS
+        .iter()
+        .find(|(kind, ..)| *kind == line.kind)
+        .map_or(theme::INK, |(.., colour)| colour);
+    let mut layer = Layer::new("line")
+        .stroked(colour, 2.6)
+        .with("stroke-opacity", 0.35 + 0.65 * line.confidence.clamp(0.0, 1.0));
+    let [a, b] = line.ends.map(|end| plan.px(end));
+    layer.line(a, b);
+    let mut ends = Layer::new("ends").with("fill", colour);
+    for (at, _) in [a, b].into_iter().zip(line.terminal).filter(|(_, terminal)| *terminal) {
+        ends.mark(Shape::Dot, at, 3.5, None);
+    }
+    layer.add(ends);
+    layer
+}

@@ -1,0 +1,252 @@
+//! Floor plans: metres to pixels, and what every plan has on it: frame, grid, walls, poses and
+//! a scale bar.
+
+use super::{
+    canvas::{Anchor, Layer, Px, Rect, text_width_px},
+    labels::Labels,
+    theme, ticks,
+};
+use sonard_model::{
+    geometry::{DVec2, Pose},
+    scene::Scene,
+};
+
+/// A region of the floor, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Bounds {
+    pub(super) min: DVec2,
+    pub(super) max: DVec2,
+}
+
+impl Bounds {
+    /// The smallest region around the finite points; `None` without any.
+    pub(super) fn around(points: impl IntoIterator<Item = DVec2>) -> Option<Self> {
+        points
+            .into_iter()
+            .filter(|point| point.is_finite())
+            .map(|point| Self { min: point, max: point })
+            .reduce(|a, b| Self { min: a.min.min(b.min), max: a.max.max(b.max) })
+    }
+
+    /// Walls and cylinders of a scene.
+    pub(super) fn of_scene(scene: &Scene) -> Option<Self> {
+        let ends = scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
+        let discs = scene.cylinders.iter().flat_map(|cylinder| {
+            let reach = DVec2::splat(cylinder.radius_m);
+            [cylinder.center - reach, cylinder.center + reach]
+        });
+        Self::around(ends.chain(discs))
+    }
+
+    pub(super) fn including(self, points: impl IntoIterator<Item = DVec2>) -> Self {
+        Self::around(points.into_iter().chain([self.min, self.max])).unwrap_or(self)
+    }
+
+    pub(super) fn size(&self) -> DVec2 {
+        self.max - self.min
+    }
+
+    pub(super) fn grown(self, by_m: f64) -> Self {
+        let by = DVec2::splat(by_m);
+        Self { min: self.min - by, max: self.max + by }
+    }
+}
+
+/// A floor plan's place on the page.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plan {
+    /// The panel, pixels.
+    pub(super) panel: Rect,
+    /// What is seen in it, metres.
+    pub(super) view: Bounds,
+    px_per_m: f64,
+}
+
+impl Plan {
+    /// Fits a region into a panel; what is left over at the sides is shown as well.
+    pub(super) fn fit(region: Bounds, panel: Rect) -> Self {
+        let size = region.size().max(DVec2::splat(1e-3));
+        let px_per_m = (panel.width() / size.x).min(panel.height() / size.y);
+        let middle = (region.min + region.max) / 2.0;
+        let half = DVec2::new(panel.width(), panel.height()) / px_per_m / 2.0;
+        Self { panel, view: Bounds { min: middle - half, max: middle + half }, px_per_m }
+    }
+
+    /// Height of a panel so wide that shows the region without spare sides, within limits.
+    pub(super) fn height_for(region: &Bounds, width_px: f64, limits_px: [f64; 2]) -> f64 {
+        let size = region.size().max(DVec2::splat(1e-3));
+        (width_px * size.y / size.x).clamp(limits_px[0], limits_px[1]).round()
+    }
+
+    pub(super) fn px(&self, at: DVec2) -> Px {
+        let from_corner = (at - self.view.min) * self.px_per_m;
+        Px::new(self.panel.left + from_corner.x, self.panel.bottom - from_corner.y)
+    }
+
+    pub(super) fn length_px(&self, length_m: f64) -> f64 {
+        length_m * self.px_per_m
+    }
+
+    /// Frame, grid and the coordinates along the left and lower side.
+    pub(super) fn frame(&self) -> Layer {
+        let mut layer = Layer::new("frame");
+        let step = ticks::nice_step(self.panel.width() / self.px_per_m, self.panel.width() / 100.0);
+        let xs: Vec<f64> = ticks::multiples(self.view.min.x, self.view.max.x, step).collect();
+        let ys: Vec<f64> = ticks::multiples(self.view.min.y, self.view.max.y, step).collect();
+        let mut grid = Layer::new("grid").stroked(theme::GRID, theme::HAIRLINE_PX);
+        let mut numbers = Layer::new("coordinates").with("fill", theme::QUIET);
+        for &x in &xs {
+            let at = self.px(DVec2::new(x, 0.0)).x;
+            grid.line(Px::new(at, self.panel.top), Px::new(at, self.panel.bottom));
+            let below = Px::new(at, self.panel.bottom + 15.0);
+            numbers.text(below, Anchor::Middle, theme::SMALL_PX, &ticks::label(x, step));
+        }
+        for &y in &ys {
+            let at = self.px(DVec2::new(0.0, y)).y;
+            grid.line(Px::new(self.panel.left, at), Px::new(self.panel.right, at));
+            let beside = Px::new(self.panel.left - 5.0, at + 4.0);
+            numbers.text(beside, Anchor::End, theme::SMALL_PX, &ticks::label(y, step));
+        }
+        let mut border = Layer::new("border").stroked(theme::FRAME, 1.0);
+        border.rect(self.panel, 0.0);
+        layer.add(grid);
+        layer.add(numbers);
+        layer.add(border);
+        layer
+    }
+
+    /// Walls and cylinders, their line style by material.
+    pub(super) fn walls(&self, scene: &Scene) -> Layer {
+        let materials = super::materials::Materials::of(scene);
+        let mut layer = Layer::new("walls")
+            .stroked(theme::WALL, theme::WALL_PX)
+            .with("stroke-linecap", "round");
+        for (dash, material) in materials.styles() {
+            let mut style = Layer::new("material").with("stroke-dasharray", dash);
+            for wall in scene.walls.iter().filter(|wall| wall.material == material) {
+                style.line(self.px(wall.a), self.px(wall.b));
+            }
+            for cylinder in scene.cylinders.iter().filter(|c| c.material == material) {
+                // A table leg must not shrink to nothing.
+                let radius_px = self.length_px(cylinder.radius_m).max(1.5);
+                style.circle(self.px(cylinder.center), radius_px);
+            }
+            layer.add(style);
+        }
+        layer
+    }
+
+    /// The robot's body, if the scene has one, where it is with the ranger at `pose`.
+    pub(super) fn body(&self, scene: &Scene, pose: &Pose) -> Layer {
+        let mut layer = Layer::new("robot").stroked(theme::FRAME, 1.6);
+        let whole = scene.with_robot_at(pose);
+        for side in whole.walls.iter().skip(scene.walls.len()) {
+            layer.line(self.px(side.a), self.px(side.b));
+        }
+        for round in whole.cylinders.iter().skip(scene.cylinders.len()) {
+            layer.circle(self.px(round.center), self.length_px(round.radius_m));
+        }
+        layer
+    }
+
+    /// Names of walls and cylinders, where there is room for them.
+    pub(super) fn names(&self, scene: &Scene, labels: &mut Labels) -> Layer {
+        let mut layer = Layer::new("names").with("fill", theme::QUIET).haloed();
+        let middle = Bounds::of_scene(scene).map_or(DVec2::ZERO, |b| (b.min + b.max) / 2.0);
+        let mut groups: Vec<(&str, Bounds)> = Vec::new();
+        for wall in &scene.walls {
+            let [a, b] = [self.px(wall.a), self.px(wall.b)];
+            let along = b - a;
+            if along.length() < text_width_px(&wall.id, theme::SMALL_PX) {
+                note_group(&mut groups, &wall.id, wall.a, wall.b);
+                continue;
+            }
+            let turn_deg = upright_deg(along);
+            let outward = side_away_from(self.px(middle), a, b);
+            for side in [1.0, -1.0] {
+                let at = (a + b) / 2.0 + 10.0 * side * outward;
+                if labels.place_turned(at, turn_deg, theme::SMALL_PX, &wall.id) {
+                    // `at` is the middle of the text, its base line is a little lower.
+                    let lower = DVec2::from_angle(turn_deg.to_radians()).perp() * 4.0;
+                    layer.turned_text(at + lower, turn_deg, theme::SMALL_PX, &wall.id);
+                    break;
+                }
+            }
+        }
+        let discs = scene.cylinders.iter().map(|c| {
+            let reach = DVec2::splat(c.radius_m);
+            (&*c.id, Bounds { min: c.center - reach, max: c.center + reach })
+        });
+        for (name, bounds) in groups.into_iter().chain(discs) {
+            let corner = self.px(DVec2::new(bounds.max.x, bounds.max.y));
+            let low = self.px(DVec2::new(bounds.max.x, bounds.min.y));
+            for at in [low + Px::new(5.0, 12.0), corner + Px::new(5.0, -3.0)] {
+                if labels.place(at, Anchor::Start, theme::SMALL_PX, name) {
+                    layer.text(at, Anchor::Start, theme::SMALL_PX, name);
+                    break;
+                }
+            }
+        }
+        layer
+    }
+
+    /// The ranger's place and heading.
+    pub(super) fn pose(&self, pose: &Pose) -> Layer {
+        let mut layer = Layer::new("pose").stroked(theme::INK, 1.6);
+        let at = self.px(pose.position());
+        let heading = pose.direction_rad(0.0);
+        let ahead = Px::new(heading.cos(), -heading.sin());
+        let (tip, wing) = (at + 26.0 * ahead, ahead.perp());
+        layer.line(at + 5.0 * ahead, tip - 4.0 * ahead);
+        let mut solid = Layer::new("head").with("fill", theme::INK).with("stroke", "none");
+        solid.polygon(&[tip, tip - 9.0 * ahead + 4.0 * wing, tip - 9.0 * ahead - 4.0 * wing]);
+        let mut body = Layer::new("body").with("fill", theme::PAPER);
+        body.circle(at, 5.0);
+        layer.add(solid);
+        layer.add(body);
+        layer
+    }
+
+    /// A bar of a round length, above the panel's right end where it covers nothing.
+    pub(super) fn scale_bar(&self) -> Layer {
+        let length_m = ticks::nice_step(self.panel.width() / self.px_per_m, 9.0);
+        let end = Px::new(self.panel.right, self.panel.top - 6.0);
+        let start = end - Px::new(self.length_px(length_m), 0.0);
+        let rise = Px::new(0.0, 6.0);
+        let mut layer = Layer::new("scale-bar");
+        let mut bar = Layer::new("bar").stroked(theme::INK, 1.6);
+        bar.runs([[start - rise, start, end, end - rise]]);
+        layer.add(bar);
+        let text = format!("{} m", ticks::label(length_m, length_m));
+        layer.text(start - Px::new(6.0, -1.0), Anchor::End, theme::TEXT_PX, &text);
+        layer
+    }
+}
+
+/// Extends the region of the polyline that a short segment `id.N` belongs to.
+fn note_group<'a>(groups: &mut Vec<(&'a str, Bounds)>, id: &'a str, a: DVec2, b: DVec2) {
+    let name = id.rsplit_once('.').map_or(id, |(name, _)| name);
+    match groups.iter_mut().find(|(known, _)| *known == name) {
+        Some((_, bounds)) => *bounds = bounds.including([a, b]),
+        None => groups.extend(Bounds::around([a, b]).map(|bounds| (name, bounds))),
+    }
+}
+
+/// Turn of a text along this direction, degrees clockwise, so that it is never upside down.
+fn upright_deg(along: Px) -> f64 {
+    let turn = along.y.atan2(along.x).to_degrees();
+    // Exactly vertical walls read from below, like an axis title.
+    if turn >= 89.9 {
+        turn - 180.0
+    } else if turn < -90.1 {
+        turn + 180.0
+    } else {
+        turn
+    }
+}
+
+/// The unit normal of a wall that points away from the middle of the room.
+fn side_away_from(middle: Px, a: Px, b: Px) -> Px {
+    let normal = (b - a).perp().normalize_or_zero();
+    if normal.dot((a + b) / 2.0 - middle) < 0.0 { -normal } else { normal }
+}

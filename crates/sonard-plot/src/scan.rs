@@ -1,0 +1,189 @@
+//! The main picture: a scan on the floor plan, with strips of range and residual.
+
+use super::{
+    canvas::{Layer, Px, Rect},
+    caption,
+    floor::Floor,
+    keys,
+    labels::Labels,
+    legend,
+    picture::Picture,
+    plan::Plan,
+    readings::Readings,
+    region,
+    strip::AzimuthAxis,
+    strips, theme, words,
+};
+use sonard_model::{geometry::Pose, scene::Scene};
+use sonard_records::ScanView;
+
+/// Draws a scan: on the left the floor plan with measured readings as marks (their shape and
+/// colour say what made them), predictions as rays ending in rings, silent beams as ticks on
+/// the border and readings beyond the view as arrows; on the right range and residual against
+/// azimuth.
+///
+/// Without predictions in the log there is no residual; a simulated log's own readings are the
+/// marks, with their margin above the threshold in the residual's place. Without a scene there
+/// are no walls.
+#[must_use]
+pub fn draw_scan(scan: &ScanView, scene: Option<&Scene>) -> Picture {
+    draw_scans(std::slice::from_ref(scan), scene)
+}
+
+/// Draws several scans over each other, so that it shows how well they repeat; caption and
+/// predictions are those of the first at each pose.
+#[must_use]
+pub fn draw_scans(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
+    let readings: Vec<Readings> = scans.iter().map(Readings::of).collect();
+    let placed: Vec<(Pose, &Readings)> = scans
+        .iter()
+        .zip(&readings)
+        .filter_map(|(view, r)| Some((words::pose_of(view)?, r)))
+        .collect();
+    let title = words::title(scans, scene);
+    let (heading, top) = caption::draw(&title, words::badge(scans), &words::lines(scans));
+
+    let region = region::region(&placed, scene);
+    let layout = Layout::choose(&region, top + 22.0);
+    let plan = Plan::fit(region, layout.plan);
+    let azimuths = AzimuthAxis::of(scans.first().and_then(|s| Some(&s.start.as_ref()?.plan)));
+
+    let mut page = Layer::new("scan");
+    page.add(heading);
+    let (floor, beyond) = floor_plan(&plan, &placed, scene);
+    page.add(floor);
+    page.add(strips_beside(&layout.strips, azimuths, &readings));
+    let below = Px::new(theme::MARGIN_PX, layout.bottom + 10.0);
+    let width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
+    let (entries, height) = legend::draw(&keys::all(&readings, scene, beyond), below, width);
+    page.add(entries);
+    Picture::new(theme::PAGE_PX, below.y + height + theme::MARGIN_PX / 2.0, page)
+}
+
+/// Where the panels are.
+struct Layout {
+    plan: Rect,
+    strips: [Rect; 2],
+    bottom: f64,
+}
+
+impl Layout {
+    /// Strips beside the plan, or under it when the plan is long.
+    fn choose(region: &super::plan::Bounds, top: f64) -> Self {
+        let size = region.size();
+        if size.x > 2.0 * size.y { Self::stacked(region, top) } else { Self::beside(region, top) }
+    }
+
+    fn beside(region: &super::plan::Bounds, top: f64) -> Self {
+        let left = theme::MARGIN_PX + 36.0;
+        let plan_width = 540.0;
+        let height = Plan::height_for(region, plan_width, [430.0, 640.0]);
+        let strip_left = left + plan_width + 66.0;
+        let strip_width = theme::PAGE_PX - theme::MARGIN_PX - strip_left;
+        let strip_height = (height - 46.0) / 2.0;
+        let strip = |y: f64| Rect::new(strip_left, y, strip_width, strip_height);
+        Self {
+            plan: Rect::new(left, top, plan_width, height),
+            strips: [strip(top), strip(top + strip_height + 30.0)],
+            bottom: top + height + 22.0,
+        }
+    }
+
+    fn stacked(region: &super::plan::Bounds, top: f64) -> Self {
+        let left = theme::MARGIN_PX + 50.0;
+        let width = theme::PAGE_PX - theme::MARGIN_PX - left;
+        let height = Plan::height_for(region, width, [180.0, 460.0]);
+        let strip = |y: f64| Rect::new(left, y, width, 150.0);
+        let strips_top = top + height + 48.0;
+        Self {
+            plan: Rect::new(left, top, width, height),
+            strips: [strip(strips_top), strip(strips_top + 150.0 + 30.0)],
+            bottom: strips_top + 330.0 + 38.0,
+        }
+    }
+}
+
+/// What was read at one pose.
+struct Stand<'a> {
+    pose: Pose,
+    /// The scan whose predictions are shown.
+    first: &'a Readings,
+    /// The beams of all scans here.
+    all: Readings,
+}
+
+impl<'a> Stand<'a> {
+    /// The scans by pose, in the order of the log.
+    fn gather(scans: &[(Pose, &'a Readings)]) -> Vec<Self> {
+        let mut stands: Vec<Self> = Vec::new();
+        for &(pose, first) in scans {
+            if stands.iter().all(|stand| stand.pose != pose) {
+                let here = scans.iter().filter(|(other, _)| *other == pose);
+                let all = Readings::merged(here.map(|(_, scan)| *scan));
+                stands.push(Self { pose, first, all });
+            }
+        }
+        stands
+    }
+
+    fn predicted(&self, plan: &'a Plan) -> Floor<'_> {
+        Floor { plan, pose: self.pose, scan: self.first }
+    }
+
+    fn measured(&self, plan: &'a Plan) -> Floor<'_> {
+        Floor { plan, pose: self.pose, scan: &self.all }
+    }
+}
+
+/// The floor plan, and how many readings lie beyond it.
+fn floor_plan(plan: &Plan, scans: &[(Pose, &Readings)], scene: Option<&Scene>) -> (Layer, usize) {
+    let stands = Stand::gather(scans);
+    let mut inside = Layer::new("inside").clipped("plan-window", plan.panel);
+    inside.extend(stands.iter().map(|stand| stand.predicted(plan).model()));
+    inside.extend(scene.map(|scene| plan.walls(scene)));
+    for stand in &stands {
+        inside.extend(scene.map(|scene| plan.body(scene, &stand.pose)));
+        inside.add(stand.predicted(plan).min_range());
+    }
+    let opacity = if scans.len() > 1 { 0.6 } else { 1.0 };
+    inside.extend(stands.iter().map(|stand| stand.measured(plan).marks(opacity)));
+    inside.extend(stands.iter().map(|stand| plan.pose(&stand.pose)));
+
+    let mut labels = Labels::new(plan.panel);
+    let mut layer = Layer::new("floor-plan");
+    layer.add(plan.frame());
+    layer.add(inside);
+    for floor in stands.iter().map(|stand| stand.measured(plan)) {
+        layer.add(floor.silent_ticks());
+        layer.add(floor.beyond(&mut labels));
+    }
+    layer.extend(scene.map(|scene| plan.names(scene, &mut labels)));
+    layer.add(plan.scale_bar());
+    (layer, stands.iter().map(|stand| stand.measured(plan).count_beyond()).sum())
+}
+
+fn strips_beside(panels: &[Rect; 2], azimuths: AzimuthAxis, scans: &[Readings]) -> Layer {
+    let mut layer = Layer::new("strips");
+    let has_residuals = scans.iter().any(|scan| scan.residuals().next().is_some());
+    let has_margins =
+        scans.iter().flat_map(|scan| &scan.beams).any(|beam| beam.margin_db.is_some());
+    let [upper, lower] = *panels;
+    let second = if has_residuals {
+        Some(strips::residual(lower, azimuths, scans, true))
+    } else if has_margins {
+        Some(strips::margin(lower, azimuths, scans, true))
+    } else {
+        None
+    };
+    match second {
+        Some(second) => {
+            layer.add(strips::range(upper, azimuths, scans, false));
+            layer.add(second);
+        }
+        None => {
+            let whole = Rect { bottom: lower.bottom, ..upper };
+            layer.add(strips::range(whole, azimuths, scans, true));
+        }
+    }
+    layer
+}

@@ -1,0 +1,363 @@
+//! What every picture must keep: well-formed, nothing lost, nothing that makes it panic.
+
+use proptest::prelude::*;
+use resvg::{
+    tiny_skia::Pixmap,
+    usvg::{self, roxmltree},
+};
+use uuid::Uuid;
+
+use super::{
+    MAX_WIDTH_PX, Picture, PlotError,
+    fixtures::{furnished_room, room, scan_of_room, session, simulated},
+    *,
+};
+use sonard_model::{
+    geometry::{DVec2, Pose},
+    scene::{Robot, RobotShape, Scene},
+};
+use sonard_records::{
+    Event, EventKind, PathKind, PathRecord, Ping, PingStatus, ScanPlan, ScanStart, ScanView,
+    SimRecord,
+};
+
+/// Every kind of picture of these scans.
+fn pictures(scans: &[ScanView], scene: Option<&Scene>) -> Vec<Picture> {
+    vec![draw_scans(scans, scene), draw_polar(scans, scene), draw_residuals(scans, scene)]
+}
+
+/// Parses the SVG as a renderer does; gives the text for a closer look.
+fn well_formed(picture: &Picture) -> String {
+    let svg = picture.to_svg();
+    usvg::Tree::from_str(&svg, &usvg::Options::default()).expect("a renderer reads it");
+    let document = roxmltree::Document::parse(&svg).expect("well-formed");
+    for attribute in document.descendants().flat_map(|node| node.attributes()) {
+        let value = attribute.value();
+        assert!(!value.contains("NaN") && !value.contains("inf"), "{attribute:?}");
+    }
+    svg
+}
+
+/// Number of marks (shapes with a hint) in the groups of this class inside `outer`.
+fn marks(svg: &str, outer: &str, class: &str) -> usize {
+    let document = roxmltree::Document::parse(svg).expect("well-formed");
+    document
+        .descendants()
+        .filter(|node| node.attribute("class") == Some(class))
+        .filter(|node| node.ancestors().any(|up| up.attribute("class") == Some(outer)))
+        .flat_map(|group| group.children())
+        .filter(|node| node.children().any(|child| child.has_tag_name("title")))
+        .count()
+}
+
+/// All text that is shown.
+fn texts(svg: &str) -> Vec<String> {
+    let document = roxmltree::Document::parse(svg).expect("well-formed");
+    let texts = document.descendants().filter(|node| node.has_tag_name("text"));
+    texts.filter_map(|node| node.text().map(str::to_owned)).collect()
+}
+
+fn pose(name: &str) -> Pose {
+    room().poses[name]
+}
+
+#[test]
+fn every_reading_of_a_scan_is_a_mark_a_tick_or_an_arrow() {
+    let scan = scan_of_room(pose("fig9"), 0.9, 1);
+    let svg = well_formed(&draw_scan(&scan, Some(&room())));
+    let readings = readings::Readings::of(&scan);
+    let on_plan: usize =
+        readings::Kind::HEARD.iter().map(|kind| marks(&svg, "floor-plan", kind.words())).sum();
+    let legend = texts(&svg);
+    let beyond: usize = legend
+        .iter()
+        .find_map(|text| text.strip_prefix("beyond the view (")?.strip_suffix(')'))
+        .map_or(0, |n| n.parse().expect("a number"));
+    let heard = readings.beams.iter().filter(|beam| beam.range_m.is_some()).count();
+    assert!(on_plan > 100 && beyond > 0, "{on_plan} on the plan, {beyond} beyond");
+    assert_eq!(on_plan + beyond, heard);
+    // The strip beside the plan has them all.
+    let on_strip: usize =
+        readings::Kind::HEARD.iter().map(|kind| marks(&svg, "range-strip", kind.words())).sum();
+    assert_eq!(on_strip, heard);
+}
+
+#[test]
+fn the_false_wall_is_seen_and_one_phantom_does_not_shrink_the_room() {
+    let mut scan = scan_of_room(pose("fig9"), 0.9, 1);
+    let view_of = |scan: &ScanView| {
+        let readings = readings::Readings::of(scan);
+        region::region(&[(pose("fig9"), &readings)], Some(&room()))
+    };
+    let before = view_of(&scan);
+    assert!(before.min.y < 0.085 - 0.742, "the wall's mirror image is within {before:?}");
+    scan.pings[0].status = PingStatus::Echo;
+    scan.pings[0].range_m = Some(50.0);
+    let after = view_of(&scan);
+    assert!((after.size() - before.size()).length() < 0.05, "{before:?} became {after:?}");
+}
+
+#[test]
+fn provenance_is_said_unless_it_is_hardware() {
+    let mut scan = scan_of_room(pose("fig7"), 4.5, 1);
+    let has = |scan: &ScanView, words: &str| {
+        let shown = |p: &Picture| texts(&well_formed(p)).iter().any(|text| text.contains(words));
+        pictures(std::slice::from_ref(scan), Some(&room())).iter().all(shown)
+    };
+    assert!(has(&scan, "MOCK, not hardware"));
+    assert!(has(&ScanView { session: None, ..scan.clone() }, "PROVENANCE UNKNOWN"));
+    assert!(has(&simulated(scan.clone()), "SIMULATED, nothing measured"));
+    let mut session = session();
+    session.provenance = sonard_records::Provenance::Hardware;
+    scan.session = Some(session.into());
+    assert!(!has(&scan, "not hardware"));
+}
+
+#[test]
+fn a_simulated_log_shows_its_own_readings_and_margins() {
+    let scan = simulated(scan_of_room(pose("fig9"), 0.9, 1));
+    let svg = well_formed(&draw_scan(&scan, Some(&room())));
+    assert!(marks(&svg, "floor-plan", "multiple reflection") > 50);
+    assert!(marks(&svg, "margin-strip", "multiple reflection") > 50);
+    assert!(!svg.contains("residual-strip"));
+}
+
+#[test]
+fn a_log_without_predictions_shows_plain_echoes() {
+    let mut scan = scan_of_room(pose("fig9"), 0.9, 1);
+    for ping in &mut scan.pings {
+        (ping.sim, ping.residual_m) = (None, None);
+    }
+    let svg = well_formed(&draw_scan(&scan, None));
+    assert!(marks(&svg, "floor-plan", "echo") > 100);
+    assert!(!svg.contains("residual-strip") && !svg.contains("class=\"walls\""));
+    let residuals = well_formed(&draw_residuals(&[scan], None));
+    assert!(texts(&residuals).iter().any(|text| text.contains("no residuals")));
+}
+
+#[test]
+fn overlaid_scans_show_all_their_marks() {
+    let scans: Vec<ScanView> = (0..3).map(|seed| scan_of_room(pose("fig7"), 4.5, seed)).collect();
+    let all = well_formed(&draw_scans(&scans, Some(&room())));
+    let single: usize = scans
+        .iter()
+        .map(|scan| {
+            marks(&well_formed(&draw_polar(std::slice::from_ref(scan), None)), "polar", "edge")
+        })
+        .sum();
+    assert_eq!(marks(&well_formed(&draw_polar(&scans, None)), "polar", "edge"), single);
+    assert!(texts(&all).iter().any(|text| text.starts_with("3 scans overlaid")));
+}
+
+#[test]
+fn png_has_the_size_asked_for_and_is_not_blank() {
+    let picture = draw_scan(&scan_of_room(pose("fig9"), 0.9, 1), Some(&room()));
+    for width_px in [1, 320, 1000] {
+        let image = Pixmap::decode_png(&picture.to_png(width_px).expect("drawn")).expect("PNG");
+        assert_eq!(image.width(), width_px);
+    }
+    let image = Pixmap::decode_png(&picture.to_png(1000).expect("drawn")).expect("PNG");
+    let blue = image.pixels().iter().filter(|p| p.blue() > 150 && p.red() < 30).count();
+    // Without the font the title would be blank.
+    let title = (0..300).flat_map(|x| (15..45).map(move |y| (x, y)));
+    let ink = title.filter_map(|(x, y)| image.pixel(x, y)).filter(|p| p.red() < 100).count();
+    assert!(blue > 100, "{blue} pixels of direct echoes");
+    assert!(ink > 200, "{ink} pixels of the title");
+    for width_px in [0, MAX_WIDTH_PX + 1, u32::MAX] {
+        assert!(matches!(picture.to_png(width_px), Err(PlotError::Width(w)) if w == width_px));
+    }
+}
+
+#[test]
+fn names_are_escaped_wherever_they_stand() {
+    let hostile = "</text><script>&\"'\u{0}\u{1b}\u{fffe} x";
+    let mut scene = furnished_room();
+    scene.name = hostile.into();
+    scene.source = Some(hostile.into());
+    scene.walls[0].id = hostile.into();
+    scene.poses = [(hostile.to_owned(), pose("fig9"))].into();
+    let mut scan = scan_of_room(pose("fig9"), 4.5, 1);
+    scan.events.push(Event {
+        time: jiff::Timestamp::UNIX_EPOCH,
+        kind: EventKind::Fault,
+        detail: hostile.into(),
+    });
+    for ping in &mut scan.pings {
+        if let Some(path) = ping.sim.as_mut().and_then(|sim| sim.path.as_mut()) {
+            path.walls = vec![hostile.into()];
+        }
+    }
+    let mut all = pictures(&[scan], Some(&scene));
+    all.push(draw_scene(&scene));
+    for picture in all {
+        let svg = well_formed(&picture);
+        assert!(!svg.contains("<script"));
+        let shown = texts(&svg).iter().any(|text| text.contains("</text><script>&\"'"));
+        assert!(shown, "the name is shown as it is");
+    }
+}
+
+#[test]
+fn a_scene_shows_walls_materials_poses_and_the_robot() {
+    let mut scene = furnished_room();
+    let svg = well_formed(&draw_scene(&scene));
+    let shown = texts(&svg);
+    for words in ["south", "leg", "fig7", "fig9", "wall, reflectance 0.7, roughness 0.4"] {
+        assert!(shown.iter().any(|text| text == words), "{words} is missing in {shown:?}");
+    }
+    let document = roxmltree::Document::parse(&svg).expect("well-formed");
+    let lines = document
+        .descendants()
+        .filter(|node| node.attribute("class") == Some("material"))
+        .flat_map(|node| node.children())
+        .filter(|node| node.has_tag_name("line"))
+        .count();
+    assert_eq!(lines, scene.walls.len());
+    let shape = RobotShape::Circle { center: DVec2::new(-0.1, 0.0), radius_m: 0.08 };
+    let material = scene.walls[0].material;
+    scene.robot = Some(Robot { id: "b12".into(), shape, material, z_m: None });
+    let with_robot = well_formed(&draw_scene(&scene));
+    assert_eq!(with_robot.matches("class=\"robot\"").count(), 2);
+    assert!(texts(&with_robot).contains(&"robot b12".to_owned()));
+}
+
+#[test]
+fn empty_and_silent_scans_are_drawn() {
+    let whole = scan_of_room(pose("fig9"), 4.5, 1);
+    let bare = ScanView {
+        scan: Uuid::nil(),
+        session: None,
+        start: None,
+        pings: Vec::new(),
+        events: Vec::new(),
+        end: None,
+    };
+    let one = ScanView { pings: whole.pings[..1].to_vec(), ..whole.clone() };
+    let mut silent = whole;
+    for ping in &mut silent.pings {
+        (ping.status, ping.range_m, ping.residual_m, ping.sim) =
+            (PingStatus::NoEcho, None, None, None);
+    }
+    let mut nothing = room();
+    nothing.walls.clear();
+    nothing.poses.clear();
+    well_formed(&draw_scene(&nothing));
+    for scans in [vec![], vec![bare], vec![one], vec![silent]] {
+        for scene in [None, Some(&room()), Some(&nothing)] {
+            for picture in pictures(&scans, scene) {
+                well_formed(&picture);
+                assert!(picture.to_png(200).is_ok());
+            }
+        }
+    }
+}
+
+/// Numbers that logs should not hold, besides those that they do.
+fn any_number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        4 => 0.0..10.0_f64,
+        1 => Just(1e9),
+        1 => Just(0.0),
+        2 => prop::num::f64::ANY,
+    ]
+}
+
+fn any_status() -> impl Strategy<Value = PingStatus> {
+    prop::sample::select(vec![
+        PingStatus::Echo,
+        PingStatus::NoEcho,
+        PingStatus::MinRange,
+        PingStatus::LinkLost,
+        PingStatus::StepDoubtful,
+        PingStatus::ModuleFault,
+    ])
+}
+
+prop_compose! {
+    fn any_sim()(
+        status in any_status(),
+        range_m in prop::option::of(any_number()),
+        margin_db in prop::option::of(any_number()),
+        order in 0..5_u32,
+        length_m in any_number(),
+    ) -> SimRecord {
+        let kind = if order == 4 { PathKind::Diffracted } else { PathKind::Specular };
+        let path = PathRecord { kind, order, walls: vec!["south".into()], edge: None, second_edge: None, length_m };
+        SimRecord { status, range_m, amplitude: margin_db, margin_db, path: Some(path) }
+    }
+}
+
+prop_compose! {
+    fn any_ping()(
+        index in any::<u32>(),
+        azimuth_deg in prop_oneof![4 => 0.0..360.0_f64, 1 => prop::num::f64::ANY],
+        status in any_status(),
+        range_m in prop::option::of(any_number()),
+        residual_m in prop::option::of(any_number()),
+        margin_db in prop::option::of(any_number()),
+        sim in prop::option::of(any_sim()),
+    ) -> Ping {
+        Ping {
+            scan: Uuid::nil(), index, step: 0, azimuth_deg, ranger: None, pose: None,
+            provenance: None, time: None, time_sigma_us: None,
+            status, fired_ticks: None, echo_ticks: Vec::new(), tof_us: None, range_m,
+            repaired: false, amplitude: None, margin_db, path: None, sim, residual_m,
+            confidence: None,
+        }
+    }
+}
+
+prop_compose! {
+    fn any_scan()(
+        pings in prop::collection::vec(any_ping(), 0..40),
+        place in prop::option::of([any_number(), any_number(), any_number()]),
+        plan in [any_number(), any_number(), any_number()],
+        blanking_us in any_number(),
+        with_session in any::<bool>(),
+    ) -> ScanView {
+        let mut session = session();
+        session.sensor.blanking_us = blanking_us;
+        let start = place.map(|[x_m, y_m, heading_deg]| ScanStart {
+            scan: Uuid::nil(),
+            time: jiff::Timestamp::UNIX_EPOCH,
+            pose: Pose { x_m, y_m, heading_deg },
+            plan: ScanPlan {
+                from_deg: plan[0], to_deg: plan[1], step_deg: plan[2], pings_per_stop: 1,
+            },
+            air: None,
+            provenance: None,
+            request: None,
+        });
+        let session = with_session.then(|| session.into());
+        ScanView { scan: Uuid::nil(), session, start, pings, events: Vec::new(), end: None }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(128))]
+
+    #[test]
+    fn no_scan_makes_a_picture_panic_or_break(
+        scans in prop::collection::vec(any_scan(), 1..4),
+        with_scene in any::<bool>(),
+    ) {
+        let room = room();
+        for picture in pictures(&scans, with_scene.then_some(&room)) {
+            well_formed(&picture);
+        }
+    }
+
+    #[test]
+    fn no_scene_makes_a_picture_panic_or_break(
+        ends in prop::collection::vec([any_number(), any_number()], 4),
+        name in any::<String>(),
+    ) {
+        let mut scene = room();
+        scene.name = name.clone();
+        for (wall, [x, y]) in scene.walls.iter_mut().zip(ends) {
+            wall.a = DVec2::new(x, y);
+            wall.id = name.as_str().into();
+        }
+        well_formed(&draw_scene(&scene));
+    }
+}

@@ -1,0 +1,341 @@
+//! The trace of one firing: what an oscilloscope shows at the amplifier, the envelope against the
+//! threshold, and ECHO.
+
+use super::{
+    canvas::{Anchor, Layer, Px, Rect, Shape},
+    caption,
+    labels::Labels,
+    legend::{self, Entry, Sample},
+    picture::Picture,
+    theme, ticks,
+};
+use sonard_model::acoustics::EchoTrace;
+
+/// Lowest level shown, decibels below a head-on wall.
+const FLOOR_DB: f64 = -60.0;
+const TOP_DB: f64 = 10.0;
+
+/// Most humps that get a number.
+const MOST_NAMED: usize = 12;
+
+/// Humps this far below the threshold are left without a number, decibels.
+const NAMED_BELOW_DB: f64 = 12.0;
+
+/// A firing to be drawn.
+#[derive(Debug, Clone)]
+pub struct TraceView<'a> {
+    /// Above the picture.
+    pub title: String,
+    /// Under the title.
+    pub lines: Vec<String>,
+    /// The firing.
+    pub trace: &'a EchoTrace,
+    /// What each of its humps is, in the same order.
+    pub names: Vec<String>,
+    /// From firing until the receiver listens, microseconds.
+    pub blanking_us: f64,
+    /// How long BLNK holds the detector after an echo, microseconds.
+    pub rearm_us: f64,
+    /// Speed of sound, metres a second.
+    pub sound_speed_m_s: f64,
+}
+
+/// Draws the trace of a firing: on top the signal as an oscilloscope shows it (the envelope on both
+/// sides of zero, as the carrier fills it), below its level with the threshold in force, the
+/// blanking and the moments at which ECHO rises; then the gain and ECHO itself. Numbers on the humps
+/// stand for the paths listed below.
+#[must_use]
+pub fn draw_trace(view: &TraceView) -> Picture {
+    let (heading, top) =
+        caption::draw(&view.title, Some("SIMULATED, nothing measured"), &view.lines);
+    let axes = Axes::new(view, top + 26.0);
+    let named = named(view);
+    let mut page = Layer::new("trace");
+    page.add(heading);
+    for layer in [axes.signal(view), axes.levels(view, &named), axes.gain(view), axes.echo(view)] {
+        page.add(layer);
+    }
+    let below = Px::new(theme::MARGIN_PX, axes.echo.bottom + 52.0);
+    let width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
+    let (key, height) = legend::draw(&keys(), below, width);
+    page.add(key);
+    let (list, bottom) = list(view, &named, below.y + height + 12.0);
+    page.add(list);
+    Picture::new(theme::PAGE_PX, bottom + theme::MARGIN_PX / 2.0, page)
+}
+
+/// A hump with a number: several sounds of the same name that come together are one.
+struct Named {
+    peak: f64,
+    peak_us: f64,
+    tof_us: f64,
+    name: String,
+    count: usize,
+}
+
+/// The strongest humps, in order of time.
+fn named(view: &TraceView) -> Vec<Named> {
+    let threshold_at = |t_us: f64| {
+        let point = view.trace.points.iter().find(|point| point.t_us >= t_us);
+        point.or(view.trace.points.last()).map_or(0.0, |point| point.threshold)
+    };
+    let mut humps: Vec<Named> = Vec::new();
+    for (hump, name) in view.trace.humps.iter().zip(&view.names) {
+        let (peak, peak_us) = hump.peak;
+        if peak < threshold_at(peak_us) * 10f64.powf(-NAMED_BELOW_DB / 20.0) {
+            continue;
+        }
+        let same =
+            |known: &&mut Named| known.name == *name && (known.tof_us - hump.tof_us).abs() < 1.0;
+        match humps.iter_mut().find(same) {
+            Some(known) => {
+                known.peak = known.peak.max(peak);
+                known.count += 1;
+            }
+            None => humps.push(Named {
+                peak,
+                peak_us,
+                tof_us: hump.tof_us,
+                name: name.clone(),
+                count: 1,
+            }),
+        }
+    }
+    humps.sort_by(|one, other| other.peak.total_cmp(&one.peak));
+    humps.truncate(MOST_NAMED);
+    humps.sort_by(|one, other| one.tof_us.total_cmp(&other.tof_us));
+    humps
+}
+
+struct Axes {
+    signal: Rect,
+    levels: Rect,
+    gain: Rect,
+    echo: Rect,
+    until_us: f64,
+    sound_speed_m_s: f64,
+}
+
+impl Axes {
+    fn new(view: &TraceView, top: f64) -> Self {
+        let left = theme::MARGIN_PX + 46.0;
+        let width = theme::PAGE_PX - theme::MARGIN_PX - left;
+        let until_us = view.trace.points.last().map_or(1.0, |point| point.t_us).max(1.0);
+        let signal = Rect::new(left, top, width, 150.0);
+        let levels = Rect::new(left, signal.bottom + 34.0, width, 290.0);
+        let gain = Rect::new(left, levels.bottom + 34.0, width, 60.0);
+        let echo = Rect::new(left, gain.bottom + 34.0, width, 30.0);
+        Self { signal, levels, gain, echo, until_us, sound_speed_m_s: view.sound_speed_m_s }
+    }
+
+    fn x(&self, t_us: f64) -> f64 {
+        self.signal.left + (t_us / self.until_us).clamp(0.0, 1.0) * self.signal.width()
+    }
+
+    fn level_y(&self, amplitude: f64) -> f64 {
+        let db = 20.0 * amplitude.max(1e-9).log10();
+        let share = ((db - FLOOR_DB) / (TOP_DB - FLOOR_DB)).clamp(0.0, 1.0);
+        self.levels.bottom - share * self.levels.height()
+    }
+
+    /// Border, title and vertical grid; numbers of the time below where wanted.
+    fn frame(&self, panel: Rect, title: &str, numbered: bool) -> Layer {
+        let mut layer = Layer::new("frame");
+        let mut grid = Layer::new("grid").stroked(theme::GRID, theme::HAIRLINE_PX);
+        let mut numbers = Layer::new("numbers").with("fill", theme::QUIET);
+        let until_ms = self.until_us / 1e3;
+        let step = ticks::nice_step(until_ms, 12.0);
+        for ms in ticks::multiples(0.0, until_ms, step) {
+            let x = self.x(1e3 * ms);
+            grid.line(Px::new(x, panel.top), Px::new(x, panel.bottom));
+            if numbered {
+                let range_m = self.sound_speed_m_s * ms * 1e-3 / 2.0;
+                let at = |row: f64| Px::new(x, panel.bottom + row);
+                numbers.text(at(15.0), Anchor::Middle, theme::SMALL_PX, &ticks::label(ms, step));
+                let range = ticks::label(range_m, 0.01);
+                numbers.text(at(30.0), Anchor::Middle, theme::SMALL_PX, &range);
+            }
+        }
+        if numbered {
+            let beside = |row: f64| Px::new(panel.left - 22.0, panel.bottom + row);
+            numbers.text(beside(15.0), Anchor::End, theme::SMALL_PX, "ms");
+            numbers.text(beside(30.0), Anchor::End, theme::SMALL_PX, "m");
+        }
+        let mut border = Layer::new("border").stroked(theme::FRAME, 1.0);
+        border.rect(panel, 0.0);
+        layer.add(grid);
+        layer.add(numbers);
+        layer.add(border);
+        let above = Px::new(panel.left, panel.top - 6.0);
+        layer.text(above, Anchor::Start, theme::TEXT_PX, title);
+        layer
+    }
+
+    fn blanking(&self, panel: Rect, blanking_us: f64) -> Layer {
+        let mut layer = Layer::new("blanking").with("fill", theme::SKY).with("fill-opacity", 0.2);
+        let width = self.x(blanking_us) - panel.left;
+        layer.rect(Rect::new(panel.left, panel.top, width, panel.height()), 0.0);
+        layer
+    }
+
+    /// The envelope on both sides of zero, the transmission among it.
+    fn signal(&self, view: &TraceView) -> Layer {
+        let panel = self.signal;
+        let highest = view.trace.points.iter().map(|point| point.envelope).fold(1.0, f64::max);
+        let middle = panel.center().y;
+        let y = |amplitude: f64| middle - 0.47 * panel.height() * amplitude / highest;
+        let mut layer = Layer::new("signal");
+        layer.add(self.blanking(panel, view.blanking_us));
+        layer.add(self.frame(panel, "signal after the amplifier (compensated)", false));
+        let both_sides = |points: &[(f64, f64)]| {
+            let upper = points.iter().map(|&(t_us, size)| Px::new(self.x(t_us), y(size)));
+            let lower = points.iter().rev().map(|&(t_us, size)| Px::new(self.x(t_us), y(-size)));
+            upper.chain(lower).collect::<Vec<_>>()
+        };
+        let mut sent = Layer::new("transmission").with("fill", theme::ORANGE);
+        sent.polygon(&both_sides(&view.trace.transmission));
+        layer.add(sent);
+        let points: Vec<_> = view.trace.points.iter().map(|p| (p.t_us, p.envelope)).collect();
+        let mut heard = Layer::new("envelope").with("fill", theme::BLUE);
+        heard.polygon(&both_sides(&points));
+        layer.add(heard);
+        layer
+    }
+
+    fn levels(&self, view: &TraceView, named: &[Named]) -> Layer {
+        let panel = self.levels;
+        let mut layer = Layer::new("levels");
+        layer.add(self.blanking(panel, view.blanking_us));
+        layer.add(self.frame(
+            panel,
+            "envelope and threshold in force, dB below a head-on wall",
+            false,
+        ));
+        let mut grid = Layer::new("grid").stroked(theme::GRID, theme::HAIRLINE_PX);
+        let mut numbers = Layer::new("numbers").with("fill", theme::QUIET);
+        for db in ticks::multiples(FLOOR_DB, TOP_DB, 10.0) {
+            let y = self.level_y(10f64.powf(db / 20.0));
+            grid.line(Px::new(panel.left, y), Px::new(panel.right, y));
+            let at = Px::new(panel.left - 5.0, y + 4.0);
+            numbers.text(at, Anchor::End, theme::SMALL_PX, &ticks::label(db, 10.0));
+        }
+        layer.add(grid);
+        layer.add(numbers);
+        let run = |points: &mut dyn Iterator<Item = (f64, f64)>| -> Vec<Px> {
+            points.map(|(t_us, size)| Px::new(self.x(t_us), self.level_y(size))).collect()
+        };
+        let points = &view.trace.points;
+        let mut sent = Layer::new("transmission").stroked(theme::ORANGE, 1.6);
+        sent.runs([run(&mut view.trace.transmission.iter().copied())]);
+        let mut heard = Layer::new("envelope").stroked(theme::BLUE, 1.4);
+        heard.runs([run(&mut points.iter().map(|p| (p.t_us, p.envelope)))]);
+        let mut threshold = Layer::new("threshold").stroked(theme::VERMILLION, 1.2);
+        let listening = points.iter().filter(|p| p.t_us >= view.blanking_us);
+        threshold.runs([run(&mut listening.map(|p| (p.t_us, p.threshold)))]);
+        layer.extend([sent, heard, threshold]);
+        layer.add(self.rises(view));
+        layer.add(self.numbers(named));
+        layer
+    }
+
+    /// Triangles where ECHO rises.
+    fn rises(&self, view: &TraceView) -> Layer {
+        let mut layer = Layer::new("rises").with("fill", theme::VERMILLION);
+        for &echo_us in view.trace.detection.echoes_us.iter().filter(|us| **us <= self.until_us) {
+            let point = view.trace.points.iter().find(|point| point.t_us >= echo_us);
+            let y = self.level_y(point.map_or(1.0, |point| point.threshold));
+            let range_m = self.sound_speed_m_s * echo_us * 1e-6 / 2.0;
+            let hint = format!("ECHO rises at {echo_us:.1} us, {range_m:.4} m");
+            layer.mark(Shape::Triangle, Px::new(self.x(echo_us), y + 7.0), 4.5, Some(&hint));
+        }
+        layer
+    }
+
+    fn numbers(&self, named: &[Named]) -> Layer {
+        let mut layer = Layer::new("numbers-of-humps").haloed();
+        let mut labels = Labels::new(self.levels);
+        for (number, hump) in (1..).zip(named) {
+            let text = format!("{number}");
+            let at = Px::new(self.x(hump.peak_us), self.level_y(hump.peak) - 5.0);
+            // Beside each other, or one above the other.
+            let place = (0..8)
+                .flat_map(|row| [0.0, 12.0, -12.0].map(|x| at + Px::new(x, -14.0 * f64::from(row))))
+                .find(|place| labels.place(*place, Anchor::Middle, theme::SMALL_PX, &text));
+            if let Some(place) = place {
+                layer.text(place, Anchor::Middle, theme::SMALL_PX, &text);
+            }
+        }
+        layer
+    }
+
+    fn gain(&self, view: &TraceView) -> Layer {
+        let panel = self.gain;
+        let mut layer = Layer::new("gain");
+        layer.add(self.frame(panel, "gain, dB above what a wall at 1 m needs", false));
+        let (low, high) = (-15.0, 25.0);
+        let y =
+            |db: f64| panel.bottom - ((db - low) / (high - low)).clamp(0.0, 1.0) * panel.height();
+        let mut numbers = Layer::new("numbers").with("fill", theme::QUIET);
+        for db in [-10.0, 0.0, 10.0, 20.0] {
+            let at = Px::new(panel.left - 5.0, y(db) + 4.0);
+            numbers.text(at, Anchor::End, theme::SMALL_PX, &ticks::label(db, 10.0));
+        }
+        let mut line = Layer::new("line").stroked(theme::GREEN, 1.4);
+        let points = view.trace.points.iter();
+        line.runs([points.map(|p| Px::new(self.x(p.t_us), y(p.gain_db))).collect::<Vec<_>>()]);
+        layer.add(numbers);
+        layer.add(line);
+        layer
+    }
+
+    fn echo(&self, view: &TraceView) -> Layer {
+        let panel = self.echo;
+        let mut layer = Layer::new("echo");
+        layer.add(self.frame(panel, "ECHO (BLNK makes it ready again after each)", true));
+        let (low, high) = (panel.bottom - 5.0, panel.top + 5.0);
+        let mut run = vec![Px::new(panel.left, low)];
+        for &echo_us in view.trace.detection.echoes_us.iter().filter(|us| **us <= self.until_us) {
+            let (rise, fall) = (self.x(echo_us), self.x(echo_us + view.rearm_us));
+            run.extend([(rise, low), (rise, high), (fall, high), (fall, low)].map(Px::from));
+        }
+        run.push(Px::new(panel.right, low));
+        let mut line = Layer::new("line").stroked(theme::INK, 1.4);
+        line.runs([run]);
+        layer.add(line);
+        layer
+    }
+}
+
+fn keys() -> Vec<Entry> {
+    let line = |colour| Sample::Line { colour, width_px: 2.0, dash: "none" };
+    vec![
+        Entry::new(line(theme::ORANGE), "transmission (cut off)"),
+        Entry::new(line(theme::BLUE), "envelope of all sounds"),
+        Entry::new(line(theme::VERMILLION), "threshold in force"),
+        Entry::new(
+            Sample::Mark { shape: Shape::Triangle, colour: theme::VERMILLION },
+            "ECHO rises",
+        ),
+        Entry::new(Sample::Line { colour: theme::SKY, width_px: 9.0, dash: "none" }, "blanking"),
+    ]
+}
+
+/// What the numbers stand for; returns the layer and where it ends.
+fn list(view: &TraceView, named: &[Named], top: f64) -> (Layer, f64) {
+    let mut layer = Layer::new("paths");
+    let mut y = top;
+    for (number, hump) in (1..).zip(named) {
+        y += theme::TEXT_PX + 4.0;
+        let times = if hump.count > 1 { format!(" ({} ways)", hump.count) } else { String::new() };
+        let range_m = view.sound_speed_m_s * hump.tof_us * 1e-6 / 2.0;
+        let db = 20.0 * hump.peak.log10();
+        let text = format!("{number}   {range_m:.3} m, {db:.1} dB: {}{times}", hump.name);
+        layer.text(Px::new(theme::MARGIN_PX + 8.0, y), Anchor::Start, theme::TEXT_PX, &text);
+    }
+    if named.is_empty() {
+        y += theme::TEXT_PX + 4.0;
+        let text = "no sound comes near the threshold";
+        layer.text(Px::new(theme::MARGIN_PX + 8.0, y), Anchor::Start, theme::TEXT_PX, text);
+    }
+    (layer, y + 8.0)
+}

@@ -1,0 +1,143 @@
+//! One beam's way through the floor plan.
+
+use super::{
+    canvas::{Anchor, Layer, Px, Rect},
+    caption, keys,
+    labels::Labels,
+    legend::{self, Entry, Sample},
+    picture::Picture,
+    plan::{Bounds, Plan},
+    theme,
+};
+use sonard_model::{
+    geometry::{DVec2, Pose},
+    scene::Scene,
+};
+
+/// A beam and the way its sound took.
+#[derive(Debug, Clone)]
+pub struct WayView<'a> {
+    /// Above the picture.
+    pub title: String,
+    /// Under the title: what was read, and by which path.
+    pub lines: Vec<String>,
+    /// The room, without the robot.
+    pub scene: &'a Scene,
+    /// Where the ranger stands.
+    pub pose: Pose,
+    /// Where the transducer itself is; its heading is the way it looks.
+    pub looks: Pose,
+    /// That way, degrees from the scan's heading.
+    pub azimuth_deg: f64,
+    /// What was read, metres.
+    pub range_m: Option<f64>,
+    /// From the ranger over each reflection back to it ([`Path::points`](sonard_model::model::Path::points)).
+    pub points: Vec<DVec2>,
+}
+
+/// Draws the way of a beam's sound through the floor plan: reflections numbered in order, an arrow
+/// on each stretch, and where the ranger believes the echo to be.
+#[must_use]
+pub fn draw_way(view: &WayView) -> Picture {
+    let (heading, top) = caption::draw(&view.title, None, &view.lines);
+    let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
+    let region = region(view);
+    let height = Plan::height_for(&region, right - left, [300.0, 700.0]);
+    let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
+    let mut labels = Labels::new(plan.panel);
+    let mut page = Layer::new("way-of-a-beam");
+    page.add(heading);
+    page.add(plan.frame());
+    let mut inside = Layer::new("inside").clipped("plan-window", plan.panel);
+    inside.add(beam(view, &plan));
+    inside.add(plan.walls(view.scene));
+    inside.add(plan.body(view.scene, &view.pose));
+    inside.add(way(view, &plan, &mut labels));
+    inside.add(plan.pose(&view.pose));
+    page.add(inside);
+    page.add(plan.names(view.scene, &mut labels));
+    page.add(plan.scale_bar());
+    let below = Px::new(left, plan.panel.bottom + 24.0);
+    let mut entries = vec![
+        Entry::new(line(theme::VERMILLION, "none"), "way of the sound"),
+        Entry::new(line(theme::SKY, "5 4"), "where the ranger looks"),
+    ];
+    if view.range_m.is_some() {
+        entries.push(Entry::new(Sample::Ring { colour: theme::BLUE }, "where it reads an echo"));
+    }
+    entries.extend(keys::materials(view.scene));
+    let (key, key_height) = legend::draw(&entries, below, right - left);
+    page.add(key);
+    Picture::new(theme::PAGE_PX, below.y + key_height + theme::MARGIN_PX / 2.0, page)
+}
+
+const fn line(colour: &'static str, dash: &'static str) -> Sample {
+    Sample::Line { colour, width_px: 2.0, dash }
+}
+
+/// The way and the reading with some room around; of the room what is near.
+fn region(view: &WayView) -> Bounds {
+    let read = view.range_m.map(|range_m| view.looks.point_at(0.0, range_m));
+    let here = [view.pose.position()].into_iter().chain(read).chain(view.points.iter().copied());
+    let way = Bounds::around(here).unwrap_or(Bounds { min: DVec2::ZERO, max: DVec2::ONE });
+    let reach = way.size().max_element().max(0.1);
+    let near = way.grown(1.5 * reach);
+    let walls = view.scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
+    way.including(walls.map(|end| end.clamp(near.min, near.max))).grown(0.12 * reach)
+}
+
+fn beam(view: &WayView, plan: &Plan) -> Layer {
+    let reach_m = view.range_m.unwrap_or_else(|| plan.view.size().max_element());
+    let from = plan.px(view.looks.position());
+    let to = view.looks.point_at(0.0, reach_m);
+    let mut layer = Layer::new("axis").stroked(theme::SKY, 2.0).with("stroke-dasharray", "5 4");
+    layer.line(from, plan.px(to));
+    let mut ring = Layer::new("reading").stroked(theme::BLUE, 1.6);
+    if view.range_m.is_some() {
+        ring.circle(plan.px(to), 6.0);
+    }
+    layer.add(ring.with("stroke-dasharray", "none"));
+    layer
+}
+
+fn way(view: &WayView, plan: &Plan, labels: &mut Labels) -> Layer {
+    let stretches = apart(&view.points.iter().map(|point| plan.px(*point)).collect::<Vec<_>>());
+    let mut layer = Layer::new("way").stroked(theme::VERMILLION, 1.8);
+    let mut heads = Layer::new("heads").with("fill", theme::VERMILLION).with("stroke", "none");
+    for &(from, to) in &stretches {
+        layer.line(from, to);
+        let along = (to - from).normalize_or_zero();
+        let (nose, side) = (from + 0.58 * (to - from), 4.0 * along.perp());
+        if from.distance(to) > 16.0 {
+            heads.polygon(&[nose, nose - 10.0 * along + side, nose - 10.0 * along - side]);
+        }
+    }
+    layer.add(heads);
+    let mut numbers = Layer::new("order").with("fill", theme::INK).haloed();
+    let bends = view.points.len().saturating_sub(2);
+    for (number, point) in (1..).zip(view.points.iter().skip(1).take(bends)) {
+        let text = format!("{number}");
+        let at = plan.px(*point);
+        let places =
+            [(7.0, -7.0), (-12.0, -7.0), (7.0, 16.0), (-12.0, 16.0), (20.0, -7.0), (20.0, 16.0)];
+        let place = places
+            .iter()
+            .map(|&(x, y)| at + Px::new(x, y))
+            .find(|place| labels.place(*place, Anchor::Start, theme::TEXT_PX, &text));
+        if let Some(place) = place {
+            numbers.text(place, Anchor::Start, theme::TEXT_PX, &text);
+        }
+    }
+    layer.add(numbers.with("stroke-width", 3.0));
+    layer
+}
+
+/// Stretches moved a little to their left, so that the way there and the way back can be told apart.
+fn apart(points: &[Px]) -> Vec<(Px, Px)> {
+    let shift = |from: Px, to: Px| -2.2 * (to - from).normalize_or_zero().perp();
+    points
+        .windows(2)
+        .filter(|pair| pair[0].distance(pair[1]) > 1e-6)
+        .map(|pair| (pair[0] + shift(pair[0], pair[1]), pair[1] + shift(pair[0], pair[1])))
+        .collect()
+}

@@ -1,0 +1,168 @@
+//! Scans of an array: one round of its rangers, or several.
+
+use jiff::Timestamp;
+use uuid::Uuid;
+
+use super::{Ping, Provenance, ScanEnd, ScanStart, ScanView, Session};
+use sonard_model::{
+    geometry::{DVec2, Pose},
+    model::{ArrayModel, ArrayStand, Prediction},
+};
+
+impl ScanView {
+    /// Where a reading's transducer stood, and which way it looked (its heading): in an array at its
+    /// ranger's place, on a stepper where the mounting has its face beside the axis; between transmitter
+    /// and receiver if they are apart. `None` if the log does not say.
+    #[must_use]
+    pub fn transducer(&self, ping: &Ping) -> Option<Pose> {
+        let robot = ping.pose.or_else(|| self.pose())?;
+        let heading_deg = robot.heading_deg + ping.azimuth_deg;
+        let Some(id) = &ping.ranger else {
+            let at = self.ends(&robot, ping.azimuth_deg);
+            let [x_m, y_m] = (0.5 * (at[0] + at[1])).to_array();
+            return Some(Pose { x_m, y_m, heading_deg });
+        };
+        let array = self.session.as_ref()?.array.as_ref()?;
+        Some(Pose { heading_deg, ..array.ranger(id)?.pose_on(&robot) })
+    }
+
+    /// Where the transmitter and the receiver of a ranger on a stepper are at an azimuth, degrees.
+    #[must_use]
+    pub fn ends(&self, axis: &Pose, azimuth_deg: f64) -> [DVec2; 2] {
+        let mounting = self.session.as_ref().map(|session| session.sensor.mounting);
+        mounting.unwrap_or_default().places(axis.position(), axis.direction_rad(azimuth_deg))
+    }
+
+    /// Whether it is of an array and not of a stepper's ranger.
+    #[must_use]
+    pub fn is_of_array(&self) -> bool {
+        self.session.as_ref().is_some_and(|session| session.array.is_some())
+    }
+}
+
+impl Session {
+    /// The session of an array that the model plays.
+    #[must_use]
+    pub fn of_array(model: &ArrayModel, started: Timestamp) -> Self {
+        let array = Some(model.array().as_ref().clone());
+        Self { array, ..Self::simulated(model.simulator(), started) }
+    }
+}
+
+impl ScanStart {
+    /// So many rounds of an array that the model plays begin.
+    #[must_use]
+    pub fn of_array(
+        model: &ArrayModel,
+        scan: Uuid,
+        pose: Pose,
+        rounds: u32,
+        time: Timestamp,
+    ) -> Self {
+        let plan = model.array().plan(rounds);
+        Self {
+            scan,
+            time,
+            pose,
+            plan,
+            air: None,
+            provenance: Some(Provenance::Simulated),
+            request: None,
+        }
+    }
+}
+
+impl Ping {
+    /// What a ranger of an array reads in the model, in a scan that began at `scan_pose`.
+    #[must_use]
+    pub fn of_array(
+        stand: &ArrayStand<'_>,
+        scan: Uuid,
+        scan_pose: &Pose,
+        index: u32,
+        ranger: usize,
+        prediction: &Prediction,
+    ) -> Self {
+        let mounted = &stand.array().rangers[ranger];
+        let azimuth_deg = mounted.azimuth_deg();
+        let ping = Self::simulated(stand.simulator(ranger), scan, index, azimuth_deg, prediction);
+        Self {
+            step: 0,
+            ranger: Some(mounted.id.clone()),
+            pose: Some(*stand.pose()).filter(|pose| pose != scan_pose),
+            provenance: Some(Provenance::Simulated),
+            ..ping
+        }
+    }
+}
+
+impl ScanEnd {
+    /// The end of a round or several, of which so many rangers fired and so many did not.
+    #[must_use]
+    pub fn of_array(
+        model: &ArrayModel,
+        scan: Uuid,
+        [beams, missing]: [u32; 2],
+        time: Timestamp,
+    ) -> Self {
+        let end = Self::simulated(model.simulator(), scan, beams, time);
+        let duration_s = f64::from(beams) * model.array().interval_ms * 1e-3;
+        Self { missing, duration_s, provenance: Some(Provenance::Simulated), ..end }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use sonard_model::{
+        acoustics::{Air, Sensor},
+        array::RangerArray,
+        model::Options,
+        scene::Scene,
+    };
+
+    use super::*;
+    use crate::{Record, decode_line, encode_line};
+
+    const ROOM: &str = r#"{"name": "square", "materials": {"hard": {"reflectance": 1.0}},
+        "walls": [{"id": "wall", "polyline": [[0, 0], [3, 0], [3, 3], [0, 3]], "closed": true,
+                   "material": "hard"}]}"#;
+
+    #[test]
+    fn a_scan_of_an_array_says_where_each_transducer_was() {
+        let array = RangerArray::preset("pioneer-8").expect("a preset");
+        let sensor = Sensor::preset(&array.sensor).expect("a preset");
+        let room = Scene::from_json(ROOM).expect("a scene");
+        let (air, options) = (Air::default(), Options::default());
+        let model =
+            ArrayModel::new(Arc::new(array), &room, sensor, air, options).expect("right options");
+        let (time, scan) = (jiff::Timestamp::UNIX_EPOCH, uuid::Uuid::from_u128(1));
+        let [from, to] = [0.0, 10.0].map(|heading_deg| Pose { x_m: 1.0, y_m: 1.0, heading_deg });
+        let pings = [from, to].into_iter().zip(0..).map(|(pose, index)| {
+            let stand = model.at(pose).expect("a stand");
+            Record::Ping(Box::new(Ping::of_array(&stand, scan, &from, index, 1, &stand.ping(1))))
+        });
+        let records = [
+            Record::Session(Box::new(Session::of_array(&model, time))),
+            Record::ScanStart(ScanStart::of_array(&model, scan, from, 1, time)),
+        ];
+        let records = records.into_iter().chain(pings.collect::<Vec<_>>());
+        let through_text = records.map(|record| {
+            let mut line = Vec::new();
+            encode_line(&record, &mut line).expect("it can be written");
+            let read = decode_line(line.trim_ascii_end()).expect("and read");
+            assert_eq!(read, record);
+            read
+        });
+        let view = ScanView::from_records(through_text).remove(0);
+        assert_eq!((view.pings[0].pose, view.pings[1].pose), (None, Some(to)));
+        for (ping, robot) in view.pings.iter().zip([from, to]) {
+            let mounted = model.array().rangers[1].pose_on(&robot);
+            assert_eq!(view.transducer(ping), Some(mounted));
+        }
+        let mut stranger = view.pings[0].clone();
+        stranger.ranger = Some("s99".into());
+        assert_eq!(view.transducer(&stranger), None);
+    }
+}

@@ -1,0 +1,413 @@
+//! One line of a log: a record to bytes, and bytes to a record or to what is wrong with them.
+
+use std::{borrow::Cow, fmt};
+
+use serde::{Deserialize, de::DeserializeOwned};
+use thiserror::Error;
+
+use super::{LOG_FORMAT, Record};
+
+/// Longest line that is written or read, bytes. A record of 65535 echo times would fit.
+pub const MAX_LINE_BYTES: usize = 1 << 20;
+
+/// What kind of thing is wrong with a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum FaultKind {
+    /// Nothing on it.
+    Empty,
+    /// Longer than [`MAX_LINE_BYTES`].
+    TooLong,
+    /// Not UTF-8, or NUL bytes.
+    NotText,
+    /// Not a JSON object.
+    NotJson,
+    /// A JSON object without a `type` that is a string.
+    NoType,
+    /// A JSON object of a `type` that this program does not know.
+    UnknownType,
+    /// A record with a field missing or of the wrong kind.
+    BadField,
+    /// A session of a log format later than this program knows.
+    NewerFormat,
+    /// The last line, cut off in the middle of the record.
+    Torn,
+}
+
+/// Why a line is not a record.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub struct RecordError {
+    /// What kind of thing is wrong.
+    pub kind: FaultKind,
+    /// Byte on the line where it was noticed, from 1, if there is such a place.
+    pub column: Option<usize>,
+    /// The field, as a path such as `sim.path.walls[2]`.
+    pub field: Option<String>,
+    /// What is wrong and what would be right.
+    pub message: String,
+}
+
+impl fmt::Display for RecordError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(column) = self.column {
+            write!(f, "column {column}: ")?;
+        }
+        if let Some(field) = &self.field {
+            write!(f, "{field}: ")?;
+        }
+        f.write_str(&self.message)
+    }
+}
+
+impl RecordError {
+    /// Whether the line is a whole record all the same, which another version of the program may
+    /// read: a JSON object with a `type`.
+    #[must_use]
+    pub fn is_whole_record(&self) -> bool {
+        use FaultKind as Kind;
+        matches!(self.kind, Kind::UnknownType | Kind::BadField | Kind::NewerFormat)
+    }
+}
+
+/// Why a record can't be written.
+#[derive(Debug, Error)]
+pub enum EncodeError {
+    /// JSON has no such number, and the field may not be `null`.
+    #[error("{field} is {value}: it must be a finite number")]
+    NotFinite {
+        /// Which field.
+        field: &'static str,
+        /// What it holds.
+        value: f64,
+    },
+    /// No reader would take it.
+    #[error("the record is {0} bytes long; a line has at most {MAX_LINE_BYTES}")]
+    TooLong(usize),
+    /// A map with a key that JSON can't hold.
+    #[error("the record can't be written as JSON: {0}")]
+    Json(#[from] serde_json::Error),
+}
+
+/// Writes one record and its newline at the end of `line`.
+///
+/// # Errors
+/// When a number that may not be `null` is not finite, or the line gets too long; `line` is then
+/// as it was.
+pub fn encode_line(record: &Record, line: &mut Vec<u8>) -> Result<(), EncodeError> {
+    if let Some((field, value)) = first_not_finite(record) {
+        return Err(EncodeError::NotFinite { field, value });
+    }
+    let before = line.len();
+    let result = serde_json::to_writer(&mut *line, record).map_err(EncodeError::from);
+    let length = line.len() - before;
+    let result = match result {
+        Ok(()) if length > MAX_LINE_BYTES => Err(EncodeError::TooLong(length)),
+        other => other,
+    };
+    match result {
+        Ok(()) => line.push(b'\n'),
+        Err(_) => line.truncate(before),
+    }
+    result
+}
+
+/// Reads one line, without its newline, as a record. A carriage return at its end is ignored.
+///
+/// # Errors
+/// Says where on the line and in which field, and what would be right.
+pub fn decode_line(bytes: &[u8]) -> Result<Record, RecordError> {
+    let bytes = bytes.strip_suffix(b"\r").unwrap_or(bytes);
+    let text = text_of(bytes)?;
+    let tag: Tag = serde_json::from_str(text).map_err(|error| tag_fault(text, &error))?;
+    match &*tag.kind {
+        "session" => decode_session(text),
+        "scan_start" => fields_of(text).map(Record::ScanStart),
+        "ping" => fields_of(text).map(Record::Ping),
+        "scan_end" => fields_of(text).map(Record::ScanEnd),
+        "event" => fields_of(text).map(Record::Event),
+        other => Err(RecordError {
+            kind: FaultKind::UnknownType,
+            column: None,
+            field: Some("type".into()),
+            message: format!(
+                "unknown type {other:?}: expected session, scan_start, ping, scan_end or event"
+            ),
+        }),
+    }
+}
+
+/// What stands in front of every record.
+#[derive(Deserialize)]
+struct Tag<'a> {
+    #[serde(rename = "type", borrow)]
+    kind: Cow<'a, str>,
+}
+
+fn text_of(bytes: &[u8]) -> Result<&str, RecordError> {
+    let fault =
+        |kind, column, message: String| Err(RecordError { kind, column, field: None, message });
+    if bytes.trim_ascii().is_empty() {
+        return fault(FaultKind::Empty, None, "empty line: expected one record a line".into());
+    }
+    if let Some(at) = bytes.iter().position(|&byte| byte == 0) {
+        let count = bytes.iter().filter(|&&byte| byte == 0).count();
+        let message = format!(
+            "{count} NUL byte(s): space that was reserved but not written before the power went"
+        );
+        return fault(FaultKind::NotText, Some(at + 1), message);
+    }
+    match std::str::from_utf8(bytes) {
+        // serde would take an array for a struct.
+        Ok(text) if !text.trim_start().starts_with('{') => {
+            fault(FaultKind::NotJson, Some(1), "expected a JSON object, { ... }".into())
+        }
+        Ok(text) => Ok(text),
+        Err(error) => {
+            let at = error.valid_up_to();
+            let message = format!("byte 0x{:02x} is not UTF-8", bytes[at]);
+            fault(FaultKind::NotText, Some(at + 1), message)
+        }
+    }
+}
+
+/// Tells damaged JSON from a whole object without a usable `type`.
+fn tag_fault(text: &str, error: &serde_json::Error) -> RecordError {
+    if serde_json::from_str::<serde::de::IgnoredAny>(text).is_ok() {
+        return RecordError {
+            kind: FaultKind::NoType,
+            column: None,
+            field: Some("type".into()),
+            message: format!("{}: expected \"type\":\"ping\" or another record", plain(error)),
+        };
+    }
+    let message = match error.classify() {
+        serde_json::error::Category::Eof => "the JSON object is not closed".into(),
+        _ => plain(error),
+    };
+    RecordError { kind: FaultKind::NotJson, column: Some(error.column()), field: None, message }
+}
+
+/// A session of a later format is named as such, whatever fields it has.
+fn decode_session(text: &str) -> Result<Record, RecordError> {
+    #[derive(Deserialize)]
+    struct Format {
+        format: u32,
+    }
+    fields_of(text).map(Record::Session).map_err(|error| {
+        match serde_json::from_str::<Format>(text) {
+            Ok(Format { format }) if format > LOG_FORMAT => RecordError {
+                kind: FaultKind::NewerFormat,
+                field: Some("format".into()),
+                message: format!(
+                    "the log is of format {format} and this program reads up to {LOG_FORMAT}: \
+                     use a newer sonard"
+                ),
+                ..error
+            },
+            _ => error,
+        }
+    })
+}
+
+/// Reads a record's fields; only when that fails, again with an eye on the path.
+fn fields_of<T: DeserializeOwned>(text: &str) -> Result<T, RecordError> {
+    serde_json::from_str(text).or_else(|_| {
+        let mut json = serde_json::Deserializer::from_str(text);
+        serde_path_to_error::deserialize(&mut json).map_err(|error| {
+            let path = error.path().to_string();
+            let error = error.inner();
+            RecordError {
+                kind: FaultKind::BadField,
+                column: Some(error.column()),
+                field: (path != ".").then_some(path),
+                message: plain(error),
+            }
+        })
+    })
+}
+
+/// The message without serde_json's own position, which counts lines inside the line.
+fn plain(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    let position = format!(" at line {} column {}", error.line(), error.column());
+    text.strip_suffix(&position).unwrap_or(&text).to_owned()
+}
+
+/// The first number that must be known and is not finite.
+fn first_not_finite(record: &Record) -> Option<(&'static str, f64)> {
+    let numbers: &[(&'static str, f64)] = match record {
+        Record::Session(session) => {
+            let air = session.air;
+            &[
+                ("air.temperature_c", air.temperature_c),
+                ("air.humidity_percent", air.humidity_percent),
+                ("air.pressure_kpa", air.pressure_kpa),
+                ("air.sound_speed_m_s", air.sound_speed_m_s),
+                ("sensor.frequency_hz", session.sensor.frequency_hz),
+                ("sensor.blanking_us", session.sensor.blanking_us),
+                ("sensor.max_range_m", session.sensor.max_range_m),
+                ("sensor.threshold", session.sensor.threshold),
+            ]
+        }
+        Record::ScanStart(start) => &[
+            ("pose.x_m", start.pose.x_m),
+            ("pose.y_m", start.pose.y_m),
+            ("pose.heading_deg", start.pose.heading_deg),
+            ("plan.from_deg", start.plan.from_deg),
+            ("plan.to_deg", start.plan.to_deg),
+            ("plan.step_deg", start.plan.step_deg),
+        ],
+        Record::Ping(ping) => {
+            let length =
+                |path: &Option<super::PathRecord>| path.as_ref().map_or(0.0, |p| p.length_m);
+            &[
+                ("azimuth_deg", ping.azimuth_deg),
+                ("pose.x_m", ping.pose.map_or(0.0, |pose| pose.x_m)),
+                ("pose.y_m", ping.pose.map_or(0.0, |pose| pose.y_m)),
+                ("pose.heading_deg", ping.pose.map_or(0.0, |pose| pose.heading_deg)),
+                ("path.length_m", length(&ping.path)),
+                ("sim.path.length_m", ping.sim.as_ref().map_or(0.0, |sim| length(&sim.path))),
+            ]
+        }
+        Record::ScanEnd(end) => {
+            &[("duration_s", end.duration_s), ("acoustic_limit_s", end.acoustic_limit_s)]
+        }
+        Record::Event(_) => &[],
+    };
+    numbers.iter().copied().find(|(_, value)| !value.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const LOG: &str = include_str!("../../../tests/fixtures/small.jsonl");
+
+    fn line_of(kind: &str) -> &'static str {
+        let tag = format!("{{\"type\":\"{kind}\"");
+        LOG.lines().find(|line| line.starts_with(&tag)).expect("the fixture has every kind")
+    }
+
+    #[test]
+    fn every_record_of_the_fixture_comes_back_as_the_same_json() {
+        for line in LOG.lines() {
+            let record = decode_line(line.as_bytes()).expect("the fixture is clean");
+            let mut written = Vec::new();
+            encode_line(&record, &mut written).expect("it was read, so it can be written");
+            assert_eq!(written.pop(), Some(b'\n'));
+            let (was, is): (serde_json::Value, serde_json::Value) = (
+                serde_json::from_str(line).expect("JSON"),
+                serde_json::from_slice(&written).expect("JSON"),
+            );
+            assert_eq!(was, is);
+        }
+    }
+
+    /// Kind, column and field of the fault on a line.
+    fn check(line: impl AsRef<[u8]>, kind: FaultKind, column: Option<usize>, field: &str) {
+        let shown = String::from_utf8_lossy(line.as_ref()).into_owned();
+        let fault = decode_line(line.as_ref()).expect_err(&shown);
+        assert_eq!(
+            (fault.kind, fault.column, fault.field.as_deref().unwrap_or("")),
+            (kind, column, field),
+            "{shown}: {fault}"
+        );
+        assert!(!fault.message.contains("at line 1"), "{fault}");
+    }
+
+    #[test]
+    fn damage_is_named_with_its_place() {
+        let ping = line_of("ping");
+        check("", FaultKind::Empty, None, "");
+        check(" \r", FaultKind::Empty, None, "");
+        check("garbage", FaultKind::NotJson, Some(1), "");
+        check("[1]", FaultKind::NotJson, Some(1), "");
+        check(&ping[..40], FaultKind::NotJson, Some(40), "");
+        check(b"\0\0\0\0", FaultKind::NotText, Some(1), "");
+        check(b"{\"type\":\"ev\xffnt\"}", FaultKind::NotText, Some(12), "");
+        check("{}", FaultKind::NoType, None, "type");
+        check(r#"{"type":7}"#, FaultKind::NoType, None, "type");
+        check(r#"{"type":"pong"}"#, FaultKind::UnknownType, None, "type");
+        check(format!("{ping} {ping}"), FaultKind::NotJson, Some(ping.len() + 2), "");
+        let wrong = ping.replace("\"order\":1", "\"order\":-1");
+        let column = wrong.find(":-1").expect("just put there") + 3;
+        check(&wrong, FaultKind::BadField, Some(column), "sim.path.order");
+        let later = line_of("session").replace("\"format\":1", "\"format\":9");
+        assert!(decode_line(later.as_bytes()).is_ok(), "added fields do no harm");
+        let later = later.replace("\"started\"", "\"begun\"");
+        check(&later, FaultKind::NewerFormat, Some(later.len()), "format");
+        check("[".repeat(100_000), FaultKind::NotJson, Some(1), "");
+        let deep = line_of("session")
+            .replace("\"lossless\":false", &format!("\"x\":{}", "[".repeat(9999)));
+        check(&deep, FaultKind::NotJson, Some(deep.len() - 1), "");
+        let deep = deep.replace("[}", &format!("[{}}}", "]".repeat(9999)));
+        assert_eq!(decode_line(deep.as_bytes()).expect_err("too deep").kind, FaultKind::BadField);
+    }
+
+    #[test]
+    fn unknown_fields_and_carriage_returns_do_no_harm() {
+        let ping = line_of("ping");
+        let more = ping.replace("\"index\"", "\"note\":{\"a\":[1,2]},\"index\"") + "\r";
+        assert_eq!(decode_line(more.as_bytes()), decode_line(ping.as_bytes()));
+    }
+
+    #[test]
+    fn what_no_reader_would_take_is_not_written() {
+        let Ok(Record::Ping(ping)) = decode_line(line_of("ping").as_bytes()) else {
+            panic!("the fixture is clean")
+        };
+        let mut line = b"before".to_vec();
+        let mut bad = ping.clone();
+        bad.azimuth_deg = f64::NAN;
+        let error = encode_line(&Record::Ping(bad), &mut line).expect_err("not a number");
+        assert!(error.to_string().starts_with("azimuth_deg is NaN"), "{error}");
+        let mut long = ping.clone();
+        long.echo_ticks = vec![u32::MAX; 100_000];
+        let error = encode_line(&Record::Ping(long), &mut line).expect_err("too long");
+        assert!(matches!(error, EncodeError::TooLong(_)), "{error}");
+        assert_eq!(line, b"before");
+        // What may be unknown is written as unknown.
+        let mut unknown = ping;
+        unknown.range_m = Some(f64::INFINITY);
+        encode_line(&Record::Ping(unknown), &mut line).expect("null is a value");
+        let text = String::from_utf8(line).expect("JSON is UTF-8");
+        assert!(text.contains("\"range_m\":null"), "{text}");
+    }
+
+    proptest! {
+        #[test]
+        fn every_finite_number_comes_back_bit_for_bit(
+            range_m in proptest::num::f64::NORMAL | proptest::num::f64::SUBNORMAL,
+            azimuth_deg in 0.0..360.0_f64,
+            ticks in any::<u64>(),
+        ) {
+            let Ok(Record::Ping(mut ping)) = decode_line(line_of("ping").as_bytes()) else {
+                panic!("the fixture is clean")
+            };
+            ping.range_m = Some(range_m);
+            ping.azimuth_deg = azimuth_deg;
+            ping.fired_ticks = Some(ticks);
+            let record = Record::Ping(ping);
+            let mut line = Vec::new();
+            encode_line(&record, &mut line).expect("finite");
+            prop_assert_eq!(decode_line(line.trim_ascii_end()), Ok(record));
+        }
+
+        #[test]
+        fn no_bytes_make_it_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+            let _ = decode_line(&bytes);
+        }
+
+        /// Nearly right lines reach deeper than noise.
+        #[test]
+        fn no_change_of_a_record_makes_it_panic(
+            line in 0..11_usize, at in 0..2000_usize, byte in any::<u8>(), cut in any::<bool>(),
+        ) {
+            let mut bytes = LOG.lines().nth(line).expect("11 lines").as_bytes().to_vec();
+            let at = at % bytes.len();
+            if cut { bytes.truncate(at) } else { bytes[at] = byte }
+            let _ = decode_line(&bytes);
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! Scans: the plan, the readings, and the records they are logged as.
+
+mod array;
+mod codec;
+mod modelled;
+mod record;
+mod remaining;
+mod simulated;
+mod view;
+
+pub use codec::{EncodeError, FaultKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};
+pub use record::{
+    AirRecord, AirSource, CollectionRef, Device, Event, EventKind, LOG_FORMAT, ModelRecord,
+    PathRecord, Ping, Provenance, Record, STOPPED_ON_REQUEST, ScanAir, ScanEnd, ScanStart,
+    SceneRef, Session, SimRecord,
+};
+pub use remaining::Segment;
+pub use sonard_model::{
+    plan::{PlanError, ScanPlan},
+    reading::{PathKind, PingStatus},
+};
+pub use view::ScanView;

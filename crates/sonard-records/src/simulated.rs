@@ -1,0 +1,130 @@
+//! Scans made by the model alone.
+
+use jiff::Timestamp;
+use uuid::Uuid;
+
+use super::{
+    LOG_FORMAT, Ping, Provenance, ScanEnd, ScanPlan, ScanStart, ScanView, SceneRef, Session,
+    SimRecord,
+};
+use sonard_model::{
+    geometry::Pose,
+    model::{Prediction, Simulator},
+};
+
+/// Motor steps a revolution that `step` counts in.
+const STEPS_PER_REVOLUTION: f64 = 400.0;
+
+impl ScanView {
+    /// What the model reads at a pose, as a whole scan with its session; `time` is what all of it
+    /// is stamped with.
+    #[must_use]
+    pub fn simulated(
+        simulator: &Simulator,
+        scan: Uuid,
+        pose: &Pose,
+        plan: &ScanPlan,
+        time: Timestamp,
+    ) -> Self {
+        let station = simulator.station(pose.position());
+        let pings = (0..plan.beams()).map(|index| {
+            let azimuth_deg = plan.azimuth_deg(index / plan.pings_per_stop.max(1));
+            let prediction = station.ping(pose.direction_rad(azimuth_deg));
+            Ping::simulated(simulator, scan, index, azimuth_deg, &prediction)
+        });
+        Self {
+            scan,
+            session: Some(std::sync::Arc::new(Session::simulated(simulator, time))),
+            start: Some(ScanStart {
+                scan,
+                time,
+                pose: *pose,
+                plan: *plan,
+                air: None,
+                provenance: None,
+                request: None,
+            }),
+            pings: pings.collect(),
+            events: Vec::new(),
+            end: Some(ScanEnd::simulated(simulator, scan, plan.beams(), time)),
+        }
+    }
+}
+
+impl Session {
+    /// The session of a simulated log.
+    #[must_use]
+    pub fn simulated(simulator: &Simulator, started: Timestamp) -> Self {
+        let scene = simulator.scene();
+        Self {
+            format: LOG_FORMAT,
+            started,
+            sonard: env!("CARGO_PKG_VERSION").to_owned(),
+            provenance: Provenance::Simulated,
+            device: None,
+            sensor: simulator.sensor().clone(),
+            array: None,
+            air: simulator.air().into(),
+            scene: Some(SceneRef::of(scene)),
+            model: Some(simulator.options().into()),
+            collection: None,
+        }
+    }
+}
+
+impl Ping {
+    /// A prediction as a reading of its own.
+    #[must_use]
+    pub fn simulated(
+        simulator: &Simulator,
+        scan: Uuid,
+        index: u32,
+        azimuth_deg: f64,
+        prediction: &Prediction,
+    ) -> Self {
+        let said = SimRecord::of(simulator, prediction);
+        Self {
+            scan,
+            index,
+            step: (azimuth_deg / 360.0 * STEPS_PER_REVOLUTION).round() as i32,
+            azimuth_deg,
+            ranger: None,
+            pose: None,
+            provenance: None,
+            time: None,
+            time_sigma_us: None,
+            status: said.status,
+            fired_ticks: None,
+            echo_ticks: Vec::new(),
+            tof_us: prediction.echoes_us.first().copied(),
+            range_m: said.range_m,
+            repaired: false,
+            amplitude: said.amplitude,
+            margin_db: said.margin_db,
+            path: said.path,
+            sim: None,
+            residual_m: None,
+            confidence: None,
+        }
+    }
+}
+
+impl ScanEnd {
+    /// The model has no motor: a scan lasts as long as its listening windows.
+    #[must_use]
+    pub fn simulated(simulator: &Simulator, scan: Uuid, beams: u32, time: Timestamp) -> Self {
+        let window_s = 2.0 * simulator.receiver().max_range_m / simulator.sound_speed_m_s();
+        let listening_s = f64::from(beams) * window_s;
+        Self {
+            scan,
+            time,
+            beams,
+            missing: 0,
+            repaired: 0,
+            duration_s: listening_s,
+            acoustic_limit_s: listening_s,
+            home_drift_steps: None,
+            provenance: None,
+        }
+    }
+}
