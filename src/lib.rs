@@ -40,7 +40,7 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub use sonard_interpret::{compare, explore, interpret};
-pub use sonard_model::{acoustics, array, geometry, model, motion, scene};
+pub use sonard_model::{acoustics, array, geometry, model, motion, scene, viewpoint};
 #[cfg(feature = "plot")]
 pub use sonard_plot as plot;
 pub use sonard_records as scan;

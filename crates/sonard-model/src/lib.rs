@@ -14,3 +14,4 @@ pub mod motion;
 pub mod plan;
 pub mod reading;
 pub mod scene;
+pub mod viewpoint;

@@ -56,15 +56,15 @@ fn classed(scan: &ScanView) -> Vec<(usize, &Ping)> {
 }
 
 fn layer(plan: &Plan, scan: &ScanView, pings: &[(usize, &Ping)]) -> Option<Layer> {
-    let pose = scan.pose()?;
+    scan.pose()?;
     let mut layer = Layer::new("confidences");
     // The doubtful ones lie on top.
     for (class, (_, words, shape, colour)) in CLASSES.iter().enumerate() {
         let mut marks = Layer::new(words).with("fill", *colour);
         for (_, ping) in pings.iter().filter(|(of, _)| *of == class) {
             let Some(range_m) = ping.range_m else { continue };
-            let ranger = scan.transducer(ping).unwrap_or(pose);
-            let at = plan.px(ranger.point_at(0.0, range_m));
+            let Some(viewpoint) = scan.viewpoint(ping) else { continue };
+            let at = plan.px(viewpoint.point_at(range_m));
             let confidence = ping.confidence.unwrap_or_default();
             let hint = format!("{:.1}\u{b0} {range_m:.3} m: {confidence:.3}", ping.azimuth_deg);
             marks.mark(*shape, at, 2.6, Some(&hint));

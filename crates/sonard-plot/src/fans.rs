@@ -8,7 +8,7 @@ use super::{
     readings::{Reading, Readings},
     theme,
 };
-use sonard_model::geometry::{DVec2, Pose};
+use sonard_model::{geometry::DVec2, viewpoint::Viewpoint};
 
 /// An arc has so many pieces.
 const PIECES: i32 = 12;
@@ -30,9 +30,9 @@ impl Fan {
     pub(super) fn draw(&self, plan: &Plan, scan: &Readings) -> Layer {
         let mut layer = Layer::new("fans");
         let mut faces = Layer::new("faces").with("fill", theme::INK);
-        for (beam, ranger) in scan.beams.iter().filter_map(|beam| Some((beam, beam.transducer?))) {
-            layer.add(self.fan(plan, beam, &ranger));
-            faces.mark(Shape::Dot, plan.px(ranger.position()), 1.6, None);
+        for (beam, at) in scan.beams.iter().filter_map(|beam| Some((beam, beam.viewpoint?))) {
+            layer.add(self.fan(plan, beam, &at));
+            faces.mark(Shape::Dot, plan.px(at.position()), 1.6, None);
         }
         layer.add(faces);
         if scan.beams.len() <= MOST_NAMED {
@@ -45,22 +45,22 @@ impl Fan {
     fn names(&self, plan: &Plan, scan: &Readings) -> Layer {
         let mut names = Layer::new("rangers").with("fill", theme::QUIET).haloed();
         for beam in &scan.beams {
-            let (Some(ranger), Some(name)) = (&beam.transducer, &beam.ranger) else { continue };
+            let (Some(viewpoint), Some(name)) = (&beam.viewpoint, &beam.ranger) else { continue };
             let range_m = beam.range_m.unwrap_or(self.max_range_m);
             // Where the fan is wide enough, but not so far out that it leaves the picture; a silent
             // one's nearer, where fewer other names are.
             let share = if beam.range_m.is_some() { 0.3 } else { 0.15 };
             let out_m = (0.6 * range_m).min(share * plan.view.size().min_element());
-            let at = plan.px(ranger.point_at(0.0, out_m)) + Px::new(0.0, 4.0);
+            let at = plan.px(viewpoint.point_at(out_m)) + Px::new(0.0, 4.0);
             names.text(at, Anchor::Middle, theme::SMALL_PX, name);
         }
         names
     }
 
-    fn fan(&self, plan: &Plan, beam: &Reading, ranger: &Pose) -> Layer {
+    fn fan(&self, plan: &Plan, beam: &Reading, from: &Viewpoint) -> Layer {
         let colour = beam.kind.colour();
-        let arc = self.arc(plan, ranger, beam.range_m.unwrap_or(self.max_range_m));
-        let outline = [&[plan.px(ranger.position())], arc.as_slice()].concat();
+        let arc = self.arc(plan, from, beam.range_m.unwrap_or(self.max_range_m));
+        let outline = [&[plan.px(from.position())], arc.as_slice()].concat();
         if beam.range_m.is_none() {
             let mut silent = Layer::new("silent").stroked(colour, theme::HAIRLINE_PX);
             silent.polygon_with_hint(&outline, &beam.hint);
@@ -80,17 +80,17 @@ impl Fan {
             .stroked(theme::PURPLE, 1.0)
             .with("stroke-dasharray", MIN_RANGE_DASH);
         if let Some(range_m) = scan.min_range_m {
-            let rangers = scan.beams.iter().filter_map(|beam| beam.transducer);
-            layer.runs(rangers.map(|ranger| self.arc(plan, &ranger, range_m)));
+            let viewpoints = scan.beams.iter().filter_map(|beam| beam.viewpoint);
+            layer.runs(viewpoints.map(|from| self.arc(plan, &from, range_m)));
         }
         layer
     }
 
-    fn arc(&self, plan: &Plan, ranger: &Pose, range_m: f64) -> Vec<Px> {
+    fn arc(&self, plan: &Plan, from: &Viewpoint, range_m: f64) -> Vec<Px> {
         let point = |i: i32| {
             let off_rad = self.half_rad * (2.0 * f64::from(i) / f64::from(PIECES) - 1.0);
-            let direction = DVec2::from_angle(ranger.direction_rad(0.0) + off_rad);
-            plan.px(ranger.position() + range_m * direction)
+            let direction = DVec2::from_angle(from.direction_rad() + off_rad);
+            plan.px(from.position() + range_m * direction)
         };
         (0..=PIECES).map(point).collect()
     }

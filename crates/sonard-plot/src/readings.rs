@@ -7,6 +7,7 @@ use sonard_interpret::compare::{Judged, Verdict, compare};
 use sonard_model::{
     acoustics::BeamPattern,
     geometry::{DVec2, Pose, wrap_360},
+    viewpoint::Viewpoint,
 };
 use sonard_records::{PathKind, PathRecord, Ping, PingStatus, ScanView, Session};
 
@@ -82,8 +83,8 @@ impl Kind {
 pub(super) struct Reading {
     /// Azimuth from the scan's heading, degrees.
     pub(super) azimuth_deg: f64,
-    /// Of a ranger of an array, or beside its axis: where it stood and looked.
-    pub(super) transducer: Option<Pose>,
+    /// Where it was taken from, if not all of the scan are from its pose.
+    pub(super) viewpoint: Option<Viewpoint>,
     /// Its name.
     pub(super) ranger: Option<String>,
     pub(super) kind: Kind,
@@ -113,16 +114,16 @@ pub(super) struct Readings {
 impl Reading {
     /// The place at a range along the beam, for a scan at `pose`.
     pub(super) fn point(&self, pose: &Pose, range_m: f64) -> DVec2 {
-        match &self.transducer {
-            Some(ranger) => ranger.point_at(0.0, range_m),
+        match &self.viewpoint {
+            Some(viewpoint) => viewpoint.point_at(range_m),
             None => pose.point_at(self.azimuth_deg, range_m),
         }
     }
 
     /// Where the beam begins, and the world direction that it has, radians.
     pub(super) fn ray(&self, pose: &Pose) -> (DVec2, f64) {
-        match &self.transducer {
-            Some(ranger) => (ranger.position(), ranger.direction_rad(0.0)),
+        match &self.viewpoint {
+            Some(viewpoint) => (viewpoint.position(), viewpoint.direction_rad()),
             None => (pose.position(), pose.direction_rad(self.azimuth_deg)),
         }
     }
@@ -133,11 +134,13 @@ impl Readings {
     pub(super) fn of(view: &ScanView) -> Self {
         let min_range_m = view.session.as_deref().and_then(min_range_m);
         let (_, judged) = compare(std::slice::from_ref(view));
-        let mut beams: Vec<_> = judged
-            .iter()
-            .filter(|judged| judged.ping.azimuth_deg.is_finite())
-            .map(|judged| mounted(view, judged.ping, reading(judged, min_range_m)))
-            .collect();
+        let has_one_place = view.has_one_place();
+        let seen = |judged: &Judged<'_>| {
+            let reading = reading(judged, min_range_m);
+            if has_one_place { reading } else { mounted(view, judged.ping, reading) }
+        };
+        let finite = judged.iter().filter(|judged| judged.ping.azimuth_deg.is_finite());
+        let mut beams: Vec<_> = finite.map(seen).collect();
         beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
         let has_model = view.pings.iter().any(|ping| ping.sim.is_some());
         let fan = view.session.as_deref().and_then(fan);
@@ -176,14 +179,6 @@ fn min_range_m(session: &Session) -> Option<f64> {
     length(Some(session.air.sound_speed_m_s * blanking_us * 1e-6 / 2.0))
 }
 
-/// Whether the transducer turns beside its axis.
-fn is_beside(view: &ScanView) -> bool {
-    view.session.as_ref().is_some_and(|session| {
-        let mounting = &session.sensor.mounting;
-        mounting.ahead_m != 0.0 || mounting.left_m != 0.0
-    })
-}
-
 /// The beam's width and reach, for the session of an array.
 fn fan(session: &Session) -> Option<Fan> {
     session.array.as_ref()?;
@@ -196,20 +191,18 @@ fn fan(session: &Session) -> Option<Fan> {
     Some(Fan { half_rad: BeamPattern::new(sensor, speed_m_s).angle_at(0.5), max_range_m })
 }
 
-/// A reading of an array, or of a ranger beside its axis, with its transducer's place, and its azimuth as seen from the scan's.
+/// A reading of a scan with several places, with its viewpoint, and its azimuth as seen from the scan's pose.
 fn mounted(view: &ScanView, ping: &Ping, reading: Reading) -> Reading {
-    let transducer = view.transducer(ping).filter(|pose| {
-        (ping.ranger.is_some() || ping.pose.is_some() || is_beside(view))
-            && pose.position().is_finite()
-            && pose.heading_deg.is_finite()
+    let viewpoint = view.viewpoint(ping).filter(|viewpoint| {
+        viewpoint.position().is_finite() && viewpoint.direction_deg.is_finite()
     });
-    let azimuth_deg = match (&transducer, view.pose()) {
-        (Some(ranger), Some(pose)) if pose.heading_deg.is_finite() => {
-            wrap_360(ranger.heading_deg - pose.heading_deg)
+    let azimuth_deg = match (&viewpoint, view.pose()) {
+        (Some(viewpoint), Some(pose)) if pose.heading_deg.is_finite() => {
+            wrap_360(viewpoint.direction_deg - pose.heading_deg)
         }
         _ => reading.azimuth_deg,
     };
-    Reading { azimuth_deg, transducer, ranger: ping.ranger.clone(), ..reading }
+    Reading { azimuth_deg, viewpoint, ranger: ping.ranger.clone(), ..reading }
 }
 
 fn reading(judged: &Judged<'_>, min_range_m: Option<f64>) -> Reading {
@@ -227,7 +220,7 @@ fn reading(judged: &Judged<'_>, min_range_m: Option<f64>) -> Reading {
     };
     Reading {
         azimuth_deg: ping.azimuth_deg,
-        transducer: None,
+        viewpoint: None,
         ranger: None,
         kind,
         range_m,

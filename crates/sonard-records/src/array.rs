@@ -3,42 +3,11 @@
 use jiff::Timestamp;
 use uuid::Uuid;
 
-use super::{Ping, Provenance, ScanEnd, ScanStart, ScanView, Session};
+use super::{Ping, Provenance, ScanEnd, ScanStart, Session};
 use sonard_model::{
-    geometry::{DVec2, Pose},
+    geometry::Pose,
     model::{ArrayModel, ArrayStand, Prediction},
 };
-
-impl ScanView {
-    /// Where a reading's transducer stood, and which way it looked (its heading): in an array at its
-    /// ranger's place, on a stepper where the mounting has its face beside the axis; between transmitter
-    /// and receiver if they are apart. `None` if the log does not say.
-    #[must_use]
-    pub fn transducer(&self, ping: &Ping) -> Option<Pose> {
-        let robot = ping.pose.or_else(|| self.pose())?;
-        let heading_deg = robot.heading_deg + ping.azimuth_deg;
-        let Some(id) = &ping.ranger else {
-            let at = self.ends(&robot, ping.azimuth_deg);
-            let [x_m, y_m] = (0.5 * (at[0] + at[1])).to_array();
-            return Some(Pose { x_m, y_m, heading_deg });
-        };
-        let array = self.session.as_ref()?.array.as_ref()?;
-        Some(Pose { heading_deg, ..array.ranger(id)?.pose_on(&robot) })
-    }
-
-    /// Where the transmitter and the receiver of a ranger on a stepper are at an azimuth, degrees.
-    #[must_use]
-    pub fn ends(&self, axis: &Pose, azimuth_deg: f64) -> [DVec2; 2] {
-        let mounting = self.session.as_ref().map(|session| session.sensor.mounting);
-        mounting.unwrap_or_default().places(axis.position(), axis.direction_rad(azimuth_deg))
-    }
-
-    /// Whether it is of an array and not of a stepper's ranger.
-    #[must_use]
-    pub fn is_of_array(&self) -> bool {
-        self.session.as_ref().is_some_and(|session| session.array.is_some())
-    }
-}
 
 impl Session {
     /// The session of an array that the model plays.
@@ -118,12 +87,13 @@ mod tests {
     use sonard_model::{
         acoustics::{Air, Sensor},
         array::RangerArray,
+        geometry::wrap_360,
         model::Options,
         scene::Scene,
     };
 
     use super::*;
-    use crate::{Record, decode_line, encode_line};
+    use crate::{Record, ScanView, decode_line, encode_line};
 
     const ROOM: &str = r#"{"name": "square", "materials": {"hard": {"reflectance": 1.0}},
         "walls": [{"id": "wall", "polyline": [[0, 0], [3, 0], [3, 3], [0, 3]], "closed": true,
@@ -159,10 +129,12 @@ mod tests {
         assert_eq!((view.pings[0].pose, view.pings[1].pose), (None, Some(to)));
         for (ping, robot) in view.pings.iter().zip([from, to]) {
             let mounted = model.array().rangers[1].pose_on(&robot);
-            assert_eq!(view.transducer(ping), Some(mounted));
+            let viewpoint = view.viewpoint(ping).expect("a viewpoint");
+            assert!(viewpoint.position().distance(mounted.position()) < 1e-12);
+            assert_eq!(viewpoint.direction_deg, wrap_360(mounted.heading_deg));
         }
         let mut stranger = view.pings[0].clone();
         stranger.ranger = Some("s99".into());
-        assert_eq!(view.transducer(&stranger), None);
+        assert_eq!(view.viewpoint(&stranger), None);
     }
 }

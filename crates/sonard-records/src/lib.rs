@@ -7,6 +7,7 @@ mod record;
 mod remaining;
 mod simulated;
 mod view;
+mod viewpoint;
 
 pub use codec::{EncodeError, FaultKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};
 pub use record::{

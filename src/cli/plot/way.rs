@@ -39,16 +39,23 @@ pub(super) fn draw(
             "choose a beam with an echo; `sonard log show --pings` lists them",
         )
     })?;
-    let whole = scene.with_robot_at(&pose);
-    let looks = view.transducer(ping).unwrap_or(pose);
-    let z_m = view.session.as_ref().and_then(|session| session.sensor.mounting.z_m);
-    let ends = match ping.ranger {
-        Some(_) => [looks.position(); 2],
-        None => view.ends(&ping.pose.unwrap_or(pose), azimuth_deg),
+    let robot = ping.pose.unwrap_or(pose);
+    let whole = match &view.session {
+        Some(session) => session.scene_around(scene, &robot),
+        None => scene.with_robot_at(&robot),
     };
+    let viewpoint = view.viewpoint(ping).ok_or_else(|| {
+        let ranger = ping.ranger.as_deref().unwrap_or_default();
+        Failure::input(
+            format!("beam {index} is of ranger {ranger:?}, which the log's array does not have"),
+            "correct the session's record",
+        )
+    })?;
     let points = record
         .path(&whole)
-        .and_then(|path| path.points_between(&whole, ends, z_m, record.length_m))
+        .and_then(|path| {
+            path.points_between(&whole, viewpoint.ends(), viewpoint.z_m, record.length_m)
+        })
         .ok_or_else(|| {
             Failure::input(
                 format!("beam {index}: the scene has no way over {}", record.in_words()),
@@ -60,7 +67,7 @@ pub(super) fn draw(
         lines: vec![reading(ping), by(record)],
         scene,
         pose,
-        looks,
+        looks: viewpoint.pose(),
         azimuth_deg,
         range_m: ping.range_m,
         points,

@@ -15,6 +15,7 @@ use crate::{
     model::{Options, Simulator, Station},
     scan::{PathRecord, Ping, ScanView, Session},
     scene::Scene,
+    viewpoint::Viewpoint,
 };
 
 /// The model is asked so far beyond what was heard or predicted, metres.
@@ -114,17 +115,20 @@ fn ask_model(
     let model = session.model.as_ref().ok_or("the scan was taken without a model")?;
     let options = model.options().ok_or("the scan's model is unknown here")?;
     let air = air(view, session).map_err(|error| error.to_string())?;
-    let scene = Arc::new(scene.with_robot_at(&pose));
+    let axis = ping.axis(Some(session), &pose).ok_or("the log's array has no such ranger")?;
+    let scene = Arc::new(session.scene_around(scene, &ping.pose.unwrap_or(pose)));
+    let sensor = session.sensor_of(ping);
     let heard_m = [ping.range_m, ping.sim.as_ref().and_then(|sim| sim.range_m)];
     let heard_m = heard_m.into_iter().flatten().fold(0.0, f64::max);
-    let until_m = options.max_range_m.unwrap_or(session.sensor.max_range_m);
+    let until_m = options.max_range_m.unwrap_or(sensor.max_range_m);
     let until_m = if heard_m > 0.0 { until_m.min(heard_m + BEYOND_M) } else { until_m };
     let options = Options { max_range_m: Some(until_m), ..options };
-    let simulator = Simulator::new(Arc::clone(&scene), session.sensor.clone(), air, options)
+    let viewpoint = sensor.mounting.viewpoint(&axis);
+    let simulator = Simulator::new(Arc::clone(&scene), sensor, air, options)
         .map_err(|error| error.to_string())?;
-    let path = ping.sim.as_ref().and_then(|sim| sim.path.as_ref());
-    let way = path.and_then(|path| way(&scene, &pose, path));
-    Ok((way, humps(&simulator, &pose, ping.azimuth_deg, until_m)))
+    let path = ping.path.as_ref().or_else(|| ping.sim.as_ref()?.path.as_ref());
+    let way = path.and_then(|path| way(&scene, &viewpoint, path));
+    Ok((way, humps(&simulator, &axis, until_m)))
 }
 
 /// The session's air, at the temperature that was known when the scan began.
@@ -137,9 +141,10 @@ fn air(view: &ScanView, session: &Session) -> Result<Air, crate::acoustics::AirE
     }
 }
 
-fn humps(simulator: &Simulator, pose: &Pose, azimuth_deg: f64, until_m: f64) -> Vec<HumpLine> {
-    let direction_rad = pose.direction_rad(azimuth_deg);
-    let station = simulator.station(pose.position());
+fn humps(simulator: &Simulator, axis: &Pose, until_m: f64) -> Vec<HumpLine> {
+    let direction_rad = axis.direction_rad(0.0);
+    let viewpoint = simulator.sensor().mounting.viewpoint(axis);
+    let station = simulator.station(axis.position());
     let trace = station.trace(direction_rad, until_m, STEP_US);
     let receiver = simulator.receiver();
     let over = |hump: &Hump| hump.peak.0 / receiver.threshold_at(hump.tof_us);
@@ -155,15 +160,15 @@ fn humps(simulator: &Simulator, pose: &Pose, azimuth_deg: f64, until_m: f64) -> 
             range_m: arrival.length_m / 2.0,
             peak: hump.peak.0,
             margin_db: 20.0 * over(hump).log10(),
-            way: way(simulator.scene(), pose, &path),
+            way: way(simulator.scene(), &viewpoint, &path),
             path,
         }
     };
     loudest.into_iter().map(line).collect()
 }
 
-fn way(scene: &Scene, pose: &Pose, record: &PathRecord) -> Option<Vec<Point>> {
+fn way(scene: &Scene, from: &Viewpoint, record: &PathRecord) -> Option<Vec<Point>> {
     let path = record.path(scene)?;
-    let points = path.points(scene, pose.position(), record.length_m)?;
+    let points = path.points_between(scene, from.ends(), from.z_m, record.length_m)?;
     Some(points.into_iter().map(point).collect())
 }

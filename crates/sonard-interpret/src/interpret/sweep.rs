@@ -143,10 +143,12 @@ impl Sweep {
 const MOST_GAP_STEPS: f64 = 3.5;
 
 fn stops(scan: &ScanView, pose: &Pose) -> Result<Vec<Beam>, SweepError> {
+    let has_one_place = scan.has_one_place();
     let mut by_index: BTreeMap<u32, Beam> = BTreeMap::new();
     for ping in &scan.pings {
         if let Some(beam) = beam(ping) {
-            by_index.insert(ping.index, mounted(scan, ping, beam, pose)?);
+            let beam = if has_one_place { beam } else { mounted(scan, ping, beam, pose)? };
+            by_index.insert(ping.index, beam);
         }
     }
     let mut beams: Vec<Beam> = by_index.into_values().collect();
@@ -159,16 +161,13 @@ fn stops(scan: &ScanView, pose: &Pose) -> Result<Vec<Beam>, SweepError> {
 
 /// A beam with its transducer's place and direction as seen from the scan's pose.
 fn mounted(scan: &ScanView, ping: &Ping, beam: Beam, pose: &Pose) -> Result<Beam, SweepError> {
-    if ping.ranger.is_none() && ping.pose.is_none() {
-        return Ok(beam);
-    }
-    let transducer = scan.transducer(ping).ok_or_else(|| SweepError::UnknownRanger {
+    let viewpoint = scan.viewpoint(ping).ok_or_else(|| SweepError::UnknownRanger {
         index: ping.index,
         id: ping.ranger.clone().unwrap_or_default(),
     })?;
     let turn_back = DVec2::from_angle(-pose.direction_rad(0.0));
-    let mount = turn_back.rotate(transducer.position() - pose.position());
-    let azimuth_deg = wrap_360(transducer.heading_deg - pose.heading_deg);
+    let mount = turn_back.rotate(viewpoint.position() - pose.position());
+    let azimuth_deg = wrap_360(viewpoint.direction_deg - pose.heading_deg);
     Ok(Beam { azimuth_deg, mount, ..beam })
 }
 
