@@ -4,6 +4,7 @@
 //! [`SceneError`] with line, column and what would be right. [`shipped`] holds the scenes that
 //! come with the program.
 
+mod builder;
 mod check;
 mod error;
 mod file;
@@ -17,6 +18,7 @@ pub mod shipped;
 #[cfg(test)]
 mod tests;
 
+pub use builder::SceneBuilder;
 pub use error::{SceneError, SceneProblem, suggest};
 pub use pose::{PoseError, parse_pose};
 pub use robot::{Robot, RobotShape};
