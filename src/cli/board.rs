@@ -1,7 +1,6 @@
 //! `sonard board`.
 
 use std::{
-    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -10,7 +9,7 @@ use std::{
 
 use rand::RngExt as _;
 
-use super::{Failure, Outcome, runtime};
+use super::{Failure, Outcome, output::OutPath, runtime};
 use crate::{
     mock::Pty,
     pi::{GpioPins, PiBoard, PiSettings, PinNumbers, serve},
@@ -22,7 +21,7 @@ use crate::{
 pub(super) struct Args {
     /// Make this symbolic link to the pty
     #[arg(long, value_name = "PATH")]
-    link: Option<PathBuf>,
+    link: Option<OutPath>,
     /// Motor steps a revolution, microsteps and gears counted in
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u16).range(4..))]
     steps_per_revolution: u16,

@@ -28,6 +28,7 @@ use super::{
     Failure, Outcome,
     daemon::{DaemonArgs, check_scene},
     mock_world::{self, MockWorldArgs},
+    output::OutPath,
     runtime::{self, Interrupts},
 };
 use crate::{
@@ -48,7 +49,7 @@ pub(super) struct Args {
     plan: Option<PathBuf>,
     /// Folder of the collection, instead of the plan's
     #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    out: Option<OutPath>,
     /// Set a key of the plan, over the file; may be given several times
     #[arg(long, value_name = "SECTION.KEY=VALUE")]
     set: Vec<String>,

@@ -6,16 +6,19 @@ mod table;
 use std::{
     io::{self, Write},
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use serde::Serialize;
 
-use super::{Failure, Outcome, scene_file};
+use super::{Failure, Outcome, logs::for_each_scan, scene_file};
 use crate::{
-    compare::{Comparison, compare},
+    compare::{Comparer, Comparison},
     scan::{Provenance, ScanView},
-    store::load,
+    scene::Scene,
 };
+use predict::Predictor;
+use table::Worst;
 
 pub(super) use table::{RULED, path_text};
 
@@ -27,7 +30,8 @@ pub(super) struct Args {
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// Scene file or name of a shipped scene: predict again in it, with the log's sensor, air and
-    /// model, instead of taking the predictions in the log
+    /// model, instead of taking the predictions in the log. Without it, measured scans that have no
+    /// prediction beside them get one in the scene of the log, if the log holds it
     #[arg(long, value_name = "SCENE")]
     scene: Option<String>,
     /// How many of the beams that fit worst to list
@@ -49,41 +53,38 @@ Exit codes: 0 it ran, whatever the result, 2 a log can't be opened or \
 holds no record, or the scene is wrong.";
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let scene = args.scene.as_deref().map(scene_file::load).transpose()?;
+    let scene = args.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
     for log in &args.logs {
-        let mut scans = scans_of(log)?;
-        if let Some(scene) = &scene {
-            predict::predict(log, &mut scans, scene)?;
-        }
-        let (comparison, judged) = compare(&scans);
-        let mut out = io::stdout().lock();
-        let printed = if args.json {
-            print_json(&mut out, log, &comparison)
-        } else {
-            writeln!(out, "{}", log.display())
-                .and_then(|()| table::print(&mut out, &comparison, &judged, args.worst))
-        };
-        if let Err(error) = printed {
-            return Failure::from_write("standard output", &error);
-        }
-        hint(log, &scans, &comparison);
+        compare_log(args, log, scene.as_ref())?;
     }
     Ok(())
 }
 
-/// Reads a log's scans; says on standard error what could not be read.
-fn scans_of(log: &Path) -> Result<Vec<ScanView>, Failure> {
-    let loaded = load(log)?;
-    for error in &loaded.damaged {
-        anstream::eprintln!("{}: {error}: skipped", log.display());
-    }
-    if loaded.records.is_empty() {
-        return Err(Failure::input(
-            format!("{} holds no record", log.display()),
-            "give a log as `sonard scan` writes it: one JSON object a line",
-        ));
-    }
-    Ok(ScanView::from_records(loaded.records))
+fn compare_log(args: &Args, log: &Path, scene: Option<&Arc<Scene>>) -> Outcome {
+    let (mut comparer, mut worst) = (Comparer::default(), Worst::new(args.worst));
+    let mut predictor = Predictor::new(log, scene);
+    let mut all_simulated = true;
+    for_each_scan(log, |mut scan| {
+        predictor.predict(&mut scan)?;
+        worst.add(&comparer.add(&scan));
+        all_simulated &= is_simulated(&scan);
+        Ok(())
+    })?;
+    let comparison = comparer.finish();
+    let mut out = io::stdout().lock();
+    let printed = if args.json {
+        print_json(&mut out, log, &comparison)
+    } else {
+        writeln!(out, "{}", log.display())
+            .and_then(|()| table::print(&mut out, &comparison, &worst))
+    };
+    printed.or_else(|error| Failure::from_write("standard output", &error))?;
+    hint(log, all_simulated, &comparison);
+    Ok(())
+}
+
+fn is_simulated(scan: &ScanView) -> bool {
+    scan.session.as_ref().is_some_and(|session| session.provenance == Provenance::Simulated)
 }
 
 fn print_json(out: &mut impl Write, log: &Path, comparison: &Comparison) -> io::Result<()> {
@@ -98,19 +99,16 @@ fn print_json(out: &mut impl Write, log: &Path, comparison: &Comparison) -> io::
 }
 
 /// Says why nothing could be compared.
-fn hint(log: &Path, scans: &[ScanView], comparison: &Comparison) {
+fn hint(log: &Path, all_simulated: bool, comparison: &Comparison) {
     if comparison.beams > 0 {
         return;
     }
     let log = log.display();
-    let simulated = |scan: &ScanView| {
-        scan.session.as_ref().is_some_and(|s| s.provenance == Provenance::Simulated)
-    };
     if comparison.not_compared.total() == 0 {
         anstream::eprintln!("{log}: there is no reading in it");
     } else if comparison.not_compared.no_prediction == 0 {
         anstream::eprintln!("{log}: no reading came through");
-    } else if scans.iter().all(simulated) {
+    } else if all_simulated {
         anstream::eprintln!(
             "{log}: simulated readings have no prediction beside them; --scene makes one"
         );

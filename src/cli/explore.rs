@@ -2,7 +2,7 @@
 
 use std::{
     io::{self, Write},
-    path::{Path, PathBuf},
+    path::Path,
     sync::Arc,
 };
 
@@ -13,9 +13,9 @@ use serde::Serialize;
 use super::{
     Failure, Outcome,
     answer::answer,
-    files::{make_folder, save},
     lines::record,
     options::{AirArgs, SensorArgs},
+    output::{OutPath, Overwrite, Product, make_folder},
     place::PlaceArgs,
     progress,
 };
@@ -46,10 +46,12 @@ pub(super) struct Args {
     seed: u64,
     /// Folder for the map, what the laser saw, the stops and pictures
     #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    out: Option<OutPath>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
     #[command(flatten)]
     sensor: SensorArgs,
     #[command(flatten)]
@@ -127,6 +129,9 @@ be written.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let (scene, pose) = args.place.load()?;
+    if let Some(folder) = &args.out {
+        check_all(folder, args.overwrite)?;
+    }
     let sensing = args.sensing.sensing();
     let (robot, settings) = args.robot.settings()?;
     let options = Options { max_range_m: Some(args.robot.max_range), ..Options::default() };
@@ -137,7 +142,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let scene = simulator.scene();
     let summary = Summary::of(scene, sensing, &made);
     if let Some(folder) = &args.out {
-        write_all(folder, &made, sensing, scene)?;
+        write_all((folder, args.overwrite), &made, sensing, scene)?;
     }
     answer(args.json, [&summary], |out| summary.print(out))?;
     if made.finished {
@@ -273,26 +278,54 @@ const MOST_FRAMES: usize = 120;
 const FRAME_MS: u16 = 150;
 const FRAME_PX: u32 = 700;
 
+/// Files that an exploration leaves besides its stages.
+const FILES: [&str; 6] = [
+    "lines.jsonl",
+    "laser.jsonl",
+    "stops.jsonl",
+    "exploration.svg",
+    "exploration.png",
+    "exploration.apng",
+];
+
+fn product(name: &str) -> Product {
+    match name {
+        "lines.jsonl" => {
+            Product::List(&["kind", "from_m", "to_m", "length_m", "confidence", "terminal"])
+        }
+        "laser.jsonl" => Product::List(&["pose", "returns"]),
+        "stops.jsonl" => Product::List(&["pose", "task", "target_m", "laser_shots", "lines"]),
+        "exploration.svg" => Product::Svg,
+        _ => Product::Png,
+    }
+}
+
+/// Checks that an exploration may be written into a folder.
+fn check_all(folder: &Path, overwrite: Overwrite) -> Outcome {
+    FILES.iter().try_for_each(|name| overwrite.check_in(folder, name, product(name)))
+}
+
 /// Writes map, stops and pictures into a folder.
 pub(super) fn write_all(
-    folder: &Path,
+    (folder, overwrite): (&Path, Overwrite),
     made: &Exploration,
     sensing: Sensing,
     scene: &Scene,
 ) -> Outcome {
     make_folder(folder)?;
+    let save = |name: &str, bytes: &[u8]| overwrite.save(&folder.join(name), product(name), bytes);
     let refuse = |error: PlotError| Failure::device(error, "this scene can't be drawn");
-    save(&folder.join("lines.jsonl"), &json_lines(made.lines().iter().map(record)))?;
+    save("lines.jsonl", &json_lines(made.lines().iter().map(record)))?;
     let laser = made.stops.iter().flat_map(|stop| &stop.laser).map(serde_json::to_value);
-    save(&folder.join("laser.jsonl"), &json_lines(laser.filter_map(Result::ok)))?;
-    save(&folder.join("stops.jsonl"), &json_lines(made.stops.iter().map(stop_record)))?;
+    save("laser.jsonl", &json_lines(laser.filter_map(Result::ok)))?;
+    save("stops.jsonl", &json_lines(made.stops.iter().map(stop_record)))?;
     let count = made.stops.len();
     let draw = |stops: usize| draw_exploration(made, stops, sensing, Some(scene));
-    save(&folder.join("exploration.svg"), draw(count).to_svg().as_bytes())?;
-    save(&folder.join("exploration.png"), &draw(count).to_png(1000).map_err(refuse)?)?;
+    save("exploration.svg", draw(count).to_svg().as_bytes())?;
+    save("exploration.png", &draw(count).to_png(1000).map_err(refuse)?)?;
     for stage in 1..=STAGES {
         let png = draw((count * stage).div_ceil(STAGES)).to_png(1000).map_err(refuse)?;
-        save(&folder.join(format!("stage-{stage}.png")), &png)?;
+        save(&format!("stage-{stage}.png"), &png)?;
     }
     let every = count.div_ceil(MOST_FRAMES);
     let shown: Vec<usize> =
@@ -301,7 +334,7 @@ pub(super) fn write_all(
     let frames = shown.iter().map(|stops| draw(*stops)).inspect(|_| bar.inc(1));
     let animation = animate(frames, shown.len(), FRAME_PX, FRAME_MS).map_err(refuse)?;
     bar.finish_and_clear();
-    save(&folder.join("exploration.apng"), &animation)
+    save("exploration.apng", &animation)
 }
 
 fn json_lines(records: impl Iterator<Item = serde_json::Value>) -> Vec<u8> {

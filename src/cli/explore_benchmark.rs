@@ -2,7 +2,6 @@
 
 use std::{
     io::{self, Write},
-    path::PathBuf,
     sync::Arc,
 };
 
@@ -18,7 +17,7 @@ use super::{
     answer::answer,
     compare::RULED,
     explore::{RobotArgs, Summary, explored, write_all},
-    files::save,
+    output::{OutPath, Overwrite, Product},
     progress,
 };
 use crate::{
@@ -46,7 +45,9 @@ pub(super) struct Args {
     json: bool,
     /// Folder for what `sonard explore --out` writes, and a picture of each room's three maps
     #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    out: Option<OutPath>,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 pub(super) const ABOUT: &str = "\
@@ -100,11 +101,12 @@ fn room(args: &Args, number: u32, bar: &ProgressBar) -> Result<Vec<Row>, Failure
     if let Some(folder) = &args.out {
         let folder = folder.join(format!("room-{}", number + 1));
         for (sensing, made) in &made {
-            write_all(&folder.join(sensing.name()), made, *sensing, scene)?;
+            write_all((&folder.join(sensing.name()), args.overwrite), made, *sensing, scene)?;
         }
         let all: Vec<(Sensing, &Exploration)> = made.iter().map(|(s, made)| (*s, made)).collect();
         let picture = draw_explorations(&all, Some(scene));
-        save(&folder.join("maps.png"), &picture.to_png(1200).map_err(|error| refuse(&error))?)?;
+        let png = picture.to_png(1200).map_err(|error| refuse(&error))?;
+        args.overwrite.save(&folder.join("maps.png"), Product::Png, &png)?;
     }
     bar.inc(1);
     let row = |(sensing, made): &(Sensing, Exploration)| Row {

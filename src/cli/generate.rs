@@ -2,21 +2,21 @@
 
 use std::{
     fs, io,
-    path::{Path, PathBuf},
+    path::Path,
 };
 
 use clap::{Command, CommandFactory as _};
 use clap_complete::{Shell, generate_to};
 use clap_mangen::roff::{Roff, bold, italic, roman};
 
-use super::{Cli, Failure, Outcome};
+use super::{Cli, Failure, Outcome, output::OutPath};
 use crate::config::{Key, Section, sections};
 
 /// Options of `sonard generate`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// Folder to write into; it gets man1, man5 and completions
-    dir: PathBuf,
+    dir: OutPath,
 }
 
 pub(super) fn run(args: &Args) -> Outcome {

@@ -11,6 +11,7 @@ use super::{
     Failure, Outcome,
     answer::answer,
     compare::RULED,
+    logs::first_of,
     picture::{PictureArgs, scene_for},
     sweeps::for_each_sweep,
 };
@@ -32,7 +33,7 @@ pub(super) struct Args {
     json: bool,
     #[command(flatten)]
     picture: PictureArgs,
-    /// Scene file or name of a shipped scene to draw; without it, the shipped one that the log names
+    /// Scene file or name of a shipped scene to draw; without it, the one in the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<String>,
     /// Strength of an edge's echo, sigma_E: for the boundary between edges and the rest
@@ -84,7 +85,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if targets.is_empty() {
         return Ok(());
     }
-    let scene = scene_for(&scans, args.scene.as_deref())?;
+    let scene = scene_for(first_of(&args.logs), &scans, args.scene.as_deref())?;
     let picture = draw_features(&scans, scene.as_ref(), &features);
     targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
 }

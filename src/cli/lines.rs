@@ -10,6 +10,7 @@ use std::{
 use super::{
     Failure, Outcome,
     answer::answer,
+    logs::{Drawn, first_of},
     picture::{PictureArgs, scene_for},
     sweeps::for_each_sweep,
 };
@@ -38,7 +39,7 @@ pub(super) struct Args {
     json: bool,
     #[command(flatten)]
     picture: PictureArgs,
-    /// Scene file or name of a shipped scene to draw; without it, the shipped one that the log names
+    /// Scene file or name of a shipped scene to draw; without it, the one in the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<String>,
 }
@@ -77,21 +78,21 @@ pub(super) fn run(args: &Args) -> Outcome {
     if targets.is_empty() {
         return Ok(());
     }
-    let scene = scene_for(&scans, args.scene.as_deref())?;
+    let scene = scene_for(first_of(&args.logs), &scans, args.scene.as_deref())?;
     let picture = draw_lines(&scans, scene.as_ref(), map.lines());
     targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
 }
 
 fn read(args: &Args) -> Result<(Vec<ScanView>, LineMap, usize), Failure> {
     let settings = LineMapSettings { logical_m: args.logical, ..LineMapSettings::default() };
-    let (mut scans, mut map) = (Vec::new(), LineMap::new(settings));
+    let (mut scans, mut map) = (Drawn::default(), LineMap::new(settings));
     let (mut count, mut left_out) = (0_usize, 0);
     for_each_sweep(&args.logs, |scan, sweep| {
         left_out += map.add_sonar(&sweep);
         count += 1;
         // A picture shows all readings; without one they need not stay in memory.
         if !args.picture.out.is_empty() {
-            scans.push(scan);
+            scans.add(scan);
         }
     })?;
     for file in &args.laser {
@@ -105,7 +106,7 @@ fn read(args: &Args) -> Result<(Vec<ScanView>, LineMap, usize), Failure> {
             "give logs as `sonard scan` or `sonard simulate` writes them",
         ));
     }
-    Ok((scans, map, left_out))
+    Ok((scans.finish(), map, left_out))
 }
 
 pub(super) fn record(line: &MapLine) -> serde_json::Value {

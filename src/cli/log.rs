@@ -35,7 +35,9 @@ impl From<StoreError> for Failure {
     /// A path that can't be opened is wrong input; a lock or a disk that fails is not.
     fn from(error: StoreError) -> Self {
         match &error {
-            StoreError::Open { .. } => Self::input(&error, error.help()),
+            StoreError::Open { .. } | StoreError::Unreadable { .. } | StoreError::NoLog { .. } => {
+                Self::input(&error, error.help())
+            }
             _ => Self::device(&error, error.help()),
         }
     }

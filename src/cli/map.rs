@@ -10,8 +10,10 @@ use serde::Serialize;
 use super::{
     Failure, Outcome,
     answer::answer,
-    files::{make_folder, save},
-    map_file, progress, scene_file,
+    logs::first_of,
+    map_file,
+    output::{OutPath, Overwrite, Product, make_folder},
+    progress, scene_file,
     sweeps::for_each_sweep,
 };
 use crate::{
@@ -23,6 +25,7 @@ use crate::{
     },
     plot::draw_map,
     scan::Session,
+    store::logged_scene,
 };
 
 /// Without a word on it, ranges beyond this are not mapped, metres.
@@ -40,7 +43,7 @@ pub(super) struct Args {
     logs: Vec<PathBuf>,
     /// Folder for map.pgm, map.yaml and map.png
     #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    out: OutPath,
     /// Whether readings that predicted features contradict count less
     #[arg(long, value_enum, default_value_t = Switch::On)]
     feature_prediction: Switch,
@@ -77,13 +80,16 @@ pub(super) struct Args {
     evidence: Option<u8>,
     /// Write the confidence of every reading to this file, one JSON object a line
     #[arg(long, value_name = "FILE")]
-    confidences: Option<PathBuf>,
-    /// Scene file or name of a shipped scene whose walls to draw over map.png
+    confidences: Option<OutPath>,
+    /// Scene file or name of a shipped scene whose walls to draw over map.png; without it, the
+    /// one in the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<String>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 /// What did best on the made-up rooms of `sonard map-benchmark`.
@@ -126,6 +132,14 @@ is how far the reading is right in any case.
 Exit codes: 0 done, 2 wrong usage or input, 3 a file can't be written.";
 
 pub(super) fn run(args: &Args) -> Outcome {
+    if let Some(map) = &args.onto {
+        map_file::note(map);
+    }
+    map_file::check(&args.out, args.overwrite)?;
+    args.overwrite.check_in(&args.out, "map.png", Product::Png)?;
+    if let Some(path) = &args.confidences {
+        args.overwrite.check(path, CONFIDENCES)?;
+    }
     let (session, taken) = sweeps(args)?;
     let refuse = |error: &dyn std::fmt::Display| {
         Failure::input(error.to_string(), "see `sonard map --help`")
@@ -143,14 +157,18 @@ pub(super) fn run(args: &Args) -> Outcome {
         None => Grid::new(shape(args, &taken, max_range_m)?),
     };
     let (model, prediction) = models(args, extents, max_range_m, session.array.is_some());
-    let scene = args.scene.as_deref().map(scene_file::load).transpose()?;
+    let scene = match &args.scene {
+        Some(given) => Some(scene_file::load(given)?),
+        // Walls under the map are a help: a log that lacks them is mapped as well.
+        None => logged_scene(&session, first_of(&args.logs)).ok().flatten(),
+    };
     make_folder(&args.out)?;
 
     let mapped = map(args, &taken, begun, &model, prediction)?;
     let way: Vec<DVec2> = taken.iter().map(|(_, sweep)| sweep.pose.position()).collect();
     let png = draw_map(&mapped.grid, scene.as_ref(), &way, 4).map_err(|error| refuse(&error))?;
-    map_file::write(&args.out, &mapped.grid)?;
-    save(&args.out.join("map.png"), &png)?;
+    map_file::write(&args.out, &mapped.grid, args.overwrite)?;
+    args.overwrite.save(&args.out.join("map.png"), Product::Png, &png)?;
     let summary = mapped.summary(args, &taken);
     answer(args.json, [&summary], |out| summary.print(out))
 }
@@ -284,10 +302,12 @@ fn map(
     }
     bar.finish_and_clear();
     if let Some(path) = &args.confidences {
-        save(path, &confidences)?;
+        args.overwrite.save(path, CONFIDENCES, &confidences)?;
     }
     Ok(mapped)
 }
+
+const CONFIDENCES: Product = Product::List(&["scan", "index", "confidence", "clear_m"]);
 
 fn write_confidence(bytes: &mut Vec<u8>, scan: uuid::Uuid, index: u32, worth: &Worth) {
     let Worth { confidence, clear_m } = *worth;

@@ -1,9 +1,7 @@
 //! `sonard map-benchmark`.
 
 use std::{
-    fs,
     io::{self, Write},
-    path::PathBuf,
     sync::{
         Arc, Mutex,
         atomic::{AtomicUsize, Ordering},
@@ -20,8 +18,8 @@ use super::{
     Failure, Outcome,
     answer::answer,
     compare::RULED,
-    files::make_folder,
     map::{EXTEND_M, LEAST_CONFIDENCE},
+    output::{OutPath, Overwrite, Product, make_folder},
     progress,
 };
 use crate::{
@@ -77,7 +75,9 @@ pub(super) struct Args {
     json: bool,
     /// Folder for PNG pictures of the maps: ideal, without, with
     #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    out: Option<OutPath>,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 pub(super) const ABOUT: &str = "\
@@ -214,7 +214,7 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
     let arrangement = if ring { "ring" } else { "stepper" };
     if let Some(folder) = &args.out {
         let stem = format!("{course:03}-{}-{arrangement}", name.replace([' ', ','], "-"));
-        save(folder, &stem, simulator.scene(), &course_taken, &trial)?;
+        save((folder, args.overwrite), &stem, simulator.scene(), &course_taken, &trial)?;
     }
     let [without, with] = trial.scores;
     Ok(Row { scene: name, arrangement, course, without, with })
@@ -234,7 +234,7 @@ fn scene(number: usize, rng: &mut Pcg64) -> Result<(&'static str, Scene, DVec2),
 }
 
 fn save(
-    folder: &std::path::Path,
+    (folder, overwrite): (&std::path::Path, Overwrite),
     stem: &str,
     scene: &Scene,
     course: &Course,
@@ -247,8 +247,7 @@ fn save(
         let path = folder.join(format!("{stem}-{kind}.png"));
         let png = draw_map(map, Some(scene), &way, 5)
             .map_err(|error| Failure::input(error, "choose a coarser --resolution"))?;
-        fs::write(&path, png)
-            .or_else(|error| Failure::from_write(&path.display().to_string(), &error))?;
+        overwrite.save(&path, Product::Png, &png)?;
     }
     Ok(())
 }

@@ -5,7 +5,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{Failure, Outcome, answer::answer, files::make_folder, map_file, scene_file};
+use super::{
+    Failure, Outcome,
+    answer::answer,
+    map_file,
+    output::{OutPath, Overwrite, make_folder},
+    scene_file,
+};
 use crate::{
     geometry::{DVec2, Pose},
     interpret::grid::{Grid, GridShape, MapScore, PathSettings, ideal, score},
@@ -26,10 +32,12 @@ pub(super) struct Args {
     spacing: f64,
     /// Also write the ideal map drawn from the scene into this folder
     #[arg(long, value_name = "DIR")]
-    save_ideal: Option<PathBuf>,
+    save_ideal: Option<OutPath>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 pub(super) const ABOUT: &str = "\
@@ -64,7 +72,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     };
     if let Some(folder) = &args.save_ideal {
         make_folder(folder)?;
-        map_file::write(folder, &ideal)?;
+        map_file::write(folder, &ideal, args.overwrite)?;
     }
     let settings = PathSettings { spacing_m: args.spacing, ..PathSettings::default() };
     let found = score(&map, &ideal, &settings).map_err(|error| {

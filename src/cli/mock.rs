@@ -1,12 +1,13 @@
 //! `sonard mock`.
 
-use std::{path::PathBuf, sync::Arc};
+use std::sync::Arc;
 
 use super::{
     Failure, Outcome,
     array::NoArray,
     mock_world::{Belief, MockWorldArgs},
     options::{AirArgs, EngineArgs, SensorArgs},
+    output::OutPath,
     place::PlaceArgs,
     runtime,
 };
@@ -23,7 +24,7 @@ pub(super) struct Args {
     place: PlaceArgs,
     /// Make this symbolic link to the pty
     #[arg(long, value_name = "PATH")]
-    link: Option<PathBuf>,
+    link: Option<OutPath>,
     #[command(flatten)]
     world: MockWorldArgs,
     #[command(flatten)]

@@ -11,11 +11,11 @@ mod doctor;
 mod explore;
 mod explore_benchmark;
 mod failure;
-mod files;
 mod generate;
 mod interpret;
 mod lines;
 mod log;
+mod logs;
 mod map;
 mod map_benchmark;
 mod map_file;
@@ -23,6 +23,7 @@ mod map_score;
 mod mock;
 mod mock_world;
 mod options;
+mod output;
 mod paths;
 mod picture;
 mod place;
@@ -41,9 +42,9 @@ mod watch;
 
 pub use failure::{Failure, Outcome};
 
-use std::process::ExitCode;
+use std::{process::ExitCode, sync::Arc};
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 /// Drives an ultrasonic ranger on a stepper, and predicts what it reads.
 #[derive(Debug, Parser)]
@@ -130,7 +131,14 @@ enum Verb {
 /// Runs the command line of this process.
 #[must_use]
 pub fn main() -> ExitCode {
-    let outcome = match Cli::parse().verb {
+    outlive_file_size_limit();
+    let mut command = Cli::command();
+    let matches = command.get_matches_mut();
+    if let Err(failure) = output::guard(&command, &matches) {
+        return failure::report(Err(failure));
+    }
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit());
+    let outcome = match cli.verb {
         Verb::Scan(args) => scan::run(&args),
         Verb::Collect(args) => collect::run(&args),
         Verb::Run(args) => run::run(*args),
@@ -157,4 +165,18 @@ pub fn main() -> ExitCode {
         Verb::Scene(verb) => scene::run(verb),
     };
     failure::report(outcome)
+}
+
+/// Every argument of the command line that names a place to write to: verb and option.
+#[doc(hidden)]
+#[must_use]
+pub fn outputs() -> Vec<String> {
+    output::arguments(&Cli::command())
+}
+
+/// A file-size limit is to be an error of the write that meets it, with a message, and not the end of
+/// the process.
+fn outlive_file_size_limit() {
+    // Whoever can't have a handler has the system's behaviour.
+    drop(signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default()));
 }

@@ -1,17 +1,19 @@
 //! Pictures that verbs write, and the scene and damage that they tell of.
 
 use std::{
-    fs,
     io::{self, IsTerminal, Write as _},
     path::{Path, PathBuf},
 };
 
-use super::{Failure, Outcome, scene_file};
+use super::{
+    Failure, Outcome,
+    output::{self, OutPath, Overwrite, Product},
+    scene_file,
+};
 use crate::{
     plot::{MAX_WIDTH_PX, Picture},
     scan::ScanView,
-    scene::{Scene, shipped},
-    store::LineError,
+    scene::Scene,
 };
 
 /// Which pictures.
@@ -19,51 +21,54 @@ use crate::{
 pub(super) struct PictureArgs {
     /// Picture to write, .svg or .png, or - for SVG to standard output; several are possible
     #[arg(short = 'o', long = "out", value_name = "FILE")]
-    pub(super) out: Vec<PathBuf>,
+    pub(super) out: Vec<OutPath>,
     /// Width of a PNG, pixels
     #[arg(long, value_name = "PX", default_value_t = 1000,
           value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_WIDTH_PX)))]
     pub(super) width: u32,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 impl PictureArgs {
     /// Checked before anything is read, so that a wrong name costs no time.
     pub(super) fn targets(&self) -> Result<Vec<Target>, Failure> {
-        self.out.iter().map(|path| target(path)).collect()
+        self.out.iter().map(|path| Target::of(path, self.overwrite)).collect()
     }
 }
 
 /// Where a picture goes, and in which format.
 pub(super) enum Target {
     StandardOutput,
-    Svg(PathBuf),
-    Png(PathBuf),
+    File(PathBuf, Product, Overwrite),
 }
 
 impl Target {
+    /// A place whose name says the format, and that may be written to.
+    pub(super) fn of(path: &Path, overwrite: Overwrite) -> Result<Self, Failure> {
+        if path == Path::new("-") {
+            return Ok(Self::StandardOutput);
+        }
+        let product = output::picture(path)?;
+        overwrite.check(path, product)?;
+        Ok(Self::File(path.into(), product, overwrite))
+    }
+
     /// Writes a picture; `width_px` is a PNG's.
     pub(super) fn write(&self, picture: &Picture, width_px: u32) -> Outcome {
-        let (path, bytes) = match self {
-            Self::StandardOutput => {
-                return io::stdout()
-                    .lock()
-                    .write_all(picture.to_svg().as_bytes())
-                    .or_else(|error| Failure::from_write("standard output", &error));
-            }
-            Self::Svg(path) => (path, picture.to_svg().into_bytes()),
-            Self::Png(path) => {
-                let png = picture.to_png(width_px).map_err(|error| {
-                    Failure::input(format!("{}: {error}", path.display()), "choose another --width")
-                })?;
-                (path, png)
-            }
+        let Self::File(path, product, overwrite) = self else {
+            return io::stdout()
+                .lock()
+                .write_all(picture.to_svg().as_bytes())
+                .or_else(|error| Failure::from_write("standard output", &error));
         };
-        fs::write(path, bytes).map_err(|error| {
-            Failure::device(
-                format!("cannot write {}: {error}", path.display()),
-                "check that its folder exists, may be written to and has room",
-            )
-        })
+        let bytes = match product {
+            Product::Png => picture.to_png(width_px).map_err(|error| {
+                Failure::input(format!("{}: {error}", path.display()), "choose another --width")
+            })?,
+            _ => picture.to_svg().into_bytes(),
+        };
+        overwrite.save(path, *product, &bytes)
     }
 }
 
@@ -78,47 +83,22 @@ pub(super) fn targets(args: &PictureArgs) -> Result<Vec<Target>, Failure> {
     if args.out.is_empty() { Ok(vec![Target::StandardOutput]) } else { args.targets() }
 }
 
-fn target(path: &Path) -> Result<Target, Failure> {
-    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-    match extension.as_deref() {
-        Some("svg") => Ok(Target::Svg(path.into())),
-        Some("png") => Ok(Target::Png(path.into())),
-        None if path == Path::new("-") => Ok(Target::StandardOutput),
-        _ => Err(Failure::input(
-            format!("{}: the format of a picture follows from its ending", path.display()),
-            "let the name end in .svg or .png",
-        )),
-    }
-}
-
-/// Names the lines of a log that could not be read.
-pub(super) fn warn_of_damage(log: &Path, damaged: &[LineError]) {
-    const SHOWN: usize = 5;
-    for error in damaged.iter().take(SHOWN) {
-        anstream::eprintln!("warning: {}: {error}; the line is left out", log.display());
-    }
-    if damaged.len() > SHOWN {
-        let more = damaged.len() - SHOWN;
-        anstream::eprintln!("warning: {more} more damaged lines; see `sonard log verify`");
-    }
-}
-
-/// The scene named on the command line, else the shipped scene that the log names.
-pub(super) fn scene_for(views: &[ScanView], given: Option<&str>) -> Result<Option<Scene>, Failure> {
-    let logged = views.iter().find_map(|view| view.session.as_ref()?.scene.as_ref());
-    let scene = match (given, logged) {
+/// The scene named on the command line, else the one that the first of these scans with a scene was
+/// predicted in: as the log has it, or, in logs that only name it, the shipped one.
+pub(super) fn scene_for(
+    log: &Path,
+    views: &[ScanView],
+    given: Option<&str>,
+) -> Result<Option<Scene>, Failure> {
+    let session =
+        views.iter().filter_map(|view| view.session.as_deref()).find(|session| session.scene.is_some());
+    let logged = session.and_then(|session| session.scene.as_ref());
+    let scene = match (given, session) {
         (Some(given), _) => scene_file::load(given)?,
-        (None, Some(logged)) if shipped::text(&logged.name).is_some() => {
-            scene_file::shipped(&logged.name)?
-        }
-        (None, Some(logged)) => {
-            anstream::eprintln!(
-                "note: the log's scene `{}` does not come with sonard: drawn without walls; give \
-                 its file with --scene",
-                logged.name
-            );
-            return Ok(None);
-        }
+        (None, Some(session)) => match scene_file::of_session(log, session)? {
+            Some(scene) => scene,
+            None => return Ok(None),
+        },
         (None, None) => return Ok(None),
     };
     if logged.is_some_and(|logged| logged.sha256 != scene.sha256) {

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use super::{
     Failure, Outcome,
-    picture::{PictureArgs, scene_for, targets, warn_of_damage},
+    logs::{Drawn, for_each_scan},
+    picture::{PictureArgs, scene_for, targets},
 };
 use crate::{
     plot::{draw_confidence, draw_polar, draw_residuals, draw_scans, draw_side_by_side},
     scan::ScanView,
-    store::load,
 };
 
 /// Options of `sonard plot`.
@@ -20,7 +20,7 @@ use crate::{
 pub(super) struct Args {
     /// The log; - for standard input
     log: PathBuf,
-    /// Scene file or name of a shipped scene; without it, the shipped scene that the log names
+    /// Scene file or name of a shipped scene; without it, the scene in the log
     #[arg(long, value_name = "FILE|NAME")]
     scene: Option<String>,
     /// What to draw
@@ -79,10 +79,8 @@ Exit codes: 0 drawn, 2 wrong usage or input, 3 a picture can't be written.";
 pub(super) fn run(args: &Args) -> Outcome {
     let targets = targets(&args.picture)?;
     let log = &args.log;
-    let loaded = load(log).map_err(|error| Failure::input(&error, error.help()))?;
-    warn_of_damage(log, &loaded.damaged);
-    let views = choose(ScanView::from_records(loaded.records), log, &args.scan)?;
-    let scene = scene_for(&views, args.scene.as_deref())?;
+    let views = if args.scan.is_empty() { all(args)? } else { chosen(log, &args.scan)? };
+    let scene = scene_for(log, &views, args.scene.as_deref())?;
     let beam = args.beam.map(way::Beam::Index).or(args.azimuth_deg.map(way::Beam::Azimuth));
     let picture = match (beam, args.kind) {
         (Some(beam), _) => way::draw(&views, scene.as_ref(), beam)?,
@@ -95,43 +93,81 @@ pub(super) fn run(args: &Args) -> Outcome {
     targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
 }
 
-/// The scans asked for; all without a choice.
-fn choose(views: Vec<ScanView>, log: &Path, wanted: &[String]) -> Result<Vec<ScanView>, Failure> {
-    if views.is_empty() {
-        return Err(Failure::input(
-            format!("{}: there is no scan in this log", log.display()),
-            "give a log written by `sonard scan` or `sonard simulate`; `sonard log show` tells \
-             what is in one",
-        ));
-    }
-    if wanted.is_empty() {
-        return Ok(views);
-    }
-    wanted.iter().map(|one| find(&views, one).cloned()).collect()
+/// The scans of the log, as far as they are drawn.
+fn all(args: &Args) -> Result<Vec<ScanView>, Failure> {
+    let one = args.beam.is_some() || args.azimuth_deg.is_some();
+    let most = match args.kind {
+        _ if one => 1,
+        Kind::SideBySide => SIDE_BY_SIDE,
+        _ => usize::MAX,
+    };
+    let (mut drawn, mut count) = (Drawn::default(), 0);
+    for_each_scan(&args.log, |scan| {
+        count += 1;
+        if count <= most {
+            drawn.add(scan);
+        }
+        Ok(())
+    })?;
+    let scans = drawn.finish();
+    if scans.is_empty() { Err(no_scan(&args.log)) } else { Ok(scans) }
 }
 
-/// The scan of this number, or the only one whose id begins so.
-fn find<'a>(views: &'a [ScanView], wanted: &str) -> Result<&'a ScanView, Failure> {
-    let by_number = wanted.parse::<usize>().ok().and_then(|n| views.get(n.checked_sub(1)?));
-    if let Some(view) = by_number {
-        return Ok(view);
-    }
-    let lower = wanted.to_lowercase();
-    let mut by_id =
-        views.iter().filter(|view| !lower.is_empty() && view.scan.to_string().starts_with(&lower));
-    match (by_id.next(), by_id.next()) {
-        (Some(view), None) => Ok(view),
-        (Some(_), Some(_)) => Err(Failure::input(
-            format!("--scan {wanted}: several scans have ids that begin so"),
-            "give more of the id, or the scan's number",
-        )),
-        (None, _) => Err(Failure::input(
-            format!("--scan {wanted}: the log has no such scan"),
-            format!(
-                "give a number from 1 to {}, or the beginning of an id; the first is {}",
-                views.len(),
-                views.first().map(|view| view.scan.to_string()).unwrap_or_default()
-            ),
-        )),
+/// Scans that fit next to each other.
+const SIDE_BY_SIDE: usize = 3;
+
+fn no_scan(log: &Path) -> Failure {
+    Failure::input(
+        format!("{}: there is no scan in this log", log.display()),
+        "give a log written by `sonard scan` or `sonard simulate`; `sonard log show` tells what is \
+         in one",
+    )
+}
+
+/// The scans asked for: each by its number from 1, or by the only id that begins so.
+fn chosen(log: &Path, wanted: &[String]) -> Result<Vec<ScanView>, Failure> {
+    let mut found: Vec<Found> = wanted.iter().map(|_| Found::default()).collect();
+    let (mut count, mut first) = (0, None);
+    for_each_scan(log, |scan| {
+        count += 1;
+        let id = scan.scan.to_string();
+        for (wanted, found) in wanted.iter().zip(&mut found) {
+            if wanted.parse() == Ok(count) {
+                found.by_number = Some(scan.clone());
+            } else if !wanted.is_empty() && id.starts_with(&wanted.to_lowercase()) {
+                found.with_id += 1;
+                found.by_id.get_or_insert_with(|| scan.clone());
+            }
+        }
+        first.get_or_insert(id);
+        Ok(())
+    })?;
+    let Some(first) = first else { return Err(no_scan(log)) };
+    wanted.iter().zip(found).map(|(wanted, found)| found.one(wanted, count, &first)).collect()
+}
+
+/// What was found for a choice.
+#[derive(Default)]
+struct Found {
+    by_number: Option<ScanView>,
+    by_id: Option<ScanView>,
+    with_id: usize,
+}
+
+impl Found {
+    fn one(self, wanted: &str, count: usize, first: &str) -> Result<ScanView, Failure> {
+        match (self.by_number, self.by_id, self.with_id) {
+            (Some(scan), ..) | (None, Some(scan), 1) => Ok(scan),
+            (None, Some(_), _) => Err(Failure::input(
+                format!("--scan {wanted}: several scans have ids that begin so"),
+                "give more of the id, or the scan's number",
+            )),
+            (None, None, _) => Err(Failure::input(
+                format!("--scan {wanted}: the log has no such scan"),
+                format!(
+                    "give a number from 1 to {count}, or the beginning of an id; the first is {first}"
+                ),
+            )),
+        }
     }
 }

@@ -18,6 +18,7 @@ use super::{
     daemon::DaemonArgs,
     mock_world::{self, MockWorldArgs},
     options::{AirArgs, EngineArgs, SensorArgs},
+    output::OutPath,
     place::{AzimuthArgs, PlaceArgs},
     runtime::{self, Interrupts},
 };
@@ -88,7 +89,7 @@ pub(super) struct Args {
     place: PlaceArgs,
     /// Write scan.jsonl, scan.svg and scan.png to this folder instead of records to standard output
     #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    out: Option<OutPath>,
     /// How often to take the scan
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     repeat: u32,
@@ -193,7 +194,9 @@ async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
         .unwrap_or_default();
     let mut ranger = meet(&port, &interrupts).await?;
     let job = setup.job(ranger.identity())?;
-    output.record(&Record::Session(Box::new(setup.session(ranger.identity()))))?;
+    let session = setup.session(ranger.identity());
+    output.add_to_earlier(&session, job.pose, job.plan)?;
+    output.record(&Record::Session(Box::new(session)))?;
     let mut missing = 0;
     for turn in 1..=args.repeat {
         output.begin_scan(turn, args.repeat, job.plan.beams());

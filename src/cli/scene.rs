@@ -1,12 +1,15 @@
 //! `sonard scene`.
 
 use std::{
-    fs,
     io::{self, Write as _},
-    path::{Path, PathBuf},
 };
 
-use super::{Failure, Outcome, scene_file};
+use super::{
+    Failure, Outcome,
+    output::{OutPath, Overwrite},
+    picture::Target,
+    scene_file,
+};
 use crate::{
     geometry::DVec2,
     plot::draw_scene,
@@ -51,10 +54,12 @@ pub(super) struct DrawArgs {
     pose: Option<String>,
     /// Where to write the picture, as .svg or .png [default: SVG to standard output]
     #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    output: Option<OutPath>,
     /// Width of a PNG, pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 1200)]
     width: u32,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 const CHECK_ABOUT: &str = "\
@@ -121,22 +126,13 @@ fn check(args: &CheckArgs) -> Outcome {
 }
 
 fn draw(args: &DrawArgs) -> Outcome {
+    let target = args.output.as_ref().map(|path| Target::of(path, args.overwrite)).transpose()?;
     let scene = scene_file::load(&args.scene)?;
     let picture = draw_scene(&drawn(scene, args.pose.as_deref())?);
-    let Some(path) = &args.output else { return print(picture.to_svg().trim_end()) };
-    let bytes = match path.extension().and_then(|extension| extension.to_str()) {
-        Some("svg") => picture.to_svg().into_bytes(),
-        Some("png") => picture
-            .to_png(args.width)
-            .map_err(|error| Failure::input(error, "choose another --width"))?,
-        _ => {
-            return Err(Failure::input(
-                format!("{} is neither .svg nor .png", path.display()),
-                "end the name of the picture with .svg or .png",
-            ));
-        }
-    };
-    write_file(path, &bytes)
+    match target {
+        None => print(picture.to_svg().trim_end()),
+        Some(target) => target.write(&picture, args.width),
+    }
 }
 
 /// The scene with the poses to draw, and the robot's body at each of them.
@@ -151,15 +147,6 @@ fn drawn(mut scene: Scene, pose: Option<&str>) -> Result<Scene, Failure> {
         scene = scene.with_robot_at(pose);
     }
     Ok(scene)
-}
-
-fn write_file(path: &Path, bytes: &[u8]) -> Outcome {
-    fs::write(path, bytes).map_err(|error| {
-        Failure::device(
-            format!("cannot write {}: {error}", path.display()),
-            "check that the folder exists, may be written to and has space",
-        )
-    })
 }
 
 fn list() -> Outcome {

@@ -4,10 +4,12 @@ use std::{fs, io, path::Path};
 
 use miette::{LabeledSpan, MietteDiagnostic, NamedSource, Report};
 
-use super::Failure;
+use super::{Failure, output::note_input};
 use crate::{
     geometry::Pose,
+    scan::Session,
     scene::{PoseError, Scene, SceneError, shipped, suggest},
+    store::{SceneLost, logged_scene},
 };
 
 /// Reads and checks a scene: a file, or a shipped scene by its name. A file of that name wins.
@@ -28,6 +30,31 @@ pub(super) fn shipped(name: &str) -> Result<Scene, Failure> {
     Scene::from_json(text).map_err(|error| Failure::Input(report(name, text.to_owned(), &error)))
 }
 
+/// The scene that a session of a log was predicted in: the one that the log holds, else a shipped one
+/// of its name; without either a note says so.
+///
+/// # Errors
+/// A shipped scene with a fault, which there is none of.
+pub(super) fn of_session(log: &Path, session: &Session) -> Result<Option<Scene>, Failure> {
+    let lost = match logged_scene(session, log) {
+        Ok(scene) => return Ok(scene),
+        Err(lost) => lost,
+    };
+    let named = session.scene.as_ref().map(|scene| &*scene.name).unwrap_or_default();
+    if matches!(lost, SceneLost::Changed(_)) {
+        anstream::eprintln!("warning: {}: {lost}", log.display());
+    }
+    if shipped::text(named).is_some() {
+        return shipped(named).map(Some);
+    }
+    anstream::eprintln!(
+        "note: {}: {lost}, and it does not come with sonard: give its file with --scene; until then \
+         it is taken as unknown",
+        log.display()
+    );
+    Ok(None)
+}
+
 /// The pose meant by `X,Y,DEG` or a name, if a ranger can stand there.
 ///
 /// # Errors
@@ -41,6 +68,7 @@ pub(super) fn pose(scene: &Scene, spec: &str) -> Result<Pose, Failure> {
 
 /// The text of a scene, by its file or name.
 pub(super) fn read(path_or_name: &str) -> Result<String, Failure> {
+    note_input(path_or_name.as_ref());
     let bytes = match fs::read(path_or_name) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {

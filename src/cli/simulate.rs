@@ -3,8 +3,6 @@
 mod array;
 
 use std::{
-    fs::File,
-    io::{self, BufWriter, Write},
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -19,6 +17,7 @@ use super::{
     Failure, Outcome,
     array::load_course,
     options::{AirArgs, EngineArgs, SensorArgs},
+    output::{OutPath, Overwrite, Product, Stream},
     place::AzimuthArgs,
     progress, scene_file,
 };
@@ -28,6 +27,7 @@ use crate::{
     model::{Prediction, Simulator, Station},
     scan::{Ping, Record, ScanEnd, ScanPlan, ScanStart, Session},
     scene::Scene,
+    store::{LogWriter, Pipe, StoreError},
 };
 
 use array::ArrayArgs;
@@ -57,7 +57,9 @@ pub(super) struct Args {
     azimuths: AzimuthArgs,
     /// Write the records to this file instead of standard output
     #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
+    out: Option<OutPath>,
+    #[command(flatten)]
+    overwrite: Overwrite,
     #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
@@ -138,13 +140,14 @@ pub(super) fn run(args: &Args) -> Outcome {
         None => Some(simulator(args, &scene, &poses[0])?),
     };
     let noise = args.noise.noise()?;
-    let (what, mut out) = open(args.out.as_deref())?;
+    let mut out = Out::open(args)?;
     let mut rng = Pcg64::seed_from_u64(args.noise.seed);
     let mut ping = |station: &Station, direction_rad| match &noise {
         Some(noise) => station.ping_in_noise(direction_rad, noise, &mut rng),
         None => station.ping(direction_rad),
     };
     let bar = progress::bar(u64::from(plan.stops()) * poses.len() as u64, "beams");
+    let mut written = Ok(());
     for (number, pose) in poses.iter().enumerate() {
         let own = match shared {
             Some(_) => None,
@@ -152,16 +155,15 @@ pub(super) fn run(args: &Args) -> Outcome {
         };
         let Some(simulator) = shared.as_ref().or(own.as_ref()) else { break };
         let session = (number == 0 || own.is_some()).then_some(simulator);
-        let written = session.map_or(Ok(()), |simulator| write_session(&mut out, simulator));
-        if let Err(error) =
-            written.and_then(|()| write(&mut out, simulator, pose, &plan, &mut ping, &bar))
-        {
-            bar.finish_and_clear();
-            return Failure::from_write(&what, &error);
+        written = session
+            .map_or(Ok(()), |simulator| write_session(&mut out, simulator))
+            .and_then(|()| write(&mut out, simulator, pose, &plan, &mut ping, &bar));
+        if written.is_err() {
+            break;
         }
     }
     bar.finish_and_clear();
-    out.flush().or_else(|error| Failure::from_write(&what, &error))
+    out.close(written)
 }
 
 /// The pose asked for, or those of a file.
@@ -184,18 +186,39 @@ fn refuse_pose(
     Failure::input(format!("{}{error}", which.unwrap_or_default()), help)
 }
 
-/// Where the records go, and its name.
-fn open(path: Option<&Path>) -> Result<(String, Box<dyn Write>), Failure> {
-    let Some(path) = path else {
-        return Ok(("to standard output".into(), Box::new(BufWriter::new(io::stdout().lock()))));
-    };
-    let file = File::create(path).map_err(|error| {
-        Failure::input(
-            format!("cannot write {}: {error}", path.display()),
-            "give a file in a folder that exists and that you may write to",
-        )
-    })?;
-    Ok((path.display().to_string(), Box::new(BufWriter::new(file))))
+/// Where the records go: a log that takes its place when it is whole.
+struct Out {
+    log: LogWriter<Pipe<Stream>>,
+}
+
+impl Out {
+    fn open(args: &Args) -> Result<Self, Failure> {
+        let log = match &args.out {
+            Some(path) => {
+                let stream = args.overwrite.begin(path, Product::Log)?;
+                LogWriter::new(Pipe(stream), path).with_scenes_beside()
+            }
+            None => LogWriter::new(Pipe(Stream::standard()), Path::new("standard output")),
+        };
+        Ok(Self { log })
+    }
+
+    fn put(&mut self, record: &Record) -> Result<(), StoreError> {
+        self.log.append(record)
+    }
+
+    /// Puts the log in its place, unless writing it has failed.
+    fn close(mut self, written: Result<(), StoreError>) -> Outcome {
+        let closed = written.and_then(|()| self.log.sync()).and_then(|()| {
+            let path = self.log.path().to_path_buf();
+            let Pipe(stream) = self.log.medium_mut();
+            stream.finish().map_err(|source| StoreError::Write { path, source })
+        });
+        match closed {
+            Err(error) if !error.is_broken_pipe() => Err(Failure::device(&error, error.help())),
+            _ => Ok(()),
+        }
+    }
 }
 
 fn simulator(args: &Args, scene: &Scene, pose: &Pose) -> Result<Simulator, Failure> {
@@ -205,18 +228,18 @@ fn simulator(args: &Args, scene: &Scene, pose: &Pose) -> Result<Simulator, Failu
         .map_err(|error| Failure::input(error, "see `sonard simulate --help`"))
 }
 
-fn write_session(out: &mut dyn Write, simulator: &Simulator) -> io::Result<()> {
-    put(out, &Record::Session(Box::new(Session::simulated(simulator, Timestamp::now()))))
+fn write_session(out: &mut Out, simulator: &Simulator) -> Result<(), StoreError> {
+    out.put(&Record::Session(Box::new(Session::simulated(simulator, Timestamp::now()))))
 }
 
 fn write(
-    out: &mut dyn Write,
+    out: &mut Out,
     simulator: &Simulator,
     pose: &Pose,
     plan: &ScanPlan,
     predict: &mut dyn FnMut(&Station, f64) -> Prediction,
     bar: &ProgressBar,
-) -> io::Result<()> {
+) -> Result<(), StoreError> {
     let scan = Uuid::new_v4();
     let start = ScanStart {
         scan,
@@ -227,21 +250,15 @@ fn write(
         provenance: None,
         request: None,
     };
-    put(out, &Record::ScanStart(start))?;
+    out.put(&Record::ScanStart(start))?;
     let station = simulator.station(pose.position());
     for index in 0..plan.stops() {
         let azimuth_deg = plan.azimuth_deg(index);
         let prediction = predict(&station, pose.direction_rad(azimuth_deg));
         let ping = Ping::simulated(simulator, scan, index, azimuth_deg, &prediction);
-        put(out, &Record::Ping(Box::new(ping)))?;
+        out.put(&Record::Ping(Box::new(ping)))?;
         bar.inc(1);
     }
     let end = ScanEnd::simulated(simulator, scan, plan.stops(), Timestamp::now());
-    put(out, &Record::ScanEnd(end))
-}
-
-/// Writes a record as one line.
-fn put(out: &mut dyn Write, record: &Record) -> io::Result<()> {
-    serde_json::to_writer(&mut *out, record)?;
-    out.write_all(b"\n")
+    out.put(&Record::ScanEnd(end))
 }

@@ -15,6 +15,7 @@ use sha2::{Digest as _, Sha256};
 use thiserror::Error;
 
 use super::order::Slot;
+use crate::store::WholeFile;
 
 /// Scans under way: empty unless the program is running or was killed.
 pub(super) const TAKING: &str = "taking";
@@ -219,18 +220,7 @@ impl Folder {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(|s| FolderError::io("make", folder, s))?;
         }
-        let draft = self.root.join(format!("{name}{DRAFT}"));
-        let write = || -> io::Result<()> {
-            fs::write(&draft, bytes)?;
-            File::open(&draft)?.sync_all()?;
-            fs::rename(&draft, &path)?;
-            sync_folder(&path)
-        };
-        write().map_err(|source| {
-            // The old one is in force; half a new one would only confuse.
-            let _ = fs::remove_file(&draft);
-            FolderError::io("write", &path, source)
-        })
+        WholeFile::write(&path, bytes).map_err(|source| FolderError::io("write", &path, source))
     }
 
     /// Removes what [`write`](Self::write) was at when the program was killed. Only for who holds

@@ -24,6 +24,7 @@ use crate::{
     config::ScanningKeys,
     daemon::AirOrder,
     scan::{Device, Provenance, SceneRef},
+    store::open_own,
 };
 
 /// One line.
@@ -232,7 +233,7 @@ impl Journal {
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         let fail = |source| FolderError::io("open", path, source);
         let mut file =
-            OpenOptions::new().read(true).append(true).create(true).open(path).map_err(fail)?;
+            open_own(OpenOptions::new().read(true).append(true).create(true), path).map_err(fail)?;
         match rustix::fs::flock(&file, rustix::fs::FlockOperation::NonBlockingLockExclusive) {
             Ok(()) => {}
             Err(rustix::io::Errno::WOULDBLOCK) => {
@@ -243,11 +244,12 @@ impl Journal {
         let mut text = Vec::new();
         file.read_to_end(&mut text).map_err(fail)?;
         let whole = text.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
+        // Read before it is cut: what is no journal must stay as it is.
+        let history = read(&text[..whole], path)?;
         if whole < text.len() {
             file.set_len(whole as u64).and_then(|()| file.sync_all()).map_err(fail)?;
             file.seek(SeekFrom::End(0)).map_err(fail)?;
         }
-        let history = read(&text[..whole], path)?;
         Ok(Self { file, path: path.into(), history })
     }
 

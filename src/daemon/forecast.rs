@@ -76,6 +76,7 @@ impl Forecast {
             array: None,
             air: air.into(),
             scene: settings.scene.as_deref().map(SceneRef::of),
+            scene_text: settings.scene.as_ref().map(|scene| Arc::clone(&scene.text)),
             model: self.model.clone(),
             collection: None,
         }

@@ -7,8 +7,8 @@ use jiff::Timestamp;
 use super::{hub::Hub, journal::Journal, status::Shared};
 use crate::{
     ranger::Sink,
-    scan::{Event, EventKind, Record},
-    store::StoreError,
+    scan::{Event, EventKind, Record, Session},
+    store::{MAX_LOGGED_SCENE_BYTES, StoreError},
 };
 
 /// Where records and news go.
@@ -27,16 +27,26 @@ impl Outlet {
 
     /// A record for everybody.
     pub(super) fn put(&self, record: &Record) {
-        if let Record::Session(session) = record {
-            let session = Arc::new((**session).clone());
-            self.shared.view.send_modify(|view| view.session = Some(session));
-        }
         let over = self.shared.collect(record);
         self.journal.record(record);
-        self.hub.publish(record);
+        match record {
+            Record::Session(session) => self.begin(session),
+            _ => self.hub.publish(record),
+        }
         if let Some(scan) = over {
             self.hub.publish_scan(&scan);
         }
+    }
+
+    /// Live streams go without the scene's text, and the API has it as far as a log's line has: what a
+    /// client asks for is bounded, whatever the scene.
+    fn begin(&self, session: &Session) {
+        let fits = |text: &Arc<str>| text.len() <= MAX_LOGGED_SCENE_BYTES;
+        let mut session = session.clone();
+        let scene_text = session.scene_text.take().filter(fits);
+        self.hub.publish(&Record::Session(Box::new(session.clone())));
+        let session = Arc::new(Session { scene_text, ..session });
+        self.shared.view.send_modify(|view| view.session = Some(session));
     }
 }
 

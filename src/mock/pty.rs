@@ -110,20 +110,24 @@ fn open_raw(name: &CStr) -> io::Result<OwnedFd> {
     Ok(slave)
 }
 
-/// Points `link` at `target`, replacing a link that an earlier mock left.
+/// Points `link` at `target`, replacing a link that an earlier mock left, which leads to a terminal.
 fn point(link: &Path, target: &Path) -> io::Result<()> {
     match fs::symlink_metadata(link) {
-        Ok(metadata) if metadata.is_symlink() => fs::remove_file(link)?,
+        Ok(there) if there.is_symlink() && leads_to_terminal(link) => fs::remove_file(link)?,
         Ok(_) => {
             return Err(io::Error::new(
                 io::ErrorKind::AlreadyExists,
-                format!("{} exists and is not a symbolic link", link.display()),
+                format!("{} exists and is not a link that a mock left", link.display()),
             ));
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {}
         Err(error) => return Err(error),
     }
     std::os::unix::fs::symlink(target, link)
+}
+
+fn leads_to_terminal(link: &Path) -> bool {
+    fs::read_link(link).is_ok_and(|to| to.starts_with("/dev/pts"))
 }
 
 #[cfg(test)]
@@ -160,5 +164,10 @@ mod tests {
         let error = Pty::open(Some(&link)).expect_err("a file is in the way");
         assert_eq!(error.kind(), io::ErrorKind::AlreadyExists);
         assert_eq!(fs::read(&link).expect("kept"), b"data");
+        let other = folder.path().join("current");
+        std::os::unix::fs::symlink(&link, &other).expect("somebody's link");
+        let error = Pty::open(Some(&other)).expect_err("a link of somebody's is in the way");
+        assert_eq!(error.kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(fs::read_link(&other).expect("kept"), link);
     }
 }

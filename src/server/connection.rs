@@ -26,17 +26,17 @@ const BUFFER: usize = 32 * 1024;
 
 impl Server {
     /// Serves until `stop` is ready, then lets requests under way end.
-    pub async fn run(self, listeners: Listeners, stop: impl Future<Output = ()>) {
+    pub async fn run(self, mut listeners: Listeners, stop: impl Future<Output = ()>) {
         let shutdown = CancellationToken::new();
         let server = Arc::new(self);
         let mut accepting = JoinSet::new();
-        for listener in listeners.unix {
+        for listener in std::mem::take(&mut listeners.unix) {
             let server = Arc::clone(&server);
             accepting.spawn(server.accept(Peer::Unix, shutdown.clone(), async move || {
                 listener.accept().await.map(|(stream, _)| stream)
             }));
         }
-        for (listener, peer) in listeners.tcp {
+        for (listener, peer) in std::mem::take(&mut listeners.tcp) {
             let server = Arc::clone(&server);
             accepting.spawn(server.accept(peer, shutdown.clone(), async move || {
                 let (stream, _) = listener.accept().await?;
@@ -48,7 +48,7 @@ impl Server {
         stop.await;
         shutdown.cancel();
         while accepting.join_next().await.is_some() {}
-        listeners.made.iter().for_each(|path| drop(std::fs::remove_file(path)));
+        listeners.remove_made();
     }
 
     /// Takes connections in until the end, and waits for them then.

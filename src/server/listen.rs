@@ -3,7 +3,10 @@
 use std::{
     fs, io,
     net::SocketAddr,
-    os::unix::{fs::PermissionsExt as _, net::UnixStream},
+    os::unix::{
+        fs::{FileTypeExt as _, MetadataExt as _, PermissionsExt as _},
+        net::UnixStream,
+    },
     path::{Path, PathBuf},
 };
 
@@ -19,8 +22,31 @@ use crate::config::ServerKeys;
 pub struct Listeners {
     pub(super) unix: Vec<UnixListener>,
     pub(super) tcp: Vec<(TcpListener, Peer)>,
-    /// Files to remove at the end.
-    pub(super) made: Vec<PathBuf>,
+    /// Sockets to remove at the end.
+    made: Vec<Made>,
+}
+
+/// A socket that this process made: its path, device and inode.
+#[derive(Debug)]
+struct Made {
+    path: PathBuf,
+    id: (u64, u64),
+}
+
+impl Made {
+    fn at(path: PathBuf) -> io::Result<Self> {
+        let there = fs::symlink_metadata(&path)?;
+        Ok(Self { path, id: (there.dev(), there.ino()) })
+    }
+
+    /// Removes the socket, unless something else has taken its name.
+    fn remove(&self) {
+        let there = fs::symlink_metadata(&self.path);
+        if there.is_ok_and(|there| (there.dev(), there.ino()) == self.id) {
+            // Nothing more can be done about one that won't go.
+            drop(fs::remove_file(&self.path));
+        }
+    }
 }
 
 /// Why a socket can't be had.
@@ -45,6 +71,10 @@ impl ListenError {
                 "give server.socket in a folder that exists and that you may write to, or an \
                  empty one for no socket"
             }
+            io::ErrorKind::AlreadyExists => {
+                "only a socket that a dead sonard left behind is replaced: give server.socket a name \
+                 of its own"
+            }
             _ => "see server.socket and server.listen",
         }
     }
@@ -67,7 +97,7 @@ impl Listeners {
             let path = PathBuf::from(&keys.socket);
             let mode = u32::from_str_radix(&keys.socket_mode, 8).unwrap_or(0o600);
             listeners.unix.push(bind_unix(&path, mode).map_err(fail(&keys.socket))?);
-            listeners.made.push(path);
+            listeners.made.push(Made::at(path).map_err(fail(&keys.socket))?);
         }
         if let Some(address) = keys.listen.as_deref().filter(|_| listeners.tcp.is_empty()) {
             listeners.add_tcp(address).map_err(fail(address))?;
@@ -81,6 +111,11 @@ impl Listeners {
     /// As the system says.
     pub fn addresses(&self) -> io::Result<Vec<SocketAddr>> {
         self.tcp.iter().map(|(listener, _)| listener.local_addr()).collect()
+    }
+
+    /// Removes the sockets that were made.
+    pub(super) fn remove_made(&self) {
+        self.made.iter().for_each(Made::remove);
     }
 
     fn take_inherited(&mut self) -> io::Result<()> {
@@ -113,16 +148,21 @@ fn peer(address: SocketAddr) -> Peer {
     if address.ip().is_loopback() { Peer::Loopback } else { Peer::Network }
 }
 
-/// Makes the socket; one that a dead process left behind is replaced, a living one is not.
+/// Makes the socket; one that a dead process left behind is replaced, a living one is not, and
+/// nothing else is touched.
 fn bind_unix(path: &Path, mode: u32) -> io::Result<UnixListener> {
-    if path.exists() {
-        match UnixStream::connect(path) {
-            Ok(_) => return Err(io::ErrorKind::AddrInUse.into()),
-            Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => {
-                fs::remove_file(path)?;
-            }
-            Err(error) => return Err(error),
+    match fs::symlink_metadata(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+        Err(error) => return Err(error),
+        Ok(there) if !there.file_type().is_socket() => {
+            let error = "there is a file of that name, which is no socket";
+            return Err(io::Error::new(io::ErrorKind::AlreadyExists, error));
         }
+        Ok(_) => match UnixStream::connect(path) {
+            Ok(_) => return Err(io::ErrorKind::AddrInUse.into()),
+            Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => fs::remove_file(path)?,
+            Err(error) => return Err(error),
+        },
     }
     let listener = UnixListener::bind(path)?;
     fs::set_permissions(path, fs::Permissions::from_mode(mode))?;

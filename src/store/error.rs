@@ -4,6 +4,7 @@ use std::{io, path::PathBuf};
 
 use thiserror::Error;
 
+use super::FileKind;
 use crate::scan::EncodeError;
 
 /// Why a log can't be opened, written, synced or repaired.
@@ -16,6 +17,22 @@ pub enum StoreError {
         path: PathBuf,
         /// What the system says.
         source: io::Error,
+    },
+    /// The file can't be opened to read it.
+    #[error("cannot open {}: {source}", path.display())]
+    Unreadable {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// It is another kind of file.
+    #[error("{} is {kind}, not a log", path.display())]
+    NoLog {
+        /// Which file.
+        path: PathBuf,
+        /// What it is.
+        kind: FileKind,
     },
     /// Reading failed.
     #[error("cannot read {}: {source}", path.display())]
@@ -84,10 +101,13 @@ impl StoreError {
     #[must_use]
     pub fn help(&self) -> String {
         match self {
+            Self::Unreadable { source, .. } | Self::Read { source, .. } => {
+                help_for_reading(source).into()
+            }
             Self::Open { source, .. }
-            | Self::Read { source, .. }
             | Self::Write { source, .. }
             | Self::Sync { source, .. } => help_for(source),
+            Self::NoLog { kind, .. } => kind.instead_of_a_log().into(),
             Self::Busy { .. } => "wait until it is done, stop it, or choose another file".into(),
             Self::Torn { source, path } => {
                 format!("{}; then `sonard log repair {}`", help_for(source), path.display())
@@ -117,7 +137,18 @@ fn help_for(error: &io::Error) -> String {
             "choose a place where you may write, or change its permissions"
         }
         Kind::IsADirectory => "name a file in that folder",
+        Kind::InvalidInput => "move it out of the way, or choose another place",
         _ => "check the disk; every record synced before is in the log",
     }
     .into()
+}
+
+fn help_for_reading(error: &io::Error) -> &'static str {
+    use io::ErrorKind as Kind;
+    match error.kind() {
+        Kind::NotFound => "check the path",
+        Kind::PermissionDenied => "ask its owner for permission to read it, or read a copy",
+        Kind::IsADirectory => "name a file in that folder",
+        _ => "check the disk; copy what can still be read of it",
+    }
 }

@@ -69,6 +69,10 @@ pub fn log_files(folder: &Path) -> io::Result<Vec<LogFile>> {
         if name.starts_with(PREFIX) && name.ends_with(SUFFIX) {
             // A file that is removed at this moment is none.
             let Ok(metadata) = entry.metadata() else { continue };
+            // A link is not followed: a log is what this program wrote here itself.
+            if !metadata.is_file() {
+                continue;
+            }
             files.push(LogFile { name, bytes: metadata.len() });
         }
     }
@@ -182,7 +186,7 @@ impl LogFolder {
         let interval = self.rotation.sync_interval;
         let writer = match self.writer.take() {
             Some(writer) => writer,
-            None => LogWriter::open(&self.path)?.with_sync_interval(interval),
+            None => LogWriter::open(&self.path)?.with_sync_interval(interval).with_scenes_beside(),
         };
         Ok(self.writer.insert(writer))
     }

@@ -50,12 +50,16 @@ pub struct PastScan {
 struct Index {
     read_to: u64,
     session: Option<SessionPlace>,
+    /// Where the last session stands that has the text of its scene, and which scene.
+    text: Option<(u64, Option<SceneRef>)>,
     scans: Vec<Place>,
 }
 
 #[derive(Debug, Clone)]
 struct SessionPlace {
     at: u64,
+    /// The session before it that has the text of the same scene, if it has none itself.
+    text_at: Option<u64>,
     provenance: Provenance,
     scene: Option<SceneRef>,
 }
@@ -108,6 +112,23 @@ impl History {
         Ok(None)
     }
 
+    /// A scan without its readings, and its log; `None` if the newest logs have no such scan.
+    ///
+    /// # Errors
+    /// When the folder or a log in it can't be read.
+    pub fn outline(&mut self, scan: Uuid) -> io::Result<Option<(ScanView, PathBuf)>> {
+        for log in self.recent()? {
+            let path = self.folder.join(&log);
+            let places = &self.read_on(&log)?.scans;
+            if let Some(place) = places.iter().rev().find(|place| place.start.scan == scan) {
+                let mut records = read_session(&mut BufReader::new(File::open(&path)?), place)?;
+                records.push(Record::ScanStart(place.start.clone()));
+                return Ok(ScanView::from_records(records).pop().map(|view| (view, path)));
+            }
+        }
+        Ok(None)
+    }
+
     /// Names of the newest logs, newest first; what is known of others is forgotten.
     fn recent(&mut self) -> io::Result<Vec<String>> {
         let files = log_files(&self.folder)?;
@@ -142,19 +163,26 @@ impl History {
     }
 
     fn read(&self, log: &str, place: &Place) -> io::Result<Option<ScanView>> {
-        let mut records = Vec::new();
         let mut file = BufReader::new(File::open(self.folder.join(log))?);
-        if let Some(session) = &place.session {
-            file.seek(SeekFrom::Start(session.at))?;
-            records.extend(read_log(file.by_ref()).next().transpose()?);
-        }
+        let mut records = read_session(&mut file, place)?;
         file.seek(SeekFrom::Start(place.from))?;
         for line in read_log(file.take(place.to - place.from)) {
-            records.push(line?);
+            records.extend(line?.record);
         }
-        let views = ScanView::from_records(records.into_iter().filter_map(|line| line.record.ok()));
+        let views = ScanView::from_records(records);
         Ok(views.into_iter().find(|view| view.scan == place.start.scan))
     }
+}
+
+/// The session of a scan, after the one before it that has the text of its scene.
+fn read_session(file: &mut BufReader<File>, place: &Place) -> io::Result<Vec<Record>> {
+    let places = place.session.iter().flat_map(|session| session.text_at.into_iter().chain([session.at]));
+    let mut records = Vec::new();
+    for at in places {
+        file.seek(SeekFrom::Start(at))?;
+        records.extend(read_log(file.by_ref()).next().transpose()?.and_then(|line| line.record.ok()));
+    }
+    Ok(records)
 }
 
 impl Index {
@@ -166,7 +194,12 @@ impl Index {
         match record {
             Some(Ok(Record::Session(session))) => {
                 let (provenance, scene) = (session.provenance, session.scene);
-                self.session = Some(SessionPlace { at, provenance, scene });
+                if session.scene_text.is_some() {
+                    self.text = Some((at, scene.clone()));
+                }
+                let text = self.text.as_ref().filter(|(_, of)| *of == scene && scene.is_some());
+                let text_at = text.map(|(text_at, _)| *text_at).filter(|text_at| *text_at != at);
+                self.session = Some(SessionPlace { at, text_at, provenance, scene });
             }
             Some(Ok(Record::ScanStart(start))) => {
                 let session = self.session.clone();

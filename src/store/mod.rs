@@ -9,21 +9,27 @@ mod check;
 mod error;
 mod folder;
 mod history;
+mod kind;
 mod medium;
 mod open;
 mod reader;
 mod repair;
+mod scenes;
+mod whole;
 mod writer;
 
 pub use check::{Checker, Finding, FindingKind, Severity, Totals, check};
 pub use error::StoreError;
 pub use folder::{LogFile, LogFolder, Rotation, log_files};
 pub use history::{History, PastScan};
+pub use kind::{FileKind, HEAD_BYTES};
 pub use medium::{FileMedium, Medium, Pipe};
-pub use open::{Recovered, is_being_written};
+pub use open::{Recovered, is_being_written, open_own};
 pub(crate) use reader::open_for_reading;
 pub use reader::{Line, LineError, Lines, Loaded, load, read_log};
 pub use repair::{LeftOut, Repair, repair};
+pub use scenes::{MAX_LOGGED_SCENE_BYTES, SceneLost, logged_scene};
+pub use whole::WholeFile;
 pub use writer::{LogWriter, SYNC_INTERVAL};
 
 #[cfg(test)]

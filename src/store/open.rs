@@ -4,12 +4,12 @@ use std::{
     ffi::OsString,
     fs::{self, File, OpenOptions},
     io::{self, Seek, SeekFrom},
-    os::unix::fs::{FileExt, MetadataExt},
+    os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt},
     path::{Path, PathBuf},
 };
 
 use jiff::Timestamp;
-use rustix::fs::{FlockOperation, flock};
+use rustix::fs::{FlockOperation, OFlags, flock};
 
 use crate::scan::{Event, EventKind, MAX_LINE_BYTES};
 
@@ -52,10 +52,10 @@ pub(super) fn open_file(
     path: &Path,
 ) -> Result<(Box<dyn Medium + Send>, Option<Recovered>), StoreError> {
     let fail = |source| StoreError::Open { path: path.into(), source };
-    let existing = fs::metadata(path);
-    if existing.as_ref().is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
+    let existing = fs::symlink_metadata(path);
+    if existing.as_ref().is_ok_and(|meta| !meta.is_file() && !meta.is_dir() && !meta.is_symlink()) {
         // A FIFO or a device: nothing to lock, nothing to mend.
-        let file = OpenOptions::new().append(true).open(path).map_err(fail)?;
+        let file = open_own(OpenOptions::new().append(true), path).map_err(fail)?;
         return Ok((Box::new(Pipe(file)), None));
     }
     let file = open_locked(path)?;
@@ -66,15 +66,35 @@ pub(super) fn open_file(
     Ok((Box::new(FileMedium(file)), recovered))
 }
 
+/// Opens a file that is to be changed, where it is: a symbolic link in its place is refused, since
+/// what it leads to is not this program's to mend.
+///
+/// # Errors
+/// As the system says, or that it is a link.
+pub fn open_own(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
+    let opened = options.custom_flags(OFlags::NOFOLLOW.bits().cast_signed()).open(path);
+    opened.map_err(|error| match fs::symlink_metadata(path) {
+        Ok(there) if there.is_symlink() => io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "it is a symbolic link, and what it leads to is not written to",
+        ),
+        _ => error,
+    })
+}
+
 /// Opens and locks a regular file, and makes sure that the path still means it: a repair may
 /// have put another file in its place between the two.
 fn open_locked(path: &Path) -> Result<File, StoreError> {
     let fail = |source| StoreError::Open { path: path.into(), source };
     loop {
-        let file =
-            OpenOptions::new().read(true).append(true).create(true).open(path).map_err(fail)?;
+        let file = open_own(OpenOptions::new().read(true).append(true).create(true), path)
+            .map_err(fail)?;
+        let ours = file.metadata().map_err(fail)?;
+        if !ours.is_file() {
+            return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, "it is no regular file")));
+        }
         lock(&file, path)?;
-        let (ours, named) = (file.metadata().map_err(fail)?, fs::metadata(path));
+        let named = fs::symlink_metadata(path);
         if named.is_ok_and(|named| (named.dev(), named.ino()) == (ours.dev(), ours.ino())) {
             return Ok(file);
         }

@@ -8,7 +8,7 @@ use std::{
 
 use crate::scan::{FaultKind, MAX_LINE_BYTES, Record, RecordError, decode_line};
 
-use super::StoreError;
+use super::{FileKind, HEAD_BYTES, StoreError};
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
@@ -176,12 +176,19 @@ pub fn load(path: &Path) -> Result<Loaded, StoreError> {
 /// Opens a file, or standard input for `-`, for [`read_log`].
 pub(crate) fn open_for_reading(path: &Path) -> Result<Box<dyn BufRead>, StoreError> {
     if path == Path::new("-") {
-        return Ok(Box::new(io::stdin().lock()));
+        return refuse_other(path, Box::new(io::stdin().lock()));
     }
-    let fail = |source| StoreError::Open { path: PathBuf::from(path), source };
+    let fail = |source| StoreError::Unreadable { path: PathBuf::from(path), source };
     let file = fs::File::open(path).map_err(fail)?;
     if file.metadata().map_err(fail)?.is_dir() {
         return Err(fail(io::ErrorKind::IsADirectory.into()));
     }
-    Ok(Box::new(io::BufReader::with_capacity(1 << 16, file)))
+    refuse_other(path, Box::new(io::BufReader::with_capacity(HEAD_BYTES, file)))
+}
+
+/// Names what is plainly no log instead of finding fault with each of its lines.
+fn refuse_other(path: &Path, mut reader: Box<dyn BufRead>) -> Result<Box<dyn BufRead>, StoreError> {
+    let fail = |source| StoreError::Read { path: path.into(), source };
+    let kind = FileKind::of(reader.fill_buf().map_err(fail)?);
+    if kind.is_no_log() { Err(StoreError::NoLog { path: path.into(), kind }) } else { Ok(reader) }
 }

@@ -2,16 +2,16 @@
 
 use std::{
     fs::{self, File, OpenOptions},
-    io::{self, BufReader, BufWriter, Write},
+    io::{self, BufRead as _, BufReader, BufWriter, Write},
     path::{Path, PathBuf},
 };
 
 use crate::scan::{FaultKind, RecordError};
 
 use super::{
-    Line, LineError, StoreError,
-    open::{lock, sync_folder_of, with_suffix},
-    read_log,
+    FileKind, Line, LineError, StoreError,
+    open::{lock, open_own, sync_folder_of, with_suffix},
+    open_for_reading, read_log,
 };
 
 /// A line that a repair left out.
@@ -56,11 +56,13 @@ pub struct Repair {
 pub fn repair(path: &Path) -> Result<Repair, StoreError> {
     // A link to a log is repaired where the log is.
     let path =
-        &fs::canonicalize(path).map_err(|source| StoreError::Open { path: path.into(), source })?;
+        &fs::canonicalize(path).map_err(|source| StoreError::Unreadable { path: path.into(), source })?;
+    // Other files have no records to keep.
+    drop(open_for_reading(path)?);
     let open = |source| StoreError::Open { path: path.clone(), source };
-    let file = File::open(path).map_err(open)?;
-    if file.metadata().map_err(open)?.is_dir() {
-        return Err(open(io::ErrorKind::IsADirectory.into()));
+    let file = open_own(OpenOptions::new().read(true), path).map_err(open)?;
+    if !file.metadata().map_err(open)?.is_file() {
+        return Err(open(io::Error::new(io::ErrorKind::InvalidInput, "it is no regular file")));
     }
     lock(&file, path)?;
     let draft = Draft::create(path)?;
@@ -69,6 +71,11 @@ pub fn repair(path: &Path) -> Result<Repair, StoreError> {
     for line in read_log(BufReader::with_capacity(1 << 16, &file)) {
         let line = line.map_err(|source| StoreError::Read { path: path.clone(), source })?;
         repair.take(&line, &mut out).map_err(|source| draft.fail(source))?;
+    }
+    if repair.kept == 0 && repair.kept_unread.is_empty() && !repair.left_out.is_empty() {
+        // There is nothing to keep: it is some other file, and stays what it is.
+        let kind = open_for_reading(path)?.fill_buf().map_or(FileKind::Binary, FileKind::of);
+        return Err(StoreError::NoLog { path: path.clone(), kind });
     }
     out.flush().map_err(|source| draft.fail(source))?;
     drop(out);

@@ -6,6 +6,7 @@ mod folder;
 mod history;
 mod reading;
 mod repairing;
+mod scenes;
 
 use std::path::{Path, PathBuf};
 

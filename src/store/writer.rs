@@ -11,6 +11,7 @@ use crate::scan::{Record, encode_line};
 use super::{
     Medium, Pipe, StoreError,
     open::{Recovered, open_file},
+    scenes::SceneKeeper,
 };
 
 /// How long a record may wait for the disk while others follow it.
@@ -35,6 +36,7 @@ pub struct LogWriter<M: Medium = Box<dyn Medium + Send>> {
     synced: u64,
     failed: bool,
     recovered: Option<Recovered>,
+    scenes: SceneKeeper,
 }
 
 impl LogWriter {
@@ -76,6 +78,7 @@ impl<M: Medium> LogWriter<M> {
             synced: 0,
             failed: false,
             recovered: None,
+            scenes: SceneKeeper::default(),
         }
     }
 
@@ -83,6 +86,13 @@ impl<M: Medium> LogWriter<M> {
     #[must_use]
     pub fn with_sync_interval(mut self, interval: Duration) -> Self {
         self.interval = interval;
+        self
+    }
+
+    /// The same, with scenes too long for a line kept in the log's folder.
+    #[must_use]
+    pub fn with_scenes_beside(mut self) -> Self {
+        self.scenes = SceneKeeper::beside(&self.path);
         self
     }
 
@@ -102,9 +112,11 @@ impl<M: Medium> LogWriter<M> {
     pub fn append_at(&mut self, record: &Record, now: Instant) -> Result<(), StoreError> {
         self.check_usable()?;
         self.line.clear();
-        encode_line(record, &mut self.line)
+        let shorter = self.scenes.shortened(record)?;
+        encode_line(shorter.as_ref().unwrap_or(record), &mut self.line)
             .map_err(|source| StoreError::Record { path: self.path.clone(), source })?;
         self.write_line()?;
+        self.scenes.written(record);
         self.appended += 1;
         self.waiting_since.get_or_insert(now);
         if matches!(record, Record::ScanEnd(_)) { self.sync() } else { self.sync_if_due(now) }
@@ -148,6 +160,11 @@ impl<M: Medium> LogWriter<M> {
     /// As for [`sync`](Self::sync).
     pub fn close(mut self) -> Result<(), StoreError> {
         self.sync()
+    }
+
+    /// What it writes to: for what is to happen to it after the last record.
+    pub fn medium_mut(&mut self) -> &mut M {
+        &mut self.medium
     }
 
     /// Records appended through this writer.

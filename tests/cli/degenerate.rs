@@ -20,6 +20,7 @@ fn scan(folder: &Path, pose: &str) -> Vec<String> {
         "3",
         "--step-deg",
         "3.6",
+        "--force",
         "--out",
         path,
     ]);

@@ -95,7 +95,7 @@ fn wrong_input_is_refused_with_what_would_be_right() {
     fs::write(folder.path().join("empty.jsonl"), "").expect("written");
     let cases: [(&[&str], &str); 7] = [
         (&["nowhere.jsonl", "-o", "a.svg"], "nowhere.jsonl"),
-        (&["empty.jsonl", "-o", "a.svg"], "no scan in this log"),
+        (&["empty.jsonl", "-o", "a.svg"], "holds no record"),
         (&["scan.jsonl", "-o", "a.pdf"], ".svg or .png"),
         (&["scan.jsonl", "-o", "a.svg", "--scan", "3"], "1 to 2"),
         (&["scan.jsonl", "-o", "a.svg", "--scan", "ff"], "no such scan"),

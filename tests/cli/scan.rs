@@ -139,7 +139,7 @@ fn a_second_run_into_the_same_folder_keeps_the_first() {
     let few = ["--to-deg", "9"];
     assert_eq!(mock_scan("fig9", folder.path(), &few).status.code(), Some(0));
     let before = fs::read(folder.path().join("scan.jsonl")).expect("a log");
-    assert_eq!(mock_scan("fig7", folder.path(), &few).status.code(), Some(0));
+    assert_eq!(mock_scan("fig9", folder.path(), &few).status.code(), Some(0));
     let after = fs::read(folder.path().join("scan.jsonl")).expect("a log");
     assert!(after.starts_with(&before) && after.len() > before.len());
     assert_eq!(Log::read(&folder.path().join("scan.jsonl")).of_type("session").count(), 2);

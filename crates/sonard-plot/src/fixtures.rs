@@ -48,6 +48,7 @@ pub(super) fn room() -> Scene {
         ]),
         robot: None,
         sha256: String::new(),
+        text: "".into(),
     }
 }
 
@@ -135,6 +136,7 @@ pub(super) fn session() -> Session {
         array: None,
         air: (&air).into(),
         scene: Some(SceneRef { name: "simple-room".into(), sha256: String::new() }),
+        scene_text: None,
         model: Some(ModelRecord { engine: "fan".into(), settings: serde_json::Map::new() }),
         collection: None,
     }

@@ -1,5 +1,7 @@
 //! The log's records: one JSON object a line. These names are the project's public interface.
 
+use std::sync::Arc;
+
 use jiff::Timestamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -67,6 +69,11 @@ pub struct Session {
     pub air: AirRecord,
     /// The scene the model was given.
     pub scene: Option<SceneRef>,
+    /// The text of that scene's file, so that a log is whole by itself. In a log it stands once: a
+    /// later session of the same scene goes without, and so does one of a scene too long for a line,
+    /// which is kept beside the log.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene_text: Option<Arc<str>>,
     /// The model whose predictions stand beside the readings.
     pub model: Option<ModelRecord>,
     /// The collection that its scans were taken for, if it was one.

@@ -1,5 +1,7 @@
 //! Scans made by the model alone.
 
+use std::sync::Arc;
+
 use jiff::Timestamp;
 use uuid::Uuid;
 
@@ -66,6 +68,8 @@ impl Session {
             array: None,
             air: simulator.air().into(),
             scene: Some(SceneRef::of(scene)),
+            // A scene that was never a file has no text.
+            scene_text: Some(Arc::clone(&scene.text)).filter(|text| !text.is_empty()),
             model: Some(simulator.options().into()),
             collection: None,
         }

@@ -4,7 +4,7 @@ use std::{collections::VecDeque, iter::Fuse, sync::Arc};
 
 use uuid::Uuid;
 
-use super::{Event, Ping, Record, ScanEnd, ScanStart, Session};
+use super::{Event, Ping, Record, ScanEnd, ScanStart, SceneRef, Session};
 use sonard_model::geometry::Pose;
 
 /// One scan with the session it was taken in.
@@ -63,6 +63,8 @@ impl ScanView {
 #[derive(Default)]
 struct Gathered {
     session: Option<Arc<Session>>,
+    /// The last scene that came with its text: its SHA-256, and the text.
+    scene: Option<(String, Arc<str>)>,
     /// In the order in which they begin.
     scans: Vec<ScanView>,
     /// Numbers of the first and last record of each.
@@ -74,7 +76,7 @@ impl Gathered {
     fn add(&mut self, record: Record) {
         self.count += 1;
         match record {
-            Record::Session(opened) => self.session = Some(Arc::from(opened)),
+            Record::Session(opened) => self.begin_session(opened),
             Record::ScanStart(start) => {
                 let view = self.entry(start.scan);
                 view.start = Some(start);
@@ -90,6 +92,20 @@ impl Gathered {
                 }
             }
         }
+    }
+
+    /// A log has the text of a scene once: later sessions get it back.
+    fn begin_session(&mut self, mut session: Box<Session>) {
+        if let Some(SceneRef { sha256, .. }) = &session.scene {
+            match (&session.scene_text, &self.scene) {
+                (Some(text), _) => self.scene = Some((sha256.clone(), Arc::clone(text))),
+                (None, Some((known, text))) if known == sha256 => {
+                    session.scene_text = Some(Arc::clone(text));
+                }
+                (None, _) => {}
+            }
+        }
+        self.session = Some(Arc::from(session));
     }
 
     /// The view of `scan`, made if this is its first record.

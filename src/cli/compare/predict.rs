@@ -8,46 +8,91 @@ use crate::{
     cli::Failure,
     geometry::Pose,
     model::{ArrayModel, EngineKind, ModelError, Options, Simulator},
-    scan::{Ping, ScanView, Session, SimRecord},
+    scan::{Ping, Provenance, ScanView, Session, SimRecord},
     scene::Scene,
+    store::logged_scene,
 };
 
-/// Puts the model's reading in `scene` beside each reading of `scans`, in place of what the log
-/// has there. Sensor, array, air and model are those of the scan's session.
-///
-/// # Errors
-/// When the ranger can't stand in the scene where it stood, or the session's figures make no
-/// sense.
-pub(super) fn predict(log: &Path, scans: &mut [ScanView], scene: &Scene) -> Result<(), Failure> {
-    let mut made: Option<(Arc<Session>, ArrayModel)> = None;
-    for scan in scans {
-        for ping in &mut scan.pings {
-            (ping.sim, ping.residual_m) = (None, None);
-        }
+/// Puts the model's reading in a scene beside each reading. Sensor, array, air and model are those of
+/// the scan's session.
+pub(super) struct Predictor<'a> {
+    log: &'a Path,
+    /// The scene to predict in, in place of what the log has.
+    given: Option<&'a Arc<Scene>>,
+    /// The scene of the session of the scan before.
+    logged: Option<(Arc<Session>, Option<Arc<Scene>>)>,
+    /// An array's scans are many and short, and a session's share their model.
+    made: Option<(Arc<Session>, ArrayModel)>,
+}
+
+impl<'a> Predictor<'a> {
+    /// For the scans of a log.
+    pub(super) const fn new(log: &'a Path, given: Option<&'a Arc<Scene>>) -> Self {
+        Self { log, given, logged: None, made: None }
+    }
+
+    /// Predicts a scan again in the scene given; without one, in the log's own scene what has no
+    /// prediction.
+    ///
+    /// # Errors
+    /// When the ranger can't stand in the scene where it stood, or the session's figures make no
+    /// sense.
+    pub(super) fn predict(&mut self, scan: &mut ScanView) -> Result<(), Failure> {
         let (Some(pose), Some(session)) = (scan.pose(), scan.session.clone()) else {
-            let (log, id) = (log.display(), scan.scan);
-            anstream::eprintln!("{log}: scan {id} lacks its pose or session: no prediction");
-            continue;
+            if self.given.is_some() {
+                let (log, id) = (self.log.display(), scan.scan);
+                anstream::eprintln!("{log}: scan {id} lacks its pose or session: no prediction");
+                forget(scan);
+            }
+            return Ok(());
         };
+        let scene = match self.given {
+            Some(scene) => Some(Arc::clone(scene)),
+            None => self.own_scene(scan, &session),
+        };
+        let Some(scene) = scene else { return Ok(()) };
+        forget(scan);
         let Some(array) = &session.array else {
             scene.check_pose(&pose).map_err(|error| Failure::input(&error, error.help()))?;
-            let simulator = simulator(log, scene.with_robot_at(&pose), &session)?;
+            let simulator = simulator(self.log, scene.with_robot_at(&pose), &session)?;
             let station = simulator.station(pose.position());
             for ping in &mut scan.pings {
                 let prediction = station.ping(pose.direction_rad(ping.azimuth_deg));
                 set_beside(ping, SimRecord::of(&simulator, &prediction));
             }
-            continue;
+            return Ok(());
         };
-        // An array's scans are many and short, and a session's share their model.
-        let model = match made.take() {
+        let model = match self.made.take() {
             Some((of, model)) if Arc::ptr_eq(&of, &session) => model,
-            _ => array_model(log, array, scene, &session)?,
+            _ => array_model(self.log, array, &scene, &session)?,
         };
         predict_array(scan, &pose, &model)?;
-        made = Some((session, model));
+        self.made = Some((session, model));
+        Ok(())
     }
-    Ok(())
+
+    /// The scene that the log holds, for measured scans without predictions. A simulated scan beside
+    /// itself would say nothing.
+    fn own_scene(&mut self, scan: &ScanView, session: &Arc<Session>) -> Option<Arc<Scene>> {
+        let measured = session.provenance != Provenance::Simulated && session.model.is_some();
+        if !measured || scan.pings.iter().any(|ping| ping.sim.is_some()) {
+            return None;
+        }
+        match &self.logged {
+            Some((of, scene)) if Arc::ptr_eq(of, session) => scene.clone(),
+            _ => {
+                let scene = logged_scene(session, self.log).ok().flatten().map(Arc::new);
+                self.logged = Some((Arc::clone(session), scene.clone()));
+                scene
+            }
+        }
+    }
+}
+
+fn forget(scan: &mut ScanView) {
+    for ping in &mut scan.pings {
+        (ping.sim, ping.residual_m) = (None, None);
+    }
 }
 
 /// The same for the scan of an array; a reading of a ranger that it does not have stays alone.

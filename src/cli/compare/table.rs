@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 
 use crate::{
     compare::{Comparison, Judged, Verdict},
-    scan::{PathKind, PathRecord, PingStatus},
+    scan::{PathKind, PathRecord, Ping, PingStatus},
 };
 
 /// A rule above, below and under the header.
@@ -19,18 +19,17 @@ pub(in crate::cli) const RULED: TableStyle = TableStyle::new()
 pub(super) fn print(
     out: &mut impl Write,
     comparison: &Comparison,
-    judged: &[Judged<'_>],
-    worst: usize,
+    worst: &Worst,
 ) -> io::Result<()> {
     print_numbers(out, comparison)?;
     if comparison.beams > 0 {
         writeln!(out, "{}", verdict_table(comparison))?;
     }
-    let apart = worst_residuals(judged, worst);
+    let apart = worst.apart();
     if !apart.is_empty() {
         writeln!(out, "Largest residuals:\n{}", beam_table(&apart))?;
     }
-    let one_sided = one_sided(judged, worst);
+    let one_sided = worst.one_sided();
     if !one_sided.is_empty() {
         writeln!(out, "Heard on one side only, or near on one only:\n{}", beam_table(&one_sided))?;
     }
@@ -38,8 +37,9 @@ pub(super) fn print(
 }
 
 fn print_numbers(out: &mut impl Write, comparison: &Comparison) -> io::Result<()> {
-    let Comparison { beams, both_echo, agree, scans, duplicates, .. } = *comparison;
-    writeln!(out, "{beams} beams compared, in {scans} scan(s)")?;
+    let Comparison { beams, both_echo, agree, scans, poses, duplicates, .. } = *comparison;
+    let at = if poses > 1 { format!(" at {poses} poses, all together") } else { String::new() };
+    writeln!(out, "{beams} beams compared, in {scans} scan(s){at}")?;
     let skipped = comparison.not_compared;
     for (count, why) in [
         (skipped.link_lost, "not compared: the reading was lost"),
@@ -90,7 +90,7 @@ fn verdict_table(comparison: &Comparison) -> Table {
     table
 }
 
-fn beam_table(beams: &[&Judged<'_>]) -> Table {
+fn beam_table(beams: &[&Beam]) -> Table {
     let mut table = Table::new();
     table.load_style(RULED).set_header([
         "beam",
@@ -101,7 +101,7 @@ fn beam_table(beams: &[&Judged<'_>]) -> Table {
         "margin",
         "predicted path",
     ]);
-    for Judged { ping, residual_m, .. } in beams {
+    for Beam { ping, residual_m } in beams {
         let sim = ping.sim.as_ref();
         let margin_db = sim.and_then(|sim| sim.margin_db);
         table.add_row([
@@ -120,26 +120,81 @@ fn beam_table(beams: &[&Judged<'_>]) -> Table {
     table
 }
 
-/// The pairs of echoes farthest apart, and only those that disagree.
-fn worst_residuals<'a, 'b>(judged: &'a [Judged<'b>], count: usize) -> Vec<&'a Judged<'b>> {
-    let size = |beam: &Judged<'_>| beam.residual_m.map_or(0.0, f64::abs);
-    let mut beams: Vec<_> = judged
-        .iter()
-        .filter(|beam| beam.verdict == Ok(Verdict::Unexplained) && beam.residual_m.is_some())
-        .collect();
-    beams.sort_by(|a, b| size(b).total_cmp(&size(a)));
-    beams.truncate(count);
-    beams
+/// A beam that fits badly.
+#[derive(Debug, Clone)]
+struct Beam {
+    ping: Ping,
+    residual_m: Option<f64>,
 }
 
-/// Some unexplained beams without a residual, spread over the scan.
-fn one_sided<'a, 'b>(judged: &'a [Judged<'b>], count: usize) -> Vec<&'a Judged<'b>> {
-    let beams: Vec<_> = judged
-        .iter()
-        .filter(|beam| beam.verdict == Ok(Verdict::Unexplained) && beam.residual_m.is_none())
-        .collect();
-    let stride = beams.len().div_ceil(count.max(1)).max(1);
-    beams.into_iter().step_by(stride).take(count).collect()
+/// The beams that fit worst, of scans that come one by one.
+#[derive(Debug)]
+pub(super) struct Worst {
+    count: usize,
+    apart: Vec<Beam>,
+    /// Every `stride`th of the unexplained beams without a residual.
+    one_sided: Vec<Beam>,
+    stride: usize,
+    seen: usize,
+}
+
+/// Beams without a residual that are kept to choose from.
+const KEPT: usize = 1024;
+
+impl Worst {
+    /// As many as this of each kind.
+    pub(super) const fn new(count: usize) -> Self {
+        Self { count, apart: Vec::new(), one_sided: Vec::new(), stride: 1, seen: 0 }
+    }
+
+    /// Takes in the beams of a scan.
+    pub(super) fn add(&mut self, judged: &[Judged<'_>]) {
+        for beam in judged.iter().filter(|beam| beam.verdict == Ok(Verdict::Unexplained)) {
+            let keep = || Beam { ping: beam.ping.clone(), residual_m: beam.residual_m };
+            match beam.residual_m {
+                Some(m) if self.least_m().is_none_or(|least_m| m.abs() > least_m) => {
+                    self.apart.push(keep());
+                }
+                Some(_) => {}
+                None => {
+                    if self.seen.is_multiple_of(self.stride) {
+                        self.one_sided.push(keep());
+                    }
+                    self.seen += 1;
+                }
+            }
+        }
+        self.apart.sort_by(|a, b| size(b).total_cmp(&size(a)));
+        self.apart.truncate(self.count);
+        while self.one_sided.len() > KEPT.max(2 * self.count) {
+            let mut place = 0;
+            self.one_sided.retain(|_| {
+                place += 1;
+                place % 2 == 1
+            });
+            self.stride *= 2;
+        }
+    }
+
+    /// What a residual must exceed to be listed, metres.
+    fn least_m(&self) -> Option<f64> {
+        (self.apart.len() >= self.count).then(|| self.apart.last().map_or(f64::INFINITY, size))
+    }
+
+    /// The pairs of echoes farthest apart, and only those that disagree.
+    fn apart(&self) -> Vec<&Beam> {
+        self.apart.iter().collect()
+    }
+
+    /// Some unexplained beams without a residual, spread over the scans.
+    fn one_sided(&self) -> Vec<&Beam> {
+        let stride = self.one_sided.len().div_ceil(self.count.max(1)).max(1);
+        self.one_sided.iter().step_by(stride).take(self.count).collect()
+    }
+}
+
+fn size(beam: &Beam) -> f64 {
+    beam.residual_m.map_or(0.0, f64::abs)
 }
 
 fn right_align(table: &mut Table, from: usize) {

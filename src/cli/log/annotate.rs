@@ -10,9 +10,9 @@ use std::{
 use uuid::Uuid;
 
 use super::super::{
-    files::save,
+    logs::for_each_record,
     map::{EXTEND_M, MAX_RANGE_M},
-    picture::warn_of_damage,
+    output::{OutPath, Overwrite, Product},
 };
 use super::{Failure, Outcome};
 use crate::{
@@ -22,7 +22,6 @@ use crate::{
         prediction::{FeaturePrediction, PredictionSettings},
     },
     scan::{Ping, PingStatus, Record, ScanView, Session},
-    store::load,
 };
 
 /// Options of `sonard log annotate`.
@@ -33,7 +32,9 @@ pub(in crate::cli) struct Args {
     log: PathBuf,
     /// Where to write it with confidences [default: standard output]
     #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
+    out: Option<OutPath>,
+    #[command(flatten)]
+    overwrite: Overwrite,
     /// Take longer ranges as silence, metres [default: the sensor's, at most 5]
     #[arg(long, value_name = "M")]
     max_range: Option<f64>,
@@ -63,15 +64,12 @@ pub(super) fn run(args: &Args) -> Outcome {
         let help = "give a length in metres, greater than 0";
         return Err(Failure::input(format!("--max-range is {range_m}"), help));
     }
-    if args.out.as_deref().is_some_and(|out| out == args.log) {
-        return Err(Failure::input(
-            format!("--out {} is the log itself", args.log.display()),
-            "give another file: a log is never changed in place",
-        ));
+    if let Some(out) = &args.out {
+        args.overwrite.check(out, Product::Log)?;
     }
-    let loaded = load(&args.log).map_err(|error| Failure::input(&error, error.help()))?;
-    warn_of_damage(&args.log, &loaded.damaged);
-    let confidences = confidences(args, &loaded.records)?;
+    let mut records = Vec::new();
+    for_each_record(&args.log, |record| records.push(record))?;
+    let confidences = confidences(args, &records)?;
     if confidences.is_empty() {
         return Err(Failure::input(
             format!("{}: there is no scan with its session and pose to weigh", args.log.display()),
@@ -79,7 +77,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         ));
     }
     let mut bytes = Vec::new();
-    for mut record in loaded.records {
+    for mut record in records {
         if let Record::Ping(ping) = &mut record {
             ping.confidence = confidences.get(&key(ping)).copied().filter(|_| is_weighed(ping));
         }
@@ -88,7 +86,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         bytes.push(b'\n');
     }
     match &args.out {
-        Some(out) => save(out, &bytes),
+        Some(out) => args.overwrite.save(out, Product::Log, &bytes),
         None => write_out(&bytes).or_else(|error| Failure::from_write("standard output", &error)),
     }
 }

@@ -1,6 +1,7 @@
 //! `sonard log show`.
 
 mod follow;
+mod readings;
 mod summary;
 mod text;
 
@@ -9,8 +10,10 @@ use std::{
     path::PathBuf,
 };
 
+use super::super::progress;
 use super::{Failure, Outcome};
-use crate::store::{StoreError, load, open_for_reading, read_log};
+use crate::store::{StoreError, open_for_reading, read_log};
+use readings::Readings;
 use summary::Summary;
 
 /// Options of `sonard log show`.
@@ -41,18 +44,39 @@ pub(super) fn run(args: &Args) -> Outcome {
     if args.follow {
         return follow(args);
     }
-    let loaded = load(&args.log)?;
-    let summary = Summary::of(&loaded);
+    let summary = read(args)?;
     let mut out = io::stdout().lock();
     let printed = if args.json {
         summary.items.iter().try_for_each(|item| {
             serde_json::to_writer(&mut out, item)?;
             writeln!(out)
         })
+    } else if args.pings {
+        let readings = Readings::of(&args.log)?;
+        text::print(&mut out, &summary, Some(readings))
     } else {
-        text::print(&mut out, &summary, args.pings.then_some(&loaded))
+        text::print(&mut out, &summary, None)
     };
     printed.or_else(|error| Failure::from_write("standard output", &error))
+}
+
+/// Goes through the log once; with its readings listed, once more afterwards.
+fn read(args: &Args) -> Result<Summary, Failure> {
+    if args.pings && args.log.as_os_str() == "-" {
+        return Err(Failure::input(
+            "readings of standard input can't be listed: they are read twice",
+            "name the log's file, or use --follow",
+        ));
+    }
+    let mut summary = Summary::default();
+    for line in read_log(progress::reading(&args.log, open_for_reading(&args.log)?)) {
+        let line = line.map_err(|source| StoreError::Read { path: args.log.clone(), source })?;
+        match line.record {
+            Ok(record) => summary.add(record),
+            Err(error) => summary.damaged(&error),
+        }
+    }
+    Ok(summary.finished())
 }
 
 fn follow(args: &Args) -> Outcome {

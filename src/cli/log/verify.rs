@@ -15,6 +15,8 @@ use crate::store::{
 
 /// Findings printed for one log unless all are asked for.
 const SHOWN: u64 = 40;
+/// Damaged lines among them.
+const SHOWN_DAMAGED: u64 = 5;
 
 /// Options of `sonard log verify`.
 #[derive(Debug, clap::Args)]
@@ -55,10 +57,13 @@ fn verify(log: &Path, args: &Args) -> Result<Totals, Failure> {
     let reader = open_for_reading(log)?;
     let mut out = io::stdout().lock();
     let mut printed = Ok(());
-    let (mut shown, mut hidden, mut torn) = (0, 0, false);
+    let (mut shown, mut damaged, mut hidden, mut torn) = (0, 0, 0, false);
     let totals = check(reader, |finding| {
         torn |= matches!(finding.kind, FindingKind::TornTail | FindingKind::NoNewline);
-        if !args.all && !args.json && shown == SHOWN {
+        damaged += u64::from(finding.kind == FindingKind::Damaged);
+        let enough = shown == SHOWN
+            || (finding.kind == FindingKind::Damaged && damaged > SHOWN_DAMAGED);
+        if !args.all && !args.json && enough {
             hidden += 1;
         } else if printed.is_ok() {
             shown += 1;

@@ -11,7 +11,8 @@ use crate::{
     },
     client::RequestedScans,
     compare::compare,
-    scan::{Record, ScanEnd},
+    geometry::Pose,
+    scan::{Record, ScanEnd, ScanPlan},
 };
 
 pub(super) fn run(args: &Args) -> Outcome {
@@ -20,7 +21,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let wish = json!({"scans": args.repeat, "plan": plan, "pose": pose});
     let client = args.at.client()?;
     let output = Output::open(args.out.as_deref())?;
-    let mut scans = Scans { output, wanted: args.repeat, ends: Vec::new(), told_again: 0 };
+    let mut scans = Scans { output, wanted: args.repeat, ends: Vec::new(), told_again: 0, pose, plan };
     let measured = runtime::new()?.block_on(async {
         let interrupts = Interrupts::listen();
         let status: Value = client.get_json("/v1/status").await.map_err(|error| refuse(&error))?;
@@ -43,6 +44,8 @@ struct Scans {
     ends: Vec<ScanEnd>,
     /// Readings fetched again that were told of.
     told_again: usize,
+    pose: Pose,
+    plan: ScanPlan,
 }
 
 impl Scans {
@@ -77,6 +80,9 @@ impl Scans {
     }
 
     fn take_in(&mut self, record: &Record) -> Outcome {
+        if let Record::Session(session) = record {
+            self.output.add_to_earlier(session, self.pose, self.plan)?;
+        }
         if let Record::ScanStart(start) = record {
             let turn = self.ends.len() as u32 + 1;
             self.output.begin_scan(turn, self.wanted, start.plan.beams());

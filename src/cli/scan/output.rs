@@ -1,20 +1,24 @@
 //! Where a scan's records, bar and pictures go.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+mod earlier;
+
+use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::{
-    cli::{Failure, Outcome},
+    cli::{
+        Failure, Outcome,
+        output::{Overwrite, Product, make_folder},
+    },
+    geometry::Pose,
     plot,
     ranger::Sink,
-    scan::{Record, ScanView},
+    scan::{Record, ScanPlan, ScanView, Session},
     scene::Scene,
     store::{LogWriter, StoreError},
 };
+use earlier::Earlier;
 
 const PICTURE_WIDTH_PX: u32 = 1600;
 
@@ -22,6 +26,8 @@ const PICTURE_WIDTH_PX: u32 = 1600;
 pub(super) struct Output {
     log: Option<LogWriter>,
     folder: Option<PathBuf>,
+    /// What was in the folder's log before, until the first scan.
+    earlier: Option<Earlier>,
     bar: ProgressBar,
     records: Vec<Record>,
 }
@@ -29,13 +35,14 @@ pub(super) struct Output {
 impl Output {
     /// Opens `scan.jsonl` in `folder` (made if it isn't there), or standard output.
     pub(super) fn open(folder: Option<&Path>) -> Result<Self, Failure> {
-        let log = match folder {
+        let (log, earlier) = match folder {
             Some(folder) => open_log(folder)?,
-            None => LogWriter::stdout(),
+            None => (LogWriter::stdout(), None),
         };
         Ok(Self {
             log: Some(log),
             folder: folder.map(Path::to_path_buf),
+            earlier,
             bar: ProgressBar::hidden(),
             records: Vec::new(),
         })
@@ -65,6 +72,19 @@ impl Output {
         self.folder.as_deref()
     }
 
+    /// Makes sure that what is to be added to the folder's log was taken like what is in it, and says
+    /// what it is added to. Asked with the session and the beginning of the first scan, before either is
+    /// written.
+    pub(super) fn add_to_earlier(
+        &mut self,
+        session: &Session,
+        pose: Pose,
+        plan: ScanPlan,
+    ) -> Outcome {
+        let Some(earlier) = self.earlier.take() else { return Ok(()) };
+        earlier.agree(session, pose, plan)
+    }
+
     /// Writes a record outside a scan.
     pub(super) fn record(&mut self, record: &Record) -> Outcome {
         Sink::record(self, record).map_err(|error| Failure::device(&error, error.help()))
@@ -84,8 +104,9 @@ impl Output {
         let png = picture.to_png(PICTURE_WIDTH_PX).map_err(|error| {
             Failure::device(format!("cannot draw the scan: {error}"), "the log is complete")
         })?;
-        write(&folder.join("scan.svg"), picture.to_svg().as_bytes())?;
-        write(&folder.join("scan.png"), &png)
+        let overwrite = Overwrite::default();
+        overwrite.save(&folder.join(SVG), Product::Svg, picture.to_svg().as_bytes())?;
+        overwrite.save(&folder.join(PNG), Product::Png, &png)
     }
 }
 
@@ -109,22 +130,18 @@ impl Sink for Output {
     }
 }
 
-fn open_log(folder: &Path) -> Result<LogWriter, Failure> {
-    fs::create_dir_all(folder).map_err(|error| {
-        Failure::input(
-            format!("cannot make the folder {}: {error}", folder.display()),
-            "give --out a folder that you may write to",
-        )
-    })?;
-    LogWriter::open(&folder.join("scan.jsonl"))
-        .map_err(|error| Failure::input(&error, error.help()))
-}
+const LOG: &str = "scan.jsonl";
+const SVG: &str = "scan.svg";
+const PNG: &str = "scan.png";
 
-fn write(path: &Path, bytes: &[u8]) -> Outcome {
-    fs::write(path, bytes).map_err(|error| {
-        Failure::device(
-            format!("cannot write {}: {error}", path.display()),
-            "the log is complete; draw it again with `sonard plot`",
-        )
-    })
+fn open_log(folder: &Path) -> Result<(LogWriter, Option<Earlier>), Failure> {
+    make_folder(folder)?;
+    for (name, product) in [(SVG, Product::Svg), (PNG, Product::Png)] {
+        Overwrite::default().check(&folder.join(name), product)?;
+    }
+    let path = folder.join(LOG);
+    let earlier = Earlier::of(&path)?;
+    let log =
+        LogWriter::open(&path).map_err(|error| Failure::input(&error, error.help()))?;
+    Ok((log.with_scenes_beside(), earlier))
 }

@@ -147,6 +147,7 @@ impl Setup {
             array: None,
             air: AirRecord::from(&self.air),
             scene: Some(SceneRef::of(&self.scene)),
+            scene_text: Some(Arc::clone(&self.scene.text)),
             model: Some(ModelRecord::from(self.simulator.options())),
             collection: None,
         }

@@ -1,19 +1,20 @@
 //! `sonard simulate --array`: rounds of an array's rangers at one pose or many.
 
-use std::{io, io::Write, sync::Arc};
+use std::sync::Arc;
 
 use jiff::Timestamp;
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use uuid::Uuid;
 
-use super::{Args, open, poses, put, refuse_pose};
+use super::{Args, Out, poses, refuse_pose};
 use crate::{
     acoustics::ReceiverNoise,
     cli::{Failure, Outcome, array::load_array, progress, scene_file},
     geometry::{Pose, wrap_360},
     model::{ArrayModel, ArrayStand, ModelError},
     scan::{Ping, Record, ScanEnd, ScanStart, Session},
+    store::StoreError,
 };
 
 /// Several rangers instead of one that turns.
@@ -45,12 +46,12 @@ pub(super) fn run(args: &Args, name: &str) -> Outcome {
     let model = ArrayModel::new(Arc::new(array), &scene, sensor, air, args.engine.options()?)
         .map_err(|error| refuse(&error))?;
     let noise = args.noise.noise()?;
-    let (what, mut out) = open(args.out.as_deref())?;
+    let mut out = Out::open(args)?;
     let mut player = Player { model: &model, noise, rng: Pcg64::seed_from_u64(args.noise.seed) };
     match player.play(&mut out, &rounds) {
-        Ok(()) => Ok(()),
+        Ok(()) => out.close(Ok(())),
         Err(Stop::Model(error)) => Err(refuse(&error)),
-        Err(Stop::Write(error)) => Failure::from_write(&what, &error),
+        Err(Stop::Write(error)) => out.close(Err(error)),
     }
 }
 
@@ -71,11 +72,11 @@ fn refuse(error: &ModelError) -> Failure {
 /// Why it ended before the last scan.
 enum Stop {
     Model(ModelError),
-    Write(io::Error),
+    Write(StoreError),
 }
 
-impl From<io::Error> for Stop {
-    fn from(error: io::Error) -> Self {
+impl From<StoreError> for Stop {
+    fn from(error: StoreError) -> Self {
         Self::Write(error)
     }
 }
@@ -88,8 +89,8 @@ struct Player<'a> {
 
 impl Player<'_> {
     /// Writes the session, and a scan for each place with its rounds.
-    fn play(&mut self, out: &mut dyn Write, places: &[Vec<Pose>]) -> Result<(), Stop> {
-        put(out, &Record::Session(Box::new(Session::of_array(self.model, Timestamp::now()))))?;
+    fn play(&mut self, out: &mut Out, places: &[Vec<Pose>]) -> Result<(), Stop> {
+        out.put(&Record::Session(Box::new(Session::of_array(self.model, Timestamp::now()))))?;
         let firings =
             self.model.array().round().count() * places.iter().map(Vec::len).sum::<usize>();
         let progress = progress::bar(firings as u64, "beams");
@@ -97,23 +98,23 @@ impl Player<'_> {
             let Some(first) = rounds.first() else { continue };
             let (scan, count) = (Uuid::new_v4(), rounds.len() as u32);
             let start = ScanStart::of_array(self.model, scan, *first, count, Timestamp::now());
-            put(out, &Record::ScanStart(start))?;
+            out.put(&Record::ScanStart(start))?;
             let mut index = 0;
             for pose in rounds {
                 let stand = self.model.at(*pose).map_err(Stop::Model)?;
                 for ranger in self.model.array().round() {
                     let prediction = self.listen(&stand, ranger);
                     let ping = Ping::of_array(&stand, scan, first, index, ranger, &prediction);
-                    put(out, &Record::Ping(Box::new(ping)))?;
+                    out.put(&Record::Ping(Box::new(ping)))?;
                     index += 1;
                     progress.inc(1);
                 }
             }
             let end = ScanEnd::of_array(self.model, scan, [index, 0], Timestamp::now());
-            put(out, &Record::ScanEnd(end))?;
+            out.put(&Record::ScanEnd(end))?;
         }
         progress.finish_and_clear();
-        Ok(out.flush()?)
+        Ok(())
     }
 
     fn listen(&mut self, stand: &ArrayStand<'_>, ranger: usize) -> crate::model::Prediction {

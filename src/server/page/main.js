@@ -52,6 +52,7 @@ function show(scan) {
   if (scan) scan.added = [];
   plan.latest = null;
   redraw();
+  loadScene();
 }
 
 function redraw() {
@@ -86,7 +87,7 @@ function tell() {
   const when = shown === live && shown.underWay ? "live" : clock(shown.start.time);
   setText(byId("which"), `${when} · ${shown.beams.size} of ${shown.planned} beams`);
   const other = shown.session?.scene && !plan.sceneFits();
-  byId("stage").title = other ? `Taken in the scene ${shown.session.scene.name}, which is not in force: no walls are drawn` : "";
+  byId("stage").title = other ? `Taken in the scene ${shown.session.scene.name}, which its log does not hold: no walls are drawn` : "";
   slider.max = Math.max(0, shown.planned - 1);
   slider.disabled = shown.beams.size === 0;
 }
@@ -191,9 +192,15 @@ async function readNewest() {
   }
 }
 
+/** The floor plan of the scan shown: of the scene in force, or of the one in its log. */
 async function loadScene() {
-  const scene = await ask("/v1/scene").catch((error) => (error.status === 404 ? null : undefined));
-  if (scene === undefined || scene?.sha256 === plan.scene?.sha256) return;
+  const scan = shown;
+  const taken = scan?.session?.scene?.sha256;
+  if (taken && taken === plan.scene?.sha256) return;
+  const unknown = (error) => (error.status === 404 ? null : undefined);
+  let scene = await ask("/v1/scene").catch(unknown);
+  if (taken && scene?.sha256 !== taken) scene = (await ask(`/v1/scans/${scan.id}/scene`).catch(unknown)) ?? scene;
+  if (scene === undefined || scan !== shown || scene?.sha256 === plan.scene?.sha256) return;
   plan.scene = scene;
   setText(byId("floor-title"), scene ? `Floor plan: ${scene.name}` : "Floor plan");
   plan.redraw(palette);

@@ -16,17 +16,21 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use uuid::Uuid;
 
-use super::beam::{Beam, look};
+use super::{
+    beam::{Beam, look},
+    scene::FloorPlan,
+};
 use crate::{
     compare::{NotCompared, Verdict, judge},
     geometry::Pose,
     scan::{Event, Ping, Provenance, ScanEnd, ScanPlan, ScanStart, ScanView, Session},
+    scene::Scene,
     server::{
         Api,
         answer::{Failed, Query},
         openapi::Endpoint,
     },
-    store::{History, PastScan},
+    store::{History, PastScan, logged_scene},
 };
 
 /// Scans listed when nothing else is asked for.
@@ -124,6 +128,13 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
             "Index of the reading in the scan's plan",
         )
         .answers::<Beam>(200, "The beam"),
+        Endpoint::get(
+            "/v1/scans/{scan}/scene",
+            scene,
+            "The floor plan of the scene that a scan was predicted in, from its log",
+        )
+        .parameter("path", "scan", uuid(), "A scan from GET /v1/scans, or the one under way")
+        .answers::<FloorPlan>(200, "The floor plan"),
     ]
 }
 
@@ -167,7 +178,7 @@ async fn beam(
         let help = format!("readings so far run up to {last}");
         Failed::new(StatusCode::NOT_FOUND, "the scan has no such beam", help)
     })?;
-    let scene = api.daemon.scene();
+    let scene = scene_of(&api, view.scan, view.session.as_deref()).await?;
     // One after the other, also when clients leave meanwhile: asking the model takes its time.
     let turn = Arc::clone(&api.looking).acquire_owned().await;
     let looking = tokio::task::spawn_blocking(move || {
@@ -175,6 +186,45 @@ async fn beam(
         look(&view, ping, scene.as_deref())
     });
     looking.await.map(Json).map_err(|error| broken(&error))
+}
+
+async fn scene(
+    State(api): State<Api>,
+    Path(scan): Path<String>,
+) -> Result<Json<FloorPlan>, Failed> {
+    let missing = |error: String, help: &str| Failed::new(StatusCode::NOT_FOUND, error, help);
+    let no_scan = || missing("there is no such scan".into(), "GET /v1/scans names the newest");
+    let id = Uuid::parse_str(&scan).map_err(|_| no_scan())?;
+    let (view, _) = in_history(&api, move |history| history.outline(id)).await?.ok_or_else(no_scan)?;
+    let scene = scene_of(&api, id, view.session.as_deref()).await?;
+    let taken_in = view.session.as_deref().and_then(|session| session.scene.as_ref());
+    match scene.filter(|scene| taken_in.is_some_and(|taken_in| taken_in.sha256 == scene.sha256)) {
+        Some(scene) => Ok(Json(FloorPlan::of(&scene))),
+        None => Err(missing(
+            "the log does not hold the scene of this scan".into(),
+            "logs hold their scene since it is written into them; older ones name it only",
+        )),
+    }
+}
+
+/// The scene that a scan was taken in: the one in force, or the one in its log. The one in force
+/// also where the log says nothing.
+async fn scene_of(
+    api: &Api,
+    scan: Uuid,
+    session: Option<&Session>,
+) -> Result<Option<Arc<Scene>>, Failed> {
+    let in_force = api.daemon.scene();
+    let taken_in = session.and_then(|session| session.scene.as_ref());
+    let fits = |scene: &Scene| taken_in.is_none_or(|taken_in| taken_in.sha256 == scene.sha256);
+    if in_force.as_deref().is_some_and(fits) {
+        return Ok(in_force);
+    }
+    let logged = in_history(api, move |history| {
+        let Some((view, log)) = history.outline(scan)? else { return Ok(None) };
+        Ok(view.session.and_then(|session| logged_scene(&session, &log).ok().flatten()))
+    });
+    Ok(logged.await?.map(Arc::new).or(in_force))
 }
 
 async fn find(api: &Api, scan: &str) -> Result<ScanView, Failed> {

@@ -17,7 +17,7 @@ pub(super) type Point = [f64; 2];
 
 /// The scene in force: everything that a floor plan shows.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
-struct FloorPlan {
+pub(super) struct FloorPlan {
     /// Its name.
     name: String,
     /// SHA-256 of its file, hexadecimal, as sessions of logs have it.
@@ -76,7 +76,7 @@ async fn scene(State(api): State<Api>) -> Result<Json<FloorPlan>, Failed> {
 }
 
 impl FloorPlan {
-    fn of(scene: &Scene) -> Self {
+    pub(super) fn of(scene: &Scene) -> Self {
         Self {
             name: scene.name.clone(),
             sha256: scene.sha256.clone(),

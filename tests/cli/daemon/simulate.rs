@@ -310,6 +310,12 @@ fn another_scene_array_and_noise_come_with_the_configuration() {
     wait_until("the other array", || daemon.status()["simulation"]["array"] == "pioneer-7");
     let scans = daemon.health()["scans"]["completed"].as_u64().expect("a count");
     daemon.wait_for_scans(scans + 4);
+    // A scan of the other scene is still drawn and looked into in its own.
+    let scans = daemon.get("/v1/scans?limit=500").json();
+    let first = scans.as_array().and_then(|scans| scans.last()).expect("scans")["scan"].clone();
+    let first = first.as_str().expect("an id").to_owned();
+    assert_eq!(daemon.get(&format!("/v1/scans/{first}/scene")).json()["name"], "mcgill-lab");
+    assert_eq!(daemon.get(&format!("/v1/scans/{first}/beams/0")).json()["lacks"], Value::Null);
     // A configuration that makes no sense changes nothing and is told.
     fs::write(&file, text("two-surface-room", "pioneer-9", 2.0)).expect("writes");
     daemon.signal(Signal::HUP);

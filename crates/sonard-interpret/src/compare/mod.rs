@@ -20,11 +20,12 @@
 
 mod statistics;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use sonard_model::geometry::Pose;
 use sonard_records::{PathKind, Ping, PingStatus, ScanView, SimRecord};
 
 pub use statistics::quantile;
@@ -115,6 +116,8 @@ pub struct Comparison {
     pub duplicates: u32,
     /// Scans looked at.
     pub scans: u32,
+    /// Poses that they were taken at; figures are of all together.
+    pub poses: u32,
 }
 
 /// Beams by verdict.
@@ -173,18 +176,44 @@ impl NotComparedCounts {
 /// Compares every beam of some scans: the numbers, and the beams they come from.
 #[must_use]
 pub fn compare(scans: &[ScanView]) -> (Comparison, Vec<Judged<'_>>) {
-    let mut comparison = Comparison { scans: scans.len() as u32, ..Comparison::default() };
-    let mut judged = Vec::new();
-    for scan in scans {
+    let mut comparer = Comparer::default();
+    let judged = scans.iter().flat_map(|scan| comparer.add(scan)).collect();
+    (comparer.finish(), judged)
+}
+
+/// Compares scans one by one, for logs too long to be held whole: 16 bytes a pair of echoes stay in memory.
+#[derive(Debug, Default)]
+pub struct Comparer {
+    comparison: Comparison,
+    residuals_m: Vec<(Verdict, f64)>,
+    poses: HashSet<[u64; 3]>,
+}
+
+impl Comparer {
+    /// Takes in a scan; gives its beams.
+    pub fn add<'a>(&mut self, scan: &'a ScanView) -> Vec<Judged<'a>> {
         let beams = last_readings(&scan.pings);
-        comparison.duplicates += (scan.pings.len() - beams.len()) as u32;
-        judged.extend(beams.into_iter().map(judge));
+        self.comparison.scans += 1;
+        self.comparison.duplicates += (scan.pings.len() - beams.len()) as u32;
+        let bits = |pose: Pose| [pose.x_m, pose.y_m, pose.heading_deg].map(f64::to_bits);
+        self.poses.extend(scan.pose().map(bits));
+        let judged: Vec<Judged<'a>> = beams.into_iter().map(judge).collect();
+        for beam in &judged {
+            self.comparison.count(beam);
+            let residual_m = beam.verdict.ok().zip(beam.residual_m);
+            self.residuals_m.extend(residual_m);
+        }
+        judged
     }
-    for beam in &judged {
-        comparison.count(beam);
+
+    /// The numbers of all scans together.
+    #[must_use]
+    pub fn finish(self) -> Comparison {
+        let mut comparison = self.comparison;
+        comparison.poses = self.poses.len() as u32;
+        comparison.take_statistics(&self.residuals_m);
+        comparison
     }
-    comparison.take_statistics(&judged);
-    (comparison, judged)
 }
 
 /// Sets one reading beside its prediction.
@@ -299,12 +328,12 @@ impl Comparison {
         self.agree += u32::from(agree.is_some_and(|(range_m, m)| agrees(range_m, range_m - m)));
     }
 
-    fn take_statistics(&mut self, judged: &[Judged<'_>]) {
+    fn take_statistics(&mut self, residuals_m: &[(Verdict, f64)]) {
         let residuals = |wanted: Option<Verdict>, of: fn(f64) -> f64| -> Vec<f64> {
-            judged
+            residuals_m
                 .iter()
-                .filter(|beam| wanted.is_none() || beam.verdict.ok() == wanted)
-                .filter_map(|beam| beam.residual_m.map(of))
+                .filter(|(verdict, _)| wanted.is_none_or(|wanted| *verdict == wanted))
+                .map(|(_, residual_m)| of(*residual_m))
                 .collect()
         };
         let median_of = |verdict| quantile(residuals(Some(verdict), f64::abs), 0.5);

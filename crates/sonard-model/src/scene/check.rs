@@ -62,6 +62,7 @@ pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
         poses: file.poses,
         robot,
         sha256: Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect(),
+        text: text.into(),
     };
     check_poses(&scene, &root.key("poses"))?;
     Ok(scene)

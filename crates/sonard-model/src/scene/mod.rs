@@ -60,6 +60,8 @@ pub struct Scene {
     pub robot: Option<Robot>,
     /// SHA-256 of the text it was read from, hexadecimal.
     pub sha256: String,
+    /// That text.
+    pub text: Arc<str>,
 }
 
 impl Scene {

@@ -17,7 +17,7 @@ const POLL: Duration = Duration::from_millis(200);
 pub(super) fn open(path: &Path) -> Result<Box<dyn BufRead>, StoreError> {
     match File::open(path) {
         Ok(file) => Ok(Box::new(BufReader::new(Growing { file }))),
-        Err(source) => Err(StoreError::Open { path: path.into(), source }),
+        Err(source) => Err(StoreError::Unreadable { path: path.into(), source }),
     }
 }
 

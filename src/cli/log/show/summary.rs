@@ -10,25 +10,29 @@ use crate::{
     compare::quantile,
     geometry::Pose,
     scan::{Event, Ping, PingStatus, Record, ScanEnd, ScanStart, Session},
-    store::Loaded,
+    store::LineError,
 };
 
 /// A log's contents in order.
 #[derive(Debug, Default)]
-pub(super) struct Summary<'a> {
-    pub(super) items: Vec<Item<'a>>,
+pub(super) struct Summary {
+    pub(super) items: Vec<Item>,
     /// Where in `items` each scan is.
     scans: HashMap<Uuid, usize>,
+    damaged: Vec<Item>,
+    more_damaged: u64,
 }
 
 /// A session, a scan, an event or a damaged line.
 #[derive(Debug, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
-pub(super) enum Item<'a> {
-    Session(&'a Session),
+pub(super) enum Item {
+    Session(Box<Session>),
     Scan(Box<Scan>),
-    Event(&'a Event),
+    Event(Event),
     Damaged { line: u64, fault: String },
+    /// So many more damaged lines.
+    MoreDamaged { lines: u64 },
 }
 
 /// A scan in numbers.
@@ -51,32 +55,46 @@ pub(super) struct Scan {
     residuals_m: Vec<f64>,
 }
 
-impl<'a> Summary<'a> {
-    pub(super) fn of(loaded: &'a Loaded) -> Self {
-        let mut summary = Self::default();
-        for record in &loaded.records {
-            summary.add(record);
+/// Damaged lines that are listed; of more only the number is told.
+const MOST_DAMAGED: usize = 5;
+
+impl Summary {
+    /// Takes in the next record.
+    pub(super) fn add(&mut self, record: Record) {
+        match record {
+            Record::Session(session) => self.items.push(Item::Session(session)),
+            Record::ScanStart(start) => self.scan(start.scan).begin(&start),
+            Record::Ping(ping) => self.scan(ping.scan).count(&ping),
+            Record::ScanEnd(end) => {
+                let scan = end.scan;
+                self.scan(scan).end = Some(end);
+            }
+            Record::Event(event) => self.items.push(Item::Event(event)),
         }
-        for item in &mut summary.items {
+    }
+
+    /// Takes in a line that is no record.
+    pub(super) fn damaged(&mut self, error: &LineError) {
+        if self.damaged.len() == MOST_DAMAGED {
+            self.more_damaged += 1;
+            return;
+        }
+        let fault = error.fault.to_string();
+        self.damaged.push(Item::Damaged { line: error.line, fault });
+    }
+
+    /// After the last line.
+    pub(super) fn finished(mut self) -> Self {
+        for item in &mut self.items {
             if let Item::Scan(scan) = item {
                 scan.median_abs_residual_m = quantile(mem::take(&mut scan.residuals_m), 0.5);
             }
         }
-        for error in &loaded.damaged {
-            let fault = error.fault.to_string();
-            summary.items.push(Item::Damaged { line: error.line, fault });
+        self.items.append(&mut self.damaged);
+        if self.more_damaged > 0 {
+            self.items.push(Item::MoreDamaged { lines: self.more_damaged });
         }
-        summary
-    }
-
-    fn add(&mut self, record: &'a Record) {
-        match record {
-            Record::Session(session) => self.items.push(Item::Session(session)),
-            Record::ScanStart(start) => self.scan(start.scan).begin(start),
-            Record::Ping(ping) => self.scan(ping.scan).count(ping),
-            Record::ScanEnd(end) => self.scan(end.scan).end = Some(end.clone()),
-            Record::Event(event) => self.items.push(Item::Event(event)),
-        }
+        self
     }
 
     fn scan(&mut self, id: Uuid) -> &mut Scan {

@@ -5,18 +5,21 @@ use std::io::{self, Write};
 use comfy_table::{CellAlignment, Table};
 use uuid::Uuid;
 
-use super::summary::{Item, Scan, Summary};
+use super::{
+    readings::Readings,
+    summary::{Item, Scan, Summary},
+};
 use crate::{
     cli::compare::{RULED, path_text},
     scan::{Ping, PingStatus, Record, Session},
-    store::{Line, Loaded},
+    store::Line,
 };
 
 /// Prints sessions with a table of their scans and events; with `pings`, every reading after it.
 pub(super) fn print(
     out: &mut impl Write,
-    summary: &Summary<'_>,
-    pings: Option<&Loaded>,
+    summary: &Summary,
+    mut pings: Option<Readings>,
 ) -> io::Result<()> {
     if summary.items.is_empty() {
         writeln!(out, "the log is empty")?;
@@ -27,15 +30,18 @@ pub(super) fn print(
             scans.push(&**scan);
             continue;
         }
-        print_scans(out, &mut scans, pings)?;
+        print_scans(out, &mut scans, pings.as_mut())?;
         match item {
             Item::Session(session) => print_session(out, session)?,
             Item::Event(event) => print_event(out, event)?,
             Item::Damaged { line, fault } => writeln!(out, "damaged   line {line}: {fault}")?,
+            Item::MoreDamaged { lines } => {
+                writeln!(out, "damaged   {lines} more lines; `sonard log verify --all` lists them")?;
+            }
             Item::Scan(_) => {}
         }
     }
-    print_scans(out, &mut scans, pings)
+    print_scans(out, &mut scans, pings.as_mut())
 }
 
 /// Prints one line of a log as it comes.
@@ -104,21 +110,19 @@ fn print_event(out: &mut impl Write, event: &crate::scan::Event) -> io::Result<(
 fn print_scans(
     out: &mut impl Write,
     scans: &mut Vec<&Scan>,
-    pings: Option<&Loaded>,
+    pings: Option<&mut Readings>,
 ) -> io::Result<()> {
     if scans.is_empty() {
         return Ok(());
     }
     writeln!(out, "{}", scan_table(scans))?;
-    for scan in scans.drain(..).filter(|_| pings.is_some()) {
+    let scans = scans.drain(..);
+    let Some(pings) = pings else { return Ok(()) };
+    for scan in scans {
         writeln!(out, "scan {}", scan.scan)?;
         writeln!(out, "{PING_HEADER}")?;
-        for record in pings.iter().flat_map(|loaded| &loaded.records) {
-            if let Record::Ping(ping) = record
-                && ping.scan == scan.scan
-            {
-                writeln!(out, "{}", ping_text(ping))?;
-            }
+        for ping in pings.take(scan.scan) {
+            writeln!(out, "{}", ping_text(&ping))?;
         }
     }
     Ok(())

@@ -144,6 +144,7 @@ impl World {
             poses: BTreeMap::new(),
             robot: None,
             sha256: String::new(),
+            text: "".into(),
         }))
     }
 

@@ -115,6 +115,7 @@ impl Room {
             )]),
             robot: None,
             sha256: String::new(),
+            text: "".into(),
         }
     }
 }

@@ -64,6 +64,7 @@ fn scene(walls: &[[f64; 4]]) -> Scene {
         poses: Default::default(),
         robot: None,
         sha256: String::new(),
+        text: "".into(),
     }
 }
 

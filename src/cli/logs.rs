@@ -1,0 +1,169 @@
+//! Logs as verbs read them: scan by scan, so that a collection of days need not be in memory, and with
+//! what is wrong in them told once.
+
+use std::path::{Path, PathBuf};
+
+use super::{Failure, progress};
+use crate::{
+    scan::{Record, ScanView},
+    store::{FileKind, LineError, StoreError, open_for_reading, read_log},
+};
+
+/// Lines that can't be read and are named; of more only the number is told.
+const SHOWN: usize = 5;
+
+/// Damaged lines as they are met.
+#[derive(Debug, Default)]
+pub(super) struct Damage {
+    count: u64,
+}
+
+impl Damage {
+    /// Names a line, unless enough are named.
+    pub(super) fn note(&mut self, log: &Path, error: &LineError) {
+        self.count += 1;
+        if self.count <= SHOWN as u64 {
+            anstream::eprintln!("warning: {}: {error}; the line is left out", log.display());
+        }
+    }
+
+    /// Says how many more there were.
+    pub(super) fn sum_up(&self, log: &Path) {
+        if let Some(more) = self.count.checked_sub(SHOWN as u64).filter(|more| *more > 0) {
+            anstream::eprintln!(
+                "warning: {}: {more} more damaged lines; see `sonard log verify`",
+                log.display()
+            );
+        }
+    }
+}
+
+/// Hands over each record of a log; names the lines that hold none.
+///
+/// # Errors
+/// It can't be read, or holds no record at all.
+pub(super) fn for_each_record(log: &Path, mut take: impl FnMut(Record)) -> Result<(), Failure> {
+    let mut reader = progress::reading(log, open_for_reading(log)?);
+    let kind = kind_of(&mut reader);
+    let (mut damage, mut any) = (Damage::default(), false);
+    for line in read_log(reader) {
+        let line = line.map_err(|source| StoreError::Read { path: log.into(), source })?;
+        match line.record {
+            Ok(record) => {
+                any = true;
+                take(record);
+            }
+            Err(error) => damage.note(log, &error),
+        }
+    }
+    damage.sum_up(log);
+    if any { Ok(()) } else { Err(no_record(log, kind)) }
+}
+
+fn kind_of(reader: &mut impl std::io::BufRead) -> FileKind {
+    reader.fill_buf().map_or(FileKind::Binary, FileKind::of)
+}
+
+fn no_record(log: &Path, kind: FileKind) -> Failure {
+    Failure::input(
+        format!("{} holds no record: it looks like {kind}", log.display()),
+        kind.instead_of_a_log(),
+    )
+}
+
+/// Hands over each scan of a log as soon as it has ended.
+///
+/// # Errors
+/// As [`for_each_record`], or what `take` refuses; nothing is read after that.
+pub(super) fn for_each_scan(
+    log: &Path,
+    mut take: impl FnMut(ScanView) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let mut outcome = Ok(());
+    each_scan(log, |scan| {
+        if outcome.is_ok() {
+            outcome = take(scan);
+        }
+        outcome.is_ok()
+    })?;
+    outcome
+}
+
+/// The same until `take` has had enough.
+fn each_scan(log: &Path, mut take: impl FnMut(ScanView) -> bool) -> Result<(), Failure> {
+    let mut reader = progress::reading(log, open_for_reading(log)?);
+    let kind = kind_of(&mut reader);
+    let (mut damage, mut any, mut broken) = (Damage::default(), false, None);
+    let records = read_log(reader)
+        .map_while(|line| line.map_err(|source| broken = Some(source)).ok())
+        .filter_map(|line| line.record.map_err(|error| damage.note(log, &error)).ok())
+        .inspect(|_| any = true);
+    for scan in ScanView::one_by_one(records) {
+        if !take(scan) {
+            break;
+        }
+    }
+    damage.sum_up(log);
+    match broken {
+        Some(source) => Err(StoreError::Read { path: log.into(), source }.into()),
+        None if any => Ok(()),
+        None => Err(no_record(log, kind)),
+    }
+}
+
+/// Readings that a picture shows: more could not be told apart, and would fill the memory.
+const MOST_DRAWN: usize = 60_000;
+
+/// Scans for a picture: all of them, or evenly so many that they can be shown.
+#[derive(Debug)]
+pub(super) struct Drawn {
+    scans: Vec<ScanView>,
+    readings: usize,
+    /// One scan in so many is kept.
+    every: usize,
+    seen: usize,
+}
+
+impl Default for Drawn {
+    fn default() -> Self {
+        Self { scans: Vec::new(), readings: 0, every: 1, seen: 0 }
+    }
+}
+
+impl Drawn {
+    pub(super) fn add(&mut self, scan: ScanView) {
+        self.seen += 1;
+        if !(self.seen - 1).is_multiple_of(self.every) {
+            return;
+        }
+        self.readings += scan.pings.len();
+        self.scans.push(scan);
+        while self.readings > MOST_DRAWN && self.scans.len() > 1 {
+            let mut place = 0;
+            self.scans.retain(|_| {
+                place += 1;
+                place % 2 == 1
+            });
+            self.readings = self.scans.iter().map(|scan| scan.pings.len()).sum();
+            self.every *= 2;
+        }
+    }
+
+    /// The scans to draw; says if these are not all.
+    pub(super) fn finish(self) -> Vec<ScanView> {
+        if self.every > 1 {
+            anstream::eprintln!(
+                "note: {} scans are more than a picture shows: one in {} is drawn, {} in all",
+                self.seen,
+                self.every,
+                self.scans.len()
+            );
+        }
+        self.scans
+    }
+}
+
+/// Logs of one robot stand together, and their scenes with them.
+pub(super) fn first_of(logs: &[PathBuf]) -> &Path {
+    logs.first().map_or(Path::new("-"), PathBuf::as_path)
+}

@@ -1,0 +1,63 @@
+use std::collections::BTreeSet;
+
+use clap::CommandFactory as _;
+
+use super::*;
+use crate::cli::Cli;
+
+/// Every argument that is a path and nothing else, with its verb.
+fn paths(command: &Command, verb: &str, found: &mut BTreeSet<String>) {
+    for below in command.get_subcommands() {
+        let verb = format!("{verb} {}", below.get_name());
+        let is_path = |argument: &&clap::Arg| {
+            argument.get_value_parser().type_id() == std::any::TypeId::of::<PathBuf>()
+        };
+        let named = |argument: &clap::Arg| format!("{} {}", verb.trim_start(), argument.get_id());
+        found.extend(below.get_arguments().filter(is_path).map(named));
+        paths(below, &verb, found);
+    }
+}
+
+/// A path that a verb writes to is an `OutPath`, so that the rule holds for it.
+#[test]
+fn every_plain_path_of_the_command_line_is_read() {
+    let mut found = BTreeSet::new();
+    paths(&Cli::command(), "", &mut found);
+    let read = [
+        "collect plan",
+        "collect report",
+        "collect socket",
+        "collect token_file",
+        "collect verify",
+        "compare logs",
+        "interpret logs",
+        "lines laser",
+        "lines logs",
+        "log annotate log",
+        "log repair log",
+        "log show log",
+        "log verify logs",
+        "map logs",
+        "map onto",
+        "map-score map",
+        "plot log",
+        "run config",
+        "scan socket",
+        "scan token_file",
+        "simulate poses",
+        "status socket",
+        "status token_file",
+        "watch socket",
+        "watch token_file",
+    ];
+    assert_eq!(found, read.map(str::to_owned).into(), "is a new one written to?");
+}
+
+#[test]
+fn a_list_is_known_by_its_members() {
+    let list = Product::List(&["pose", "returns"]);
+    assert!(list.replaces(b"{\"returns\":[],\"pose\":{}}\n{\"pose\":1}\n") && list.replaces(b""));
+    for other in [&b"{\"pose\":{}}\n"[..], b"{\"returns\":[],\"pose\":{},\"more\":1}\n", b"[1]", b"x"] {
+        assert!(!list.replaces(other), "{other:?}");
+    }
+}

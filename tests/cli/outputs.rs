@@ -1,0 +1,407 @@
+//! What verbs write: never over what they read, over nothing that is not their own unasked, and whole
+//! or not at all.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    os::unix::fs::{FileTypeExt as _, PermissionsExt as _, symlink},
+    path::{Path, PathBuf},
+    process::{Output, Stdio},
+};
+
+use tempfile::TempDir;
+
+use crate::{
+    collect::said,
+    common::{Log, mock_scan, run, sonard, stderr},
+};
+
+const LOG: &str = include_str!("../fixtures/small.jsonl");
+const SCENE: &str = include_str!("../../scenes/simple-room.json");
+
+/// A command whose output is its own input: the option of the output, the input by its name and
+/// content, and the arguments, in which `IN` stands for the input, `DIR` for its folder.
+struct Case {
+    output: &'static str,
+    input: (&'static str, &'static str),
+    arguments: &'static str,
+}
+
+const fn case(
+    output: &'static str,
+    input: (&'static str, &'static str),
+    arguments: &'static str,
+) -> Case {
+    Case { output, input, arguments }
+}
+
+const CASES: [Case; 22] = [
+    case("plot --out", ("a.svg", LOG), "plot IN -o IN"),
+    case("plot --out", ("a.png", LOG), "plot IN -o IN --force"),
+    case("plot --out", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),
+    case("trace --out", ("a.png", SCENE), "trace --scene IN --pose fig9 -o IN"),
+    case("interpret --out", ("a.svg", LOG), "interpret IN -o IN"),
+    case("lines --out", ("a.svg", LOG), "lines IN -o IN"),
+    case("scene draw --output", ("a.svg", SCENE), "scene draw IN -o IN"),
+    case("simulate --out", ("a.json", SCENE), "simulate --scene IN --pose fig9 --out IN --force"),
+    case("simulate --out", ("a", POSES), "simulate --scene simple-room --poses IN --out IN --force"),
+    case(
+        "simulate --out",
+        ("a", POSES),
+        "simulate --scene simple-room --poses IN --array ring-12 --out IN --force",
+    ),
+    case("map --out", ("map.pgm", LOG), "map IN --out DIR --force"),
+    case("map --out", ("map.png", SCENE), "map LOG --scene IN --out DIR --force"),
+    case("map --confidences", ("c.jsonl", LOG), "map IN --out DIR/map --confidences IN --force"),
+    case("map-score --save-ideal", ("map.yaml", MAP), "map-score DIR DIR --save-ideal DIR --force"),
+    case(
+        "explore --out",
+        ("stops.jsonl", SCENE),
+        "explore --scene IN --pose fig9 --most-stops 1 --out DIR --force",
+    ),
+    case("log annotate --out", ("a.jsonl", LOG), "log annotate IN --out IN --force"),
+    case(
+        "scan --out",
+        ("scan.jsonl", SCENE),
+        "scan --mock --scene IN --pose fig9 --to-deg 9 --out DIR",
+    ),
+    case(
+        "scan --out",
+        ("scan.svg", SCENE),
+        "scan --mock --scene IN --pose fig9 --to-deg 9 --out DIR",
+    ),
+    case("collect --out", ("journal.jsonl", PLAN), "collect IN --mock --out DIR"),
+    case("mock --link", ("a.json", SCENE), "mock --scene IN --pose fig9 --link IN"),
+    case("board --link", ("a.json", SCENE), "board --link IN"),
+    case("run --socket", ("a.json", SCENE), "run --mock --scene IN --pose fig9 --log DIR/log --socket IN"),
+];
+
+/// Outputs of verbs that read no file.
+const WITHOUT_INPUT: [&str; 3] =
+    ["map-benchmark --out", "explore-benchmark --out", "generate DIR"];
+
+const POSES: &str = "{\"x_m\":0.774,\"y_m\":0.085,\"heading_deg\":0.0}\n";
+const MAP: &str = "image: map.pgm\nresolution: 0.5\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n\
+                   occupied_thresh: 0.65\nfree_thresh: 0.196\n";
+const PLAN: &str = "[collection]\nfolder = \"out\"\n[place]\nscene = \"simple-room\"\n\
+                    poses = [\"fig9\"]\n";
+
+/// A folder with an input of this name and content, and what else commands need.
+fn folder_with((name, content): (&str, &str)) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("log.jsonl"), LOG).expect("writable");
+    if content == MAP {
+        fs::write(folder.path().join("map.pgm"), b"P5\n2 2\n255\n\0\xff\0\xff").expect("writable");
+    }
+    let input = folder.path().join(name);
+    fs::write(&input, content).expect("writable");
+    (folder, input)
+}
+
+fn run_case(arguments: &str, input: &Path, folder: &Path) -> Output {
+    let input = input.to_str().expect("plain path");
+    let folder = folder.to_str().expect("plain path");
+    let log = format!("{folder}/log.jsonl");
+    let arguments: Vec<String> = arguments
+        .split(' ')
+        .map(|word| match word {
+            "IN" => input.to_owned(),
+            "LOG" => log.clone(),
+            word => word.replace("DIR", folder),
+        })
+        .collect();
+    run(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+#[test]
+fn every_output_has_a_case() {
+    let known: BTreeSet<String> = sonard::cli::outputs().into_iter().collect();
+    let told: BTreeSet<String> = CASES.iter().map(|case| case.output.to_owned()).collect();
+    let without: BTreeSet<String> = WITHOUT_INPUT.map(str::to_owned).into();
+    let mut expected = &told | &without;
+    // A socket is configuration, and no path of the command line alone.
+    assert!(expected.remove("run --socket"));
+    assert_eq!(known, expected, "a verb that writes needs a case here");
+}
+
+#[test]
+fn no_command_writes_over_what_it_reads() {
+    for Case { input, arguments, .. } in CASES {
+        let (folder, path) = folder_with(input);
+        let output = run_case(arguments, &path, folder.path());
+        let message = stderr(&output);
+        let code = output.status.code();
+        assert!(matches!(code, Some(2 | 3)), "{arguments}: {code:?} {message}");
+        assert_eq!(fs::read_to_string(&path).expect("kept"), input.1, "{arguments}: {message}");
+        let place = folder.path().file_name().and_then(|name| name.to_str()).expect("plain path");
+        assert!(message.contains(place) || input.0 == "a.json", "{arguments}: {message}");
+    }
+}
+
+#[test]
+fn no_other_name_of_an_input_is_written_over_either() {
+    let (folder, input) = folder_with(("room.json", SCENE));
+    let place = |name: &str| folder.path().join(name);
+    fs::hard_link(&input, place("hard.svg")).expect("same file system");
+    symlink(&input, place("soft.svg")).expect("writable");
+    symlink(place("soft.svg"), place("softer.svg")).expect("writable");
+    let at_stdin = |name: &str| {
+        let mut plot = sonard(&["plot", "-", "--force", "-o", place(name).to_str().expect("plain")]);
+        plot.stdin(fs::File::open(&input).expect("there")).output().expect("starts")
+    };
+    for name in ["hard.svg", "soft.svg", "softer.svg"] {
+        let message = said(&run_case(&format!("scene draw IN --force -o DIR/{name}"), &input, folder.path()));
+        assert!(message.contains("is read by this command"), "{name}: {message}");
+        let output = at_stdin(name);
+        assert_eq!(output.status.code(), Some(2), "{name}: {}", stderr(&output));
+        assert_eq!(fs::read_to_string(&input).expect("kept"), SCENE, "{name}");
+    }
+    // The shell opened it to append.
+    let out = fs::OpenOptions::new().append(true).open(&input).expect("there");
+    let path = input.to_str().expect("plain path");
+    let draw = sonard(&["scene", "draw", path]).stdout(out).stderr(Stdio::piped()).output();
+    let output = draw.expect("starts");
+    assert!(said(&output).contains("standard output goes to"), "{}", stderr(&output));
+    assert_eq!(fs::read_to_string(&input).expect("kept"), SCENE);
+}
+
+#[test]
+fn a_picture_replaces_a_picture_and_nothing_else_unasked() {
+    let (folder, scene) = folder_with(("room.json", SCENE));
+    let draw = |name: &str, further: &str| {
+        run_case(&format!("scene draw IN -o DIR/{name}{further}"), &scene, folder.path())
+    };
+    let place = |name: &str| folder.path().join(name);
+    assert!(draw("a.svg", "").status.success());
+    fs::set_permissions(place("a.svg"), fs::Permissions::from_mode(0o600)).expect("ours");
+    assert!(draw("a.svg", "").status.success(), "again");
+    let mode = fs::metadata(place("a.svg")).expect("there").permissions().mode();
+    assert_eq!(mode & 0o777, 0o600, "what was kept from others stays so");
+    assert!(draw("a.png", "").status.success());
+    assert!(draw("a.png", "").status.success(), "again");
+    fs::write(place("empty.svg"), "").expect("writable");
+    assert!(draw("empty.svg", "").status.success(), "as mktemp leaves it");
+    for (name, content, kind) in [
+        ("log.svg", LOG, "a log"),
+        ("room.svg", SCENE, "a scene"),
+        ("thesis.svg", "\\documentclass{book}\n", "text"),
+        ("plan.png", "[plan]\nstep_deg = 1\n", "TOML"),
+        ("a2.png", "<svg xmlns=\"http://www.w3.org/2000/svg\"/>", "an SVG picture"),
+    ] {
+        fs::write(place(name), content).expect("writable");
+        let refused = draw(name, "");
+        let message = said(&refused);
+        assert_eq!(refused.status.code(), Some(2), "{name}: {message}");
+        assert!(message.contains(kind) && message.contains("--force"), "{name}: {message}");
+        assert_eq!(fs::read_to_string(place(name)).expect("kept"), content);
+        assert!(draw(name, " --force").status.success(), "{name}");
+        assert_ne!(fs::read(place(name)).expect("there"), content.as_bytes());
+    }
+    symlink(place("b.svg"), place("link.svg")).expect("writable");
+    assert_eq!(draw("link.svg", "").status.code(), Some(2), "a link to nothing");
+    assert!(draw("b.svg", "").status.success());
+    assert!(draw("link.svg", "").status.success(), "the file behind the link");
+    assert!(fs::symlink_metadata(place("link.svg")).expect("there").is_symlink());
+}
+
+#[test]
+fn a_log_that_was_measured_or_simulated_is_not_replaced_unasked() {
+    let (folder, log) = folder_with(("measured.jsonl", LOG));
+    let to_log = "simulate --scene simple-room --pose fig9 --to-deg 9 --out IN";
+    let refused = run_case(to_log, &log, folder.path());
+    assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
+    assert!(said(&refused).contains("is a log"), "{}", stderr(&refused));
+    assert_eq!(fs::read_to_string(&log).expect("kept"), LOG);
+    let new = to_log.replace("IN", "DIR/new.jsonl");
+    assert!(run_case(&new, &log, folder.path()).status.success());
+    assert_eq!(run_case(&new, &log, folder.path()).status.code(), Some(2), "again");
+    assert!(run_case(&format!("{new} --force"), &log, folder.path()).status.success());
+    assert_eq!(Log::read(&folder.path().join("new.jsonl")).pings().len(), 10);
+}
+
+#[test]
+fn map_and_explore_replace_their_own_files_only() {
+    let (folder, log) = folder_with(("scan.jsonl", LOG));
+    let simulate = "simulate --scene simple-room --pose fig9 --out DIR/fig9.jsonl";
+    assert!(run_case(simulate, &log, folder.path()).status.success());
+    let map = "map DIR/fig9.jsonl --out DIR/map --confidences DIR/c.jsonl";
+    for again in ["", " again"] {
+        let output = run_case(map, &log, folder.path());
+        assert!(output.status.success(), "{again} {}", stderr(&output));
+    }
+    for name in ["map/map.yaml", "map/map.pgm", "map/map.png", "c.jsonl"] {
+        let path = folder.path().join(name);
+        let was = fs::read(&path).expect("written");
+        fs::write(&path, "{\"mine\": 1}\n").expect("writable");
+        let refused = run_case(map, &log, folder.path());
+        assert_eq!(refused.status.code(), Some(2), "{name}: {}", stderr(&refused));
+        assert_eq!(fs::read_to_string(&path).expect("kept"), "{\"mine\": 1}\n");
+        fs::write(&path, was).expect("writable");
+    }
+}
+
+/// A scan into `folder` of a few beams, with further options.
+fn short_scan(pose: &str, folder: &Path, further: &[&str]) -> Output {
+    let mut options = vec!["--to-deg", "9", "--max-range", "1.5"];
+    options.extend(further);
+    mock_scan(pose, folder, &options)
+}
+
+#[test]
+fn a_scan_is_added_only_to_scans_taken_alike_and_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path();
+    let first = short_scan("fig9", out, &[]);
+    assert!(first.status.success() && !stderr(&first).contains("added"), "{}", stderr(&first));
+    let second = short_scan("fig9", out, &[]);
+    assert!(second.status.success(), "{}", stderr(&second));
+    assert!(stderr(&second).contains("holds 1 scan(s) taken alike"), "{}", stderr(&second));
+    let was = fs::read(out.join("scan.jsonl")).expect("written");
+    for (pose, further, difference) in [
+        ("fig7", &[][..], "pose"),
+        ("fig9", &["--step-deg", "1.8"], "plan"),
+        ("fig9", &["--sensor", "hc-sr04"], "sensor"),
+        ("fig9", &["--engine", "cone"], "model"),
+    ] {
+        let refused = short_scan(pose, out, further);
+        let message = said(&refused);
+        assert_eq!(refused.status.code(), Some(2), "{message}");
+        assert!(message.contains("taken otherwise") && message.contains(difference), "{message}");
+        assert_eq!(fs::read(out.join("scan.jsonl")).expect("kept"), was, "{difference}");
+    }
+    let text = String::from_utf8(run(&["compare", out.join("scan.jsonl").to_str().expect("plain")]).stdout);
+    assert!(!text.expect("text").contains("poses"));
+}
+
+#[test]
+fn compare_says_that_scans_were_taken_at_several_poses() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let of = |pose: &str| {
+        let out = folder.path().join(pose);
+        assert!(short_scan(pose, &out, &[]).status.success());
+        fs::read_to_string(out.join("scan.jsonl")).expect("written")
+    };
+    let both = folder.path().join("both.jsonl");
+    fs::write(&both, of("fig7") + &of("fig9")).expect("writable");
+    let both = both.to_str().expect("plain path");
+    let text = String::from_utf8(run(&["compare", both]).stdout).expect("text");
+    assert!(text.contains("2 scan(s) at 2 poses, all together"), "{text}");
+    let json = Log::parse(&String::from_utf8(run(&["compare", "--json", both]).stdout).expect("text"));
+    assert_eq!((&json.records[0]["scans"], &json.records[0]["poses"]), (&2.into(), &2.into()));
+}
+
+#[test]
+fn a_full_disk_leaves_the_old_file_or_none_and_the_command_says_so() {
+    let (folder, scene) = folder_with(("room.json", SCENE));
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (old, new) = (path("old.png"), path("new.png"));
+    assert!(run_case("scene draw IN -o DIR/old.png", &scene, folder.path()).status.success());
+    let was = fs::read(&old).expect("written");
+    let course = path("course.jsonl");
+    let fine = "simulate --scene simple-room --pose fig9 --out DIR/fig9.jsonl";
+    assert!(run_case(fine, &scene, folder.path()).status.success());
+    for (out, arguments) in [
+        (&old, vec!["scene", "draw", "simple-room", "-o", &old]),
+        (&new, vec!["scene", "draw", "simple-room", "-o", &new]),
+        (&new, vec!["plot", &path("fig9.jsonl"), "-o", &new]),
+        (&course, vec!["simulate", "--scene", "simple-room", "--pose", "fig9", "--out", &course]),
+        (&path("t.jsonl"), vec!["log", "annotate", &path("fig9.jsonl"), "--out", &path("t.jsonl")]),
+        (&path("map/map.pgm"), vec!["map", &path("fig9.jsonl"), "--out", &path("map")]),
+    ] {
+        // Blocks of 512 bytes: less than any of these files. Nothing is said of signals.
+        let limited = sonard(&arguments);
+        let mut shell = std::process::Command::new("sh");
+        shell.args(["-c", "ulimit -f 1; exec \"$0\" \"$@\""]).arg(limited.get_program());
+        let output = shell.args(limited.get_args()).output().expect("starts");
+        let message = stderr(&output).replace(['\n', '\u{2502}', ' '], "");
+        assert_eq!(output.status.code(), Some(3), "{arguments:?}: {:?} {message}", output.status);
+        assert!(message.contains(out.as_str()), "{arguments:?}: {message}");
+        assert_eq!(Path::new(out).exists(), *out == old, "{arguments:?}");
+        let left = fs::read_dir(folder.path()).expect("there").flatten();
+        let litter: Vec<_> =
+            left.filter(|entry| entry.file_name().to_string_lossy().ends_with(".new")).collect();
+        assert!(litter.is_empty(), "{arguments:?}: {litter:?}");
+    }
+    assert_eq!(fs::read(&old).expect("kept"), was);
+}
+
+#[test]
+fn only_a_dead_socket_is_replaced_by_the_daemons() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = |name: &str| folder.path().join(name);
+    let socket = place("s").display().to_string();
+    let start = |log: &str| {
+        let log = place(log).display().to_string();
+        run(&["run", "--mock", "--scene", "simple-room", "--pose", "fig9", "--log", &log, "--socket", &socket])
+    };
+    let refused = |what: &str| {
+        let output = start("log");
+        let message = stderr(&output);
+        assert_eq!(output.status.code(), Some(3), "{what}: {message}");
+        assert!(message.replace(['\n', '\u{2502}', ' '], "").contains(&socket), "{what}: {message}");
+    };
+    fs::write(&socket, "a thesis").expect("writable");
+    refused("a file");
+    assert_eq!(fs::read_to_string(&socket).expect("kept"), "a thesis");
+    fs::rename(&socket, place("thesis")).expect("ours");
+    symlink(place("thesis"), &socket).expect("writable");
+    refused("a link to a file");
+    assert_eq!(fs::read_to_string(place("thesis")).expect("kept"), "a thesis");
+    assert!(fs::symlink_metadata(&socket).expect("kept").is_symlink());
+    fs::remove_file(&socket).expect("ours");
+    symlink(place("nothing"), &socket).expect("writable");
+    refused("a link to nothing");
+    assert!(fs::symlink_metadata(&socket).expect("kept").is_symlink());
+    fs::remove_file(&socket).expect("ours");
+    fs::create_dir(&socket).expect("writable");
+    refused("a folder");
+    fs::remove_dir(&socket).expect("kept, and empty");
+    let (fifo, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RUSR);
+    rustix::fs::mknodat(rustix::fs::CWD, socket.as_str(), fifo, mode, 0).expect("a pipe");
+    refused("a pipe");
+    assert!(fs::metadata(&socket).expect("kept").file_type().is_fifo());
+    fs::remove_file(&socket).expect("ours");
+    // A listener that is gone without its file is what a killed daemon leaves.
+    drop(std::os::unix::net::UnixListener::bind(&socket).expect("a socket"));
+    let mut daemon = sonard(&["run", "--mock", "--scene", "simple-room", "--pose", "fig9"]);
+    daemon.args(["--log", place("log").to_str().expect("plain"), "--socket", &socket]);
+    let mut daemon = daemon.stderr(Stdio::null()).spawn().expect("starts");
+    crate::common::wait_until("the socket", || {
+        std::os::unix::net::UnixStream::connect(&socket).is_ok()
+    });
+    // What takes the socket's name meanwhile is not the daemon's to remove.
+    fs::remove_file(&socket).expect("ours");
+    fs::write(&socket, "another's").expect("writable");
+    crate::common::interrupt(daemon.id());
+    assert!(daemon.wait().expect("ends").success());
+    assert_eq!(fs::read_to_string(&socket).expect("kept"), "another's");
+}
+
+#[test]
+fn a_daemon_does_not_mend_what_a_link_in_its_log_folder_leads_to() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let logs = folder.path().join("log");
+    fs::create_dir(&logs).expect("writable");
+    let precious = folder.path().join("precious.txt");
+    fs::write(&precious, "one line\nand half a").expect("writable");
+    symlink(&precious, logs.join("sonard-20991122T000000Z.jsonl")).expect("writable");
+    let (log, socket) = (logs.display().to_string(), folder.path().join("s").display().to_string());
+    let mut daemon = sonard(&["run", "--mock", "--scene", "simple-room", "--pose", "fig9"]);
+    daemon.args(["--log", &log, "--socket", &socket]).stderr(Stdio::null());
+    let mut daemon = daemon.spawn().expect("starts");
+    crate::common::wait_until("the socket", || {
+        std::os::unix::net::UnixStream::connect(&socket).is_ok()
+    });
+    crate::common::interrupt(daemon.id());
+    assert!(daemon.wait().expect("ends").success());
+    assert_eq!(fs::read_to_string(&precious).expect("kept"), "one line\nand half a");
+    let beside: Vec<_> = fs::read_dir(folder.path()).expect("there").flatten().collect();
+    assert!(beside.iter().all(|entry| !entry.file_name().to_string_lossy().contains("torn")));
+    // The same of one scan's log, and of a repair's.
+    let out = folder.path().join("out");
+    fs::create_dir(&out).expect("writable");
+    symlink(&precious, out.join("scan.jsonl")).expect("writable");
+    let scan = short_scan("fig9", &out, &[]);
+    assert_eq!(scan.status.code(), Some(2), "{}", stderr(&scan));
+    assert_eq!(fs::read_to_string(&precious).expect("kept"), "one line\nand half a");
+}
