@@ -6,18 +6,11 @@
 #   packaging/test.sh arm64   for a Raspberry Pi: cross-built, looked into, run in an emulator
 set -euo pipefail
 cd "$(dirname "$0")/.."
+. packaging/debian.sh
 step() { printf -- '-- %s\n' "$*"; }
 fail() { printf 'packaging/test.sh: %s\n' "$*" >&2; exit 1; }
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-
-need() {
-  local program=$1 package=$2
-  command -v "$program" >/dev/null && return
-  [ "$(id -u)" = 0 ] || fail "$program is missing: sudo apt-get install $package"
-  apt-get update -qq
-  apt-get install -y -qq --no-install-recommends "$package" >/dev/null
-}
 
 # What is the same on every architecture.
 look_into() {
@@ -89,14 +82,15 @@ test_here() {
   bash -n "$work/tree/usr/share/bash-completion/completions/sonard"
 
   step "a Debian of its own"
-  need mmdebstrap mmdebstrap
-  local root=$work/root suite
-  suite=$(. /etc/os-release && echo "$VERSION_CODENAME")
-  mmdebstrap --quiet --variant=apt --include=systemd,udev,procps "$suite" "$root" >/dev/null
+  local root=$work/root
+  new_debian "$root"
   cp "$deb" "$root/tmp/new.deb"
   older "$deb" "$root/tmp/old.deb"
   cp packaging/lifecycle.sh "$root/tmp/"
   chroot "$root" /tmp/lifecycle.sh
+
+  step "under a booted systemd"
+  systemd/boot-test.sh "$deb"
 }
 
 # The same package with a version that is older, and another default in its configuration.

@@ -25,6 +25,9 @@ pub fn document<K: Form>() -> String {
 fn write_key(text: &mut String, key: &Key) {
     comment(text, &format!("{} {}", key.about, key.kind.wanted()));
     let _ = match (&key.default, &key.example) {
+        (Some(default), _) if key.default_yields => {
+            writeln!(text, "# {} = {}", key.name, key.kind.toml(default))
+        }
         (Some(default), _) => writeln!(text, "{} = {}", key.name, key.kind.toml(default)),
         (None, Some(example)) => {
             writeln!(text, "# {} = {}", key.name, key.kind.toml(example))
@@ -73,6 +76,19 @@ mod tests {
         let opened = read(&opened.join("\n")).expect("the examples are right");
         assert_eq!(opened.server.listen.as_deref(), Some("127.0.0.1:8765"));
         assert_eq!(opened.gpio.reset_pin, Some(17));
+    }
+
+    #[test]
+    fn the_shipped_file_sets_no_default_that_gives_way() {
+        let read = Layers::<Keys>::new().file("sonard.toml", SHIPPED).expect("it is right");
+        let mut yielding = Vec::new();
+        for section in sections() {
+            for key in section.keys.iter().filter(|key| key.default_yields) {
+                yielding.push(format!("{}.{}", section.name, key.name));
+                assert_eq!(read.origin(&section.name, &key.name), None, "{}", key.name);
+            }
+        }
+        assert_eq!(yielding, ["scanning.mode", "model.sensor", "log.folder", "server.socket"]);
     }
 
     #[test]

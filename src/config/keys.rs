@@ -85,7 +85,9 @@ pub struct PlanKeys {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ScanningKeys {
-    /// Scan after scan, only when asked to, or one every so often.
+    /// Scan after scan, only when asked to, or one every so often. With --simulate scan after scan
+    /// goes before the default.
+    #[schemars(extend("x-default-yields" = true))]
     pub mode: Mode,
     /// From the start of a scan to the start of the next, seconds, when the mode is schedule. A
     /// turn that is missed is left out.
@@ -134,7 +136,9 @@ pub struct MotionKeys {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ModelKeys {
-    /// Sensor preset, or a file with a sensor's data.
+    /// Sensor preset, or a file with a sensor's data. With --simulate the array's own goes before the
+    /// default.
+    #[schemars(extend("x-default-yields" = true))]
     pub sensor: String,
     /// How echoes are found.
     pub engine: EngineKind,
@@ -173,6 +177,7 @@ pub struct SimulateKeys {
 #[serde(default, deny_unknown_fields)]
 pub struct LogKeys {
     /// Folder of the logs (restart). systemd's STATE_DIRECTORY goes before the default.
+    #[schemars(extend("x-default-yields" = true))]
     pub folder: String,
     /// Begin another file when this one is larger, megabytes.
     #[schemars(range(min = 0.01, max = 100_000))]
@@ -210,6 +215,7 @@ pub struct LinkKeys {
 #[serde(default, deny_unknown_fields)]
 pub struct ServerKeys {
     /// Unix socket (restart); empty for none. systemd's RUNTIME_DIRECTORY goes before the default.
+    #[schemars(extend("x-default-yields" = true))]
     pub socket: String,
     /// Who may use the socket: its permissions, octal (restart).
     #[schemars(regex(pattern = "^0?[0-7]{3}$"))]

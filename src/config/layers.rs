@@ -65,6 +65,7 @@ static FREE_KEY: Key = Key {
     kind: Kind::Any,
     default: None,
     example: None,
+    default_yields: false,
 };
 
 impl<K: Form> Layers<K> {

@@ -22,11 +22,11 @@ pub trait Form: Default + Serialize + DeserializeOwned + JsonSchema {
 
 impl Form for Keys {
     const HEAD: &'static str = "\
-# Configuration of `sonard run`. Every key is here, with its default; a key without one stands in
-# a comment with an example. Over the file go environment variables (SONARD_PLAN_STEP_DEG=1.8),
-# over those the options of the command line (--set plan.step_deg=1.8). `sonard run --check` reads
-# it all and says what is in force. `systemctl reload` (SIGHUP) takes changes in; those of keys
-# marked (restart) wait for the next start.
+# Configuration of `sonard run`. Every key is here, with its default; in a comment if that depends
+# on how the daemon is started; a key without one stands in a comment with an example. Over the file
+# go environment variables (SONARD_PLAN_STEP_DEG=1.8), over those the options of the command line
+# (--set plan.step_deg=1.8). `sonard run --check` reads it all and says what is in force. `systemctl
+# reload` (SIGHUP) takes changes in; those of keys marked (restart) wait for the next start.
 ";
     const DOCUMENTED_BY: &'static str = "sonard run --print-config";
 
@@ -49,6 +49,9 @@ pub struct Section {
     pub free: bool,
 }
 
+/// Marks in the schema what [`Key::default_yields`] says.
+const DEFAULT_YIELDS: &str = "x-default-yields";
+
 /// A key of a section.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Key {
@@ -62,6 +65,9 @@ pub struct Key {
     pub default: Option<Value>,
     /// What one could give, for keys without a default.
     pub example: Option<Value>,
+    /// Whether the default gives way to something about how the program is started: a file that
+    /// shows the default must not set it.
+    pub default_yields: bool,
 }
 
 /// What a key may be given.
@@ -160,6 +166,7 @@ fn read_key(name: &str, of: &Value) -> Key {
         kind: kind(of),
         default: of.get("default").filter(|default| !default.is_null()).cloned(),
         example: of.get("examples").and_then(|examples| examples.get(0)).cloned(),
+        default_yields: of.get(DEFAULT_YIELDS).is_some_and(|yields| *yields == true),
     }
 }
 

@@ -18,6 +18,28 @@ fn the_shipped_file_is_what_the_program_prints_and_it_is_right() {
     assert!(String::from_utf8_lossy(&checked.stdout).contains("step_deg = 0.9"));
 }
 
+/// An instance's file is a copy of the shipped one: it must not send the instance to the folder and
+/// socket of another.
+#[test]
+fn a_copy_of_the_shipped_file_leaves_to_the_start_what_is_decided_there() {
+    let shipped = concat!(env!("CARGO_MANIFEST_DIR"), "/config/sonard.toml");
+    let start = ["--simulate", "--scene", "corridor", "--pose", "2,1,0"];
+    let output = sonard(&["run", "--check", "--config", shipped])
+        .args(start)
+        .env("STATE_DIRECTORY", "/var/lib/sonard/front")
+        .env("RUNTIME_DIRECTORY", "/run/sonard/front")
+        .output()
+        .expect("the program starts");
+    let said = String::from_utf8_lossy(&output.stdout);
+    for part in [
+        "folder = \"/var/lib/sonard/front\"",
+        "socket = \"/run/sonard/front/sonard.sock\"",
+        "mode = \"continuous\"",
+    ] {
+        assert!(said.contains(part), "no {part} in {said}{}", stderr(&output));
+    }
+}
+
 #[test]
 fn wrong_configurations_end_with_the_place_and_a_way_out() {
     let folder = tempfile::tempdir().expect("a folder");
