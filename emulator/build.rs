@@ -1,11 +1,15 @@
 //! Bindings to libsimavr.
 
-use std::{env, error::Error, path::PathBuf};
+use std::error::Error;
 
+#[cfg(feature = "simavr")]
 const FUNCTIONS: &str = "avr_(make_mcu_by_name|init|load_firmware|run|terminate|reset|ioctl|\
 io_getirq|raise_irq|irq_register_notify|cycle_timer_register|cycle_timer_cancel)|elf_read_firmware";
 
+#[cfg(feature = "simavr")]
 fn main() -> Result<(), Box<dyn Error>> {
+    use std::{env, path::PathBuf};
+
     println!("cargo:rerun-if-changed=wrapper.h");
     let simavr = pkg_config::Config::new().atleast_version("1.6").probe("simavr").map_err(|error| {
         format!("libsimavr is missing (apt-get install libsimavr-dev libelf-dev libclang-dev): {error}")
@@ -22,5 +26,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         .layout_tests(false)
         .generate()?
         .write_to_file(PathBuf::from(env::var("OUT_DIR")?).join("simavr.rs"))?;
+    Ok(())
+}
+
+#[cfg(not(feature = "simavr"))]
+fn main() -> Result<(), Box<dyn Error>> {
+    println!("cargo:rerun-if-changed=build.rs");
     Ok(())
 }

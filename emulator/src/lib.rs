@@ -12,6 +12,7 @@
 //! not: voltages, and simavr's own limits: its UART takes the next byte only a byte's time after
 //! the last was read, so that some 200 bytes in a row at line speed overrun it; interrupts begin at
 //! instruction boundaries, so an echo may be seen up to two cycles late.
+#![cfg(feature = "simavr")]
 
 mod emulator;
 mod module;

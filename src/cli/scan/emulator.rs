@@ -16,8 +16,8 @@ const VARIABLE: &str = "SONARD_EMULATOR";
 const LISTENING: &str = "listening on ";
 
 const BUILD: &str = "build it, in a clone of the repository, with `firmware/test.sh` (Debian; it \
-                     installs what is missing) or `cargo build --release --manifest-path \
-                     emulator/Cargo.toml`; put it beside `sonard` or in PATH, or name it in \
+                     installs what is missing) or `cargo build --release --package \
+                     sonard-emulator --features simavr`; put it beside `sonard` or in PATH, or name it in \
                      SONARD_EMULATOR. Without it, `--mock` runs the same device code";
 
 /// A `sonard-emulator` that ends when this is dropped.
@@ -98,7 +98,7 @@ fn find() -> Result<PathBuf, Failure> {
     let search = env::var_os("PATH").unwrap_or_default();
     let in_path = env::split_paths(&search).map(|folder| folder.join(PROGRAM));
     let built = program.ancestors().flat_map(|folder| {
-        ["release", "debug"].map(|kind| folder.join("emulator/target").join(kind).join(PROGRAM))
+        ["release", "debug"].map(|kind| folder.join("target").join(kind).join(PROGRAM))
     });
     beside
         .into_iter()

@@ -141,3 +141,16 @@ fn text(svg: &mut String, x: i32, y: i32, anchor: &str, size: i32, words: &str) 
          fill=\"#1b2733\">{words}</text>"
     );
 }
+
+#[cfg(test)]
+mod tests {
+    use super::drawing;
+
+    #[test]
+    fn the_picture_in_the_documents_is_this_drawing() {
+        assert!(
+            drawing() == include_str!("../../../../docs/wiring/wiring.svg"),
+            "docs/wiring/wiring.svg is behind: docs/wiring/README.md has the command that makes it"
+        );
+    }
+}

@@ -1,0 +1,1 @@
+//! Nothing. What counts is in `Cargo.toml`.
