@@ -2,111 +2,233 @@
 # Everything a change must pass. Installs what is missing where it may, else says what to install.
 #
 #   ./test.sh            all of it
+#   ./test.sh quick      format, lints, unit tests: what to run while at work
 #   FUZZ_SECONDS=60 ./test.sh   fuzz each target for a minute (default 5 s; 0 leaves fuzzing out)
 #   FIRMWARE=0 ./test.sh        leave firmware and emulator out, where they can't be built: they
 #                               need Debian's packages (firmware/test.sh)
 #   PAGE=0 ./test.sh            leave the live page out, where there is no Chromium to look at it
 #   AXE=0 ./test.sh             leave axe-core out of that, where there is no npm to get it with
 #   FAKETIME=0 ./test.sh        leave the clock that is set out, where there is no libfaketime
+#   BOOT=0 ./test.sh            leave the units under a booted systemd out (systemd/boot-test.sh)
 #   PACKAGE=1 ./test.sh         build, install, upgrade and remove the Debian package, too; PACKAGE=all
 #                               also cross-builds that for a Raspberry Pi and runs it in an emulator
 #   SONARD_SOAK_FAULTS=1000 SONARD_KILLS=200 SONARD_COLLECT_KILLS=200 ./test.sh   longer runs of daemon
 #                               and collection among faults
+#
+# Everything is built with --workspace and the same features, so that nothing is built twice
+# (workspace-hack). Tests are run by cargo-nextest where it is installed, else by cargo test.
 set -euo pipefail
 cd "$(dirname "$0")"
 fuzz_seconds=${FUZZ_SECONDS:-5}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
 
-step() { printf '\n== %s\n' "$*"; }
 fail() { printf 'test.sh: %s\n' "$*" >&2; exit 1; }
 
-step "tools"
-command -v cargo >/dev/null || fail "cargo is missing: install Rust 1.90 or newer from https://rustup.rs"
-if ! command -v cc >/dev/null || { [ "$fuzz_seconds" != 0 ] && ! command -v c++ >/dev/null; }; then
+# Seconds of processor time of all that has run so far.
+cpu_s() {
+  times >"$work/times"
+  tail -n 1 "$work/times" | tr 'ms' '  ' | awk '{printf "%.0f", 60 * ($1 + $3) + $2 + $4}'
+}
+
+step_name=
+step() {
+  end_step
+  step_name=$*
+  step_began=$SECONDS
+  step_cpu=$(cpu_s)
+  printf '\n== %s\n' "$*"
+}
+end_step() {
+  [ -z "$step_name" ] || printf '%6d %6d  %s\n' $((SECONDS - step_began)) $(($(cpu_s) - step_cpu)) "$step_name" >>"$work/took"
+}
+print_times() {
+  end_step
+  printf '\n== time\n  wall    cpu  step (seconds)\n'
+  cat "$work/took"
+  printf '%6d %6d  all\n\n' "$SECONDS" "$(cpu_s)"
+}
+
+# get_packages WHAT-TO-DO-WITHOUT PACKAGE...: installs them where it may.
+get_packages() {
+  local without=$1
+  shift
   if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
-    apt-get update -qq && apt-get install -y -qq --no-install-recommends gcc g++ libc6-dev
+    apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@" >/dev/null
   else
-    fail "a C linker and (for fuzzing) a C++ compiler are missing: sudo apt-get install gcc g++ libc6-dev"
+    fail "missing here: sudo apt-get install $*$without"
   fi
-fi
-for component in rustfmt clippy; do
-  cargo "${component/rustfmt/fmt}" --version >/dev/null 2>&1 || rustup component add "$component" ||
-    fail "$component is missing: rustup component add $component"
-done
-step "format"
-cargo fmt --all -- --check
-cargo fmt --manifest-path fuzz/Cargo.toml -- --check
+}
 
-step "clippy, warnings denied"
-cargo clippy --workspace --all-targets --quiet -- -D warnings
+check_tools() {
+  step "tools"
+  command -v cargo >/dev/null || fail "cargo is missing: install Rust 1.90 or newer from https://rustup.rs"
+  if ! command -v cc >/dev/null || { [ "$fuzz_seconds" != 0 ] && ! command -v c++ >/dev/null; }; then
+    get_packages "" gcc g++ libc6-dev
+  fi
+  for component in rustfmt clippy; do
+    cargo "${component/rustfmt/fmt}" --version >/dev/null 2>&1 || rustup component add "$component" ||
+      fail "$component is missing: rustup component add $component"
+  done
+}
 
-step "the pure part alone"
-cargo clippy --lib --no-default-features --quiet -- -D warnings
-tests/pure-tree.sh
+check_text() {
+  step "format"
+  cargo fmt --all -- --check
+  cargo fmt --manifest-path fuzz/Cargo.toml -- --check
+  step "clippy, warnings denied"
+  cargo clippy --workspace --all-targets "${features[@]}" --quiet -- -D warnings
+}
 
-step "systemd units"
-systemd/test.sh
+check_pure_part() {
+  step "the pure part alone"
+  cargo clippy --lib --no-default-features --quiet -- -D warnings
+  tests/pure-tree.sh
+}
 
-step "documentation, warnings denied"
-RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
+check_documentation() {
+  step "documentation, warnings denied"
+  RUSTDOCFLAGS="-D warnings" cargo doc --workspace "${features[@]}" --no-deps --quiet
+}
 
-if [ "$fuzz_seconds" != 0 ]; then
+fuzz() {
+  if [ "$fuzz_seconds" = 0 ]; then return; fi
   step "fuzz targets, $fuzz_seconds s each"
-  fuzz/smoke.sh "$fuzz_seconds" >"${TMPDIR:-/tmp}/sonard-fuzz.$$" 2>&1 || {
-    tail -n 60 "${TMPDIR:-/tmp}/sonard-fuzz.$$"
+  fuzz/smoke.sh "$fuzz_seconds" >"$work/fuzz" 2>&1 || {
+    tail -n 60 "$work/fuzz"
     fail "a fuzz target found something: its input is in fuzz/artifacts"
   }
-  rm -f "${TMPDIR:-/tmp}/sonard-fuzz.$$"
   printf 'no finding\n'
-fi
+}
 
-if [ "${FIRMWARE:-1}" = 0 ]; then
-  step "firmware and emulator: LEFT OUT, because FIRMWARE=0"
-else
-  firmware/test.sh || fail "firmware or emulator: see above. Where they can't be built, FIRMWARE=0 leaves them out"
-fi
-
-if [ "${FAKETIME:-1}" != 0 ] && ! ls /usr/lib/*/faketime/libfaketime.so.1 >/dev/null 2>&1; then
-  if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
-    apt-get update -qq && apt-get install -y -qq --no-install-recommends libfaketime >/dev/null
-  else
-    fail "libfaketime is missing: sudo apt-get install libfaketime, or leave the test out with FAKETIME=0"
+build_firmware() {
+  if [ "${FIRMWARE:-1}" = 0 ]; then
+    step "firmware and emulator: LEFT OUT, because FIRMWARE=0"
+    return
   fi
-fi
+  step "firmware"
+  firmware/test.sh build || fail "firmware: see above. Where it can't be built, FIRMWARE=0 leaves it and the emulator out"
+  features=(--features sonard-emulator/simavr)
+}
 
-if [ "${PAGE:-1}" != 0 ]; then
+build_tests() {
+  step "build of the tests"
+  if [ "${FAKETIME:-1}" != 0 ] && ! ls /usr/lib/*/faketime/libfaketime.so.1 >/dev/null 2>&1; then
+    get_packages ", or leave the clock that is set out with FAKETIME=0" libfaketime
+  fi
+  if [ "$runner" = nextest ]; then
+    cargo nextest run --workspace "${features[@]}" --no-run --cargo-quiet
+  else
+    cargo test --workspace --lib --bins --tests "${features[@]}" --no-run --quiet
+  fi
+}
+
+prepare_browser() {
+  if [ "${PAGE:-1}" = 0 ]; then
+    step "the live page: LEFT OUT, because PAGE=0"
+    return
+  fi
   step "a browser for the live page"
   if ! command -v chromium >/dev/null || ! command -v chromedriver >/dev/null; then
-    if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
-      apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium chromium-driver >/dev/null
-    else
-      fail "Chromium is missing: sudo apt-get install chromium chromium-driver, or leave the page out with PAGE=0"
-    fi
+    get_packages ", or leave the page out with PAGE=0" chromium chromium-driver
   fi
   if [ "${AXE:-1}" = 0 ]; then printf 'axe-core: LEFT OUT, because AXE=0\n'; else tests/axe.sh; fi
-fi
+  chromium --version
+}
 
-case ${PACKAGE:-0} in
-1 | all)
-  step "the Debian package"
-  packaging/test.sh
+check_units_and_package() {
+  step "systemd units"
+  systemd/test.sh
+  case ${PACKAGE:-0} in
+  1 | all)
+    step "the Debian package"
+    packaging/test.sh
+    ;;
+  *)
+    step "the Debian package: left to packaging/test.sh (PACKAGE=1 runs it here)"
+    if [ "${BOOT:-1}" = 0 ]; then
+      step "units under a booted systemd: LEFT OUT, because BOOT=0"
+    else
+      step "units under a booted systemd"
+      systemd/boot-test.sh "${CARGO_TARGET_DIR:-target}/debug/sonard"
+    fi
+    ;;
+  esac
+  if [ "${PACKAGE:-0}" = all ]; then
+    step "the Debian package for a Raspberry Pi"
+    packaging/test.sh arm64
+  fi
+}
+
+play_emulator() {
+  if [ "${FIRMWARE:-1}" = 0 ]; then return; fi
+  step "sonard on the emulated board"
+  firmware/test.sh play
+}
+
+check_examples() {
+  step "examples in the documentation"
+  cargo test --workspace "${features[@]}" --doc --quiet
+}
+
+# run_tests [ARGUMENT...]: the closing lines are kept for the end.
+run_tests() {
+  if [ "$runner" = nextest ]; then
+    local filter=(-E 'not test(/^live_page::/)')
+    if [ "${PAGE:-1}" != 0 ]; then filter=(); fi
+    cargo nextest run --workspace "${features[@]}" "$@" "${filter[@]}" --cargo-quiet --no-fail-fast \
+      --status-level slow --final-status-level fail 2>&1
+  else
+    if [ $# = 0 ]; then set -- --lib --bins --tests; fi
+    cargo test --workspace "${features[@]}" "$@" --no-fail-fast --quiet -- --skip live_page:: 2>&1
+  fi | tee "$work/tests" | head -n "-$closing_lines"
+}
+
+# By itself: a browser takes the processors that tests of timing want. To nextest its configuration
+# says that.
+test_page() {
+  if [ "${PAGE:-1}" = 0 ] || [ "$runner" = nextest ]; then return; fi
+  step "the live page"
+  cargo test --workspace "${features[@]}" --test cli --quiet live_page::
+}
+
+runner=cargo
+if cargo nextest --version >/dev/null 2>&1; then runner=nextest; fi
+# What the runner says of all tests, with an empty line around it.
+closing_lines=3
+features=()
+export SONARD_FIRMWARE=${SONARD_FIRMWARE:-$PWD/firmware/target/avr-none/release/sonard-firmware.elf}
+
+finish() {
+  local code=$1
+  print_times
+  tail -n "$closing_lines" "$work/tests"
+  exit "$code"
+}
+
+case ${1:-} in
+quick)
+  check_tools
+  check_text
+  step "unit tests"
+  run_tests --lib || finish $?
   ;;
-*) step "the Debian package: left to packaging/test.sh (PACKAGE=1 runs it here)" ;;
+"")
+  check_tools
+  build_firmware
+  check_text
+  check_pure_part
+  build_tests
+  check_documentation
+  fuzz
+  prepare_browser
+  check_units_and_package
+  play_emulator
+  check_examples
+  test_page
+  step "tests"
+  run_tests || finish $?
+  ;;
+*) fail "all (no argument) or quick, not $1" ;;
 esac
-if [ "${PACKAGE:-0}" = all ]; then
-  step "the Debian package for a Raspberry Pi"
-  packaging/test.sh arm64
-fi
-
-step "examples in the documentation"
-cargo test --workspace --doc --quiet
-
-if [ "${PAGE:-1}" = 0 ]; then
-  step "the live page: LEFT OUT, because PAGE=0"
-else
-  # By itself: a browser takes the processors that tests of timing want.
-  step "the live page in $(chromium --version)"
-  cargo test --test cli --quiet live_page::
-fi
-
-step "tests"
-cargo test --workspace --lib --bins --tests --quiet -- --skip live_page::
+finish 0
