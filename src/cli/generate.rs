@@ -1,9 +1,6 @@
 //! `sonard generate`: manual pages and completions, for packages.
 
-use std::{
-    fs, io,
-    path::Path,
-};
+use std::{fs, io, path::Path};
 
 use clap::{Command, CommandFactory as _};
 use clap_complete::{Shell, generate_to};

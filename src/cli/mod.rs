@@ -137,7 +137,8 @@ pub fn main() -> ExitCode {
     if let Err(failure) = output::guard(&command, &matches) {
         return failure::report(Err(failure));
     }
-    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit());
+    let cli =
+        Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit());
     let outcome = match cli.verb {
         Verb::Scan(args) => scan::run(&args),
         Verb::Collect(args) => collect::run(&args),

@@ -133,7 +133,12 @@ pub(super) fn guard(command: &Command, matches: &ArgMatches) -> Outcome {
         let arguments = command.get_arguments().filter(|argument| !is_output(argument));
         for argument in arguments.filter(|argument| given(argument.get_id().as_str())) {
             let values = level.1.try_get_raw(argument.get_id().as_str());
-            values.ok().flatten().into_iter().flatten().for_each(|value| note_input(value.as_ref()));
+            values
+                .ok()
+                .flatten()
+                .into_iter()
+                .flatten()
+                .for_each(|value| note_input(value.as_ref()));
         }
     }
     if let Some(metadata) = of_descriptor(io::stdin().as_fd()) {
@@ -247,7 +252,8 @@ impl Overwrite {
             }
             _ => WholeFile::create(&at).and_then(|file| {
                 // What was kept from others stays so.
-                there.map_or(Ok(()), |there| file.as_file().set_permissions(there.permissions()))?;
+                there
+                    .map_or(Ok(()), |there| file.as_file().set_permissions(there.permissions()))?;
                 Ok(Stream::File(BufWriter::new(file)))
             }),
         };
@@ -307,7 +313,9 @@ impl Stream {
     pub(super) fn finish(&mut self) -> io::Result<()> {
         self.flush()?;
         match mem::replace(self, Self::Finished) {
-            Self::File(file) => file.into_inner().map_err(io::IntoInnerError::into_error)?.take_place(),
+            Self::File(file) => {
+                file.into_inner().map_err(io::IntoInnerError::into_error)?.take_place()
+            }
             Self::Standard(_) | Self::Device(_) | Self::Finished => Ok(()),
         }
     }

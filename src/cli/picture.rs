@@ -90,8 +90,10 @@ pub(super) fn scene_for(
     views: &[ScanView],
     given: Option<&str>,
 ) -> Result<Option<Scene>, Failure> {
-    let session =
-        views.iter().filter_map(|view| view.session.as_deref()).find(|session| session.scene.is_some());
+    let session = views
+        .iter()
+        .filter_map(|view| view.session.as_deref())
+        .find(|session| session.scene.is_some());
     let logged = session.and_then(|session| session.scene.as_ref());
     let scene = match (given, session) {
         (Some(given), _) => scene_file::load(given)?,

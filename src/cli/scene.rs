@@ -1,8 +1,6 @@
 //! `sonard scene`.
 
-use std::{
-    io::{self, Write as _},
-};
+use std::io::{self, Write as _};
 
 use super::{
     Failure, Outcome,

@@ -232,8 +232,8 @@ impl Journal {
     /// When another process holds it, it can't be read, or a line in it is no entry.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         let fail = |source| FolderError::io("open", path, source);
-        let mut file =
-            open_own(OpenOptions::new().read(true).append(true).create(true), path).map_err(fail)?;
+        let mut file = open_own(OpenOptions::new().read(true).append(true).create(true), path)
+            .map_err(fail)?;
         match rustix::fs::flock(&file, rustix::fs::FlockOperation::NonBlockingLockExclusive) {
             Ok(()) => {}
             Err(rustix::io::Errno::WOULDBLOCK) => {

@@ -160,7 +160,9 @@ fn bind_unix(path: &Path, mode: u32) -> io::Result<UnixListener> {
         }
         Ok(_) => match UnixStream::connect(path) {
             Ok(_) => return Err(io::ErrorKind::AddrInUse.into()),
-            Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => fs::remove_file(path)?,
+            Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => {
+                fs::remove_file(path)?
+            }
             Err(error) => return Err(error),
         },
     }

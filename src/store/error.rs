@@ -104,9 +104,9 @@ impl StoreError {
             Self::Unreadable { source, .. } | Self::Read { source, .. } => {
                 help_for_reading(source).into()
             }
-            Self::Open { source, .. }
-            | Self::Write { source, .. }
-            | Self::Sync { source, .. } => help_for(source),
+            Self::Open { source, .. } | Self::Write { source, .. } | Self::Sync { source, .. } => {
+                help_for(source)
+            }
             Self::NoLog { kind, .. } => kind.instead_of_a_log().into(),
             Self::Busy { .. } => "wait until it is done, stop it, or choose another file".into(),
             Self::Torn { source, path } => {

@@ -176,11 +176,13 @@ impl History {
 
 /// The session of a scan, after the one before it that has the text of its scene.
 fn read_session(file: &mut BufReader<File>, place: &Place) -> io::Result<Vec<Record>> {
-    let places = place.session.iter().flat_map(|session| session.text_at.into_iter().chain([session.at]));
+    let places =
+        place.session.iter().flat_map(|session| session.text_at.into_iter().chain([session.at]));
     let mut records = Vec::new();
     for at in places {
         file.seek(SeekFrom::Start(at))?;
-        records.extend(read_log(file.by_ref()).next().transpose()?.and_then(|line| line.record.ok()));
+        records
+            .extend(read_log(file.by_ref()).next().transpose()?.and_then(|line| line.record.ok()));
     }
     Ok(records)
 }

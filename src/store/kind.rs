@@ -115,10 +115,14 @@ impl FileKind {
             Self::Gzip => "unpack it: zcat FILE | sonard ... -",
             Self::Compressed => "unpack it first",
             Self::Scene => "give it with --scene; a log is what `sonard scan` or `simulate` writes",
-            Self::Sensor => "give it with --sensor; a log is what `sonard scan` or `simulate` writes",
+            Self::Sensor => {
+                "give it with --sensor; a log is what `sonard scan` or `simulate` writes"
+            }
             Self::Array => "give it with --array; a log is what `sonard scan` or `simulate` writes",
             Self::Empty => "nothing was written to it; give a log as `sonard scan` writes it",
-            _ => "give a log as `sonard scan` or `sonard simulate` writes it: one JSON object a line",
+            _ => {
+                "give a log as `sonard scan` or `sonard simulate` writes it: one JSON object a line"
+            }
         }
     }
 }
@@ -200,7 +204,9 @@ fn of_text(text: &str) -> FileKind {
 }
 
 fn of_json(text: &str, first: &str) -> FileKind {
-    if first.len() < text.trim_end().len() && serde_json::from_str::<Map<String, Value>>(first).is_ok() {
+    if first.len() < text.trim_end().len()
+        && serde_json::from_str::<Map<String, Value>>(first).is_ok()
+    {
         return FileKind::JsonLines;
     }
     // Only the beginning may be here: names of members tell enough.
@@ -223,7 +229,12 @@ mod tests {
     #[track_caller]
     fn check(head: impl AsRef<[u8]>, kind: FileKind) {
         let head = head.as_ref();
-        assert_eq!(FileKind::of(head), kind, "{:?}", String::from_utf8_lossy(&head[..head.len().min(80)]));
+        assert_eq!(
+            FileKind::of(head),
+            kind,
+            "{:?}",
+            String::from_utf8_lossy(&head[..head.len().min(80)])
+        );
     }
 
     #[test]

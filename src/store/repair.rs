@@ -55,8 +55,8 @@ pub struct Repair {
 /// When another process holds the log, or reading or writing fails; the log is then as it was.
 pub fn repair(path: &Path) -> Result<Repair, StoreError> {
     // A link to a log is repaired where the log is.
-    let path =
-        &fs::canonicalize(path).map_err(|source| StoreError::Unreadable { path: path.into(), source })?;
+    let path = &fs::canonicalize(path)
+        .map_err(|source| StoreError::Unreadable { path: path.into(), source })?;
     // Other files have no records to keep.
     drop(open_for_reading(path)?);
     let open = |source| StoreError::Open { path: path.clone(), source };

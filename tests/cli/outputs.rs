@@ -44,7 +44,11 @@ const CASES: [Case; 22] = [
     case("lines --out", ("a.svg", LOG), "lines IN -o IN"),
     case("scene draw --output", ("a.svg", SCENE), "scene draw IN -o IN"),
     case("simulate --out", ("a.json", SCENE), "simulate --scene IN --pose fig9 --out IN --force"),
-    case("simulate --out", ("a", POSES), "simulate --scene simple-room --poses IN --out IN --force"),
+    case(
+        "simulate --out",
+        ("a", POSES),
+        "simulate --scene simple-room --poses IN --out IN --force",
+    ),
     case(
         "simulate --out",
         ("a", POSES),
@@ -73,12 +77,15 @@ const CASES: [Case; 22] = [
     case("collect --out", ("journal.jsonl", PLAN), "collect IN --mock --out DIR"),
     case("mock --link", ("a.json", SCENE), "mock --scene IN --pose fig9 --link IN"),
     case("board --link", ("a.json", SCENE), "board --link IN"),
-    case("run --socket", ("a.json", SCENE), "run --mock --scene IN --pose fig9 --log DIR/log --socket IN"),
+    case(
+        "run --socket",
+        ("a.json", SCENE),
+        "run --mock --scene IN --pose fig9 --log DIR/log --socket IN",
+    ),
 ];
 
 /// Outputs of verbs that read no file.
-const WITHOUT_INPUT: [&str; 3] =
-    ["map-benchmark --out", "explore-benchmark --out", "generate DIR"];
+const WITHOUT_INPUT: [&str; 3] = ["map-benchmark --out", "explore-benchmark --out", "generate DIR"];
 
 const POSES: &str = "{\"x_m\":0.774,\"y_m\":0.085,\"heading_deg\":0.0}\n";
 const MAP: &str = "image: map.pgm\nresolution: 0.5\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n\
@@ -146,11 +153,13 @@ fn no_other_name_of_an_input_is_written_over_either() {
     symlink(&input, place("soft.svg")).expect("writable");
     symlink(place("soft.svg"), place("softer.svg")).expect("writable");
     let at_stdin = |name: &str| {
-        let mut plot = sonard(&["plot", "-", "--force", "-o", place(name).to_str().expect("plain")]);
+        let mut plot =
+            sonard(&["plot", "-", "--force", "-o", place(name).to_str().expect("plain")]);
         plot.stdin(fs::File::open(&input).expect("there")).output().expect("starts")
     };
     for name in ["hard.svg", "soft.svg", "softer.svg"] {
-        let message = said(&run_case(&format!("scene draw IN --force -o DIR/{name}"), &input, folder.path()));
+        let message =
+            said(&run_case(&format!("scene draw IN --force -o DIR/{name}"), &input, folder.path()));
         assert!(message.contains("is read by this command"), "{name}: {message}");
         let output = at_stdin(name);
         assert_eq!(output.status.code(), Some(2), "{name}: {}", stderr(&output));
@@ -269,7 +278,9 @@ fn a_scan_is_added_only_to_scans_taken_alike_and_says_so() {
         assert!(message.contains("taken otherwise") && message.contains(difference), "{message}");
         assert_eq!(fs::read(out.join("scan.jsonl")).expect("kept"), was, "{difference}");
     }
-    let text = String::from_utf8(run(&["compare", out.join("scan.jsonl").to_str().expect("plain")]).stdout);
+    let text = String::from_utf8(
+        run(&["compare", out.join("scan.jsonl").to_str().expect("plain")]).stdout,
+    );
     assert!(!text.expect("text").contains("poses"));
 }
 
@@ -286,7 +297,8 @@ fn compare_says_that_scans_were_taken_at_several_poses() {
     let both = both.to_str().expect("plain path");
     let text = String::from_utf8(run(&["compare", both]).stdout).expect("text");
     assert!(text.contains("2 scan(s) at 2 poses, all together"), "{text}");
-    let json = Log::parse(&String::from_utf8(run(&["compare", "--json", both]).stdout).expect("text"));
+    let json =
+        Log::parse(&String::from_utf8(run(&["compare", "--json", both]).stdout).expect("text"));
     assert_eq!((&json.records[0]["scans"], &json.records[0]["poses"]), (&2.into(), &2.into()));
 }
 
@@ -332,13 +344,27 @@ fn only_a_dead_socket_is_replaced_by_the_daemons() {
     let socket = place("s").display().to_string();
     let start = |log: &str| {
         let log = place(log).display().to_string();
-        run(&["run", "--mock", "--scene", "simple-room", "--pose", "fig9", "--log", &log, "--socket", &socket])
+        run(&[
+            "run",
+            "--mock",
+            "--scene",
+            "simple-room",
+            "--pose",
+            "fig9",
+            "--log",
+            &log,
+            "--socket",
+            &socket,
+        ])
     };
     let refused = |what: &str| {
         let output = start("log");
         let message = stderr(&output);
         assert_eq!(output.status.code(), Some(3), "{what}: {message}");
-        assert!(message.replace(['\n', '\u{2502}', ' '], "").contains(&socket), "{what}: {message}");
+        assert!(
+            message.replace(['\n', '\u{2502}', ' '], "").contains(&socket),
+            "{what}: {message}"
+        );
     };
     fs::write(&socket, "a thesis").expect("writable");
     refused("a file");

@@ -47,7 +47,8 @@ fn a_log_of_ones_own_room_is_drawn_mapped_and_interpreted_without_its_file() {
     let svg = drawn("plot DIR/scan/scan.jsonl --azimuth-deg 270 -o DIR/way.svg", "way.svg");
     assert!(svg.contains("my-cellar"));
     for verb in ["interpret", "lines"] {
-        let svg = drawn(&format!("{verb} DIR/scan/scan.jsonl -o DIR/{verb}.svg"), &format!("{verb}.svg"));
+        let svg =
+            drawn(&format!("{verb} DIR/scan/scan.jsonl -o DIR/{verb}.svg"), &format!("{verb}.svg"));
         assert!(svg.contains("class=\"walls\""), "{verb}");
     }
     succeed("map DIR/scan/scan.jsonl --out DIR/map", folder.path());
@@ -84,7 +85,8 @@ fn a_text_that_is_not_the_sessions_scene_is_not_taken_for_it() {
     let folder = scanned_room();
     let log = folder.path().join("scan/scan.jsonl");
     let text = fs::read_to_string(&log).expect("there");
-    fs::write(&log, text.replacen("\\\"reflectance\\\"", "\\\"reflectance\\\" ", 1)).expect("writable");
+    fs::write(&log, text.replacen("\\\"reflectance\\\"", "\\\"reflectance\\\" ", 1))
+        .expect("writable");
     let (_, said) = succeed("plot DIR/scan/scan.jsonl -o DIR/scan.svg", folder.path());
     assert!(said.contains("was changed") && said.contains("--scene"), "{said}");
     let svg = fs::read_to_string(folder.path().join("scan.svg")).expect("written");

@@ -99,7 +99,9 @@ fn of_many_damaged_lines_five_are_named_and_the_rest_counted() {
 fn a_log_that_may_not_be_read_is_not_a_matter_of_writing() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = folder.path().join("no-such.jsonl").display().to_string();
-    for arguments in [&["compare", &log][..], &["log", "show", &log], &["plot", &log, "-o", "x.svg"]] {
+    for arguments in
+        [&["compare", &log][..], &["log", "show", &log], &["plot", &log, "-o", "x.svg"]]
+    {
         let output = sonard(arguments).stdout(Stdio::null()).output().expect("starts");
         let message = said(&output);
         assert_eq!(output.status.code(), Some(2), "{message}");

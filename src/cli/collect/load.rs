@@ -91,7 +91,10 @@ impl Loaded {
                 "set device.port, give --port or --daemon, or use --mock to try without one",
             ));
         }
-        let folder = args.out.as_deref().map_or_else(|| PathBuf::from(&keys.collection.folder), Path::to_path_buf);
+        let folder = args
+            .out
+            .as_deref()
+            .map_or_else(|| PathBuf::from(&keys.collection.folder), Path::to_path_buf);
         let steps_per_revolution = args.world.steps_per_revolution();
         Ok(Self {
             keys,

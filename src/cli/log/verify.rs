@@ -61,8 +61,8 @@ fn verify(log: &Path, args: &Args) -> Result<Totals, Failure> {
     let totals = check(reader, |finding| {
         torn |= matches!(finding.kind, FindingKind::TornTail | FindingKind::NoNewline);
         damaged += u64::from(finding.kind == FindingKind::Damaged);
-        let enough = shown == SHOWN
-            || (finding.kind == FindingKind::Damaged && damaged > SHOWN_DAMAGED);
+        let enough =
+            shown == SHOWN || (finding.kind == FindingKind::Damaged && damaged > SHOWN_DAMAGED);
         if !args.all && !args.json && enough {
             hidden += 1;
         } else if printed.is_ok() {

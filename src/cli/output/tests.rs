@@ -57,7 +57,9 @@ fn every_plain_path_of_the_command_line_is_read() {
 fn a_list_is_known_by_its_members() {
     let list = Product::List(&["pose", "returns"]);
     assert!(list.replaces(b"{\"returns\":[],\"pose\":{}}\n{\"pose\":1}\n") && list.replaces(b""));
-    for other in [&b"{\"pose\":{}}\n"[..], b"{\"returns\":[],\"pose\":{},\"more\":1}\n", b"[1]", b"x"] {
+    for other in
+        [&b"{\"pose\":{}}\n"[..], b"{\"returns\":[],\"pose\":{},\"more\":1}\n", b"[1]", b"x"]
+    {
         assert!(!list.replaces(other), "{other:?}");
     }
 }

@@ -21,7 +21,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let wish = json!({"scans": args.repeat, "plan": plan, "pose": pose});
     let client = args.at.client()?;
     let output = Output::open(args.out.as_deref())?;
-    let mut scans = Scans { output, wanted: args.repeat, ends: Vec::new(), told_again: 0, pose, plan };
+    let mut scans =
+        Scans { output, wanted: args.repeat, ends: Vec::new(), told_again: 0, pose, plan };
     let measured = runtime::new()?.block_on(async {
         let interrupts = Interrupts::listen();
         let status: Value = client.get_json("/v1/status").await.map_err(|error| refuse(&error))?;

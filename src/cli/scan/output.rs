@@ -141,7 +141,6 @@ fn open_log(folder: &Path) -> Result<(LogWriter, Option<Earlier>), Failure> {
     }
     let path = folder.join(LOG);
     let earlier = Earlier::of(&path)?;
-    let log =
-        LogWriter::open(&path).map_err(|error| Failure::input(&error, error.help()))?;
+    let log = LogWriter::open(&path).map_err(|error| Failure::input(&error, error.help()))?;
     Ok((log.with_scenes_beside(), earlier))
 }

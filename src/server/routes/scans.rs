@@ -195,7 +195,8 @@ async fn scene(
     let missing = |error: String, help: &str| Failed::new(StatusCode::NOT_FOUND, error, help);
     let no_scan = || missing("there is no such scan".into(), "GET /v1/scans names the newest");
     let id = Uuid::parse_str(&scan).map_err(|_| no_scan())?;
-    let (view, _) = in_history(&api, move |history| history.outline(id)).await?.ok_or_else(no_scan)?;
+    let (view, _) =
+        in_history(&api, move |history| history.outline(id)).await?.ok_or_else(no_scan)?;
     let scene = scene_of(&api, id, view.session.as_deref()).await?;
     let taken_in = view.session.as_deref().and_then(|session| session.scene.as_ref());
     match scene.filter(|scene| taken_in.is_some_and(|taken_in| taken_in.sha256 == scene.sha256)) {

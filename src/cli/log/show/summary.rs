@@ -30,9 +30,14 @@ pub(super) enum Item {
     Session(Box<Session>),
     Scan(Box<Scan>),
     Event(Event),
-    Damaged { line: u64, fault: String },
+    Damaged {
+        line: u64,
+        fault: String,
+    },
     /// So many more damaged lines.
-    MoreDamaged { lines: u64 },
+    MoreDamaged {
+        lines: u64,
+    },
 }
 
 /// A scan in numbers.

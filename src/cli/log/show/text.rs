@@ -36,7 +36,10 @@ pub(super) fn print(
             Item::Event(event) => print_event(out, event)?,
             Item::Damaged { line, fault } => writeln!(out, "damaged   line {line}: {fault}")?,
             Item::MoreDamaged { lines } => {
-                writeln!(out, "damaged   {lines} more lines; `sonard log verify --all` lists them")?;
+                writeln!(
+                    out,
+                    "damaged   {lines} more lines; `sonard log verify --all` lists them"
+                )?;
             }
             Item::Scan(_) => {}
         }

@@ -81,7 +81,9 @@ impl Earlier {
             if was.scene != session.scene {
                 let named = |of: &Session| {
                     let scene = of.scene.as_ref();
-                    scene.map_or("none".into(), |scene| format!("{} ({:.8})", scene.name, scene.sha256))
+                    scene.map_or("none".into(), |scene| {
+                        format!("{} ({:.8})", scene.name, scene.sha256)
+                    })
                 };
                 return told("scene", &named(was), &named(session));
             }
@@ -91,7 +93,9 @@ impl Earlier {
             }
             if was.model != session.model {
                 let engine = |of: &Session| {
-                    of.model.as_ref().map_or_else(|| "none".to_owned(), |model| model.engine.clone())
+                    of.model
+                        .as_ref()
+                        .map_or_else(|| "none".to_owned(), |model| model.engine.clone())
                 };
                 return told("model", &engine(was), &format!("{}, set otherwise", engine(session)));
             }
