@@ -19,11 +19,13 @@ leave_out() { printf 'units under a booted systemd: LEFT OUT, because %s\n' "$*"
 work=$(mktemp -d)
 group=sonard-boot-test-$$
 clean_up() {
-  # The container's init dies with its keeper.
+  # The container's init dies with its keeper, and what is left of it takes its time under load.
   if [ -n "${keeper:-}" ] && kill -KILL "$keeper" 2>/dev/null; then wait "$keeper" 2>/dev/null || true; fi
   for hierarchy in "${hierarchies[@]}"; do
-    for _ in $(seq 50); do
+    for _ in $(seq 300); do
       [ -d "$hierarchy/$group" ] || break
+      find "$hierarchy/$group" -name cgroup.procs -exec cat {} + 2>/dev/null |
+        xargs --no-run-if-empty kill -KILL 2>/dev/null || true
       find "$hierarchy/$group" -depth -type d -exec rmdir {} + 2>/dev/null || sleep 0.1
     done
   done

@@ -161,7 +161,7 @@ fn bind_unix(path: &Path, mode: u32) -> io::Result<UnixListener> {
         Ok(_) => match UnixStream::connect(path) {
             Ok(_) => return Err(io::ErrorKind::AddrInUse.into()),
             Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => {
-                fs::remove_file(path)?
+                fs::remove_file(path)?;
             }
             Err(error) => return Err(error),
         },
