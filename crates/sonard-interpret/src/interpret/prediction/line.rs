@@ -21,6 +21,9 @@ pub struct Line {
     pub support: f64,
     /// Where the robot was when it was last seen.
     pub seen_from: DVec2,
+    /// How far it may go on beyond `a` and `b`, metres: hardly where it was split, because it was not
+    /// heard where it should have been; without limit where nothing is known.
+    pub may_go_on_m: [f64; 2],
     /// Readings of the present set that it explains, in rising order.
     pub readings: Vec<u32>,
     /// Ranger and mean range, as long as it stands on one set of readings.
@@ -44,6 +47,7 @@ impl Line {
             normal_rad: axis_rad,
             spread_rad,
             support: 1.0,
+            may_go_on_m: [f64::INFINITY; 2],
             seen_from: from,
             readings: vec![index],
             reference: Some((from, range_m)),
@@ -91,7 +95,12 @@ impl Line {
             _ => None,
         };
         let place = |along_m: f64| offset_m * normal + along_m * normal.perp();
-        (self.a, self.b) = (place(low.min(other_low)), place(high.max(other_high)));
+        let [start, end] = [low.min(other_low), high.max(other_high)];
+        // What is known of where it ends holds for the whole, unless it was seen farther on.
+        let least = (low - self.may_go_on_m[0]).max(other_low - other.may_go_on_m[0]);
+        let most = (high + self.may_go_on_m[1]).min(other_high + other.may_go_on_m[1]);
+        self.may_go_on_m = [(start - least).max(0.0), (most - end).max(0.0)];
+        (self.a, self.b) = (place(start), place(end));
         (self.normal_rad, self.spread_rad) = (normal_rad, spread_rad);
         self.support = support;
         self.seen_from = other.seen_from;
@@ -111,15 +120,19 @@ impl Line {
         self.support = self.support.min(50.0);
     }
 
-    /// The parts on both sides of a point, each shortened there.
-    pub(super) fn split(&self, at: DVec2, shorten_m: f64) -> [Self; 2] {
+    /// The parts on both sides of a point, each shortened there and known to end within `end_m`.
+    pub(super) fn split(&self, at: DVec2, shorten_m: f64, end_m: f64) -> [Self; 2] {
         let along = (self.b - self.a).normalize_or_zero();
-        let part = |a: DVec2, b: DVec2| {
+        let part = |a: DVec2, b: DVec2, may_go_on_m: [f64; 2]| {
             let forward = (b - a).dot(along) > 0.0;
             let b = if forward { b } else { a };
-            Self { a, b, ..self.clone() }
+            Self { a, b, may_go_on_m, ..self.clone() }
         };
-        [part(self.a, at - shorten_m * along), part(at + shorten_m * along, self.b)]
+        let [before, after] = self.may_go_on_m;
+        [
+            part(self.a, at - shorten_m * along, [before, end_m]),
+            part(at + shorten_m * along, self.b, [end_m, after]),
+        ]
     }
 
     /// The middle of the directions that both normals may have, and half their width; between

@@ -43,11 +43,17 @@ pub struct PredictionSettings {
     /// `T_L`: features shorter than this are dropped after a split, metres.
     pub least_length_m: f64,
     /// A feature of several readings is taken to go on beyond its ends by this for beams that
-    /// could not hear it there, metres. The paper has no such thing (0): its ring of wide beams
-    /// sees more of a wall at once than a narrow one.
+    /// could not hear it there, metres, unless it was split there ([`Self::end_m`]). The paper has no such thing (0):
+    /// its ring of wide beams sees more of a wall at once than a narrow one.
     pub extend_m: f64,
     /// By how much both parts are shortened at a split, metres.
     pub shorten_m: f64,
+    /// A feature whose normal is within this of a beam's axis is heard for certain: where it is not,
+    /// it is split, degrees. The paper takes `omega`; but at the edge of its arc a wall is as often
+    /// silent as heard, so that every wall would be split on both sides of its perpendicular.
+    pub heard_deg: f64,
+    /// How far a feature may still go on where it was split, metres.
+    pub end_m: f64,
 }
 
 impl PredictionSettings {
@@ -66,6 +72,8 @@ impl PredictionSettings {
             least_length_m: 0.15,
             extend_m: 0.0,
             shorten_m: 0.05,
+            heard_deg: 5.0,
+            end_m: 0.2,
         }
     }
 
@@ -255,20 +263,21 @@ impl FeaturePrediction {
     /// Splits a feature at the first of the beams that should have heard it, and its parts at
     /// those after that; what is left goes into the local map.
     fn split_from(&mut self, beams: &[Ray], line: Line) {
-        let cos_omega = self.settings.omega_deg.to_radians().cos();
+        let cos_heard = self.settings.heard_deg.to_radians().cos();
         let obstacle = Obstacle::new(&line, 0.0);
         let unheard = |beam: &Ray| {
             let far_m = beam.range_m - self.settings.near_m;
             let crossing_m = obstacle.crossing_of_axis_m(beam, far_m)?;
-            let audible = obstacle.cos_to(beam.axis()) >= cos_omega;
-            (audible && !line.explains(beam.index)).then(|| beam.from + crossing_m * beam.axis())
+            let certain = obstacle.cos_to(beam.axis()) >= cos_heard;
+            (certain && !line.explains(beam.index)).then(|| beam.from + crossing_m * beam.axis())
         };
         let split = (1..).zip(beams).find_map(|(next, beam)| Some((next, unheard(beam)?)));
         let Some((next, at)) = split else {
             self.local.push(line);
             return;
         };
-        for part in line.split(at, self.settings.shorten_m) {
+        let PredictionSettings { shorten_m, end_m, .. } = self.settings;
+        for part in line.split(at, shorten_m, end_m) {
             if part.length_m() >= self.settings.least_length_m {
                 self.split_from(&beams[next..], part);
             }

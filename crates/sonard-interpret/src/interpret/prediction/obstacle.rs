@@ -12,21 +12,22 @@ pub(super) struct Obstacle<'a> {
     normal: DVec2,
     /// Where it ends if it goes on beyond both ends, metres.
     outer: [DVec2; 2],
-    /// Length by which it goes on beyond an end, as part of its own.
-    beyond: f64,
+    /// Lengths by which it goes on beyond both ends, as parts of its own.
+    beyond: [f64; 2],
 }
 
 impl<'a> Obstacle<'a> {
-    /// The features of a map; beams may be asked for as if each went on beyond both ends by
-    /// `extend_m`.
+    /// The features of a map; beams may be asked for as if each went on beyond its ends by
+    /// `extend_m`, as far as it may.
     pub(super) fn all(map: &'a [Line], extend_m: f64) -> Vec<Self> {
         map.iter().map(|line| Self::new(line, extend_m)).collect()
     }
 
     pub(super) fn new(line: &'a Line, extend_m: f64) -> Self {
         let along = line.b - line.a;
-        let beyond = if extend_m > 0.0 { extend_m / along.length() } else { 0.0 };
-        let outer = [line.a - beyond * along, line.b + beyond * along];
+        let length_m = along.length().max(f64::MIN_POSITIVE);
+        let beyond = line.may_go_on_m.map(|most_m| extend_m.clamp(0.0, most_m) / length_m);
+        let outer = [line.a - beyond[0] * along, line.b + beyond[1] * along];
         Self { line, along, normal: DVec2::from_angle(line.normal_rad), outer, beyond }
     }
 
@@ -46,23 +47,29 @@ impl<'a> Obstacle<'a> {
         if passes_right || passes_left {
             return None;
         }
-        let beyond = if extended { self.beyond } else { 0.0 };
+        let beyond = if extended { self.beyond } else { [0.0; 2] };
         let distance = |direction: &DVec2| self.distance_m(beam.from, *direction, far_m, beyond);
         beam.sides.iter().filter_map(distance).min_by(f64::total_cmp)
     }
 
     /// The same for the beam's axis alone.
     pub(super) fn crossing_of_axis_m(&self, beam: &Ray, far_m: f64) -> Option<f64> {
-        self.distance_m(beam.from, beam.axis(), far_m, 0.0)
+        self.distance_m(beam.from, beam.axis(), far_m, [0.0; 2])
     }
 
-    fn distance_m(&self, from: DVec2, direction: DVec2, far_m: f64, beyond: f64) -> Option<f64> {
+    fn distance_m(
+        &self,
+        from: DVec2,
+        direction: DVec2,
+        far_m: f64,
+        [before, after]: [f64; 2],
+    ) -> Option<f64> {
         let across = direction.perp_dot(self.along);
         let to_a = (self.line.a - from) * across.signum();
         let (distance, share) = (to_a.perp_dot(self.along), to_a.perp_dot(direction));
         let across = across.abs();
         let near = distance > 0.0 && distance < far_m * across;
-        let within = (-beyond * across..=(1.0 + beyond) * across).contains(&share);
+        let within = (-before * across..=(1.0 + after) * across).contains(&share);
         (near && within).then(|| distance / across)
     }
 }

@@ -1,5 +1,7 @@
 //! Feature Prediction on hand-made sets of readings.
 
+mod course;
+
 use super::{FeaturePrediction, PredictionSettings, combine, of_angle, of_distance};
 use crate::interpret::{Beam, Heard, Sweep};
 use sonard_model::geometry::{DVec2, Pose};
@@ -93,6 +95,24 @@ fn an_unheard_wall_is_split_and_its_stubs_go() {
         prediction.assess(&ring(Pose { heading_deg: turn_deg, ..ORIGIN }, &[(0.0, 0.0)]));
     }
     assert!(prediction.local().iter().all(|line| line.length_m() >= 0.15));
+}
+
+#[test]
+fn a_wall_does_not_go_on_where_it_was_not_heard() {
+    let settings = PredictionSettings { extend_m: 2.0, ..PredictionSettings::ring(MAX_RANGE_M) };
+    let mut prediction = FeaturePrediction::new(settings);
+    let wall = [(15.0, 1.0), (0.0, 1.0), (345.0, 1.0)];
+    // Looking along the wall, so that it would not be heard, through what may be its going on.
+    let beside = Pose { x_m: 0.0, y_m: 1.2, heading_deg: 35.0 };
+    prediction.assess(&ring(ORIGIN, &wall));
+    assert!(prediction.assess(&ring(beside, &[(0.0, 3.0)]))[0].confidence < 0.48, "it may go on");
+    // Beyond its end nothing is heard where a wall would be: it ends.
+    let past_its_end = Pose { y_m: 0.45, ..ORIGIN };
+    prediction.assess(&ring(past_its_end, &[(0.0, 3.0)]));
+    assert_eq!(prediction.assess(&ring(beside, &[(0.0, 3.0)]))[0].confidence, 0.5);
+    // The rest of it is seen again: it is known to end all the same.
+    prediction.assess(&ring(Pose { y_m: -0.4, ..ORIGIN }, &wall));
+    assert_eq!(prediction.assess(&ring(beside, &[(0.0, 3.0)]))[0].confidence, 0.5);
 }
 
 #[test]

@@ -1,0 +1,109 @@
+//! What Feature Prediction makes of a long course through one room, read as the model hears it.
+
+use std::sync::Arc;
+
+use jiff::Timestamp;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use uuid::Uuid;
+
+use crate::interpret::{
+    Extents, Sweep,
+    prediction::{FeaturePrediction, PredictionSettings},
+};
+use sonard_model::{
+    acoustics::{Air, Sensor},
+    geometry::{DVec2, Pose},
+    model::{Options, Simulator},
+    scene::{Scene, shipped},
+};
+use sonard_records::{PathKind, Ping, ScanPlan, ScanView};
+
+/// How close the robot comes to a wall, metres.
+const CLEARANCE_M: f64 = 0.4;
+
+/// From one scan to the next, metres.
+const STRIDE_M: f64 = 0.15;
+
+/// How far walls are taken to go on, and what is trusted, as `sonard map` does it.
+const EXTEND_M: f64 = 2.0;
+const LEAST_CONFIDENCE: f64 = 0.48;
+
+/// The L-shaped room.
+fn simulator() -> Simulator {
+    let scene = Scene::from_json(shipped::text("two-surface-room").expect("shipped"));
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    Simulator::new(Arc::new(scene.expect("a scene")), sensor, Air::default(), Options::default())
+        .expect("sensible figures")
+}
+
+/// A way that turns little as long as it can.
+fn wander(scene: &Scene, places: usize, seed: u64) -> Vec<Pose> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let mut pose = scene.pose("middle").expect("a pose");
+    let mut poses = vec![pose];
+    while poses.len() < places {
+        let (turn_deg, next) = (0..)
+            .find_map(|tries| {
+                let turn_deg = (17.0 + 3.0 * f64::from(tries)) * rng.random_range(-1.0..1.0);
+                let ahead = DVec2::from_angle(pose.direction_rad(turn_deg));
+                let half = pose.position() + STRIDE_M / 2.0 * ahead;
+                let next = pose.position() + STRIDE_M * ahead;
+                let free = |at: DVec2| scene.clearance_m(at) >= CLEARANCE_M;
+                (free(half) && free(next)).then_some((turn_deg, next))
+            })
+            .expect("a way on");
+        pose = Pose { x_m: next.x, y_m: next.y, heading_deg: pose.heading_deg + turn_deg };
+        poses.push(pose);
+    }
+    poses
+}
+
+/// Of the readings that came straight from a wall's surface, the share that the prediction trusts in
+/// each fifty scans; and of those that are far too long, by more than one wall.
+fn trusted_shares(scans: usize, seed: u64) -> Vec<[f64; 2]> {
+    let simulator = simulator();
+    let extents = Extents::new(simulator.sensor(), simulator.air(), false).expect("figures");
+    let mut prediction = FeaturePrediction::new(PredictionSettings {
+        extend_m: EXTEND_M,
+        ..PredictionSettings::stepper(extents.plane_corner_deg(1.0, 1.0), 5.0)
+    });
+    let mut counts = vec![[[0_usize; 2]; 2]; scans.div_ceil(50)];
+    for (number, pose) in wander(simulator.scene(), scans, seed).iter().enumerate() {
+        let (id, plan) = (Uuid::from_u128(number as u128), ScanPlan::default());
+        let scan = ScanView::simulated(&simulator, id, pose, &plan, Timestamp::UNIX_EPOCH);
+        let sweep = Sweep::of(&scan).expect("a sweep");
+        for (beam, worth) in sweep.beams.iter().zip(prediction.assess(&sweep)) {
+            let Some(kind) = kind(&scan.pings[beam.index as usize]) else { continue };
+            let [all, trusted] = &mut counts[number / 50][kind];
+            *all += 1;
+            *trusted += usize::from(worth.confidence > LEAST_CONFIDENCE);
+        }
+    }
+    let share = |[all, trusted]: [usize; 2]| trusted as f64 / all as f64;
+    counts.into_iter().map(|kinds| kinds.map(share)).collect()
+}
+
+/// 0 for a reading that came straight from a wall, 1 for one by three reflections or more; those
+/// of corners are between the two: their range is right, but not for all of their beams.
+fn kind(ping: &Ping) -> Option<usize> {
+    let path = ping.path.as_ref()?;
+    match (path.kind, path.order) {
+        (PathKind::Specular, 1) => Some(0),
+        (PathKind::Specular, 3..) => Some(1),
+        _ => None,
+    }
+}
+
+#[test]
+fn right_readings_are_trusted_as_much_after_500_scans_as_at_first() {
+    for seed in [1, 2] {
+        let shares = trusted_shares(500, seed);
+        println!("{shares:.3?}");
+        let ([first, _], [last, _]) = (shares[0], shares[shares.len() - 1]);
+        assert!(first > 0.70, "seed {seed}: {shares:.3?}");
+        assert!(last > first - 0.05, "seed {seed}: {shares:.3?}");
+        let too_long = shares.iter().map(|[_, too_long]| *too_long).fold(0.0, f64::max);
+        assert!(too_long < 0.03, "seed {seed}: {shares:.3?}");
+    }
+}
