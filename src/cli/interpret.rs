@@ -62,7 +62,10 @@ Tell planes, corners and edges apart in scans.
 After O. Bozma and R. Kuc (IEEE PAMI 13, 1991): beams that read one range make an arc. An arc \
 narrower than b(r), half way between what the sensor gives edges and what it gives planes and \
 corners, is an edge. A plane is seen in the same direction from a second place, a corner is not. \
-With one scan, planes and corners stay `unresolved`, with the place to scan from next that decides \
+Beyond the paper, an arc may be something else: sound by way of several walls, between a wall and \
+the ranger, from a round body; it has a probability too, the greater the more nearer arcs the arc lies \
+behind. `sonard interpret-benchmark` measures how often probabilities come true. Repeats from one \
+pose count as one scan. With one scan, planes and corners stay `unresolved`, with the place to scan from next that decides \
 most of them; give the log of that scan too, and they are decided.";
 
 const HELP: &str = "\
@@ -75,7 +78,8 @@ A feature's bearing is counter-clockwise from the heading of the scan it was fir
 one is unresolved: second_position (plane or corner), translation (the places are too near to \
 each other), lost (not seen again), ambiguous (several arcs fit, or none), interference \
 (something nearer covers a part of the arc), cut_off (the scan ends in it), extent (fits neither), \
-min_range (closer than can be measured).
+reflections (behind what may be walls: the sound may have come by way of them), min_range (closer than \
+can be measured, or so near to that that a part may be).
 Exit codes: 0 done, also if nothing was found, 2 wrong usage or input, 3 a picture can't be written.";
 
 pub(super) fn run(args: &Args) -> Outcome {
@@ -155,12 +159,13 @@ fn print(out: &mut impl Write, features: &[Feature]) -> io::Result<()> {
         "beta",
         "corner's",
         "confidence",
+        "else",
         "why open",
     ]);
     for feature in features {
         table.add_row(row(feature));
     }
-    for column in table.column_iter_mut().skip(1).take(7) {
+    for column in table.column_iter_mut().skip(1).take(8) {
         column.set_cell_alignment(CellAlignment::Right);
     }
     writeln!(out, "{table}")?;
@@ -185,7 +190,7 @@ fn print(out: &mut impl Write, features: &[Feature]) -> io::Result<()> {
     Ok(())
 }
 
-fn row(feature: &Feature) -> [String; 9] {
+fn row(feature: &Feature) -> [String; 10] {
     // Adding zero makes -0 plain.
     let hundredths = |value: f64| (value * 100.0).round() / 100.0 + 0.0;
     let degrees =
@@ -207,6 +212,7 @@ fn row(feature: &Feature) -> [String; 9] {
         degrees(feature.beta_deg),
         degrees(feature.beta_corner_deg),
         format!("{:.4}", feature.confidence),
+        format!("{:.4}", feature.probabilities.other),
         reason.unwrap_or_default(),
     ]
 }

@@ -13,6 +13,7 @@ mod explore_benchmark;
 mod failure;
 mod generate;
 mod interpret;
+mod interpret_benchmark;
 mod lines;
 mod log;
 mod logs;
@@ -96,6 +97,9 @@ enum Verb {
     /// Tell planes, corners and edges apart in scans
     #[command(long_about = interpret::ABOUT)]
     Interpret(interpret::Args),
+    /// Measure on made-up rooms how often the probabilities of `interpret` come true
+    #[command(long_about = interpret_benchmark::ABOUT)]
+    InterpretBenchmark(interpret_benchmark::Args),
     /// Make a map of line segments of the scans of logs
     #[command(long_about = lines::ABOUT)]
     Lines(lines::Args),
@@ -153,6 +157,7 @@ pub fn main() -> ExitCode {
         Verb::Paths(args) => paths::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Interpret(args) => interpret::run(&args),
+        Verb::InterpretBenchmark(args) => interpret_benchmark::run(&args),
         Verb::Lines(args) => lines::run(&args),
         Verb::Map(args) => map::run(&args),
         Verb::MapScore(args) => map_score::run(&args),

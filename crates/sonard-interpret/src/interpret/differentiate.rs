@@ -3,18 +3,14 @@
 use uuid::Uuid;
 
 use super::{
-    Extents, Feature, FeatureKind, Probabilities, Reason, Region, Settings, Sweep, UniformSum,
-    next::propose, regions,
+    Extents, Feature, FeatureKind, Probabilities, Reason, Settings, Sweep, UniformSum,
+    arc::Arc,
+    belief::{TurnLikelihood, probabilities},
+    next::propose,
+    regions,
+    sweep::merge_repeats,
 };
 use sonard_model::geometry::{DVec2, wrap_pi};
-
-/// Prior probability that an arc is none of the three; its extent may then be anything up to
-/// [`OTHER_EXTENT_DEG`], and its `beta` too.
-const OTHER: f64 = 0.02;
-const OTHER_EXTENT_DEG: f64 = 60.0;
-
-/// So many scattering strengths, and reflectances, are the densities averaged over.
-const STRENGTHS: usize = 16;
 
 /// Standard deviations that count as certainty where there is noise.
 const CERTAIN: f64 = 2.58;
@@ -22,30 +18,14 @@ const CERTAIN: f64 = 2.58;
 /// Rounding of angles, degrees.
 pub(super) const ROUNDING_DEG: f64 = 1e-9;
 
-/// An arc of one scan.
-#[derive(Debug, Clone)]
-pub(super) struct Arc {
-    /// Which scan.
-    pub(super) scan: usize,
-    /// Where it was seen from, world, metres.
-    pub(super) from: DVec2,
-    /// Heading there, degrees.
-    pub(super) heading_deg: f64,
-    pub(super) region: Region,
-    /// World direction of its middle, radians.
-    pub(super) bearing_rad: f64,
-    /// Standard deviation of each border, degrees.
-    pub(super) border_sigma_deg: f64,
-    /// Likelihoods of its extent for a plane or corner and for an edge.
-    extent_likelihood: [f64; 2],
-}
-
 /// Interprets scans taken with one sensor from one place or more.
 ///
 /// `scans` are the sweeps with the ids of their scans, in the order they were taken; `extents`
-/// is the sensor's. An element that was seen in several scans is one feature, of the first.
+/// is the sensor's. An element that was seen in several scans is one feature, of the first; repeats
+/// from one pose are one scan, of the first as well.
 #[must_use]
 pub fn interpret(scans: &[(Uuid, Sweep)], extents: &Extents, settings: &Settings) -> Vec<Feature> {
+    let scans = &merge_repeats(scans);
     let arcs: Vec<Arc> = scans
         .iter()
         .enumerate()
@@ -70,97 +50,6 @@ pub fn interpret(scans: &[(Uuid, Sweep)], extents: &Extents, settings: &Settings
     features
 }
 
-impl Arc {
-    fn new(
-        scan: usize,
-        sweep: &Sweep,
-        region: Region,
-        extents: &Extents,
-        settings: &Settings,
-    ) -> Self {
-        let noise = settings.noise;
-        let border = extents.border_sigma_deg(region.extent_deg(), noise.amplitude);
-        let border_sigma_deg = border.hypot(noise.azimuth_deg);
-        let extent_likelihood = region.range_m.map_or([0.0; 2], |range_m| {
-            let error = UniformSum::of_extent(region.gaps_deg, border_sigma_deg);
-            let (seen_deg, least) = (region.extent_deg(), extents.least_heard(range_m));
-            let [edge_least, plane_least] = [least / extents.edge_level(range_m, 1.0), least];
-            [
-                mean_density(
-                    &error,
-                    seen_deg,
-                    settings.reflectance_range,
-                    plane_least,
-                    |strength| extents.plane_corner_deg(range_m, strength),
-                ),
-                mean_density(&error, seen_deg, settings.sigma_e_range, edge_least, |strength| {
-                    extents.edge_deg(range_m, strength)
-                }),
-            ]
-        });
-        Self {
-            scan,
-            from: sweep.pose.position(),
-            heading_deg: sweep.pose.heading_deg,
-            bearing_rad: sweep.pose.direction_rad(region.bearing_deg()),
-            region,
-            border_sigma_deg,
-            extent_likelihood,
-        }
-    }
-
-    /// The middle of the arc, world, metres.
-    pub(super) fn point(&self) -> Option<DVec2> {
-        let range_m = self.region.range_m?;
-        Some(self.from + range_m * DVec2::from_angle(self.bearing_rad))
-    }
-
-    /// Whether its extent is rather an edge's than a plane's or corner's (18).
-    fn is_edge(&self) -> bool {
-        let [of_plane_corner, of_edge] = self.extent_likelihood;
-        of_edge > of_plane_corner
-    }
-
-    /// Why the arc by itself can't be told, if so.
-    fn fault(&self) -> Option<Reason> {
-        let sides = self.region.sides;
-        if self.region.range_m.is_none() {
-            Some(Reason::MinRange)
-        } else if sides.contains(&super::Side::Covered) {
-            Some(Reason::Interference)
-        } else if sides.contains(&super::Side::Cut) {
-            Some(Reason::CutOff)
-        } else {
-            None
-        }
-    }
-}
-
-/// Mean density of a measured extent over strengths from `low` to `high`, all of them equally
-/// likely as far as they are heard at all: from `least` on.
-fn mean_density(
-    error: &UniformSum,
-    seen_deg: f64,
-    [low, high]: [f64; 2],
-    least: f64,
-    true_deg: impl Fn(f64) -> f64,
-) -> f64 {
-    let from = low.max(least);
-    if from >= high {
-        return 0.0;
-    }
-    let (mut sum, mut weights) = (0.0, 0.0);
-    for i in 0..STRENGTHS {
-        // The extent grows like a root from where it begins to be heard, so strengths are taken
-        // closer together there.
-        let part = (i as f64 + 0.5) / STRENGTHS as f64;
-        let extent_deg = true_deg(from + (high - from) * part * part);
-        sum += part * error.density(seen_deg - extent_deg);
-        weights += part;
-    }
-    sum / weights
-}
-
 /// What a second place tells about an arc.
 #[derive(Debug, Clone, Copy)]
 struct Second {
@@ -169,7 +58,7 @@ struct Second {
     beta_deg: f64,
     beta_corner_deg: f64,
     /// Likelihoods of beta for a plane, and for a corner or edge.
-    likelihood: [f64; 2],
+    likelihood: TurnLikelihood,
     /// Whether the two can be told apart from there (25).
     decides: bool,
 }
@@ -211,13 +100,15 @@ impl Verdict {
         for second in &seconds {
             taken[second.arc] = true;
         }
-        let probabilities = probabilities(arc, &seconds);
+        let hidden_by = arc.hidden_by(arcs, extents.min_range_m);
+        let turns = seconds.iter().map(|second| second.likelihood);
+        let probabilities = probabilities(&arc.extent_likelihood, hidden_by, turns);
         let second = seconds.iter().copied().max_by(|a, b| {
             (a.decides, a.beta_corner_deg)
                 .partial_cmp(&(b.decides, b.beta_corner_deg))
                 .unwrap_or(std::cmp::Ordering::Equal)
         });
-        let reason = open_reason(&probabilities, second.as_ref(), why_not, settings);
+        let reason = open_reason(&probabilities, hidden_by, second.as_ref(), why_not, settings);
         Self { reason, probabilities, second }
     }
 
@@ -396,43 +287,27 @@ fn apart(one: &UniformSum, other: &UniformSum) -> f64 {
     one.reach(CERTAIN) + other.reach(CERTAIN)
 }
 
-fn probabilities(arc: &Arc, seconds: &[Second]) -> Probabilities {
-    let [of_plane_corner, of_edge] = arc.extent_likelihood;
-    let [mut plane, mut corner, mut edge] = [of_plane_corner, of_plane_corner, of_edge];
-    let mut other = 1.0 / OTHER_EXTENT_DEG;
-    for second in seconds {
-        let [as_plane, as_corner] = second.likelihood;
-        plane *= as_plane;
-        corner *= as_corner;
-        edge *= as_corner;
-        other /= OTHER_EXTENT_DEG;
-    }
-    let known = (1.0 - OTHER) / 3.0;
-    let all = known * (plane + corner + edge) + OTHER * other;
-    Probabilities {
-        plane: known * plane / all,
-        corner: known * corner / all,
-        edge: known * edge / all,
-    }
-}
-
 /// Why the kind stays open, if it does.
 fn open_reason(
     probabilities: &Probabilities,
+    hidden_by: usize,
     second: Option<&Second>,
     why_not: Option<Reason>,
     settings: &Settings,
 ) -> Option<Reason> {
-    let Probabilities { plane, corner, edge } = *probabilities;
+    let Probabilities { plane, corner, edge, other } = *probabilities;
     let least = settings.min_confidence;
+    let odd = if hidden_by > 0 { Reason::Reflections } else { Reason::Extent };
     if edge >= least {
         return None;
     }
     match second {
-        _ if plane + corner < least && second.is_none() => Some(Reason::Extent),
+        _ if other > 0.5 => Some(odd),
+        _ if second.is_none() && plane + corner < least * (1.0 - other) => Some(Reason::Extent),
         None => Some(why_not.unwrap_or(Reason::SecondPosition)),
         Some(second) if !second.decides => Some(Reason::Translation),
         Some(_) if plane.max(corner) >= least => None,
+        Some(_) if other > 1.0 - least => Some(odd),
         Some(_) => Some(Reason::Ambiguous),
     }
 }

@@ -83,11 +83,13 @@ pub enum Reason {
     CutOff,
     /// Its arc is as wide as that of neither an edge nor a plane or corner.
     Extent,
+    /// It lies behind what may be walls, so the sound may have come by way of them.
+    Reflections,
     /// Closer than can be measured.
     MinRange,
 }
 
-/// Probabilities of the three kinds; what is missing to 1 is the chance of something else.
+/// Probabilities of the three kinds and of something else; all 0 where the arc says nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Probabilities {
     /// Of a plane.
@@ -96,10 +98,12 @@ pub struct Probabilities {
     pub corner: f64,
     /// Of an edge.
     pub edge: f64,
+    /// Of something else: sound by way of several walls or between a wall and the ranger, a round body.
+    pub other: f64,
 }
 
 impl Probabilities {
-    /// The likeliest kind and its probability.
+    /// The likeliest of the three kinds and its probability.
     #[must_use]
     pub fn best(&self) -> (FeatureKind, f64) {
         [

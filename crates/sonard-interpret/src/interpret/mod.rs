@@ -10,6 +10,9 @@
 //! [`prediction`] gives each reading a confidence, and [`grid`] makes maps of readings with
 //! poses and says how good they are.
 
+mod arc;
+mod belief;
+pub mod calibration;
 mod density;
 mod differentiate;
 mod extent;

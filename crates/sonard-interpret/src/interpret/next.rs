@@ -4,7 +4,8 @@ use std::cmp::Reverse;
 
 use super::{
     Extents, Feature, NextPosition, Reason, Settings,
-    differentiate::{Arc, Expected, ROUNDING_DEG},
+    arc::Arc,
+    differentiate::{Expected, ROUNDING_DEG},
 };
 use sonard_model::geometry::{DVec2, wrap_360};
 

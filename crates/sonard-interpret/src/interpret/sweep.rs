@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use thiserror::Error;
+use uuid::Uuid;
 
 use crate::compare::quantile;
 use sonard_model::geometry::{DVec2, Pose, wrap_360};
@@ -139,6 +140,28 @@ impl Sweep {
     }
 }
 
+/// Scans from one pose as one: at each stop the majority of the repeats, with the median of their
+/// ranges. Each has the place and the id of the first.
+pub(super) fn merge_repeats(scans: &[(Uuid, Sweep)]) -> Vec<(Uuid, Sweep)> {
+    let mut merged: Vec<(Uuid, Sweep)> = Vec::with_capacity(scans.len());
+    for (at, (id, sweep)) in scans.iter().enumerate() {
+        let same = |other: &Sweep| other.pose == sweep.pose && other.step_deg == sweep.step_deg;
+        if scans[..at].iter().any(|(_, earlier)| same(earlier)) {
+            continue;
+        }
+        let repeats: Vec<&Sweep> =
+            scans[at..].iter().map(|(_, later)| later).filter(|later| same(later)).collect();
+        let mut beams: Vec<Beam> = repeats.iter().flat_map(|sweep| sweep.beams.clone()).collect();
+        if repeats.len() > 1 {
+            beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
+            beams = beams.chunk_by(same_stop).map(one_of_stop).collect();
+        }
+        let closed = repeats.iter().any(|sweep| sweep.closed);
+        merged.push((*id, Sweep { beams, closed, ..sweep.clone() }));
+    }
+    merged
+}
+
 /// Neighbours may be this many steps apart: two lost readings in a row.
 const MOST_GAP_STEPS: f64 = 3.5;
 
@@ -153,10 +176,11 @@ fn stops(scan: &ScanView, pose: &Pose) -> Result<Vec<Beam>, SweepError> {
     }
     let mut beams: Vec<Beam> = by_index.into_values().collect();
     beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
-    let same_stop = |a: &Beam, b: &Beam| {
-        (b.azimuth_deg - a.azimuth_deg).abs() < SAME_STOP_DEG && a.mount == b.mount
-    };
     Ok(beams.chunk_by(same_stop).map(one_of_stop).collect())
+}
+
+fn same_stop(a: &Beam, b: &Beam) -> bool {
+    (b.azimuth_deg - a.azimuth_deg).abs() < SAME_STOP_DEG && a.mount == b.mount
 }
 
 /// A beam with its transducer's place and direction as seen from the scan's pose.

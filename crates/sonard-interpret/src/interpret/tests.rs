@@ -1,5 +1,6 @@
 //! Interpretation against the paper's figures, its densities, and random worlds.
 
+mod calibration;
 mod degenerate;
 mod densities;
 mod paper;

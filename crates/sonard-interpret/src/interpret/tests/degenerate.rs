@@ -7,7 +7,7 @@ use crate::interpret::{
     Extents, FeatureKind, Heard, Reason, Settings, Sweep, SweepError, interpret,
 };
 use sonard_model::{
-    geometry::Pose,
+    geometry::{Pose, wrap_360},
     scene::{Scene, shipped},
 };
 use sonard_records::{PingStatus, ScanView};
@@ -64,12 +64,36 @@ fn readings_that_are_no_numbers_count_as_lost() {
 fn a_second_scan_from_the_same_place_does_not_decide() {
     let (one, mut two) = (fig13(), fig13());
     two.scan = Uuid::from_u128(2);
+    // Turned, or it would be a repeat.
+    two.start.as_mut().expect("a start").pose.heading_deg += 45.0;
+    for ping in &mut two.pings {
+        ping.azimuth_deg = wrap_360(ping.azimuth_deg - 45.0);
+    }
     let features = features(&[one, two], &Settings::default());
     assert_eq!(features.len(), 6);
     for feature in features.iter().filter(|feature| feature.extent_deg > 15.0) {
         assert_eq!(feature.kind, FeatureKind::Unresolved);
         assert_eq!(feature.reason, Some(Reason::Translation));
         assert!(feature.next.is_some());
+    }
+}
+
+#[test]
+fn repeats_from_one_pose_are_one_scan() {
+    let repeats = [1, 2, 3].map(|number| {
+        let mut scan = fig13();
+        scan.scan = Uuid::from_u128(number);
+        // Each has an odd reading of its own, in another arc.
+        let odd = &mut scan.pings[40 * number as usize];
+        (odd.status, odd.range_m) = (PingStatus::Echo, Some(0.2));
+        scan
+    });
+    let features = features(&repeats, &Settings::default());
+    assert_eq!(features.len(), 6, "{features:#?}");
+    let alone = super::features(&[fig13()], &Settings::default());
+    for (feature, alone) in features.iter().zip(&alone) {
+        assert_eq!((feature.beams, feature.reason), (alone.beams, alone.reason));
+        assert_eq!(feature.scan, Uuid::from_u128(1));
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{features, scan, simulator};
 use crate::interpret::{
-    Extents, Feature, FeatureKind, Reason, Settings, least_corner_m, least_plane_m,
+    Extents, Feature, FeatureKind, Probabilities, Reason, Settings, least_corner_m, least_plane_m,
     least_translation_m,
 };
 use sonard_model::{
@@ -101,7 +101,10 @@ fn one_scan_tells_the_edges_and_asks_for_a_second_place() {
         assert!((feature.extent_deg - 23.3).abs() <= STEP_DEG, "{feature:?}");
         assert_eq!(feature.kind, FeatureKind::Unresolved);
         assert_eq!(feature.reason, Some(Reason::SecondPosition));
-        assert!((feature.probabilities.plane - 0.5).abs() < 0.01);
+        // One scan tells nothing of plane or corner: they are as likely as before it.
+        let Probabilities { plane, corner, other, .. } = feature.probabilities;
+        assert!((plane / corner - 0.58 / 0.34).abs() < 1e-9, "{feature:?}");
+        assert!(other < 0.03, "{feature:?}");
         assert!(feature.next.is_some_and(|next| next.decides == 4), "{:?}", feature.next);
     }
     for (bearing_deg, extent_deg, range_m) in [(36.0, 8.0, 0.44), (198.1, 7.8, 0.47)] {
@@ -110,7 +113,8 @@ fn one_scan_tells_the_edges_and_asks_for_a_second_place() {
         assert!((feature.extent_deg - extent_deg).abs() <= STEP_DEG, "{feature:?}");
         assert!((feature.range_m.expect("a range") - range_m).abs() < 0.001);
         assert!(feature.boundary_deg.is_some_and(|b| (b - 15.55).abs() < 0.2));
-        assert!(feature.confidence > 0.99);
+        // The paper knows nothing else than its edges; what else it may be keeps it from certainty.
+        assert!(feature.confidence > 0.95, "{feature:?}");
     }
 }
 
@@ -128,7 +132,7 @@ fn two_scans_tell_planes_from_the_corner() {
     for (bearing_deg, kind) in expected {
         let feature = at(&features, bearing_deg);
         assert_eq!(feature.kind, kind, "{feature:?}");
-        assert!(feature.confidence > 0.99, "{feature:?}");
+        assert!(feature.confidence > 0.95, "{feature:?}");
     }
     let corner = at(&features, 117.0);
     let expected_deg = (0.069_f64 / 0.99).asin().to_degrees();
