@@ -23,8 +23,9 @@ use crate::{
         grid::{BeamModel, GaussianBeam, Grid, GridShape, PhysicalBeam, Trust},
         prediction::{FeaturePrediction, PredictionSettings, Worth},
     },
-    plot::draw_map,
-    scan::Session,
+    plot::{MapView, badge_of, draw_map},
+    scan::{Provenance, Session},
+    scene::Scene,
     store::logged_scene,
 };
 
@@ -140,7 +141,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.confidences {
         args.overwrite.check(path, CONFIDENCES)?;
     }
-    let (session, taken) = sweeps(args)?;
+    let Taken { session, provenance, sweeps: taken } = sweeps(args)?;
     let refuse = |error: &dyn std::fmt::Display| {
         Failure::input(error.to_string(), "see `sonard map --help`")
     };
@@ -166,11 +167,26 @@ pub(super) fn run(args: &Args) -> Outcome {
 
     let mapped = map(args, &taken, begun, &model, prediction)?;
     let way: Vec<DVec2> = taken.iter().map(|(_, sweep)| sweep.pose.position()).collect();
-    let png = draw_map(&mapped.grid, scene.as_ref(), &way, 4).map_err(|error| refuse(&error))?;
+    let summary = mapped.summary(args, &taken);
+    let png = draw_map(&MapView {
+        title: title(&session, scene.as_ref()),
+        lines: vec![summary.of_cells()],
+        badge: badge_of(Some(provenance)),
+        grid: &mapped.grid,
+        scene: scene.as_ref(),
+        way: &way,
+    })
+    .map_err(|error| refuse(&error))?;
     map_file::write(&args.out, &mapped.grid, args.overwrite)?;
     args.overwrite.save(&args.out.join("map.png"), Product::Png, &png)?;
-    let summary = mapped.summary(args, &taken);
     answer(args.json, [&summary], |out| summary.print(out))
+}
+
+/// Of which room the map is.
+fn title(session: &Session, scene: Option<&Scene>) -> String {
+    let logged = session.scene.as_ref().map(|scene| scene.name.as_str());
+    let name = scene.map(|scene| scene.name.as_str()).or(logged).unwrap_or("unknown place");
+    format!("{name}, occupancy grid")
 }
 
 impl Args {
@@ -188,22 +204,35 @@ impl Args {
 /// From so many scans on each counts once.
 const ENOUGH_SCANS: usize = 5;
 
-/// The scans that can be mapped, and the session of the first.
-fn sweeps(args: &Args) -> Result<(Session, Vec<(uuid::Uuid, Sweep)>), Failure> {
-    let (mut session, mut taken) = (None, Vec::new());
+/// The scans that can be mapped.
+struct Taken {
+    /// Of the first.
+    session: Session,
+    /// Of the first that no ranger took, if any.
+    provenance: Provenance,
+    sweeps: Vec<(uuid::Uuid, Sweep)>,
+}
+
+fn sweeps(args: &Args) -> Result<Taken, Failure> {
+    let (mut session, mut sweeps, mut made_up) = (None, Vec::new(), None);
     for_each_sweep(&args.logs, |scan, sweep| {
-        taken.push((scan.scan, sweep));
+        sweeps.push((scan.scan, sweep));
+        let Some(of_scan) = scan.session.as_deref() else { return };
+        if of_scan.provenance != Provenance::Hardware {
+            made_up.get_or_insert(of_scan.provenance);
+        }
         if session.is_none() {
-            session = scan.session.as_deref().cloned();
+            session = Some(of_scan.clone());
         }
     })?;
-    match session {
-        Some(session) => Ok((session, taken)),
-        None => Err(Failure::input(
+    let session = session.ok_or_else(|| {
+        Failure::input(
             "there is no scan with its session and pose to map",
             "give logs as `sonard scan` or `sonard simulate` writes them",
-        )),
-    }
+        )
+    })?;
+    let provenance = made_up.unwrap_or(session.provenance);
+    Ok(Taken { session, provenance, sweeps })
 }
 
 /// The region asked for, else around poses and echoes within range.
@@ -367,6 +396,21 @@ impl Mapped {
 }
 
 impl Summary<'_> {
+    /// What stands under the picture's title.
+    fn of_cells(&self) -> String {
+        format!(
+            "{} scans, {} readings \u{b7} {}x{} cells of {} m: {} occupied, {} free, {} between",
+            self.scans,
+            self.readings,
+            self.width,
+            self.height,
+            self.resolution_m,
+            self.occupied_cells,
+            self.free_cells,
+            self.unknown_cells
+        )
+    }
+
     fn print(&self, out: &mut impl Write) -> io::Result<()> {
         writeln!(
             out,

@@ -32,7 +32,8 @@ use crate::{
         trial::{Arrangement, Course, Trial, TrialSettings, random_room},
     },
     model::{Options, Simulator},
-    plot::draw_map,
+    plot::{MapView, badge_of, draw_map},
+    scan::Provenance,
     scene::{Scene, shipped},
 };
 
@@ -242,10 +243,18 @@ fn save(
 ) -> Outcome {
     let way: Vec<DVec2> = course.sweeps.iter().map(|sweep| sweep.pose.position()).collect();
     let pictures =
-        [("ideal", &course.ideal), ("without", &trial.maps[0]), ("with", &trial.maps[1])];
+        [("ideal map", &course.ideal), ("without", &trial.maps[0]), ("with", &trial.maps[1])];
     for (kind, map) in pictures {
-        let path = folder.join(format!("{stem}-{kind}.png"));
-        let png = draw_map(map, Some(scene), &way, 5)
+        let path = folder.join(format!("{stem}-{}.png", kind.replace(" map", "")));
+        let view = MapView {
+            title: format!("{}, {kind}", scene.name),
+            lines: Vec::new(),
+            badge: badge_of(Some(Provenance::Simulated)),
+            grid: map,
+            scene: Some(scene),
+            way: &way,
+        };
+        let png = draw_map(&view)
             .map_err(|error| Failure::input(error, "choose a coarser --resolution"))?;
         overwrite.save(&path, Product::Png, &png)?;
     }

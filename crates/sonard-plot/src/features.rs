@@ -3,7 +3,6 @@
 use super::{
     canvas::{Anchor, Layer, Px, Shape},
     keys,
-    labels::Labels,
     legend::{Entry, Sample},
     overlay,
     picture::Picture,
@@ -29,7 +28,7 @@ pub fn draw_features(scans: &[ScanView], scene: Option<&Scene>, features: &[Feat
         let arcs = features.iter().map(|feature| arc(plan, scans, feature));
         arcs.chain([next_places(plan, scans, features)]).collect()
     };
-    let beside = |plan: &Plan| Some(names(plan, scans, features));
+    let beside = |plan: &Plan| Some(names(plan, scene, scans, features));
     overlay::draw(scans, scene, counts(features), &[], over, beside, &entries(features, scene))
 }
 
@@ -97,14 +96,7 @@ fn arc(plan: &Plan, scans: &[ScanView], feature: &Feature) -> Layer {
     let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) else {
         return layer;
     };
-    let half_deg = feature.extent_deg / 2.0;
-    let points: Vec<Px> = (-8..=8)
-        .map(|i| {
-            let azimuth_deg = feature.bearing_deg + half_deg * f64::from(i) / 8.0;
-            plan.px(pose.point_at(azimuth_deg, range_m))
-        })
-        .collect();
-    layer.runs([points]);
+    layer.runs([arc_of(plan, scans, feature)]);
     let mut solid = Layer::new("mark").with("fill", colour).with("stroke", theme::PAPER);
     let at = plan.px(pose.point_at(feature.bearing_deg, range_m));
     solid.mark(shape(feature.kind), at, 6.0, Some(&hint(feature)));
@@ -112,19 +104,37 @@ fn arc(plan: &Plan, scans: &[ScanView], feature: &Feature) -> Layer {
     layer
 }
 
+/// The feature's arc on the page; empty where only the direction is known.
+fn arc_of(plan: &Plan, scans: &[ScanView], feature: &Feature) -> Vec<Px> {
+    let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) else {
+        return Vec::new();
+    };
+    let half_deg = feature.extent_deg / 2.0;
+    (-8..=8)
+        .map(|i| {
+            let azimuth_deg = feature.bearing_deg + half_deg * f64::from(i) / 8.0;
+            plan.px(pose.point_at(azimuth_deg, range_m))
+        })
+        .collect()
+}
+
 fn hint(feature: &Feature) -> String {
     let reason = feature.reason.map(|reason| format!(" ({reason:?})")).unwrap_or_default();
     format!(
-        "{}{reason}: extent {:.1}\u{b0}, confidence {:.3}",
+        "{}{reason}: extent {:.1}\u{b0}, confidence {:.3}, something else {:.3}",
         name(feature.kind),
         feature.extent_deg,
-        feature.confidence
+        feature.confidence,
+        feature.probabilities.other
     )
 }
 
 /// Extent and, where there is one, beta beside each mark.
-fn names(plan: &Plan, scans: &[ScanView], features: &[Feature]) -> Layer {
-    let mut labels = Labels::new(plan.panel);
+fn names(plan: &Plan, scene: Option<&Scene>, scans: &[ScanView], features: &[Feature]) -> Layer {
+    let mut labels = plan.labels(scene);
+    for feature in features {
+        arc_of(plan, scans, feature).windows(2).for_each(|two| labels.keep_off(two[0], two[1]));
+    }
     let mut layer = Layer::new("names").haloed();
     for feature in features {
         let (Some(pose), Some(range_m)) = (pose_of(scans, feature), feature.range_m) else {
@@ -143,6 +153,14 @@ fn names(plan: &Plan, scans: &[ScanView], features: &[Feature]) -> Layer {
             (Px::new(11.0, 16.0), Anchor::Start),
             (Px::new(-11.0, -8.0), Anchor::End),
             (Px::new(-11.0, 16.0), Anchor::End),
+            (Px::new(11.0, 4.0), Anchor::Start),
+            (Px::new(-11.0, 4.0), Anchor::End),
+            (Px::new(0.0, -16.0), Anchor::Middle),
+            (Px::new(0.0, 24.0), Anchor::Middle),
+            (Px::new(24.0, -22.0), Anchor::Start),
+            (Px::new(24.0, 30.0), Anchor::Start),
+            (Px::new(-24.0, -22.0), Anchor::End),
+            (Px::new(-24.0, 30.0), Anchor::End),
         ];
         let free = places
             .into_iter()

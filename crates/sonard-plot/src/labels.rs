@@ -1,4 +1,4 @@
-//! Keeps texts from covering each other.
+//! Keeps texts from covering each other, and the walls.
 
 use super::canvas::{Anchor, Px, Rect, text_width_px};
 
@@ -7,17 +7,23 @@ use super::canvas::{Anchor, Px, Rect, text_width_px};
 pub(super) struct Labels {
     panel: Rect,
     taken: Vec<Rect>,
+    lines: Vec<(Px, Px)>,
 }
 
 impl Labels {
     /// Texts within this panel.
     pub(super) fn new(panel: Rect) -> Self {
-        Self { panel, taken: Vec::new() }
+        Self { panel, taken: Vec::new(), lines: Vec::new() }
     }
 
     /// Keeps a region free of texts.
     pub(super) fn keep_free(&mut self, rect: Rect) {
         self.taken.push(rect);
+    }
+
+    /// Keeps a line free of texts.
+    pub(super) fn keep_off(&mut self, from: Px, to: Px) {
+        self.lines.push((from, to));
     }
 
     /// Takes the room of a text on the base line at `at`, unless some of it is taken.
@@ -28,7 +34,8 @@ impl Labels {
             Anchor::Middle => at.x - width / 2.0,
             Anchor::End => at.x - width,
         };
-        self.take(Rect::new(left, at.y - 0.8 * size_px, width, 1.1 * size_px))
+        let rect = Rect::new(left, at.y - 0.8 * size_px, width, 1.1 * size_px);
+        self.take(rect, 0.0, Px::new(rect.width(), rect.height()))
     }
 
     /// The same for a text turned about its middle, which is at `at`.
@@ -37,14 +44,60 @@ impl Labels {
         let (w, h) = (text_width_px(text, size_px), size_px);
         let width = w * cos.abs() + h * sin.abs();
         let height = w * sin.abs() + h * cos.abs();
-        self.take(Rect::new(at.x - width / 2.0, at.y - height / 2.0, width, height))
+        let around = Rect::new(at.x - width / 2.0, at.y - height / 2.0, width, height);
+        self.take(around, turn_deg, Px::new(w, h))
     }
 
-    fn take(&mut self, rect: Rect) -> bool {
-        let free = self.panel.encloses(&rect) && !self.taken.iter().any(|other| other.meets(&rect));
+    /// Takes `around`, in which a text of a size lies turned about its middle.
+    fn take(&mut self, around: Rect, turn_deg: f64, size: Px) -> bool {
+        let back = Px::from_angle(-turn_deg.to_radians());
+        let middle = around.center();
+        let crossed = |&(from, to): &(Px, Px)| {
+            let [from, to] = [from, to].map(|at| back.rotate(at - middle));
+            crosses(from, to, size / 2.0)
+        };
+        let free = self.panel.encloses(&around)
+            && !self.taken.iter().any(|other| other.meets(&around))
+            && !self.lines.iter().any(crossed);
         if free {
-            self.taken.push(rect);
+            self.taken.push(around);
         }
         free
+    }
+}
+
+/// Whether a line passes through a rectangle about the origin (clipping after Liang and Barsky).
+fn crosses(from: Px, to: Px, half: Px) -> bool {
+    let along = to - from;
+    let mut part = [0.0_f64, 1.0];
+    for (at, along, half) in [(from.x, along.x, half.x), (from.y, along.y, half.y)] {
+        if along.abs() < 1e-9 {
+            if at.abs() > half {
+                return false;
+            }
+        } else {
+            let [one, other] = [(-half - at) / along, (half - at) / along];
+            part = [part[0].max(one.min(other)), part[1].min(one.max(other))];
+        }
+    }
+    part[0] <= part[1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_keeps_off_walls_but_may_stand_beside_them() {
+        let panel = Rect::new(0.0, 0.0, 200.0, 200.0);
+        let mut labels = Labels::new(panel);
+        labels.keep_off(Px::new(0.0, 0.0), Px::new(200.0, 200.0));
+        let at = |x: f64, y: f64| Px::new(x, y);
+        assert!(!labels.place(at(80.0, 100.0), Anchor::Start, 12.0, "a wall here"));
+        assert!(labels.place(at(120.0, 50.0), Anchor::Start, 12.0, "none"));
+        // Along the wall, 10 pixels beside it.
+        let beside = at(100.0, 100.0) + 10.0 * Px::new(-1.0, 1.0).normalize();
+        assert!(labels.place_turned(beside, 45.0, 12.0, "along"));
+        assert!(!labels.place_turned(at(50.0, 50.0), 45.0, 12.0, "over"));
     }
 }

@@ -1,7 +1,7 @@
 //! Legends: samples of what is drawn, with words, in rows.
 
 use super::{
-    canvas::{Anchor, Layer, Px, Shape, text_width_px},
+    canvas::{Anchor, Layer, Px, Rect, Shape, text_width_px},
     theme,
 };
 
@@ -15,10 +15,25 @@ pub(super) struct Entry {
 /// What stands before the words.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Sample {
-    Mark { shape: Shape, colour: &'static str },
-    Ring { colour: &'static str },
-    Line { colour: &'static str, width_px: f64, dash: &'static str },
-    Tick { colour: &'static str },
+    Mark {
+        shape: Shape,
+        colour: &'static str,
+    },
+    Ring {
+        colour: &'static str,
+    },
+    Line {
+        colour: &'static str,
+        width_px: f64,
+        dash: &'static str,
+    },
+    Tick {
+        colour: &'static str,
+    },
+    /// A framed area.
+    Patch {
+        colour: &'static str,
+    },
     Outward,
 }
 
@@ -72,6 +87,11 @@ fn sample(sample: &Sample, at: Px) -> Layer {
             let mut layer =
                 Layer::new("sample").stroked(colour, *width_px).with("stroke-dasharray", *dash);
             layer.line(left, right);
+            layer
+        }
+        Sample::Patch { colour } => {
+            let mut layer = Layer::new("sample").stroked(theme::FRAME, 1.0).with("fill", *colour);
+            layer.rect(Rect::new(left.x, at.y - 6.0, right.x - left.x, 12.0), 0.0);
             layer
         }
         Sample::Tick { colour } => {

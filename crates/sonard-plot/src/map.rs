@@ -1,67 +1,141 @@
-//! Occupancy grids as images.
+//! Occupancy grids with what a reader needs: axes, scale, legend, and what the readings are.
 
-use resvg::tiny_skia::{
-    Color, LineCap, Paint, PathBuilder, Pixmap, PremultipliedColorU8, Stroke, Transform,
+use resvg::tiny_skia::{Pixmap, PremultipliedColorU8};
+
+use super::{
+    PlotError,
+    canvas::{Layer, Px, Rect},
+    caption,
+    legend::{self, Entry, Sample},
+    picture::Picture,
+    plan::{Bounds, Plan},
+    theme,
 };
-
-use super::PlotError;
 use sonard_interpret::interpret::grid::Grid;
 use sonard_model::{geometry::DVec2, scene::Scene};
 
-/// Widest image, pixels.
-const MOST_PX: usize = 4096;
+/// Cells get so many pixels where the picture does not become wider than this by it.
+const CELL_PX: f64 = 4.0;
+const MOST_PX: f64 = 4096.0;
 
-/// A map as a PNG: free is white, occupied black, unknown grey; so many pixels a cell (fewer if
-/// the image would be too large). Over it the walls of `scene`, thin and blue, and the way of the
-/// robot, orange.
+/// A map to be drawn.
+#[derive(Debug, Clone)]
+pub struct MapView<'a> {
+    /// Above the picture.
+    pub title: String,
+    /// Under the title.
+    pub lines: Vec<String>,
+    /// What the readings are, if not of a real ranger ([`badge_of`](crate::badge_of)).
+    pub badge: Option<&'static str>,
+    /// The map.
+    pub grid: &'a Grid,
+    /// Walls to draw over it.
+    pub scene: Option<&'a Scene>,
+    /// Where the robot went.
+    pub way: &'a [DVec2],
+}
+
+/// A map as a PNG: free is white, occupied black, unknown grey; over it the walls of the scene, thin
+/// and blue, and the way of the robot, orange.
 ///
 /// # Errors
 /// When the image can't be made or encoded.
-pub fn draw_map(
-    grid: &Grid,
-    scene: Option<&Scene>,
-    way: &[DVec2],
-    cell_px: usize,
-) -> Result<Vec<u8>, PlotError> {
+pub fn draw_map(view: &MapView) -> Result<Vec<u8>, PlotError> {
+    let (heading, top) = caption::draw(&view.title, view.badge, &view.lines);
+    let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
+    let region = region(view.grid);
+    let height = Plan::height_for(&region, right - left, [160.0, 1400.0]);
+    let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
+    let below = Px::new(left, plan.panel.bottom + 24.0);
+    let (key, key_height) = legend::draw(&keys(view), below, right - left);
+    let page_px = below.y + key_height + theme::MARGIN_PX / 2.0;
+
+    let mut under = Layer::new("map");
+    under.add(heading);
+    under.add(plan.frame());
+    under.add(key);
+    under.add(plan.scale_bar());
+    let mut over = Layer::new("inside").clipped("map-window", plan.panel);
+    over.add(walls(view, &plan));
+    over.add(way(view, &plan));
+
+    let mut pixels =
+        Picture::new(theme::PAGE_PX, page_px, under).to_pixels(width_px(view, &plan))?;
+    paint(&mut pixels, view.grid, &plan);
+    Picture::without_page(theme::PAGE_PX, page_px, over).draw_onto(&mut pixels)?;
+    pixels.encode_png().map_err(|error| PlotError::Encoding(error.to_string()))
+}
+
+fn region(grid: &Grid) -> Bounds {
     let shape = grid.shape();
-    let cell_px = cell_px.clamp(1, (MOST_PX / shape.width.max(shape.height)).max(1));
-    let (width, height) = (shape.width * cell_px, shape.height * cell_px);
-    let mut image =
-        Pixmap::new(width as u32, height as u32).ok_or(PlotError::Width(width as u32))?;
-    for (at, pixel) in image.pixels_mut().iter_mut().enumerate() {
-        let (column, row) = (at % width / cell_px, shape.height - 1 - at / width / cell_px);
-        let shade = (255.0 * (1.0 - grid.probability(row * shape.width + column))) as u8;
+    let size = DVec2::new(shape.width as f64, shape.height as f64) * shape.resolution_m;
+    Bounds { min: shape.origin, max: shape.origin + size }
+}
+
+/// So wide that cells can be told apart, within bounds.
+fn width_px(view: &MapView, plan: &Plan) -> u32 {
+    let cell_px = plan.length_px(view.grid.shape().resolution_m);
+    let wanted = theme::PAGE_PX * (CELL_PX / cell_px).max(1.0);
+    let highest = MOST_PX * theme::PAGE_PX / (plan.panel.bottom + 100.0);
+    wanted.min(MOST_PX).min(highest.max(theme::PAGE_PX)).round() as u32
+}
+
+/// Puts the cells into the panel, as grey as they are likely to be occupied.
+fn paint(pixels: &mut Pixmap, grid: &Grid, plan: &Plan) {
+    let (width, scale) = (pixels.width() as usize, f64::from(pixels.width()) / theme::PAGE_PX);
+    let shape = grid.shape();
+    for (at, pixel) in pixels.pixels_mut().iter_mut().enumerate() {
+        let centre = Px::new((at % width) as f64 + 0.5, (at / width) as f64 + 0.5) / scale;
+        if !plan.panel.contains(centre) {
+            continue;
+        }
+        let Some(cell) = shape.index_at(plan.place(centre)) else { continue };
+        let shade = (255.0 * (1.0 - grid.probability(cell))) as u8;
         if let Some(grey) = PremultipliedColorU8::from_rgba(shade, shade, shade, 255) {
             *pixel = grey;
         }
     }
-    let px = |at: DVec2| {
-        let place = (at - shape.origin) / shape.resolution_m * cell_px as f64;
-        (place.x as f32, height as f32 - place.y as f32)
-    };
-    let walls = scene.iter().flat_map(|scene| &scene.walls).map(|wall| vec![wall.a, wall.b]);
-    for wall in walls {
-        stroke(&mut image, &wall, px, Color::from_rgba8(0, 114, 178, 255), 1.5);
-    }
-    stroke(&mut image, way, px, Color::from_rgba8(230, 159, 0, 255), 1.5);
-    image.encode_png().map_err(|error| PlotError::Encoding(error.to_string()))
 }
 
-fn stroke(
-    image: &mut Pixmap,
-    points: &[DVec2],
-    px: impl Fn(DVec2) -> (f32, f32),
-    colour: Color,
-    width_px: f32,
-) {
-    let mut builder = PathBuilder::new();
-    for (number, point) in points.iter().filter(|point| point.is_finite()).enumerate() {
-        let (x, y) = px(*point);
-        if number == 0 { builder.move_to(x, y) } else { builder.line_to(x, y) }
+fn walls(view: &MapView, plan: &Plan) -> Layer {
+    let mut layer = Layer::new("walls").stroked(theme::BLUE, WALL_PX);
+    for wall in view.scene.iter().flat_map(|scene| &scene.walls) {
+        layer.line(plan.px(wall.a), plan.px(wall.b));
     }
-    let Some(path) = builder.finish() else { return };
-    let mut paint = Paint { anti_alias: true, ..Paint::default() };
-    paint.set_color(colour);
-    let stroke = Stroke { width: width_px, line_cap: LineCap::Round, ..Stroke::default() };
-    image.stroke_path(&path, &paint, &stroke, Transform::identity(), None);
+    for cylinder in view.scene.iter().flat_map(|scene| &scene.cylinders) {
+        layer.circle(plan.px(cylinder.center), plan.length_px(cylinder.radius_m));
+    }
+    layer
 }
+
+const WALL_PX: f64 = 1.2;
+
+fn way(view: &MapView, plan: &Plan) -> Layer {
+    let mut layer = Layer::new("way").stroked(theme::ORANGE, 1.4);
+    let points: Vec<Px> =
+        view.way.iter().filter(|at| at.is_finite()).map(|at| plan.px(*at)).collect();
+    if let (Some(start), 1) = (points.first(), points.len()) {
+        layer.circle(*start, 3.0);
+    }
+    layer.runs([points]);
+    layer
+}
+
+fn keys(view: &MapView) -> Vec<Entry> {
+    let line = |colour, width_px| Sample::Line { colour, width_px, dash: "none" };
+    let mut entries = vec![
+        Entry::new(Sample::Patch { colour: theme::PAPER }, "free"),
+        Entry::new(Sample::Patch { colour: UNKNOWN }, "unknown"),
+        Entry::new(Sample::Patch { colour: "#000000" }, "occupied"),
+    ];
+    if view.scene.is_some() {
+        entries.push(Entry::new(line(theme::BLUE, WALL_PX), "walls of the scene"));
+    }
+    if !view.way.is_empty() {
+        entries.push(Entry::new(line(theme::ORANGE, 1.4), "way of the ranger"));
+    }
+    entries
+}
+
+/// Of a cell at 0.5.
+const UNKNOWN: &str = "#7f7f7f";

@@ -48,16 +48,12 @@ impl Picture {
             .set("width", width_px)
             .set("height", height_px)
             .set("fill", theme::PAPER);
-        let document = svg::Document::new()
-            .set("viewBox", (0.0, 0.0, width_px, height_px))
-            .set("width", width_px)
-            .set("height", height_px)
-            .set("font-family", theme::FONT_FAMILY)
-            .set("font-size", theme::TEXT_PX)
-            .set("fill", theme::INK)
-            .add(page)
-            .add(content.into_group());
-        Self { document }
+        Self { document: document(width_px, height_px).add(page).add(content.into_group()) }
+    }
+
+    /// The same without the white page, to be drawn over another.
+    pub(super) fn without_page(width_px: f64, height_px: f64, content: Layer) -> Self {
+        Self { document: document(width_px, height_px).add(content.into_group()) }
     }
 
     /// The picture as an SVG document.
@@ -80,8 +76,7 @@ impl Picture {
         if !(1..=MAX_WIDTH_PX).contains(&width_px) {
             return Err(PlotError::Width(width_px));
         }
-        let options = usvg::Options { fontdb: FONTS.clone(), ..usvg::Options::default() };
-        let tree = usvg::Tree::from_str(&self.to_svg(), &options)?;
+        let tree = self.tree()?;
         let scale = width_px as f32 / tree.size().width();
         let height_px = (scale * tree.size().height()).round();
         let mut pixels = Some(height_px)
@@ -92,6 +87,31 @@ impl Picture {
         resvg::render(&tree, transform, &mut pixels.as_mut());
         Ok(pixels)
     }
+
+    /// Draws the picture over pixels, as wide as they are.
+    pub(super) fn draw_onto(&self, pixels: &mut tiny_skia::Pixmap) -> Result<(), PlotError> {
+        let tree = self.tree()?;
+        let scale = pixels.width() as f32 / tree.size().width();
+        let transform = tiny_skia::Transform::from_scale(scale, scale);
+        resvg::render(&tree, transform, &mut pixels.as_mut());
+        Ok(())
+    }
+
+    fn tree(&self) -> Result<usvg::Tree, PlotError> {
+        let options = usvg::Options { fontdb: FONTS.clone(), ..usvg::Options::default() };
+        Ok(usvg::Tree::from_str(&self.to_svg(), &options)?)
+    }
+}
+
+/// An empty page with what all texts on it have in common.
+fn document(width_px: f64, height_px: f64) -> svg::Document {
+    svg::Document::new()
+        .set("viewBox", (0.0, 0.0, width_px, height_px))
+        .set("width", width_px)
+        .set("height", height_px)
+        .set("font-family", theme::FONT_FAMILY)
+        .set("font-size", theme::TEXT_PX)
+        .set("fill", theme::INK)
 }
 
 /// The bundled font, under its own name and as every generic family, so that a PNG looks the

@@ -83,6 +83,12 @@ impl Plan {
         Px::new(self.panel.left + from_corner.x, self.panel.bottom - from_corner.y)
     }
 
+    /// The place on the floor that a point of the page shows, metres.
+    pub(super) fn place(&self, at: Px) -> DVec2 {
+        let from_corner = Px::new(at.x - self.panel.left, self.panel.bottom - at.y);
+        self.view.min + from_corner / self.px_per_m
+    }
+
     pub(super) fn length_px(&self, length_m: f64) -> f64 {
         length_m * self.px_per_m
     }
@@ -136,6 +142,23 @@ impl Plan {
         layer
     }
 
+    /// Room for texts in the panel, off the walls of a scene.
+    pub(super) fn labels(&self, scene: Option<&Scene>) -> Labels {
+        let mut labels = Labels::new(self.panel);
+        for wall in scene.iter().flat_map(|scene| &scene.walls) {
+            labels.keep_off(self.px(wall.a), self.px(wall.b));
+        }
+        for cylinder in scene.iter().flat_map(|scene| &scene.cylinders) {
+            let radius_px = self.length_px(cylinder.radius_m);
+            let rim = |i: u32| {
+                self.px(cylinder.center)
+                    + radius_px * Px::from_angle(f64::from(i) * std::f64::consts::FRAC_PI_8)
+            };
+            (0..16).for_each(|i| labels.keep_off(rim(i), rim(i + 1)));
+        }
+        labels
+    }
+
     /// The robot's body, if the scene has one, where it is with the ranger at `pose`.
     pub(super) fn body(&self, scene: &Scene, pose: &Pose) -> Layer {
         let mut layer = Layer::new("robot").stroked(theme::FRAME, 1.6);
@@ -163,8 +186,11 @@ impl Plan {
             }
             let turn_deg = upright_deg(along);
             let outward = side_away_from(self.px(middle), a, b);
-            for side in [1.0, -1.0] {
-                let at = (a + b) / 2.0 + 10.0 * side * outward;
+            // In the middle, else nearer to either end.
+            let places = [0.5, 0.25, 0.75]
+                .into_iter()
+                .flat_map(|part| [1.0, -1.0].map(|side| a + part * along + 10.0 * side * outward));
+            for at in places {
                 if labels.place_turned(at, turn_deg, theme::SMALL_PX, &wall.id) {
                     // `at` is the middle of the text, its base line is a little lower.
                     let lower = DVec2::from_angle(turn_deg.to_radians()).perp() * 4.0;
@@ -180,11 +206,24 @@ impl Plan {
         for (name, bounds) in groups.into_iter().chain(discs) {
             let corner = self.px(DVec2::new(bounds.max.x, bounds.max.y));
             let low = self.px(DVec2::new(bounds.max.x, bounds.min.y));
-            for at in [low + Px::new(5.0, 12.0), corner + Px::new(5.0, -3.0)] {
-                if labels.place(at, Anchor::Start, theme::SMALL_PX, name) {
-                    layer.text(at, Anchor::Start, theme::SMALL_PX, name);
-                    break;
-                }
+            let middle = (low + corner) / 2.0;
+            let left = self.px(DVec2::new(bounds.min.x, bounds.min.y));
+            let above = Px::new((left.x + low.x) / 2.0, corner.y);
+            let places = [
+                (low + Px::new(5.0, 12.0), Anchor::Start),
+                (corner + Px::new(5.0, -3.0), Anchor::Start),
+                (middle + Px::new(6.0, 4.0), Anchor::Start),
+                (above - Px::new(0.0, 6.0), Anchor::Middle),
+                (Px::new(left.x - 6.0, middle.y + 4.0), Anchor::End),
+                (Px::new(above.x, low.y + 15.0), Anchor::Middle),
+                (Px::new(left.x - 5.0, corner.y - 3.0), Anchor::End),
+                (Px::new(above.x, middle.y + 4.0), Anchor::Middle),
+            ];
+            let free = places
+                .into_iter()
+                .find(|(at, anchor)| labels.place(*at, *anchor, theme::SMALL_PX, name));
+            if let Some((at, anchor)) = free {
+                layer.text(at, anchor, theme::SMALL_PX, name);
             }
         }
         layer

@@ -45,7 +45,7 @@ pub fn draw_residuals(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     let mut entries = keys::heard(&readings);
     if readings.iter().any(|scan| scan.has_model) {
         let sample = Sample::Line { colour: theme::SKY, width_px: 7.0, dash: "none" };
-        entries.push(Entry::new(sample, "model; within 10 mm of it"));
+        entries.push(Entry::new(sample, "model"));
     }
     let (key, height) = legend::draw(&entries, below, legend_width);
     page.add(key);

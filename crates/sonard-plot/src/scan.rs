@@ -4,9 +4,7 @@ use super::{
     canvas::{Layer, Px, Rect},
     caption,
     floor::Floor,
-    keys,
-    labels::Labels,
-    legend,
+    keys, legend,
     picture::Picture,
     plan::Plan,
     readings::Readings,
@@ -149,7 +147,7 @@ fn floor_plan(plan: &Plan, scans: &[(Pose, &Readings)], scene: Option<&Scene>) -
     inside.extend(stands.iter().map(|stand| stand.measured(plan).marks(opacity)));
     inside.extend(stands.iter().map(|stand| plan.pose(&stand.pose)));
 
-    let mut labels = Labels::new(plan.panel);
+    let mut labels = plan.labels(scene);
     let mut layer = Layer::new("floor-plan");
     layer.add(plan.frame());
     layer.add(inside);

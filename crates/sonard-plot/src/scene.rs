@@ -20,7 +20,7 @@ pub fn draw_scene(scene: &Scene) -> Picture {
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
     let height = Plan::height_for(&region, right - left, [220.0, 640.0]);
     let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
-    let mut labels = Labels::new(plan.panel);
+    let mut labels = plan.labels(Some(scene));
 
     let mut page = Layer::new("scene");
     page.add(heading);

@@ -47,7 +47,7 @@ impl AzimuthAxis {
 pub(super) enum Scale {
     /// From `min` to `max`.
     Linear { min: f64, max: f64 },
-    /// Linear up to `threshold` on either side of zero, then this many decades, each half as
+    /// Linear up to `threshold` on either side of zero, then this many decades, each as
     /// high as the linear part of its side.
     SymLog { threshold: f64, decades: f64 },
 }
@@ -59,8 +59,8 @@ impl Scale {
             Self::Linear { min, max } => (value - min) / (max - min),
             Self::SymLog { threshold, decades } => {
                 let size = value.abs() / threshold;
-                let reach = if size <= 1.0 { 2.0 * size } else { 2.0 + size.log10() };
-                0.5 + 0.5 * value.signum() * reach / (2.0 + decades)
+                let reach = if size <= 1.0 { size } else { 1.0 + size.log10() };
+                0.5 + 0.5 * value.signum() * reach / (1.0 + decades)
             }
         }
     }

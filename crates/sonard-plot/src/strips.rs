@@ -12,6 +12,9 @@ const MARK_PX: f64 = 2.1;
 /// a predicted reading always count as the same, millimetres.
 const RESIDUAL_LINEAR_MM: f64 = 10.0;
 
+/// No residual scale is finer than this to either side, millimetres.
+const LEAST_SCALE_MM: f64 = 1.0;
+
 /// Range against azimuth: measured marks over the model's line.
 pub(super) fn range(panel: Rect, azimuths: AzimuthAxis, scans: &[Readings], last: bool) -> Layer {
     let strip = Strip { panel, azimuths, scale: Scale::Linear { min: 0.0, max: top_m(scans) } };
@@ -36,20 +39,32 @@ pub(super) fn residual(
 ) -> Layer {
     let strip = Strip { panel, azimuths, scale: residual_scale(scans) };
     let mut layer = Layer::new("residual-strip");
-    layer.add(strip.band(-RESIDUAL_LINEAR_MM, RESIDUAL_LINEAR_MM));
-    layer.add(strip.frame("measured \u{2212} model, mm", last));
+    // On the linear scale everything would lie in the band.
+    let title = match strip.scale {
+        Scale::Linear { .. } => "measured \u{2212} model, mm",
+        Scale::SymLog { .. } => {
+            layer.add(strip.band(-RESIDUAL_LINEAR_MM, RESIDUAL_LINEAR_MM));
+            "measured \u{2212} model, mm (linear within \u{b1}10 mm, shaded; logarithmic beyond)"
+        }
+    };
+    layer.add(strip.frame(title, last));
     layer.add(marks(&strip, scans, |beam| beam.residual_m.map(|r| 1e3 * r)));
     layer
 }
 
-/// Wide enough for every residual up to 10 m; beyond there is an arrow.
+/// Linear where every residual is within 10 mm; else logarithmic beyond that, wide enough for every
+/// residual up to 10 m; beyond there is an arrow.
 pub(super) fn residual_scale(scans: &[Readings]) -> Scale {
     let largest_mm = scans
         .iter()
         .flat_map(Readings::residuals)
         .map(|(_, residual_m)| 1e3 * residual_m.abs())
         .fold(0.0, f64::max);
-    let decades = (1.2 * largest_mm / RESIDUAL_LINEAR_MM).log10().clamp(0.3, 3.0);
+    if largest_mm <= RESIDUAL_LINEAR_MM {
+        let max = (1.15 * largest_mm).max(LEAST_SCALE_MM);
+        return Scale::Linear { min: -max, max };
+    }
+    let decades = (1.2 * largest_mm / RESIDUAL_LINEAR_MM).log10().clamp(1.0, 3.0);
     Scale::SymLog { threshold: RESIDUAL_LINEAR_MM, decades }
 }
 

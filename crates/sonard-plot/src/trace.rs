@@ -18,8 +18,11 @@ const TOP_DB: f64 = 10.0;
 /// Most humps that get a number.
 const MOST_NAMED: usize = 12;
 
-/// Humps this far below the threshold are left without a number, decibels.
+/// Humps this far below the threshold get one only where they stand out, decibels.
 const NAMED_BELOW_DB: f64 = 12.0;
+
+/// A hump stands out where the envelope at its peak is at most this many times as high.
+const STANDS_OUT: f64 = 1.5;
 
 /// A firing to be drawn.
 #[derive(Debug, Clone)]
@@ -75,14 +78,19 @@ struct Named {
 
 /// The strongest humps, in order of time.
 fn named(view: &TraceView) -> Vec<Named> {
-    let threshold_at = |t_us: f64| {
-        let point = view.trace.points.iter().find(|point| point.t_us >= t_us);
-        point.or(view.trace.points.last()).map_or(0.0, |point| point.threshold)
+    let floor = 10f64.powf(FLOOR_DB / 20.0);
+    let is_seen = |peak: f64, peak_us: f64| {
+        let points = &view.trace.points;
+        let point = points.iter().find(|point| point.t_us >= peak_us).or(points.last());
+        point.is_some_and(|point| {
+            peak >= point.threshold * 10f64.powf(-NAMED_BELOW_DB / 20.0)
+                || (peak > floor && point.envelope <= STANDS_OUT * peak)
+        })
     };
     let mut humps: Vec<Named> = Vec::new();
     for (hump, name) in view.trace.humps.iter().zip(&view.names) {
         let (peak, peak_us) = hump.peak;
-        if peak < threshold_at(peak_us) * 10f64.powf(-NAMED_BELOW_DB / 20.0) {
+        if !is_seen(peak, peak_us) {
             continue;
         }
         let same =

@@ -21,6 +21,8 @@ pub struct WayView<'a> {
     pub title: String,
     /// Under the title: what was read, and by which path.
     pub lines: Vec<String>,
+    /// What the readings are of, if not of a real ranger ([`badge_of`](crate::badge_of)).
+    pub badge: Option<&'static str>,
     /// The room, without the robot.
     pub scene: &'a Scene,
     /// Where the ranger stands.
@@ -39,12 +41,12 @@ pub struct WayView<'a> {
 /// on each stretch, and where the ranger believes the echo to be.
 #[must_use]
 pub fn draw_way(view: &WayView) -> Picture {
-    let (heading, top) = caption::draw(&view.title, None, &view.lines);
+    let (heading, top) = caption::draw(&view.title, view.badge, &view.lines);
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
     let region = region(view);
     let height = Plan::height_for(&region, right - left, [300.0, 700.0]);
     let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
-    let mut labels = Labels::new(plan.panel);
+    let mut labels = plan.labels(Some(view.scene));
     let mut page = Layer::new("way-of-a-beam");
     page.add(heading);
     page.add(plan.frame());

@@ -22,8 +22,17 @@ pub(super) fn title(views: &[ScanView], scene: Option<&Scene>) -> String {
 
 /// What the readings are, in a few words; `None` for readings of a real ranger.
 pub(super) fn badge(views: &[ScanView]) -> Option<&'static str> {
-    let session = views.iter().find_map(|view| view.session.as_ref());
-    match session.map(|session| session.provenance) {
+    let of_views = views.iter().filter_map(|view| Some(view.session.as_ref()?.provenance));
+    // Made-up readings among measured ones must not pass for measured.
+    let made_up = of_views.clone().find(|provenance| *provenance != Provenance::Hardware);
+    badge_of(made_up.or(of_views.clone().next()))
+}
+
+/// The words that every picture of readings has in its corner, unless a real ranger took them; for
+/// readings of which nothing is known, that.
+#[must_use]
+pub fn badge_of(provenance: Option<Provenance>) -> Option<&'static str> {
+    match provenance {
         Some(Provenance::Hardware) => None,
         Some(Provenance::Emulator) => Some("EMULATOR, not hardware"),
         Some(Provenance::Mock) => Some("MOCK, not hardware"),

@@ -3,7 +3,7 @@
 use crate::{
     cli::Failure,
     geometry::wrap_pi,
-    plot::{Picture, WayView, draw_way},
+    plot::{Picture, WayView, badge_of, draw_way},
     scan::{PathRecord, Ping, PingStatus, ScanView},
     scene::Scene,
 };
@@ -65,6 +65,7 @@ pub(super) fn draw(
     Ok(draw_way(&WayView {
         title: format!("{}, beam {index} at azimuth {azimuth_deg}\u{b0}", scene.name),
         lines: vec![reading(ping), by(record)],
+        badge: badge_of(ping.provenance.or(view.session.as_ref().map(|s| s.provenance))),
         scene,
         pose,
         looks: viewpoint.pose(),
