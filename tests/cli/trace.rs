@@ -52,6 +52,17 @@ fn the_table_says_what_a_silence_lacks_and_what_blanking_hides() {
 }
 
 #[test]
+fn a_faint_hump_that_stands_alone_has_a_number_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let svg = folder.path().join("trace.svg");
+    let svg = svg.to_str().expect("plain");
+    sonard(&["trace", "--scene", "echo-traces", "--pose", "d", "-o", svg]).success();
+    let drawn = std::fs::read_to_string(svg).expect("written");
+    // 18 dB below the threshold, and nothing else near it.
+    assert!(drawn.contains(">\n1   0.7") || drawn.contains(">1   0.7"), "{drawn}");
+}
+
+#[test]
 fn pictures_and_ways_are_drawn_and_wrong_input_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("plain").to_owned();

@@ -41,6 +41,8 @@ mod words;
 #[cfg(test)]
 mod fixtures;
 #[cfg(test)]
+mod legible;
+#[cfg(test)]
 mod tests;
 
 pub use animation::animate;

@@ -1,0 +1,109 @@
+//! What a reader must find on a picture: whose the readings are, what the axes mean, and names that stand
+//! free of walls.
+
+use resvg::{tiny_skia::Pixmap, usvg::roxmltree};
+use sonard_interpret::interpret::{
+    calibration::{Bin, Reliability},
+    grid::{Grid, GridShape},
+};
+use sonard_model::{
+    geometry::DVec2,
+
+};
+use sonard_records::Provenance;
+
+use super::{
+    fixtures::{room, scan_of_room},
+    *,
+};
+
+fn texts(svg: &str) -> Vec<String> {
+    let document = roxmltree::Document::parse(svg).expect("well-formed");
+    let texts = document.descendants().filter(|node| node.has_tag_name("text"));
+    texts.filter_map(|node| node.text().map(str::to_owned)).collect()
+}
+
+#[test]
+fn the_way_of_a_beam_says_whose_the_reading_is() {
+    let scene = room();
+    let pose = scene.poses["fig9"];
+    let way = |provenance| {
+        let view = WayView {
+            title: "a way".into(),
+            lines: Vec::new(),
+            badge: badge_of(Some(provenance)),
+            scene: &scene,
+            pose,
+            looks: pose,
+            azimuth_deg: 0.0,
+            range_m: Some(0.5),
+            points: vec![pose.position(), pose.position() + DVec2::X, pose.position()],
+        };
+        draw_way(&view).to_svg()
+    };
+    assert!(way(Provenance::Mock).contains("MOCK, not hardware"));
+    assert!(way(Provenance::Emulator).contains("EMULATOR, not hardware"));
+    assert!(!way(Provenance::Hardware).contains("class=\"provenance\""));
+}
+
+#[test]
+fn made_up_readings_among_measured_ones_are_said() {
+    let of = |provenance: Provenance| {
+        let mut scan = scan_of_room(room().poses["fig9"], 9.0, 1);
+        let mut session = scan.session.as_deref().expect("a session").clone();
+        session.provenance = provenance;
+        scan.session = Some(std::sync::Arc::new(session));
+        scan
+    };
+    let scans = [of(Provenance::Hardware), of(Provenance::Mock)];
+    assert!(draw_scans(&scans, None).to_svg().contains("MOCK, not hardware"));
+    assert!(!draw_scans(&scans[..1], None).to_svg().contains("class=\"provenance\""));
+}
+
+#[test]
+fn a_map_has_a_frame_round_its_cells_and_a_badge() {
+    let shape = GridShape::covering(DVec2::ZERO, DVec2::new(2.0, 1.0), 0.05).expect("a shape");
+    let grid = Grid::new(shape);
+    let draw = |badge| {
+        let (title, lines) = ("a map".to_owned(), Vec::new());
+        let view = MapView { title, lines, badge, grid: &grid, scene: Some(&room()), way: &[] };
+        Pixmap::decode_png(&draw_map(&view).expect("drawn")).expect("a PNG")
+    };
+    let red = |image: &Pixmap| {
+        let is_red = |p: &&resvg::tiny_skia::PremultipliedColorU8| p.red() > 180 && p.blue() < 60;
+        image.pixels().iter().filter(is_red).count()
+    };
+    let [plain, marked] = [draw(None), draw(badge_of(Some(Provenance::Simulated)))];
+    assert_eq!(red(&plain), 0);
+    assert!(red(&marked) > 200, "a badge");
+    let is_grey = |p: &&resvg::tiny_skia::PremultipliedColorU8| p.red() == 127;
+    let unknown = plain.pixels().iter().filter(is_grey).count();
+    let all = plain.pixels().len();
+    assert!(unknown > all / 3 && unknown < all * 9 / 10, "{unknown} of {all}: cells, and paper");
+}
+
+#[test]
+fn a_residual_axis_says_where_it_is_logarithmic() {
+    let scan = scan_of_room(room().poses["fig9"], 0.9, 1);
+    let mut close = scan.clone();
+    close.pings.retain(|ping| {
+        let model_m = ping.sim.as_ref().and_then(|sim| sim.range_m);
+        ping.range_m.zip(model_m).is_none_or(|(range_m, model_m)| (range_m - model_m).abs() < 0.01)
+    });
+    let svg = draw_residuals(&[scan], None).to_svg();
+    assert!(texts(&svg).iter().any(|text| text.contains("logarithmic beyond")), "{svg}");
+    assert!(svg.contains("class=\"band\""));
+    let svg = draw_residuals(&[close], None).to_svg();
+    assert!(texts(&svg).contains(&"measured \u{2212} model, mm".to_owned()));
+    assert!(!svg.contains("class=\"band\""), "a band over everything says nothing");
+}
+
+#[test]
+fn a_reliability_diagram_has_a_mark_for_every_bin_with_claims() {
+    let mut bins = [Bin::default(); 10];
+    bins[0] = Bin { count: 90, claimed: 0.02, came_true: 0.03 };
+    bins[9] = Bin { count: 10, claimed: 0.97, came_true: 0.9 };
+    let reliability = Reliability { bins, expected_error: 0.016, brier: 0.03 };
+    let svg = draw_reliability("claims", &[], &reliability).to_svg();
+    assert_eq!(svg.matches("claims of 0.").count(), 2, "{svg}");
+}
