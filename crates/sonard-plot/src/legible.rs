@@ -6,10 +6,7 @@ use sonard_interpret::interpret::{
     calibration::{Bin, Reliability},
     grid::{Grid, GridShape},
 };
-use sonard_model::{
-    geometry::DVec2,
-
-};
+use sonard_model::geometry::DVec2;
 use sonard_records::Provenance;
 
 use super::{
