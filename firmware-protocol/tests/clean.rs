@@ -5,7 +5,7 @@ mod world;
 
 use firmware_protocol::device::Device;
 use firmware_protocol::frame::{Frame, Header};
-use firmware_protocol::host::{Command, HostError, HostEvent, LinkStats, StartError};
+use firmware_protocol::host::{ATTEMPTS, Command, HostError, HostEvent, LinkStats, StartError};
 use firmware_protocol::messages::{Request, Settings, Sweep};
 use world::line::Faults;
 use world::ready::{BAUD, delivered, plan, ready};
@@ -93,7 +93,7 @@ fn a_closed_line_fails_at_once_and_the_device_is_met_again() {
     sim.host.handle_hangup(now);
     assert_eq!(sim.host.poll_event(), Some(HostEvent::Failed(HostError::Hangup)));
     assert_eq!(sim.host.poll_timeout(), None);
-    assert_eq!(sim.host.start(now, Command::Ping), Err(StartError::NotIdentified));
+    assert_eq!(sim.host.start(now, Command::Ping), Err(StartError::Restarted));
     let events = sim.run(Command::Identify).expect("ends");
     assert!(matches!(events.last(), Some(HostEvent::Identified(_))));
     assert!(!events.iter().any(|event| matches!(event, HostEvent::Rebooted { .. })));
@@ -103,7 +103,7 @@ fn a_closed_line_fails_at_once_and_the_device_is_met_again() {
 fn a_dead_line_fails_without_an_answer() {
     let mut sim = Sim::new(3, BAUD, Faults { frame_lost_one_in: 1, ..Faults::default() });
     let events = sim.run(Command::Identify).expect("ends");
-    assert_eq!(events, [HostEvent::Failed(HostError::NoAnswer { attempts: 10 })]);
+    assert_eq!(events, [HostEvent::Failed(HostError::NoAnswer { attempts: ATTEMPTS })]);
 }
 
 #[test]

@@ -80,6 +80,7 @@ fn run(seed: u64, tally: &mut Tally) {
         }
     }
     let stats = sim.host.stats();
+    assert_eq!(stats.refused, 0, "the device tells the truth");
     tally.repaired += stats.repaired;
     tally.duplicates += stats.duplicates;
     tally.retries += stats.retries;

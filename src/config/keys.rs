@@ -33,6 +33,8 @@ pub struct Keys {
     pub log: LogKeys,
     /// The line to the device.
     pub link: LinkKeys,
+    /// After an emergency stop.
+    pub safety: SafetyKeys,
     /// The HTTP API.
     pub server: ServerKeys,
     /// Pins of a Raspberry Pi (BCM numbers); only in a build with the feature pi.
@@ -208,6 +210,15 @@ pub struct LinkKeys {
     /// How often a device without work is asked how it is, seconds.
     #[schemars(range(min = 0.1, max = 60))]
     pub check_s: f64,
+}
+
+/// After an emergency stop.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SafetyKeys {
+    /// Home and scan again by itself once an emergency stop is released. Without it the state is
+    /// awaiting_start, and nothing moves until POST /v1/start or a restart of the daemon.
+    pub resume_after_emergency_stop: bool,
 }
 
 /// The HTTP API.

@@ -77,6 +77,8 @@ pub(super) enum Interrupt {
     Shutdown,
     /// The emergency stop was pressed or released.
     EmergencyStop(bool),
+    /// Somebody wants scans.
+    Start,
     /// The scan under way is to end.
     Stop,
     /// Another port is to be used.
@@ -180,7 +182,11 @@ impl Desk {
 
     fn carry_out(&mut self, Request { order, reply }: Request) -> Option<Interrupt> {
         let (answer, interrupt) = match order {
-            Order::Start(asked) => (self.start(asked), Some(Interrupt::Agenda)),
+            Order::Start(asked) => {
+                let answer = self.start(asked);
+                let begun = if answer.is_ok() { Interrupt::Start } else { Interrupt::Agenda };
+                (answer, Some(begun))
+            }
             Order::Cancel(request) => self.cancel(request),
             Order::Mode(mode, every_s) => (self.set_mode(mode, every_s), Some(Interrupt::Agenda)),
             Order::Stop => {
@@ -213,6 +219,12 @@ impl Desk {
     }
 
     fn start(&mut self, asked: Asked) -> Result<(), Refusal> {
+        if self.pressed {
+            return Err(Refusal {
+                message: "the emergency stop is pressed".into(),
+                help: "release it first".into(),
+            });
+        }
         asked.plan.map_or(Ok(()), |plan| self.check_plan(&plan))?;
         asked.pose.map_or(Ok(()), |pose| check_pose(&self.settings, &pose))?;
         if self.agenda.start(asked) {

@@ -25,6 +25,8 @@ pub enum LinkState {
     Scanning,
     /// The emergency stop is pressed.
     EmergencyStop,
+    /// There was an emergency stop: nothing moves until somebody starts it.
+    AwaitingStart,
     /// Stopped for good.
     Stopped,
     /// It can't be used, and why; in records the trouble stands for itself.
@@ -73,6 +75,10 @@ pub enum Input {
     Failed(Trouble),
     /// The emergency stop was pressed (`true`) or released.
     EmergencyStop(bool),
+    /// The device's own emergency stop was pressed.
+    DeviceStopped,
+    /// Somebody wants it to work.
+    Start,
     /// Another port is to be used.
     PortChanged,
     /// The end.
@@ -129,6 +135,8 @@ pub struct LinkMachine {
     /// Since when the device can be used without a break.
     up_since: Option<Duration>,
     pressed: bool,
+    /// Whether it works on by itself after an emergency stop.
+    resumes: bool,
     /// The settled state that was told last.
     told: Option<LinkState>,
     transition: Option<Transition>,
@@ -146,6 +154,7 @@ impl LinkMachine {
             failures: 0,
             up_since: None,
             pressed: false,
+            resumes: false,
             told: None,
             transition: None,
         }
@@ -156,6 +165,11 @@ impl LinkMachine {
         self.back_off = back_off;
     }
 
+    /// Whether it works on by itself after the next emergency stop.
+    pub const fn set_resumes(&mut self, resumes: bool) {
+        self.resumes = resumes;
+    }
+
     /// What to do now. The same until something is handled, except that a wait ends.
     pub fn poll(&mut self, now: Duration) -> Step {
         use LinkState as State;
@@ -164,7 +178,7 @@ impl LinkMachine {
             State::Identifying => Step::Identify,
             State::Homing => Step::Home,
             State::Ready | State::Scanning => Step::Serve,
-            State::EmergencyStop => Step::Rest,
+            State::EmergencyStop | State::AwaitingStart => Step::Rest,
             State::Stopped => Step::End,
             _ if now < self.retry_at => Step::Wait(self.retry_at),
             _ => {
@@ -185,11 +199,14 @@ impl LinkMachine {
                 if pressed {
                     self.enter(now, State::EmergencyStop);
                 } else if state == State::EmergencyStop {
-                    // Somebody may have turned the motor by hand: begin anew, homing and all.
-                    self.enter(now, State::Opening);
+                    self.after_stop(now);
                 }
             }
             (_, State::EmergencyStop) => {}
+            (Input::Start, State::AwaitingStart) => self.enter(now, State::Opening),
+            (_, State::AwaitingStart) => {}
+            (Input::DeviceStopped, _) if self.resumes => self.fail(now, Trouble::Fault),
+            (Input::DeviceStopped, _) => self.enter(now, State::AwaitingStart),
             (Input::PortChanged, _) => self.enter(now, State::Opening),
             (Input::Failed(trouble), _) => self.fail(now, trouble),
             (Input::Opened, State::Opening) => self.enter(now, State::Identifying),
@@ -237,8 +254,18 @@ impl LinkMachine {
     #[must_use]
     pub fn retry_at(&self) -> Option<Duration> {
         let waits = self.state.is_settled() && !self.state.is_up();
-        let for_ever = matches!(self.state, LinkState::EmergencyStop | LinkState::Stopped);
+        let for_ever = matches!(
+            self.state,
+            LinkState::EmergencyStop | LinkState::AwaitingStart | LinkState::Stopped
+        );
         (waits && !for_ever).then_some(self.retry_at)
+    }
+
+    /// Whoever released it may still have a hand there, or have turned the motor: nothing moves by
+    /// itself, and what begins then begins anew, homing and all.
+    fn after_stop(&mut self, now: Duration) {
+        let next = if self.resumes { LinkState::Opening } else { LinkState::AwaitingStart };
+        self.enter(now, next);
     }
 
     fn fail(&mut self, now: Duration, trouble: Trouble) {
@@ -294,6 +321,7 @@ impl LinkState {
             Self::Ready => "ready",
             Self::Scanning => "scanning",
             Self::EmergencyStop => "emergency_stop",
+            Self::AwaitingStart => "awaiting_start",
             Self::Stopped => "stopped",
             Self::Down(trouble) => trouble.name(),
         }

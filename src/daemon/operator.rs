@@ -5,7 +5,10 @@ mod tell;
 
 use std::time::Duration;
 
-use firmware_protocol::host::{HostConfig, HostError};
+use firmware_protocol::{
+    host::{BoardChange, HostConfig, HostError},
+    messages::{FaultKind, Identity, NakReason},
+};
 use tokio::time::{Instant, sleep_until};
 use tokio_serial::SerialStream;
 
@@ -23,6 +26,9 @@ use crate::{
     scan::{EventKind, Session},
 };
 
+/// What to do after an emergency stop.
+const AWAITS_START: &str = "there was an emergency stop: nothing moves until somebody starts it \
+                            (POST /v1/start, or a restart of the daemon)";
 /// How often an operator that waits shows that it is alive.
 const BEAT: Duration = Duration::from_secs(1);
 
@@ -36,6 +42,8 @@ pub(super) struct Operator {
     ranger: Option<Ranger<SerialStream>>,
     line: Option<SerialStream>,
     forecast: Forecast,
+    /// The device that was met last, on whatever connection.
+    met: Option<Identity>,
     /// The session's record that is in force in the log.
     session: Option<Session>,
     out: Outlet,
@@ -55,6 +63,7 @@ impl Operator {
             ranger: None,
             line: None,
             forecast: Forecast::default(),
+            met: None,
             session: None,
             out,
             trouble: None,
@@ -159,7 +168,14 @@ impl Operator {
             );
             return self.fail(Trouble::WrongDevice, why);
         }
-        self.desk.identity = Some(*ranger.identity());
+        let identity = *ranger.identity();
+        if let Some(change) = self.met.and_then(|met| BoardChange::between(&met, &identity)) {
+            let detail = format!("another device than before: {change}; a new session begins");
+            self.out.event(EventKind::Reconnected, detail);
+            self.session = None;
+        }
+        self.met = Some(identity);
+        self.desk.identity = Some(identity);
         self.line_figures.live = Some(ranger.watch_link());
         self.ranger = Some(ranger);
         self.handle(Input::Identified);
@@ -222,6 +238,11 @@ impl Operator {
                 self.out.event(EventKind::Reboot, detail);
                 self.handle(Input::Restarted);
             }
+            // Homing again is all that it takes.
+            Unasked::Fault(FaultKind::HoldExpired) => self.handle(Input::Restarted),
+            Unasked::Fault(FaultKind::EmergencyStop) => {
+                self.device_stopped(&DriveError::Host(HostError::EmergencyStop));
+            }
             Unasked::Fault(kind) => {
                 self.fail(Trouble::Fault, format!("the device stopped by itself: {kind}"));
             }
@@ -243,9 +264,26 @@ impl Operator {
         }
     }
 
+    /// The device's own emergency stop was pressed.
+    fn device_stopped(&mut self, error: &DriveError) {
+        self.out.event(EventKind::Fault, error.to_string());
+        let why = if self.resumes() { error.help() } else { AWAITS_START };
+        self.trouble = Some(format!("{error}; {why}"));
+        self.machine.set_resumes(self.resumes());
+        self.handle(Input::DeviceStopped);
+    }
+
     fn device_failed(&mut self, error: &DriveError) {
         use HostError as Host;
         let trouble = match error {
+            DriveError::Host(Host::EmergencyStop | Host::Refused(NakReason::EmergencyStop)) => {
+                return self.device_stopped(error);
+            }
+            DriveError::OtherBoard(_) => {
+                // Whatever it measures goes under its own name.
+                self.session = None;
+                Trouble::WrongDevice
+            }
             DriveError::Host(Host::NoAnswer { .. } | Host::NotADevice { .. }) => {
                 Trouble::NotAnswering
             }
@@ -279,6 +317,10 @@ impl Operator {
                     false => (EventKind::Reconnected, "the emergency stop was released"),
                 };
                 self.out.event(kind, what.to_owned());
+                if !pressed && !self.resumes() {
+                    self.trouble = Some(AWAITS_START.to_owned());
+                }
+                self.machine.set_resumes(self.resumes());
                 self.handle(Input::EmergencyStop(pressed));
             }
             Interrupt::PortChanged => self.handle(Input::PortChanged),
@@ -286,9 +328,15 @@ impl Operator {
                 Some(error) => tracing::error!("no scan until the log can be written: {error}"),
                 None => tracing::info!("the log can be written again"),
             },
+            Interrupt::Start => self.handle(Input::Start),
             Interrupt::Stop | Interrupt::Agenda => {}
         }
         self.machine.set_back_off(self.desk.settings.back_off());
+        self.machine.set_resumes(self.resumes());
+    }
+
+    const fn resumes(&self) -> bool {
+        self.desk.settings.keys.safety.resume_after_emergency_stop
     }
 
     fn close(&mut self) {
@@ -315,7 +363,7 @@ async fn attended<T>(desk: &mut Desk, work: impl Future<Output = T>) -> Result<T
                     return Err(interrupt);
                 }
                 // The operator looks at the agenda and the log when the device can be used.
-                Interrupt::Stop | Interrupt::Log | Interrupt::Agenda => {}
+                Interrupt::Start | Interrupt::Stop | Interrupt::Log | Interrupt::Agenda => {}
             }
         }
     }

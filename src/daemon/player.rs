@@ -187,7 +187,10 @@ impl Player {
                     None => tracing::info!("the log can be written again"),
                 },
                 // There is neither a port nor a board.
-                Interrupt::PortChanged | Interrupt::EmergencyStop(_) | Interrupt::Agenda => {}
+                Interrupt::PortChanged
+                | Interrupt::EmergencyStop(_)
+                | Interrupt::Start
+                | Interrupt::Agenda => {}
             }
             self.tell();
             // A waiting player has to look at its agenda again.

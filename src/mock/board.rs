@@ -10,7 +10,8 @@ use firmware_protocol::{
 
 use super::{
     faults::{DeviceFault, Faults},
-    identity::{BoardSettings, Pace, identity, with_version},
+    identity::{BoardSettings, Pace, identity},
+    liar::Liar,
     note::Note,
     world::World,
 };
@@ -45,6 +46,7 @@ pub struct MockBoard {
     device: Device,
     world: World,
     faults: Faults,
+    liar: Liar,
     now: u64,
     boot: u16,
     /// What the step counter says.
@@ -90,6 +92,7 @@ impl MockBoard {
             device: Device::new(identity(&settings, settings.boot, ResetCause::PowerOn)),
             world,
             faults: Faults::new(settings.faults, settings.seed ^ 0x00b0_a4d0),
+            liar: Liar::new(settings.faults.lie, settings.faults.version),
             now: u64::from(settings.clock),
             boot: settings.boot,
             step: 0,
@@ -188,10 +191,8 @@ impl MockBoard {
             }
             said.extend_from_slice(buffer.get(..count).unwrap_or_default());
         }
-        match self.settings.faults.version {
-            Some(version) => self.faults.garble(&with_version(&said, version), out),
-            None => self.faults.garble(&said, out),
-        }
+        let told = self.liar.told(said);
+        self.faults.garble(&told, out);
         // A restart waits until its acknowledgement is out.
         self.act();
     }
@@ -291,6 +292,11 @@ impl MockBoard {
                 }
                 Action::AbortFire => self.activity = Activity::Nothing,
                 Action::Reset => self.restart(ResetCause::Requested),
+            }
+            if matches!(action, Action::Home { .. } | Action::Move { .. })
+                && let Some(fault) = self.faults.at_motion()
+            {
+                self.suffer(fault);
             }
         }
     }

@@ -1,10 +1,12 @@
 //! Faults of the line and of the device, chosen by a seed.
 
-use std::{fmt, str::FromStr};
+use std::{borrow::Cow, fmt, str::FromStr};
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use thiserror::Error;
+
+use super::liar::Lie;
 
 /// How often what goes wrong. Written `flip=0.001,drop=0.001,reset=0.002,version=9`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -27,18 +29,26 @@ pub struct FaultPlan {
     pub reset: f64,
     /// Probability for each firing that the line hangs up and comes back.
     pub hangup: f64,
+    /// Probability for each turn of the motor that the device restarts, as from a weak supply.
+    pub motor_reset: f64,
+    /// Probability for each turn of the motor that the line hangs up and comes back.
+    pub motor_hangup: f64,
     /// Probability for each firing that no echo comes back, as without a transducer.
     pub no_echo: f64,
     /// Probability for each firing that ECHO is high before it, as from a module without power.
     pub stuck_echo: f64,
     /// Protocol version to claim instead of the true one.
     pub version: Option<u8>,
+    /// What it says wrongly.
+    pub lie: Option<Lie>,
 }
 
 /// The keys of a fault specification, with what their value means.
 pub const FAULT_HELP: &str = "comma-separated KEY=VALUE: flip, drop, double (probability a byte), \
 delay (probability a chunk; delay_ms, default 20), stall (probability a firing; stall_ms, default \
-500), reset, hangup, no_echo, stuck_echo (probability a firing), version (protocol version to claim)";
+500), reset, hangup, no_echo, stuck_echo (probability a firing), motor_reset, motor_hangup \
+(probability a turn of the motor), version (protocol version to claim), lie (what to say wrongly: \
+lie=? names them)";
 
 /// Why a fault specification can't be read.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -57,7 +67,7 @@ pub enum FaultSpecError {
         /// The value.
         value: String,
         /// What would be right.
-        wanted: &'static str,
+        wanted: Cow<'static, str>,
     },
 }
 
@@ -89,6 +99,9 @@ impl FaultPlan {
             "stuck_echo" => self.stuck_echo = probability(key, value)?,
             "delay_ms" => self.delay_ms = whole(key, value, "milliseconds, 0 to 60000")?,
             "stall_ms" => self.stall_ms = whole(key, value, "milliseconds, 0 to 60000")?,
+            "motor_reset" => self.motor_reset = probability(key, value)?,
+            "motor_hangup" => self.motor_hangup = probability(key, value)?,
+            "lie" => self.lie = Some(Lie::named(value).map_err(|names| bad(key, value, names))?),
             "version" => self.version = Some(whole(key, value, "a protocol version, 0 to 255")?),
             _ => return Err(FaultSpecError::UnknownKey(key.into())),
         }
@@ -111,8 +124,8 @@ fn whole<T: FromStr>(key: &str, value: &str, wanted: &'static str) -> Result<T, 
     value.parse().map_err(|_| bad(key, value, wanted))
 }
 
-fn bad(key: &str, value: &str, wanted: &'static str) -> FaultSpecError {
-    FaultSpecError::BadValue { key: key.into(), value: value.into(), wanted }
+fn bad(key: &str, value: &str, wanted: impl Into<Cow<'static, str>>) -> FaultSpecError {
+    FaultSpecError::BadValue { key: key.into(), value: value.into(), wanted: wanted.into() }
 }
 
 /// A fault of the device at a firing.
@@ -184,6 +197,16 @@ impl Faults {
             .find_map(|(fault, happens)| happens.then_some(fault))
     }
 
+    /// What befalls the device as its motor begins to turn, if anything.
+    pub fn at_motion(&mut self) -> Option<DeviceFault> {
+        let FaultPlan { motor_reset, motor_hangup, .. } = self.plan;
+        let draws = [self.happens(motor_reset), self.happens(motor_hangup)];
+        [DeviceFault::Reset, DeviceFault::Hangup]
+            .into_iter()
+            .zip(draws)
+            .find_map(|(fault, happens)| happens.then_some(fault))
+    }
+
     /// What the module does at a firing: whether ECHO hangs high, and whether nothing comes back.
     pub fn of_module(&mut self) -> (bool, bool) {
         let FaultPlan { stuck_echo, no_echo, .. } = self.plan;
@@ -210,6 +233,7 @@ mod tests {
             ("flip=NaN", "0 to 1"),
             ("stall_ms=70000", "60000"),
             ("version=300", "0 to 255"),
+            ("lie=so", "late-echo"),
         ] {
             let error = spec.parse::<FaultPlan>().expect_err(spec);
             assert!(error.to_string().contains(part), "{spec}: {error}");

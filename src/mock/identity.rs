@@ -2,8 +2,7 @@
 
 use firmware_protocol::{
     device::Board,
-    frame::{Frame, FrameDecoder, Received},
-    messages::{Capabilities, FirmwareVersion, ProtocolId, Reply, ResetCause},
+    messages::{Capabilities, FirmwareVersion, ResetCause},
 };
 
 use super::faults::FaultPlan;
@@ -53,25 +52,4 @@ pub(super) fn identity(settings: &BoardSettings, boot: u16, reset_cause: ResetCa
             .with(clock),
         reset_cause,
     }
-}
-
-/// The same frames, but every Identity claims another protocol version.
-pub(super) fn with_version(bytes: &[u8], version: u8) -> Vec<u8> {
-    let mut decoder = FrameDecoder::new();
-    let mut out = Vec::with_capacity(bytes.len());
-    for &byte in bytes {
-        let Received::Frame(frame) = decoder.push(byte) else { continue };
-        let Ok(reply) = Reply::decode(frame.body) else { continue };
-        let claimed = match reply {
-            Reply::Identity(mut identity) => {
-                identity.protocol = ProtocolId { version, ..identity.protocol };
-                Reply::Identity(identity)
-            }
-            other => other,
-        };
-        if let Ok(frame) = Frame::encode(frame.header, &claimed) {
-            out.extend_from_slice(&frame);
-        }
-    }
-    out
 }

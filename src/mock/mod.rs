@@ -6,6 +6,9 @@
 mod board;
 mod faults;
 mod identity;
+mod liar;
+#[cfg(test)]
+mod lies;
 mod noise;
 mod note;
 mod pty;
@@ -17,6 +20,7 @@ mod world;
 pub use board::{MockBoard, Wake, WakeKind};
 pub use faults::{DeviceFault, FAULT_HELP, FaultPlan, FaultSpecError, Faults};
 pub use identity::{BoardSettings, Pace};
+pub use liar::{LIES, Lie};
 pub use noise::Noise;
 pub use note::Note;
 pub use pty::Pty;

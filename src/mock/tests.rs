@@ -10,7 +10,7 @@ use crate::{model::Prediction, scan::PingStatus};
 
 const TICKS_PER_US: u64 = 2;
 
-fn board(faults: FaultPlan) -> MockBoard {
+pub(super) fn board(faults: FaultPlan) -> MockBoard {
     let echo_us = |step: u32| 5_000.0 + f64::from(step);
     let predictions: Vec<Prediction> = (0..400)
         .map(|step| Prediction {

@@ -3,8 +3,8 @@
 use firmware_protocol::{
     frame::{Frame, Header},
     messages::{
-        Alive, Echoes, Reading, ReadingStatus, Reply, Request, Settings, Status, Sweep, Wire,
-        limits::TICK_HZ,
+        Alive, Echoes, Identity, Reading, ReadingStatus, Reply, Request, Settings, Status, Sweep,
+        Wire, limits::TICK_HZ,
     },
 };
 use serde::Serialize;
@@ -98,7 +98,7 @@ fn reading_bytes(echoes: u8) -> f64 {
 }
 
 /// Bytes of the commands around a sweep and of their replies, which nothing happens beside:
-/// Configure, Home, four times Status for the clock's fit, Sweep, Home.
+/// Identify, Stop, Configure, Home, four times Status for the clock's fit, Sweep, Home.
 fn exchange_bytes(settings: &Settings) -> f64 {
     let sweep = Sweep {
         sweep: 300,
@@ -111,9 +111,12 @@ fn exchange_bytes(settings: &Settings) -> f64 {
     let home =
         bytes(&Request::Home) + bytes(&Reply::Started) + bytes(&Reply::Homed { drift_steps: 0 });
     let status = bytes(&Request::Status) + bytes(&Reply::StatusReport(Status::BLANK));
-    bytes(&Request::Configure(*settings))
+    bytes(&Request::Identify)
+        + bytes(&Reply::Identity(Identity::BLANK))
+        + bytes(&Request::Stop)
+        + bytes(&Request::Configure(*settings))
         + bytes(&Request::Sweep(sweep))
-        + 2.0 * bytes(&Reply::Ack)
+        + 3.0 * bytes(&Reply::Ack)
         + 2.0 * home
         + 4.0 * status
         // A last word of the sweep's end.

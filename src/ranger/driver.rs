@@ -3,7 +3,10 @@
 use std::{ops::ControlFlow, time::Duration};
 
 use firmware_protocol::{
-    host::{Command, Host, HostConfig, HostError, HostEvent, LinkStats, Outcome, StartError},
+    host::{
+        BoardChange, Command, Host, HostConfig, HostError, HostEvent, LinkStats, Outcome,
+        StartError,
+    },
     messages::{Identity, SweepState},
 };
 use thiserror::Error;
@@ -52,6 +55,9 @@ pub enum DriveError {
     /// Whoever takes the events wanted no more of them; the command is still under way.
     #[error("given up by the receiver of its readings")]
     Abandoned,
+    /// The device that answers is not the one that the session describes.
+    #[error("another device answers than the one that was met: {0}")]
+    OtherBoard(BoardChange),
 }
 
 impl DriveError {
@@ -61,6 +67,10 @@ impl DriveError {
         match self {
             Self::NotStarted(_) | Self::Abandoned => "this is a fault of the program: report it",
             Self::Host(error) => host_help(error),
+            Self::OtherBoard(_) => {
+                "what it measures must not go under the other one's name: scan again, or put the \
+                 other one back"
+            }
         }
     }
 }
@@ -78,6 +88,10 @@ const fn host_help(error: &HostError) -> &'static str {
         HostError::WrongVersion { .. } => {
             "flash the firmware of this version of sonard, or install the sonard of the firmware's"
         }
+        HostError::WrongIdentity(_) => {
+            "flash the firmware of this version of sonard; on a board of your own see what \
+             PROTOCOL.md says that a host must refuse"
+        }
         HostError::Refused(_) => "change the setting that the device names",
         HostError::Rebooted => {
             "the board restarts again and again: look at its supply (the module draws 2 A while \
@@ -90,7 +104,14 @@ const fn host_help(error: &HostError) -> &'static str {
         HostError::EmergencyStop => "release the emergency stop, then scan again",
         HostError::MotionFault => "free the motor, check its supply and current, then scan again",
         HostError::Stopped => "another program stopped it: make sure that only one uses the port",
-        HostError::Stalled { .. } | HostError::SweepLost | HostError::WrongReading { .. } => {
+        HostError::Overrun { .. } => {
+            "check that the motor turns, its supply and its index sensor; reset the board"
+        }
+        HostError::Stalled { .. }
+        | HostError::SweepLost
+        | HostError::WrongReading { .. }
+        | HostError::SenselessReading(_)
+        | HostError::SenselessReply(_) => {
             "reset the board and scan again; if it happens again, report it with the log"
         }
     }
@@ -128,10 +149,17 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
     /// Begins a command; [`Self::finish`] carries it out.
     ///
     /// # Errors
-    /// When another one is under way or something must come first.
+    /// When another one is under way or something must come first; a hangup or a restart of the
+    /// device since the command before is told as what it is.
     pub fn start(&mut self, command: Command) -> Result<(), DriveError> {
+        if self.hung_up {
+            return Err(DriveError::Host(HostError::Hangup));
+        }
         let now_us = self.now_us();
-        self.host.start(now_us, command).map_err(DriveError::NotStarted)
+        self.host.start(now_us, command).map_err(|error| match error {
+            StartError::Restarted => DriveError::Host(HostError::Rebooted),
+            error => DriveError::NotStarted(error),
+        })
     }
 
     /// Carries out one command and hands every event on the way to `on_event`, which may break

@@ -1,6 +1,9 @@
 //! What a device says of itself, as it stands in records.
 
-use firmware_protocol::messages::{Capabilities, Identity};
+use firmware_protocol::{
+    host::Serial,
+    messages::{Capabilities, Identity},
+};
 
 use crate::scan::{Device, Provenance};
 
@@ -34,9 +37,5 @@ pub fn device_record(identity: &Identity) -> Device {
 /// The serial number as text if it is text, else in hexadecimal.
 #[must_use]
 pub fn serial_text(identity: &Identity) -> String {
-    let text = std::str::from_utf8(&identity.serial).map(|text| text.trim_end_matches('\0'));
-    match text {
-        Ok(text) if text.chars().all(|c| c.is_ascii_graphic()) => text.to_owned(),
-        _ => identity.serial.iter().map(|byte| format!("{byte:02x}")).collect(),
-    }
+    Serial(&identity.serial).to_string()
 }

@@ -18,5 +18,5 @@ pub use introduction::{device_record, provenance, serial_text};
 pub use job::ScanJob;
 pub use progress::Sink;
 pub use scanner::{Ranger, ScanError, ScanSummary, Unasked};
-pub use settings::{Listening, Motion};
+pub use settings::{Listening, Motion, hold_s};
 pub use timing::limit_s;

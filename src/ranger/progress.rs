@@ -1,7 +1,7 @@
 //! The state of one scan: which beams are in, what the clocks say, and the records of it.
 
 use firmware_protocol::{
-    host::{HostError, HostEvent},
+    host::{HostError, HostEvent, ReadingFault},
     messages::{Capabilities, FaultKind, Identity, Reading, ReadingStatus},
 };
 use jiff::{SignedDuration, Timestamp};
@@ -52,6 +52,8 @@ pub(super) struct Progress<'a> {
     sink: &'a mut dyn Sink,
     segment: Option<Segment>,
     done: Vec<bool>,
+    /// Beams whose readings made no sense: they are not asked for again.
+    refused: Vec<bool>,
     repaired: u32,
     restarts: u32,
     clock: ClockFit,
@@ -80,6 +82,7 @@ impl<'a> Progress<'a> {
             sink,
             segment: None,
             done: vec![false; job.plan.beams() as usize],
+            refused: vec![false; job.plan.beams() as usize],
             repaired: 0,
             restarts: 0,
             clock: ClockFit::new(identity.tick_hz),
@@ -96,7 +99,8 @@ impl<'a> Progress<'a> {
     }
 
     pub(super) fn next_segment(&self) -> Option<Segment> {
-        Segment::next(&self.done, self.job.plan.pings_per_stop)
+        let settled = self.done.iter().zip(&self.refused).map(|(done, refused)| *done || *refused);
+        Segment::next(&settled.collect::<Vec<_>>(), self.job.plan.pings_per_stop)
     }
 
     pub(super) fn begin(&mut self, segment: Segment) {
@@ -118,6 +122,9 @@ impl<'a> Progress<'a> {
                     self.clock.push(sent_us, received_us, ticks);
                 }
             }
+            HostEvent::ReadingRefused { reading, fault } => self.refuse(&reading, fault),
+            // It comes late: the coils were let go before this scan, which homed first.
+            HostEvent::Fault(FaultKind::HoldExpired) => {}
             HostEvent::Fault(kind) => self.note(EventKind::Fault, fault_text(kind)),
             HostEvent::Rebooted { old, new } => self.note(
                 EventKind::Reboot,
@@ -159,11 +166,40 @@ impl<'a> Progress<'a> {
     /// Marks every beam that will not come any more.
     pub(super) fn give_up(&mut self, error: &DriveError) {
         self.note(kind_of(error), format!("scan given up: {error}"));
-        let missing = self.done.iter().enumerate().filter(|(_, done)| !**done);
-        for index in missing.map(|(index, _)| index as u32).collect::<Vec<_>>() {
-            let ping = self.blank_ping(index, PingStatus::LinkLost);
-            self.write(&Record::Ping(Box::new(ping)));
+        for index in 0..self.done.len() {
+            if self.is_open(index) {
+                self.write_lost(index as u32);
+            }
         }
+    }
+
+    /// Whether nothing was written of a beam yet.
+    fn is_open(&self, index: usize) -> bool {
+        self.done.get(index) == Some(&false) && self.refused.get(index) == Some(&false)
+    }
+
+    fn write_lost(&mut self, index: u32) {
+        let ping = self.blank_ping(index, PingStatus::LinkLost);
+        self.write(&Record::Ping(Box::new(ping)));
+    }
+
+    /// The device told what can't be: the log says what, and the beam counts as lost.
+    fn refuse(&mut self, reading: &Reading, fault: ReadingFault) {
+        let Some(segment) = self.segment else { return };
+        let index = segment.index(u32::from(reading.index), self.job.plan.pings_per_stop);
+        if !self.is_open(index as usize) {
+            return;
+        }
+        self.note(EventKind::Fault, format!("the reading of beam {index} is refused: {fault}"));
+        if let Some(refused) = self.refused.get_mut(index as usize) {
+            *refused = true;
+        }
+        self.write_lost(index);
+    }
+
+    /// The scan is over, but what it began with is lost.
+    pub(super) fn could_not_go_home(&mut self, error: &DriveError) {
+        self.note(kind_of(error), format!("could not go home after it: {error}"));
     }
 
     /// Gives back the first failure to write, if there was one.
@@ -202,7 +238,7 @@ impl<'a> Progress<'a> {
     fn reading(&mut self, reading: &Reading, repaired: bool) {
         let Some(segment) = self.segment else { return };
         let index = segment.index(u32::from(reading.index), self.job.plan.pings_per_stop);
-        if self.done.get(index as usize) != Some(&false) {
+        if !self.is_open(index as usize) {
             return;
         }
         let fired = self.extender.extend(reading.fired_ticks);

@@ -1,7 +1,7 @@
 //! Takes a scan: sends the plan to the device and turns what comes back into records.
 
 use firmware_protocol::{
-    host::{Command, HostError, HostEvent, LinkStats, Outcome},
+    host::{BoardChange, Command, HostError, HostEvent, LinkStats, Outcome},
     messages::{Capabilities, FaultKind, Identity, Settings, Sweep},
 };
 use jiff::{SignedDuration, Timestamp};
@@ -40,6 +40,8 @@ pub struct ScanSummary {
     pub restarts: u32,
     /// Relative deviation of the device's clock from its nominal rate; `None` until known.
     pub clock_drift: Option<f64>,
+    /// Why the device could not go home after it, if so. The scan is whole all the same.
+    pub not_home: Option<DriveError>,
 }
 
 /// Why a scan ended early. Its records up to there are written, `scan_end` included.
@@ -87,12 +89,26 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         Ok(Self { driver, identity, wall_epoch })
     }
 
-    /// Asks the device again who it is, after it restarted.
+    /// Asks the device again who it is, after it restarted; another one may answer now, which
+    /// [`Self::identity`] tells.
     ///
     /// # Errors
     /// When nothing or something else answers.
     pub async fn meet_again(&mut self) -> Result<(), DriveError> {
         self.identity = identify(&mut self.driver).await?;
+        Ok(())
+    }
+
+    /// Makes sure that the board that answers is the one that was met; it may have restarted.
+    ///
+    /// # Errors
+    /// When another one answers, or none.
+    pub async fn recognise(&mut self) -> Result<(), DriveError> {
+        let identity = identify(&mut self.driver).await?;
+        if let Some(change) = BoardChange::between(&self.identity, &identity) {
+            return Err(DriveError::OtherBoard(change));
+        }
+        self.identity = identity;
         Ok(())
     }
 
@@ -159,8 +175,9 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
 
     /// Takes one scan, from `scan_start` to `scan_end`, handing each record to `sink`.
     ///
+    /// Asks first who is there, so that no scan begins with a device that is gone or another one.
     /// Goes home first and, if there is an index sensor, afterwards. A device that restarts
-    /// meanwhile is homed and goes on with what is left. When `stop` is ready, the motor is
+    /// meanwhile is homed and goes on with what is left, if it is the same board. When `stop` is ready, the motor is
     /// stopped and the scan closed, with the words of `stop` as an event.
     ///
     /// # Errors
@@ -175,24 +192,34 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         job.plan.check()?;
         let steps_per_revolution = u32::from(self.identity.steps_per_revolution);
         let motor = job.plan.motor_steps(steps_per_revolution)?;
+        let before = self.identity.boot;
+        self.recognise().await?;
         let scan = Uuid::new_v4();
         let time = Timestamp::now();
         let ScanJob { pose, plan, air, request, .. } = *job;
         let start = ScanStart { scan, time, pose, plan, air, provenance: None, request };
         sink.record(&Record::ScanStart(start))?;
         let mut progress = Progress::new(job, scan, motor, self.wall_epoch, &self.identity, sink);
+        if before != self.identity.boot {
+            progress.note(
+                EventKind::Reboot,
+                format!("the device restarted before it (boot {before:04x})"),
+            );
+        }
         let outcome = self.measure(job, motor, &mut progress, stop).await;
         let stopped = matches!(outcome, Ok(Stopped(true)));
         if let Err(ScanError::Device(error)) = &outcome {
             progress.give_up(error);
         }
-        let drift = match outcome {
+        let home = match outcome {
             Ok(Stopped(false)) => self.home_check(&mut progress).await,
-            _ => None,
+            _ => Ok(None),
         };
-        let summary = progress.finish(timing::limit_s(&job.plan, &job.settings, motor.1), drift);
-        let Finished { end, restarts, clock_drift } = summary?;
-        outcome.map(|_| ScanSummary { end, stopped, restarts, clock_drift })
+        let limit_s = timing::limit_s(&job.plan, &job.settings, motor.1);
+        let drift = home.as_ref().ok().copied().flatten();
+        let Finished { end, restarts, clock_drift } = progress.finish(limit_s, drift)?;
+        let not_home = home.err();
+        outcome.map(|_| ScanSummary { end, stopped, restarts, clock_drift, not_home })
     }
 
     /// Sweeps until nothing is left of the plan.
@@ -226,7 +253,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
                     if fruitless >= FRUITLESS_RESTARTS {
                         return Err(DriveError::Host(HostError::Rebooted).into());
                     }
-                    self.identity = identify(&mut self.driver).await?;
+                    self.recognise().await?;
                     progress.restarted(&self.identity);
                 }
                 Ok(done) => {
@@ -244,6 +271,8 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         (from_step, stride): (i32, i32),
         progress: &mut Progress<'_>,
     ) -> Result<(), ScanError> {
+        // A sweep that an earlier program left behind would go on for as long as anybody talks.
+        self.halt(progress).await?;
         self.command(Command::Configure(job.settings), progress).await?;
         self.command(Command::Home, progress).await?;
         for _ in 0..CLOCK_EXCHANGES {
@@ -287,16 +316,16 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
     }
 
     /// Goes home and reports by how much the index was off.
-    async fn home_check(&mut self, progress: &mut Progress<'_>) -> Option<i32> {
+    async fn home_check(&mut self, progress: &mut Progress<'_>) -> Result<Option<i32>, DriveError> {
         if !self.identity.capabilities.has(Capabilities::INDEX_SENSOR) {
-            return None;
+            return Ok(None);
         }
         match self.command(Command::Home, progress).await {
-            Ok(Ended::Done(Outcome::Homed { drift_steps })) => Some(drift_steps),
-            Ok(_) => None,
+            Ok(Ended::Done(Outcome::Homed { drift_steps })) => Ok(Some(drift_steps)),
+            Ok(_) => Ok(None),
             Err(error) => {
-                progress.note(EventKind::Fault, format!("could not go home after it: {error}"));
-                None
+                progress.could_not_go_home(&error);
+                Err(error)
             }
         }
     }

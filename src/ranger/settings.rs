@@ -58,9 +58,17 @@ impl Motion {
             },
             speed: self.speed,
             acceleration: self.acceleration,
-            hold_s: 0,
+            hold_s: hold_s(identity),
         }
     }
+}
+
+/// How long a device holds idle coils for a host that says nothing, seconds: three times the
+/// longest wait between two looks at a device without work. A board that can't let go of its coils
+/// would lose its position for nothing.
+#[must_use]
+pub const fn hold_s(identity: &Identity) -> u16 {
+    if identity.capabilities.has(Capabilities::COIL_RELEASE) { 180 } else { 0 }
 }
 
 fn ticks(ms: f64) -> u32 {

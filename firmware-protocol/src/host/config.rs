@@ -2,6 +2,28 @@
 
 use crate::messages::{Settings, Sweep};
 
+/// How often a request is sent before the device counts as gone: some nine seconds, in which a
+/// board that the opening of its port has reset is long awake.
+pub const ATTEMPTS: u8 = 7;
+/// How often the time that its work takes may pass while a device says that it is at it.
+pub const OVERRUNS: u8 = 3;
+/// How often the Stop is sent that ends a device which the host gives up on.
+pub const STOP_ATTEMPTS: u8 = 3;
+/// What a reply may take beyond the time of bytes and work before that was measured, us.
+pub const INITIAL_MARGIN_US: u32 = 200_000;
+/// Least such margin once measured, us.
+pub const MIN_MARGIN_US: u32 = 20_000;
+/// Largest such margin, repetitions counted in, us.
+pub const MAX_MARGIN_US: u32 = 2_000_000;
+/// A sweep's host speaks at least so many times a lease.
+pub const KEEP_ALIVES_A_LEASE: u8 = 3;
+/// It acknowledges readings so many times while the device's memory for them fills.
+pub const ACKNOWLEDGEMENTS_A_RING: u8 = 4;
+/// Readings that it takes ahead of the lowest one that it lacks.
+pub const READINGS_AHEAD: u8 = 64;
+/// A host goes on at most so many numbers behind the last one that the device accepted.
+pub const SEQ_GAP_MAX: u16 = 256;
+
 /// Facts and limits that the host machine cannot find out by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HostConfig {
@@ -11,6 +33,8 @@ pub struct HostConfig {
     pub seed: u32,
     /// How often a request is sent before the device counts as gone.
     pub max_attempts: u8,
+    /// How often the time that its work takes may pass while a device says that it is at it.
+    pub max_overruns: u8,
     /// What a reply may take beyond the time of bytes and motion, before that was measured, us.
     pub initial_margin_us: u32,
     /// Least such margin however quick the replies are, us.
@@ -20,17 +44,17 @@ pub struct HostConfig {
 }
 
 impl HostConfig {
-    /// Values that suit a USB serial adapter: ten attempts, margins of 200 ms at first and
-    /// 20 ms to 2 s once measured.
+    /// Values that suit a USB serial adapter.
     #[must_use]
     pub const fn new(baud: u32, seed: u32) -> Self {
         Self {
             baud,
             seed,
-            max_attempts: 10,
-            initial_margin_us: 200_000,
-            min_margin_us: 20_000,
-            max_margin_us: 2_000_000,
+            max_attempts: ATTEMPTS,
+            max_overruns: OVERRUNS,
+            initial_margin_us: INITIAL_MARGIN_US,
+            min_margin_us: MIN_MARGIN_US,
+            max_margin_us: MAX_MARGIN_US,
         }
     }
 }
@@ -69,6 +93,8 @@ pub enum StartError {
     Busy,
     /// Identify first.
     NotIdentified,
+    /// The device restarted, or the line was closed, since it was identified: identify it again.
+    Restarted,
     /// Configure first, so that the host can compute how long things take.
     NotConfigured,
     /// The plan has no beams, or more than a sweep may have.
@@ -80,6 +106,7 @@ impl core::fmt::Display for StartError {
         formatter.write_str(match self {
             Self::Busy => "another command is under way",
             Self::NotIdentified => "the device has not been identified",
+            Self::Restarted => "the device restarted meanwhile",
             Self::NotConfigured => "the device has not been configured",
             Self::EmptySweep => "a sweep must have 1 to 65535 beams",
         })

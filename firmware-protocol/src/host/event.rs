@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use super::{IdentityFault, ReadingFault, ReplyFault};
 use crate::messages::{
     FaultKind, FirmwareVersion, Identity, NakReason, ProtocolId, Reading, Status, SweepState,
 };
@@ -22,7 +23,15 @@ pub enum HostEvent {
         /// Whether it was lost on the line at first and sent again.
         repaired: bool,
     },
-    /// A sweep ended: every beam was delivered, or it was stopped by [`super::Command::Stop`].
+    /// A beam of a sweep whose reading makes no sense. It is not asked for again, and not
+    /// delivered.
+    ReadingRefused {
+        /// What was told.
+        reading: Reading,
+        /// What is wrong with it.
+        fault: ReadingFault,
+    },
+    /// A sweep ended: every beam was delivered or refused, or it was stopped by [`super::Command::Stop`].
     SweepDone {
         /// Its number.
         sweep: u16,
@@ -102,6 +111,8 @@ pub enum HostError {
         /// The device's firmware.
         firmware: FirmwareVersion,
     },
+    /// What the device says of itself makes no sense.
+    WrongIdentity(IdentityFault),
     /// The device refused.
     Refused(NakReason),
     /// The device restarted meanwhile.
@@ -121,8 +132,17 @@ pub enum HostError {
         /// Beams fired so far.
         fired: u16,
     },
+    /// The device says again and again that it is at it, for longer than its work can take.
+    Overrun {
+        /// How long it was waited for, ms.
+        waited_ms: u32,
+    },
     /// The device does not know the sweep (any more).
     SweepLost,
+    /// The reading of a Ping makes no sense; it was not delivered.
+    SenselessReading(ReadingFault),
+    /// An answer makes no sense.
+    SenselessReply(ReplyFault),
     /// A reading does not fit the plan; it was not delivered.
     WrongReading {
         /// Its index.
@@ -155,6 +175,9 @@ impl fmt::Display for HostError {
                 ours.version,
                 ours.schema,
             ),
+            Self::WrongIdentity(fault) => {
+                write!(formatter, "what the device says of itself makes no sense: {fault}")
+            }
             Self::Refused(reason) => write!(formatter, "the device refused: {reason}"),
             Self::Rebooted => formatter.write_str("the device restarted"),
             Self::Hangup => formatter.write_str("the line was closed"),
@@ -164,6 +187,15 @@ impl fmt::Display for HostError {
             Self::Stopped => formatter.write_str("it was stopped"),
             Self::Stalled { fired } => {
                 write!(formatter, "the device answers but makes no progress after {fired} beams")
+            }
+            Self::Overrun { waited_ms } => {
+                write!(formatter, "the device says after {waited_ms} ms that it is still at it")
+            }
+            Self::SenselessReading(fault) => {
+                write!(formatter, "the device told of a reading that makes no sense: {fault}")
+            }
+            Self::SenselessReply(fault) => {
+                write!(formatter, "the device told what makes no sense: {fault}")
             }
             Self::SweepLost => formatter.write_str("the device does not know the sweep any more"),
             Self::WrongReading { index, step, planned } => match planned {

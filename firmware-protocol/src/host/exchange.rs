@@ -1,5 +1,6 @@
 //! One request at a time: numbering, deadlines, repeating.
 
+use super::config::{SEQ_GAP_MAX, STOP_ATTEMPTS};
 use super::deadline::{beam_us, longest_frame_us, slew_us, wire_us};
 use super::{Command, Host, HostError};
 use crate::frame::{Frame, Header};
@@ -10,10 +11,13 @@ use crate::messages::{Request, Settings};
 pub(super) struct Exchange {
     pub(super) request: Request,
     pub(super) seq: u16,
+    /// When it was sent for the first time.
     pub(super) sent_us: u64,
     pub(super) attempts: u8,
     /// The device has said that it is at it.
     pub(super) started: bool,
+    /// How often the time of its work has passed since then.
+    overruns: u8,
     pub(super) deadline_us: u64,
     frame: Frame,
 }
@@ -57,7 +61,7 @@ impl Numbers {
     /// keeps clear of requests of an earlier host that may still be on their way.
     pub(super) fn follow(&mut self, last_seq: u16) {
         if !(1..0x8000).contains(&self.seq.wrapping_sub(last_seq)) {
-            self.seq = last_seq.wrapping_add(self.random() & 0xff);
+            self.seq = last_seq.wrapping_add(self.random() % SEQ_GAP_MAX);
         }
     }
 }
@@ -65,6 +69,9 @@ impl Numbers {
 impl Host {
     /// Sends a new request.
     pub(super) fn send(&mut self, now_us: u64, request: Request) {
+        if matches!(request, Request::Home | Request::MoveTo { .. }) {
+            self.device_time.forget();
+        }
         let seq = self.numbers.next_seq();
         let boot = self.identity.as_ref().map_or(Header::BOOT_UNKNOWN, |identity| identity.boot);
         // Every request fits a frame; there is a test.
@@ -79,6 +86,7 @@ impl Host {
             sent_us: now_us,
             attempts: 1,
             started: false,
+            overruns: 0,
             deadline_us: now_us,
             frame,
         };
@@ -99,9 +107,9 @@ impl Host {
         let Some(mut exchange) = self.exchange.take() else {
             return;
         };
-        if exchange.attempts >= self.config.max_attempts {
-            let error = self.gave_up(&exchange);
-            return self.fail(error);
+        exchange.overruns += u8::from(exchange.started);
+        if self.is_exhausted(&exchange) {
+            return self.give_up_on(now_us, &exchange);
         }
         exchange.attempts += 1;
         exchange.started = false;
@@ -115,9 +123,8 @@ impl Host {
         let Some(exchange) = self.exchange.take() else {
             return;
         };
-        if exchange.attempts >= self.config.max_attempts {
-            let error = self.gave_up(&exchange);
-            return self.fail(error);
+        if self.is_exhausted(&exchange) {
+            return self.give_up_on(now_us, &exchange);
         }
         self.stats.retries += 1;
         self.send(now_us, exchange.request);
@@ -126,11 +133,46 @@ impl Host {
         }
     }
 
-    fn gave_up(&self, exchange: &Exchange) -> HostError {
+    fn is_exhausted(&self, exchange: &Exchange) -> bool {
+        let attempts = if self.giving_up.is_some() {
+            STOP_ATTEMPTS.min(self.config.max_attempts)
+        } else {
+            self.config.max_attempts
+        };
+        exchange.attempts >= attempts || exchange.overruns >= self.config.max_overruns
+    }
+
+    /// The exchange came to nothing. A device that has said something since it began may still be
+    /// at work.
+    fn give_up_on(&mut self, now_us: u64, exchange: &Exchange) {
+        let error = self.gave_up(now_us, exchange);
+        if self.heard_us.is_some_and(|heard_us| heard_us >= exchange.sent_us) {
+            self.give_up(now_us, error);
+        } else {
+            self.fail(error);
+        }
+    }
+
+    /// Ends the command by an error, and before that whatever the device is at.
+    pub(super) fn give_up(&mut self, now_us: u64, error: HostError) {
+        let at_work = matches!(
+            self.job,
+            Some(Command::Sweep(_) | Command::Home | Command::MoveTo { .. } | Command::Ping)
+        );
+        if !at_work || self.giving_up.is_some() || self.identity.is_none() {
+            return self.fail(error);
+        }
+        self.giving_up = Some(error);
+        self.track = None;
+        self.send(now_us, Request::Stop);
+    }
+
+    fn gave_up(&self, now_us: u64, exchange: &Exchange) -> HostError {
         let (bytes, frames) = self.received_before;
         let bytes = self.stats.bytes_received - bytes;
         if exchange.started {
-            HostError::Stalled { fired: self.track.as_ref().map_or(0, |track| track.fired) }
+            let waited_us = now_us.saturating_sub(exchange.sent_us);
+            HostError::Overrun { waited_ms: u32::try_from(waited_us / 1_000).unwrap_or(u32::MAX) }
         } else if bytes > 0 && self.stats.frames_received == frames {
             HostError::NotADevice { bytes }
         } else {
@@ -207,6 +249,10 @@ impl Host {
     /// The open request, if `seq` is its number.
     pub(super) fn request_with(&self, seq: u16) -> Option<Request> {
         self.exchange.as_ref().filter(|exchange| exchange.seq == seq).map(|open| open.request)
+    }
+
+    pub(super) fn is_started(&self) -> bool {
+        self.exchange.as_ref().is_some_and(|open| open.started)
     }
 
     pub(super) fn is_stopping(&self) -> bool {

@@ -12,21 +12,29 @@
 //! }
 //! ```
 //!
-//! A timeout that comes early or twice does no harm. After [`HostEvent::Failed`] the host does
-//! nothing more by itself: a device that may still turn or fire is ended by [`Command::Stop`],
-//! or by the sweep's lease.
+//! A timeout that comes early or twice does no harm. Before [`HostEvent::Failed`] a device that
+//! still answers and may be at work is stopped; after it the host does nothing more by itself: one
+//! that does not answer is ended by the sweep's lease.
 
+mod board;
 mod config;
 mod deadline;
 mod event;
 mod exchange;
+mod firings;
 mod receive;
+mod sense;
 mod stats;
 mod sweep;
 mod track;
 
-pub use config::{Command, HostConfig, StartError};
+pub use board::{BoardChange, Serial};
+pub use config::{
+    ACKNOWLEDGEMENTS_A_RING, ATTEMPTS, Command, HostConfig, INITIAL_MARGIN_US, KEEP_ALIVES_A_LEASE,
+    MAX_MARGIN_US, MIN_MARGIN_US, OVERRUNS, READINGS_AHEAD, SEQ_GAP_MAX, STOP_ATTEMPTS, StartError,
+};
 pub use event::{HostError, HostEvent, Outcome};
+pub use sense::{IdentityFault, ReadingFault, ReplyFault};
 pub use stats::LinkStats;
 
 use heapless::Deque;
@@ -35,6 +43,7 @@ use crate::frame::{Frame, FrameDecoder, Received};
 use crate::messages::{Identity, Reply, Request, Settings};
 use deadline::Margin;
 use exchange::{Exchange, Numbers};
+use firings::DeviceTime;
 use track::Track;
 
 /// Events kept until they are polled. Readings that find no place count as lost on the line, and
@@ -70,6 +79,8 @@ pub struct Host {
     boot: Option<u16>,
     /// The boot before: its frames are late copies.
     previous_boot: Option<u16>,
+    /// Who was met last. Survives hangup and restart, so that another board is noticed.
+    met: Option<Identity>,
     /// What the device was last set to.
     settings: Option<Settings>,
     /// Where the ranger points, as far as known.
@@ -80,6 +91,11 @@ pub struct Host {
     track: Option<Track>,
     /// Bytes and right frames received when the job began.
     received_before: (u64, u64),
+    /// When the last right frame came.
+    heard_us: Option<u64>,
+    /// Why the command fails as soon as the device has been stopped.
+    giving_up: Option<HostError>,
+    device_time: DeviceTime,
 }
 
 impl Host {
@@ -95,6 +111,7 @@ impl Host {
             identity: None,
             boot: None,
             previous_boot: None,
+            met: None,
             settings: None,
             step: None,
             job: None,
@@ -102,6 +119,9 @@ impl Host {
             outgoing: None,
             track: None,
             received_before: (0, 0),
+            heard_us: None,
+            giving_up: None,
+            device_time: DeviceTime::default(),
             config,
         }
     }
@@ -117,6 +137,7 @@ impl Host {
             return self.start_sweep(now_us, plan);
         }
         self.job = Some(command);
+        self.giving_up = None;
         self.received_before = (self.stats.bytes_received, self.stats.frames_received);
         self.send(
             now_us,
@@ -145,7 +166,9 @@ impl Host {
             return Ok(());
         }
         if self.identity.is_none() {
-            return Err(StartError::NotIdentified);
+            // After a hangup or a restart it was met, and has to be met again.
+            let met = self.met.is_some();
+            return Err(if met { StartError::Restarted } else { StartError::NotIdentified });
         }
         let needs_settings =
             !matches!(command, Command::Configure(_) | Command::Status | Command::Reset);
@@ -173,6 +196,7 @@ impl Host {
             Received::Dropped(reason) => self.stats.dropped.count(reason),
             Received::Frame(raw) => {
                 self.stats.frames_received += 1;
+                self.heard_us = Some(now_us);
                 let (header, wire_len) = (raw.header, raw.wire_len);
                 match Reply::decode(raw.body) {
                     Ok(Reply::Identity(identity)) => {
@@ -200,6 +224,7 @@ impl Host {
     pub fn handle_hangup(&mut self, _now_us: u64) {
         self.decoder = FrameDecoder::new();
         self.identity = None;
+        self.giving_up = None;
         if self.job.is_some() {
             self.fail(HostError::Hangup);
         }
@@ -267,6 +292,8 @@ impl Host {
     }
 
     fn fail(&mut self, error: HostError) {
+        // Whatever became of the Stop, the command fails for its own cause.
+        let error = self.giving_up.take().unwrap_or(error);
         self.end_job();
         self.report(HostEvent::Failed(error));
     }

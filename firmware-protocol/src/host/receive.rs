@@ -1,10 +1,19 @@
 //! What replies and events mean.
 
-use super::{Host, HostError, HostEvent, Outcome};
-use crate::frame::Header;
-use crate::messages::{
-    FirmwareVersion, Identity, NakReason, PROTOCOL, ProtocolId, Reading, Reply, Request, Status,
+use super::firings::check_after;
+use super::sense::{check_drift, check_echoes, check_identity};
+use super::{
+    BoardChange, Host, HostError, HostEvent, IdentityFault, Outcome, ReadingFault, ReplyFault,
 };
+use crate::frame::Header;
+use crate::messages::limits::POSITION_MAX;
+use crate::messages::{
+    Capabilities, FirmwareVersion, Identity, NakReason, PROTOCOL, ProtocolId, Reading, Reply,
+    Request, Status,
+};
+
+/// A computer may have been away for so long without knowing while a Ping was under way, us.
+const PING_SLACK_US: u64 = 2_000_000;
 
 impl Host {
     /// An Identity: the answer to Identify, or a device that announces its restart.
@@ -19,6 +28,9 @@ impl Host {
             if identity.protocol != PROTOCOL {
                 return self.wrong_version(identity.protocol, identity.firmware);
             }
+            if let Err(fault) = check_identity(header, identity) {
+                return self.wrong_identity(fault);
+            }
             self.time_reply(now_us, wire_len);
             return self.identified(identity);
         }
@@ -28,15 +40,27 @@ impl Host {
             if let Some(open) = &mut self.exchange {
                 open.deadline_us = now_us;
             }
-        } else if self.is_new_boot(header.boot) {
+        } else if self.is_new_boot(header.boot) || self.is_other_board(header, identity) {
             self.rebooted(header.boot);
         }
     }
 
+    /// Whether a board that announces itself under the known nonce is another one all the same.
+    fn is_other_board(&self, header: Header, announced: &Identity) -> bool {
+        let known = self.identity.as_ref().filter(|known| known.boot == header.boot);
+        known.is_some_and(|known| BoardChange::between(known, announced).is_some())
+    }
+
+    fn wrong_identity(&mut self, fault: IdentityFault) {
+        self.stats.refused += 1;
+        self.fail(HostError::WrongIdentity(fault));
+    }
+
     fn identified(&mut self, identity: &Identity) {
         let new = identity.boot;
+        let other = self.met.is_some_and(|met| BoardChange::between(&met, identity).is_some());
         if let Some(old) = self.boot
-            && old != new
+            && (old != new || other)
         {
             self.forget_boot(old);
             self.report(HostEvent::Rebooted { old, new });
@@ -46,6 +70,7 @@ impl Host {
         }
         self.boot = Some(new);
         self.identity = Some(*identity);
+        self.met = Some(*identity);
         if let Some(last_seq) = identity.last_seq {
             self.numbers.follow(last_seq);
         }
@@ -58,10 +83,10 @@ impl Host {
         self.stats.dropped.undecodable = self.stats.dropped.undecodable.saturating_add(1);
         let identifying =
             self.exchange.as_ref().is_some_and(|open| open.request == Request::Identify);
-        if let Some((theirs, firmware)) = stranger
-            && identifying
-        {
-            self.wrong_version(theirs, firmware);
+        match stranger {
+            Some((PROTOCOL, _)) if identifying => self.wrong_identity(IdentityFault::Form),
+            Some((theirs, firmware)) if identifying => self.wrong_version(theirs, firmware),
+            _ => {}
         }
     }
 
@@ -85,7 +110,10 @@ impl Host {
             Reply::SweepDone(done) => self.handle_sweep_done(now_us, &done),
             Reply::Fault { kind } => {
                 self.step = None;
-                self.report(HostEvent::Fault(kind));
+                // However many come, what ends a command finds its place.
+                if self.has_room_for_reading() {
+                    self.report(HostEvent::Fault(kind));
+                }
                 self.ask_soon(now_us);
             }
             _ => match request {
@@ -115,7 +143,9 @@ impl Host {
     }
 
     fn is_new_boot(&self, boot: u16) -> bool {
-        self.identity.as_ref().is_some_and(|identity| identity.boot != boot)
+        // No device has boot 0: a frame that says so proves nothing.
+        boot != Header::BOOT_UNKNOWN
+            && self.identity.as_ref().is_some_and(|identity| identity.boot != boot)
             && self.previous_boot != Some(boot)
     }
 
@@ -123,6 +153,7 @@ impl Host {
         let Some(old) = self.boot else { return };
         self.forget_boot(old);
         self.boot = Some(new);
+        self.giving_up = None;
         let stopped = self.is_stopping();
         let reset = matches!(self.job, Some(super::Command::Reset));
         if reset {
@@ -143,6 +174,7 @@ impl Host {
         self.identity = None;
         self.settings = None;
         self.step = None;
+        self.device_time.forget();
     }
 
     fn count_stale(&mut self) {
@@ -153,17 +185,18 @@ impl Host {
     fn handle_answer(&mut self, now_us: u64, request: &Request, reply: &Reply, wire_len: u8) {
         match (*reply, *request) {
             (Reply::Nak { reason: NakReason::SequenceReused }, _) => self.renumber(now_us),
+            (Reply::Nak { reason }, Request::KeepAlive { .. } | Request::Resend { .. }) => {
+                self.give_up(now_us, HostError::Refused(reason));
+            }
             (Reply::Nak { reason }, _) => self.fail(HostError::Refused(reason)),
+            (Reply::Started, _) if self.is_started() => self.count_stale(),
             (Reply::Started, _) => {
                 self.time_reply(now_us, wire_len);
                 self.started(now_us);
             }
             (Reply::Ack, _) => self.handle_ack(now_us, request, wire_len),
-            (Reply::Homed { drift_steps }, Request::Home) => {
-                self.step = Some(0);
-                self.finish(Outcome::Homed { drift_steps });
-            }
-            (Reply::Reading(reading), Request::Ping) => self.handle_ping(&reading),
+            (Reply::Homed { drift_steps }, Request::Home) => self.handle_homed(drift_steps),
+            (Reply::Reading(reading), Request::Ping) => self.handle_ping(now_us, &reading),
             (Reply::StatusReport(status), Request::Status) => {
                 self.handle_status(now_us, &status, wire_len);
             }
@@ -200,26 +233,89 @@ impl Host {
         }
     }
 
-    fn handle_ping(&mut self, reading: &Reading) {
-        // Without a place for it, the request is repeated and the device answers from memory.
-        if self.has_room_for_reading() {
-            self.stats.readings += 1;
-            let reading = *reading;
-            self.report(HostEvent::Reading { reading, repaired: false });
-            self.finish(Outcome::Pinged);
+    fn handle_homed(&mut self, drift_steps: i32) {
+        let sense = self.identity.as_ref().map(|identity| check_drift(drift_steps, identity));
+        match sense {
+            Some(Err(fault)) => self.refuse_reply(fault),
+            _ => {
+                self.step = Some(0);
+                self.finish(Outcome::Homed { drift_steps });
+            }
         }
     }
 
+    fn handle_ping(&mut self, now_us: u64, reading: &Reading) {
+        // Without a place for it, the request is repeated and the device answers from memory.
+        if !self.has_room_for_reading() {
+            return;
+        }
+        match self.check_ping(now_us, reading) {
+            Ok(()) => {
+                self.stats.readings += 1;
+                self.report(HostEvent::Reading { reading: *reading, repaired: false });
+                self.finish(Outcome::Pinged);
+            }
+            Err(error) => {
+                self.stats.refused += 1;
+                self.fail(error);
+            }
+        }
+    }
+
+    fn check_ping(&self, now_us: u64, reading: &Reading) -> Result<(), HostError> {
+        let Reading { index, step, .. } = *reading;
+        let planned = self.step.or(Some(step)).filter(|_| index == 0);
+        if planned != Some(step) {
+            return Err(HostError::WrongReading { index, step, planned });
+        }
+        let sense = || {
+            if let Some(settings) = &self.settings {
+                check_echoes(reading, settings)?;
+            }
+            let asked_us = self.exchange.as_ref().map_or(now_us, |open| open.sent_us);
+            check_after(self.device_time.floor(asked_us), reading.fired_ticks)?;
+            self.check_past(now_us, reading, PING_SLACK_US)
+        };
+        sense().map_err(HostError::SenselessReading)
+    }
+
+    /// Refuses a reading from the future, if the device's clock does not jump.
+    pub(super) fn check_past(
+        &self,
+        now_us: u64,
+        reading: &Reading,
+        slack_us: u64,
+    ) -> Result<(), ReadingFault> {
+        let jumps = self
+            .identity
+            .as_ref()
+            .is_some_and(|identity| identity.capabilities.has(Capabilities::VIRTUAL_CLOCK));
+        if jumps {
+            return Ok(());
+        }
+        self.device_time.check_past(now_us, reading.fired_ticks, slack_us)
+    }
+
     fn handle_status(&mut self, now_us: u64, status: &Status, wire_len: u8) {
+        let step = status.step;
+        if status.homed && !(-POSITION_MAX..=POSITION_MAX).contains(&step) {
+            return self.refuse_reply(ReplyFault::Position { step });
+        }
         self.time_reply(now_us, wire_len);
-        self.step = status.homed.then_some(status.step);
+        self.step = status.homed.then_some(step);
         self.report_clock(now_us, status.ticks);
         self.finish(Outcome::Status(*status));
+    }
+
+    fn refuse_reply(&mut self, fault: ReplyFault) {
+        self.stats.refused += 1;
+        self.fail(HostError::SenselessReply(fault));
     }
 
     pub(super) fn report_clock(&mut self, now_us: u64, device_ticks: u32) {
         let Some(open) = &self.exchange else { return };
         let (sent_us, retried) = (open.sent_us, open.attempts > 1);
+        self.device_time.told(sent_us, device_ticks);
         if self.has_room_for_reading() {
             let received_us = now_us;
             self.report(HostEvent::ClockSample { sent_us, received_us, device_ticks, retried });

@@ -21,6 +21,8 @@ pub struct LinkStats {
     pub repaired: u64,
     /// Readings that came more than once.
     pub duplicates: u64,
+    /// Readings, and identities or answers, that made no sense and were refused.
+    pub refused: u64,
     /// What was dropped on receiving.
     pub dropped: LinkCounters,
 }

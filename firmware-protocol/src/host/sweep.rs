@@ -1,8 +1,11 @@
 //! Keeping a sweep alive and its readings whole.
 
+use super::config::ACKNOWLEDGEMENTS_A_RING;
 use super::deadline::{beam_us, longest_frame_us, slew_us};
+use super::firings::Firings;
+use super::sense::check_echoes;
 use super::track::{Place, Track};
-use super::{Command, Host, HostError, HostEvent, StartError};
+use super::{Command, Host, HostError, HostEvent, ReadingFault, StartError};
 use crate::messages::limits::readings_in;
 use crate::messages::{Alive, Reading, Request, Sweep, SweepDone, SweepState};
 
@@ -14,8 +17,12 @@ impl Host {
         let kept = readings_in(identity.ring_bytes, settings.max_echoes);
         let plan = Sweep { sweep: self.numbers.next_sweep(), ..plan };
         self.job = Some(Command::Sweep(plan));
+        self.giving_up = None;
         self.received_before = (self.stats.bytes_received, self.stats.frames_received);
-        self.track = Some(Track::new(plan, beams, kept / 4, now_us));
+        let floor = self.device_time.floor(now_us).zip(self.step);
+        let firings = Firings::new(*settings, floor);
+        let acknowledge_after = kept / u16::from(ACKNOWLEDGEMENTS_A_RING);
+        self.track = Some(Track::new(plan, beams, firings, acknowledge_after, now_us));
         self.send(now_us, Request::Sweep(plan));
         self.expect_progress(now_us);
         Ok(())
@@ -29,24 +36,54 @@ impl Host {
             return;
         };
         match track.place(reading) {
-            Err(error) => self.fail(error),
+            Err(error) => self.give_up(now_us, error),
             Ok(Place::Duplicate) => self.stats.duplicates += 1,
             Ok(Place::Beyond) => {}
             Ok(Place::New { repaired }) if self.has_room_for_reading() => {
-                self.deliver(now_us, reading, repaired);
+                match self.check_beam(now_us, track, reading) {
+                    Ok(()) => self.deliver(reading, repaired),
+                    Err(fault) => self.refuse(reading, fault),
+                }
+                self.beam_settled(now_us);
             }
             Ok(Place::New { .. }) => {}
         }
     }
 
-    fn deliver(&mut self, now_us: u64, reading: &Reading, repaired: bool) {
+    fn check_beam(
+        &self,
+        now_us: u64,
+        track: &Track,
+        reading: &Reading,
+    ) -> Result<(), ReadingFault> {
+        if let Some(settings) = &self.settings {
+            check_echoes(reading, settings)?;
+        }
+        // A computer that was away for less than the lease takes time for the past.
+        self.check_past(now_us, reading, track.lease_us)?;
+        track.firings.check(&track.plan, reading)
+    }
+
+    fn deliver(&mut self, reading: &Reading, repaired: bool) {
         if let Some(track) = &mut self.track {
-            track.deliver(reading.index);
+            track.deliver(reading);
         }
         self.step = Some(reading.step);
         self.stats.readings += 1;
         self.stats.repaired += u64::from(repaired);
         self.report(HostEvent::Reading { reading: *reading, repaired });
+    }
+
+    /// The beam is done with: asked for again, the device would tell the same.
+    fn refuse(&mut self, reading: &Reading, fault: ReadingFault) {
+        if let Some(track) = &mut self.track {
+            track.settle(reading.index);
+        }
+        self.stats.refused += 1;
+        self.report(HostEvent::ReadingRefused { reading: *reading, fault });
+    }
+
+    fn beam_settled(&mut self, now_us: u64) {
         self.expect_progress(now_us);
         // A reading proves that the plan was accepted, whatever became of the Ack.
         if self.exchange.as_ref().is_some_and(|open| matches!(open.request, Request::Sweep(_))) {
@@ -58,13 +95,14 @@ impl Host {
         let Some(track) = self.track.as_mut().filter(|track| track.plan.sweep == done.sweep) else {
             return;
         };
+        let sense = track.check(done.fired, done.fired, done.end == SweepState::Complete);
         track.learn(done.fired, done.fired);
         if self.is_stopping() {
             return;
         }
-        match end_error(done.end) {
-            Some(error) => self.fail(error),
-            None => self.continue_sweep(now_us),
+        match (sense, end_error(done.end)) {
+            (Err(error), _) | (Ok(()), Some(error)) => self.sweep_failed(now_us, error),
+            (Ok(()), None) => self.continue_sweep(now_us),
         }
     }
 
@@ -75,11 +113,15 @@ impl Host {
         self.exchange = None;
         let Some(track) = &mut self.track else { return };
         if alive.sweep != track.plan.sweep {
-            return self.fail(HostError::SweepLost);
+            return self.give_up(now_us, HostError::SweepLost);
+        }
+        let complete = alive.state == SweepState::Complete;
+        if let Err(error) = track.check(alive.sent, alive.fired, complete) {
+            return self.sweep_failed(now_us, error);
         }
         track.learn(alive.sent, alive.fired);
         if let Some(error) = end_error(alive.state) {
-            return self.fail(error);
+            return self.sweep_failed(now_us, error);
         }
         self.count_stall(now_us);
     }
@@ -94,10 +136,16 @@ impl Host {
         track.stalls = track.stalls.saturating_add(1);
         let (stalls, fired) = (track.stalls, track.fired);
         if stalls > self.config.max_attempts {
-            self.fail(HostError::Stalled { fired });
+            self.give_up(now_us, HostError::Stalled { fired });
         } else {
             self.expect_progress(now_us);
         }
+    }
+
+    /// A device that ended the sweep by itself is at nothing any more.
+    fn sweep_failed(&mut self, now_us: u64, error: HostError) {
+        self.stats.refused += u64::from(matches!(error, HostError::SenselessReply(_)));
+        if has_ended(&error) { self.fail(error) } else { self.give_up(now_us, error) }
     }
 
     /// Sends what the sweep needs, once nothing else is open.
@@ -141,6 +189,9 @@ impl Host {
     pub(super) fn stopped(&mut self) {
         let track = self.track.take();
         self.step = None;
+        if let Some(error) = self.giving_up {
+            return self.fail(error);
+        }
         if let Some(track) = track {
             let end = if track.is_complete() { SweepState::Complete } else { SweepState::Stopped };
             let (sweep, delivered) = (track.plan.sweep, track.delivered);
@@ -168,6 +219,16 @@ impl Host {
             track.progress_at_us = now_us + time;
         }
     }
+}
+
+const fn has_ended(error: &HostError) -> bool {
+    matches!(
+        error,
+        HostError::Stopped
+            | HostError::LeaseExpired
+            | HostError::EmergencyStop
+            | HostError::MotionFault
+    )
 }
 
 /// What a sweep's end means to a host that did not ask for it; `None` if it is no failure.

@@ -1,16 +1,20 @@
 //! Which beams of a sweep have come in.
 
-use super::HostError;
+use super::config::{KEEP_ALIVES_A_LEASE, READINGS_AHEAD};
+use super::firings::Firings;
+use super::{HostError, ReplyFault};
 use crate::messages::{Reading, Sweep};
 
 /// Readings that may be known out of order, at most: more than the device can keep.
-const WINDOW: u16 = u64::BITS as u16;
+const WINDOW: u16 = READINGS_AHEAD as u16;
+const _: () = assert!(READINGS_AHEAD as u32 == u64::BITS);
 
 /// The sweep under way, as the host sees it.
 #[derive(Debug, Clone)]
 pub(super) struct Track {
     pub(super) plan: Sweep,
     pub(super) beams: u16,
+    pub(super) firings: Firings,
     /// Lowest index lacking.
     pub(super) next: u16,
     /// Bit `i` set: `next + i` is there.
@@ -48,11 +52,18 @@ pub(super) enum Place {
 }
 
 impl Track {
-    pub(super) fn new(plan: Sweep, beams: u16, acknowledge_after: u16, now_us: u64) -> Self {
+    pub(super) fn new(
+        plan: Sweep,
+        beams: u16,
+        firings: Firings,
+        acknowledge_after: u16,
+        now_us: u64,
+    ) -> Self {
         let lease_us = u64::from(plan.lease_ms) * 1_000;
         Self {
             plan,
             beams,
+            firings,
             next: 0,
             seen: 0,
             delivered: 0,
@@ -83,16 +94,31 @@ impl Track {
         })
     }
 
-    /// Marks beam `index` as delivered.
-    pub(super) fn deliver(&mut self, index: u16) {
+    /// Marks the beam of a reading as delivered.
+    pub(super) fn deliver(&mut self, reading: &Reading) {
+        self.firings.keep(reading);
+        self.delivered = self.delivered.saturating_add(1);
+        self.settle(reading.index);
+    }
+
+    /// Marks beam `index` as done with.
+    pub(super) fn settle(&mut self, index: u16) {
         self.seen |= 1_u64.checked_shl(u32::from(index.wrapping_sub(self.next))).unwrap_or(0);
         let complete = self.seen.trailing_ones();
         self.seen = self.seen.checked_shr(complete).unwrap_or(0);
         self.next = self.next.saturating_add(u16::try_from(complete).unwrap_or(0));
-        self.delivered = self.delivered.saturating_add(1);
         self.unacknowledged = self.unacknowledged.saturating_add(1);
         self.learn(index.saturating_add(1), index.saturating_add(1));
         self.progress();
+    }
+
+    /// Checks what the device tells of its progress.
+    pub(super) fn check(&self, sent: u16, fired: u16, complete: bool) -> Result<(), HostError> {
+        let beams = self.beams;
+        if sent <= fired && fired <= beams && (!complete || fired == beams) {
+            return Ok(());
+        }
+        Err(HostError::SenselessReply(ReplyFault::Progress { fired, sent, beams }))
     }
 
     /// The device has sent everything below `sent` and fired `fired` beams.
@@ -123,7 +149,7 @@ impl Track {
 
     /// A frame goes out, which renews the lease.
     pub(super) fn frame_sent(&mut self, now_us: u64) {
-        self.keep_alive_at_us = now_us + self.lease_us / 3;
+        self.keep_alive_at_us = now_us + self.lease_us / u64::from(KEEP_ALIVES_A_LEASE);
         self.unacknowledged = 0;
     }
 }

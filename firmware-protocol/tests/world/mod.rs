@@ -79,12 +79,19 @@ pub fn settings() -> Settings {
     }
 }
 
-/// Echoes that nobody else has: the number of the firing and its position are in them.
-pub fn echoes_of(number: usize, step: i32, max_echoes: u8) -> Vec<u32> {
+/// Echoes within the window that nobody else has: the number of the firing and its position are in
+/// them.
+pub fn echoes_of(number: usize, step: i32, window_ticks: u32, max_echoes: u8) -> Vec<u32> {
+    let count = usize::from(max_echoes).min(number % 4).min(3);
     let number = number as u32;
-    let all =
-        [2_000 + number % 40_000, 2_000 + step.rem_euclid(40_000) as u32, 46_000 + number / 40_000];
-    all[..usize::from(max_echoes).min(number as usize % 4).min(3)].to_vec()
+    let third = window_ticks / 3;
+    let place = |part: u32, what: u32| part * third + 1 + what % (third - 1);
+    let all = [
+        place(0, number),
+        place(1, step.rem_euclid(40_000).unsigned_abs()),
+        place(2, number / third),
+    ];
+    all[..count].to_vec()
 }
 
 impl World {
@@ -184,7 +191,7 @@ impl World {
                 self.firings.push(Firing {
                     step: self.step,
                     fired_ticks: self.ticks(),
-                    echoes: echoes_of(number, self.step, max_echoes),
+                    echoes: echoes_of(number, self.step, window_ticks, max_echoes),
                 });
                 self.ranger = Some((self.clock, end, Job::Fire { window_ticks, max_echoes }));
             }

@@ -233,7 +233,7 @@ impl Daemon {
         }
         let wall_s = began.elapsed().as_secs_f64();
         let stopped = stopped && !self.interrupts.happened();
-        Ok(Taken { view: sink.close()?, lost, stopped, wall_s })
+        Ok(Taken { view: sink.close()?, gone: lost.is_some(), lost, stopped, wall_s })
     }
 
     /// Asks for the scan and waits for its first record; a daemon that restarts meanwhile is asked

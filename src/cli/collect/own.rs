@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use firmware_protocol::{host::BoardChange, messages::Identity};
 use tokio::time::{Instant, sleep};
 use tokio_serial::SerialStream;
 
@@ -32,6 +33,8 @@ pub(super) struct Own {
     scene: String,
     interrupts: Interrupts,
     ranger: Option<Ranger<SerialStream>>,
+    /// The ranger that was met first.
+    met: Option<Identity>,
 }
 
 impl Own {
@@ -54,7 +57,7 @@ impl Own {
             Kind::Port(port.unwrap_or_default())
         };
         let (world, scene) = (args.world.clone(), keys.place.scene.clone());
-        let mut device = Self { kind, world, scene, interrupts, ranger: None };
+        let mut device = Self { kind, world, scene, interrupts, ranger: None, met: None };
         // A mock was made there.
         if args.emulator {
             device.carry_to(first)?;
@@ -93,6 +96,14 @@ impl Own {
             Some(ranger) => ranger,
             None => scan::meet(&self.port(), &self.interrupts).await?,
         };
+        let identity = *ranger.identity();
+        if let Some(change) = self.met.and_then(|met| BoardChange::between(&met, &identity)) {
+            return Err(Failure::device(
+                format!("another ranger answers than the one that measured so far: {change}"),
+                "connect that one, or start the collection again: it says what it needs",
+            ));
+        }
+        self.met = Some(identity);
         Ok(self.ranger.insert(ranger))
     }
 

@@ -23,6 +23,8 @@ pub(super) struct Taken {
     pub(super) view: Option<ScanView>,
     /// Why the device gave up, if it did.
     pub(super) lost: Option<Failure>,
+    /// Whether it has to be met again, though the scan may be whole.
+    pub(super) gone: bool,
     /// Whether somebody told the daemon that took it to stop.
     pub(super) stopped: bool,
     pub(super) wall_s: f64,
@@ -45,12 +47,12 @@ pub(super) async fn take(
     ranger.reanchor();
     let outcome = ranger.scan(job, &mut sink, interrupts.clone().reason()).await;
     let wall_s = began.elapsed().as_secs_f64();
-    let lost = match outcome {
-        Ok(_) => None,
-        Err(error @ ScanError::Device(_)) => Some(scan_failure(error)),
+    let (lost, gone) = match outcome {
+        Ok(summary) => (None, summary.not_home.is_some()),
+        Err(error @ ScanError::Device(_)) => (Some(scan_failure(error)), true),
         Err(error) => return Err(scan_failure(error)),
     };
-    Ok(Taken { view: sink.close()?, lost, stopped: false, wall_s })
+    Ok(Taken { view: sink.close()?, lost, gone, stopped: false, wall_s })
 }
 
 /// Marks the end of a file that does not count, so that it says so itself.

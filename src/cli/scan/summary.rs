@@ -117,5 +117,8 @@ fn warnings(summary: &ScanSummary) -> Option<String> {
     if let Some(drift) = summary.end.home_drift_steps.filter(|&drift| drift != 0) {
         parts.push(format!("the index was {drift} steps off afterwards: azimuths are doubtful"));
     }
+    if let Some(error) = &summary.not_home {
+        parts.push(format!("it could not go home afterwards: {error}"));
+    }
     (!parts.is_empty()).then(|| format!("  warning: {}", parts.join("; ")))
 }

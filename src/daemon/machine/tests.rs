@@ -112,8 +112,34 @@ fn a_restart_without_work_homes_again_before_the_next_scan() {
 }
 
 #[test]
-fn the_emergency_stop_holds_everything_until_it_is_released_and_then_homes() {
+fn after_an_emergency_stop_nothing_moves_until_it_is_started() {
     let mut machine = ready();
+    machine.handle(ms(1), Input::EmergencyStop(true));
+    machine.handle(ms(2), Input::Start);
+    assert_eq!(machine.poll(ms(2)), Step::Rest, "it is still pressed");
+    machine.handle(ms(3), Input::EmergencyStop(false));
+    for input in
+        [Input::PortChanged, Input::Restarted, Input::Failed(Trouble::Lost), Input::ScanBegun]
+    {
+        machine.handle(ms(4), input);
+        assert_eq!(machine.state(), LinkState::AwaitingStart);
+        assert_eq!(machine.poll(ms(3_600_000)), Step::Rest);
+    }
+    machine.handle(ms(5), Input::Start);
+    assert_eq!(machine.poll(ms(5)), Step::Open);
+
+    // The device's own emergency stop is no other.
+    let mut machine = ready();
+    machine.handle(ms(1), Input::DeviceStopped);
+    assert_eq!(machine.poll(ms(3_600_000)), Step::Rest);
+    machine.handle(ms(2), Input::Start);
+    assert_eq!(machine.poll(ms(2)), Step::Open);
+}
+
+#[test]
+fn where_it_may_resume_it_homes_after_the_emergency_stop() {
+    let mut machine = ready();
+    machine.set_resumes(true);
     machine.handle(ms(1), Input::ScanBegun);
     machine.handle(ms(2), Input::EmergencyStop(true));
     for input in [Input::ScanEnded, Input::Homed, Input::Failed(Trouble::Lost)] {
@@ -145,6 +171,8 @@ fn input() -> impl Strategy<Value = Input> {
         Just(Input::Restarted),
         trouble.prop_map(Input::Failed),
         any::<bool>().prop_map(Input::EmergencyStop),
+        Just(Input::DeviceStopped),
+        Just(Input::Start),
         Just(Input::PortChanged),
     ]
 }
@@ -178,11 +206,14 @@ proptest! {
                 Input::Restarted => homed = false,
                 _ => {}
             }
-            let held = machine.state() == LinkState::EmergencyStop;
+            let held =
+                matches!(machine.state(), LinkState::EmergencyStop | LinkState::AwaitingStart);
             machine.handle(now, input);
             match input {
                 Input::Failed(_) if !held => failed_at = Some(now),
-                Input::EmergencyStop(_) | Input::PortChanged => failed_at = None,
+                Input::EmergencyStop(_) | Input::DeviceStopped | Input::PortChanged => {
+                    failed_at = None;
+                }
                 _ => {}
             }
         }

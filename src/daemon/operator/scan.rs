@@ -2,9 +2,10 @@
 
 use std::future::pending;
 
-use firmware_protocol::messages::Identity;
+use firmware_protocol::{host::HostError, messages::Identity};
 use tokio::{sync::oneshot, time::Instant};
 use tokio_serial::SerialStream;
+use uuid::Uuid;
 
 use super::{
     super::{
@@ -16,7 +17,7 @@ use super::{
     Operator, attended,
 };
 use crate::{
-    ranger::{Ranger, ScanError, ScanJob, ScanSummary},
+    ranger::{DriveError, Ranger, ScanError, ScanJob, ScanSummary},
     scan::{EventKind, Record, STOPPED_ON_REQUEST, Session},
 };
 
@@ -25,7 +26,7 @@ const CLOCK_STEP_S: f64 = 0.1;
 
 impl Operator {
     pub(super) async fn scan(&mut self) {
-        let Some(identity) = self.desk.identity else { return };
+        let Some(identity) = self.recognise().await else { return };
         let asked = self.desk.agenda.next();
         let Some(job) = self.prepare(&identity, asked).await else { return };
         if self.desk.agenda.next() != asked {
@@ -38,14 +39,30 @@ impl Operator {
         self.desk.serving = job.request;
         self.handle(Input::ScanBegun);
         self.tell();
+        let before = self.latest_scan();
         let (outcome, interrupts) = self.scan_attended(&mut ranger, &job).await;
         self.desk.serving = None;
         self.desk.identity = Some(*ranger.identity());
         self.ranger = Some(ranger);
         self.next_check = Instant::now() + self.check_interval();
         self.out.shared.view.send_modify(|view| view.scan = None);
-        self.scan_ended(outcome);
+        self.scan_ended(before, outcome);
         interrupts.into_iter().for_each(|interrupt| self.react(interrupt));
+    }
+
+    /// Makes sure that the device is there, before a scan is begun that nobody would take. A restart
+    /// since the last one is no other device, but begins a session.
+    async fn recognise(&mut self) -> Option<Identity> {
+        let ranger = self.ranger.as_mut()?;
+        match attended(&mut self.desk, ranger.recognise()).await {
+            Err(interrupt) => self.react(interrupt),
+            Ok(Err(error)) => self.device_failed(&error),
+            Ok(Ok(())) => {
+                self.desk.identity = Some(*ranger.identity());
+                return self.desk.identity;
+            }
+        }
+        None
     }
 
     /// The next scan, and a session in the log that it fits; `None` if it can't be taken now.
@@ -144,7 +161,10 @@ impl Operator {
                 Interrupt::EmergencyStop(true) => "the emergency stop was pressed",
                 Interrupt::PortChanged => "another port is to be used",
                 Interrupt::Log if !self.out.journal.is_well() => "the log can't be written",
-                Interrupt::Log | Interrupt::Agenda | Interrupt::EmergencyStop(false) => {
+                Interrupt::Log
+                | Interrupt::Start
+                | Interrupt::Agenda
+                | Interrupt::EmergencyStop(false) => {
                     if let Interrupt::EmergencyStop(_) = interrupt {
                         interrupts.push(interrupt);
                     }
@@ -161,10 +181,16 @@ impl Operator {
         (outcome, interrupts)
     }
 
-    fn scan_ended(&mut self, outcome: Result<ScanSummary, ScanError>) {
+    fn latest_scan(&self) -> Option<Uuid> {
+        let latest = self.out.shared.latest_scan()?;
+        latest.end.as_ref().map(|end| end.scan)
+    }
+
+    fn scan_ended(&mut self, before: Option<Uuid>, outcome: Result<ScanSummary, ScanError>) {
         if let Some(latest) = self.out.shared.latest_scan()
             && let Some(end) = &latest.end
             && outcome.is_err()
+            && Some(end.scan) != before
         {
             self.scans.beams += u64::from(end.beams);
             self.scans.missing += u64::from(end.missing);
@@ -173,6 +199,11 @@ impl Operator {
             Ok(summary) => {
                 self.count(&summary);
                 self.handle(Input::ScanEnded);
+                match summary.not_home {
+                    None => {}
+                    Some(DriveError::Host(HostError::Rebooted)) => self.handle(Input::Restarted),
+                    Some(error) => self.device_failed(&error),
+                }
             }
             Err(ScanError::Device(error)) => {
                 self.scans.failed += 1;

@@ -70,6 +70,10 @@ impl Operator {
             }
             LinkState::Stopped => tracing::info!("stopped"),
             LinkState::EmergencyStop => tracing::warn!("the emergency stop is pressed"),
+            LinkState::AwaitingStart => {
+                self.line_figures.earlier.losses += u64::from(was_up);
+                tracing::warn!("{trouble}");
+            }
             state => {
                 tracing::warn!("{}: {trouble}", state.name());
                 self.line_figures.earlier.losses += u64::from(was_up);

@@ -34,6 +34,7 @@ const STATES = {
   lost: ["bad", "link lost"],
   fault: ["bad", "fault"],
   emergency_stop: ["bad", "emergency stop"],
+  awaiting_start: ["bad", "awaiting start"],
   stopped: ["bad", "stopped"],
 };
 

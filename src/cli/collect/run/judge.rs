@@ -21,7 +21,7 @@ impl Collector<'_> {
         slot: Slot,
         (taken, change_c): (Taken, Option<f64>),
     ) -> Result<Next, Failure> {
-        let Taken { view, lost, stopped, wall_s } = taken;
+        let Taken { view, lost, stopped, wall_s, gone: _ } = taken;
         let Some(view) = view.filter(|view| !is_cut(view)) else {
             self.set_aside(slot, None, Outcome::Cut, Vec::new(), "it was broken off")?;
             if self.interrupts.happened() {

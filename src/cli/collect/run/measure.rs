@@ -80,7 +80,7 @@ impl Collector<'_> {
         let session = Session { collection: Some(Box::new(of)), ..setup.session(&identity) };
         let taken =
             taking::take(ranger, (&job, session), &path, &self.bar, &self.interrupts).await?;
-        if taken.lost.is_some() {
+        if taken.gone {
             own.lose();
         }
         Ok(taken)

@@ -1,0 +1,240 @@
+//! When beams can have been fired, on the device's clock, which wraps.
+
+use super::ReadingFault;
+use super::config::READINGS_AHEAD;
+use super::deadline::{beam_us, slew_us, ticks_us};
+use crate::messages::limits::TICK_HZ;
+use crate::messages::{Reading, ReadingStatus, Settings, Sweep};
+
+/// Ticks that can't be mistaken for some that are a turn of the clock away: a quarter of a turn.
+const NEAR_TICKS: u64 = 1 << 30;
+const TICKS_PER_US: u64 = TICK_HZ as u64 / 1_000_000;
+/// A device's clock may run fast by one part in so many.
+const RATE_ERROR_ONE_IN: u64 = 50;
+/// Firings remembered: as many as may come out of order, and as many before them.
+const REMEMBERED: usize = 2 * READINGS_AHEAD as usize;
+
+/// The device's clock as it was told last.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct DeviceTime {
+    /// When the question was sent, us, and what the clock showed after that.
+    told: Option<(u64, u32)>,
+}
+
+impl DeviceTime {
+    pub(super) const fn told(&mut self, sent_us: u64, ticks: u32) {
+        self.told = Some((sent_us, ticks));
+    }
+
+    /// The device restarted, or begins something that may take longer than a turn of its clock.
+    pub(super) const fn forget(&mut self) {
+        self.told = None;
+    }
+
+    /// Nothing that is asked for now is done before the device's clock shows this.
+    pub(super) fn floor(&self, now_us: u64) -> Option<u32> {
+        let (sent_us, ticks) = self.told?;
+        let elapsed = now_us.saturating_sub(sent_us).saturating_mul(TICKS_PER_US);
+        (elapsed < NEAR_TICKS).then_some(ticks)
+    }
+
+    /// Refuses what was fired later than now, and than the host may have missed time by.
+    pub(super) fn check_past(
+        &self,
+        now_us: u64,
+        fired_ticks: u32,
+        slack_us: u64,
+    ) -> Result<(), ReadingFault> {
+        let Some((sent_us, ticks)) = self.told else { return Ok(()) };
+        let elapsed = now_us.saturating_sub(sent_us).saturating_mul(TICKS_PER_US);
+        let latest = elapsed + elapsed / RATE_ERROR_ONE_IN + slack_us * TICKS_PER_US;
+        let after = fired_ticks.wrapping_sub(ticks).cast_signed();
+        match u64::try_from(after) {
+            Ok(after) if latest < NEAR_TICKS && after > latest => {
+                let ticks = u32::try_from(after - elapsed).unwrap_or(u32::MAX);
+                Err(ReadingFault::FiredInFuture { ticks })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Refuses what was fired before `floor`.
+pub(super) fn check_after(floor: Option<u32>, fired_ticks: u32) -> Result<(), ReadingFault> {
+    floor.map_or(Ok(()), |floor| check_delay(floor, fired_ticks, 0))
+}
+
+fn check_delay(earlier: u32, later: u32, least: u64) -> Result<(), ReadingFault> {
+    let delay = i64::from(later.wrapping_sub(earlier).cast_signed());
+    let lacking = i64::try_from(least).unwrap_or(i64::MAX).saturating_sub(delay);
+    if lacking <= 0 {
+        return Ok(());
+    }
+    Err(ReadingFault::FiredTooEarly { ticks: u32::try_from(lacking).unwrap_or(u32::MAX) })
+}
+
+/// When the beams of a sweep were fired.
+#[derive(Debug, Clone)]
+pub(super) struct Firings {
+    settings: Settings,
+    /// Device time before the sweep, and where the motor stood.
+    floor: Option<(u32, i32)>,
+    known: [Option<Firing>; REMEMBERED],
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Firing {
+    index: u16,
+    ticks: u32,
+    /// The module was fired, and listened to.
+    listened: bool,
+}
+
+impl Firings {
+    pub(super) const fn new(settings: Settings, floor: Option<(u32, i32)>) -> Self {
+        Self { settings, floor, known: [None; REMEMBERED] }
+    }
+
+    /// Remembers a reading that was taken.
+    pub(super) fn keep(&mut self, reading: &Reading) {
+        let slot = self.known.get_mut(usize::from(reading.index) % REMEMBERED);
+        if let Some(slot) = slot {
+            *slot = Some(Firing::of(reading));
+        }
+    }
+
+    /// Checks a reading against those before and after it.
+    pub(super) fn check(&self, plan: &Sweep, reading: &Reading) -> Result<(), ReadingFault> {
+        let this = Firing::of(reading);
+        let known = || self.known.iter().flatten();
+        let before = known().filter(|one| one.index < this.index).max_by_key(|one| one.index);
+        let after = known().filter(|one| one.index > this.index).min_by_key(|one| one.index);
+        match before {
+            Some(before) => self.check_pair(plan, *before, this)?,
+            None => self.check_first(plan, this)?,
+        }
+        after.map_or(Ok(()), |after| self.check_pair(plan, this, *after))
+    }
+
+    fn check_first(&self, plan: &Sweep, this: Firing) -> Result<(), ReadingFault> {
+        let Some((floor, from)) = self.floor else { return Ok(()) };
+        let way_us = slew_us(plan.first_step.abs_diff(from), &self.settings);
+        let beams = u64::from(this.index) + 1;
+        let longest = self.longest_us(plan, beams).saturating_add(way_us);
+        if longest.saturating_mul(TICKS_PER_US) > NEAR_TICKS {
+            return Ok(());
+        }
+        check_delay(floor, this.ticks, 0)
+    }
+
+    /// From beam to beam pass at least the interval, and after one that was fired its window; and
+    /// at another stop the rest.
+    fn check_pair(&self, plan: &Sweep, earlier: Firing, later: Firing) -> Result<(), ReadingFault> {
+        let beams = u64::from(later.index.saturating_sub(earlier.index));
+        if self.longest_us(plan, beams).saturating_mul(TICKS_PER_US) > NEAR_TICKS {
+            return Ok(());
+        }
+        let Settings { window_ticks, min_interval_ticks, settle_ticks, .. } = self.settings;
+        let moved = plan.step_of(earlier.index) != plan.step_of(later.index);
+        let busy = if earlier.listened { u64::from(window_ticks) } else { 0 }
+            + if moved { u64::from(settle_ticks) } else { 0 };
+        let interval = u64::from(min_interval_ticks);
+        let least = busy.max(interval) + beams.saturating_sub(1) * interval;
+        check_delay(earlier.ticks, later.ticks, least)
+    }
+
+    /// More than so many beams take.
+    fn longest_us(&self, plan: &Sweep, beams: u64) -> u64 {
+        let turn_us = slew_us(plan.stride.unsigned_abs().into(), &self.settings);
+        let settle_us = ticks_us(self.settings.settle_ticks);
+        let beam_us = beam_us(&self.settings).saturating_add(turn_us).saturating_add(settle_us);
+        beams.saturating_mul(beam_us).saturating_mul(2)
+    }
+}
+
+impl Firing {
+    const fn of(reading: &Reading) -> Self {
+        let listened = !matches!(reading.status, ReadingStatus::ModuleFault);
+        Self { index: reading.index, ticks: reading.fired_ticks, listened }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{DeviceTime, Firings};
+    use crate::host::ReadingFault;
+    use crate::messages::{Blanking, Echoes, Reading, ReadingStatus, Settings, Sweep};
+
+    const SETTINGS: Settings = Settings {
+        window_ticks: 40_000,
+        min_interval_ticks: 50_000,
+        settle_ticks: 20_000,
+        max_echoes: 1,
+        blanking: Blanking::Internal,
+        speed: 1_000,
+        acceleration: 40_000,
+        hold_s: 0,
+    };
+    const PLAN: Sweep =
+        Sweep { sweep: 1, first_step: 0, stride: 1, stops: 50, pings_per_stop: 2, lease_ms: 1_000 };
+
+    fn reading(index: u16, fired_ticks: u32) -> Reading {
+        Reading {
+            sweep: 1,
+            index,
+            step: i32::from(index / 2),
+            fired_ticks,
+            status: ReadingStatus::NoEcho,
+            echoes: Echoes::new(),
+        }
+    }
+
+    fn early(ticks: u32) -> Result<(), ReadingFault> {
+        Err(ReadingFault::FiredTooEarly { ticks })
+    }
+
+    #[test]
+    fn beams_follow_one_another_by_interval_window_and_rest() {
+        // Over a wrap of the clock.
+        let start = u32::MAX - 30_000;
+        let mut firings = Firings::new(SETTINGS, Some((start, 0)));
+        let at = |after: u32| start.wrapping_add(after);
+        assert_eq!(firings.check(&PLAN, &reading(0, start.wrapping_sub(7))), early(7));
+        assert_eq!(firings.check(&PLAN, &reading(0, at(0))), Ok(()));
+        firings.keep(&reading(0, at(0)));
+        // The same stop: the interval counts. The next: window and rest.
+        assert_eq!(firings.check(&PLAN, &reading(1, at(49_999))), early(1));
+        assert_eq!(firings.check(&PLAN, &reading(1, at(50_000))), Ok(()));
+        firings.keep(&reading(1, at(50_000)));
+        assert_eq!(firings.check(&PLAN, &reading(2, at(109_999))), early(1));
+        assert_eq!(firings.check(&PLAN, &reading(2, at(110_000))), Ok(()));
+        // One that comes late must fit between its neighbours.
+        firings.keep(&reading(4, at(300_000)));
+        assert_eq!(firings.check(&PLAN, &reading(3, at(240_000))), Ok(()));
+        assert_eq!(firings.check(&PLAN, &reading(3, at(240_001))), early(1));
+        assert_eq!(firings.check(&PLAN, &reading(2, at(210_000))), Ok(()));
+    }
+
+    #[test]
+    fn what_may_take_a_turn_of_the_clock_is_not_judged_by_it() {
+        let slow = Settings { speed: 1, ..SETTINGS };
+        let far = Sweep { stride: 30_000, ..PLAN };
+        let mut firings = Firings::new(slow, Some((1_000, 0)));
+        firings.keep(&reading(0, 2_000));
+        assert_eq!(firings.check(&far, &reading(2, 1_500)), Ok(()));
+    }
+
+    #[test]
+    fn nothing_is_fired_in_the_future() {
+        let mut time = DeviceTime::default();
+        assert_eq!(time.check_past(5_000_000, 77, 0), Ok(()));
+        time.told(1_000_000, u32::MAX);
+        // One second later the clock shows two million ticks more, or two percent above that.
+        assert_eq!(time.check_past(2_000_000, 2_039_999, 0), Ok(()));
+        let ahead = ReadingFault::FiredInFuture { ticks: 50_000 };
+        assert_eq!(time.check_past(2_000_000, 2_049_999, 0), Err(ahead));
+        assert_eq!(time.check_past(2_000_000, 2_049_999, 10_000), Ok(()));
+        assert_eq!(time.floor(2_000_000), Some(u32::MAX));
+        assert_eq!(time.floor(600_000_000_000), None, "so long ago that the clock has wrapped");
+    }
+}
