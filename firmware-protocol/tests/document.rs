@@ -5,7 +5,7 @@ mod samples;
 
 use firmware_protocol::device::DeviceTimer;
 use firmware_protocol::frame::{Frame, Header};
-use firmware_protocol::host::HostTimer;
+use firmware_protocol::host::{self, HostTimer, IdentityFault, ReadingFault, ReplyFault};
 use firmware_protocol::messages::{
     Alive, Blanking, Capabilities, DeviceState, FaultKind, Field, FirmwareVersion, Identity,
     NakReason, PROTOCOL_VERSION, ProtocolId, Reading, ReadingStatus, Reply, Request, ResetCause,
@@ -133,15 +133,75 @@ fn limits_are_as_documented() {
 fn timers_are_as_documented() {
     let device =
         [DeviceTimer::Settle, DeviceTimer::MinInterval, DeviceTimer::Lease, DeviceTimer::Hold];
-    let host = [HostTimer::Reply, HostTimer::Completion, HostTimer::KeepAlive, HostTimer::Progress];
+    let of_host = [HostTimer::Reply, HostTimer::Completion, HostTimer::KeepAlive, HostTimer::Progress];
     let coded: Vec<_> = device
         .iter()
         .map(|timer| (format!("{timer:?}"), "device"))
-        .chain(host.iter().map(|timer| (format!("{timer:?}"), "host")))
+        .chain(of_host.iter().map(|timer| (format!("{timer:?}"), "host")))
         .collect();
     let documented: Vec<_> =
         table("## Timers").iter().map(|row| (row[0].to_string(), row[1])).collect();
     assert_eq!(documented, coded);
+}
+
+#[test]
+fn timer_constants_are_as_documented() {
+    let coded = [
+        ("ATTEMPTS", u32::from(host::ATTEMPTS)),
+        ("OVERRUNS", u32::from(host::OVERRUNS)),
+        ("STOP_ATTEMPTS", u32::from(host::STOP_ATTEMPTS)),
+        ("INITIAL_MARGIN_US", host::INITIAL_MARGIN_US),
+        ("MIN_MARGIN_US", host::MIN_MARGIN_US),
+        ("MAX_MARGIN_US", host::MAX_MARGIN_US),
+        ("KEEP_ALIVES_A_LEASE", u32::from(host::KEEP_ALIVES_A_LEASE)),
+        ("ACKNOWLEDGEMENTS_A_RING", u32::from(host::ACKNOWLEDGEMENTS_A_RING)),
+        ("READINGS_AHEAD", u32::from(host::READINGS_AHEAD)),
+        ("SEQ_GAP_MAX", u32::from(host::SEQ_GAP_MAX)),
+    ];
+    let documented: Vec<_> = table("### Timer constants")
+        .iter()
+        .map(|row| (row[0], row[1].parse::<u32>().expect("a number")))
+        .collect();
+    assert_eq!(documented, coded);
+}
+
+/// Each name of a fault is one of the code's, and the other way round: a new one needs its row.
+#[test]
+fn what_a_host_refuses_is_as_documented() {
+    let names = |title| table(title).iter().map(|row| row[0].to_owned()).collect::<Vec<_>>();
+    let name = |fault: &dyn core::fmt::Debug| {
+        format!("{fault:?}").split([' ', '{']).next().expect("a name").to_owned()
+    };
+    let identity = [
+        IdentityFault::Form,
+        IdentityFault::BootZero,
+        IdentityFault::BootNotOfFrame { frame: 0, identity: 0 },
+        IdentityFault::TickRate { tick_hz: 0 },
+        IdentityFault::NoSteps,
+        IdentityFault::RingTooSmall { ring_bytes: 0, needed: 0 },
+    ];
+    let reading = [
+        ReadingFault::EchoMissing,
+        ReadingFault::EchoUnexpected { echoes: 1 },
+        ReadingFault::TooManyEchoes { echoes: 1, asked: 0 },
+        ReadingFault::EchoAfterWindow { ticks: 1, window: 0 },
+        ReadingFault::EchoesOutOfOrder,
+        ReadingFault::FiredTooEarly { ticks: 1 },
+        ReadingFault::FiredInFuture { ticks: 1 },
+    ];
+    let reply = [
+        ReplyFault::Drift { drift_steps: 1 },
+        ReplyFault::Position { step: 1 },
+        ReplyFault::Progress { fired: 1, sent: 0, beams: 0 },
+    ];
+    let coded: Vec<_> = identity.iter().map(|fault| name(fault)).collect();
+    assert_eq!(names("An Identity (the device is not used):"), coded);
+    let title = "A reading (in a sweep the beam counts as lost, is not asked for again, and the \
+                 sweep goes on; a Ping fails):";
+    let coded: Vec<_> = reading.iter().map(|fault| name(fault)).collect();
+    assert_eq!(names(title), coded);
+    let coded: Vec<_> = reply.iter().map(|fault| name(fault)).collect();
+    assert_eq!(names("An answer (the command fails; a sweep is stopped first):"), coded);
 }
 
 #[test]

@@ -8,6 +8,26 @@ use firmware_protocol::messages::{FaultKind, NakReason, Request, Settings, Sweep
 use world::line::Faults;
 use world::ready::{BAUD, delivered, plan, ready};
 use world::settings;
+use world::sim::Sim;
+
+#[test]
+fn coils_are_released_also_where_no_index_was_found() {
+    let mut sim = Sim::new(7, BAUD, Faults::default());
+    sim.world.index_missing = true;
+    sim.run(Command::Identify).expect("ends");
+    sim.run(Command::Configure(Settings { hold_s: 3, ..settings() })).expect("ends");
+    sim.idle(4_000_000).expect("no hang");
+    assert_eq!(sim.world.coils_released, 0, "nobody gave them current");
+    let events = sim.run(Command::Home).expect("ends");
+    let refused = HostError::Refused(NakReason::IndexNotFound);
+    assert_eq!(events.last(), Some(&HostEvent::Failed(refused)));
+    sim.idle(10_000_000).expect("no hang");
+    assert_eq!(sim.world.coils_released, 1);
+    let told = sim.events.iter().filter(|(_, event)| {
+        matches!(event, HostEvent::Fault(FaultKind::HoldExpired))
+    });
+    assert_eq!(told.count(), 1, "once");
+}
 
 #[test]
 fn a_silent_host_ends_the_sweep() {
@@ -143,4 +163,24 @@ fn the_device_holds_when_nobody_acknowledges_and_goes_on_when_somebody_does() {
     sim.world.device.handle_bytes(ticks, &go_on);
     sim.idle(1_000_000).expect("no hang");
     assert!(sim.world.firings.len() - before > held, "did not go on");
+}
+
+#[test]
+fn what_is_acknowledged_before_it_was_sent_is_sent_all_the_same() {
+    let mut sim = ready(settings());
+    let seq = 30_000_u16
+        .wrapping_add(sim.host.identity().and_then(|identity| identity.last_seq).unwrap_or(0));
+    let header = |seq| Header { boot: sim.world.boot, seq };
+    let start = Frame::encode(header(seq), &Request::Sweep(Sweep { sweep: 5, ..plan(6, 1) }));
+    let all = Request::KeepAlive { sweep: 5, next: 6 };
+    let acknowledged = Frame::encode(header(seq.wrapping_add(1)), &all).expect("fits");
+    let ticks = sim.world.ticks();
+    sim.world.device.handle_bytes(ticks, &start.expect("fits"));
+    for _ in 0..500 {
+        let ticks = sim.world.ticks();
+        sim.world.device.handle_bytes(ticks, &acknowledged);
+        sim.idle(1_000).expect("no hang");
+    }
+    // The host knows nothing of this sweep, and counts each of its readings as a copy.
+    assert_eq!(sim.host.stats().duplicates, 6);
 }

@@ -111,10 +111,12 @@ fn device(status: &Value, health: &Value) -> Vec<String> {
             word(&status["provenance"]),
         ),
         format!(
-            "  line     {} CRC errors, {} requests repeated, {} readings repaired, lost {} times",
+            "  line     {} CRC errors, {} requests repeated, {} readings repaired, {} refused, lost {} \
+             times",
             health["line"]["crc_errors"],
             health["line"]["retries"],
             health["line"]["repaired"],
+            health["line"]["refused"],
             health["line"]["losses"],
         ),
     ]

@@ -160,6 +160,8 @@ pub struct LineTotals {
     pub retries: u64,
     /// Readings that were lost at first and fetched again.
     pub repaired: u64,
+    /// Readings and answers that made no sense.
+    pub refused: u64,
     /// Times that the device was lost from use.
     pub losses: u64,
 }
@@ -408,6 +410,7 @@ impl LineTotals {
         self.framing_errors += u64::from(dropped.stuffing) + u64::from(dropped.too_long);
         self.retries += stats.retries;
         self.repaired += stats.repaired;
+        self.refused += stats.refused;
         self
     }
 }

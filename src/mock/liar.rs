@@ -25,8 +25,8 @@ pub enum Lie {
     OtherSerial,
     /// After a restart: twice the steps a revolution.
     OtherSteps,
-    /// After a restart: hardware.
-    Hardware,
+    /// After a restart: an emulator. Never hardware: no log shall take a mock for that.
+    Emulator,
     /// After a restart: no index sensor.
     NoIndex,
     /// An echo after the window.
@@ -64,7 +64,7 @@ pub const LIES: [(&str, Lie); 21] = [
     ("small-ring", Lie::SmallRing),
     ("other-serial", Lie::OtherSerial),
     ("other-steps", Lie::OtherSteps),
-    ("hardware", Lie::Hardware),
+    ("emulator", Lie::Emulator),
     ("no-index", Lie::NoIndex),
     ("late-echo", Lie::LateEcho),
     ("silent-echo", Lie::SilentEcho),
@@ -120,8 +120,9 @@ impl Lie {
                 steps_per_revolution: identity.steps_per_revolution.saturating_mul(2),
                 ..identity
             },
-            Self::Hardware => {
-                Identity { capabilities: without(Capabilities::SIMULATED), ..identity }
+            Self::Emulator => {
+                let capabilities = without(Capabilities::SIMULATED).with(Capabilities::EMULATED);
+                Identity { capabilities, ..identity }
             }
             Self::NoIndex => {
                 Identity { capabilities: without(Capabilities::INDEX_SENSOR), ..identity }

@@ -37,7 +37,7 @@ fn verdict(lie: Lie) -> Verdict {
         Lie::SmallRing => NotMet("it keeps 4 bytes of readings"),
         Lie::OtherSerial => Ends("its serial number is OTHER-0002, not MOCK-00001"),
         Lie::OtherSteps => Ends("its motor has 800 steps a revolution, not 400"),
-        Lie::Hardware => Ends("-SIMULATED"),
+        Lie::Emulator => Ends("+EMULATED -SIMULATED"),
         Lie::NoIndex => Ends("-INDEX_SENSOR"),
         Lie::LateEcho => Refused("an echo after 2097151 ticks in a window of 46512"),
         Lie::SilentEcho => Refused("it says that there was no echo, with 1"),
@@ -111,7 +111,7 @@ fn job() -> ScanJob {
 async fn scan(lie: Lie) -> Result<(Result<ScanSummary, ScanError>, Records), String> {
     // It restarts now and then, where the lie is about that.
     let after_restart =
-        matches!(lie, Lie::OtherSerial | Lie::OtherSteps | Lie::Hardware | Lie::NoIndex);
+        matches!(lie, Lie::OtherSerial | Lie::OtherSteps | Lie::Emulator | Lie::NoIndex);
     let reset = if after_restart { 0.1 } else { 0.0 };
     let board = board(FaultPlan { lie: Some(lie), reset, ..FaultPlan::default() });
     let port = MockPort::open(board, None).expect("a pty");

@@ -65,7 +65,15 @@ fn a_sound_ranger_is_called_sound() {
 
 #[test]
 fn each_fault_has_its_name() {
-    let cases: [(&str, &[&str], &str, i32); 5] = [
+    let cases: [(&str, &[&str], &str, i32); 12] = [
+        // A supply that sags as the motor turns, whichever turn it is.
+        ("motor_reset=1", &[], "motor power failed", 1),
+        ("motor_reset=0.4", &[], "motor power failed", 1),
+        ("motor_hangup=1", &[], "motor cable failed", 3),
+        ("lie=endless-home", &[], "motor device failed", 1),
+        ("lie=far-home", &[], "motor device failed", 1),
+        ("lie=no-steps", &[], "board wrong_firmware failed", 3),
+        ("lie=slow-ticks", &[], "board wrong_firmware failed", 3),
         ("no_echo=1", &["--no-motion"], "echo missing_echo failed", 1),
         ("stuck_echo=1", &["--no-motion"], "echo stuck_echo failed", 1),
         ("reset=1", &[], "echo power failed", 1),

@@ -48,8 +48,9 @@ impl Device {
         (self.outbox.is_empty() && self.pending.take(Pending::RESET)).then_some(Action::Reset)
     }
 
-    fn phase_action(&self) -> Option<Action> {
+    fn phase_action(&mut self) -> Option<Action> {
         let settings = self.settings?;
+        self.holds_coils |= !matches!(self.phase, Phase::Beam(Beam::Listening));
         let (speed, acceleration) = (settings.speed, settings.acceleration);
         match self.phase {
             Phase::Homing => Some(Action::Home { speed, acceleration }),

@@ -48,6 +48,8 @@ pub struct Device {
     /// Where the motor stands, or stood before the present move. Steps.
     step: i32,
     homed: bool,
+    /// The motor was turned, or held for Home, since its coils were let go.
+    holds_coils: bool,
     fault: Option<FaultKind>,
     phase: Phase,
     /// Number of the request that `phase` serves.
@@ -145,6 +147,7 @@ impl Device {
             settings: None,
             step: 0,
             homed: false,
+            holds_coils: false,
             fault: None,
             phase: Phase::Idle,
             phase_seq: 0,
@@ -226,7 +229,7 @@ impl Device {
         if timers::expire(&mut self.timers.lease, now) {
             self.halt(FaultKind::LeaseExpired);
         }
-        if timers::expire(&mut self.timers.hold, now) && self.phase == Phase::Idle && self.homed {
+        if timers::expire(&mut self.timers.hold, now) && self.phase == Phase::Idle {
             self.halt(FaultKind::HoldExpired);
         }
         self.try_fire();

@@ -123,7 +123,7 @@ impl Device {
 
     fn reset(&mut self) -> Outcome {
         self.interrupt();
-        self.pending.add(Pending::RELEASE_COILS);
+        self.release_coils();
         self.homed = false;
         self.end_run(SweepState::Stopped);
         self.rest();
@@ -133,7 +133,7 @@ impl Device {
 
     fn resend(&mut self, sweep: u16, first: u16, count: u8) -> Outcome {
         if sweep == self.run.plan.sweep {
-            self.ring.acknowledge(first);
+            self.acknowledge(first);
             self.outbox.resend(first, count);
             self.try_fire();
         }
@@ -142,10 +142,15 @@ impl Device {
 
     fn keep_alive(&mut self, sweep: u16, next: u16) -> Outcome {
         if sweep == self.run.plan.sweep {
-            self.ring.acknowledge(next);
+            self.acknowledge(next);
             self.try_fire();
         }
         Outcome::Told(Answer::Alive { ticks: self.now })
+    }
+
+    /// Nobody can have what was never sent: it is kept, whatever is acknowledged.
+    fn acknowledge(&mut self, next: u16) {
+        self.ring.acknowledge(self.outbox.sent().min(next));
     }
 
     fn configure(&mut self, settings: &Settings) -> Result<Outcome, NakReason> {

@@ -168,7 +168,7 @@ impl Device {
         if self.phase == Phase::Beam(Beam::Listening) {
             self.pending.add(Pending::ABORT_FIRE);
         }
-        self.pending.add(Pending::RELEASE_COILS);
+        self.release_coils();
         let running = core::mem::replace(&mut self.phase, Phase::Idle);
         match running {
             Phase::Homing | Phase::Moving { .. } => self.refuse_running(kind),
@@ -185,6 +185,11 @@ impl Device {
         self.fault = Some(kind);
         self.outbox.fault(kind);
         self.rest();
+    }
+
+    pub(super) fn release_coils(&mut self) {
+        self.holds_coils = false;
+        self.pending.add(Pending::RELEASE_COILS);
     }
 
     fn refuse_running(&mut self, kind: FaultKind) {
@@ -231,7 +236,7 @@ impl Device {
     fn arm_hold(&mut self) {
         let hold_s = self.settings.map_or(0, |settings| settings.hold_s);
         let hold = armed(self.now, u32::from(hold_s).wrapping_mul(TICK_HZ));
-        self.timers.hold = hold.filter(|_| self.homed);
+        self.timers.hold = hold.filter(|_| self.holds_coils);
     }
 }
 

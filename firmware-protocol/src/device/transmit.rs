@@ -56,6 +56,11 @@ impl Outbox {
         self.resend_left = 0;
     }
 
+    /// Lowest index never sent.
+    pub(super) const fn sent(&self) -> u16 {
+        self.sent
+    }
+
     pub(super) fn resend(&mut self, first: u16, count: u8) {
         self.resend_next = first;
         self.resend_left = count;

@@ -47,7 +47,8 @@ impl DeviceTime {
     ) -> Result<(), ReadingFault> {
         let Some((sent_us, ticks)) = self.told else { return Ok(()) };
         let elapsed = now_us.saturating_sub(sent_us).saturating_mul(TICKS_PER_US);
-        let latest = elapsed + elapsed / RATE_ERROR_ONE_IN + slack_us * TICKS_PER_US;
+        let slack = slack_us.saturating_mul(TICKS_PER_US);
+        let latest = elapsed.saturating_add(elapsed / RATE_ERROR_ONE_IN).saturating_add(slack);
         let after = fired_ticks.wrapping_sub(ticks).cast_signed();
         match u64::try_from(after) {
             Ok(after) if latest < NEAR_TICKS && after > latest => {

@@ -1,4 +1,5 @@
 //! A device made of nothing but well-formed replies, true or not, against the host machine.
+#![allow(unreachable_pub, reason = "a test file's part")]
 
 use firmware_protocol::frame::{Frame, FrameDecoder, Header, Received};
 use firmware_protocol::host::{Command, Host, HostConfig, HostEvent};

@@ -17,7 +17,7 @@ use super::{
 use crate::{
     cli::{runtime::Interrupts, scan::ATTEMPTS},
     link::{self, BAUD, LinkError},
-    ranger::{DriveError, Driver, Ended, serial_text},
+    ranger::{DriveError, Driver, Ended, hold_s, serial_text},
 };
 
 /// Steps that the motor is turned by, there and back.
@@ -101,11 +101,15 @@ impl Patient {
         if broken {
             return;
         }
+        let settings = Settings { hold_s: hold_s(&identity), ..SETTINGS };
         checks.push(match args.no_motion {
             true => Check::skipped("motor", "--no-motion"),
-            false => self.motor(&identity).await,
+            false => self.motor(&identity, settings).await,
         });
-        let echo = self.echo(args.pings).await;
+        if checks.last().is_some_and(|check| check.cause == Some(Cause::Cable)) {
+            return;
+        }
+        let echo = self.echo(args.pings, settings).await;
         checks.push(echo);
     }
 
@@ -141,14 +145,14 @@ impl Patient {
         )
     }
 
-    async fn motor(&mut self, identity: &Identity) -> Check {
+    async fn motor(&mut self, identity: &Identity, settings: Settings) -> Check {
         let has_index = identity.capabilities.has(Capabilities::INDEX_SENSOR);
         // With an index, home from where it stands: a motor that misses as much on its way back as
         // on its way there would look right.
         let back = if has_index { Command::Home } else { Command::MoveTo { step: 0 } };
         let turn = Command::MoveTo { step: TURN_STEPS };
         let mut drift = None;
-        for command in [Command::Configure(SETTINGS), Command::Home, turn, back] {
+        for command in [Command::Configure(settings), Command::Home, turn, back] {
             match self.perform(command).await {
                 Ok((Ended::Done(Outcome::Homed { drift_steps }), _)) => drift = Some(drift_steps),
                 Ok(_) => {}
@@ -174,8 +178,14 @@ impl Patient {
         }
     }
 
-    async fn echo(&mut self, pings: u32) -> Check {
-        if let Err(error) = self.perform(Command::Configure(SETTINGS)).await {
+    async fn echo(&mut self, pings: u32, settings: Settings) -> Check {
+        // What befell the board before is told already.
+        if self.driver.host().identity().is_none()
+            && let Err(error) = self.identify().await
+        {
+            return gone("echo", &error);
+        }
+        if let Err(error) = self.perform(Command::Configure(settings)).await {
             return gone("echo", &error);
         }
         let before = self.restarts;
@@ -227,6 +237,9 @@ fn no_answer(error: &DriveError) -> Check {
             "another program runs on this board, or this is another device: check the port; if it \
              is the ranger's, flash the firmware (firmware/README.md)",
         ),
+        DriveError::Host(HostError::WrongIdentity(_)) => {
+            Check::failed("board", Cause::WrongFirmware, error.to_string(), error.help())
+        }
         DriveError::Host(HostError::WrongVersion { .. }) => {
             Check::failed("board", Cause::WrongVersion, error.to_string(), error.help())
         }

@@ -100,12 +100,13 @@ fn traffic(link: &LinkStats) -> String {
     let dropped = &link.dropped;
     format!(
         "  link: {} bytes in, {} bytes out ({:.1} % of the traffic), {} frames damaged, {} requests \
-         repeated",
+         repeated, {} readings refused",
         link.bytes_received,
         link.bytes_sent,
         100.0 * link.bytes_sent as f64 / (link.bytes_sent + link.bytes_received).max(1) as f64,
         u32::from(dropped.checksum) + u32::from(dropped.stuffing) + u32::from(dropped.too_long),
         link.retries,
+        link.refused,
     )
 }
 

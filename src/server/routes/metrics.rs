@@ -49,6 +49,7 @@ fn registry(daemon: &Handle) -> Registry {
         ("line_framing_errors", "Frames damaged otherwise", health.line.framing_errors),
         ("line_retries", "Requests sent again", health.line.retries),
         ("line_repaired_readings", "Readings fetched again", health.line.repaired),
+        ("line_refused_readings", "Readings and answers without sense", health.line.refused),
         ("link_losses", "Times that the device was lost from use", health.line.losses),
         ("scans_completed", "Scans with every beam", health.scans.completed),
         ("scans_stopped", "Scans stopped on request", health.scans.stopped),

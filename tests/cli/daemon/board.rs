@@ -12,11 +12,14 @@ use sonard::{
     acoustics::Sensor,
     board::Board,
     config::{Keys, Mode},
-    daemon::{Handle, Journal, LinkState, Resources, Settings, Trouble, prepare},
+    daemon::{
+        Asked, Handle, Journal, LinkState, Order, Resources, Settings, Trouble, prepare,
+    },
     link,
     mock::Pace,
     scene::parse_pose,
 };
+use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
 
 use super::{clean_log, rig::Rig};
@@ -71,7 +74,7 @@ fn pins_stop_power_reset_and_show() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::RealTime);
     let switches = Arc::new(Switches::default());
-    let runtime = tokio::runtime::Runtime::new().expect("threads");
+    let runtime = Runtime::new().expect("threads");
     let settings = settings(folder.path().join("ranger").display().to_string());
     let (journal, thread) =
         Journal::open(&folder.path().join("log"), settings.rotation()).expect("a log");
@@ -82,7 +85,7 @@ fn pins_stop_power_reset_and_show() {
     let (daemon, handle) = prepare(resources, settings);
     drop(context);
     let running = runtime.spawn(daemon.run(stop.clone().cancelled_owned()));
-    play(&mut rig, &handle, &switches);
+    play(&mut rig, &runtime, &handle, &switches);
     stop.cancel();
     runtime.block_on(running).expect("it ends");
     assert!(!switches.power.load(SeqCst) && !switches.light.load(SeqCst), "off at the end");
@@ -94,7 +97,7 @@ fn pins_stop_power_reset_and_show() {
     }
 }
 
-fn play(rig: &mut Rig, daemon: &Handle, switches: &Switches) {
+fn play(rig: &mut Rig, runtime: &Runtime, daemon: &Handle, switches: &Switches) {
     let state = || daemon.status().link.state;
     let scans = |beams| {
         wait_until("beams", || daemon.status().scan.is_some_and(|scan| scan.done >= beams));
@@ -115,7 +118,53 @@ fn play(rig: &mut Rig, daemon: &Handle, switches: &Switches) {
     let beams = daemon.health().scans.beams;
     std::thread::sleep(Duration::from_millis(400));
     assert_eq!((state(), daemon.health().scans.beams), (LinkState::EmergencyStop, beams));
+    let refused = runtime.block_on(daemon.order(start()));
+    assert!(refused.is_err_and(|refusal| refusal.message.contains("emergency stop")));
+    // Released, it waits for somebody to start it.
     switches.pressed.store(false, SeqCst);
+    wait_until("the release", || state() == LinkState::AwaitingStart);
+    let trouble = daemon.status().link.trouble;
+    assert!(trouble.is_some_and(|trouble| trouble.contains("/v1/start")));
+    std::thread::sleep(Duration::from_millis(400));
+    assert_eq!((state(), daemon.health().scans.beams), (LinkState::AwaitingStart, beams));
+    assert!(!switches.power.load(SeqCst));
+    runtime.block_on(daemon.order(start())).expect("it begins");
     scans(3);
     assert!(switches.power.load(SeqCst));
+}
+
+fn start() -> Order {
+    let request = uuid::Uuid::new_v4();
+    Order::Start(Asked { request, scans: None, plan: None, pose: None })
+}
+
+#[test]
+fn where_it_may_it_goes_on_by_itself_after_an_emergency_stop() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut rig = Rig::new(folder.path(), Pace::RealTime);
+    rig.plug("", 1);
+    let switches = Arc::new(Switches::default());
+    let runtime = Runtime::new().expect("threads");
+    let mut settings = settings(folder.path().join("ranger").display().to_string());
+    settings.keys.safety.resume_after_emergency_stop = true;
+    let (journal, thread) =
+        Journal::open(&folder.path().join("log"), settings.rotation()).expect("a log");
+    let board = Box::new(Switchboard(Arc::clone(&switches)));
+    let resources = Resources { open_port: Box::new(link::open), board, journal };
+    let stop = CancellationToken::new();
+    let context = runtime.enter();
+    let (daemon, handle) = prepare(resources, settings);
+    drop(context);
+    let running = runtime.spawn(daemon.run(stop.clone().cancelled_owned()));
+    let scans = || {
+        wait_until("beams", || handle.status().scan.is_some_and(|scan| scan.done >= 3));
+    };
+    scans();
+    switches.pressed.store(true, SeqCst);
+    wait_until("the stop", || handle.status().link.state == LinkState::EmergencyStop);
+    switches.pressed.store(false, SeqCst);
+    scans();
+    stop.cancel();
+    runtime.block_on(running).expect("it ends");
+    assert_eq!(thread.close().error, None);
 }

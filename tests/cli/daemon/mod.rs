@@ -13,6 +13,7 @@ pub(crate) mod rig;
 mod schema;
 mod simulate;
 mod soak;
+mod strangers;
 mod systemd;
 
 use std::{

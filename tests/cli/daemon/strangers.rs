@@ -1,0 +1,106 @@
+//! Devices that restart, come back as others, or say what can't be.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+use sonard::mock::Pace;
+
+use super::{Daemon, clean_log, rig::Rig};
+use crate::common::{Log, wait_until};
+
+/// A daemon that scans without end on a rig.
+fn start(rig: &Rig, folder: &std::path::Path, further: &[&str]) -> Daemon {
+    let options = rig.options();
+    let options: Vec<&str> = options.iter().map(String::as_str).collect();
+    Daemon::start(folder, &[&options[..], &["--set", "scanning.mode=continuous"], further].concat())
+}
+
+/// Checks each reading against the session that it stands in; how many sessions of each kind had
+/// readings, by serial, provenance and steps a revolution.
+fn sessions_of_readings(log: &Log) -> BTreeSet<String> {
+    let mut session = &Value::Null;
+    let mut kinds = BTreeSet::new();
+    for record in &log.records {
+        match record["type"].as_str() {
+            Some("session") => session = record,
+            Some("ping") if record["status"] != "link_lost" => {
+                let device = &session["device"];
+                let steps = device["steps_per_revolution"].as_f64().expect("steps");
+                let azimuth_deg = record["azimuth_deg"].as_f64().expect("an azimuth");
+                let turned_deg = record["step"].as_f64().expect("a step") * 360.0 / steps;
+                assert!((azimuth_deg - turned_deg).abs() < 1e-9, "{record} in {device}");
+                kinds.insert(format!(
+                    "{} {} {steps}",
+                    device["serial"].as_str().expect("a serial"),
+                    session["provenance"].as_str().expect("a provenance")
+                ));
+            }
+            _ => {}
+        }
+    }
+    kinds
+}
+
+#[test]
+fn a_board_that_comes_back_as_another_begins_a_session_of_its_own() {
+    for (lie, kind, said) in [
+        ("other-steps", "MOCK-00001 mock 800", "800 steps a revolution, not 400"),
+        ("other-serial", "OTHER-0002 mock 400", "OTHER-0002, not MOCK-00001"),
+        ("emulator", "MOCK-00001 emulator 400", "-SIMULATED"),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut rig = Rig::new(folder.path(), Pace::Virtual);
+        rig.plug(&format!("reset=0.01,lie={lie}"), 1);
+        let daemon = start(&rig, folder.path(), &["--set", "plan.step_deg=1.8"]);
+        wait_until("scans", || daemon.health()["scans"]["completed"].as_u64() >= Some(3));
+        assert_eq!(daemon.stop(), Some(0));
+        let log = clean_log(folder.path());
+        let kinds = sessions_of_readings(&log);
+        let first = "MOCK-00001 mock 400".to_owned();
+        assert_eq!(kinds, BTreeSet::from([first, kind.to_owned()]), "{lie}");
+        assert!(log.events().iter().any(|event| event.contains(said)), "{:?}", log.events());
+    }
+}
+
+#[test]
+fn another_board_is_refused_where_one_is_named_also_after_a_restart() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut rig = Rig::new(folder.path(), Pace::Virtual);
+    rig.plug("reset=0.01,lie=other-serial", 1);
+    let daemon = start(&rig, folder.path(), &["--set", "device.serial=MOCK-00001"]);
+    daemon.wait_for("wrong_device");
+    wait_until("the name", || {
+        let trouble = daemon.status()["link"]["trouble"].clone();
+        trouble.as_str().is_some_and(|trouble| trouble.contains("not MOCK-00001"))
+    });
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    assert_eq!(daemon.stop(), Some(0));
+    let kinds = sessions_of_readings(&clean_log(folder.path()));
+    assert_eq!(kinds, BTreeSet::from(["MOCK-00001 mock 400".to_owned()]));
+}
+
+#[test]
+fn a_restart_or_hangup_in_the_home_after_a_scan_is_what_it_is() {
+    for faults in ["motor_reset=0.2", "motor_hangup=0.2"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut rig = Rig::new(folder.path(), Pace::Virtual);
+        rig.plug(faults, 1);
+        // One beam at home: the motor only ever goes home, before and after.
+        let daemon = start(&rig, folder.path(), &["--set", "plan.to_deg=0.9"]);
+        wait_until("scans", || daemon.health()["scans"]["completed"].as_u64() >= Some(20));
+        assert_eq!(daemon.stop(), Some(0));
+        let log = clean_log(folder.path());
+        let events = log.events();
+        assert!(events.iter().any(|event| event.contains("could not go home")), "{events:?}");
+        for nonsense in ["identified", "configured", "fault of the program"] {
+            let found = events.iter().find(|event| {
+                event.contains(nonsense) && !event.contains("ready again")
+            });
+            assert_eq!(found, None, "{faults}");
+        }
+        let empty = log.of_type("scan_end").filter(|end| end["beams"] == 0).count();
+        let begun = log.of_type("scan_start").count();
+        // Where the Home before it fails again and again, a scan is given up.
+        assert!(empty * 10 <= begun, "{faults}: {empty} of {begun} scans are empty: {events:?}");
+    }
+}
