@@ -133,7 +133,8 @@ fn limits_are_as_documented() {
 fn timers_are_as_documented() {
     let device =
         [DeviceTimer::Settle, DeviceTimer::MinInterval, DeviceTimer::Lease, DeviceTimer::Hold];
-    let of_host = [HostTimer::Reply, HostTimer::Completion, HostTimer::KeepAlive, HostTimer::Progress];
+    let of_host =
+        [HostTimer::Reply, HostTimer::Completion, HostTimer::KeepAlive, HostTimer::Progress];
     let coded: Vec<_> = device
         .iter()
         .map(|timer| (format!("{timer:?}"), "device"))

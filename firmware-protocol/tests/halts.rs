@@ -23,9 +23,10 @@ fn coils_are_released_also_where_no_index_was_found() {
     assert_eq!(events.last(), Some(&HostEvent::Failed(refused)));
     sim.idle(10_000_000).expect("no hang");
     assert_eq!(sim.world.coils_released, 1);
-    let told = sim.events.iter().filter(|(_, event)| {
-        matches!(event, HostEvent::Fault(FaultKind::HoldExpired))
-    });
+    let told = sim
+        .events
+        .iter()
+        .filter(|(_, event)| matches!(event, HostEvent::Fault(FaultKind::HoldExpired)));
     assert_eq!(told.count(), 1, "once");
 }
 

@@ -167,7 +167,8 @@ fn a_full_disk_stops_the_scan_and_what_is_in_the_log_is_counted_right() {
 fn a_restart_in_the_home_after_a_scan_leaves_the_next_one_whole() {
     let folder = tempfile::tempdir().expect("a folder");
     // One beam at home: the motor only ever goes home, before and after.
-    let further = ["--to-deg", "0.9", "--repeat", "20", "--faults", "motor_reset=0.2", "--seed", "3"];
+    let further =
+        ["--to-deg", "0.9", "--repeat", "20", "--faults", "motor_reset=0.2", "--seed", "3"];
     let output = mock_scan("fig9", folder.path(), &further);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(stderr(&output).contains("could not go home"), "{}", stderr(&output));
@@ -182,7 +183,8 @@ fn a_reading_that_cannot_be_is_told_and_never_good() {
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     let log = Log::read(&folder.path().join("scan.jsonl"));
     log.assert_each_beam_once(400);
-    let lost: Vec<_> = log.pings().into_iter().filter(|ping| ping["status"] == "link_lost").collect();
+    let lost: Vec<_> =
+        log.pings().into_iter().filter(|ping| ping["status"] == "link_lost").collect();
     assert_eq!(lost.len(), 4, "beams 7, 107, 207 and 307");
     assert!(lost.iter().all(|ping| ping["index"].as_u64().is_some_and(|index| index % 100 == 7)));
     assert_eq!((&log.end()["missing"], &log.end()["beams"]), (&4.into(), &396.into()));

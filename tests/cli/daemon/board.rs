@@ -12,9 +12,7 @@ use sonard::{
     acoustics::Sensor,
     board::Board,
     config::{Keys, Mode},
-    daemon::{
-        Asked, Handle, Journal, LinkState, Order, Resources, Settings, Trouble, prepare,
-    },
+    daemon::{Asked, Handle, Journal, LinkState, Order, Resources, Settings, Trouble, prepare},
     link,
     mock::Pace,
     scene::parse_pose,

@@ -93,9 +93,9 @@ fn a_restart_or_hangup_in_the_home_after_a_scan_is_what_it_is() {
         let events = log.events();
         assert!(events.iter().any(|event| event.contains("could not go home")), "{events:?}");
         for nonsense in ["identified", "configured", "fault of the program"] {
-            let found = events.iter().find(|event| {
-                event.contains(nonsense) && !event.contains("ready again")
-            });
+            let found = events
+                .iter()
+                .find(|event| event.contains(nonsense) && !event.contains("ready again"));
             assert_eq!(found, None, "{faults}");
         }
         let empty = log.of_type("scan_end").filter(|end| end["beams"] == 0).count();
