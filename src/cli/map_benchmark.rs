@@ -93,7 +93,7 @@ const HELP: &str = "\
 Examples:
   sonard map-benchmark                         128 courses; the same seed gives the same table
   sonard map-benchmark --maps 16 --out maps    and pictures of the maps
-  sonard map-benchmark --extend 0 --whole-readings --least-confidence 0     the paper to the letter
+  sonard map-benchmark --extend 0 --whole-readings --least-confidence 0     the paper's way, but for splits
 
 The benchmarks, in percent: correlation of the two maps (more is better); map score, the mean \
 squared difference of cells; the same of cells occupied in either map; and of the shortest ways \
