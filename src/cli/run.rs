@@ -68,7 +68,7 @@ pub(super) struct Args {
     /// Folder of the logs (log.folder)
     #[arg(long, value_name = "DIR")]
     log: Option<String>,
-    /// Unix socket of the API (server.socket)
+    /// Unix socket of the API (server.socket); a dead one of that name is replaced, no other file
     #[arg(long, value_name = "PATH")]
     socket: Option<String>,
     #[command(flatten)]

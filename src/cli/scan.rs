@@ -87,7 +87,8 @@ pub(super) struct Args {
     at: DaemonArgs,
     #[command(flatten)]
     place: PlaceArgs,
-    /// Write scan.jsonl, scan.svg and scan.png to this folder instead of records to standard output
+    /// Write scan.jsonl, scan.svg and scan.png to this folder instead of records to standard output; a
+    /// log that is there is added to if its scans are of the same setup
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
     /// How often to take the scan
