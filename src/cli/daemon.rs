@@ -1,6 +1,6 @@
 //! Which daemon a verb asks.
 
-use std::{fs, path::PathBuf};
+use std::path::PathBuf;
 
 use serde_json::Value;
 
@@ -8,6 +8,7 @@ use super::{Failure, Outcome};
 use crate::{
     client::{Client, ClientError, Place, ScansError},
     scene::Scene,
+    server::{TokenError, read_token},
 };
 
 /// Where the daemon is.
@@ -44,11 +45,12 @@ impl DaemonArgs {
             ));
         }
         let token = self.token_file.as_ref().map(|file| {
-            fs::read_to_string(file).map(|text| text.trim().to_owned()).map_err(|error| {
-                Failure::input(
-                    format!("cannot read the token in {}: {error}", file.display()),
-                    "give --token-file a copy of the daemon's server.token_file",
-                )
+            read_token(file).map_err(|error| {
+                let help = match error {
+                    TokenError::Open(_) => error.help(file),
+                    _ => "give --token-file a copy of the daemon's server.token_file".into(),
+                };
+                Failure::input(format!("the token in {}: {error}", file.display()), help)
             })
         });
         Ok(Client::new(Place::Address(host.to_owned()), token.transpose()?))

@@ -5,7 +5,7 @@ mod mock;
 
 use std::{
     io::{self, IsTerminal as _},
-    path::PathBuf,
+    path::{Path, PathBuf},
 };
 
 use rustix::process::Signal;
@@ -22,7 +22,7 @@ use crate::{
     board,
     daemon::{self, Handle, Journal, Order, Resources, Settings},
     link,
-    server::{Access, Listeners, Server},
+    server::{Access, Listeners, Server, read_token},
 };
 use load::Loader;
 use mock::Mock;
@@ -185,20 +185,12 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
 fn access(settings: &Settings, listeners: &Listeners) -> Result<Access, Failure> {
     let keys = &settings.keys.server;
     let token = match &keys.token_file {
-        Some(file) => Some(std::fs::read_to_string(file).map_err(|error| {
-            Failure::input(
-                format!("cannot read server.token_file {file}: {error}"),
-                "make it with `openssl rand -hex 32`, readable for this user only",
-            )
+        Some(file) => Some(read_token(Path::new(file)).map_err(|error| {
+            let help = error.help(Path::new(file));
+            Failure::input(format!("server.token_file {file}: {error}"), help)
         })?),
         None => None,
     };
-    if token.as_ref().is_some_and(|token| token.trim().len() < 16) {
-        return Err(Failure::input(
-            "the token in server.token_file is shorter than 16 characters",
-            "make one with `openssl rand -hex 32`",
-        ));
-    }
     let mut access = Access::new(&keys.hosts, token.as_deref());
     for address in listeners.addresses().into_iter().flatten() {
         if !address.ip().is_loopback() && token.is_none() {

@@ -228,22 +228,23 @@ pub struct ServerKeys {
     /// Unix socket (restart); empty for none. systemd's RUNTIME_DIRECTORY goes before the default.
     #[schemars(extend("x-default-yields" = true))]
     pub socket: String,
-    /// Who may use the socket: its permissions, octal (restart).
-    #[schemars(regex(pattern = "^0?[0-7]{3}$"))]
+    /// Who may use the socket: its permissions, three octal digits, as of chmod (restart).
     pub socket_mode: String,
     /// TCP address of API and live page (restart). Off loopback, all data need a token.
     #[schemars(example = "127.0.0.1:8765")]
     pub listen: Option<String>,
-    /// File with the token that writes over TCP must show (restart); without one there are no
-    /// writes over TCP.
+    /// File with the token that writes over TCP must show, readable by its owner alone (restart);
+    /// without one there are no writes over TCP.
     #[schemars(example = "/etc/sonard/token")]
     pub token_file: Option<String>,
     /// Host names, besides those of loopback, under which a browser may ask (restart).
     pub hosts: Vec<String>,
-    /// Connections at a time (restart).
+    /// Connections at a time (restart): so many by the socket, by TCP from this computer, and by TCP
+    /// from others, each by itself.
     #[schemars(range(min = 1, max = 10_000))]
     pub max_clients: u32,
-    /// Requests a second, from all clients together (restart).
+    /// Requests a second (restart): so many by the socket, with the token, and of all others, each by
+    /// itself. What is refused counts nowhere.
     #[schemars(range(min = 1, max = 100_000))]
     pub max_requests_per_s: f64,
     /// Largest body of a request, kilobytes (restart).
@@ -343,6 +344,17 @@ impl Default for LogKeys {
 impl Default for LinkKeys {
     fn default() -> Self {
         Self { attempts: 7, retry_min_s: 0.2, retry_max_s: 5.0, check_s: 5.0 }
+    }
+}
+
+impl ServerKeys {
+    /// The socket's permissions; `None` if they are not three octal digits.
+    #[must_use]
+    pub fn socket_permissions(&self) -> Option<u32> {
+        let digits = self.socket_mode.strip_prefix('0').unwrap_or(&self.socket_mode);
+        let digits = if digits.len() == 3 { digits } else { &self.socket_mode };
+        let octal = digits.len() == 3 && digits.bytes().all(|digit| (b'0'..=b'7').contains(&digit));
+        u32::from_str_radix(digits, 8).ok().filter(|_| octal)
     }
 }
 

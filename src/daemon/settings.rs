@@ -1,6 +1,6 @@
 //! Everything the daemon works by, checked and loaded.
 
-use std::{sync::Arc, time::Duration};
+use std::{net::SocketAddr, sync::Arc, time::Duration};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -160,11 +160,32 @@ impl Settings {
         Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa).map_err(|error| {
             Mismatch { key: "air.temperature_c", message: error.to_string(), help: String::new() }
         })?;
+        self.check_server()?;
         if self.keys.link.retry_max_s < self.keys.link.retry_min_s {
             return Err(Mismatch {
                 key: "link.retry_max_s",
                 message: "the longest wait is shorter than the first one".into(),
                 help: "give link.retry_max_s at least link.retry_min_s".into(),
+            });
+        }
+        Ok(())
+    }
+
+    fn check_server(&self) -> Result<(), Mismatch> {
+        let server = &self.keys.server;
+        if server.socket_permissions().is_none() {
+            return Err(Mismatch {
+                key: "server.socket_mode",
+                message: format!("server.socket_mode is {}", server.socket_mode),
+                help: "three octal digits: 0660 for the socket's group, 0600 for its owner".into(),
+            });
+        }
+        let listen = server.listen.as_deref().unwrap_or("127.0.0.1:0");
+        if listen.parse::<SocketAddr>().is_err() {
+            return Err(Mismatch {
+                key: "server.listen",
+                message: format!("server.listen is {listen}"),
+                help: "an address and a port, such as 127.0.0.1:8765 or [::1]:8765".into(),
             });
         }
         Ok(())

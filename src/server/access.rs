@@ -2,7 +2,7 @@
 //!
 //! On the unix socket the file's permissions decide. Over TCP any program on the computer, and
 //! any page in a browser on it, could knock: a page gives itself away by `Host` (a name made to
-//! point here) or `Origin`, and writing needs a token that no page knows.
+//! point here), `Origin` or `Sec-Fetch-Site`, and writing needs a token that no page knows.
 
 use std::net::IpAddr;
 
@@ -23,6 +23,18 @@ pub enum Peer {
     Loopback,
     /// By TCP on another address.
     Network,
+}
+
+/// On what ground a request is let in. Each has requests a second of its own, so that none takes
+/// them from another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// It came by the unix socket, whose permissions say who may.
+    Socket,
+    /// It shows the token.
+    Token,
+    /// It only reads, from this computer, or asks for what everybody may see.
+    Guest,
 }
 
 /// Why a request is refused.
@@ -65,7 +77,7 @@ impl Access {
         self
     }
 
-    /// Whether a request may go on.
+    /// On what ground a request may go on.
     ///
     /// # Errors
     /// Why not.
@@ -75,22 +87,25 @@ impl Access {
         method: &Method,
         uri: &Uri,
         headers: &HeaderMap,
-    ) -> Result<(), Refused> {
-        self.check_origin(headers)?;
+    ) -> Result<Standing, Refused> {
+        self.check_origin(uri, headers)?;
         if peer == Peer::Unix {
-            return Ok(());
+            return Ok(Standing::Socket);
         }
         self.check_host(uri, headers)?;
+        if self.shows_token(headers) {
+            return Ok(Standing::Token);
+        }
         let reads = matches!(*method, Method::GET | Method::HEAD | Method::OPTIONS);
         // A browser can't show a token before the page is there that asks for it.
         if reads && (peer == Peer::Loopback || is_public(uri.path())) {
-            return Ok(());
+            return Ok(Standing::Guest);
         }
-        self.check_token(headers)
+        Err(self.lacks_token())
     }
 
-    fn check_origin(&self, headers: &HeaderMap) -> Result<(), Refused> {
-        let Some(origin) = headers.get(ORIGIN) else { return Ok(()) };
+    fn check_origin(&self, uri: &Uri, headers: &HeaderMap) -> Result<(), Refused> {
+        let Some(origin) = headers.get(ORIGIN) else { return check_site(uri, headers) };
         let host = origin
             .to_str()
             .ok()
@@ -120,27 +135,29 @@ impl Access {
         })
     }
 
-    fn check_token(&self, headers: &HeaderMap) -> Result<(), Refused> {
-        let Some(token) = self.token else {
-            return Err(Refused {
-                status: StatusCode::FORBIDDEN,
-                message: "nothing may be changed over TCP: there is no token".into(),
-                help: "use the unix socket, or set server.token_file",
-            });
-        };
+    fn shows_token(&self, headers: &HeaderMap) -> bool {
         let shown = headers
             .get(AUTHORIZATION)
             .and_then(|value| value.to_str().ok())
-            .and_then(|value| value.strip_prefix("Bearer "));
+            .and_then(|value| value.split_once(' '))
+            .filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"));
         // Digests are compared, so that the time says nothing about the token.
-        if shown.is_some_and(|shown| digest(shown.trim()) == token) {
-            return Ok(());
+        shown.is_some_and(|(_, shown)| self.token == Some(digest(shown.trim())))
+    }
+
+    fn lacks_token(&self) -> Refused {
+        if self.token.is_none() {
+            return Refused {
+                status: StatusCode::FORBIDDEN,
+                message: "nothing may be changed over TCP: there is no token".into(),
+                help: "use the unix socket, or set server.token_file",
+            };
         }
-        Err(Refused {
+        Refused {
             status: StatusCode::UNAUTHORIZED,
             message: "the token is missing or wrong".into(),
             help: "send `Authorization: Bearer TOKEN` with what is in server.token_file",
-        })
+        }
     }
 
     /// Whether a host, with or without a port, is one of this server's names.
@@ -153,6 +170,21 @@ impl Access {
         let name = name.to_ascii_lowercase();
         ["localhost", "127.0.0.1", "[::1]"].contains(&name.as_str()) || self.hosts.contains(&name)
     }
+}
+
+/// Images and scripts of a page are asked for without `Origin`, but browsers say that they belong to
+/// a page from elsewhere. A link to the live page may be followed from anywhere.
+fn check_site(uri: &Uri, headers: &HeaderMap) -> Result<(), Refused> {
+    let says = |name: &str, word: &str| headers.get(name).is_some_and(|value| value == word);
+    let follows_link = says("sec-fetch-mode", "navigate") && is_public(uri.path());
+    if !says("sec-fetch-site", "cross-site") || follows_link {
+        return Ok(());
+    }
+    Err(Refused {
+        status: StatusCode::FORBIDDEN,
+        message: "pages from elsewhere may not ask here".into(),
+        help: "open the page from this server itself",
+    })
 }
 
 fn digest(token: &str) -> [u8; 32] {
@@ -185,7 +217,41 @@ mod tests {
             map.append(*name, HeaderValue::from_str(value).expect("a header"));
         }
         let uri = path.parse().expect("a path");
-        access.check(peer, method, &uri, &map).map_err(|refused| refused.status.as_u16())
+        access.check(peer, method, &uri, &map).map(drop).map_err(|refused| refused.status.as_u16())
+    }
+
+    #[test]
+    fn each_request_stands_on_its_own_ground() {
+        let access = Access::new(&[], Some("secret"));
+        let ask = |peer, token: &str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(HOST, HeaderValue::from_static("localhost"));
+            headers.insert(AUTHORIZATION, HeaderValue::from_str(token).expect("a header"));
+            access.check(peer, &Method::GET, &Uri::from_static("/v1/status"), &headers)
+        };
+        assert_eq!(ask(Peer::Unix, "Bearer secret"), Ok(Standing::Socket));
+        assert_eq!(ask(Peer::Loopback, "bEARER  secret"), Ok(Standing::Token));
+        assert_eq!(ask(Peer::Network, "bearer secret"), Ok(Standing::Token));
+        assert_eq!(ask(Peer::Loopback, "Bearer wrong"), Ok(Standing::Guest));
+        assert_eq!(ask(Peer::Loopback, "Basic secret"), Ok(Standing::Guest));
+    }
+
+    #[test]
+    fn images_of_foreign_pages_are_refused_and_links_to_the_page_followed() {
+        let (access, host) = (Access::default(), ("host", "localhost:8765"));
+        let foreign = ("sec-fetch-site", "cross-site");
+        let navigates = ("sec-fetch-mode", "navigate");
+        for (path, headers, expected) in [
+            ("/v1/status", vec![host, foreign, ("sec-fetch-mode", "no-cors")], Err(403)),
+            ("/v1/status", vec![host, foreign, navigates], Err(403)),
+            ("/page/main.js", vec![host, foreign, ("sec-fetch-mode", "no-cors")], Err(403)),
+            ("/", vec![host, foreign, navigates], Ok(())),
+            ("/v1/status", vec![host, ("sec-fetch-site", "same-origin")], Ok(())),
+            ("/v1/status", vec![host, ("sec-fetch-site", "none"), navigates], Ok(())),
+        ] {
+            let answer = ask_for(path, &access, Peer::Loopback, &Method::GET, &headers);
+            assert_eq!(answer, expected, "{path} {headers:?}");
+        }
     }
 
     #[test]
@@ -211,6 +277,7 @@ mod tests {
             (&put, vec![host, ("authorization", "Bearer wrong")], Err(401)),
             (&put, vec![host, ("authorization", "secret")], Err(401)),
             (&put, vec![host, token], Ok(())),
+            (&put, vec![host, ("authorization", "bearer secret")], Ok(())),
             (&put, vec![host, token, ("origin", "http://evil.example")], Err(403)),
         ] {
             assert_eq!(ask(&access, Peer::Loopback, method, &headers), expected, "{headers:?}");

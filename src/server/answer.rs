@@ -3,14 +3,17 @@
 use axum::{
     Json,
     extract::{
-        FromRequest, FromRequestParts,
-        rejection::{JsonRejection, QueryRejection},
+        FromRequest, FromRequestParts, Request,
+        rejection::{JsonRejection, PathRejection, QueryRejection},
     },
-    http::StatusCode,
+    http::{HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{
+    Deserialize, Deserializer, Serialize,
+    de::{DeserializeOwned, Error as _},
+};
 
 use super::access::Refused;
 use crate::daemon::Refusal;
@@ -50,7 +53,12 @@ impl Failed {
 
 impl IntoResponse for Failed {
     fn into_response(self) -> Response {
-        (self.status, Json(self.problem)).into_response()
+        let mut response = (self.status, Json(self.problem)).into_response();
+        if self.status == StatusCode::UNAUTHORIZED {
+            let scheme = HeaderValue::from_static("Bearer realm=\"sonard\"");
+            response.headers_mut().insert(header::WWW_AUTHENTICATE, scheme);
+        }
+        response
     }
 }
 
@@ -80,10 +88,45 @@ impl From<QueryRejection> for Failed {
     }
 }
 
+impl From<PathRejection> for Failed {
+    fn from(rejection: PathRejection) -> Self {
+        Self::new(rejection.status(), rejection.body_text(), "see GET /v1/openapi.json")
+    }
+}
+
 /// A JSON body whose faults are answered in JSON.
-#[derive(FromRequest)]
-#[from_request(via(Json), rejection(Failed))]
 pub(super) struct Body<T>(pub(super) T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Body<T> {
+    type Rejection = Failed;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Failed> {
+        let Json(Strict(body)) = Json::from_request(request, state).await?;
+        Ok(Self(body))
+    }
+}
+
+/// What is read only if nothing in it is unknown, however deep: a key that is left out by mistyping it
+/// would silently keep its default.
+struct Strict<T>(T);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for Strict<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let mut unknown = None;
+        let value = serde_ignored::deserialize(deserializer, |path| {
+            unknown.get_or_insert_with(|| path.to_string());
+        })?;
+        match unknown {
+            None => Ok(Self(value)),
+            Some(name) => Err(D::Error::custom(format!("unknown field `{name}`"))),
+        }
+    }
+}
+
+/// Parts of the path whose faults are answered in JSON.
+#[derive(FromRequestParts)]
+#[from_request(via(axum::extract::Path), rejection(Failed))]
+pub(super) struct Path<T>(pub(super) T);
 
 /// A query whose faults are answered in JSON.
 #[derive(FromRequestParts)]

@@ -1,6 +1,8 @@
 //! Connections: taken in up to a bound, each with its own limits, ended in order.
 
-use std::{error::Error as _, future::Future, io, pin::pin, sync::Arc, time::Duration};
+use std::{
+    error::Error as _, future::Future, io, net::IpAddr, pin::pin, sync::Arc, time::Duration,
+};
 
 use axum::extract::Request;
 use hyper::{body::Incoming, server::conn::http1, service::service_fn};
@@ -15,7 +17,7 @@ use tokio_io_timeout::TimeoutStream;
 use tokio_util::sync::CancellationToken;
 use tower::ServiceExt as _;
 
-use super::{Listeners, Peer, Server};
+use super::{Listeners, Peer, Server, places::Place, plain::Worded};
 
 /// How long the head of a request may take.
 const HEAD_TIME: Duration = Duration::from_secs(5);
@@ -33,16 +35,16 @@ impl Server {
         for listener in std::mem::take(&mut listeners.unix) {
             let server = Arc::clone(&server);
             accepting.spawn(server.accept(Peer::Unix, shutdown.clone(), async move || {
-                listener.accept().await.map(|(stream, _)| stream)
+                listener.accept().await.map(|(stream, _)| (stream, None))
             }));
         }
         for (listener, peer) in std::mem::take(&mut listeners.tcp) {
             let server = Arc::clone(&server);
             accepting.spawn(server.accept(peer, shutdown.clone(), async move || {
-                let (stream, _) = listener.accept().await?;
+                let (stream, from) = listener.accept().await?;
                 // Each line goes out at once.
                 stream.set_nodelay(true)?;
-                Ok(stream)
+                Ok((stream, Some(from.ip())))
             }));
         }
         stop.await;
@@ -56,23 +58,25 @@ impl Server {
         self: Arc<Self>,
         peer: Peer,
         shutdown: CancellationToken,
-        next: impl AsyncFn() -> io::Result<S>,
+        next: impl AsyncFn() -> io::Result<(S, Option<IpAddr>)>,
     ) {
         let mut connections = JoinSet::new();
         loop {
-            let stream = tokio::select! {
+            let came = tokio::select! {
                 () = shutdown.cancelled() => break,
                 Some(_) = connections.join_next(), if !connections.is_empty() => continue,
-                stream = next() => stream,
+                came = next() => came,
             };
-            match (stream, Arc::clone(&self.places).try_acquire_owned()) {
-                (Ok(stream), Ok(place)) => {
-                    let server = Arc::clone(&self);
-                    connections.spawn(server.serve(peer, stream, place, shutdown.clone()));
-                }
-                (Ok(stream), Err(_full)) => drop(connections.spawn(turn_away(stream))),
+            let Ok((stream, address)) = came else {
                 // No descriptors left: some will be given back.
-                (Err(_), _) => sleep(Duration::from_millis(100)).await,
+                sleep(Duration::from_millis(100)).await;
+                continue;
+            };
+            if let Some(place) = self.places.take(peer, address) {
+                let server = Arc::clone(&self);
+                connections.spawn(server.serve(peer, stream, place, shutdown.clone()));
+            } else if let Ok(place) = Arc::clone(&self.doorstep).try_acquire_owned() {
+                connections.spawn(turn_away(stream, place));
             }
         }
         drop(timeout(LAST_CALL, async { while connections.join_next().await.is_some() {} }).await);
@@ -82,7 +86,7 @@ impl Server {
         self: Arc<Self>,
         peer: Peer,
         stream: S,
-        _place: OwnedSemaphorePermit,
+        _place: Place,
         shutdown: CancellationToken,
     ) {
         let mut stream = TimeoutStream::new(stream);
@@ -96,7 +100,7 @@ impl Server {
             .timer(TokioTimer::new())
             .header_read_timeout(HEAD_TIME)
             .max_buf_size(BUFFER)
-            .serve_connection(TokioIo::new(Box::pin(stream)), service);
+            .serve_connection(TokioIo::new(Worded::new(Box::pin(stream))), service);
         let mut connection = pin!(connection);
         let ended = tokio::select! {
             ended = &mut connection => ended,
@@ -114,12 +118,14 @@ impl Server {
 }
 
 /// Says that all places are taken.
-async fn turn_away<S: AsyncRead + AsyncWrite>(stream: S) {
+async fn turn_away<S: AsyncRead + AsyncWrite>(stream: S, _place: OwnedSemaphorePermit) {
     const BODY: &str =
         "{\"error\":\"too many clients\",\"help\":\"try later, or raise server.max_clients\"}\n";
     let answer = format!(
         "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\n\
-         Connection: close\r\nRetry-After: 5\r\nContent-Length: {}\r\n\r\n{BODY}",
+         X-Content-Type-Options: nosniff\r\nCache-Control: no-store\r\n\
+         Cross-Origin-Resource-Policy: same-origin\r\nConnection: close\r\nRetry-After: 5\r\n\
+         Content-Length: {}\r\n\r\n{BODY}",
         BODY.len()
     );
     let mut stream = pin!(stream);

@@ -17,6 +17,9 @@ use tokio::net::{TcpListener, UnixListener};
 use super::Peer;
 use crate::config::ServerKeys;
 
+const SOCKET: &str = "server.socket";
+const LISTEN: &str = "server.listen";
+
 /// Sockets that the server listens on.
 #[derive(Debug, Default)]
 pub struct Listeners {
@@ -53,6 +56,8 @@ impl Made {
 #[derive(Debug, Error)]
 #[error("cannot listen on {place}: {source}")]
 pub struct ListenError {
+    /// The key that names it; `None` for sockets that systemd hands over.
+    pub key: Option<&'static str>,
     /// The path or address.
     pub place: String,
     /// What the system says.
@@ -63,19 +68,31 @@ impl ListenError {
     /// What a person can do about it.
     #[must_use]
     pub fn help(&self) -> &'static str {
-        match self.source.kind() {
-            io::ErrorKind::AddrInUse => {
+        match (self.key, self.source.kind()) {
+            (Some(SOCKET), io::ErrorKind::AddrInUse) => {
                 "another sonard listens there: stop it, or give this one another server.socket"
             }
-            io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied => {
+            (Some(SOCKET), io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied) => {
                 "give server.socket in a folder that exists and that you may write to, or an \
                  empty one for no socket"
             }
-            io::ErrorKind::AlreadyExists => {
+            (Some(SOCKET), io::ErrorKind::AlreadyExists) => {
                 "only a socket that a dead sonard left behind is replaced: give server.socket a name \
                  of its own"
             }
-            _ => "see server.socket and server.listen",
+            (Some(LISTEN), io::ErrorKind::AddrInUse) => {
+                "another program listens on that port: stop it, or give this one another \
+                 server.listen"
+            }
+            (Some(LISTEN), io::ErrorKind::AddrNotAvailable) => {
+                "give server.listen an address of this computer, such as 127.0.0.1:8765"
+            }
+            (Some(LISTEN), io::ErrorKind::PermissionDenied) => {
+                "ports below 1024 are the system's: give server.listen a higher one"
+            }
+            (Some(LISTEN), _) => "see server.listen",
+            (Some(_), _) => "see server.socket",
+            (None, _) => "see the socket unit: it hands over stream sockets",
         }
     }
 }
@@ -88,19 +105,21 @@ impl Listeners {
     /// When a socket can't be made, or another program listens there.
     pub fn open(keys: &ServerKeys) -> Result<Self, ListenError> {
         let mut listeners = Self::default();
-        let fail = |place: &str| {
+        let fail = |key, place: &str| {
             let place = place.to_owned();
-            move |source| ListenError { place, source }
+            move |source| ListenError { key, place, source }
         };
-        listeners.take_inherited().map_err(fail("the sockets of systemd"))?;
+        listeners.take_inherited().map_err(fail(None, "the sockets of systemd"))?;
         if listeners.unix.is_empty() && !keys.socket.is_empty() {
             let path = PathBuf::from(&keys.socket);
-            let mode = u32::from_str_radix(&keys.socket_mode, 8).unwrap_or(0o600);
-            listeners.unix.push(bind_unix(&path, mode).map_err(fail(&keys.socket))?);
-            listeners.made.push(Made::at(path).map_err(fail(&keys.socket))?);
+            // Checked with the configuration; nothing wider than meant comes of a wrong one.
+            let mode = keys.socket_permissions().unwrap_or(0o600);
+            let bound = bind_unix(&path, mode).map_err(fail(Some(SOCKET), &keys.socket))?;
+            listeners.unix.push(bound);
+            listeners.made.push(Made::at(path).map_err(fail(Some(SOCKET), &keys.socket))?);
         }
         if let Some(address) = keys.listen.as_deref().filter(|_| listeners.tcp.is_empty()) {
-            listeners.add_tcp(address).map_err(fail(address))?;
+            listeners.add_tcp(address).map_err(fail(Some(LISTEN), address))?;
         }
         Ok(listeners)
     }

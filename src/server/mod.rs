@@ -1,16 +1,21 @@
 //! The HTTP API, on a unix socket and on loopback TCP.
 //!
 //! Everything a client can do to the server is bounded: connections, requests a second, size and
-//! time of a request, time without reading. A client that hits a bound loses its connection; the
-//! operator, who measures, is a task of its own and never waits for a client.
+//! time of a request, time without reading, and memory in bytes. A client that hits a bound loses its
+//! connection, and never one of another's: whoever comes by the unix socket, shows the token, or is
+//! neither, has places and requests a second of their own. The operator, who measures, is a task of
+//! its own and never waits for a client.
 
 mod access;
 mod answer;
 mod connection;
 mod listen;
 mod openapi;
+mod places;
+mod plain;
 mod rate;
 mod routes;
+mod token;
 
 use std::{
     path::PathBuf,
@@ -21,26 +26,34 @@ use std::{
 use axum::{
     Router,
     extract::{DefaultBodyLimit, Request, State},
-    http::{HeaderValue, StatusCode, header},
+    http::{HeaderName, HeaderValue, StatusCode, header},
     middleware::{self, Next},
     response::{IntoResponse, Response},
 };
 use serde_json::Value;
-use tokio::{sync::Semaphore, time::Instant};
-use tower_http::{
-    catch_panic::CatchPanicLayer, set_header::SetResponseHeaderLayer, timeout::TimeoutLayer,
+use tokio::{
+    sync::Semaphore,
+    time::{Instant, timeout},
 };
+use tower_http::{catch_panic::CatchPanicLayer, set_header::SetResponseHeaderLayer};
 
-pub use access::{Access, Peer, Refused};
+pub use access::{Access, Peer, Refused, Standing};
 pub use answer::{Accepted, Problem};
 pub use listen::{ListenError, Listeners};
+pub use token::{TokenError, read_token};
 
 use crate::{config::ServerKeys, daemon::Handle, store::History};
 use answer::Failed;
-use rate::Bucket;
+use places::Places;
+use rate::Buckets;
 
 /// How long a request may take until its answer begins.
 const REQUEST_TIME: Duration = Duration::from_secs(10);
+/// Connections that may be told at a time that there is no place for them; more are closed unheard.
+const DOORSTEP: usize = 16;
+
+/// Pages of elsewhere may not show or run what is answered here.
+const NO_STRANGERS: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
 
 /// What every handler knows.
 #[derive(Clone)]
@@ -52,7 +65,8 @@ pub(crate) struct Api {
     history: Arc<Mutex<History>>,
     /// Who asks the model about a beam.
     looking: Arc<Semaphore>,
-    bucket: Arc<Mutex<Bucket>>,
+    places: Arc<Places>,
+    buckets: Arc<Mutex<Buckets>>,
     epoch: Instant,
 }
 
@@ -60,7 +74,8 @@ pub(crate) struct Api {
 pub struct Server {
     router: Router,
     daemon: Handle,
-    places: Arc<Semaphore>,
+    places: Arc<Places>,
+    doorstep: Arc<Semaphore>,
     stall: Duration,
 }
 
@@ -69,6 +84,7 @@ impl Server {
     #[must_use]
     pub fn new(daemon: Handle, log_folder: PathBuf, access: Access, keys: &ServerKeys) -> Self {
         let endpoints = routes::endpoints();
+        let places = Arc::new(Places::new(keys.max_clients as usize));
         let api = Api {
             daemon: daemon.clone(),
             history: Arc::new(Mutex::new(History::new(log_folder.clone()))),
@@ -76,46 +92,69 @@ impl Server {
             log_folder: Arc::new(log_folder),
             document: Arc::new(openapi::document(&endpoints)),
             access: Arc::new(access),
-            bucket: Arc::new(Mutex::new(Bucket::new(keys.max_requests_per_s))),
+            places: Arc::clone(&places),
+            buckets: Arc::new(Mutex::new(Buckets::new(keys.max_requests_per_s))),
             epoch: Instant::now(),
         };
-        let nosniff = (header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
-        let uncached = (header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+        let on_all = |name, value| {
+            SetResponseHeaderLayer::if_not_present(name, HeaderValue::from_static(value))
+        };
         let router = openapi::router(endpoints)
             .fallback(nothing_here)
             .method_not_allowed_fallback(other_method)
             .layer(DefaultBodyLimit::max(keys.max_body_kb as usize * 1000))
-            .layer(TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, REQUEST_TIME))
+            .layer(middleware::from_fn(in_time))
             .layer(middleware::from_fn_with_state(api.clone(), guard))
-            .layer(SetResponseHeaderLayer::if_not_present(nosniff.0, nosniff.1))
-            .layer(SetResponseHeaderLayer::if_not_present(uncached.0, uncached.1))
-            .layer(CatchPanicLayer::new())
+            .layer(CatchPanicLayer::custom(|_| failed_within().into_response()))
+            .layer(on_all(header::X_CONTENT_TYPE_OPTIONS, "nosniff"))
+            .layer(on_all(header::CACHE_CONTROL, "no-store"))
+            .layer(on_all(NO_STRANGERS, "same-origin"))
             .with_state(api);
         Self {
             router,
             daemon,
-            places: Arc::new(Semaphore::new(keys.max_clients as usize)),
+            places,
+            doorstep: Arc::new(Semaphore::new(DOORSTEP)),
             stall: Duration::from_secs_f64(keys.stall_s),
         }
     }
 }
 
-/// Lets in only what may come in, at the rate that is allowed.
-async fn guard(State(api): State<Api>, request: Request, next: Next) -> Response {
+/// Lets in only what may come in, at the rate that is allowed. What may not costs nobody who may: it
+/// is counted nowhere, and gives its place back.
+async fn guard(State(api): State<Api>, mut request: Request, next: Next) -> Response {
+    // A request that came in by no connection of this server is trusted with nothing.
+    let peer = request.extensions().get().copied().unwrap_or(Peer::Network);
+    let standing = match api.access.check(peer, request.method(), request.uri(), request.headers())
+    {
+        Ok(standing) => standing,
+        Err(refused) => {
+            return ([(header::CONNECTION, "close")], Failed::from(refused)).into_response();
+        }
+    };
     let now = api.epoch.elapsed();
     // Nothing under this lock can panic, so a poisoned one holds what it should.
-    let free = api.bucket.lock().unwrap_or_else(PoisonError::into_inner).take(now);
-    if !free {
+    if !api.buckets.lock().unwrap_or_else(PoisonError::into_inner).take(standing, now) {
         let help = "ask less often, or subscribe to /v1/live/records";
         let refusal = Failed::new(StatusCode::TOO_MANY_REQUESTS, "too many requests", help);
         return ([(header::RETRY_AFTER, "1")], refusal).into_response();
     }
-    // A request that came in by no connection of this server is trusted with nothing.
-    let peer = request.extensions().get().copied().unwrap_or(Peer::Network);
-    match api.access.check(peer, request.method(), request.uri(), request.headers()) {
-        Ok(()) => next.run(request).await,
-        Err(refused) => Failed::from(refused).into_response(),
-    }
+    request.extensions_mut().insert(standing);
+    next.run(request).await
+}
+
+/// Gives up on a request whose answer does not begin.
+async fn in_time(request: Request, next: Next) -> Response {
+    timeout(REQUEST_TIME, next.run(request)).await.unwrap_or_else(|_| {
+        let error = format!("nothing came of it within {} s", REQUEST_TIME.as_secs());
+        let help = "send the whole request at once, or try again later";
+        Failed::new(StatusCode::REQUEST_TIMEOUT, error, help).into_response()
+    })
+}
+
+fn failed_within() -> Failed {
+    let help = "this is a fault of the program: see its messages";
+    Failed::new(StatusCode::INTERNAL_SERVER_ERROR, "the daemon failed at this request", help)
 }
 
 async fn nothing_here() -> Failed {

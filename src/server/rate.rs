@@ -2,21 +2,49 @@
 
 use std::time::Duration;
 
+use super::access::Standing;
+
+/// A bucket for each standing.
+#[derive(Debug, Clone)]
+pub(super) struct Buckets {
+    socket: Bucket,
+    token: Bucket,
+    guest: Bucket,
+}
+
+impl Buckets {
+    /// So many requests a second for each.
+    pub(super) fn new(per_s: f64) -> Self {
+        let bucket = Bucket::new(per_s);
+        Self { socket: bucket.clone(), token: bucket.clone(), guest: bucket }
+    }
+
+    /// Whether one more may come in now.
+    pub(super) fn take(&mut self, standing: Standing, now: Duration) -> bool {
+        let bucket = match standing {
+            Standing::Socket => &mut self.socket,
+            Standing::Token => &mut self.token,
+            Standing::Guest => &mut self.guest,
+        };
+        bucket.take(now)
+    }
+}
+
 /// A bucket that fills at a constant rate and holds one second's worth; each request takes one.
 #[derive(Debug, Clone)]
-pub(super) struct Bucket {
+struct Bucket {
     per_s: f64,
     level: f64,
     at: Duration,
 }
 
 impl Bucket {
-    pub(super) fn new(per_s: f64) -> Self {
+    fn new(per_s: f64) -> Self {
         Self { per_s, level: per_s.max(1.0), at: Duration::ZERO }
     }
 
     /// Whether one more may come in now.
-    pub(super) fn take(&mut self, now: Duration) -> bool {
+    fn take(&mut self, now: Duration) -> bool {
         let since_s = now.saturating_sub(self.at).as_secs_f64();
         self.at = self.at.max(now);
         self.level = (self.level + since_s * self.per_s).min(self.per_s.max(1.0));

@@ -1,5 +1,7 @@
 //! The way of one beam's sound.
 
+use std::fmt;
+
 use crate::{
     cli::Failure,
     geometry::wrap_pi,
@@ -15,6 +17,15 @@ pub(super) enum Beam {
     Index(u32),
     /// The one nearest to an azimuth, degrees.
     Azimuth(f64),
+}
+
+impl fmt::Display for Beam {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Index(index) => write!(f, "number {index}"),
+            Self::Azimuth(azimuth_deg) => write!(f, "near {azimuth_deg}\u{b0}"),
+        }
+    }
 }
 
 /// The picture of a beam of the first scan, by the path that its record or the prediction in it
@@ -117,5 +128,5 @@ fn no_beam(views: &[ScanView], beam: Beam) -> Failure {
         Some(last) => format!("the scan's beams run from 0 to {last}"),
         None => "the scan has no readings; choose another with --scan".to_owned(),
     };
-    Failure::input(format!("there is no such beam: {beam:?}"), help)
+    Failure::input(format!("the scan has no beam {beam}"), help)
 }

@@ -4,8 +4,8 @@ use std::{borrow::Cow, convert::Infallible, time::Duration};
 
 use axum::{
     body::{Body, Bytes},
-    extract::State,
-    http::{HeaderMap, HeaderValue, header},
+    extract::{Extension, State},
+    http::{HeaderMap, HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use futures_util::stream;
@@ -18,7 +18,7 @@ use crate::{
     daemon::{ScanReport, Subscription, Wanted},
     scan::{Record, decode_line},
     server::{
-        Api,
+        Api, Standing,
         answer::{Failed, Query},
         openapi::Endpoint,
     },
@@ -76,23 +76,31 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
 
 async fn live_records(
     State(api): State<Api>,
+    Extension(standing): Extension<Standing>,
     headers: HeaderMap,
     Query(options): Query<Options>,
 ) -> Result<Response, Failed> {
-    live(&api, &headers, options, false)
+    live(&api, standing, &headers, options, false)
 }
 
 async fn live_scans(
     State(api): State<Api>,
+    Extension(standing): Extension<Standing>,
     headers: HeaderMap,
     Query(options): Query<Options>,
 ) -> Result<Response, Failed> {
-    live(&api, &headers, options, true)
+    live(&api, standing, &headers, options, true)
 }
 
-fn live(api: &Api, headers: &HeaderMap, options: Options, scans: bool) -> Result<Response, Failed> {
+fn live(
+    api: &Api,
+    standing: Standing,
+    headers: &HeaderMap,
+    options: Options,
+    scans: bool,
+) -> Result<Response, Failed> {
     if options.moved_m.is_some_and(|moved_m| !(moved_m.is_finite() && moved_m >= 0.0)) {
-        let status = axum::http::StatusCode::UNPROCESSABLE_ENTITY;
+        let status = StatusCode::UNPROCESSABLE_ENTITY;
         return Err(Failed::new(status, "moved_m is no length", "metres, 0 or more"));
     }
     let wanted = Wanted { moved_m: options.moved_m, scans };
@@ -102,11 +110,16 @@ fn live(api: &Api, headers: &HeaderMap, options: Options, scans: bool) -> Result
         .is_some_and(|accept| accept.contains(SSE));
     let format =
         options.format.unwrap_or(if accepts_events { Format::Sse } else { Format::Ndjson });
+    let leave = api.places.take_stream(standing).ok_or_else(|| {
+        let help = "subscribe by the unix socket, or show the token; or raise server.max_clients";
+        Failed::new(StatusCode::SERVICE_UNAVAILABLE, "too many live streams of guests", help)
+    })?;
     let subscription = api.daemon.hub().subscribe(wanted);
-    let chunks = stream::unfold(subscription, move |mut subscription| async move {
-        let chunk = next_chunk(&mut subscription, format, options.verdicts).await?;
-        Some((Ok::<_, Infallible>(chunk), subscription))
-    });
+    let chunks =
+        stream::unfold((subscription, leave), move |(mut subscription, leave)| async move {
+            let chunk = next_chunk(&mut subscription, format, options.verdicts).await?;
+            Some((Ok::<_, Infallible>(chunk), (subscription, leave)))
+        });
     let mut response = Body::from_stream(chunks).into_response();
     let media = if format == Format::Sse { SSE } else { NDJSON };
     response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(media));

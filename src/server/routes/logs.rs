@@ -3,7 +3,7 @@
 use axum::{
     Json,
     body::Body,
-    extract::{Path, State},
+    extract::State,
     http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
@@ -14,7 +14,11 @@ use tokio::{fs::File, io::AsyncReadExt as _};
 use tokio_util::io::ReaderStream;
 
 use crate::{
-    server::{Api, answer::Failed, openapi::Endpoint},
+    server::{
+        Api,
+        answer::{Failed, Path},
+        openapi::Endpoint,
+    },
     store::log_files,
 };
 

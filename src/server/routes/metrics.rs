@@ -12,7 +12,8 @@ use prometheus_client::{
 };
 
 use crate::{
-    daemon::Handle,
+    daemon::{Handle, Status},
+    scan::Provenance,
     server::{Api, answer::Failed, openapi::Endpoint},
 };
 
@@ -36,6 +37,12 @@ async fn metrics(State(api): State<Api>) -> Result<Response, Failed> {
         )
     })?;
     Ok(([(header::CONTENT_TYPE, MEDIA)], text).into_response())
+}
+
+/// A mock measures as little as the model does: only hardware is no simulation.
+fn is_made_up(status: &Status) -> bool {
+    status.provenance.is_some_and(|provenance| provenance != Provenance::Hardware)
+        || status.simulation.is_some()
 }
 
 fn registry(daemon: &Handle) -> Registry {
@@ -82,8 +89,8 @@ fn registry(daemon: &Handle) -> Registry {
         ),
         (
             "simulated",
-            "Whether the model makes the readings, and nothing is measured",
-            f64::from(u8::from(status.simulation.is_some())),
+            "Whether readings are made up: by a mock, or by the model; 0 also before a device tells",
+            f64::from(u8::from(is_made_up(&status))),
         ),
         (
             "simulation_skipped_turns",

@@ -1,14 +1,16 @@
 //! The live page: files without secrets, which ask the API like any other client.
 
 use axum::{
-    extract::Path,
     http::{HeaderMap, HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use serde_json::json;
 use sha2::{Digest as _, Sha256};
 
-use crate::server::{answer::Failed, openapi::Endpoint};
+use crate::server::{
+    answer::{Failed, Path},
+    openapi::Endpoint,
+};
 
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";

@@ -5,11 +5,7 @@ use std::{
     sync::{Arc, PoisonError},
 };
 
-use axum::{
-    Json,
-    extract::{Path, State},
-    http::StatusCode,
-};
+use axum::{Json, extract::State, http::StatusCode};
 use jiff::Timestamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,7 +23,7 @@ use crate::{
     scene::Scene,
     server::{
         Api,
-        answer::{Failed, Query},
+        answer::{Failed, Path, Query},
         openapi::Endpoint,
     },
     store::{History, PastScan, logged_scene},

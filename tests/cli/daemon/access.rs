@@ -2,17 +2,19 @@
 
 use std::{
     io::{Read as _, Write as _},
+    net::TcpStream,
+    sync::atomic::{AtomicBool, Ordering},
+    thread,
     time::{Duration, Instant},
 };
 
-use super::{Daemon, ask, read_reply};
+use super::{Daemon, Reply, ask, read_reply, write_token};
 use crate::common::wait_until;
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 
 fn start(folder: &std::path::Path, further: &[&str]) -> Daemon {
-    let token = folder.join("token");
-    std::fs::write(&token, format!("{TOKEN}\n")).expect("a file");
+    let token = write_token(folder, format!("{TOKEN}\n"));
     let token = format!("server.token_file={}", token.display());
     let tcp = [
         "--set",
@@ -41,6 +43,7 @@ fn strangers_are_refused_and_the_daemon_keeps_scanning() {
     let json = ("Content-Type", "application/json");
     let bearer = format!("Bearer {TOKEN}");
     let token = ("Authorization", bearer.as_str());
+    let lower = format!("bearer {TOKEN}");
     let large = format!(r#"{{"scans": {}1}}"#, " ".repeat(200_000));
     for (method, path, headers, body, status) in [
         ("GET", "/v1/status", vec![host], "", 200),
@@ -55,14 +58,33 @@ fn strangers_are_refused_and_the_daemon_keeps_scanning() {
         ("POST", "/v1/start", vec![host, token, json], "{{{{", 400),
         ("POST", "/v1/start", vec![host, token, ("Content-Type", "text/plain")], "{}", 415),
         ("POST", "/v1/start", vec![host, token, json], "{}", 202),
+        ("POST", "/v1/start", vec![host, ("authorization", lower.as_str()), json], "{}", 202),
+        ("GET", "/v1/logs/%ff", vec![host], "", 400),
+        ("GET", "/page/%ff", vec![host], "", 400),
+        ("GET", "/v1/status", vec![host, ("Sec-Fetch-Site", "cross-site")], "", 403),
     ] {
         let reply = ask(daemon.connect_tcp(), method, path, &headers, body);
         assert_eq!(reply.status, status, "{method} {path} {headers:?}: {}", reply.json());
+        if status >= 400 {
+            assert_problem(&reply, path);
+        }
+        let asks_for_token = reply.head.contains("www-authenticate: bearer");
+        assert_eq!(asks_for_token, status == 401, "{}", reply.head);
+        assert!(reply.head.contains("cross-origin-resource-policy: same-origin"), "{}", reply.head);
     }
     // Not HTTP at all, and heads without end.
     let mut stream = daemon.connect_tcp();
     stream.write_all(b"\x16\x03\x01\x02\x00garbage\r\n\r\n").expect("it listens");
-    assert_eq!(read_reply(stream).status, 400);
+    let garbage = read_reply(stream);
+    assert_eq!(garbage.status, 400);
+    assert_problem(&garbage, "no HTTP");
+    let mut stream = daemon.connect_tcp();
+    let many: String = (0..200).map(|n| format!("X-{n}: 1\r\n")).collect();
+    let head = format!("GET / HTTP/1.1\r\nHost: localhost\r\n{many}\r\n");
+    stream.write_all(head.as_bytes()).expect("it listens");
+    let crowded = read_reply(stream);
+    assert_eq!(crowded.status, 431);
+    assert_problem(&crowded, "a head of many fields");
     let mut stream = daemon.connect_tcp();
     let flood = format!("GET / HTTP/1.1\r\nHost: localhost\r\nX: {}\r\n", "a".repeat(300_000));
     // It may hang up while being flooded.
@@ -80,17 +102,21 @@ fn clients_that_dawdle_lose_their_places_and_too_many_are_turned_away() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start(folder.path(), &["--set", "server.max_clients=8"]);
     let began = Instant::now();
-    // Seven heads that never end, and one place for everybody else.
+    // Seven heads that never end, and one place for everybody else who comes by TCP.
     let mut slow: Vec<_> = (0..7).map(|_| daemon.connect_tcp()).collect();
     for stream in &mut slow {
         stream.write_all(b"GET /v1/status HTTP/1.1\r\nHost: local").expect("it listens");
     }
     std::thread::sleep(Duration::from_millis(300));
-    assert_eq!(daemon.get("/v1/status").status, 200);
+    let by_tcp = || ask(daemon.connect_tcp(), "GET", "/v1/status", &[("Host", "localhost")], "");
+    assert_eq!(by_tcp().status, 200);
     let mut one_more = daemon.connect_tcp();
     one_more.write_all(b"GET /v1/status HTTP/1.1\r\nHost: local").expect("it listens");
     std::thread::sleep(Duration::from_millis(300));
-    assert_eq!(daemon.get("/v1/status").status, 503, "all places are taken");
+    let full = by_tcp();
+    assert_eq!(full.status, 503, "all places are taken");
+    assert_problem(&full, "a full house");
+    assert_eq!(daemon.get("/v1/status").status, 200, "those of the socket are not");
     for mut stream in slow {
         let mut answer = Vec::new();
         // Closed by the daemon, with or without a word.
@@ -102,7 +128,9 @@ fn clients_that_dawdle_lose_their_places_and_too_many_are_turned_away() {
     let head = "POST /v1/start HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n\
                 Content-Length: 10\r\n\r\n{";
     stream.write_all(head.as_bytes()).expect("it listens");
-    assert_eq!(read_reply(stream).status, 408);
+    let late = read_reply(stream);
+    assert_eq!(late.status, 408);
+    assert_problem(&late, "a body that never ends");
     assert!(beams(&daemon) > 5, "it went on scanning");
     assert_eq!(daemon.stop(), Some(0));
 }
@@ -120,4 +148,66 @@ fn a_flood_of_requests_is_cut_to_the_rate() {
     );
     std::thread::sleep(Duration::from_secs(1));
     wait_until("beams", || beams(&daemon) > 0);
+}
+
+/// What every refusal is, whoever makes it.
+fn assert_problem(reply: &Reply, of: &str) {
+    assert!(reply.head.contains("content-type: application/json"), "{of}: {}", reply.head);
+    let problem = reply.json();
+    let says = |name: &str| problem[name].as_str().is_some_and(|text| !text.is_empty());
+    assert!(says("error") && says("help"), "{of}: {problem}");
+}
+
+#[test]
+fn strangers_on_loopback_take_neither_places_nor_requests_from_the_owner() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = start(folder.path(), &["--set", "server.max_requests_per_s=50"]);
+    let subscribe = |host: &str| {
+        let mut stream = daemon.connect_tcp();
+        let request = format!("GET /v1/live/records HTTP/1.1\r\nHost: {host}\r\n\r\n");
+        drop(stream.write_all(request.as_bytes()));
+        stream
+    };
+    // As many streams as there are places, and a flood of what is refused and of what is not.
+    let streams: Vec<_> = (0..128).map(|_| subscribe("localhost")).collect();
+    let streaming = || daemon.status()["subscribers"]["now"].as_u64();
+    wait_until("the strangers' streams", || streaming() >= Some(64));
+    let over = AtomicBool::new(false);
+    let (waits, refused) = thread::scope(|scope| {
+        let flood = |host: &'static str| {
+            let (daemon, over) = (&daemon, &over);
+            scope.spawn(move || {
+                let mut answers = 0;
+                while !over.load(Ordering::Relaxed) {
+                    let Ok(mut stream) = TcpStream::connect(daemon.address()) else { continue };
+                    drop(stream.set_read_timeout(Some(Duration::from_secs(1))));
+                    let request = format!("GET /v1/status HTTP/1.1\r\nHost: {host}\r\n\r\n");
+                    drop(stream.write_all(request.as_bytes()));
+                    answers += usize::from(stream.read(&mut [0; 64]).is_ok_and(|got| got > 0));
+                }
+                answers
+            })
+        };
+        let floods = [flood("evil.example"), flood("evil.example"), flood("localhost")];
+        let mut waits = Vec::new();
+        // What the owner is allowed, nearly: forty requests a second.
+        for _ in 0..120 {
+            let began = Instant::now();
+            let reply = daemon.get("/v1/status");
+            assert_eq!(reply.status, 200, "{}", String::from_utf8_lossy(&reply.body));
+            waits.push(began.elapsed());
+            thread::sleep(Duration::from_millis(25).saturating_sub(began.elapsed()));
+        }
+        assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
+        assert_eq!(daemon.send("POST", "/v1/start", "{}").status, 202);
+        over.store(true, Ordering::Relaxed);
+        (waits, floods.into_iter().map(|one| one.join().expect("no panic")).sum::<usize>())
+    });
+    let longest = waits.iter().max().expect("some");
+    println!("the owner's requests took {longest:?} at most, among {refused} of strangers");
+    assert!(refused > 200, "{refused} requests are no flood");
+    assert!(*longest < Duration::from_secs(2), "{longest:?}");
+    assert_eq!(streaming(), Some(64), "guests get half of the places for streams");
+    drop(streams);
+    assert_eq!(daemon.stop(), Some(0));
 }

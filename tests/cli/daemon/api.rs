@@ -80,6 +80,14 @@ fn the_server_does_what_its_document_says() {
         }
     }
     assert!(operations >= 25, "{operations} operations");
+    // What only looks like a log is none, and breaks no list.
+    let folder_like_a_log = folder.path().join("log/sonard-20260101T000000Z.jsonl");
+    std::fs::create_dir(folder_like_a_log).expect("it is new");
+    let names = daemon.get("/v1/logs").json();
+    assert_eq!(names.as_array().map(Vec::len), Some(1), "{names}");
+    assert_eq!(daemon.get("/v1/scans").status, 200);
+    let figures = String::from_utf8(daemon.get("/metrics").body).expect("text");
+    assert!(figures.contains("\nsonard_simulated 1"), "a mock measures nothing: {figures}");
     // Refusals are as the document says, too.
     for (method, path, body, status) in [
         ("GET", "/v1/nothing", "", 404),
@@ -87,6 +95,16 @@ fn the_server_does_what_its_document_says() {
         ("DELETE", "/v1/plan", "", 405),
         ("PUT", "/v1/plan", "{", 400),
         ("PUT", "/v1/plan", "{}", 422),
+        (
+            "PUT",
+            "/v1/plan",
+            r#"{"from_deg":0,"to_deg":9,"step_deg":0.9,"pings_per_stop":1,"pings":2}"#,
+            422,
+        ),
+        ("PUT", "/v1/pose", r#"{"x_m":0.5,"y_m":0.3,"heading_deg":0,"z_m":1}"#, 422),
+        ("POST", "/v1/start", r#"{"pose":{"x_m":0.5,"y_m":0.3,"heading_deg":0,"z_m":1}}"#, 422),
+        ("POST", "/v1/start", r#"{"scans":1,"scans":2}"#, 422),
+        ("GET", "/v1/logs/sonard-20260101T000000Z.jsonl", "", 404),
         ("PUT", "/v1/pose", r#"{"x_m":99,"y_m":0,"heading_deg":0}"#, 422),
         ("PUT", "/v1/air", r#"{"temperature_c":70}"#, 422),
         ("POST", "/v1/start", r#"{"scnas":1}"#, 422),

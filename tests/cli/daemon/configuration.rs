@@ -1,10 +1,10 @@
 //! File, environment and options, and taking changes in while running.
 
-use std::fs;
+use std::{fs, net::TcpListener, os::unix::fs::PermissionsExt as _};
 
 use rustix::process::Signal;
 
-use super::Daemon;
+use super::{Daemon, write_token};
 use crate::common::{run, sonard, stderr, wait_until};
 
 #[test]
@@ -61,6 +61,9 @@ fn wrong_configurations_end_with_the_place_and_a_way_out() {
         ("[model]\nsensor = \"hc\"\n", &port[..], &["presets"]),
         ("", &[][..], &["device.port is not set", "--mock"]),
         ("", &["--mock"][..], &["needs a scene"]),
+        ("[server]\nsocket_mode = \"9999\"\n", &port[..], &["s.toml:2:15", "three octal digits"]),
+        ("[server]\nsocket_mode = \"00660\"\n", &port[..], &["three octal digits"]),
+        ("[server]\nlisten = \"localhost\"\n", &port[..], &["s.toml:2:10", "127.0.0.1:8765"]),
         ("", &["--port", "x", "--set", "link.retry_max_s=0.1"][..], &["--set", "retry_min_s"]),
     ] {
         fs::write(&file, text).expect("a file");
@@ -104,6 +107,43 @@ fn a_hangup_takes_changes_in_and_a_wrong_file_changes_nothing() {
     let error = status["configuration"]["error"].as_str().expect("text");
     assert!(error.contains("s.toml:2:1") && error.contains("to_deg"), "{error}");
     assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn a_token_that_others_may_read_or_that_is_no_file_is_refused_at_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let token = write_token(folder.path(), "0123456789abcdef");
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let start = |token: &str| {
+        let key = format!("server.token_file={token}");
+        let mock = ["run", "--mock", "--scene", "simple-room", "--pose", "fig9", "--set", &key];
+        let output = run(&[&mock[..], &["--log", &path("log"), "--socket", &path("s")]].concat());
+        let said = stderr(&output).replace("\n  │ ", "").replace('\n', " ");
+        assert_eq!(output.status.code(), Some(2), "{token}: {said}");
+        said
+    };
+    let mode = |mode: u32| fs::set_permissions(&token, fs::Permissions::from_mode(mode));
+    mode(0o640).expect("it is ours");
+    let said = start(&token.display().to_string());
+    assert!(said.contains("chmod 600") && said.contains("640"), "{said}");
+    let said = start("/dev/zero");
+    assert!(said.contains("no regular file"), "{said}");
+    // The same file in a client's hands.
+    let status = ["status", "--address", "localhost:1", "--token-file", "/dev/zero"];
+    assert_eq!(run(&status).status.code(), Some(2));
+}
+
+#[test]
+fn a_port_that_is_taken_blames_the_key_that_names_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let listen = format!("server.listen={}", taken.local_addr().expect("an address"));
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let mock = ["run", "--mock", "--scene", "simple-room", "--pose", "fig9", "--set", &listen];
+    let output = run(&[&mock[..], &["--log", &path("log"), "--socket", &path("s")]].concat());
+    let said = stderr(&output).replace("\n  │ ", "").replace('\n', " ");
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("server.listen") && !said.contains("server.socket"), "{said}");
 }
 
 #[test]

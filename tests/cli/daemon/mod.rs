@@ -20,7 +20,7 @@ use std::{
     fs,
     io::{BufRead as _, BufReader, Read, Write},
     net::TcpStream,
-    os::unix::net::UnixStream,
+    os::unix::{fs::PermissionsExt as _, net::UnixStream},
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     sync::{Arc, Mutex},
@@ -169,6 +169,14 @@ impl Drop for Daemon {
         drop(self.child.kill());
         drop(self.child.wait());
     }
+}
+
+/// A file with a token, as the daemon wants it.
+pub(crate) fn write_token(folder: &Path, token: impl AsRef<str>) -> PathBuf {
+    let file = folder.join("token");
+    fs::write(&file, token.as_ref()).expect("there is room");
+    fs::set_permissions(&file, fs::Permissions::from_mode(0o600)).expect("it is ours");
+    file
 }
 
 /// The logs of a daemon's folder, oldest first.

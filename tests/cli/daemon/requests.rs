@@ -10,7 +10,7 @@ use std::{
 
 use serde_json::{Value, json};
 
-use super::Daemon;
+use super::{Daemon, write_token};
 use crate::common::{Log, interrupt, sonard, stderr, wait_until};
 
 const SHORT: [&str; 6] =
@@ -75,8 +75,7 @@ fn a_scan_through_a_busy_daemon_has_its_own_plan_and_leaves_the_daemons_alone() 
 #[test]
 fn over_tcp_a_scan_needs_the_token_and_a_look_does_not() {
     let folder = tempfile::tempdir().expect("a folder");
-    let token = folder.path().join("token");
-    std::fs::write(&token, "correct horse battery\n").expect("writable");
+    let token = write_token(folder.path(), "correct horse battery\n");
     let token = token.to_str().expect("plain path").to_owned();
     let token_key = format!("server.token_file={token}");
     let tcp = ["--set", "server.listen=127.0.0.1:0", "--set", &token_key];

@@ -1,7 +1,7 @@
 //! Start and stop from the page, with and without a token.
 
 use super::{browser::Browser, browser::DESK, daemon, scanning};
-use crate::common::wait_until;
+use crate::{common::wait_until, daemon::write_token};
 
 #[test]
 fn without_a_token_the_page_says_why_nothing_is_started() {
@@ -20,8 +20,7 @@ fn without_a_token_the_page_says_why_nothing_is_started() {
 fn with_a_token_scans_are_started_and_stopped() {
     let folder = tempfile::tempdir().expect("a folder");
     let token = "0123456789abcdef0123456789abcdef";
-    let file = folder.path().join("token");
-    std::fs::write(&file, token).expect("there is room");
+    let file = write_token(folder.path(), token);
     let setting = format!("server.token_file={}", file.display());
     let (daemon, address) = daemon(folder.path(), "127.0.0.1:0", &["--set", &setting]);
     let browser = Browser::open(&address, DESK);
