@@ -1,36 +1,47 @@
-//! Hands records to subscribers: each has a queue with a bound, and nobody waits for anybody.
+//! Hands records to subscribers. What waits for them is kept once for all, within a bound in bytes,
+//! and nobody waits for anybody.
 //!
-//! A reading that finds a queue full pushes out the oldest reading in it; how many went is told
-//! in their place. Scan starts, scan ends and events are never pushed out: a subscriber with too
-//! many of them waiting is cut off.
+//! A subscriber is no more than its place in what waits. A shelf that is full drops its oldest: how many
+//! readings a subscriber missed by that is told in their place. Scan starts, scan ends and events are
+//! told without a gap: a subscriber that missed one is cut off.
+
+mod shelf;
 
 use std::{
-    collections::{BTreeMap, HashMap, VecDeque},
+    collections::HashMap,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicU64, Ordering},
+        atomic::{AtomicU64, AtomicUsize, Ordering},
     },
 };
 
-use tokio::sync::Notify;
+use tokio::sync::watch;
+use uuid::Uuid;
 
-use super::status::ScanReport;
+use super::judged::judged_line;
 use crate::scan::{Ping, PingStatus, Record, encode_line};
+use shelf::Shelf;
 
-/// Records other than readings that may wait for one subscriber.
-const CONTROL_LIMIT: usize = 1024;
+/// Most readings that wait, bytes.
+const READING_BYTES: usize = 4 << 20;
+/// Records other than readings that may wait, and scans that are over.
+const CONTROLS: usize = 1024;
+/// The same in bytes.
+const CONTROL_BYTES: usize = 4 << 20;
+/// Directions whose last reading a subscriber to what moved remembers; with more, it begins anew.
+const DIRECTIONS: usize = 1600;
 
-/// What a subscriber wants.
+/// What a subscriber wants of records.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wanted {
     /// Only readings whose range moved by more than this since it was last sent for that
-    /// direction, metres, or whose status changed; of whole scans, too.
+    /// direction, metres, or whose status changed.
     pub moved_m: Option<f64>,
-    /// Whole scans when they are over, instead of single records.
-    pub scans: bool,
+    /// Readings with their verdicts.
+    pub verdicts: bool,
 }
 
-/// One line of a stream: a JSON text, without its newline.
+/// One line of a stream: a JSON text with its newline. All subscribers share it.
 pub type Line = Arc<[u8]>;
 
 /// Hands records to subscribers. Cheap to clone: all clones are one hub.
@@ -41,66 +52,96 @@ pub struct Hub {
 
 #[derive(Debug)]
 struct Inner {
-    capacity: usize,
-    subscribers: Mutex<BTreeMap<u64, Arc<Subscriber>>>,
-    next_id: AtomicU64,
+    waiting: Mutex<Waiting>,
+    /// Changes with whatever records subscribers have to look at, and with whatever scans.
+    records: watch::Sender<()>,
+    scans: watch::Sender<()>,
+    subscribers: AtomicUsize,
+    /// Those of them who want records, and verdicts.
+    of_records: AtomicUsize,
+    of_verdicts: AtomicUsize,
     dropped: AtomicU64,
     cut_off: AtomicU64,
 }
 
 #[derive(Debug)]
-struct Subscriber {
-    wanted: Wanted,
-    queue: Mutex<Queue>,
-    wake: Notify,
-}
-
-#[derive(Debug, Default)]
-struct Queue {
-    lines: VecDeque<(Class, Line)>,
-    readings: usize,
-    /// Readings pushed out since that was last told.
-    dropped: u64,
+struct Waiting {
+    readings: Shelf<Reading>,
+    controls: Shelf<Control>,
+    scans: Shelf<Uuid>,
     closed: bool,
-    /// What was last sent for each direction: a motor step, or a ranger of an array.
-    sent: HashMap<(i32, Option<String>), (PingStatus, Option<f64>)>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Class {
-    Reading,
-    Control,
+#[derive(Debug)]
+struct Reading {
+    line: Line,
+    /// With its verdict, if somebody wanted that.
+    judged: Option<Line>,
+    step: i32,
+    ranger: Option<Box<str>>,
+    status: PingStatus,
+    range_m: Option<f64>,
+}
+
+#[derive(Debug)]
+struct Control {
+    line: Line,
+    /// Number of the reading that came after it.
+    before: u64,
 }
 
 impl Hub {
-    /// A hub whose subscribers each may have so many readings waiting.
+    /// A hub that keeps so many readings for slow subscribers.
     #[must_use]
-    pub fn new(capacity: usize) -> Self {
+    pub fn new(readings: usize) -> Self {
+        let waiting = Waiting {
+            readings: Shelf::new(readings, READING_BYTES),
+            controls: Shelf::new(CONTROLS, CONTROL_BYTES),
+            scans: Shelf::new(CONTROLS, CONTROL_BYTES),
+            closed: false,
+        };
         let inner = Inner {
-            capacity: capacity.max(1),
-            subscribers: Mutex::default(),
-            next_id: AtomicU64::new(0),
+            waiting: Mutex::new(waiting),
+            records: watch::Sender::new(()),
+            scans: watch::Sender::new(()),
+            subscribers: AtomicUsize::new(0),
+            of_records: AtomicUsize::new(0),
+            of_verdicts: AtomicUsize::new(0),
             dropped: AtomicU64::new(0),
             cut_off: AtomicU64::new(0),
         };
         Self { inner: Arc::new(inner) }
     }
 
-    /// Begins to listen.
+    /// Begins to listen for records.
     #[must_use]
     pub fn subscribe(&self, wanted: Wanted) -> Subscription {
-        let id = self.inner.next_id.fetch_add(1, Ordering::Relaxed);
-        let subscriber =
-            Arc::new(Subscriber { wanted, queue: Mutex::default(), wake: Notify::new() });
-        held(&self.inner.subscribers).insert(id, Arc::clone(&subscriber));
-        Subscription { hub: self.clone(), id, subscriber }
+        let verdicts = usize::from(wanted.verdicts);
+        self.inner.of_verdicts.fetch_add(verdicts, Ordering::Relaxed);
+        self.inner.of_records.fetch_add(1, Ordering::Relaxed);
+        let changed = self.inner.records.subscribe();
+        let waiting = held(&self.inner.waiting);
+        Subscription {
+            reading: waiting.readings.end(),
+            control: waiting.controls.end(),
+            wanted,
+            moved: Moved::new(wanted.moved_m),
+            changed,
+            _counted: Counted::new(self, true, wanted.verdicts),
+        }
     }
 
-    /// Hands a record to everybody who wants single records.
+    /// Begins to listen for scans that are over.
+    #[must_use]
+    pub fn subscribe_scans(&self) -> ScanSubscription {
+        let changed = self.inner.scans.subscribe();
+        let scan = held(&self.inner.waiting).scans.end();
+        ScanSubscription { scan, changed, counted: Counted::new(self, false, false) }
+    }
+
+    /// Hands a record to everybody who wants records.
     pub fn publish(&self, record: &Record) {
-        let subscribers = held(&self.inner.subscribers);
-        let mut wanting = subscribers.values().filter(|one| !one.wanted.scans).peekable();
-        if wanting.peek().is_none() {
+        if self.inner.of_records.load(Ordering::Relaxed) == 0 {
             return;
         }
         let mut line = Vec::new();
@@ -108,47 +149,44 @@ impl Hub {
             // The log refuses the same record and says so.
             return;
         }
-        line.pop();
-        let line: Line = line.into();
-        for subscriber in wanting {
-            match record {
-                Record::Ping(ping) => self.push_reading(subscriber, ping, &line),
-                _ => self.push_control(subscriber, &line),
-            }
-        }
-    }
-
-    /// Hands a whole scan to everybody who wants those; to who wants only what moved, with those
-    /// readings alone.
-    pub fn publish_scan(&self, scan: &ScanReport) {
-        let subscribers = held(&self.inner.subscribers);
-        let mut whole: Option<Line> = None;
-        for subscriber in subscribers.values().filter(|one| one.wanted.scans) {
-            let line = match subscriber.wanted.moved_m {
-                None => Arc::clone(whole.get_or_insert_with(|| json(scan))),
-                Some(_) => {
-                    let mut queue = held(&subscriber.queue);
-                    let moved = |ping: &&Ping| queue.is_news(ping, subscriber.wanted.moved_m);
-                    let pings = scan.pings.iter().filter(moved).cloned().collect();
-                    json(&ScanReport { pings, ..scan.clone() })
-                }
+        if let Record::Ping(ping) = record {
+            let wants_verdicts = self.inner.of_verdicts.load(Ordering::Relaxed) > 0;
+            let judged: Option<Line> = wants_verdicts.then(|| judged_line(&line, ping).into());
+            let bytes = line.len() + judged.as_ref().map_or(0, |judged| judged.len());
+            let reading = Reading {
+                line: line.into(),
+                judged,
+                step: ping.step,
+                ranger: ping.ranger.as_deref().map(Box::from),
+                status: ping.status,
+                range_m: ping.range_m,
             };
-            self.push_control(subscriber, &line);
+            held(&self.inner.waiting).readings.put(bytes, reading);
+        } else {
+            let mut waiting = held(&self.inner.waiting);
+            let (bytes, before) = (line.len(), waiting.readings.end());
+            waiting.controls.put(bytes, Control { line: line.into(), before });
         }
+        self.inner.records.send_replace(());
     }
 
-    /// Ends every stream after what is waiting in it.
+    /// Tells everybody who wants scans that one is over.
+    pub fn publish_scan(&self, scan: Uuid) {
+        held(&self.inner.waiting).scans.put(size_of::<Uuid>(), scan);
+        self.inner.scans.send_replace(());
+    }
+
+    /// Ends every stream after what is waiting for it.
     pub fn close(&self) {
-        for subscriber in held(&self.inner.subscribers).values() {
-            held(&subscriber.queue).closed = true;
-            subscriber.wake.notify_one();
-        }
+        held(&self.inner.waiting).closed = true;
+        self.inner.records.send_replace(());
+        self.inner.scans.send_replace(());
     }
 
     /// Streams at the moment.
     #[must_use]
     pub fn subscribers(&self) -> usize {
-        held(&self.inner.subscribers).len()
+        self.inner.subscribers.load(Ordering::Relaxed)
     }
 
     /// Readings that slow subscribers missed.
@@ -167,216 +205,214 @@ impl Hub {
     pub fn count_cut_off(&self) {
         self.inner.cut_off.fetch_add(1, Ordering::Relaxed);
     }
-
-    fn push_reading(&self, subscriber: &Subscriber, ping: &Ping, line: &Line) {
-        let mut queue = held(&subscriber.queue);
-        if queue.closed || !queue.is_news(ping, subscriber.wanted.moved_m) {
-            return;
-        }
-        if queue.readings >= self.inner.capacity {
-            queue.drop_oldest_reading();
-            self.inner.dropped.fetch_add(1, Ordering::Relaxed);
-        }
-        queue.readings += 1;
-        queue.lines.push_back((Class::Reading, Arc::clone(line)));
-        subscriber.wake.notify_one();
-    }
-
-    fn push_control(&self, subscriber: &Subscriber, line: &Line) {
-        let mut queue = held(&subscriber.queue);
-        if queue.closed {
-            return;
-        }
-        if queue.lines.len() - queue.readings >= CONTROL_LIMIT {
-            queue.closed = true;
-            queue.lines.clear();
-            queue.readings = 0;
-            self.inner.cut_off.fetch_add(1, Ordering::Relaxed);
-        } else {
-            queue.lines.push_back((Class::Control, Arc::clone(line)));
-        }
-        subscriber.wake.notify_one();
-    }
-}
-
-impl Queue {
-    /// Whether this reading differs enough from the last one sent in its direction.
-    fn is_news(&mut self, ping: &Ping, moved_m: Option<f64>) -> bool {
-        let Some(moved_m) = moved_m else { return true };
-        let now = (ping.status, ping.range_m);
-        let direction = (ping.step, ping.ranger.clone());
-        let same = self.sent.get(&direction).is_some_and(|&(status, range_m)| {
-            let moved = range_m.zip(ping.range_m).map_or(0.0, |(before, now)| (now - before).abs());
-            status == ping.status && moved <= moved_m
-        });
-        if !same {
-            self.sent.insert(direction, now);
-        }
-        !same
-    }
-
-    fn drop_oldest_reading(&mut self) {
-        let oldest = self.lines.iter().position(|(class, _)| *class == Class::Reading);
-        if let Some(oldest) = oldest {
-            self.lines.remove(oldest);
-            self.readings -= 1;
-            self.dropped += 1;
-        }
-    }
-
-    fn pop(&mut self) -> Option<Line> {
-        if self.dropped > 0 {
-            let told = format!(r#"{{"type":"dropped","readings":{}}}"#, self.dropped);
-            self.dropped = 0;
-            return Some(told.into_bytes().into());
-        }
-        let (class, line) = self.lines.pop_front()?;
-        self.readings -= usize::from(class == Class::Reading);
-        Some(line)
-    }
 }
 
 /// A subscriber's end; dropping it ends the subscription.
 #[derive(Debug)]
 pub struct Subscription {
-    hub: Hub,
-    id: u64,
-    subscriber: Arc<Subscriber>,
+    /// Numbers of the next reading and of the next other record.
+    reading: u64,
+    control: u64,
+    wanted: Wanted,
+    moved: Moved,
+    changed: watch::Receiver<()>,
+    _counted: Counted,
+}
+
+/// What a subscriber finds.
+enum Found {
+    Line(Line),
+    /// A reading that it does not want.
+    Unwanted,
+    Nothing,
+    Over,
 }
 
 impl Subscription {
     /// The next line; `None` when the stream is over. Cancel-safe.
     pub async fn next(&mut self) -> Option<Line> {
         loop {
-            {
-                let mut queue = held(&self.subscriber.queue);
-                if let Some(line) = queue.pop() {
-                    return Some(line);
-                }
-                if queue.closed {
-                    return None;
-                }
+            // What comes after this look makes it ready again.
+            self.changed.mark_unchanged();
+            match self.look() {
+                Found::Line(line) => return Some(line),
+                Found::Unwanted => {}
+                Found::Nothing => self.changed.changed().await.ok()?,
+                Found::Over => return None,
             }
-            self.subscriber.wake.notified().await;
+        }
+    }
+
+    fn look(&mut self) -> Found {
+        let inner = Arc::clone(&self._counted.hub.inner);
+        let waiting = held(&inner.waiting);
+        if self.control < waiting.controls.first() {
+            drop(waiting);
+            inner.cut_off.fetch_add(1, Ordering::Relaxed);
+            self.control = u64::MAX;
+            return Found::Over;
+        }
+        let control = waiting.controls.get(self.control);
+        let until = control.map_or(waiting.readings.end(), |control| control.before);
+        if self.reading < until {
+            let missed = waiting.readings.first().min(until).saturating_sub(self.reading);
+            if missed > 0 {
+                self.reading += missed;
+                inner.dropped.fetch_add(missed, Ordering::Relaxed);
+                let told = format!("{{\"type\":\"dropped\",\"readings\":{missed}}}\n");
+                return Found::Line(told.into_bytes().into());
+            }
+            let Some(reading) = waiting.readings.get(self.reading) else { return Found::Nothing };
+            self.reading += 1;
+            let (ranger, status) = (reading.ranger.as_deref(), reading.status);
+            if !self.moved.is_news(reading.step, ranger, status, reading.range_m) {
+                return Found::Unwanted;
+            }
+            let judged = reading.judged.as_ref().filter(|_| self.wanted.verdicts);
+            return Found::Line(Arc::clone(judged.unwrap_or(&reading.line)));
+        }
+        match control {
+            Some(control) => {
+                self.control += 1;
+                Found::Line(Arc::clone(&control.line))
+            }
+            None if waiting.closed || self.control == u64::MAX => Found::Over,
+            None => Found::Nothing,
         }
     }
 }
 
-impl Drop for Subscription {
-    fn drop(&mut self) {
-        held(&self.hub.inner.subscribers).remove(&self.id);
+/// The end of a subscriber to whole scans.
+#[derive(Debug)]
+pub struct ScanSubscription {
+    scan: u64,
+    changed: watch::Receiver<()>,
+    counted: Counted,
+}
+
+impl ScanSubscription {
+    /// The next scan that is over; `None` when the stream is. Cancel-safe.
+    pub async fn next(&mut self) -> Option<Uuid> {
+        loop {
+            self.changed.mark_unchanged();
+            {
+                let waiting = held(&self.counted.hub.inner.waiting);
+                if self.scan < waiting.scans.first() {
+                    self.counted.hub.count_cut_off();
+                    return None;
+                }
+                if let Some(scan) = waiting.scans.get(self.scan) {
+                    self.scan += 1;
+                    return Some(*scan);
+                }
+                if waiting.closed {
+                    return None;
+                }
+            }
+            self.changed.changed().await.ok()?;
+        }
     }
 }
 
-fn json(scan: &ScanReport) -> Line {
-    serde_json::to_vec(scan).unwrap_or_default().into()
+/// What was last sent for each direction (a motor step, or a ranger of an array), for who wants only what
+/// moved.
+#[derive(Debug, Clone, Default)]
+pub struct Moved {
+    moved_m: Option<f64>,
+    sent: HashMap<(i32, u16), (PingStatus, Option<f64>)>,
+    rangers: Vec<Box<str>>,
 }
 
-/// Nothing under these locks can panic, so a poisoned one holds what it should.
+impl Moved {
+    /// With everything that moved by more than this, metres; with everything, if it is `None`.
+    #[must_use]
+    pub fn new(moved_m: Option<f64>) -> Self {
+        Self { moved_m, ..Self::default() }
+    }
+
+    /// Whether it leaves nothing out.
+    #[must_use]
+    pub const fn is_everything(&self) -> bool {
+        self.moved_m.is_none()
+    }
+
+    /// Whether a reading differs enough from the last one sent in its direction. It counts as sent
+    /// then.
+    pub fn is_news_of(&mut self, ping: &Ping) -> bool {
+        self.is_news(ping.step, ping.ranger.as_deref(), ping.status, ping.range_m)
+    }
+
+    fn is_news(
+        &mut self,
+        step: i32,
+        ranger: Option<&str>,
+        status: PingStatus,
+        range_m: Option<f64>,
+    ) -> bool {
+        let Some(moved_m) = self.moved_m else { return true };
+        let direction = (step, ranger.map_or(0, |id| self.number_of(id)));
+        let same = self.sent.get(&direction).is_some_and(|&(before, before_m)| {
+            let moved = before_m.zip(range_m).map_or(0.0, |(before, now)| (now - before).abs());
+            status == before && moved <= moved_m
+        });
+        if !same {
+            if self.sent.len() >= DIRECTIONS && !self.sent.contains_key(&direction) {
+                self.sent.clear();
+            }
+            self.sent.insert(direction, (status, range_m));
+        }
+        !same
+    }
+
+    /// From 1; those beyond the bound are forgotten together.
+    fn number_of(&mut self, id: &str) -> u16 {
+        let known = self.rangers.iter().position(|known| **known == *id);
+        let at = known.unwrap_or_else(|| {
+            if self.rangers.len() >= DIRECTIONS {
+                self.rangers.clear();
+                self.sent.clear();
+            }
+            self.rangers.push(id.into());
+            self.rangers.len() - 1
+        });
+        at as u16 + 1
+    }
+}
+
+/// Counts a subscriber as long as it is there.
+#[derive(Debug)]
+struct Counted {
+    hub: Hub,
+    of_records: bool,
+    of_verdicts: bool,
+}
+
+impl Counted {
+    fn new(hub: &Hub, of_records: bool, of_verdicts: bool) -> Self {
+        hub.inner.subscribers.fetch_add(1, Ordering::Relaxed);
+        Self { hub: hub.clone(), of_records, of_verdicts }
+    }
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        let inner = &self.hub.inner;
+        inner.subscribers.fetch_sub(1, Ordering::Relaxed);
+        inner.of_verdicts.fetch_sub(usize::from(self.of_verdicts), Ordering::Relaxed);
+        let last = inner.of_records.fetch_sub(usize::from(self.of_records), Ordering::Relaxed) == 1;
+        if self.of_records && last {
+            // Nobody is left who wants them. Who comes at this moment misses nothing but these.
+            let mut waiting = held(&inner.waiting);
+            waiting.readings.clear();
+            waiting.controls.clear();
+        }
+    }
+}
+
+/// Nothing under this lock can panic, so a poisoned one holds what it should.
 fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scan::decode_line;
-
-    const LOG: &str = include_str!("../../tests/fixtures/small.jsonl");
-
-    fn ping(step: i32, range_m: Option<f64>) -> Record {
-        let record = decode_line(LOG.lines().nth(2).expect("a reading").as_bytes());
-        let Ok(Record::Ping(mut ping)) = record else { panic!("a reading") };
-        (ping.step, ping.range_m, ping.residual_m) = (step, range_m, None);
-        Record::Ping(ping)
-    }
-
-    fn control() -> Record {
-        decode_line(LOG.lines().nth(1).expect("a start").as_bytes()).expect("clean")
-    }
-
-    async fn all(subscription: &mut Subscription, hub: &Hub) -> Vec<serde_json::Value> {
-        hub.close();
-        let mut lines = Vec::new();
-        while let Some(line) = subscription.next().await {
-            lines.push(serde_json::from_slice(&line).expect("JSON"));
-        }
-        lines
-    }
-
-    #[tokio::test]
-    async fn a_slow_subscriber_loses_the_oldest_readings_with_a_count_and_no_control() {
-        let hub = Hub::new(10);
-        let mut slow = hub.subscribe(Wanted::default());
-        hub.publish(&control());
-        for step in 0..25 {
-            hub.publish(&ping(step, Some(1.0)));
-        }
-        hub.publish(&control());
-        let lines = all(&mut slow, &hub).await;
-        assert_eq!(lines[0], serde_json::json!({"type": "dropped", "readings": 15}));
-        let steps: Vec<i64> = lines.iter().filter_map(|line| line["step"].as_i64()).collect();
-        assert_eq!(steps, (15..25).collect::<Vec<_>>());
-        assert_eq!(lines.iter().filter(|line| line["type"] == "scan_start").count(), 2);
-        assert_eq!(hub.dropped(), 15);
-    }
-
-    #[tokio::test]
-    async fn only_what_moved_is_sent_on_request() {
-        let hub = Hub::new(100);
-        let mut some = hub.subscribe(Wanted { moved_m: Some(0.05), scans: false });
-        for (step, range_m) in [
-            (0, Some(1.0)),
-            (0, Some(1.04)),
-            // Creeping away in small steps is noticed against what was sent, not the last one.
-            (0, Some(1.08)),
-            (1, Some(1.08)),
-            (0, Some(1.09)),
-            (0, Some(0.9)),
-        ] {
-            hub.publish(&ping(step, range_m));
-        }
-        let ranges: Vec<_> = all(&mut some, &hub)
-            .await
-            .iter()
-            .map(|line| (line["step"].as_i64().unwrap_or(-1), line["range_m"].as_f64()))
-            .collect();
-        assert_eq!(ranges, [(0, Some(1.0)), (0, Some(1.08)), (1, Some(1.08)), (0, Some(0.9))]);
-    }
-
-    #[tokio::test]
-    async fn whole_scans_hold_only_what_moved_for_who_wants_that() {
-        let hub = Hub::new(100);
-        let mut all_of_it = hub.subscribe(Wanted { moved_m: None, scans: true });
-        let mut some = hub.subscribe(Wanted { moved_m: Some(0.05), scans: true });
-        let Record::ScanStart(start) = control() else { panic!("a start") };
-        let pinged = |range_m| match ping(3, Some(range_m)) {
-            Record::Ping(ping) => *ping,
-            _ => panic!("a reading"),
-        };
-        for range_m in [1.0, 1.01, 1.2] {
-            let fixed = Ping { step: 9, ..pinged(0.5) };
-            let pings = vec![pinged(range_m), fixed];
-            let (start, events) = (start.clone(), Vec::new());
-            hub.publish_scan(&ScanReport { start, pings, events, end: None });
-        }
-        let counts = |lines: Vec<serde_json::Value>| -> Vec<usize> {
-            lines.iter().map(|scan| scan["pings"].as_array().map_or(0, Vec::len)).collect()
-        };
-        assert_eq!(counts(all(&mut some, &hub).await), [2, 0, 1]);
-        assert_eq!(counts(all(&mut all_of_it, &hub).await), [2, 2, 2]);
-    }
-
-    #[tokio::test]
-    async fn a_subscriber_that_never_reads_is_cut_off_and_one_that_leaves_is_forgotten() {
-        let hub = Hub::new(10);
-        let mut dead = hub.subscribe(Wanted::default());
-        for _ in 0..=CONTROL_LIMIT {
-            hub.publish(&control());
-        }
-        assert_eq!((hub.cut_off(), dead.next().await), (1, None));
-        assert_eq!(hub.subscribers(), 1);
-        drop(dead);
-        assert_eq!(hub.subscribers(), 0);
-    }
-}
+mod tests;

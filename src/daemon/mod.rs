@@ -16,6 +16,7 @@ mod desk;
 mod forecast;
 mod hub;
 mod journal;
+mod judged;
 mod machine;
 mod notify;
 mod operator;
@@ -30,12 +31,14 @@ use std::sync::Arc;
 use jiff::Timestamp;
 use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
+use uuid::Uuid;
 
 pub use agenda::{Agenda, Asked, Due};
 pub use air::{AirOrder, AirStatus, read_thermometer};
 pub use desk::{Order, Refusal, Request};
-pub use hub::{Hub, Line, Subscription, Wanted};
+pub use hub::{Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
 pub use journal::{Journal, JournalThread, LogStatus};
+pub use judged::{Word, judged_line};
 pub use machine::{BackOff, Input, LinkMachine, LinkState, Step, Transition, Trouble};
 pub use operator::OpenPort;
 pub use settings::{Mismatch, Settings, Setup, Simulated};
@@ -175,7 +178,7 @@ impl Handle {
 
     /// The last scan that is over.
     #[must_use]
-    pub fn latest_scan(&self) -> Option<Arc<ScanReport>> {
+    pub fn latest_scan(&self) -> Option<Uuid> {
         self.shared.latest_scan()
     }
 

@@ -34,7 +34,7 @@ impl Outlet {
             _ => self.hub.publish(record),
         }
         if let Some(scan) = over {
-            self.hub.publish_scan(&scan);
+            self.hub.publish_scan(scan);
         }
     }
 

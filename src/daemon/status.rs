@@ -194,7 +194,7 @@ pub struct ClockReport {
     pub steps: u64,
 }
 
-/// One scan, whole.
+/// One scan, whole. The daemon does not keep it: its log does.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ScanReport {
     /// How it began.
@@ -268,10 +268,13 @@ pub(super) struct Shared {
     scans: Mutex<Collector>,
 }
 
+/// What is remembered of scans. Their readings are in the log.
 #[derive(Debug, Default)]
 struct Collector {
-    current: Option<ScanReport>,
-    latest: Option<Arc<ScanReport>>,
+    current: Option<Uuid>,
+    /// How the last one ended, and the standard deviation of its last reading's time, microseconds.
+    latest: Option<(ScanEnd, Option<f64>)>,
+    sigma_us: Option<f64>,
 }
 
 impl Shared {
@@ -295,39 +298,35 @@ impl Shared {
     }
 
     /// Takes in a record of a scan; gives back the scan if this was its end.
-    pub(super) fn collect(&self, record: &Record) -> Option<Arc<ScanReport>> {
+    pub(super) fn collect(&self, record: &Record) -> Option<Uuid> {
         self.beat();
         let mut scans = self.scans();
         match record {
             Record::ScanStart(start) => {
                 self.beams_done.store(0, Ordering::Relaxed);
-                let start = start.clone();
-                scans.current =
-                    Some(ScanReport { start, pings: Vec::new(), events: Vec::new(), end: None });
+                (scans.current, scans.sigma_us) = (Some(start.scan), None);
             }
             Record::Ping(ping) => {
                 self.beams_done.fetch_add(1, Ordering::Relaxed);
-                let pings = scans.current.as_mut().map(|scan| &mut scan.pings);
-                pings.into_iter().for_each(|pings| pings.push((**ping).clone()));
-            }
-            Record::Event(event) => {
-                let events = scans.current.as_mut().map(|scan| &mut scan.events);
-                events.into_iter().for_each(|events| events.push(event.clone()));
+                scans.sigma_us = ping.time_sigma_us;
             }
             Record::ScanEnd(end) => {
-                let mut report = scans.current.take()?;
-                report.end = Some(end.clone());
-                let report = Arc::new(report);
-                scans.latest = Some(Arc::clone(&report));
-                return Some(report);
+                let scan = scans.current.take()?;
+                scans.latest = Some((end.clone(), scans.sigma_us));
+                return Some(scan);
             }
-            Record::Session(_) => {}
+            Record::Session(_) | Record::Event(_) => {}
         }
         None
     }
 
     /// The last scan that is over.
-    pub(super) fn latest_scan(&self) -> Option<Arc<ScanReport>> {
+    pub(super) fn latest_scan(&self) -> Option<Uuid> {
+        self.scans().latest.as_ref().map(|(end, _)| end.scan)
+    }
+
+    /// How it ended, and the standard deviation of its last reading's time, microseconds.
+    pub(super) fn latest_end(&self) -> Option<(ScanEnd, Option<f64>)> {
         self.scans().latest.clone()
     }
 

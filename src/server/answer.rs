@@ -1,7 +1,10 @@
 //! What goes wrong with a request, as JSON.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use axum::{
     Json,
+    body::Bytes,
     extract::{
         FromRequest, FromRequestParts, Request,
         rejection::{JsonRejection, PathRejection, QueryRejection},
@@ -39,6 +42,43 @@ pub(super) struct Failed {
 pub struct Accepted {
     /// Always `true`.
     pub accepted: bool,
+}
+
+/// An answer of any size that is the same for all: written once, and shared by who takes it.
+pub(super) struct Shelved<T>(Arc<Mutex<Option<(Arc<T>, Bytes)>>>);
+
+impl<T> Shelved<T> {
+    /// The answer about `of`, by `write` if it is about another than before.
+    pub(super) fn answer<U: Serialize>(
+        &self,
+        of: &Arc<T>,
+        write: impl FnOnce(&T) -> U,
+    ) -> Response {
+        // Nothing under this lock can panic, so a poisoned one holds what it should.
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = kept.as_ref().filter(|(before, _)| Arc::ptr_eq(before, of));
+        let bytes = match same {
+            Some((_, bytes)) => bytes.clone(),
+            None => {
+                let bytes = Bytes::from(serde_json::to_vec(&write(of)).unwrap_or_default());
+                *kept = Some((Arc::clone(of), bytes.clone()));
+                bytes
+            }
+        };
+        ([(header::CONTENT_TYPE, "application/json")], bytes).into_response()
+    }
+}
+
+impl<T> Clone for Shelved<T> {
+    fn clone(&self) -> Self {
+        Self(Arc::clone(&self.0))
+    }
+}
+
+impl<T> Default for Shelved<T> {
+    fn default() -> Self {
+        Self(Arc::default())
+    }
 }
 
 impl Failed {

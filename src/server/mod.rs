@@ -25,12 +25,12 @@ use std::{
 
 use axum::{
     Router,
+    body::Bytes,
     extract::{DefaultBodyLimit, Request, State},
     http::{HeaderName, HeaderValue, StatusCode, header},
     middleware::{self, Next},
     response::{IntoResponse, Response},
 };
-use serde_json::Value;
 use tokio::{
     sync::Semaphore,
     time::{Instant, timeout},
@@ -42,8 +42,8 @@ pub use answer::{Accepted, Problem};
 pub use listen::{ListenError, Listeners};
 pub use token::{TokenError, read_token};
 
-use crate::{config::ServerKeys, daemon::Handle, store::History};
-use answer::Failed;
+use crate::{config::ServerKeys, daemon::Handle, scan::Session, scene::Scene, store::History};
+use answer::{Failed, Shelved};
 use places::Places;
 use rate::Buckets;
 
@@ -60,11 +60,16 @@ const NO_STRANGERS: HeaderName = HeaderName::from_static("cross-origin-resource-
 pub(crate) struct Api {
     daemon: Handle,
     log_folder: Arc<PathBuf>,
-    document: Arc<Value>,
+    /// The OpenAPI document.
+    document: Bytes,
     access: Arc<Access>,
     history: Arc<Mutex<History>>,
     /// Who asks the model about a beam.
     looking: Arc<Semaphore>,
+    /// Who reads a scan's next piece.
+    reading: Arc<Semaphore>,
+    scene: Shelved<Scene>,
+    session: Shelved<Session>,
     places: Arc<Places>,
     buckets: Arc<Mutex<Buckets>>,
     epoch: Instant,
@@ -89,8 +94,11 @@ impl Server {
             daemon: daemon.clone(),
             history: Arc::new(Mutex::new(History::new(log_folder.clone()))),
             looking: Arc::new(Semaphore::new(1)),
+            reading: Arc::new(Semaphore::new(1)),
+            scene: Shelved::default(),
+            session: Shelved::default(),
             log_folder: Arc::new(log_folder),
-            document: Arc::new(openapi::document(&endpoints)),
+            document: openapi::document(&endpoints).to_string().into(),
             access: Arc::new(access),
             places: Arc::clone(&places),
             buckets: Arc::new(Mutex::new(Buckets::new(keys.max_requests_per_s))),

@@ -1,20 +1,21 @@
 //! The scans in a folder of logs, newest first, found without reading any log twice.
 //!
 //! Logs only grow, so what was read of one is remembered as places in it, and the next question
-//! reads on from there. Readings themselves are not kept: a scan that is asked for is read then.
+//! reads on from there. Nothing but places is kept: a scan that is asked for is read then.
 
 use std::{
     collections::BTreeMap,
     fs::File,
     io::{self, BufRead, BufReader, Read as _, Seek as _, SeekFrom},
-    path::PathBuf,
+    path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use uuid::Uuid;
 
 use super::{log_files, read_log};
 use crate::scan::{
-    MAX_LINE_BYTES, Provenance, Record, ScanEnd, ScanStart, ScanView, SceneRef, decode_line,
+    MAX_LINE_BYTES, Ping, Provenance, Record, ScanEnd, ScanStart, ScanView, SceneRef, decode_line,
 };
 
 /// Only so many of the newest logs are looked at: memory stays bounded after months.
@@ -49,10 +50,20 @@ pub struct PastScan {
 #[derive(Debug, Default)]
 struct Index {
     read_to: u64,
-    session: Option<SessionPlace>,
+    session: Option<Arc<SessionPlace>>,
     /// Where the last session stands that has the text of its scene, and which scene.
     text: Option<(u64, Option<SceneRef>)>,
     scans: Vec<Place>,
+}
+
+/// A log may hold tens of thousands of scans: what is told of them is read when it is asked for.
+#[derive(Debug, Clone)]
+struct Place {
+    scan: Uuid,
+    from: u64,
+    to: u64,
+    end_at: Option<u64>,
+    session: Option<Arc<SessionPlace>>,
 }
 
 #[derive(Debug, Clone)]
@@ -64,13 +75,15 @@ struct SessionPlace {
     scene: Option<SceneRef>,
 }
 
+/// Where the records of a scan stand in a log, to be read piece by piece.
 #[derive(Debug, Clone)]
-struct Place {
+pub struct Passage {
+    /// The scan, without its readings and events.
+    pub view: ScanView,
+    /// The log.
+    pub path: PathBuf,
     from: u64,
     to: u64,
-    session: Option<SessionPlace>,
-    start: ScanStart,
-    end: Option<ScanEnd>,
 }
 
 impl History {
@@ -89,7 +102,11 @@ impl History {
         for log in self.recent()? {
             let index = self.read_on(&log)?;
             let wanted = most - newest.len();
-            newest.extend(index.scans.iter().rev().take(wanted).map(|place| place.summary(&log)));
+            let places: Vec<Place> = index.scans.iter().rev().take(wanted).cloned().collect();
+            let mut file = BufReader::new(File::open(self.folder.join(&log))?);
+            for place in places {
+                newest.extend(place.summary(&log, &mut file)?);
+            }
             if newest.len() == most {
                 break;
             }
@@ -97,33 +114,16 @@ impl History {
         Ok(newest)
     }
 
-    /// A scan with its readings; `None` if the newest logs have no such scan.
+    /// Where a scan stands; `None` if the newest logs have no such scan.
     ///
     /// # Errors
     /// When the folder or a log in it can't be read.
-    pub fn scan(&mut self, scan: Uuid) -> io::Result<Option<ScanView>> {
-        for log in self.recent()? {
-            let places = &self.read_on(&log)?.scans;
-            if let Some(place) = places.iter().rev().find(|place| place.start.scan == scan) {
-                let place = place.clone();
-                return self.read(&log, &place);
-            }
-        }
-        Ok(None)
-    }
-
-    /// A scan without its readings, and its log; `None` if the newest logs have no such scan.
-    ///
-    /// # Errors
-    /// When the folder or a log in it can't be read.
-    pub fn outline(&mut self, scan: Uuid) -> io::Result<Option<(ScanView, PathBuf)>> {
+    pub fn passage(&mut self, scan: Uuid) -> io::Result<Option<Passage>> {
         for log in self.recent()? {
             let path = self.folder.join(&log);
             let places = &self.read_on(&log)?.scans;
-            if let Some(place) = places.iter().rev().find(|place| place.start.scan == scan) {
-                let mut records = read_session(&mut BufReader::new(File::open(&path)?), place)?;
-                records.push(Record::ScanStart(place.start.clone()));
-                return Ok(ScanView::from_records(records).pop().map(|view| (view, path)));
+            if let Some(place) = places.iter().rev().find(|place| place.scan == scan) {
+                return place.passage(path);
             }
         }
         Ok(None)
@@ -161,30 +161,12 @@ impl History {
             index.take(&line, length);
         }
     }
-
-    fn read(&self, log: &str, place: &Place) -> io::Result<Option<ScanView>> {
-        let mut file = BufReader::new(File::open(self.folder.join(log))?);
-        let mut records = read_session(&mut file, place)?;
-        file.seek(SeekFrom::Start(place.from))?;
-        for line in read_log(file.take(place.to - place.from)) {
-            records.extend(line?.record);
-        }
-        let views = ScanView::from_records(records);
-        Ok(views.into_iter().find(|view| view.scan == place.start.scan))
-    }
 }
 
-/// The session of a scan, after the one before it that has the text of its scene.
-fn read_session(file: &mut BufReader<File>, place: &Place) -> io::Result<Vec<Record>> {
-    let places =
-        place.session.iter().flat_map(|session| session.text_at.into_iter().chain([session.at]));
-    let mut records = Vec::new();
-    for at in places {
-        file.seek(SeekFrom::Start(at))?;
-        records
-            .extend(read_log(file.by_ref()).next().transpose()?.and_then(|line| line.record.ok()));
-    }
-    Ok(records)
+/// The record of the line that begins there.
+fn record_at(file: &mut BufReader<File>, at: u64) -> io::Result<Option<Record>> {
+    file.seek(SeekFrom::Start(at))?;
+    Ok(read_log(file.by_ref()).next().transpose()?.and_then(|line| line.record.ok()))
 }
 
 impl Index {
@@ -201,21 +183,22 @@ impl Index {
                 }
                 let text = self.text.as_ref().filter(|(_, of)| *of == scene && scene.is_some());
                 let text_at = text.map(|(text_at, _)| *text_at).filter(|text_at| *text_at != at);
-                self.session = Some(SessionPlace { at, text_at, provenance, scene });
+                self.session = Some(Arc::new(SessionPlace { at, text_at, provenance, scene }));
             }
             Some(Ok(Record::ScanStart(start))) => {
                 let session = self.session.clone();
-                self.scans.push(Place { from: at, to: self.read_to, session, start, end: None });
+                let (scan, to) = (start.scan, self.read_to);
+                self.scans.push(Place { scan, from: at, to, end_at: None, session });
             }
             Some(Ok(Record::ScanEnd(end))) => {
-                let of = self.scans.iter_mut().rev().find(|place| place.start.scan == end.scan);
+                let of = self.scans.iter_mut().rev().find(|place| place.scan == end.scan);
                 if let Some(place) = of {
-                    (place.to, place.end) = (self.read_to, Some(end));
+                    (place.to, place.end_at) = (self.read_to, Some(at));
                 }
             }
             // Damaged lines are `sonard log verify`'s business.
             _ => {
-                if let Some(place) = self.scans.last_mut().filter(|place| place.end.is_none()) {
+                if let Some(place) = self.scans.last_mut().filter(|place| place.end_at.is_none()) {
                     place.to = self.read_to;
                 }
             }
@@ -224,13 +207,110 @@ impl Index {
 }
 
 impl Place {
-    fn summary(&self, log: &str) -> PastScan {
-        PastScan {
+    /// How it began and ended, if that can still be read.
+    fn bounds(
+        &self,
+        file: &mut BufReader<File>,
+    ) -> io::Result<Option<(ScanStart, Option<ScanEnd>)>> {
+        let Some(Record::ScanStart(start)) = record_at(file, self.from)? else { return Ok(None) };
+        let end = self.end_at.map(|at| record_at(file, at)).transpose()?.flatten();
+        let end = match end {
+            Some(Record::ScanEnd(end)) => Some(end),
+            _ => None,
+        };
+        Ok(Some((start, end)))
+    }
+
+    fn summary(&self, log: &str, file: &mut BufReader<File>) -> io::Result<Option<PastScan>> {
+        let session = self.session.as_ref();
+        Ok(self.bounds(file)?.map(|(start, end)| PastScan {
             log: log.to_owned(),
-            start: self.start.clone(),
-            end: self.end.clone(),
-            provenance: self.session.as_ref().map(|session| session.provenance),
-            scene: self.session.as_ref().and_then(|session| session.scene.clone()),
+            start,
+            end,
+            provenance: session.map(|session| session.provenance),
+            scene: session.and_then(|session| session.scene.clone()),
+        }))
+    }
+
+    fn passage(&self, path: PathBuf) -> io::Result<Option<Passage>> {
+        let mut file = BufReader::new(File::open(&path)?);
+        let Some((start, end)) = self.bounds(&mut file)? else { return Ok(None) };
+        // Before the session the one before it that has the text of its scene.
+        let sessions = self.session.iter();
+        let sessions = sessions.flat_map(|session| session.text_at.into_iter().chain([session.at]));
+        let mut records = Vec::new();
+        for at in sessions {
+            records.extend(record_at(&mut file, at)?);
+        }
+        records.push(Record::ScanStart(start));
+        records.extend(end.map(Record::ScanEnd));
+        let view = ScanView::from_records(records).pop();
+        Ok(view.map(|view| Passage { view, path, from: self.from, to: self.to }))
+    }
+}
+
+impl Passage {
+    /// The lines of its readings, or of everything else in it, in the order of the log, each with its
+    /// newline.
+    ///
+    /// # Errors
+    /// When the log can't be opened.
+    pub fn lines(&self, readings: bool) -> io::Result<PassageLines> {
+        PassageLines::open(&self.path, self.from, self.to, readings)
+    }
+
+    /// The last reading of a beam, and the highest index that there is.
+    ///
+    /// # Errors
+    /// When the log can't be read.
+    pub fn beam(&self, index: u32) -> io::Result<(Option<Ping>, Option<u32>)> {
+        let scan = self.view.scan;
+        let head = format!(r#"{{"type":"ping","scan":"{scan}","index":"#);
+        let (mut found, mut highest) = (None, None);
+        for line in self.lines(true)? {
+            let line = line?;
+            let Some(rest) = line.strip_prefix(head.as_bytes()) else { continue };
+            let digits = rest.iter().take_while(|byte| byte.is_ascii_digit()).count();
+            let here = std::str::from_utf8(&rest[..digits]).ok().and_then(|text| text.parse().ok());
+            highest = highest.max(here);
+            if here == Some(index)
+                && let Ok(Record::Ping(ping)) = decode_line(line.trim_ascii_end())
+            {
+                found = Some(*ping);
+            }
+        }
+        Ok((found, highest))
+    }
+}
+
+/// See [`Passage::lines`]. It holds a line at a time.
+#[derive(Debug)]
+pub struct PassageLines {
+    file: io::Take<BufReader<File>>,
+    readings: bool,
+}
+
+impl PassageLines {
+    fn open(path: &Path, from: u64, to: u64, readings: bool) -> io::Result<Self> {
+        let mut file = BufReader::with_capacity(1 << 15, File::open(path)?);
+        file.seek(SeekFrom::Start(from))?;
+        Ok(Self { file: file.take(to.saturating_sub(from)), readings })
+    }
+}
+
+impl Iterator for PassageLines {
+    type Item = io::Result<Vec<u8>>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            let mut line = Vec::new();
+            let limit = MAX_LINE_BYTES as u64 + 2;
+            match self.file.by_ref().take(limit).read_until(b'\n', &mut line) {
+                Ok(0) => return None,
+                Ok(_) if line.starts_with(READING) == self.readings => return Some(Ok(line)),
+                Ok(_) => {}
+                Err(error) => return Some(Err(error)),
+            }
         }
     }
 }

@@ -21,7 +21,7 @@ mod writer;
 pub use check::{Checker, Finding, FindingKind, Severity, Totals, check};
 pub use error::StoreError;
 pub use folder::{LogFile, LogFolder, Rotation, log_files};
-pub use history::{History, PastScan};
+pub use history::{History, Passage, PassageLines, PastScan};
 pub use kind::{FileKind, HEAD_BYTES};
 pub use medium::{FileMedium, Medium, Pipe};
 pub use open::{Recovered, is_being_written, open_own};

@@ -39,7 +39,7 @@ impl Operator {
         self.desk.serving = job.request;
         self.handle(Input::ScanBegun);
         self.tell();
-        let before = self.latest_scan();
+        let before = self.out.shared.latest_scan();
         let (outcome, interrupts) = self.scan_attended(&mut ranger, &job).await;
         self.desk.serving = None;
         self.desk.identity = Some(*ranger.identity());
@@ -181,14 +181,8 @@ impl Operator {
         (outcome, interrupts)
     }
 
-    fn latest_scan(&self) -> Option<Uuid> {
-        let latest = self.out.shared.latest_scan()?;
-        latest.end.as_ref().map(|end| end.scan)
-    }
-
     fn scan_ended(&mut self, before: Option<Uuid>, outcome: Result<ScanSummary, ScanError>) {
-        if let Some(latest) = self.out.shared.latest_scan()
-            && let Some(end) = &latest.end
+        if let Some((end, _)) = self.out.shared.latest_end()
             && outcome.is_err()
             && Some(end.scan) != before
         {
@@ -223,9 +217,7 @@ impl Operator {
         self.scans.missing += u64::from(end.missing);
         self.scans.restarts += u64::from(summary.restarts);
         let drift_ppm = summary.clock_drift.map(|drift| drift * 1e6);
-        let latest = self.out.shared.latest_scan();
-        let sigma_us =
-            latest.and_then(|scan| scan.pings.last().and_then(|ping| ping.time_sigma_us));
+        let sigma_us = self.out.shared.latest_end().and_then(|(_, sigma_us)| sigma_us);
         self.out.shared.view.send_modify(|view| {
             (view.clock.drift_ppm, view.clock.sigma_us) = (drift_ppm, sigma_us);
         });

@@ -1,6 +1,6 @@
 //! Live streams: lines of JSON, or server-sent events for browsers.
 
-use std::{borrow::Cow, convert::Infallible, time::Duration};
+use std::{convert::Infallible, io, sync::Arc, time::Duration};
 
 use axum::{
     body::{Body, Bytes},
@@ -8,15 +8,18 @@ use axum::{
     http::{HeaderMap, HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
-use futures_util::stream;
+use futures_util::{Stream, StreamExt as _, stream};
 use serde::Deserialize;
 use serde_json::json;
-use tokio::time::timeout;
+use tokio::{sync::OwnedSemaphorePermit, time::timeout};
 
-use super::scans::Word;
+use super::{
+    pieces::{Form, Pieces, read_on},
+    scans::written,
+};
 use crate::{
-    daemon::{ScanReport, Subscription, Wanted},
-    scan::{Record, decode_line},
+    daemon::{Moved, ScanReport, ScanSubscription, Subscription, Wanted},
+    scan::Record,
     server::{
         Api, Standing,
         answer::{Failed, Query},
@@ -52,6 +55,8 @@ enum Format {
 pub(super) fn endpoints() -> Vec<Endpoint> {
     let format = json!({"type": "string", "enum": ["ndjson", "sse"]});
     let format_about = "Lines of JSON or server-sent events; without it, as `Accept` says";
+    let scans = "One scan a line, read from the log: a slow client costs no memory. A line \
+        {\"type\":\"dropped\",\"scans\":N} stands for scans that the log no longer has";
     let records = "One record a line, as in a log. A line {\"type\":\"dropped\",\"readings\":N} \
         stands for readings that this client was too slow for";
     vec![
@@ -69,8 +74,8 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
         Endpoint::get("/v1/live/scans", live_scans, "Whole scans when they are over")
             .parameter("query", "format", format, format_about)
             .parameter("query", "moved_m", json!({"type": "number", "minimum": 0}), MOVED)
-            .answers_as::<ScanReport>(200, NDJSON, "One scan a line")
-            .answers_as::<ScanReport>(200, SSE, "One scan an event"),
+            .answers_as::<ScanReport>(200, NDJSON, scans)
+            .answers_as::<ScanReport>(200, SSE, scans),
     ]
 }
 
@@ -80,7 +85,15 @@ async fn live_records(
     headers: HeaderMap,
     Query(options): Query<Options>,
 ) -> Result<Response, Failed> {
-    live(&api, standing, &headers, options, false)
+    let (format, leave) = begin(&api, standing, &headers, options)?;
+    let wanted = Wanted { moved_m: options.moved_m, verdicts: options.verdicts };
+    let subscription = api.daemon.hub().subscribe(wanted);
+    let lines =
+        stream::unfold((subscription, leave), move |(mut subscription, leave)| async move {
+            let line = next_line(&mut subscription, format).await?;
+            Some((line, (subscription, leave)))
+        });
+    Ok(answer(format, lines.flat_map(stream::iter).map(Ok::<_, Infallible>)))
 }
 
 async fn live_scans(
@@ -89,109 +102,128 @@ async fn live_scans(
     headers: HeaderMap,
     Query(options): Query<Options>,
 ) -> Result<Response, Failed> {
-    live(&api, standing, &headers, options, true)
+    let (format, leave) = begin(&api, standing, &headers, options)?;
+    let scans = Scans {
+        subscription: api.daemon.hub().subscribe_scans(),
+        api,
+        format,
+        moved: Moved::new(options.moved_m),
+        current: None,
+        _leave: leave,
+    };
+    let pieces = stream::unfold(Some(scans), |scans| async move {
+        match scans?.next().await {
+            Ok((piece, scans)) => Some((Ok(piece?), Some(scans))),
+            // What was begun can't be ended: the client sees that the stream broke off.
+            Err(error) => Some((Err(error), None)),
+        }
+    });
+    Ok(answer(format, pieces))
 }
 
-fn live(
+/// The form of a stream, and leave for it.
+fn begin(
     api: &Api,
     standing: Standing,
     headers: &HeaderMap,
     options: Options,
-    scans: bool,
-) -> Result<Response, Failed> {
+) -> Result<(Format, Option<OwnedSemaphorePermit>), Failed> {
     if options.moved_m.is_some_and(|moved_m| !(moved_m.is_finite() && moved_m >= 0.0)) {
         let status = StatusCode::UNPROCESSABLE_ENTITY;
         return Err(Failed::new(status, "moved_m is no length", "metres, 0 or more"));
     }
-    let wanted = Wanted { moved_m: options.moved_m, scans };
-    let accepts_events = headers
-        .get(header::ACCEPT)
-        .and_then(|accept| accept.to_str().ok())
-        .is_some_and(|accept| accept.contains(SSE));
-    let format =
-        options.format.unwrap_or(if accepts_events { Format::Sse } else { Format::Ndjson });
     let leave = api.places.take_stream(standing).ok_or_else(|| {
         let help = "subscribe by the unix socket, or show the token; or raise server.max_clients";
         Failed::new(StatusCode::SERVICE_UNAVAILABLE, "too many live streams of guests", help)
     })?;
-    let subscription = api.daemon.hub().subscribe(wanted);
-    let chunks =
-        stream::unfold((subscription, leave), move |(mut subscription, leave)| async move {
-            let chunk = next_chunk(&mut subscription, format, options.verdicts).await?;
-            Some((Ok::<_, Infallible>(chunk), (subscription, leave)))
-        });
-    let mut response = Body::from_stream(chunks).into_response();
+    let accepts_events = headers
+        .get(header::ACCEPT)
+        .and_then(|accept| accept.to_str().ok())
+        .is_some_and(|accept| accept.contains(SSE));
+    let usual = if accepts_events { Format::Sse } else { Format::Ndjson };
+    Ok((options.format.unwrap_or(usual), leave))
+}
+
+fn answer<E>(
+    format: Format,
+    pieces: impl Stream<Item = Result<Bytes, E>> + Send + 'static,
+) -> Response
+where
+    E: Into<Box<dyn std::error::Error + Send + Sync>> + 'static,
+{
+    let mut response = Body::from_stream(pieces).into_response();
     let media = if format == Format::Sse { SSE } else { NDJSON };
     response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(media));
-    Ok(response)
+    response
 }
 
-/// The next piece of a stream; `None` at its end.
-async fn next_chunk(
-    subscription: &mut Subscription,
-    format: Format,
-    verdicts: bool,
-) -> Option<Bytes> {
-    let line = match format {
-        Format::Ndjson => subscription.next().await?,
-        Format::Sse => match timeout(SIGN_OF_LIFE, subscription.next()).await {
-            Ok(line) => line?,
-            Err(_nothing_yet) => return Some(Bytes::from_static(b":\n\n")),
-        },
-    };
-    let line = if verdicts { with_verdict(&line) } else { Cow::Borrowed(&*line) };
-    Some(match format {
-        Format::Ndjson => [&*line, b"\n"].concat().into(),
-        Format::Sse => [b"data: ", &*line, b"\n\n"].concat().into(),
-    })
-}
-
-/// A reading with what explains it as its last field; any other line as it is.
-fn with_verdict(line: &[u8]) -> Cow<'_, [u8]> {
-    let Ok(Record::Ping(ping)) = decode_line(line) else { return Cow::Borrowed(line) };
-    let (Some(open), Ok(verdict)) =
-        (line.strip_suffix(b"}"), serde_json::to_string(&Word::of(&ping)))
-    else {
-        return Cow::Borrowed(line);
-    };
-    Cow::Owned([open, b",\"verdict\":", verdict.as_bytes(), b"}"].concat())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_reading_gets_its_verdict_and_other_lines_stay() {
-        let log = include_str!("../../../tests/fixtures/small.jsonl");
-        let judged: Vec<serde_json::Value> = log
-            .lines()
-            .map(|line| serde_json::from_slice(&with_verdict(line.as_bytes())).expect("JSON"))
-            .collect();
-        let verdicts: Vec<Option<&str>> =
-            judged.iter().map(|record| record["verdict"].as_str()).collect();
-        assert_eq!(
-            verdicts,
-            [
-                None,
-                None,
-                Some("direct"),
-                Some("multiple"),
-                Some("edge"),
-                Some("min_range"),
-                Some("silent"),
-                Some("unexplained"),
-                Some("link_lost"),
-                None,
-                None
-            ]
-        );
-        for (record, line) in judged.iter().zip(log.lines()) {
-            let mut record = record.clone();
-            record.as_object_mut().expect("an object").remove("verdict");
-            let before: serde_json::Value = serde_json::from_str(line).expect("JSON");
-            assert_eq!(record, before);
+impl Format {
+    /// What stands before and after each text.
+    const fn around(self) -> [&'static [u8]; 2] {
+        match self {
+            Self::Ndjson => [b"", b"\n"],
+            Self::Sse => [b"data: ", b"\n\n"],
         }
-        assert_eq!(&*with_verdict(b"{\"type\":\"dropped\"}"), b"{\"type\":\"dropped\"}");
+    }
+}
+
+/// The next line of a stream, in pieces of which the largest is everybody's; `None` at the end.
+async fn next_line(subscription: &mut Subscription, format: Format) -> Option<Vec<Bytes>> {
+    match format {
+        Format::Ndjson => Some(vec![Bytes::from_owner(subscription.next().await?)]),
+        Format::Sse => match timeout(SIGN_OF_LIFE, subscription.next()).await {
+            Ok(line) => Some(vec![
+                Bytes::from_static(b"data: "),
+                Bytes::from_owner(line?),
+                Bytes::from_static(b"\n"),
+            ]),
+            Err(_nothing_yet) => Some(vec![Bytes::from_static(b":\n\n")]),
+        },
+    }
+}
+
+/// A stream of whole scans.
+struct Scans {
+    subscription: ScanSubscription,
+    api: Api,
+    format: Format,
+    moved: Moved,
+    /// The one that is being sent.
+    current: Option<Pieces>,
+    _leave: Option<OwnedSemaphorePermit>,
+}
+
+impl Scans {
+    /// The next piece of the stream; `None` at its end.
+    async fn next(mut self) -> io::Result<(Option<Bytes>, Self)> {
+        let [before, after] = self.format.around();
+        if let Some(pieces) = self.current.take() {
+            let (piece, pieces) = read_on(pieces, Arc::clone(&self.api.reading)).await?;
+            if piece.is_some() {
+                self.current = Some(pieces);
+                return Ok((piece, self));
+            }
+            self.moved = pieces.into_moved();
+            return Ok((Some(Bytes::from_static(after)), self));
+        }
+        let next = match self.format {
+            Format::Ndjson => Ok(self.subscription.next().await),
+            Format::Sse => timeout(SIGN_OF_LIFE, self.subscription.next()).await,
+        };
+        let scan = match next {
+            Ok(Some(scan)) => scan,
+            Ok(None) => return Ok((None, self)),
+            Err(_nothing_yet) => return Ok((Some(Bytes::from_static(b":\n\n")), self)),
+        };
+        let passage = written(&self.api, scan)
+            .await
+            .map_err(|failed| io::Error::other(failed.problem.error))?;
+        let Some(passage) = passage else {
+            let told = [before, br#"{"type":"dropped","scans":1}"#, after].concat();
+            return Ok((Some(told.into()), self));
+        };
+        let moved = std::mem::take(&mut self.moved);
+        self.current = Some(Pieces::new(passage, Form::Report, moved));
+        Ok((Some(Bytes::from_static(before)), self))
     }
 }

@@ -6,11 +6,12 @@ mod live;
 mod logs;
 mod metrics;
 mod page;
+mod pieces;
 mod report;
 mod scans;
 mod scene;
 
-use axum::{Json, extract::State};
+use axum::{extract::State, http::header, response::IntoResponse};
 use serde_json::Value;
 
 pub(super) use page::is_public;
@@ -34,6 +35,6 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
     endpoints
 }
 
-async fn openapi(State(api): State<Api>) -> Json<Value> {
-    Json((*api.document).clone())
+async fn openapi(State(api): State<Api>) -> impl IntoResponse {
+    ([(header::CONTENT_TYPE, "application/json")], api.document)
 }

@@ -2,10 +2,14 @@
 
 use std::sync::Arc;
 
-use axum::{Json, extract::State, http::StatusCode};
+use axum::{Json, extract::State, http::StatusCode, response::Response};
 
+use super::{
+    pieces::{Form, Pieces},
+    scans::{answer, written},
+};
 use crate::{
-    daemon::{AirStatus, Health, ScanReport, Setup, Status},
+    daemon::{AirStatus, Health, Moved, ScanReport, Setup, Status},
     geometry::Pose,
     scan::{ScanPlan, Session},
     server::{Api, answer::Failed, openapi::Endpoint},
@@ -46,18 +50,24 @@ async fn health(State(api): State<Api>) -> (StatusCode, Json<Health>) {
     (status, Json(health))
 }
 
-async fn latest(State(api): State<Api>) -> Result<Json<Arc<ScanReport>>, Failed> {
-    api.daemon.latest_scan().map(Json).ok_or_else(|| {
+async fn latest(State(api): State<Api>) -> Result<Response, Failed> {
+    let scan = api.daemon.latest_scan().ok_or_else(|| {
         let help = "start one with POST /v1/start, and wait for it";
         Failed::new(StatusCode::NOT_FOUND, "no scan is over yet", help)
-    })
+    })?;
+    let passage = written(&api, scan).await?.ok_or_else(|| {
+        let help = "GET /v1/status says what the log lacks";
+        Failed::new(StatusCode::SERVICE_UNAVAILABLE, "the log does not have the scan yet", help)
+    })?;
+    Ok(answer(&api, Pieces::new(passage, Form::Report, Moved::default())))
 }
 
-async fn session(State(api): State<Api>) -> Result<Json<Arc<Session>>, Failed> {
-    api.daemon.session().map(Json).ok_or_else(|| {
+async fn session(State(api): State<Api>) -> Result<Response, Failed> {
+    let session = api.daemon.session().ok_or_else(|| {
         let help = "a session begins with the first scan: POST /v1/start";
         Failed::new(StatusCode::NOT_FOUND, "there is no session yet", help)
-    })
+    })?;
+    Ok(api.session.answer(&session, Session::clone))
 }
 
 async fn setup(State(api): State<Api>) -> Json<Arc<Setup>> {

@@ -3,6 +3,7 @@
 use std::{
     io,
     sync::{Arc, PoisonError},
+    time::Duration,
 };
 
 use axum::{Json, extract::State, http::StatusCode};
@@ -10,29 +11,33 @@ use jiff::Timestamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
+use tokio::time::{Instant, sleep};
 use uuid::Uuid;
 
 use super::{
     beam::{Beam, look},
+    pieces::{Form, Pieces, stream},
     scene::FloorPlan,
 };
 use crate::{
-    compare::{NotCompared, Verdict, judge},
+    daemon::{Moved, Word},
     geometry::Pose,
-    scan::{Event, Ping, Provenance, ScanEnd, ScanPlan, ScanStart, ScanView, Session},
+    scan::{Event, Ping, Provenance, ScanEnd, ScanPlan, ScanStart, Session},
     scene::Scene,
     server::{
         Api,
         answer::{Failed, Path, Query},
         openapi::Endpoint,
     },
-    store::{History, PastScan, logged_scene},
+    store::{History, Passage, PastScan, logged_scene},
 };
 
 /// Scans listed when nothing else is asked for.
 const USUAL: u16 = 50;
 /// Most scans that are listed.
 const MOST: u16 = 500;
+/// How long the log may take to have what was measured.
+const WRITING: Duration = Duration::from_secs(5);
 
 /// A scan in a list.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -55,8 +60,9 @@ struct ListedScan {
     end: Option<ScanEnd>,
 }
 
-/// A scan with its readings.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+/// A scan with its readings. It is never in memory: [`Pieces`] writes it.
+#[derive(JsonSchema)]
+#[expect(dead_code, reason = "its schema says what is written")]
 struct WholeScan {
     /// What was true for it; `null` if the log lacks it.
     session: Option<Arc<Session>>,
@@ -78,16 +84,6 @@ pub(super) struct JudgedPing {
     pub(super) ping: Ping,
     /// What explains it.
     pub(super) verdict: Word,
-}
-
-/// What explains a reading, or why it can't be compared with a prediction.
-#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
-#[serde(untagged)]
-pub(super) enum Word {
-    /// Compared with the prediction.
-    Compared(Verdict),
-    /// Not compared, and why.
-    NotCompared(NotCompared),
 }
 
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
@@ -147,58 +143,53 @@ async fn list(
     Ok(Json(scans.into_iter().map(ListedScan::from).collect()))
 }
 
-async fn whole(
-    State(api): State<Api>,
-    Path(scan): Path<String>,
-) -> Result<Json<WholeScan>, Failed> {
-    let view = find(&api, &scan).await?;
-    Ok(Json(WholeScan {
-        session: view.session,
-        start: view.start,
-        pings: view.pings.into_iter().map(JudgedPing::from).collect(),
-        events: view.events,
-        end: view.end,
-    }))
+async fn whole(State(api): State<Api>, Path(scan): Path<String>) -> Result<Response, Failed> {
+    let passage = find(&api, &scan).await?;
+    Ok(answer(&api, Pieces::new(passage, Form::Whole, Moved::default())))
+}
+
+/// A scan as JSON, piece by piece.
+pub(super) fn answer(api: &Api, pieces: Pieces) -> Response {
+    let media = [(header::CONTENT_TYPE, "application/json")];
+    let body = axum::body::Body::from_stream(stream(pieces, Arc::clone(&api.reading)));
+    (media, body).into_response()
 }
 
 async fn beam(
     State(api): State<Api>,
     Path((scan, index)): Path<(String, String)>,
 ) -> Result<Json<Beam>, Failed> {
-    let view = find(&api, &scan).await?;
-    let index = index.parse().ok();
-    // Of a beam that was measured twice, the last reading counts.
-    let ping = view.pings.iter().rev().find(|ping| Some(ping.index) == index).cloned();
-    let ping = ping.ok_or_else(|| {
-        let last = view.pings.iter().map(|ping| ping.index).max().unwrap_or_default();
-        let help = format!("readings so far run up to {last}");
-        Failed::new(StatusCode::NOT_FOUND, "the scan has no such beam", help)
-    })?;
-    let scene = scene_of(&api, view.scan, view.session.as_deref()).await?;
+    let passage = find(&api, &scan).await?;
+    let scene = scene_of(&api, &passage).await?;
     // One after the other, also when clients leave meanwhile: asking the model takes its time.
     let turn = Arc::clone(&api.looking).acquire_owned().await;
     let looking = tokio::task::spawn_blocking(move || {
         let _turn = turn;
-        look(&view, ping, scene.as_deref())
+        // Of a beam that was measured twice, the last reading counts.
+        let index = index.parse().ok();
+        let (ping, highest) =
+            passage.beam(index.unwrap_or(u32::MAX)).map_err(|e| unreadable(&e))?;
+        let ping = ping.filter(|_| index.is_some()).ok_or_else(|| {
+            let help = format!("readings so far run up to {}", highest.unwrap_or_default());
+            Failed::new(StatusCode::NOT_FOUND, "the scan has no such beam", help)
+        })?;
+        Ok(Json(look(&passage.view, ping, scene.as_deref())))
     });
-    looking.await.map(Json).map_err(|error| broken(&error))
+    looking.await.map_err(|error| broken(&error))?
 }
 
 async fn scene(
     State(api): State<Api>,
     Path(scan): Path<String>,
 ) -> Result<Json<FloorPlan>, Failed> {
-    let missing = |error: String, help: &str| Failed::new(StatusCode::NOT_FOUND, error, help);
-    let no_scan = || missing("there is no such scan".into(), "GET /v1/scans names the newest");
-    let id = Uuid::parse_str(&scan).map_err(|_| no_scan())?;
-    let (view, _) =
-        in_history(&api, move |history| history.outline(id)).await?.ok_or_else(no_scan)?;
-    let scene = scene_of(&api, id, view.session.as_deref()).await?;
-    let taken_in = view.session.as_deref().and_then(|session| session.scene.as_ref());
+    let passage = find(&api, &scan).await?;
+    let scene = scene_of(&api, &passage).await?;
+    let taken_in = passage.view.session.as_deref().and_then(|session| session.scene.as_ref());
     match scene.filter(|scene| taken_in.is_some_and(|taken_in| taken_in.sha256 == scene.sha256)) {
         Some(scene) => Ok(Json(FloorPlan::of(&scene))),
-        None => Err(missing(
-            "the log does not hold the scene of this scan".into(),
+        None => Err(Failed::new(
+            StatusCode::NOT_FOUND,
+            "the log does not hold the scene of this scan",
             "logs hold their scene since it is written into them; older ones name it only",
         )),
     }
@@ -206,31 +197,46 @@ async fn scene(
 
 /// The scene that a scan was taken in: the one in force, or the one in its log. The one in force
 /// also where the log says nothing.
-async fn scene_of(
-    api: &Api,
-    scan: Uuid,
-    session: Option<&Session>,
-) -> Result<Option<Arc<Scene>>, Failed> {
+async fn scene_of(api: &Api, passage: &Passage) -> Result<Option<Arc<Scene>>, Failed> {
     let in_force = api.daemon.scene();
-    let taken_in = session.and_then(|session| session.scene.as_ref());
+    let session = passage.view.session.clone();
+    let taken_in = session.as_deref().and_then(|session| session.scene.as_ref());
     let fits = |scene: &Scene| taken_in.is_none_or(|taken_in| taken_in.sha256 == scene.sha256);
     if in_force.as_deref().is_some_and(fits) {
         return Ok(in_force);
     }
-    let logged = in_history(api, move |history| {
-        let Some((view, log)) = history.outline(scan)? else { return Ok(None) };
-        Ok(view.session.and_then(|session| logged_scene(&session, &log).ok().flatten()))
+    let log = passage.path.clone();
+    let reading = tokio::task::spawn_blocking(move || {
+        session.and_then(|session| logged_scene(&session, &log).ok().flatten())
     });
-    Ok(logged.await?.map(Arc::new).or(in_force))
+    let logged = reading.await.map_err(|error| broken(&error))?;
+    Ok(logged.map(Arc::new).or(in_force))
 }
 
-async fn find(api: &Api, scan: &str) -> Result<ScanView, Failed> {
+async fn find(api: &Api, scan: &str) -> Result<Passage, Failed> {
     let missing = || {
         let help = "GET /v1/scans names the newest; older ones are in GET /v1/logs";
         Failed::new(StatusCode::NOT_FOUND, "there is no such scan", help)
     };
     let id = Uuid::parse_str(scan).map_err(|_| missing())?;
-    in_history(api, move |history| history.scan(id)).await?.ok_or_else(missing)
+    in_history(api, move |history| history.passage(id)).await?.ok_or_else(missing)
+}
+
+/// A scan that has just ended, as soon as all of it is in the log; `None` if that does not come to be.
+pub(super) async fn written(api: &Api, scan: Uuid) -> Result<Option<Passage>, Failed> {
+    let mut wait = Duration::from_millis(5);
+    let until = Instant::now() + WRITING;
+    loop {
+        let passage = in_history(api, move |history| history.passage(scan)).await?;
+        if let Some(passage) = passage.filter(|passage| passage.view.end.is_some()) {
+            return Ok(Some(passage));
+        }
+        if Instant::now() >= until {
+            return Ok(None);
+        }
+        sleep(wait).await;
+        wait = (wait * 2).min(Duration::from_millis(200));
+    }
 }
 
 /// Looks into the logs, beside everything else: disks block.
@@ -243,11 +249,13 @@ async fn in_history<T: Send + 'static>(
         ask(&mut history.lock().unwrap_or_else(PoisonError::into_inner))
     });
     let answer = asking.await.map_err(|error| broken(&error))?;
-    answer.map_err(|error| {
-        let help = "check the log folder and its permissions";
-        let error = format!("cannot read the logs: {error}");
-        Failed::new(StatusCode::INTERNAL_SERVER_ERROR, error, help)
-    })
+    answer.map_err(|error| unreadable(&error))
+}
+
+fn unreadable(error: &io::Error) -> Failed {
+    let help = "check the log folder and its permissions";
+    let error = format!("cannot read the logs: {error}");
+    Failed::new(StatusCode::INTERNAL_SERVER_ERROR, error, help)
 }
 
 fn broken(error: &tokio::task::JoinError) -> Failed {
@@ -274,11 +282,5 @@ impl From<Ping> for JudgedPing {
     fn from(ping: Ping) -> Self {
         let verdict = Word::of(&ping);
         Self { ping, verdict }
-    }
-}
-
-impl Word {
-    pub(super) fn of(ping: &Ping) -> Self {
-        judge(ping).verdict.map_or_else(Self::NotCompared, Self::Compared)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use axum::{Json, extract::State, http::StatusCode};
+use axum::{extract::State, http::StatusCode, response::Response};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -67,12 +67,12 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
     ]
 }
 
-async fn scene(State(api): State<Api>) -> Result<Json<FloorPlan>, Failed> {
+async fn scene(State(api): State<Api>) -> Result<Response, Failed> {
     let scene = api.daemon.scene().ok_or_else(|| {
         let help = "give the daemon one with place.scene";
         Failed::new(StatusCode::NOT_FOUND, "there is no scene", help)
     })?;
-    Ok(Json(FloorPlan::of(&scene)))
+    Ok(api.scene.answer(&scene, FloorPlan::of))
 }
 
 impl FloorPlan {

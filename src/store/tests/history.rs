@@ -5,7 +5,7 @@ use std::{fs, io::Write as _, path::Path};
 use uuid::Uuid;
 
 use super::{LOG, folder};
-use crate::store::{History, PastScan};
+use crate::store::{History, Passage, PastScan};
 
 /// The fixture's lines with another scan id.
 fn scan(n: u128) -> String {
@@ -27,6 +27,10 @@ fn ids(scans: &[PastScan]) -> Vec<u128> {
     scans.iter().map(|past| past.start.scan.as_u128()).collect()
 }
 
+fn readings(passage: &Passage) -> usize {
+    passage.lines(true).expect("readable").map(|line| line.expect("a line")).count()
+}
+
 #[test]
 fn the_newest_scans_come_first_from_several_logs_while_they_grow() {
     let (folder, _) = folder();
@@ -45,8 +49,9 @@ fn the_newest_scans_come_first_from_several_logs_while_they_grow() {
     let newest = history.newest(1).expect("readable");
     assert_eq!((ids(&newest), newest[0].end.is_none()), (vec![4], true));
     let pings = |history: &mut History, n: u128| {
-        let view = history.scan(Uuid::from_u128(n)).expect("readable");
-        view.map(|view| (view.pings.len(), view.session.is_some(), view.end.is_some()))
+        let passage = history.passage(Uuid::from_u128(n)).expect("readable")?;
+        let view = &passage.view;
+        Some((readings(&passage), view.session.is_some(), view.end.is_some()))
     };
     assert_eq!(pings(&mut history, 4), Some((2, true, false)));
     append(folder, "sonard-20261121T000000Z.jsonl", torn);
@@ -67,7 +72,7 @@ fn what_was_removed_or_repaired_is_not_shown_from_memory() {
     fs::remove_file(folder.join(old)).expect("it is there");
     fs::write(folder.join(new), scan(2)).expect("there is room");
     assert_eq!(ids(&history.newest(5).expect("readable")), [2]);
-    assert_eq!(history.scan(Uuid::from_u128(3)).expect("readable"), None);
+    assert!(history.passage(Uuid::from_u128(3)).expect("readable").is_none());
 }
 
 #[test]
@@ -78,6 +83,12 @@ fn damaged_and_endless_lines_do_not_hide_the_scans_around_them() {
     append(folder, "sonard-20261121T000000Z.jsonl", &(scan(1) + &noise + &scan(2)));
     let mut history = History::new(folder.into());
     assert_eq!(ids(&history.newest(5).expect("readable")), [2, 1]);
-    let view = history.scan(Uuid::from_u128(2)).expect("readable").expect("it is there");
-    assert_eq!(view.pings.len(), 7);
+    let passage = history.passage(Uuid::from_u128(2)).expect("readable").expect("it is there");
+    assert_eq!(readings(&passage), 7);
+    // Both kinds of lines are all of it, and a beam is found among them.
+    let others = passage.lines(false).expect("readable").count();
+    assert_eq!(others + 7, scan(2).lines().count() - 2, "without session and the event behind it");
+    let (ping, highest) = passage.beam(3).expect("readable");
+    assert_eq!((ping.map(|ping| ping.index), highest), (Some(3), Some(6)));
+    assert_eq!(passage.beam(7).expect("readable"), (None, Some(6)));
 }
