@@ -84,6 +84,7 @@ fn screen(status: &Value, health: &Value) -> String {
             status["subscribers"]["cut_off"],
         ),
     ]);
+    lines.extend(pending(&status["pending"]));
     let reasons = health["reasons"].as_array().into_iter().flatten();
     lines.extend(reasons.map(|reason| format!("  not well: {}", word(reason))));
     if let Some(error) = status["air"]["error"].as_str() {
@@ -93,6 +94,27 @@ fn screen(status: &Value, health: &Value) -> String {
         lines.push(format!("  the last change of the configuration was refused: {error}"));
     }
     lines.join("\n") + "\n"
+}
+
+/// What counts from the next scan on.
+fn pending(pending: &Value) -> Option<String> {
+    let (plan, pose) = (&pending["plan"], &pending["pose"]);
+    let parts = [
+        (!plan.is_null()).then(|| {
+            format!(
+                "plan {} to {} degrees, every {}, {} pings",
+                plan["from_deg"], plan["to_deg"], plan["step_deg"], plan["pings_per_stop"]
+            )
+        }),
+        (!pose.is_null()).then(|| {
+            format!("pose {},{},{}", pose["x_m"], pose["y_m"], pose["heading_deg"])
+        }),
+        pending["scene"]["name"].as_str().map(|scene| format!("scene {scene}")),
+        pending["air"]["temperature_c"].as_f64().map(|c| format!("air {c:.1} C")),
+        (!pending["setup"].is_null()).then(|| "sensor, model or motion".into()),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    (!parts.is_empty()).then(|| format!("  pending  from the next scan on: {}", parts.join("; ")))
 }
 
 /// The ranger and its line.

@@ -1,15 +1,27 @@
 //! `sonard watch`.
 
-use std::io::{self, Write as _};
+use std::{
+    io::{self, Write as _},
+    time::Duration,
+};
 
 use http_body_util::BodyExt as _;
+use hyper::body::Incoming;
+use tokio::time::sleep;
 
 use super::{
     Failure, Outcome,
     daemon::{DaemonArgs, refuse},
     runtime::{self, Interrupts},
 };
-use crate::scan::{PingStatus, Provenance, Record, decode_line};
+use crate::{
+    client::Client,
+    scan::{PingStatus, Provenance, Record, decode_line},
+};
+
+/// Wait before it is tried to reach the daemon again, and the longest one.
+const RECONNECT_MIN: Duration = Duration::from_millis(200);
+const RECONNECT_MAX: Duration = Duration::from_secs(5);
 
 /// Options of `sonard watch`.
 #[derive(Debug, clap::Args)]
@@ -26,16 +38,21 @@ pub(super) struct Args {
     /// The records themselves, one a line
     #[arg(long)]
     json: bool,
+    /// Wait for a daemon that goes away, and go on when it is back; what it measures meanwhile is not
+    /// shown
+    #[arg(long)]
+    reconnect: bool,
 }
 
 const HELP: &str = "\
 Examples:
   sonard watch
   sonard watch --moved 0.05
+  sonard watch --reconnect >>readings.txt
   sonard watch --json | jq 'select(.type == \"ping\") | .range_m'
 
-Ends with the daemon, or when interrupted.
-Exit codes: 0 done, 2 wrong usage, 3 no daemon answers.";
+Exit codes: 0 interrupted, or nobody reads its output any more; 2 wrong usage; 3 no daemon answers, or
+it ended the stream (with --reconnect: it refused to go on).";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let path = match (args.scans, args.moved) {
@@ -52,26 +69,73 @@ pub(super) fn run(args: &Args) -> Outcome {
     })
 }
 
+/// Why a stream is over.
+enum Over {
+    /// Nobody reads what is written here.
+    Reader(Outcome),
+    /// The daemon ended it, or broke off.
+    Daemon(String),
+}
+
 async fn watch(args: &Args, path: &str) -> Outcome {
     let client = args.daemon.client()?;
     let mut body = client.get(path).await.map_err(|error| refuse(&error))?.into_body();
-    let mut rest = Vec::new();
-    while let Some(frame) = body.frame().await {
-        let frame = frame.map_err(|error| refuse(&error.into()))?;
+    loop {
+        let why = match follow(args, body).await {
+            Over::Reader(outcome) => return outcome,
+            Over::Daemon(why) => why,
+        };
+        if !args.reconnect {
+            return Err(Failure::device(
+                why,
+                "it was stopped, or this client was too slow for it; lines that came are whole. \
+                 --reconnect waits for it and goes on",
+            ));
+        }
+        anstream::eprintln!("{why}: waiting for it");
+        body = again(&client, path).await?;
+        anstream::eprintln!("the daemon answers again; its log has what was measured meanwhile");
+    }
+}
+
+/// Asks until the daemon answers; only a refusal ends that.
+async fn again(client: &Client, path: &str) -> Result<Incoming, Failure> {
+    let mut wait = RECONNECT_MIN;
+    loop {
+        sleep(wait).await;
+        match client.get(path).await {
+            Ok(response) => return Ok(response.into_body()),
+            Err(error) if error.is_final() => return Err(refuse(&error)),
+            Err(_not_yet) => wait = (wait * 2).min(RECONNECT_MAX),
+        }
+    }
+}
+
+/// Writes lines as they come, each only when it is whole.
+async fn follow(args: &Args, mut body: Incoming) -> Over {
+    let (mut rest, mut seen) = (Vec::new(), 0);
+    loop {
+        let frame = match body.frame().await {
+            Some(Ok(frame)) => frame,
+            Some(Err(error)) => return Over::Daemon(format!("the daemon broke off: {error}")),
+            None => return Over::Daemon("the daemon ended the stream".into()),
+        };
         rest.extend_from_slice(frame.data_ref().map_or(&[][..], |data| data));
-        while let Some(end) = rest.iter().position(|&byte| byte == b'\n') {
-            let line: Vec<u8> = rest.drain(..=end).collect();
+        // A scan may be a line of many megabytes: each byte of it is looked at once.
+        while let Some(end) = rest[seen..].iter().position(|&byte| byte == b'\n') {
+            let line: Vec<u8> = rest.drain(..=seen + end).collect();
+            seen = 0;
             let text = match args.json || args.scans {
                 true => line,
                 false => words(&line).into_bytes(),
             };
             let mut out = io::stdout().lock();
             if let Err(error) = out.write_all(&text).and_then(|()| out.flush()) {
-                return Failure::from_write("to standard output", &error);
+                return Over::Reader(Failure::from_write("to standard output", &error));
             }
         }
+        seen = rest.len();
     }
-    Ok(())
 }
 
 /// A record as a line for a person.

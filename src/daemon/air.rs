@@ -161,6 +161,14 @@ impl AirDesk {
         }
     }
 
+    /// Whether another air is known here than there.
+    #[must_use]
+    pub(super) fn differs(&self, other: &Self) -> bool {
+        (self.temperature_c, self.source) != (other.temperature_c, other.source)
+            || self.humidity_percent != other.humidity_percent
+            || self.pressure_kpa != other.pressure_kpa
+    }
+
     fn air(&self) -> Air {
         // Every way in checks the figures.
         Air::new(self.temperature_c, self.humidity_percent, self.pressure_kpa).unwrap_or_default()

@@ -16,7 +16,7 @@ use super::{
     air::{AirDesk, AirOrder, Reading, watch_thermometer},
     journal::Journal,
     settings::{Settings, Setup},
-    status::ConfigurationReport,
+    status::{ConfigurationReport, Shared, Terms},
 };
 use crate::{
     board::Board,
@@ -112,6 +112,7 @@ pub(super) struct Desk {
     shutdown: CancellationToken,
     thermometer: watch::Receiver<Option<Reading>>,
     journal: Journal,
+    shared: Arc<Shared>,
     pressed: bool,
 }
 
@@ -120,7 +121,7 @@ impl Desk {
         settings: Settings,
         board: Box<dyn Board>,
         requests: mpsc::Receiver<Request>,
-        shutdown: CancellationToken,
+        (shutdown, shared): (CancellationToken, Arc<Shared>),
         journal: Journal,
     ) -> Self {
         Self {
@@ -140,6 +141,7 @@ impl Desk {
             requests,
             shutdown,
             journal,
+            shared,
             pressed: false,
             settings,
         }
@@ -148,6 +150,28 @@ impl Desk {
     /// Time since the start, on a clock that does not jump.
     pub(super) fn now(&self) -> Duration {
         self.epoch.elapsed()
+    }
+
+    /// What the next scan is taken by.
+    pub(super) fn terms(&self) -> Terms {
+        let simulated = self.settings.simulated.as_ref();
+        Terms {
+            plan: simulated.map_or(self.plan, |simulated| simulated.array.plan(1)),
+            pose: self.pose,
+            scene: self.settings.scene.clone(),
+            setup: Arc::clone(&self.setup),
+            air: self.air.clone(),
+        }
+    }
+
+    /// Publishes what changed for scans to come, while one may be under way.
+    fn publish(&self) {
+        self.shared.view.send_modify(|view| {
+            view.next = self.terms();
+            view.scanning = self.scanning.clone();
+            (view.paused, view.requested) = (self.agenda.is_paused(), self.agenda.requested());
+            view.configuration = self.configuration.clone();
+        });
     }
 
     /// Carries out orders until one needs the operator. Cancel-safe.
@@ -172,6 +196,7 @@ impl Desk {
                     let reading = self.thermometer.borrow_and_update().clone();
                     if let Some(reading) = reading {
                         self.air.read(&reading, Instant::now());
+                        self.publish();
                         return Interrupt::Agenda;
                     }
                 }
@@ -213,6 +238,8 @@ impl Desk {
                 (Ok(()), Some(Interrupt::Agenda))
             }
         };
+        // Whoever asks after the answer finds what was ordered.
+        self.publish();
         // A program that did not wait for its answer does not want it.
         drop(reply.send(answer));
         interrupt

@@ -44,8 +44,8 @@ pub use operator::OpenPort;
 pub use settings::{Mismatch, Settings, Setup, Simulated};
 pub use simulation::{RangerReading, SimulationReport};
 pub use status::{
-    ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, ScanProgress, ScanReport,
-    ScanTotals, ScanningReport, Status, SubscriberReport,
+    ClockReport, ConfigurationReport, Health, InForce, LineTotals, LinkReport, Pending, ScanProgress,
+    ScanReport, ScanTotals, ScanningReport, Status, SubscriberReport,
 };
 
 use crate::{
@@ -58,7 +58,7 @@ use desk::Desk;
 use operator::Operator;
 use outlet::Outlet;
 use player::Player;
-use status::{Shared, View};
+use status::{Shared, Terms, View};
 
 /// Orders that may wait while one is carried out.
 const ORDERS: usize = 64;
@@ -124,7 +124,8 @@ fn wire(
     let shutdown = CancellationToken::new();
     let hub = Hub::new(settings.keys.server.queue as usize);
     let shared = Arc::new(Shared::new(first_view(&settings)));
-    let desk = Desk::new(settings, board, requests, shutdown.clone(), journal.clone());
+    let gate = (shutdown.clone(), Arc::clone(&shared));
+    let desk = Desk::new(settings, board, requests, gate, journal.clone());
     let outlet = Outlet { journal: journal.clone(), hub: hub.clone(), shared: Arc::clone(&shared) };
     let worker = employ(desk, outlet);
     let handle = Handle { orders, shared: Arc::clone(&shared), hub: hub.clone(), journal };
@@ -185,13 +186,14 @@ impl Handle {
     /// The scene in force, if there is one.
     #[must_use]
     pub fn scene(&self) -> Option<Arc<Scene>> {
-        self.shared.view.borrow().scene.clone()
+        self.shared.view.borrow().in_force().scene.clone()
     }
 
     /// What the configuration in force decides about every scan.
     #[must_use]
-    pub fn setup(&self) -> Arc<Setup> {
-        Arc::clone(&self.shared.view.borrow().setup)
+    pub fn setup(&self) -> InForce<Setup> {
+        let now = (*self.shared.view.borrow().in_force().setup).clone();
+        InForce { now, pending: self.status().pending.setup }
     }
 
     /// The session in force in the log, once there was a scan.
@@ -216,6 +218,13 @@ impl Handle {
 }
 
 fn first_view(settings: &Settings) -> View {
+    let terms = Terms {
+        plan: settings.plan(),
+        pose: settings.pose,
+        scene: settings.scene.clone(),
+        setup: Arc::new(settings.setup()),
+        air: AirDesk::new(settings.keys.air.clone()),
+    };
     View {
         state: LinkState::Opening,
         since: Timestamp::now(),
@@ -231,11 +240,8 @@ fn first_view(settings: &Settings) -> View {
         requested: 0,
         next_at: None,
         scan: None,
-        plan: settings.plan(),
-        pose: settings.pose,
-        scene: settings.scene.clone(),
-        setup: Arc::new(settings.setup()),
-        air: AirDesk::new(settings.keys.air.clone()),
+        now: terms.clone(),
+        next: terms,
         configuration: ConfigurationReport::default(),
         line: status::Line::default(),
         scans: ScanTotals::default(),

@@ -260,8 +260,8 @@ impl Player {
             view.port.clear();
             view.scanning = desk.scanning.clone();
             (view.paused, view.requested) = (desk.agenda.is_paused(), desk.agenda.requested());
-            (view.next_at, view.pose) = (next_at, desk.pose);
-            view.air = desk.air.clone();
+            view.next_at = next_at;
+            (view.now, view.next) = (desk.terms(), desk.terms());
             view.configuration = desk.configuration.clone();
             view.scans = self.scans;
             let told = desk.settings.simulated.as_ref().map(|simulated| {
@@ -272,9 +272,6 @@ impl Player {
                 let (driving, skipped) = (drive.is_driving(), rhythm.skipped());
                 SimulationReport { driving, skipped, readings, ..now }
             });
-            if let Some(simulated) = &desk.settings.simulated {
-                view.plan = simulated.array.plan(1);
-            }
             view.simulation = told;
         });
     }

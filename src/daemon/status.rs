@@ -45,14 +45,16 @@ pub struct Status {
     pub scanning: ScanningReport,
     /// The scan under way.
     pub scan: Option<ScanProgress>,
-    /// Azimuths of the next scan.
+    /// Azimuths in force: of the daemon's own scan that is under way, else of the next.
     pub plan: ScanPlan,
-    /// Where the ranger stands.
+    /// Where the ranger stands, likewise.
     pub pose: Pose,
-    /// The scene that readings are predicted in, if there is one.
+    /// The scene that readings are predicted in, if there is one, likewise.
     pub scene: Option<SceneRef>,
-    /// The air in force.
+    /// The air, likewise.
     pub air: AirStatus,
+    /// What was changed since the scan under way began: it counts from the next one on.
+    pub pending: Pending,
     /// The log.
     pub log: LogStatus,
     /// Clients of live streams.
@@ -61,6 +63,32 @@ pub struct Status {
     pub configuration: ConfigurationReport,
     /// The array that the model plays, where nothing is measured.
     pub simulation: Option<SimulationReport>,
+}
+
+/// What counts from the next scan on, where that differs from what the one under way is taken by.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Pending {
+    /// Other azimuths.
+    pub plan: Option<ScanPlan>,
+    /// Another place.
+    pub pose: Option<Pose>,
+    /// Another scene.
+    pub scene: Option<SceneRef>,
+    /// Other air.
+    pub air: Option<AirStatus>,
+    /// Another sensor, model or motion.
+    pub setup: Option<Setup>,
+}
+
+/// What is in force, and what is to be.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct InForce<T> {
+    /// In force: for the daemon's own scan that is under way, else for the next.
+    #[serde(flatten)]
+    pub now: T,
+    /// What counts from the next scan on, if that is something else.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pending: Option<T>,
 }
 
 /// The link to the device.
@@ -224,16 +252,55 @@ pub(super) struct View {
     pub(super) requested: u32,
     pub(super) next_at: Option<Instant>,
     pub(super) scan: Option<(Uuid, u32)>,
-    pub(super) plan: ScanPlan,
-    pub(super) pose: Pose,
-    pub(super) scene: Option<Arc<Scene>>,
-    pub(super) setup: Arc<Setup>,
-    pub(super) air: AirDesk,
+    /// What the scan under way is taken by, unless it was asked for otherwise.
+    pub(super) now: Terms,
+    /// What the next one will be taken by.
+    pub(super) next: Terms,
     pub(super) configuration: ConfigurationReport,
     pub(super) line: Line,
     pub(super) scans: ScanTotals,
     pub(super) clock: ClockReport,
     pub(super) simulation: Option<SimulationReport>,
+}
+
+/// What scans are taken by.
+#[derive(Debug, Clone)]
+pub(super) struct Terms {
+    pub(super) plan: ScanPlan,
+    pub(super) pose: Pose,
+    pub(super) scene: Option<Arc<Scene>>,
+    pub(super) setup: Arc<Setup>,
+    pub(super) air: AirDesk,
+}
+
+impl Terms {
+    /// Whether a scan by these is one by others, but for the air, which may change at any time.
+    pub(super) fn measures_as(&self, other: &Self) -> bool {
+        let scene = |terms: &Self| terms.scene.as_ref().map(Arc::as_ptr);
+        (self.plan, self.pose, scene(self)) == (other.plan, other.pose, scene(other))
+            && Arc::ptr_eq(&self.setup, &other.setup)
+    }
+}
+
+impl View {
+    /// What is in force. Without a scan under way that is what the next one will be taken by.
+    pub(super) const fn in_force(&self) -> &Terms {
+        if self.scan.is_some() { &self.now } else { &self.next }
+    }
+
+    /// What differs from it in the next scan.
+    fn pending(&self, at: Instant) -> Pending {
+        let (now, next) = (self.in_force(), &self.next);
+        let hash = |terms: &Terms| terms.scene.as_ref().map(|scene| scene.sha256.clone());
+        let scene = next.scene.as_deref().filter(|_| hash(now) != hash(next));
+        Pending {
+            plan: Some(next.plan).filter(|plan| *plan != now.plan),
+            pose: Some(next.pose).filter(|pose| *pose != now.pose),
+            scene: scene.map(SceneRef::of),
+            air: next.air.differs(&now.air).then(|| next.air.status(at)),
+            setup: Some(&next.setup).filter(|setup| **setup != now.setup).map(|s| (**s).clone()),
+        }
+    }
 }
 
 /// Figures of the line: what is settled, and the connection that there is.
@@ -335,6 +402,7 @@ impl Shared {
         let until =
             |at: Option<Instant>| at.map(|at| at.saturating_duration_since(now).as_secs_f64());
         let view = self.view.borrow().clone();
+        let (in_force, pending) = (view.in_force().clone(), view.pending(now));
         Status {
             sonard: env!("CARGO_PKG_VERSION").into(),
             uptime_s: now.duration_since(self.started).as_secs_f64(),
@@ -360,10 +428,11 @@ impl Shared {
                 beams,
                 done: self.beams_done.load(Ordering::Relaxed),
             }),
-            plan: view.plan,
-            pose: view.pose,
-            scene: view.scene.as_deref().map(SceneRef::of),
-            air: view.air.status(now),
+            plan: in_force.plan,
+            pose: in_force.pose,
+            scene: in_force.scene.as_deref().map(SceneRef::of),
+            air: in_force.air.status(now),
+            pending,
             log,
             subscribers,
             configuration: view.configuration,
@@ -373,7 +442,8 @@ impl Shared {
 
     pub(super) fn health(&self, log: &LogStatus) -> Health {
         let view = self.view.borrow().clone();
-        let air = view.air.status(Instant::now());
+        // A scan takes its time: the thermometer is judged by what it said last.
+        let air = view.next.air.status(Instant::now());
         let mut reasons = Vec::new();
         if !view.state.is_up() {
             let trouble = view.trouble.unwrap_or_default();

@@ -49,8 +49,15 @@ pub(super) struct Status {
     provenance: Option<Provenance>,
     scanning: ScanningNow,
     air: AirNow,
+    #[serde(default)]
+    pending: PendingNow,
     simulation: Option<Value>,
     scene: Value,
+}
+
+#[derive(Default, Deserialize)]
+struct PendingNow {
+    air: Option<AirNow>,
 }
 
 #[derive(Deserialize)]
@@ -73,10 +80,23 @@ struct AirNow {
     source: AirSource,
 }
 
+/// The air in force, and the one that is to be.
+#[derive(Deserialize)]
+struct AirInForce {
+    #[serde(flatten)]
+    now: AirNow,
+    pending: Option<AirNow>,
+}
+
 impl Status {
     /// The scene that it predicts in.
     pub(super) const fn scene(&self) -> &Value {
         &self.scene
+    }
+
+    /// The air that the next scan will be taken in.
+    fn air(&self) -> &AirNow {
+        self.pending.air.as_ref().unwrap_or(&self.air)
     }
 
     fn is_up(&self) -> bool {
@@ -147,10 +167,10 @@ impl Daemon {
         if mode != Mode::OnRequest {
             before.get_or_insert_default().scanning = Some(ScanningKeys { mode, every_s });
         }
-        if air.is_some_and(|air| !status.air.is(air)) {
+        if air.is_some_and(|air| !status.air().is(air)) {
             // Air that this collection gave earlier is not the daemon's own.
-            let own = || match status.air.source {
-                AirSource::Api => AirBefore::Given(status.air.order()),
+            let own = || match status.air().source {
+                AirSource::Api => AirBefore::Given(status.air().order()),
                 _ => AirBefore::Own,
             };
             before.get_or_insert_default().air.get_or_insert_with(own);
@@ -169,7 +189,7 @@ impl Daemon {
         }
         self.put("/v1/scanning", &json!({ "mode": Mode::OnRequest })).await?;
         let status: Status = self.client.get_json("/v1/status").await.map_err(|e| refuse(&e))?;
-        match air.filter(|air| !status.air.is(air)) {
+        match air.filter(|air| !status.air().is(air)) {
             Some(air) => self.put("/v1/air", &json!(air)).await,
             None => Ok(()),
         }
@@ -193,7 +213,8 @@ impl Daemon {
 
     /// The temperature that somebody measured for it, degrees Celsius.
     pub(super) async fn temperature_c(&self) -> Option<f64> {
-        let air: AirNow = self.client.get_json("/v1/air").await.ok()?;
+        let AirInForce { now, pending } = self.client.get_json("/v1/air").await.ok()?;
+        let air = pending.unwrap_or(now);
         (air.source != AirSource::Configuration).then_some(air.temperature_c)
     }
 

@@ -27,9 +27,10 @@ const CLOCK_STEP_S: f64 = 0.1;
 impl Operator {
     pub(super) async fn scan(&mut self) {
         let Some(identity) = self.recognise().await else { return };
-        let asked = self.desk.agenda.next();
+        let (asked, terms) = (self.desk.agenda.next(), self.desk.terms());
         let Some(job) = self.prepare(&identity, asked).await else { return };
-        if self.desk.agenda.next() != asked {
+        let now = self.desk.terms();
+        if self.desk.agenda.next() != asked || !now.measures_as(&terms) {
             // While the model was asked, somebody wanted something else.
             return;
         }

@@ -1,7 +1,5 @@
 //! What others get to know.
 
-use std::sync::Arc;
-
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
@@ -46,10 +44,8 @@ impl Operator {
             view.provenance = desk.identity.as_ref().map(provenance);
             view.scanning = desk.scanning.clone();
             (view.paused, view.requested) = (desk.agenda.is_paused(), desk.agenda.requested());
-            (view.next_at, view.plan, view.pose) = (next_at, desk.plan, desk.pose);
-            view.scene.clone_from(&desk.settings.scene);
-            view.setup = Arc::clone(&desk.setup);
-            view.air = desk.air.clone();
+            view.next_at = next_at;
+            (view.now, view.next) = (desk.terms(), desk.terms());
             view.configuration = desk.configuration.clone();
             view.line.clone_from(&self.line_figures);
             view.scans = self.scans;

@@ -4,6 +4,8 @@ import { ask } from "./api.js";
 import * as words from "./words.js";
 
 const EVERY_MS = 1000;
+/** When it answered last. */
+let answered = null;
 const byId = (id) => document.getElementById(id);
 
 /** Asks for ever; `onStatus` gets each answer, or `null` when there is none. */
@@ -18,6 +20,7 @@ async function look(onStatus) {
   try {
     const signal = AbortSignal.timeout(5 * EVERY_MS);
     const [status, health] = await Promise.all([ask("/v1/status", { signal }), ask("/v1/health", { signal })]);
+    answered = new Date();
     show(status, health);
     onStatus(status);
   } catch (error) {
@@ -37,9 +40,21 @@ function show(status, health) {
     ["Plan", `${plan.from_deg}° to ${plan.to_deg}°, every ${plan.step_deg}°${plan.pings_per_stop > 1 ? `, ${plan.pings_per_stop} pings` : ""}`],
     ["Pose", `${pose.x_m.toFixed(3)}, ${pose.y_m.toFixed(3)} m, ${pose.heading_deg}°`],
     ["Scans", mode(status.scanning)],
+    ...pending(status.pending),
   ]);
   showTrouble(trouble(status));
   showHealth(status, health);
+}
+
+/** What counts from the next scan on, if anything does. */
+function pending({ plan, pose, scene, air, setup }) {
+  const parts = [];
+  if (plan) parts.push(`plan ${plan.from_deg}° to ${plan.to_deg}°, every ${plan.step_deg}°${plan.pings_per_stop > 1 ? `, ${plan.pings_per_stop} pings` : ""}`);
+  if (pose) parts.push(`pose ${pose.x_m.toFixed(3)}, ${pose.y_m.toFixed(3)} m, ${pose.heading_deg}°`);
+  if (scene) parts.push(`scene ${scene.name}`);
+  if (air) parts.push(`air ${air.temperature_c.toFixed(1)} °C`);
+  if (setup) parts.push("sensor, model or motion");
+  return parts.length > 0 ? [["From the next scan on", parts.join("; ")]] : [];
 }
 
 function mode({ mode, paused, requested, next_in_s }) {
@@ -94,6 +109,8 @@ function showProvenance(name) {
 
 function showLost(error) {
   setLamp(byId("link"), "bad", "daemon not answering");
+  const since = answered ? ` since ${answered.toLocaleTimeString()}` : "";
+  setLamp(byId("healthy"), "bad", `The daemon is not answering${since}.`);
   const refused = error.status ? `The daemon refuses: ${error.message}. ${error.help}` : "";
   showTrouble(refused || "The daemon does not answer. Trying again; what is shown is what was known last.");
 }

@@ -1,7 +1,5 @@
 //! What the daemon is doing and has done.
 
-use std::sync::Arc;
-
 use axum::{Json, extract::State, http::StatusCode, response::Response};
 
 use super::{
@@ -9,7 +7,7 @@ use super::{
     scans::{answer, written},
 };
 use crate::{
-    daemon::{AirStatus, Health, Moved, ScanReport, Setup, Status},
+    daemon::{AirStatus, Health, InForce, Moved, ScanReport, Setup, Status},
     geometry::Pose,
     scan::{ScanPlan, Session},
     server::{Api, answer::Failed, openapi::Endpoint},
@@ -31,12 +29,13 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
         )
         .answers::<Session>(200, "The session"),
         Endpoint::get("/v1/setup", setup, "What the configuration decides about every scan")
-            .answers::<Setup>(200, "The setup"),
-        Endpoint::get("/v1/plan", plan, "The azimuths of the next scan")
-            .answers::<ScanPlan>(200, "The plan"),
-        Endpoint::get("/v1/pose", pose, "Where the ranger stands").answers::<Pose>(200, "The pose"),
+            .answers::<InForce<Setup>>(200, "The setup, and what of it is pending"),
+        Endpoint::get("/v1/plan", plan, "The azimuths in force")
+            .answers::<InForce<ScanPlan>>(200, "The plan, and one that is pending"),
+        Endpoint::get("/v1/pose", pose, "Where the ranger stands")
+            .answers::<InForce<Pose>>(200, "The pose, and one that is pending"),
         Endpoint::get("/v1/air", air, "The air in force, with its age")
-            .answers::<AirStatus>(200, "The air"),
+            .answers::<InForce<AirStatus>>(200, "The air, and what is pending"),
     ]
 }
 
@@ -70,18 +69,21 @@ async fn session(State(api): State<Api>) -> Result<Response, Failed> {
     Ok(api.session.answer(&session, Session::clone))
 }
 
-async fn setup(State(api): State<Api>) -> Json<Arc<Setup>> {
+async fn setup(State(api): State<Api>) -> Json<InForce<Setup>> {
     Json(api.daemon.setup())
 }
 
-async fn plan(State(api): State<Api>) -> Json<ScanPlan> {
-    Json(api.daemon.status().plan)
+async fn plan(State(api): State<Api>) -> Json<InForce<ScanPlan>> {
+    let Status { plan, pending, .. } = api.daemon.status();
+    Json(InForce { now: plan, pending: pending.plan })
 }
 
-async fn pose(State(api): State<Api>) -> Json<Pose> {
-    Json(api.daemon.status().pose)
+async fn pose(State(api): State<Api>) -> Json<InForce<Pose>> {
+    let Status { pose, pending, .. } = api.daemon.status();
+    Json(InForce { now: pose, pending: pending.pose })
 }
 
-async fn air(State(api): State<Api>) -> Json<AirStatus> {
-    Json(api.daemon.status().air)
+async fn air(State(api): State<Api>) -> Json<InForce<AirStatus>> {
+    let Status { air, pending, .. } = api.daemon.status();
+    Json(InForce { now: air, pending: pending.air })
 }

@@ -280,14 +280,17 @@ fn status_and_watch_are_clients() {
 
     let watching = crate::common::sonard(&["watch", "--socket", &socket, "--json"])
         .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
         .spawn()
         .expect("starts");
     wait_until("the subscriber", || daemon.status()["subscribers"]["now"] == 1);
     daemon.send("POST", "/v1/start", r#"{"scans":1}"#);
     daemon.wait_for_scans(1);
     assert_eq!(daemon.stop(), Some(0));
-    // It ends with the daemon.
+    // It ends with the daemon, and a script can tell that from an end that was asked for.
     let watched = watching.wait_with_output().expect("it ends");
+    assert_eq!(watched.status.code(), Some(3));
+    assert!(stderr(&watched).contains("--reconnect"), "{}", stderr(&watched));
     let text = String::from_utf8(watched.stdout).expect("text");
     let log = crate::common::Log::parse(&text);
     log.assert_each_beam_once(20);
@@ -295,4 +298,87 @@ fn status_and_watch_are_clients() {
     let gone = run(&["status", "--socket", &socket]);
     assert_eq!(gone.status.code(), Some(3));
     assert!(stderr(&gone).contains("sonard run"), "{}", stderr(&gone));
+}
+
+#[test]
+fn watch_goes_on_with_the_next_daemon_if_told_to() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    let socket = folder.path().join("s").display().to_string();
+    let watching =
+        crate::common::sonard(&["watch", "--socket", &socket, "--json", "--reconnect"])
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .expect("starts");
+    wait_until("the subscriber", || daemon.status()["subscribers"]["now"] == 1);
+    daemon.kill();
+    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    wait_until("the subscriber again", || daemon.status()["subscribers"]["now"] == 1);
+    daemon.wait_for("ready");
+    daemon.send("POST", "/v1/start", r#"{"scans":1}"#);
+    daemon.wait_for_scans(1);
+    // Its queue is empty before it is interrupted.
+    std::thread::sleep(Duration::from_millis(500));
+    crate::common::interrupt(watching.id());
+    let watched = watching.wait_with_output().expect("it ends");
+    assert_eq!(watched.status.code(), Some(0));
+    let log = crate::common::Log::parse(&String::from_utf8(watched.stdout).expect("text"));
+    log.assert_each_beam_once(20);
+}
+
+#[test]
+fn a_change_during_a_scan_is_shown_at_once_beside_what_is_in_force() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("s.toml");
+    std::fs::write(&file, "[plan]\nto_deg = 360\n").expect("a file");
+    let config = ["--config", file.to_str().expect("plain path"), "--set", "motion.settle_ms=50"];
+    let daemon = Daemon::start_mock(folder.path(), &config);
+    daemon.wait_for("ready");
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+    wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(2));
+    assert_eq!(daemon.status()["pending"]["plan"], Value::Null);
+    let half = json!({"from_deg": 0.0, "to_deg": 180.0, "step_deg": 0.9, "pings_per_stop": 1});
+    for (path, body) in [
+        ("/v1/plan", half.to_string()),
+        ("/v1/pose", r#"{"x_m":0.5,"y_m":0.3,"heading_deg":0}"#.to_owned()),
+        ("/v1/air", r#"{"temperature_c":25}"#.to_owned()),
+        ("/v1/scanning", r#"{"mode":"schedule","every_s":3600}"#.to_owned()),
+    ] {
+        assert_eq!(daemon.send("PUT", path, &body).status, 202, "{path}");
+    }
+    // No wait: who has his answer finds what he ordered.
+    let status = daemon.status();
+    assert_eq!((&status["plan"]["to_deg"], &status["pending"]["plan"]), (&json!(360.0), &half));
+    assert_eq!(status["pending"]["pose"]["x_m"], 0.5);
+    assert_eq!(status["pending"]["air"]["temperature_c"], 25.0);
+    assert_eq!((&status["air"]["temperature_c"], &status["pose"]["x_m"]), (&json!(20.0), &json!(0.774)));
+    assert_eq!(status["scanning"]["mode"], "schedule");
+    let plan = daemon.get("/v1/plan").json();
+    assert_eq!((&plan["to_deg"], &plan["pending"]), (&json!(360.0), &half));
+    assert_eq!(daemon.get("/v1/air").json()["pending"]["temperature_c"], 25.0);
+    assert_eq!(daemon.get("/v1/pose").json()["pending"]["x_m"], 0.5);
+    let shown = run(&["status", "--socket", daemon.folder.join("s").to_str().expect("plain path")]);
+    let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
+    assert!(shown.contains("pending  from the next scan on: plan 0.0 to 180.0"), "{shown}");
+
+    // The configuration that is read again, and what is wrong with it, likewise.
+    std::fs::write(&file, "[plan]\nto_dge = 90\n").expect("a file");
+    daemon.signal(rustix::process::Signal::HUP);
+    wait_until("the refusal", || daemon.status()["configuration"]["error"].is_string());
+    std::fs::write(&file, "[plan]\nto_deg = 90\n[motion]\nsettle_ms = 60\n").expect("a file");
+    daemon.signal(rustix::process::Signal::HUP);
+    wait_until("the new plan", || daemon.status()["pending"]["plan"]["to_deg"] == 90.0);
+    let status = daemon.status();
+    assert_eq!(status["configuration"]["error"], Value::Null);
+    assert_eq!(status["plan"]["to_deg"], 360.0);
+    assert!(status["scan"].is_object(), "all that in one scan");
+
+    // Nothing is pending without a scan under way.
+    assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
+    wait_until("rest", || daemon.status()["scan"].is_null());
+    let status = daemon.status();
+    assert_eq!(status["plan"]["to_deg"], 90.0);
+    assert!(status["pending"].as_object().expect("an object").values().all(Value::is_null));
+    assert_eq!(daemon.get("/v1/plan").json().get("pending"), None);
+    assert_eq!(daemon.stop(), Some(0));
 }

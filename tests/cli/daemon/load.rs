@@ -2,6 +2,7 @@
 
 use std::{
     io::{BufRead as _, BufReader, Write as _},
+    sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
 };
 
@@ -139,4 +140,118 @@ fn lateness_ms(stream: impl std::io::Read, until: Instant) -> Vec<f64> {
         late_ms.push(Timestamp::now().duration_since(fired).as_secs_f64() * 1e3 - 3.5);
     }
     late_ms
+}
+
+/// Beams of the largest scans here: 400 stops, 160 firings at each.
+const MANY_BEAMS: u64 = 64_000;
+/// What clients may make a daemon take in memory beyond what it has when idle, kilobytes.
+const MOST_KB: u64 = 64 * 1024;
+
+/// Reads a stream by little and little, as over a poor line, until told to stop.
+fn read_slowly(mut stream: impl std::io::Read, over: &AtomicBool) {
+    let mut piece = [0; 4096];
+    while !over.load(Ordering::Relaxed) && stream.read(&mut piece).is_ok_and(|count| count > 0) {
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+/// Most memory that a process has had since `forget_peak`, kilobytes.
+fn peak_kb(process: u32) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).expect("it runs");
+    let line = status.lines().find(|line| line.starts_with("VmHWM:")).expect("a figure");
+    line.split_whitespace().nth(1).and_then(|kb| kb.parse().ok()).expect("a number")
+}
+
+fn forget_peak(process: u32) {
+    std::fs::write(format!("/proc/{process}/clear_refs"), "5").expect("it is ours");
+}
+
+fn ask_for(daemon: &Daemon, path: &str) -> std::os::unix::net::UnixStream {
+    let mut stream = daemon.connect().expect("it listens");
+    let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+    stream.write_all(request.as_bytes()).expect("it listens");
+    stream
+}
+
+/// A log with a scan of very many beams, taken while 100 subscribers to whole scans read slowly.
+#[test]
+fn large_scans_cost_a_bounded_amount_of_memory_and_do_not_delay_the_operator() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let many = ["--virtual-time", "--set", "plan.pings_per_stop=160", "--set", "model.max_range_m=1"];
+    let daemon = Daemon::start_mock(folder.path(), &[&many[..], &["--set", "server.stall_s=30"]].concat());
+    daemon.wait_for("ready");
+    let over = AtomicBool::new(false);
+    let (idle_kb, taken_kb) = std::thread::scope(|scope| {
+        forget_peak(daemon.id());
+        let idle_kb = resident_kb(daemon.id());
+        for at in 0..100 {
+            let moved = if at % 10 == 0 { "?moved_m=0.01" } else { "" };
+            let stream = ask_for(&daemon, &format!("/v1/live/scans{moved}"));
+            let over = &over;
+            scope.spawn(move || read_slowly(stream, over));
+        }
+        wait_until("the subscribers", || daemon.status()["subscribers"]["now"] == 100);
+        assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+        daemon.wait_for_scans(1);
+        // The scan goes out to all of them meanwhile.
+        std::thread::sleep(Duration::from_secs(5));
+        over.store(true, Ordering::Relaxed);
+        (idle_kb, peak_kb(daemon.id()))
+    });
+    let beams = daemon.health()["scans"]["beams"].as_u64();
+    assert_eq!(beams, Some(MANY_BEAMS));
+    println!("idle {idle_kb} kB; {taken_kb} kB with 100 slow subscribers of {MANY_BEAMS} beams");
+    assert!(taken_kb < idle_kb + MOST_KB, "{taken_kb} kB, {idle_kb} kB when idle");
+    assert_eq!(daemon.stop(), Some(0));
+
+    // Another one measures in real time while they ask for that scan.
+    let mut rig = Rig::new(folder.path(), Pace::RealTime);
+    rig.plug("", 1);
+    let further = [
+        "scanning.mode=continuous",
+        "model.max_range_m=0.6",
+        "motion.min_interval_ms=8",
+        "server.stall_s=30",
+    ];
+    let further: Vec<&str> = further.iter().flat_map(|setting| ["--set", setting]).collect();
+    let daemon = start(&rig, folder.path(), &further);
+    daemon.wait_for("scanning");
+    forget_peak(daemon.id());
+    let idle_kb = resident_kb(daemon.id());
+    let scans = daemon.get("/v1/scans").json();
+    let large = scans.as_array().into_iter().flatten().find(|scan| {
+        scan["end"]["beams"].as_u64() == Some(MANY_BEAMS)
+    });
+    let path = format!("/v1/scans/{}", large.expect("the large scan")["scan"].as_str().expect("an id"));
+    let over = AtomicBool::new(false);
+    let mut late_ms = std::thread::scope(|scope| {
+        for _ in 0..10 {
+            let (stream, over) = (ask_for(&daemon, &path), &over);
+            scope.spawn(move || read_slowly(stream, over));
+        }
+        for _ in 0..90 {
+            let (stream, over) = (ask_for(&daemon, "/v1/live/scans"), &over);
+            scope.spawn(move || read_slowly(stream, over));
+        }
+        let until = Instant::now() + Duration::from_secs(15);
+        let readings = ask_for(&daemon, "/v1/live/records");
+        let late_ms = scope.spawn(move || lateness_ms(readings, until));
+        let whole = daemon.get(&path);
+        assert_eq!(whole.status, 200);
+        assert_eq!(whole.json()["pings"].as_array().map(Vec::len), Some(MANY_BEAMS as usize));
+        let late_ms = late_ms.join().expect("no panic");
+        over.store(true, Ordering::Relaxed);
+        late_ms
+    });
+    late_ms.sort_by(f64::total_cmp);
+    let late = late_ms[late_ms.len() * 95 / 100];
+    let asked_kb = peak_kb(daemon.id());
+    println!(
+        "idle {idle_kb} kB; {asked_kb} kB with the scan asked for at once and ten times slowly; {} \
+         readings, {late:.1} ms late at 95 %",
+        late_ms.len()
+    );
+    assert!(asked_kb < idle_kb + MOST_KB, "{asked_kb} kB, {idle_kb} kB when idle");
+    assert!(late_ms.len() > 300 && late < 200.0, "{} readings, {late} ms late", late_ms.len());
+    assert_eq!(daemon.stop(), Some(0));
 }
