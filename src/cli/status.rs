@@ -106,9 +106,8 @@ fn pending(pending: &Value) -> Option<String> {
                 plan["from_deg"], plan["to_deg"], plan["step_deg"], plan["pings_per_stop"]
             )
         }),
-        (!pose.is_null()).then(|| {
-            format!("pose {},{},{}", pose["x_m"], pose["y_m"], pose["heading_deg"])
-        }),
+        (!pose.is_null())
+            .then(|| format!("pose {},{},{}", pose["x_m"], pose["y_m"], pose["heading_deg"])),
         pending["scene"]["name"].as_str().map(|scene| format!("scene {scene}")),
         pending["air"]["temperature_c"].as_f64().map(|c| format!("air {c:.1} C")),
         (!pending["setup"].is_null()).then(|| "sensor, model or motion".into()),

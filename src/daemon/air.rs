@@ -24,13 +24,16 @@ const NOTABLE_C: f64 = 0.1;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AirOrder {
-    /// Temperature, degrees Celsius, -20 to 50.
+    /// Temperature, degrees Celsius.
+    #[schemars(range(min = -20, max = 50))]
     pub temperature_c: f64,
     /// Relative humidity, percent.
     #[serde(default)]
+    #[schemars(range(min = 0, max = 100))]
     pub humidity_percent: Option<f64>,
     /// Static pressure, kilopascals.
     #[serde(default)]
+    #[schemars(range(min = 60, max = 110))]
     pub pressure_kpa: Option<f64>,
 }
 

@@ -22,7 +22,7 @@ use crate::{
     board::Board,
     config::{Mode, ScanningKeys},
     geometry::Pose,
-    scan::ScanPlan,
+    scan::{PlanError, ScanPlan},
 };
 
 /// How often the emergency stop is looked at.
@@ -64,10 +64,25 @@ pub struct Request {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{message}")]
 pub struct Refusal {
+    /// Whether it is wrong at all times.
+    pub kind: RefusalKind,
     /// What is wrong.
     pub message: String,
     /// What would be right.
     pub help: String,
+}
+
+/// Whether a refused order is wrong at all times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RefusalKind {
+    /// It is wrong in itself.
+    Wrong,
+    /// It does not go together with what is in force: scene, motor, requests that wait.
+    Conflict,
+    /// It is about something that there is not, or no more.
+    Unknown,
+    /// The daemon is stopping.
+    Stopping,
 }
 
 /// What the operator has to react to.
@@ -168,6 +183,10 @@ impl Desk {
     fn publish(&self) {
         self.shared.view.send_modify(|view| {
             view.next = self.terms();
+            if self.settings.simulated.is_some() {
+                // What is simulated moves at once.
+                view.now = self.terms();
+            }
             view.scanning = self.scanning.clone();
             (view.paused, view.requested) = (self.agenda.is_paused(), self.agenda.requested());
             view.configuration = self.configuration.clone();
@@ -223,6 +242,7 @@ impl Desk {
             Order::Air(order) => {
                 let outcome = self.air.order(&order, Instant::now());
                 let refuse = |error: crate::acoustics::AirError| Refusal {
+                    kind: RefusalKind::Wrong,
                     message: error.to_string(),
                     help: "temperatures are degrees Celsius, pressures kilopascals".into(),
                 };
@@ -258,6 +278,7 @@ impl Desk {
             return Ok(());
         }
         Err(Refusal {
+            kind: RefusalKind::Conflict,
             message: "too many requests wait already".into(),
             help: "wait until some are done, or POST /v1/stop".into(),
         })
@@ -273,13 +294,14 @@ impl Desk {
         }
         let message = format!("there is no request {request}");
         let help = "POST /v1/start gives it its id; it may be over".into();
-        (Err(Refusal { message, help }), None)
+        (Err(Refusal { kind: RefusalKind::Unknown, message, help }), None)
     }
 
     fn set_mode(&mut self, mode: Mode, every_s: Option<f64>) -> Result<(), Refusal> {
         let every_s = every_s.unwrap_or(self.scanning.every_s);
         if !(1.0..=604_800.0).contains(&every_s) {
             return Err(Refusal {
+                kind: RefusalKind::Wrong,
                 message: format!("every_s is {every_s}"),
                 help: "1 to 604800 seconds".into(),
             });
@@ -298,11 +320,16 @@ impl Desk {
     fn check_plan(&self, plan: &ScanPlan) -> Result<(), Refusal> {
         if self.settings.simulated.is_some() {
             return Err(Refusal {
+                kind: RefusalKind::Conflict,
                 message: "an array has no plan: its rangers are fixed".into(),
                 help: "another array is simulate.array in the configuration".into(),
             });
         }
-        let refuse = |error: crate::scan::PlanError| Refusal {
+        let refuse = |error: PlanError| Refusal {
+            kind: match error {
+                PlanError::OffMotorGrid { .. } => RefusalKind::Conflict,
+                _ => RefusalKind::Wrong,
+            },
             message: error.to_string(),
             help: "a full turn is from_deg 0, to_deg 360, step_deg 0.9, pings_per_stop 1".into(),
         };
@@ -368,6 +395,7 @@ fn check_pose(settings: &Settings, pose: &Pose) -> Result<(), Refusal> {
     let finite = [pose.x_m, pose.y_m, pose.heading_deg].iter().all(|figure| figure.is_finite());
     if !finite {
         return Err(Refusal {
+            kind: RefusalKind::Wrong,
             message: "a figure of the pose is not finite".into(),
             help: "metres and degrees".into(),
         });
@@ -377,9 +405,12 @@ fn check_pose(settings: &Settings, pose: &Pose) -> Result<(), Refusal> {
         return simulated
             .array
             .check_pose(scene, pose)
-            .map_err(|error| Refusal { message: error.to_string(), help: error.help() });
+            .map_err(|error| in_the_way(&error, error.help()));
     }
-    scene
-        .check_pose(pose)
-        .map_err(|error| Refusal { message: error.to_string(), help: error.help() })
+    scene.check_pose(pose).map_err(|error| in_the_way(&error, error.help()))
+}
+
+/// A pose that is right elsewhere.
+fn in_the_way(error: &impl std::fmt::Display, help: String) -> Refusal {
+    Refusal { kind: RefusalKind::Conflict, message: error.to_string(), help }
 }

@@ -35,7 +35,7 @@ use uuid::Uuid;
 
 pub use agenda::{Agenda, Asked, Due};
 pub use air::{AirOrder, AirStatus, read_thermometer};
-pub use desk::{Order, Refusal, Request};
+pub use desk::{Order, Refusal, RefusalKind, Request};
 pub use hub::{Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
 pub use journal::{Journal, JournalThread, LogStatus};
 pub use judged::{Word, judged_line};
@@ -44,8 +44,8 @@ pub use operator::OpenPort;
 pub use settings::{Mismatch, Settings, Setup, Simulated};
 pub use simulation::{RangerReading, SimulationReport};
 pub use status::{
-    ClockReport, ConfigurationReport, Health, InForce, LineTotals, LinkReport, Pending, ScanProgress,
-    ScanReport, ScanTotals, ScanningReport, Status, SubscriberReport,
+    ClockReport, ConfigurationReport, Health, InForce, LineTotals, LinkReport, Pending,
+    ScanProgress, ScanReport, ScanTotals, ScanningReport, Status, SubscriberReport,
 };
 
 use crate::{
@@ -159,7 +159,11 @@ impl Handle {
     /// # Errors
     /// When the order is refused, or the daemon is stopping.
     pub async fn order(&self, order: Order) -> Result<(), Refusal> {
-        let gone = || Refusal { message: "the daemon is stopping".into(), help: String::new() };
+        let gone = || Refusal {
+            kind: RefusalKind::Stopping,
+            message: "the daemon is stopping".into(),
+            help: "ask the next one".into(),
+        };
         let (reply, answer) = oneshot::channel();
         self.orders.send(Request { order, reply }).await.map_err(|_| gone())?;
         answer.await.map_err(|_| gone())?

@@ -7,7 +7,7 @@ use axum::{
     body::Bytes,
     extract::{
         FromRequest, FromRequestParts, Request,
-        rejection::{JsonRejection, PathRejection, QueryRejection},
+        rejection::{BytesRejection, JsonRejection, PathRejection, QueryRejection},
     },
     http::{HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
@@ -17,9 +17,10 @@ use serde::{
     Deserialize, Deserializer, Serialize,
     de::{DeserializeOwned, Error as _},
 };
+use serde_json::Value;
 
 use super::access::Refused;
-use crate::daemon::Refusal;
+use crate::daemon::{Refusal, RefusalKind};
 
 /// Why a request was not carried out.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -45,7 +46,10 @@ pub struct Accepted {
 }
 
 /// An answer of any size that is the same for all: written once, and shared by who takes it.
-pub(super) struct Shelved<T>(Arc<Mutex<Option<(Arc<T>, Bytes)>>>);
+pub(super) struct Shelved<T>(Arc<Mutex<Option<Written<T>>>>);
+
+/// What was written, and of what.
+type Written<T> = (Arc<T>, Bytes);
 
 impl<T> Shelved<T> {
     /// The answer about `of`, by `write` if it is about another than before.
@@ -104,13 +108,29 @@ impl IntoResponse for Failed {
 
 impl From<Refusal> for Failed {
     fn from(refusal: Refusal) -> Self {
-        Self::new(StatusCode::UNPROCESSABLE_ENTITY, refusal.message, refusal.help)
+        let status = match refusal.kind {
+            RefusalKind::Wrong => StatusCode::UNPROCESSABLE_ENTITY,
+            RefusalKind::Conflict => StatusCode::CONFLICT,
+            RefusalKind::Unknown => StatusCode::NOT_FOUND,
+            RefusalKind::Stopping => StatusCode::SERVICE_UNAVAILABLE,
+        };
+        Self::new(status, refusal.message, refusal.help)
     }
 }
 
 impl From<Refused> for Failed {
     fn from(refused: Refused) -> Self {
         Self::new(refused.status, refused.message, refused.help)
+    }
+}
+
+impl From<BytesRejection> for Failed {
+    fn from(rejection: BytesRejection) -> Self {
+        Self::new(
+            rejection.status(),
+            rejection.body_text(),
+            "send less, or raise server.max_body_kb",
+        )
     }
 }
 
@@ -141,8 +161,26 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Body<T> {
     type Rejection = Failed;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Failed> {
+        let (parts, body) = request.into_parts();
+        let (again, request) = (parts.clone(), Request::from_parts(parts, body));
+        let bytes = Bytes::from_request(request, state).await?;
+        let request = Request::from_parts(again, bytes.clone().into());
         let Json(Strict(body)) = Json::from_request(request, state).await?;
+        if serde_json::from_slice(&bytes).is_ok_and(|value| has_list(&value)) {
+            let help = "send objects, as GET /v1/openapi.json describes them";
+            let error = "there is a list where an object is wanted";
+            return Err(Self::Rejection::new(StatusCode::UNPROCESSABLE_ENTITY, error, help));
+        }
         Ok(Self(body))
+    }
+}
+
+/// No body has a list in it, but fields in a list without their names would be read as an object.
+fn has_list(value: &Value) -> bool {
+    match value {
+        Value::Array(_) => true,
+        Value::Object(fields) => fields.values().any(has_list),
+        _ => false,
     }
 }
 

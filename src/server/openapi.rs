@@ -186,8 +186,8 @@ fn operation(
         "default".into(),
         json!({
             "description": "Refused, with the reason: 400 or 422 malformed or out of range, 401 or \
-                403 not allowed, 404 not there, 408 too slow, 413 too large, 429 too often, 503 \
-                too many clients",
+                403 not allowed, 404 not there, 408 too slow, 409 not with what is in force (scene, \
+                motor, requests that wait), 413 too large, 429 too often, 503 too many clients",
             "content": {"application/json": {"schema": problem}},
         }),
     );
@@ -208,7 +208,8 @@ fn operation(
         "responses": responses,
     });
     if let Some(body) = endpoint.body {
-        let schema = body(bodies);
+        let mut schema = body(bodies).to_value();
+        close(&mut schema);
         operation["requestBody"] =
             json!({ "required": true, "content": {"application/json": {"schema": schema}} });
     }
@@ -216,6 +217,22 @@ fn operation(
         operation["security"] = json!([{}, {"token": []}]);
     }
     operation
+}
+
+/// Says what holds for every body: nothing unknown is taken, and a whole number fits its type.
+fn close(schema: &mut Value) {
+    if let Value::Object(schema) = schema {
+        if schema.contains_key("properties") {
+            schema.entry("additionalProperties").or_insert(Value::Bool(false));
+        }
+        if schema.get("format").is_some_and(|format| format == "uint32") {
+            schema.entry("maximum").or_insert_with(|| u32::MAX.into());
+        }
+        schema.values_mut().for_each(close);
+    }
+    if let Value::Array(schemas) = schema {
+        schemas.iter_mut().for_each(close);
+    }
 }
 
 /// `get_v1_logs_name` for `GET /v1/logs/{name}`.

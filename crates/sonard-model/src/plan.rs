@@ -16,8 +16,10 @@ pub struct ScanPlan {
     /// End of the range, degrees, not itself measured.
     pub to_deg: f64,
     /// Between stops, degrees.
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub step_deg: f64,
     /// Firings at each stop.
+    #[schemars(range(min = 1, max = 255))]
     pub pings_per_stop: u32,
 }
 

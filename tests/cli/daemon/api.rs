@@ -105,7 +105,10 @@ fn the_server_does_what_its_document_says() {
         ("POST", "/v1/start", r#"{"pose":{"x_m":0.5,"y_m":0.3,"heading_deg":0,"z_m":1}}"#, 422),
         ("POST", "/v1/start", r#"{"scans":1,"scans":2}"#, 422),
         ("GET", "/v1/logs/sonard-20260101T000000Z.jsonl", "", 404),
-        ("PUT", "/v1/pose", r#"{"x_m":99,"y_m":0,"heading_deg":0}"#, 422),
+        ("PUT", "/v1/pose", r#"{"x_m":99,"y_m":0,"heading_deg":0}"#, 409),
+        ("PUT", "/v1/pose", "[0.5,0.3,0]", 422),
+        ("POST", "/v1/start", "[null,null]", 422),
+        ("POST", "/v1/start", r#"{"plan":[0,9,0.9,1]}"#, 422),
         ("PUT", "/v1/air", r#"{"temperature_c":70}"#, 422),
         ("POST", "/v1/start", r#"{"scnas":1}"#, 422),
         ("GET", "/v1/live/records?moved_m=-1", "", 422),
@@ -231,7 +234,7 @@ fn scans_are_taken_on_request_with_the_plan_pose_and_air_in_force() {
         "/v1/plan",
         r#"{"from_deg":0,"to_deg":9,"step_deg":1,"pings_per_stop":1}"#,
     );
-    assert_eq!(off.status, 422);
+    assert_eq!(off.status, 409);
     assert!(off.json()["error"].as_str().is_some_and(|error| error.contains("0.9")));
     assert_eq!(daemon.stop(), Some(0));
     let log = clean_log(folder.path());
@@ -305,11 +308,10 @@ fn watch_goes_on_with_the_next_daemon_if_told_to() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &SHORT);
     let socket = folder.path().join("s").display().to_string();
-    let watching =
-        crate::common::sonard(&["watch", "--socket", &socket, "--json", "--reconnect"])
-            .stdout(std::process::Stdio::piped())
-            .spawn()
-            .expect("starts");
+    let watching = crate::common::sonard(&["watch", "--socket", &socket, "--json", "--reconnect"])
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .expect("starts");
     wait_until("the subscriber", || daemon.status()["subscribers"]["now"] == 1);
     daemon.kill();
     let daemon = Daemon::start_mock(folder.path(), &SHORT);
@@ -351,7 +353,10 @@ fn a_change_during_a_scan_is_shown_at_once_beside_what_is_in_force() {
     assert_eq!((&status["plan"]["to_deg"], &status["pending"]["plan"]), (&json!(360.0), &half));
     assert_eq!(status["pending"]["pose"]["x_m"], 0.5);
     assert_eq!(status["pending"]["air"]["temperature_c"], 25.0);
-    assert_eq!((&status["air"]["temperature_c"], &status["pose"]["x_m"]), (&json!(20.0), &json!(0.774)));
+    assert_eq!(
+        (&status["air"]["temperature_c"], &status["pose"]["x_m"]),
+        (&json!(20.0), &json!(0.774))
+    );
     assert_eq!(status["scanning"]["mode"], "schedule");
     let plan = daemon.get("/v1/plan").json();
     assert_eq!((&plan["to_deg"], &plan["pending"]), (&json!(360.0), &half));

@@ -177,8 +177,10 @@ fn ask_for(daemon: &Daemon, path: &str) -> std::os::unix::net::UnixStream {
 #[test]
 fn large_scans_cost_a_bounded_amount_of_memory_and_do_not_delay_the_operator() {
     let folder = tempfile::tempdir().expect("a folder");
-    let many = ["--virtual-time", "--set", "plan.pings_per_stop=160", "--set", "model.max_range_m=1"];
-    let daemon = Daemon::start_mock(folder.path(), &[&many[..], &["--set", "server.stall_s=30"]].concat());
+    let many =
+        ["--virtual-time", "--set", "plan.pings_per_stop=160", "--set", "model.max_range_m=1"];
+    let daemon =
+        Daemon::start_mock(folder.path(), &[&many[..], &["--set", "server.stall_s=30"]].concat());
     daemon.wait_for("ready");
     let over = AtomicBool::new(false);
     let (idle_kb, taken_kb) = std::thread::scope(|scope| {
@@ -219,10 +221,13 @@ fn large_scans_cost_a_bounded_amount_of_memory_and_do_not_delay_the_operator() {
     forget_peak(daemon.id());
     let idle_kb = resident_kb(daemon.id());
     let scans = daemon.get("/v1/scans").json();
-    let large = scans.as_array().into_iter().flatten().find(|scan| {
-        scan["end"]["beams"].as_u64() == Some(MANY_BEAMS)
-    });
-    let path = format!("/v1/scans/{}", large.expect("the large scan")["scan"].as_str().expect("an id"));
+    let large = scans
+        .as_array()
+        .into_iter()
+        .flatten()
+        .find(|scan| scan["end"]["beams"].as_u64() == Some(MANY_BEAMS));
+    let path =
+        format!("/v1/scans/{}", large.expect("the large scan")["scan"].as_str().expect("an id"));
     let over = AtomicBool::new(false);
     let mut late_ms = std::thread::scope(|scope| {
         for _ in 0..10 {

@@ -66,7 +66,7 @@ fn a_scan_through_a_busy_daemon_has_its_own_plan_and_leaves_the_daemons_alone() 
     let sensor = [&own[..], &["--sensor", "pioneer"]].concat();
     assert_eq!(scan(&daemon, &sensor).output().expect("it runs").status.code(), Some(2));
     let wrong = daemon.send("POST", "/v1/start", r#"{"pose":{"x_m":9,"y_m":9,"heading_deg":0}}"#);
-    assert_eq!(wrong.status, 422);
+    assert_eq!(wrong.status, 409);
     assert_eq!(daemon.stop(), Some(0));
     let nobody = sonard(&["scan", "--daemon", "--socket", "/nowhere"]).args(own).output();
     assert_eq!(nobody.expect("it runs").status.code(), Some(3));
@@ -177,7 +177,7 @@ fn the_mode_can_be_changed_while_it_runs() {
         assert_eq!(daemon.send("PUT", "/v1/scanning", body).status, code, "{body}");
     }
     let unknown = format!(r#"{{"request":"{}"}}"#, "6ba7b810-9dad-11d1-80b4-00c04fd430c8");
-    assert_eq!(daemon.send("POST", "/v1/cancel", &unknown).status, 422);
+    assert_eq!(daemon.send("POST", "/v1/cancel", &unknown).status, 404);
     assert_eq!(daemon.stop(), Some(0));
 }
 

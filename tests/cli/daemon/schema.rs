@@ -28,6 +28,7 @@ fn check(schema: &Value, document: &Value, value: &Value, at: &str, found: &mut 
         "const",
         "oneOf",
         "anyOf",
+        "exclusiveMinimum",
         "minimum",
         "maximum",
         "description",

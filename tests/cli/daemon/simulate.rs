@@ -181,7 +181,7 @@ fn a_pose_set_shows_in_readings_that_are_those_of_sonard_simulate() {
         ("/v1/plan", r#"{"from_deg":0,"to_deg":9,"step_deg":0.9,"pings_per_stop":1}"#, "fixed"),
     ] {
         let reply = daemon.send("PUT", path, body);
-        assert_eq!(reply.status, 422, "{}", reply.json());
+        assert_eq!(reply.status, 409, "{}", reply.json());
         assert!(
             reply.json()["error"].as_str().is_some_and(|e| e.contains(word)),
             "{}",
