@@ -8,6 +8,7 @@
 #                               need Debian's packages (firmware/test.sh)
 #   PAGE=0 ./test.sh            leave the live page out, where there is no Chromium to look at it
 #   AXE=0 ./test.sh             leave axe-core out of that, where there is no npm to get it with
+#   SCHEMATHESIS=0 ./test.sh    leave the fuzzer of the API out, where there is no Python or PyPI
 #   FAKETIME=0 ./test.sh        leave the clock that is set out, where there is no libfaketime
 #   BOOT=0 ./test.sh            leave the units under a booted systemd out (systemd/boot-test.sh)
 #   PACKAGE=1 ./test.sh         build, install, upgrade and remove the Debian package, too; PACKAGE=all
@@ -171,6 +172,18 @@ check_examples() {
   cargo test --workspace "${features[@]}" --doc --quiet
 }
 
+check_api() {
+  if [ "${SCHEMATHESIS:-1}" = 0 ]; then
+    step "the API's document against the daemon: LEFT OUT, because SCHEMATHESIS=0"
+    return
+  fi
+  step "the API's document against the daemon"
+  tests/schemathesis.sh "${CARGO_TARGET_DIR:-target}/debug/sonard" >"$work/api" 2>&1 || {
+    tail -n 100 "$work/api"
+    fail "the daemon does not do what its OpenAPI document says, or the fuzzer can't be had: SCHEMATHESIS=0 leaves it out"
+  }
+}
+
 # run_tests [ARGUMENT...]: the closing lines are kept for the end.
 run_tests() {
   if [ "$runner" = nextest ]; then
@@ -225,6 +238,7 @@ quick)
   check_units_and_package
   play_emulator
   check_examples
+  check_api
   test_page
   step "tests"
   run_tests || finish $?

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  API, signals ──orders──> Desk ──┐                        ┌──> Journal (thread: log folder)
-//!  emergency stop, thermometer ────┤   Operator (port,      ├──> Hub ──> subscribers' queues
+//!  emergency stop, thermometer ────┤   Operator (port,      ├──> Hub ──> subscribers
 //!                                  └─> Ranger) ──records──> ┤
 //!                      LinkMachine, Agenda: what to do      └──> Shared: status, latest scan
 //! ```

@@ -116,13 +116,10 @@ fn a_scan_of_the_history_has_its_scene_whichever_session_of_the_log_holds_the_te
     let mut history = History::new(folder.path().into());
     for n in 1..3 {
         let id = Uuid::from_u128(n);
-        let whole = history.scan(id).expect("readable").expect("there");
-        let (outline, path) = history.outline(id).expect("readable").expect("there");
-        assert_eq!((outline.pings.len(), &path), (0, &log));
-        for view in [whole, outline] {
-            let session = view.session.expect("there");
-            assert_eq!(session.scene_text.as_deref(), Some(&*scene.text), "scan {n}");
-        }
+        let passage = history.passage(id).expect("readable").expect("there");
+        assert_eq!((passage.view.pings.len(), &passage.path), (0, &log));
+        let session = passage.view.session.expect("there");
+        assert_eq!(session.scene_text.as_deref(), Some(&*scene.text), "scan {n}");
     }
 }
 

@@ -1,0 +1,50 @@
+#!/usr/bin/env bash
+# Asks a daemon on a mock for everything that its OpenAPI document names, in ways that the document
+# allows and in others, and holds the answers against the document (Schemathesis, from PyPI, in an
+# environment of its own under target/tools). Live streams are left out: they have no end.
+#
+#   tests/schemathesis.sh [PROGRAM]    without a program, it is built
+set -euo pipefail
+cd "$(dirname "$0")/.."
+version=4.32.5
+target=${CARGO_TARGET_DIR:-target}
+tools=$target/tools/schemathesis-$version
+if [ ! -x "$tools/bin/schemathesis" ]; then
+  if ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
+    if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
+      apt-get update -qq && apt-get install -y -qq --no-install-recommends python3-venv >/dev/null
+    else
+      echo "tests/schemathesis.sh: Python's venv is missing: sudo apt-get install python3-venv, or leave it out with SCHEMATHESIS=0" >&2
+      exit 1
+    fi
+  fi
+  python3 -m venv "$tools"
+  "$tools/bin/pip" install --quiet --disable-pip-version-check "schemathesis==$version"
+fi
+program=${1:-$target/debug/sonard}
+if [ $# = 0 ]; then cargo build --workspace --quiet; fi
+
+work=$(mktemp -d)
+daemon=
+trap 'if [ -n "$daemon" ]; then kill "$daemon" && wait "$daemon" || true; fi; rm -rf "$work"' EXIT
+token=0123456789abcdef0123456789abcdef
+(umask 077 && echo "$token" >"$work/token")
+"$program" run --mock --scene simple-room --pose fig9 --log "$work/log" --socket "$work/s" \
+  --set server.listen=127.0.0.1:0 --set server.token_file="$work/token" \
+  --set server.max_requests_per_s=100000 --set model.max_range_m=2 2>"$work/said" &
+daemon=$!
+address=
+for _ in $(seq 100); do
+  address=$(sed -n 's|.*listening on http://\([^ ]*\).*|\1|p' "$work/said")
+  if [ -n "$address" ]; then break; fi
+  sleep 0.1
+done
+# There is a scan to be asked for.
+curl -sf --unix-socket "$work/s" -H 'Content-Type: application/json' -d '{"scans": 1}' \
+  http://localhost/v1/start >/dev/null
+
+"$tools/bin/schemathesis" --config-file tests/schemathesis.toml run "http://$address/v1/openapi.json" \
+  --header "Authorization: Bearer $token" --exclude-path-regex '^/v1/live/' --checks all \
+  --phases examples,coverage,fuzzing --max-examples "${SCHEMATHESIS_EXAMPLES:-50}" --seed 1 \
+  --continue-on-failure --suppress-health-check all --warnings off --generation-database none
+kill -0 "$daemon"
