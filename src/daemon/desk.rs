@@ -3,7 +3,6 @@
 use std::{sync::Arc, time::Duration};
 
 use firmware_protocol::messages::Identity;
-use thiserror::Error;
 use tokio::{
     sync::{mpsc, oneshot, watch},
     time::{Instant, sleep},
@@ -15,8 +14,10 @@ use super::{
     agenda::{Agenda, Asked},
     air::{AirDesk, AirOrder, Reading, watch_thermometer},
     journal::Journal,
+    refusal::{Refusal, RefusalKind},
     settings::{Settings, Setup},
-    status::{ConfigurationReport, Shared, Terms},
+    shared::{Shared, Terms},
+    status::ConfigurationReport,
 };
 use crate::{
     board::Board,
@@ -58,31 +59,6 @@ pub struct Request {
     pub order: Order,
     /// Where the answer goes; a program that left needs none.
     pub reply: oneshot::Sender<Result<(), Refusal>>,
-}
-
-/// Why an order is not carried out.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("{message}")]
-pub struct Refusal {
-    /// Whether it is wrong at all times.
-    pub kind: RefusalKind,
-    /// What is wrong.
-    pub message: String,
-    /// What would be right.
-    pub help: String,
-}
-
-/// Whether a refused order is wrong at all times.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RefusalKind {
-    /// It is wrong in itself.
-    Wrong,
-    /// It does not go together with what is in force: scene, motor, requests that wait.
-    Conflict,
-    /// It is about something that there is not, or no more.
-    Unknown,
-    /// The daemon is stopping.
-    Stopping,
 }
 
 /// What the operator has to react to.

@@ -5,21 +5,20 @@
 //! readings a subscriber missed by that is told in their place. Scan starts, scan ends and events are
 //! told without a gap: a subscriber that missed one is cut off.
 
+mod moved;
 mod shelf;
 
-use std::{
-    collections::HashMap,
-    sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicU64, AtomicUsize, Ordering},
-    },
+use std::sync::{
+    Arc, Mutex, MutexGuard, PoisonError,
+    atomic::{AtomicU64, AtomicUsize, Ordering},
 };
 
 use tokio::sync::watch;
 use uuid::Uuid;
 
 use super::judged::judged_line;
-use crate::scan::{Ping, PingStatus, Record, encode_line};
+use crate::scan::{PingStatus, Record, encode_line};
+pub use moved::Moved;
 use shelf::Shelf;
 
 /// Most readings that wait, bytes.
@@ -28,8 +27,6 @@ const READING_BYTES: usize = 4 << 20;
 const CONTROLS: usize = 1024;
 /// The same in bytes.
 const CONTROL_BYTES: usize = 4 << 20;
-/// Directions whose last reading a subscriber to what moved remembers; with more, it begins anew.
-const DIRECTIONS: usize = 1600;
 
 /// What a subscriber wants of records.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -127,7 +124,7 @@ impl Hub {
             wanted,
             moved: Moved::new(wanted.moved_m),
             changed,
-            _counted: Counted::new(self, true, wanted.verdicts),
+            counted: Counted::new(self, true, wanted.verdicts),
         }
     }
 
@@ -216,7 +213,7 @@ pub struct Subscription {
     wanted: Wanted,
     moved: Moved,
     changed: watch::Receiver<()>,
-    _counted: Counted,
+    counted: Counted,
 }
 
 /// What a subscriber finds.
@@ -244,12 +241,12 @@ impl Subscription {
     }
 
     fn look(&mut self) -> Found {
-        let inner = Arc::clone(&self._counted.hub.inner);
+        let inner = Arc::clone(&self.counted.hub.inner);
         let waiting = held(&inner.waiting);
         if self.control < waiting.controls.first() {
             drop(waiting);
             inner.cut_off.fetch_add(1, Ordering::Relaxed);
-            self.control = u64::MAX;
+            (self.reading, self.control) = (u64::MAX, u64::MAX);
             return Found::Over;
         }
         let control = waiting.controls.get(self.control);
@@ -311,71 +308,6 @@ impl ScanSubscription {
             }
             self.changed.changed().await.ok()?;
         }
-    }
-}
-
-/// What was last sent for each direction (a motor step, or a ranger of an array), for who wants only what
-/// moved.
-#[derive(Debug, Clone, Default)]
-pub struct Moved {
-    moved_m: Option<f64>,
-    sent: HashMap<(i32, u16), (PingStatus, Option<f64>)>,
-    rangers: Vec<Box<str>>,
-}
-
-impl Moved {
-    /// With everything that moved by more than this, metres; with everything, if it is `None`.
-    #[must_use]
-    pub fn new(moved_m: Option<f64>) -> Self {
-        Self { moved_m, ..Self::default() }
-    }
-
-    /// Whether it leaves nothing out.
-    #[must_use]
-    pub const fn is_everything(&self) -> bool {
-        self.moved_m.is_none()
-    }
-
-    /// Whether a reading differs enough from the last one sent in its direction. It counts as sent
-    /// then.
-    pub fn is_news_of(&mut self, ping: &Ping) -> bool {
-        self.is_news(ping.step, ping.ranger.as_deref(), ping.status, ping.range_m)
-    }
-
-    fn is_news(
-        &mut self,
-        step: i32,
-        ranger: Option<&str>,
-        status: PingStatus,
-        range_m: Option<f64>,
-    ) -> bool {
-        let Some(moved_m) = self.moved_m else { return true };
-        let direction = (step, ranger.map_or(0, |id| self.number_of(id)));
-        let same = self.sent.get(&direction).is_some_and(|&(before, before_m)| {
-            let moved = before_m.zip(range_m).map_or(0.0, |(before, now)| (now - before).abs());
-            status == before && moved <= moved_m
-        });
-        if !same {
-            if self.sent.len() >= DIRECTIONS && !self.sent.contains_key(&direction) {
-                self.sent.clear();
-            }
-            self.sent.insert(direction, (status, range_m));
-        }
-        !same
-    }
-
-    /// From 1; those beyond the bound are forgotten together.
-    fn number_of(&mut self, id: &str) -> u16 {
-        let known = self.rangers.iter().position(|known| **known == *id);
-        let at = known.unwrap_or_else(|| {
-            if self.rangers.len() >= DIRECTIONS {
-                self.rangers.clear();
-                self.sent.clear();
-            }
-            self.rangers.push(id.into());
-            self.rangers.len() - 1
-        });
-        at as u16 + 1
     }
 }
 

@@ -22,7 +22,9 @@ mod notify;
 mod operator;
 mod outlet;
 mod player;
+mod refusal;
 mod settings;
+mod shared;
 mod simulation;
 mod status;
 
@@ -35,12 +37,13 @@ use uuid::Uuid;
 
 pub use agenda::{Agenda, Asked, Due};
 pub use air::{AirOrder, AirStatus, read_thermometer};
-pub use desk::{Order, Refusal, RefusalKind, Request};
+pub use desk::{Order, Request};
 pub use hub::{Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
 pub use journal::{Journal, JournalThread, LogStatus};
 pub use judged::{Word, judged_line};
 pub use machine::{BackOff, Input, LinkMachine, LinkState, Step, Transition, Trouble};
 pub use operator::OpenPort;
+pub use refusal::{Refusal, RefusalKind};
 pub use settings::{Mismatch, Settings, Setup, Simulated};
 pub use simulation::{RangerReading, SimulationReport};
 pub use status::{
@@ -58,7 +61,7 @@ use desk::Desk;
 use operator::Operator;
 use outlet::Outlet;
 use player::Player;
-use status::{Shared, Terms, View};
+use shared::{Shared, Terms, View};
 
 /// Orders that may wait while one is carried out.
 const ORDERS: usize = 64;
@@ -247,7 +250,7 @@ fn first_view(settings: &Settings) -> View {
         now: terms.clone(),
         next: terms,
         configuration: ConfigurationReport::default(),
-        line: status::Line::default(),
+        line: shared::Line::default(),
         scans: ScanTotals::default(),
         clock: ClockReport::default(),
         // From the first look on: nobody shall take a simulation for a ranger.

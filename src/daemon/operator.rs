@@ -18,7 +18,8 @@ use super::{
     forecast::{Forecast, listening},
     machine::{Input, LinkMachine, Step, Trouble},
     outlet::Outlet,
-    status::{Line, ScanTotals},
+    shared::Line,
+    status::ScanTotals,
 };
 use crate::{
     link::{BAUD, LinkError},

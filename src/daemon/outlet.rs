@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 
-use super::{hub::Hub, journal::Journal, status::Shared};
+use super::{hub::Hub, journal::Journal, shared::Shared};
 use crate::{
     ranger::Sink,
     scan::{Event, EventKind, Record, Session},

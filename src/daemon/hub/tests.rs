@@ -132,19 +132,3 @@ async fn what_waits_is_bounded_in_bytes_and_kept_once_for_all() {
     drop(slow);
     assert_eq!(super::held(&hub.inner.waiting).readings.get(49_999).is_none(), true);
 }
-
-#[test]
-fn who_wants_what_moved_remembers_a_bounded_number_of_directions() {
-    let mut moved = Moved::new(Some(0.1));
-    for turn in 0..3 {
-        for step in 0..DIRECTIONS as i32 {
-            let news = moved.is_news(step, None, PingStatus::Echo, Some(1.0));
-            assert_eq!(news, turn == 0, "{step} in turn {turn}");
-        }
-    }
-    for step in 0..10 * DIRECTIONS as i32 {
-        moved.is_news(step, None, PingStatus::Echo, Some(1.0));
-        moved.is_news(0, Some(&step.to_string()), PingStatus::Echo, Some(1.0));
-    }
-    assert!(moved.sent.len() <= DIRECTIONS && moved.rangers.len() <= DIRECTIONS);
-}

@@ -1,0 +1,28 @@
+//! Orders that are refused.
+
+use thiserror::Error;
+
+/// Why an order is not carried out.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{message}")]
+pub struct Refusal {
+    /// Whether it is wrong at all times.
+    pub kind: RefusalKind,
+    /// What is wrong.
+    pub message: String,
+    /// What would be right.
+    pub help: String,
+}
+
+/// Whether a refused order is wrong at all times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RefusalKind {
+    /// It is wrong in itself.
+    Wrong,
+    /// It does not go together with what is in force: scene, motor, requests that wait.
+    Conflict,
+    /// It is about something that there is not, or no more.
+    Unknown,
+    /// The daemon is stopping.
+    Stopping,
+}

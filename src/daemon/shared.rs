@@ -1,0 +1,262 @@
+//! What the operator publishes, and other tasks look at.
+
+use std::sync::{
+    Arc, Mutex, MutexGuard, PoisonError,
+    atomic::{AtomicU32, AtomicU64, Ordering},
+};
+
+use firmware_protocol::host::LinkStats;
+use jiff::Timestamp;
+use tokio::{sync::watch, time::Instant};
+use uuid::Uuid;
+
+use super::{
+    air::AirDesk,
+    journal::LogStatus,
+    machine::LinkState,
+    settings::Setup,
+    simulation::SimulationReport,
+    status::{
+        ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, Pending, ScanProgress,
+        ScanTotals, ScanningReport, Status, SubscriberReport,
+    },
+};
+use crate::{
+    config::ScanningKeys,
+    geometry::Pose,
+    scan::{Device, Provenance, Record, ScanEnd, ScanPlan, SceneRef, Session},
+    scene::Scene,
+};
+
+/// What the operator publishes; ages and waits are computed when somebody asks.
+#[derive(Debug, Clone)]
+pub(super) struct View {
+    pub(super) state: LinkState,
+    pub(super) since: Timestamp,
+    pub(super) port: String,
+    pub(super) trouble: Option<String>,
+    pub(super) failures: u32,
+    pub(super) retry_at: Option<Instant>,
+    pub(super) device: Option<Device>,
+    pub(super) provenance: Option<Provenance>,
+    pub(super) scanning: ScanningKeys,
+    pub(super) session: Option<Arc<Session>>,
+    pub(super) paused: bool,
+    pub(super) requested: u32,
+    pub(super) next_at: Option<Instant>,
+    pub(super) scan: Option<(Uuid, u32)>,
+    /// What the scan under way is taken by, unless it was asked for otherwise.
+    pub(super) now: Terms,
+    /// What the next one will be taken by.
+    pub(super) next: Terms,
+    pub(super) configuration: ConfigurationReport,
+    pub(super) line: Line,
+    pub(super) scans: ScanTotals,
+    pub(super) clock: ClockReport,
+    pub(super) simulation: Option<SimulationReport>,
+}
+
+/// What scans are taken by.
+#[derive(Debug, Clone)]
+pub(super) struct Terms {
+    pub(super) plan: ScanPlan,
+    pub(super) pose: Pose,
+    pub(super) scene: Option<Arc<Scene>>,
+    pub(super) setup: Arc<Setup>,
+    pub(super) air: AirDesk,
+}
+
+impl Terms {
+    /// Whether a scan by these is one by others, but for the air, which may change at any time.
+    pub(super) fn measures_as(&self, other: &Self) -> bool {
+        let scene = |terms: &Self| terms.scene.as_ref().map(Arc::as_ptr);
+        (self.plan, self.pose, scene(self)) == (other.plan, other.pose, scene(other))
+            && Arc::ptr_eq(&self.setup, &other.setup)
+    }
+}
+
+impl View {
+    /// What is in force. Without a scan under way that is what the next one will be taken by.
+    pub(super) const fn in_force(&self) -> &Terms {
+        if self.scan.is_some() { &self.now } else { &self.next }
+    }
+
+    /// What differs from it in the next scan.
+    fn pending(&self, at: Instant) -> Pending {
+        let (now, next) = (self.in_force(), &self.next);
+        let hash = |terms: &Terms| terms.scene.as_ref().map(|scene| scene.sha256.clone());
+        let scene = next.scene.as_deref().filter(|_| hash(now) != hash(next));
+        Pending {
+            plan: Some(next.plan).filter(|plan| *plan != now.plan),
+            pose: Some(next.pose).filter(|pose| *pose != now.pose),
+            scene: scene.map(SceneRef::of),
+            air: next.air.differs(&now.air).then(|| next.air.status(at)),
+            setup: Some(&next.setup).filter(|setup| **setup != now.setup).map(|s| (**s).clone()),
+        }
+    }
+}
+
+/// Figures of the line: what is settled, and the connection that there is.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Line {
+    /// Connections before this one, and losses.
+    pub(super) earlier: LineTotals,
+    /// This one's, which go on changing.
+    pub(super) live: Option<watch::Receiver<LinkStats>>,
+}
+
+impl Line {
+    /// All together, now.
+    pub(super) fn totals(&self) -> LineTotals {
+        self.live.as_ref().map_or(self.earlier, |live| self.earlier.with(&live.borrow()))
+    }
+
+    /// The connection is over.
+    pub(super) fn close(&mut self) {
+        *self = Self { earlier: self.totals(), live: None };
+    }
+}
+
+/// State that several tasks look at.
+#[derive(Debug)]
+pub(super) struct Shared {
+    pub(super) started: Instant,
+    pub(super) view: watch::Sender<View>,
+    /// Counts whatever shows that the operator gets on; the watchdog looks at it.
+    beats: AtomicU64,
+    beams_done: AtomicU32,
+    scans: Mutex<Collector>,
+}
+
+/// What is remembered of scans. Their readings are in the log.
+#[derive(Debug, Default)]
+struct Collector {
+    current: Option<Uuid>,
+    /// How the last one ended, and the standard deviation of its last reading's time, microseconds.
+    latest: Option<(ScanEnd, Option<f64>)>,
+    sigma_us: Option<f64>,
+}
+
+impl Shared {
+    pub(super) fn new(view: View) -> Self {
+        Self {
+            started: Instant::now(),
+            view: watch::Sender::new(view),
+            beats: AtomicU64::new(0),
+            beams_done: AtomicU32::new(0),
+            scans: Mutex::default(),
+        }
+    }
+
+    /// Something went on.
+    pub(super) fn beat(&self) {
+        self.beats.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(super) fn beats(&self) -> u64 {
+        self.beats.load(Ordering::Relaxed)
+    }
+
+    /// Takes in a record of a scan; gives back the scan if this was its end.
+    pub(super) fn collect(&self, record: &Record) -> Option<Uuid> {
+        self.beat();
+        let mut scans = self.scans();
+        match record {
+            Record::ScanStart(start) => {
+                self.beams_done.store(0, Ordering::Relaxed);
+                (scans.current, scans.sigma_us) = (Some(start.scan), None);
+            }
+            Record::Ping(ping) => {
+                self.beams_done.fetch_add(1, Ordering::Relaxed);
+                scans.sigma_us = ping.time_sigma_us;
+            }
+            Record::ScanEnd(end) => {
+                let scan = scans.current.take()?;
+                scans.latest = Some((end.clone(), scans.sigma_us));
+                return Some(scan);
+            }
+            Record::Session(_) | Record::Event(_) => {}
+        }
+        None
+    }
+
+    /// The last scan that is over.
+    pub(super) fn latest_scan(&self) -> Option<Uuid> {
+        self.scans().latest.as_ref().map(|(end, _)| end.scan)
+    }
+
+    /// How it ended, and the standard deviation of its last reading's time, microseconds.
+    pub(super) fn latest_end(&self) -> Option<(ScanEnd, Option<f64>)> {
+        self.scans().latest.clone()
+    }
+
+    pub(super) fn status(&self, log: LogStatus, subscribers: SubscriberReport) -> Status {
+        let now = Instant::now();
+        let until =
+            |at: Option<Instant>| at.map(|at| at.saturating_duration_since(now).as_secs_f64());
+        let view = self.view.borrow().clone();
+        let (in_force, pending) = (view.in_force().clone(), view.pending(now));
+        Status {
+            sonard: env!("CARGO_PKG_VERSION").into(),
+            uptime_s: now.duration_since(self.started).as_secs_f64(),
+            link: LinkReport {
+                state: view.state,
+                since: view.since,
+                port: view.port,
+                trouble: view.trouble,
+                failures: view.failures,
+                retry_in_s: until(view.retry_at),
+            },
+            device: view.device,
+            provenance: view.provenance,
+            scanning: ScanningReport {
+                mode: view.scanning.mode,
+                every_s: view.scanning.every_s,
+                paused: view.paused,
+                requested: view.requested,
+                next_in_s: until(view.next_at),
+            },
+            scan: view.scan.map(|(scan, beams)| ScanProgress {
+                scan,
+                beams,
+                done: self.beams_done.load(Ordering::Relaxed),
+            }),
+            plan: in_force.plan,
+            pose: in_force.pose,
+            scene: in_force.scene.as_deref().map(SceneRef::of),
+            air: in_force.air.status(now),
+            pending,
+            log,
+            subscribers,
+            configuration: view.configuration,
+            simulation: view.simulation,
+        }
+    }
+
+    pub(super) fn health(&self, log: &LogStatus) -> Health {
+        let view = self.view.borrow().clone();
+        // A scan takes its time: the thermometer is judged by what it said last.
+        let air = view.next.air.status(Instant::now());
+        let mut reasons = Vec::new();
+        if !view.state.is_up() {
+            let trouble = view.trouble.unwrap_or_default();
+            reasons.push(format!("the link is {}: {trouble}", view.state.name()));
+        }
+        reasons.extend(log.error.iter().map(|error| format!("the log: {error}")));
+        if air.stale {
+            reasons.push("the air temperature is stale".into());
+        }
+        Health {
+            healthy: reasons.is_empty(),
+            reasons,
+            line: view.line.totals(),
+            scans: view.scans,
+            clock: view.clock,
+        }
+    }
+
+    fn scans(&self) -> MutexGuard<'_, Collector> {
+        // Nothing under this lock can panic, so a poisoned one holds what it should.
+        self.scans.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
