@@ -50,7 +50,10 @@ impl DaemonArgs {
                     TokenError::Open(_) => error.help(file),
                     _ => "give --token-file a copy of the daemon's server.token_file".into(),
                 };
-                Failure::input(format!("the token in {}: {error}", file.display()), help)
+                Failure::input(
+                    format!("cannot read the token in {}: {error}", file.display()),
+                    help,
+                )
             })
         });
         Ok(Client::new(Place::Address(host.to_owned()), token.transpose()?))

@@ -130,5 +130,5 @@ async fn what_waits_is_bounded_in_bytes_and_kept_once_for_all() {
     };
     assert!((READING_BYTES / 2..=READING_BYTES).contains(&held), "{held} bytes wait");
     drop(slow);
-    assert_eq!(super::held(&hub.inner.waiting).readings.get(49_999).is_none(), true);
+    assert!(super::held(&hub.inner.waiting).readings.get(49_999).is_none());
 }

@@ -93,7 +93,7 @@ async fn live_records(
             let line = next_line(&mut subscription, format).await?;
             Some((line, (subscription, leave)))
         });
-    Ok(answer(format, lines.flat_map(stream::iter).map(Ok::<_, Infallible>)))
+    Ok(answer(format, lines.map(Ok::<_, Infallible>)))
 }
 
 async fn live_scans(
@@ -167,17 +167,13 @@ impl Format {
     }
 }
 
-/// The next line of a stream, in pieces of which the largest is everybody's; `None` at the end.
-async fn next_line(subscription: &mut Subscription, format: Format) -> Option<Vec<Bytes>> {
+/// The next line of a stream; `None` at its end. Where nothing has to stand around it, it is everybody's.
+async fn next_line(subscription: &mut Subscription, format: Format) -> Option<Bytes> {
     match format {
-        Format::Ndjson => Some(vec![Bytes::from_owner(subscription.next().await?)]),
+        Format::Ndjson => Some(Bytes::from_owner(subscription.next().await?)),
         Format::Sse => match timeout(SIGN_OF_LIFE, subscription.next()).await {
-            Ok(line) => Some(vec![
-                Bytes::from_static(b"data: "),
-                Bytes::from_owner(line?),
-                Bytes::from_static(b"\n"),
-            ]),
-            Err(_nothing_yet) => Some(vec![Bytes::from_static(b":\n\n")]),
+            Ok(line) => Some([b"data: ", &*line?, b"\n"].concat().into()),
+            Err(_nothing_yet) => Some(Bytes::from_static(b":\n\n")),
         },
     }
 }
@@ -196,34 +192,50 @@ struct Scans {
 impl Scans {
     /// The next piece of the stream; `None` at its end.
     async fn next(mut self) -> io::Result<(Option<Bytes>, Self)> {
-        let [before, after] = self.format.around();
-        if let Some(pieces) = self.current.take() {
+        loop {
+            let pieces = match self.current.take() {
+                Some(pieces) => pieces,
+                None => match self.begin().await? {
+                    Begun::Scan(pieces) => pieces,
+                    Begun::Told(told) => return Ok((told, self)),
+                },
+            };
             let (piece, pieces) = read_on(pieces, Arc::clone(&self.api.reading)).await?;
             if piece.is_some() {
                 self.current = Some(pieces);
                 return Ok((piece, self));
             }
             self.moved = pieces.into_moved();
-            return Ok((Some(Bytes::from_static(after)), self));
         }
+    }
+
+    /// Waits for the next scan.
+    async fn begin(&mut self) -> io::Result<Begun> {
         let next = match self.format {
             Format::Ndjson => Ok(self.subscription.next().await),
             Format::Sse => timeout(SIGN_OF_LIFE, self.subscription.next()).await,
         };
         let scan = match next {
             Ok(Some(scan)) => scan,
-            Ok(None) => return Ok((None, self)),
-            Err(_nothing_yet) => return Ok((Some(Bytes::from_static(b":\n\n")), self)),
+            Ok(None) => return Ok(Begun::Told(None)),
+            Err(_nothing_yet) => return Ok(Begun::Told(Some(Bytes::from_static(b":\n\n")))),
         };
         let passage = written(&self.api, scan)
             .await
             .map_err(|failed| io::Error::other(failed.problem.error))?;
+        let around = self.format.around();
         let Some(passage) = passage else {
-            let told = [before, br#"{"type":"dropped","scans":1}"#, after].concat();
-            return Ok((Some(told.into()), self));
+            let told = [around[0], br#"{"type":"dropped","scans":1}"#, around[1]].concat();
+            return Ok(Begun::Told(Some(told.into())));
         };
         let moved = std::mem::take(&mut self.moved);
-        self.current = Some(Pieces::new(passage, Form::Report, moved));
-        Ok((Some(Bytes::from_static(before)), self))
+        Ok(Begun::Scan(Pieces::new(passage, Form::Report, moved).within(around)))
     }
+}
+
+/// What comes next in a stream of scans.
+enum Begun {
+    Scan(Pieces),
+    /// Something else, or the end.
+    Told(Option<Bytes>),
 }

@@ -37,6 +37,8 @@ pub(super) struct Pieces {
     part: Part,
     /// Whether nothing stands in the list that is being written.
     first: bool,
+    /// What stands before and after it all.
+    around: [&'static [u8]; 2],
 }
 
 enum Part {
@@ -49,10 +51,16 @@ enum Part {
 
 impl Pieces {
     pub(super) const fn new(passage: Passage, form: Form, moved: Moved) -> Self {
-        Self { passage, form, moved, part: Part::Head, first: true }
+        Self { passage, form, moved, part: Part::Head, first: true, around: [b"", b""] }
     }
 
-    /// What only moves on for who wants what moved.
+    /// The same with something before and after it.
+    pub(super) const fn within(mut self, around: [&'static [u8]; 2]) -> Self {
+        self.around = around;
+        self
+    }
+
+    /// What was sent by now, for who wants only what moved.
     pub(super) fn into_moved(self) -> Moved {
         self.moved
     }
@@ -82,6 +90,7 @@ impl Pieces {
                     piece.extend_from_slice(br#"],"end":"#);
                     write(&mut piece, &self.passage.view.end)?;
                     piece.push(b'}');
+                    piece.extend_from_slice(self.around[1]);
                     self.part = Part::Over;
                 }
                 Part::Over => break,
@@ -91,6 +100,7 @@ impl Pieces {
     }
 
     fn write_head(&self, piece: &mut Vec<u8>) -> io::Result<()> {
+        piece.extend_from_slice(self.around[0]);
         piece.push(b'{');
         if self.form == Form::Whole {
             piece.extend_from_slice(br#""session":"#);

@@ -169,7 +169,13 @@ fn strangers_on_loopback_take_neither_places_nor_requests_from_the_owner() {
         stream
     };
     // As many streams as there are places, and a flood of what is refused and of what is not.
-    let streams: Vec<_> = (0..128).map(|_| subscribe("localhost")).collect();
+    let streams: Vec<_> = (0..128)
+        .map(|_| {
+            // Within the rate.
+            thread::sleep(Duration::from_millis(25));
+            subscribe("localhost")
+        })
+        .collect();
     let streaming = || daemon.status()["subscribers"]["now"].as_u64();
     wait_until("the strangers' streams", || streaming() >= Some(64));
     let over = AtomicBool::new(false);
