@@ -196,7 +196,7 @@ impl Scans {
             let pieces = match self.current.take() {
                 Some(pieces) => pieces,
                 None => match self.begin().await? {
-                    Begun::Scan(pieces) => pieces,
+                    Begun::Scan(pieces) => *pieces,
                     Begun::Told(told) => return Ok((told, self)),
                 },
             };
@@ -229,13 +229,14 @@ impl Scans {
             return Ok(Begun::Told(Some(told.into())));
         };
         let moved = std::mem::take(&mut self.moved);
-        Ok(Begun::Scan(Pieces::new(passage, Form::Report, moved).within(around)))
+        let pieces = Pieces::new(passage, Form::Report, moved).within(around);
+        Ok(Begun::Scan(Box::new(pieces)))
     }
 }
 
 /// What comes next in a stream of scans.
 enum Begun {
-    Scan(Pieces),
+    Scan(Box<Pieces>),
     /// Something else, or the end.
     Told(Option<Bytes>),
 }
