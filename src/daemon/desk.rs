@@ -244,6 +244,7 @@ impl Desk {
     fn start(&mut self, asked: Asked) -> Result<(), Refusal> {
         if self.pressed {
             return Err(Refusal {
+                kind: RefusalKind::Conflict,
                 message: "the emergency stop is pressed".into(),
                 help: "release it first".into(),
             });
