@@ -7,6 +7,7 @@ mod daemon;
 mod device;
 mod load;
 mod own;
+mod patience;
 mod preview;
 mod report;
 mod run;

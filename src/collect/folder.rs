@@ -203,6 +203,20 @@ impl Folder {
         self.seal(slot, format!("{SET_ASIDE}/{name}"))
     }
 
+    /// Removes a scan that has no reading in it.
+    ///
+    /// # Errors
+    /// When the disk fails.
+    pub fn discard(&self, slot: Slot) -> Result<(), FolderError> {
+        let path = self.taking(slot);
+        match fs::remove_file(&path) {
+            Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                Err(FolderError::io("remove", &path, source))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Size and SHA-256 of a scan that counts.
     ///
     /// # Errors

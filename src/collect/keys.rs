@@ -68,13 +68,14 @@ pub struct CollectionSection {
     /// Pause between the end of a scan and the beginning of the next, seconds.
     #[schemars(range(min = 0, max = 604_800))]
     pub pause_s: f64,
-    /// How often a scan that was cut off or refused by a check is taken again.
+    /// How often a scan that a check refused is taken again.
     #[schemars(range(min = 0, max = 1000))]
     pub retakes: u32,
     /// What to do when that did not help: go on without that scan, or stop.
     pub after_retakes: AfterRetakes,
-    /// How long a ranger that is gone is waited for, seconds, before the collection stops. It goes
-    /// on where it stopped when it is started again.
+    /// How long a ranger that is gone, or that loses one scan after the other, is tried again, ever
+    /// more seldom, seconds, before the collection stops. It goes on where it stopped when it is
+    /// started again.
     #[schemars(range(min = 0, max = 604_800))]
     pub patience_s: f64,
 }

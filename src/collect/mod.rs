@@ -33,5 +33,5 @@ pub use keys::{
 };
 pub use manifest::{Counts, FileEntry, MANIFEST, Manifest, ScanEntry, Verified, verify};
 pub use order::{Slot, slots};
-pub use poses::{NamedPose, PoseFault, numbers_of, read_file};
+pub use poses::{NamedPose, PoseFault, PoseLine, numbers_of, read_file, read_lines};
 pub use repeatability::{BeamSpread, Repeatability, repeatability};

@@ -56,36 +56,46 @@ impl NamedPose {
     /// # Errors
     /// What is wrong, and what would be right.
     pub fn parse(text: &str, scene: &Scene) -> Result<Self, PoseFault> {
+        Self::read(text, scene, None)?.checked(scene)
+    }
+
+    /// The same, whether or not a ranger can stand there, with the heading where none is given.
+    fn read(text: &str, scene: &Scene, heading_deg: Option<f64>) -> Result<Self, PoseFault> {
         let text = text.trim();
         if text.starts_with('{') {
             let object = serde_json::from_str(text).map_err(|error| {
                 PoseFault::new(format!("{text}: no JSON object: {error}"), JSON_HELP)
             })?;
-            return Self::from_object(object, scene);
+            return Self::from_object(object, heading_deg);
         }
         let pose = scene.pose(text).map_err(|error| PoseFault::new(&error, error.help()))?;
         let name = scene.poses.contains_key(text).then(|| text.to_owned());
-        Self { name, pose, conditions: Conditions::new() }.checked(scene)
+        Ok(Self { name, pose, conditions: Conditions::new() })
     }
 
     /// Reads a pose of an object with `x_m`, `y_m`, `heading_deg`; `name` is its name, and
     /// everything else is noted as a condition.
-    fn from_object(mut object: Map<String, Value>, scene: &Scene) -> Result<Self, PoseFault> {
-        let mut figure = |key: &str| {
-            let value = object.remove(key);
-            value.as_ref().and_then(Value::as_f64).ok_or_else(|| match value {
-                Some(value) => PoseFault::new(format!("{key} is {value}"), JSON_HELP),
-                None => PoseFault::new(format!("there is no {key}"), JSON_HELP),
-            })
+    fn from_object(
+        mut object: Map<String, Value>,
+        heading_deg: Option<f64>,
+    ) -> Result<Self, PoseFault> {
+        let mut figure = |key: &str, otherwise: Option<f64>| match object.remove(key) {
+            Some(value) => {
+                value.as_f64().ok_or_else(|| PoseFault::new(format!("{key} is {value}"), JSON_HELP))
+            }
+            None => {
+                otherwise.ok_or_else(|| PoseFault::new(format!("there is no {key}"), JSON_HELP))
+            }
         };
-        let (x_m, y_m, heading_deg) = (figure("x_m")?, figure("y_m")?, figure("heading_deg")?);
+        let (x_m, y_m) = (figure("x_m", None)?, figure("y_m", None)?);
+        let heading_deg = figure("heading_deg", heading_deg)?;
         let name = match object.remove("name") {
             None | Some(Value::Null) => None,
             Some(Value::String(name)) => Some(name).filter(|name| !name.is_empty()),
             Some(other) => Some(other.to_string()),
         };
         let pose = Pose { x_m, y_m, heading_deg };
-        Self { name, pose, conditions: object.into_iter().collect() }.checked(scene)
+        Ok(Self { name, pose, conditions: object.into_iter().collect() })
     }
 
     fn checked(self, scene: &Scene) -> Result<Self, PoseFault> {
@@ -125,34 +135,60 @@ const JSON_HELP: &str = "a pose is {\"x_m\": 1.2, \"y_m\": 0.8, \"heading_deg\":
 const CSV_HELP: &str = "the first line names the columns: x_m,y_m,heading_deg, perhaps name, and \
                         any others, which are noted as conditions";
 
-/// Reads a file of poses: JSON lines if its first character is `{`, else CSV with a header.
+/// What stands on a line of a file of poses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseLine {
+    /// Number of the line, from 1.
+    pub line: u64,
+    /// The pose, wherever it is, or why there is none.
+    pub pose: Result<NamedPose, PoseFault>,
+}
+
+/// Reads a file of poses: JSON lines if its first character is `{`, else CSV with a header. A ranger
+/// must be able to stand at each.
 ///
 /// # Errors
 /// The first line that is wrong.
 pub fn read_file(text: &str, scene: &Scene) -> Result<Vec<NamedPose>, PoseFault> {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let poses = if text.trim_start().starts_with('{') {
-        json_lines(text, scene)?
-    } else {
-        comma_separated(text, scene)?
-    };
-    if poses.is_empty() {
-        return Err(PoseFault::new("no pose in it", CSV_HELP));
-    }
-    Ok(poses)
-}
-
-fn json_lines(text: &str, scene: &Scene) -> Result<Vec<NamedPose>, PoseFault> {
-    text.lines()
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty())
-        .map(|(index, line)| {
-            NamedPose::parse(line, scene).map_err(|fault| fault.at(index as u64 + 1))
+    let lines = read_lines(text, scene, None)?.into_iter();
+    lines
+        .map(|PoseLine { line, pose }| {
+            pose.and_then(|pose| pose.checked(scene)).map_err(|fault| fault.at(line))
         })
         .collect()
 }
 
-fn comma_separated(text: &str, scene: &Scene) -> Result<Vec<NamedPose>, PoseFault> {
+/// Reads a file of poses line by line, so that one that is wrong costs no other. `heading_deg` is
+/// taken where a JSON object has none.
+///
+/// # Errors
+/// When there is no pose to be read at all: an empty file, or columns that are missing.
+pub fn read_lines(
+    text: &str,
+    scene: &Scene,
+    heading_deg: Option<f64>,
+) -> Result<Vec<PoseLine>, PoseFault> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let lines = if text.trim_start().starts_with('{') {
+        json_lines(text, scene, heading_deg)
+    } else {
+        comma_separated(text)?
+    };
+    if lines.is_empty() {
+        return Err(PoseFault::new("no pose in it", CSV_HELP));
+    }
+    Ok(lines)
+}
+
+fn json_lines(text: &str, scene: &Scene, heading_deg: Option<f64>) -> Vec<PoseLine> {
+    (1..)
+        .zip(text.lines())
+        .filter(|(_, text)| !text.trim().is_empty())
+        .map(|(line, text)| PoseLine { line, pose: NamedPose::read(text, scene, heading_deg) })
+        .collect()
+}
+
+fn comma_separated(text: &str) -> Result<Vec<PoseLine>, PoseFault> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let fault = |error: &csv::Error| {
         let line = error.position().map(csv::Position::line);
@@ -164,15 +200,20 @@ fn comma_separated(text: &str, scene: &Scene) -> Result<Vec<NamedPose>, PoseFaul
             return Err(PoseFault::new(format!("there is no column {needed}"), CSV_HELP).at(1));
         }
     }
-    let mut poses = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|error| fault(&error))?;
+    let lines = reader.records().map(|record| {
+        let record = match record {
+            Ok(record) => record,
+            Err(error) => {
+                let fault = fault(&error);
+                return PoseLine { line: fault.line.unwrap_or(1), pose: Err(fault) };
+            }
+        };
         let line = record.position().map_or(0, csv::Position::line);
         let cells = columns.iter().zip(record.iter()).filter(|(_, cell)| !cell.is_empty());
         let object = cells.map(|(column, cell)| (column.to_owned(), value(column, cell))).collect();
-        poses.push(NamedPose::from_object(object, scene).map_err(|fault| fault.at(line))?);
-    }
-    Ok(poses)
+        PoseLine { line, pose: NamedPose::from_object(object, None) }
+    });
+    Ok(lines.collect())
 }
 
 /// A cell as a number or a switch if it is one; a name is always text.

@@ -130,8 +130,10 @@ pub struct LinkMachine {
     state: LinkState,
     since: Duration,
     retry_at: Duration,
-    /// Failures since the device was last in proper use.
+    /// Tries in a row that did not bring the device up.
     failures: u32,
+    /// Times in a row that the device was up, and lost before it had been of use.
+    relapses: u32,
     /// Since when the device can be used without a break.
     up_since: Option<Duration>,
     pressed: bool,
@@ -152,6 +154,7 @@ impl LinkMachine {
             since: now,
             retry_at: now,
             failures: 0,
+            relapses: 0,
             up_since: None,
             pressed: false,
             resumes: false,
@@ -217,7 +220,7 @@ impl LinkMachine {
             }
             (Input::ScanBegun, State::Ready) => self.enter(now, State::Scanning),
             (Input::ScanEnded, State::Scanning) => {
-                self.failures = 0;
+                self.relapses = 0;
                 self.enter(now, State::Ready);
             }
             (Input::Restarted, State::Ready | State::Scanning) => {
@@ -269,9 +272,14 @@ impl LinkMachine {
     }
 
     fn fail(&mut self, now: Duration, trouble: Trouble) {
-        // A device that was up for long enough is a new case, not one more failure of the same.
-        if self.up_since.is_some_and(|since| now.saturating_sub(since) > self.back_off.max) {
-            self.failures = 0;
+        // A device that came up is there again, however long it was away: what counts from here on is
+        // how often it was lost again, until it was of use or up for longer than the longest wait.
+        if let Some(since) = self.up_since {
+            if now.saturating_sub(since) > self.back_off.max {
+                self.relapses = 0;
+            }
+            self.failures = self.relapses;
+            self.relapses = self.relapses.saturating_add(1);
         }
         let doublings = self.failures.min(16);
         let wait = self.back_off.min.saturating_mul(1 << doublings).min(self.back_off.max);

@@ -5,7 +5,7 @@ use std::{net::SocketAddr, sync::Arc, time::Duration};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::machine::BackOff;
+use super::{forecast::listening, machine::BackOff};
 use crate::{
     acoustics::{Air, Sensor},
     array::{Course, RangerArray},
@@ -157,9 +157,25 @@ impl Settings {
             message: error.to_string(),
             help: "a full turn is from_deg = 0, to_deg = 360, step_deg = 0.9".into(),
         })?;
-        Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa).map_err(|error| {
-            Mismatch { key: "air.temperature_c", message: error.to_string(), help: String::new() }
-        })?;
+        let air = Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa).map_err(
+            |error| Mismatch {
+                key: "air.temperature_c",
+                message: error.to_string(),
+                help: String::new(),
+            },
+        )?;
+        // What the model plays listens until the next one of its rangers fires.
+        if self.simulated.is_none() {
+            let windowed = self.motion().check_window(&listening(self, &air));
+            windowed.map_err(|deaf| Mismatch {
+                key: match self.keys.motion.window_ms {
+                    Some(_) => "motion.window_ms",
+                    None => "model.max_range_m",
+                },
+                message: deaf.to_string(),
+                help: deaf.help(),
+            })?;
+        }
         self.check_server()?;
         if self.keys.link.retry_max_s < self.keys.link.retry_min_s {
             return Err(Mismatch {

@@ -7,7 +7,7 @@ use firmware_protocol::{
         BoardChange, Command, Host, HostConfig, HostError, HostEvent, LinkStats, Outcome,
         StartError,
     },
-    messages::{Identity, SweepState},
+    messages::{Identity, NakReason, SweepState},
 };
 use thiserror::Error;
 use tokio::{
@@ -15,6 +15,9 @@ use tokio::{
     sync::watch,
     time::{Instant, sleep_until},
 };
+
+/// Restarts of a device that is being met, after which it is given up.
+const RESTARTS: u32 = 3;
 
 /// A host machine on a line. It owns both; whoever wants something of the device asks it.
 #[derive(Debug)]
@@ -92,7 +95,7 @@ const fn host_help(error: &HostError) -> &'static str {
             "flash the firmware of this version of sonard; on a board of your own see what \
              PROTOCOL.md says that a host must refuse"
         }
-        HostError::Refused(_) => "change the setting that the device names",
+        HostError::Refused(reason) => refused_help(*reason),
         HostError::Rebooted => {
             "the board restarts again and again: look at its supply (the module draws 2 A while \
              firing; it needs 1000 uF beside it)"
@@ -114,6 +117,40 @@ const fn host_help(error: &HostError) -> &'static str {
         | HostError::SenselessReply(_) => {
             "reset the board and scan again; if it happens again, report it with the log"
         }
+    }
+}
+
+const fn refused_help(reason: NakReason) -> &'static str {
+    match reason {
+        NakReason::Busy => {
+            "another program gives the ranger work at the same time: make sure that only one uses \
+             the port"
+        }
+        NakReason::WrongBoot
+        | NakReason::SequenceReused
+        | NakReason::UnknownRequest
+        | NakReason::NotConfigured
+        | NakReason::NotHomed => {
+            "reset the board and scan again; if it happens again, report it with the log"
+        }
+        NakReason::IndexNotFound => {
+            "if the motor did not turn, check its supply and current; if it did, check the index \
+             sensor; `sonard doctor --port PORT` examines both"
+        }
+        NakReason::Stopped => host_help(&HostError::Stopped),
+        NakReason::EmergencyStop => host_help(&HostError::EmergencyStop),
+        NakReason::MotionFault => host_help(&HostError::MotionFault),
+        NakReason::PositionOutOfRange
+        | NakReason::WindowOutOfRange
+        | NakReason::IntervalOutOfRange
+        | NakReason::SettleOutOfRange
+        | NakReason::EchoesOutOfRange
+        | NakReason::BlankingOutOfRange
+        | NakReason::SpeedOutOfRange
+        | NakReason::AccelerationOutOfRange
+        | NakReason::HoldOutOfRange
+        | NakReason::SweepOutOfRange
+        | NakReason::LeaseOutOfRange => "change the setting that the device names",
     }
 }
 
@@ -174,6 +211,48 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
     ) -> Result<Ended, DriveError> {
         self.start(command)?;
         self.finish(on_event).await
+    }
+
+    /// Asks the device who it is, and stops whatever it still does: a sweep that an earlier program
+    /// left behind goes on for as long as anybody talks to the device, and all else is refused
+    /// meanwhile. Events go to `on_event`.
+    ///
+    /// # Errors
+    /// When nothing or something else answers, or the device only restarts.
+    pub async fn take_over(
+        &mut self,
+        mut on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
+    ) -> Result<Identity, DriveError> {
+        let mut restarts = 0;
+        loop {
+            let ended = self.perform(Command::Identify, &mut on_event).await?;
+            let Ended::Identified(identity) = ended else { continue };
+            match self.stop(&mut on_event).await {
+                Ok(()) => return Ok(identity),
+                // It restarted in between: what it says of itself is no longer true.
+                Err(DriveError::Host(HostError::Rebooted)) if restarts < RESTARTS => restarts += 1,
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Brings the device to a stand, whatever is under way.
+    ///
+    /// # Errors
+    /// As [`Self::start`] and [`Self::finish`].
+    pub async fn stop(
+        &mut self,
+        mut on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
+    ) -> Result<(), DriveError> {
+        self.start(Command::Stop)?;
+        loop {
+            // The end of what was stopped may come first.
+            match self.finish(&mut on_event).await {
+                Ok(Ended::Done(Outcome::Stopped)) => return Ok(()),
+                Ok(_) | Err(DriveError::Host(HostError::Stopped) | DriveError::Abandoned) => {}
+                Err(error) => return Err(error),
+            }
+        }
     }
 
     /// Waits for the end of the command under way, handing every other event to `on_event`.

@@ -10,6 +10,7 @@ mod progress;
 mod scanner;
 mod settings;
 mod timing;
+mod wall_clock;
 
 pub use budget::Budget;
 pub use clock::{ClockFit, HostTime, TickExtender};
@@ -18,5 +19,5 @@ pub use introduction::{device_record, provenance, serial_text};
 pub use job::ScanJob;
 pub use progress::Sink;
 pub use scanner::{Ranger, ScanError, ScanSummary, Unasked};
-pub use settings::{Listening, Motion, hold_s};
+pub use settings::{DeafWindow, Listening, Motion, hold_s};
 pub use timing::limit_s;

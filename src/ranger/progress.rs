@@ -12,6 +12,7 @@ use super::{
     clock::{ClockFit, TickExtender},
     driver::DriveError,
     job::ScanJob,
+    wall_clock::{WallClock, as_step},
 };
 use crate::{
     acoustics::classify_tof,
@@ -48,6 +49,7 @@ pub(super) struct Progress<'a> {
     /// First step and stride of the plan.
     motor: (i32, i32),
     wall_epoch: Timestamp,
+    wall_clock: WallClock,
     identity: Identity,
     sink: &'a mut dyn Sink,
     segment: Option<Segment>,
@@ -78,6 +80,7 @@ impl<'a> Progress<'a> {
             scan,
             motor,
             wall_epoch,
+            wall_clock: WallClock::new(),
             identity: *identity,
             sink,
             segment: None,
@@ -114,6 +117,7 @@ impl<'a> Progress<'a> {
     }
 
     fn take_in(&mut self, event: HostEvent) {
+        self.look_at_wall_clock();
         match event {
             HostEvent::Reading { reading, repaired } => self.reading(&reading, repaired),
             HostEvent::ClockSample { sent_us, received_us, device_ticks, retried } => {
@@ -157,6 +161,34 @@ impl<'a> Progress<'a> {
             self.done.len() as u32 - self.measured()
         );
         self.note(EventKind::Reconnected, detail);
+    }
+
+    /// Tells that the wall clock was set by so much before the scan.
+    pub(super) fn wall_clock_was_set(&mut self, step: SignedDuration) {
+        if let Some(step) = as_step(step) {
+            let step_s = step.as_secs_f64();
+            let detail = format!(
+                "the computer's clock was set by {step_s:+.3} s since it was looked at last"
+            );
+            self.note(EventKind::ClockStep, detail);
+        }
+    }
+
+    /// Tells that it was set during the scan, within which times are by the clock as it was.
+    pub(super) fn look_at_wall_clock(&mut self) {
+        if let Some(step) = self.wall_clock.step() {
+            let step_s = step.as_secs_f64();
+            let detail = format!(
+                "the computer's clock was set by {step_s:+.3} s during the scan: the times of its \
+                 readings go on by the clock as it was when the scan began"
+            );
+            self.note(EventKind::ClockStep, detail);
+        }
+    }
+
+    /// By how much the wall clock was set during the scan, and in how many steps.
+    pub(super) const fn wall_clock_steps(&self) -> (SignedDuration, u32) {
+        self.wall_clock.told()
     }
 
     pub(super) fn note(&mut self, kind: EventKind, detail: String) {

@@ -18,6 +18,7 @@ use super::{
     job::ScanJob,
     progress::{Finished, Progress, Sink},
     timing,
+    wall_clock::{as_step, confirmed},
 };
 use crate::{
     scan::{EventKind, PlanError, Record, ScanEnd, ScanStart, Segment},
@@ -65,6 +66,7 @@ pub struct Ranger<L> {
     identity: Identity,
     /// Wall clock at microsecond 0 of the driver.
     wall_epoch: Timestamp,
+    clock_steps: u32,
 }
 
 /// What happened on a line without work.
@@ -79,14 +81,14 @@ pub enum Unasked {
 }
 
 impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
-    /// Meets the device on a line.
+    /// Meets the device on a line, and stops whatever it still does.
     ///
     /// # Errors
     /// When nothing or something else answers.
     pub async fn meet(mut driver: Driver<L>) -> Result<Self, DriveError> {
         let wall_epoch = wall_epoch(Timestamp::now(), driver.now_us());
-        let identity = identify(&mut driver).await?;
-        Ok(Self { driver, identity, wall_epoch })
+        let identity = driver.take_over(ignore).await?;
+        Ok(Self { driver, identity, wall_epoch, clock_steps: 0 })
     }
 
     /// Asks the device again who it is, after it restarted; another one may answer now, which
@@ -95,16 +97,17 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
     /// # Errors
     /// When nothing or something else answers.
     pub async fn meet_again(&mut self) -> Result<(), DriveError> {
-        self.identity = identify(&mut self.driver).await?;
+        self.identity = self.driver.take_over(ignore).await?;
         Ok(())
     }
 
     /// Makes sure that the board that answers is the one that was met; it may have restarted.
+    /// Whatever it still does is stopped.
     ///
     /// # Errors
     /// When another one answers, or none.
     pub async fn recognise(&mut self) -> Result<(), DriveError> {
-        let identity = identify(&mut self.driver).await?;
+        let identity = self.driver.take_over(ignore).await?;
         if let Some(change) = BoardChange::between(&self.identity, &identity) {
             return Err(DriveError::OtherBoard(change));
         }
@@ -112,14 +115,11 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         Ok(())
     }
 
-    /// Sets the device up and finds home; returns by how much the index was off, steps. A sweep
-    /// that an earlier program left behind is stopped first: it would go on for as long as
-    /// anybody talks to the device.
+    /// Sets the device up and finds home; returns by how much the index was off, steps.
     ///
     /// # Errors
     /// The device's and the line's.
     pub async fn home(&mut self, settings: Settings) -> Result<i32, DriveError> {
-        self.stop().await?;
         self.driver.perform(Command::Configure(settings), ignore).await?;
         match self.driver.perform(Command::Home, ignore).await? {
             Ended::Done(Outcome::Homed { drift_steps }) => Ok(drift_steps),
@@ -148,13 +148,24 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
     }
 
     /// Takes the computer's wall clock anew, and returns by how much it was set meanwhile (or
-    /// drifted away from the clock that never jumps). Called between scans, so that within a scan
+    /// drifted away from the clock that never jumps). Done between scans, so that within a scan
     /// times are consistent.
-    pub fn reanchor(&mut self) -> SignedDuration {
-        let epoch = wall_epoch(Timestamp::now(), self.driver.now_us());
-        let step = epoch.duration_since(self.wall_epoch);
-        self.wall_epoch = epoch;
-        step
+    fn reanchor(&mut self) -> SignedDuration {
+        let epoch = || wall_epoch(Timestamp::now(), self.driver.now_us());
+        let moved = || epoch().duration_since(self.wall_epoch);
+        let drift = moved();
+        let moved = match as_step(drift) {
+            None => drift,
+            Some(_) => confirmed(moved).unwrap_or(SignedDuration::ZERO),
+        };
+        self.wall_epoch = self.wall_epoch.checked_add(moved).unwrap_or(self.wall_epoch);
+        moved
+    }
+
+    /// How often the computer's wall clock was set; each time is an event of the scan that noticed.
+    #[must_use]
+    pub const fn clock_steps(&self) -> u32 {
+        self.clock_steps
     }
 
     /// What the device said of itself.
@@ -195,6 +206,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         let before = self.identity.boot;
         self.recognise().await?;
         let scan = Uuid::new_v4();
+        let step = self.reanchor();
         let time = Timestamp::now();
         let ScanJob { pose, plan, air, request, .. } = *job;
         let start = ScanStart { scan, time, pose, plan, air, provenance: None, request };
@@ -206,6 +218,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
                 format!("the device restarted before it (boot {before:04x})"),
             );
         }
+        progress.wall_clock_was_set(step);
         let outcome = self.measure(job, motor, &mut progress, stop).await;
         let stopped = matches!(outcome, Ok(Stopped(true)));
         if let Err(ScanError::Device(error)) = &outcome {
@@ -215,6 +228,10 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
             Ok(Stopped(false)) => self.home_check(&mut progress).await,
             _ => Ok(None),
         };
+        progress.look_at_wall_clock();
+        let (set_by, steps) = progress.wall_clock_steps();
+        self.wall_epoch = self.wall_epoch.checked_add(set_by).unwrap_or(self.wall_epoch);
+        self.clock_steps += steps + u32::from(as_step(step).is_some());
         let limit_s = timing::limit_s(&job.plan, &job.settings, motor.1);
         let drift = home.as_ref().ok().copied().flatten();
         let Finished { end, restarts, clock_drift } = progress.finish(limit_s, drift)?;
@@ -292,27 +309,12 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
     /// # Errors
     /// The device's and the line's.
     pub async fn stop(&mut self) -> Result<(), DriveError> {
-        self.bring_to_stand(ignore).await
+        self.driver.stop(ignore).await
     }
 
     /// The same, and takes in what was measured until then.
     async fn halt(&mut self, progress: &mut Progress<'_>) -> Result<(), DriveError> {
-        self.bring_to_stand(|event| progress.handle(event)).await
-    }
-
-    async fn bring_to_stand(
-        &mut self,
-        mut on_event: impl FnMut(HostEvent) -> ControlFlow<()>,
-    ) -> Result<(), DriveError> {
-        self.driver.start(Command::Stop)?;
-        loop {
-            // The end of what was stopped may come first.
-            match self.driver.finish(&mut on_event).await {
-                Ok(Ended::Done(Outcome::Stopped)) => return Ok(()),
-                Ok(_) | Err(DriveError::Host(HostError::Stopped) | DriveError::Abandoned) => {}
-                Err(error) => return Err(error),
-            }
-        }
+        self.driver.stop(|event| progress.handle(event)).await
     }
 
     /// Goes home and reports by how much the index was off.
@@ -345,16 +347,6 @@ struct Stopped(bool);
 fn wall_epoch(wall: Timestamp, driver_us: u64) -> Timestamp {
     let since = SignedDuration::from_micros(i64::try_from(driver_us).unwrap_or(0));
     wall.checked_sub(since).unwrap_or(wall)
-}
-
-async fn identify<L: AsyncRead + AsyncWrite + Unpin>(
-    driver: &mut Driver<L>,
-) -> Result<Identity, DriveError> {
-    loop {
-        if let Ended::Identified(identity) = driver.perform(Command::Identify, ignore).await? {
-            return Ok(identity);
-        }
-    }
 }
 
 fn ignore(_event: HostEvent) -> ControlFlow<()> {

@@ -4,6 +4,7 @@ use firmware_protocol::messages::{
     Blanking, Capabilities, Identity, Settings,
     limits::{SHORT_BLANKING_TICKS_MIN, TICK_HZ},
 };
+use thiserror::Error;
 
 /// Blanking of the module when nothing shortens it, microseconds.
 const INTERNAL_BLANKING_US: f64 = 2380.0;
@@ -36,16 +37,58 @@ pub struct Listening {
     pub blanking_us: f64,
 }
 
+/// A listening window that ends before the receiver opens: the ranger would be deaf.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error(
+    "the listening window, {window_ms:.2} ms, ends before the receiver opens {blanking_ms:.2} ms after \
+     firing: nothing could be heard"
+)]
+pub struct DeafWindow {
+    /// The window, milliseconds.
+    pub window_ms: f64,
+    /// When the receiver opens, milliseconds after firing.
+    pub blanking_ms: f64,
+    /// Range that belongs to that time, metres.
+    pub least_range_m: f64,
+}
+
+impl DeafWindow {
+    /// What would be right.
+    #[must_use]
+    pub fn help(&self) -> String {
+        let Self { blanking_ms, least_range_m, .. } = self;
+        format!(
+            "give a window of more than {blanking_ms:.2} ms, a maximum range of more than \
+             {least_range_m:.2} m, or a shorter blanking"
+        )
+    }
+}
+
 impl Motion {
+    /// Checks that something can be heard at all.
+    ///
+    /// # Errors
+    /// When the window is over before the receiver opens.
+    pub fn check_window(&self, listening: &Listening) -> Result<(), DeafWindow> {
+        let (window_ms, blanking_ms) = (self.window_ms(listening), listening.blanking_us / 1e3);
+        if window_ms > blanking_ms {
+            return Ok(());
+        }
+        let least_range_m = blanking_ms / 1e3 * listening.sound_speed_m_s / 2.0;
+        Err(DeafWindow { window_ms, blanking_ms, least_range_m })
+    }
+
+    fn window_ms(&self, listening: &Listening) -> f64 {
+        self.window_ms.unwrap_or(2e3 * listening.max_range_m / listening.sound_speed_m_s)
+    }
+
     /// The settings for a device of this identity; what it can't do is left out.
     #[must_use]
     pub fn settings(&self, listening: &Listening, identity: &Identity) -> Settings {
         let can = |capability| identity.capabilities.has(capability);
-        let window_ms =
-            self.window_ms.unwrap_or(2e3 * listening.max_range_m / listening.sound_speed_m_s);
         let shorter = listening.blanking_us < INTERNAL_BLANKING_US;
         Settings {
-            window_ticks: ticks(window_ms),
+            window_ticks: ticks(self.window_ms(listening)),
             min_interval_ticks: ticks(self.min_interval_ms),
             settle_ticks: ticks(self.settle_ms),
             max_echoes: if can(Capabilities::MULTIPLE_ECHOES) { self.max_echoes } else { 1 },

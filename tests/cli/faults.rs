@@ -140,6 +140,40 @@ fn a_killed_host_stops_the_firing_within_the_lease_and_leaves_the_port_usable() 
 }
 
 #[test]
+fn what_a_killed_scan_left_behind_is_stopped_by_whoever_comes_next() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mock = MockProcess::start(folder.path(), &["--realtime"]);
+    let place = ["--port", mock.port(), "--scene", "simple-room", "--pose", "fig9"];
+    let short = ["--max-range", "4", "--to-deg", "9"];
+    let after: [(&str, Vec<&str>); 3] = [
+        ("scan", [&["scan"], &place[..], &short[..]].concat()),
+        ("doctor", vec!["doctor", "--port", mock.port(), "--no-motion", "--pings", "2"]),
+        ("scan", [&["scan"], &place[..], &short[..]].concat()),
+    ];
+    for (number, (name, arguments)) in after.iter().enumerate() {
+        let out = folder.path().join(format!("out{number}"));
+        let mut scan = sonard(&[&["scan"], &place[..]].concat())
+            .args(["--max-range", "4", "--out"])
+            .arg(&out)
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("starts");
+        wait_until("some readings", || {
+            std::fs::read_to_string(out.join("scan.jsonl"))
+                .is_ok_and(|log| log.matches("\"ping\"").count() >= 20)
+        });
+        scan.kill().expect("it runs");
+        scan.wait().expect("it ends");
+        let killed = Instant::now();
+        let next = run(arguments);
+        assert_eq!(next.status.code(), Some(0), "{name} {number}: {}", stderr(&next));
+        assert!(killed.elapsed() < Duration::from_secs(15), "{name}: {:?}", killed.elapsed());
+    }
+    let (_, said) = mock.stop();
+    assert!(!said.contains("coils released"), "no lease had to end: {said}");
+}
+
+#[test]
 fn a_full_disk_stops_the_scan_and_what_is_in_the_log_is_counted_right() {
     let folder = tempfile::tempdir().expect("a folder");
     // A limit on the file's size fails writes as a full disk does, and needs no disk.

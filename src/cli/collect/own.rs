@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use firmware_protocol::{host::BoardChange, messages::Identity};
-use tokio::time::{Instant, sleep};
+use tokio::time::sleep;
 use tokio_serial::SerialStream;
 
-use super::{Args, load::Loaded};
+use super::{Args, load::Loaded, patience::Patience};
 use crate::{
     cli::{
         Failure,
@@ -16,9 +16,6 @@ use crate::{
     },
     ranger::Ranger,
 };
-
-const WAIT_MIN: Duration = Duration::from_millis(300);
-const WAIT_MAX: Duration = Duration::from_secs(10);
 
 /// Who measures.
 enum Kind {
@@ -75,7 +72,7 @@ impl Own {
                 self.ranger = None;
                 *running = None;
                 let [temperature_c, humidity_percent, pressure_kpa] = air;
-                let mut options = self.world.emulator(&self.scene)?;
+                let mut options = self.world.emulator(self.scene.as_ref())?;
                 options.extend([
                     format!("--pose={}", setup.pose_numbers()),
                     format!("--sensor={sensor}"),
@@ -112,17 +109,17 @@ impl Own {
         &mut self,
         patience: Duration,
     ) -> Result<&mut Ranger<SerialStream>, Failure> {
-        let (until, mut wait, mut told) = (Instant::now() + patience, WAIT_MIN, false);
+        let (mut patience, mut told) = (Patience::with_absence(patience), false);
         loop {
-            match self.meet().await {
+            let report = match self.meet().await {
                 // The borrow checker would keep the first borrow through the loop.
                 Ok(_) => return self.meet().await,
-                Err(Failure::Device(report)) if Instant::now() + wait < until => {
-                    if !std::mem::replace(&mut told, true) {
-                        anstream::eprintln!("waiting for the ranger: {report}");
-                    }
-                }
+                Err(Failure::Device(report)) => report,
                 Err(failure) => return Err(failure),
+            };
+            let Some(wait) = patience.next_wait() else { return Err(Failure::Device(report)) };
+            if !std::mem::replace(&mut told, true) {
+                anstream::eprintln!("waiting for the ranger: {report}");
             }
             tokio::select! {
                 () = sleep(wait) => {}
@@ -130,7 +127,6 @@ impl Own {
                     return Err(Failure::stopped());
                 }
             }
-            wait = (wait * 2).min(WAIT_MAX);
         }
     }
 

@@ -109,7 +109,8 @@ fn head(history: &History, keys: &CollectionKeys) -> String {
             history.starts.len()
         );
     }
-    let seconds: f64 = accepted.iter().filter_map(|take| take.wall_s).sum();
+    // The sum of no numbers is -0, and a scan that an earlier run left behind was not timed.
+    let seconds = accepted.iter().filter_map(|take| take.wall_s).fold(0.0, |sum, one| sum + one);
     let _ = writeln!(text, "Scanning took {seconds:.0} s in all.\n");
     for start in &history.starts {
         let device = &start.device;

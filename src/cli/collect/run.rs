@@ -11,8 +11,8 @@ use std::{
 };
 
 use super::{
-    Args, bar::Bar, daemon::Daemon, device::Device, load::Loaded, preview, refuse, report,
-    source::Source, terminal::Terminal, thermometer::Thermometer,
+    Args, bar::Bar, daemon::Daemon, device::Device, load::Loaded, patience::Patience, preview,
+    refuse, report, source::Source, terminal::Terminal, thermometer::Thermometer,
 };
 use crate::{
     acoustics::Air,
@@ -44,6 +44,8 @@ struct Collector<'a> {
     here: Option<u32>,
     /// The pose that the device was carried to.
     carried_to: Option<u32>,
+    /// Waits while the ranger loses one scan after the other; `None` once it took a whole one.
+    losses: Option<Patience>,
     /// Refused scans of this run.
     refused: BTreeMap<Slot, u32>,
     /// Noted at the start of this run.

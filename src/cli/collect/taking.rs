@@ -44,7 +44,6 @@ pub(super) async fn take(
     let mut sink = Taking::open(path, bar)?;
     sink.record(&Record::Session(Box::new(session))).map_err(|error| refuse(&error))?;
     let began = Instant::now();
-    ranger.reanchor();
     let outcome = ranger.scan(job, &mut sink, interrupts.clone().reason()).await;
     let wall_s = began.elapsed().as_secs_f64();
     let (lost, gone) = match outcome {

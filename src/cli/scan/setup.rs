@@ -37,7 +37,7 @@ pub(in crate::cli) struct Setup {
     pub(super) plan: ScanPlan,
     pub(super) simulator: Simulator,
     motion: Motion,
-    max_range_m: f64,
+    listening: Listening,
     pub(super) sensor: Sensor,
     air: Air,
     options: Options,
@@ -62,6 +62,12 @@ impl Setup {
     /// Asks the model about every stop.
     pub(in crate::cli) fn of(wish: Wish) -> Result<Self, Failure> {
         let Wish { scene, pose, pose_text, plan, motion, sensor, air, options } = wish;
+        let listening = Listening {
+            max_range_m: options.max_range_m.unwrap_or(sensor.max_range_m),
+            sound_speed_m_s: air.sound_speed_m_s(),
+            blanking_us: sensor.blanking_us,
+        };
+        motion.check_window(&listening).map_err(|deaf| Failure::input(deaf, deaf.help()))?;
         let simulator =
             Simulator::new(Arc::new(scene.with_robot_at(&pose)), sensor.clone(), air, options)
                 .map_err(|error| Failure::input(error, "see `sonard scan --help`"))?;
@@ -77,7 +83,7 @@ impl Setup {
             pose_text,
             plan,
             motion,
-            max_range_m: options.max_range_m.unwrap_or(sensor.max_range_m),
+            listening,
             scene,
             simulator,
             sensor,
@@ -127,12 +133,7 @@ impl Setup {
 
     /// The settings for a device of this identity.
     pub(in crate::cli) fn settings(&self, identity: &Identity) -> Settings {
-        let listening = Listening {
-            max_range_m: self.max_range_m,
-            sound_speed_m_s: self.air.sound_speed_m_s(),
-            blanking_us: self.sensor.blanking_us,
-        };
-        self.motion.settings(&listening, identity)
+        self.motion.settings(&self.listening, identity)
     }
 
     /// The session's record: what is true for every reading, and who measured.

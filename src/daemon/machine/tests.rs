@@ -70,6 +70,35 @@ fn a_device_that_fails_again_as_soon_as_it_is_up_is_tried_less_and_less_often() 
 }
 
 #[test]
+fn a_device_that_came_back_is_waited_for_as_if_it_had_never_been_away() {
+    let mut machine = ready();
+    let mut now = ms(0);
+    let mut waits = Vec::new();
+    // Pulled and plugged in again: gone for five tries, and soon up again.
+    for _ in 0..3 {
+        now += ms(1_000);
+        machine.handle(now, Input::Failed(Trouble::Lost));
+        for attempt in 0..5 {
+            let Step::Wait(until) = machine.poll(now) else { panic!("it waits") };
+            if attempt == 0 {
+                waits.push((until - now).as_millis());
+            }
+            now = until;
+            assert_eq!(machine.poll(now), Step::Open);
+            machine.handle(now, Input::Failed(Trouble::Absent));
+        }
+        let Step::Wait(until) = machine.poll(now) else { panic!("it waits") };
+        now = until;
+        for input in [Input::Opened, Input::Identified, Input::Homed] {
+            machine.poll(now);
+            machine.handle(now, input);
+        }
+    }
+    // Without a scan it has not proved itself: one that flaps is tried less and less often.
+    assert_eq!(waits, [200, 400, 800]);
+}
+
+#[test]
 fn a_long_absence_is_told_once_and_the_return_once() {
     let mut machine = ready();
     assert_eq!(machine.poll_transition(), Some(Transition { from: None, to: LinkState::Ready }));

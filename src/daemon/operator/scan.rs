@@ -21,9 +21,6 @@ use crate::{
     scan::{EventKind, Record, STOPPED_ON_REQUEST, Session},
 };
 
-/// A wall clock that moved by more than this against the one that never jumps was set.
-const CLOCK_STEP_S: f64 = 0.1;
-
 impl Operator {
     pub(super) async fn scan(&mut self) {
         let Some(identity) = self.recognise().await else { return };
@@ -35,13 +32,14 @@ impl Operator {
             return;
         }
         let Some(mut ranger) = self.ranger.take() else { return };
-        self.note_clock_step(&mut ranger);
         self.desk.agenda.begun(self.desk.now());
         self.desk.serving = job.request;
         self.handle(Input::ScanBegun);
         self.tell();
         let before = self.out.shared.latest_scan();
+        let clock_steps = ranger.clock_steps();
         let (outcome, interrupts) = self.scan_attended(&mut ranger, &job).await;
+        self.count_clock_steps(ranger.clock_steps() - clock_steps);
         self.desk.serving = None;
         self.desk.identity = Some(*ranger.identity());
         self.ranger = Some(ranger);
@@ -119,15 +117,10 @@ impl Operator {
         }
     }
 
-    fn note_clock_step(&mut self, ranger: &mut Ranger<SerialStream>) {
-        let step_s = ranger.reanchor().as_secs_f64();
-        if step_s.abs() > CLOCK_STEP_S {
-            let detail = format!(
-                "the computer's clock was set by {step_s:+.3} s since it was looked at last"
-            );
-            tracing::warn!("{detail}");
-            self.out.shared.view.send_modify(|view| view.clock.steps += 1);
-            self.out.event(EventKind::ClockStep, detail);
+    fn count_clock_steps(&self, steps: u32) {
+        if steps > 0 {
+            tracing::warn!("the computer's clock was set; the log says by how much");
+            self.out.shared.view.send_modify(|view| view.clock.steps += u64::from(steps));
         }
     }
 

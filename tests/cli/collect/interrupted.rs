@@ -107,7 +107,10 @@ fn a_ranger_that_goes_away_is_waited_for_and_the_scan_retaken() {
     let mock = MockProcess::start(folder.path(), &["--realtime"]);
     let port = mock.port().to_owned();
     let child = spawn(&case, &["--port", &port]);
-    wait_until("a scan", || case.path("out/taking").exists() && !case.files("taking").is_empty());
+    wait_until("some readings", || {
+        let taking = case.path("out/taking/p001-r01.jsonl");
+        fs::read_to_string(taking).is_ok_and(|log| log.matches("\"ping\"").count() >= 3)
+    });
     drop(mock);
     wait_until("the refusal", || !case.files("set-aside").is_empty());
     // Another boot of the same ranger under the same name.
@@ -118,6 +121,42 @@ fn a_ranger_that_goes_away_is_waited_for_and_the_scan_retaken() {
     drop(mock);
     case.assert_each_scan_once(1, 3, 25);
     assert!(case.text("out/report.md").contains("have no usable reading"));
+}
+
+#[test]
+fn a_sweep_that_a_killed_collection_left_behind_costs_the_next_one_nothing() {
+    let plan = "[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 2\n";
+    let case = Case::new(plan);
+    let folder = tempfile::tempdir().expect("a folder");
+    let mock = MockProcess::start(folder.path(), &["--realtime"]);
+    let mut first = spawn(&case, &["--port", mock.port()]);
+    wait_until("some readings", || {
+        let taking = case.path("out/taking/p001-r01.jsonl");
+        fs::read_to_string(taking).is_ok_and(|log| log.matches("\"ping\"").count() >= 3)
+    });
+    first.kill().expect("it runs");
+    first.wait().expect("it ends");
+    case.collect_all(&["--port", mock.port()]);
+    case.assert_each_scan_once(1, 2, 25);
+    // Nothing but what the first run had begun.
+    assert_eq!(case.files("set-aside"), ["p001-r01-take1.jsonl"]);
+}
+
+#[test]
+fn a_ranger_that_measures_nothing_is_tried_ever_more_seldom_and_leaves_no_scans_aside() {
+    let plan = "[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 20\npatience_s = 8\n";
+    let case = Case::new(plan);
+    let began = std::time::Instant::now();
+    let output = case.collect(&["--faults", "reset=1"]);
+    let text = said(&output);
+    assert_eq!(output.status.code(), Some(3), "{text}");
+    assert!(text.contains("supply"), "{text}");
+    let tries = text.matches("the ranger was lost").count();
+    assert!((2..=4).contains(&tries), "{tries} tries in {:?}: {text}", began.elapsed());
+    assert_eq!(case.files("set-aside"), Vec::<String>::new());
+    assert_eq!(case.manifest()["counts"]["given_up"], 0, "its pose is not to blame");
+    // With another ranger it goes on.
+    case.collect_all(&["--set", "collection.repeats=2", "--accept-changed-plan"]);
 }
 
 #[test]

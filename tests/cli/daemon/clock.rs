@@ -1,10 +1,16 @@
 //! The computer's wall clock is set while the daemon runs. `libfaketime` stands between it and the
 //! clock; without that library, `FAKETIME=0` leaves the test out.
 
-use std::{env, fs, path::PathBuf};
+use std::{
+    env, fs,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+};
+
+use jiff::Timestamp;
 
 use super::{Daemon, clean_log};
-use crate::common::{sonard, wait_until};
+use crate::common::{Log, sonard, wait_until};
 
 /// Where Debian puts it, on any architecture.
 fn library() -> PathBuf {
@@ -15,21 +21,73 @@ fn library() -> PathBuf {
     )
 }
 
-#[test]
-fn a_clock_that_is_set_is_noted_and_costs_no_beam() {
-    if env::var("FAKETIME").is_ok_and(|wanted| wanted == "0") {
-        return eprintln!("LEFT OUT, because FAKETIME=0");
-    }
-    let folder = tempfile::tempdir().expect("a folder");
-    let offset = folder.path().join("offset");
-    fs::write(&offset, "+0").expect("writable");
-    let mut command = sonard(&[]);
+/// The program with a clock that is off by what a file says.
+fn with_clock(arguments: &[&str], offset: &Path) -> Command {
+    fs::write(offset, "+0").expect("writable");
+    let mut command = sonard(arguments);
     command
         .env("LD_PRELOAD", library())
-        .env("FAKETIME_TIMESTAMP_FILE", &offset)
+        .env("FAKETIME_TIMESTAMP_FILE", offset)
         .env("FAKETIME_NO_CACHE", "1")
         // The clock that never jumps doesn't.
         .env("FAKETIME_DONT_FAKE_MONOTONIC", "1");
+    command
+}
+
+fn is_left_out() -> bool {
+    let left_out = env::var("FAKETIME").is_ok_and(|wanted| wanted == "0");
+    if left_out {
+        eprintln!("LEFT OUT, because FAKETIME=0");
+    }
+    left_out
+}
+
+#[test]
+fn a_clock_that_is_set_within_a_scan_is_noted_there_and_its_times_stay_even() {
+    if is_left_out() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let (offset, out) = (folder.path().join("offset"), folder.path().join("out"));
+    let scan = ["scan", "--mock", "--scene", "simple-room", "--pose", "fig9", "--max-range", "4"];
+    let mut scanning = with_clock(&scan, &offset)
+        .args(["--realtime", "--to-deg", "90", "--repeat", "2", "--out"])
+        .arg(&out)
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("starts");
+    let log = out.join("scan.jsonl");
+    wait_until("some readings", || {
+        fs::read_to_string(&log).is_ok_and(|log| log.matches("\"ping\"").count() >= 20)
+    });
+    fs::write(&offset, "+3600").expect("writable");
+    assert_eq!(scanning.wait().expect("it ends").code(), Some(0));
+    let log = Log::read(&log);
+    let steps: Vec<_> =
+        log.events().into_iter().filter(|event| event.contains("clock_step")).collect();
+    assert!(steps.len() == 1 && steps[0].contains("+3600.0"), "{steps:?}");
+    let step = log.records.iter().position(|record| record["kind"] == "clock_step");
+    let end = log.records.iter().position(|record| record["type"] == "scan_end");
+    assert!(step < end, "it is told within the scan that it happened in");
+    let mut times: Vec<Timestamp> = log.pings()[..100]
+        .iter()
+        .map(|ping| ping["time"].as_str().expect("a time").parse().expect("a time"))
+        .collect();
+    times.sort();
+    assert!(times[99].duration_since(times[0]).as_secs() < 60, "{} to {}", times[0], times[99]);
+    let second = log.of_type("scan_start").nth(1).expect("a second scan")["time"].clone();
+    let second: Timestamp = second.as_str().expect("a time").parse().expect("a time");
+    assert!(second.duration_since(times[99]).as_secs() > 3000, "the next one has the new clock");
+}
+
+#[test]
+fn a_clock_that_is_set_is_noted_and_costs_no_beam() {
+    if is_left_out() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let offset = folder.path().join("offset");
+    let command = with_clock(&[], &offset);
     let mock = ["--mock", "--scene", "simple-room", "--pose", "fig9"];
     let short = ["plan.to_deg=36", "plan.step_deg=3.6", "model.max_range_m=1"];
     let settings = ["scanning.mode=continuous"].into_iter().chain(short);

@@ -73,6 +73,7 @@ impl<'a> Collector<'a> {
             device: daemon.map(|daemon| Device::Daemon(Box::new(daemon))),
             here: None,
             carried_to: None,
+            losses: None,
             refused: BTreeMap::new(),
             conditions: Conditions::new(),
             bar: Bar::new(scan_s, loaded.keys.collection.pause_s, loaded.plan.beams()),

@@ -1,7 +1,12 @@
 //! What becomes of a scan: accepted, refused or cut.
 
+use std::time::Duration;
+
+use tokio::time::sleep;
+
 use super::{
     super::{
+        patience::Patience,
         refuse,
         taking::{self, Taken},
     },
@@ -10,7 +15,7 @@ use super::{
 use crate::{
     cli::{Failure, Outcome as Done},
     collect::{Action, Entry, Figures, Finding, Outcome, Slot, Take, check, is_cut, verdict},
-    scan::ScanView,
+    scan::{PingStatus, ScanView},
     store::load,
 };
 
@@ -22,19 +27,14 @@ impl Collector<'_> {
         (taken, change_c): (Taken, Option<f64>),
     ) -> Result<Next, Failure> {
         let Taken { view, lost, stopped, wall_s, gone: _ } = taken;
-        let Some(view) = view.filter(|view| !is_cut(view)) else {
-            self.set_aside(slot, None, Outcome::Cut, Vec::new(), "it was broken off")?;
-            if self.interrupts.happened() {
-                return Ok(Next::Stop("stopped on request".into()));
-            }
-            if stopped {
-                return Ok(Next::Stop("the daemon was told to stop".into()));
-            }
-            if let Some(Failure::Device(report)) = &lost {
-                self.bar.say(&format!("the ranger was lost: {report}"));
-            }
-            return self.count_refusal(slot);
+        let lost =
+            lost.or_else(|| view.as_ref().filter(|view| lacks_readings(view)).map(|_| gone()));
+        let Some(view) = view.filter(|view| !is_cut(view) && is_measured(view)) else {
+            return self.broken_off(slot, lost, stopped).await;
         };
+        if lost.is_none() {
+            self.losses = None;
+        }
         let figures = Figures::of(&view, change_c);
         let findings = check(&figures, &self.loaded.keys.checks);
         let mut action = verdict(&findings);
@@ -53,7 +53,57 @@ impl Collector<'_> {
         }
         match action {
             Action::Stop | Action::Ask => Ok(Next::Stop(format!("stopped: {why}"))),
-            Action::Note | Action::Retake => self.count_refusal(slot),
+            Action::Note | Action::Retake => match lost {
+                Some(lost) => self.wait_for_ranger(lost).await,
+                None => self.count_refusal(slot),
+            },
+        }
+    }
+
+    /// Puts away a scan without an end, or without a reading, and says what is next.
+    async fn broken_off(
+        &mut self,
+        slot: Slot,
+        lost: Option<Failure>,
+        stopped: bool,
+    ) -> Result<Next, Failure> {
+        let stop = match (self.interrupts.happened(), stopped) {
+            (true, _) => Some("stopped on request"),
+            (_, true) => Some("the daemon was told to stop"),
+            _ => None,
+        };
+        // A ranger that loses scan after scan before the first reading must not fill the folder.
+        if stop.is_some() || read(&self.folder.taking(slot))?.is_some_and(|view| is_measured(&view))
+        {
+            self.set_aside(slot, None, Outcome::Cut, Vec::new(), "it was broken off")?;
+        } else {
+            self.folder.discard(slot).map_err(|error| refuse(&error))?;
+        }
+        if let Some(why) = stop {
+            return Ok(Next::Stop(why.into()));
+        }
+        self.wait_for_ranger(lost.unwrap_or_else(gone)).await
+    }
+
+    /// Gives a ranger that lost a scan time before the next one, longer each time. That says nothing
+    /// about the pose, so it is no refusal: the collection ends when the plan's patience does.
+    async fn wait_for_ranger(&mut self, lost: Failure) -> Result<Next, Failure> {
+        let patience = Duration::from_secs_f64(self.loaded.keys.collection.patience_s);
+        let losses = self.losses.get_or_insert_with(|| Patience::with_losses(patience));
+        let (Failure::Device(report), Some(wait)) = (&lost, losses.next_wait()) else {
+            return match lost {
+                // The daemon wants no more of it.
+                Failure::Found(Some(why)) => Ok(Next::Stop(why)),
+                lost => Err(lost),
+            };
+        };
+        self.bar.say(&format!(
+            "the ranger was lost, the scan is taken again in {} s: {report}",
+            wait.as_secs()
+        ));
+        tokio::select! {
+            () = sleep(wait) => Ok(Next::GoOn),
+            () = self.interrupts.clone().wait() => Ok(Next::Stop("stopped on request".into())),
         }
     }
 
@@ -198,6 +248,23 @@ impl Collector<'_> {
             self.bar.say(&format!("  {}: {done}", finding.detail));
         }
     }
+}
+
+/// Whether any beam has a reading of the ranger's.
+fn is_measured(view: &ScanView) -> bool {
+    view.pings.iter().any(|ping| ping.status != PingStatus::LinkLost)
+}
+
+/// Whether the ranger was given up before its last beam.
+fn lacks_readings(view: &ScanView) -> bool {
+    view.pings.iter().any(|ping| ping.status == PingStatus::LinkLost)
+}
+
+fn gone() -> Failure {
+    Failure::device(
+        "the ranger was lost during the scan",
+        "look at its cable and supply: `sonard doctor --port PORT` examines them",
+    )
 }
 
 fn words(findings: &[Finding]) -> String {
