@@ -1,6 +1,9 @@
 //! `sonard doctor`.
 
+mod clock;
+mod echo;
 mod examine;
+mod line;
 mod report;
 
 use super::{Failure, Outcome, runtime};
@@ -29,7 +32,7 @@ pub(super) const ABOUT: &str = "\
 Find out what is wrong with a ranger: port, firmware, motor, echo.
 
 With --port, opens that port, asks the board who it is, measures the line, turns the motor a few \
-steps there and back, and fires some times. Each check says what it found and, where something \
+steps there and back, fires some times, and sets the board's clock beside this computer's. Each check says what it found and, where something \
 is wrong, what to do. Without --port it lists the serial ports by their stable names and opens \
 none of them: another device might take offence.";
 
@@ -44,10 +47,11 @@ of the transducer, which carries 400 V while it fires.
 
 With --json, `checks` holds objects {check, status, detail, cause, help}. status is ok, warning, \
 failed or skipped; cause is null or one of not_found, permission, busy, not_serial, port_error, \
-cable, silent, wrong_firmware, wrong_version, power, line, emergency_stop, motor, missing_echo, \
-stuck_echo, device.
+cable, silent, wrong_firmware, wrong_version, power, line, latency, emergency_stop, motor, \
+missing_echo, stuck_echo, echo_time (before the receiver opens or after the window), scatter (readings \
+that disagree), clock (it stands or runs at another rate), device.
 
-Exit codes: 0 all well (or ports listed), 1 the board works but something was found, 2 wrong \
+Exit codes: 0 all well, or warnings only (or ports listed), 1 the board works but something failed, 2 wrong \
 usage, 3 no port, no board or no link to it.";
 
 pub(super) fn run(args: &Args) -> Outcome {

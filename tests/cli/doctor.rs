@@ -9,10 +9,14 @@ use std::{
     time::Duration,
 };
 
+use firmware_protocol::messages::{Echoes, Reply};
 use serde_json::Value;
 use sonard::mock::Pty;
 
-use crate::common::{MockProcess, run, stderr};
+use crate::{
+    common::{MockProcess, run, stderr},
+    tamper::Tampered,
+};
 
 /// Examines a mock with such faults; exit code and report.
 fn examine(further: &[&str], options: &[&str]) -> (Option<i32>, Value) {
@@ -58,7 +62,7 @@ fn a_sound_ranger_is_called_sound() {
         .iter()
         .filter_map(|check| check["check"].as_str())
         .collect();
-    assert_eq!(names, ["port", "board", "restart", "line", "motor", "echo"]);
+    assert_eq!(names, ["port", "board", "restart", "line", "motor", "echo", "clock"]);
     assert!(report["checks"][1]["detail"].as_str().expect("text").contains("mock"));
     assert!(report["checks"][5]["detail"].as_str().expect("text").contains("10 of 10"));
 }
@@ -85,6 +89,65 @@ fn each_fault_has_its_name() {
         assert_eq!(findings(&report), [expected], "{faults}: {report:#}");
         assert_eq!(exit, Some(code), "{faults}");
     }
+}
+
+#[test]
+fn a_clock_that_stands_or_runs_at_another_rate_is_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mock = MockProcess::start(folder.path(), &["--realtime"]);
+    let options = ["--no-motion", "--pings", "1"];
+    let (code, report) = doctor(mock.port(), &options);
+    assert_eq!((findings(&report), code), (vec![], Some(0)), "{report:#}");
+    assert_eq!(report["checks"][6]["status"], "ok", "{report:#}");
+    for (rate, said) in [(0_u32, "stands still"), (2, "2.0")] {
+        let change = move |reply: &mut Reply| {
+            if let Reply::StatusReport(status) = reply {
+                status.ticks = status.ticks.wrapping_mul(rate);
+            }
+        };
+        let line = Tampered::start(mock.port(), Box::new(change));
+        let (code, report) = doctor(line.port(), &options);
+        assert_eq!(findings(&report), ["clock clock failed"], "{report:#}");
+        assert!(report["checks"][6]["detail"].as_str().expect("text").contains(said), "{report:#}");
+        assert_eq!(code, Some(1));
+    }
+}
+
+#[test]
+fn echoes_that_no_sound_made_and_readings_that_disagree_are_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mock = MockProcess::start(folder.path(), &[]);
+    // An echo at 1 mm, and one at 172 m; readings that wander by 0.7 m.
+    type Echo = fn(u32) -> u32;
+    let cases: [(Echo, &[&str]); 3] = [
+        (|_| 12, &["echo_time"]),
+        // A host that refuses such a reading on the line says so as well.
+        (|_| 2_000_000, &["echo_time", "device"]),
+        (|firing| 8_000 + firing % 10 * 900, &["scatter"]),
+    ];
+    for (echo_ticks, causes) in cases {
+        let mut firing = 0;
+        let change = move |reply: &mut Reply| {
+            if let Reply::Reading(reading) = reply {
+                firing += 1;
+                reading.echoes = Echoes::from_ticks(&[echo_ticks(firing)]);
+            }
+        };
+        let line = Tampered::start(mock.port(), Box::new(change));
+        let (code, report) = doctor(line.port(), &["--no-motion"]);
+        let found = findings(&report);
+        let expected = causes.iter().any(|cause| found == [format!("echo {cause} failed")]);
+        assert!(expected, "{found:?}: {report:#}");
+        assert_eq!(code, Some(1));
+    }
+}
+
+#[test]
+fn answers_that_come_late_are_not_called_lost() {
+    let slow = ["--faults", "delay=1,delay_ms=150"];
+    let (code, report) = examine(&slow, &["--no-motion", "--pings", "1"]);
+    assert_eq!(findings(&report), ["line latency warning"], "{report:#}");
+    assert_eq!(code, Some(0));
 }
 
 #[test]

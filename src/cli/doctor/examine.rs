@@ -1,17 +1,22 @@
 //! The examination of one board: each check needs the ones before it.
 
-use std::ops::ControlFlow;
+use std::{
+    ops::ControlFlow,
+    time::{Duration, Instant},
+};
 
 use firmware_protocol::{
     host::{Command, HostConfig, HostError, HostEvent, Outcome},
-    messages::{
-        Blanking, Capabilities, Identity, NakReason, Reading, ReadingStatus, ResetCause, Settings,
-    },
+    messages::{Blanking, Capabilities, Identity, NakReason, Reading, ResetCause, Settings},
 };
+use tokio::time::{sleep, timeout};
 use tokio_serial::SerialStream;
 
 use super::{
     Args,
+    clock::{self, Exchange},
+    echo,
+    line::{self, Questions},
     report::{Cause, Check, Report},
 };
 use crate::{
@@ -24,8 +29,10 @@ use crate::{
 const TURN_STEPS: i32 = 25;
 /// Exchanges that the line is judged by.
 const EXCHANGES: u32 = 20;
-/// Speed of sound that a range is quoted with, metres a second: 20 degrees Celsius.
-const SOUND_M_S: f64 = 343.4;
+/// Least time over which the board's clock is judged, microseconds.
+const CLOCK_SPAN_US: u64 = 1_500_000;
+/// How long an answer that came late may take at most to be awaited.
+const LATEST: Duration = Duration::from_secs(5);
 
 /// Gentle to the motor, and as far as the module hears: 62 ms, 10.7 m.
 const SETTINGS: Settings = Settings {
@@ -52,7 +59,8 @@ pub(super) async fn examine(port: &str, args: &Args) -> Report {
     report.checks.push(Check::ok("port", "opened, and nobody else has it"));
     let interrupts = Interrupts::listen();
     let config = HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, rand::random()) };
-    let mut patient = Patient { driver: Driver::new(line, config), restarts: 0 };
+    let driver = Driver::new(line, config);
+    let mut patient = Patient { driver, restarts: 0, exchanges: Vec::new() };
     tokio::select! {
         () = patient.examine(args, &mut report.checks) => {}
         () = interrupts.wait() => {
@@ -79,6 +87,8 @@ struct Patient {
     driver: Driver<SerialStream>,
     /// Restarts noticed.
     restarts: u32,
+    /// What both clocks showed, since the board's last restart.
+    exchanges: Vec<Exchange>,
 }
 
 /// What came of a command, beside its end.
@@ -110,39 +120,60 @@ impl Patient {
             return;
         }
         let echo = self.echo(args.pings, settings).await;
+        let gone = matches!(echo.cause, Some(Cause::Cable | Cause::Power));
         checks.push(echo);
+        checks.push(match gone {
+            true => Check::skipped("clock", "the board has to stay for that"),
+            false => self.clock(&identity).await,
+        });
     }
 
+    /// Who it is; whatever it still does is stopped.
     async fn identify(&mut self) -> Result<Identity, DriveError> {
-        loop {
-            if let Ended::Identified(identity) = self.perform(Command::Identify).await?.0 {
-                return Ok(identity);
+        let Self { driver, restarts, exchanges } = self;
+        let identified = driver.take_over(|event| {
+            if matches!(event, HostEvent::Rebooted { .. }) {
+                *restarts += 1;
+                exchanges.clear();
             }
-        }
+            ControlFlow::Continue(())
+        });
+        identified.await
     }
 
-    /// Round trips and damage.
+    /// Round trips, loss and damage.
     async fn line(&mut self) -> Check {
+        let before = *self.driver.host().stats();
+        let mut longest = Duration::ZERO;
         for _ in 0..EXCHANGES {
+            let began = Instant::now();
             if let Err(error) = self.perform(Command::Status).await {
                 return gone("line", &error);
             }
+            longest = longest.max(began.elapsed());
         }
-        let stats = self.driver.host().stats();
-        let dropped = &stats.dropped;
-        let damaged = dropped.checksum + dropped.stuffing + dropped.too_long;
-        if damaged == 0 && stats.retries <= 1 {
-            return Check::ok("line", format!("{EXCHANGES} questions, each answered at once"));
+        if self.driver.host().stats().retries > before.retries {
+            // What is still under way is late, and no loss.
+            let _ = timeout((2 * longest).min(LATEST), self.driver.idle()).await;
         }
-        Check::warning(
-            "line",
-            Cause::Line,
-            format!(
-                "of {EXCHANGES} questions {} had to be repeated, {damaged} frames came damaged",
-                stats.retries
-            ),
-            "the line loses or changes bytes: try another cable, away from the motor's, and no hub",
-        )
+        let after = *self.driver.host().stats();
+        line::judge(&Questions { asked: EXCHANGES, before, after, longest })
+    }
+
+    /// The board's ticks beside this computer's clock, over the examination so far.
+    async fn clock(&mut self, identity: &Identity) -> Check {
+        if identity.capabilities.has(Capabilities::VIRTUAL_CLOCK) {
+            return Check::skipped("clock", "it is virtual and jumps");
+        }
+        let began_us = self.exchanges.first().map_or(0, |exchange| exchange.sent_us);
+        let spent_us = self.driver.now_us().saturating_sub(began_us);
+        sleep(Duration::from_micros(CLOCK_SPAN_US.saturating_sub(spent_us))).await;
+        for _ in 0..EXCHANGES {
+            if let Err(error) = self.perform(Command::Status).await {
+                return gone("clock", &error);
+            }
+        }
+        clock::judge(&self.exchanges, identity.tick_hz)
     }
 
     async fn motor(&mut self, identity: &Identity, settings: Settings) -> Check {
@@ -199,18 +230,28 @@ impl Patient {
                 Err(error) => return gone("echo", &error),
             }
         }
-        judge(&readings)
+        echo::judge(&readings, SETTINGS.window_ticks)
     }
 
     async fn perform(&mut self, command: Command) -> Result<(Ended, Seen), DriveError> {
         let mut seen = Seen::default();
-        let restarts = &mut self.restarts;
-        let ended = self
-            .driver
+        let Self { driver, restarts, exchanges } = self;
+        let ended = driver
             .perform(command, |event| {
                 match event {
                     HostEvent::Reading { reading, .. } => seen.readings.push(reading),
-                    HostEvent::Rebooted { .. } => *restarts += 1,
+                    HostEvent::Rebooted { .. } => {
+                        *restarts += 1;
+                        exchanges.clear();
+                    }
+                    HostEvent::ClockSample {
+                        sent_us,
+                        received_us,
+                        device_ticks,
+                        retried: false,
+                    } => {
+                        exchanges.push(Exchange { sent_us, received_us, device_ticks });
+                    }
                     _ => {}
                 }
                 ControlFlow::Continue(())
@@ -340,50 +381,4 @@ fn weak_supply(restarts: u32, readings: &[Reading]) -> Check {
         "its supply sags when the module draws its 2 A: put 1000 uF beside the module, and feed it \
          from a supply of its own, not from USB",
     )
-}
-
-/// What the readings say of the module.
-fn judge(readings: &[Reading]) -> Check {
-    let count = |status| readings.iter().filter(|reading| reading.status == status).count();
-    let stuck = count(ReadingStatus::ModuleFault);
-    if stuck > 0 {
-        return Check::failed(
-            "echo",
-            Cause::StuckEcho,
-            format!("ECHO was high before {stuck} of {} firings", readings.len()),
-            "ECHO must be low until INIT rises: check the module's 5 V and ground, that its 4.7 \
-             kohm pull-up goes to its own supply, and that INIT and ECHO are not swapped",
-        );
-    }
-    let mut echoes: Vec<f64> = readings
-        .iter()
-        .filter_map(|reading| reading.echoes.first())
-        .map(|ticks| f64::from(*ticks) * 0.5e-6 * SOUND_M_S / 2.0)
-        .collect();
-    echoes.sort_by(f64::total_cmp);
-    let Some(median) = echoes.get(echoes.len() / 2) else {
-        return Check::failed(
-            "echo",
-            Cause::MissingEcho,
-            format!("no echo in {} firings", readings.len()),
-            "point the ranger at a wall 0.5 to 5 m away; if it clicks at each firing, ECHO does not \
-             reach the board (its wire, its 4.7 kohm pull-up); if it is silent, check INIT's wire, \
-             the module's 5 V and the transducer's cable",
-        );
-    };
-    let spread_mm = (echoes.last().unwrap_or(median) - echoes.first().unwrap_or(median)) * 1e3;
-    let heard = format!(
-        "{} of {} firings heard an echo, at {median:.3} m (spread {spread_mm:.1} mm)",
-        echoes.len(),
-        readings.len()
-    );
-    if 2 * echoes.len() < readings.len() {
-        return Check::warning(
-            "echo",
-            Cause::MissingEcho,
-            heard,
-            "more than half of them heard nothing: point the ranger squarely at a hard wall",
-        );
-    }
-    Check::ok("echo", heard)
 }

@@ -29,10 +29,14 @@ pub(super) enum Cause {
     WrongVersion,
     Power,
     Line,
+    Latency,
     EmergencyStop,
     Motor,
     MissingEcho,
     StuckEcho,
+    EchoTime,
+    Scatter,
+    Clock,
     Device,
 }
 
