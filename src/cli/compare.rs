@@ -33,7 +33,7 @@ pub(super) struct Args {
     /// model, instead of taking the predictions in the log. Without it, measured scans that have no
     /// prediction beside them get one in the scene of the log, if the log holds it
     #[arg(long, value_name = "SCENE")]
-    scene: Option<String>,
+    scene: Option<PathBuf>,
     /// How many of the beams that fit worst to list
     #[arg(long, default_value_t = 5)]
     worst: usize,
@@ -54,19 +54,30 @@ holds no record, or the scene is wrong.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let scene = args.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
+    let mut all = Comparer::default();
     for log in &args.logs {
-        compare_log(args, log, scene.as_ref())?;
+        compare_log(args, log, scene.as_ref(), &mut all)?;
     }
-    Ok(())
+    if args.logs.len() < 2 || args.json {
+        return Ok(());
+    }
+    let mut out = io::stdout().lock();
+    let printed = writeln!(out, "all {} logs", args.logs.len())
+        .and_then(|()| table::print(&mut out, &all.finish(), &Worst::new(0)));
+    printed.or_else(|error| Failure::from_write("standard output", &error))
 }
 
-fn compare_log(args: &Args, log: &Path, scene: Option<&Arc<Scene>>) -> Outcome {
+/// Compares one log, and takes its scans into the comparison of all.
+fn compare_log(args: &Args, log: &Path, scene: Option<&Arc<Scene>>, all: &mut Comparer) -> Outcome {
     let (mut comparer, mut worst) = (Comparer::default(), Worst::new(args.worst));
     let mut predictor = Predictor::new(log, scene);
     let mut all_simulated = true;
     for_each_scan(log, |mut scan| {
         predictor.predict(&mut scan)?;
         worst.add(&comparer.add(&scan));
+        if args.logs.len() > 1 {
+            all.add(&scan);
+        }
         all_simulated &= is_simulated(&scan);
         Ok(())
     })?;

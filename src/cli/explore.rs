@@ -6,6 +6,7 @@ use std::{
     sync::Arc,
 };
 
+use indicatif::ProgressBar;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use serde::Serialize;
@@ -21,7 +22,8 @@ use super::{
 };
 use crate::{
     explore::{
-        Exploration, ExploreSettings, Ranger, RobotSettings, Sensing, SimulatedRobot, Stop, explore,
+        Exploration, ExploreSettings, Ranger, RobotSettings, Sensing, SimulatedRobot, Stop,
+        explore_watched,
     },
     geometry::Pose,
     interpret::lines::{MapError, map_error},
@@ -138,7 +140,10 @@ pub(super) fn run(args: &Args) -> Outcome {
     let simulator =
         Simulator::new(Arc::new(scene), args.sensor.sensor()?, args.air.air()?, options)
             .map_err(|error| Failure::input(error, "see `sonard explore --help`"))?;
-    let made = explored(&simulator, pose, sensing, robot, &settings, args.seed)?;
+    let bar = progress::spinner("stops");
+    let made = explored((&simulator, pose), sensing, robot, &settings, args.seed, &bar);
+    bar.finish_and_clear();
+    let made = made?;
     let scene = simulator.scene();
     let summary = Summary::of(scene, sensing, &made);
     if let Some(folder) = &args.out {
@@ -154,14 +159,14 @@ pub(super) fn run(args: &Args) -> Outcome {
     ))))
 }
 
-/// One exploration; the same seed gives the same.
+/// One exploration from a pose, counted in `bar`; the same seed gives the same.
 pub(super) fn explored(
-    simulator: &Simulator,
-    pose: Pose,
+    (simulator, pose): (&Simulator, Pose),
     sensing: Sensing,
     robot: RobotSettings,
     settings: &ExploreSettings,
     seed: u64,
+    bar: &ProgressBar,
 ) -> Result<Exploration, Failure> {
     let free_m = simulator.scene().clearance_m(pose.position());
     if free_m <= robot.radius_m {
@@ -171,7 +176,12 @@ pub(super) fn explored(
         ));
     }
     let rng = Pcg64::seed_from_u64(seed);
-    Ok(explore(&mut SimulatedRobot::new(simulator, pose, robot, rng), sensing, settings))
+    let mut robot = SimulatedRobot::new(simulator, pose, robot, rng);
+    let made = explore_watched(&mut robot, sensing, settings, |so_far| {
+        bar.set_position(so_far.stops.len() as u64);
+        bar.set_message(format!("{:.0} m driven", so_far.travel_m));
+    });
+    Ok(made)
 }
 
 impl SensingName {

@@ -94,10 +94,13 @@ fn room(args: &Args, number: u32, bar: &ProgressBar) -> Result<Vec<Row>, Failure
     let simulator = Simulator::new(Arc::new(scene), sensor, Air::default(), options)
         .map_err(|error| refuse(&error))?;
     let scene = simulator.scene();
-    let made: Vec<(Sensing, Exploration)> = Sensing::ALL
-        .into_iter()
-        .map(|sensing| Ok((sensing, explored(&simulator, pose, sensing, robot, &settings, seed)?)))
-        .collect::<Result<_, Failure>>()?;
+    let stops = ProgressBar::hidden();
+    let explore = |sensing| {
+        let made = explored((&simulator, pose), sensing, robot, &settings, seed, &stops)?;
+        Ok((sensing, made))
+    };
+    let made: Vec<(Sensing, Exploration)> =
+        Sensing::ALL.into_iter().map(explore).collect::<Result<_, Failure>>()?;
     if let Some(folder) = &args.out {
         let folder = folder.join(format!("room-{}", number + 1));
         for (sensing, made) in &made {
@@ -147,13 +150,20 @@ fn print(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
     };
     let map = |sensing| mean(sensing, |one| one.error.map_error_m);
     let shots = |sensing| mean(sensing, |one| f64::from(one.laser_shots));
-    writeln!(
-        out,
-        "just in time against laser only: {:.1} % of the shots, map error {:+.0} %; against sonar \
-         only: map error / {:.0}",
+    // Where there was nothing to divide by there is no ratio.
+    let told = |text: String, ratio: f64| if ratio.is_finite() { text } else { "-".into() };
+    let [of_shots, of_laser, of_sonar] = [
         100.0 * shots(Sensing::JustInTime) / shots(Sensing::Laser),
         100.0 * (map(Sensing::JustInTime) / map(Sensing::Laser) - 1.0),
-        map(Sensing::Sonar) / map(Sensing::JustInTime)
+        map(Sensing::Sonar) / map(Sensing::JustInTime),
+    ];
+    writeln!(
+        out,
+        "just in time against laser only: {} of the shots, map error {}; against sonar only: map \
+         error / {}",
+        told(format!("{of_shots:.1} %"), of_shots),
+        told(format!("{of_laser:+.0} %"), of_laser),
+        told(format!("{of_sonar:.0}"), of_sonar),
     )
 }
 

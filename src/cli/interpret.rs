@@ -35,7 +35,7 @@ pub(super) struct Args {
     picture: PictureArgs,
     /// Scene file or name of a shipped scene to draw; without it, the one in the log
     #[arg(long, value_name = "SCENE")]
-    scene: Option<String>,
+    scene: Option<PathBuf>,
     /// Strength of an edge's echo, sigma_E: for the boundary between edges and the rest
     #[arg(long, value_name = "S", default_value_t = Settings::default().sigma_e, value_parser = positive)]
     sigma_e: f64,

@@ -41,7 +41,7 @@ pub(super) struct Args {
     picture: PictureArgs,
     /// Scene file or name of a shipped scene to draw; without it, the one in the log
     #[arg(long, value_name = "SCENE")]
-    scene: Option<String>,
+    scene: Option<PathBuf>,
 }
 
 pub(super) const ABOUT: &str = "\

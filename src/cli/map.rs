@@ -85,7 +85,7 @@ pub(super) struct Args {
     /// Scene file or name of a shipped scene whose walls to draw over map.png; without it, the
     /// one in the log
     #[arg(long, value_name = "SCENE")]
-    scene: Option<String>,
+    scene: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,

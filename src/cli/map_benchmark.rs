@@ -48,8 +48,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Sets of readings in each course
-    #[arg(long, value_name = "N", default_value_t = 60)]
-    places: usize,
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    places: u32,
     /// Side of a cell, metres
     #[arg(long, value_name = "M", default_value_t = 0.05)]
     resolution: f64,
@@ -189,7 +189,7 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
     };
     let settings = TrialSettings {
         resolution_m: args.resolution,
-        places: args.places,
+        places: args.places as usize,
         stride_m: 0.25,
         clearance_m: if name == "simple-room" { 0.2 } else { 0.3 },
         arrangement,
@@ -294,17 +294,13 @@ fn print(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
     for column in table.column_iter_mut().skip(2) {
         column.set_cell_alignment(CellAlignment::Right);
     }
-    writeln!(out, "percent, without -> with Feature Prediction (change)\n{table}")
+    writeln!(out, "percent, without -> with Feature Prediction (change in points)\n{table}")
 }
 
 fn line(scene: &str, arrangement: &str, rows: &[&Row]) -> Vec<String> {
     let cell = |of: fn(&MapScore) -> Option<f64>| {
-        let mean = |side: fn(&Row) -> &MapScore| {
-            let values: Vec<f64> = rows.iter().filter_map(|row| of(side(row))).collect();
-            values.iter().sum::<f64>() / values.len() as f64
-        };
-        let (without, with) = (mean(|row| &row.without), mean(|row| &row.with));
-        format!("{without:.2} -> {with:.2} ({:+.0} %)", 100.0 * (with / without - 1.0))
+        let mean = |side: fn(&Row) -> &MapScore| mean(rows.iter().filter_map(|row| of(side(row))));
+        change(mean(|row| &row.without), mean(|row| &row.with))
     };
     vec![
         scene.into(),
@@ -315,4 +311,37 @@ fn line(scene: &str, arrangement: &str, rows: &[&Row]) -> Vec<String> {
         cell(|score| Some(score.map_score_occupied_percent)),
         cell(|score| score.false_positive_paths_percent),
     ]
+}
+
+/// `None` of no values at all: a benchmark that no map of a scene has.
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.fold((0.0, 0_u32), |(sum, count), value| (sum + value, count + 1));
+    (count > 0).then(|| sum / f64::from(count))
+}
+
+/// Two percentages, and what is between them in points: a ratio would mean nothing where a
+/// correlation is near 0 or negative.
+fn change(without: Option<f64>, with: Option<f64>) -> String {
+    match (without, with) {
+        (Some(without), Some(with)) => {
+            format!("{without:.2} -> {with:.2} ({:+.1})", with - without)
+        }
+        _ => {
+            let text = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.2}"));
+            format!("{} -> {}", text(without), text(with))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_is_told_in_points_and_what_no_map_has_is_a_dash() {
+        assert_eq!(change(Some(27.0), Some(66.04)), "27.00 -> 66.04 (+39.0)");
+        assert_eq!(change(Some(10.0), Some(-10.4)), "10.00 -> -10.40 (-20.4)");
+        assert_eq!(change(None, mean([1.0, 2.0].into_iter())), "- -> 1.50");
+        assert_eq!(change(mean(std::iter::empty()), None), "- -> -");
+    }
 }

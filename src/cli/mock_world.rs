@@ -1,6 +1,9 @@
 //! The mock's world as options: shared by `mock` and `scan --mock`.
 
-use std::sync::Arc;
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use rand::RngExt as _;
 
@@ -32,7 +35,7 @@ pub(super) const OPTIONS: [&str; 9] = [
 pub(super) struct MockWorldArgs {
     /// Scene the mock's sound comes from, if it is to differ from --scene
     #[arg(long, value_name = "SCENE")]
-    truth: Option<String>,
+    truth: Option<PathBuf>,
     /// Air temperature of the mock's world, degrees Celsius, if it is to differ
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     truth_temperature_c: Option<f64>,
@@ -121,7 +124,12 @@ impl MockWorldArgs {
     }
 
     /// The same world for `sonard-emulator`, as far as it has one.
-    pub(super) fn emulator(&self, scene: &str) -> Result<Vec<String>, Failure> {
+    pub(super) fn emulator(&self, scene: &Path) -> Result<Vec<String>, Failure> {
+        let scene = self.truth.as_deref().unwrap_or(scene);
+        let scene = scene.to_str().ok_or_else(|| {
+            let help = "rename it: the emulator takes its options as text";
+            Failure::input(format!("the path {} is not UTF-8", scene.display()), help)
+        })?;
         let refuse = |option: &str, instead: &str| {
             Err(Failure::input(format!("the emulator has no {option}"), instead))
         };
@@ -138,7 +146,7 @@ impl MockWorldArgs {
             );
         }
         let mut options = vec![
-            format!("--scene={}", self.truth.as_deref().unwrap_or(scene)),
+            format!("--scene={scene}"),
             format!("--seed={}", self.seed),
             format!("--noise-mm={}", self.noise_mm),
             format!("--mounting-offset-deg={}", self.mounting_offset_deg),

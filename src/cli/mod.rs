@@ -29,6 +29,7 @@ mod paths;
 mod picture;
 mod place;
 mod plot;
+mod preset;
 mod progress;
 mod run;
 mod runtime;
@@ -45,7 +46,7 @@ pub use failure::{Failure, Outcome};
 
 use std::{process::ExitCode, sync::Arc};
 
-use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
+use clap::{Command, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 /// Drives an ultrasonic ranger on a stepper, and predicts what it reads.
 #[derive(Debug, Parser)]
@@ -127,16 +128,36 @@ enum Verb {
     /// Write manual pages and shell completions, for packages
     #[command(hide = true)]
     Generate(generate::Args),
-    /// Check or draw a scene file, or print its JSON Schema
+    /// Check or draw a scene file, list or print those that come with sonard, or print their schema
     #[command(subcommand)]
     Scene(scene::Verb),
+    /// List or print the sensors that come with sonard
+    #[command(subcommand)]
+    Sensor(preset::SensorVerb),
+    /// List or print the arrays of rangers that come with sonard
+    #[command(subcommand)]
+    Array(preset::ArrayVerb),
+}
+
+/// The command line, in which every value may be a negative number: what begins with a digit after
+/// the minus is no option.
+fn command_line() -> Command {
+    fn with_negative_numbers(command: Command) -> Command {
+        command
+            .mut_args(|arg| match arg.get_action().takes_values() {
+                true => arg.allow_negative_numbers(true),
+                false => arg,
+            })
+            .mut_subcommands(with_negative_numbers)
+    }
+    with_negative_numbers(Cli::command())
 }
 
 /// Runs the command line of this process.
 #[must_use]
 pub fn main() -> ExitCode {
     outlive_file_size_limit();
-    let mut command = Cli::command();
+    let mut command = command_line();
     let matches = command.get_matches_mut();
     if let Err(failure) = output::guard(&command, &matches) {
         return failure::report(Err(failure));
@@ -169,6 +190,8 @@ pub fn main() -> ExitCode {
         Verb::Log(verb) => log::run(verb),
         Verb::Generate(args) => generate::run(&args),
         Verb::Scene(verb) => scene::run(verb),
+        Verb::Sensor(verb) => preset::sensor(&verb),
+        Verb::Array(verb) => preset::array(&verb),
     };
     failure::report(outcome)
 }
@@ -185,4 +208,44 @@ pub fn outputs() -> Vec<String> {
 fn outlive_file_size_limit() {
     // Whoever can't have a handler has the system's behaviour.
     drop(signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default()));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::error::ErrorKind;
+
+    /// Each option of each verb with a value, as the words that lead to it, and the value's name.
+    fn options(command: &Command, path: &[String]) -> Vec<(Vec<String>, String)> {
+        let of_this = command.get_arguments().filter(|arg| arg.get_action().takes_values());
+        let mut found: Vec<_> = of_this
+            .filter_map(|arg| {
+                let option = format!("--{}", arg.get_long()?);
+                let name = arg.get_value_names()?.first()?.to_string();
+                Some(([path, &[option]].concat(), name))
+            })
+            .collect();
+        for verb in command.get_subcommands() {
+            found.extend(options(verb, &[path, &[verb.get_name().to_owned()]].concat()));
+        }
+        found
+    }
+
+    #[test]
+    fn a_negative_number_is_a_value_and_no_option_everywhere() {
+        let command = command_line();
+        let options = options(&command, &["sonard".to_owned()]);
+        assert!(options.len() > 200, "{}", options.len());
+        for (words, name) in options {
+            let value = match name.as_str() {
+                "POSE" => "-1,2,90",
+                "REGION" => "-1,-2,3,4",
+                _ => "-1.5",
+            };
+            let words = [&words[..], &[value.to_owned()]].concat();
+            let error = command.clone().try_get_matches_from(&words).err();
+            let kind = error.map(|error| error.kind());
+            assert_ne!(kind, Some(ErrorKind::UnknownArgument), "{words:?}");
+        }
+    }
 }

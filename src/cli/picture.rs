@@ -88,7 +88,7 @@ pub(super) fn targets(args: &PictureArgs) -> Result<Vec<Target>, Failure> {
 pub(super) fn scene_for(
     log: &Path,
     views: &[ScanView],
-    given: Option<&str>,
+    given: Option<&Path>,
 ) -> Result<Option<Scene>, Failure> {
     let session = views
         .iter()

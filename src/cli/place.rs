@@ -1,5 +1,7 @@
 //! Options that say where and in which directions to look: shared by several verbs.
 
+use std::path::PathBuf;
+
 use super::{Failure, scene_file};
 use crate::{geometry::Pose, scan::ScanPlan, scene::Scene};
 
@@ -8,7 +10,7 @@ use crate::{geometry::Pose, scan::ScanPlan, scene::Scene};
 pub(super) struct PlaceArgs {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(long, value_name = "SCENE")]
-    pub(super) scene: String,
+    pub(super) scene: PathBuf,
     /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pub(super) pose: String,

@@ -22,7 +22,7 @@ pub(super) struct Args {
     log: PathBuf,
     /// Scene file or name of a shipped scene; without it, the scene in the log
     #[arg(long, value_name = "FILE|NAME")]
-    scene: Option<String>,
+    scene: Option<PathBuf>,
     /// What to draw
     #[arg(long, value_enum, default_value_t = Kind::Scan)]
     kind: Kind,

@@ -9,7 +9,18 @@ const LONG_LOG_BYTES: u64 = 16 << 20;
 
 /// Of so many `things` (a word in the plural); drawn from the first second on.
 pub(super) fn bar(of: u64, things: &str) -> ProgressBar {
-    let bar = styled(of, &format!("{{bar:40}} {{pos}}/{{len}} {things}, {{eta}} left"));
+    later(styled(of, &format!("{{bar:40}} {{pos}}/{{len}} {things}, {{eta}} left")))
+}
+
+/// Of `things` nobody knows how many of there will be, and a message; drawn from the first second on.
+pub(super) fn spinner(things: &str) -> ProgressBar {
+    later(
+        ProgressBar::no_length()
+            .with_style(style(&format!("{{spinner}} {{pos}} {things}, {{msg}}, {{elapsed}}"))),
+    )
+}
+
+fn later(bar: ProgressBar) -> ProgressBar {
     bar.set_draw_target(ProgressDrawTarget::hidden());
     let shown = bar.clone();
     thread::spawn(move || {
@@ -32,6 +43,9 @@ pub(super) fn reading(log: &Path, reader: impl BufRead) -> impl BufRead {
 }
 
 fn styled(of: u64, template: &str) -> ProgressBar {
-    let style = ProgressStyle::with_template(template);
-    ProgressBar::new(of).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+    ProgressBar::new(of).with_style(style(template))
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }

@@ -61,16 +61,16 @@ pub(super) struct Args {
     virtual_time: bool,
     /// Scene file, or the name of a shipped scene (place.scene)
     #[arg(long, value_name = "SCENE")]
-    scene: Option<String>,
+    scene: Option<PathBuf>,
     /// Where the ranger stands (place.pose)
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
     /// Folder of the logs (log.folder)
     #[arg(long, value_name = "DIR")]
-    log: Option<String>,
+    log: Option<PathBuf>,
     /// Unix socket of the API (server.socket); a dead one of that name is replaced, no other file
     #[arg(long, value_name = "PATH")]
-    socket: Option<String>,
+    socket: Option<PathBuf>,
     #[command(flatten)]
     world: MockWorldArgs,
 }
@@ -94,7 +94,8 @@ Examples:
       --set scanning.mode=continuous --set model.max_range_m=4
   curl --unix-socket /tmp/sonard.sock http://localhost/v1/status
   curl --unix-socket /tmp/sonard.sock -N http://localhost/v1/live/records
-  curl --unix-socket /tmp/sonard.sock --json '{\"scans\": 1}' http://localhost/v1/start
+  curl --unix-socket /tmp/sonard.sock -H 'Content-Type: application/json' -d '{\"scans\": 1}' \\
+      http://localhost/v1/start
   sonard run --simulate --array pioneer-8 --scene mcgill-lab --pose fig4 --log log --socket /tmp/s.sock
   curl --unix-socket /tmp/s.sock -N 'http://localhost/v1/live/records?moved_m=0.05'
   sonard run --print-config > sonard.toml

@@ -8,7 +8,7 @@ mod summary;
 
 use std::path::{Path, PathBuf};
 
-use firmware_protocol::host::HostConfig;
+use firmware_protocol::host::{HostConfig, LinkStats};
 use tokio::sync::{mpsc, oneshot};
 use tokio_serial::SerialStream;
 
@@ -198,17 +198,21 @@ async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
     let session = setup.session(ranger.identity());
     output.add_to_earlier(&session, job.pose, job.plan)?;
     output.record(&Record::Session(Box::new(session)))?;
-    let mut missing = 0;
+    let (mut missing, mut link) = (0, LinkStats::default());
     for turn in 1..=args.repeat {
         output.begin_scan(turn, args.repeat, job.plan.beams());
         let summary = ranger.scan(&job, output, interrupts.clone().reason()).await;
         output.end_scan();
         let summary = summary.map_err(scan_failure)?;
-        summary::print(setup, &summary, ranger.identity(), ranger.link_stats(), output);
+        let before = std::mem::replace(&mut link, *ranger.link_stats());
+        summary::print(setup, &summary, ranger.identity(), &[before, link], output);
         if interrupts.happened() {
             return Err(stopped(&summary));
         }
         missing += summary.end.missing;
+    }
+    if args.repeat > 1 {
+        summary::print_total(args.repeat, &link);
     }
     if let Some(mock) = mock {
         mock.stop().await;

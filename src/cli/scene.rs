@@ -1,12 +1,15 @@
 //! `sonard scene`.
 
-use std::io::{self, Write as _};
+use std::{
+    io::{self, Write as _},
+    path::PathBuf,
+};
 
 use super::{
     Failure, Outcome,
     output::{OutPath, Overwrite},
     picture::Target,
-    scene_file,
+    preset, scene_file,
 };
 use crate::{
     geometry::DVec2,
@@ -25,6 +28,8 @@ pub(super) enum Verb {
     Draw(DrawArgs),
     /// List the scenes that come with sonard, with their poses
     List,
+    /// Print the file of a scene that comes with sonard: a start for one of your own
+    Show(preset::Name),
     /// Print the JSON Schema of scene files
     #[command(long_about = SCHEMA_ABOUT, after_help = SCHEMA_EXAMPLES)]
     Schema,
@@ -35,7 +40,7 @@ pub(super) enum Verb {
 pub(super) struct CheckArgs {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(value_name = "FILE")]
-    scene: String,
+    scene: PathBuf,
     /// Also check that a ranger can stand at this pose: X,Y,DEG (metres, degrees) or a name
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
@@ -46,7 +51,7 @@ pub(super) struct CheckArgs {
 pub(super) struct DrawArgs {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(value_name = "FILE")]
-    scene: String,
+    scene: PathBuf,
     /// Draw this pose only: X,Y,DEG (metres, degrees) or a name [default: all named poses]
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
@@ -111,6 +116,7 @@ pub(super) fn run(verb: Verb) -> Outcome {
         Verb::Check(args) => check(&args),
         Verb::Draw(args) => draw(&args),
         Verb::List => list(),
+        Verb::Show(name) => preset::scene(&name),
         Verb::Schema => schema(),
     }
 }
@@ -151,7 +157,7 @@ fn list() -> Outcome {
     let mut lines = String::new();
     let width = shipped::names().map(str::len).max().unwrap_or_default();
     for name in shipped::names() {
-        let scene = scene_file::load(name)?;
+        let scene = scene_file::shipped(name)?;
         let poses = scene.poses.keys().cloned().collect::<Vec<_>>().join(", ");
         lines.push_str(&format!("{name:width$}  poses: {poses}\n"));
     }

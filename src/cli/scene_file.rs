@@ -16,9 +16,11 @@ use crate::{
 ///
 /// # Errors
 /// No such file or name, a file that can't be read, or a fault in it, shown at its line.
-pub(super) fn load(path_or_name: &str) -> Result<Scene, Failure> {
+pub(super) fn load(path_or_name: impl AsRef<Path>) -> Result<Scene, Failure> {
+    let path_or_name = path_or_name.as_ref();
     let text = read(path_or_name)?;
-    Scene::from_json(&text).map_err(|error| Failure::Input(report(path_or_name, text, &error)))
+    let name = path_or_name.display().to_string();
+    Scene::from_json(&text).map_err(|error| Failure::Input(report(&name, text, &error)))
 }
 
 /// Reads and checks a shipped scene, whatever files there are.
@@ -67,18 +69,19 @@ pub(super) fn pose(scene: &Scene, spec: &str) -> Result<Pose, Failure> {
 }
 
 /// The text of a scene, by its file or name.
-pub(super) fn read(path_or_name: &str) -> Result<String, Failure> {
-    note_input(path_or_name.as_ref());
-    let bytes = match fs::read(path_or_name) {
+pub(super) fn read(path_or_name: impl AsRef<Path>) -> Result<String, Failure> {
+    let path = path_or_name.as_ref();
+    note_input(path);
+    // No shipped scene has a name that is no text.
+    let name = path.to_string_lossy();
+    let bytes = match fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            return shipped::text(path_or_name)
-                .map(str::to_owned)
-                .ok_or_else(|| no_such_scene(path_or_name));
+            return shipped::text(&name).map(str::to_owned).ok_or_else(|| no_such_scene(&name));
         }
         Err(error) => {
             return Err(Failure::input(
-                format!("cannot read the scene {path_or_name}: {error}"),
+                format!("cannot read the scene {name}: {error}"),
                 "give a scene file that you may read, or the name of a shipped scene",
             ));
         }
@@ -86,7 +89,7 @@ pub(super) fn read(path_or_name: &str) -> Result<String, Failure> {
     String::from_utf8(bytes).map_err(|error| {
         Failure::input(
             format!(
-                "the scene {path_or_name} is not UTF-8 text: byte {} is wrong",
+                "the scene {name} is not UTF-8 text: byte {} is wrong",
                 error.utf8_error().valid_up_to()
             ),
             "a scene is a JSON text file; `sonard scene schema` describes it",

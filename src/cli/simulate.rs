@@ -3,6 +3,7 @@
 mod array;
 
 use std::{
+    fs,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -15,7 +16,6 @@ use uuid::Uuid;
 
 use super::{
     Failure, Outcome,
-    array::load_course,
     options::{AirArgs, EngineArgs, SensorArgs},
     output::{OutPath, Overwrite, Product, Stream},
     place::AzimuthArgs,
@@ -23,6 +23,7 @@ use super::{
 };
 use crate::{
     acoustics::ReceiverNoise,
+    collect::{PoseLine, read_lines},
     geometry::Pose,
     model::{Prediction, Simulator, Station},
     scan::{Ping, Record, ScanEnd, ScanPlan, ScanStart, Session},
@@ -38,7 +39,7 @@ use array::ArrayArgs;
 pub(super) struct Args {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(long, value_name = "SCENE")]
-    scene: String,
+    scene: PathBuf,
     /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
     #[arg(
         long,
@@ -47,8 +48,8 @@ pub(super) struct Args {
         required_unless_present = "poses"
     )]
     pose: Option<String>,
-    /// Poses one after the other, a scan at each: a file with one a line, as {"x_m": 1.0,
-    /// "y_m": 2.0, "heading_deg": 90.0}
+    /// Poses one after the other, a scan at each: a CSV file with columns x_m,y_m,heading_deg, or
+    /// one with a line {"x_m": 1.0, "y_m": 2.0, "heading_deg": 90.0} for each
     #[arg(long, value_name = "FILE", conflicts_with = "pose")]
     poses: Option<PathBuf>,
     #[command(flatten)]
@@ -119,20 +120,20 @@ Examples:
   sonard simulate --scene corridor --pose 1,0.4,0 --engine cone --max-range 4 | sonard plot -
   sonard simulate --scene my-room.json --pose 1.2,0.8,90 --temperature-c 5 --lossless
   sonard simulate --scene two-surface-room --pose 1.2,1,30 --array pioneer-8 | sonard plot - -o a.svg
-  sonard simulate --scene mcgill-lab --poses way.jsonl --out course.jsonl
+  sonard simulate --scene mcgill-lab --poses way.csv --out course.jsonl
   sonard simulate --scene corridor --poses way.jsonl --array ring-12 --rounds 15 > ring.jsonl
 
-Exit codes: 0 done, 2 wrong usage or input, 3 a disk that gave up.";
+Exit codes: 0 done, 1 poses of the file were left out because nothing can stand there or their line is
+wrong, 2 wrong usage or input, 3 a disk that gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     if let Some(name) = &args.array.array {
         return array::run(args, name);
     }
     let scene = scene_file::load(&args.scene)?;
-    let poses = poses(args, &scene)?;
-    for (number, pose) in (1..).zip(&poses) {
-        scene.check_pose(pose).map_err(|error| refuse_pose(args, number, &error, error.help()))?;
-    }
+    let Places { poses, left_out } = places(args, &scene, |pose| {
+        scene.check_pose(pose).map_err(|error| (error.to_string(), error.help()))
+    })?;
     let plan = args.azimuths.plan(1)?;
     // A robot's body stands among the reflectors, so that each pose has its own.
     let shared = match scene.robot {
@@ -163,27 +164,65 @@ pub(super) fn run(args: &Args) -> Outcome {
         }
     }
     bar.finish_and_clear();
-    out.close(written)
+    out.close(written)?;
+    left_out
 }
 
-/// The pose asked for, or those of a file.
-fn poses(args: &Args, scene: &Scene) -> Result<Vec<Pose>, Failure> {
-    if let Some(file) = &args.poses {
-        return Ok(load_course(file)?.poses().to_vec());
-    }
-    let pose = scene.pose(args.pose.as_deref().unwrap_or_default());
-    Ok(vec![pose.map_err(|error| Failure::input(&error, error.help()))?])
+/// Where scans are to be taken.
+struct Places {
+    poses: Vec<Pose>,
+    /// Whether poses of the file were left out, as the verb is to end.
+    left_out: Outcome,
 }
 
-/// Names the pose by its number in the file, if it is from one.
-fn refuse_pose(
+/// Wrong lines that are named; the others are counted.
+const NAMED_LINES: usize = 20;
+
+/// The pose asked for, or those of a file that are right; says which are not.
+fn places(
     args: &Args,
-    number: usize,
-    error: &dyn std::fmt::Display,
-    help: impl std::fmt::Display,
-) -> Failure {
-    let which = args.poses.as_ref().map(|file| format!("{}: pose {number}: ", file.display()));
-    Failure::input(format!("{}{error}", which.unwrap_or_default()), help)
+    scene: &Scene,
+    check: impl Fn(&Pose) -> Result<(), (String, String)>,
+) -> Result<Places, Failure> {
+    let Some(file) = &args.poses else {
+        let pose = scene.pose(args.pose.as_deref().unwrap_or_default());
+        let pose = pose.map_err(|error| Failure::input(&error, error.help()))?;
+        check(&pose).map_err(|(message, help)| Failure::input(message, help))?;
+        return Ok(Places { poses: vec![pose], left_out: Ok(()) });
+    };
+    let name = file.display();
+    let text = fs::read_to_string(file).map_err(|error| {
+        let help = "give a CSV or JSON lines file of poses that you may read";
+        Failure::input(format!("cannot read the poses {name}: {error}"), help)
+    })?;
+    let lines = read_lines(&text, scene, Some(0.0)).map_err(|fault| {
+        let line = fault.line.map_or_else(String::new, |line| format!("{line}:"));
+        Failure::input(format!("{name}:{line} {fault}"), &fault.help)
+    })?;
+    let (all, mut poses, mut wrong) = (lines.len(), Vec::new(), Vec::new());
+    for PoseLine { line, pose } in lines {
+        let checked = pose
+            .map_err(|fault| (fault.message, fault.help))
+            .and_then(|pose| check(&pose.pose).map(|()| pose.pose));
+        match checked {
+            Ok(pose) => poses.push(pose),
+            Err((message, help)) => wrong.push((format!("{name}:{line}: {message}"), help)),
+        }
+    }
+    if poses.is_empty() {
+        let (message, help) = wrong.into_iter().next().unwrap_or_default();
+        return Err(Failure::input(format!("{message} (and no other pose is right)"), help));
+    }
+    for (message, help) in wrong.iter().take(NAMED_LINES) {
+        anstream::eprintln!("{message}: left out; {help}");
+    }
+    let left_out = match wrong.len() {
+        0 => Ok(()),
+        count => {
+            Err(Failure::Found(Some(format!("{count} of {all} poses of {name} were left out"))))
+        }
+    };
+    Ok(Places { poses, left_out })
 }
 
 /// Where the records go: a log that takes its place when it is whole.

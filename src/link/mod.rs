@@ -2,10 +2,11 @@
 
 use std::{
     fs, io,
-    os::unix::fs::FileTypeExt as _,
+    os::unix::fs::{FileTypeExt as _, MetadataExt as _},
     path::{Path, PathBuf},
 };
 
+use rustix::fs::{Mode, OFlags};
 use serialport::{ClearBuffer, ErrorKind, SerialPort as _, SerialPortType};
 use thiserror::Error;
 use tokio_serial::{SerialPortBuilderExt as _, SerialStream};
@@ -141,7 +142,9 @@ pub fn candidates() -> Vec<Candidate> {
 fn resolve(port: &str) -> Result<PathBuf, LinkError> {
     let path = PathBuf::from(port);
     match fs::metadata(&path) {
-        Ok(metadata) if metadata.file_type().is_char_device() => return Ok(path),
+        Ok(metadata) if metadata.file_type().is_char_device() && !is_console(&metadata) => {
+            return Ok(path);
+        }
         Ok(_) => return Err(LinkError::NotSerial(path)),
         Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
             return Err(LinkError::Permission(path));
@@ -151,6 +154,20 @@ fn resolve(port: &str) -> Result<PathBuf, LinkError> {
     by_id(port)
         .or_else(|| by_usb_serial(port))
         .ok_or_else(|| LinkError::NotFound { port: port.to_owned(), present: present() })
+}
+
+/// Whether it is a terminal of people's and no line: this process's own (`/dev/tty`), the maker of
+/// new ones (`/dev/ptmx`), or a console of the screen (`/dev/tty1`). To open one would lock it.
+fn is_console(metadata: &fs::Metadata) -> bool {
+    let device = metadata.rdev();
+    matches!((rustix::fs::major(device), rustix::fs::minor(device)), (5, 0 | 2) | (4, 0..64))
+}
+
+/// Whether it can be opened and is no terminal at all, such as `/dev/null`. Asked only of what could
+/// not be opened as a line: opening resets many a board.
+fn is_no_terminal(path: &Path) -> bool {
+    let flags = OFlags::RDONLY | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
+    rustix::fs::open(path, flags, Mode::empty()).is_ok_and(|file| !rustix::termios::isatty(file))
 }
 
 fn by_id(id: &str) -> Option<PathBuf> {
@@ -190,6 +207,7 @@ fn classify(path: &Path, error: serialport::Error) -> LinkError {
         ErrorKind::Io(io::ErrorKind::NotFound) => {
             LinkError::NotFound { port: port.display().to_string(), present: present() }
         }
+        _ if is_no_terminal(path) => LinkError::NotSerial(port),
         _ => LinkError::Io { port, source: error.into() },
     }
 }
@@ -211,5 +229,18 @@ mod tests {
         let file = tempfile::NamedTempFile::new().expect("a temporary file");
         let path = file.path().to_str().expect("plain name");
         assert!(matches!(resolve(path), Err(LinkError::NotSerial(_))));
+    }
+
+    #[tokio::test]
+    async fn devices_that_are_no_line_are_refused_by_name() {
+        for path in ["/dev/null", "/dev/zero", "/dev/urandom", "/dev/tty", "/dev/ptmx", "/dev", "/"]
+        {
+            match open(path) {
+                Err(error @ LinkError::NotSerial(_)) => assert!(error.to_string().contains(path)),
+                // What a container lacks.
+                Err(LinkError::NotFound { .. }) => assert!(!Path::new(path).exists(), "{path}"),
+                other => panic!("{path}: {other:?}"),
+            }
+        }
     }
 }

@@ -55,13 +55,46 @@ fn a_course_is_the_scans_of_its_poses() {
 }
 
 #[test]
-fn a_pose_where_no_ranger_can_stand_is_named() {
+fn poses_that_are_wrong_are_named_and_left_out_and_the_others_done() {
     let folder = TempDir::new().expect("a temporary folder");
     let path = folder.path().join("way.jsonl");
-    fs::write(&path, "{\"x_m\":0.4,\"y_m\":0.3}\n{\"x_m\":9,\"y_m\":0.3}\n").expect("writes");
+    let lines = "{\"x_m\":0.4,\"y_m\":0.3}\n{\"x_m\":9,\"y_m\":0.3}\n{\"x_m\":\"a\"}\n\
+                 {\"x_m\":0.5,\"y_m\":0.3}\n";
+    fs::write(&path, lines).expect("writes");
     let path = path.to_str().expect("plain path");
     let output = run(&["simulate", "--scene", "simple-room", "--poses", path]);
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert_eq!(String::from_utf8_lossy(&output.stdout).matches("scan_end").count(), 2);
+    for part in ["way.jsonl:2: ", "outside", "way.jsonl:3: ", "x_m is", "2 of 4 poses"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    // With none left there is nothing to do.
+    fs::write(folder.path().join("none.csv"), "x_m,y_m,heading_deg\n9,9,0\n").expect("writes");
+    let none = folder.path().join("none.csv");
+    let none = none.to_str().expect("plain path");
+    let output = run(&["simulate", "--scene", "simple-room", "--poses", none]);
     assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0));
     let said = stderr(&output);
-    assert!(said.contains("way.jsonl: pose 2: ") && said.contains("outside"), "{said}");
+    assert!(said.contains("none.csv:2: ") && said.contains("outside"), "{said}");
+}
+
+#[test]
+fn a_course_is_read_from_the_file_that_a_collection_takes() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let path = folder.path().join("poses.csv");
+    fs::write(&path, "name,x_m,y_m,heading_deg,door\na,0.4,0.3,90,open\nb,0.5,0.2,-5,shut\n")
+        .expect("writes");
+    let path = path.to_str().expect("plain path");
+    let records = simulated("simple-room", ["--poses", path]);
+    let headings: Vec<_> = of_type(&records, "scan_start")
+        .iter()
+        .map(|start| start["pose"]["heading_deg"].as_f64().expect("a heading"))
+        .collect();
+    assert_eq!(headings, [90.0, -5.0]);
+    let plan = folder.path().join("plan.toml");
+    let text = format!("[place]\nscene = \"simple-room\"\n[poses]\nfile = \"{path}\"\n");
+    fs::write(&plan, text).expect("writes");
+    let checked = run(&["collect", plan.to_str().expect("plain path"), "--check"]);
+    assert!(checked.status.success(), "{}", stderr(&checked));
 }

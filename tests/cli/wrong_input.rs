@@ -36,7 +36,10 @@ fn scan_of<'a>(scene: &'a str, pose: &'a str, further: &[&'a str]) -> Vec<&'a st
 fn ports() {
     let port = |port| ["scan", "--port", port, "--scene", "simple-room", "--pose", "fig9"];
     check(&port("/dev/no-such-port"), 3, &["no serial port", "/dev/no-such-port", "--mock"]);
-    check(&port("/etc/hostname"), 3, &["/etc/hostname is not a serial port"]);
+    for no_port in ["/etc/hostname", "/etc", "/dev/null", "/dev/zero", "/dev/ptmx"] {
+        let named = format!("{no_port} is not a serial port");
+        check(&port(no_port), 3, &[&named, "/dev/ttyACM0"]);
+    }
     check(&["scan", "--scene", "simple-room", "--pose", "fig9"], 2, &["--port", "--mock"]);
 }
 

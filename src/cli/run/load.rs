@@ -1,7 +1,9 @@
 //! From options, environment and file to settings; again at each reload.
 
 use std::{
-    env, fs, io,
+    env,
+    ffi::OsString,
+    fs, io,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -94,19 +96,29 @@ impl Loader {
             Some((name.into_string().ok()?, value.into_string().ok()?))
         });
         layers = layers.environment(variables).map_err(|error| refuse(&error))?;
+        let args = &self.args;
+        let path = |path: &Option<PathBuf>| path.clone().map(PathBuf::into_os_string);
+        let text = |text: &Option<String>| text.clone().map(OsString::from);
         let shortcuts = [
-            ("--port", "device.port", &self.args.port),
-            ("--scene", "place.scene", &self.args.scene),
-            ("--pose", "place.pose", &self.args.pose),
-            ("--log", "log.folder", &self.args.log),
-            ("--socket", "server.socket", &self.args.socket),
-            ("--array", "simulate.array", &self.args.array),
+            ("--port", "device.port", text(&args.port)),
+            ("--scene", "place.scene", path(&args.scene)),
+            ("--pose", "place.pose", text(&args.pose)),
+            ("--log", "log.folder", path(&args.log)),
+            ("--socket", "server.socket", path(&args.socket)),
+            ("--array", "simulate.array", text(&args.array)),
         ];
         for setting in &self.args.set {
             layers = layers.option("--set", setting).map_err(|error| refuse(&error))?;
         }
         for (option, key, value) in shortcuts {
             if let Some(value) = value {
+                let value = value.to_str().ok_or_else(|| {
+                    let value = value.display();
+                    Failure::input(
+                        format!("{option}: {value} is not UTF-8, and a configuration is text"),
+                        "rename it, or name it by a symbolic link",
+                    )
+                })?;
                 layers = layers
                     .option(option, &format!("{key}={value}"))
                     .map_err(|error| refuse(&error))?;

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Args, output::Output};
+use super::{Args, output::Output, summary};
 use crate::{
     cli::{
         Failure, Outcome,
@@ -10,7 +10,6 @@ use crate::{
         runtime::{self, Interrupts},
     },
     client::RequestedScans,
-    compare::compare,
     geometry::Pose,
     scan::{Record, ScanEnd, ScanPlan},
 };
@@ -28,6 +27,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         let status: Value = client.get_json("/v1/status").await.map_err(|error| refuse(&error))?;
         check_scene(&status["scene"], &scene)?;
         let requested = RequestedScans::ask(client, &wish).await.map_err(|error| refuse(&error))?;
+        anstream::eprintln!("the daemon takes {} scan(s), {}", args.repeat, first(&status));
         let followed = scans.follow(requested, &interrupts).await;
         scans.output.end_scan();
         followed
@@ -86,12 +86,14 @@ impl Scans {
         }
         if let Record::ScanStart(start) = record {
             let turn = self.ends.len() as u32 + 1;
-            self.output.begin_scan(turn, self.wanted, start.plan.beams());
+            let (wanted, beams) = (self.wanted, start.plan.beams());
+            anstream::eprintln!("scan {turn} of {wanted} has begun: {beams} beams");
+            self.output.begin_scan(turn, wanted, beams);
         }
         self.output.record(record)?;
         if let Record::ScanEnd(end) = record {
             self.output.end_scan();
-            self.tell(end);
+            summary::print_of_daemon(end, &self.output);
             self.ends.push(end.clone());
         }
         Ok(())
@@ -108,18 +110,19 @@ impl Scans {
             self.wanted
         ))))
     }
+}
 
-    /// One screen about a scan.
-    fn tell(&self, end: &ScanEnd) {
-        let views = self.output.views();
-        let compared = compare(&views).0;
-        anstream::eprintln!(
-            "by the daemon: {} beams, {} missing; {} of {} echo pairs agree; {:.3} s of device time",
-            end.beams,
-            end.missing,
-            compared.agree,
-            compared.both_echo,
-            end.duration_s,
-        );
+/// What the daemon does before the scans that it was asked for, as its status has it.
+fn first(status: &Value) -> String {
+    match status["scan"].as_object() {
+        Some(scan) => format!(
+            "after the one it is at, {} of {} beams of which are measured",
+            scan["done"], scan["beams"]
+        ),
+        None if status["link"]["state"] == "ready" => "at once".into(),
+        None => {
+            let state = status["link"]["state"].as_str().unwrap_or("unknown");
+            format!("once its ranger is ready; it is {state} now")
+        }
     }
 }

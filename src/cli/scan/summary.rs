@@ -6,24 +6,25 @@ use super::{output::Output, setup::Setup};
 use crate::{
     compare::{Comparison, compare},
     ranger::{ScanSummary, provenance, serial_text},
-    scan::{PingStatus, ScanView},
+    scan::{PingStatus, Provenance, ScanEnd, ScanView},
 };
 
-/// Prints it on standard error, where it is in no pipe's way.
+/// Prints it on standard error, where it is in no pipe's way. The line's figures are counted from the
+/// first of two moments to the second.
 pub(super) fn print(
     setup: &Setup,
     summary: &ScanSummary,
     identity: &Identity,
-    link: &LinkStats,
+    [before, now]: &[LinkStats; 2],
     output: &Output,
 ) {
     let views = output.views();
     for line in [
         Some(headline(setup, identity)),
-        Some(beams(summary, views.last())),
-        Some(agreement(&compare(&views).0, setup)),
-        Some(time(summary)),
-        Some(traffic(link)),
+        Some(beams(&summary.end, views.last())),
+        Some(agreement(&compare(&views).0, setup.simulator.options().engine.name())),
+        Some(time(&summary.end)),
+        Some(traffic(before, now)),
         warnings(summary),
         output.folder().map(|folder| {
             format!("  wrote {0}/scan.jsonl, {0}/scan.svg and {0}/scan.png", folder.display())
@@ -36,26 +37,46 @@ pub(super) fn print(
     }
 }
 
+/// The same about a scan that a daemon took.
+pub(super) fn print_of_daemon(end: &ScanEnd, output: &Output) {
+    let views = output.views();
+    let session = views.last().and_then(|view| view.session.as_ref());
+    let by = session.map(|session| {
+        let device = session.device.as_ref().map_or("", |device| &device.serial);
+        format!("{} {device}", provenance_text(session.provenance))
+    });
+    anstream::eprintln!("by the daemon's {}", by.as_deref().unwrap_or("ranger").trim_end());
+    anstream::eprintln!("{}", beams(end, views.last()));
+    if let Some(model) = session.and_then(|session| session.model.as_ref()) {
+        anstream::eprintln!("{}", agreement(&compare(&views).0, &model.engine));
+    }
+    anstream::eprintln!("{}", time(end));
+}
+
+fn provenance_text(provenance: Provenance) -> String {
+    let text = serde_json::to_value(provenance).unwrap_or_default();
+    text.as_str().unwrap_or("ranger").to_owned()
+}
+
 fn headline(setup: &Setup, identity: &Identity) -> String {
-    let provenance = serde_json::to_value(provenance(identity)).unwrap_or_default();
     format!(
         "{} at {} by {} {}",
         setup.scene.name,
         setup.pose_text,
-        provenance.as_str().unwrap_or("ranger"),
+        provenance_text(provenance(identity)),
         serial_text(identity),
     )
 }
 
-fn beams(summary: &ScanSummary, view: Option<&ScanView>) -> String {
+fn beams(end: &ScanEnd, view: Option<&ScanView>) -> String {
     let count = |status| {
         view.map_or(0, |view| view.pings.iter().filter(|ping| ping.status == status).count())
     };
     let mut text = format!(
         "  {} beams, {} missing, {} repaired: {} echo, {} minimum range, {} silent",
-        summary.end.beams,
-        summary.end.missing,
-        summary.end.repaired,
+        end.beams,
+        end.missing,
+        end.repaired,
         count(PingStatus::Echo),
         count(PingStatus::MinRange),
         count(PingStatus::NoEcho),
@@ -70,8 +91,7 @@ fn beams(summary: &ScanSummary, view: Option<&ScanView>) -> String {
     text
 }
 
-fn agreement(comparison: &Comparison, setup: &Setup) -> String {
-    let engine = setup.simulator.options().engine.name();
+fn agreement(comparison: &Comparison, engine: &str) -> String {
     let mm = |metres: Option<f64>| {
         metres.map_or_else(|| "-".into(), |metres| format!("{:.1} mm", metres * 1e3))
     };
@@ -87,8 +107,7 @@ fn agreement(comparison: &Comparison, setup: &Setup) -> String {
     )
 }
 
-fn time(summary: &ScanSummary) -> String {
-    let end = &summary.end;
+fn time(end: &ScanEnd) -> String {
     let ratio = end.duration_s / end.acoustic_limit_s;
     format!(
         "  {:.3} s of device time; acoustics and motor need {:.3} s (x {ratio:.4})",
@@ -96,17 +115,25 @@ fn time(summary: &ScanSummary) -> String {
     )
 }
 
-fn traffic(link: &LinkStats) -> String {
-    let dropped = &link.dropped;
+/// One line about the line over several scans.
+pub(super) fn print_total(scans: u32, link: &LinkStats) {
+    anstream::eprintln!("{scans} scans in all\n{}", traffic(&LinkStats::default(), link));
+}
+
+fn traffic(before: &LinkStats, now: &LinkStats) -> String {
+    let received = now.bytes_received - before.bytes_received;
+    let sent = now.bytes_sent - before.bytes_sent;
+    let damaged = |link: &LinkStats| {
+        let dropped = &link.dropped;
+        u32::from(dropped.checksum) + u32::from(dropped.stuffing) + u32::from(dropped.too_long)
+    };
     format!(
-        "  link: {} bytes in, {} bytes out ({:.1} % of the traffic), {} frames damaged, {} requests \
-         repeated, {} readings refused",
-        link.bytes_received,
-        link.bytes_sent,
-        100.0 * link.bytes_sent as f64 / (link.bytes_sent + link.bytes_received).max(1) as f64,
-        u32::from(dropped.checksum) + u32::from(dropped.stuffing) + u32::from(dropped.too_long),
-        link.retries,
-        link.refused,
+        "  link: {received} bytes in, {sent} bytes out ({:.1} % of the traffic), {} frames damaged, {} \
+         requests repeated, {} readings refused",
+        100.0 * sent as f64 / (sent + received).max(1) as f64,
+        damaged(now) - damaged(before),
+        now.retries - before.retries,
+        now.refused - before.refused,
     )
 }
 

@@ -7,7 +7,7 @@ use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use uuid::Uuid;
 
-use super::{Args, Out, poses, refuse_pose};
+use super::{Args, Out, Places, places};
 use crate::{
     acoustics::ReceiverNoise,
     cli::{Failure, Outcome, array::load_array, progress, scene_file},
@@ -35,13 +35,13 @@ pub(super) struct ArrayArgs {
 pub(super) fn run(args: &Args, name: &str) -> Outcome {
     let array = load_array(name)?;
     let scene = scene_file::load(&args.scene)?;
-    let poses = poses(args, &scene)?;
+    let Places { poses, left_out } = places(args, &scene, |pose| {
+        let mut rounds = turned(args, *pose, &array).into_iter();
+        rounds.try_for_each(|pose| {
+            array.check_pose(&scene, &pose).map_err(|error| (error.to_string(), error.help()))
+        })
+    })?;
     let rounds: Vec<Vec<Pose>> = poses.iter().map(|pose| turned(args, *pose, &array)).collect();
-    for (number, pose) in (1..).zip(&rounds).flat_map(|(n, all)| all.iter().map(move |p| (n, p))) {
-        array
-            .check_pose(&scene, pose)
-            .map_err(|error| refuse_pose(args, number, &error, error.help()))?;
-    }
     let (sensor, air) = (args.sensor.sensor_or(&array.sensor)?, args.air.air()?);
     let model = ArrayModel::new(Arc::new(array), &scene, sensor, air, args.engine.options()?)
         .map_err(|error| refuse(&error))?;
@@ -49,7 +49,10 @@ pub(super) fn run(args: &Args, name: &str) -> Outcome {
     let mut out = Out::open(args)?;
     let mut player = Player { model: &model, noise, rng: Pcg64::seed_from_u64(args.noise.seed) };
     match player.play(&mut out, &rounds) {
-        Ok(()) => out.close(Ok(())),
+        Ok(()) => {
+            out.close(Ok(()))?;
+            left_out
+        }
         Err(Stop::Model(error)) => Err(refuse(&error)),
         Err(Stop::Write(error)) => out.close(Err(error)),
     }

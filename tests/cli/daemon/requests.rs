@@ -39,6 +39,11 @@ fn a_scan_through_a_busy_daemon_has_its_own_plan_and_leaves_the_daemons_alone() 
         .output()
         .expect("it runs");
     assert_eq!(taken.status.code(), Some(0), "{}", stderr(&taken));
+    let told = stderr(&taken);
+    for part in ["takes 2 scan(s), ", "scan 2 of 2 has begun: 50 beams", "mock", "echo pairs agree"]
+    {
+        assert!(told.contains(part), "{part}: {told}");
+    }
     let log = Log::read(&out.join("scan.jsonl"));
     let starts: Vec<_> = log.of_type("scan_start").collect();
     assert_eq!(starts.len(), 2);

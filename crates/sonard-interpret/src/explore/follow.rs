@@ -49,6 +49,17 @@ pub fn explore(
     sensing: Sensing,
     settings: &ExploreSettings,
 ) -> Exploration {
+    explore_watched(robot, sensing, settings, |_| {})
+}
+
+/// [`explore`], showing what is known after each stop.
+#[must_use]
+pub fn explore_watched(
+    robot: &mut impl Robot,
+    sensing: Sensing,
+    settings: &ExploreSettings,
+    mut on_stop: impl FnMut(&Exploration),
+) -> Exploration {
     let mut explorer = Explorer {
         robot,
         sensing,
@@ -60,6 +71,7 @@ pub fn explore(
     };
     explorer.stop(Task::Begin, None);
     while explorer.log.stops.len() < settings.most_stops {
+        on_stop(&explorer.log);
         let Some(goal) = explorer.choose() else {
             explorer.log.finished = true;
             break;

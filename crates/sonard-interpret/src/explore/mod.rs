@@ -14,7 +14,7 @@ mod robot;
 #[cfg(test)]
 mod tests;
 
-pub use follow::explore;
+pub use follow::{explore, explore_watched};
 pub use laser::Laser;
 pub use robot::{Drive, Ranger, Robot, RobotSettings, SimulatedRobot};
 

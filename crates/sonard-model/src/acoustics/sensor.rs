@@ -146,13 +146,19 @@ impl Sensor {
         PRESETS.iter().map(|(name, _)| *name)
     }
 
+    /// The data file of a sensor that comes with the program, as it is shipped.
+    #[must_use]
+    pub fn preset_text(name: &str) -> Option<&'static str> {
+        PRESETS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+    }
+
     /// A sensor that comes with the program.
     ///
     /// # Errors
     /// When there is none of that name.
     pub fn preset(name: &str) -> Result<Self, SensorError> {
-        match PRESETS.iter().find(|(known, _)| *known == name) {
-            Some((_, text)) => Self::from_json(text),
+        match Self::preset_text(name) {
+            Some(text) => Self::from_json(text),
             None => Err(SensorError::UnknownPreset {
                 name: name.to_owned(),
                 known: Self::preset_names().collect::<Vec<_>>().join(", "),

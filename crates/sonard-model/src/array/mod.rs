@@ -106,13 +106,19 @@ impl RangerArray {
         PRESETS.iter().map(|(name, _)| *name)
     }
 
+    /// The file of an array that comes with the program, as it is shipped.
+    #[must_use]
+    pub fn preset_text(name: &str) -> Option<&'static str> {
+        PRESETS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+    }
+
     /// An array that comes with the program.
     ///
     /// # Errors
     /// When there is none of that name.
     pub fn preset(name: &str) -> Result<Self, ArrayError> {
-        match PRESETS.iter().find(|(known, _)| *known == name) {
-            Some((_, text)) => Self::from_json(text),
+        match Self::preset_text(name) {
+            Some(text) => Self::from_json(text),
             None => Err(ArrayError::UnknownPreset {
                 name: name.to_owned(),
                 known: Self::preset_names().map(str::to_owned).collect(),

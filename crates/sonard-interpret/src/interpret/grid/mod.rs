@@ -59,12 +59,18 @@ pub enum GridError {
     },
     /// More than memory should be spent on.
     #[error(
-        "{cells} cells are too many (at most {MOST_CELLS}): choose a coarser resolution or a smaller region"
+        "{} cells are too many (at most {MOST_CELLS}): choose a coarser resolution or a smaller \
+         region", in_words(*cells)
     )]
     TooLarge {
-        /// How many it would have.
-        cells: u64,
+        /// How many it would have; infinite where a number does not hold them.
+        cells: f64,
     },
+}
+
+/// A number of cells; nobody reads one of twenty digits.
+fn in_words(cells: f64) -> String {
+    if cells < 1e12 { format!("{cells:.0}") } else { "more than 10^12".into() }
 }
 
 impl GridShape {
@@ -77,14 +83,14 @@ impl GridShape {
             return Err(GridError::Resolution(resolution_m));
         }
         let size = (high - low) / resolution_m;
-        if !size.is_finite() || size.min_element() <= 0.0 {
+        if !(high - low).is_finite() || (high - low).min_element() <= 0.0 {
             return Err(GridError::Empty { low: low.into(), high: high.into() });
         }
         // A region that is a whole number of cells must not get one more by rounding.
         let count = |cells: f64| (cells - 1e-6).ceil().max(1.0);
         let cells = count(size.x) * count(size.y);
         if cells > MOST_CELLS as f64 {
-            return Err(GridError::TooLarge { cells: cells as u64 });
+            return Err(GridError::TooLarge { cells });
         }
         let (width, height) = (count(size.x) as usize, count(size.y) as usize);
         Ok(Self { origin: low, resolution_m, width, height })

@@ -88,6 +88,10 @@ fn impossible_grids_are_refused() {
     assert!(matches!(covering(-1.0, 0.1), Err(GridError::Empty { .. })));
     assert!(matches!(covering(f64::NAN, 0.1), Err(GridError::Empty { .. })));
     assert!(matches!(covering(1e6, 0.001), Err(GridError::TooLarge { .. })));
+    for (side_m, resolution_m) in [(10.0, 1e-12), (1e300, 1e-300)] {
+        let error = covering(side_m, resolution_m).expect_err("more than any memory").to_string();
+        assert!(error.contains("more than 10^12 cells"), "{error}");
+    }
     assert_eq!(covering(10.0, 0.02).map(|shape| shape.cells()), Ok(250_000));
 }
 
