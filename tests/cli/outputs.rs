@@ -85,7 +85,8 @@ const CASES: [Case; 22] = [
 ];
 
 /// Outputs of verbs that read no file.
-const WITHOUT_INPUT: [&str; 3] = ["map-benchmark --out", "explore-benchmark --out", "generate DIR"];
+const WITHOUT_INPUT: [&str; 4] =
+    ["map-benchmark --out", "explore-benchmark --out", "interpret-benchmark --out", "generate DIR"];
 
 const POSES: &str = "{\"x_m\":0.774,\"y_m\":0.085,\"heading_deg\":0.0}\n";
 const MAP: &str = "image: map.pgm\nresolution: 0.5\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n\

@@ -213,7 +213,9 @@ mod tests {
         firings.keep(&reading(4, at(300_000)));
         assert_eq!(firings.check(&PLAN, &reading(3, at(240_000))), Ok(()));
         assert_eq!(firings.check(&PLAN, &reading(3, at(240_001))), early(1));
-        assert_eq!(firings.check(&PLAN, &reading(2, at(210_000))), Ok(()));
+        // Two beams before it, so an interval earlier still.
+        assert_eq!(firings.check(&PLAN, &reading(2, at(190_000))), Ok(()));
+        assert_eq!(firings.check(&PLAN, &reading(2, at(190_001))), early(1));
     }
 
     #[test]
