@@ -7,8 +7,6 @@ mod board;
 mod faults;
 mod identity;
 mod liar;
-#[cfg(test)]
-mod lies;
 mod noise;
 mod note;
 mod pty;

@@ -1,5 +1,7 @@
 //! The board against the host machine, without a pty and in simulated time.
 
+mod lies;
+
 use firmware_protocol::{
     host::{Command, Host, HostConfig, HostEvent},
     messages::{Blanking, Capabilities, Settings, Sweep, SweepState},

@@ -6,7 +6,10 @@ use firmware_protocol::{
 };
 use tokio::sync::oneshot;
 
-use super::{FaultPlan, LIES, Lie, MockPort, tests::board};
+use super::{
+    super::{FaultPlan, LIES, Lie, MockPort},
+    board,
+};
 use crate::{
     geometry::Pose,
     link,
