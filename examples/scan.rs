@@ -1,4 +1,4 @@
-//! A scan simulated with the library alone: `cargo run --example scan --no-default-features`.
+//! A scan simulated with the library alone: `cargo run --example scan`.
 
 use std::{error::Error, sync::Arc};
 

@@ -110,7 +110,9 @@ fn numbers_without_sense_are_refused_in_words() {
     let simulate = ["simulate", "--scene", "simple-room", "--pose", "fig9", "--out", log];
     assert_eq!(run(&simulate).status.code(), Some(0));
     for resolution in ["1e-12", "1e-200"] {
-        let map = run(&["map", log, "--out", log, "--resolution", resolution]);
+        let out = folder.path().join("map");
+        let out = out.to_str().expect("plain path");
+        let map = run(&["map", log, "--out", out, "--resolution", resolution]);
         let text = said(&map);
         assert_eq!(map.status.code(), Some(2), "{text}");
         assert!(text.contains("more than 10^12 cells are too many"), "{text}");

@@ -101,9 +101,12 @@ fn a_restart_or_hangup_in_the_home_after_a_scan_is_what_it_is() {
         let empty = log.of_type("scan_end").filter(|end| end["beams"] == 0).count();
         let begun = log.of_type("scan_start").count();
         // What its own Home failed at is the only reason for an empty scan: one in five, and not also one
-        // for each Home that failed before it.
-        let given_up = events.iter().filter(|event| event.contains("scan given up")).count();
-        assert_eq!(empty, given_up, "{faults}: {events:?}");
+        // for each Home that failed before it. The last one may have been stopped with the daemon.
+        let has_reason = |event: &&String| {
+            event.contains("scan given up") || event.contains("the daemon is stopping")
+        };
+        let reasons = events.iter().filter(has_reason).count();
+        assert!(empty <= reasons, "{faults}: {empty} empty scans: {events:?}");
         assert!(
             empty * 10 <= begun * 4,
             "{faults}: {empty} of {begun} scans are empty: {events:?}"
