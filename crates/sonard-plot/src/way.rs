@@ -33,7 +33,7 @@ pub struct WayView<'a> {
     pub azimuth_deg: f64,
     /// What was read, metres.
     pub range_m: Option<f64>,
-    /// From the ranger over each reflection back to it ([`Path::points`](sonard_model::model::Path::points)).
+    /// From the ranger over each reflection back to it ([`RecordedPath::points`](sonard_model::model::RecordedPath::points)).
     pub points: Vec<DVec2>,
 }
 

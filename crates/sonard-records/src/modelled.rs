@@ -2,7 +2,7 @@
 
 use sonard_model::{
     acoustics::{Air, AirError},
-    model::{Bend, Options, Path, Prediction, Reflector, Simulator},
+    model::{Bend, FACE_NAME, Options, Path, Prediction, RecordedPath, Reflector, Simulator},
     scene::Scene,
 };
 
@@ -80,11 +80,15 @@ impl PathRecord {
     /// If the path is of another scene.
     #[must_use]
     pub fn of(scene: &Scene, path: &Path, length_m: f64) -> Self {
+        let path = RecordedPath::from(path);
         let mut edges = path.bends.iter().map(|bend| bend.name(scene));
+        let name = |met: &Option<Reflector>| {
+            met.map_or_else(|| FACE_NAME.to_owned(), |reflector| reflector.name(scene))
+        };
         Self {
             kind: path.kind,
             order: path.walls.len() as u32,
-            walls: path.walls.iter().map(|wall| wall.name(scene)).collect(),
+            walls: path.walls.iter().map(name).collect(),
             edge: edges.next(),
             second_edge: edges.next(),
             length_m,
@@ -93,11 +97,14 @@ impl PathRecord {
 
     /// The path of a log's record in its scene; `None` if the scene lacks one of its names.
     #[must_use]
-    pub fn path(&self, scene: &Scene) -> Option<Path> {
-        let walls = self.walls.iter().map(|name| Reflector::named(scene, name));
+    pub fn path(&self, scene: &Scene) -> Option<RecordedPath> {
+        let met = |name: &String| {
+            if name == FACE_NAME { Some(None) } else { Reflector::named(scene, name).map(Some) }
+        };
+        let walls = self.walls.iter().map(met);
         let edges = self.edge.iter().chain(&self.second_edge);
         let bends = edges.map(|name| Bend::named(scene, name));
-        Some(Path {
+        Some(RecordedPath {
             kind: self.kind,
             walls: walls.collect::<Option<_>>()?,
             bends: bends.collect::<Option<_>>()?,

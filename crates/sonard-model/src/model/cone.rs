@@ -2,13 +2,10 @@
 
 use std::sync::Arc;
 
-use smallvec::{SmallVec, smallvec};
-
-use super::{Arrival, Engine, Path, Survey, raycast::Reflectors};
+use super::{Arrival, Engine, Interaction, Mechanism, Path, Survey, raycast::Reflectors};
 use crate::{
     acoustics::Sound,
     geometry::{DVec2, wrap_pi},
-    reading::PathKind,
     scene::Scene,
 };
 
@@ -72,9 +69,11 @@ impl ConeSurvey<'_> {
             departure_rad: ray_rad,
             arrival_rad: ray_rad,
             path: Path {
-                kind: PathKind::Specular,
-                walls: smallvec![hit.reflector],
-                bends: SmallVec::new(),
+                interactions: vec![Interaction {
+                    mechanism: Mechanism::Reflection(hit.reflector),
+                    point: self.position + hit.distance_m * DVec2::from_angle(ray_rad),
+                    z_m: None,
+                }],
             },
         })
     }

@@ -157,7 +157,7 @@ impl Fan {
                 EventKind::Arrival(candidate) => {
                     let amplitude = candidate.weighing().amplitude(&self.beam, facing);
                     if amplitude >= threshold && candidate.length_m >= shortest_m {
-                        return Some(candidate.arrival(amplitude));
+                        return Some(candidate.arrival(self, position, amplitude));
                     }
                 }
                 EventKind::Wall(index, hit) => {

@@ -8,6 +8,7 @@ mod batch;
 mod cone;
 mod fan;
 mod names;
+mod path;
 pub mod paths;
 mod place;
 pub mod raycast;
@@ -20,16 +21,19 @@ mod way;
 pub use array::{ArrayModel, ArrayStand};
 pub use cone::Cone;
 pub use fan::{Fan, FanSettings};
+pub use names::FACE_NAME;
+pub use path::{Bend, Edge, Interaction, Mechanism, Path, Reflector};
 pub use simulator::{EngineKind, ModelError, Options, Simulator};
 pub use station::Station;
+pub use way::RecordedPath;
 
 pub use crate::acoustics::EdgeLawKind;
 
 use smallvec::SmallVec;
 
 use crate::{
-    acoustics::{Sound, edge::EdgeView},
-    geometry::DVec2,
+    acoustics::{Image, Incidence, Incident, Sound},
+    geometry::{DVec2, wrap_pi},
     reading::{PathKind, PingStatus},
 };
 
@@ -50,57 +54,8 @@ pub struct Arrival {
     pub departure_rad: f64,
     /// World direction from the ranger towards where the sound comes from, radians.
     pub arrival_rad: f64,
-    /// The way it took.
+    /// What it met on its way, and where.
     pub path: Path,
-}
-
-/// The way an echo took, by indices into the scene.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Path {
-    /// How the sound got back.
-    pub kind: PathKind,
-    /// Reflectors met, in order.
-    pub walls: SmallVec<[Reflector; 4]>,
-    /// The edges it bent at, in order.
-    pub bends: SmallVec<[Bend; 2]>,
-}
-
-/// A reflector of the scene.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Reflector {
-    /// `scene.walls[i]`.
-    Wall(u32),
-    /// `scene.cylinders[i]`.
-    Cylinder(u32),
-    /// The transducer's own face.
-    Face,
-    /// The floor of a scene with heights.
-    Floor,
-    /// Its ceiling.
-    Ceiling,
-}
-
-/// An edge of a scene.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Bend {
-    /// An upright one: where walls end or meet.
-    Upright(Edge),
-    /// A level one of a wall that ends below the ceiling or above the floor.
-    Level {
-        /// Index into `scene.walls`.
-        wall: u32,
-        /// Whether it is the wall's upper one (else the lower).
-        is_upper: bool,
-    },
-}
-
-/// An end of a wall.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Edge {
-    /// Index into `scene.walls`.
-    pub wall: u32,
-    /// Whether it is end `b` (else `a`).
-    pub at_b: bool,
 }
 
 /// Finds echo paths in a scene.
@@ -137,10 +92,24 @@ pub trait Survey: Send + Sync {
     /// The full account of a sound that [`listen`](Self::listen) gave for the same direction.
     fn arrival(&self, direction_rad: f64, sound: &Sound) -> Arrival;
 
-    /// How the edge of a sound looks from the face; `None` of others, and from engines and laws that do
-    /// not say.
-    fn edge(&self, _sound: &Sound) -> Option<EdgeView> {
-        None
+    /// How a sound that [`listen`](Self::listen) gave for the same direction meets the face: what the
+    /// full response of the face asks of each sound of a firing.
+    fn incident(&self, direction_rad: f64, sound: &Sound) -> Incident {
+        let arrival = self.arrival(direction_rad, sound);
+        let image = match arrival.path.kind() {
+            PathKind::Specular => mirrored(arrival.path.interactions.len()),
+            PathKind::Diffracted | PathKind::Scattered => Image::Lost,
+        };
+        let off_rad = |end_rad: f64| wrap_pi(end_rad - direction_rad);
+        Incident {
+            strength: arrival.path_amplitude,
+            incidence: Incidence {
+                leaving_rad: off_rad(arrival.departure_rad),
+                arriving_rad: off_rad(arrival.arrival_rad),
+                length_m: arrival.length_m,
+                image,
+            },
+        }
     }
 
     /// Every arrival of a firing, shortest path first.
@@ -149,6 +118,11 @@ pub trait Survey: Send + Sync {
         self.listen(direction_rad, &mut sounds);
         sounds.iter().map(|sound| self.arrival(direction_rad, sound)).collect()
     }
+}
+
+/// How the face looks over a number of mirrors.
+const fn mirrored(count: usize) -> Image {
+    if count.is_multiple_of(2) { Image::Upright } else { Image::Swapped }
 }
 
 /// What the model says a firing gives.

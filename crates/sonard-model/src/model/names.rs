@@ -3,14 +3,14 @@
 use super::{Bend, Edge, Reflector};
 use crate::scene::Scene;
 
-/// What the transducer's own face is called among the reflectors of a path.
-const FACE: &str = "transducer";
+/// What the transducer's own face is called on a path.
+pub const FACE_NAME: &str = "transducer";
 /// The same of a room's floor and ceiling.
 const FLOOR: &str = "floor";
 const CEILING: &str = "ceiling";
 
 impl Reflector {
-    /// Its name in a scene: the id of a wall or cylinder, `transducer`, `floor` or `ceiling`.
+    /// Its name in a scene: the id of a wall or cylinder, `floor` or `ceiling`.
     ///
     /// # Panics
     /// If it is of another scene.
@@ -19,7 +19,6 @@ impl Reflector {
         match self {
             Self::Wall(index) => scene.walls[index as usize].id.to_string(),
             Self::Cylinder(index) => scene.cylinders[index as usize].id.to_string(),
-            Self::Face => FACE.to_owned(),
             Self::Floor => FLOOR.to_owned(),
             Self::Ceiling => CEILING.to_owned(),
         }
@@ -28,9 +27,6 @@ impl Reflector {
     /// The reflector of that name; `None` if the scene has none.
     #[must_use]
     pub fn named(scene: &Scene, name: &str) -> Option<Self> {
-        if name == FACE {
-            return Some(Self::Face);
-        }
         let wall = scene.walls.iter().position(|wall| &*wall.id == name);
         let cylinder = || scene.cylinders.iter().position(|cylinder| &*cylinder.id == name);
         wall.map(|index| Self::Wall(index as u32))

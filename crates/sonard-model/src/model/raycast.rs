@@ -20,7 +20,7 @@ pub struct Hit {
     pub(super) reflector: Reflector,
     /// Unit normal of the surface there; out of a cylinder, to either side of a wall.
     pub(super) normal: DVec2,
-    /// From the nearer end of the wall, metres; endless on a cylinder.
+    /// From the nearer end of the wall, metres, negative beyond it; endless on a cylinder.
     pub(super) from_end_m: f64,
 }
 
@@ -86,6 +86,25 @@ impl Reflectors {
         best
     }
 
+    /// Where a ray meets one of the reflectors, walls taken without their ends and others out of the way;
+    /// `None` if it is parallel to the wall or misses the cylinder.
+    pub(super) fn meet(
+        &self,
+        origin: DVec2,
+        direction: DVec2,
+        reflector: Reflector,
+    ) -> Option<Hit> {
+        match reflector {
+            Reflector::Wall(index) => {
+                self.segments[index as usize].meet_line(origin, direction, reflector)
+            }
+            Reflector::Cylinder(index) => {
+                self.circles[index as usize].meet(origin, direction, reflector)
+            }
+            Reflector::Floor | Reflector::Ceiling => None,
+        }
+    }
+
     /// Whether nothing stands between two points; what touches `to` does not count.
     pub(super) fn sees(&self, from: DVec2, to: DVec2) -> bool {
         let way = to - from;
@@ -99,14 +118,14 @@ impl Reflectors {
         match reflector {
             Reflector::Wall(index) => self.segments[index as usize].mirror,
             Reflector::Cylinder(index) => self.circles[index as usize].mirror,
-            Reflector::Face | Reflector::Floor | Reflector::Ceiling => 0.0,
+            Reflector::Floor | Reflector::Ceiling => 0.0,
         }
     }
 
     /// Radius of curvature of a surface, metres; `None` for a flat one.
     pub(super) fn radius_m(&self, reflector: Reflector) -> Option<f64> {
         match reflector {
-            Reflector::Wall(_) | Reflector::Face | Reflector::Floor | Reflector::Ceiling => None,
+            Reflector::Wall(_) | Reflector::Floor | Reflector::Ceiling => None,
             Reflector::Cylinder(index) => Some(self.circles[index as usize].radius_m),
         }
     }
@@ -138,16 +157,20 @@ impl Segment {
     }
 
     fn meet(&self, origin: DVec2, direction: DVec2, reflector: Reflector) -> Option<Hit> {
+        self.meet_line(origin, direction, reflector)
+            .filter(|hit| hit.distance_m > START_M && hit.from_end_m >= -JOINT_M)
+    }
+
+    /// The same on the line through it, ahead or behind.
+    fn meet_line(&self, origin: DVec2, direction: DVec2, reflector: Reflector) -> Option<Hit> {
         let slant = direction.perp_dot(self.along);
         if slant.abs() < 1e-15 {
             return None;
         }
         let to_start = self.start - origin;
-        let distance_m = to_start.perp_dot(self.along) / slant;
         let place_m = to_start.perp_dot(direction) / slant;
-        let inside = (-JOINT_M..=self.length_m + JOINT_M).contains(&place_m);
-        (distance_m > START_M && inside).then(|| Hit {
-            distance_m,
+        Some(Hit {
+            distance_m: to_start.perp_dot(self.along) / slant,
             reflector,
             normal: self.along.perp(),
             from_end_m: place_m.min(self.length_m - place_m),

@@ -226,6 +226,15 @@ impl Simulator {
         &self.scene
     }
 
+    /// The height of the transducer, metres; `None` in a scene without floor and ceiling.
+    #[must_use]
+    pub fn sensor_z_m(&self) -> Option<f64> {
+        let (floor_z_m, ceiling_z_m) = (self.scene.floor_z_m, self.scene.ceiling_z_m);
+        floor_z_m.or(ceiling_z_m)?;
+        let usual_z_m = || paths::usual_z_m(floor_z_m, ceiling_z_m);
+        Some(self.sensor.mounting.z_m.unwrap_or_else(usual_z_m))
+    }
+
     pub(super) fn place(&self, at: [DVec2; 2]) -> Place<'_> {
         Place::new(self.engine.as_ref(), at, 2.0 * self.receiver.max_range_m)
     }

@@ -4,9 +4,8 @@ use rand::Rng;
 
 use super::{Arrival, Prediction, Simulator, Survey, place::Place};
 use crate::{
-    acoustics::{Detection, EchoTrace, Image, Incidence, Incident, Latch, ReceiverNoise, Sound},
-    geometry::{DVec2, wrap_pi},
-    reading::PathKind,
+    acoustics::{Detection, EchoTrace, Incident, Latch, ReceiverNoise, Sound},
+    geometry::DVec2,
 };
 
 /// A place from which firings are predicted; [`Simulator::station`] makes it.
@@ -137,22 +136,7 @@ impl Firing<'_> {
     }
 
     fn incident(&self, sound: &Sound) -> Incident {
-        let arrival = self.survey.arrival(self.direction_rad, sound);
-        let image = match arrival.path.kind {
-            PathKind::Diffracted => self.survey.edge(sound).map_or(Image::Lost, Image::Bent),
-            PathKind::Scattered => Image::Lost,
-            PathKind::Specular if arrival.path.walls.len() % 2 == 1 => Image::Swapped,
-            PathKind::Specular => Image::Upright,
-        };
-        Incident {
-            strength: arrival.path_amplitude,
-            incidence: Incidence {
-                leaving_rad: wrap_pi(arrival.departure_rad - self.direction_rad),
-                arriving_rad: wrap_pi(arrival.arrival_rad - self.direction_rad),
-                length_m: arrival.length_m,
-                image,
-            },
-        }
+        self.survey.incident(self.direction_rad, sound)
     }
 
     fn prediction(&self, detection: Detection) -> Prediction {

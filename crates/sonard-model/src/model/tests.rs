@@ -4,6 +4,7 @@ mod array;
 mod closed_forms;
 mod extents;
 mod full_wave;
+mod interactions;
 mod laws;
 mod phenomena;
 mod reach;
@@ -12,7 +13,7 @@ mod ways;
 
 use std::sync::Arc;
 
-use super::{Arrival, EngineKind, Options, Simulator};
+use super::{Arrival, Bend, EngineKind, Options, Path, Reflector, Simulator};
 use crate::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
@@ -67,7 +68,17 @@ fn arrivals(scene: Scene, options: Options, from: DVec2, direction_deg: f64) -> 
 }
 
 fn of_kind(arrivals: &[Arrival], kind: PathKind) -> impl Iterator<Item = &Arrival> {
-    arrivals.iter().filter(move |arrival| arrival.path.kind == kind)
+    arrivals.iter().filter(move |arrival| arrival.path.kind() == kind)
+}
+
+/// A path's mirror reflections, in order.
+pub(in crate::model) fn reflectors(path: &Path) -> Vec<Reflector> {
+    path.reflectors().collect()
+}
+
+/// The edges that diffract it, in order.
+pub(in crate::model) fn bends(path: &Path) -> Vec<Bend> {
+    path.bends().collect()
 }
 
 fn pose(scene: &Scene, name: &str) -> Pose {

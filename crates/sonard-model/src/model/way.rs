@@ -5,7 +5,7 @@
 
 use smallvec::SmallVec;
 
-use super::{Bend, Edge, Path, Reflector, paths::usual_z_m};
+use super::{Bend, Edge, Mechanism, Path, Reflector, paths::usual_z_m};
 use crate::{
     geometry::{DVec2, Mirror},
     reading::PathKind,
@@ -25,7 +25,29 @@ const BEYOND_END_M: f64 = 1e-4;
 const CLOSE_M: f64 = 1e-7;
 const MOST_ROUNDS: usize = 500;
 
-impl Path {
+/// A path as format 1 of the records keeps it: what it meets, without saying where.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordedPath {
+    /// How the sound got back.
+    pub kind: PathKind,
+    /// Surfaces in order, the wall of a level edge among them, floor and ceiling after the others; `None`
+    /// is the transducer's face.
+    pub walls: SmallVec<[Option<Reflector>; 4]>,
+    /// The edges it bent at, in order.
+    pub bends: SmallVec<[Bend; 2]>,
+}
+
+impl From<&Path> for RecordedPath {
+    fn from(path: &Path) -> Self {
+        let is_met = |met: &Mechanism| !matches!(met, Mechanism::Diffraction(Bend::Upright(_)));
+        let met = || path.mechanisms().filter(is_met).map(Mechanism::surface);
+        let upright = |met: &Option<Reflector>| met.as_ref().is_none_or(is_upright);
+        let walls = met().filter(upright).chain(met().filter(|met| !upright(met))).collect();
+        Self { kind: path.kind(), walls, bends: path.bends().collect() }
+    }
+}
+
+impl RecordedPath {
     /// The points of the way from a ranger at `position` and back to it, in order and in the plan: the
     /// ranger, each reflection and edge, the ranger. Round an edge the way may be the one run through
     /// backwards, which meets the same walls in the same order and arrives at the same time. `None`
@@ -48,10 +70,12 @@ impl Path {
         if self.kind == PathKind::Scattered {
             return None;
         }
-        let walls: SmallVec<[Reflector; 8]> =
-            self.walls.iter().copied().filter(is_upright).collect();
+        let met = || self.walls.iter().copied();
+        let upright = |met: &Option<Reflector>| met.as_ref().is_none_or(is_upright);
+        let rounds: SmallVec<[Option<Reflector>; 8]> = met().filter(upright).collect();
+        let walls: SmallVec<[Reflector; 8]> = rounds.iter().copied().flatten().collect();
         let levels: SmallVec<[Reflector; 4]> =
-            self.walls.iter().copied().filter(|met| !is_upright(met)).collect();
+            met().flatten().filter(|met| !is_upright(met)).collect();
         let z_m = z_m.unwrap_or_else(|| usual_z_m(scene.floor_z_m, scene.ceiling_z_m));
         let rise_m = level_image_m(scene, z_m, levels.iter())? - z_m;
         let plan_m = (length_m * length_m - rise_m * rise_m).max(0.0).sqrt();
@@ -62,7 +86,7 @@ impl Path {
                 Bend::Upright(edge) => edges.push(edge.place(scene)?),
                 // In a train it lies as high as the ranger, where the way in the plan is a mirror's (or
                 // runs straight over it, and is not drawn).
-                Bend::Level { .. } if walls.contains(&Reflector::Face) => {}
+                Bend::Level { .. } if rounds.contains(&None) => {}
                 Bend::Level { wall, is_upper } => {
                     let rim_z_m = scene.walls.get(wall as usize)?.z_m?[usize::from(is_upper)];
                     return Over { way, z_m, length_m, wall, rim_z_m }.points(&walls, &levels);
@@ -70,11 +94,13 @@ impl Path {
             }
         }
         // The transducer's face sends the sound off again from where it started.
-        let mut rounds = walls.split(|wall| *wall == Reflector::Face);
-        let first = rounds.next().unwrap_or_default();
-        let rounds: SmallVec<[&[Reflector]; 4]> = rounds.collect();
+        let rounds = rounds.split(Option::is_none);
+        let rounds: Vec<SmallVec<[Reflector; 8]>> =
+            rounds.map(|round| round.iter().copied().flatten().collect()).collect();
+        let rounds: SmallVec<[&[Reflector]; 4]> = rounds.iter().map(|round| &round[..]).collect();
+        let (first, rounds) = rounds.split_first()?;
         let mut points = vec![from];
-        way.follow(&mut points, first, &rounds, &edges).then_some(points)
+        way.follow(&mut points, first, rounds, &edges).then_some(points)
     }
 }
 

@@ -1,18 +1,25 @@
 //! One ray of the fan and what it brings to the receiver.
 
-use smallvec::{SmallVec, smallvec};
+use smallvec::SmallVec;
 
 use super::Fan;
 use crate::{
     acoustics::BeamPattern,
     geometry::{DVec2, wrap_pi},
-    model::{Arrival, Bend, Edge, Path, Reflector, raycast::Hit},
-    reading::PathKind,
+    model::{
+        Arrival, Bend, Edge, Interaction, Mechanism, Path, Reflector,
+        raycast::{Hit, Reflectors},
+    },
 };
 
 /// A ray this close to a wall's end, metres, is dropped after the end has diffracted it: which
 /// of the walls that meet there it hits is a matter of rounding, and its neighbours tell.
 const VERTEX_M: f64 = 1e-7;
+
+/// The ray to the receiver's centre (or to an edge) is found to within this, metres, in at most so many
+/// steps of Newton's method: one without curved surfaces, three with them.
+const EXACT_M: f64 = 1e-12;
+const MOST_STEPS: usize = 30;
 
 /// A ray on its way, at the last surface it met.
 #[derive(Debug)]
@@ -45,7 +52,16 @@ pub(super) struct Candidate {
     pub(super) miss_m: f64,
     /// Which part of its half-length the receiver segment must show to the ray to be met.
     pub(super) share: f64,
-    pub(super) path: Path,
+    /// In which direction the ray itself leaves, radians.
+    ray_departure_rad: f64,
+    pub(super) met: Met,
+}
+
+/// What a path meets: reflectors, in order, and then perhaps an edge.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) struct Met {
+    reflectors: SmallVec<[Reflector; 4]>,
+    edge: Option<Edge>,
 }
 
 impl Ray {
@@ -94,8 +110,6 @@ impl Ray {
         if target.length_m > fan.settings.longest_m || gain < fan.settings.weakest {
             return None;
         }
-        let path =
-            Path { kind: PathKind::Specular, walls: self.walls.clone(), bends: SmallVec::new() };
         Some(Candidate {
             length_m: target.length_m,
             gain,
@@ -103,7 +117,8 @@ impl Ray {
             arrival_rad: (-self.direction).to_angle() + target.arrival_turn_rad(),
             miss_m: target.offset_m.abs(),
             share: target.offset_m.abs() / half_m,
-            path,
+            ray_departure_rad: self.departure_rad,
+            met: Met { reflectors: self.walls.clone(), edge: None },
         })
     }
 
@@ -141,11 +156,6 @@ impl Ray {
         if !matters || !fan.reflectors.sees(position, point) {
             return None;
         }
-        let path = Path {
-            kind: PathKind::Diffracted,
-            walls: self.walls.clone(),
-            bends: smallvec![Bend::Upright(edge)],
-        };
         Some(Candidate {
             length_m,
             gain,
@@ -153,18 +163,28 @@ impl Ray {
             arrival_rad: (point - position).to_angle(),
             miss_m: target.offset_m.abs(),
             share: 0.0,
-            path,
+            ray_departure_rad: self.departure_rad,
+            met: Met { reflectors: self.walls.clone(), edge: Some(edge) },
         })
     }
 
     /// Leaves the surface it hit; `false` if the ray ends there.
     pub(super) fn reflect(&mut self, hit: &Hit, fan: &Fan) -> bool {
         let settings = &fan.settings;
+        self.turn(hit, &fan.reflectors);
+        let left = self.gain * settings.through_air(self.travelled_m);
+        hit.from_end_m > VERTEX_M
+            && self.walls.len() <= settings.max_order as usize
+            && self.travelled_m <= settings.longest_m
+            && left >= settings.weakest
+    }
+
+    fn turn(&mut self, hit: &Hit, reflectors: &Reflectors) {
         self.origin += hit.distance_m * self.direction;
         self.travelled_m += hit.distance_m;
         self.width_m += hit.distance_m * self.growth;
-        self.gain *= fan.reflectors.mirror(hit.reflector);
-        if let Some(radius_m) = fan.reflectors.radius_m(hit.reflector) {
+        self.gain *= reflectors.mirror(hit.reflector);
+        if let Some(radius_m) = reflectors.radius_m(hit.reflector) {
             // Mirror equation for an oblique ray in the plane of incidence: the wave front's
             // curvature grows by 2 / (r cos i), and less from inside the cylinder.
             let toward = -self.direction.dot(hit.normal);
@@ -173,11 +193,23 @@ impl Ray {
         self.direction -= 2.0 * self.direction.dot(hit.normal) * hit.normal;
         self.handedness = -self.handedness;
         self.walls.push(hit.reflector);
-        let left = self.gain * settings.through_air(self.travelled_m);
-        hit.from_end_m > VERTEX_M
-            && self.walls.len() <= settings.max_order as usize
-            && self.travelled_m <= settings.longest_m
-            && left >= settings.weakest
+    }
+
+    /// The ray that leaves `origin` in a direction and meets these reflectors, as if walls had no ends, at
+    /// the last of them, and where it met them; `None` if it misses a cylinder.
+    fn over(
+        origin: DVec2,
+        departure_rad: f64,
+        met: &[Reflector],
+        reflectors: &Reflectors,
+    ) -> Option<(Self, Vec<DVec2>)> {
+        let mut ray = Self::new(origin, departure_rad);
+        let mut points = Vec::with_capacity(met.len() + 1);
+        for &reflector in met {
+            ray.turn(&reflectors.meet(ray.origin, ray.direction, reflector)?, reflectors);
+            points.push(ray.origin);
+        }
+        Some((ray, points))
     }
 
     /// The neighbouring ray that passes exactly through a point at `way` from the origin.
@@ -221,8 +253,8 @@ impl Aim {
 }
 
 impl Candidate {
-    /// The arrival, with the amplitude it has at some azimuth.
-    pub(super) fn arrival(&self, amplitude: f64) -> Arrival {
+    /// The arrival at a ranger at `position`, with the amplitude it has at some azimuth.
+    pub(super) fn arrival(&self, fan: &Fan, position: DVec2, amplitude: f64) -> Arrival {
         Arrival {
             length_m: self.length_m,
             amplitude,
@@ -230,8 +262,37 @@ impl Candidate {
             phase_rad: 0.0,
             departure_rad: wrap_pi(self.departure_rad),
             arrival_rad: wrap_pi(self.arrival_rad),
-            path: self.path.clone(),
+            path: self.path(&fan.reflectors, position),
         }
+    }
+
+    /// The path of the neighbouring ray that this one stands for. By way of cylinders, where its length
+    /// comes from the curvature of the front, the points are more exact than that.
+    fn path(&self, reflectors: &Reflectors, position: DVec2) -> Path {
+        let bend = self.met.edge.map(|edge| (edge, reflectors.edge_point(edge)));
+        let end = bend.map_or(position, |(_, point)| point);
+        let over = |leaves_rad| Ray::over(position, leaves_rad, &self.met.reflectors, reflectors);
+        let mut leaves_rad = self.ray_departure_rad;
+        let mut points = Vec::new();
+        let mut turn_rad = 0.0;
+        for _ in 0..MOST_STEPS {
+            let Some((ray, met)) = over(leaves_rad + turn_rad) else {
+                turn_rad *= 0.5;
+                continue;
+            };
+            points = met;
+            leaves_rad += turn_rad;
+            let aim = ray.aim(end - ray.origin);
+            if aim.offset_m.abs() < EXACT_M {
+                break;
+            }
+            turn_rad = ray.handedness * aim.departure_turn_rad();
+        }
+        let reflections =
+            self.met.reflectors.iter().copied().map(Mechanism::Reflection).zip(points);
+        let bend = bend.map(|(edge, point)| (Mechanism::Diffraction(Bend::Upright(edge)), point));
+        let interaction = |(mechanism, point)| Interaction { mechanism, point, z_m: None };
+        Path { interactions: reflections.chain(bend).map(interaction).collect() }
     }
 
     pub(super) fn weighing(&self) -> Weighing {

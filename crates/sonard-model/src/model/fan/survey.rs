@@ -4,16 +4,17 @@ use std::collections::HashMap;
 
 use super::{
     Fan,
-    ray::{Candidate, Weighing},
+    ray::{Candidate, Met, Weighing},
 };
 use crate::{
     acoustics::Sound,
     geometry::DVec2,
-    model::{Arrival, Path, Survey},
+    model::{Arrival, Survey},
 };
 
 pub(super) struct FanSurvey<'a> {
     fan: &'a Fan,
+    position: DVec2,
     /// Shortest first, each path once.
     candidates: Vec<Candidate>,
     /// What weighting them takes, close together in memory.
@@ -40,17 +41,13 @@ impl<'a> FanSurvey<'a> {
             }
         }
         let mut candidates: Vec<Candidate> = closest.0.into_values().collect();
-        // Ties (a corner's two orders) are broken by the path, so that results do not depend on
+        // Ties (a corner's two orders) are broken by what is met, so that results do not depend on
         // the order of a hash table.
         candidates.sort_by(|one, other| {
-            let by_path = || one.path.walls.cmp(&other.path.walls);
-            one.length_m
-                .total_cmp(&other.length_m)
-                .then_with(by_path)
-                .then_with(|| one.path.bends.cmp(&other.path.bends))
+            one.length_m.total_cmp(&other.length_m).then_with(|| one.met.cmp(&other.met))
         });
         let weighings = candidates.iter().map(Candidate::weighing).collect();
-        Self { fan, candidates, weighings }
+        Self { fan, position, candidates, weighings }
     }
 }
 
@@ -68,21 +65,21 @@ impl Survey for FanSurvey<'_> {
 
     fn arrival(&self, _direction_rad: f64, sound: &Sound) -> Arrival {
         let candidate = &self.candidates[sound.index as usize];
-        candidate.arrival(sound.amplitude)
+        candidate.arrival(self.fan, self.position, sound.amplitude)
     }
 }
 
 /// Of the rays that took the same path, the one that passed closest.
 #[derive(Default)]
-struct Closest(HashMap<Path, Candidate>);
+struct Closest(HashMap<Met, Candidate>);
 
 impl Closest {
     fn offer(&mut self, candidate: Candidate) {
-        match self.0.get_mut(&candidate.path) {
+        match self.0.get_mut(&candidate.met) {
             Some(known) if candidate.miss_m < known.miss_m => *known = candidate,
             Some(_) => {}
             None => {
-                self.0.insert(candidate.path.clone(), candidate);
+                self.0.insert(candidate.met.clone(), candidate);
             }
         }
     }

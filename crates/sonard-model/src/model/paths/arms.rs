@@ -19,10 +19,10 @@ use std::f64::consts::{PI, TAU};
 
 use super::{
     Paths,
+    interactions::Leg,
     rounds::Span,
     trace::View,
     tube::{Front, Surfaces, Tracer, zero_between},
-    ways::Leg,
     wheel::Both,
 };
 use crate::geometry::{DVec2, wrap_pi};

@@ -1,6 +1,6 @@
 //! Echoes while they are being sorted out.
 
-use crate::geometry::DVec2;
+use crate::{geometry::DVec2, reading::PathKind};
 
 /// Echoes that agree in length and both directions to within this are one, metres and radians.
 pub(super) const SAME_M: f64 = 1e-8;
@@ -53,6 +53,17 @@ pub(super) enum Via {
     Rim {
         rim: u32,
     },
+}
+
+impl Via {
+    /// How the sound gets back.
+    pub(super) const fn kind(&self) -> PathKind {
+        match self {
+            Self::Edge { .. } | Self::Edges { .. } | Self::Rim { .. } => PathKind::Diffracted,
+            Self::Walls { .. } | Self::Cylinder { .. } | Self::Upright => PathKind::Specular,
+            Self::Scatter { .. } => PathKind::Scattered,
+        }
+    }
 }
 
 impl Echo {

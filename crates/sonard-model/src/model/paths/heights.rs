@@ -15,7 +15,7 @@ use rstar::{
 use super::{Echo, Paths, Trees, beam::TIE_M};
 use crate::{
     geometry::{Arrangement, DVec2, Piece, SNAP_M, between},
-    model::Reflector,
+    model::{Mechanism, Reflector},
     scene::Scene,
 };
 
@@ -111,6 +111,12 @@ impl Heights {
         [0, 1].into_iter().filter_map(rim)
     }
 
+    /// How far above the ranger a level edge of a wall is, metres.
+    pub(super) fn rim_rise_m(&self, wall: u32, is_upper: bool) -> f64 {
+        let limits = self.walls[wall as usize].unwrap_or_default();
+        limits[usize::from(is_upper)] - self.z_m
+    }
+
     /// Whether what stands between such heights ends above the floor, and below the ceiling.
     fn has_rims(&self, [from_m, to_m]: [f64; 2]) -> [bool; 2] {
         let lower = self.floor_z_m.is_none_or(|floor| from_m > floor);
@@ -136,7 +142,7 @@ impl Heights {
         match reflector {
             Reflector::Wall(wall) => self.walls[wall as usize],
             Reflector::Cylinder(cylinder) => self.cylinders[cylinder as usize],
-            Reflector::Face | Reflector::Floor | Reflector::Ceiling => None,
+            Reflector::Floor | Reflector::Ceiling => None,
         }
     }
 
@@ -166,6 +172,30 @@ impl Heights {
         low_m <= to_m && high_m >= from_m
     }
 
+    /// The height of a path that would have climbed so far if floor and ceiling were windows, metres;
+    /// `None` without either.
+    pub(super) fn z_at(&self, climbed_m: f64) -> Option<f64> {
+        self.rises().then(|| self.folded_m(self.z_m + climbed_m))
+    }
+
+    /// Where a path is reflected that climbs so far if floor and ceiling are windows, metres, in `count`
+    /// reflections; downwards it comes to the floor first.
+    pub(super) fn bounces(&self, climb_m: f64, count: u16) -> impl Iterator<Item = Bounce> {
+        let mut surfaces =
+            [(Reflector::Floor, self.floor_z_m), (Reflector::Ceiling, self.ceiling_z_m)];
+        if climb_m > 0.0 {
+            surfaces.reverse();
+        }
+        let first_m = surfaces[0].1.map_or(0.0, |z_m| (z_m - self.z_m).abs());
+        let apart_m =
+            self.floor_z_m.zip(self.ceiling_z_m).map_or(0.0, |(floor, ceiling)| ceiling - floor);
+        (0..count).filter_map(move |number| {
+            let (surface, z_m) = surfaces[usize::from(number % 2)];
+            let share = (first_m + f64::from(number) * apart_m) / climb_m.abs();
+            Some(Bounce { share, surface, z_m: z_m? })
+        })
+    }
+
     /// The height of a path that would be at `z_m` if floor and ceiling were windows.
     fn folded_m(&self, z_m: f64) -> f64 {
         match (self.floor_z_m, self.ceiling_z_m) {
@@ -181,36 +211,40 @@ impl Heights {
     }
 }
 
+/// A reflection at floor or ceiling.
+pub(super) struct Bounce {
+    /// After which share of the path's length.
+    pub(super) share: f64,
+    pub(super) surface: Reflector,
+    pub(super) z_m: f64,
+}
+
 fn holds(limits: Option<[f64; 2]>, z_m: f64) -> bool {
     // On the very end counts as met; a rim's echo knows that.
     limits.is_none_or(|[from, to]| (from - TIE_M..=to + TIE_M).contains(&z_m))
 }
 
 impl Paths {
-    /// Leaves out echoes whose way misses a wall above or below, or is barred by one.
-    pub(super) fn retain_clear(
-        &self,
-        trees: &Trees,
-        echoes: &mut Vec<Echo>,
-        [start, target]: [DVec2; 2],
-    ) {
+    /// Leaves out echoes whose path misses a wall above or below, or is barred by one.
+    pub(super) fn retain_clear(&self, trees: &Trees, echoes: &mut Vec<Echo>) {
         if self.heights.matter() {
-            echoes.retain(|echo| self.is_clear(trees, echo, start, target));
+            echoes.retain(|echo| self.is_clear(trees, echo));
         }
     }
 
-    fn is_clear(&self, trees: &Trees, echo: &Echo, start: DVec2, target: DVec2) -> bool {
+    fn is_clear(&self, trees: &Trees, echo: &Echo) -> bool {
+        let [start, target] = trees.ends;
         let ends = Ends { start, end: Some(target), rise_m: self.image(echo.image).rise_m };
         self.is_way_clear(&self.contacts(trees, echo, target), &ends)
     }
 
     /// Whether a way meets its contacts where they stand, and nothing else.
-    pub(super) fn is_way_clear(&self, contacts: &[(DVec2, Reflector)], ends: &Ends) -> bool {
+    pub(super) fn is_way_clear(&self, contacts: &[(DVec2, Mechanism)], ends: &Ends) -> bool {
         let heights = &self.heights;
         let points = || {
             let first = [(ends.start, None)].into_iter();
             let last = ends.end.map(|end| (end, None));
-            first.chain(contacts.iter().map(|&(at, what)| (at, Some(what)))).chain(last)
+            first.chain(contacts.iter().map(|&(at, what)| (at, what.surface()))).chain(last)
         };
         let plan_m: f64 =
             points().zip(points().skip(1)).map(|((a, _), (b, _))| a.distance(b)).sum();

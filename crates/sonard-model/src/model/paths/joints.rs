@@ -14,10 +14,10 @@ use super::{
     Echo, Paths, Via,
     arms::{Arm, ArmTracer, Contact, DIRECT, Leaves, Strength},
     beam::TIE_M,
+    interactions::{Leg, Part},
     rounds::Circle,
     trace::{Tree, View},
     tube::Curved,
-    ways::{Leg, Part},
     wheel::Both,
 };
 use crate::geometry::wrap_pi;

@@ -94,6 +94,7 @@ mod bridges;
 mod echo;
 mod edges;
 mod heights;
+mod interactions;
 mod joints;
 mod mesh;
 mod rims;
@@ -102,13 +103,12 @@ mod scatter;
 mod settings;
 mod survey;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 mod trace;
 mod trains;
 mod tube;
 mod tubes;
 mod vertical;
-mod ways;
 mod wheel;
 
 pub use settings::{ROUNDS_ABOVE, Settings, usual_z_m};
@@ -183,7 +183,7 @@ pub struct EchoPath {
     pub arrival_rad: f64,
     /// How far up it leaves and comes from, radians.
     pub rise_rad: [f64; 2],
-    /// The way it took.
+    /// What it met on its way, and where.
     pub path: Path,
 }
 
@@ -261,6 +261,12 @@ impl Paths {
         Self { settings, ..self.clone() }
     }
 
+    /// The height of the transducer, metres; `None` in a scene without floor and ceiling.
+    #[must_use]
+    pub fn sensor_z_m(&self) -> Option<f64> {
+        self.heights.z_at(0.0)
+    }
+
     /// All echo paths from a place, shortest first.
     #[must_use]
     pub fn enumerate(&self, position: DVec2) -> Vec<EchoPath> {
@@ -293,15 +299,16 @@ impl Paths {
         }
         let joints =
             self.add_rounds(&mut echoes, &mut out, back.as_mut(), [transmitter, receiver], both);
-        let mut trees = Trees { out, back, joints, bridged: Vec::new(), rims: Vec::new() };
+        let ends = [transmitter, receiver];
+        let mut trees = Trees { ends, out, back, joints, bridged: Vec::new(), rims: Vec::new() };
         if let Some(law) = self.settings.edge_law {
             echoes.extend(self.edges.echoes(&mut trees, law, &self.settings));
             echoes.extend(bridges::echoes(self, &mut trees, law));
         }
         self.add_images(&mut echoes, receiver - transmitter);
-        self.retain_clear(&trees, &mut echoes, [transmitter, receiver]);
+        self.retain_clear(&trees, &mut echoes);
         if let Some(law) = self.settings.edge_law {
-            echoes.extend(rims::echoes(self, &mut trees, [transmitter, receiver], law));
+            echoes.extend(rims::echoes(self, &mut trees, law));
         }
         (trees, sorted(&echoes))
     }
@@ -392,6 +399,8 @@ fn mirror_gain(material: &Material) -> f64 {
 /// The beams of a place, or of transmitter and receiver.
 #[derive(Debug)]
 struct Trees {
+    /// Transmitter and receiver.
+    ends: [DVec2; 2],
     /// From the transmitter.
     out: Tree,
     /// From the receiver, if it is somewhere else.

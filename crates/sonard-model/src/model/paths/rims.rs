@@ -42,15 +42,15 @@ use super::{
     echo::{SAME_M, SAME_RAD, drop_repeats},
     edges::distance_parameter_m,
     heights::Ends,
+    interactions::{Leg, Part},
     scatter::Lit,
     trace::Tree,
     vertical::Image,
-    ways::{Leg, Part},
 };
 use crate::{
     acoustics::edge::{Aspect, EdgeLaw, Wedge},
     geometry::{DVec2, Mirror},
-    model::Reflector,
+    model::{Bend, Mechanism},
 };
 
 /// A way by a rim.
@@ -66,12 +66,7 @@ pub(super) struct Rim {
 }
 
 /// The echoes of all rims in sight from transmitter and receiver; their ways go to [`Trees::rims`].
-pub(super) fn echoes(
-    paths: &Paths,
-    trees: &mut Trees,
-    starts: [DVec2; 2],
-    law: EdgeLaw,
-) -> Vec<Echo> {
+pub(super) fn echoes(paths: &Paths, trees: &mut Trees, law: EdgeLaw) -> Vec<Echo> {
     let outs = by_wall(&mut trees.out);
     let backs = trees.back.as_mut().map(by_wall);
     let mut all: Vec<(Echo, Rim)> = Vec::new();
@@ -80,7 +75,7 @@ pub(super) fn echoes(
         let backs = backs.as_ref().map(|backs| of_wall(backs, wall));
         for (rise_m, is_upper) in paths.heights.rims(wall) {
             let line = Line::new(paths, wall, rise_m, is_upper);
-            let search = Search { paths, trees, starts, law, line };
+            let search = Search { paths, trees, law, line };
             let outs = line.arms(paths, outs);
             let mut found = match backs {
                 None => search.pairs(&outs),
@@ -185,8 +180,7 @@ impl Line {
             lit,
             image: index,
             gain: lit.beam.gain * image.gain,
-            // Each reflection at floor or ceiling turns it.
-            climb_m: if image.bounces.is_multiple_of(2) { below_m } else { -below_m },
+            climb_m: image.climb_m(self.rise_m),
             off_m,
             foot_m,
             around_rad: before_m.atan2(along_face_m).rem_euclid(TAU),
@@ -210,8 +204,6 @@ impl Arm<'_> {
 struct Search<'a> {
     paths: &'a Paths,
     trees: &'a Trees,
-    /// Transmitter and receiver.
-    starts: [DVec2; 2],
     law: EdgeLaw,
     line: Line,
 }
@@ -263,8 +255,8 @@ impl Search<'_> {
         let [to, from] = [out, back].map(|arm| arm.lit.beam.ray_to(place));
         let legs = [Leg::from(&to), Leg::from(&from)];
         let trees = self.trees;
-        if !(self.is_clear(&trees.out, self.starts[0], out, legs[0], place)
-            && self.is_clear(trees.back(), self.starts[1], back, legs[1], place))
+        if !(self.is_clear(&trees.out, trees.ends[0], out, legs[0], place)
+            && self.is_clear(trees.back(), trees.ends[1], back, legs[1], place))
         {
             return None;
         }
@@ -312,7 +304,8 @@ impl Search<'_> {
     /// Whether nothing stands in the way of a leg from one of the starts.
     fn is_clear(&self, tree: &Tree, start: DVec2, arm: &Arm, leg: Leg, place: DVec2) -> bool {
         let mut contacts = self.paths.part_contacts(tree, Part::Flat(leg), place);
-        contacts.push((place, Reflector::Wall(self.line.wall)));
+        let Line { wall, is_upper, .. } = self.line;
+        contacts.push((place, Mechanism::Diffraction(Bend::Level { wall, is_upper })));
         let ends = Ends { start, end: None, rise_m: arm.climb_m };
         self.paths.is_way_clear(&contacts, &ends)
     }

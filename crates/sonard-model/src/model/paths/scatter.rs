@@ -53,7 +53,7 @@ pub(super) struct Lit {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spot {
     pub(super) wall: u32,
-    pub(super) leg: super::ways::Leg,
+    pub(super) leg: super::interactions::Leg,
     pub(super) place: DVec2,
 }
 

@@ -2,17 +2,15 @@
 
 use std::f64::consts::PI;
 
-use smallvec::SmallVec;
-
 use super::{
-    Echo, EchoPath, Paths, Settings, Trees,
+    Echo, Paths, Settings, Trees,
     trains::{FLOOR_ABOVE, Loops, Round, Train},
     wheel::{Both, Envelope, Spoke, Wheel},
 };
 use crate::{
-    acoustics::{BeamPattern, Disc, Sound, edge::EdgeView},
+    acoustics::{BeamPattern, Disc, Image, Incidence, Incident, Sound},
     geometry::{DVec2, wrap_pi},
-    model::{Arrival, Bend, Engine, Path, Reflector, Survey},
+    model::{Arrival, Engine, Interaction, Mechanism, Path, Survey, mirrored},
     reading::PathKind,
     scene::Scene,
 };
@@ -138,39 +136,59 @@ impl<'a> PathSurvey<'a> {
     }
 
     fn train_arrival(&self, direction_rad: f64, train: &Train, amplitude: f64) -> Arrival {
-        let paths = &self.paths;
-        let way = |round: &Round| {
-            let mut way = paths.path(&self.trees, &self.echoes[round.echo as usize]);
-            if round.reversed {
-                way.path.walls.reverse();
-                std::mem::swap(&mut way.departure_rad, &mut way.arrival_rad);
-            }
-            way
+        let path = |round: &Round| {
+            let echo = &self.echoes[round.echo as usize];
+            let path = self.paths.path(&self.trees, echo).path;
+            if round.reversed { path.reversed() } else { path }
         };
-        let ways: Vec<EchoPath> = train.rounds.iter().map(way).collect();
-        let bends: SmallVec<[Bend; 2]> =
-            ways.iter().flat_map(|way| way.path.bends.iter().copied()).collect();
-        let kind = if bends.is_empty() { PathKind::Specular } else { PathKind::Diffracted };
-        let mut walls = SmallVec::new();
-        for way in &ways {
-            if !walls.is_empty() {
-                walls.push(Reflector::Face);
-            }
-            walls.extend_from_slice(&way.path.walls);
+        let at_face = Interaction {
+            mechanism: Mechanism::Transducer,
+            point: self.trees.ends[0],
+            z_m: self.paths.sensor_z_m(),
+        };
+        let mut interactions = Vec::new();
+        for (number, round) in train.rounds.iter().enumerate() {
+            interactions.extend((number > 0).then_some(at_face));
+            interactions.extend(path(round).interactions);
         }
-        let (departure_rad, arrival_rad) =
-            (ways[0].departure_rad, ways[ways.len() - 1].arrival_rad);
-        let [leaving, arriving] = [departure_rad, arrival_rad]
-            .map(|end| self.engine.beam.one_way(wrap_pi(end - direction_rad)));
+        let (path_amplitude, [departure_rad, arrival_rad]) =
+            self.train_ends(direction_rad, train, amplitude);
         Arrival {
             length_m: train.length_m,
             amplitude,
-            path_amplitude: amplitude / (leaving * arriving),
+            path_amplitude,
             phase_rad: train.phase_rad,
             departure_rad,
             arrival_rad,
-            path: Path { kind, walls, bends },
+            path: Path { interactions },
         }
+    }
+
+    /// A train's amplitude before the beam pattern, and the directions in which it leaves and comes back.
+    fn train_ends(&self, direction_rad: f64, train: &Train, amplitude: f64) -> (f64, [f64; 2]) {
+        let ends_rad = |round: &Round| {
+            let echo = &self.echoes[round.echo as usize];
+            let ends_rad = [echo.departure, echo.arrival].map(DVec2::to_angle);
+            if round.reversed { [ends_rad[1], ends_rad[0]] } else { ends_rad }
+        };
+        let [first, last] = [&train.rounds[0], &train.rounds[train.rounds.len() - 1]].map(ends_rad);
+        let ends_rad = [first[0], last[1]];
+        let [leaving, arriving] =
+            ends_rad.map(|end| self.engine.beam.one_way(wrap_pi(end - direction_rad)));
+        (amplitude / (leaving * arriving), ends_rad)
+    }
+
+    /// How the face looks over a train.
+    fn train_image(&self, train: &Train) -> Image {
+        let echoes = train.rounds.iter().map(|round| &self.echoes[round.echo as usize]);
+        let passages = train.rounds.len() - 1;
+        echoes
+            .map(|echo| match echo.via.kind() {
+                PathKind::Specular => Some(self.paths.mirrors_met(&self.trees, echo)),
+                PathKind::Diffracted | PathKind::Scattered => None,
+            })
+            .try_fold(passages, |met, more| Some(met + more?))
+            .map_or(Image::Lost, mirrored)
     }
 }
 
@@ -210,9 +228,27 @@ impl Survey for PathSurvey<'_> {
         }
     }
 
-    fn edge(&self, sound: &Sound) -> Option<EdgeView> {
-        let echo = self.echoes.get(sound.index as usize)?;
-        self.paths.edges.view(&self.trees, echo, &self.paths.settings)
+    fn incident(&self, direction_rad: f64, sound: &Sound) -> Incident {
+        let (paths, trees) = (&self.paths, &self.trees);
+        let index = sound.index as usize;
+        let (strength, ends_rad, length_m, image) = if let Some(echo) = self.echoes.get(index) {
+            let image = match echo.via.kind() {
+                PathKind::Specular => mirrored(paths.mirrors_met(trees, echo)),
+                PathKind::Diffracted => {
+                    let view = paths.edges.view(trees, echo, &paths.settings);
+                    view.map_or(Image::Lost, Image::Bent)
+                }
+                PathKind::Scattered => Image::Lost,
+            };
+            let ends_rad = [echo.departure, echo.arrival].map(DVec2::to_angle);
+            (echo.amplitude, ends_rad, echo.length_m, image)
+        } else {
+            let train = &self.trains(wrap_pi(direction_rad))[index - self.echoes.len()];
+            let (strength, ends_rad) = self.train_ends(direction_rad, train, sound.amplitude);
+            (strength, ends_rad, train.length_m, self.train_image(train))
+        };
+        let [leaving_rad, arriving_rad] = ends_rad.map(|end_rad| wrap_pi(end_rad - direction_rad));
+        Incident { strength, incidence: Incidence { leaving_rad, arriving_rad, length_m, image } }
     }
 
     fn arrival(&self, direction_rad: f64, sound: &Sound) -> Arrival {

@@ -22,12 +22,15 @@ use rand_pcg::Pcg64;
 use super::*;
 use crate::{
     acoustics::edge::EdgeLaw,
-    model::{Bend, Edge},
+    model::{
+        Bend, Edge,
+        tests::{bends, reflectors},
+    },
     reading::PathKind,
     scene::{Material, Wall},
 };
 
-pub(super) const LOSSLESS: Settings = Settings {
+pub(in crate::model) const LOSSLESS: Settings = Settings {
     max_path_m: 20.0,
     max_order: None,
     floor: 1e-4,

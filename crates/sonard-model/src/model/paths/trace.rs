@@ -3,11 +3,11 @@
 use super::{
     Face, Paths,
     beam::{Beam, Ray},
+    interactions::{Leg, Part},
     rounds::Span,
     scatter::{Lit, Spot},
     tube::{Curved, Link},
     tubes::BentRay,
-    ways::{Leg, Part},
 };
 use crate::geometry::DVec2;
 

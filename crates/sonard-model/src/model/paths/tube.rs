@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use super::{Face, Paths, arms::Contact, rounds::Circle, trace::View, ways::Leg};
+use super::{Face, Paths, arms::Contact, interactions::Leg, rounds::Circle, trace::View};
 use crate::{geometry::DVec2, model::Reflector};
 
 /// Marks a tube that has met its first cylinder only.
@@ -111,7 +111,7 @@ impl Paths {
             Reflector::Cylinder(cylinder) => {
                 front.off_circle(&self.rounds.circles[cylinder as usize])
             }
-            Reflector::Face | Reflector::Floor | Reflector::Ceiling => *front,
+            Reflector::Floor | Reflector::Ceiling => *front,
         }
     }
 }

@@ -11,10 +11,8 @@
 //! edge's direction, and the field by the square root of that; the small part of it that shifts the
 //! transition (its distance parameter falls by `sin b`) is left out. At two edges it grows twice.
 
-use smallvec::SmallVec;
-
 use super::{Echo, Settings, Via};
-use crate::{geometry::DVec2, model::Reflector};
+use crate::geometry::DVec2;
 
 /// An image of the ranger below the floor or above the ceiling.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,12 +80,11 @@ impl Image {
     /// The ranger itself.
     pub(super) const NONE: Self = Self { rise_m: 0.0, bounces: 0, gain: 1.0 };
 
-    /// Floor and ceiling in the order in which they are met.
-    pub(super) fn met(&self) -> SmallVec<[Reflector; 4]> {
-        let first = u16::from(self.rise_m > 0.0);
-        (0..self.bounces)
-            .map(|i| if (first + i) % 2 == 0 { Reflector::Floor } else { Reflector::Ceiling })
-            .collect()
+    /// How much higher than it began a ray from this image comes to a place at a height above the ranger,
+    /// if floor and ceiling are windows, metres: each reflection at one of them turns it.
+    pub(super) fn climb_m(&self, rise_m: f64) -> f64 {
+        let below_m = rise_m - self.rise_m;
+        if self.bounces.is_multiple_of(2) { below_m } else { -below_m }
     }
 
     /// An echo of the plan by way of this image, which is number `index`; `None` if it is too long

@@ -1,11 +1,7 @@
 //! Single reflectors, whose echoes are known exactly.
 
 use super::*;
-use crate::{
-    acoustics::BeamPattern,
-    model::{Bend, Edge},
-    reading::PingStatus,
-};
+use crate::{acoustics::BeamPattern, model::Edge, reading::PingStatus};
 
 const SPACINGS_DEG: [f64; 3] = [0.4, 0.2, 0.05];
 
@@ -54,7 +50,7 @@ fn a_right_angled_corner_answers_from_its_vertex() {
         let bearing_deg = vertex.to_angle().to_degrees();
         let all = arrivals(scene(corner), at_spacing(spacing_deg), DVec2::ZERO, bearing_deg);
         let twice: Vec<_> =
-            of_kind(&all, PathKind::Specular).filter(|a| a.path.walls.len() == 2).collect();
+            of_kind(&all, PathKind::Specular).filter(|a| reflectors(&a.path).len() == 2).collect();
         // Either half of the beam meets the walls in its own order.
         assert_eq!(twice.len(), 2, "{spacing_deg}");
         for arrival in twice {
@@ -78,7 +74,7 @@ fn parallel_walls_answer_at_multiples_of_their_distance() {
         // Odd orders that begin at the north wall; even ones come back from behind.
         assert_eq!(found.len(), 2, "{spacing_deg}: {found:?}");
         for (arrival, (order, length_m)) in found.iter().zip([(1, 1.0), (3, 2.6)]) {
-            assert_eq!(arrival.path.walls.len(), order);
+            assert_eq!(reflectors(&arrival.path).len(), order);
             close(arrival.length_m, length_m, 1e-9, "length");
             close(arrival.amplitude, 0.9f64.powi(order as i32), 1e-6, "amplitude");
         }
@@ -94,7 +90,7 @@ fn a_free_end_returns_kuc_and_siegels_share_of_a_plane() {
         let all = arrivals(scene(vec![tilted]), BARE, DVec2::ZERO, 0.0);
         let found = of_kind(&all, PathKind::Diffracted)
             .find(|arrival| {
-                arrival.path.bends[..] == [Bend::Upright(Edge { wall: 0, at_b: false })]
+                bends(&arrival.path)[..] == [Bend::Upright(Edge { wall: 0, at_b: false })]
             })
             .expect("the end is heard");
         let wavelength_m = Air::default().sound_speed_m_s() / 49.4e3;
@@ -111,7 +107,7 @@ fn an_end_out_of_sight_is_silent() {
         wall("screen", (0.5, -0.4), (0.5, 0.4), 1.0),
     ];
     let all = arrivals(scene(walls), BARE, DVec2::ZERO, 0.0);
-    let of_second = |a: &Arrival| matches!(a.path.bends[..], [Bend::Upright(e)] if e.wall == 1);
+    let of_second = |a: &Arrival| matches!(bends(&a.path)[..], [Bend::Upright(e)] if e.wall == 1);
     assert!(of_kind(&all, PathKind::Diffracted).all(of_second));
 }
 

@@ -121,7 +121,7 @@ impl Score {
 /// 0 for a mirrored echo, 1 for a bent one.
 fn kind(found: &Prediction) -> usize {
     let arrival = found.arrival.as_ref().expect("an echo");
-    usize::from(arrival.path.kind == PathKind::Diffracted)
+    usize::from(arrival.path.kind() == PathKind::Diffracted)
 }
 
 #[test]

@@ -3,10 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::{
-    model::{Path, Prediction, Reflector},
-    plan::ScanPlan,
-};
+use crate::{model::Prediction, plan::ScanPlan};
 
 /// A room with a slanted partition and a post, and a place in it.
 fn room() -> (Scene, DVec2) {
@@ -155,8 +152,8 @@ fn a_finer_fan_reads_the_same_in_every_shipped_scene() {
 }
 
 fn met_round_body(prediction: &Prediction) -> bool {
-    let walls = prediction.arrival.iter().flat_map(|arrival| &arrival.path.walls);
-    walls.into_iter().any(|wall| matches!(wall, Reflector::Cylinder(_)))
+    let mut met = prediction.arrival.iter().flat_map(|arrival| arrival.path.reflectors());
+    met.any(|reflector| matches!(reflector, Reflector::Cylinder(_)))
 }
 
 fn range_differs(one: &Prediction, other: &Prediction, tolerance_m: f64) -> bool {

@@ -3,7 +3,7 @@
 use super::*;
 use crate::{
     geometry::{Mirror, wrap_pi},
-    model::{Bend, Path, Reflector, paths::Paths},
+    model::{RecordedPath, paths::Paths},
 };
 
 /// Each way has the path's length, leaves and comes back in its directions, and at each flat
@@ -20,11 +20,10 @@ fn every_path_of_every_shipped_scene_has_its_way() {
             let simulator =
                 Simulator::new(scene.clone(), sensor, Air::default(), options).expect("options");
             let paths = Paths::new(&scene, simulator.path_settings()).enumerate(pose.position());
-            for echo in paths.iter().filter(|echo| echo.path.kind != PathKind::Scattered) {
+            for echo in paths.iter().filter(|echo| echo.path.kind() != PathKind::Scattered) {
                 let record = &echo.path;
                 are_named(&echo.path, &scene);
-                let points = echo
-                    .path
+                let points = RecordedPath::from(&echo.path)
                     .points(&scene, pose.position(), echo.length_m)
                     .unwrap_or_else(|| panic!("{name}: no way for {record:?}"));
                 let [first, .., last] = points.as_slice() else { panic!("{record:?}") };
@@ -40,9 +39,9 @@ fn every_path_of_every_shipped_scene_has_its_way() {
                 let fits = |(out, back): &(f64, f64)| {
                     wrap_pi(leaves - out).abs() < 1e-3 && wrap_pi(comes - back).abs() < 1e-3
                 };
-                let known = if echo.path.bends.is_empty() { 1 } else { 2 };
+                let known = if bends(&echo.path).is_empty() { 1 } else { 2 };
                 assert!(ends[..known].iter().any(fits), "{name} {record:?}");
-                if echo.path.bends.is_empty() {
+                if bends(&echo.path).is_empty() {
                     mirrors(&scene, &echo.path, &points);
                 }
                 drawn += 1;
@@ -54,10 +53,10 @@ fn every_path_of_every_shipped_scene_has_its_way() {
 
 /// What a path meets is found again by its name.
 fn are_named(path: &Path, scene: &Scene) {
-    for wall in &path.walls {
+    for wall in &reflectors(path) {
         assert_eq!(Reflector::named(scene, &wall.name(scene)), Some(*wall));
     }
-    for bend in &path.bends {
+    for bend in &bends(path) {
         assert_eq!(Bend::named(scene, &bend.name(scene)), Some(*bend));
     }
 }
@@ -87,16 +86,16 @@ fn ways_in_space_and_by_two_edges_are_drawn_in_the_plan() {
         let record = &echo.path;
         are_named(&echo.path, &room);
         let is_level = |met: &Reflector| matches!(met, Reflector::Floor | Reflector::Ceiling);
-        let upright = echo.path.walls.iter().all(is_level);
-        if upright && echo.path.bends.is_empty() {
+        let upright = reflectors(&echo.path).iter().all(is_level);
+        if upright && bends(&echo.path).is_empty() {
             continue;
         }
-        let points = echo.path.points(&room, at, echo.length_m);
+        let points = RecordedPath::from(&echo.path).points(&room, at, echo.length_m);
         let points = points.unwrap_or_else(|| panic!("no way for {record:?}"));
         let run_m = |points: &[DVec2]| -> f64 {
             points.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
         };
-        let edge = record.bends.first().map(|bend| bend.name(&room));
+        let edge = record.bends().next().map(|bend| bend.name(&room));
         if edge.as_deref() == Some("low.top") {
             // As steep as it leaves up to the edge, as steep as it comes from there on.
             let [up, down] = echo.rise_rad.map(f64::cos);
@@ -110,16 +109,16 @@ fn ways_in_space_and_by_two_edges_are_drawn_in_the_plan() {
             let rise_m = echo.rise_rad[0].sin() * echo.length_m;
             assert!((run_m(&points).hypot(rise_m) - echo.length_m).abs() < 1e-6, "{record:?}");
         }
-        floors += usize::from(record.walls.contains(&Reflector::Floor));
-        twice += usize::from(record.bends.len() > 1);
+        floors += usize::from(reflectors(record).contains(&Reflector::Floor));
+        twice += usize::from(record.bends().count() > 1);
     }
     assert!(rims >= 4 && floors > 2 && twice > 2, "{rims} {floors} {twice}");
 }
 
 fn mirrors(scene: &Scene, path: &Path, points: &[DVec2]) {
-    for (corner, reflector) in points.windows(3).zip(&path.walls) {
+    for (corner, reflector) in points.windows(3).zip(path.reflectors()) {
         let Reflector::Wall(index) = reflector else { continue };
-        let wall = &scene.walls[*index as usize];
+        let wall = &scene.walls[index as usize];
         let turned = Mirror::through(wall.a, wall.b).turn(corner[1] - corner[0]);
         let (before, after) =
             (turned.normalize_or_zero(), (corner[2] - corner[1]).normalize_or_zero());
@@ -133,14 +132,14 @@ fn mirrors(scene: &Scene, path: &Path, points: &[DVec2]) {
 #[test]
 fn no_way_is_made_up() {
     let room = shipped_scene("simple-room");
-    let path = Path {
+    let path = RecordedPath {
         kind: PathKind::Specular,
-        walls: [Reflector::Wall(0)].into_iter().collect(),
+        walls: [Some(Reflector::Wall(0))].into_iter().collect(),
         bends: Default::default(),
     };
     let at = DVec2::new(0.774, 0.085);
     assert!(path.points(&room, at, 0.17).is_some());
     assert_eq!(path.points(&room, at, 0.3), None, "not of that length");
-    let missing = Path { walls: [Reflector::Wall(99)].into_iter().collect(), ..path };
+    let missing = RecordedPath { walls: [Some(Reflector::Wall(99))].into_iter().collect(), ..path };
     assert_eq!(missing.points(&room, at, 0.17), None, "no such wall");
 }

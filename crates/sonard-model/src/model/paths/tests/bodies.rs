@@ -134,7 +134,7 @@ fn ways_by_a_body_run_backwards_from_receiver_to_transmitter() {
     assert_eq!(strong(&there), strong(&back));
     for echo in there.iter().filter(|echo| echo.amplitude > 0.0101) {
         let found = back.iter().any(|other| {
-            other.path.walls.iter().eq(echo.path.walls.iter().rev())
+            reflectors(&other.path).iter().eq(reflectors(&echo.path).iter().rev())
                 && (other.length_m - echo.length_m).abs() < 1e-9
                 && (other.amplitude / echo.amplitude - 1.0).abs() < 1e-6
         });
@@ -148,7 +148,7 @@ fn contacts_go_on_as_long_as_they_are_heard() {
     let most = |floor: f64| {
         let paths = Paths::new(&narrow_room(), Settings { max_path_m: 3.0, floor, ..LOSSLESS });
         let at_body = |echo: &EchoPath| {
-            echo.path.walls.iter().filter(|wall| **wall == Reflector::Cylinder(0)).count()
+            reflectors(&echo.path).iter().filter(|wall| **wall == Reflector::Cylinder(0)).count()
         };
         paths.enumerate(DVec2::new(0.774, 0.085)).iter().map(at_body).max().unwrap_or(0)
     };

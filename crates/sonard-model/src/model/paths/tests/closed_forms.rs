@@ -35,7 +35,7 @@ fn a_right_angled_corner_answers_once_from_its_vertex() {
         let at = 0.8 * DVec2::from_angle(turn + 0.61);
         let settings = Settings { max_path_m: 10.0, edge_law: Some(EdgeLaw::Utd), ..LOSSLESS };
         let echoes = Paths::new(&dihedral(FRAC_PI_2, turn), settings).enumerate(at);
-        let double: Vec<_> = echoes.iter().filter(|e| e.path.walls.len() == 2).collect();
+        let double: Vec<_> = echoes.iter().filter(|e| reflectors(&e.path).len() == 2).collect();
         assert_eq!((echoes.len(), double.len()), (3, 1));
         assert!((double[0].length_m - 1.6).abs() < 1e-12);
         assert!((double[0].departure_rad - double[0].arrival_rad).abs() < 1e-12);
@@ -106,6 +106,6 @@ fn an_edge_seen_along_its_wall_answers() {
     let echoes = Paths::new(&wall, settings).enumerate(DVec2::new(-0.5, 0.0));
     assert_eq!(echoes.len(), 1);
     let end = Bend::Upright(Edge { wall: 0, at_b: false });
-    assert_eq!(echoes[0].path.bends[..], [end]);
+    assert_eq!(bends(&echoes[0].path)[..], [end]);
     assert!((echoes[0].length_m - 1.0).abs() < 1e-12);
 }

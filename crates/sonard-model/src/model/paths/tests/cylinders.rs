@@ -29,7 +29,7 @@ fn a_cylinder_answers_from_its_nearest_point_and_spreads() {
     let distance = 2.5 - 0.3;
     assert!((echoes[0].length_m - 2.0 * distance).abs() < 1e-12);
     assert!((echoes[0].amplitude - (0.3_f64 / (0.3 + distance)).sqrt()).abs() < 1e-12);
-    assert_eq!(echoes[0].path.walls[..], [Reflector::Cylinder(0)]);
+    assert_eq!(reflectors(&echoes[0].path)[..], [Reflector::Cylinder(0)]);
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn a_cylinder_hides_the_wall_behind_it() {
     let paths = Paths::new(&plan, settings);
     let kinds = |x: f64| {
         let echoes = paths.enumerate(DVec2::new(x, 0.0));
-        echoes.iter().map(|echo| echo.path.walls[0]).collect::<Vec<_>>()
+        echoes.iter().map(|echo| reflectors(&echo.path)[0]).collect::<Vec<_>>()
     };
     assert_eq!(kinds(0.1), [Reflector::Cylinder(0)]);
     assert_eq!(kinds(0.3), [Reflector::Cylinder(0), Reflector::Wall(0)]);
@@ -74,7 +74,7 @@ fn echoes_between_cylinder_and_walls_take_the_shortest_way() {
     // And those that touch the cylinder again and again: to and fro between the two.
     let once = echoes.iter().filter(|echo| {
         let is_round = |r: &&Reflector| matches!(r, Reflector::Cylinder(_));
-        echo.path.walls.iter().filter(is_round).count() < 2
+        reflectors(&echo.path).iter().filter(is_round).count() < 2
     });
     assert_eq!(once.count(), 5);
 }
@@ -146,7 +146,7 @@ fn echoes_by_two_cylinders_take_the_shortest_way() {
     ] {
         let (length_m, contacts) = shortest(at, &surfaces, &plan, &guess);
         let found: Vec<_> =
-            echoes.iter().filter(|echo| echo.path.walls[..] == surfaces[..]).collect();
+            echoes.iter().filter(|echo| reflectors(&echo.path)[..] == surfaces[..]).collect();
         assert_eq!(found.len(), 1, "{surfaces:?}: {found:?}");
         assert!((found[0].length_m - length_m).abs() < 1e-9, "{surfaces:?} {length_m}");
         let leaves = (contacts[0] - at).to_angle();
@@ -161,11 +161,11 @@ fn cylinders_spread_sound_as_rays_beside_it_diverge() {
     plan.cylinders = vec![cylinder(0.8, 0.3, 0.25), cylinder(-0.9, 0.1, 0.35)];
     let at = DVec2::new(0.1, 0.0);
     let echoes = Paths::new(&plan, Settings { max_path_m: 6.0, ..LOSSLESS }).enumerate(at);
-    let echo = echoes.iter().find(|echo| echo.path.walls.len() == 2).expect("by both");
+    let echo = echoes.iter().find(|echo| reflectors(&echo.path).len() == 2).expect("by both");
     // A ray of its own: on to the first and the second circle, and to abreast of the start.
     let trace = |angle: f64| {
         let (mut p, mut d) = (at, DVec2::from_angle(angle));
-        for wall in &echo.path.walls {
+        for wall in &reflectors(&echo.path) {
             let Reflector::Cylinder(i) = *wall else { panic!("a wall") };
             let round = &plan.cylinders[i as usize];
             let foot = (round.center - p).dot(d);
@@ -196,7 +196,7 @@ fn a_huge_cylinder_is_a_wall() {
     let (round, flat) = (all(&round), all(&flat));
     // Ways by more than one contact are followed down to ten times the floor.
     let at_round = |echo: &&EchoPath| {
-        echo.path.walls.iter().filter(|wall| **wall == Reflector::Wall(2)).count()
+        reflectors(&echo.path).iter().filter(|wall| **wall == Reflector::Wall(2)).count()
     };
     let flat: Vec<_> = flat.iter().filter(|echo| echo.amplitude > 0.01).collect();
     assert!(flat.iter().filter(|echo| at_round(echo) > 1).count() > 10);
@@ -204,8 +204,8 @@ fn a_huge_cylinder_is_a_wall() {
         let is_same = |one: &&EchoPath| {
             (one.length_m - other.length_m).abs() < 1e-3
                 && (one.amplitude - other.amplitude).abs() < 1e-2 * other.amplitude
-                && one.path.bends == other.path.bends
-                && one.path.walls.len() == other.path.walls.len()
+                && bends(&one.path) == bends(&other.path)
+                && reflectors(&one.path).len() == reflectors(&other.path).len()
         };
         assert!(round.iter().any(|one| is_same(&one)), "{other:?}");
     }
@@ -230,8 +230,8 @@ fn edges_answer_by_way_of_cylinders() {
         .fold(f64::INFINITY, f64::min);
     let bent: Vec<_> = echoes
         .iter()
-        .filter(|echo| matches!(echo.path.bends[..], [Bend::Upright(edge)] if !edge.at_b))
-        .map(|echo| (echo.length_m, echo.path.walls.len()))
+        .filter(|echo| matches!(bends(&echo.path)[..], [Bend::Upright(edge)] if !edge.at_b))
+        .map(|echo| (echo.length_m, reflectors(&echo.path).len()))
         .collect();
     for (expected, count) in [(2.4, 1), (1.2 + by, 2), (2.0 * by, 1)] {
         let found = bent.iter().filter(|echo| (echo.0 - expected).abs() < 1e-9).count();

@@ -19,9 +19,9 @@ fn simulator(scene: &Arc<Scene>, engine: EngineKind, ray_spacing_deg: f64) -> Si
 fn mirrored(station: &Station, pose: &Pose, azimuth_deg: f64) -> Vec<Arrival> {
     let mut arrivals = station.arrivals(pose.direction_rad(azimuth_deg));
     arrivals.retain(|arrival| {
-        arrival.path.kind == PathKind::Specular
+        arrival.path.kind() == PathKind::Specular
             && arrival.amplitude > 0.02
-            && !arrival.path.walls.contains(&crate::model::Reflector::Face)
+            && arrival.path.mechanisms().all(|met| met != crate::model::Mechanism::Transducer)
     });
     arrivals
 }

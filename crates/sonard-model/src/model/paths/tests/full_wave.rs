@@ -77,8 +77,8 @@ impl Chain {
         let k = TAU * f / self.c;
         // Seen through an odd number of mirrors the aperture is mirrored; an edge forgets where
         // on the aperture the sound left, but looks otherwise from each place.
-        let bent = echo.path.kind == PathKind::Diffracted;
-        let side = if echo.path.walls.len() % 2 == 1 { -1.0 } else { 1.0 };
+        let bent = echo.path.kind() == PathKind::Diffracted;
+        let side = if reflectors(&echo.path).len() % 2 == 1 { -1.0 } else { 1.0 };
         let point = |i: i32| self.half_width_m * (f64::from(2 * i + 1) / f64::from(POINTS) - 1.0);
         let shares = edge.map(|edge| edge.shares());
         let mut sum = Complex64::ZERO;
@@ -132,7 +132,7 @@ impl Chain {
                     .filter(|&e| (lengths[e] - place(i)).abs() < 0.015)
                     .max_by(|&a, &b| middle[a].norm().total_cmp(&middle[b].norm()));
                 let bent = strongest
-                    .is_some_and(|e| self.echoes[0].1[e].echo.path.kind == PathKind::Diffracted);
+                    .is_some_and(|e| self.echoes[0].1[e].echo.path.kind() == PathKind::Diffracted);
                 (place(i), heights[i], bent)
             })
             .collect()

@@ -38,10 +38,9 @@ fn every_way_can_be_run_through_backwards() {
     let echoes = Paths::new(&scene(&clutter()), settings()).enumerate(AT);
     assert!(echoes.len() > 100, "{}", echoes.len());
     for echo in &echoes {
-        let mut backwards = echo.path.clone();
-        backwards.walls.reverse();
+        let backwards: Vec<_> = echo.path.mechanisms().rev().collect();
         let found = echoes.iter().any(|other| {
-            other.path == backwards
+            other.path.mechanisms().eq(backwards.iter().copied())
                 && (other.length_m - echo.length_m).abs() < 1e-10
                 && (other.amplitude - echo.amplitude).abs() < 1e-9
                 && wrap(other.phase_rad - echo.phase_rad).abs() < 1e-6
@@ -121,7 +120,7 @@ fn no_echo_gains_energy_and_more_loss_leaves_less() {
     let steps = [(1.0, 0.0), (0.9, 0.0), (0.9, 0.1), (0.5, 0.1), (0.5, 0.5)];
     for pair in steps.windows(2) {
         let (more, less) = (with(pair[0].0, pair[0].1), with(pair[1].0, pair[1].1));
-        for echo in less.iter().filter(|echo| echo.path.kind == PathKind::Specular) {
+        for echo in less.iter().filter(|echo| echo.path.kind() == PathKind::Specular) {
             let before = more.iter().find(|other| other.path == echo.path);
             let before = before.unwrap_or_else(|| panic!("{echo:?} comes out of nothing"));
             assert!(echo.amplitude < before.amplitude);

@@ -47,7 +47,9 @@ fn lengths_are_those_of_both_ways() {
     ] {
         let found: Vec<_> = echoes
             .iter()
-            .filter(|echo| echo.path.walls[..] == walls[..] && echo.path.bends.is_empty() != bent)
+            .filter(|echo| {
+                reflectors(&echo.path)[..] == walls[..] && bends(&echo.path).is_empty() != bent
+            })
             .filter(|echo| (echo.length_m - expected).abs() < 1e-9)
             .collect();
         assert_eq!(found.len(), 1, "{walls:?} {expected}: {echoes:#?}");
@@ -64,11 +66,11 @@ fn the_same_way_back_from_receiver_to_transmitter() {
     let (there, back) = (paths.enumerate_between(T, R), paths.enumerate_between(R, T));
     assert!(there.len() >= 15, "{}", there.len());
     for echo in there.iter().filter(|echo| echo.amplitude > 2e-3) {
-        let mut walls = echo.path.walls.clone();
+        let mut walls = reflectors(&echo.path);
         walls.reverse();
         let found = back.iter().any(|other| {
-            other.path.walls == walls
-                && other.path.bends == echo.path.bends
+            reflectors(&other.path) == walls
+                && bends(&other.path) == bends(&echo.path)
                 && (other.length_m - echo.length_m).abs() < 1e-9
                 && (other.amplitude - echo.amplitude).abs() < 1e-6 * echo.amplitude
                 && crate::geometry::wrap_pi(other.departure_rad - echo.arrival_rad).abs() < 1e-7

@@ -37,7 +37,7 @@ fn in_random_polygons_the_images_are_those_of_pyroomacoustics() {
         for echo in &echoes {
             let image = at + echo.length_m * DVec2::from_angle(echo.arrival_rad);
             let place = images.iter().position(|&(order, x, y)| {
-                order == echo.path.walls.len() && image.distance(DVec2::new(x, y)) < CLOSE_M
+                order == reflectors(&echo.path).len() && image.distance(DVec2::new(x, y)) < CLOSE_M
             });
             let place = place.unwrap_or_else(|| panic!("case {number}: only here: {echo:?}"));
             images.swap_remove(place);

@@ -8,14 +8,14 @@ use super::{
     half_plane::{K, Spot, keller, macdonald},
     *,
 };
-use crate::model::Reflector;
+use crate::model::{Mechanism, Reflector};
 
 pub(super) fn at_height(z_m: f64) -> Settings {
     Settings { sensor_z_m: Some(z_m), max_path_m: 8.0, edge_law: Some(EdgeLaw::Utd), ..LOSSLESS }
 }
 
 pub(super) fn is_rim(echo: &EchoPath) -> bool {
-    matches!(echo.path.bends[..], [Bend::Level { .. }])
+    matches!(bends(&echo.path)[..], [Bend::Level { .. }])
 }
 
 /// Pressure of an echo beside a source's at 1 m.
@@ -31,6 +31,11 @@ fn low_wall() -> Scene {
     plan
 }
 
+/// The upper edge of a wall, as what bends a path.
+fn top_of(wall: u32) -> Mechanism {
+    Mechanism::Diffraction(Bend::Level { wall, is_upper: true })
+}
+
 fn rims(plan: &Scene, at: DVec2, z_m: f64) -> Vec<EchoPath> {
     let mut echoes = Paths::new(plan, at_height(z_m)).enumerate(at);
     echoes.retain(is_rim);
@@ -41,13 +46,13 @@ fn rims(plan: &Scene, at: DVec2, z_m: f64) -> Vec<EchoPath> {
 fn the_upper_edge_of_a_low_wall_answers_from_the_foot_of_the_perpendicular() {
     for (z_m, exact) in [(0.9, 3e-3), (1.3, 3e-3), (0.5, 3e-2)] {
         let mut found = rims(&low_wall(), DVec2::new(0.4, 0.0), z_m);
-        found.retain(|echo| !echo.path.walls.contains(&Reflector::Floor));
+        found.retain(|echo| !reflectors(&echo.path).contains(&Reflector::Floor));
         assert_eq!(found.len(), 1, "{found:?}");
         let distance_m = 1_f64.hypot(z_m - 0.3);
         assert!((found[0].length_m - 2.0 * distance_m).abs() < 1e-12);
         assert!((found[0].rise_rad[0] + (z_m - 0.3).atan()).abs() < 1e-12);
         assert!((found[0].departure_rad - FRAC_PI_2).abs() < 1e-9);
-        assert_eq!(found[0].path.walls[..], [Reflector::Wall(0)]);
+        assert_eq!(found[0].path.mechanisms().collect::<Vec<_>>(), [top_of(0)]);
         let keller = keller([1_f64.atan2(0.3 - z_m); 2], 0.5 * distance_m);
         assert!((found[0].amplitude / keller - 1.0).abs() < exact, "{z_m}: {found:?} {keller}");
     }
@@ -61,10 +66,10 @@ fn the_upper_edge_of_a_low_wall_answers_from_the_foot_of_the_perpendicular() {
         ..hidden.walls[0].clone()
     });
     let mut found = rims(&hidden, DVec2::new(0.4, 0.0), 0.9);
-    found.retain(|echo| !echo.path.walls.contains(&Reflector::Floor));
+    found.retain(|echo| !reflectors(&echo.path).contains(&Reflector::Floor));
     assert_eq!(
-        found.iter().map(|echo| echo.path.walls[0]).collect::<Vec<_>>(),
-        [Reflector::Wall(1)]
+        found.iter().flat_map(|echo| echo.path.mechanisms()).collect::<Vec<_>>(),
+        [top_of(1)]
     );
 }
 
@@ -75,7 +80,8 @@ fn a_wall_ends_gradually_at_its_upper_edge() {
         let settings = Settings { max_path_m: 2.3, ..at_height(z_m) };
         let echoes = Paths::new(&low_wall(), settings).enumerate(DVec2::ZERO);
         // Without what comes by the floor.
-        let level = echoes.iter().filter(|echo| !echo.path.walls.contains(&Reflector::Floor));
+        let level =
+            echoes.iter().filter(|echo| !reflectors(&echo.path).contains(&Reflector::Floor));
         level
             .map(|e| Complex64::from_polar(e.amplitude, e.phase_rad - K * (e.length_m - 2.0)))
             .sum::<Complex64>()
@@ -116,9 +122,9 @@ fn by_the_floor_a_rim_is_seen_from_an_image() {
             let off = (pressure(echo) - gain * exact).norm() * echo.length_m;
             assert!(off < 0.003, "{z_m}: {echo:?} {exact} {off}");
             let floors = usize::from(out_below) + usize::from(back_below);
-            let mut walls = vec![Reflector::Wall(0)];
-            walls.resize(1 + floors, Reflector::Floor);
-            assert_eq!(echo.path.walls[..], walls);
+            assert_eq!(reflectors(&echo.path), vec![Reflector::Floor; floors]);
+            let met: Vec<_> = echo.path.mechanisms().collect();
+            assert_eq!(met[usize::from(out_below)], top_of(0), "{echo:?}");
         }
     }
     // On the floor itself the ranger is its own image: four times the edge's field.
@@ -140,10 +146,10 @@ fn beside_a_high_wall_a_rim_answers_slantwise() {
     let mut room = scene(&[[0.0, -3.0, 0.0, 3.0], [0.0, 0.0, 4.0, 0.0]]);
     room.floor_z_m = Some(0.0);
     room.walls[1].z_m = Some([0.0, top]);
-    let (high, low, floor) = (Reflector::Wall(0), Reflector::Wall(1), Reflector::Floor);
+    let (high, floor) = (Reflector::Wall(0), Reflector::Floor);
     let echoes = Paths::new(&room, at_height(z_m)).enumerate(DVec2::new(x, -d));
     let slant: Vec<_> =
-        echoes.iter().filter(|e| is_rim(e) && e.path.walls.contains(&high)).collect();
+        echoes.iter().filter(|e| is_rim(e) && reflectors(&e.path).contains(&high)).collect();
     let [above_m, below_m] = [z_m - top, z_m + top];
     let [above, below] = [d.hypot(above_m), d.hypot(below_m)];
     for (offs, angles, floors, count) in [
@@ -158,15 +164,16 @@ fn beside_a_high_wall_a_rim_answers_slantwise() {
         let amplitude = keller(around_rad, offs[0] * offs[1] / length_m);
         for echo in found {
             assert!((echo.amplitude / amplitude - 1.0).abs() < 0.03, "{echo:?} {amplitude}");
-            let met: Vec<_> = echo.path.walls.iter().filter(|wall| **wall != floor).collect();
-            assert!(met == [&low, &high] || met == [&high, &low], "{echo:?}");
-            assert_eq!(echo.path.walls.len(), 2 + floors);
+            let (floor, high) = (Mechanism::Reflection(floor), Mechanism::Reflection(high));
+            let met: Vec<_> = echo.path.mechanisms().filter(|met| *met != floor).collect();
+            assert!(met == [top_of(1), high] || met == [high, top_of(1)], "{echo:?}");
+            assert_eq!(echo.path.order(), 1 + floors);
         }
     }
     assert_eq!(slant.len(), 4, "{slant:#?}");
     // By the floor it bends beside the corner, nearer to the foot of the shorter leg.
     let place_m = x * (below - above) / (below + above);
-    let side = slant.iter().find(|e| e.path.walls.len() == 3).expect("one by the floor");
+    let side = slant.iter().find(|e| e.path.order() == 2).expect("one by the floor");
     let direct_rad = d.atan2(place_m - x);
     let ends = [side.departure_rad, side.arrival_rad];
     assert!(ends.iter().any(|end_rad| (end_rad - direct_rad).abs() < 1e-9), "{side:?}");
@@ -280,7 +287,7 @@ fn both_rims_of_a_plate_answer() {
     let mut plan = low_wall();
     plan.walls[0].z_m = Some([0.6, 1.2]);
     let found = rims(&plan, DVec2::ZERO, 0.9);
-    let near = found.iter().filter(|echo| echo.path.walls.len() == 1);
+    let near = found.iter().filter(|echo| echo.path.interactions.len() == 1);
     assert_eq!(near.count(), 2, "{found:?}");
 }
 
@@ -297,7 +304,7 @@ fn a_rim_in_pieces_is_one() {
         ..cut.walls[0].clone()
     });
     let mut pieces = rims(&cut, DVec2::new(0.25, 0.0), 0.9);
-    pieces.retain(|e| matches!(e.path.bends[..], [Bend::Level { wall: 0, .. }]));
+    pieces.retain(|e| matches!(bends(&e.path)[..], [Bend::Level { wall: 0, .. }]));
     assert_eq!(pieces.len(), whole.len(), "{pieces:#?}");
 }
 
@@ -320,8 +327,8 @@ fn jumps(plan: &Scene, heights_m: [f64; 2], [from, to]: [DVec2; 2]) -> Vec<(f64,
     let mirrored = |echoes: &[EchoPath]| {
         let mut ways: Vec<_> = echoes
             .iter()
-            .filter(|e| e.path.bends.is_empty() && e.length_m < 6.0)
-            .map(|e| e.path.walls.to_vec())
+            .filter(|e| bends(&e.path).is_empty() && e.length_m < 6.0)
+            .map(|e| reflectors(&e.path).to_vec())
             .collect();
         ways.sort();
         ways
@@ -344,7 +351,7 @@ fn jumps(plan: &Scene, heights_m: [f64; 2], [from, to]: [DVec2; 2]) -> Vec<(f64,
         let [before, after] = [low, high].map(echoes);
         let mirrors = |echoes: &[EchoPath]| {
             let mut echoes = echoes.to_vec();
-            echoes.retain(|echo| echo.path.bends.is_empty());
+            echoes.retain(|echo| bends(&echo.path).is_empty());
             sum(&echoes)
         };
         let alone = (mirrors(&before) - mirrors(&after)).norm();

@@ -20,7 +20,7 @@ fn power(reflectance: f64, roughness: f64, aside_rad: f64, sensor: &Sensor) -> (
     let engine = PathEngine::new(&plan, beam, None, settings);
     let arrivals = engine.survey(DVec2::ZERO).arrivals(FRAC_PI_2 - aside_rad);
     let of = |kind: PathKind| {
-        arrivals.iter().filter(|a| a.path.kind == kind).map(|a| a.amplitude.powi(2)).sum()
+        arrivals.iter().filter(|a| a.path.kind() == kind).map(|a| a.amplitude.powi(2)).sum()
     };
     (of(PathKind::Specular), of(PathKind::Scattered))
 }

@@ -40,7 +40,7 @@ fn each_is_met_at_its_own_height() {
     for (z_m, first, length_m) in [(0.5, 0, 3.0), (1.1, 3, 6.0), (2.0, 1, 3.0)] {
         let ahead: Vec<_> = echoes(&room, z_m, None)
             .into_iter()
-            .filter(|echo| echo.path.walls[..] == [Reflector::Wall(first)])
+            .filter(|echo| reflectors(&echo.path)[..] == [Reflector::Wall(first)])
             .collect();
         assert_eq!(ahead.len(), 1, "{z_m}: {ahead:?}");
         assert!((ahead[0].length_m - length_m).abs() < 1e-9, "{z_m}: {ahead:?}");
@@ -55,7 +55,9 @@ fn which_is_named_first_does_not_matter() {
         let sorted = |room: &Scene, law| {
             let mut all: Vec<[f64; 2]> = echoes(room, z_m, law)
                 .iter()
-                .filter(|echo| !echo.path.bends.iter().any(|bend| matches!(bend, Bend::Upright(_))))
+                .filter(|echo| {
+                    !bends(&echo.path).iter().any(|bend| matches!(bend, Bend::Upright(_)))
+                })
                 .map(|echo| [echo.length_m, echo.amplitude])
                 .collect();
             all.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));

@@ -138,7 +138,7 @@ fn double() -> Settings {
 }
 
 fn bent_twice(echoes: Vec<EchoPath>) -> Vec<EchoPath> {
-    echoes.into_iter().filter(|echo| echo.path.bends.len() == 2).collect()
+    echoes.into_iter().filter(|echo| bends(&echo.path).len() == 2).collect()
 }
 
 /// Two parallel screens with their free ends side by side, and the product written out.
@@ -152,11 +152,13 @@ fn between_two_free_ends_it_is_the_product_of_their_coefficients() {
         [from.distance(ends[0]), ends[0].distance(ends[1]), to.distance(ends[1])];
     let straight: Vec<_> = echoes
         .iter()
-        .filter(|echo| echo.path.walls.is_empty() && echo.length_m < out + across + back + 1e-9)
+        .filter(|echo| {
+            reflectors(&echo.path).is_empty() && echo.length_m < out + across + back + 1e-9
+        })
         .collect();
     assert_eq!(straight.len(), 1);
     let names = [Edge { wall: 0, at_b: false }, Edge { wall: 1, at_b: false }];
-    assert_eq!(straight[0].path.bends[..], names.map(Bend::Upright));
+    assert_eq!(bends(&straight[0].path)[..], names.map(Bend::Upright));
     assert!((straight[0].length_m - (out + across + back)).abs() < 1e-12);
 
     // Keller's coefficient of a half plane, angles from its face, far from both boundaries.
@@ -204,14 +206,14 @@ fn each_way_can_be_run_through_backwards() {
         let back = bent_twice(paths.enumerate_between(other, one));
         assert!(out.len() > 30 && out.len() == back.len(), "{} {}", out.len(), back.len());
         assert!(out.iter().any(|echo| {
-            echo.path.walls.iter().any(|wall| matches!(wall, crate::model::Reflector::Cylinder(_)))
+            reflectors(&echo.path)
+                .iter()
+                .any(|wall| matches!(wall, crate::model::Reflector::Cylinder(_)))
         }));
         for echo in &out {
-            let mut reverse = echo.path.clone();
-            reverse.walls.reverse();
-            reverse.bends.reverse();
+            let reverse: Vec<_> = echo.path.mechanisms().rev().collect();
             let count = back.iter().filter(|other| {
-                other.path == reverse
+                other.path.mechanisms().eq(reverse.iter().copied())
                     && (other.length_m - echo.length_m).abs() < 1e-9
                     && (other.amplitude - echo.amplitude).abs() < 1e-9
                     && crate::geometry::wrap_pi(other.departure_rad - echo.arrival_rad).abs() < 1e-7
@@ -240,7 +242,9 @@ fn where_the_second_edge_ceases_to_hide_the_first_nothing_jumps() {
             let least_m = from.length() + edge.length() + 0.6;
             let near = paths.enumerate_between(from, to);
             near.iter()
-                .filter(|echo| echo.path.walls.is_empty() && (echo.length_m - least_m).abs() < 1e-2)
+                .filter(|echo| {
+                    reflectors(&echo.path).is_empty() && (echo.length_m - least_m).abs() < 1e-2
+                })
                 .map(|echo| {
                     let phase = echo.phase_rad - k * (echo.length_m - least_m);
                     Complex64::from_polar(echo.amplitude, phase)

@@ -24,7 +24,7 @@ fn a_wall_and_the_floor_answer_from_their_corner() {
     }
     assert_eq!(lengths.len(), 3);
     let corner = &echoes[2];
-    assert_eq!(corner.path.walls[..], [Reflector::Wall(0), Reflector::Floor]);
+    assert_eq!(reflectors(&corner.path)[..], [Reflector::Wall(0), Reflector::Floor]);
     let below = -(h / d).atan();
     assert!((corner.rise_rad[0] - below).abs() < 1e-12);
     assert!((corner.rise_rad[1] - below).abs() < 1e-12, "as steep back as there");
@@ -79,7 +79,7 @@ fn floor_and_ceiling_leave_what_their_materials_do() {
     let settings = Settings { max_path_m: 6.0, floor: 0.02, ..at_height(0.3) };
     let echoes = Paths::new(&room, settings.clone()).enumerate(DVec2::new(0.4, 0.25));
     for echo in &echoes {
-        let gains = echo.path.walls.iter().map(|met| match met {
+        let gains = echo.path.reflectors().map(|met| match met {
             Reflector::Floor => 0.5,
             Reflector::Ceiling => 0.81,
             _ => 0.8,
@@ -87,7 +87,8 @@ fn floor_and_ceiling_leave_what_their_materials_do() {
         let all: f64 = gains.product();
         assert!((echo.amplitude / all - 1.0).abs() < 1e-12, "{echo:?}");
     }
-    let corner = echoes.iter().find(|e| e.path.walls[..] == [Reflector::Wall(3), Reflector::Floor]);
+    let corner =
+        echoes.iter().find(|e| reflectors(&e.path)[..] == [Reflector::Wall(3), Reflector::Floor]);
     assert!((corner.expect("the corner").amplitude - 0.4).abs() < 1e-12);
     // None is left out but for its weakness.
     let rigid = Scene {
@@ -98,7 +99,8 @@ fn floor_and_ceiling_leave_what_their_materials_do() {
     let all =
         Paths::new(&rigid, Settings { floor: 1e-4, ..settings }).enumerate(DVec2::new(0.4, 0.25));
     let strong = all.iter().filter(|echo| {
-        let hits = |level| echo.path.walls.iter().filter(|met| **met == level).count() as i32;
+        let hits =
+            |level| reflectors(&echo.path).iter().filter(|met| **met == level).count() as i32;
         let left = 0.5_f64.powi(hits(Reflector::Floor)) * 0.81_f64.powi(hits(Reflector::Ceiling));
         echo.amplitude * left >= 0.02
     });
@@ -118,7 +120,7 @@ fn the_beam_is_weighed_in_space_and_a_tilt_finds_the_floor() {
         let engine = PathEngine::new(&room, beam.clone(), None, settings);
         let place = engine.survey(DVec2::ZERO);
         let arrivals = place.arrivals(FRAC_PI_2);
-        arrivals.iter().find(|a| a.path.walls[..] == *walls).map_or(0.0, |a| a.amplitude)
+        arrivals.iter().find(|a| reflectors(&a.path)[..] == *walls).map_or(0.0, |a| a.amplitude)
     };
     let (wall, corner) = ([Reflector::Wall(0)], [Reflector::Wall(0), Reflector::Floor]);
     let below = (h / d).atan();
@@ -153,7 +155,7 @@ fn a_low_wall_is_missed_above_and_bars_the_way_below() {
         let mut met: Vec<_> = Paths::new(room, settings)
             .enumerate(DVec2::ZERO)
             .into_iter()
-            .map(|echo| echo.path.walls.to_vec())
+            .map(|echo| reflectors(&echo.path).to_vec())
             .collect();
         met.sort();
         met
@@ -187,7 +189,7 @@ fn a_low_cylinder_hides_only_what_is_behind_it() {
     let level = |z_m: f64| {
         let echoes = Paths::new(&plan, at_height(z_m)).enumerate(DVec2::ZERO);
         let level = echoes.iter().filter(|echo| echo.rise_rad == [0.0; 2]);
-        level.map(|echo| echo.path.walls[0]).collect::<Vec<_>>()
+        level.map(|echo| reflectors(&echo.path)[0]).collect::<Vec<_>>()
     };
     assert_eq!(level(0.4), [Reflector::Cylinder(0)]);
     assert_eq!(level(0.6), [Reflector::Wall(0)]);
@@ -207,7 +209,7 @@ fn corners_of_low_walls_answer_as_those_of_high_ones() {
         let level = |plan: &Scene, at: DVec2| -> Vec<f64> {
             let mut echoes = Paths::new(plan, settings.clone()).enumerate(frame.rotate(at));
             let is_rim = |bend: &Bend| matches!(bend, Bend::Level { .. });
-            echoes.retain(|e| e.rise_rad == [0.0; 2] && !e.path.bends.iter().any(is_rim));
+            echoes.retain(|e| e.rise_rad == [0.0; 2] && !bends(&e.path).iter().any(is_rim));
             echoes.iter().map(|echo| echo.length_m).collect()
         };
         for at in [DVec2::new(-0.4, 0.3), DVec2::new(0.4, -0.3)] {

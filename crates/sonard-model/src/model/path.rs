@@ -1,0 +1,150 @@
+//! Propagation paths: what the sound interacts with between transmitter and receiver.
+
+use crate::{geometry::DVec2, reading::PathKind};
+
+/// A propagation path: its interactions in the order in which the sound meets them.
+///
+/// From transmitter over all points to receiver it runs straight from each to the next.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Path {
+    /// From the transmitter to the receiver.
+    pub interactions: Vec<Interaction>,
+}
+
+/// A point where the sound changes its direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interaction {
+    /// What changes it.
+    pub mechanism: Mechanism,
+    /// Where, in the plan (world, metres).
+    pub point: DVec2,
+    /// At which height, metres; `None` in a scene without floor and ceiling, and from engines that know
+    /// no heights.
+    pub z_m: Option<f64>,
+}
+
+/// How a direction of propagation is changed, and by which part of the scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Mechanism {
+    /// Mirror reflection (by engine [`Cone`](super::Cone), which knows no mirrors: the nearest hit).
+    Reflection(Reflector),
+    /// Diffraction at an edge.
+    Diffraction(Bend),
+    /// Diffuse scattering by the roughness of a wall.
+    Scattering {
+        /// Index into `scene.walls`.
+        wall: u32,
+    },
+    /// Return from the face of the transducer, which sends an echo out once more.
+    Transducer,
+}
+
+/// A surface of the scene that reflects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Reflector {
+    /// `scene.walls[i]`.
+    Wall(u32),
+    /// `scene.cylinders[i]`.
+    Cylinder(u32),
+    /// The floor of a scene with heights.
+    Floor,
+    /// Its ceiling.
+    Ceiling,
+}
+
+/// An edge of a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Bend {
+    /// An upright one: where walls end or meet.
+    Upright(Edge),
+    /// A level one of a wall that ends below the ceiling or above the floor.
+    Level {
+        /// Index into `scene.walls`.
+        wall: u32,
+        /// Whether it is the wall's upper one (else the lower).
+        is_upper: bool,
+    },
+}
+
+/// An end of a wall.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Edge {
+    /// Index into `scene.walls`.
+    pub wall: u32,
+    /// Whether it is end `b` (else `a`).
+    pub at_b: bool,
+}
+
+impl Path {
+    /// What sends the sound back, in one word: scattering if any wall scatters it, else diffraction if
+    /// any edge bends it.
+    #[must_use]
+    pub fn kind(&self) -> PathKind {
+        kind(self.mechanisms())
+    }
+
+    /// Number of mirror reflections, at walls, cylinders, floor and ceiling. Diffraction and scattering
+    /// do not count, and neither does the transducer's face: a few wavelengths wide, it is no mirror.
+    #[must_use]
+    pub fn order(&self) -> usize {
+        self.reflectors().count()
+    }
+
+    /// What happens to the sound, in order.
+    pub fn mechanisms(&self) -> impl DoubleEndedIterator<Item = Mechanism> {
+        self.interactions.iter().map(|interaction| interaction.mechanism)
+    }
+
+    /// Its mirror reflections, in order.
+    pub fn reflectors(&self) -> impl DoubleEndedIterator<Item = Reflector> {
+        self.mechanisms().filter_map(|mechanism| match mechanism {
+            Mechanism::Reflection(reflector) => Some(reflector),
+            _ => None,
+        })
+    }
+
+    /// The edges that diffract it, in order.
+    pub fn bends(&self) -> impl DoubleEndedIterator<Item = Bend> {
+        self.mechanisms().filter_map(|mechanism| match mechanism {
+            Mechanism::Diffraction(bend) => Some(bend),
+            _ => None,
+        })
+    }
+
+    /// The path as a line in the plan, from a transmitter to a receiver at these places.
+    #[must_use]
+    pub fn polyline(&self, [transmitter, receiver]: [DVec2; 2]) -> Vec<DVec2> {
+        let points = self.interactions.iter().map(|interaction| interaction.point);
+        std::iter::once(transmitter).chain(points).chain([receiver]).collect()
+    }
+
+    /// The same path from the receiver to the transmitter.
+    #[must_use]
+    pub fn reversed(mut self) -> Self {
+        self.interactions.reverse();
+        self
+    }
+}
+
+/// [`Path::kind`] of a path with these mechanisms.
+pub(super) fn kind(mechanisms: impl Iterator<Item = Mechanism>) -> PathKind {
+    mechanisms.fold(PathKind::Specular, |kind, mechanism| match mechanism {
+        Mechanism::Scattering { .. } => PathKind::Scattered,
+        Mechanism::Diffraction(_) if kind == PathKind::Specular => PathKind::Diffracted,
+        _ => kind,
+    })
+}
+
+impl Mechanism {
+    /// The wall or cylinder at whose surface or edge it happens, floor or ceiling; `None` for the
+    /// transducer.
+    #[must_use]
+    pub const fn surface(self) -> Option<Reflector> {
+        match self {
+            Self::Reflection(reflector) => Some(reflector),
+            Self::Diffraction(Bend::Upright(Edge { wall, .. }) | Bend::Level { wall, .. })
+            | Self::Scattering { wall } => Some(Reflector::Wall(wall)),
+            Self::Transducer => None,
+        }
+    }
+}

@@ -1,0 +1,351 @@
+//! Paths as their interactions: each runs straight from point to point, is as long as it says, and changes
+//! its direction by the law of what it meets.
+
+use glam::DVec3;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::*;
+use crate::{
+    acoustics::edge::EdgeLaw,
+    geometry::{DVec2, Mirror, SNAP_M, square_up, wrap_pi},
+    model::{
+        Edge, Interaction, Mechanism,
+        paths::{EchoPath, Paths, Settings},
+    },
+};
+
+/// Stretches shorter than this, metres, tell no direction.
+const SHORT_M: f64 = 1e-4;
+
+/// The points of a path in space; everything at the same height in a scene without heights.
+fn points(path: &Path, ends: [DVec2; 2], z_m: Option<f64>) -> Vec<DVec3> {
+    let end = |at: DVec2| at.extend(z_m.unwrap_or(0.0));
+    let point = |at: &Interaction| at.point.extend(at.z_m.unwrap_or(0.0));
+    let between = path.interactions.iter().map(point);
+    [end(ends[0])].into_iter().chain(between).chain([end(ends[1])]).collect()
+}
+
+fn length_m(points: &[DVec3]) -> f64 {
+    points.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
+}
+
+fn is_round(path: &Path) -> bool {
+    path.reflectors().any(|met| matches!(met, Reflector::Cylinder(_)))
+}
+
+/// A scene with its walls as the engine has them, which makes corners square that rounding made
+/// nearly so.
+struct Room {
+    scene: Scene,
+    z_m: Option<f64>,
+}
+
+impl Room {
+    fn new(scene: &Scene, z_m: Option<f64>) -> Self {
+        let mut scene = scene.clone();
+        let mut segments: Vec<_> = scene.walls.iter().map(|wall| (wall.a, wall.b)).collect();
+        square_up(&mut segments);
+        for (wall, (a, b)) in scene.walls.iter_mut().zip(segments) {
+            (wall.a, wall.b) = (a, b);
+        }
+        Self { scene, z_m }
+    }
+
+    /// Whether a path obeys the laws; `length_off_m` is what its length may differ by.
+    fn check(&self, path: &Path, ends: [DVec2; 2], stated_m: f64, length_off_m: f64) {
+        let points = points(path, ends, self.z_m);
+        let off_m = length_m(&points) - stated_m;
+        assert!(off_m.abs() < length_off_m, "{off_m} of {stated_m}: {path:?} {points:?}");
+        for (at, interaction) in path.interactions.iter().enumerate() {
+            assert_eq!(interaction.z_m.is_some(), self.z_m.is_some(), "{path:?}");
+            let legs = [points[at + 1] - points[at], points[at + 2] - points[at + 1]];
+            let bound = if is_round(path) { 1e-5 } else { 1e-7 };
+            let bound = bound / legs[0].length().min(legs[1].length()).min(1.0);
+            let units = legs.map(DVec3::normalize_or_zero);
+            let is_told = legs.iter().all(|leg| leg.length() > SHORT_M);
+            let is_lawful = self.off_law(interaction, units) < if is_told { bound } else { 3.0 };
+            assert!(is_lawful, "{at}: {} {path:?}", self.off_law(interaction, units));
+            assert!(self.off_place_m(interaction, ends) < 1e-8, "{at}: {path:?}");
+        }
+    }
+
+    /// How far directions before and after a point are from the law of what is met there.
+    fn off_law(&self, interaction: &Interaction, [before, after]: [DVec3; 2]) -> f64 {
+        let mirrored =
+            |normal: DVec3| (before - 2.0 * before.dot(normal) * normal - after).length();
+        // Keller's cone: as steep to the edge after as before.
+        let diffracted = |along: DVec3| (before.dot(along) - after.dot(along)).abs();
+        match interaction.mechanism {
+            Mechanism::Reflection(Reflector::Wall(wall)) => {
+                mirrored(self.mirror(wall).normal.extend(0.0))
+            }
+            Mechanism::Reflection(Reflector::Cylinder(index)) => {
+                let out = interaction.point - self.scene.cylinders[index as usize].center;
+                assert!(before.dot(out.extend(0.0)) < 1e-6, "from inside");
+                mirrored(out.normalize().extend(0.0))
+            }
+            Mechanism::Reflection(Reflector::Floor | Reflector::Ceiling) => mirrored(DVec3::Z),
+            Mechanism::Diffraction(Bend::Upright(_)) => diffracted(DVec3::Z),
+            Mechanism::Diffraction(Bend::Level { wall, .. }) => {
+                diffracted(self.mirror(wall).normal.perp().extend(0.0))
+            }
+            Mechanism::Scattering { .. } | Mechanism::Transducer => 0.0,
+        }
+    }
+
+    /// How far a point is from where it can be, metres.
+    fn off_place_m(&self, interaction: &Interaction, ends: [DVec2; 2]) -> f64 {
+        let Interaction { mechanism, point, z_m } = *interaction;
+        let off_wall_m = |index: u32| {
+            let wall = &self.scene.walls[index as usize];
+            let (low, high) = wall.z_m.map_or((f64::MIN, f64::MAX), |[from, to]| (from, to));
+            let off_height_m = z_m.map_or(0.0, |z_m| (low - z_m).max(z_m - high).max(0.0));
+            // Beyond its end, its neighbour in the plan may have been snapped to it.
+            let beyond_m = crate::geometry::distance_to_segment(point, wall.a, wall.b);
+            assert!(beyond_m < 1e-4, "{interaction:?} {beyond_m}");
+            self.mirror(index).height_m(point).abs().max(off_height_m)
+        };
+        let off_z_m = |wanted_m: Option<f64>| (z_m.unwrap() - wanted_m.unwrap()).abs();
+        match mechanism {
+            Mechanism::Reflection(Reflector::Wall(wall)) | Mechanism::Scattering { wall } => {
+                off_wall_m(wall)
+            }
+            Mechanism::Reflection(Reflector::Cylinder(index)) => {
+                let cylinder = &self.scene.cylinders[index as usize];
+                (point.distance(cylinder.center) - cylinder.radius_m).abs()
+            }
+            Mechanism::Reflection(Reflector::Floor) => off_z_m(self.scene.floor_z_m),
+            Mechanism::Reflection(Reflector::Ceiling) => off_z_m(self.scene.ceiling_z_m),
+            Mechanism::Diffraction(Bend::Upright(Edge { wall, at_b })) => {
+                let wall = &self.scene.walls[wall as usize];
+                let end = if at_b { wall.b } else { wall.a };
+                (point.distance(end) - 2.0 * SNAP_M).max(0.0)
+            }
+            Mechanism::Diffraction(Bend::Level { wall, is_upper }) => {
+                let limits = self.scene.walls[wall as usize].z_m.unwrap();
+                off_wall_m(wall).max(off_z_m(Some(limits[usize::from(is_upper)])))
+            }
+            Mechanism::Transducer => point.distance(ends[0]),
+        }
+    }
+
+    fn mirror(&self, wall: u32) -> Mirror {
+        let wall = &self.scene.walls[wall as usize];
+        Mirror::through(wall.a, wall.b)
+    }
+}
+
+/// A path of the exact engine also leaves and comes back as it says.
+fn check_echo(room: &Room, echo: &EchoPath, ends: [DVec2; 2]) {
+    let length_off_m = if is_round(&echo.path) { 1e-7 } else { 1e-9 };
+    room.check(&echo.path, ends, echo.length_m, length_off_m);
+    let points = points(&echo.path, ends, room.z_m);
+    let last = points.len() - 1;
+    let legs = [points[1] - points[0], points[last - 1] - points[last]];
+    let stated = [echo.departure_rad, echo.arrival_rad].into_iter().zip(echo.rise_rad);
+    for (leg, (plan_rad, rise_rad)) in legs.into_iter().zip(stated) {
+        let run = leg.truncate();
+        if run.length() > SHORT_M {
+            let bound = 1e-6 / run.length().min(1.0);
+            assert!(wrap_pi(run.to_angle() - plan_rad).abs() < bound, "{leg} {echo:?}");
+            assert!((leg.z.atan2(run.length()) - rise_rad).abs() < bound, "{leg} {echo:?}");
+        }
+    }
+}
+
+/// A scene of a few walls and round bodies, some rough, some low or hanging, with and without heights.
+fn random_scene(rng: &mut Pcg64) -> Scene {
+    let mut place =
+        |size: f64| DVec2::new(rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5) * size;
+    let ends: Vec<[DVec2; 2]> = (0..6).map(|_| [place(3.0), place(3.0)]).collect();
+    let centers = [place(2.0), place(2.0)];
+    let walls = ends.iter().zip(0..).map(|([a, b], i)| {
+        let mut wall =
+            wall(&format!("w{i}"), (a.x, a.y), (b.x, b.y), 0.8 + 0.2 * rng.random::<f64>());
+        wall.material.roughness = if rng.random_bool(0.2) { 0.3 } else { 0.0 };
+        wall
+    });
+    let mut scene = scene(walls.collect());
+    let count = rng.random_range(0..=2);
+    scene.cylinders = centers[..count]
+        .iter()
+        .map(|at| cylinder((at.x, at.y), 0.05 + 0.2 * rng.random::<f64>()))
+        .collect();
+    if rng.random_bool(0.6) {
+        scene.floor_z_m = rng.random_bool(0.8).then_some(0.0);
+        scene.ceiling_z_m = (scene.floor_z_m.is_none() || rng.random_bool(0.6)).then_some(1.3);
+        for wall in scene.walls.iter_mut().step_by(2) {
+            let low = rng.random_bool(0.5);
+            let at = 0.2 + 0.8 * rng.random::<f64>();
+            wall.z_m = Some(if low { [0.0, at] } else { [at, 1.3] });
+        }
+    }
+    scene
+}
+
+#[test]
+fn paths_of_random_scenes_obey_the_laws_at_every_point() {
+    let mut rng = Pcg64::seed_from_u64(19);
+    let mut found = Counts::default();
+    for case in 0..120 {
+        let scene = random_scene(&mut rng);
+        let mut place = || loop {
+            let at = DVec2::new(rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5) * 2.5;
+            if scene.clearance_m(at) > 0.03 {
+                return at;
+            }
+        };
+        let from = place();
+        let to = if case % 2 == 0 { from } else { place() };
+        let settings = Settings {
+            max_path_m: 3.0,
+            floor: 3e-3,
+            edge_law: Some(EdgeLaw::Utd),
+            double_diffraction: case % 3 == 0,
+            sensor_z_m: Some(0.55),
+            scatter_height_rad: 0.2,
+            ..crate::model::paths::tests::LOSSLESS
+        };
+        let paths = Paths::new(&scene, settings);
+        let room = Room::new(&scene, paths.sensor_z_m());
+        for echo in paths.enumerate_between(from, to) {
+            check_echo(&room, &echo, [from, to]);
+            found.add(&echo.path);
+        }
+    }
+    found.assert_at_least(100);
+}
+
+/// How many paths met what.
+#[derive(Debug, Default)]
+struct Counts {
+    mirrored: usize,
+    round: usize,
+    floor: usize,
+    scattered: usize,
+    upright: usize,
+    level: usize,
+    level_by_floor: usize,
+    twice: usize,
+}
+
+impl Counts {
+    fn add(&mut self, path: &Path) {
+        let of_floor = |met| matches!(met, Reflector::Floor | Reflector::Ceiling);
+        let floor = path.reflectors().any(of_floor);
+        let bends = bends(path);
+        let level = bends.iter().any(|bend| matches!(bend, Bend::Level { .. }));
+        let mirrors = path.interactions.len() == path.order() && !floor && !is_round(path);
+        self.mirrored += usize::from(mirrors);
+        self.round += usize::from(is_round(path));
+        self.floor += usize::from(floor);
+        self.scattered += usize::from(path.kind() == PathKind::Scattered);
+        self.upright += usize::from(!bends.is_empty() && !level);
+        self.level += usize::from(level);
+        self.level_by_floor += usize::from(level && floor);
+        self.twice += usize::from(bends.len() == 2);
+    }
+
+    fn assert_at_least(&self, count: usize) {
+        let Self { mirrored, round, floor, scattered, upright, level, level_by_floor, twice } =
+            *self;
+        let all = [mirrored, round, floor, scattered, upright, level, level_by_floor, twice];
+        assert!(all.into_iter().all(|met| met >= count), "{self:?}");
+    }
+}
+
+/// Every sound of every engine in every shipped scene, in a few directions, those by way of the
+/// transducer's face included.
+#[test]
+fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
+    let [mut trains, mut checked] = [0; 2];
+    for name in shipped::names() {
+        let shipped = shipped_scene(name);
+        for pose in shipped.poses.values() {
+            let scene = Arc::new(shipped.with_robot_at(pose));
+            for engine in [EngineKind::Paths, EngineKind::Fan, EngineKind::Cone] {
+                let options = Options {
+                    engine,
+                    max_range_m: Some(2.0),
+                    ray_spacing_deg: 0.5,
+                    double_diffraction: true,
+                    ..Options::default()
+                };
+                let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+                let simulator = Simulator::new(scene.clone(), sensor, Air::default(), options)
+                    .expect("options");
+                let is_exact = engine == EngineKind::Paths;
+                let room = if is_exact {
+                    Room::new(&scene, simulator.sensor_z_m())
+                } else {
+                    Room { scene: Scene::clone(&scene), z_m: None }
+                };
+                let at = pose.position();
+                let station = simulator.station(at);
+                for direction in 0..20 {
+                    for arrival in station.arrivals(0.3 * f64::from(direction)) {
+                        let path = &arrival.path;
+                        match engine {
+                            EngineKind::Paths => {
+                                let off_m = if is_round(path) { 1e-7 } else { 1e-9 };
+                                room.check(path, [at; 2], arrival.length_m, off_m);
+                            }
+                            // The fan lets its rays pass beside a wall's end by as much as they are apart, and
+                            // knows lengths over cylinders by the curvature of the front.
+                            EngineKind::Fan => {
+                                let off_m = if is_round(path) { 1e-4 } else { 1e-9 };
+                                let points = points(path, [at; 2], None);
+                                let length_m = length_m(&points);
+                                assert!(
+                                    (length_m - arrival.length_m).abs() < off_m,
+                                    "{name}: {length_m} {arrival:?}"
+                                );
+                                for (place, met) in path.interactions.iter().enumerate() {
+                                    let legs = [1, 2]
+                                        .map(|to| points[place + to] - points[place + to - 1]);
+                                    let off = room.off_law(met, legs.map(DVec3::normalize_or_zero));
+                                    let is_told = legs.iter().all(|leg| leg.length() > SHORT_M);
+                                    assert!(!is_told || off < 1e-6, "{name}: {off} {arrival:?}");
+                                }
+                            }
+                            // The nearest hit, mirror or not.
+                            EngineKind::Cone => {
+                                let length_m = length_m(&points(path, [at; 2], None));
+                                assert!((length_m - arrival.length_m).abs() < 1e-9);
+                                assert!(room.off_place_m(&path.interactions[0], [at; 2]) < 1e-8);
+                            }
+                        }
+                        let face = |met| met == Mechanism::Transducer;
+                        trains += usize::from(path.mechanisms().any(face));
+                        checked += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(checked > 10_000 && trains > 100, "{checked} {trains}");
+}
+
+/// Mirror reflections alone count; an edge, a patch of a rough wall and the face do not.
+#[test]
+fn the_order_of_a_path_counts_mirror_reflections_only() {
+    let meets = |mechanisms: &[Mechanism]| Path {
+        interactions: mechanisms
+            .iter()
+            .map(|&mechanism| Interaction { mechanism, point: DVec2::ZERO, z_m: None })
+            .collect(),
+    };
+    let wall = Mechanism::Reflection(Reflector::Wall(0));
+    let level = Mechanism::Diffraction(Bend::Level { wall: 1, is_upper: true });
+    let rough = Mechanism::Scattering { wall: 2 };
+    let floor = Mechanism::Reflection(Reflector::Floor);
+    for (path, kind, order) in [
+        (meets(&[wall, Mechanism::Transducer, wall]), PathKind::Specular, 2),
+        (meets(&[wall, floor, level, floor]), PathKind::Diffracted, 3),
+        (meets(&[wall, rough, wall]), PathKind::Scattered, 2),
+        (meets(&[level, Mechanism::Transducer, rough]), PathKind::Scattered, 0),
+    ] {
+        assert_eq!((path.kind(), path.order()), (kind, order), "{path:?}");
+    }
+}
