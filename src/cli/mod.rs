@@ -87,7 +87,7 @@ enum Verb {
     /// Predict a scan with the model alone
     #[command(long_about = simulate::ABOUT)]
     Simulate(simulate::Args),
-    /// List the ways that echoes take from a place
+    /// List the propagation paths of echoes at a place
     #[command(long_about = paths::ABOUT)]
     Paths(paths::Args),
     /// Show the echo trace of one firing, each hump with its path

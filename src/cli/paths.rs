@@ -19,7 +19,7 @@ use crate::{
         Options, Simulator,
         paths::{EchoPath, Paths},
     },
-    scan::{PathKind, PathRecord},
+    scan::{InteractionRecord, PathKind, PathRecord},
 };
 
 /// Options of `sonard paths`.
@@ -56,7 +56,7 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-List the ways that echoes take from a place, shortest first.
+List the propagation paths of echoes at a place, shortest first.
 
 All mirror reflections, and one diffraction (two with --double-diffraction) with any reflections before \
 and after. The amplitude \
@@ -67,7 +67,7 @@ directions is listed twice, with departure and arrival swapped.";
 const EXAMPLES: &str = "\
 Examples:
   sonard paths --scene simple-room --pose fig9 --max-range 1
-  sonard paths --scene mcgill-lab --pose 1,1,0 --max-order 2 --json | jq .walls
+  sonard paths --scene mcgill-lab --pose 1,1,0 --max-order 2 --json | jq -c '.interactions[].point'
   sonard paths --scene my-room.json --pose 1.2,0.8,90 --lossless --weakest 0.05
 
 Exit codes: 0 done, 2 wrong usage or input, 3 a disk that gave up.";
@@ -78,16 +78,13 @@ struct PathLine {
     length_m: f64,
     kind: PathKind,
     order: u32,
-    walls: Vec<String>,
-    edge: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    second_edge: Option<String>,
+    interactions: Vec<InteractionRecord>,
     departure_deg: f64,
     arrival_deg: f64,
     amplitude: f64,
     phase_deg: f64,
     #[serde(skip)]
-    way: String,
+    words: String,
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
@@ -120,13 +117,11 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn line(simulator: &Simulator, path: &EchoPath) -> PathLine {
     let record = PathRecord::of(simulator.scene(), &path.path, path.length_m);
     PathLine {
-        way: record.in_words(),
+        words: record.in_words(),
         length_m: path.length_m,
         kind: record.kind,
         order: record.order,
-        walls: record.walls,
-        edge: record.edge,
-        second_edge: record.second_edge,
+        interactions: record.interactions,
         departure_deg: degrees(path.departure_rad),
         arrival_deg: degrees(path.arrival_rad),
         amplitude: path.amplitude,
@@ -156,7 +151,7 @@ fn write_table(lines: impl Iterator<Item = PathLine>, count: usize) -> io::Resul
         "leaves",
         "comes from",
         "amplitude",
-        "way",
+        "path",
     ]);
     for index in 0..5 {
         if let Some(column) = table.column_mut(index) {
@@ -170,7 +165,7 @@ fn write_table(lines: impl Iterator<Item = PathLine>, count: usize) -> io::Resul
             format!("{:.1}°", line.departure_deg),
             format!("{:.1}°", line.arrival_deg),
             format!("{:.4}", line.amplitude),
-            line.way,
+            line.words,
         ]);
     }
     let mut out = io::BufWriter::new(io::stdout().lock());

@@ -1,6 +1,6 @@
 //! `sonard plot`.
 
-mod way;
+mod path;
 
 use std::path::{Path, PathBuf};
 
@@ -30,7 +30,7 @@ pub(super) struct Args {
     /// are drawn over each other
     #[arg(long, value_name = "N|ID")]
     scan: Vec<String>,
-    /// Draw the way that one beam's sound took: the beam's index in the plan
+    /// Draw the path of one beam's sound: the beam's index in the plan
     #[arg(long, value_name = "INDEX", conflicts_with = "azimuth_deg")]
     beam: Option<u32>,
     /// The same for the beam nearest to this azimuth, degrees
@@ -62,7 +62,7 @@ Filled marks are readings; shape and colour say what made them: a direct echo, m
 reflections, an edge, sound that was there when the receiver opened (minimum range), or nothing \
 the model knows. Rings and thin rays are the model's. Ticks on the border are silent beams, \
 arrows readings that lie beyond the view. In a browser, pointing at a mark of an SVG tells its \
-numbers. Scans of one log are drawn over each other. With --beam or --azimuth-deg the way of one \
+numbers. Scans of one log are drawn over each other. With --beam or --azimuth-deg the path of one \
 beam's sound is drawn instead, reflection by reflection.";
 
 const HELP: &str = "\
@@ -70,7 +70,7 @@ Examples:
   sonard plot scan.jsonl -o scan.svg -o scan.png
   sonard plot scan.jsonl --kind residuals --scan 2 -o residuals.png --width 2000
   sonard simulate --scene simple-room --pose fig9 | sonard plot - -o fig9.svg
-  sonard plot scan.jsonl --azimuth-deg 270 -o way.png
+  sonard plot scan.jsonl --azimuth-deg 270 -o path.png
   for e in paths fan cone; do sonard simulate --scene corridor --pose beside-wall --engine $e; done \
       | sonard plot - --kind side-by-side -o engines.png
 
@@ -81,9 +81,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     let log = &args.log;
     let views = if args.scan.is_empty() { all(args)? } else { chosen(log, &args.scan)? };
     let scene = scene_for(log, &views, args.scene.as_deref())?;
-    let beam = args.beam.map(way::Beam::Index).or(args.azimuth_deg.map(way::Beam::Azimuth));
+    let beam = args.beam.map(path::Beam::Index).or(args.azimuth_deg.map(path::Beam::Azimuth));
     let picture = match (beam, args.kind) {
-        (Some(beam), _) => way::draw(&views, scene.as_ref(), beam)?,
+        (Some(beam), _) => path::draw(&views, scene.as_ref(), beam)?,
         (None, Kind::Scan) => draw_scans(&views, scene.as_ref()),
         (None, Kind::Polar) => draw_polar(&views, scene.as_ref()),
         (None, Kind::SideBySide) => draw_side_by_side(&views, scene.as_ref()),

@@ -208,7 +208,7 @@ impl<'a> Firing<'a> {
 
     fn table(&self) -> Table {
         let mut table = Table::new();
-        table.load_style(NOTHING).set_header(["time us", "range m", "peak", "peak dB", "way"]);
+        table.load_style(NOTHING).set_header(["time us", "range m", "peak", "peak dB", "path"]);
         for index in 0..4 {
             if let Some(column) = table.column_mut(index) {
                 column.set_cell_alignment(CellAlignment::Right);
@@ -229,8 +229,8 @@ impl<'a> Firing<'a> {
     /// What the receiver makes of it, in words.
     fn reading(&self) -> String {
         let detection = &self.trace.detection;
-        let way = self.path.as_ref().map(PathRecord::in_words);
-        let by = way.map(|way| format!(" by {way}")).unwrap_or_default();
+        let path = self.path.as_ref().map(PathRecord::in_words);
+        let by = path.map(|path| format!(" by {path}")).unwrap_or_default();
         let margin_db = detection.margin_db.unwrap_or(f64::NEG_INFINITY);
         match (detection.status, detection.range_m) {
             (PingStatus::MinRange, Some(range_m)) => format!(

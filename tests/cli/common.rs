@@ -36,6 +36,12 @@ pub(crate) fn mock_scan(pose: &str, out: &Path, further: &[&str]) -> Output {
     run(&arguments)
 }
 
+/// The ids of what a path's record meets, in order.
+pub(crate) fn met(path: &Value) -> Vec<&str> {
+    let interactions = path["interactions"].as_array().expect("interactions");
+    interactions.iter().map(|met| met["id"].as_str().expect("an id")).collect()
+}
+
 /// The records of a log, by type.
 pub(crate) struct Log {
     pub(crate) records: Vec<Value>,

@@ -10,6 +10,7 @@ mod degenerate;
 mod doctor;
 mod explore;
 mod faults;
+mod format_1;
 mod hangup;
 mod interpret;
 mod live_page;

@@ -15,7 +15,7 @@ fn lines(args: &[&str]) -> Vec<Value> {
 }
 
 #[test]
-fn json_lists_the_false_wall_of_figure_9_with_its_way() {
+fn json_lists_the_false_wall_of_figure_9_with_its_path() {
     let lines = lines(&["--scene", "simple-room", "--pose", "fig9", "--max-range", "1", "--json"]);
     let length = |line: &Value| line["length_m"].as_f64().expect("a number");
     assert!(lines.windows(2).all(|pair| length(&pair[0]) <= length(&pair[1])));
@@ -23,9 +23,11 @@ fn json_lists_the_false_wall_of_figure_9_with_its_way() {
         lines.iter().filter(|line| (length(line) - 1.654).abs() < 1e-9).collect();
     assert_eq!(false_wall.len(), 1);
     let line = false_wall[0];
-    assert_eq!(line["walls"], serde_json::json!(["south", "north", "south"]));
+    let at =
+        |id: &str, y: f64| serde_json::json!({"kind": "reflection", "id": id, "point": [0.774, y]});
+    let met = [at("south", 0.0), at("north", 0.742), at("south", 0.0)];
+    assert_eq!(line["interactions"], serde_json::json!(met));
     assert_eq!((&line["kind"], &line["order"]), (&"specular".into(), &3.into()));
-    assert_eq!(line["edge"], Value::Null);
     for end in ["departure_deg", "arrival_deg"] {
         assert!((line[end].as_f64().expect("a number") - 270.0).abs() < 1e-9);
     }
@@ -35,7 +37,7 @@ fn json_lists_the_false_wall_of_figure_9_with_its_way() {
 }
 
 #[test]
-fn the_table_names_ways_and_max_order_limits_them() {
+fn the_table_names_paths_and_max_order_limits_them() {
     paths(&["--scene", "simple-room", "--pose", "fig9", "--max-range", "1", "--max-order", "1"])
         .success()
         .stdout(contains("south").and(contains("4 paths")).and(contains("south, east").not()));

@@ -1,8 +1,10 @@
-//! `sonard trace`, and the way of a beam, as a user meets them.
+//! `sonard trace`, and the path of a beam, as a user meets them.
 
 use assert_cmd::Command;
 use predicates::{prelude::PredicateBooleanExt, str::contains};
 use serde_json::Value;
+
+use crate::common::met;
 
 fn sonard(args: &[&str]) -> assert_cmd::assert::Assert {
     Command::new(env!("CARGO_BIN_EXE_sonard")).args(args).assert()
@@ -26,10 +28,7 @@ fn json_has_the_signal_the_humps_and_what_was_made_of_them() {
     assert!((times[highest] - tof_us - 200.0).abs() < 200.0, "{}", times[highest]);
     let detection = &trace["detection"];
     assert_eq!(detection["status"], "echo");
-    assert_eq!(
-        detection["path"]["walls"],
-        serde_json::json!(["d-plate", "d-far-object", "d-plate"])
-    );
+    assert_eq!(met(&detection["path"]), ["d-plate", "d-far-object", "d-plate"]);
     let first_us = detection["tof_us"][0].as_f64().expect("a time");
     let crossing = times.iter().position(|t_us| *t_us > first_us + 5.0).expect("later");
     assert!(
@@ -84,7 +83,7 @@ fn pictures_and_ways_are_drawn_and_wrong_input_is_refused() {
     sonard(&["simulate", "--scene", "simple-room", "--pose", "fig9", "--out", &log]).success();
     sonard(&["plot", &log, "--azimuth-deg", "270", "-o", &way]).success();
     let text = std::fs::read_to_string(&way).expect("the picture");
-    assert!(text.contains("way of 1.6540 m: south, north, south"), "{text}");
+    assert!(text.contains("path of 1.6540 m: south, north, south"), "{text}");
     sonard(&["plot", &log, "--beam", "300", "--kind", "scan", "-o", &way]).success();
     sonard(&["plot", &log, "--beam", "4000", "-o", &way]).code(2).stderr(contains("0 to 399"));
     sonard(&["trace", "--scene", "simple-room", "--pose", "fig9", "--step-us", "0"])

@@ -12,8 +12,9 @@ use sonard_model::{
     scene::{Cylinder, Material, Scene, Wall},
 };
 use sonard_records::{
-    LOG_FORMAT, ModelRecord, PathKind, PathRecord, Ping, PingStatus, Provenance, Record, ScanEnd,
-    ScanPlan, ScanStart, ScanView, SceneRef, Session, SimRecord,
+    InteractionKind, InteractionRecord, LOG_FORMAT, ModelRecord, PathKind, PathRecord, Ping,
+    PingStatus, Provenance, Record, ScanEnd, ScanPlan, ScanStart, ScanView, SceneRef, Session,
+    SimRecord,
 };
 
 const WIDTH_M: f64 = 0.928;
@@ -185,9 +186,10 @@ fn predict(pose: &Pose, azimuth_deg: f64) -> SimRecord {
         path: best.map(|(length_m, _, order)| PathRecord {
             kind: if order % 5 == 4 { PathKind::Diffracted } else { PathKind::Specular },
             order: *order,
-            walls: (0..*order).map(|i| ["south", "north"][i as usize % 2].into()).collect(),
-            edge: None,
-            second_edge: None,
+            interactions: (0..*order)
+                .map(|i| ["south", "north"][i as usize % 2])
+                .map(|id| InteractionRecord::unplaced(InteractionKind::Reflection, id))
+                .collect(),
             length_m: *length_m,
         }),
     }

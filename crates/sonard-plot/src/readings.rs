@@ -273,9 +273,8 @@ fn hint(ping: &Ping, kind: Kind, range_m: Option<f64>, model_m: Option<f64>) -> 
     if let Some(model) = model_m {
         words += &format!(", model {model:.3} m");
     }
-    let path = ping.path.as_ref().or_else(|| ping.sim.as_ref().and_then(|sim| sim.path.as_ref()));
-    if let Some(path) = path.filter(|path| !path.walls.is_empty()) {
-        words += &format!(" by {}", path.walls.join(", "));
+    if let Some(path) = ping.sound_path().filter(|path| !path.interactions.is_empty()) {
+        words += &format!(" by {}", path.in_words());
     }
     words
 }

@@ -17,8 +17,8 @@ use sonard_model::{
     scene::{Robot, RobotShape, Scene},
 };
 use sonard_records::{
-    Event, EventKind, PathKind, PathRecord, Ping, PingStatus, ScanPlan, ScanStart, ScanView,
-    SimRecord,
+    Event, EventKind, InteractionKind, InteractionRecord, PathKind, PathRecord, Ping, PingStatus,
+    ScanPlan, ScanStart, ScanView, SimRecord,
 };
 
 /// Every kind of picture of these scans.
@@ -184,7 +184,8 @@ fn names_are_escaped_wherever_they_stand() {
     });
     for ping in &mut scan.pings {
         if let Some(path) = ping.sim.as_mut().and_then(|sim| sim.path.as_mut()) {
-            path.walls = vec![hostile.into()];
+            path.interactions =
+                vec![InteractionRecord::unplaced(InteractionKind::Reflection, hostile)];
         }
     }
     let mut all = pictures(&[scan], Some(&scene));
@@ -282,7 +283,12 @@ prop_compose! {
         length_m in any_number(),
     ) -> SimRecord {
         let kind = if order == 4 { PathKind::Diffracted } else { PathKind::Specular };
-        let path = PathRecord { kind, order, walls: vec!["south".into()], edge: None, second_edge: None, length_m };
+        let path = PathRecord {
+            kind,
+            order,
+            interactions: vec![InteractionRecord::unplaced(InteractionKind::Reflection, "south")],
+            length_m,
+        };
         SimRecord { status, range_m, amplitude: margin_db, margin_db, path: Some(path) }
     }
 }

@@ -5,7 +5,7 @@ use std::{borrow::Cow, fmt};
 use serde::{Deserialize, de::DeserializeOwned};
 use thiserror::Error;
 
-use super::{LOG_FORMAT, Record};
+use super::{LOG_FORMAT, PathRecord, Point, Record, Session};
 
 /// Longest line that is written or read, bytes. A record of 65535 echo times would fit.
 pub const MAX_LINE_BYTES: usize = 1 << 20;
@@ -40,7 +40,7 @@ pub struct RecordError {
     pub kind: FaultKind,
     /// Byte on the line where it was noticed, from 1, if there is such a place.
     pub column: Option<usize>,
-    /// The field, as a path such as `sim.path.walls[2]`.
+    /// The field, as a path such as `sim.path.interactions[2]`.
     pub field: Option<String>,
     /// What is wrong and what would be right.
     pub message: String,
@@ -97,7 +97,15 @@ pub fn encode_line(record: &Record, line: &mut Vec<u8>) -> Result<(), EncodeErro
         return Err(EncodeError::NotFinite { field, value });
     }
     let before = line.len();
-    let result = serde_json::to_writer(&mut *line, record).map_err(EncodeError::from);
+    let result = match record {
+        // What was read from an earlier format is written in this one.
+        Record::Session(session) if session.format < LOG_FORMAT => {
+            let session = Session { format: LOG_FORMAT, ..(**session).clone() };
+            serde_json::to_writer(&mut *line, &Record::Session(Box::new(session)))
+        }
+        _ => serde_json::to_writer(&mut *line, record),
+    };
+    let result = result.map_err(EncodeError::from);
     let length = line.len() - before;
     let result = match result {
         Ok(()) if length > MAX_LINE_BYTES => Err(EncodeError::TooLong(length)),
@@ -257,15 +265,23 @@ fn first_not_finite(record: &Record) -> Option<(&'static str, f64)> {
             ("plan.step_deg", start.plan.step_deg),
         ],
         Record::Ping(ping) => {
-            let length =
-                |path: &Option<super::PathRecord>| path.as_ref().map_or(0.0, |p| p.length_m);
+            let length = |path: Option<&PathRecord>| path.map_or(0.0, |path| path.length_m);
+            let place = |path: Option<&PathRecord>| {
+                let met = path.into_iter().flat_map(|path| &path.interactions);
+                let known = met.filter_map(|met| met.point).all(Point::is_finite);
+                if known { 0.0 } else { f64::NAN }
+            };
+            let path = ping.path.as_ref();
+            let sim_path = ping.sim.as_ref().and_then(|sim| sim.path.as_ref());
             &[
                 ("azimuth_deg", ping.azimuth_deg),
                 ("pose.x_m", ping.pose.map_or(0.0, |pose| pose.x_m)),
                 ("pose.y_m", ping.pose.map_or(0.0, |pose| pose.y_m)),
                 ("pose.heading_deg", ping.pose.map_or(0.0, |pose| pose.heading_deg)),
-                ("path.length_m", length(&ping.path)),
-                ("sim.path.length_m", ping.sim.as_ref().map_or(0.0, |sim| length(&sim.path))),
+                ("path.length_m", length(path)),
+                ("path.interactions.point", place(path)),
+                ("sim.path.length_m", length(sim_path)),
+                ("sim.path.interactions.point", place(sim_path)),
             ]
         }
         Record::ScanEnd(end) => {
@@ -333,7 +349,7 @@ mod tests {
         let wrong = ping.replace("\"order\":1", "\"order\":-1");
         let column = wrong.find(":-1").expect("just put there") + 3;
         check(&wrong, FaultKind::BadField, Some(column), "sim.path.order");
-        let later = line_of("session").replace("\"format\":1", "\"format\":9");
+        let later = line_of("session").replace("\"format\":2", "\"format\":9");
         assert!(decode_line(later.as_bytes()).is_ok(), "added fields do no harm");
         let later = later.replace("\"started\"", "\"begun\"");
         check(&later, FaultKind::NewerFormat, Some(later.len()), "format");
@@ -343,6 +359,23 @@ mod tests {
         check(&deep, FaultKind::NotJson, Some(deep.len() - 1), "");
         let deep = deep.replace("[}", &format!("[{}}}", "]".repeat(9999)));
         assert_eq!(decode_line(deep.as_bytes()).expect_err("too deep").kind, FaultKind::BadField);
+    }
+
+    #[test]
+    fn a_log_of_format_1_is_written_again_in_format_2() {
+        for line in include_str!("../../../tests/fixtures/format-1/scan.jsonl").lines() {
+            let record = decode_line(line.as_bytes()).expect(line);
+            let mut written = Vec::new();
+            encode_line(&record, &mut written).expect(line);
+            let again = decode_line(written.trim_ascii_end()).expect(line);
+            match (record, again) {
+                (Record::Session(was), Record::Session(is)) => {
+                    assert_eq!((was.format, is.format), (1, 2));
+                    assert_eq!(*is, Session { format: 2, ..*was });
+                }
+                (was, is) => assert_eq!(was, is),
+            }
+        }
     }
 
     #[test]

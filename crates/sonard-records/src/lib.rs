@@ -2,7 +2,9 @@
 
 mod array;
 mod codec;
+mod drawn;
 mod modelled;
+mod path;
 mod record;
 mod remaining;
 mod simulated;
@@ -10,10 +12,11 @@ mod view;
 mod viewpoint;
 
 pub use codec::{EncodeError, FaultKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};
+pub use path::{InteractionKind, InteractionRecord, PathRecord, Point};
 pub use record::{
-    AirRecord, AirSource, CollectionRef, Device, Event, EventKind, LOG_FORMAT, ModelRecord,
-    PathRecord, Ping, Provenance, Record, STOPPED_ON_REQUEST, ScanAir, ScanEnd, ScanStart,
-    SceneRef, Session, SimRecord,
+    AirRecord, AirSource, CollectionRef, Device, Event, EventKind, LOG_FORMAT, ModelRecord, Ping,
+    Provenance, Record, STOPPED_ON_REQUEST, ScanAir, ScanEnd, ScanStart, SceneRef, Session,
+    SimRecord,
 };
 pub use remaining::Segment;
 pub use sonard_model::{

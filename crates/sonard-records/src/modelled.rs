@@ -2,11 +2,13 @@
 
 use sonard_model::{
     acoustics::{Air, AirError},
-    model::{Bend, FACE_NAME, Options, Path, Prediction, RecordedPath, Reflector, Simulator},
+    model::{Arrival, Interaction, Mechanism, Options, Path, Prediction, Simulator, Station},
     scene::Scene,
 };
 
-use crate::{AirRecord, ModelRecord, PathRecord, SimRecord};
+use crate::{
+    AirRecord, InteractionKind, InteractionRecord, ModelRecord, PathRecord, Point, SimRecord,
+};
 
 impl From<&Air> for AirRecord {
     fn from(air: &Air) -> Self {
@@ -80,35 +82,43 @@ impl PathRecord {
     /// If the path is of another scene.
     #[must_use]
     pub fn of(scene: &Scene, path: &Path, length_m: f64) -> Self {
-        let path = RecordedPath::from(path);
-        let mut edges = path.bends.iter().map(|bend| bend.name(scene));
-        let name = |met: &Option<Reflector>| {
-            met.map_or_else(|| FACE_NAME.to_owned(), |reflector| reflector.name(scene))
+        let interaction = |met: &Interaction| InteractionRecord {
+            kind: met.mechanism.into(),
+            id: met.mechanism.name(scene),
+            point: Some(Point::rounded(met.point, met.z_m)),
         };
         Self {
-            kind: path.kind,
-            order: path.walls.len() as u32,
-            walls: path.walls.iter().map(name).collect(),
-            edge: edges.next(),
-            second_edge: edges.next(),
+            kind: path.kind(),
+            order: path.order() as u32,
+            interactions: path.interactions.iter().map(interaction).collect(),
             length_m,
         }
     }
 
-    /// The path of a log's record in its scene; `None` if the scene lacks one of its names.
+    /// The arrival that is this path, among those that a firing in a world direction brings, radians: the
+    /// model finds again where a path of a log of format 1 ran. `None` if it finds none of that kind and
+    /// length.
     #[must_use]
-    pub fn path(&self, scene: &Scene) -> Option<RecordedPath> {
-        let met = |name: &String| {
-            if name == FACE_NAME { Some(None) } else { Reflector::named(scene, name).map(Some) }
-        };
-        let walls = self.walls.iter().map(met);
-        let edges = self.edge.iter().chain(&self.second_edge);
-        let bends = edges.map(|name| Bend::named(scene, name));
-        Some(RecordedPath {
-            kind: self.kind,
-            walls: walls.collect::<Option<_>>()?,
-            bends: bends.collect::<Option<_>>()?,
-        })
+    pub fn arrival(&self, station: &Station<'_>, direction_rad: f64) -> Option<Arrival> {
+        let off_m = |arrival: &Arrival| (arrival.length_m - self.length_m).abs();
+        let mut arrivals = station.arrivals(direction_rad);
+        arrivals
+            .retain(|arrival| arrival.path.kind() == self.kind && off_m(arrival) < SAME_LENGTH_M);
+        arrivals.into_iter().min_by(|one, other| off_m(one).total_cmp(&off_m(other)))
+    }
+}
+
+/// Paths of a log and of the model are one if their lengths differ by less, metres: a log may round.
+const SAME_LENGTH_M: f64 = 1e-3;
+
+impl From<Mechanism> for InteractionKind {
+    fn from(mechanism: Mechanism) -> Self {
+        match mechanism {
+            Mechanism::Reflection(_) => Self::Reflection,
+            Mechanism::Diffraction(_) => Self::Diffraction,
+            Mechanism::Scattering { .. } => Self::Scattering,
+            Mechanism::Transducer => Self::Transducer,
+        }
     }
 }
 

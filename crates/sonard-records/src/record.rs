@@ -7,11 +7,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-use crate::{PathKind, PingStatus, ScanPlan};
+use crate::{PathRecord, PingStatus, ScanPlan};
 use sonard_model::{acoustics::Sensor, array::RangerArray, geometry::Pose, scene::Scene};
 
-/// Version of the record format, written into every session.
-pub const LOG_FORMAT: u32 = 1;
+/// Version of the record format, written into every session. Format 1, in which paths had `walls` in place
+/// of `interactions`, is read as well.
+pub const LOG_FORMAT: u32 = 2;
 
 /// One line of a log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -50,7 +51,7 @@ pub enum Provenance {
 /// Opens a log, and again after each reconnection to a different device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Session {
-    /// Record format, [`LOG_FORMAT`].
+    /// Record format: [`LOG_FORMAT`], or of a log that was read an earlier one.
     pub format: u32,
     /// Wall clock at the start.
     pub started: Timestamp,
@@ -277,49 +278,6 @@ pub struct SimRecord {
     pub margin_db: Option<f64>,
     /// The path the sound took (for `no_echo`, the best candidate's).
     pub path: Option<PathRecord>,
-}
-
-/// The path of an echo.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct PathRecord {
-    /// How the sound got back.
-    pub kind: PathKind,
-    /// Number of mirror reflections.
-    pub order: u32,
-    /// Names of the walls in the order they were met.
-    pub walls: Vec<String>,
-    /// The edge it bent at, if any: `WALL.a` and `WALL.b` are the upright ones at the ends of a wall,
-    /// `WALL.top` and `WALL.bottom` the level ones of a wall that ends below or above.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub edge: Option<String>,
-    /// The edge it bent at after that: with double diffraction, or after the transducer's face sent it
-    /// round again.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub second_edge: Option<String>,
-    /// Length there and back, metres.
-    pub length_m: f64,
-}
-
-impl PathRecord {
-    /// The walls in order; for a bent path its edges in front.
-    #[must_use]
-    pub fn in_words(&self) -> String {
-        let walls = self.walls.join(", ");
-        match self.edges_in_words() {
-            Some(edges) if walls.is_empty() => edges,
-            Some(edges) => format!("{edges} by {walls}"),
-            None => walls,
-        }
-    }
-
-    /// `edge a`, or `edges a and b`; `None` for a path that did not bend.
-    #[must_use]
-    pub fn edges_in_words(&self) -> Option<String> {
-        Some(match (self.edge.as_ref()?, &self.second_edge) {
-            (edge, None) => format!("edge {edge}"),
-            (edge, Some(second)) => format!("edges {edge} and {second}"),
-        })
-    }
 }
 
 /// A scan is over.

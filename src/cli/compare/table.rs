@@ -217,17 +217,13 @@ fn millimetres(value_m: Option<f64>) -> String {
     value_m.map_or("-".into(), |value_m| format!("{:.1} mm", value_m * 1e3))
 }
 
-/// A path in words: `3 reflections: south north south`.
+/// A path in words: `3 reflections: south, north, south`.
 pub(in crate::cli) fn path_text(path: &PathRecord) -> String {
-    let walls = path.walls.join(" ");
-    match (path.kind, path.edges_in_words()) {
-        (PathKind::Diffracted, Some(edges)) if walls.is_empty() => edges,
-        (PathKind::Diffracted, Some(edges)) => format!("{edges}, by {walls}"),
-        (PathKind::Diffracted, None) => format!("edge, by {walls}"),
-        (PathKind::Scattered, _) => format!("scattered by {walls}"),
-        (PathKind::Specular, _) => match path.order {
-            1 => format!("1 reflection: {walls}"),
-            order => format!("{order} reflections: {walls}"),
-        },
+    let met = path.in_words();
+    match (path.kind, path.order) {
+        (PathKind::Diffracted, _) => met,
+        (PathKind::Scattered, _) => format!("scattered by {met}"),
+        (PathKind::Specular, 1) => format!("1 reflection: {met}"),
+        (PathKind::Specular, order) => format!("{order} reflections: {met}"),
     }
 }

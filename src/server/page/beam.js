@@ -1,4 +1,4 @@
-// The panel of the selected beam: its reading at once, its echoes and the model's ways when the
+// The panel of the selected beam: its reading at once, its echoes and the model's paths when the
 // daemon has told them.
 
 import { ask } from "./api.js";
@@ -9,10 +9,10 @@ import * as words from "./words.js";
 const PAUSE_MS = 120;
 
 export class BeamPanel {
-  /** Calls `onWay(points)` when the way of some sound is to be drawn. */
-  constructor(panel, onWay) {
+  /** Calls `onPath(points)` when the path of some sound is to be drawn. */
+  constructor(panel, onPath) {
     this.panel = panel;
-    this.onWay = onWay;
+    this.onPath = onPath;
     this.request = new AbortController();
   }
 
@@ -33,35 +33,34 @@ export class BeamPanel {
     if (signal.aborted) return;
     try {
       const beam = await ask(`/v1/scans/${scan.id}/beams/${ping.index}`, { signal });
-      this.onWay(beam.way);
+      this.onPath(beam.polyline);
       this.panel.append(...echoes(beam), ...this.humps(beam));
     } catch (error) {
       if (!signal.aborted) this.panel.append(note(`The daemon did not tell more: ${error.message}`));
     }
   }
 
-  /** What the model hears; each sound draws its way. */
+  /** What the model hears; each sound draws its path. */
   humps(beam) {
-    if (beam.lacks) return [note(`No ways: ${beam.lacks}.`)];
+    if (beam.lacks) return [note(`No paths: ${beam.lacks}.`)];
     const list = document.createElement("ul");
     list.className = "humps";
     for (const hump of beam.humps ?? []) list.append(this.hump(hump, beam, list));
     if (!list.children.length) return [heading("What the model hears"), note("nothing that comes near the threshold")];
-    return [heading("What the model hears: range, over the threshold, way"), list];
+    return [heading("What the model hears: range, over the threshold, path"), list];
   }
 
   hump(hump, beam, list) {
     const item = document.createElement("li");
     const button = item.appendChild(document.createElement("button"));
     button.type = "button";
-    const drawn = hump.way !== null && JSON.stringify(hump.way) === JSON.stringify(beam.way);
+    const drawn = JSON.stringify(hump.polyline) === JSON.stringify(beam.polyline);
     button.ariaPressed = String(drawn);
     const texts = [words.metres(hump.range_m), words.decibels(hump.margin_db), words.path(hump.path)];
     for (const text of texts) button.appendChild(document.createElement("span")).textContent = text;
-    button.disabled = hump.way === null;
     button.addEventListener("click", () => {
       for (const other of list.querySelectorAll("button")) other.ariaPressed = String(other === button);
-      this.onWay(hump.way);
+      this.onPath(hump.polyline);
     });
     return item;
   }
@@ -92,7 +91,7 @@ function reading(ping) {
       ["Model", ping.sim.range_m === null ? ping.sim.status.replace("_", " ") : words.metres(ping.sim.range_m)],
       ["Residual", words.millimetres(ping.residual_m)],
       ["Over the threshold", ping.sim.margin_db === null ? "–" : words.decibels(ping.sim.margin_db)],
-      ["Way", words.path(ping.sim.path)],
+      ["Path", words.path(ping.sim.path)],
     );
   }
   if (ping.repaired) facts.push(["Line", "fetched again after the line lost it"]);

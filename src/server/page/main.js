@@ -32,7 +32,7 @@ let again = false;
 const plan = new Plan(byId("stage"), select);
 const strip = new Strip(byId("strip"), select);
 const table = new BeamTable(byId("table"));
-const panel = new BeamPanel(byId("beam-panel"), (way) => plan.select(selected, way));
+const panel = new BeamPanel(byId("beam-panel"), (path) => plan.select(selected, path));
 const summary = new Summary(byId("summary"));
 const history = new History(
   { list: byId("scans-list"), live: byId("live"), replay: byId("replay"), speed: byId("speed") },

@@ -1,5 +1,5 @@
 // The floor plan on three layers: ground (grid, walls, ranger), marks (readings, drawn as they
-// come), and above them what changes with every beam (sweep, selection, way of the sound).
+// come), and above them what changes with every beam (sweep, selection, path of the sound).
 
 import { MARKS, draw } from "./verdicts.js";
 
@@ -21,7 +21,7 @@ export class Plan {
     this.fitAll = false;
     this.selected = null;
     this.latest = null;
-    this.way = null;
+    this.path = null;
     this.onPick = onPick;
     new ResizeObserver(() => this.resize()).observe(stage);
     this.over.canvas.addEventListener("click", (event) => this.pick(event.offsetX, event.offsetY));
@@ -49,10 +49,10 @@ export class Plan {
     this.drawOver();
   }
 
-  /** Marks a beam, with the way of its sound once that is known. */
-  select(ping, way = null) {
+  /** Marks a beam, with the path of its sound once that is known. */
+  select(ping, path = null) {
     this.selected = ping;
-    this.way = way;
+    this.path = path;
     if (this.width) this.drawOver();
   }
 
@@ -292,7 +292,7 @@ export class Plan {
     if (this.scan.underWay && this.latest) this.drawRay(c, this.latest, this.palette["--quiet"], [2, 5]);
     if (!this.selected) return;
     this.drawRay(c, this.selected, this.palette["--ray"], [6, 4]);
-    if (this.way) this.drawWay(c);
+    if (this.path) this.drawPath(c);
     const { range_m } = this.selected;
     if (range_m === null) return;
     const [x, y] = this.px(this.place(this.selected, range_m));
@@ -317,10 +317,10 @@ export class Plan {
     c.setLineDash([]);
   }
 
-  /** The way of the sound, with an arrow on each of its legs. */
-  drawWay(c) {
-    const points = this.way.map((point) => this.px(point));
-    c.strokeStyle = c.fillStyle = this.palette["--way"];
+  /** The path of the sound, with an arrow on each of its legs. */
+  drawPath(c) {
+    const points = this.path.map((point) => this.px(point));
+    c.strokeStyle = c.fillStyle = this.palette["--path"];
     c.lineWidth = 1.8;
     c.lineJoin = "round";
     c.beginPath();

@@ -13,10 +13,8 @@ export const clock = (time) =>
 
 export function path(record) {
   if (!record) return "nothing came near";
-  const walls = record.walls.join(", ");
-  if (!record.edge) return record.kind === "scattered" ? `scattered by ${walls}` : walls;
-  const edges = record.second_edge ? `edges ${record.edge} and ${record.second_edge}` : `edge ${record.edge}`;
-  return walls ? `${edges} by ${walls}` : edges;
+  const met = record.interactions.map(({ kind, id }) => (kind === "diffraction" ? `edge ${id}` : id));
+  return (record.kind === "scattered" ? "scattered by " : "") + met.join(", ");
 }
 
 const STATES = {

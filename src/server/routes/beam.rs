@@ -1,4 +1,4 @@
-//! One beam of a scan: what was heard, what the model hears, and the ways of the sound.
+//! One beam of a scan: what was heard, what the model hears, and the paths of the sound.
 
 use std::sync::Arc;
 
@@ -15,7 +15,6 @@ use crate::{
     model::{Options, Simulator, Station},
     scan::{PathRecord, Ping, ScanView, Session},
     scene::Scene,
-    viewpoint::Viewpoint,
 };
 
 /// The model is asked so far beyond what was heard or predicted, metres.
@@ -34,8 +33,9 @@ pub(super) struct Beam {
     reading: JudgedPing,
     /// Its echoes, in the order in which they came.
     echoes: Vec<Echo>,
-    /// The way of the predicted echo: the ranger, each reflection and edge, the ranger.
-    way: Option<Vec<Point>>,
+    /// The path of the reading's sound, or else of the predicted echo, in the plan: the transmitter, each
+    /// interaction, the receiver.
+    polyline: Option<Vec<Point>>,
     /// What the model hears, in order of time, faint sounds included; `null` if it could not be
     /// asked.
     humps: Option<Vec<HumpLine>>,
@@ -67,9 +67,8 @@ struct HumpLine {
     margin_db: f64,
     /// The path the sound took.
     path: PathRecord,
-    /// The path's points; `null` where a record does not say them (scattered sound, floor and
-    /// ceiling).
-    way: Option<Vec<Point>>,
+    /// The same in the plan: the transmitter, each interaction, the receiver.
+    polyline: Vec<Point>,
 }
 
 /// Everything about a reading of a scan. The model is asked if `scene` is the one that the scan
@@ -77,11 +76,17 @@ struct HumpLine {
 pub(super) fn look(view: &ScanView, ping: Ping, scene: Option<&Scene>) -> Beam {
     let session = view.session.as_deref();
     let echoes = echoes(view, session, &ping);
-    let (way, humps, lacks) = match ask_model(view, session, &ping, scene) {
-        Ok((way, humps)) => (way, Some(humps), None),
-        Err(lacks) => (None, None, Some(lacks)),
+    let (humps, lacks) = match ask_model(view, session, &ping, scene) {
+        Ok(humps) => (Some(humps), None),
+        Err(lacks) => (None, Some(lacks)),
     };
-    Beam { reading: ping.into(), echoes, way, humps, lacks }
+    // A log of format 1 does not say where the sound went; the model does, in the scan's own scene.
+    let polyline = ping.sound_path().and_then(|path| match scene {
+        Some(scene) if lacks.is_none() => view.polyline(&ping, path, scene),
+        _ => path.polyline(view.viewpoint(&ping)?.ends()),
+    });
+    let polyline = polyline.map(|points| points.into_iter().map(point).collect());
+    Beam { reading: ping.into(), echoes, polyline, humps, lacks }
 }
 
 fn echoes(view: &ScanView, session: Option<&Session>, ping: &Ping) -> Vec<Echo> {
@@ -98,14 +103,12 @@ fn echoes(view: &ScanView, session: Option<&Session>, ping: &Ping) -> Vec<Echo> 
     ping.echo_ticks.iter().map(echo).collect()
 }
 
-type Asked = (Option<Vec<Point>>, Vec<HumpLine>);
-
 fn ask_model(
     view: &ScanView,
     session: Option<&Session>,
     ping: &Ping,
     scene: Option<&Scene>,
-) -> Result<Asked, String> {
+) -> Result<Vec<HumpLine>, String> {
     let (session, pose) = session.zip(view.pose()).ok_or("the log lacks the scan's session")?;
     let scene = scene.ok_or("there is no scene in force")?;
     let taken_in = session.scene.as_ref().ok_or("the scan was taken without a scene")?;
@@ -123,12 +126,9 @@ fn ask_model(
     let until_m = options.max_range_m.unwrap_or(sensor.max_range_m);
     let until_m = if heard_m > 0.0 { until_m.min(heard_m + BEYOND_M) } else { until_m };
     let options = Options { max_range_m: Some(until_m), ..options };
-    let viewpoint = sensor.mounting.viewpoint(&axis);
     let simulator = Simulator::new(Arc::clone(&scene), sensor, air, options)
         .map_err(|error| error.to_string())?;
-    let path = ping.path.as_ref().or_else(|| ping.sim.as_ref()?.path.as_ref());
-    let way = path.and_then(|path| way(&scene, &viewpoint, path));
-    Ok((way, humps(&simulator, &axis, until_m)))
+    Ok(humps(&simulator, &axis, until_m))
 }
 
 /// The session's air, at the temperature that was known when the scan began.
@@ -143,7 +143,7 @@ fn air(view: &ScanView, session: &Session) -> Result<Air, crate::acoustics::AirE
 
 fn humps(simulator: &Simulator, axis: &Pose, until_m: f64) -> Vec<HumpLine> {
     let direction_rad = axis.direction_rad(0.0);
-    let viewpoint = simulator.sensor().mounting.viewpoint(axis);
+    let ends = simulator.sensor().mounting.viewpoint(axis).ends();
     let station = simulator.station(axis.position());
     let trace = station.trace(direction_rad, until_m, STEP_US);
     let receiver = simulator.receiver();
@@ -160,15 +160,9 @@ fn humps(simulator: &Simulator, axis: &Pose, until_m: f64) -> Vec<HumpLine> {
             range_m: arrival.length_m / 2.0,
             peak: hump.peak.0,
             margin_db: 20.0 * over(hump).log10(),
-            way: way(simulator.scene(), &viewpoint, &path),
+            polyline: path.polyline(ends).into_iter().flatten().map(point).collect(),
             path,
         }
     };
     loudest.into_iter().map(line).collect()
-}
-
-fn way(scene: &Scene, from: &Viewpoint, record: &PathRecord) -> Option<Vec<Point>> {
-    let path = record.path(scene)?;
-    let points = path.points_between(scene, from.ends(), from.z_m, record.length_m)?;
-    Some(points.into_iter().map(point).collect())
 }

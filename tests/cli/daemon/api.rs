@@ -177,17 +177,20 @@ fn past_scans_and_their_beams_are_read_from_the_logs() {
     }
     assert_eq!(pings, latest["pings"]);
 
-    // In this room everything is explained: the way goes from the ranger round and back to it.
+    // In this room everything is explained: the path runs from the ranger round and back to it.
     let beam = daemon.get(&format!("/v1/scans/{id}/beams/5")).json();
     assert_eq!(beam["reading"], whole["pings"][5]);
-    let way = beam["way"].as_array().expect("a way");
-    assert_eq!((&way[0], way.last()), (&json!([0.774, 0.085]), Some(&way[0])));
-    let length_m: f64 = way.windows(2).map(|leg| distance(&leg[0], &leg[1])).sum();
+    let path = beam["polyline"].as_array().expect("a path");
+    assert_eq!((&path[0], path.last()), (&json!([0.774, 0.085]), Some(&path[0])));
+    let length_m: f64 = path.windows(2).map(|leg| distance(&leg[0], &leg[1])).sum();
     let stated_m = whole["pings"][5]["sim"]["path"]["length_m"].as_f64().expect("a length");
     assert!((length_m - stated_m).abs() < 1e-6, "{length_m} and {stated_m}");
     let drawn = |hump: &Value| hump["path"] == whole["pings"][5]["sim"]["path"];
     let humps = beam["humps"].as_array().expect("humps");
-    assert!(humps.iter().any(|hump| drawn(hump) && hump["way"] == beam["way"]), "{humps:?}");
+    assert!(
+        humps.iter().any(|hump| drawn(hump) && hump["polyline"] == beam["polyline"]),
+        "{humps:?}"
+    );
     let echo = &beam["echoes"][0];
     let off_m = echo["range_m"].as_f64().zip(whole["pings"][5]["range_m"].as_f64());
     assert!(off_m.is_some_and(|(a, b)| (a - b).abs() < 1e-9), "{echo}");

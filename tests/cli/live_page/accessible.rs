@@ -90,7 +90,7 @@ fn contrasts(browser: &Browser) -> Vec<(String, f64)> {
         "--silent",
         "--lost",
         "--model",
-        "--way",
+        "--path",
         "--ray",
         "--wall",
         "--edge",

@@ -51,8 +51,8 @@ fn count_points(browser: &Browser, layer: &str, condition: &str) -> u64 {
          const look = copy.getContext('2d', {{willReadFrequently: true}}); \
          look.drawImage(c, 0, 0); \
          const d = look.getImageData(0, 0, c.width, c.height).data; \
-         const hex = getComputedStyle(document.documentElement).getPropertyValue('--way').trim(); \
-         const way = [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16)); \
+         const hex = getComputedStyle(document.documentElement).getPropertyValue('--path').trim(); \
+         const path = [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16)); \
          let n = 0; for (let i = 0; i < d.length; i += 4) n += {condition}; return n; }})()"
     ));
     count.as_u64().expect("a number")
@@ -97,7 +97,7 @@ fn readings_appear_while_the_sweep_goes_on_and_add_up_at_its_end() {
 }
 
 #[test]
-fn a_beam_is_chosen_by_click_or_key_and_its_way_is_drawn() {
+fn a_beam_is_chosen_by_click_or_key_and_its_path_is_drawn() {
     let folder = tempfile::tempdir().expect("a folder");
     let (daemon, address) = daemon(folder.path(), "127.0.0.1:0", &[]);
     let browser = Browser::open(&address, DESK);
@@ -120,23 +120,23 @@ fn a_beam_is_chosen_by_click_or_key_and_its_way_is_drawn() {
     assert!(now().starts_with("beam 3, azimuth 10.8"), "{}", now());
     let spoken = browser.eval("document.getElementById('beam').getAttribute('aria-valuetext')");
     assert_eq!(spoken, json!(now()));
-    // The daemon tells the beam's echoes and ways; the predicted one is drawn.
+    // The daemon tells the beam's echoes and paths; the predicted one is drawn.
     browser.until("document.querySelectorAll('.humps button').length > 0");
     browser.until("document.querySelectorAll('.humps [aria-pressed=true]').length === 1");
     assert!(browser.eval("document.querySelectorAll('.echoes li').length").as_u64() >= Some(1));
-    let with_way = way_points(&browser);
-    assert!(with_way > 50, "{with_way} points of the way's colour");
-    // Another sound by key: tab to it, press it, and its own way is drawn.
+    let with_path = path_points(&browser);
+    assert!(with_path > 50, "{with_path} points of the path's colour");
+    // Another sound by key: tab to it, press it, and its own path is drawn.
     browser.eval("document.querySelector('.humps [aria-pressed=false]:not(:disabled)').focus()");
     browser.press(Key::Enter.into());
     browser.until("document.activeElement.ariaPressed === 'true'");
-    assert_ne!(way_points(&browser), with_way);
+    assert_ne!(path_points(&browser), with_path);
     assert_clean(&browser);
 }
 
-/// How many points above the plan have the colour of a sound's way.
-fn way_points(browser: &Browser) -> u64 {
-    let like = "d[i + 3] > 200 && way.every((v, k) => Math.abs(d[i + k] - v) < 12)";
+/// How many points above the plan have the colour of a sound's path.
+fn path_points(browser: &Browser) -> u64 {
+    let like = "d[i + 3] > 200 && path.every((v, k) => Math.abs(d[i + k] - v) < 12)";
     count_points(browser, "over", like)
 }
 

@@ -16,7 +16,6 @@ mod simulator;
 mod station;
 #[cfg(test)]
 mod tests;
-mod way;
 
 pub use array::{ArrayModel, ArrayStand};
 pub use cone::Cone;
@@ -25,7 +24,6 @@ pub use names::FACE_NAME;
 pub use path::{Bend, Edge, Interaction, Mechanism, Path, Reflector};
 pub use simulator::{EngineKind, ModelError, Options, Simulator};
 pub use station::Station;
-pub use way::RecordedPath;
 
 pub use crate::acoustics::EdgeLawKind;
 

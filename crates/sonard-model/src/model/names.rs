@@ -1,6 +1,6 @@
 //! Names of what a path meets: ids of the scene, and words for what has no id.
 
-use super::{Bend, Edge, Reflector};
+use super::{Bend, Edge, Mechanism, Reflector};
 use crate::scene::Scene;
 
 /// What the transducer's own face is called on a path.
@@ -23,16 +23,21 @@ impl Reflector {
             Self::Ceiling => CEILING.to_owned(),
         }
     }
+}
 
-    /// The reflector of that name; `None` if the scene has none.
+impl Mechanism {
+    /// What it is done by, in a scene: a [`Reflector`]'s name, a [`Bend`]'s, or [`FACE_NAME`].
+    ///
+    /// # Panics
+    /// If it is of another scene.
     #[must_use]
-    pub fn named(scene: &Scene, name: &str) -> Option<Self> {
-        let wall = scene.walls.iter().position(|wall| &*wall.id == name);
-        let cylinder = || scene.cylinders.iter().position(|cylinder| &*cylinder.id == name);
-        wall.map(|index| Self::Wall(index as u32))
-            .or_else(|| cylinder().map(|index| Self::Cylinder(index as u32)))
-            .or_else(|| (name == FLOOR).then_some(Self::Floor))
-            .or_else(|| (name == CEILING).then_some(Self::Ceiling))
+    pub fn name(self, scene: &Scene) -> String {
+        match self {
+            Self::Reflection(reflector) => reflector.name(scene),
+            Self::Diffraction(bend) => bend.name(scene),
+            Self::Scattering { wall } => Reflector::Wall(wall).name(scene),
+            Self::Transducer => FACE_NAME.to_owned(),
+        }
     }
 }
 
@@ -51,19 +56,5 @@ impl Bend {
             Self::Level { wall, is_upper: false } => (wall, "bottom"),
         };
         format!("{}.{end}", scene.walls[wall as usize].id)
-    }
-
-    /// The edge of that name; `None` if the scene has none.
-    #[must_use]
-    pub fn named(scene: &Scene, name: &str) -> Option<Self> {
-        let (wall, end) = name.rsplit_once('.')?;
-        let wall = scene.walls.iter().position(|known| &*known.id == wall)? as u32;
-        match end {
-            "a" => Some(Self::Upright(Edge { wall, at_b: false })),
-            "b" => Some(Self::Upright(Edge { wall, at_b: true })),
-            "top" => Some(Self::Level { wall, is_upper: true }),
-            "bottom" => Some(Self::Level { wall, is_upper: false }),
-            _ => None,
-        }
     }
 }

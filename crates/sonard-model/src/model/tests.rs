@@ -9,7 +9,6 @@ mod laws;
 mod phenomena;
 mod reach;
 pub(in crate::model) mod reference;
-mod ways;
 
 use std::sync::Arc;
 

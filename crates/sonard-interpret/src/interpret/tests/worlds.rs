@@ -189,7 +189,9 @@ fn is_direct(scan: &ScanView) -> bool {
         ping.path.as_ref().is_some_and(|path| match (path.kind, path.order) {
             (PathKind::Specular, 1) | (PathKind::Diffracted, 0) => true,
             // A corner's two sides meet where the sound turns.
-            (PathKind::Specular, 2) => path.walls.iter().all(|wall| wall.starts_with("wall-")),
+            (PathKind::Specular, 2) => {
+                path.interactions.iter().all(|met| met.id.starts_with("wall-"))
+            }
             _ => false,
         })
     })

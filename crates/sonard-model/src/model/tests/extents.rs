@@ -1,7 +1,11 @@
 //! The angular extents of Bozma and Kuc's figure 13, by the full simulation of their scan.
 
 use super::*;
-use crate::{model::Prediction, plan::ScanPlan, reading::PingStatus};
+use crate::{
+    model::{Mechanism, Prediction},
+    plan::ScanPlan,
+    reading::PingStatus,
+};
 
 const STEP_DEG: f64 = 0.9;
 
@@ -16,9 +20,11 @@ struct Run {
 /// Walls and edges of its path.
 fn names(simulator: &Simulator, arrival: &Arrival) -> String {
     let scene = simulator.scene();
-    let bends = arrival.path.bends.iter().map(|bend| format!("edge {}", bend.name(scene)));
-    let walls = arrival.path.walls.iter().map(|wall| wall.name(scene));
-    bends.chain(walls).collect::<Vec<_>>().join(", ")
+    let name = |met: Mechanism| match met {
+        Mechanism::Diffraction(bend) => format!("edge {}", bend.name(scene)),
+        _ => met.name(scene),
+    };
+    arrival.path.mechanisms().map(name).collect::<Vec<_>>().join(", ")
 }
 
 fn runs(simulator: &Simulator, readings: &[(f64, Prediction)]) -> Vec<Run> {

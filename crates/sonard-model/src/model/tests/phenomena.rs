@@ -42,7 +42,7 @@ fn walls_of(simulator: &Simulator, prediction: &Prediction) -> Vec<String> {
 }
 
 fn names(simulator: &Simulator, arrival: &Arrival) -> Vec<String> {
-    arrival.path.walls.iter().map(|wall| wall.name(simulator.scene())).collect()
+    arrival.path.mechanisms().map(|met| met.name(simulator.scene())).collect()
 }
 
 fn length_m(prediction: &Prediction) -> f64 {

@@ -1,11 +1,11 @@
-//! The way of one beam's sound.
+//! The path of one beam's sound.
 
 use std::fmt;
 
 use crate::{
     cli::Failure,
     geometry::wrap_pi,
-    plot::{Picture, WayView, badge_of, draw_way},
+    plot::{PathView, Picture, badge_of, draw_path},
     scan::{PathRecord, Ping, PingStatus, ScanView},
     scene::Scene,
 };
@@ -36,7 +36,7 @@ pub(super) fn draw(
     beam: Beam,
 ) -> Result<Picture, Failure> {
     let scene = scene.ok_or_else(|| {
-        Failure::input("a way needs a floor plan", "give the log's scene with --scene")
+        Failure::input("a path needs a floor plan", "give the log's scene with --scene")
     })?;
     let Some(view) = views.first() else { return Err(no_beam(views, beam)) };
     let ping = find(view, beam).ok_or_else(|| no_beam(views, beam))?;
@@ -44,17 +44,12 @@ pub(super) fn draw(
         Failure::input("the scan lacks its scan_start record", "choose another with --scan")
     })?;
     let (azimuth_deg, index) = (ping.azimuth_deg, ping.index);
-    let record = path_of(ping).ok_or_else(|| {
+    let record = ping.sound_path().ok_or_else(|| {
         Failure::input(
             format!("beam {index}, azimuth {azimuth_deg}\u{b0}, has no path: nothing came near"),
             "choose a beam with an echo; `sonard log show --pings` lists them",
         )
     })?;
-    let robot = ping.pose.unwrap_or(pose);
-    let whole = match &view.session {
-        Some(session) => session.scene_around(scene, &robot),
-        None => scene.with_robot_at(&robot),
-    };
     let viewpoint = view.viewpoint(ping).ok_or_else(|| {
         let ranger = ping.ranger.as_deref().unwrap_or_default();
         Failure::input(
@@ -62,18 +57,17 @@ pub(super) fn draw(
             "correct the session's record",
         )
     })?;
-    let points = record
-        .path(&whole)
-        .and_then(|path| {
-            path.points_between(&whole, viewpoint.ends(), viewpoint.z_m, record.length_m)
-        })
-        .ok_or_else(|| {
-            Failure::input(
-                format!("beam {index}: the scene has no way over {}", record.in_words()),
-                "give the scene that the log's model used with --scene",
-            )
-        })?;
-    Ok(draw_way(&WayView {
+    let points = view.polyline(ping, record, scene).ok_or_else(|| {
+        Failure::input(
+            format!(
+                "beam {index}: its log is of format 1, without points, and the model finds no path over {} in \
+                 this scene",
+                record.in_words()
+            ),
+            "give the scene that the log's model used with --scene",
+        )
+    })?;
+    Ok(draw_path(&PathView {
         title: format!("{}, beam {index} at azimuth {azimuth_deg}\u{b0}", scene.name),
         lines: vec![reading(ping), by(record)],
         badge: badge_of(ping.provenance.or(view.session.as_ref().map(|s| s.provenance))),
@@ -96,10 +90,6 @@ fn find(view: &ScanView, beam: Beam) -> Option<&Ping> {
     }
 }
 
-fn path_of(ping: &Ping) -> Option<&PathRecord> {
-    ping.path.as_ref().or_else(|| ping.sim.as_ref()?.path.as_ref())
-}
-
 /// What was read, and what the model says.
 fn reading(ping: &Ping) -> String {
     let said = |status: PingStatus, range_m: Option<f64>| match (status, range_m) {
@@ -119,7 +109,7 @@ fn reading(ping: &Ping) -> String {
 }
 
 fn by(record: &PathRecord) -> String {
-    format!("way of {:.4} m: {}", record.length_m, record.in_words())
+    format!("path of {:.4} m: {}", record.length_m, record.in_words())
 }
 
 fn no_beam(views: &[ScanView], beam: Beam) -> Failure {

@@ -1,4 +1,4 @@
-//! One beam's way through the floor plan.
+//! The propagation path of one beam, on the floor plan.
 
 use super::{
     canvas::{Anchor, Layer, Px, Rect},
@@ -14,9 +14,9 @@ use sonard_model::{
     scene::Scene,
 };
 
-/// A beam and the way its sound took.
+/// A beam and the propagation path of its sound.
 #[derive(Debug, Clone)]
-pub struct WayView<'a> {
+pub struct PathView<'a> {
     /// Above the picture.
     pub title: String,
     /// Under the title: what was read, and by which path.
@@ -33,35 +33,35 @@ pub struct WayView<'a> {
     pub azimuth_deg: f64,
     /// What was read, metres.
     pub range_m: Option<f64>,
-    /// From the ranger over each reflection back to it ([`RecordedPath::points`](sonard_model::model::RecordedPath::points)).
+    /// From the transmitter over each interaction to the receiver.
     pub points: Vec<DVec2>,
 }
 
-/// Draws the way of a beam's sound through the floor plan: reflections numbered in order, an arrow
+/// Draws the path of a beam's sound on the floor plan: reflections and edges numbered in order, an arrow
 /// on each stretch, and where the ranger believes the echo to be.
 #[must_use]
-pub fn draw_way(view: &WayView) -> Picture {
+pub fn draw_path(view: &PathView) -> Picture {
     let (heading, top) = caption::draw(&view.title, view.badge, &view.lines);
     let (left, right) = (theme::MARGIN_PX + 38.0, theme::PAGE_PX - theme::MARGIN_PX);
     let region = region(view);
     let height = Plan::height_for(&region, right - left, [300.0, 700.0]);
     let plan = Plan::fit(region, Rect::new(left, top + 22.0, right - left, height));
     let mut labels = plan.labels(Some(view.scene));
-    let mut page = Layer::new("way-of-a-beam");
+    let mut page = Layer::new("path-of-a-beam");
     page.add(heading);
     page.add(plan.frame());
     let mut inside = Layer::new("inside").clipped("plan-window", plan.panel);
     inside.add(beam(view, &plan));
     inside.add(plan.walls(view.scene));
     inside.add(plan.body(view.scene, &view.pose));
-    inside.add(way(view, &plan, &mut labels));
+    inside.add(path(view, &plan, &mut labels));
     inside.add(plan.pose(&view.pose));
     page.add(inside);
     page.add(plan.names(view.scene, &mut labels));
     page.add(plan.scale_bar());
     let below = Px::new(left, plan.panel.bottom + 24.0);
     let mut entries = vec![
-        Entry::new(line(theme::VERMILLION, "none"), "way of the sound"),
+        Entry::new(line(theme::VERMILLION, "none"), "path of the sound"),
         Entry::new(line(theme::SKY, "5 4"), "where the ranger looks"),
     ];
     if view.range_m.is_some() {
@@ -77,18 +77,18 @@ const fn line(colour: &'static str, dash: &'static str) -> Sample {
     Sample::Line { colour, width_px: 2.0, dash }
 }
 
-/// The way and the reading with some room around; of the room what is near.
-fn region(view: &WayView) -> Bounds {
+/// The path and the reading with some room around; of the room what is near.
+fn region(view: &PathView) -> Bounds {
     let read = view.range_m.map(|range_m| view.looks.point_at(0.0, range_m));
     let here = [view.pose.position()].into_iter().chain(read).chain(view.points.iter().copied());
-    let way = Bounds::around(here).unwrap_or(Bounds { min: DVec2::ZERO, max: DVec2::ONE });
-    let reach = way.size().max_element().max(0.1);
-    let near = way.grown(1.5 * reach);
+    let path = Bounds::around(here).unwrap_or(Bounds { min: DVec2::ZERO, max: DVec2::ONE });
+    let reach = path.size().max_element().max(0.1);
+    let near = path.grown(1.5 * reach);
     let walls = view.scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
-    way.including(walls.map(|end| end.clamp(near.min, near.max))).grown(0.12 * reach)
+    path.including(walls.map(|end| end.clamp(near.min, near.max))).grown(0.12 * reach)
 }
 
-fn beam(view: &WayView, plan: &Plan) -> Layer {
+fn beam(view: &PathView, plan: &Plan) -> Layer {
     let reach_m = view.range_m.unwrap_or_else(|| plan.view.size().max_element());
     let from = plan.px(view.looks.position());
     let to = view.looks.point_at(0.0, reach_m);
@@ -102,9 +102,9 @@ fn beam(view: &WayView, plan: &Plan) -> Layer {
     layer
 }
 
-fn way(view: &WayView, plan: &Plan, labels: &mut Labels) -> Layer {
+fn path(view: &PathView, plan: &Plan, labels: &mut Labels) -> Layer {
     let stretches = apart(&view.points.iter().map(|point| plan.px(*point)).collect::<Vec<_>>());
-    let mut layer = Layer::new("way").stroked(theme::VERMILLION, 1.8);
+    let mut layer = Layer::new("path").stroked(theme::VERMILLION, 1.8);
     let mut heads = Layer::new("heads").with("fill", theme::VERMILLION).with("stroke", "none");
     for &(from, to) in &stretches {
         layer.line(from, to);
@@ -134,7 +134,7 @@ fn way(view: &WayView, plan: &Plan, labels: &mut Labels) -> Layer {
     layer
 }
 
-/// Stretches moved a little to their left, so that the way there and the way back can be told apart.
+/// Stretches moved a little to their left, so that the way out and the way back can be told apart.
 fn apart(points: &[Px]) -> Vec<(Px, Px)> {
     let shift = |from: Px, to: Px| -2.2 * (to - from).normalize_or_zero().perp();
     points
