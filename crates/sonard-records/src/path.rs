@@ -237,6 +237,8 @@ mod tests {
         serde_json::from_str(text)
     }
 
+    type Met<'a> = &'a [(InteractionKind, &'a str)];
+
     fn words(path: &PathRecord) -> Vec<(InteractionKind, &str)> {
         path.interactions.iter().map(|met| (met.kind, met.id.as_str())).collect()
     }
@@ -244,7 +246,7 @@ mod tests {
     #[test]
     fn paths_of_format_1_are_read_without_points() {
         use InteractionKind::{Diffraction, Reflection, Scattering, Transducer};
-        let cases: [(&str, u32, &[(InteractionKind, &str)]); 5] = [
+        let cases: [(&str, u32, Met<'_>); 5] = [
             (
                 r#"{"kind":"specular","order":3,"walls":["south","transducer","south"],"length_m":1}"#,
                 2,

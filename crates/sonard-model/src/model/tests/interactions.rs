@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 use super::*;
 use crate::{
     acoustics::edge::EdgeLaw,
-    geometry::{DVec2, Mirror, SNAP_M, square_up, wrap_pi},
+    geometry::{DVec2, Mirror, SNAP_M, distance_to_segment, square_up, wrap_pi},
     model::{
         Edge, Interaction, Mechanism,
         paths::{EchoPath, Paths, Settings},
@@ -102,11 +102,13 @@ impl Room {
             let (low, high) = wall.z_m.map_or((f64::MIN, f64::MAX), |[from, to]| (from, to));
             let off_height_m = z_m.map_or(0.0, |z_m| (low - z_m).max(z_m - high).max(0.0));
             // Beyond its end, its neighbour in the plan may have been snapped to it.
-            let beyond_m = crate::geometry::distance_to_segment(point, wall.a, wall.b);
+            let beyond_m = distance_to_segment(point, wall.a, wall.b);
             assert!(beyond_m < 1e-4, "{interaction:?} {beyond_m}");
             self.mirror(index).height_m(point).abs().max(off_height_m)
         };
-        let off_z_m = |wanted_m: Option<f64>| (z_m.unwrap() - wanted_m.unwrap()).abs();
+        let off_z_m = |wanted_m: Option<f64>| {
+            z_m.zip(wanted_m).map_or(f64::INFINITY, |(is, should)| (is - should).abs())
+        };
         match mechanism {
             Mechanism::Reflection(Reflector::Wall(wall)) | Mechanism::Scattering { wall } => {
                 off_wall_m(wall)
@@ -123,11 +125,18 @@ impl Room {
                 (point.distance(end) - 2.0 * SNAP_M).max(0.0)
             }
             Mechanism::Diffraction(Bend::Level { wall, is_upper }) => {
-                let limits = self.scene.walls[wall as usize].z_m.unwrap();
+                let limits = self.scene.walls[wall as usize].z_m.expect("a wall with limits");
                 off_wall_m(wall).max(off_z_m(Some(limits[usize::from(is_upper)])))
             }
             Mechanism::Transducer => point.distance(ends[0]),
         }
+    }
+
+    /// Whether a point is not beyond the ends of its wall.
+    fn is_on_wall(&self, interaction: &Interaction) -> bool {
+        let Some(Reflector::Wall(wall)) = interaction.mechanism.surface() else { return true };
+        let wall = &self.scene.walls[wall as usize];
+        distance_to_segment(interaction.point, wall.a, wall.b) < 1e-9
     }
 
     fn mirror(&self, wall: u32) -> Mirror {
@@ -167,11 +176,14 @@ fn random_scene(rng: &mut Pcg64) -> Scene {
         wall
     });
     let mut scene = scene(walls.collect());
-    let count = rng.random_range(0..=2);
-    scene.cylinders = centers[..count]
-        .iter()
-        .map(|at| cylinder((at.x, at.y), 0.05 + 0.2 * rng.random::<f64>()))
-        .collect();
+    let mut round = |at: &DVec2| cylinder((at.x, at.y), 0.05 + 0.2 * rng.random::<f64>());
+    scene.cylinders = centers.iter().map(&mut round).collect();
+    let apart_m = centers[0].distance(centers[1]);
+    let sum_m: f64 = scene.cylinders.iter().map(|round| round.radius_m).sum();
+    scene.cylinders.truncate(if apart_m > sum_m + 0.02 { 2 } else { 1 });
+    if rng.random_bool(0.3) {
+        scene.cylinders.clear();
+    }
     if rng.random_bool(0.6) {
         scene.floor_z_m = rng.random_bool(0.8).then_some(0.0);
         scene.ceiling_z_m = (scene.floor_z_m.is_none() || rng.random_bool(0.6)).then_some(1.3);
@@ -263,7 +275,6 @@ fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
     for name in shipped::names() {
         let shipped = shipped_scene(name);
         for pose in shipped.poses.values() {
-            let scene = Arc::new(shipped.with_robot_at(pose));
             for engine in [EngineKind::Paths, EngineKind::Fan, EngineKind::Cone] {
                 let options = Options {
                     engine,
@@ -272,52 +283,13 @@ fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
                     double_diffraction: true,
                     ..Options::default()
                 };
-                let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-                let simulator = Simulator::new(scene.clone(), sensor, Air::default(), options)
-                    .expect("options");
-                let is_exact = engine == EngineKind::Paths;
-                let room = if is_exact {
-                    Room::new(&scene, simulator.sensor_z_m())
-                } else {
-                    Room { scene: Scene::clone(&scene), z_m: None }
-                };
-                let at = pose.position();
-                let station = simulator.station(at);
+                let simulator = simulator(shipped.with_robot_at(pose), options);
+                let station = simulator.station(pose.position());
                 for direction in 0..20 {
                     for arrival in station.arrivals(0.3 * f64::from(direction)) {
-                        let path = &arrival.path;
-                        match engine {
-                            EngineKind::Paths => {
-                                let off_m = if is_round(path) { 1e-7 } else { 1e-9 };
-                                room.check(path, [at; 2], arrival.length_m, off_m);
-                            }
-                            // The fan lets its rays pass beside a wall's end by as much as they are apart, and
-                            // knows lengths over cylinders by the curvature of the front.
-                            EngineKind::Fan => {
-                                let off_m = if is_round(path) { 1e-4 } else { 1e-9 };
-                                let points = points(path, [at; 2], None);
-                                let length_m = length_m(&points);
-                                assert!(
-                                    (length_m - arrival.length_m).abs() < off_m,
-                                    "{name}: {length_m} {arrival:?}"
-                                );
-                                for (place, met) in path.interactions.iter().enumerate() {
-                                    let legs = [1, 2]
-                                        .map(|to| points[place + to] - points[place + to - 1]);
-                                    let off = room.off_law(met, legs.map(DVec3::normalize_or_zero));
-                                    let is_told = legs.iter().all(|leg| leg.length() > SHORT_M);
-                                    assert!(!is_told || off < 1e-6, "{name}: {off} {arrival:?}");
-                                }
-                            }
-                            // The nearest hit, mirror or not.
-                            EngineKind::Cone => {
-                                let length_m = length_m(&points(path, [at; 2], None));
-                                assert!((length_m - arrival.length_m).abs() < 1e-9);
-                                assert!(room.off_place_m(&path.interactions[0], [at; 2]) < 1e-8);
-                            }
-                        }
+                        check_arrival(&simulator, &arrival, pose.position());
                         let face = |met| met == Mechanism::Transducer;
-                        trains += usize::from(path.mechanisms().any(face));
+                        trains += usize::from(arrival.path.mechanisms().any(face));
                         checked += 1;
                     }
                 }
@@ -325,6 +297,37 @@ fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
         }
     }
     assert!(checked > 10_000 && trains > 100, "{checked} {trains}");
+}
+
+fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2) {
+    let (path, ends) = (&arrival.path, [at; 2]);
+    let plan = Room { scene: Scene::clone(simulator.scene()), z_m: None };
+    let off_m = || length_m(&points(path, ends, None)) - arrival.length_m;
+    let round = path.reflectors().filter(|met| matches!(met, Reflector::Cylinder(_))).count();
+    match (simulator.options().engine, round) {
+        (EngineKind::Paths, _) => {
+            let room = Room::new(simulator.scene(), simulator.sensor_z_m());
+            room.check(path, ends, arrival.length_m, if round > 0 { 1e-7 } else { 1e-9 });
+        }
+        // The fan's ray stands for a neighbour that may pass a corner on its other side. Lengths over a
+        // cylinder it knows by the curvature of the front; over two, neighbours part too fast for that.
+        (EngineKind::Fan, 0 | 1) if path.interactions.iter().all(|met| plan.is_on_wall(met)) => {
+            assert!(off_m().abs() < if round > 0 { 2e-3 } else { 1e-9 }, "{} {arrival:?}", off_m());
+            let points = points(path, ends, None);
+            for (place, met) in path.interactions.iter().enumerate() {
+                let legs = [1, 2].map(|to| points[place + to] - points[place + to - 1]);
+                let is_told = legs.iter().all(|leg| leg.length() > SHORT_M);
+                let off = plan.off_law(met, legs.map(DVec3::normalize_or_zero));
+                assert!(!is_told || off < 1e-6, "{off} {arrival:?}");
+            }
+        }
+        (EngineKind::Fan, _) => assert!(path.interactions.iter().all(|met| met.z_m.is_none())),
+        // The nearest hit, mirror or not.
+        (EngineKind::Cone, _) => {
+            assert!(off_m().abs() < 1e-9, "{} {arrival:?}", off_m());
+            assert!(plan.off_place_m(&path.interactions[0], ends) < 1e-8, "{arrival:?}");
+        }
+    }
 }
 
 /// Mirror reflections alone count; an edge, a patch of a rough wall and the face do not.

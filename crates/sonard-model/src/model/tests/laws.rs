@@ -3,7 +3,10 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::{model::Prediction, plan::ScanPlan};
+use crate::{
+    model::{Mechanism, Prediction},
+    plan::ScanPlan,
+};
 
 /// A room with a slanted partition and a post, and a place in it.
 fn room() -> (Scene, DVec2) {
@@ -31,7 +34,7 @@ fn moved(mut scene: Scene, to: impl Fn(DVec2) -> DVec2) -> Scene {
 
 /// Loud arrivals by path. Faint ones, and paths that only graze the receiver, may come and go
 /// with the grid of rays, which is fixed in the world.
-fn loud(scene: Scene, from: DVec2, direction_rad: f64) -> Vec<(Path, f64, f64)> {
+fn loud(scene: Scene, from: DVec2, direction_rad: f64) -> Vec<(Vec<Mechanism>, f64, f64)> {
     let options = Options { max_range_m: Some(2.0), ..BARE };
     let simulator = simulator(scene, options);
     let mut all: Vec<_> = simulator
@@ -39,13 +42,13 @@ fn loud(scene: Scene, from: DVec2, direction_rad: f64) -> Vec<(Path, f64, f64)> 
         .arrivals(direction_rad)
         .into_iter()
         .filter(|arrival| arrival.amplitude > 0.05)
-        .map(|arrival| (arrival.path, arrival.length_m, arrival.amplitude))
+        .map(|arrival| (arrival.path.mechanisms().collect(), arrival.length_m, arrival.amplitude))
         .collect();
     all.sort_by(|one, other| one.1.total_cmp(&other.1));
     all
 }
 
-fn same(one: &[(Path, f64, f64)], other: &[(Path, f64, f64)]) {
+fn same(one: &[(Vec<Mechanism>, f64, f64)], other: &[(Vec<Mechanism>, f64, f64)]) {
     assert_eq!(one.len(), other.len(), "{one:#?} {other:#?}");
     for (path, length_m, amplitude) in one {
         let twin = other.iter().find(|(twin, ..)| twin == path).expect("the same path");

@@ -97,7 +97,7 @@ fn each_echo_of_a_seen_wall_turns_with_the_world() {
     let there = Paths::new(&scene(&walls), settings()).enumerate(AT.rotate(rotor));
     for one in &here {
         let found = there.iter().any(|other| {
-            other.path == one.path
+            other.path.mechanisms().eq(one.path.mechanisms())
                 && wrap(other.departure_rad - one.departure_rad - turn).abs() < 1e-9
         });
         assert!(found, "{one:?}");
