@@ -25,7 +25,7 @@ fn the_way_of_a_beam_says_whose_the_reading_is() {
     let scene = room();
     let pose = scene.poses["fig9"];
     let way = |provenance| {
-        let view = WayView {
+        let view = PathView {
             title: "a way".into(),
             lines: Vec::new(),
             badge: badge_of(Some(provenance)),
@@ -36,7 +36,7 @@ fn the_way_of_a_beam_says_whose_the_reading_is() {
             range_m: Some(0.5),
             points: vec![pose.position(), pose.position() + DVec2::X, pose.position()],
         };
-        draw_way(&view).to_svg()
+        draw_path(&view).to_svg()
     };
     assert!(way(Provenance::Mock).contains("MOCK, not hardware"));
     assert!(way(Provenance::Emulator).contains("EMULATOR, not hardware"));
