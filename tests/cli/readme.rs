@@ -52,7 +52,7 @@ fn every_command_of_the_readme_runs_as_pasted() {
     verbs.sort();
     verbs.dedup();
     assert!(commands > 40 && verbs.len() > 17, "{commands} lines of {verbs:?}");
-    for file in ["out/fig7/scan.png", "way.png", "plan.png", "map/map.yaml", "array.png"] {
+    for file in ["out/fig7/scan.png", "path.png", "plan.png", "map/map.yaml", "array.png"] {
         assert!(fs::metadata(folder.path().join(file)).is_ok_and(|file| file.len() > 0), "{file}");
     }
 }
