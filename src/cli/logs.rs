@@ -38,28 +38,6 @@ impl Damage {
     }
 }
 
-/// Hands over each record of a log; names the lines that hold none.
-///
-/// # Errors
-/// It can't be read, or holds no record at all.
-pub(super) fn for_each_record(log: &Path, mut take: impl FnMut(Record)) -> Result<(), Failure> {
-    let mut reader = progress::reading(log, open_for_reading(log)?);
-    let kind = kind_of(&mut reader);
-    let (mut damage, mut any) = (Damage::default(), false);
-    for line in read_log(reader) {
-        let line = line.map_err(|source| StoreError::Read { path: log.into(), source })?;
-        match line.record {
-            Ok(record) => {
-                any = true;
-                take(record);
-            }
-            Err(error) => damage.note(log, &error),
-        }
-    }
-    damage.sum_up(log);
-    if any { Ok(()) } else { Err(no_record(log, kind)) }
-}
-
 fn kind_of(reader: &mut impl std::io::BufRead) -> FileKind {
     reader.fill_buf().map_or(FileKind::Binary, FileKind::of)
 }
@@ -71,16 +49,28 @@ fn no_record(log: &Path, kind: FileKind) -> Failure {
     )
 }
 
-/// Hands over each scan of a log as soon as it has ended.
+/// Hands over each scan of a log as soon as it has ended; names the lines that hold no record.
 ///
 /// # Errors
-/// As [`for_each_record`], or what `take` refuses; nothing is read after that.
+/// The log can't be read or holds no record at all, or what `take` refuses; nothing is read after that.
 pub(super) fn for_each_scan(
     log: &Path,
+    take: impl FnMut(ScanView) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    for_each_scan_of(log, |_| {}, take)
+}
+
+/// The same, and before a scan each record up to the one that ends it is shown to `see`.
+///
+/// # Errors
+/// As [`for_each_scan`].
+pub(super) fn for_each_scan_of(
+    log: &Path,
+    see: impl FnMut(&Record),
     mut take: impl FnMut(ScanView) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let mut outcome = Ok(());
-    each_scan(log, |scan| {
+    each_scan(log, see, |scan| {
         if outcome.is_ok() {
             outcome = take(scan);
         }
@@ -90,14 +80,21 @@ pub(super) fn for_each_scan(
 }
 
 /// The same until `take` has had enough.
-fn each_scan(log: &Path, mut take: impl FnMut(ScanView) -> bool) -> Result<(), Failure> {
+fn each_scan(
+    log: &Path,
+    mut see: impl FnMut(&Record),
+    mut take: impl FnMut(ScanView) -> bool,
+) -> Result<(), Failure> {
     let mut reader = progress::reading(log, open_for_reading(log)?);
     let kind = kind_of(&mut reader);
     let (mut damage, mut any, mut broken) = (Damage::default(), false, None);
     let records = read_log(reader)
         .map_while(|line| line.map_err(|source| broken = Some(source)).ok())
         .filter_map(|line| line.record.map_err(|error| damage.note(log, &error)).ok())
-        .inspect(|_| any = true);
+        .inspect(|record| {
+            any = true;
+            see(record);
+        });
     for scan in ScanView::one_by_one(records) {
         if !take(scan) {
             break;

@@ -41,7 +41,8 @@ fn every_verb_that_reads_logs_reads_them() {
         ];
         let map = out(&format!("map-{name}"));
         runs[5].extend(["--out", &map]);
-        let [picture, lines, trusted] = ["picture.svg", "lines.svg", "trusted.jsonl"].map(out);
+        let [picture, lines] = ["picture.svg", "lines.svg"].map(out);
+        let trusted = out(&format!("trusted-{name}"));
         runs.push(vec!["lines", &log, "-o", &lines]);
         for kind in ["scan", "polar", "residuals", "side-by-side", "confidence"] {
             runs.push(vec!["plot", &log, "--scene", &scene, "--kind", kind, "-o", &picture]);

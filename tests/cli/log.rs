@@ -82,7 +82,7 @@ fn a_log_is_shown() {
         "5a0e7f5e",
         "7/7",
         "0.774,0.085,0",
-        "3 reflections: south north south",
+        "3 reflections: south, north, south",
         "(repaired)",
         "stopped: on request",
         "line 12",

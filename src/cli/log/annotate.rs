@@ -1,8 +1,9 @@
 //! `sonard log annotate`.
 
 use std::{
-    collections::HashMap,
-    io::{self, BufWriter, Write},
+    cell::RefCell,
+    collections::{HashMap, VecDeque},
+    io::{self, Write},
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -10,9 +11,9 @@ use std::{
 use uuid::Uuid;
 
 use super::super::{
-    logs::for_each_record,
+    logs::for_each_scan_of,
     map::{EXTEND_M, MAX_RANGE_M},
-    output::{OutPath, Overwrite, Product},
+    output::{OutPath, Overwrite, Product, Stream},
 };
 use super::{Failure, Outcome};
 use crate::{
@@ -21,7 +22,7 @@ use crate::{
         Extents, Sweep,
         prediction::{FeaturePrediction, PredictionSettings},
     },
-    scan::{Ping, PingStatus, Record, ScanView, Session},
+    scan::{Ping, PingStatus, Record, ScanView, Session, encode_line},
 };
 
 /// Options of `sonard log annotate`.
@@ -64,69 +65,124 @@ pub(super) fn run(args: &Args) -> Outcome {
         let help = "give a length in metres, greater than 0";
         return Err(Failure::input(format!("--max-range is {range_m}"), help));
     }
-    if let Some(out) = &args.out {
-        args.overwrite.check(out, Product::Log)?;
-    }
-    let mut records = Vec::new();
-    for_each_record(&args.log, |record| records.push(record))?;
-    let confidences = confidences(args, &records)?;
-    if confidences.is_empty() {
+    let out = match &args.out {
+        Some(out) => args.overwrite.begin(out, Product::Log)?,
+        None => Stream::standard(),
+    };
+    let waiting = RefCell::new(VecDeque::new());
+    let mut annotated = Annotated { args, waiting: &waiting, out, ready: HashMap::new() };
+    let (mut predictor, mut any) = (Predictor { args, of_session: None }, false);
+    for_each_scan_of(
+        &args.log,
+        |record| waiting.borrow_mut().push_back(record.clone()),
+        |scan| {
+            let found = predictor.confidences(&scan)?;
+            any |= !found.is_empty();
+            annotated.ready.insert(scan.scan, found);
+            annotated.write_ready()
+        },
+    )?;
+    if !any {
         return Err(Failure::input(
             format!("{}: there is no scan with its session and pose to weigh", args.log.display()),
             "give a log as `sonard scan` or `sonard simulate` writes it",
         ));
     }
-    let mut bytes = Vec::new();
-    for mut record in records {
-        if let Record::Ping(ping) = &mut record {
-            ping.confidence = confidences.get(&key(ping)).copied().filter(|_| is_weighed(ping));
+    annotated.finish()
+}
+
+/// Confidences of a scan's stops, by azimuth in millionths of a degree: readings of one stop have one.
+type Confidences = HashMap<i64, f64>;
+
+/// Records on their way out, in the order of the log: at most those from the oldest scan on that has not ended.
+struct Annotated<'a> {
+    args: &'a Args,
+    /// Read and not written.
+    waiting: &'a RefCell<VecDeque<Record>>,
+    /// Scans that have ended and whose end is not written.
+    ready: HashMap<Uuid, Confidences>,
+    out: Stream,
+}
+
+impl Annotated<'_> {
+    /// Writes up to the first reading whose scan has not ended.
+    fn write_ready(&mut self) -> Outcome {
+        while let Some(record) = self.next_ready() {
+            self.write(record)?;
         }
-        serde_json::to_writer(&mut bytes, &record)
-            .map_err(|error| Failure::device(error, "this record can't be written"))?;
-        bytes.push(b'\n');
+        Ok(())
     }
-    match &args.out {
-        Some(out) => args.overwrite.save(out, Product::Log, &bytes),
-        None => write_out(&bytes).or_else(|error| Failure::from_write("standard output", &error)),
+
+    fn next_ready(&self) -> Option<Record> {
+        let mut waiting = self.waiting.borrow_mut();
+        let is_ready = match waiting.front()? {
+            Record::Ping(ping) => self.ready.contains_key(&ping.scan),
+            _ => true,
+        };
+        if is_ready { waiting.pop_front() } else { None }
+    }
+
+    fn write(&mut self, mut record: Record) -> Outcome {
+        match &mut record {
+            Record::Ping(ping) => {
+                let of_scan = self.ready.get(&ping.scan);
+                let found = of_scan.and_then(|found| found.get(&stop(ping.azimuth_deg)));
+                ping.confidence = found.copied().filter(|_| is_weighed(ping));
+            }
+            Record::ScanEnd(end) => drop(self.ready.remove(&end.scan)),
+            _ => {}
+        }
+        let mut line = Vec::new();
+        encode_line(&record, &mut line)
+            .map_err(|error| Failure::input(error, "correct the record in the log"))?;
+        self.out.write_all(&line).or_else(|error| self.failed(&error))
+    }
+
+    fn finish(mut self) -> Outcome {
+        let left: Vec<_> = self.waiting.borrow_mut().drain(..).collect();
+        left.into_iter().try_for_each(|record| self.write(record))?;
+        self.out.finish().or_else(|error| self.failed(&error))
+    }
+
+    fn failed(&self, error: &io::Error) -> Outcome {
+        let name = self.args.out.as_deref().map(Path::display);
+        match name {
+            Some(path) => Failure::from_write(&path.to_string(), error),
+            None => Failure::from_write("standard output", error),
+        }
     }
 }
 
-fn write_out(bytes: &[u8]) -> io::Result<()> {
-    let mut out = BufWriter::new(io::stdout().lock());
-    out.write_all(bytes)?;
-    out.flush()
+/// Feature Prediction through the scans of a session; each session begins with nothing predicted.
+struct Predictor<'a> {
+    args: &'a Args,
+    of_session: Option<(Arc<Session>, FeaturePrediction)>,
 }
 
-/// A stop of a scan: readings of one stop have one confidence.
-type Stop = (Uuid, i64);
-
-/// The confidence of each stop. Each session begins with nothing predicted.
-fn confidences(args: &Args, records: &[Record]) -> Result<HashMap<Stop, f64>, Failure> {
-    let mut found = HashMap::new();
-    let mut predictor: Option<(Arc<Session>, FeaturePrediction)> = None;
-    for scan in ScanView::from_records(records.iter().cloned()) {
-        let Some(session) = &scan.session else { continue };
-        let sweep = match Sweep::of(&scan) {
+impl Predictor<'_> {
+    /// The confidence of each stop of a scan; none if it can't be weighed, which is told.
+    fn confidences(&mut self, scan: &ScanView) -> Result<Confidences, Failure> {
+        let Some(session) = &scan.session else { return Ok(Confidences::new()) };
+        let sweep = match Sweep::of(scan) {
             Ok(sweep) => sweep,
             Err(error) => {
-                let log = Path::display(&args.log);
+                let log = Path::display(&self.args.log);
                 anstream::eprintln!("{log}: scan {} has no confidences: {error}", scan.scan);
-                continue;
+                return Ok(Confidences::new());
             }
         };
-        let same = predictor.take().filter(|(known, _)| Arc::ptr_eq(known, session));
+        let same = self.of_session.take().filter(|(known, _)| Arc::ptr_eq(known, session));
         let (_, predicted) = match same {
-            Some(known) => predictor.insert(known),
+            Some(known) => self.of_session.insert(known),
             None => {
-                let fresh = FeaturePrediction::new(settings(args, session)?);
-                predictor.insert((Arc::clone(session), fresh))
+                let fresh = FeaturePrediction::new(settings(self.args, session)?);
+                self.of_session.insert((Arc::clone(session), fresh))
             }
         };
-        for (beam, worth) in sweep.beams.iter().zip(predicted.assess(&sweep)) {
-            found.insert((scan.scan, millionths(beam.azimuth_deg)), worth.confidence);
-        }
+        let assessed = predicted.assess(&sweep);
+        let of_stops = sweep.beams.iter().zip(assessed);
+        Ok(of_stops.map(|(beam, worth)| (stop(beam.azimuth_deg), worth.confidence)).collect())
     }
-    Ok(found)
 }
 
 fn settings(args: &Args, session: &Session) -> Result<PredictionSettings, Failure> {
@@ -142,13 +198,9 @@ fn settings(args: &Args, session: &Session) -> Result<PredictionSettings, Failur
     })
 }
 
-fn key(ping: &Ping) -> Stop {
-    (ping.scan, millionths(wrap_360(ping.azimuth_deg)))
-}
-
-/// Azimuths of one stop agree to this.
-fn millionths(azimuth_deg: f64) -> i64 {
-    (azimuth_deg * 1e6).round() as i64
+/// An azimuth in millionths of a degree: those of one stop agree to this.
+fn stop(azimuth_deg: f64) -> i64 {
+    (wrap_360(azimuth_deg) * 1e6).round() as i64
 }
 
 /// Whether a reading counts: one that was lost or is doubtful says nothing.

@@ -200,7 +200,7 @@ fn random_scene(rng: &mut Pcg64) -> Scene {
 fn paths_of_random_scenes_obey_the_laws_at_every_point() {
     let mut rng = Pcg64::seed_from_u64(19);
     let mut found = Counts::default();
-    for case in 0..60 {
+    for case in 0..30 {
         let scene = random_scene(&mut rng);
         let mut place = || loop {
             let at = DVec2::new(rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5) * 2.5;
@@ -212,7 +212,7 @@ fn paths_of_random_scenes_obey_the_laws_at_every_point() {
         let to = if case % 2 == 0 { from } else { place() };
         let settings = Settings {
             max_path_m: 3.0,
-            floor: 3e-3,
+            floor: 6e-3,
             edge_law: Some(EdgeLaw::Utd),
             double_diffraction: case % 3 == 0,
             sensor_z_m: Some(0.55),
@@ -272,6 +272,7 @@ impl Counts {
 #[test]
 fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
     let [mut trains, mut checked] = [0; 2];
+    let mut fan_rounds = FanRounds::default();
     for name in shipped::names() {
         let shipped = shipped_scene(name);
         for pose in shipped.poses.values() {
@@ -285,9 +286,9 @@ fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
                 };
                 let simulator = simulator(shipped.with_robot_at(pose), options);
                 let station = simulator.station(pose.position());
-                for direction in 0..20 {
-                    for arrival in station.arrivals(0.3 * f64::from(direction)) {
-                        check_arrival(&simulator, &arrival, pose.position());
+                for direction in 0..63 {
+                    for arrival in station.arrivals(0.1 * f64::from(direction)) {
+                        check_arrival(&simulator, &arrival, pose.position(), &mut fan_rounds);
                         let face = |met| met == Mechanism::Transducer;
                         trains += usize::from(arrival.path.mechanisms().any(face));
                         checked += 1;
@@ -297,9 +298,20 @@ fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
         }
     }
     assert!(checked > 10_000 && trains > 100, "{checked} {trains}");
+    // Without them the law would be broken by 0.3 and more, where the bound is 1e-6.
+    let FanRounds { lawful, missed } = fan_rounds;
+    assert!(lawful > 500 && 50 * missed < lawful, "{fan_rounds:?}");
 }
 
-fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2) {
+/// Paths of the fan by one cylinder: those that obey the law of mirrors at each point, and those whose
+/// neighbour that would come back misses the cylinder, so that the last leg is not lawful.
+#[derive(Debug, Default)]
+struct FanRounds {
+    lawful: usize,
+    missed: usize,
+}
+
+fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2, fan_rounds: &mut FanRounds) {
     let (path, ends) = (&arrival.path, [at; 2]);
     let plan = Room { scene: Scene::clone(simulator.scene()), z_m: None };
     let off_m = || length_m(&points(path, ends, None)) - arrival.length_m;
@@ -315,11 +327,17 @@ fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2) {
         (EngineKind::Fan, 0 | 1) if path.interactions.iter().all(|met| plan.is_on_wall(met)) => {
             assert!(round > 0 || off_m().abs() < 1e-9, "{} {arrival:?}", off_m());
             let points = points(path, ends, None);
+            let last = path.interactions.len() - 1;
             for (place, met) in path.interactions.iter().enumerate() {
                 let legs = [1, 2].map(|to| points[place + to] - points[place + to - 1]);
                 let is_told = legs.iter().all(|leg| leg.length() > SHORT_M);
                 let off = plan.off_law(met, legs.map(DVec3::normalize_or_zero));
-                assert!(!is_told || off < 1e-6, "{off} {arrival:?}");
+                let is_lawful = !is_told || off < 1e-6;
+                let may_miss = round > 0 && place == last;
+                assert!(is_lawful || may_miss, "{off} {arrival:?}");
+                if may_miss {
+                    *(if is_lawful { &mut fan_rounds.lawful } else { &mut fan_rounds.missed }) += 1;
+                }
             }
         }
         (EngineKind::Fan, _) => assert!(path.interactions.iter().all(|met| met.z_m.is_none())),
