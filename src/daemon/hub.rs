@@ -16,8 +16,8 @@ use std::sync::{
 use tokio::sync::watch;
 use uuid::Uuid;
 
-use super::judged::judged_line;
-use crate::scan::{PingStatus, Record, encode_line};
+use super::judged::{Beside, judged_line};
+use crate::scan::{PingStatus, Record, ScanStart, ScanView, Session, encode_line};
 pub use moved::Moved;
 use shelf::Shelf;
 
@@ -34,7 +34,7 @@ pub struct Wanted {
     /// Only readings whose range moved by more than this since it was last sent for that
     /// direction, metres, or whose status changed.
     pub moved_m: Option<f64>,
-    /// Readings with their verdicts.
+    /// Readings with what is told [beside](Beside) them.
     pub verdicts: bool,
 }
 
@@ -50,6 +50,7 @@ pub struct Hub {
 #[derive(Debug)]
 struct Inner {
     waiting: Mutex<Waiting>,
+    scan: Mutex<UnderWay>,
     /// Changes with whatever records subscribers have to look at, and with whatever scans.
     records: watch::Sender<()>,
     scans: watch::Sender<()>,
@@ -59,6 +60,14 @@ struct Inner {
     of_verdicts: AtomicUsize,
     dropped: AtomicU64,
     cut_off: AtomicU64,
+}
+
+/// What readings are seen in, also those that somebody asks for in mid-scan.
+#[derive(Debug, Default)]
+struct UnderWay {
+    session: Option<Arc<Session>>,
+    /// The scan under way, without its readings.
+    view: Option<ScanView>,
 }
 
 #[derive(Debug)]
@@ -72,7 +81,7 @@ struct Waiting {
 #[derive(Debug)]
 struct Reading {
     line: Line,
-    /// With its verdict, if somebody wanted that.
+    /// With what is told beside it, if somebody wanted that.
     judged: Option<Line>,
     step: i32,
     ranger: Option<Box<str>>,
@@ -99,6 +108,7 @@ impl Hub {
         };
         let inner = Inner {
             waiting: Mutex::new(waiting),
+            scan: Mutex::default(),
             records: watch::Sender::new(()),
             scans: watch::Sender::new(()),
             subscribers: AtomicUsize::new(0),
@@ -138,6 +148,7 @@ impl Hub {
 
     /// Hands a record to everybody who wants records.
     pub fn publish(&self, record: &Record) {
+        held(&self.inner.scan).follow(record);
         if self.inner.of_records.load(Ordering::Relaxed) == 0 {
             return;
         }
@@ -148,7 +159,9 @@ impl Hub {
         }
         if let Record::Ping(ping) = record {
             let wants_verdicts = self.inner.of_verdicts.load(Ordering::Relaxed) > 0;
-            let judged: Option<Line> = wants_verdicts.then(|| judged_line(&line, ping).into());
+            let beside = || Beside::of(ping, held(&self.inner.scan).view.as_ref());
+            let judged: Option<Line> =
+                wants_verdicts.then(|| judged_line(&line, &beside()).into());
             let bytes = line.len() + judged.as_ref().map_or(0, |judged| judged.len());
             let reading = Reading {
                 line: line.into(),
@@ -275,6 +288,27 @@ impl Subscription {
             }
             None if waiting.closed || self.control == u64::MAX => Found::Over,
             None => Found::Nothing,
+        }
+    }
+}
+
+impl UnderWay {
+    fn follow(&mut self, record: &Record) {
+        match record {
+            Record::Session(session) => self.session = Some(Arc::from(session.clone())),
+            Record::ScanStart(start) => self.view = Some(self.begin(start)),
+            Record::Ping(_) | Record::ScanEnd(_) | Record::Event(_) => {}
+        }
+    }
+
+    fn begin(&self, start: &ScanStart) -> ScanView {
+        ScanView {
+            scan: start.scan,
+            session: self.session.clone(),
+            start: Some(start.clone()),
+            pings: Vec::new(),
+            events: Vec::new(),
+            end: None,
         }
     }
 }

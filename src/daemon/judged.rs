@@ -1,12 +1,32 @@
-//! Readings with what explains them.
+//! Readings with what the API tells beside them.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::{
     compare::{NotCompared, Verdict, judge},
-    scan::Ping,
+    scan::{Ping, ScanView},
+    viewpoint::Viewpoint,
 };
+
+/// What the API tells beside a reading, where its record alone does not say it.
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
+pub struct Beside {
+    /// What explains the reading.
+    pub verdict: Word,
+    /// Where its transducer was when it fired, and where it pointed; `null` if its scan does not say.
+    pub viewpoint: Option<Viewpoint>,
+}
+
+impl Beside {
+    /// What is told of a reading of a scan. Of the scan, only session and start are looked at.
+    #[must_use]
+    pub fn of(ping: &Ping, scan: Option<&ScanView>) -> Self {
+        let viewpoint = scan.filter(|scan| scan.scan == ping.scan);
+        let viewpoint = viewpoint.and_then(|scan| scan.viewpoint(ping));
+        Self { verdict: Word::of(ping), viewpoint }
+    }
+}
 
 /// What explains a reading, or why it can't be compared with a prediction.
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
@@ -26,44 +46,81 @@ impl Word {
     }
 }
 
-/// A reading's line, an object with or without a newline, with what explains it as its last field.
+/// A reading's line, an object with or without a newline, with what is told beside it as its last fields.
 #[must_use]
-pub fn judged_line(line: &[u8], ping: &Ping) -> Vec<u8> {
+pub fn judged_line(line: &[u8], beside: &Beside) -> Vec<u8> {
     let (object, newline) = match line.strip_suffix(b"\n") {
         Some(object) => (object, &b"\n"[..]),
         None => (line, &b""[..]),
     };
-    let (Some(open), Ok(verdict)) =
-        (object.strip_suffix(b"}"), serde_json::to_string(&Word::of(ping)))
-    else {
+    let Some((open, fields)) = object.strip_suffix(b"}").zip(serde_json::to_vec(beside).ok()) else {
         return line.to_vec();
     };
-    [open, b",\"verdict\":", verdict.as_bytes(), b"}", newline].concat()
+    // The second object's fields take the place of the first one's end.
+    [open, b",", &fields[1..], newline].concat()
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use crate::scan::{Record, decode_line};
+    use crate::{
+        geometry::Pose,
+        scan::{Record, Session, decode_line},
+    };
+
+    const LOG: &str = include_str!("../../tests/fixtures/small.jsonl");
+
+    fn view() -> ScanView {
+        let records = LOG.lines().map(|line| decode_line(line.as_bytes()).expect("a record"));
+        ScanView::from_records(records).remove(0)
+    }
 
     #[test]
-    fn a_reading_gets_its_verdict_and_nothing_else() {
-        let log = include_str!("../../tests/fixtures/small.jsonl");
-        let mut verdicts = Vec::new();
-        for line in log.lines() {
+    fn a_reading_gets_its_verdict_its_viewpoint_and_nothing_else() {
+        let view = view();
+        let (mut verdicts, robot) = (Vec::new(), view.pose().expect("a pose"));
+        for line in LOG.lines() {
             let Ok(Record::Ping(ping)) = decode_line(line.as_bytes()) else { continue };
-            let judged = judged_line(format!("{line}\n").as_bytes(), &ping);
-            assert!(
-                judged.ends_with(b"}\n") && !judged_line(line.as_bytes(), &ping).ends_with(b"\n")
-            );
+            let beside = Beside::of(&ping, Some(&view));
+            let judged = judged_line(format!("{line}\n").as_bytes(), &beside);
+            assert!(judged.ends_with(b"}\n"));
+            assert!(!judged_line(line.as_bytes(), &beside).ends_with(b"\n"));
             let mut judged: serde_json::Value = serde_json::from_slice(&judged).expect("JSON");
-            let verdict = judged.as_object_mut().expect("an object").remove("verdict");
-            verdicts.push(verdict.expect("a verdict").as_str().expect("a word").to_owned());
+            let fields = judged.as_object_mut().expect("an object");
+            let verdict = fields.remove("verdict").expect("a verdict");
+            verdicts.push(verdict.as_str().expect("a word").to_owned());
+            let viewpoint = fields.remove("viewpoint").expect("a viewpoint");
+            assert_eq!(viewpoint["x_m"], robot.x_m);
+            assert_eq!(viewpoint["direction_deg"], (robot.heading_deg + ping.azimuth_deg) % 360.0);
             let before: serde_json::Value = serde_json::from_str(line).expect("JSON");
             assert_eq!(judged, before);
         }
         let expected =
             ["direct", "multiple", "edge", "min_range", "silent", "unexplained", "link_lost"];
         assert_eq!(verdicts, expected);
+    }
+
+    #[test]
+    fn a_viewpoint_is_that_of_the_mounting_and_unknown_where_the_scan_does_not_say() {
+        let mut view = view();
+        let mut session = Session::clone(view.session.as_deref().expect("a session"));
+        session.sensor.mounting.ahead_m = 0.1;
+        view.session = Some(Arc::new(session));
+        let robot = Pose { x_m: 1.0, y_m: 2.0, heading_deg: 90.0 };
+        let mut ping = view.pings[0].clone();
+        (ping.pose, ping.azimuth_deg) = (Some(robot), 0.0);
+        let seen = Beside::of(&ping, Some(&view)).viewpoint.expect("a viewpoint");
+        assert!((seen.x_m - 1.0).hypot(seen.y_m - 2.1) < 1e-12, "{seen:?}");
+
+        ping.ranger = Some("s0".into());
+        assert_eq!(Beside::of(&ping, Some(&view)).viewpoint, None, "a ranger that the array lacks");
+        let ping = view.pings[0].clone();
+        assert_eq!(Beside::of(&ping, None).viewpoint, None);
+        view.start = None;
+        assert_eq!(Beside::of(&ping, Some(&view)).viewpoint, None, "a scan without a pose");
+        view.scan = uuid::Uuid::from_u128(7);
+        assert_eq!(Beside::of(&ping, Some(&view)).viewpoint, None, "another scan");
     }
 }

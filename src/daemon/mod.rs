@@ -40,7 +40,7 @@ pub use air::{AirOrder, AirStatus, read_thermometer};
 pub use desk::{Order, Request};
 pub use hub::{Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
 pub use journal::{Journal, JournalThread, LogStatus};
-pub use judged::{Word, judged_line};
+pub use judged::{Beside, Word, judged_line};
 pub use machine::{BackOff, Input, LinkMachine, LinkState, Step, Transition, Trouble};
 pub use operator::OpenPort;
 pub use refusal::{Refusal, RefusalKind};

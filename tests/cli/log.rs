@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use serde_json::Value;
 
-use crate::common::{run, sonard, stderr};
+use crate::common::{Log, run, sonard, stderr};
 
 const LOG: &str = include_str!("../fixtures/small.jsonl");
 
@@ -156,4 +156,33 @@ fn degenerate_logs_have_clear_answers() {
     let json: Value =
         serde_json::from_str(&check(&["compare", "--json", log], 0)).expect("one object");
     assert_eq!((&json["beams"], &json["agree_fraction"]), (&1.into(), &1.0.into()));
+}
+
+#[test]
+fn readings_of_a_robot_that_moved_are_predicted_from_where_they_were_taken() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let simulated = |pose: &str| {
+        let turn = ["--step-deg", "9", "--max-range", "2"];
+        let made = run(&[&["simulate", "--scene", "simple-room", "--pose", pose][..], &turn].concat());
+        String::from_utf8(made.stdout).expect("text")
+    };
+    // The second half of one scan is taken from the other one's place.
+    let [from, to] = ["fig9", "fig7"].map(simulated);
+    let scan_of = |text: &str| Log::parse(text).end()["scan"].to_string();
+    let to = to.replace(&scan_of(&to), &scan_of(&from));
+    let moved = from.lines().zip(to.lines()).map(|(stood, moved)| {
+        let mut ping: Value = serde_json::from_str(moved).expect("a record");
+        if ping["index"].as_u64() < Some(20) {
+            return stood.to_owned();
+        }
+        ping["pose"] = serde_json::json!({"x_m": 0.834, "y_m": 0.345, "heading_deg": 0.0});
+        ping.to_string()
+    });
+    let log = folder.path().join("moved.jsonl");
+    fs::write(&log, moved.map(|line| line + "\n").collect::<String>()).expect("there is room");
+    let log = log.to_str().expect("a plain path");
+    let compared = run(&["compare", log, "--scene", "simple-room", "--json"]);
+    let compared: Value = serde_json::from_slice(&compared.stdout).expect("one object");
+    assert_eq!((&compared["beams"], &compared["p90_abs_residual_m"]), (&40.into(), &0.0.into()));
+    assert_eq!(compared["verdicts"]["unexplained"], 0, "{compared}");
 }

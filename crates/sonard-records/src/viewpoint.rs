@@ -1,7 +1,7 @@
 //! Where the transducer of a logged reading was, and what stood around it.
 
 use sonard_model::{
-    acoustics::Sensor, array::MountedRanger, geometry::Pose, scene::Scene, viewpoint::Viewpoint,
+    acoustics::{Mounting, Sensor}, array::MountedRanger, geometry::Pose, scene::Scene, viewpoint::Viewpoint,
 };
 
 use crate::{Ping, ScanView, Session};
@@ -12,14 +12,17 @@ impl Session {
         self.array.as_ref()?.ranger(ping.ranger.as_ref()?)
     }
 
+    /// How the transducer of a reading is mounted: as the sensor's data say, at the height of its ranger.
+    fn mounting_of(&self, ping: &Ping) -> Mounting {
+        let mounting = self.sensor.mounting;
+        let z_m = self.ranger_of(ping).and_then(|ranger| ranger.z_m);
+        Mounting { z_m: z_m.or(mounting.z_m), ..mounting }
+    }
+
     /// The sensor that took a reading, at its height.
     #[must_use]
     pub fn sensor_of(&self, ping: &Ping) -> Sensor {
-        let mut sensor = self.sensor.clone();
-        if let Some(ranger) = self.ranger_of(ping) {
-            sensor.mounting.z_m = ranger.z_m.or(sensor.mounting.z_m);
-        }
-        sensor
+        Sensor { mounting: self.mounting_of(ping), ..self.sensor.clone() }
     }
 
     /// A scene with the body of the session's robot in it: the array's, or else the scene's own.
@@ -50,10 +53,7 @@ impl Ping {
     #[must_use]
     pub fn viewpoint(&self, session: Option<&Session>, robot: &Pose) -> Option<Viewpoint> {
         let axis = self.axis(session, robot)?;
-        let mut mounting = session.map(|session| session.sensor.mounting).unwrap_or_default();
-        if let Some(ranger) = session.and_then(|session| session.ranger_of(self)) {
-            mounting.z_m = ranger.z_m.or(mounting.z_m);
-        }
+        let mounting = session.map(|session| session.mounting_of(self)).unwrap_or_default();
         Some(mounting.viewpoint(&axis))
     }
 }

@@ -53,14 +53,7 @@ impl<'a> Predictor<'a> {
         let Some(scene) = scene else { return Ok(()) };
         forget(scan);
         let Some(array) = &session.array else {
-            scene.check_pose(&pose).map_err(|error| Failure::input(&error, error.help()))?;
-            let simulator = simulator(self.log, scene.with_robot_at(&pose), &session)?;
-            let station = simulator.station(pose.position());
-            for ping in &mut scan.pings {
-                let prediction = station.ping(pose.direction_rad(ping.azimuth_deg));
-                set_beside(ping, SimRecord::of(&simulator, &prediction));
-            }
-            return Ok(());
+            return predict_stepper(self.log, scan, &pose, &scene, &session);
         };
         let model = match self.made.take() {
             Some((of, model)) if Arc::ptr_eq(&of, &session) => model,
@@ -93,6 +86,28 @@ fn forget(scan: &mut ScanView) {
     for ping in &mut scan.pings {
         (ping.sim, ping.residual_m) = (None, None);
     }
+}
+
+/// Predicts the scan of a ranger on a stepper, each reading from where the robot stood then.
+fn predict_stepper(
+    log: &Path,
+    scan: &mut ScanView,
+    pose: &Pose,
+    scene: &Scene,
+    session: &Session,
+) -> Result<(), Failure> {
+    for pings in scan.pings.chunk_by_mut(|one, next| one.pose == next.pose) {
+        let robot = pings[0].pose.unwrap_or(*pose);
+        scene.check_pose(&robot).map_err(|error| Failure::input(&error, error.help()))?;
+        let simulator = simulator(log, scene.with_robot_at(&robot), session)?;
+        let station = simulator.station(robot.position());
+        for ping in pings {
+            let Some(axis) = ping.axis(Some(session), pose) else { continue };
+            let prediction = station.ping(axis.direction_rad(0.0));
+            set_beside(ping, SimRecord::of(&simulator, &prediction));
+        }
+    }
+    Ok(())
 }
 
 /// The same for the scan of an array; a reading of a ranger that it does not have stays alone.

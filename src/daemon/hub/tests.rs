@@ -14,6 +14,10 @@ fn control() -> Record {
     decode_line(LOG.lines().nth(1).expect("a start").as_bytes()).expect("clean")
 }
 
+fn session() -> Record {
+    decode_line(LOG.lines().next().expect("a session").as_bytes()).expect("clean")
+}
+
 async fn all(subscription: &mut Subscription, hub: &Hub) -> Vec<serde_json::Value> {
     hub.close();
     let mut lines = Vec::new();
@@ -81,13 +85,20 @@ async fn only_what_moved_is_sent_on_request() {
 }
 
 #[tokio::test]
-async fn verdicts_come_to_who_wants_them_alone() {
+async fn verdicts_and_viewpoints_come_to_who_wants_them_alone() {
     let hub = Hub::new(100);
+    // Who begins to listen in mid-scan sees its readings from the same places.
+    hub.publish(&session());
+    hub.publish(&control());
     let mut judged = hub.subscribe(Wanted { verdicts: true, ..Wanted::default() });
     let mut plain = hub.subscribe(Wanted::default());
     hub.publish(&ping(0, Some(1.0)));
-    assert_eq!(all(&mut judged, &hub).await[0]["verdict"].as_str().map(str::is_empty), Some(false));
-    assert_eq!(all(&mut plain, &hub).await[0].get("verdict"), None);
+    let judged = all(&mut judged, &hub).await.remove(0);
+    assert_eq!(judged["verdict"].as_str().map(str::is_empty), Some(false));
+    let Record::ScanStart(start) = control() else { panic!("a start") };
+    assert_eq!(judged["viewpoint"]["x_m"], start.pose.x_m);
+    let plain = all(&mut plain, &hub).await.remove(0);
+    assert_eq!((plain.get("verdict"), plain.get("viewpoint")), (None, None));
 }
 
 #[tokio::test]

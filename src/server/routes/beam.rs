@@ -86,7 +86,7 @@ pub(super) fn look(view: &ScanView, ping: Ping, scene: Option<&Scene>) -> Beam {
         _ => path.polyline(view.viewpoint(&ping)?.ends()),
     });
     let polyline = polyline.map(|points| points.into_iter().map(point).collect());
-    Beam { reading: ping.into(), echoes, polyline, humps, lacks }
+    Beam { reading: JudgedPing::of(ping, view), echoes, polyline, humps, lacks }
 }
 
 fn echoes(view: &ScanView, session: Option<&Session>, ping: &Ping) -> Vec<Echo> {

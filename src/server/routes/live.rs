@@ -9,6 +9,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use futures_util::{Stream, StreamExt as _, stream};
+use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::json;
 use tokio::{sync::OwnedSemaphorePermit, time::timeout};
@@ -18,7 +19,7 @@ use super::{
     scans::written,
 };
 use crate::{
-    daemon::{Moved, ScanReport, ScanSubscription, Subscription, Wanted},
+    daemon::{Beside, Moved, ScanReport, ScanSubscription, Subscription, Wanted},
     scan::Record,
     server::{
         Api, Standing,
@@ -52,6 +53,18 @@ enum Format {
     Sse,
 }
 
+/// A record of a live stream.
+#[derive(JsonSchema)]
+#[expect(dead_code, reason = "its schema says what is written")]
+struct LiveRecord {
+    /// The record, as in a log.
+    #[serde(flatten)]
+    record: Record,
+    /// What is told beside a reading, with `verdicts`.
+    #[serde(flatten)]
+    beside: Option<Beside>,
+}
+
 pub(super) fn endpoints() -> Vec<Endpoint> {
     let format = json!({"type": "string", "enum": ["ndjson", "sse"]});
     let format_about = "Lines of JSON or server-sent events; without it, as `Accept` says";
@@ -67,10 +80,10 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
                 "query",
                 "verdicts",
                 json!({"type": "boolean"}),
-                "Give each reading a `verdict`, as GET /v1/scans/{scan} has it",
+                "Give each reading a `verdict` and a `viewpoint`, as GET /v1/scans/{scan} has them",
             )
-            .answers_as::<Record>(200, NDJSON, records)
-            .answers_as::<Record>(200, SSE, records),
+            .answers_as::<LiveRecord>(200, NDJSON, records)
+            .answers_as::<LiveRecord>(200, SSE, records),
         Endpoint::get("/v1/live/scans", live_scans, "Whole scans when they are over")
             .parameter("query", "format", format, format_about)
             .parameter("query", "moved_m", json!({"type": "number", "minimum": 0}), MOVED)

@@ -9,7 +9,7 @@ use serde::{Serialize, de::IgnoredAny};
 use tokio::sync::Semaphore;
 
 use crate::{
-    daemon::{Moved, judged_line},
+    daemon::{Beside, Moved, judged_line},
     scan::{Record, decode_line},
     store::{Passage, PassageLines},
 };
@@ -22,7 +22,7 @@ const TAG: &[u8] = br#"{"type":"ping","#;
 /// What of a scan is wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Form {
-    /// With its session and verdicts, as `WholeScan`.
+    /// With its session, verdicts and viewpoints, as `WholeScan`.
     Whole,
     /// As it was measured, as `ScanReport`.
     Report,
@@ -136,7 +136,10 @@ impl Pieces {
         self.separate(piece);
         piece.push(b'{');
         match self.form {
-            Form::Whole => piece.extend_from_slice(&judged_line(fields, &ping)),
+            Form::Whole => {
+                let beside = Beside::of(&ping, Some(&self.passage.view));
+                piece.extend_from_slice(&judged_line(fields, &beside));
+            }
             Form::Report => piece.extend_from_slice(fields),
         }
     }

@@ -25,9 +25,9 @@ use super::{
     scene::FloorPlan,
 };
 use crate::{
-    daemon::{Moved, Word},
+    daemon::{Beside, Moved},
     geometry::Pose,
-    scan::{Event, Ping, Provenance, ScanEnd, ScanPlan, ScanStart, Session},
+    scan::{Event, Ping, Provenance, ScanEnd, ScanPlan, ScanStart, ScanView, Session},
     scene::Scene,
     server::{
         Api,
@@ -81,14 +81,15 @@ struct WholeScan {
     end: Option<ScanEnd>,
 }
 
-/// A reading and what explains it.
+/// A reading and what is told beside it.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub(super) struct JudgedPing {
     /// The reading.
     #[serde(flatten)]
     pub(super) ping: Ping,
-    /// What explains it.
-    pub(super) verdict: Word,
+    /// What explains it, and where its transducer was.
+    #[serde(flatten)]
+    pub(super) beside: Beside,
 }
 
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
@@ -283,9 +284,10 @@ impl From<PastScan> for ListedScan {
     }
 }
 
-impl From<Ping> for JudgedPing {
-    fn from(ping: Ping) -> Self {
-        let verdict = Word::of(&ping);
-        Self { ping, verdict }
+impl JudgedPing {
+    /// A reading of a scan.
+    pub(super) fn of(ping: Ping, scan: &ScanView) -> Self {
+        let beside = Beside::of(&ping, Some(scan));
+        Self { ping, beside }
     }
 }

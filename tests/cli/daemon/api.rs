@@ -136,14 +136,23 @@ fn check_stream(daemon: &Daemon, path: &str, content: &Value, document: &Value) 
         [("ndjson", "application/x-ndjson", ""), ("sse", "text/event-stream", "data: ")]
     {
         let mut stream = daemon.connect().expect("it listens");
-        let request = format!("GET {path}?format={format} HTTP/1.1\r\nHost: localhost\r\n\r\n");
+        // Of records, a reading with all that is told beside it has the most to be held to.
+        let (verdicts, kind) = if path == "/v1/live/records" {
+            ("&verdicts=true", json!("ping"))
+        } else {
+            ("", Value::Null)
+        };
+        let request = format!(
+            "GET {path}?format={format}{verdicts} HTTP/1.1\r\nHost: localhost\r\n\r\n"
+        );
         stream.write_all(request.as_bytes()).expect("it listens");
         let mut lines = BufReader::new(stream).lines().map(|line| line.expect("a line"));
         assert!(lines.any(|line| line.eq_ignore_ascii_case(&format!("content-type: {media}"))));
         assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
         let first = lines.find_map(|line| {
             let json = line.strip_prefix(prefix)?;
-            serde_json::from_str::<Value>(json).ok().filter(Value::is_object)
+            let record = serde_json::from_str::<Value>(json).ok().filter(Value::is_object);
+            record.filter(|record| record["type"] == kind)
         });
         let schema = &content[media]["schema"];
         assert!(schema.is_object(), "{media} is not in the document");
@@ -172,8 +181,12 @@ fn past_scans_and_their_beams_are_read_from_the_logs() {
     // The same readings as in memory, with their verdicts.
     let mut pings = whole["pings"].clone();
     for ping in pings.as_array_mut().expect("readings") {
-        let verdict = ping.as_object_mut().expect("an object").remove("verdict");
-        assert!(verdict.is_some_and(|verdict| verdict.is_string()));
+        let azimuth_deg = ping["azimuth_deg"].clone();
+        let fields = ping.as_object_mut().expect("an object");
+        assert!(fields.remove("verdict").is_some_and(|verdict| verdict.is_string()));
+        let viewpoint = fields.remove("viewpoint").expect("a viewpoint");
+        assert_eq!((&viewpoint["x_m"], &viewpoint["y_m"]), (&json!(0.774), &json!(0.085)));
+        assert_eq!(viewpoint["direction_deg"], azimuth_deg);
     }
     assert_eq!(pings, latest["pings"]);
 

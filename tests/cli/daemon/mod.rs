@@ -15,6 +15,7 @@ mod simulate;
 mod soak;
 mod strangers;
 mod systemd;
+pub(crate) mod viewpoint;
 
 use std::{
     fs,
