@@ -160,8 +160,7 @@ impl Hub {
         if let Record::Ping(ping) = record {
             let wants_verdicts = self.inner.of_verdicts.load(Ordering::Relaxed) > 0;
             let beside = || Beside::of(ping, held(&self.inner.scan).view.as_ref());
-            let judged: Option<Line> =
-                wants_verdicts.then(|| judged_line(&line, &beside()).into());
+            let judged: Option<Line> = wants_verdicts.then(|| judged_line(&line, &beside()).into());
             let bytes = line.len() + judged.as_ref().map_or(0, |judged| judged.len());
             let reading = Reading {
                 line: line.into(),

@@ -53,7 +53,8 @@ pub fn judged_line(line: &[u8], beside: &Beside) -> Vec<u8> {
         Some(object) => (object, &b"\n"[..]),
         None => (line, &b""[..]),
     };
-    let Some((open, fields)) = object.strip_suffix(b"}").zip(serde_json::to_vec(beside).ok()) else {
+    let Some((open, fields)) = object.strip_suffix(b"}").zip(serde_json::to_vec(beside).ok())
+    else {
         return line.to_vec();
     };
     // The second object's fields take the place of the first one's end.

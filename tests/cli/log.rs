@@ -163,7 +163,8 @@ fn readings_of_a_robot_that_moved_are_predicted_from_where_they_were_taken() {
     let folder = tempfile::tempdir().expect("a folder");
     let simulated = |pose: &str| {
         let turn = ["--step-deg", "9", "--max-range", "2"];
-        let made = run(&[&["simulate", "--scene", "simple-room", "--pose", pose][..], &turn].concat());
+        let made =
+            run(&[&["simulate", "--scene", "simple-room", "--pose", pose][..], &turn].concat());
         String::from_utf8(made.stdout).expect("text")
     };
     // The second half of one scan is taken from the other one's place.

@@ -1,7 +1,11 @@
 //! Where the transducer of a logged reading was, and what stood around it.
 
 use sonard_model::{
-    acoustics::{Mounting, Sensor}, array::MountedRanger, geometry::Pose, scene::Scene, viewpoint::Viewpoint,
+    acoustics::{Mounting, Sensor},
+    array::MountedRanger,
+    geometry::Pose,
+    scene::Scene,
+    viewpoint::Viewpoint,
 };
 
 use crate::{Ping, ScanView, Session};

@@ -142,9 +142,8 @@ fn check_stream(daemon: &Daemon, path: &str, content: &Value, document: &Value) 
         } else {
             ("", Value::Null)
         };
-        let request = format!(
-            "GET {path}?format={format}{verdicts} HTTP/1.1\r\nHost: localhost\r\n\r\n"
-        );
+        let request =
+            format!("GET {path}?format={format}{verdicts} HTTP/1.1\r\nHost: localhost\r\n\r\n");
         stream.write_all(request.as_bytes()).expect("it listens");
         let mut lines = BufReader::new(stream).lines().map(|line| line.expect("a line"));
         assert!(lines.any(|line| line.eq_ignore_ascii_case(&format!("content-type: {media}"))));

@@ -102,8 +102,7 @@ fn readings_of_an_array_say_where_their_sonar_was_and_paths_end_there() {
             assert_eq!(reading["ranger"], ranger["id"]);
             let [ahead_m, left_m, bearing_deg] =
                 ["x_m", "y_m", "bearing_deg"].map(|name| ranger[name].as_f64().expect("a figure"));
-            let place =
-                [x_m + cos * ahead_m - sin * left_m, y_m + sin * ahead_m + cos * left_m];
+            let place = [x_m + cos * ahead_m - sin * left_m, y_m + sin * ahead_m + cos * left_m];
             let (seen, direction_deg) = viewpoint(reading);
             assert!(distance(seen, place) < 1e-9, "{reading}");
             let off_deg = (direction_deg - heading_deg - bearing_deg).rem_euclid(360.0);
