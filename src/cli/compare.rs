@@ -4,6 +4,7 @@ mod predict;
 mod table;
 
 use std::{
+    borrow::Cow,
     io::{self, Write},
     path::{Path, PathBuf},
     sync::Arc,
@@ -37,7 +38,7 @@ pub(super) struct Args {
     /// How many of the beams that fit worst to list
     #[arg(long, default_value_t = 5)]
     worst: usize,
-    /// One JSON object a log
+    /// One JSON object a log, and after several logs one for all of them
     #[arg(long)]
     json: bool,
 }
@@ -58,12 +59,16 @@ pub(super) fn run(args: &Args) -> Outcome {
     for log in &args.logs {
         compare_log(args, log, scene.as_ref(), &mut all)?;
     }
-    if args.logs.len() < 2 || args.json {
+    let (logs, all) = (args.logs.len(), all.finish());
+    if logs < 2 {
         return Ok(());
     }
     let mut out = io::stdout().lock();
-    let printed = writeln!(out, "all {} logs", args.logs.len())
-        .and_then(|()| table::print(&mut out, &all.finish(), &Worst::new(0)));
+    let printed = if args.json {
+        print_json(&mut out, &Of::All { logs, comparison: &all })
+    } else {
+        writeln!(out, "all {logs} logs").and_then(|()| table::print(&mut out, &all, &Worst::new(0)))
+    };
     printed.or_else(|error| Failure::from_write("standard output", &error))
 }
 
@@ -84,7 +89,8 @@ fn compare_log(args: &Args, log: &Path, scene: Option<&Arc<Scene>>, all: &mut Co
     let comparison = comparer.finish();
     let mut out = io::stdout().lock();
     let printed = if args.json {
-        print_json(&mut out, log, &comparison)
+        let log = log.to_string_lossy();
+        print_json(&mut out, &Of::Log { log, comparison: &comparison })
     } else {
         writeln!(out, "{}", log.display())
             .and_then(|()| table::print(&mut out, &comparison, &worst))
@@ -98,14 +104,25 @@ fn is_simulated(scan: &ScanView) -> bool {
     scan.session.as_ref().is_some_and(|session| session.provenance == Provenance::Simulated)
 }
 
-fn print_json(out: &mut impl Write, log: &Path, comparison: &Comparison) -> io::Result<()> {
-    #[derive(Serialize)]
-    struct OfLog<'a> {
-        log: &'a Path,
+/// A line of `--json`.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Of<'a> {
+    Log {
+        log: Cow<'a, str>,
         #[serde(flatten)]
         comparison: &'a Comparison,
-    }
-    serde_json::to_writer(&mut *out, &OfLog { log, comparison })?;
+    },
+    All {
+        /// How many.
+        logs: usize,
+        #[serde(flatten)]
+        comparison: &'a Comparison,
+    },
+}
+
+fn print_json(out: &mut impl Write, line: &Of<'_>) -> io::Result<()> {
+    serde_json::to_writer(&mut *out, line)?;
     writeln!(out)
 }
 

@@ -111,6 +111,12 @@ fn a_comparison_is_one_object_and_always_ends_well() {
         assert_eq!(json[field], expected, "{field}");
     }
     assert_eq!(json["verdicts"]["multiple"], 1);
+    // Of several logs, one more for all of them.
+    let said = check(&["compare", "--json", log, log], 0);
+    let lines: Vec<Value> =
+        said.lines().map(|line| serde_json::from_str(line).expect("an object")).collect();
+    assert_eq!((lines.len(), &lines[0], &lines[1]), (3, &json, &json));
+    assert_eq!((&lines[2]["logs"], &lines[2]["beams"]), (&2.into(), &12.into()));
     let said = check(&["compare", log], 0);
     assert!(said.contains("Largest residuals") && said.contains("300.0 mm"), "{said}");
     // In another scene the predictions are others, and it still runs.

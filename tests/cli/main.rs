@@ -15,6 +15,7 @@ mod hangup;
 mod interpret;
 mod live_page;
 mod log;
+mod long_logs;
 mod map;
 mod outputs;
 mod paths;
