@@ -13,8 +13,7 @@ use hyper::{
     http::request::Builder,
 };
 use hyper_util::rt::TokioIo;
-use serde::de::DeserializeOwned;
-use serde_json::Value;
+use serde::{Serialize, de::DeserializeOwned};
 use thiserror::Error;
 use tokio::{
     net::{TcpStream, UnixStream},
@@ -23,7 +22,7 @@ use tokio::{
 
 pub use scans::{RequestedScans, ScansError};
 
-use crate::server::Problem;
+use crate::api::{Accepted, Problem};
 
 /// How long a daemon may take for its answer to begin.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -132,7 +131,7 @@ impl Client {
     pub async fn post<T: DeserializeOwned>(
         &self,
         path: &str,
-        body: &Value,
+        body: &impl Serialize,
     ) -> Result<T, ClientError> {
         self.order(Request::post(path), body).await
     }
@@ -141,8 +140,8 @@ impl Client {
     ///
     /// # Errors
     /// As [`Self::get`].
-    pub async fn put(&self, path: &str, body: &Value) -> Result<(), ClientError> {
-        self.order::<Value>(Request::put(path), body).await.map(drop)
+    pub async fn put(&self, path: &str, body: &impl Serialize) -> Result<(), ClientError> {
+        self.order::<Accepted>(Request::put(path), body).await.map(drop)
     }
 
     /// Takes something out of force.
@@ -156,10 +155,10 @@ impl Client {
     async fn order<T: DeserializeOwned>(
         &self,
         request: Builder,
-        body: &Value,
+        body: &impl Serialize,
     ) -> Result<T, ClientError> {
         let request = request.header(header::CONTENT_TYPE, "application/json");
-        let answer = self.ask(request, body.to_string().into()).await?;
+        let answer = self.ask(request, serde_json::to_vec(body)?.into()).await?;
         Ok(serde_json::from_slice(&answer.into_body().collect().await?.to_bytes())?)
     }
 

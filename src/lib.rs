@@ -46,6 +46,8 @@ pub use sonard_plot as plot;
 pub use sonard_records as scan;
 
 #[cfg(feature = "daemon")]
+pub mod api;
+#[cfg(feature = "daemon")]
 pub mod board;
 #[cfg(feature = "daemon")]
 pub mod cli;
@@ -69,3 +71,5 @@ pub mod ranger;
 pub mod server;
 #[cfg(feature = "store")]
 pub mod store;
+#[cfg(feature = "daemon")]
+pub mod thermometer;

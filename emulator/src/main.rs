@@ -17,8 +17,9 @@ use firmware_protocol::messages::Capabilities;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use sonard::{
-    acoustics::{Air, Sensor},
-    mock::{Noise, Pty, Soundings, World},
+    acoustics::{Air, Sensor, TofNoise},
+    link::Pty,
+    mock::{Soundings, World},
     model::{Options, Simulator},
     scene::{Scene, shipped},
 };
@@ -177,7 +178,7 @@ fn world(args: &Args) -> Result<World, Box<dyn Error>> {
         args.humidity_percent,
         args.pressure_kpa,
     )?;
-    let noise = Noise::of_range_mm(args.noise_mm, air.sound_speed_m_s());
+    let noise = TofNoise::of_range_mm(args.noise_mm, air.sound_speed_m_s());
     let scene = Arc::new(scene.with_robot_at(&pose));
     let simulator = Simulator::new(scene, sensor, air, Options::default())?;
     let soundings =

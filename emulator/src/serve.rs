@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use sonard::mock::Pty;
+use sonard::link::Pty;
 
 use crate::{CYCLES_PER_US, Emulator};
 

@@ -9,7 +9,7 @@ use rand::RngExt as _;
 
 use super::{Failure, Outcome, output::OutPath, runtime};
 use crate::{
-    mock::Pty,
+    link::Pty,
     pi::{GpioPins, PiBoard, PiSettings, PinNumbers, serve},
 };
 

@@ -162,7 +162,7 @@ async fn daemon(
     interrupts: Interrupts,
 ) -> Result<Daemon, Failure> {
     let (daemon, status) = Daemon::find(args.at.client()?, interrupts).await?;
-    check_scene(status.scene(), &loaded.scene)?;
+    check_scene(status.scene.as_ref(), &loaded.scene)?;
     loaded.adopt(&daemon, &status)?;
     Ok(daemon)
 }

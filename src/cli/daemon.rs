@@ -2,11 +2,10 @@
 
 use std::path::PathBuf;
 
-use serde_json::Value;
-
 use super::{Failure, Outcome};
 use crate::{
     client::{Client, ClientError, Place, ScansError},
+    scan::SceneRef,
     scene::Scene,
     server::{TokenError, read_token},
 };
@@ -73,15 +72,15 @@ pub(super) fn refuse_scans(error: &ScansError) -> Failure {
 }
 
 /// Predictions are the daemon's: with another scene they would not be what was asked for.
-pub(super) fn check_scene(of_daemon: &Value, scene: &Scene) -> Outcome {
-    if of_daemon["sha256"] == scene.sha256.as_str() {
+pub(super) fn check_scene(of_daemon: Option<&SceneRef>, scene: &Scene) -> Outcome {
+    if of_daemon.is_some_and(|of_daemon| of_daemon.sha256 == scene.sha256) {
         return Ok(());
     }
-    let of_daemon = of_daemon["name"].as_str();
     Err(Failure::input(
         format!(
             "the daemon predicts in {}, not in the scene {} as it is here",
-            of_daemon.map_or_else(|| "no scene".into(), |name| format!("its scene {name}")),
+            of_daemon
+                .map_or_else(|| "no scene".into(), |scene| format!("its scene {}", scene.name)),
             scene.name
         ),
         "name that one here, or change place.scene of the daemon",

@@ -4,6 +4,8 @@ use std::{io, process::ExitCode};
 
 use miette::Report;
 
+use crate::scan::SinkError;
+
 /// What a verb returns.
 pub type Outcome = Result<(), Failure>;
 
@@ -47,6 +49,12 @@ impl Failure {
             format!("cannot write {what}: {error}"),
             "check free space and permissions; what was written before is kept",
         ))
+    }
+}
+
+impl From<SinkError> for Failure {
+    fn from(error: SinkError) -> Self {
+        Self::device(&error, error.help())
     }
 }
 

@@ -9,9 +9,9 @@ use rand::RngExt as _;
 
 use super::{Failure, scene_file};
 use crate::{
-    acoustics::{Air, Sensor},
+    acoustics::{Air, Sensor, TofNoise},
     geometry::Pose,
-    mock::{BoardSettings, FAULT_HELP, FaultPlan, MockBoard, Noise, Pace, Soundings, World},
+    mock::{BoardSettings, FAULT_HELP, FaultPlan, MockBoard, Pace, Soundings, World},
     model::{Options, Simulator},
     scene::Scene,
 };
@@ -83,7 +83,7 @@ impl MockWorldArgs {
         let sound_speed_m_s = self.truth_air(belief.air)?.sound_speed_m_s();
         let soundings = self.soundings(belief)?;
         let steps = self.steps_per_revolution;
-        let noise = Noise::of_range_mm(self.noise_mm, sound_speed_m_s);
+        let noise = TofNoise::of_range_mm(self.noise_mm, sound_speed_m_s);
         let world = World::new(soundings, noise, self.missed_steps, self.seed);
         // Two mocks in a row are two boots: a nonce from the seed would repeat.
         let boot = rand::rng().random_range(1..=u16::MAX);

@@ -295,8 +295,8 @@ pub(super) fn scan_failure(error: ScanError) -> Failure {
     match error {
         ScanError::Plan(error) => Failure::input(error, "see `sonard scan --help`"),
         ScanError::Device(error) => device_failure(&error),
-        ScanError::Store(error) if error.is_broken_pipe() => Failure::Found(None),
-        ScanError::Store(error) => Failure::device(&error, error.help()),
+        ScanError::Sink(error) if error.is_broken_pipe() => Failure::Found(None),
+        ScanError::Sink(error) => Failure::device(&error, error.help()),
     }
 }
 

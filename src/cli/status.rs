@@ -3,13 +3,14 @@
 use std::io::Write as _;
 
 use jiff::Timestamp;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use super::{
     Failure, Outcome,
     daemon::{DaemonArgs, refuse},
     runtime,
 };
+use crate::api::{Health, LinkReport, Pending, SimulationReport, Status};
 
 /// Options of `sonard status`.
 #[derive(Debug, clap::Args)]
@@ -29,164 +30,150 @@ Examples:
 
 Exit codes: 0 all is well, 1 something is not, 3 no daemon answers.";
 
+/// What is told with `--json`.
+#[derive(Serialize)]
+struct Told<'a> {
+    status: &'a Status,
+    health: &'a Health,
+}
+
 pub(super) fn run(args: &Args) -> Outcome {
     let client = args.daemon.client()?;
-    let (status, health): (Value, Value) = runtime::new()?
+    let (status, health): (Status, Health) = runtime::new()?
         .block_on(async {
             Ok((client.get_json("/v1/status").await?, client.get_json("/v1/health").await?))
         })
         .map_err(|error| refuse(&error))?;
-    let text = match args.json {
-        true => format!("{}\n", json!({ "status": status, "health": health })),
+    let mut text = match args.json {
+        true => serde_json::to_string(&Told { status: &status, health: &health })
+            .map_err(|error| Failure::device(error, "this is a fault of the program"))?,
         false => screen(&status, &health),
     };
+    text.push('\n');
     let written = std::io::stdout().lock().write_all(text.as_bytes());
     written.or_else(|error| Failure::from_write("to standard output", &error))?;
-    if health["healthy"] == true { Ok(()) } else { Err(Failure::Found(None)) }
+    if health.healthy { Ok(()) } else { Err(Failure::Found(None)) }
 }
 
 /// One screen for a person.
-fn screen(status: &Value, health: &Value) -> String {
-    let mut lines = match status["simulation"].is_null() {
-        true => device(status, health),
-        false => simulation(status),
+fn screen(status: &Status, health: &Health) -> String {
+    let mut lines = match &status.simulation {
+        None => device(status, health),
+        Some(simulation) => array(status, simulation),
     };
+    let scans = &health.scans;
+    let mode = word(&status.scanning.mode);
+    let stopped = if status.scanning.paused { " (stopped)" } else { "" };
     lines.push(format!(
-        "  scans    {} completed, {} stopped, {} failed; {} beams, {} missing; mode {}{}",
-        health["scans"]["completed"],
-        health["scans"]["stopped"],
-        health["scans"]["failed"],
-        health["scans"]["beams"],
-        health["scans"]["missing"],
-        word(&status["scanning"]["mode"]),
-        if status["scanning"]["paused"] == true { " (stopped)" } else { "" },
+        "  scans    {} completed, {} stopped, {} failed; {} beams, {} missing; mode {mode}{stopped}",
+        scans.completed, scans.stopped, scans.failed, scans.beams, scans.missing,
     ));
-    if let Some(scan) = status["scan"].as_object() {
-        lines.push(format!("  scan     {} of {} beams", scan["done"], scan["beams"]));
+    if let Some(scan) = &status.scan {
+        lines.push(format!("  scan     {} of {} beams", scan.done, scan.beams));
     }
+    let (air, log, clients) = (&status.air, &status.log, &status.subscribers);
+    let source = word(&air.source);
+    let file = log.file.as_ref().map_or_else(|| "-".into(), |file| file.display().to_string());
     lines.extend([
         format!(
-            "  air      {} C ({}), sound {} m/s",
-            figure(&status["air"]["temperature_c"]),
-            word(&status["air"]["source"]),
-            figure(&status["air"]["sound_speed_m_s"]),
+            "  air      {:.1} C ({source}), sound {:.1} m/s",
+            air.temperature_c, air.sound_speed_m_s,
         ),
-        format!(
-            "  log      {} ({} records, {} synced)",
-            word(&status["log"]["file"]),
-            status["log"]["written"],
-            status["log"]["synced"],
-        ),
+        format!("  log      {file} ({} records, {} synced)", log.written, log.synced),
         format!(
             "  clients  {} live; {} readings dropped, {} cut off",
-            status["subscribers"]["now"],
-            status["subscribers"]["dropped_readings"],
-            status["subscribers"]["cut_off"],
+            clients.now, clients.dropped_readings, clients.cut_off,
         ),
     ]);
-    lines.extend(pending(&status["pending"]));
-    let reasons = health["reasons"].as_array().into_iter().flatten();
-    lines.extend(reasons.map(|reason| format!("  not well: {}", word(reason))));
-    if let Some(error) = status["air"]["error"].as_str() {
+    lines.extend(pending(&status.pending));
+    lines.extend(health.reasons.iter().map(|reason| format!("  not well: {reason}")));
+    if let Some(error) = &air.error {
         lines.push(format!("  the thermometer can't be read: {error}"));
     }
-    if let Some(error) = status["configuration"]["error"].as_str() {
+    if let Some(error) = &status.configuration.error {
         lines.push(format!("  the last change of the configuration was refused: {error}"));
     }
-    lines.join("\n") + "\n"
+    lines.join("\n")
 }
 
 /// What counts from the next scan on.
-fn pending(pending: &Value) -> Option<String> {
-    let (plan, pose) = (&pending["plan"], &pending["pose"]);
+fn pending(pending: &Pending) -> Option<String> {
     let parts = [
-        (!plan.is_null()).then(|| {
+        pending.plan.map(|plan| {
             format!(
-                "plan {} to {} degrees, every {}, {} pings",
-                plan["from_deg"], plan["to_deg"], plan["step_deg"], plan["pings_per_stop"]
+                "plan {:?} to {:?} degrees, every {:?}, {} pings",
+                plan.from_deg, plan.to_deg, plan.step_deg, plan.pings_per_stop
             )
         }),
-        (!pose.is_null())
-            .then(|| format!("pose {},{},{}", pose["x_m"], pose["y_m"], pose["heading_deg"])),
-        pending["scene"]["name"].as_str().map(|scene| format!("scene {scene}")),
-        pending["air"]["temperature_c"].as_f64().map(|c| format!("air {c:.1} C")),
-        (!pending["setup"].is_null()).then(|| "sensor, model or motion".into()),
+        pending.pose.map(|p| format!("pose {:?},{:?},{:?}", p.x_m, p.y_m, p.heading_deg)),
+        pending.scene.as_ref().map(|scene| format!("scene {}", scene.name)),
+        pending.air.as_ref().map(|air| format!("air {:.1} C", air.temperature_c)),
+        pending.setup.as_ref().map(|_| "sensor, model or motion".into()),
     ];
     let parts: Vec<String> = parts.into_iter().flatten().collect();
     (!parts.is_empty()).then(|| format!("  pending  from the next scan on: {}", parts.join("; ")))
 }
 
 /// The ranger and its line.
-fn device(status: &Value, health: &Value) -> Vec<String> {
+fn device(status: &Status, health: &Health) -> Vec<String> {
+    let (device, line) = (status.device.as_ref(), &health.line);
     vec![
         format!(
-            "{} on {}; the daemon runs for {} s",
-            state(status),
-            word(&status["link"]["port"]),
-            figure(&status["uptime_s"]),
+            "{} on {}; the daemon runs for {:.1} s",
+            state(&status.link),
+            status.link.port,
+            status.uptime_s,
         ),
         format!(
             "  device   {} firmware {} ({})",
-            word(&status["device"]["serial"]),
-            word(&status["device"]["firmware"]),
-            word(&status["provenance"]),
+            device.map_or("-", |device| &device.serial),
+            device.map_or("-", |device| &device.firmware),
+            word(&status.provenance),
         ),
         format!(
             "  line     {} CRC errors, {} requests repeated, {} readings repaired, {} refused, lost {} \
              times",
-            health["line"]["crc_errors"],
-            health["line"]["retries"],
-            health["line"]["repaired"],
-            health["line"]["refused"],
-            health["line"]["losses"],
+            line.crc_errors, line.retries, line.repaired, line.refused, line.losses,
         ),
     ]
 }
 
 /// The array that the model plays, and what it reads.
-fn simulation(status: &Value) -> Vec<String> {
-    let told = &status["simulation"];
-    let driving = if told["driving"] == true { ", driving" } else { "" };
-    let pose = &status["pose"];
-    let metres = |value: &Value| value.as_f64().map_or("-".into(), |m| format!("{m:.2}"));
-    let readings = told["readings"].as_array().into_iter().flatten().map(|reading| {
-        let (id, range) = (word(&reading["id"]), metres(&reading["range_m"]));
-        format!("{id} {range}")
+fn array(status: &Status, simulation: &SimulationReport) -> Vec<String> {
+    let driving = if simulation.driving { ", driving" } else { "" };
+    let pose = &status.pose;
+    let readings = simulation.readings.iter().map(|reading| {
+        let range = reading.range_m.map_or_else(|| "-".into(), |range_m| format!("{range_m:.2}"));
+        format!("{} {range}", reading.id)
     });
     vec![
         format!(
-            "SIMULATED, nothing measured: {}; the daemon runs for {} s",
-            state(status),
-            figure(&status["uptime_s"]),
+            "SIMULATED, nothing measured: {}; the daemon runs for {:.1} s",
+            state(&status.link),
+            status.uptime_s,
         ),
         format!(
-            "  array    {}, one ranger each {} ms, {} turns left out",
-            word(&told["array"]),
-            figure(&told["interval_ms"]),
-            told["skipped"],
+            "  array    {}, one ranger each {:.1} ms, {} turns left out",
+            simulation.array, simulation.interval_ms, simulation.skipped,
         ),
         format!(
-            "  robot    at {}, {} m, heading {} degrees{driving}",
-            metres(&pose["x_m"]),
-            metres(&pose["y_m"]),
-            figure(&pose["heading_deg"]),
+            "  robot    at {:.2}, {:.2} m, heading {:.1} degrees{driving}",
+            pose.x_m, pose.y_m, pose.heading_deg,
         ),
         format!("  ranges   {} m", readings.collect::<Vec<_>>().join(", ")),
     ]
 }
 
 /// What it is doing or suffering, and for how long.
-fn state(status: &Value) -> String {
-    let link = &status["link"];
-    let since = link["since"].as_str().and_then(|time| time.parse::<Timestamp>().ok());
-    let seconds = since.map(|since| Timestamp::now().duration_since(since).as_secs_f64());
-    format!("{} for {} s", word(&link["state"]).replace('_', " "), figure(&seconds.into()))
+fn state(link: &LinkReport) -> String {
+    let seconds = Timestamp::now().duration_since(link.since).as_secs_f64();
+    format!("{} for {seconds:.1} s", link.state.name().replace('_', " "))
 }
 
-fn word(value: &Value) -> String {
-    value.as_str().unwrap_or("-").to_owned()
-}
-
-fn figure(value: &Value) -> String {
-    value.as_f64().map_or_else(|| "-".into(), |figure| format!("{figure:.1}"))
+/// The word that stands for a value in JSON.
+fn word(value: &impl Serialize) -> String {
+    match serde_json::to_value(value) {
+        Ok(serde_json::Value::String(word)) => word,
+        _ => "-".into(),
+    }
 }

@@ -7,14 +7,15 @@ use std::{
 
 use http_body_util::BodyExt as _;
 use hyper::body::Incoming;
-use serde::Deserialize;
-use serde_json::{Value, json};
 use thiserror::Error;
 use tokio::time::timeout;
 use uuid::Uuid;
 
 use super::{Client, ClientError};
-use crate::scan::{EventKind, Ping, Record, ScanEnd, ScanStart, Session, decode_line};
+use crate::{
+    api::{Accepted, CancelRequest, ScanReport, ScanRequest, Started, Status},
+    scan::{EventKind, Ping, Record, ScanEnd, Session, decode_line},
+};
 
 /// How long nothing may come before it is asked whether the request is still known.
 const QUIET: Duration = Duration::from_secs(2);
@@ -77,26 +78,15 @@ impl ScansError {
     }
 }
 
-#[derive(Deserialize)]
-struct Started {
-    request: Uuid,
-}
-
-#[derive(Deserialize)]
-struct Latest {
-    start: ScanStart,
-    pings: Vec<Ping>,
-}
-
 impl RequestedScans {
-    /// Asks for scans with a body of `POST /v1/start`.
+    /// Asks for scans.
     ///
     /// # Errors
     /// When nobody answers, or the daemon refuses.
-    pub async fn ask(client: Client, wish: &Value) -> Result<Self, ClientError> {
+    pub async fn ask(client: Client, wish: &ScanRequest) -> Result<Self, ClientError> {
         // Listening before asking: nothing is missed.
         let stream = client.get("/v1/live/records").await?.into_body();
-        let Started { request } = client.post("/v1/start", wish).await?;
+        let Started { request, .. } = client.post("/v1/start", wish).await?;
         Ok(Self {
             client,
             stream,
@@ -143,8 +133,8 @@ impl RequestedScans {
     /// # Errors
     /// When nobody answers.
     pub async fn cancel(&mut self) -> Result<Vec<Record>, ScansError> {
-        let body = json!({ "request": self.request });
-        match self.client.post::<Value>("/v1/cancel", &body).await {
+        let body = CancelRequest { request: self.request };
+        match self.client.post::<Accepted>("/v1/cancel", &body).await {
             // It is over already.
             Ok(_) | Err(ClientError::Refused { .. }) => {}
             Err(error) => return Err(error.into()),
@@ -229,7 +219,7 @@ impl RequestedScans {
 
     /// Readings of the scan that ends here that did not come.
     async fn lost(&self, end: &ScanEnd) -> Result<Vec<Ping>, ScansError> {
-        let latest: Latest = self.client.get_json("/v1/scan/latest").await?;
+        let latest: ScanReport = self.client.get_json("/v1/scan/latest").await?;
         if latest.start.scan != end.scan {
             return Err(ScansError::Overtaken);
         }
@@ -242,8 +232,8 @@ impl RequestedScans {
     /// its first record a scan is neither asked for nor under way: one look may fall there, two
     /// don't.
     async fn doubt(&mut self) -> Result<(), ScansError> {
-        let status: Value = self.client.get_json("/v1/status").await?;
-        let forgotten = status["scanning"]["requested"] == 0 && status["scan"].is_null();
+        let status: Status = self.client.get_json("/v1/status").await?;
+        let forgotten = status.scanning.requested == 0 && status.scan.is_none();
         self.doubts = if forgotten { self.doubts + 1 } else { 0 };
         if self.doubts == 2 { Err(ScansError::Forgotten(self.reason.take())) } else { Ok(()) }
     }

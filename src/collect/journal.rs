@@ -21,8 +21,8 @@ use super::{
     poses::NamedPose,
 };
 use crate::{
+    api::AirOrder,
     config::ScanningKeys,
-    daemon::AirOrder,
     scan::{Device, Provenance, SceneRef},
     store::open_own,
 };

@@ -1,62 +1,20 @@
 //! The air as it is known now: from the configuration, a thermometer's file, or the API.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::{path::PathBuf, time::Duration};
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use tokio::{sync::watch, time::Instant};
 
 use crate::{
     acoustics::{Air, AirError},
+    api::{AirOrder, AirStatus},
     config::AirKeys,
     scan::{AirSource, ScanAir},
+    thermometer::read_thermometer,
 };
 
 /// A change smaller than this is no reason to predict everything anew, degrees: it moves a range
 /// by less than 0.02 percent.
 const NOTABLE_C: f64 = 0.1;
-
-/// What a program says about the air; what it leaves out stays.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct AirOrder {
-    /// Temperature, degrees Celsius.
-    #[schemars(range(min = -20, max = 50))]
-    pub temperature_c: f64,
-    /// Relative humidity, percent.
-    #[serde(default)]
-    #[schemars(range(min = 0, max = 100))]
-    pub humidity_percent: Option<f64>,
-    /// Static pressure, kilopascals.
-    #[serde(default)]
-    #[schemars(range(min = 60, max = 110))]
-    pub pressure_kpa: Option<f64>,
-}
-
-/// The air in force, with its age.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct AirStatus {
-    /// Temperature, degrees Celsius.
-    pub temperature_c: f64,
-    /// Relative humidity, percent.
-    pub humidity_percent: f64,
-    /// Static pressure, kilopascals.
-    pub pressure_kpa: f64,
-    /// Speed of sound, metres a second.
-    pub sound_speed_m_s: f64,
-    /// Who gave the temperature.
-    pub source: AirSource,
-    /// How old it is, seconds; `null` for a fixed one.
-    pub age_s: Option<f64>,
-    /// Older than the configuration allows.
-    pub stale: bool,
-    /// Why the thermometer can't be read, if so.
-    pub error: Option<String>,
-}
 
 /// What is known about the air. The newest reading counts, whoever gave it.
 #[derive(Debug, Clone)]
@@ -203,55 +161,9 @@ pub(super) fn watch_thermometer(keys: &AirKeys) -> watch::Receiver<Option<Readin
     receiver
 }
 
-/// The temperature in a file of a 1-wire or hwmon driver, degrees Celsius. A 1-wire conversion takes
-/// most of a second.
-///
-/// # Errors
-/// When it can't be read or is no temperature, in words.
-pub fn read_thermometer(path: &Path) -> Result<f64, String> {
-    let text = fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-    parse_thermometer(&text).map_err(|error| format!("{}: {error}", path.display()))
-}
-
-/// Either a number of thousandths of a degree, or the two lines of `w1_slave`: a checksum's
-/// `YES`, and `t=` with the number.
-fn parse_thermometer(text: &str) -> Result<f64, String> {
-    let number = match text.split_once("t=") {
-        Some((head, tail)) if head.contains("YES") => tail,
-        Some(_) => return Err("the sensor's checksum was wrong".into()),
-        None => text,
-    };
-    let thousandths: i32 = number
-        .trim()
-        .parse()
-        .map_err(|_| format!("{:?} is no number of thousandths of a degree", number.trim()))?;
-    let temperature_c = f64::from(thousandths) / 1e3;
-    // A DS18B20 that never measured says 85 degrees.
-    match Air::new(temperature_c, 50.0, 101.325) {
-        Ok(_) => Ok(temperature_c),
-        Err(error) => Err(error.to_string()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn both_forms_are_read_and_nonsense_is_not_taken_for_a_temperature() {
-        let w1 = "72 01 4b 46 7f ff 0e 10 57 : crc=57 YES\n72 01 4b 46 7f ff 0e 10 57 t=23125\n";
-        assert_eq!(parse_thermometer(w1), Ok(23.125));
-        assert_eq!(parse_thermometer("-1500\n"), Ok(-1.5));
-        for (text, part) in [
-            (w1.replace("YES", "NO"), "checksum"),
-            ("85000".into(), "-20 to 50"),
-            (String::new(), "thousandths"),
-            ("warm".into(), "thousandths"),
-        ] {
-            let error = parse_thermometer(&text).expect_err("it is refused");
-            assert!(error.contains(part), "{error}");
-        }
-    }
 
     #[test]
     fn the_newest_reading_counts_and_its_age_is_told() {

@@ -12,14 +12,14 @@ use uuid::Uuid;
 
 use super::{
     agenda::{Agenda, Asked},
-    air::{AirDesk, AirOrder, Reading, watch_thermometer},
+    air::{AirDesk, Reading, watch_thermometer},
     journal::Journal,
     refusal::{Refusal, RefusalKind},
-    settings::{Settings, Setup},
+    settings::Settings,
     shared::{Shared, Terms},
-    status::ConfigurationReport,
 };
 use crate::{
+    api::{AirOrder, ConfigurationReport, Setup},
     board::Board,
     config::{Mode, ScanningKeys},
     geometry::Pose,

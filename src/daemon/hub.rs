@@ -16,8 +16,11 @@ use std::sync::{
 use tokio::sync::watch;
 use uuid::Uuid;
 
-use super::judged::{Beside, judged_line};
-use crate::scan::{PingStatus, Record, ScanStart, ScanView, Session, encode_line};
+use super::judged::judged_line;
+use crate::{
+    api::Beside,
+    scan::{PingStatus, Record, ScanStart, ScanView, Session, encode_line},
+};
 pub use moved::Moved;
 use shelf::Shelf;
 

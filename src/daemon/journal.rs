@@ -5,20 +5,18 @@
 
 use std::{
     collections::VecDeque,
-    path::{Path, PathBuf},
+    path::Path,
     sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel},
     thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
 
 use jiff::Timestamp;
-use schemars::JsonSchema;
-use serde::Serialize;
 use tokio::sync::watch;
 
 use crate::{
-    ranger::Sink,
-    scan::{Event, EventKind, Record},
+    api::LogStatus,
+    scan::{Event, EventKind, Record, Sink, SinkError},
     store::{LogFolder, Rotation, StoreError},
 };
 
@@ -28,21 +26,6 @@ const QUEUE: usize = 4096;
 const SYNC_CHECK: Duration = Duration::from_millis(500);
 const RETRY_MIN: Duration = Duration::from_millis(250);
 const RETRY_MAX: Duration = Duration::from_secs(10);
-
-/// What the log is doing.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct LogStatus {
-    /// The log that is being written.
-    pub file: Option<PathBuf>,
-    /// Records written since the start.
-    pub written: u64,
-    /// Of those, records that are on the disk for good.
-    pub synced: u64,
-    /// Records that could not be written yet.
-    pub waiting: usize,
-    /// Why not, if so: no scan is taken until there is room again.
-    pub error: Option<String>,
-}
 
 enum Entry {
     Record(Box<Record>),
@@ -152,7 +135,7 @@ impl JournalThread {
 
 /// Takes records for the log.
 impl Sink for Journal {
-    fn record(&mut self, record: &Record) -> Result<(), StoreError> {
+    fn record(&mut self, record: &Record) -> Result<(), SinkError> {
         Self::record(self, record);
         Ok(())
     }

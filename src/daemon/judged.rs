@@ -1,50 +1,6 @@
 //! Readings with what the API tells beside them.
 
-use schemars::JsonSchema;
-use serde::Serialize;
-
-use crate::{
-    compare::{NotCompared, Verdict, judge},
-    scan::{Ping, ScanView},
-    viewpoint::Viewpoint,
-};
-
-/// What the API tells beside a reading, where its record alone does not say it.
-#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
-pub struct Beside {
-    /// What explains the reading.
-    pub verdict: Word,
-    /// Where its transducer was when it fired, and where it pointed; `null` if its scan does not say.
-    pub viewpoint: Option<Viewpoint>,
-}
-
-impl Beside {
-    /// What is told of a reading of a scan. Of the scan, only session and start are looked at.
-    #[must_use]
-    pub fn of(ping: &Ping, scan: Option<&ScanView>) -> Self {
-        let viewpoint = scan.filter(|scan| scan.scan == ping.scan);
-        let viewpoint = viewpoint.and_then(|scan| scan.viewpoint(ping));
-        Self { verdict: Word::of(ping), viewpoint }
-    }
-}
-
-/// What explains a reading, or why it can't be compared with a prediction.
-#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
-#[serde(untagged)]
-pub enum Word {
-    /// Compared with the prediction.
-    Compared(Verdict),
-    /// Not compared, and why.
-    NotCompared(NotCompared),
-}
-
-impl Word {
-    /// What explains this reading.
-    #[must_use]
-    pub fn of(ping: &Ping) -> Self {
-        judge(ping).verdict.map_or_else(Self::NotCompared, Self::Compared)
-    }
-}
+use crate::api::Beside;
 
 /// A reading's line, an object with or without a newline, with what is told beside it as its last fields.
 #[must_use]
@@ -68,7 +24,7 @@ mod tests {
     use super::*;
     use crate::{
         geometry::Pose,
-        scan::{Record, Session, decode_line},
+        scan::{Record, ScanView, Session, decode_line},
     };
 
     const LOG: &str = include_str!("../../tests/fixtures/small.jsonl");

@@ -6,55 +6,7 @@
 
 use std::time::Duration;
 
-use schemars::JsonSchema;
-use serde::Serialize;
-
-/// What the link is doing or suffering.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum LinkState {
-    /// The port is being opened.
-    Opening,
-    /// The device is asked who it is.
-    Identifying,
-    /// The motor is looking for its index.
-    Homing,
-    /// The device stands at home, without work.
-    Ready,
-    /// A scan is under way.
-    Scanning,
-    /// The emergency stop is pressed.
-    EmergencyStop,
-    /// There was an emergency stop: nothing moves until somebody starts it.
-    AwaitingStart,
-    /// Stopped for good.
-    Stopped,
-    /// It can't be used, and why; in records the trouble stands for itself.
-    #[serde(untagged)]
-    Down(Trouble),
-}
-
-/// Why the link can't be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Trouble {
-    /// The port is not there.
-    Absent,
-    /// Another program has the port.
-    Busy,
-    /// This user may not open the port, or it is no serial port.
-    Forbidden,
-    /// Nothing that speaks the protocol answers.
-    NotAnswering,
-    /// The device speaks another version of the protocol.
-    WrongFirmware,
-    /// The device is not the one with the configured serial number.
-    WrongDevice,
-    /// The line was lost while the device was in use.
-    Lost,
-    /// The device refused, or its motor or module failed.
-    Fault,
-}
+use crate::api::{LinkState, Trouble};
 
 /// What came of a step, or what happened by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -301,54 +253,6 @@ impl LinkMachine {
         if settled.is_settled() && self.told != Some(settled) {
             let from = self.told.replace(settled);
             self.transition = Some(Transition { from, to: settled });
-        }
-    }
-}
-
-impl LinkState {
-    /// Whether the device can be used.
-    #[must_use]
-    pub const fn is_up(self) -> bool {
-        matches!(self, Self::Ready | Self::Scanning)
-    }
-
-    /// Whether the link stays like this until something happens. The steps of a try are not
-    /// settled: telling of each would flood a log while a device is away.
-    #[must_use]
-    pub const fn is_settled(self) -> bool {
-        !matches!(self, Self::Opening | Self::Identifying | Self::Homing)
-    }
-
-    /// Its name in records and on the screen.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Opening => "opening",
-            Self::Identifying => "identifying",
-            Self::Homing => "homing",
-            Self::Ready => "ready",
-            Self::Scanning => "scanning",
-            Self::EmergencyStop => "emergency_stop",
-            Self::AwaitingStart => "awaiting_start",
-            Self::Stopped => "stopped",
-            Self::Down(trouble) => trouble.name(),
-        }
-    }
-}
-
-impl Trouble {
-    /// Its name in records and on the screen.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Absent => "absent",
-            Self::Busy => "busy",
-            Self::Forbidden => "forbidden",
-            Self::NotAnswering => "not_answering",
-            Self::WrongFirmware => "wrong_firmware",
-            Self::WrongDevice => "wrong_device",
-            Self::Lost => "lost",
-            Self::Fault => "fault",
         }
     }
 }

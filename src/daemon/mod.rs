@@ -25,8 +25,6 @@ mod player;
 mod refusal;
 mod settings;
 mod shared;
-mod simulation;
-mod status;
 
 use std::sync::Arc;
 
@@ -36,22 +34,20 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 pub use agenda::{Agenda, Asked, Due};
-pub use air::{AirOrder, AirStatus, read_thermometer};
 pub use desk::{Order, Request};
 pub use hub::{Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
-pub use journal::{Journal, JournalThread, LogStatus};
-pub use judged::{Beside, Word, judged_line};
-pub use machine::{BackOff, Input, LinkMachine, LinkState, Step, Transition, Trouble};
+pub use journal::{Journal, JournalThread};
+pub use judged::judged_line;
+pub use machine::{BackOff, Input, LinkMachine, Step, Transition};
 pub use operator::OpenPort;
 pub use refusal::{Refusal, RefusalKind};
-pub use settings::{Mismatch, Settings, Setup, Simulated};
-pub use simulation::{RangerReading, SimulationReport};
-pub use status::{
-    ClockReport, ConfigurationReport, Health, InForce, LineTotals, LinkReport, Pending,
-    ScanProgress, ScanReport, ScanTotals, ScanningReport, Status, SubscriberReport,
-};
+pub use settings::{Mismatch, Settings, Simulated};
 
 use crate::{
+    api::{
+        ClockReport, ConfigurationReport, Health, InForce, LinkState, ScanTotals, Setup,
+        SimulationReport, Status, SubscriberReport,
+    },
     board::{Board, NoBoard},
     scan::Session,
     scene::Scene,

@@ -7,7 +7,8 @@ use sd_notify::{NotifyState, notify, watchdog_enabled};
 use tokio::time::interval;
 use tokio_util::sync::CancellationToken;
 
-use super::{machine::LinkState, shared::Shared};
+use super::shared::Shared;
+use crate::api::LinkState;
 
 /// How often systemd is asked to wait longer for a ranger that is not there yet.
 const PATIENCE: Duration = Duration::from_secs(5);

@@ -16,12 +16,12 @@ use super::{
     agenda::Due,
     desk::{Desk, Interrupt},
     forecast::{Forecast, listening},
-    machine::{Input, LinkMachine, Step, Trouble},
+    machine::{Input, LinkMachine, Step},
     outlet::Outlet,
     shared::Line,
-    status::ScanTotals,
 };
 use crate::{
+    api::{ScanTotals, Trouble},
     link::{BAUD, LinkError},
     ranger::{DriveError, Driver, Ranger, Unasked, serial_text},
     scan::{EventKind, Session},

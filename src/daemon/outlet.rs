@@ -6,9 +6,8 @@ use jiff::Timestamp;
 
 use super::{hub::Hub, journal::Journal, shared::Shared};
 use crate::{
-    ranger::Sink,
-    scan::{Event, EventKind, Record, Session},
-    store::{MAX_LOGGED_SCENE_BYTES, StoreError},
+    scan::{Event, EventKind, Record, Session, Sink, SinkError},
+    store::MAX_LOGGED_SCENE_BYTES,
 };
 
 /// Where records and news go.
@@ -51,7 +50,7 @@ impl Outlet {
 }
 
 impl Sink for Outlet {
-    fn record(&mut self, record: &Record) -> Result<(), StoreError> {
+    fn record(&mut self, record: &Record) -> Result<(), SinkError> {
         if let Record::ScanStart(start) = record {
             let begun = (start.scan, start.plan.beams());
             self.shared.view.send_modify(|view| view.scan = Some(begun));

@@ -16,15 +16,12 @@ use uuid::Uuid;
 use super::{
     agenda::Due,
     desk::{Desk, Interrupt},
-    machine::LinkState,
     outlet::Outlet,
-    simulation::SimulationReport,
-    status::ScanTotals,
 };
 use crate::{
+    api::{LinkState, ScanTotals, SimulationReport},
     geometry::Pose,
-    ranger::Sink as _,
-    scan::{EventKind, Ping, Provenance, Record, STOPPED_ON_REQUEST, ScanEnd, ScanStart, Session},
+    scan::{EventKind, Ping, Provenance, Record, STOPPED_ON_REQUEST, ScanEnd, ScanStart, Session, Sink as _},
 };
 use rhythm::Rhythm;
 use stage::{Drive, Stage};

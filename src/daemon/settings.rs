@@ -2,14 +2,12 @@
 
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 use super::{forecast::listening, machine::BackOff};
 use crate::{
     acoustics::{Air, Sensor},
+    api::Setup,
     array::{Course, RangerArray},
-    config::{Keys, ModelKeys, MotionKeys},
+    config::Keys,
     geometry::Pose,
     model::Options,
     ranger::Motion,
@@ -40,19 +38,6 @@ pub struct Simulated {
     pub array: Arc<RangerArray>,
     /// The way its robot takes, with times.
     pub course: Option<Arc<Course>>,
-}
-
-/// What the configuration decides about every scan, and no request can change.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Setup {
-    /// The sensor's data.
-    pub sensor: Sensor,
-    /// How echoes are predicted, as configured.
-    pub model: ModelKeys,
-    /// How the motor turns and the ranger listens.
-    pub motion: MotionKeys,
-    /// Whether a thermometer's file is read.
-    pub thermometer: bool,
 }
 
 /// What is wrong with values that are each within their range.

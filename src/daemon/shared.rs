@@ -10,18 +10,13 @@ use jiff::Timestamp;
 use tokio::{sync::watch, time::Instant};
 use uuid::Uuid;
 
-use super::{
-    air::AirDesk,
-    journal::LogStatus,
-    machine::LinkState,
-    settings::Setup,
-    simulation::SimulationReport,
-    status::{
-        ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, Pending, ScanProgress,
-        ScanTotals, ScanningReport, Status, SubscriberReport,
-    },
-};
+use super::air::AirDesk;
 use crate::{
+    api::{
+        ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, LinkState, LogStatus,
+        Pending, ScanProgress, ScanTotals, ScanningReport, Setup, SimulationReport, Status,
+        SubscriberReport,
+    },
     config::ScanningKeys,
     geometry::Pose,
     scan::{Device, Provenance, Record, ScanEnd, ScanPlan, SceneRef, Session},
@@ -108,13 +103,27 @@ pub(super) struct Line {
 impl Line {
     /// All together, now.
     pub(super) fn totals(&self) -> LineTotals {
-        self.live.as_ref().map_or(self.earlier, |live| self.earlier.with(&live.borrow()))
+        self.live.as_ref().map_or(self.earlier, |live| with(self.earlier, &live.borrow()))
     }
 
     /// The connection is over.
     pub(super) fn close(&mut self) {
         *self = Self { earlier: self.totals(), live: None };
     }
+}
+
+/// Totals of earlier connections, and the figures of one more.
+fn with(mut totals: LineTotals, stats: &LinkStats) -> LineTotals {
+    let dropped = &stats.dropped;
+    totals.bytes_sent += stats.bytes_sent;
+    totals.bytes_received += stats.bytes_received;
+    totals.frames_received += stats.frames_received;
+    totals.crc_errors += u64::from(dropped.checksum);
+    totals.framing_errors += u64::from(dropped.stuffing) + u64::from(dropped.too_long);
+    totals.retries += stats.retries;
+    totals.repaired += stats.repaired;
+    totals.refused += stats.refused;
+    totals
 }
 
 /// State that several tasks look at.

@@ -1,5 +1,7 @@
 //! Serial lines: finding, opening and locking them, with errors that tell causes apart.
 
+mod pty;
+
 use std::{
     fs, io,
     os::unix::fs::{FileTypeExt as _, MetadataExt as _},
@@ -10,6 +12,8 @@ use rustix::fs::{Mode, OFlags};
 use serialport::{ClearBuffer, ErrorKind, SerialPort as _, SerialPortType};
 use thiserror::Error;
 use tokio_serial::{SerialPortBuilderExt as _, SerialStream};
+
+pub use pty::Pty;
 
 /// Line rate of the firmware, bits a second (8N1).
 pub const BAUD: u32 = 115_200;

@@ -1,15 +1,14 @@
 //! A mock ranger: the device machine on a pty, with sound from the model.
 //!
-//! [`World`] and [`MockBoard`] are a simulation without I/O; [`MockPort`] plays it on a [`Pty`].
+//! [`World`] and [`MockBoard`] are a simulation without I/O; [`MockPort`] plays it on a
+//! [`Pty`](crate::link::Pty).
 //! It is only ever used when asked for by name, and it says of itself that it is simulated.
 
 mod board;
 mod faults;
 mod identity;
 mod liar;
-mod noise;
 mod note;
-mod pty;
 mod serve;
 #[cfg(test)]
 mod tests;
@@ -19,8 +18,6 @@ pub use board::{MockBoard, Wake, WakeKind};
 pub use faults::{DeviceFault, FAULT_HELP, FaultPlan, FaultSpecError, Faults};
 pub use identity::{BoardSettings, Pace};
 pub use liar::{LIES, Lie};
-pub use noise::Noise;
 pub use note::Note;
-pub use pty::Pty;
 pub use serve::MockPort;
 pub use world::{Soundings, World};

@@ -17,9 +17,9 @@ use super::{
     board::{MockBoard, WakeKind},
     identity::Pace,
     note::Note,
-    pty::Pty,
     world::Soundings,
 };
+use crate::link::Pty;
 
 /// How often a lock left behind by a killed host is lifted.
 const LOCK_CHECK: Duration = Duration::from_millis(200);

@@ -7,8 +7,8 @@ use firmware_protocol::{
     messages::{Blanking, Capabilities, Settings, Sweep, SweepState},
 };
 
-use super::{BoardSettings, FaultPlan, MockBoard, Noise, Note, Pace, Soundings, WakeKind, World};
-use crate::{model::Prediction, scan::PingStatus};
+use super::{BoardSettings, FaultPlan, MockBoard, Note, Pace, Soundings, WakeKind, World};
+use crate::{acoustics::TofNoise, model::Prediction, scan::PingStatus};
 
 const TICKS_PER_US: u64 = 2;
 
@@ -24,7 +24,7 @@ pub(super) fn board(faults: FaultPlan) -> MockBoard {
             echoes_us: [echo_us(step)].into_iter().collect(),
         })
         .collect();
-    let world = World::new(Soundings::from_predictions(&predictions), Noise::NONE, 0.0, 1);
+    let world = World::new(Soundings::from_predictions(&predictions), TofNoise::NONE, 0.0, 1);
     let settings = BoardSettings {
         boot: 7,
         clock: u32::MAX - 1_000_000,

@@ -6,8 +6,8 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use smallvec::SmallVec;
 
-use super::noise::Noise;
 use crate::{
+    acoustics::TofNoise,
     geometry::Pose,
     model::{Prediction, Simulator},
     scan::{PingStatus, ScanPlan},
@@ -69,7 +69,7 @@ impl Soundings {
 #[derive(Debug)]
 pub struct World {
     soundings: Soundings,
-    noise: Noise,
+    noise: TofNoise,
     missed_step_rate: f64,
     /// Where the motor really is, steps.
     step: i32,
@@ -80,7 +80,7 @@ impl World {
     /// A world; the motor stands at home. `missed_step_rate`: probability for each move that it
     /// falls one step short.
     #[must_use]
-    pub fn new(soundings: Soundings, noise: Noise, missed_step_rate: f64, seed: u64) -> Self {
+    pub fn new(soundings: Soundings, noise: TofNoise, missed_step_rate: f64, seed: u64) -> Self {
         let rng = Pcg64::seed_from_u64(seed);
         Self { soundings, noise, missed_step_rate: missed_step_rate.clamp(0.0, 1.0), step: 0, rng }
     }
@@ -148,7 +148,7 @@ mod tests {
 
     #[test]
     fn each_direction_has_its_echoes_and_a_turn_wraps() {
-        let mut world = World::new(soundings(), Noise::NONE, 0.0, 1);
+        let mut world = World::new(soundings(), TofNoise::NONE, 0.0, 1);
         let heard: SmallVec<[u32; 8]> = smallvec![6000, 10_000];
         assert_eq!(world.fire(20_000, 2_000_000), heard);
         world.turn(-2);
@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn the_end_of_blanking_has_no_noise_and_a_seed_repeats() {
-        let noise = Noise { sigma_us: 5.0, tail_share: 0.1, tail_us: 20.0 };
+        let noise = TofNoise { sigma_us: 5.0, tail_share: 0.1, tail_us: 20.0 };
         let fire = |seed| {
             let mut world = World::new(soundings(), noise, 0.0, seed);
             world.turn(1);
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn missed_steps_show_at_the_index() {
-        let mut world = World::new(soundings(), Noise::NONE, 1.0, 1);
+        let mut world = World::new(soundings(), TofNoise::NONE, 1.0, 1);
         for _ in 0..10 {
             world.turn(3);
         }

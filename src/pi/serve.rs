@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::{board::PiBoard, pins::Pins};
-use crate::mock::Pty;
+use crate::link::Pty;
 
 /// The last moment before something is due is spent awake: a sleep ends late.
 const AWAKE_TICKS: u64 = 200;

@@ -17,7 +17,6 @@ pub use clock::{ClockFit, HostTime, TickExtender};
 pub use driver::{DriveError, Driver, Ended};
 pub use introduction::{device_record, provenance, serial_text};
 pub use job::ScanJob;
-pub use progress::Sink;
 pub use scanner::{Ranger, ScanError, ScanSummary, Unasked};
 pub use settings::{DeafWindow, Listening, Motion, hold_s};
 pub use timing::limit_s;

@@ -16,18 +16,8 @@ use super::{
 };
 use crate::{
     acoustics::classify_tof,
-    scan::{Event, EventKind, Ping, PingStatus, Record, ScanEnd, Segment},
-    store::StoreError,
+    scan::{Event, EventKind, Ping, PingStatus, Record, ScanEnd, Segment, Sink, SinkError},
 };
-
-/// Where records go.
-pub trait Sink: Send {
-    /// Takes a record in.
-    ///
-    /// # Errors
-    /// When it can't be kept.
-    fn record(&mut self, record: &Record) -> Result<(), StoreError>;
-}
 
 /// Device time from the first firing to the last, within one boot.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +53,7 @@ pub(super) struct Progress<'a> {
     span: Option<Span>,
     /// Ticks of the boots before this one.
     earlier_ticks: u64,
-    failed: Option<StoreError>,
+    failed: Option<SinkError>,
 }
 
 impl<'a> Progress<'a> {
@@ -235,7 +225,7 @@ impl<'a> Progress<'a> {
     }
 
     /// Gives back the first failure to write, if there was one.
-    pub(super) fn check_sink(&mut self) -> Result<(), StoreError> {
+    pub(super) fn check_sink(&mut self) -> Result<(), SinkError> {
         self.failed.take().map_or(Ok(()), Err)
     }
 
@@ -243,7 +233,7 @@ impl<'a> Progress<'a> {
         mut self,
         acoustic_limit_s: f64,
         home_drift_steps: Option<i32>,
-    ) -> Result<Finished, StoreError> {
+    ) -> Result<Finished, SinkError> {
         if let Some(drift) = home_drift_steps.filter(|&drift| drift != 0) {
             let detail = format!(
                 "the index was found {drift} steps off after the scan: its azimuths are doubtful"

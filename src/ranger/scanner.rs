@@ -16,13 +16,12 @@ use uuid::Uuid;
 use super::{
     driver::{DriveError, Driver, Ended},
     job::ScanJob,
-    progress::{Finished, Progress, Sink},
+    progress::{Finished, Progress},
     timing,
     wall_clock::{as_step, confirmed},
 };
 use crate::{
-    scan::{EventKind, PlanError, Record, ScanEnd, ScanStart, Segment},
-    store::StoreError,
+    scan::{EventKind, PlanError, Record, ScanEnd, ScanStart, Segment, Sink, SinkError},
 };
 
 /// Restarts of the device without a single new reading after which a scan is given up.
@@ -54,9 +53,9 @@ pub enum ScanError {
     /// The device or the line failed.
     #[error("{0}")]
     Device(#[from] DriveError),
-    /// The log can't be written.
+    /// A record could not be kept.
     #[error("{0}")]
-    Store(#[from] StoreError),
+    Sink(#[from] SinkError),
 }
 
 /// A ranger that has told its identity.
@@ -263,7 +262,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
                 }
                 Ok(Err(ScanError::Device(DriveError::Abandoned))) => {
                     self.halt(progress).await?;
-                    return progress.check_sink().map(|()| Stopped(true)).map_err(ScanError::Store);
+                    return progress.check_sink().map(|()| Stopped(true)).map_err(ScanError::Sink);
                 }
                 Ok(Err(ScanError::Device(DriveError::Host(HostError::Rebooted)))) => {
                     fruitless = if progress.measured() > before { 0 } else { fruitless + 1 };

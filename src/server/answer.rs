@@ -12,7 +12,6 @@ use axum::{
     http::{HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
-use schemars::JsonSchema;
 use serde::{
     Deserialize, Deserializer, Serialize,
     de::{DeserializeOwned, Error as _},
@@ -20,29 +19,16 @@ use serde::{
 use serde_json::Value;
 
 use super::access::Refused;
-use crate::daemon::{Refusal, RefusalKind};
-
-/// Why a request was not carried out.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-pub struct Problem {
-    /// What is wrong.
-    pub error: String,
-    /// What would be right.
-    pub help: String,
-}
+use crate::{
+    api::Problem,
+    daemon::{Refusal, RefusalKind},
+};
 
 /// A problem with its status.
 #[derive(Debug, Clone)]
 pub(super) struct Failed {
     pub(super) status: StatusCode,
     pub(super) problem: Problem,
-}
-
-/// An order was taken in.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct Accepted {
-    /// Always `true`.
-    pub accepted: bool,
 }
 
 /// An answer of any size that is the same for all: written once, and shared by who takes it.

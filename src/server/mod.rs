@@ -38,7 +38,6 @@ use tokio::{
 use tower_http::{catch_panic::CatchPanicLayer, set_header::SetResponseHeaderLayer};
 
 pub use access::{Access, Peer, Refused, Standing};
-pub use answer::{Accepted, Problem};
 pub use listen::{ListenError, Listeners};
 pub use token::{TokenError, read_token};
 

@@ -9,7 +9,8 @@ use axum::{
 use schemars::{JsonSchema, Schema, SchemaGenerator, generate::SchemaSettings};
 use serde_json::{Map, Value, json};
 
-use super::{Api, answer::Problem};
+use super::Api;
+use crate::api::Problem;
 
 type SchemaOf = fn(&mut SchemaGenerator) -> Schema;
 

@@ -8,7 +8,7 @@ use std::{
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 
-use super::answer::Problem;
+use crate::api::Problem;
 
 /// A connection on which a bare refusal gets a body that says what is wrong.
 pub(super) struct Worded<S> {

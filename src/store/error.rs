@@ -5,7 +5,7 @@ use std::{io, path::PathBuf};
 use thiserror::Error;
 
 use super::FileKind;
-use crate::scan::EncodeError;
+use crate::scan::{EncodeError, SinkError};
 
 /// Why a log can't be opened, written, synced or repaired.
 #[derive(Debug, Error)]
@@ -122,6 +122,13 @@ impl StoreError {
     pub fn is_broken_pipe(&self) -> bool {
         matches!(self, Self::Write { source, .. } | Self::Torn { source, .. } | Self::Sync { source, .. }
             if source.kind() == io::ErrorKind::BrokenPipe)
+    }
+}
+
+impl From<StoreError> for SinkError {
+    fn from(error: StoreError) -> Self {
+        let help = error.help();
+        Self::new(error, help)
     }
 }
 

@@ -11,7 +11,7 @@ use std::{
 
 use firmware_protocol::messages::{Echoes, Reply};
 use serde_json::Value;
-use sonard::mock::Pty;
+use sonard::link::Pty;
 
 use crate::{
     common::{MockProcess, run, stderr},

@@ -5,8 +5,7 @@ use std::{ops::ControlFlow, time::Duration};
 use firmware_protocol::host::{Command, HostConfig, HostError};
 use rustix::time::{ClockId, clock_gettime};
 use sonard::{
-    link,
-    mock::Pty,
+    link::{self, Pty},
     ranger::{DriveError, Driver},
 };
 

@@ -18,7 +18,7 @@ use firmware_protocol::{
     messages::Reply,
 };
 use rustix::fs::OFlags;
-use sonard::mock::Pty;
+use sonard::link::Pty;
 
 /// Changes a reply on its way to the host.
 pub(crate) type Change = Box<dyn FnMut(&mut Reply) + Send>;

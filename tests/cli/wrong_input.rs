@@ -9,7 +9,7 @@ use std::{
 };
 
 use crate::common::{MockProcess, mock_scan, run, sonard, stderr};
-use sonard::mock::Pty;
+use sonard::link::Pty;
 
 /// Runs `arguments` and checks exit code and what the message must contain.
 #[track_caller]

@@ -8,6 +8,7 @@ mod path;
 mod record;
 mod remaining;
 mod simulated;
+mod sink;
 mod view;
 mod viewpoint;
 
@@ -19,6 +20,7 @@ pub use record::{
     SimRecord,
 };
 pub use remaining::Segment;
+pub use sink::{Sink, SinkError};
 pub use sonard_model::{
     plan::{PlanError, ScanPlan},
     reading::{PathKind, PingStatus},

@@ -9,10 +9,9 @@ use firmware_protocol::host::HostConfig;
 use firmware_protocol::messages::Settings;
 use sonard::geometry::Pose;
 use sonard::link;
-use sonard::mock::Pty;
-use sonard::ranger::{Driver, Ranger, ScanJob, ScanSummary, Sink};
-use sonard::scan::{EventKind, Record, ScanPlan};
-use sonard::store::StoreError;
+use sonard::link::Pty;
+use sonard::ranger::{Driver, Ranger, ScanJob, ScanSummary};
+use sonard::scan::{EventKind, Record, ScanPlan, Sink, SinkError};
 use sonard_emulator::{Emulator, HZ, serve};
 
 const MS: u64 = HZ / 1000;
@@ -22,7 +21,7 @@ const BEAMS: u32 = 60;
 struct Kept(Vec<Record>);
 
 impl Sink for Kept {
-    fn record(&mut self, record: &Record) -> Result<(), StoreError> {
+    fn record(&mut self, record: &Record) -> Result<(), SinkError> {
         self.0.push(record.clone());
         Ok(())
     }

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use crate::common::{SETTINGS, readings, ready};
 use firmware_protocol::host::Command;
 use firmware_protocol::messages::{ReadingStatus, Settings, Sweep, limits::TICK_HZ};
-use sonard::acoustics::{Air, Sensor};
-use sonard::mock::{Noise, Soundings, World};
+use sonard::acoustics::{Air, Sensor, TofNoise};
+use sonard::mock::{Soundings, World};
 use sonard::model::{Options, Simulator};
 use sonard::ranger::limit_s;
 use sonard::scan::ScanPlan;
@@ -25,7 +25,7 @@ fn world() -> World {
         Options::default(),
     );
     let soundings = Soundings::of(&simulator.expect("a model"), &pose, 400, 0.0);
-    World::new(soundings, Noise::NONE, 0.0, 1)
+    World::new(soundings, TofNoise::NONE, 0.0, 1)
 }
 
 const PLAN: Sweep =

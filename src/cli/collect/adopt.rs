@@ -4,13 +4,13 @@
 use serde_json::Value;
 
 use super::{
-    daemon::{Daemon, Status},
+    daemon::{Daemon, steps_per_revolution},
     load::{Loaded, Places, sensor},
 };
 use crate::{
+    api::{AirOrder, Setup, Status},
     acoustics::Sensor,
     cli::{Failure, options::load_sensor},
-    daemon::{AirOrder, Setup},
 };
 
 const AIR: [&str; 4] = ["temperature_c", "humidity_percent", "pressure_kpa", "file"];
@@ -38,7 +38,7 @@ impl Loaded {
             ));
         }
         self.steps_per_revolution =
-            status.steps_per_revolution().unwrap_or(self.steps_per_revolution);
+            steps_per_revolution(status).unwrap_or(self.steps_per_revolution);
         Ok(())
     }
 

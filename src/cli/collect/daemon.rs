@@ -3,16 +3,19 @@
 
 use std::{path::Path, time::Duration};
 
-use serde::Deserialize;
-use serde_json::{Value, json};
+use serde::Serialize;
 use tokio::time::{Instant, sleep};
 
 use super::{
     bar::Bar,
     device::Met,
-    taking::{self, Taken, Taking},
+    taking::{Taken, Taking},
 };
 use crate::{
+    api::{
+        AirOrder, AirStatus, InForce, LinkReport, ScanRequest, Scanning, ScanningReport, Setup,
+        Status,
+    },
     cli::{
         Failure,
         daemon::{refuse, refuse_scans},
@@ -21,9 +24,7 @@ use crate::{
     client::{Client, RequestedScans, ScansError},
     collect::{AirBefore, Borrowed},
     config::{Mode, ScanningKeys},
-    daemon::{AirOrder, Setup},
-    ranger::Sink as _,
-    scan::{AirSource, CollectionRef, Device, EventKind, Provenance, Record, STOPPED_ON_REQUEST},
+    scan::{AirSource, CollectionRef, EventKind, Record, STOPPED_ON_REQUEST, Sink as _},
 };
 
 const WAIT: Duration = Duration::from_secs(1);
@@ -41,80 +42,22 @@ pub(super) struct Daemon {
     borrowed: Option<Borrowed>,
 }
 
-/// What of its status matters here.
-#[derive(Deserialize)]
-pub(super) struct Status {
-    link: Link,
-    device: Option<Device>,
-    provenance: Option<Provenance>,
-    scanning: ScanningNow,
-    air: AirNow,
-    #[serde(default)]
-    pending: PendingNow,
-    simulation: Option<Value>,
-    scene: Value,
+/// The air that the next scan of a daemon will be taken in.
+fn next_air(status: &Status) -> &AirStatus {
+    status.pending.air.as_ref().unwrap_or(&status.air)
 }
 
-#[derive(Default, Deserialize)]
-struct PendingNow {
-    air: Option<AirNow>,
+/// Motor steps a turn of its ranger, once that told them.
+pub(super) fn steps_per_revolution(status: &Status) -> Option<u16> {
+    status.device.as_ref().and_then(|device| device.steps_per_revolution.try_into().ok())
 }
 
-#[derive(Deserialize)]
-struct Link {
-    state: String,
-    trouble: Option<String>,
-}
-
-#[derive(Deserialize)]
-struct ScanningNow {
-    mode: Mode,
-    every_s: f64,
-}
-
-#[derive(Deserialize)]
-struct AirNow {
-    temperature_c: f64,
-    humidity_percent: f64,
-    pressure_kpa: f64,
-    source: AirSource,
-}
-
-/// The air in force, and the one that is to be.
-#[derive(Deserialize)]
-struct AirInForce {
-    #[serde(flatten)]
-    now: AirNow,
-    pending: Option<AirNow>,
-}
-
-impl Status {
-    /// The scene that it predicts in.
-    pub(super) const fn scene(&self) -> &Value {
-        &self.scene
-    }
-
-    /// The air that the next scan will be taken in.
-    fn air(&self) -> &AirNow {
-        self.pending.air.as_ref().unwrap_or(&self.air)
-    }
-
-    fn is_up(&self) -> bool {
-        matches!(self.link.state.as_str(), "ready" | "scanning")
-    }
-
-    /// Motor steps a turn, once the ranger told them.
-    pub(super) fn steps_per_revolution(&self) -> Option<u16> {
-        self.device.as_ref().and_then(|device| device.steps_per_revolution.try_into().ok())
-    }
-
-    fn trouble(&self) -> Failure {
-        let trouble = self.link.trouble.as_deref().unwrap_or("no more is known");
-        Failure::device(
-            format!("the daemon has no ranger, it is {}: {trouble}", self.link.state),
-            "see `sonard status`; the collection goes on where it stopped when it is started again",
-        )
-    }
+fn trouble(link: &LinkReport) -> Failure {
+    let trouble = link.trouble.as_deref().unwrap_or("no more is known");
+    Failure::device(
+        format!("the daemon has no ranger, it is {}: {trouble}", link.state.name()),
+        "see `sonard status`; the collection goes on where it stopped when it is started again",
+    )
 }
 
 impl Daemon {
@@ -162,15 +105,15 @@ impl Daemon {
         air: Option<&AirOrder>,
     ) -> Result<Option<Borrowed>, Failure> {
         let status = self.ready().await?;
-        let ScanningNow { mode, every_s } = status.scanning;
+        let ScanningReport { mode, every_s, .. } = status.scanning;
         let mut before = self.borrowed.clone();
         if mode != Mode::OnRequest {
             before.get_or_insert_default().scanning = Some(ScanningKeys { mode, every_s });
         }
-        if air.is_some_and(|air| !status.air().is(air)) {
+        if air.is_some_and(|air| !is(next_air(&status), air)) {
             // Air that this collection gave earlier is not the daemon's own.
-            let own = || match status.air().source {
-                AirSource::Api => AirBefore::Given(status.air().order()),
+            let own = || match next_air(&status).source {
+                AirSource::Api => AirBefore::Given(as_order(next_air(&status))),
                 _ => AirBefore::Own,
             };
             before.get_or_insert_default().air.get_or_insert_with(own);
@@ -187,10 +130,11 @@ impl Daemon {
         if before.is_some() {
             self.borrowed = before;
         }
-        self.put("/v1/scanning", &json!({ "mode": Mode::OnRequest })).await?;
+        let on_request = Scanning { mode: Mode::OnRequest, every_s: None };
+        self.put("/v1/scanning", &on_request).await?;
         let status: Status = self.client.get_json("/v1/status").await.map_err(|e| refuse(&e))?;
-        match air.filter(|air| !status.air().is(air)) {
-            Some(air) => self.put("/v1/air", &json!(air)).await,
+        match air.filter(|air| !is(next_air(&status), air)) {
+            Some(air) => self.put("/v1/air", air).await,
             None => Ok(()),
         }
     }
@@ -198,11 +142,12 @@ impl Daemon {
     /// Leaves it as it was found; whether there was anything to give back.
     pub(super) async fn give_back(&mut self) -> Result<bool, Failure> {
         let Some(before) = self.borrowed.take() else { return Ok(false) };
-        if let Some(scanning) = before.scanning {
-            self.put("/v1/scanning", &json!(scanning)).await?;
+        if let Some(ScanningKeys { mode, every_s }) = before.scanning {
+            let scanning = Scanning { mode, every_s: Some(every_s) };
+            self.put("/v1/scanning", &scanning).await?;
         }
         match before.air {
-            Some(AirBefore::Given(air)) => self.put("/v1/air", &json!(air)).await?,
+            Some(AirBefore::Given(air)) => self.put("/v1/air", &air).await?,
             Some(AirBefore::Own) => {
                 self.client.delete("/v1/air").await.map_err(|error| refuse(&error))?;
             }
@@ -213,15 +158,15 @@ impl Daemon {
 
     /// The temperature that somebody measured for it, degrees Celsius.
     pub(super) async fn temperature_c(&self) -> Option<f64> {
-        let AirInForce { now, pending } = self.client.get_json("/v1/air").await.ok()?;
+        let InForce::<AirStatus> { now, pending } = self.client.get_json("/v1/air").await.ok()?;
         let air = pending.unwrap_or(now);
         (air.source != AirSource::Configuration).then_some(air.temperature_c)
     }
 
-    /// Has a scan taken into `path`, by a body of `POST /v1/start`.
+    /// Has a scan taken into `path`.
     pub(super) async fn take(
         &self,
-        (wish, of): (&Value, CollectionRef),
+        (wish, of): (&ScanRequest, CollectionRef),
         path: &Path,
         bar: &Bar,
     ) -> Result<Taken, Failure> {
@@ -235,7 +180,7 @@ impl Daemon {
                 session.collection = Some(Box::new(of.clone()));
             }
             stopped |= is_stop(&record);
-            sink.record(&record).map_err(|error| taking::refuse(&error))?;
+            sink.record(&record)?;
             if matches!(record, Record::ScanEnd(_)) {
                 break;
             }
@@ -247,7 +192,7 @@ impl Daemon {
                 () = self.interrupts.clone().wait() => {
                     // What can't be had any more is in the daemon's log.
                     for record in scans.cancel().await.unwrap_or_default() {
-                        sink.record(&record).map_err(|error| taking::refuse(&error))?;
+                        sink.record(&record)?;
                     }
                 }
             }
@@ -259,7 +204,7 @@ impl Daemon {
 
     /// Asks for the scan and waits for its first record; a daemon that restarts meanwhile is asked
     /// again.
-    async fn begin(&self, wish: &Value) -> Result<(RequestedScans, Record), Failure> {
+    async fn begin(&self, wish: &ScanRequest) -> Result<(RequestedScans, Record), Failure> {
         loop {
             self.ready().await?;
             let mut scans = match RequestedScans::ask(self.client.clone(), wish).await {
@@ -300,8 +245,8 @@ impl Daemon {
         let (until, mut told) = (Instant::now() + self.patience, false);
         loop {
             let failure = match self.look().await {
-                Ok(status) if status.is_up() => return Ok(status),
-                Ok(status) => status.trouble(),
+                Ok(status) if status.link.state.is_up() => return Ok(status),
+                Ok(status) => trouble(&status.link),
                 Err(failure @ Failure::Device(_)) => failure,
                 Err(failure) => return Err(failure),
             };
@@ -331,27 +276,25 @@ impl Daemon {
         self.client.get_json("/v1/status").await.map_err(refuse)
     }
 
-    async fn put(&self, path: &str, body: &Value) -> Result<(), Failure> {
+    async fn put(&self, path: &str, body: &impl Serialize) -> Result<(), Failure> {
         self.client.put(path, body).await.map_err(|error| refuse(&error))
     }
 }
 
-impl AirNow {
-    /// Whether that is the air in force, by a program's word.
-    fn is(&self, order: &AirOrder) -> bool {
-        let same = |wanted: Option<f64>, now: f64| wanted.is_none_or(|wanted| wanted == now);
-        self.source == AirSource::Api
-            && self.temperature_c == order.temperature_c
-            && same(order.humidity_percent, self.humidity_percent)
-            && same(order.pressure_kpa, self.pressure_kpa)
-    }
+/// Whether that is the air in force, by a program's word.
+fn is(air: &AirStatus, order: &AirOrder) -> bool {
+    let same = |wanted: Option<f64>, now: f64| wanted.is_none_or(|wanted| wanted == now);
+    air.source == AirSource::Api
+        && air.temperature_c == order.temperature_c
+        && same(order.humidity_percent, air.humidity_percent)
+        && same(order.pressure_kpa, air.pressure_kpa)
+}
 
-    const fn order(&self) -> AirOrder {
-        AirOrder {
-            temperature_c: self.temperature_c,
-            humidity_percent: Some(self.humidity_percent),
-            pressure_kpa: Some(self.pressure_kpa),
-        }
+const fn as_order(air: &AirStatus) -> AirOrder {
+    AirOrder {
+        temperature_c: air.temperature_c,
+        humidity_percent: Some(air.humidity_percent),
+        pressure_kpa: Some(air.pressure_kpa),
     }
 }
 

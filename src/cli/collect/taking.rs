@@ -10,8 +10,8 @@ use tokio_serial::SerialStream;
 use super::bar::Bar;
 use crate::{
     cli::{Failure, runtime::Interrupts, scan::scan_failure},
-    ranger::{Ranger, ScanError, ScanJob, Sink},
-    scan::{Event, EventKind, Record, ScanView, Session},
+    ranger::{Ranger, ScanError, ScanJob},
+    scan::{Event, EventKind, Record, ScanView, Session, Sink, SinkError},
     store::{LogWriter, StoreError},
 };
 
@@ -42,7 +42,7 @@ pub(super) async fn take(
     interrupts: &Interrupts,
 ) -> Result<Taken, Failure> {
     let mut sink = Taking::open(path, bar)?;
-    sink.record(&Record::Session(Box::new(session))).map_err(|error| refuse(&error))?;
+    sink.record(&Record::Session(Box::new(session)))?;
     let began = Instant::now();
     let outcome = ranger.scan(job, &mut sink, interrupts.clone().reason()).await;
     let wall_s = began.elapsed().as_secs_f64();
@@ -89,12 +89,12 @@ impl<'a> Taking<'a> {
     }
 }
 
-pub(super) fn refuse(error: &StoreError) -> Failure {
+fn refuse(error: &StoreError) -> Failure {
     Failure::device(error, error.help())
 }
 
 impl Sink for Taking<'_> {
-    fn record(&mut self, record: &Record) -> Result<(), StoreError> {
+    fn record(&mut self, record: &Record) -> Result<(), SinkError> {
         self.log.append(record)?;
         if matches!(record, Record::Ping(_)) {
             self.bar.beam();

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, time::Duration};
 
-use crate::daemon::read_thermometer;
+use crate::thermometer::read_thermometer;
 
 /// Tries for one reading: a 1-wire bus garbles one now and then.
 const TRIES: u32 = 3;

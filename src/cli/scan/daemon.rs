@@ -1,9 +1,8 @@
 //! A scan taken by a running daemon, through its API.
 
-use serde_json::{Value, json};
-
 use super::{Args, output::Output, summary};
 use crate::{
+    api::{LinkState, ScanRequest, Status},
     cli::{
         Failure, Outcome,
         daemon::{check_scene, refuse, refuse_scans},
@@ -17,15 +16,15 @@ use crate::{
 pub(super) fn run(args: &Args) -> Outcome {
     let (scene, pose) = args.place.load()?;
     let plan = args.azimuths.plan(args.pings_per_stop)?;
-    let wish = json!({"scans": args.repeat, "plan": plan, "pose": pose});
+    let wish = ScanRequest { scans: Some(args.repeat), plan: Some(plan), pose: Some(pose) };
     let client = args.at.client()?;
     let output = Output::open(args.out.as_deref())?;
     let mut scans =
         Scans { output, wanted: args.repeat, ends: Vec::new(), told_again: 0, pose, plan };
     let measured = runtime::new()?.block_on(async {
         let interrupts = Interrupts::listen();
-        let status: Value = client.get_json("/v1/status").await.map_err(|error| refuse(&error))?;
-        check_scene(&status["scene"], &scene)?;
+        let status: Status = client.get_json("/v1/status").await.map_err(|error| refuse(&error))?;
+        check_scene(status.scene.as_ref(), &scene)?;
         let requested = RequestedScans::ask(client, &wish).await.map_err(|error| refuse(&error))?;
         anstream::eprintln!("the daemon takes {} scan(s), {}", args.repeat, first(&status));
         let followed = scans.follow(requested, &interrupts).await;
@@ -113,16 +112,13 @@ impl Scans {
 }
 
 /// What the daemon does before the scans that it was asked for, as its status has it.
-fn first(status: &Value) -> String {
-    match status["scan"].as_object() {
-        Some(scan) => format!(
-            "after the one it is at, {} of {} beams of which are measured",
-            scan["done"], scan["beams"]
-        ),
-        None if status["link"]["state"] == "ready" => "at once".into(),
-        None => {
-            let state = status["link"]["state"].as_str().unwrap_or("unknown");
-            format!("once its ranger is ready; it is {state} now")
+fn first(status: &Status) -> String {
+    match (&status.scan, status.link.state) {
+        (Some(scan), _) => {
+            let (done, beams) = (scan.done, scan.beams);
+            format!("after the one it is at, {done} of {beams} beams of which are measured")
         }
+        (None, LinkState::Ready) => "at once".into(),
+        (None, state) => format!("once its ranger is ready; it is {} now", state.name()),
     }
 }

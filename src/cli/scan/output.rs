@@ -13,10 +13,9 @@ use crate::{
     },
     geometry::Pose,
     plot,
-    ranger::Sink,
-    scan::{Record, ScanPlan, ScanView, Session},
+    scan::{Record, ScanPlan, ScanView, Session, Sink, SinkError},
     scene::Scene,
-    store::{LogWriter, StoreError},
+    store::LogWriter,
 };
 use earlier::Earlier;
 
@@ -87,7 +86,7 @@ impl Output {
 
     /// Writes a record outside a scan.
     pub(super) fn record(&mut self, record: &Record) -> Outcome {
-        Sink::record(self, record).map_err(|error| Failure::device(&error, error.help()))
+        Ok(Sink::record(self, record)?)
     }
 
     /// Closes the log and draws the pictures.
@@ -111,7 +110,7 @@ impl Output {
 }
 
 impl Sink for Output {
-    fn record(&mut self, record: &Record) -> Result<(), StoreError> {
+    fn record(&mut self, record: &Record) -> Result<(), SinkError> {
         if let Some(log) = &mut self.log {
             log.append(record)?;
             if matches!(record, Record::ScanEnd(_)) {

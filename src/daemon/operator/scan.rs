@@ -12,11 +12,12 @@ use super::{
         agenda::Asked,
         desk::Interrupt,
         forecast::predict,
-        machine::{Input, Trouble},
+        machine::Input,
     },
     Operator, attended,
 };
 use crate::{
+    api::Trouble,
     ranger::{DriveError, Ranger, ScanError, ScanJob, ScanSummary},
     scan::{EventKind, Record, STOPPED_ON_REQUEST, Session},
 };

@@ -3,13 +3,11 @@
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    super::{
-        agenda::Due,
-        machine::{LinkState, Trouble},
-    },
+    super::agenda::Due,
     Operator,
 };
 use crate::{
+    api::{LinkState, Trouble},
     ranger::{device_record, provenance},
     scan::EventKind,
 };

@@ -9,10 +9,9 @@ use uuid::Uuid;
 
 use super::super::{desk::Desk, outlet::Outlet, settings::Settings};
 use crate::{
-    acoustics::Air,
+    acoustics::{Air, TofNoise},
     array::Course,
     geometry::Pose,
-    mock::Noise,
     model::ArrayModel,
     scan::{EventKind, Ping, PingStatus},
 };
@@ -22,7 +21,7 @@ pub(super) struct Stage {
     model: Arc<ArrayModel>,
     air: Air,
     heard: Vec<Option<(Pose, Ping)>>,
-    noise: Noise,
+    noise: TofNoise,
     rng: Pcg64,
 }
 
@@ -45,7 +44,7 @@ impl Stage {
             model: Arc::new(model),
             air,
             heard: vec![None; rangers],
-            noise: Noise::of_range_mm(keys.noise_mm, air.sound_speed_m_s()),
+            noise: TofNoise::of_range_mm(keys.noise_mm, air.sound_speed_m_s()),
             rng: Pcg64::seed_from_u64(keys.seed),
         })
     }

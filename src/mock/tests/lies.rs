@@ -13,9 +13,8 @@ use super::{
 use crate::{
     geometry::Pose,
     link,
-    ranger::{Driver, Ranger, ScanError, ScanJob, ScanSummary, Sink},
-    scan::{Event, Ping, PingStatus, Record, ScanPlan},
-    store::StoreError,
+    ranger::{Driver, Ranger, ScanError, ScanJob, ScanSummary},
+    scan::{Event, Ping, PingStatus, Record, ScanPlan, Sink, SinkError},
 };
 
 const BEAMS: usize = 40;
@@ -61,7 +60,7 @@ fn verdict(lie: Lie) -> Verdict {
 struct Records(Vec<Record>);
 
 impl Sink for Records {
-    fn record(&mut self, record: &Record) -> Result<(), StoreError> {
+    fn record(&mut self, record: &Record) -> Result<(), SinkError> {
         self.0.push(record.clone());
         Ok(())
     }

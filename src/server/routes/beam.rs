@@ -2,15 +2,9 @@
 
 use std::sync::Arc;
 
-use schemars::JsonSchema;
-use serde::Serialize;
-
-use super::{
-    scans::JudgedPing,
-    scene::{Point, point},
-};
 use crate::{
     acoustics::{Air, Hump},
+    api::{Beam, Echo, HumpLine, JudgedPing, point},
     geometry::Pose,
     model::{Options, Simulator, Station},
     scan::{PathRecord, Ping, ScanView, Session},
@@ -25,51 +19,6 @@ const FAINT: f64 = 0.1;
 const MOST_HUMPS: usize = 24;
 /// Spacing of the samples that find a hump's peak, microseconds.
 const STEP_US: f64 = 20.0;
-
-/// A beam with all that is known about it.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub(super) struct Beam {
-    /// The reading, and what explains it.
-    reading: JudgedPing,
-    /// Its echoes, in the order in which they came.
-    echoes: Vec<Echo>,
-    /// The path of the reading's sound, or else of the predicted echo, in the plan: the transmitter, each
-    /// interaction, the receiver.
-    polyline: Option<Vec<Point>>,
-    /// What the model hears, in order of time, faint sounds included; `null` if it could not be
-    /// asked.
-    humps: Option<Vec<HumpLine>>,
-    /// Why the model could not be asked, in words.
-    lacks: Option<String>,
-}
-
-/// An echo that the ranger heard.
-#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
-struct Echo {
-    /// Time after firing, device ticks.
-    ticks: u32,
-    /// The same in microseconds; `null` without a session.
-    tof_us: Option<f64>,
-    /// Half the way that sound goes in that time, metres.
-    range_m: Option<f64>,
-}
-
-/// A hump of the echo trace that the model predicts.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-struct HumpLine {
-    /// When it begins to rise, microseconds after firing.
-    tof_us: f64,
-    /// Half its path's length, metres.
-    range_m: f64,
-    /// Its peak, relative to a head-on, perfectly reflecting wall.
-    peak: f64,
-    /// Its peak above the threshold in force then, decibels.
-    margin_db: f64,
-    /// The path the sound took.
-    path: PathRecord,
-    /// The same in the plan: the transmitter, each interaction, the receiver.
-    polyline: Vec<Point>,
-}
 
 /// Everything about a reading of a scan. The model is asked if `scene` is the one that the scan
 /// was taken in.

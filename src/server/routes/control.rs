@@ -1,68 +1,19 @@
 //! Orders.
 
 use axum::{Json, extract::State, http::StatusCode};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 use crate::{
-    config::Mode,
-    daemon::{AirOrder, Asked, Order},
+    api::{Accepted, AirOrder, CancelRequest, ScanRequest, Scanning, Started},
+    daemon::{Asked, Order},
     geometry::Pose,
     scan::ScanPlan,
     server::{
         Api,
-        answer::{Accepted, Body, Failed},
+        answer::{Body, Failed},
         openapi::Endpoint,
     },
 };
-
-/// How many scans to take.
-#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Start {
-    /// So many scans; without it, those of the mode go on (on-request: one scan).
-    #[serde(default)]
-    #[schemars(range(min = 1))]
-    scans: Option<u32>,
-    /// Azimuths for these scans alone, instead of those in force.
-    #[serde(default)]
-    plan: Option<ScanPlan>,
-    /// Where the ranger stands for these scans alone, instead of the pose in force.
-    #[serde(default)]
-    pose: Option<Pose>,
-}
-
-/// Scans were asked for.
-#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
-pub(super) struct Started {
-    /// Always `true`.
-    accepted: bool,
-    /// Identifies the request: `scan_start.request` of its scans bears it. Scans that the mode
-    /// takes by itself bear none.
-    request: Uuid,
-}
-
-/// Which request.
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Cancel {
-    /// As POST /v1/start gave it.
-    request: Uuid,
-}
-
-/// When scans are taken.
-#[derive(Debug, Clone, Copy, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Scanning {
-    /// The mode.
-    mode: Mode,
-    /// From the start of a scan to the start of the next, seconds, when the mode is schedule;
-    /// without it, as it was.
-    #[serde(default)]
-    #[schemars(range(min = 1, max = 604_800))]
-    every_s: Option<f64>,
-}
 
 type Answer = Result<(StatusCode, Json<Accepted>), Failed>;
 
@@ -70,14 +21,14 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
     let taken = "Taken in; it counts from the next scan on";
     vec![
         Endpoint::post("/v1/start", start, "Take scans, or go on with those of the mode")
-            .takes::<Start>()
+            .takes::<ScanRequest>()
             .answers::<Started>(202, "Taken in"),
         Endpoint::post(
             "/v1/cancel",
             cancel,
             "Take no more scans of a request, end the one under way",
         )
-        .takes::<Cancel>()
+        .takes::<CancelRequest>()
         .answers::<Accepted>(202, "Taken in"),
         Endpoint::get("/v1/scanning", scanning, "When scans are taken")
             .answers::<Scanning>(200, "The mode"),
@@ -106,19 +57,19 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
 
 async fn start(
     State(api): State<Api>,
-    Body(start): Body<Start>,
+    Body(start): Body<ScanRequest>,
 ) -> Result<(StatusCode, Json<Started>), Failed> {
     if start.scans == Some(0) {
         let help = "give 1 or more, or leave it out";
         return Err(Failed::new(StatusCode::UNPROCESSABLE_ENTITY, "scans is 0", help));
     }
-    let Start { scans, plan, pose } = start;
+    let ScanRequest { scans, plan, pose } = start;
     let request = Uuid::new_v4();
     api.daemon.order(Order::Start(Asked { request, scans, plan, pose })).await?;
     Ok((StatusCode::ACCEPTED, Json(Started { accepted: true, request })))
 }
 
-async fn cancel(State(api): State<Api>, Body(cancel): Body<Cancel>) -> Answer {
+async fn cancel(State(api): State<Api>, Body(cancel): Body<CancelRequest>) -> Answer {
     carry_out(&api, Order::Cancel(cancel.request)).await
 }
 

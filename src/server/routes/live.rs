@@ -19,7 +19,8 @@ use super::{
     scans::written,
 };
 use crate::{
-    daemon::{Beside, Moved, ScanReport, ScanSubscription, Subscription, Wanted},
+    api::{Beside, ScanReport},
+    daemon::{Moved, ScanSubscription, Subscription, Wanted},
     scan::Record,
     server::{
         Api, Standing,

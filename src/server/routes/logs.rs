@@ -7,13 +7,12 @@ use axum::{
     http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
-use schemars::JsonSchema;
-use serde::Serialize;
 use serde_json::json;
 use tokio::{fs::File, io::AsyncReadExt as _};
 use tokio_util::io::ReaderStream;
 
 use crate::{
+    api::LogEntry,
     server::{
         Api,
         answer::{Failed, Path},
@@ -21,17 +20,6 @@ use crate::{
     },
     store::log_files,
 };
-
-/// A log.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub(super) struct LogEntry {
-    /// Its name, for GET /v1/logs/{name}.
-    name: String,
-    /// Its size, bytes.
-    bytes: u64,
-    /// Whether it is the one being written.
-    current: bool,
-}
 
 pub(super) fn endpoints() -> Vec<Endpoint> {
     vec![

@@ -12,7 +12,8 @@ use prometheus_client::{
 };
 
 use crate::{
-    daemon::{Handle, Status},
+    api::Status,
+    daemon::Handle,
     scan::Provenance,
     server::{Api, answer::Failed, openapi::Endpoint},
 };

@@ -9,7 +9,8 @@ use serde::{Serialize, de::IgnoredAny};
 use tokio::sync::Semaphore;
 
 use crate::{
-    daemon::{Beside, Moved, judged_line},
+    api::Beside,
+    daemon::{Moved, judged_line},
     scan::{Record, decode_line},
     store::{Passage, PassageLines},
 };

@@ -7,7 +7,8 @@ use super::{
     scans::{answer, written},
 };
 use crate::{
-    daemon::{AirStatus, Health, InForce, Moved, ScanReport, Setup, Status},
+    api::{AirStatus, Health, InForce, ScanReport, Setup, Status},
+    daemon::Moved,
     geometry::Pose,
     scan::{ScanPlan, Session},
     server::{Api, answer::Failed, openapi::Endpoint},

@@ -12,22 +12,18 @@ use axum::{
     http::{StatusCode, header},
     response::{IntoResponse as _, Response},
 };
-use jiff::Timestamp;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use serde_json::json;
 use tokio::time::{Instant, sleep};
 use uuid::Uuid;
 
 use super::{
-    beam::{Beam, look},
+    beam::look,
     pieces::{Form, Pieces, stream},
-    scene::FloorPlan,
 };
 use crate::{
-    daemon::{Beside, Moved},
-    geometry::Pose,
-    scan::{Event, Ping, Provenance, ScanEnd, ScanPlan, ScanStart, ScanView, Session},
+    api::{Beam, FloorPlan, ListedScan, WholeScan},
+    daemon::Moved,
     scene::Scene,
     server::{
         Api,
@@ -43,54 +39,6 @@ const USUAL: u16 = 50;
 const MOST: u16 = 500;
 /// How long the log may take to have what was measured.
 const WRITING: Duration = Duration::from_secs(5);
-
-/// A scan in a list.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-struct ListedScan {
-    /// The scan.
-    scan: Uuid,
-    /// When it began.
-    time: Timestamp,
-    /// Its log, for GET /v1/logs/{name}.
-    log: String,
-    /// Where the ranger stood.
-    pose: Pose,
-    /// What was to be measured.
-    plan: ScanPlan,
-    /// Where its readings come from.
-    provenance: Option<Provenance>,
-    /// Name of the scene that the model was given.
-    scene: Option<String>,
-    /// How it ended; `null` for one under way, or broken off.
-    end: Option<ScanEnd>,
-}
-
-/// A scan with its readings. It is never in memory: [`Pieces`] writes it.
-#[derive(JsonSchema)]
-#[expect(dead_code, reason = "its schema says what is written")]
-struct WholeScan {
-    /// What was true for it; `null` if the log lacks it.
-    session: Option<Arc<Session>>,
-    /// How it began.
-    start: Option<ScanStart>,
-    /// Its readings, in the order of the log.
-    pings: Vec<JudgedPing>,
-    /// What happened meanwhile.
-    events: Vec<Event>,
-    /// How it ended; `null` for one under way, or broken off.
-    end: Option<ScanEnd>,
-}
-
-/// A reading and what is told beside it.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
-pub(super) struct JudgedPing {
-    /// The reading.
-    #[serde(flatten)]
-    pub(super) ping: Ping,
-    /// What explains it, and where its transducer was.
-    #[serde(flatten)]
-    pub(super) beside: Beside,
-}
 
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -146,7 +94,7 @@ async fn list(
         return Err(Failed::new(status, format!("limit is {limit}"), help));
     }
     let scans = in_history(&api, move |history| history.newest(limit.into())).await?;
-    Ok(Json(scans.into_iter().map(ListedScan::from).collect()))
+    Ok(Json(scans.into_iter().map(listed).collect()))
 }
 
 async fn whole(State(api): State<Api>, Path(scan): Path<String>) -> Result<Response, Failed> {
@@ -269,25 +217,16 @@ fn broken(error: &tokio::task::JoinError) -> Failed {
     Failed::new(StatusCode::INTERNAL_SERVER_ERROR, error.to_string(), help)
 }
 
-impl From<PastScan> for ListedScan {
-    fn from(past: PastScan) -> Self {
-        Self {
-            scan: past.start.scan,
-            time: past.start.time,
-            log: past.log,
-            pose: past.start.pose,
-            plan: past.start.plan,
-            provenance: past.provenance,
-            scene: past.scene.map(|scene| scene.name),
-            end: past.end,
-        }
-    }
-}
-
-impl JudgedPing {
-    /// A reading of a scan.
-    pub(super) fn of(ping: Ping, scan: &ScanView) -> Self {
-        let beside = Beside::of(&ping, Some(scan));
-        Self { ping, beside }
+/// A scan of the history as a list has it.
+fn listed(past: PastScan) -> ListedScan {
+    ListedScan {
+        scan: past.start.scan,
+        time: past.start.time,
+        log: past.log,
+        pose: past.start.pose,
+        plan: past.start.plan,
+        provenance: past.provenance,
+        scene: past.scene.map(|scene| scene.name),
+        end: past.end,
     }
 }

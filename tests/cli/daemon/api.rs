@@ -5,7 +5,16 @@ use std::{
     time::Duration,
 };
 
+use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Value, json};
+use sonard::{
+    api::{
+        AirStatus, Beam, FloorPlan, Health, InForce, ListedScan, LogEntry, ScanReport, Scanning, Setup,
+        Started, Status, WholeScan,
+    },
+    geometry::Pose,
+    scan::{ScanPlan, Session},
+};
 
 use super::{Daemon, clean_log, schema::misfits};
 use crate::common::{run, stderr, wait_until};
@@ -127,6 +136,43 @@ fn the_server_does_what_its_document_says() {
         let faults = misfits(&problem["application/json"]["schema"], &document, &reply.json());
         assert_eq!(faults, Vec::<String>::new(), "{method} {path}");
     }
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+/// What the server writes is what its clients read: the same types, and nothing lost on the way.
+#[test]
+fn every_answer_is_read_by_the_type_it_is_written_by() {
+    fn same<T: Serialize + DeserializeOwned>(path: &str, answer: &Value) {
+        let read: T = serde_json::from_value(answer.clone())
+            .unwrap_or_else(|error| panic!("{path}: {error}"));
+        assert_eq!(serde_json::to_value(read).expect("JSON"), *answer, "{path}");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    daemon.wait_for("ready");
+    same::<Started>("/v1/start", &daemon.send("POST", "/v1/start", r#"{"scans":1}"#).json());
+    daemon.wait_for_scans(1);
+    let asked = daemon.send("POST", "/v1/start", r#"{"scans":2}"#);
+    assert_eq!(asked.status, 202);
+    assert_eq!(daemon.send("PUT", "/v1/air", r#"{"temperature_c":22.5}"#).status, 202);
+    let scan = daemon.get("/v1/scan/latest").json()["start"]["scan"].clone();
+    let scan = format!("/v1/scans/{}", scan.as_str().expect("an id"));
+    let check = |path: &str, of: fn(&str, &Value)| of(path, &daemon.get(path).json());
+    check("/v1/status", same::<Status>);
+    check("/v1/health", same::<Health>);
+    check("/v1/scan/latest", same::<ScanReport>);
+    check("/v1/session", same::<Session>);
+    check("/v1/setup", same::<InForce<Setup>>);
+    check("/v1/plan", same::<InForce<ScanPlan>>);
+    check("/v1/pose", same::<InForce<Pose>>);
+    check("/v1/air", same::<InForce<AirStatus>>);
+    check("/v1/scanning", same::<Scanning>);
+    check("/v1/scene", same::<FloorPlan>);
+    check("/v1/scans", same::<Vec<ListedScan>>);
+    check("/v1/logs", same::<Vec<LogEntry>>);
+    check(&scan, same::<WholeScan>);
+    check(&format!("{scan}/beams/7"), same::<Beam>);
+    check(&format!("{scan}/scene"), same::<FloorPlan>);
     assert_eq!(daemon.stop(), Some(0));
 }
 

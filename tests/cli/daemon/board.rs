@@ -10,9 +10,10 @@ use std::{
 
 use sonard::{
     acoustics::Sensor,
+    api::{LinkState, Trouble},
     board::Board,
     config::{Keys, Mode},
-    daemon::{Asked, Handle, Journal, LinkState, Order, Resources, Settings, Trouble, prepare},
+    daemon::{Asked, Handle, Journal, Order, Resources, Settings, prepare},
     link,
     mock::Pace,
     scene::parse_pose,

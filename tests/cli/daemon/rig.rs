@@ -9,10 +9,10 @@ use std::{
 };
 
 use sonard::{
-    acoustics::{Air, Sensor},
-    link,
+    acoustics::{Air, Sensor, TofNoise},
+    link::{self, Pty},
     mock::{
-        BoardSettings, FaultPlan, MockBoard, MockPort, Noise, Note, Pace, Pty, Soundings, World,
+        BoardSettings, FaultPlan, MockBoard, MockPort, Note, Pace, Soundings, World,
     },
     model::{Options, Simulator},
     scene::{Scene, shipped},
@@ -81,7 +81,7 @@ impl Rig {
             seed,
             pace: self.pace,
         };
-        let world = World::new(self.soundings.clone(), Noise::NONE, 0.0, seed);
+        let world = World::new(self.soundings.clone(), TofNoise::NONE, 0.0, seed);
         let _context = self.runtime.enter();
         let port = MockPort::open(MockBoard::new(settings, world), Some(&self.link));
         let (stop, stopped) = oneshot::channel::<()>();

@@ -23,7 +23,7 @@ mod statistics;
 use std::collections::{HashMap, HashSet};
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use sonard_model::geometry::Pose;
 use sonard_records::{PathKind, Ping, PingStatus, ScanView, SimRecord};
@@ -36,7 +36,9 @@ pub const AGREE_WITHIN_M: f64 = 0.010;
 pub const AGREE_WITHIN_SHARE: f64 = 0.01;
 
 /// What explains a reading.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Echoes agree; the sound met one reflector, or none on a path given without them.
@@ -55,7 +57,9 @@ pub enum Verdict {
 }
 
 /// Why a reading can't be set beside a prediction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum NotCompared {
     /// The reading never arrived.

@@ -7,6 +7,7 @@ mod face;
 mod pulse;
 mod receiver;
 mod sensor;
+mod tof_noise;
 mod transducer;
 
 pub use air::{Air, AirError};
@@ -21,4 +22,5 @@ pub use sensor::{
     Aperture, ChirpPart, EdgeLawKind, Gain, GainStep, Mounting, Pulse, Response, Sensor,
     SensorError,
 };
+pub use tof_noise::TofNoise;
 pub use transducer::{BeamPattern, kuc_siegel_response, piston_directivity};

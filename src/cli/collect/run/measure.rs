@@ -3,7 +3,6 @@
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use serde_json::json;
 
 use super::{
     super::{
@@ -13,6 +12,7 @@ use super::{
     Collector,
 };
 use crate::{
+    api::ScanRequest,
     cli::{Failure, Outcome, scan::setup::Setup},
     collect::{AirAction, Entry, Slot},
     ranger::ScanJob,
@@ -94,7 +94,8 @@ impl Collector<'_> {
         if let Some(before) = &before {
             self.note(Entry::Borrowed(before.clone()))?;
         }
-        let wish = json!({"scans": 1, "plan": self.loaded.plan, "pose": self.pose(slot.pose).pose});
+        let (plan, pose) = (Some(self.loaded.plan), Some(self.pose(slot.pose).pose));
+        let wish = ScanRequest { scans: Some(1), plan, pose };
         let of = self.collection_ref(slot);
         let path = self.folder.taking(slot);
         let Some(Device::Daemon(daemon)) = &mut self.device else { return Err(no_device()) };

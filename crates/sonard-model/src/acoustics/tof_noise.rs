@@ -9,7 +9,7 @@ use rand_distr::{Distribution as _, Exp1, StandardNormal};
 /// with a far tail slightly longer than the near one; here some readings, at random, come later
 /// by an exponentially distributed time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
+pub struct TofNoise {
     /// Standard deviation of the normal part, microseconds.
     pub sigma_us: f64,
     /// Share of readings in the far tail, 0 to 1.
@@ -18,7 +18,7 @@ pub struct Noise {
     pub tail_us: f64,
 }
 
-impl Noise {
+impl TofNoise {
     /// No noise at all.
     pub const NONE: Self = Self { sigma_us: 0.0, tail_share: 0.0, tail_us: 0.0 };
 
@@ -48,7 +48,7 @@ mod tests {
 
     #[test]
     fn the_far_tail_is_longer() {
-        let noise = Noise::of_range_mm(1.0, 343.0);
+        let noise = TofNoise::of_range_mm(1.0, 343.0);
         let mut rng = Pcg64::seed_from_u64(5);
         let errors: Vec<f64> = (0..200_000).map(|_| noise.sample_us(&mut rng)).collect();
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;

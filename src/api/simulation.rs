@@ -1,8 +1,8 @@
-//! What the daemon tells about an array that the model plays.
+//! An array that the model plays in place of a device.
 
 use jiff::Timestamp;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     array::{MountedRanger, RangerArray},
@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// An array that the model plays.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SimulationReport {
     /// Its name.
     pub array: String,
@@ -25,7 +25,7 @@ pub struct SimulationReport {
 }
 
 /// A ranger's last reading.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RangerReading {
     /// The ranger.
     pub id: String,
@@ -41,7 +41,7 @@ pub struct RangerReading {
 
 impl SimulationReport {
     /// Of an array that has not fired yet.
-    pub(super) fn of(array: &RangerArray) -> Self {
+    pub(crate) fn of(array: &RangerArray) -> Self {
         Self {
             array: array.name.clone(),
             interval_ms: array.interval_ms,
@@ -52,7 +52,7 @@ impl SimulationReport {
     }
 
     /// Whether its readings are of an array like this.
-    pub(super) fn is_of(&self, array: &RangerArray) -> bool {
+    pub(crate) fn is_of(&self, array: &RangerArray) -> bool {
         let told = self.readings.iter().map(|reading| (&reading.id, reading.bearing_deg));
         told.eq(array.rangers.iter().map(|ranger| (&ranger.id, ranger.bearing_deg)))
     }

@@ -1,0 +1,35 @@
+//! What is said over the HTTP API: the types of its requests and answers, for whoever serves them
+//! and whoever asks.
+//!
+//! `GET /v1/openapi.json` is made from these types, and from those of [`scan`](crate::scan) that
+//! records are.
+
+mod air;
+mod beam;
+mod health;
+mod link;
+mod logs;
+mod orders;
+mod problem;
+mod scans;
+mod scene;
+mod setup;
+mod simulation;
+mod status;
+
+pub use air::{AirOrder, AirStatus};
+pub use beam::{Beam, Echo, HumpLine};
+pub use health::{ClockReport, Health, LineTotals, ScanTotals};
+pub use link::{LinkReport, LinkState, Trouble};
+pub use logs::LogEntry;
+pub use orders::{Accepted, CancelRequest, ScanRequest, Scanning, Started};
+pub use problem::Problem;
+pub(crate) use scene::point;
+pub use scans::{Beside, JudgedPing, ListedScan, ScanReport, WholeScan, Word};
+pub use scene::{Body, Circle, FloorPlan, Point, WallLine};
+pub use setup::Setup;
+pub use simulation::{RangerReading, SimulationReport};
+pub use status::{
+    ConfigurationReport, InForce, LogStatus, Pending, ScanProgress, ScanningReport, Status,
+    SubscriberReport,
+};

@@ -1,0 +1,70 @@
+//! Whether all is well.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Whether all is well, with the figures to judge by.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Health {
+    /// Whether the device can be used, the log written, and the temperature is fresh.
+    pub healthy: bool,
+    /// Why not.
+    pub reasons: Vec<String>,
+    /// The serial line, since the start.
+    pub line: LineTotals,
+    /// Scans since the start.
+    pub scans: ScanTotals,
+    /// The device's clock in the last scan.
+    pub clock: ClockReport,
+}
+
+/// Figures of the serial line since the start.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct LineTotals {
+    /// Bytes sent.
+    pub bytes_sent: u64,
+    /// Bytes received.
+    pub bytes_received: u64,
+    /// Frames received whose checksum was right.
+    pub frames_received: u64,
+    /// Frames whose checksum was wrong.
+    pub crc_errors: u64,
+    /// Frames that were damaged otherwise.
+    pub framing_errors: u64,
+    /// Requests sent again.
+    pub retries: u64,
+    /// Readings that were lost at first and fetched again.
+    pub repaired: u64,
+    /// Readings and answers that made no sense.
+    pub refused: u64,
+    /// Times that the device was lost from use.
+    pub losses: u64,
+}
+
+/// Figures of the scans since the start.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct ScanTotals {
+    /// Every beam was measured.
+    pub completed: u64,
+    /// Stopped on request.
+    pub stopped: u64,
+    /// Given up.
+    pub failed: u64,
+    /// Beams measured.
+    pub beams: u64,
+    /// Beams that scans lacked at their end.
+    pub missing: u64,
+    /// Restarts of the device that scans survived.
+    pub restarts: u64,
+}
+
+/// The device's clock.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ClockReport {
+    /// Deviation from its nominal rate, parts in a million.
+    pub drift_ppm: Option<f64>,
+    /// Standard deviation of the times in records, microseconds.
+    pub sigma_us: Option<f64>,
+    /// Times that the computer's wall clock was set.
+    pub steps: u64,
+}

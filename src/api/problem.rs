@@ -1,0 +1,13 @@
+//! Requests that are refused.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Why a request was not carried out.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+pub struct Problem {
+    /// What is wrong.
+    pub error: String,
+    /// What would be right.
+    pub help: String,
+}

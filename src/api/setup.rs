@@ -1,0 +1,22 @@
+//! What no request can change.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    acoustics::Sensor,
+    config::{ModelKeys, MotionKeys},
+};
+
+/// What the configuration decides about every scan, and no request can change.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Setup {
+    /// The sensor's data.
+    pub sensor: Sensor,
+    /// How echoes are predicted, as configured.
+    pub model: ModelKeys,
+    /// How the motor turns and the ranger listens.
+    pub motion: MotionKeys,
+    /// Whether a thermometer's file is read.
+    pub thermometer: bool,
+}
