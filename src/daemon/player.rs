@@ -21,7 +21,10 @@ use super::{
 use crate::{
     api::{LinkState, ScanTotals, SimulationReport},
     geometry::Pose,
-    scan::{EventKind, Ping, Provenance, Record, STOPPED_ON_REQUEST, ScanEnd, ScanStart, Session, Sink as _},
+    scan::{
+        EventKind, Ping, Provenance, Record, STOPPED_ON_REQUEST, ScanEnd, ScanStart, Session,
+        Sink as _,
+    },
 };
 use rhythm::Rhythm;
 use stage::{Drive, Stage};

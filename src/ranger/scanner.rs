@@ -20,9 +20,7 @@ use super::{
     timing,
     wall_clock::{as_step, confirmed},
 };
-use crate::{
-    scan::{EventKind, PlanError, Record, ScanEnd, ScanStart, Segment, Sink, SinkError},
-};
+use crate::scan::{EventKind, PlanError, Record, ScanEnd, ScanStart, Segment, Sink, SinkError};
 
 /// Restarts of the device without a single new reading after which a scan is given up.
 const FRUITLESS_RESTARTS: u32 = 3;

@@ -25,10 +25,7 @@ pub struct SinkError {
 
 impl SinkError {
     /// What went wrong, and what a person can do about it.
-    pub fn new(
-        cause: impl Into<Box<dyn Error + Send + Sync>>,
-        help: impl Into<String>,
-    ) -> Self {
+    pub fn new(cause: impl Into<Box<dyn Error + Send + Sync>>, help: impl Into<String>) -> Self {
         Self { cause: cause.into(), help: help.into() }
     }
 

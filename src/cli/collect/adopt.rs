@@ -8,8 +8,8 @@ use super::{
     load::{Loaded, Places, sensor},
 };
 use crate::{
-    api::{AirOrder, Setup, Status},
     acoustics::Sensor,
+    api::{AirOrder, Setup, Status},
     cli::{Failure, options::load_sensor},
 };
 

@@ -8,12 +8,7 @@ use tokio_serial::SerialStream;
 use uuid::Uuid;
 
 use super::{
-    super::{
-        agenda::Asked,
-        desk::Interrupt,
-        forecast::predict,
-        machine::Input,
-    },
+    super::{agenda::Asked, desk::Interrupt, forecast::predict, machine::Input},
     Operator, attended,
 };
 use crate::{

@@ -2,10 +2,7 @@
 
 use jiff::{SignedDuration, Timestamp};
 
-use super::{
-    super::agenda::Due,
-    Operator,
-};
+use super::{super::agenda::Due, Operator};
 use crate::{
     api::{LinkState, Trouble},
     ranger::{device_record, provenance},

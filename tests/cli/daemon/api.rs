@@ -9,8 +9,8 @@ use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Value, json};
 use sonard::{
     api::{
-        AirStatus, Beam, FloorPlan, Health, InForce, ListedScan, LogEntry, ScanReport, Scanning, Setup,
-        Started, Status, WholeScan,
+        AirStatus, Beam, FloorPlan, Health, InForce, ListedScan, LogEntry, ScanReport, Scanning,
+        Setup, Started, Status, WholeScan,
     },
     geometry::Pose,
     scan::{ScanPlan, Session},

@@ -11,9 +11,7 @@ use std::{
 use sonard::{
     acoustics::{Air, Sensor, TofNoise},
     link::{self, Pty},
-    mock::{
-        BoardSettings, FaultPlan, MockBoard, MockPort, Note, Pace, Soundings, World,
-    },
+    mock::{BoardSettings, FaultPlan, MockBoard, MockPort, Note, Pace, Soundings, World},
     model::{Options, Simulator},
     scene::{Scene, shipped},
 };
