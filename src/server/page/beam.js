@@ -7,6 +7,8 @@ import * as words from "./words.js";
 
 // Somebody who holds an arrow key down passes over beams.
 const PAUSE_MS = 120;
+// A beam that is read anew all the time is asked about only so often: the model takes its time.
+const ANEW_MS = 2000;
 
 export class BeamPanel {
   /** Calls `onPath(points)` when the path of some sound is to be drawn. */
@@ -14,30 +16,52 @@ export class BeamPanel {
     this.panel = panel;
     this.onPath = onPath;
     this.request = new AbortController();
+    this.facts = document.createElement("div");
+    this.details = document.createElement("div");
+    this.ping = null;
+    this.asking = false;
+    this.asked = 0;
   }
 
   clear() {
     this.request.abort();
+    [this.ping, this.asking] = [null, false];
     const hint = document.createElement("p");
     hint.className = "hint";
     hint.textContent = "Click a beam on the plan or the residuals, or move the slider with the arrow keys.";
     this.panel.replaceChildren(hint);
   }
 
-  async show(scan, ping) {
+  /** Shows a reading; details of the same beam's reading of before stay until those of this one are known. */
+  show(ping) {
+    const anew = ping.index === this.ping?.index;
+    this.ping = ping;
+    this.facts.replaceChildren(...reading(ping));
+    if (!anew) this.details.replaceChildren();
+    this.panel.replaceChildren(this.facts, this.details);
+    if (!anew || !this.asking) this.learn(anew ? this.asked + ANEW_MS - performance.now() : 0);
+  }
+
+  /** Asks the daemon about the reading, after a pause, and about the one that has come meanwhile. */
+  async learn(pause_ms) {
     this.request.abort();
     this.request = new AbortController();
     const { signal } = this.request;
-    this.panel.replaceChildren(...reading(ping));
-    await new Promise((done) => setTimeout(done, PAUSE_MS));
+    this.asking = true;
+    await new Promise((done) => setTimeout(done, Math.max(PAUSE_MS, pause_ms)));
     if (signal.aborted) return;
+    this.asked = performance.now();
+    const { scan, index } = this.ping;
     try {
-      const beam = await ask(`/v1/scans/${scan.id}/beams/${ping.index}`, { signal });
+      const beam = await ask(`/v1/scans/${scan}/beams/${index}`, { signal });
       this.onPath(beam.polyline);
-      this.panel.append(...echoes(beam), ...this.humps(beam));
+      this.details.replaceChildren(...echoes(beam), ...this.humps(beam));
     } catch (error) {
-      if (!signal.aborted) this.panel.append(note(`The daemon did not tell more: ${error.message}`));
+      if (!signal.aborted) this.details.replaceChildren(note(`The daemon did not tell more: ${error.message}`));
     }
+    if (signal.aborted) return;
+    this.asking = false;
+    if (this.ping.scan !== scan) this.learn(ANEW_MS);
   }
 
   /** What the model hears; each sound draws its path. */
@@ -45,16 +69,17 @@ export class BeamPanel {
     if (beam.lacks) return [note(`No paths: ${beam.lacks}.`)];
     const list = document.createElement("ul");
     list.className = "humps";
-    for (const hump of beam.humps ?? []) list.append(this.hump(hump, beam, list));
+    const humps = beam.humps ?? [];
+    const drawn = drawnOf(humps, beam);
+    for (const hump of humps) list.append(this.hump(hump, hump === drawn, list));
     if (!list.children.length) return [heading("What the model hears"), note("nothing that comes near the threshold")];
     return [heading("What the model hears: range, over the threshold, path"), list];
   }
 
-  hump(hump, beam, list) {
+  hump(hump, drawn, list) {
     const item = document.createElement("li");
     const button = item.appendChild(document.createElement("button"));
     button.type = "button";
-    const drawn = JSON.stringify(hump.polyline) === JSON.stringify(beam.polyline);
     button.ariaPressed = String(drawn);
     const texts = [words.metres(hump.range_m), words.decibels(hump.margin_db), words.path(hump.path)];
     for (const text of texts) button.appendChild(document.createElement("span")).textContent = text;
@@ -66,12 +91,29 @@ export class BeamPanel {
   }
 }
 
+/** Which of the model's sounds the path of a beam's reading is: as many points, each within a millimetre;
+ * of several, the one that meets the same in the same order. */
+function drawnOf(humps, { polyline, reading }) {
+  const near = (points) => points.every(([x, y], i) => Math.hypot(x - polyline[i][0], y - polyline[i][1]) < 1e-3);
+  const same = humps.filter((hump) => hump.polyline.length === polyline?.length && near(hump.polyline));
+  const named = words.path(reading.path ?? reading.sim?.path);
+  return same.find((hump) => words.path(hump.path) === named) ?? same[0];
+}
+
 /** A reading in one line, as the slider says it. */
 export function inWords(ping) {
-  const parts = [`beam ${ping.index}, azimuth ${words.degrees(ping.azimuth_deg)}`, MARKS[ping.mark].words];
+  const parts = [`beam ${ping.index}${ranger(ping)}, azimuth ${words.degrees(ping.azimuth_deg)}`, MARKS[ping.mark].words];
   if (ping.range_m !== null) parts.push(words.metres(ping.range_m));
   if (ping.sim?.range_m != null) parts.push(`model ${words.metres(ping.sim.range_m)}`);
   return parts.join(", ");
+}
+
+const ranger = (ping) => (ping.ranger ? `, ${ping.ranger}` : "");
+
+function place(viewpoint) {
+  if (!viewpoint) return "its scan does not say where";
+  const { x_m, y_m, direction_deg } = viewpoint;
+  return `${x_m.toFixed(3)}, ${y_m.toFixed(3)} m, looking to ${words.degrees(direction_deg)}`;
 }
 
 function reading(ping) {
@@ -83,7 +125,8 @@ function reading(ping) {
   const list = document.createElement("dl");
   list.className = "facts";
   const facts = [
-    ["Beam", `${ping.index} at ${words.degrees(ping.azimuth_deg)}`],
+    ["Beam", `${ping.index}${ranger(ping)} at ${words.degrees(ping.azimuth_deg)}`],
+    ["Taken from", place(ping.viewpoint)],
     ["Time of flight", ping.tof_us === null ? "–" : `${ping.tof_us.toFixed(1)} µs`],
   ];
   if (ping.sim) {

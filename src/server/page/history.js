@@ -2,7 +2,9 @@
 
 import { ask } from "./api.js";
 import { Scan } from "./scan.js";
-import { clock } from "./words.js";
+import { clock, count } from "./words.js";
+
+const REFRESH_MS = 1000;
 
 export class History {
   /** Calls `onShow(scan)` with a scan to show, `onShow(null)` for the live one. */
@@ -10,6 +12,7 @@ export class History {
     Object.assign(this, { list, live, replay, speed, onShow });
     this.shown = null;
     this.playing = 0;
+    [this.due, this.refreshed] = [null, -REFRESH_MS];
     list.addEventListener("click", (event) => {
       const button = event.target.closest("button");
       if (button) this.show(button.dataset.scan);
@@ -18,7 +21,15 @@ export class History {
     replay.addEventListener("click", () => this.play());
   }
 
+  /** An array's scans are over several times a second: the list follows at its own pace. */
+  refreshSoon() {
+    const wait = this.refreshed + REFRESH_MS - performance.now();
+    this.due ??= setTimeout(() => this.refresh(), Math.max(0, wait));
+  }
+
   async refresh() {
+    clearTimeout(this.due);
+    [this.due, this.refreshed] = [null, performance.now()];
     try {
       const scans = await ask("/v1/scans");
       const focused = this.list.contains(document.activeElement) ? document.activeElement.dataset.scan : null;
@@ -56,7 +67,7 @@ export class History {
     const whole = await ask(`/v1/scans/${id}`).catch(() => null);
     if (!whole?.start || !whole.pings.length) return;
     this.shown = new Scan(whole.start, whole.session);
-    this.shown.underWay = true;
+    [this.shown.underWay, this.shown.replayed] = [true, true];
     this.mark();
     this.onShow(this.shown);
     const turn = ++this.playing;
@@ -68,7 +79,7 @@ export class History {
       const at = (now - began) * Number(this.speed.value);
       while (next < whole.pings.length && dues[next] <= at) this.shown.add(whole.pings[next++]);
       if (next < whole.pings.length) return requestAnimationFrame(step);
-      this.shown.underWay = false;
+      [this.shown.underWay, this.shown.replayed] = [false, false];
       if (whole.end) this.shown.finish(whole.end);
       this.onShow(this.shown);
     };
@@ -99,7 +110,7 @@ function entry(scan) {
   const button = item.appendChild(document.createElement("button"));
   button.type = "button";
   button.dataset.scan = scan.scan;
-  const beams = scan.end ? `${scan.end.beams} beams${scan.end.missing ? `, ${scan.end.missing} missing` : ""}` : "not ended";
+  const beams = scan.end ? `${count(scan.end.beams, "beam")}${scan.end.missing ? `, ${scan.end.missing} missing` : ""}` : "not ended";
   for (const text of [clock(scan.time), beams]) button.appendChild(document.createElement("span")).textContent = text;
   return item;
 }

@@ -11,7 +11,7 @@ import { Strip } from "./strip.js";
 import { Summary } from "./summary.js";
 import { BeamTable } from "./table.js";
 import { colours, legend } from "./verdicts.js";
-import { clock, setText } from "./words.js";
+import { clock, count, setText } from "./words.js";
 
 const byId = (id) => document.getElementById(id);
 const slider = byId("beam");
@@ -29,10 +29,13 @@ let unheard = null;
 let catching = null;
 let again = false;
 
-const plan = new Plan(byId("stage"), select);
+export const plan = new Plan(byId("stage"), select);
 const strip = new Strip(byId("strip"), select);
 const table = new BeamTable(byId("table"));
-const panel = new BeamPanel(byId("beam-panel"), (path) => plan.select(selected, path));
+const panel = new BeamPanel(byId("beam-panel"), (path) => {
+  plan.select(selected, path);
+  changed = true;
+});
 const summary = new Summary(byId("summary"));
 const history = new History(
   { list: byId("scans-list"), live: byId("live"), replay: byId("replay"), speed: byId("speed") },
@@ -46,13 +49,23 @@ control(byId("control"), byId("stop"), (text) => summary.say(text));
 
 /** Shows a scan, or the same one anew. */
 function show(scan) {
-  if (scan?.id !== shown?.id) deselect();
+  const another = scan?.id !== shown?.id;
   shown = scan;
   for (const view of [plan, strip, table]) view.scan = scan;
   if (scan) scan.added = [];
   plan.latest = null;
+  if (another) keepSelection();
   redraw();
   loadScene();
+}
+
+/** The selected beam stays selected in another scan. Until that has read it, its reading of before stays. */
+function keepSelection() {
+  if (!selected) return;
+  const ping = shown?.beams.get(selected.index);
+  if (ping) choose(ping);
+  else if (!shown?.underWay || selected.index >= shown.planned) deselect();
+  else tellSelected();
 }
 
 function redraw() {
@@ -67,6 +80,8 @@ function frame() {
   if (shown?.added.length) {
     const added = shown.added.splice(0);
     for (const view of [plan, strip, table]) view.addReadings(added);
+    const anew = selected && added.findLast((ping) => ping.index === selected.index);
+    if (anew && anew !== selected) choose(anew);
     changed = true;
   }
   if (changed) tell();
@@ -76,34 +91,48 @@ function frame() {
 
 /** The texts around the plan. */
 function tell() {
-  legend(byId("legend"), shown?.counts ?? new Map(), palette);
-  const beyond = plan.beyond();
-  setText(byId("beyond"), beyond ? `${beyond} readings lie beyond the view: arrows on its border` : "");
+  legend(byId("legend"), shown?.counts ?? new Map(), plan.pens(), palette);
+  const { beyond, unplaced } = plan.notShown();
+  const parts = [];
+  if (beyond) parts.push(`${count(beyond, "reading")} beyond the view: arrows on its border`);
+  if (unplaced) parts.push(`${count(unplaced, "reading")} from an unknown place: not drawn`);
+  setText(byId("beyond"), parts.join("; "));
   const progress = byId("progress");
   progress.hidden = !shown?.underWay;
   if (!shown) return setText(byId("which"), "no scan yet");
   progress.max = shown.planned;
   progress.value = shown.beams.size;
   const when = shown === live && shown.underWay ? "live" : clock(shown.start.time);
-  setText(byId("which"), `${when} · ${shown.beams.size} of ${shown.planned} beams`);
+  setText(byId("which"), `${when} · ${shown.beams.size} of ${count(shown.planned, "beam")}`);
   const other = shown.session?.scene && !plan.sceneFits();
   byId("stage").title = other ? `Taken in the scene ${shown.session.scene.name}, which its log does not hold: no walls are drawn` : "";
   slider.max = Math.max(0, shown.planned - 1);
-  slider.disabled = shown.beams.size === 0;
+  slider.disabled = shown.beams.size === 0 && !shown.before;
 }
 
 function select(index) {
   const ping = shown?.nearest(index);
-  if (!ping) return;
+  if (ping) choose(ping);
+}
+
+function choose(ping) {
+  // The path of the reading before is that of this one, until the daemon says otherwise.
+  const same = selected?.index === ping.index && JSON.stringify(selected.viewpoint) === JSON.stringify(ping.viewpoint);
+  const path = same ? plan.path : null;
   selected = ping;
   slider.value = ping.index;
-  const text = inWords(ping);
-  slider.setAttribute("aria-valuetext", text);
-  setText(byId("beam-now"), text);
-  plan.select(ping);
+  tellSelected();
+  plan.select(ping, path);
   strip.select(ping);
   table.select(ping);
-  panel.show(shown, ping);
+  panel.show(ping);
+  changed = true;
+}
+
+function tellSelected() {
+  const text = `${inWords(selected)}${selected.scan === shown.id ? "" : ", in the scan before"}`;
+  slider.setAttribute("aria-valuetext", text);
+  setText(byId("beam-now"), text);
 }
 
 function deselect() {
@@ -114,6 +143,16 @@ function deselect() {
   plan.select(null);
   strip.selected = null;
   panel.clear();
+  changed = true;
+}
+
+/** A scan that begins, and the one before it for what it has not read yet. */
+function begin(start) {
+  const scan = new Scan(start, session);
+  scan.underWay = true;
+  if (live?.planned === scan.planned) scan.before = live;
+  if (live) live.before = null;
+  return scan;
 }
 
 function take(record) {
@@ -123,8 +162,7 @@ function take(record) {
       loadScene();
       break;
     case "scan_start":
-      live = new Scan(record, session);
-      live.underWay = true;
+      live = begin(record);
       if (history.shown === null) {
         show(live);
         summary.began(live);
@@ -142,10 +180,11 @@ function take(record) {
       live.finish(record);
       changed = true;
       if (shown === live) {
-        plan.drawOver();
+        // A view that was kept wide for readings that did not come again shrinks now.
+        plan.redraw();
         summary.ended(live);
       }
-      history.refresh();
+      history.refreshSoon();
       break;
     case "event":
       summary.event(record);
@@ -202,6 +241,7 @@ async function loadScene() {
   if (taken && scene?.sha256 !== taken) scene = (await ask(`/v1/scans/${scan.id}/scene`).catch(unknown)) ?? scene;
   if (scene === undefined || scan !== shown || scene?.sha256 === plan.scene?.sha256) return;
   plan.scene = scene;
+  changed = true;
   setText(byId("floor-title"), scene ? `Floor plan: ${scene.name}` : "Floor plan");
   plan.redraw(palette);
 }
@@ -210,11 +250,9 @@ slider.addEventListener("input", () => select(Number(slider.value)));
 slider.addEventListener("focus", () => {
   if (!selected && shown?.beams.size) select(Number(slider.value));
 });
-byId("fit").addEventListener("click", (event) => {
-  plan.fitAll = !plan.fitAll;
-  event.currentTarget.ariaPressed = String(plan.fitAll);
-  plan.redraw(palette);
-  tell();
+byId("fit").addEventListener("change", (event) => {
+  plan.show(event.currentTarget.value);
+  changed = true;
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   palette = colours();

@@ -1,51 +1,58 @@
-// The floor plan on three layers: ground (grid, walls, ranger), marks (readings, drawn as they
-// come), and above them what changes with every beam (sweep, selection, path of the sound).
+// The floor plan on three layers: ground (grid, walls), marks (readings, drawn as they come), and above
+// them what changes with every beam (robot, sweep, selection, path of the sound). Every reading is drawn
+// from its own viewpoint.
 
+import { drawGrid, drawScaleBar, drawScene } from "./ground.js";
+import { arrow, circle, drawFace, drawPose, Layer, line, PEN_NAMES } from "./pens.js";
 import { MARKS, draw } from "./verdicts.js";
+import { View } from "./view.js";
+import { inWorld, offDirection, pointAt } from "./viewpoint.js";
 
-const MARGIN_PX = 26;
 const MARK_PX = 3;
 const HIT_PX = 24;
 const TURN = Math.PI / 180;
-/** Rooms with more walls than this are drawn without their names. */
-const MOST_NAMES = 24;
-const NAME_PX = 11;
+/** Half the angle of an arc that stands for the nearest range of a ranger that does not turn, degrees. */
+const ARC_DEG = 8;
+/** Half the width of a transducer's face as it is drawn, metres. */
+const FACE_M = 0.02;
 
 export class Plan {
   /** Calls `onPick(index)` when somebody clicks at a beam. */
   constructor(stage, onPick) {
     this.stage = stage;
-    [this.ground, this.marks, this.over] = [...stage.querySelectorAll("canvas")].map((canvas) => canvas.getContext("2d"));
+    this.layers = [...stage.querySelectorAll("canvas")].map((canvas) => new Layer(canvas));
+    [this.ground, this.marks, this.over] = this.layers;
+    this.view = new View();
     this.scene = null;
     this.scan = null;
-    this.fitAll = false;
     this.selected = null;
     this.latest = null;
     this.path = null;
     this.onPick = onPick;
     new ResizeObserver(() => this.resize()).observe(stage);
-    this.over.canvas.addEventListener("click", (event) => this.pick(event.offsetX, event.offsetY));
+    this.over.canvas.addEventListener("click", (event) => this.pick([event.offsetX, event.offsetY]));
   }
 
   /** Everything anew: another scene, scan, size or style. */
   redraw(palette = this.palette) {
     this.palette = palette;
-    if (!this.width) return;
+    if (!this.view.width) return;
     this.fit();
-    this.clear(this.ground);
-    this.drawGrid();
-    this.drawScene();
-    this.clear(this.marks);
-    if (this.scan) for (const ping of this.scan.beams.values()) this.drawReading(ping);
+    this.ground.clear();
+    drawGrid(this.ground, this.view, palette);
+    if (this.sceneFits()) drawScene(this.ground, this.view, palette, this.scene);
+    drawScaleBar(this.ground, this.view, palette);
+    this.marks.clear();
+    this.drawReadings(this.readings());
     this.drawOver();
   }
 
   /** Readings that came since the last frame. */
   addReadings(pings) {
-    if (!this.width) return;
-    if (this.fitAll && pings.some((ping) => this.isOutside(ping))) return this.redraw();
-    pings.forEach((ping) => this.drawReading(ping));
+    if (!this.view.width) return;
     this.latest = pings.at(-1) ?? this.latest;
+    if (pings.some((ping) => this.widens(ping))) return this.redraw();
+    this.drawReadings(pings);
     this.drawOver();
   }
 
@@ -53,149 +60,65 @@ export class Plan {
   select(ping, path = null) {
     this.selected = ping;
     this.path = path;
-    if (this.width) this.drawOver();
+    if (this.view.width) this.drawOver();
   }
 
   resize() {
     const { clientWidth, clientHeight } = this.stage;
-    const scale = devicePixelRatio;
-    [this.width, this.height] = [clientWidth, clientHeight];
-    for (const layer of [this.ground, this.marks, this.over]) {
-      layer.canvas.width = Math.round(clientWidth * scale);
-      layer.canvas.height = Math.round(clientHeight * scale);
-      layer.setTransform(scale, 0, 0, scale, 0, 0);
-    }
+    [this.view.width, this.view.height] = [clientWidth, clientHeight];
+    for (const layer of this.layers) layer.resize(clientWidth, clientHeight);
     if (this.palette) this.redraw();
   }
 
-  /** The scale and origin that show the room, or all readings as well. */
+  /** Shows the room alone, the readings around it as well, or all. */
+  show(what) {
+    [this.view.what, this.view.box] = [what, null];
+    this.redraw();
+  }
+
+  readings() {
+    return this.scan ? [...this.scan.beams.values()] : [];
+  }
+
   fit() {
-    const xs = [], ys = [];
-    const take = ([x, y]) => (xs.push(x), ys.push(y));
-    for (const wall of this.scene?.walls ?? []) [wall.from, wall.to].forEach(take);
-    for (const { center: [x, y], radius_m: r } of this.scene?.cylinders ?? []) [[x - r, y - r], [x + r, y + r]].forEach(take);
+    const room = [];
+    for (const { from, to } of this.scene?.walls ?? []) room.push(from, to);
+    for (const { center: [x, y], radius_m: r } of this.scene?.cylinders ?? []) room.push([x - r, y - r], [x + r, y + r]);
     const pose = this.scan?.start.pose;
-    if (pose) take([pose.x_m, pose.y_m]);
-    if (this.scan && (this.fitAll || xs.length < 3)) {
-      for (const ping of this.scan.beams.values()) if (ping.range_m !== null) take(this.place(ping, ping.range_m));
-    }
-    if (xs.length < 2) [[-1, -1], [1, 1]].forEach(([x, y]) => take([x + (pose?.x_m ?? 0), y + (pose?.y_m ?? 0)]));
-    const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
-    // Ghosts of a room stand outside of it: some of them are shown.
-    const around = this.fitAll ? 0.02 : 0.22;
-    const [across, up] = [Math.max(right - left, 0.2), Math.max(high - low, 0.2)];
-    const room = Math.max(across, up) * around;
-    this.scale = Math.min(
-      (this.width - 2 * MARGIN_PX) / (across + 2 * room),
-      (this.height - 2 * MARGIN_PX) / (up + 2 * room),
-    );
-    this.x0 = this.width / 2 - (this.scale * (left + right)) / 2;
-    this.y0 = this.height / 2 + (this.scale * (low + high)) / 2;
+    if (pose) room.push([pose.x_m, pose.y_m]);
+    const readings = this.readings();
+    for (const { viewpoint } of readings) if (viewpoint) room.push([viewpoint.x_m, viewpoint.y_m]);
+    const ends = readings.map((ping) => this.place(ping)).filter((end) => end !== null);
+    // While readings come in, the view only widens, from one scan of a place to the next as well.
+    const where = `${this.scene?.sha256} ${JSON.stringify(pose)}`;
+    const grow = this.scan?.underWay && where === this.fitted;
+    this.fitted = where;
+    if (room.length === 1) room.push(...[[-1, -1], [1, 1]].map(([x, y]) => [room[0][0] + x, room[0][1] + y]));
+    this.view.fit(room, ends, grow);
   }
 
-  px([x, y]) {
-    return [this.x0 + this.scale * x, this.y0 - this.scale * y];
+  /** Where a range along a beam ends, metres; by itself its reading's. `null` if it is not known. */
+  place({ viewpoint, range_m }, m = range_m) {
+    return viewpoint && m !== null ? pointAt(viewpoint, m) : null;
   }
 
-  /** Where a range along a beam ends, metres. */
-  place(ping, range_m) {
-    const { x_m, y_m, heading_deg } = this.scan.start.pose;
-    const direction = (heading_deg + ping.azimuth_deg) * TURN;
-    return [x_m + range_m * Math.cos(direction), y_m + range_m * Math.sin(direction)];
+  /** Whether a reading is out of the view that the view would widen for. */
+  widens(ping) {
+    const at = this.place(ping);
+    return at !== null && this.view.wouldGrow(at);
   }
 
-  clear(layer) {
-    layer.clearRect(0, 0, this.width, this.height);
+  /** How many readings lie beyond the view, and how many are from a place that is not known. */
+  notShown() {
+    const readings = this.view.width ? this.readings() : [];
+    const ends = readings.map((ping) => this.place(ping)).filter((end) => end !== null);
+    const beyond = ends.filter((end) => this.view.isBeyond(this.view.px(end))).length;
+    return { beyond, unplaced: readings.filter((ping) => !ping.viewpoint).length };
   }
 
-  /** How many readings lie beyond the view. */
-  beyond() {
-    if (!this.width || !this.scan) return 0;
-    return [...this.scan.beams.values()].filter((ping) => this.isOutside(ping)).length;
-  }
-
-  isOutside(ping) {
-    if (ping.range_m === null) return false;
-    const [x, y] = this.px(this.place(ping, ping.range_m));
-    return this.isBeyond(x, y);
-  }
-
-  isBeyond(x, y) {
-    return x < 2 || y < 2 || x > this.width - 2 || y > this.height - 2;
-  }
-
-  drawGrid() {
-    const c = this.ground;
-    const step = gridStep(64 / this.scale);
-    c.strokeStyle = this.palette["--grid"];
-    c.lineWidth = 1;
-    c.beginPath();
-    for (let i = Math.ceil(-this.x0 / this.scale / step); this.x0 + i * step * this.scale < this.width; i++) {
-      const x = Math.round(this.x0 + i * step * this.scale) + 0.5;
-      c.moveTo(x, 0);
-      c.lineTo(x, this.height);
-    }
-    for (let i = Math.ceil((this.y0 - this.height) / this.scale / step); this.y0 - i * step * this.scale > 0; i++) {
-      const y = Math.round(this.y0 - i * step * this.scale) + 0.5;
-      c.moveTo(0, y);
-      c.lineTo(this.width, y);
-    }
-    c.stroke();
-    this.drawScaleBar(step);
-  }
-
-  drawScaleBar(step) {
-    const c = this.ground;
-    const length = step * this.scale;
-    const [x, y] = [12, this.height - 12];
-    c.strokeStyle = c.fillStyle = this.palette["--quiet"];
-    c.lineWidth = 1.5;
-    c.beginPath();
-    c.moveTo(x, y - 4);
-    c.lineTo(x, y);
-    c.lineTo(x + length, y);
-    c.lineTo(x + length, y - 4);
-    c.stroke();
-    c.font = "12px system-ui, sans-serif";
-    c.fillText(step < 1 ? `${Math.round(100 * step)} cm` : `${step} m`, x + length + 7, y + 1);
-  }
-
-  drawScene() {
-    const c = this.ground;
-    c.strokeStyle = this.palette["--wall"];
-    c.lineWidth = 2;
-    c.lineCap = "round";
-    for (const wall of this.sceneFits() ? this.scene.walls : []) {
-      c.setLineDash(wall.material.roughness > 0 ? [4, 4] : []);
-      this.line(c, [wall.from, wall.to]);
-    }
-    c.setLineDash([]);
-    if (this.sceneFits() && this.scene.walls.length <= MOST_NAMES) this.scene.walls.forEach((wall) => this.drawName(wall));
-    for (const { center, radius_m } of this.sceneFits() ? this.scene.cylinders : []) this.circle(c, center, radius_m);
-    if (!this.scan) return;
-    if (this.sceneFits()) this.drawRobot(c);
-    this.drawRanger(c);
-  }
-
-  /** A wall's name beside its middle, on the side away from the middle of the view. */
-  drawName({ id, from, to }) {
-    const c = this.ground;
-    const [[x, y], [u, v]] = [this.px(from), this.px(to)];
-    const length = Math.hypot(u - x, v - y);
-    c.font = `${NAME_PX}px system-ui, sans-serif`;
-    if (length < c.measureText(id).width) return;
-    let [nx, ny] = [(v - y) / length, (x - u) / length];
-    const [mx, my] = [(x + u) / 2, (y + v) / 2];
-    if (nx * (this.width / 2 - mx) + ny * (this.height / 2 - my) > 0) [nx, ny] = [-nx, -ny];
-    c.save();
-    c.translate(mx + NAME_PX * nx, my + NAME_PX * ny);
-    const turn = Math.atan2(v - y, u - x);
-    c.rotate(Math.abs(turn) > Math.PI / 2 ? turn - Math.sign(turn) * Math.PI : turn);
-    c.fillStyle = this.palette["--quiet"];
-    c.textAlign = "center";
-    c.textBaseline = "middle";
-    c.fillText(id, 0, 0);
-    c.restore();
+  /** Names of the pens that something is drawn with. */
+  pens() {
+    return PEN_NAMES.filter((name) => this.layers.some((layer) => layer.used.has(name)));
   }
 
   /** Whether the scan was taken in the scene that is known. */
@@ -204,181 +127,129 @@ export class Plan {
     return this.scene && (!taken || taken === this.scene.sha256);
   }
 
-  drawRobot(c) {
-    const robot = this.scene.robot;
-    if (!robot) return;
-    const { x_m, y_m, heading_deg } = this.scan.start.pose;
-    const [cos, sin] = [Math.cos(heading_deg * TURN), Math.sin(heading_deg * TURN)];
-    const world = ([x, y]) => [x_m + cos * x - sin * y, y_m + sin * x + cos * y];
-    c.strokeStyle = this.palette["--edge"];
-    c.lineWidth = 1.5;
-    if (robot.center) return this.circle(c, world(robot.center), robot.radius_m);
-    this.line(c, [...robot.outline, robot.outline[0]].map(world));
-  }
-
-  drawRanger(c) {
-    const { x_m, y_m, heading_deg } = this.scan.start.pose;
-    const [x, y] = this.px([x_m, y_m]);
-    const direction = -heading_deg * TURN;
-    c.fillStyle = c.strokeStyle = this.palette["--ink"];
-    c.lineWidth = 1.5;
-    c.beginPath();
-    c.arc(x, y, 4, 0, 2 * Math.PI);
-    c.moveTo(x, y);
-    c.lineTo(x + 15 * Math.cos(direction), y + 15 * Math.sin(direction));
-    c.stroke();
-    const near = this.scan.session && (this.scan.session.sensor.blanking_us * 1e-6 * this.scan.session.air.sound_speed_m_s) / 2;
-    if (!near) return;
-    c.strokeStyle = this.palette["--min-range"];
-    c.setLineDash([4, 4]);
-    c.lineWidth = 1;
-    this.circle(c, [x_m, y_m], near);
-    c.setLineDash([]);
-  }
-
-  drawReading(ping) {
-    const c = this.marks;
-    if (ping.sim?.range_m != null) this.drawAt(c, "model", ping, ping.sim.range_m);
-    if (MARKS[ping.mark].shape === "tick") return this.drawRim(c, ping.mark, ping);
-    this.drawAt(c, ping.mark, ping, ping.range_m);
-  }
-
-  drawAt(c, mark, ping, range_m) {
-    const [x, y] = this.px(this.place(ping, range_m));
-    if (this.isBeyond(x, y)) {
-      if (mark !== "model") this.drawBeyond(c, mark, ping);
-      return;
+  /** What was read stands above what the model says. */
+  drawReadings(pings) {
+    const placed = pings.filter((ping) => ping.viewpoint);
+    for (const ping of placed) {
+      this.drawNearest(ping);
+      if (ping.ranger) this.drawTransducer(this.marks, ping);
+      if (ping.sim?.range_m != null) this.drawAt("model", ping, ping.sim.range_m);
     }
-    draw(c, mark, x, y, MARK_PX, this.palette[MARKS[mark].colour]);
+    for (const ping of placed) {
+      if (MARKS[ping.mark].shape === "tick") this.drawSilence(ping);
+      else this.drawAt(ping.mark, ping, ping.range_m);
+    }
+  }
+
+  drawAt(mark, ping, range_m) {
+    const at = this.view.px(this.place(ping, range_m));
+    if (!this.view.isBeyond(at)) return draw(this.marks.c, mark, ...at, MARK_PX, this.palette[MARKS[mark].colour]);
+    if (mark === "model") return;
+    // Beyond the view: an arrow on its border says that there is something, in the colour of its mark.
+    const c = this.marks.pen("beyond", this.palette);
+    c.fillStyle = this.palette[MARKS[mark].colour];
+    const { end, turn } = this.ray(ping);
+    arrow(c, end, turn, [3, 5, 2.4]);
   }
 
   /** On the border of the view, in the beam's direction. */
-  drawRim(c, mark, ping) {
-    const rim = this.rim(ping);
-    if (!rim) return;
-    draw(c, mark, ...rim.at, MARK_PX, this.palette[MARKS[mark].colour], rim.direction);
+  drawSilence(ping) {
+    const { end, turn } = this.ray(ping);
+    draw(this.marks.c, ping.mark, ...end, MARK_PX, this.palette[MARKS[ping.mark].colour], turn);
   }
 
-  /** Beyond the view: an arrow on its border says that there is something. */
-  drawBeyond(c, mark, ping) {
-    const rim = this.rim(ping);
-    if (!rim) return;
-    const [x, y] = rim.at;
-    const [dx, dy] = [Math.cos(rim.direction), Math.sin(rim.direction)];
-    c.fillStyle = this.palette[MARKS[mark].colour];
+  /** Nothing nearer is heard: a piece of arc round the transducer, as wide as one step of the plan. */
+  drawNearest(ping) {
+    const { session, start } = this.scan;
+    if (!session) return;
+    const near_m = (session.sensor.blanking_us * 1e-6 * session.air.sound_speed_m_s) / 2;
+    const half_deg = ping.ranger ? ARC_DEG : Math.min(ARC_DEG, start.plan.step_deg / 2);
+    const c = this.marks.pen("blanking", this.palette);
+    const { turn } = this.ray(ping);
     c.beginPath();
-    c.moveTo(x + 3 * dx, y + 3 * dy);
-    c.lineTo(x - 5 * dx - 2.4 * dy, y - 5 * dy + 2.4 * dx);
-    c.lineTo(x - 5 * dx + 2.4 * dy, y - 5 * dy - 2.4 * dx);
-    c.fill();
+    c.arc(...this.from(ping), near_m * this.view.scale, turn - half_deg * TURN, turn + half_deg * TURN);
+    c.stroke();
   }
 
-  rim(ping) {
-    const { x_m, y_m, heading_deg } = this.scan.start.pose;
-    const [x, y] = this.px([x_m, y_m]);
-    const direction = -(heading_deg + ping.azimuth_deg) * TURN;
-    const [dx, dy] = [Math.cos(direction), Math.sin(direction)];
-    if (x < 0 || y < 0 || x > this.width || y > this.height) return null;
-    const until = (at, along, most) => (along > 1e-9 ? (most - at) / along : along < -1e-9 ? -at / along : Infinity);
-    const inset = 3;
-    const length = Math.min(until(x, dx, this.width), until(y, dy, this.height)) - inset;
-    return { at: [x + length * dx, y + length * dy], direction };
+  drawTransducer(layer, ping) {
+    const c = layer.pen("face", this.palette);
+    drawFace(c, this.from(ping), this.ray(ping).turn, Math.max(3, FACE_M * this.view.scale));
+  }
+
+  /** Where a reading was taken, pixels. */
+  from({ viewpoint: { x_m, y_m } }) {
+    return this.view.px([x_m, y_m]);
+  }
+
+  /** Where a beam leaves the view, pixels, and its direction there, radians clockwise from the right. */
+  ray(ping) {
+    const turn = -ping.viewpoint.direction_deg * TURN;
+    return { end: this.view.border(this.from(ping), turn), turn };
   }
 
   drawOver() {
-    const c = this.over;
-    this.clear(c);
+    this.over.clear();
     if (!this.scan) return;
-    if (this.scan.underWay && this.latest) this.drawRay(c, this.latest, this.palette["--quiet"], [2, 5]);
-    if (!this.selected) return;
-    this.drawRay(c, this.selected, this.palette["--ray"], [6, 4]);
-    if (this.path) this.drawPath(c);
-    const { range_m } = this.selected;
-    if (range_m === null) return;
-    const [x, y] = this.px(this.place(this.selected, range_m));
-    c.strokeStyle = this.palette["--ray"];
-    c.lineWidth = 2;
-    c.beginPath();
-    c.arc(x, y, 8, 0, 2 * Math.PI);
-    c.stroke();
+    this.drawRobot((this.latest ?? this.readings().at(-1))?.pose ?? this.scan.start.pose);
+    if (this.scan.underWay && this.latest?.viewpoint) this.drawRay("newest", this.latest);
+    if (!this.selected?.viewpoint) return;
+    this.drawRay("direction", this.selected);
+    if (this.path) this.drawPath();
+    const at = this.place(this.selected);
+    if (at) circle(this.over.pen("selected", this.palette), this.view.px(at), 8);
   }
 
-  drawRay(c, ping, colour, dash) {
-    const rim = this.rim(ping);
-    if (!rim) return;
-    const { x_m, y_m } = this.scan.start.pose;
-    c.strokeStyle = colour;
-    c.lineWidth = 1.2;
-    c.setLineDash(dash);
-    c.beginPath();
-    c.moveTo(...this.px([x_m, y_m]));
-    c.lineTo(...rim.at);
-    c.stroke();
-    c.setLineDash([]);
+  /** The robot's body, which the array has, or else the scene. */
+  drawRobot(pose) {
+    const own = this.scan.session?.array?.body?.shape;
+    const scenes = this.sceneFits() ? this.scene.robot : null;
+    const body = own ? (own.circle ?? { outline: own.outline }) : scenes;
+    const world = (point) => this.view.px(inWorld(pose, point));
+    if (body) {
+      const c = this.over.pen("robot", this.palette);
+      if (body.center) circle(c, world(body.center), body.radius_m * this.view.scale);
+      else line(c, [...body.outline, body.outline[0]].map(world));
+    }
+    drawPose(this.over.pen("pose", this.palette), world([0, 0]), -pose.heading_deg * TURN);
+  }
+
+  drawRay(pen, ping) {
+    const from = this.from(ping);
+    line(this.over.pen(pen, this.palette), [from, this.ray(ping).end]);
+    const { x_m, y_m } = ping.pose ?? this.scan.start.pose;
+    const off_m = Math.hypot(ping.viewpoint.x_m - x_m, ping.viewpoint.y_m - y_m);
+    if (off_m > 1e-3) this.drawTransducer(this.over, ping);
   }
 
   /** The path of the sound, with an arrow on each of its legs. */
-  drawPath(c) {
-    const points = this.path.map((point) => this.px(point));
-    c.strokeStyle = c.fillStyle = this.palette["--path"];
-    c.lineWidth = 1.8;
+  drawPath() {
+    const points = this.path.map((point) => this.view.px(point));
+    const c = this.over.pen("path", this.palette);
     c.lineJoin = "round";
-    c.beginPath();
-    points.forEach(([x, y], i) => (i ? c.lineTo(x, y) : c.moveTo(x, y)));
-    c.stroke();
+    line(c, points);
     for (let i = 1; i < points.length; i++) {
       const [[x, y], [u, v]] = [points[i - 1], points[i]];
       if (Math.hypot(u - x, v - y) < 24) continue;
-      const turn = Math.atan2(v - y, u - x);
-      c.save();
-      c.translate(x + 0.55 * (u - x), y + 0.55 * (v - y));
-      c.rotate(turn);
-      c.beginPath();
-      c.moveTo(6, 0);
-      c.lineTo(-4, 4);
-      c.lineTo(-4, -4);
-      c.fill();
-      c.restore();
+      arrow(c, [x + 0.55 * (u - x), y + 0.55 * (v - y)], Math.atan2(v - y, u - x), [6, 4, 4]);
     }
-  }
-
-  line(c, points) {
-    c.beginPath();
-    points.forEach((point, i) => (i ? c.lineTo(...this.px(point)) : c.moveTo(...this.px(point))));
-    c.stroke();
-  }
-
-  circle(c, center, radius_m) {
-    c.beginPath();
-    c.arc(...this.px(center), radius_m * this.scale, 0, 2 * Math.PI);
-    c.stroke();
   }
 
   /** The beam nearest to a click: by its mark, else by its direction. */
-  pick(x, y) {
-    if (!this.scan?.beams.size) return;
-    let best = null;
-    let nearest = HIT_PX;
-    for (const ping of this.scan.beams.values()) {
-      if (ping.range_m === null) continue;
-      const [u, v] = this.px(this.place(ping, ping.range_m));
+  pick([x, y]) {
+    let [best, nearest] = [null, HIT_PX];
+    for (const ping of this.readings()) {
+      const at = this.place(ping);
+      if (!at) continue;
+      const [u, v] = this.view.px(at);
       const distance = Math.hypot(u - x, v - y);
       if (distance < nearest) [best, nearest] = [ping, distance];
     }
-    this.onPick((best ?? this.towards(x, y)).index);
+    best ??= this.towards(this.view.world([x, y]));
+    if (best) this.onPick(best.index);
   }
 
-  towards(x, y) {
-    const { x_m, y_m, heading_deg } = this.scan.start.pose;
-    const [u, v] = this.px([x_m, y_m]);
-    const wanted = Math.atan2(v - y, x - u) / TURN - heading_deg;
-    const off = (ping) => Math.abs(((((ping.azimuth_deg - wanted) % 360) + 540) % 360) - 180);
-    return [...this.scan.beams.values()].reduce((one, other) => (off(other) < off(one) ? other : one));
+  towards(point) {
+    const off = ({ viewpoint }) => (viewpoint ? offDirection(viewpoint, point) : Infinity);
+    return this.readings().reduce((one, other) => (one && off(one) <= off(other) ? one : other), null);
   }
-}
-
-/** The round length that is `least` or more: 1, 2 or 5 times a power of ten. */
-function gridStep(least) {
-  const power = 10 ** Math.floor(Math.log10(least));
-  return [1, 2, 5, 10].map((n) => n * power).find((step) => step >= least);
 }

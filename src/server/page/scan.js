@@ -1,6 +1,10 @@
 // One scan in memory: its readings by index, and what is counted of them.
 
 import { markOf } from "./verdicts.js";
+import { count } from "./words.js";
+
+/** Verdicts by which a reading, or its silence, is as the model says. */
+const EXPLAINED = ["direct", "multiple", "edge", "min_range", "silent"];
 
 export class Scan {
   constructor(start, session = null) {
@@ -8,6 +12,8 @@ export class Scan {
     this.start = start;
     this.session = session;
     this.end = null;
+    /** The scan before, while that was shown when this one began. */
+    this.before = null;
     /** Whether more readings are to come. */
     this.underWay = false;
     this.beams = new Map();
@@ -38,13 +44,14 @@ export class Scan {
 
   finish(end) {
     this.end = end;
+    this.before = null;
     this.underWay = false;
   }
 
-  /** The reading of a beam, or of the nearest one that there is. */
+  /** The reading of a beam, or of the scan before until there is one, or of the nearest beam that there is. */
   nearest(index) {
-    if (this.beams.has(index)) return this.beams.get(index);
-    let best = null;
+    let best = this.beams.get(index) ?? this.before?.beams.get(index) ?? null;
+    if (best) return best;
     for (const ping of this.beams.values()) {
       if (!best || Math.abs(ping.index - index) < Math.abs(best.index - index)) best = ping;
     }
@@ -54,6 +61,7 @@ export class Scan {
   count(ping, by) {
     const add = (name) => this.counts.set(name, (this.counts.get(name) ?? 0) + by);
     add(ping.mark);
+    if (EXPLAINED.includes(ping.verdict)) add("explained");
     if (ping.sim?.range_m != null) add("model");
   }
 
@@ -62,20 +70,16 @@ export class Scan {
     return [...this.beams.values()].filter((ping) => ping.residual_m !== null);
   }
 
-  /** What a reader should know of the whole, in one sentence or two. */
+  /** What a reader should know of the whole, in one sentence; its counts are sums of the legend's. */
   inWords() {
     const n = (name) => this.counts.get(name) ?? 0;
-    const residuals = this.residuals().map((ping) => Math.abs(ping.residual_m)).sort((a, b) => a - b);
-    const parts = [`${this.beams.size} beams`];
-    const explained = n("direct") + n("multiple") + n("edge") + n("min_range");
-    if (this.counts.get("model")) parts.push(`${explained} readings as the model says`);
+    const parts = [count(this.beams.size, "beam")];
+    if (n("explained")) parts.push(`${n("explained")} as the model says`);
     const odd = n("unexplained") + n("silent_unexplained");
-    if (odd) parts.push(`${odd} unexplained`);
-    if (n("silent")) parts.push(`${n("silent")} silent`);
+    if (odd) parts.push(`${odd} unexplained${n("silent_unexplained") ? `, ${n("silent_unexplained")} of them silent` : ""}`);
     if (n("lost")) parts.push(`${n("lost")} without a valid reading`);
-    if (residuals.length) {
-      parts.push(`median distance ${(1e3 * residuals[residuals.length >> 1]).toFixed(1)} mm`);
-    }
+    const sizes = this.residuals().map((ping) => Math.abs(ping.residual_m)).sort((a, b) => a - b);
+    if (sizes.length) parts.push(`median residual ${(1e3 * sizes[sizes.length >> 1]).toFixed(1)} mm`);
     if (this.end?.missing) parts.push(`${this.end.missing} missing`);
     if (this.end?.duration_s) parts.push(`${this.end.duration_s.toFixed(1)} s`);
     return parts.join(", ");

@@ -37,7 +37,7 @@ function show(status, health) {
   const age = air.age_s === null ? "" : `, ${air.age_s.toFixed(0)} s old`;
   words.facts(byId("conditions"), [
     ["Air", `${air.temperature_c.toFixed(1)} °C${air.stale ? " STALE" : ""}${age}, ${air.humidity_percent.toFixed(0)} %, ${air.sound_speed_m_s.toFixed(2)} m/s`],
-    ["Plan", `${plan.from_deg}° to ${plan.to_deg}°, every ${plan.step_deg}°${plan.pings_per_stop > 1 ? `, ${plan.pings_per_stop} pings` : ""}`],
+    status.simulation ? ["Array", array(status.simulation)] : ["Plan", azimuths(plan)],
     ["Pose", `${pose.x_m.toFixed(3)}, ${pose.y_m.toFixed(3)} m, ${pose.heading_deg}°`],
     ["Scans", mode(status.scanning)],
     ...pending(status.pending),
@@ -46,10 +46,18 @@ function show(status, health) {
   showHealth(status, health);
 }
 
+function azimuths({ from_deg, to_deg, step_deg, pings_per_stop }) {
+  return `${from_deg}° to ${to_deg}°, every ${step_deg}°${pings_per_stop > 1 ? `, ${pings_per_stop} pings` : ""}`;
+}
+
+function array({ array, readings, driving }) {
+  return `${array}, ${words.count(readings.length, "ranger")}${driving ? ", driving" : ""}`;
+}
+
 /** What counts from the next scan on, if anything does. */
 function pending({ plan, pose, scene, air, setup }) {
   const parts = [];
-  if (plan) parts.push(`plan ${plan.from_deg}° to ${plan.to_deg}°, every ${plan.step_deg}°${plan.pings_per_stop > 1 ? `, ${plan.pings_per_stop} pings` : ""}`);
+  if (plan) parts.push(`plan ${azimuths(plan)}`);
   if (pose) parts.push(`pose ${pose.x_m.toFixed(3)}, ${pose.y_m.toFixed(3)} m, ${pose.heading_deg}°`);
   if (scene) parts.push(`scene ${scene.name}`);
   if (air) parts.push(`air ${air.temperature_c.toFixed(1)} °C`);
@@ -82,10 +90,10 @@ function showHealth(status, health) {
   const device = status.device;
   const parts = (figure, unit, digits = 1) => (figure === null ? "–" : `${figure.toFixed(digits)} ${unit}`);
   words.facts(byId("health"), [
-    ["Device", device ? `${device.serial}, firmware ${device.firmware}` : "–"],
+    ["Device", device ? `${device.serial}, firmware ${device.firmware}` : status.simulation ? "none: the model plays" : "–"],
     ["Port", port(status.link)],
-    ["Scans", `${scans.completed} whole, ${scans.stopped} stopped, ${scans.failed} given up`],
-    ["Beams", `${scans.beams} measured, ${scans.missing} missing`],
+    ["Scans in all", `${scans.completed} whole, ${scans.stopped} stopped, ${scans.failed} given up`],
+    ["Beams in all", `${scans.beams} measured, ${scans.missing} missing`],
     ["Line", `${line.crc_errors} checksum errors, ${line.framing_errors} framing errors`],
     ["Repairs", `${line.retries} retries, ${line.repaired} readings fetched again`],
     ["Losses", `${line.losses} of the link, ${scans.restarts} restarts survived`],
@@ -97,7 +105,7 @@ function showHealth(status, health) {
   ]);
 }
 
-const port = ({ port, retry_in_s }) => (retry_in_s === null ? port : `${port}, next try in ${retry_in_s.toFixed(1)} s`);
+const port = ({ port, retry_in_s }) => (retry_in_s === null ? port || "–" : `${port}, next try in ${retry_in_s.toFixed(1)} s`);
 const running = (s) => (s < 120 ? `${s.toFixed(0)} s` : s < 7200 ? `${(s / 60).toFixed(0)} min` : `${(s / 3600).toFixed(1)} h`);
 
 function showProvenance(name) {

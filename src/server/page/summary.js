@@ -1,6 +1,6 @@
 // What is said: in a line under the plan, read out by screen readers. Never once a beam.
 
-import { setText } from "./words.js";
+import { count, setText } from "./words.js";
 
 export class Summary {
   constructor(place) {
@@ -12,16 +12,18 @@ export class Summary {
   }
 
   began(scan) {
-    this.say(`A scan of ${scan.planned} beams began.`);
+    this.say(`A scan of ${count(scan.planned, "beam")} is under way.`);
   }
 
   ended(scan) {
     this.say(`Scan over: ${scan.inWords()}.`);
   }
 
+  /** Counts of a scan under way would be out of date at once: they stand above the plan. */
   shows(scan) {
-    const course = scan.end ? "" : scan.underWay ? "Under way: " : "Not ended: ";
-    this.say(`${course}${scan.inWords()}.`);
+    if (scan.replayed) this.say(`Replay of a scan of ${count(scan.planned, "beam")}.`);
+    else if (scan.underWay) this.began(scan);
+    else this.say(`${scan.end ? "" : "Not ended: "}${scan.inWords()}.`);
   }
 
   event({ kind, detail }) {

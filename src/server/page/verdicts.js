@@ -1,4 +1,6 @@
-// What each reading is drawn as. The words, shapes and hues are those of `sonard plot`.
+// What each reading is drawn as, and the legend. The words, shapes and hues are those of `sonard plot`.
+
+import { drawSample, penWords } from "./pens.js";
 
 /** Marks by name: words of the legend, shape, and the style's colour. */
 export const MARKS = {
@@ -72,32 +74,42 @@ export function colours() {
   });
 }
 
-/** Fills the legend with the marks that occur and their numbers. */
-export function legend(list, counts, palette) {
-  const names = Object.keys(MARKS).filter((name) => counts.get(name));
-  const same = names.length === list.children.length && names.every((name, i) => list.children[i].dataset.mark === name);
+/** Fills the legend with the marks that occur and their numbers, and with the pens that are drawn with. */
+export function legend(list, counts, pens, palette) {
+  const marks = Object.keys(MARKS).filter((name) => counts.get(name));
+  const names = [...marks, ...pens];
+  const same = names.length === list.children.length && names.every((name, i) => list.children[i].dataset.sign === name);
   if (!same || list.palette !== palette) {
     list.palette = palette;
-    list.replaceChildren(...names.map((name) => entry(name, palette)));
+    list.replaceChildren(...marks.map((name) => markEntry(name, palette)), ...pens.map((name) => penEntry(name, palette)));
   }
-  names.forEach((name, i) => {
+  marks.forEach((name, i) => {
     const text = name === "model" ? MARKS[name].words : `${MARKS[name].words} (${counts.get(name)})`;
     const label = list.children[i].lastChild;
     if (label.data !== text) label.data = text;
   });
 }
 
-function entry(name, palette) {
+function markEntry(name, palette) {
+  const tick = MARKS[name].shape === "tick";
+  const sign = (c) => draw(c, name, 8, tick ? 2 : 8, 4, palette[MARKS[name].colour]);
+  return entry(name, 16, sign, "");
+}
+
+function penEntry(name, palette) {
+  return entry(name, 24, (c) => drawSample(c, name, palette), penWords(name));
+}
+
+function entry(name, width, sign, text) {
   const item = document.createElement("li");
-  item.dataset.mark = name;
+  item.dataset.sign = name;
   const sample = item.appendChild(document.createElement("canvas"));
   sample.ariaHidden = "true";
-  const scale = devicePixelRatio;
-  sample.width = sample.height = 16 * scale;
+  sample.width = width * devicePixelRatio;
+  sample.height = 16 * devicePixelRatio;
   const c = sample.getContext("2d");
-  c.scale(scale, scale);
-  const tick = MARKS[name].shape === "tick";
-  draw(c, name, 8, tick ? 2 : 8, 4, palette[MARKS[name].colour]);
-  item.append("");
+  c.scale(devicePixelRatio, devicePixelRatio);
+  sign(c);
+  item.append(text);
   return item;
 }

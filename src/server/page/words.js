@@ -6,6 +6,9 @@ export const millimetres = (m) =>
 export const degrees = (deg) => `${deg.toFixed(1)}°`;
 export const decibels = (db) => `${db < 0 ? "−" : "+"}${Math.abs(db).toFixed(1)} dB`;
 
+/** A number of things, in words. */
+export const count = (n, thing) => `${n} ${thing}${n === 1 ? "" : "s"}`;
+
 export const clock = (time) =>
   new Date(time).toLocaleString(undefined, {
     month: "short", day: "numeric", hour: "2-digit", minute: "2-digit", second: "2-digit", hour12: false,

@@ -50,7 +50,9 @@ static ASSETS: &[Asset] = &assets![
     "api.js" SCRIPT,
     "beam.js" SCRIPT,
     "control.js" SCRIPT,
+    "ground.js" SCRIPT,
     "history.js" SCRIPT,
+    "pens.js" SCRIPT,
     "plan.js" SCRIPT,
     "scan.js" SCRIPT,
     "status.js" SCRIPT,
@@ -58,6 +60,8 @@ static ASSETS: &[Asset] = &assets![
     "summary.js" SCRIPT,
     "table.js" SCRIPT,
     "verdicts.js" SCRIPT,
+    "view.js" SCRIPT,
+    "viewpoint.js" SCRIPT,
     "words.js" SCRIPT,
 ];
 

@@ -11,7 +11,7 @@ use serde_json::Value;
 use super::Daemon;
 use crate::common::{run, wait_until};
 
-/// A mock whose transducer is 0.1 m ahead of the rotation axis, in a room where it can turn.
+/// A mock without noise whose transducer is 0.1 m ahead of the rotation axis, in a room where it can turn.
 pub(crate) fn start_ahead(folder: &Path, further: &[&str]) -> Daemon {
     let shown = run(&["sensor", "show", "senscomp-6500"]);
     let mut sensor: Value = serde_json::from_slice(&shown.stdout).expect("a sensor");
@@ -20,7 +20,8 @@ pub(crate) fn start_ahead(folder: &Path, further: &[&str]) -> Daemon {
     fs::write(&file, sensor.to_string()).expect("there is room");
     let sensor = format!("model.sensor={}", file.display());
     let mock = ["--mock", "--scene", "two-surface-room", "--pose", "middle", "--set", &sensor];
-    Daemon::start(folder, &[&mock, further].concat())
+    let quiet = ["--noise-mm", "0"];
+    Daemon::start(folder, &[&mock, &quiet[..], further].concat())
 }
 
 /// Eight sonars of the model in the laboratory, standing.
@@ -82,12 +83,13 @@ fn time_walk_m(over_db: f64) -> f64 {
     if over_db > 20.0 { 4e-3 } else { 35e-3 }
 }
 
-/// An engine that knows no envelopes times echoes by their paths alone.
-const BY_PATH: [&str; 2] = ["--set", "model.engine=fan"];
+/// Engines that know no envelopes time echoes by their paths alone.
+const FAN: [&str; 2] = ["--set", "model.engine=fan"];
+const CONE: [&str; 2] = ["--set", "model.engine=cone"];
 
 #[test]
 fn readings_of_an_array_say_where_their_sonar_was_and_paths_end_there() {
-    for (further, late_m) in [(&[][..], time_walk_m as fn(f64) -> f64), (&BY_PATH, |_| 1e-3)] {
+    for (further, late_m) in [(&[][..], time_walk_m as fn(f64) -> f64), (&FAN, |_| 1e-3)] {
         let folder = tempfile::tempdir().expect("a folder");
         let daemon = start_array(folder.path(), further);
         daemon.wait_for_scans(1);
@@ -113,7 +115,7 @@ fn readings_of_an_array_say_where_their_sonar_was_and_paths_end_there() {
 
 #[test]
 fn readings_of_a_transducer_ahead_of_its_axis_say_where_its_face_was_live_and_later() {
-    for (further, late_m) in [(&[][..], time_walk_m as fn(f64) -> f64), (&BY_PATH, |_| 1e-3)] {
+    for (further, late_m) in [(&[][..], time_walk_m as fn(f64) -> f64), (&CONE, |_| 1e-3)] {
         let folder = tempfile::tempdir().expect("a folder");
         let plan = ["--set", "plan.step_deg=18", "--set", "model.max_range_m=4"];
         let daemon = start_ahead(folder.path(), &[&plan, further].concat());

@@ -3,6 +3,7 @@
 mod access;
 mod accessible;
 mod browser;
+mod viewpoints;
 
 use std::path::Path;
 

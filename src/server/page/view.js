@@ -1,0 +1,76 @@
+// Which part of the floor the plan shows, and where a point of it is on the screen.
+
+const MARGIN_PX = 26;
+/** Below, the scale has its place. */
+const FOOT_PX = 40;
+/** In the usual view the room takes up at least a quarter of the plan. */
+const NEAR = 1.5;
+
+export class View {
+  constructor() {
+    /** What is shown: "near" (room and the readings around it), "room" or "all". */
+    this.what = "near";
+    this.box = null;
+    [this.width, this.height, this.scale, this.x0, this.y0] = [0, 0, 1, 0, 0];
+  }
+
+  /** Sets scale and origin. `room` and `readings` are points, metres; `grow` keeps what is in view now. */
+  fit(room, readings, grow) {
+    const inner = boxOf(room.length ? room : readings) ?? boxOf([[-1, -1], [1, 1]]);
+    const around = { room: 0.06, near: NEAR, all: Infinity }[this.what] * Math.max(...sizes(inner));
+    const most = [inner[0] - around, inner[1] - around, inner[2] + around, inner[3] + around];
+    const wanted = this.what === "room" ? most : clip(union(inner, boxOf(readings)), most);
+    this.box = grow && this.box ? union(this.box, wanted) : wanted;
+    const [left, low, right, high] = this.box;
+    const [across, up] = sizes(this.box).map((size) => Math.max(size, 0.2));
+    this.scale = Math.min((this.width - 2 * MARGIN_PX) / across, (this.height - MARGIN_PX - FOOT_PX) / up);
+    this.x0 = this.width / 2 - (this.scale * (left + right)) / 2;
+    this.y0 = (this.height + MARGIN_PX - FOOT_PX) / 2 + (this.scale * (low + high)) / 2;
+  }
+
+  /** Where a point is, pixels. */
+  px([x, y]) {
+    return [this.x0 + this.scale * x, this.y0 - this.scale * y];
+  }
+
+  /** The point at a pixel, metres. */
+  world([x, y]) {
+    return [(x - this.x0) / this.scale, (this.y0 - y) / this.scale];
+  }
+
+  isBeyond([x, y]) {
+    return x < 2 || y < 2 || x > this.width - 2 || y > this.height - 2;
+  }
+
+  /** Whether a reading there would widen the view. */
+  wouldGrow(point) {
+    if (this.what === "room" || !this.box) return false;
+    const inside = ([x, y], [left, low, right, high]) => x >= left && y >= low && x <= right && y <= high;
+    return this.isBeyond(this.px(point)) && !inside(point, this.box);
+  }
+
+  /** Where a ray from a pixel leaves the view; `turn` in radians clockwise from the right. */
+  border([x, y], turn) {
+    const inset = 3;
+    const [dx, dy] = [Math.cos(turn), Math.sin(turn)];
+    const until = (at, along, most) =>
+      along > 1e-9 ? (most - inset - at) / along : along < -1e-9 ? (inset - at) / along : Infinity;
+    const length = Math.max(0, Math.min(until(x, dx, this.width), until(y, dy, this.height)));
+    return [x + length * dx, y + length * dy];
+  }
+}
+
+function boxOf(points) {
+  if (!points.length) return null;
+  const [xs, ys] = [0, 1].map((axis) => points.map((point) => point[axis]));
+  const least = (values) => values.reduce((a, b) => Math.min(a, b));
+  const most = (values) => values.reduce((a, b) => Math.max(a, b));
+  return [least(xs), least(ys), most(xs), most(ys)];
+}
+
+const sizes = ([left, low, right, high]) => [right - left, high - low];
+
+const union = (one, other) =>
+  other ? one.map((value, i) => (i < 2 ? Math.min(value, other[i]) : Math.max(value, other[i]))) : one;
+
+const clip = (box, most) => box.map((value, i) => (i < 2 ? Math.max(value, most[i]) : Math.min(value, most[i])));
