@@ -213,7 +213,7 @@ fn l_room() {
         max_path_m: 200.0,
         max_order: Some(8),
         floor: 1e-6,
-        rounds_above: 1.0,
+        repeated_contacts_above: 1.0,
         crowded_m: 0.0,
         edge_law: None,
         double_diffraction: false,

@@ -1,65 +1,51 @@
-//! Echoes while they are being sorted out.
+//! Echo paths as the mechanisms list them: length, field and directions, with a reference to what the
+//! mechanism keeps of the path itself.
 
+use super::tolerance::{SAME_M, SAME_RAD};
 use crate::{geometry::DVec2, reading::PathKind};
 
-/// Echoes that agree in length and both directions to within this are one, metres and radians.
-pub(super) const SAME_M: f64 = 1e-8;
-pub(super) const SAME_RAD: f64 = 1e-9;
-
-/// An echo path with its way as nodes of the tree.
+/// An echo path before the beam pattern.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Echo {
-    pub(super) length_m: f64,
-    pub(super) amplitude: f64,
-    pub(super) phase_rad: f64,
+pub(crate) struct Echo {
+    pub(crate) length_m: f64,
+    pub(crate) amplitude: f64,
+    pub(crate) phase_rad: f64,
     /// Unit vector in which it leaves.
-    pub(super) departure: DVec2,
+    pub(crate) departure: DVec2,
     /// Unit vector towards where it comes from.
-    pub(super) arrival: DVec2,
+    pub(crate) arrival: DVec2,
     /// How far up it leaves and comes from, radians.
-    pub(super) rise_rad: [f64; 2],
-    /// Its image over floor and ceiling, counted from 1; 0 for a path in the plan.
-    pub(super) image: u16,
-    pub(super) via: Via,
+    pub(crate) rise_rad: [f64; 2],
+    /// Its image by floor and ceiling, counted from 1; 0 for a path in the plan.
+    pub(crate) image: u16,
+    pub(crate) via: Via,
 }
 
-/// The way of an echo.
+/// The mechanism of an echo, with its number among what that mechanism keeps.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Via {
-    Walls {
-        node: u32,
-    },
-    /// `out` and `back` are rays to the edge; see [`super::trace::Tree::part`].
-    Edge {
-        point: u32,
-        out: u32,
-        back: u32,
-    },
-    /// By two edges, in [`super::Trees::bridged`].
-    Edges {
-        way: u32,
-    },
-    /// By the contact in its middle, in [`super::Trees::joints`].
-    Cylinder {
-        joint: u32,
-    },
+pub(crate) enum Via {
+    /// Mirror reflections at walls alone; the node of the tree of beams at which its ray ends.
+    Walls { node: u32 },
+    /// Diffraction at one upright edge; `out` and `back` number the rays to it from transmitter and
+    /// receiver.
+    Edge { point: u32, out: u32, back: u32 },
+    /// Diffraction at two upright edges.
+    Edges { double: u32 },
+    /// Reflection at cylinders; the connection in the middle of the path.
+    Cylinder { connection: u32 },
     /// Straight up or down and back.
     Upright,
-    /// Back from a place of a rough wall, by [`super::trace::Tree::spots`].
-    Scatter {
-        spot: u32,
-    },
-    /// By the rim of a wall, in [`super::Trees::rims`].
-    Rim {
-        rim: u32,
-    },
+    /// Scattering by a patch of a rough wall.
+    Scatter { patch: u32 },
+    /// Diffraction at a level edge.
+    LevelEdge { level: u32 },
 }
 
 impl Via {
-    /// How the sound gets back.
-    pub(super) const fn kind(&self) -> PathKind {
+    /// What sends the sound back.
+    pub(crate) const fn kind(&self) -> PathKind {
         match self {
-            Self::Edge { .. } | Self::Edges { .. } | Self::Rim { .. } => PathKind::Diffracted,
+            Self::Edge { .. } | Self::Edges { .. } | Self::LevelEdge { .. } => PathKind::Diffracted,
             Self::Walls { .. } | Self::Cylinder { .. } | Self::Upright => PathKind::Specular,
             Self::Scatter { .. } => PathKind::Scattered,
         }
@@ -68,30 +54,30 @@ impl Via {
 
 impl Echo {
     /// Whether two echoes are one that touches a corner and was found on both sides of it.
-    pub(super) fn is_same(&self, other: &Self) -> bool {
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
         self.departure.distance_squared(other.departure) < SAME_RAD * SAME_RAD
             && self.arrival.distance_squared(other.arrival) < SAME_RAD * SAME_RAD
             && self.image == other.image
             && std::mem::discriminant(&self.via) == std::mem::discriminant(&other.via)
-            // Between two edges, and over rims, there may be several ways of one length; none is here
-            // twice.
-            && !matches!(self.via, Via::Edges { .. } | Via::Rim { .. })
+            // By two edges, and by level edges, there may be several paths of one length and the same
+            // directions; their mechanisms list each once.
+            && !matches!(self.via, Via::Edges { .. } | Via::LevelEdge { .. })
     }
 }
 
 /// Echoes by length, each once.
-pub(super) fn sorted(echoes: &[Echo]) -> Vec<Echo> {
-    // Lengths are positive, so their bits sort like the numbers; places make it stable.
+pub(crate) fn sorted(echoes: &[Echo]) -> Vec<Echo> {
+    // Lengths are positive, so their bits sort like the numbers; indices make it stable.
     let mut order: Vec<(u64, u32)> =
-        echoes.iter().zip(0..).map(|(echo, place)| (echo.length_m.to_bits(), place)).collect();
+        echoes.iter().zip(0..).map(|(echo, index)| (echo.length_m.to_bits(), index)).collect();
     order.sort_unstable();
-    let mut sorted: Vec<Echo> = order.iter().map(|&(_, place)| echoes[place as usize]).collect();
+    let mut sorted: Vec<Echo> = order.iter().map(|&(_, index)| echoes[index as usize]).collect();
     drop_repeats(&mut sorted, |echo| echo.length_m, Echo::is_same);
     sorted
 }
 
 /// Keeps the first of items that are the same and within [`SAME_M`] in length. Sorted by length.
-pub(super) fn drop_repeats<T: Copy>(
+pub(crate) fn drop_repeats<T: Copy>(
     items: &mut Vec<T>,
     length_m: impl Fn(&T) -> f64,
     same: impl Fn(&T, &T) -> bool,

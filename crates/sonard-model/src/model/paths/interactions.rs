@@ -1,55 +1,49 @@
 //! The interactions of echo paths: what they meet, in order, and where.
 //!
-//! A survey keeps an echo by what the tracer needs to find it again ([`Via`]): rays by their last node,
+//! An echo is kept by what the tracer needs to find its path again ([`Via`]): rays by their last node,
 //! edges, contacts with cylinders by their angle. In which order all is met follows from these alone (the
-//! way out, the edge or the contact in the middle, the way back in reverse), and where by unfolding: from
+//! ray out, the edge or the contact in the middle, the ray back in reverse), and where by unfolding: from
 //! the end of each ray backwards, from wall to wall. Heights come last. If floor and ceiling were
 //! windows, a path would rise evenly over its length in the plan; where it crosses one of their images,
 //! it is reflected by the real one.
 
-use smallvec::SmallVec;
-
 use super::{
-    Echo, EchoPath, Paths, Trees, Via,
-    beam::Ray,
-    bridges::Bridged,
-    heights::Heights,
-    joints::Joint,
-    rims::Rim,
-    trace::Tree,
-    tube::{Curved, Tracer, surfaces_to},
+    beams::Leg,
+    cylinders::{Connection, OneWay},
+    diffraction::{double::DoubleDiffraction, level::LevelDiffraction},
+    echo::{Echo, Via},
+    height::{Ends, Heights},
+    prepare::Paths,
+    rays::{Contacts, Rays, end_of, wall_contacts},
+    traced::Traced,
 };
 use crate::{
     geometry::DVec2,
     model::{Bend, Interaction, Mechanism, Path, Reflector},
 };
 
-/// A ray from the start by what its walls follow from.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Leg {
-    pub(super) node: u32,
-    pub(super) run: DVec2,
-}
-
-impl From<&Ray> for Leg {
-    fn from(ray: &Ray) -> Self {
-        Self { node: ray.node, run: ray.run }
-    }
-}
-
-/// A ray from the start: over walls alone, or by way of cylinders.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Part {
-    Flat(Leg),
-    /// By its place in [`super::trace::Tree::curved`].
-    Curved(u32),
+/// An echo path, before the beam pattern.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EchoPath {
+    /// Length there and back, metres.
+    pub length_m: f64,
+    /// Reflectances, edge, curvature and absorption; a head-on, rigid wall without absorption
+    /// at the same range gives 1.
+    pub amplitude: f64,
+    /// Phase beside that of the way, for `exp(+i omega t)`, radians: what an edge adds.
+    pub phase_rad: f64,
+    /// World direction in which the sound leaves, radians.
+    pub departure_rad: f64,
+    /// World direction towards where the sound comes from, radians.
+    pub arrival_rad: f64,
+    /// How far up it leaves and comes from, radians.
+    pub rise_rad: [f64; 2],
+    /// What it met on its way, and where.
+    pub path: Path,
 }
 
 /// What a path meets within this length, metres, it meets at once.
 const AT_ONCE_M: f64 = 1e-12;
-
-/// The interactions of a path in the plan, in order, before any height.
-pub(super) type Contacts = SmallVec<[(DVec2, Mechanism); 8]>;
 
 /// A part of a path whose ends and contacts are known in the plan.
 struct Stretch<'a> {
@@ -63,7 +57,8 @@ struct Stretch<'a> {
 }
 
 impl Paths {
-    pub(super) fn path(&self, trees: &Trees, echo: &Echo) -> EchoPath {
+    /// The full account of an echo.
+    pub(super) fn path(&self, traced: &Traced, echo: &Echo) -> EchoPath {
         EchoPath {
             length_m: echo.length_m,
             amplitude: echo.amplitude,
@@ -71,169 +66,132 @@ impl Paths {
             departure_rad: echo.departure.to_angle(),
             arrival_rad: echo.arrival.to_angle(),
             rise_rad: echo.rise_rad,
-            path: Path { interactions: self.interactions(trees, echo) },
+            path: Path { interactions: self.interactions(traced, echo) },
+        }
+    }
+
+    /// How many mirrors an echo meets that is neither diffracted nor scattered.
+    pub(super) fn mirrors_met(&self, traced: &Traced, echo: &Echo) -> usize {
+        let (there, here) = (&traced.out, traced.back());
+        let upright = match echo.via {
+            Via::Walls { node } => {
+                there.order(&self.plan, OneWay::Walls(Leg { node, run: -echo.arrival }))
+            }
+            Via::Cylinder { connection } => {
+                let Connection { out, back, .. } = traced.connections[connection as usize];
+                there.order(&self.plan, out) + 1 + here.order(&self.plan, back)
+            }
+            _ => 0,
+        };
+        upright + usize::from(self.heights.image(echo.image).bounces)
+    }
+
+    /// Leaves out echoes whose path misses a wall above or below, or is barred by one.
+    pub(super) fn retain_clear(&self, traced: &Traced, echoes: &mut Vec<Echo>) {
+        let [start, target] = traced.ends;
+        let is_clear = |echo: &Echo| {
+            let rise_m = self.heights.image(echo.image).rise_m;
+            let ends = Ends { start, end: Some(target), rise_m };
+            let contacts = self.contacts(traced, echo, target);
+            self.heights.is_path_clear(&self.plan.cylinders, &contacts, &ends)
+        };
+        if self.heights.matter() {
+            echoes.retain(is_clear);
         }
     }
 
     /// The interactions of an echo, in order.
-    fn interactions(&self, trees: &Trees, echo: &Echo) -> Vec<Interaction> {
-        let [from, to] = trees.ends;
-        if let Via::Rim { rim } = echo.via {
-            return self.over_rim(trees, &trees.rims[rim as usize]);
+    fn interactions(&self, traced: &Traced, echo: &Echo) -> Vec<Interaction> {
+        let [from, to] = traced.ends;
+        if let Via::LevelEdge { level } = echo.via {
+            return self.by_level_edge(traced, &traced.level[level as usize]);
         }
-        let image = self.image(echo.image);
-        let contacts = self.contacts(trees, echo, to);
+        let image = self.heights.image(echo.image);
+        let contacts = self.contacts(traced, echo, to);
         let (climb_m, bounces) = (image.rise_m, image.bounces);
         Stretch { from, contacts: &contacts, to, climb_m, bounces }.in_space(&self.heights)
     }
 
-    /// Out to where it bends, and in reverse the way from the receiver to there.
-    fn over_rim(&self, trees: &Trees, rim: &Rim) -> Vec<Interaction> {
-        let wall = rim.wall;
-        let rise_m = self.heights.rim_rise_m(wall, rim.is_upper);
-        let way = |end: usize, tree: &Tree| {
-            let (from, leg) = (trees.ends[end], rim.legs[end]);
-            let to = self.end_of(tree, leg, from);
-            let contacts = self.leg_contacts(tree, leg, to);
-            let image = self.image(rim.images[end]);
+    /// Out to the point of diffraction, and in reverse the ray from the receiver to there.
+    fn by_level_edge(&self, traced: &Traced, level: &LevelDiffraction) -> Vec<Interaction> {
+        let wall = level.wall;
+        let rise_m = self.heights.edge_rise_m(wall, level.is_upper);
+        let half = |end: usize, Rays { beams, .. }: &Rays| {
+            let (from, leg) = (traced.ends[end], level.legs[end]);
+            let to = end_of(beams, &self.plan, leg, from);
+            let contacts = wall_contacts(beams, &self.plan, leg, to);
+            let image = self.heights.image(level.images[end]);
             let (climb_m, bounces) = (image.climb_m(rise_m), image.bounces);
             let stretch = Stretch { from, contacts: &contacts, to, climb_m, bounces };
             (to, stretch.in_space(&self.heights))
         };
-        let (point, mut interactions) = way(0, &trees.out);
-        let (_, back) = way(1, trees.back());
-        let bend = Bend::Level { wall, is_upper: rim.is_upper };
+        let (point, mut interactions) = half(0, &traced.out);
+        let (_, back) = half(1, traced.back());
+        let bend = Bend::Level { wall, is_upper: level.is_upper };
         let z_m = self.heights.z_at(rise_m);
         interactions.push(Interaction { mechanism: Mechanism::Diffraction(bend), point, z_m });
         interactions.extend(back.into_iter().rev());
         interactions
     }
 
-    /// Where a ray from `start` ends.
-    fn end_of(&self, tree: &Tree, leg: Leg, start: DVec2) -> DVec2 {
-        let walls: SmallVec<[u32; 8]> = tree.walls_back(&self.faces, leg).collect();
-        let mirror = |wall: &u32| self.faces[*wall as usize].mirror;
-        let image = walls.iter().rev().map(mirror).fold(start, |at, mirror| mirror.image(at));
-        image + leg.run
-    }
-
-    /// How many mirrors an echo meets that is neither bent nor scattered.
-    pub(super) fn mirrors_met(&self, trees: &Trees, echo: &Echo) -> usize {
-        let upright = match echo.via {
-            Via::Walls { node } => {
-                self.order(&trees.out, Part::Flat(Leg { node, run: -echo.arrival }))
-            }
-            Via::Cylinder { joint } => {
-                let Joint { out, back, .. } = trees.joints[joint as usize];
-                self.order(&trees.out, out) + 1 + self.order(trees.back(), back)
-            }
-            _ => 0,
-        };
-        upright + usize::from(self.image(echo.image).bounces)
-    }
-
-    /// How many walls and cylinders a ray from the start met.
-    fn order(&self, tree: &Tree, part: Part) -> usize {
-        let (leg, round) = match part {
-            Part::Flat(leg) => (leg, 0),
-            Part::Curved(curved) => {
-                let Curved { view, link, contact_rad } = tree.curved[curved as usize];
-                let view = &tree.to_cylinders[view as usize];
-                let surfaces = surfaces_to(&tree.links, link);
-                let tracer = Tracer { paths: self, view, surfaces: &surfaces };
-                (tracer.leg(contact_rad), 1 + surfaces.len())
-            }
-        };
-        round + tree.walls_back(&self.faces, leg).count()
-    }
-
     /// The interactions of a path in the plan, from transmitter to receiver.
-    pub(super) fn contacts(&self, trees: &Trees, echo: &Echo, target: DVec2) -> Contacts {
-        let (there, here) = (&trees.out, trees.back());
+    fn contacts(&self, traced: &Traced, echo: &Echo, target: DVec2) -> Contacts {
+        let (there, here) = (&traced.out, traced.back());
         match echo.via {
-            // A rim has ways to floor and ceiling of its own.
-            Via::Upright | Via::Rim { .. } => Contacts::new(),
+            // A level edge has images by floor and ceiling of its own.
+            Via::Upright | Via::LevelEdge { .. } => Contacts::new(),
             Via::Walls { node } => {
-                self.leg_contacts(there, Leg { node, run: -echo.arrival }, target)
+                let leg = Leg { node, run: -echo.arrival };
+                wall_contacts(&there.beams, &self.plan, leg, target)
             }
-            Via::Scatter { spot } => {
-                let spot = &there.spots[spot as usize];
-                let part = Part::Flat(spot.leg);
-                let middle = (spot.place, Mechanism::Scattering { wall: spot.wall });
-                self.out_and_back([(there, part), (there, part)], middle)
+            Via::Scatter { patch } => {
+                let patch = &traced.patches[patch as usize];
+                let ray = OneWay::Walls(patch.leg);
+                let middle = (patch.point, Mechanism::Scattering { wall: patch.wall });
+                self.out_and_back([(there, ray), (there, ray)], middle)
             }
-            Via::Cylinder { joint } => {
-                let Joint { cylinder, place_rad, out, back } = trees.joints[joint as usize];
-                let place = self.rounds.circles[cylinder as usize].point(place_rad);
-                let middle = (place, Mechanism::Reflection(Reflector::Cylinder(cylinder)));
+            Via::Cylinder { connection } => {
+                let Connection { cylinder, place_rad, out, back } =
+                    traced.connections[connection as usize];
+                let point = self.plan.cylinders.circles[cylinder as usize].point(place_rad);
+                let middle = (point, Mechanism::Reflection(Reflector::Cylinder(cylinder)));
                 self.out_and_back([(there, out), (here, back)], middle)
             }
-            Via::Edges { way } => self.bridged_contacts(trees, &trees.bridged[way as usize]),
+            Via::Edges { double } => self.by_two_edges(traced, &traced.double[double as usize]),
             Via::Edge { point, out, back } => {
                 let Some(middle) = self.upright_bend(point) else { return Contacts::new() };
-                self.out_and_back([(there, there.part(out)), (here, here.part(back))], middle)
+                let rays = [(there, there.to_edge(out)), (here, here.to_edge(back))];
+                self.out_and_back(rays, middle)
             }
         }
     }
 
-    /// Out on one ray to a place, and back in reverse on another that ends there.
-    fn out_and_back(&self, rays: [(&Tree, Part); 2], middle: (DVec2, Mechanism)) -> Contacts {
-        let [mut out, back] = rays.map(|(tree, part)| self.part_contacts(tree, part, middle.0));
+    /// Out on one ray to a point, and back in reverse on another that ends there.
+    fn out_and_back(&self, rays: [(&Rays, OneWay); 2], middle: (DVec2, Mechanism)) -> Contacts {
+        let [mut out, back] = rays.map(|(rays, ray)| rays.contacts(&self.plan, ray, middle.0));
         out.push(middle);
         out.extend(back.into_iter().rev());
         out
     }
 
     fn upright_bend(&self, point: u32) -> Option<(DVec2, Mechanism)> {
-        let bend = Bend::Upright(self.edges.edge(point)?);
-        Some((self.edges.place(point)?, Mechanism::Diffraction(bend)))
+        let bend = Bend::Upright(self.plan.corners.edge(point)?);
+        Some((self.plan.corners.position(point)?, Mechanism::Diffraction(bend)))
     }
 
-    fn bridged_contacts(&self, trees: &Trees, way: &Bridged) -> Contacts {
-        let Bridged { points: [first, second], leg, out, back } = *way;
+    fn by_two_edges(&self, traced: &Traced, path: &DoubleDiffraction) -> Contacts {
+        let DoubleDiffraction { points: [first, second], leg, out, back } = *path;
         let bends = [first, second].map(|point| self.upright_bend(point));
         let [Some(one), Some(other)] = bends else { return Contacts::new() };
-        let (there, here) = (&trees.out, trees.back());
-        let between = self.bridges.tree(self, first);
-        let mut contacts = self.part_contacts(there, there.part(out), one.0);
+        let (there, here) = (&traced.out, traced.back());
+        let between = &self.edge_to_edge.at(&self.plan, first).beams;
+        let leg = Leg::from(&between.to_edges[leg as usize].1);
+        let mut contacts = there.contacts(&self.plan, there.to_edge(out), one.0);
         contacts.push(one);
-        contacts.extend(self.part_contacts(between, between.part(leg), other.0));
+        contacts.extend(wall_contacts(between, &self.plan, leg, other.0));
         contacts.push(other);
-        let back = self.part_contacts(here, here.part(back), other.0);
+        let back = here.contacts(&self.plan, here.to_edge(back), other.0);
         contacts.extend(back.into_iter().rev());
-        contacts
-    }
-
-    pub(super) fn part_contacts(&self, tree: &Tree, part: Part, end: DVec2) -> Contacts {
-        match part {
-            Part::Flat(leg) => self.leg_contacts(tree, leg, end),
-            Part::Curved(curved) => {
-                let Curved { view, link, contact_rad } = tree.curved[curved as usize];
-                let view = &tree.to_cylinders[view as usize];
-                let surfaces = surfaces_to(&tree.links, link);
-                let tracer = Tracer { paths: self, view, surfaces: &surfaces };
-                let points = tracer.contacts(contact_rad);
-                let mut contacts = self.leg_contacts(tree, tracer.leg(contact_rad), points[0]);
-                let first = Reflector::Cylinder(view.cylinder);
-                let met = [first].into_iter().chain(surfaces.iter().copied());
-                contacts.extend(points.into_iter().zip(met.map(Mechanism::Reflection)));
-                contacts
-            }
-        }
-    }
-
-    fn leg_contacts(&self, tree: &Tree, leg: Leg, end: DVec2) -> Contacts {
-        let (mut to, mut run) = (end, leg.run);
-        let mut contacts: Contacts = tree
-            .walls_back(&self.faces, leg)
-            .map(|wall| {
-                let mirror = &self.faces[wall as usize].mirror;
-                to -= mirror.height_m(to) / mirror.normal.dot(run) * run;
-                run = mirror.turn(run);
-                (to, Mechanism::Reflection(Reflector::Wall(wall)))
-            })
-            .collect();
-        contacts.reverse();
         contacts
     }
 }

@@ -1,13 +1,13 @@
-//! What counts as an echo path.
+//! Settings of the search: what counts as an echo path.
 
 use crate::acoustics::edge::EdgeLaw;
 
-/// Usual [`Settings::rounds_above`]: with 20 dB below the threshold for the weakest, down to the
+/// Usual [`Settings::repeated_contacts_above`]: with 20 dB below the threshold for the weakest, down to the
 /// threshold itself. In a room with a round body there are a hundred times more of them at each 20 dB
 /// less.
-pub const ROUNDS_ABOVE: f64 = 10.0;
+pub const REPEATED_CONTACTS_ABOVE: f64 = 10.0;
 
-/// Which paths count, and the physics on the way.
+/// Which paths count, and the physics along them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Longest path there and back, metres.
@@ -17,14 +17,14 @@ pub struct Settings {
     /// Weakest amplitude, before the beam pattern, relative to a head-on, rigid wall.
     pub floor: f64,
     /// How many times `floor` echoes that touch cylinders more than once are followed down to; see
-    /// [`ROUNDS_ABOVE`]. 1: as far as all others.
-    pub rounds_above: f64,
+    /// [`REPEATED_CONTACTS_ABOVE`]. 1: as far as all others.
+    pub repeated_contacts_above: f64,
     /// Longest path, metres, up to which these too are followed down to `floor`: where all that came
-    /// back so far may still sound together when the receiver opens.
+    /// back so far may still overlap when the receiver opens.
     pub crowded_m: f64,
     /// What edges send back; `None`: mirror reflections only.
     pub edge_law: Option<EdgeLaw>,
-    /// Also sound that bends at two edges, by the same law at each.
+    /// Also paths with two diffractions at upright edges, by the same law at each.
     pub double_diffraction: bool,
     /// Attenuation of the amplitude in air, nepers a metre.
     pub absorption_np_per_m: f64,
@@ -49,31 +49,31 @@ pub fn usual_z_m(floor_z_m: Option<f64>, ceiling_z_m: Option<f64>) -> f64 {
 }
 
 impl Settings {
-    pub(super) fn allows(&self, order: u16) -> bool {
+    pub(crate) fn allows(&self, order: u16) -> bool {
         self.max_order.is_none_or(|most| order <= most)
     }
 
     /// The length of air that leaves a share `gain` of the amplitude; 0 without absorption.
-    pub(super) fn same_loss_m(&self, gain: f64) -> f64 {
+    pub(crate) fn same_loss_m(&self, gain: f64) -> f64 {
         if self.absorption_np_per_m > 0.0 { -gain.ln() / self.absorption_np_per_m } else { 0.0 }
     }
 
     /// The longest path over perfect walls that is strong enough.
-    pub(super) fn audible_m(&self) -> f64 {
+    pub(crate) fn audible_m(&self) -> f64 {
         if self.absorption_np_per_m > 0.0 { self.same_loss_m(self.floor) } else { self.max_path_m }
     }
 
-    pub(super) fn air_gain(&self, length_m: f64) -> f64 {
+    pub(crate) fn air_gain(&self, length_m: f64) -> f64 {
         (-self.absorption_np_per_m * length_m).exp()
     }
 
     /// The weakest echo that is asked for of those of at least this length whose middle contact with a
-    /// cylinder has so many before it.
-    pub(super) fn round_floor(&self, level: u16, least_m: f64) -> f64 {
+    /// cylinder has `level` others before it.
+    pub(crate) fn contact_floor(&self, level: u16, least_m: f64) -> f64 {
         if level == 0 || least_m <= self.crowded_m {
             self.floor
         } else {
-            self.rounds_above * self.floor
+            self.repeated_contacts_above * self.floor
         }
     }
 }

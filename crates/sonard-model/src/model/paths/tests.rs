@@ -6,9 +6,9 @@ mod fan;
 mod full_wave;
 mod half_plane;
 mod laws;
+mod level_edges;
 mod pairs;
 mod peers;
-mod rims;
 mod rough;
 mod stacked;
 mod two_edges;
@@ -22,19 +22,20 @@ use rand_pcg::Pcg64;
 use super::*;
 use crate::{
     acoustics::edge::EdgeLaw,
+    geometry::DVec2,
     model::{
         Bend, Edge,
         tests::{bends, reflectors},
     },
     reading::PathKind,
-    scene::{Material, Wall},
+    scene::{Material, Scene, Wall},
 };
 
 pub(in crate::model) const LOSSLESS: Settings = Settings {
     max_path_m: 20.0,
     max_order: None,
     floor: 1e-4,
-    rounds_above: ROUNDS_ABOVE,
+    repeated_contacts_above: REPEATED_CONTACTS_ABOVE,
     crowded_m: 0.0,
     edge_law: None,
     double_diffraction: false,

@@ -51,7 +51,7 @@ pub(super) fn path_settings(
         max_path_m: 2.0 * receiver.max_range_m,
         max_order: options.max_order.map(|order| order.try_into().unwrap_or(u16::MAX)),
         floor: receiver.threshold * 10f64.powf(-PATHS_KEPT_DB / 20.0),
-        rounds_above: paths::ROUNDS_ABOVE,
+        repeated_contacts_above: paths::REPEATED_CONTACTS_ABOVE,
         crowded_m: crowded_m(receiver),
         edge_law: Some(law),
         double_diffraction: options.double_diffraction,

@@ -256,7 +256,7 @@ fn few_readings_depend_on_what_is_left_out_below_the_threshold() {
             .expect("valid options");
         let beam = BeamPattern::new(&sensor, simulator.sound_speed_m_s());
         let own = simulator.path_settings();
-        let engines = [own.clone(), Settings { rounds_above: 1.0, ..own }]
+        let engines = [own.clone(), Settings { repeated_contacts_above: 1.0, ..own }]
             .map(|settings| PathEngine::new(&plan, beam.clone(), None, settings));
         let surveys = engines.each_ref().map(|engine| engine.survey(pose.position()));
         for azimuth in 0..120 {

@@ -6,8 +6,13 @@
 use num_complex::Complex64;
 
 use super::*;
-use crate::acoustics::edge::EdgeView;
-use crate::model::tests::reference::{Reference, ReferenceScene};
+use crate::{
+    acoustics::edge::EdgeView,
+    model::{
+        paths::{diffraction::single, echo::Echo},
+        tests::reference::{Reference, ReferenceScene},
+    },
+};
 
 /// Standard deviation of the band, and the part of it that counts, hertz.
 const BAND_SIGMA_HZ: f64 = 7000.0;
@@ -52,10 +57,10 @@ impl Chain {
                     ..LOSSLESS
                 };
                 let paths = Paths::new(&plan, settings);
-                let (trees, echoes) = paths.echoes(at, at, None);
+                let (traced, echoes) = paths.trace(at, at, None);
                 let heard = |echo: &Echo| Heard {
-                    echo: paths.path(&trees, echo),
-                    edge: paths.edges.view(&trees, echo, &paths.settings),
+                    echo: paths.path(&traced, echo),
+                    edge: single::view(&paths.plan, &traced.out, traced.back(), echo),
                 };
                 (f, echoes.iter().map(heard).collect())
             })

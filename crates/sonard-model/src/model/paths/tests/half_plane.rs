@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_4, PI};
 use num_complex::Complex64;
 
 use super::{
-    rims::{at_height, is_rim, pressure},
+    level_edges::{at_height, is_rim, pressure},
     *,
 };
 

@@ -68,7 +68,7 @@ impl Case {
 
 /// Field at a receiver over that of a cylindrical wave at 1 m, the straight way included.
 fn field(plan: &Scene, paths: &Paths, source: DVec2, at: DVec2) -> Complex64 {
-    let k = paths.settings.wave_number_per_m;
+    let k = paths.plan.settings.wave_number_per_m;
     let wave = |length_m: f64, amplitude: f64, phase_rad: f64| {
         Complex64::from_polar(amplitude / length_m.sqrt(), phase_rad - k * length_m)
     };

@@ -1,0 +1,389 @@
+//! How the tree grows.
+
+use smallvec::SmallVec;
+
+use super::{
+    beam::{Beam, reaches, reaches_well},
+    lit::LitSpan,
+    shade::shade,
+    tree::{Beams, Node, ROOT},
+};
+use crate::{
+    geometry::DVec2,
+    model::paths::{
+        plan::{Mesh, Plan, Side, WallMirror},
+        tolerance::TIE_M,
+    },
+};
+
+/// No scene keeps a beam this long; it stops one that rounding has caught.
+const MOST_REFLECTIONS: u16 = 4096;
+
+impl Beams {
+    /// All beams from `start` that can still give an echo at `target`.
+    pub(crate) fn grow(plan: &Plan, start: DVec2, target: DVec2) -> Self {
+        let triangles = || {
+            let mesh = plan.mesh.as_ref()?;
+            Some((mesh, mesh.locate(start)?, mesh.locate(target)?))
+        };
+        let Some((mesh, first, home)) = triangles() else { return Self::default() };
+        Grower::new(plan, mesh, start, target, home).grow(first)
+    }
+
+    /// All beams from a point of the mesh, whose triangles these are, for the rays in them to edges.
+    pub(crate) fn grow_from_corner(plan: &Plan, point: u32, around: &[(u32, u8)]) -> Self {
+        let Some(mesh) = &plan.mesh else { return Self::default() };
+        let Some(&(home, _)) = around.first() else { return Self::default() };
+        let start = mesh.points[point as usize];
+        let tree = Grower::new(plan, mesh, start, start, home).grow_from_corner(around);
+        Self { nodes: tree.nodes, to_edges: tree.to_edges, ..Self::default() }
+    }
+}
+
+/// Grows a tree order by order (breadth first).
+///
+/// Invariant: beams of one order lie side by side in `next`, counter-clockwise by departure, so
+/// that beams which a corner has split and brought to the same image again stand next to each
+/// other and can be merged. Without that, each corner seen in a room of right angles would cut
+/// beams for good, and their number would grow with the cube of the range instead of its square.
+struct Grower<'a> {
+    plan: &'a Plan,
+    mesh: &'a Mesh,
+    start: DVec2,
+    /// Where echoes are received: usually the start.
+    target: DVec2,
+    /// Triangle of the target.
+    home: u32,
+    most_reflections: u16,
+    /// Parts of the beam at hand still to be followed, each before it leaves by a side; without one,
+    /// what cylinders have left of it.
+    parts: Vec<(Beam, Option<usize>)>,
+    /// Beams of the next order.
+    next: Vec<Beam>,
+    /// The same by walls that stand above or below others; these are not merged.
+    stacked: Vec<Beam>,
+    tree: Beams,
+}
+
+impl<'a> Grower<'a> {
+    fn new(plan: &'a Plan, mesh: &'a Mesh, start: DVec2, target: DVec2, home: u32) -> Self {
+        let most_reflections =
+            plan.settings.max_order.unwrap_or(MOST_REFLECTIONS).min(MOST_REFLECTIONS);
+        let (parts, next, stacked) = Default::default();
+        let tree = Beams::default();
+        Self { plan, mesh, start, target, home, most_reflections, parts, next, stacked, tree }
+    }
+
+    /// All beams of a start in a triangle.
+    fn grow(mut self, triangle: u32) -> Beams {
+        self.look_around(self.first(triangle), None);
+        self.finish()
+    }
+
+    /// All beams of a start that is a corner of these triangles. Paths to another corner and back to this
+    /// one bound those by both corners to any receiver: these are no shorter.
+    fn grow_from_corner(mut self, around: &[(u32, u8)]) -> Beams {
+        for (&(triangle, corner), slot) in around.iter().zip(0..) {
+            let first = Beam { node: ROOT - slot, ..self.first(triangle) };
+            let side = (corner as usize + 1) % 3;
+            let ends = [side, (side + 1) % 3];
+            for end in ends {
+                self.meet_near_edge(&first, self.mesh.triangles[triangle as usize].corners[end]);
+            }
+            let [right, left] = ends.map(|end| self.mesh.corner(triangle, end) - self.start);
+            for part in self.shaded(Beam { right, left, ..first }) {
+                let beam = self.leave(part, side);
+                self.follow(beam);
+            }
+        }
+        self.finish()
+    }
+
+    fn first(&self, triangle: u32) -> Beam {
+        Beam {
+            image: self.start,
+            right: DVec2::ZERO,
+            left: DVec2::ZERO,
+            turn: DVec2::X,
+            gain: 1.0,
+            audible_m: self.plan.settings.audible_m(),
+            node: ROOT,
+            triangle,
+            side: 0,
+            mirrored: false,
+            order: 0,
+        }
+    }
+
+    /// Follows the beams order by order.
+    fn finish(mut self) -> Beams {
+        let mut beams = Vec::new();
+        loop {
+            std::mem::swap(&mut beams, &mut self.next);
+            beams.append(&mut self.stacked);
+            if beams.is_empty() {
+                break;
+            }
+            for beam in beams.drain(..) {
+                self.follow(Some(beam));
+            }
+        }
+        self.tree
+    }
+
+    /// Beams through the sides of the start's triangle, and its corners. A start on a side looks
+    /// around in the triangle behind it too.
+    fn look_around(&mut self, first: Beam, entered_by: Option<usize>) {
+        let (mesh, start) = (self.mesh, self.start);
+        let triangle = mesh.triangles[first.triangle as usize];
+        let to_corner = |corner: usize| mesh.corner(first.triangle, corner) - start;
+        match entered_by {
+            None => triangle.corners.iter().for_each(|&corner| self.meet_near_edge(&first, corner)),
+            Some(side) => self.meet_near_edge(&first, triangle.corners[(side + 2) % 3]),
+        }
+        // Counter-clockwise, from the side after the one it came in by.
+        let from = entered_by.map_or(0, |side| side + 1);
+        for side in (from..from + 3).map(|side| side % 3).filter(|&s| Some(s) != entered_by) {
+            let (right, left) = (to_corner(side), to_corner((side + 1) % 3));
+            let on_side = right.perp_dot(left) <= TIE_M * (left - right).length();
+            match triangle.sides[side] {
+                Side::Open { triangle, side } if on_side && entered_by.is_none() => {
+                    self.look_around(Beam { triangle, ..first }, Some(side as usize));
+                }
+                _ if on_side => {}
+                _ => {
+                    for part in self.shaded(Beam { right, left, ..first }) {
+                        let beam = self.leave(part, side);
+                        self.follow(beam);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Follows a beam and the parts that split off it to their walls, counter-clockwise by
+    /// departure.
+    fn follow(&mut self, beam: Option<Beam>) {
+        let mut at_hand = beam;
+        loop {
+            while let Some(beam) = at_hand {
+                at_hand = self.cross(beam);
+            }
+            let Some((part, side)) = self.parts.pop() else { return };
+            at_hand = match side {
+                Some(side) => self.leave(part, side),
+                None => self.pass(part),
+            };
+        }
+    }
+
+    /// Takes a beam through its triangle, past the cylinders in it.
+    fn cross(&mut self, beam: Beam) -> Option<Beam> {
+        if beam.triangle == self.home && beam.node != ROOT {
+            self.meet_target(&beam);
+        }
+        if self.plan.cylinders.in_triangle(beam.triangle).is_empty() {
+            return self.pass(beam);
+        }
+        let passing = self.shaded(beam);
+        self.parts.extend(passing.into_iter().rev().map(|part| (part, None)));
+        None
+    }
+
+    /// What cylinders in its triangle leave of a beam, counter-clockwise by departure.
+    fn shaded(&mut self, beam: Beam) -> SmallVec<[Beam; 2]> {
+        let mut passing = shade(&self.plan.cylinders, &beam, &mut self.tree.to_cylinders);
+        if beam.mirrored {
+            passing.reverse();
+        }
+        passing
+    }
+
+    /// Takes what passes cylinders through its triangle. Where the far corner splits it, the second
+    /// part waits.
+    fn pass(&mut self, beam: Beam) -> Option<Beam> {
+        let side = beam.side as usize;
+        let (right_side, left_side) = ((side + 1) % 3, (side + 2) % 3);
+        let corner = self.mesh.triangles[beam.triangle as usize].corners[left_side];
+        let run = self.mesh.points[corner as usize] - beam.image;
+        if reaches(beam.right, run) && reaches(run, beam.left) {
+            self.meet_edge(&beam, corner);
+        }
+        // A corner on a border sends the whole beam past it, on the other side.
+        if !reaches_well(beam.right, run) {
+            return self.leave(beam, left_side);
+        }
+        if !reaches_well(run, beam.left) {
+            return self.leave(beam, right_side);
+        }
+        let (right, left) = (Beam { left: run, ..beam }, Beam { right: run, ..beam });
+        if beam.mirrored {
+            self.parts.push((right, Some(right_side)));
+            self.leave(left, left_side)
+        } else {
+            self.parts.push((left, Some(left_side)));
+            self.leave(right, right_side)
+        }
+    }
+
+    /// The beam in the triangle behind a side; none if a wall reflects it or no echo can come.
+    fn leave(&mut self, beam: Beam, side: usize) -> Option<Beam> {
+        match self.mesh.triangles[beam.triangle as usize].sides[side] {
+            Side::Open { triangle, side } => {
+                let next = Beam { triangle, side, ..beam };
+                self.may_return(&next).then_some(next)
+            }
+            Side::Wall(wall) => {
+                self.reflect(&beam, wall, side);
+                for &other in self.mesh.stacked(beam.triangle, side) {
+                    let next = self.reflected(&beam, other, side);
+                    self.stacked.extend(next);
+                }
+                if !self.plan.lets_pass(wall) {
+                    return None;
+                }
+                let (triangle, side) = self.mesh.beyond(beam.triangle, side)?;
+                let next = Beam { triangle, side, ..beam };
+                self.may_return(&next).then_some(next)
+            }
+            Side::Outside => None,
+        }
+    }
+
+    /// Whether a beam can be back within its longest path through the side it came in by: a cheap test at
+    /// each side.
+    fn may_return(&self, beam: &Beam) -> bool {
+        let side = beam.side as usize;
+        let [a, b] = [side, (side + 1) % 3].map(|corner| self.mesh.corner(beam.triangle, corner));
+        let middle = 0.5 * (a + b);
+        let (out, back) =
+            (middle.distance_squared(beam.image), middle.distance_squared(self.target));
+        let longest_m = self.longest_m(beam);
+        // With distances p and q from the side's middle, no path through the side is shorter than
+        // p + q - |ab|; (p + q)^2 <= 2 p^2 + 2 q^2 spares most beams the roots.
+        2.0 * (out + back) <= longest_m * longest_m
+            || out.sqrt() + back.sqrt() - a.distance(b) <= longest_m
+    }
+
+    fn longest_m(&self, beam: &Beam) -> f64 {
+        beam.audible_m.min(self.plan.settings.max_path_m)
+    }
+
+    /// Adds what a wall sends back of a beam to the next order, merged with the beam before it where both
+    /// are one beam that a corner had split.
+    fn reflect(&mut self, beam: &Beam, wall: u32, side: usize) {
+        let Some(next) = self.reflected(beam, wall, side) else { return };
+        if let Some(last) = self.next.last_mut() {
+            let border = if next.mirrored { next.left } else { next.right };
+            if last.merge(&next) {
+                let nodes = &mut self.tree.nodes;
+                let (left, right) =
+                    if next.mirrored { (last.node, next.node) } else { (next.node, last.node) };
+                nodes.push(Node::Merged { border, left, right });
+                // `next` has the newest node, so this one follows it.
+                last.node = next.node + 1;
+                return;
+            }
+        }
+        self.next.push(next);
+    }
+
+    /// What a wall sends back of a beam, if an echo can come of it.
+    fn reflected(&mut self, beam: &Beam, wall: u32, side: usize) -> Option<Beam> {
+        let wall_mirror = &self.plan.walls[wall as usize];
+        if wall_mirror.scatter > 0.0 && self.plan.settings.scatter_height_rad > 0.0 {
+            let span_m = self.lit_span_m(beam, wall_mirror, side);
+            self.tree.on_rough_walls.push(LitSpan { beam: *beam, wall, span_m });
+        }
+        if self.plan.lets_pass(wall) {
+            let span_m = self.lit_span_m(beam, wall_mirror, side);
+            self.tree.below_level_edges.push(LitSpan { beam: *beam, wall, span_m });
+        }
+        let gain = beam.gain * wall_mirror.gain;
+        if beam.order >= self.most_reflections || gain < self.plan.settings.floor {
+            return None;
+        }
+        let next = Beam {
+            gain,
+            audible_m: beam.audible_m - wall_mirror.loss_m,
+            side: side as u8,
+            ..beam.reflected(&wall_mirror.mirror, wall_mirror.rotor)
+        };
+        if self.least_path_m(beam, &next, wall_mirror, side) > self.longest_m(&next) {
+            return None;
+        }
+        let nodes = &mut self.tree.nodes;
+        nodes.push(Node::Wall { wall, before: beam.node });
+        Some(Beam { node: nodes.len() as u32 - 1, ..next })
+    }
+
+    /// Length of the shortest path from the beam's image to its part of a wall and straight back
+    /// to the start. The length is a convex function of the position along the wall: least at one end
+    /// of the part, or where an image and the start see each other through it.
+    fn least_path_m(&self, beam: &Beam, next: &Beam, wall_mirror: &WallMirror, side: usize) -> f64 {
+        let mirror = &wall_mirror.mirror;
+        let height = mirror.height_m(beam.image);
+        let behind = mirror.height_m(self.target) * height < 0.0;
+        let through = if behind { beam } else { next };
+        let run = self.target - through.image;
+        if through.holds(run) {
+            return run.length();
+        }
+        let along = mirror.normal.perp();
+        let ends =
+            [side, (side + 1) % 3].map(|corner| along.dot(self.mesh.corner(beam.triangle, corner)));
+        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+        let by = |border: DVec2| {
+            let hit = beam.image - height / mirror.normal.dot(border) * border;
+            // Clamped, for borders that graze the wall; min and max drop a NaN.
+            let place = along.dot(hit).max(low).min(high);
+            let hit = mirror.offset_m * mirror.normal + place * along;
+            hit.distance(beam.image) + hit.distance(self.target)
+        };
+        by(beam.right).min(by(beam.left))
+    }
+
+    /// From and to where along a wall's line a beam meets it, metres.
+    fn lit_span_m(&self, beam: &Beam, wall_mirror: &WallMirror, side: usize) -> [f64; 2] {
+        let mirror = &wall_mirror.mirror;
+        let along = mirror.normal.perp();
+        let ends =
+            [side, (side + 1) % 3].map(|corner| along.dot(self.mesh.corner(beam.triangle, corner)));
+        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+        let by = |border: DVec2| {
+            let hit = beam.image - mirror.height_m(beam.image) / mirror.normal.dot(border) * border;
+            along.dot(hit).max(low).min(high)
+        };
+        let (right, left) = (by(beam.right), by(beam.left));
+        [right.min(left), right.max(left)]
+    }
+
+    fn meet_target(&mut self, beam: &Beam) {
+        let run = self.target - beam.image;
+        let is_in_reach = run.length_squared() <= self.longest_m(beam).powi(2);
+        let is_hidden = || {
+            let side = beam.side as usize;
+            let [a, b] = [side, (side + 1) % 3].map(|end| self.mesh.corner(beam.triangle, end));
+            let share = (a - beam.image).perp_dot(b - a) / run.perp_dot(b - a);
+            self.plan.cylinders.hide_in(beam.triangle, beam.image + share * run, self.target)
+        };
+        if beam.holds(run) && is_in_reach && !is_hidden() {
+            self.tree.to_receiver.push(beam.ray_to(self.target));
+        }
+    }
+
+    fn meet_edge(&mut self, beam: &Beam, point: u32) {
+        let place = self.mesh.points[point as usize];
+        if self.plan.corners.answers(point, place - beam.image) {
+            self.tree.to_edges.push((point, beam.ray_to(place)));
+        }
+    }
+
+    /// An edge in the triangle of the start, which no cylinder has shaded yet.
+    fn meet_near_edge(&mut self, beam: &Beam, point: u32) {
+        let place = self.mesh.points[point as usize];
+        if !self.plan.cylinders.hide_in(beam.triangle, self.start, place) {
+            self.meet_edge(beam, point);
+        }
+    }
+}

@@ -1,0 +1,252 @@
+//! Echoes that touch cylinders: two half-paths, connected where they meet.
+//!
+//! The path of an echo read backwards is a path too (reciprocity). So an echo of `n` contacts with cylinders
+//! is found from half-paths of half as many: one to its middle contact from the start and one from the
+//! receiver, as in bidirectional tracing. What is followed that way is the square root of what one-way search
+//! would have to follow, since behind each contact there are several times more paths.
+//!
+//! A middle contact has as many cylinders before it as after it, or one more.
+
+use super::{
+    contact::Contact,
+    departures::Departures,
+    groups::{Group, Groups},
+    half_path::{DIRECT, HalfPath, HalfPathTracer},
+    rays::{CylinderRay, CylinderRays, OneWay},
+    stationary::{SLACK, stationary_contact},
+    strength::Strength,
+};
+use crate::model::paths::{
+    beams::{Leg, View},
+    echo::{Echo, Via},
+    pattern::TwoWayBound,
+    plan::{Circle, Plan},
+};
+
+/// The contact in the middle of an echo path.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Connection {
+    pub(crate) cylinder: u32,
+    /// Angle of the contact around its centre, radians.
+    pub(crate) place_rad: f64,
+    /// From the transmitter to there.
+    pub(crate) out: OneWay,
+    /// From the receiver to there, in its own tree if it has one.
+    pub(crate) back: OneWay,
+}
+
+/// Connects half-paths.
+pub(crate) struct Connector<'a> {
+    plan: &'a Plan,
+    bound: Option<&'a TwoWayBound>,
+    pub(crate) connections: Vec<Connection>,
+    pub(crate) echoes: Vec<Echo>,
+}
+
+/// The half-paths from one place.
+pub(crate) struct HalfPaths<'a> {
+    pub(crate) views: &'a [View],
+    pub(crate) all: &'a [HalfPath],
+    /// Where rays of echoes are kept.
+    pub(crate) rays: &'a mut CylinderRays,
+}
+
+/// The half-paths from one place, sorted.
+struct Sorted<'a> {
+    views: &'a [View],
+    all: &'a [HalfPath],
+    groups: Groups,
+}
+
+impl<'a> Connector<'a> {
+    pub(crate) fn new(plan: &'a Plan, bound: Option<&'a TwoWayBound>) -> Self {
+        Self { plan, bound, connections: Vec::new(), echoes: Vec::new() }
+    }
+
+    /// All echoes between the half-paths from a place and those from another, or from the same.
+    pub(crate) fn connect(&mut self, out: &mut HalfPaths, back: Option<&mut HalfPaths>) {
+        let outs = self.sorted(out);
+        match back {
+            None => {
+                for pair in self.pairs(&outs, None) {
+                    let halves = [0, 1].map(|end| pair.half(end, out.rays));
+                    self.push(&pair, halves, !pair.own_reverse);
+                }
+            }
+            Some(back) => {
+                for pair in self.pairs(&outs, Some(&self.sorted(back))) {
+                    let halves = [pair.half(0, out.rays), pair.half(1, back.rays)];
+                    self.push(&pair, halves, false);
+                }
+            }
+        }
+    }
+
+    fn sorted<'b>(&self, from: &HalfPaths<'b>) -> Sorted<'b> {
+        let groups = Groups::of(from.all, self.plan.cylinders.circles.len());
+        Sorted { views: from.views, all: from.all, groups }
+    }
+
+    /// Echoes out on half-paths from the transmitter and back on those from the receiver; from one place
+    /// each pair once.
+    fn pairs(&self, out: &Sorted, back: Option<&Sorted>) -> Vec<Pair> {
+        let mut found = Vec::new();
+        let other = back.unwrap_or(out);
+        for (key, outs) in out.groups.by_cylinder.iter().enumerate() {
+            // As many cylinders before as after, or one more.
+            let lower = key.checked_sub(out.groups.cylinders).map(|lower| (lower, false));
+            for (key, is_level) in [(key, true)].into_iter().chain(lower) {
+                let Some(backs) = other.groups.by_cylinder.get(key) else { continue };
+                let once = is_level && back.is_none();
+                for &half_path in outs.iter().flat_map(|group| &group.half_paths) {
+                    self.partners_of(out, half_path, other, backs, once, &mut found);
+                }
+            }
+        }
+        found
+    }
+
+    /// Connects a half-path to others; with `once`, only with those whose number is not smaller.
+    fn partners_of(
+        &self,
+        out: &Sorted,
+        number: u32,
+        back: &Sorted,
+        groups: &[Group],
+        once: bool,
+        found: &mut Vec<Pair>,
+    ) {
+        let half_path = &out.all[number as usize];
+        let floor = |other_m: f64| {
+            self.plan.settings.contact_floor(half_path.level, half_path.least_m + other_m).powi(2)
+        };
+        let tracer = HalfPathTracer::new(self.plan, out.views, half_path);
+        for group in groups {
+            let most = half_path.strength.with(&group.most)
+                * self.heard(&half_path.departures, &group.departures);
+            if most < floor(group.least_m) {
+                continue;
+            }
+            for &other in group.half_paths.iter().filter(|&&other| !once || other >= number) {
+                let other = &back.all[other as usize];
+                // Sorted by falling `x`: the bound of all that follow falls with it.
+                let most = Strength { x: other.strength.x, ..group.most };
+                if half_path.strength.with(&most) < floor(group.least_m) {
+                    break;
+                }
+                if self.may_meet(half_path, other, floor(other.least_m)) {
+                    let other = HalfPathTracer::new(self.plan, back.views, other);
+                    found.extend(self.pair(&tracer, &other));
+                }
+            }
+        }
+    }
+
+    /// Most of the power that is heard of echoes that leave and come back like this.
+    fn heard(&self, one: &Departures, other: &Departures) -> f64 {
+        self.bound.map_or(1.0, |bound| bound.at(one.gap_rad(other)).powi(2))
+    }
+
+    /// Cheap tests: whether two half-paths can give an echo at all.
+    fn may_meet(&self, out: &HalfPath, back: &HalfPath, floor: f64) -> bool {
+        let [[a, b], [c, d]] = [&out.ends, &back.ends];
+        a.slope + c.slope < SLACK
+            && b.slope + d.slope > -SLACK
+            && out.strength.with(&back.strength) * self.heard(&out.departures, &back.departures)
+                >= floor
+            && self.plan.settings.allows(out.order + back.order + 1)
+    }
+
+    /// The echo out on one half-path and back on another, if there is one.
+    fn pair(&self, out: &HalfPathTracer, back: &HalfPathTracer) -> Option<Pair> {
+        let settings = &self.plan.settings;
+        let circle = &self.plan.cylinders.circles[out.half_path.cylinder as usize];
+        let gain = out.half_path.gain * back.half_path.gain * circle.gain;
+        let (contacts, place_rad) = stationary_contact(out, back, circle.radius_m)?;
+        let [one, other] = &contacts;
+        let off =
+            |contact: &Contact| circle.radius_m * contact.slope * (place_rad - contact.place_rad);
+        let length_m = one.length_m + off(one) + other.length_m + off(other);
+        let amplitude = self.amplitude(&contacts, circle, gain);
+        let departures = [out.departure(one.at_rad), back.departure(other.at_rad)];
+        let heard =
+            self.bound.map_or(1.0, |bound| bound.at(departures[0].angle_to(departures[1]).abs()));
+        let floor = settings.contact_floor(out.half_path.level, length_m);
+        let fits = length_m <= settings.max_path_m && amplitude * heard >= floor;
+        fits.then_some(Pair {
+            cylinder: out.half_path.cylinder,
+            own_reverse: std::ptr::eq(out.half_path, back.half_path),
+            rays: [(out.half_path, one), (back.half_path, other)].map(|(half_path, contact)| {
+                CylinderRay {
+                    view: half_path.view,
+                    link: half_path.link,
+                    contact_rad: contact.at_rad,
+                }
+            }),
+            place_rad,
+            legs: [out.leg(one.at_rad), back.leg(other.at_rad)],
+            echo: Echo {
+                length_m,
+                amplitude,
+                phase_rad: 0.0,
+                departure: departures[0],
+                arrival: departures[1],
+                rise_rad: [0.0; 2],
+                image: 0,
+                via: Via::Cylinder { connection: 0 },
+            },
+        })
+    }
+
+    /// Amplitude of an echo with these contacts: `sqrt(L / w)` by the equation of
+    /// [`strength`](super::strength), times what surfaces and air leave.
+    fn amplitude(&self, [one, other]: &[Contact; 2], circle: &Circle, gain: f64) -> f64 {
+        let length_m = one.length_m + other.length_m;
+        let cosine = 0.5 * (one.cosine + other.cosine);
+        let width_m = one.growth * other.width_m
+            + one.width_m * other.growth
+            + 2.0 * one.width_m * other.width_m / (circle.radius_m * cosine);
+        gain * self.plan.settings.air_gain(length_m) * (length_m / width_m).sqrt()
+    }
+
+    fn push(&mut self, pair: &Pair, [out, back]: [OneWay; 2], both_ways: bool) {
+        let connection =
+            Connection { cylinder: pair.cylinder, place_rad: pair.place_rad, out, back };
+        let number = self.connections.len() as u32;
+        self.connections.push(connection);
+        self.echoes.push(Echo { via: Via::Cylinder { connection: number }, ..pair.echo });
+        if both_ways {
+            self.connections.push(Connection { out: back, back: out, ..connection });
+            self.echoes.push(Echo {
+                departure: pair.echo.arrival,
+                arrival: pair.echo.departure,
+                via: Via::Cylinder { connection: number + 1 },
+                ..pair.echo
+            });
+        }
+    }
+}
+
+/// An echo out of two half-paths.
+struct Pair {
+    cylinder: u32,
+    /// Whether it comes back as it went.
+    own_reverse: bool,
+    /// Its rays to the cylinder, by way of others or direct.
+    rays: [CylinderRay; 2],
+    /// From the start to their first cylinders.
+    legs: [Leg; 2],
+    place_rad: f64,
+    echo: Echo,
+}
+
+impl Pair {
+    /// Its half from one of its ends; a ray by way of other cylinders is kept among the `rays` from there.
+    fn half(&self, end: usize, rays: &mut CylinderRays) -> OneWay {
+        if self.rays[end].link == DIRECT {
+            return OneWay::Walls(self.legs[end]);
+        }
+        rays.rays.push(self.rays[end]);
+        OneWay::Cylinders(rays.rays.len() as u32 - 1)
+    }
+}

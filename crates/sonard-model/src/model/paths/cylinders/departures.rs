@@ -1,0 +1,23 @@
+//! Directions of departure.
+
+use crate::geometry::{DVec2, wrap_pi};
+
+/// The directions in which the rays of a half-path leave.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Departures {
+    pub(crate) middle_rad: f64,
+    pub(crate) half_rad: f64,
+}
+
+impl Departures {
+    pub(crate) fn between(one: DVec2, other: DVec2) -> Self {
+        let half_rad = 0.5 * one.angle_to(other);
+        Self { middle_rad: wrap_pi(one.to_angle() + half_rad), half_rad: half_rad.abs() }
+    }
+
+    /// The least angle between directions of both, radians.
+    pub(crate) fn gap_rad(&self, other: &Self) -> f64 {
+        let apart = wrap_pi(self.middle_rad - other.middle_rad).abs();
+        (apart - self.half_rad - other.half_rad).max(0.0)
+    }
+}

@@ -1,0 +1,69 @@
+//! Half-paths sorted for being connected.
+
+use super::{departures::Departures, half_path::HalfPath, strength::Strength};
+use crate::geometry::wrap_pi;
+
+/// Half-paths by level and cylinder: `level * cylinders + cylinder`.
+pub(crate) struct Groups {
+    pub(crate) by_cylinder: Vec<Vec<Group>>,
+    pub(crate) cylinders: usize,
+}
+
+/// Half-paths that leave in similar directions, by falling [`Strength::x`].
+pub(crate) struct Group {
+    pub(crate) half_paths: Vec<u32>,
+    pub(crate) departures: Departures,
+    /// The most of `x` and of `y`.
+    pub(crate) most: Strength,
+    /// The shortest one's length, metres.
+    pub(crate) least_m: f64,
+}
+
+/// How far apart departures in a group are, radians.
+const GROUP_RAD: f64 = 0.1;
+
+impl Groups {
+    pub(crate) fn of(all: &[HalfPath], cylinders: usize) -> Self {
+        let mut by_cylinder: Vec<Vec<Group>> = Vec::new();
+        let key = |half_path: &HalfPath| {
+            let cylinder = half_path.level as usize * cylinders + half_path.cylinder as usize;
+            (cylinder, (half_path.departures.middle_rad / GROUP_RAD).floor() as i64)
+        };
+        let mut order: Vec<u32> = (0..all.len() as u32).collect();
+        order.sort_by(|&one, &other| {
+            let [one, other] = [one, other].map(|index| &all[index as usize]);
+            let by_x = other.strength.x.total_cmp(&one.strength.x);
+            key(one).cmp(&key(other)).then(by_x)
+        });
+        let same = |&one: &u32, &other: &u32| key(&all[one as usize]) == key(&all[other as usize]);
+        for group in order.chunk_by(same) {
+            let (cylinder, _) = key(&all[group[0] as usize]);
+            if by_cylinder.len() <= cylinder {
+                by_cylinder.resize_with(cylinder + 1, Vec::new);
+            }
+            by_cylinder[cylinder].push(Group::of(group, all));
+        }
+        Self { by_cylinder, cylinders }
+    }
+}
+
+impl Group {
+    fn of(half_paths: &[u32], all: &[HalfPath]) -> Self {
+        let first = all[half_paths[0] as usize].departures;
+        let each = || half_paths.iter().map(|&index| &all[index as usize]);
+        let reach = |half_path: &HalfPath| {
+            wrap_pi(half_path.departures.middle_rad - first.middle_rad).abs()
+                + half_path.departures.half_rad
+        };
+        let half_rad = each().map(reach).fold(0.0, f64::max);
+        let most =
+            each().map(|half_path| half_path.strength).fold(Strength::default(), Strength::max);
+        let least_m = each().map(|half_path| half_path.least_m).fold(f64::INFINITY, f64::min);
+        Self {
+            half_paths: half_paths.to_vec(),
+            departures: Departures { half_rad, ..first },
+            most,
+            least_m,
+        }
+    }
+}

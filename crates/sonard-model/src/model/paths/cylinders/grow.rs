@@ -1,0 +1,360 @@
+//! Tubes of rays, from their first cylinder on.
+//!
+//! A beam that meets a cylinder has no image behind it any more. What is left of it is a tube:
+//! the rays between two border rays, each known by where it touched the first cylinder. Cylinders
+//! are convex, so the rays of a tube spread and never cross: seen from any point they pass by in
+//! order. So the tube walks the mesh as a beam does, and where a beam finds by a sign on which
+//! side of a corner a ray passes, a tube finds the one ray through it as the zero of a monotone
+//! function. Corners, the tangents of other cylinders, and walls split it; each ray from the start
+//! is in exactly one tube, as it is in one beam.
+//!
+//! Tubes end as half-paths at the next cylinder, out of which echoes are made, and from
+//! which the next level of tubes begins; and they hold rays to edges. They are followed as long as
+//! one of both can still be heard.
+
+use smallvec::SmallVec;
+
+use super::{
+    departures::Departures,
+    front::Front,
+    half_path::{DIRECT, HalfPath},
+    partners::Partners,
+    rays::{CylinderRay, CylinderRays, FIRST, Link, SpreadRay, Surfaces, surfaces_to},
+    strength::{LOUDER, Strength},
+    tracer::Tracer,
+    tube::{Tube, ray_through, split},
+};
+use crate::{
+    geometry::{DVec2, distance_to_segment, wrap_pi},
+    model::{
+        Reflector,
+        paths::{
+            beams::{Beams, Ray, View},
+            plan::{Circle, Plan, Side, Span},
+        },
+    },
+};
+
+/// Rays that cylinders have turned to edges are followed from this much above the weakest sound
+/// that is asked for, so with 20 dB below the threshold for that, down to the threshold.
+const EDGES_ABOVE: f64 = 10.0;
+
+/// An edge sends back half of a mirror's echo at most: what it takes from it at its boundary.
+const EDGE_MOST: f64 = 0.5;
+
+/// Follows the tubes from one place, level by level: a tube of level `n` has met `n` cylinders.
+pub(crate) struct TubeGrower<'a> {
+    pub(crate) plan: &'a Plan,
+    target: DVec2,
+    views: &'a [View],
+    rays: CylinderRays,
+    waiting: Vec<Tube>,
+    /// All so far, those of the last level at the end.
+    pub(crate) half_paths: Vec<HalfPath>,
+    /// Where the last level begins.
+    last: usize,
+    pub(crate) has_edges: bool,
+    /// Largest cylinder, metres.
+    pub(crate) radius_m: f64,
+}
+
+impl<'a> TubeGrower<'a> {
+    /// For the beams that met cylinders, and echoes to `target`. Has the half-paths of level 0.
+    pub(crate) fn new(plan: &'a Plan, beams: &'a Beams, target: DVec2) -> Self {
+        let radii = plan.cylinders.circles.iter().map(|circle| circle.radius_m);
+        let mut grower = Self {
+            plan,
+            target,
+            views: &beams.to_cylinders,
+            rays: CylinderRays::default(),
+            waiting: Vec::new(),
+            half_paths: Vec::new(),
+            last: 0,
+            // Where beams find none, tubes are not followed for them.
+            has_edges: !beams.to_edges.is_empty(),
+            radius_m: radii.fold(0.0, f64::max),
+        };
+        for view in 0..grower.views.len() as u32 {
+            grower.begin(view);
+        }
+        grower
+    }
+
+    /// The half-paths of the last level.
+    pub(crate) fn last_level(&self) -> &[HalfPath] {
+        &self.half_paths[self.last..]
+    }
+
+    /// Follows the half-paths of the last level on to those of the next one, as far as there are
+    /// partners for them. False if there are none left.
+    pub(crate) fn grow(&mut self, partners: &Partners) -> bool {
+        let level = self.last..self.half_paths.len();
+        self.last = self.half_paths.len();
+        for index in level {
+            self.launch(index, partners);
+            while let Some(tube) = self.waiting.pop() {
+                self.follow(&tube);
+            }
+        }
+        self.last < self.half_paths.len()
+    }
+
+    /// What the tubes have met, and the half-paths.
+    pub(crate) fn finish(self) -> (CylinderRays, Vec<HalfPath>) {
+        (self.rays, self.half_paths)
+    }
+
+    /// The half-path of a beam that comes straight to a cylinder.
+    fn begin(&mut self, index: u32) {
+        let View { cylinder, span, beam } = self.views[index as usize];
+        if !self.plan.settings.allows(beam.order + 1) {
+            return;
+        }
+        let tracer = Tracer { plan: self.plan, view: &self.views[index as usize], surfaces: &[] };
+        let ends = [span.from_rad, span.to_rad];
+        // As they leave: before its first cylinder a ray has no front.
+        let borders = ends.map(|at| tracer.front(at));
+        let circle = tracer.circle();
+        let nearest_rad = (beam.image - circle.center).to_angle();
+        let ends = ends.map(|at| tracer.first_contact(at));
+        let middle = 0.5 * (span.from_rad + span.to_rad);
+        let away = wrap_pi(nearest_rad - middle).abs();
+        let length_m = if away < 0.5 * (span.to_rad - span.from_rad) {
+            beam.image.distance(circle.center) - circle.radius_m
+        } else {
+            ends[0].length_m.min(ends[1].length_m)
+        };
+        let one_way = [length_m, length_m, 1.0];
+        self.half_paths.push(HalfPath {
+            cylinder,
+            view: index,
+            link: DIRECT,
+            surfaces: Surfaces::new(),
+            level: 0,
+            order: beam.order,
+            gain: beam.gain,
+            span,
+            borders,
+            mirrored: true,
+            triangle: beam.triangle,
+            ends,
+            departures: Departures::between(
+                tracer.departure(span.from_rad),
+                tracer.departure(span.to_rad),
+            ),
+            least_m: length_m,
+            strength: Strength::of(beam.gain, one_way, self.radius_m, &self.plan.settings),
+        });
+    }
+
+    /// Sends what a half-path's cylinder reflects on as tubes, if it is worth it.
+    fn launch(&mut self, index: usize, partners: &Partners) {
+        let half_path = &self.half_paths[index];
+        let partner = partners.best(&half_path.departures);
+        let order = half_path.order + 1;
+        let circle = &self.plan.cylinders.circles[half_path.cylinder as usize];
+        let floor = self.plan.settings.contact_floor(1, half_path.least_m + self.back_m(circle));
+        let is_heard = half_path.strength.with(&partner) >= floor.powi(2);
+        if !(is_heard || self.has_edges) || !self.plan.settings.allows(order + 1) {
+            return;
+        }
+        let surface = Reflector::Cylinder(half_path.cylinder);
+        let (link, borders) = if half_path.link == DIRECT {
+            (FIRST, half_path.borders)
+        } else {
+            self.rays.links.push(Link { surface, before: half_path.link });
+            let borders = half_path.borders.map(|border| self.plan.reflect(&border, surface));
+            (self.rays.links.len() as u32 - 1, borders)
+        };
+        let tube = Tube {
+            view: half_path.view,
+            link,
+            span: half_path.span,
+            borders,
+            mirrored: !half_path.mirrored,
+            triangle: half_path.triangle,
+            side: None,
+            gain: half_path.gain * circle.gain,
+            order,
+            level: half_path.level + 1,
+            partner,
+        };
+        let mut surfaces = half_path.surfaces.clone();
+        if half_path.link != DIRECT {
+            surfaces.push(surface);
+        }
+        let tracer = Tracer {
+            plan: self.plan,
+            view: &self.views[half_path.view as usize],
+            surfaces: &surfaces,
+        };
+        split(&tube, &tracer, circle, 0, partners, &mut self.waiting);
+    }
+
+    /// Takes a tube through its triangle: what is in it, what it meets there, where it leaves.
+    fn follow(&mut self, tube: &Tube) {
+        if !self.is_worth(tube) {
+            return;
+        }
+        let surfaces = surfaces_to(&self.rays.links, tube.link);
+        let view = &self.views[tube.view as usize];
+        let tracer = Tracer { plan: self.plan, view, surfaces: &surfaces };
+        let mut cuts: SmallVec<[f64; 8]> = self.meet_corners(tube, &tracer);
+        let hits = self.meet_arcs(tube, &tracer);
+        cuts.extend(hits.iter().flat_map(|span| [span.from_rad, span.to_rad]));
+        cuts.sort_by(f64::total_cmp);
+        let inside = cuts.iter().filter(|&&at| tube.span.from_rad < at && at < tube.span.to_rad);
+        let inside = inside.map(|&at| (at, tracer.front(at)));
+        let [from, to] = tube.borders;
+        let first = (tube.span.from_rad, from);
+        let ends: SmallVec<[(f64, Front); 8]> =
+            [first].into_iter().chain(inside).chain([(tube.span.to_rad, to)]).collect();
+        for pair in ends.windows(2) {
+            let span = Span { from_rad: pair[0].0, to_rad: pair[1].0 };
+            let middle = 0.5 * (span.from_rad + span.to_rad);
+            let is_hit = hits.iter().any(|hit| hit.from_rad < middle && middle < hit.to_rad);
+            if !is_hit && span.to_rad > span.from_rad {
+                let part = Tube { span, borders: [pair[0].1, pair[1].1], ..*tube };
+                self.leave(&part, &tracer.front(middle));
+            }
+        }
+    }
+
+    /// Whether an echo of the tube can still be short and strong enough.
+    fn is_worth(&self, tube: &Tube) -> bool {
+        let settings = &self.plan.settings;
+        let left_m = tube.side.map_or(0.0, |side| {
+            let [a, b] = self.side_of(tube.triangle, side as usize);
+            distance_to_segment(self.target, a, b)
+        });
+        let length_m = tube.least(|front| front.length_m);
+        let least_m = length_m + left_m;
+        if least_m > settings.max_path_m {
+            return false;
+        }
+        let width_m = tube.least(|front| front.width_m);
+        let growth = tube.least(|front| front.growth);
+        let spread = [length_m, width_m, growth];
+        let strength = Strength::of(tube.gain, spread, self.radius_m, &self.plan.settings);
+        strength.with(&tube.partner) >= settings.contact_floor(1, least_m).powi(2)
+            || self.has_edges && self.is_worth_an_edge(tube.gain, spread)
+    }
+
+    /// Whether an edge could send back enough of rays that have spread so. With any partner the
+    /// power is at most `L / w + 1 / g` of a mirror's, by the same reasoning as for half-paths ([`strength`](super::strength)).
+    pub(crate) fn is_worth_an_edge(
+        &self,
+        gain: f64,
+        [length_m, width_m, growth]: [f64; 3],
+    ) -> bool {
+        let settings = &self.plan.settings;
+        let loss = EDGE_MOST * gain * settings.air_gain(length_m);
+        LOUDER * loss * loss * (length_m / width_m + 1.0 / growth)
+            >= (EDGES_ABOVE * settings.floor).powi(2)
+    }
+
+    /// Length of the shortest path back from a cylinder, metres.
+    pub(crate) fn back_m(&self, circle: &Circle) -> f64 {
+        (self.target.distance(circle.center) - circle.radius_m).max(0.0)
+    }
+
+    fn side_of(&self, triangle: u32, side: usize) -> [DVec2; 2] {
+        let Some(mesh) = &self.plan.mesh else { return [DVec2::ZERO; 2] };
+        [side, (side + 1) % 3].map(|corner| mesh.corner(triangle, corner))
+    }
+
+    /// Rays to the corners of the tube's triangle that are edges, and where corners split it.
+    fn meet_corners(&mut self, tube: &Tube, tracer: &Tracer) -> SmallVec<[f64; 8]> {
+        let Some(mesh) = &self.plan.mesh else { return SmallVec::new() };
+        let corners = mesh.triangles[tube.triangle as usize].corners;
+        let far = tube.side.map(|side| (side as usize + 2) % 3);
+        let mut cuts = SmallVec::new();
+        for (index, &corner) in corners.iter().enumerate() {
+            if far.is_some_and(|far| far != index) {
+                continue;
+            }
+            let place = mesh.points[corner as usize];
+            let Some((at, front)) = ray_through(tube, tracer, place) else { continue };
+            cuts.push(at);
+            if self.has_edges {
+                self.meet_edge(tube, tracer, corner, at, &front.moved(front.ahead_m(place)));
+            }
+        }
+        cuts
+    }
+
+    fn meet_edge(&mut self, tube: &Tube, tracer: &Tracer, point: u32, at: f64, end: &Front) {
+        let spread = [end.length_m, end.width_m, end.growth];
+        if !self.plan.corners.answers(point, end.along) || !self.is_worth_an_edge(tube.gain, spread)
+        {
+            return;
+        }
+        let rays = &mut self.rays.rays;
+        rays.push(CylinderRay { view: tube.view, link: tube.link, contact_rad: at });
+        let ray = Ray {
+            run: end.length_m * end.along,
+            departure: tracer.departure(at),
+            gain: tube.gain,
+            node: rays.len() as u32 - 1,
+            order: tube.order,
+        };
+        let (width_m, radius_m) = (end.width_m, end.radius_m());
+        self.rays.to_edges.push(SpreadRay { point, ray, width_m, radius_m });
+    }
+
+    fn reflected(&mut self, tube: &Tube, wall: u32) -> Tube {
+        let surface = Reflector::Wall(wall);
+        let borders = tube.borders.map(|border| self.plan.reflect(&border, surface));
+        let links = &mut self.rays.links;
+        links.push(Link { surface, before: tube.link });
+        Tube {
+            link: links.len() as u32 - 1,
+            mirrored: !tube.mirrored,
+            gain: tube.gain * self.plan.walls[wall as usize].gain,
+            order: tube.order + 1,
+            borders,
+            ..*tube
+        }
+    }
+
+    /// Sends a part on through the side by which its middle ray leaves.
+    fn leave(&mut self, tube: &Tube, middle: &Front) {
+        let Some(mesh) = &self.plan.mesh else { return };
+        let triangle = &mesh.triangles[tube.triangle as usize];
+        let distance_m = |side: usize| {
+            let [a, b] = self.side_of(tube.triangle, side);
+            let outward = -(b - a).perp();
+            let slant = outward.dot(middle.along);
+            // A ray that starts on a side by rounding outside leaves by it at once.
+            if slant > 0.0 {
+                (outward.dot(a - middle.origin) / slant).max(0.0)
+            } else {
+                f64::INFINITY
+            }
+        };
+        let sides = (0..3).filter(|&side| tube.side != Some(side as u8));
+        let Some(side) = sides.min_by(|&a, &b| distance_m(a).total_cmp(&distance_m(b))) else {
+            return;
+        };
+        match triangle.sides[side] {
+            Side::Open { triangle, side } => {
+                self.waiting.push(Tube { triangle, side: Some(side), ..*tube });
+            }
+            Side::Wall(wall) => {
+                if self.plan.settings.allows(tube.order + 1) {
+                    let stacked = mesh.stacked(tube.triangle, side).iter().copied();
+                    for wall in std::iter::once(wall).chain(stacked) {
+                        let next = self.reflected(tube, wall);
+                        self.waiting.push(Tube { side: Some(side as u8), ..next });
+                    }
+                }
+                if self.plan.lets_pass(wall)
+                    && let Some((triangle, side)) = mesh.beyond(tube.triangle, side)
+                {
+                    self.waiting.push(Tube { triangle, side: Some(side), ..*tube });
+                }
+            }
+            Side::Outside => {}
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Where tubes meet cylinders.
+
+use std::f64::consts::TAU;
+
+use smallvec::SmallVec;
+
+use super::{
+    contact::Contact,
+    departures::Departures,
+    front::Front,
+    grow::TubeGrower,
+    half_path::HalfPath,
+    strength::Strength,
+    tracer::Tracer,
+    tube::{Tube, ray_past},
+};
+use crate::{
+    geometry::DVec2,
+    model::{
+        Reflector,
+        paths::plan::{Circle, Span, SurfaceArc},
+    },
+};
+
+impl TubeGrower<'_> {
+    /// Makes half-paths of the parts that meet cylinders in this triangle, and says which can't pass.
+    pub(crate) fn meet_arcs(&mut self, tube: &Tube, tracer: &Tracer) -> SmallVec<[Span; 2]> {
+        let mut hits = SmallVec::new();
+        for &arc in self.plan.cylinders.in_triangle(tube.triangle) {
+            let surface = Reflector::Cylinder(arc.cylinder);
+            let first = Reflector::Cylinder(tracer.view.cylinder);
+            // A circle is convex: what leaves it does not come back to it by itself.
+            if tracer.surfaces.last().copied().unwrap_or(first) == surface {
+                continue;
+            }
+            let circle = &self.plan.cylinders.circles[arc.cylinder as usize];
+            for span in met_spans(tube, tracer, circle, &arc) {
+                if circle.is_opaque {
+                    hits.push(span);
+                }
+                self.half_paths.extend(self.half_path(tube, tracer, arc.cylinder, span));
+            }
+        }
+        hits
+    }
+
+    /// The half_path of a part that meets a cylinder, if it is worth anything.
+    fn half_path(
+        &self,
+        tube: &Tube,
+        tracer: &Tracer,
+        cylinder: u32,
+        span: Span,
+    ) -> Option<HalfPath> {
+        let settings = &self.plan.settings;
+        let circle = &self.plan.cylinders.circles[cylinder as usize];
+        if !settings.allows(tube.order + 1) {
+            return None;
+        }
+        let Span { from_rad, to_rad } = span;
+        let borders = [from_rad, to_rad].map(|at| tracer.front(at));
+        let middle = 0.5 * (from_rad + to_rad);
+        let contact = |front: &Front, at, near| Contact::of(front, circle, tube.mirrored, at, near);
+        let half = contact(&tracer.front(middle), middle, 0.0);
+        let near = half.place_rad;
+        let mut ends = [(&borders[0], from_rad), (&borders[1], to_rad)]
+            .map(|(front, at)| contact(front, at, near));
+        if !tube.mirrored {
+            ends.reverse();
+        }
+        let least = |of: fn(&Contact) -> f64| of(&ends[0]).min(of(&ends[1])).min(of(&half));
+        let spread = [least(|c| c.length_m), least(|c| c.width_m), least(|c| c.growth)];
+        let strength = Strength::of(tube.gain, spread, self.radius_m, settings);
+        let least_m = spread[0] + self.back_m(circle);
+        let is_worth = strength.with(&tube.partner) >= settings.contact_floor(1, least_m).powi(2)
+            || self.has_edges && self.is_worth_an_edge(tube.gain, spread);
+        if !is_worth || least_m > settings.max_path_m {
+            return None;
+        }
+        Some(HalfPath {
+            cylinder,
+            view: tube.view,
+            link: tube.link,
+            surfaces: tracer.surfaces.iter().copied().collect(),
+            level: tube.level,
+            order: tube.order,
+            gain: tube.gain,
+            span,
+            borders,
+            mirrored: tube.mirrored,
+            triangle: tube.triangle,
+            ends,
+            departures: Departures::between(tracer.departure(from_rad), tracer.departure(to_rad)),
+            least_m: spread[0],
+            strength,
+        })
+    }
+}
+
+/// The parts of a tube that meet an arc.
+///
+/// The tube is cut at the rays that touch the circle, then the circle's lit angles (from contact to contact,
+/// clockwise from the right border to the left one) at the ends of the arc, whose rays are found in turn.
+fn met_spans(
+    tube: &Tube,
+    tracer: &Tracer,
+    circle: &Circle,
+    arc: &SurfaceArc,
+) -> SmallVec<[Span; 2]> {
+    let [right, left] = tube.in_order();
+    let Span { from_rad, to_rad } = tube.span;
+    let (r, center) = (circle.radius_m, circle.center);
+    let is_beside = right.offset_m(center) <= -r || left.offset_m(center) >= r;
+    if is_beside {
+        return SmallVec::new();
+    }
+    // Where the rays touch the circle, its centre to their left and to their right.
+    let ends = [(right, 1.0), (left, -1.0)].map(|(border, side)| {
+        let beyond = side * border.offset_m(center) > r;
+        let own = if std::ptr::eq(border, &tube.borders[0]) { from_rad } else { to_rad };
+        if beyond { ray_past(tube, tracer, center, side * r) } else { own }
+    });
+    // Their contacts: clockwise around the circle from right to left.
+    let contact = |at: f64| (tracer.front(at).onto(circle).1).to_angle();
+    let last = contact(ends[1]);
+    let turn = (contact(ends[0]) - last).rem_euclid(TAU);
+    let lit = Span { from_rad: last, to_rad: last + turn };
+    lit.common(&arc.span)
+        .into_iter()
+        .map(|part| {
+            let at = |angle: f64, end: f64, own: f64| {
+                let point: DVec2 = circle.point(angle);
+                if angle == own { end } else { ray_past(tube, tracer, point, 0.0) }
+            };
+            let one = at(part.from_rad, ends[1], lit.from_rad);
+            let other = at(part.to_rad, ends[0], lit.to_rad);
+            Span { from_rad: one.min(other), to_rad: one.max(other) }
+        })
+        .filter(|span| {
+            let middle = tracer.front(0.5 * (span.from_rad + span.to_rad));
+            span.to_rad > span.from_rad && middle.ahead_m(center) > 0.0
+        })
+        .collect()
+}

@@ -1,0 +1,108 @@
+//! The stationary contact of two half-paths.
+//!
+//! Along a surface the length of a half-path is convex: `L'' = r cos i + r^2 cos^2 i / R`. The sum of two
+//! is stationary at one angle at most (Fermat: there the sound leaves as a mirror would have it),
+//! and Newton's method finds it.
+
+use super::{
+    contact::Contact,
+    half_path::{HalfPath, HalfPathTracer},
+};
+use crate::{geometry::wrap_pi, model::paths::tolerance::TIE_M};
+
+/// Slopes this little past each other still meet.
+pub(crate) const SLACK: f64 = 1e-9;
+
+/// Newton's steps at most; four are usual.
+const MOST_STEPS: usize = 40;
+
+/// A contact is found when both half-paths have it to within this, radians.
+const SAME_ANGLE_RAD: f64 = 1e-11;
+
+/// Where two half-paths meet as a mirror would have it: the contact of each, and the angle around the cylinder;
+/// `None` if nowhere.
+///
+/// The angle is where the slopes (`sin i`) of both add up to 0. Each step takes both half-paths as parabolas in
+/// the angle, with the slope's rate of change `cos i + r cos^2 i g / w`, and moves each to the angle where these
+/// meet. Invariant: the angle stays between `low` and `high`, which both half-paths reach.
+pub(crate) fn stationary_contact(
+    one: &HalfPathTracer,
+    other: &HalfPathTracer,
+    radius_m: f64,
+) -> Option<([Contact; 2], f64)> {
+    let [a, b] = [&one.half_path.ends, &other.half_path.ends];
+    let middle = 0.5 * (a[0].place_rad + a[1].place_rad);
+    let others = 0.5 * (b[0].place_rad + b[1].place_rad);
+    let turn = middle + wrap_pi(others - middle) - others;
+    let low = a[0].place_rad.max(b[0].place_rad + turn);
+    let high = a[1].place_rad.min(b[1].place_rad + turn);
+    if high < low {
+        return None;
+    }
+    // Straight lines through the ends for a start.
+    let slope = |[from, to]: &[Contact; 2], place: f64| {
+        let rate = (to.slope - from.slope) / (to.place_rad - from.place_rad);
+        (from.slope + rate * (place - from.place_rad), rate)
+    };
+    let ((t, rate), (u, other_rate)) = (slope(a, low), slope(b, low - turn));
+    let start = (low - (t + u) / (rate + other_rate)).max(low).min(high);
+    let mut at = [guess(a, start), guess(b, start - turn)];
+    for _ in 0..MOST_STEPS {
+        let p = one.contact(at[0], middle);
+        let mut q = other.contact(at[1], others);
+        q.place_rad += turn;
+        let rates =
+            [&p, &q].map(|c| c.cosine + radius_m * c.cosine * c.cosine * c.growth / c.width_m);
+        let sum = rates[0] * p.place_rad + rates[1] * q.place_rad - p.slope - q.slope;
+        let best = sum / (rates[0] + rates[1]);
+        let place = best.max(low).min(high);
+        let miss = (place - p.place_rad).abs().max((place - q.place_rad).abs());
+        if miss < SAME_ANGLE_RAD {
+            let is_inside = (best - place).abs() * radius_m <= TIE_M;
+            return is_inside.then_some(([p, q], place));
+        }
+        at[0] = step(one.half_path, &p, place);
+        at[1] = step(other.half_path, &q, place);
+    }
+    by_halving(one, other, [low, high], [middle, others, turn])
+}
+
+/// The same by halving the interval between `low` and `high`, for the few angles between which Newton's steps
+/// run to and fro. Invariant: the sum of the slopes is negative at `from` and not at `to`.
+fn by_halving(
+    one: &HalfPathTracer,
+    other: &HalfPathTracer,
+    [low, high]: [f64; 2],
+    [middle, others, turn]: [f64; 3],
+) -> Option<([Contact; 2], f64)> {
+    let at = |place: f64| {
+        let p = one.contact_at(place, middle);
+        let mut q = other.contact_at(place - turn, others);
+        q.place_rad += turn;
+        [p, q]
+    };
+    let sum = |place: f64| at(place).map(|contact| contact.slope).iter().sum::<f64>();
+    let ends = [low, high].map(sum);
+    if ends[0] > SLACK || ends[1] < -SLACK {
+        return None;
+    }
+    let (mut from, mut to) = (low, high);
+    while to - from > SAME_ANGLE_RAD {
+        let middle = 0.5 * (from + to);
+        if sum(middle) < 0.0 { from = middle } else { to = middle }
+    }
+    let place = 0.5 * (from + to);
+    Some((at(place), place))
+}
+
+/// The contact with the first cylinder of the ray to an angle, by linear interpolation.
+fn guess([from, to]: &[Contact; 2], place: f64) -> f64 {
+    let share = (place - from.place_rad) / (to.place_rad - from.place_rad);
+    from.at_rad + share.clamp(0.0, 1.0) * (to.at_rad - from.at_rad)
+}
+
+/// The same by one step from a ray near it.
+fn step(half_path: &HalfPath, contact: &Contact, place_rad: f64) -> f64 {
+    let next = contact.at_rad + (place_rad - contact.place_rad) / contact.place_rate;
+    next.max(half_path.span.from_rad).min(half_path.span.to_rad)
+}

@@ -1,0 +1,120 @@
+//! One tube, and the rays in it.
+
+use super::{
+    departures::Departures, front::Front, partners::Partners, root::zero_between,
+    strength::Strength, tracer::Tracer,
+};
+use crate::{
+    geometry::DVec2,
+    model::paths::{
+        plan::{Circle, Span},
+        tolerance::TIE_M,
+    },
+};
+
+/// Rays to edges and borders between tubes are found to within this, metres: far below what counts
+/// as a tie.
+const EXACT_M: f64 = 1e-12;
+
+/// A tube's part of a cylinder is split until it turns the rays by no more than twice this,
+/// radians.
+const MOST_TURN_RAD: f64 = 0.7;
+
+/// Halvings of a tube at a cylinder, at most: what grazes it is then too weak.
+const MOST_HALVINGS: u32 = 12;
+
+/// Rays between two, all of which have met the same surfaces.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Tube {
+    pub(crate) view: u32,
+    pub(crate) link: u32,
+    /// The contact of its borders with the first cylinder, in growing order.
+    pub(crate) span: Span,
+    /// The borders as they leave the last surface, in the same order.
+    pub(crate) borders: [Front; 2],
+    /// Whether the ray at `from_rad` is the left border.
+    pub(crate) mirrored: bool,
+    pub(crate) triangle: u32,
+    /// The side it came in by, if it did not start here.
+    pub(crate) side: Option<u8>,
+    pub(crate) gain: f64,
+    pub(crate) order: u16,
+    /// Cylinders met.
+    pub(crate) level: u16,
+    /// The best that its half-paths can be connected to.
+    pub(crate) partner: Strength,
+}
+
+impl Tube {
+    /// The borders, the right one first.
+    pub(crate) fn in_order(&self) -> [&Front; 2] {
+        let [from, to] = &self.borders;
+        if self.mirrored { [to, from] } else { [from, to] }
+    }
+
+    pub(crate) fn halves(&self, at_rad: f64, front: Front) -> [Self; 2] {
+        let Span { from_rad, to_rad } = self.span;
+        let [from, to] = self.borders;
+        let part =
+            |from_rad, to_rad, borders| Self { span: Span { from_rad, to_rad }, borders, ..*self };
+        [part(from_rad, at_rad, [from, front]), part(at_rad, to_rad, [front, to])]
+    }
+
+    /// The least of its borders.
+    pub(crate) fn least(&self, of: impl Fn(&Front) -> f64) -> f64 {
+        of(&self.borders[0]).min(of(&self.borders[1]))
+    }
+}
+
+/// Puts a tube that has just met a circle in parts that turn little.
+pub(crate) fn split(
+    tube: &Tube,
+    tracer: &Tracer,
+    circle: &Circle,
+    halvings: u32,
+    partners: &Partners,
+    waiting: &mut Vec<Tube>,
+) {
+    let [from, to] = tube.borders;
+    let middle = |front: &Front| front.origin - circle.center;
+    let turn = middle(&from).angle_to(middle(&to)).abs();
+    let opens = from.along.angle_to(to.along).abs();
+    let Span { from_rad, to_rad } = tube.span;
+    if halvings < MOST_HALVINGS && (turn > MOST_TURN_RAD || opens > 2.0 * MOST_TURN_RAD) {
+        let half = 0.5 * (from_rad + to_rad);
+        for part in tube.halves(half, tracer.front(half)) {
+            split(&part, tracer, circle, halvings + 1, partners, waiting);
+        }
+    } else {
+        let departures = Departures::between(tracer.departure(from_rad), tracer.departure(to_rad));
+        waiting.push(Tube { partner: partners.best(&departures), ..*tube });
+    }
+}
+
+/// The contact of the ray of a tube that passes a point at `offset_m` to its right.
+///
+/// The offset of a point is monotone in the contact, because rays of a tube never cross. Its slope is the
+/// distance between neighbouring rays abreast of the point, `width + growth * ahead`, times the angle between
+/// them at departure over that between their contacts (`rate`).
+pub(crate) fn ray_past(tube: &Tube, tracer: &Tracer, point: DVec2, offset_m: f64) -> f64 {
+    let ends = tube.borders.each_ref().map(|border| border.offset_m(point) - offset_m);
+    // Farther along the first contact's surface a ray is farther to the left.
+    let sense = if tube.mirrored { 1.0 } else { -1.0 };
+    zero_between([tube.span.from_rad, tube.span.to_rad], ends, EXACT_M, |at| {
+        let front = tracer.front(at);
+        let width_m = front.width_m + front.growth * front.ahead_m(point);
+        (front.offset_m(point) - offset_m, sense * front.rate * width_m)
+    })
+}
+
+/// The ray of the tube through a point; `None` if the point is beside it.
+pub(crate) fn ray_through(tube: &Tube, tracer: &Tracer, point: DVec2) -> Option<(f64, Front)> {
+    let [right, left] = tube.in_order();
+    let is_between = right.offset_m(point) >= -TIE_M && left.offset_m(point) <= TIE_M;
+    if !is_between {
+        return None;
+    }
+    let at = ray_past(tube, tracer, point, 0.0);
+    let front = tracer.front(at);
+    (front.ahead_m(point) > 0.0).then_some((at, front))
+}

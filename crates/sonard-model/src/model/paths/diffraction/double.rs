@@ -1,0 +1,273 @@
+//! Double diffraction: sound from one upright edge to another.
+//!
+//! The rays from edge to edge depend on the scene alone: a beams of beams from each edge that is met,
+//! grown when it is first asked for and kept for all places. Each ray out to one edge, each on
+//! from there to another (or by walls back to the same) and each back from that is an echo; what
+//! it is the reverse of is another.
+//!
+//! # Strength
+//!
+//! Over legs `s'`, `t`, `s` the wave that left the first edge is cylindrical about it in the plan, and
+//! what the second edge makes of that is a coefficient of its own (Kouyoumjian and Pathak 1974, whose
+//! section on ray-optical fields takes any such wave):
+//!
+//! ```text
+//! D1 D2 / sqrt(s' t s)      with D1 at L1 = s' t / (s' + t), D2 at L2 = t s / (t + s)
+//! ```
+//!
+//! beside a straight path's `1 / sqrt(s' + t + s)`; upright, where the front's other radius goes on
+//! growing, spreading adds the same to both. It reads the same backwards. The product holds while
+//! neither edge lies in the other's transition region: where transmitter (or receiver) and both
+//! edges are nearly in line, what comes to the second edge is no ray-optical field, and the product
+//! errs by some decibels there.
+//!
+//! # Along a wall
+//!
+//! Two ends of one wall see each other along its faces. On a rigid face what comes along it is the
+//! incident wave and its mirror image in one, of which the second coefficient counts each: half of it
+//! is incident (the same, section on grazing incidence). Of a face with reflectance `R` the share is
+//! `1 / (1 + R)`. A free-standing plate has two such paths, one on each side, of one length, and
+//! they are one echo.
+
+use num_complex::Complex64;
+use smallvec::SmallVec;
+
+use super::{
+    edge_ray::{EdgeRay, distance_parameter_m},
+    edge_to_edge::EdgeToEdge,
+};
+use crate::{
+    acoustics::edge::{Aspect, EdgeLaw},
+    model::paths::{
+        beams::Ray,
+        echo::{Echo, Via},
+        plan::{Corner, Facing, Flank, Plan},
+        rays::Rays,
+        settings::Settings,
+    },
+};
+
+/// Past the width of a tie at a boundary, radians.
+const INTO_SHADOW_RAD: f64 = 2e-9;
+
+/// A path by two edges.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DoubleDiffraction {
+    /// The edges' points, in order.
+    pub(crate) points: [u32; 2],
+    /// The ray from one to the other, in the first one's tree of [`EdgeToEdge`].
+    pub(crate) leg: u32,
+    /// Rays to the first edge and, from the receiver, to the second; see [`Rays::to_edge`].
+    pub(crate) out: u32,
+    pub(crate) back: u32,
+}
+
+/// All echoes with two diffractions, and their paths, by number in [`Via::Edges`]. The rays are sorted by edge.
+pub(crate) fn echoes(
+    plan: &Plan,
+    edge_to_edge: &EdgeToEdge,
+    law: EdgeLaw,
+    out: &Rays,
+    back: Option<&Rays>,
+) -> (Vec<Echo>, Vec<DoubleDiffraction>) {
+    if !plan.settings.double_diffraction {
+        return Default::default();
+    }
+    let mut search =
+        Search { settings: &plan.settings, law, paths: Vec::new(), echoes: Vec::new() };
+    let outs = rays_to_edges(plan, out);
+    let apart = back.map(|back| rays_to_edges(plan, back));
+    let backs = apart.as_ref().unwrap_or(&outs);
+    for (first, corner, outs) in &outs {
+        let from = edge_to_edge.at(plan, *first);
+        for (second, far_corner, backs) in backs {
+            let (number, rays) = from.beams.rays_to_edge(*second);
+            for (leg, (_, ray)) in (number..).zip(rays) {
+                let flanks = from.flanks[leg as usize];
+                let pair = EdgePair { points: [*first, *second], leg, ray, flanks };
+                if !search.connect(&pair, [corner, far_corner], [outs, backs]) {
+                    break;
+                }
+            }
+        }
+    }
+    (search.echoes, search.paths)
+}
+
+/// The edges that rays come to, and the rays to each.
+fn rays_to_edges<'a>(plan: &'a Plan, rays: &'a Rays) -> Vec<(u32, &'a Corner, Vec<EdgeRay<'a>>)> {
+    let known = |point| Some((point, plan.corners.corner(point)?));
+    let edges = rays.edges().into_iter().filter_map(known);
+    edges.map(|(point, corner)| (point, corner, EdgeRay::all(corner, rays, point))).collect()
+}
+
+/// A ray from edge to edge.
+struct EdgePair<'a> {
+    points: [u32; 2],
+    leg: u32,
+    ray: &'a Ray,
+    /// See [`FromEdge`](super::edge_to_edge::FromEdge).
+    flanks: [bool; 2],
+}
+
+/// Connects rays out, from edge to edge and back.
+struct Search<'a> {
+    settings: &'a Settings,
+    law: EdgeLaw,
+    paths: Vec<DoubleDiffraction>,
+    echoes: Vec<Echo>,
+}
+
+/// How the ray between two edges leaves one of them and comes to the other, on one of its sides.
+struct Passage {
+    ends: [Facing; 2],
+    /// What of the wave along a face counts as incident.
+    share: f64,
+}
+
+/// What an edge makes of a ray on each passage; nothing where it is not in the same air.
+type Passed = SmallVec<[Complex64; 2]>;
+
+impl Search<'_> {
+    /// Out to one corner, on to the other, and back from there. False if the ray between them, and
+    /// with it all longer ones, is too long.
+    ///
+    /// The field is `sum of share D1 D2` over the passages, times spreading. Each factor is worked out once
+    /// for each ray out and each ray back, and only their products for each pair of them.
+    fn connect(
+        &mut self,
+        pair: &EdgePair,
+        corners: [&Corner; 2],
+        [outs, backs]: [&[EdgeRay]; 2],
+    ) -> bool {
+        let leg_m = pair.ray.run.length();
+        let (Some(out), Some(back)) = (outs.first(), backs.first()) else { return true };
+        if out.length_m + leg_m + back.length_m > self.settings.max_path_m {
+            return false;
+        }
+        let passages = self.passages(pair, corners);
+        let passed = |end: usize, rays: &[EdgeRay]| -> Vec<Passed> {
+            rays.iter().map(|ray| self.passed(corners[end], end, ray, &passages, leg_m)).collect()
+        };
+        let (from_outs, from_backs) = (passed(0, outs), passed(1, backs));
+        let norm = |field: &Passed| field.iter().map(|part| part.norm()).sum::<f64>();
+        let most = from_backs.iter().map(norm).fold(0.0, f64::max) * pair.ray.gain;
+        for (out, from_out) in outs.iter().zip(&from_outs) {
+            if norm(from_out) * most < self.settings.floor {
+                continue;
+            }
+            for (back, from_back) in backs.iter().zip(&from_backs) {
+                let length_m = out.length_m + leg_m + back.length_m;
+                if length_m > self.settings.max_path_m {
+                    break;
+                }
+                let parts = passages.iter().zip(from_out.iter().zip(from_back));
+                let field: Complex64 = parts.map(|(passage, (a, b))| passage.share * a * b).sum();
+                self.add(pair, out, back, length_m, field * spreading(out, back, leg_m));
+            }
+        }
+        true
+    }
+
+    fn add(
+        &mut self,
+        pair: &EdgePair,
+        out: &EdgeRay,
+        back: &EdgeRay,
+        length_m: f64,
+        field: Complex64,
+    ) {
+        let settings = self.settings;
+        let gain = pair.ray.gain * settings.air_gain(length_m);
+        let amplitude = gain * field.norm();
+        let order = out.ray.order + pair.ray.order + back.ray.order;
+        if amplitude < settings.floor || !settings.allows(order) {
+            return;
+        }
+        self.echoes.push(Echo {
+            length_m,
+            amplitude,
+            phase_rad: field.arg(),
+            departure: out.ray.departure,
+            arrival: back.ray.departure,
+            rise_rad: [0.0; 2],
+            image: 0,
+            via: Via::Edges { double: self.paths.len() as u32 },
+        });
+        let EdgePair { points, leg, .. } = *pair;
+        self.paths.push(DoubleDiffraction { points, leg, out: out.number, back: back.number });
+    }
+
+    /// The sides on which a ray runs from one corner to another: one, or along a wall's faces two.
+    fn passages(&self, pair: &EdgePair, corners: [&Corner; 2]) -> SmallVec<[Passage; 2]> {
+        let ray = pair.ray;
+        let [mut here, there] = [corners[0].facings(ray.departure), corners[1].facings(-ray.run)];
+        here.retain(|facing| match facing.flank {
+            Flank::Open => true,
+            Flank::Left => pair.flanks[0],
+            Flank::Right => pair.flanks[1],
+        });
+        // Seen from the far end left is right, and through an odd number of mirrors right is left.
+        let is_turned = ray.order.is_multiple_of(2);
+        let fits = |one: &Facing, other: &Facing| match (one.flank, other.flank) {
+            (Flank::Open, _) | (_, Flank::Open) => true,
+            (a, b) => (a == b) != is_turned,
+        };
+        let pairs = here.iter().flat_map(|one| there.iter().map(move |other| [*one, *other]));
+        pairs
+            .filter(|[one, other]| fits(one, other))
+            .map(|ends| Passage { ends, share: self.share(&ends) })
+            .collect()
+    }
+
+    /// Of the wave along a wall's face, the share that counts as incident: see the module's description.
+    fn share(&self, ends: &[Facing; 2]) -> f64 {
+        let along = ends.iter().filter_map(|end| end.face_reflectance);
+        let (count, sum) = along.fold((0.0, 0.0), |(n, sum), r| (n + 1.0, sum + r));
+        match self.law {
+            _ if count == 0.0 => 1.0,
+            EdgeLaw::Utd => 1.0 / (1.0 + sum / count),
+            // Without an aspect, the two sides of a wall are one.
+            EdgeLaw::KucSiegel | EdgeLaw::BozmaKuc { .. } => 0.5,
+        }
+    }
+
+    /// An edge's coefficient over the root of its distance parameter, between a ray and one end of
+    /// each passage, with what the walls on the ray leave.
+    fn passed(
+        &self,
+        corner: &Corner,
+        end: usize,
+        ray: &EdgeRay,
+        passages: &[Passage],
+        leg_m: f64,
+    ) -> Passed {
+        let distance_m = distance_parameter_m(ray.radius_m, leg_m);
+        let through = |passage: &Passage| {
+            let facing = &passage.ends[end];
+            if facing.sector != ray.sector {
+                return Complex64::ZERO;
+            }
+            // Where a ray goes on along the wall the near end counts as in the shadow: what the far
+            // end sends straight on is not counted there either.
+            let in_rad = match facing.flank {
+                Flank::Open => ray.from_rad,
+                Flank::Left => ray.from_rad + INTO_SHADOW_RAD,
+                Flank::Right => ray.from_rad - INTO_SHADOW_RAD,
+            };
+            let aspect = Aspect { in_rad, out_rad: facing.from_rad, distance_m };
+            let wedge = corner.wedge(ray.sector);
+            ray.ray.gain * self.law.echo(wedge, &aspect, self.settings.wave_number_per_m)
+        };
+        passages.iter().map(through).collect()
+    }
+}
+
+/// The legs' spreading beside a straight path's and the roots of the distance parameters:
+/// `sqrt(L1 L2 (s' + t + s) / (w' t w))` for rays that cylinders have widened to `w'` and `w`.
+fn spreading(out: &EdgeRay, back: &EdgeRay, leg_m: f64) -> f64 {
+    let distance_m = |ray: &EdgeRay| distance_parameter_m(ray.radius_m, leg_m);
+    let length_m = out.length_m + leg_m + back.length_m;
+    let widths = out.width_m * leg_m * back.width_m;
+    (distance_m(out) * distance_m(back) * length_m / widths).sqrt()
+}

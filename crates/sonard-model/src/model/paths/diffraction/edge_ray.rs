@@ -1,0 +1,73 @@
+//! Rays to an upright edge, as the edge sees them.
+
+use crate::model::paths::{
+    beams::Ray, echo::drop_repeats, plan::Corner, rays::Rays, tolerance::SAME_RAD,
+};
+
+/// A ray to an edge.
+#[derive(Clone, Copy)]
+pub(crate) struct EdgeRay<'a> {
+    pub(crate) ray: &'a Ray,
+    /// See [`Rays::to_edge`].
+    pub(crate) number: u32,
+    pub(crate) length_m: f64,
+    /// Width of the ray tube at the edge, metres: without cylinders its length.
+    pub(crate) width_m: f64,
+    /// Radius of curvature of the wave front at the edge, metres: without cylinders its length.
+    pub(crate) radius_m: f64,
+    /// The sector of air between the edge's walls that it comes in.
+    pub(crate) sector: usize,
+    /// Direction from the edge towards the source, from the sector's first wall, radians.
+    pub(crate) from_rad: f64,
+}
+
+impl<'a> EdgeRay<'a> {
+    /// `None` for a ray along a wall, and in a sector that sends nothing back.
+    fn new(
+        corner: &Corner,
+        ray: &'a Ray,
+        number: u32,
+        [width_m, radius_m]: [f64; 2],
+    ) -> Option<Self> {
+        let (sector, from_rad) = corner.sector(-ray.run)?;
+        let length_m = ray.run.length();
+        Some(Self { ray, number, length_m, width_m, radius_m, sector, from_rad })
+    }
+
+    /// A ray over walls alone.
+    pub(crate) fn by_walls(corner: &Corner, ray: &'a Ray, number: u32) -> Option<Self> {
+        Self::new(corner, ray, number, [ray.run.length(); 2])
+    }
+
+    /// The rays to an edge, by length, each once.
+    pub(crate) fn all(corner: &Corner, rays: &'a Rays, point: u32) -> Vec<Self> {
+        let (first, by_walls) = rays.beams.rays_to_edge(point);
+        let (first_spread, spread) = rays.spread_to_edge(point);
+        let by_walls = (first..)
+            .zip(by_walls)
+            .filter_map(|(number, (_, ray))| Self::by_walls(corner, ray, number));
+        let spread = (first_spread..).zip(spread).filter_map(|(number, spread)| {
+            Self::new(corner, &spread.ray, number, [spread.width_m, spread.radius_m])
+        });
+        let mut all: Vec<Self> = by_walls.chain(spread).collect();
+        all.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
+        drop_repeats(&mut all, |ray| ray.length_m, Self::is_same);
+        all
+    }
+
+    /// Whether two are one ray that touches a corner on its way and was found on both sides of it.
+    fn is_same(&self, other: &Self) -> bool {
+        is_same_departure(self.ray, other.ray)
+    }
+}
+
+/// Kouyoumjian and Pathak's distance parameter of a front of one radius that goes on from an edge for
+/// the other, metres.
+pub(crate) fn distance_parameter_m(one_m: f64, other_m: f64) -> f64 {
+    one_m * other_m / (one_m + other_m)
+}
+
+/// Whether two rays from one place, of one length, leave it in one direction.
+pub(crate) fn is_same_departure(one: &Ray, other: &Ray) -> bool {
+    one.departure.distance_squared(other.departure) < SAME_RAD * SAME_RAD
+}

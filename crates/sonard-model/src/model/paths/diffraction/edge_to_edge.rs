@@ -1,0 +1,98 @@
+//! The rays from each upright edge to others.
+
+use std::sync::OnceLock;
+
+use smallvec::SmallVec;
+
+use super::edge_ray::is_same_departure;
+use crate::model::paths::{
+    beams::{Beams, Ray},
+    plan::{ALONG_RAD, Mesh, Plan},
+    settings::Settings,
+    tolerance::SAME_M,
+};
+
+/// Trees of beams from the edges of a scene, by point. A tree is grown when it is first asked for, for the
+/// longest paths that the scene was prepared for, and serves all places.
+#[derive(Debug, Default)]
+pub(crate) struct EdgeToEdge {
+    from: Vec<OnceLock<FromEdge>>,
+    /// The triangles around each point and which corner of each it is, counter-clockwise.
+    around: Vec<SmallVec<[(u32, u8); 6]>>,
+    max_path_m: f64,
+}
+
+/// The rays from an edge to edges.
+#[derive(Debug)]
+pub(crate) struct FromEdge {
+    /// Its `to_edges` lie side by side by edge, shortest first.
+    pub(crate) beams: Beams,
+    /// Of each ray, whether it left in the air on its left and on its right: along a wall it may have
+    /// gone on one side only.
+    pub(crate) flanks: Vec<[bool; 2]>,
+}
+
+impl EdgeToEdge {
+    pub(crate) fn new(mesh: &Mesh, settings: &Settings) -> Self {
+        let from = mesh.points.iter().map(|_| OnceLock::new()).collect();
+        Self { from, around: mesh.around_points(), max_path_m: settings.max_path_m }
+    }
+
+    /// The rays from an edge to edges.
+    pub(crate) fn at(&self, plan: &Plan, point: u32) -> &FromEdge {
+        let grow = || {
+            let plan = plan.within(self.max_path_m);
+            FromEdge::grow(&plan, point, &self.around[point as usize])
+        };
+        self.from[point as usize].get_or_init(grow)
+    }
+}
+
+impl FromEdge {
+    fn grow(plan: &Plan, point: u32, around: &[(u32, u8)]) -> Self {
+        let mut beams = Beams::grow_from_corner(plan, point, around);
+        let rays = std::mem::take(&mut beams.to_edges);
+        let side = |ray: &Ray| {
+            let (triangle, corner) = *around.get(beams.root_slot(&plan.walls, ray.into()))?;
+            let mesh = plan.mesh.as_ref()?;
+            let at = mesh.corner(triangle, corner as usize);
+            // What runs along its right border has it on the left.
+            Some([1, 2].map(|next| {
+                let border = mesh.corner(triangle, (corner as usize + next) % 3) - at;
+                let off_m = border.perp_dot(ray.departure).abs();
+                border.dot(ray.departure) > 0.0 && off_m <= ALONG_RAD * border.length()
+            }))
+        };
+        let mut found: Vec<(u32, Ray, [bool; 2])> =
+            rays.iter().map(|(edge, ray)| (*edge, *ray, side(ray).unwrap_or_default())).collect();
+        found.sort_by(|(one, a, _), (other, b, _)| {
+            one.cmp(other).then(a.run.length_squared().total_cmp(&b.run.length_squared()))
+        });
+        let mut flanks: Vec<[bool; 2]> = Vec::with_capacity(found.len());
+        for (edge, ray, sides) in found {
+            match known(&beams.to_edges, edge, &ray) {
+                // One that touches a corner, or runs along a wall, is found on both sides of it.
+                Some(index) => {
+                    let known = &mut flanks[index];
+                    *known = [known[0] | sides[0], known[1] | sides[1]];
+                }
+                None => {
+                    beams.to_edges.push((edge, ray));
+                    flanks.push(sides);
+                }
+            }
+        }
+        Self { beams, flanks }
+    }
+}
+
+/// The index of a ray among those known already, which are sorted by edge and length.
+fn known(rays: &[(u32, Ray)], edge: u32, ray: &Ray) -> Option<usize> {
+    let length_m = ray.run.length();
+    rays.iter()
+        .enumerate()
+        .rev()
+        .take_while(|(_, (to, other))| *to == edge && length_m - other.run.length() < SAME_M)
+        .find(|(_, (_, other))| is_same_departure(ray, other))
+        .map(|(index, _)| index)
+}

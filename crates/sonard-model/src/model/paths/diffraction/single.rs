@@ -1,0 +1,157 @@
+//! Echoes that one upright edge diffracts.
+
+use num_complex::Complex64;
+
+use super::edge_ray::{EdgeRay, distance_parameter_m};
+use crate::{
+    acoustics::edge::{Aspect, EdgeLaw, EdgeView},
+    model::paths::{
+        echo::{Echo, Via},
+        plan::{Corner, Plan},
+        rays::Rays,
+        settings::Settings,
+    },
+};
+
+/// All echoes with one diffraction: out on one ray to an edge, back on another or the same. The rays are
+/// sorted by edge.
+pub(crate) fn echoes(plan: &Plan, law: EdgeLaw, out: &Rays, back: Option<&Rays>) -> Vec<Echo> {
+    let search = Search { law, settings: &plan.settings };
+    let mut echoes = Vec::new();
+    for point in out.edges() {
+        let Some(corner) = plan.corners.corner(point) else { continue };
+        let outs = EdgeRay::all(corner, out, point);
+        match back {
+            None => search.pairs(corner, point, &outs, &mut echoes),
+            Some(back) => {
+                let backs = EdgeRay::all(corner, back, point);
+                search.pairs_between(corner, point, [&outs, &backs], &mut echoes);
+            }
+        }
+    }
+    echoes
+}
+
+/// How the edge of an echo with one diffraction looks from where the echo begins and ends; `None` of
+/// other echoes, by way of a cylinder, and by laws that know no aspect.
+pub(crate) fn view(plan: &Plan, out: &Rays, back: &Rays, echo: &Echo) -> Option<EdgeView> {
+    let Via::Edge { point, out: there, back: here } = echo.via else { return None };
+    let is_utd = plan.settings.edge_law == Some(EdgeLaw::Utd);
+    let corner = plan.corners.corner(point).filter(|_| is_utd)?;
+    let rays = [out.to_edge_by_walls(there)?, back.to_edge_by_walls(here)?];
+    let [out, back] = rays.map(|ray| EdgeRay::by_walls(corner, ray, 0));
+    let (out, back) = (out?, back?);
+    Some(EdgeView {
+        wedge: *corner.wedge(out.sector),
+        aspect: aspect(&out, &back),
+        wave_number_per_m: plan.settings.wave_number_per_m,
+        legs_m: [out.length_m, back.length_m],
+        swapped: rays.map(|ray| ray.order % 2 == 1),
+    })
+}
+
+/// Pairs of rays at one edge.
+struct Search<'a> {
+    law: EdgeLaw,
+    settings: &'a Settings,
+}
+
+impl Search<'_> {
+    /// Out on one ray and back on another or the same: each pair in both directions.
+    fn pairs(&self, corner: &Corner, point: u32, rays: &[EdgeRay], echoes: &mut Vec<Echo>) {
+        for (i, out) in rays.iter().enumerate() {
+            for (j, back) in rays.iter().enumerate().skip(i) {
+                // Sorted by length.
+                if out.length_m + back.length_m > self.settings.max_path_m {
+                    break;
+                }
+                let Some(echo) = self.echo(corner, point, out, back) else { continue };
+                if i != j {
+                    echoes.push(Echo {
+                        departure: echo.arrival,
+                        arrival: echo.departure,
+                        via: Via::Edge { point, out: back.number, back: out.number },
+                        ..echo
+                    });
+                }
+                echoes.push(echo);
+            }
+        }
+    }
+
+    /// Out on a ray from the transmitter and back on one from the receiver.
+    fn pairs_between(
+        &self,
+        corner: &Corner,
+        point: u32,
+        [outs, backs]: [&[EdgeRay]; 2],
+        echoes: &mut Vec<Echo>,
+    ) {
+        for out in outs {
+            for back in backs {
+                if out.length_m + back.length_m > self.settings.max_path_m {
+                    break;
+                }
+                echoes.extend(self.echo(corner, point, out, back));
+            }
+        }
+    }
+
+    fn echo(&self, corner: &Corner, point: u32, out: &EdgeRay, back: &EdgeRay) -> Option<Echo> {
+        let field = self.field(corner, out, back)?;
+        Some(Echo {
+            length_m: out.length_m + back.length_m,
+            amplitude: field.norm(),
+            phase_rad: field.arg(),
+            departure: out.ray.departure,
+            arrival: back.ray.departure,
+            rise_rad: [0.0; 2],
+            image: 0,
+            via: Via::Edge { point, out: out.number, back: back.number },
+        })
+    }
+
+    /// Relative field of the echo out and back on two rays, `None` below the floor.
+    ///
+    /// Cheapest test first: what walls and air leave of a mirror's echo, then the law's bound at this aspect,
+    /// then the law.
+    fn field(&self, corner: &Corner, out: &EdgeRay, back: &EdgeRay) -> Option<Complex64> {
+        let Self { law, settings } = self;
+        if out.sector != back.sector || !settings.allows(out.ray.order + back.ray.order) {
+            return None;
+        }
+        let length_m = out.length_m + back.length_m;
+        let strength = out.ray.gain * back.ray.gain * settings.air_gain(length_m);
+        // No law gives more than a wall's echo and the images that its edge replaces.
+        if 2.0 * strength < settings.floor {
+            return None;
+        }
+        let wedge = corner.wedge(out.sector);
+        let aspect = aspect(out, back);
+        let strength = strength * spreading(out, back, &aspect);
+        let k = settings.wave_number_per_m;
+        if strength * law.bound(wedge, &aspect, k) < settings.floor {
+            return None;
+        }
+        let field = strength * law.echo(wedge, &aspect, k);
+        (field.norm() >= settings.floor).then_some(field)
+    }
+}
+
+/// In on one ray, out on another.
+fn aspect(out: &EdgeRay, back: &EdgeRay) -> Aspect {
+    Aspect {
+        in_rad: out.from_rad,
+        out_rad: back.from_rad,
+        distance_m: distance_parameter_m(out.radius_m, back.radius_m),
+    }
+}
+
+/// What cylinders on the path leave of the field at an edge, beside fronts that flat walls
+/// turned: these fall by `sqrt((s + s') / (s s'))`, and the distance parameter of the
+/// transition is that of the fronts' radii of curvature in the plan (Kouyoumjian and Pathak
+/// 1974, equations (24) and (33), whose other radius, along the edge, no cylinder changes).
+fn spreading(out: &EdgeRay, back: &EdgeRay, aspect: &Aspect) -> f64 {
+    let length_m = out.length_m + back.length_m;
+    (aspect.distance_m * length_m / (out.width_m * back.width_m)).sqrt()
+}

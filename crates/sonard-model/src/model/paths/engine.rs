@@ -1,0 +1,287 @@
+//! The exact engine: the echo paths of an observation point, weighed for an azimuth.
+
+use std::f64::consts::PI;
+
+use super::{
+    diffraction::single,
+    direction_index::{DirectionIndex, Entry},
+    echo::Echo,
+    pattern::{PatternEnvelope, TwoWayBound},
+    prepare::Paths,
+    settings::Settings,
+    traced::Traced,
+    transducer::{DirectedPath, FLOOR_ABOVE, FaceEchoes, MultipleEcho},
+};
+use crate::{
+    acoustics::{BeamPattern, Disc, Image, Incidence, Incident, Sound},
+    geometry::{DVec2, wrap_pi},
+    model::{Arrival, Engine, Interaction, Mechanism, Path, Survey, mirrored},
+    reading::PathKind,
+    scene::Scene,
+};
+
+/// The exact engine: echo paths, a beam pattern and a face that reflects.
+///
+/// [`Settings::floor`] is also the weakest sound that [`Survey::listen`] gives.
+#[derive(Debug)]
+pub struct PathEngine {
+    pub(super) paths: Paths,
+    pub(super) beam: BeamPattern,
+    pub(super) face: Option<Disc>,
+    envelope: PatternEnvelope,
+    /// What echoes by cylinders are kept by; all are where the axis is tilted, and may be nearer to
+    /// a rising path than its azimuth is.
+    bound: Option<TwoWayBound>,
+    /// See [`Self::through_nulls`].
+    through_nulls: bool,
+}
+
+impl PathEngine {
+    /// Prepares a scene for a ranger; without a face, sound passes it as if it were not there.
+    #[must_use]
+    pub fn new(scene: &Scene, beam: BeamPattern, face: Option<Disc>, settings: Settings) -> Self {
+        let envelope = PatternEnvelope::of(&beam);
+        let is_wanted = !scene.cylinders.is_empty() && settings.tilt_rad == 0.0;
+        // A path that the face reflects into another loses at least this.
+        let reflected = face.map_or(0.0, |face| 2.0 * face.face.reflectance / FLOOR_ABOVE);
+        let bound = is_wanted.then(|| TwoWayBound::of(&envelope, reflected));
+        let paths = Paths::new(scene, settings);
+        Self { paths, beam, face, envelope, bound, through_nulls: false }
+    }
+
+    /// Gives also what a steady tone could not be heard of because it falls into a null of the beam
+    /// pattern: what the full response of the face to a pulse still hears.
+    #[must_use]
+    pub fn through_nulls(self, through_nulls: bool) -> Self {
+        Self { through_nulls, ..self }
+    }
+
+    /// Whether all sound stays in the plane of the scan.
+    fn is_flat(&self) -> bool {
+        self.paths.heights.images.is_empty() && self.paths.plan.settings.tilt_rad == 0.0
+    }
+
+    /// Angle between the transducer's axis and a direction that is `azimuth_rad` beside it in the
+    /// plan and points up by `rise_rad`, radians.
+    fn off_axis(&self, azimuth_rad: f64, rise_rad: f64) -> f64 {
+        let (tilt_sin, tilt_cos) = self.paths.plan.settings.tilt_rad.sin_cos();
+        let (rise_sin, rise_cos) = rise_rad.sin_cos();
+        (tilt_cos * rise_cos * azimuth_rad.cos() + tilt_sin * rise_sin).clamp(-1.0, 1.0).acos()
+    }
+}
+
+impl Engine for PathEngine {
+    fn survey<'a>(&'a self, position: DVec2) -> Box<dyn Survey + 'a> {
+        self.survey_pair(position, position)
+    }
+
+    fn survey_pair<'a>(&'a self, transmitter: DVec2, receiver: DVec2) -> Box<dyn Survey + 'a> {
+        Box::new(PathSurvey::new(self, self.paths.clone(), [transmitter, receiver]))
+    }
+
+    fn survey_within<'a>(
+        &'a self,
+        places: [DVec2; 2],
+        max_path_m: f64,
+    ) -> Option<Box<dyn Survey + 'a>> {
+        Some(Box::new(PathSurvey::new(self, self.paths.within(max_path_m), places)))
+    }
+}
+
+/// Widest reach of the entries of each index, degrees.
+const REACHES_DEG: [f64; 5] = [6.0, 10.0, 16.0, 30.0, 180.0];
+
+/// The echo paths of a place.
+struct PathSurvey<'a> {
+    engine: &'a PathEngine,
+    /// The engine's, perhaps for shorter paths.
+    paths: Paths,
+    traced: Traced,
+    /// Shortest first.
+    echoes: Vec<Echo>,
+    /// From narrow to wide reach: the many weak echoes are heard in few directions only.
+    indexes: [DirectionIndex; REACHES_DEG.len()],
+    /// What the face can reflect.
+    face_echoes: Option<FaceEchoes>,
+}
+
+impl<'a> PathSurvey<'a> {
+    fn new(engine: &'a PathEngine, paths: Paths, [transmitter, receiver]: [DVec2; 2]) -> Self {
+        let (traced, echoes) = paths.trace(transmitter, receiver, engine.bound.as_ref());
+        let settings = &paths.plan.settings;
+        let mut entries: [Vec<Entry>; REACHES_DEG.len()] = Default::default();
+        for (echo, index) in echoes.iter().zip(0..) {
+            if let Some(mut entry) = Entry::of(echo, index, &engine.envelope, settings.floor) {
+                if settings.tilt_rad != 0.0 {
+                    // A tilted axis may be nearer to a rising path than its azimuth is.
+                    entry.reach_rad = PI;
+                }
+                let reach_deg = entry.reach_rad.to_degrees();
+                let index = REACHES_DEG.iter().position(|most| reach_deg <= *most);
+                entries[index.unwrap_or(REACHES_DEG.len() - 1)].push(entry);
+            }
+        }
+        let indexes = entries.map(|entries| DirectionIndex::new(&entries));
+        // Transmitter and receiver apart have a face each, and a tilted one turns sound up or down:
+        // what runs between them and the walls is left out.
+        let faces_level = transmitter == receiver && settings.tilt_rad == 0.0;
+        let face_echoes = engine
+            .face
+            .filter(|_| faces_level)
+            .map(|face| FaceEchoes::new(face, &echoes, &engine.envelope, settings));
+        Self { engine, paths, traced, echoes, indexes, face_echoes }
+    }
+
+    /// Echoes by way of the face, in a direction in (-pi, pi].
+    fn multiple_echoes(&self, direction_rad: f64) -> Vec<MultipleEcho> {
+        let (beam, settings) = (&self.engine.beam, &self.paths.plan.settings);
+        let found = |echoes: &FaceEchoes| echoes.multiple_echoes(direction_rad, beam, settings);
+        self.face_echoes.as_ref().map_or_else(Vec::new, found)
+    }
+
+    fn multiple_arrival(
+        &self,
+        direction_rad: f64,
+        multiple: &MultipleEcho,
+        amplitude: f64,
+    ) -> Arrival {
+        let run_through = |directed: &DirectedPath| {
+            let echo = &self.echoes[directed.echo as usize];
+            let path = self.paths.path(&self.traced, echo).path;
+            if directed.reversed { path.reversed() } else { path }
+        };
+        let at_face = Interaction {
+            mechanism: Mechanism::Transducer,
+            point: self.traced.ends[0],
+            z_m: self.paths.sensor_z_m(),
+        };
+        let mut interactions = Vec::new();
+        for (number, path) in multiple.paths.iter().enumerate() {
+            interactions.extend((number > 0).then_some(at_face));
+            interactions.extend(run_through(path).interactions);
+        }
+        let (path_amplitude, [departure_rad, arrival_rad]) =
+            self.multiple_ends(direction_rad, multiple, amplitude);
+        Arrival {
+            length_m: multiple.length_m,
+            amplitude,
+            path_amplitude,
+            phase_rad: multiple.phase_rad,
+            departure_rad,
+            arrival_rad,
+            path: Path { interactions },
+        }
+    }
+
+    /// A multiple echo's amplitude before the beam pattern, and the directions in which it leaves and comes back.
+    fn multiple_ends(
+        &self,
+        direction_rad: f64,
+        multiple: &MultipleEcho,
+        amplitude: f64,
+    ) -> (f64, [f64; 2]) {
+        let ends_rad = |path: &DirectedPath| {
+            let echo = &self.echoes[path.echo as usize];
+            let ends_rad = [echo.departure, echo.arrival].map(DVec2::to_angle);
+            if path.reversed { [ends_rad[1], ends_rad[0]] } else { ends_rad }
+        };
+        let [first, last] =
+            [&multiple.paths[0], &multiple.paths[multiple.paths.len() - 1]].map(ends_rad);
+        let ends_rad = [first[0], last[1]];
+        let [leaving, arriving] =
+            ends_rad.map(|end| self.engine.beam.one_way(wrap_pi(end - direction_rad)));
+        (amplitude / (leaving * arriving), ends_rad)
+    }
+
+    /// How the face looks over a multiple echo.
+    fn multiple_image(&self, multiple: &MultipleEcho) -> Image {
+        let echoes = multiple.paths.iter().map(|path| &self.echoes[path.echo as usize]);
+        let passages = multiple.paths.len() - 1;
+        echoes
+            .map(|echo| match echo.via.kind() {
+                PathKind::Specular => Some(self.paths.mirrors_met(&self.traced, echo)),
+                PathKind::Diffracted | PathKind::Scattered => None,
+            })
+            .try_fold(passages, |met, more| Some(met + more?))
+            .map_or(Image::Lost, mirrored)
+    }
+}
+
+impl Survey for PathSurvey<'_> {
+    fn listen(&self, direction_rad: f64, sounds: &mut Vec<Sound>) {
+        sounds.clear();
+        let direction_rad = wrap_pi(direction_rad);
+        let (beam, floor) = (&self.engine.beam, self.paths.plan.settings.floor);
+        let is_flat = self.engine.is_flat();
+        for directions in &self.indexes {
+            directions.near(direction_rad, |entry, off_rad| {
+                let mut ends = [off_rad + entry.half_rad, off_rad - entry.half_rad];
+                if !is_flat {
+                    let rise_rad = self.echoes[entry.echo as usize].rise_rad;
+                    ends = [0, 1].map(|end| self.engine.off_axis(ends[end], rise_rad[end]));
+                }
+                let [leaving, arriving] = ends.map(|angle| beam.one_way(angle));
+                let amplitude = entry.amplitude * leaving * arriving;
+                let most = if self.engine.through_nulls {
+                    entry.amplitude * self.engine.envelope.beyond(&ends)
+                } else {
+                    amplitude
+                };
+                if most >= floor {
+                    let Echo { length_m, phase_rad, .. } = self.echoes[entry.echo as usize];
+                    sounds.push(Sound { length_m, amplitude, phase_rad, index: entry.echo });
+                }
+            });
+        }
+        // Echoes are numbered by length; multiple echoes come after all of them.
+        sounds.sort_unstable_by_key(|sound| sound.index);
+        let multiple = self.multiple_echoes(direction_rad);
+        if !multiple.is_empty() {
+            let numbers = self.echoes.len() as u32..;
+            sounds.extend(multiple.iter().zip(numbers).map(|(echo, index)| echo.sound(index)));
+            sounds.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
+        }
+    }
+
+    fn incident(&self, direction_rad: f64, sound: &Sound) -> Incident {
+        let (paths, traced) = (&self.paths, &self.traced);
+        let index = sound.index as usize;
+        let (strength, ends_rad, length_m, image) = if let Some(echo) = self.echoes.get(index) {
+            let image = match echo.via.kind() {
+                PathKind::Specular => mirrored(paths.mirrors_met(traced, echo)),
+                PathKind::Diffracted => {
+                    let view = single::view(&paths.plan, &traced.out, traced.back(), echo);
+                    view.map_or(Image::Lost, Image::Bent)
+                }
+                PathKind::Scattered => Image::Lost,
+            };
+            let ends_rad = [echo.departure, echo.arrival].map(DVec2::to_angle);
+            (echo.amplitude, ends_rad, echo.length_m, image)
+        } else {
+            let multiple = &self.multiple_echoes(wrap_pi(direction_rad))[index - self.echoes.len()];
+            let (strength, ends_rad) = self.multiple_ends(direction_rad, multiple, sound.amplitude);
+            (strength, ends_rad, multiple.length_m, self.multiple_image(multiple))
+        };
+        let [leaving_rad, arriving_rad] = ends_rad.map(|end_rad| wrap_pi(end_rad - direction_rad));
+        Incident { strength, incidence: Incidence { leaving_rad, arriving_rad, length_m, image } }
+    }
+
+    fn arrival(&self, direction_rad: f64, sound: &Sound) -> Arrival {
+        let index = sound.index as usize;
+        if let Some(at) = index.checked_sub(self.echoes.len()) {
+            let multiple = self.multiple_echoes(wrap_pi(direction_rad));
+            return self.multiple_arrival(direction_rad, &multiple[at], sound.amplitude);
+        }
+        let echo = &self.echoes[index];
+        let path = self.paths.path(&self.traced, echo);
+        Arrival {
+            length_m: path.length_m,
+            amplitude: sound.amplitude,
+            path_amplitude: path.amplitude,
+            phase_rad: path.phase_rad,
+            departure_rad: path.departure_rad,
+            arrival_rad: path.arrival_rad,
+            path: path.path,
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! The echo paths of a place: every mechanism in its turn.
+
+use super::{
+    beams::Beams,
+    cylinders,
+    diffraction::{double, level, single},
+    echo::{Echo, Via, sorted},
+    interactions::EchoPath,
+    pattern::TwoWayBound,
+    prepare::Paths,
+    rays::Rays,
+    scattering,
+    traced::Traced,
+};
+use crate::{acoustics::edge::EdgeLaw, geometry::DVec2};
+
+impl Paths {
+    /// All echo paths from a place, shortest first.
+    #[must_use]
+    pub fn enumerate(&self, position: DVec2) -> Vec<EchoPath> {
+        self.enumerate_between(position, position)
+    }
+
+    /// All echo paths from a transmitter to a receiver, shortest first, without the direct path
+    /// from one to the other.
+    #[must_use]
+    pub fn enumerate_between(&self, transmitter: DVec2, receiver: DVec2) -> Vec<EchoPath> {
+        let (traced, echoes) = self.trace(transmitter, receiver, None);
+        echoes.iter().map(|echo| self.path(&traced, echo)).collect()
+    }
+
+    /// The same, with what their paths are found from. With `bound`, echoes by cylinders only that can be
+    /// heard.
+    pub(super) fn trace(
+        &self,
+        transmitter: DVec2,
+        receiver: DVec2,
+        bound: Option<&TwoWayBound>,
+    ) -> (Traced, Vec<Echo>) {
+        let (mut traced, mut echoes) = self.trace_plan([transmitter, receiver], bound);
+        if let Some(law) = self.plan.settings.edge_law {
+            self.add_diffraction(law, &mut traced, &mut echoes);
+        }
+        self.add_images(&mut echoes, receiver - transmitter);
+        self.retain_clear(&traced, &mut echoes);
+        if let Some(law) = self.plan.settings.edge_law {
+            self.add_level_edges(law, &mut traced, &mut echoes);
+        }
+        (traced, sorted(&echoes))
+    }
+
+    /// Echoes in the plan without diffraction: over walls alone, off rough walls and by way of cylinders.
+    fn trace_plan(&self, ends: [DVec2; 2], bound: Option<&TwoWayBound>) -> (Traced, Vec<Echo>) {
+        let plan = &self.plan;
+        let [transmitter, receiver] = ends;
+        let mut out = Beams::grow(plan, transmitter, receiver);
+        let mut echoes = self.mirrored(&out);
+        // The rays back, as rays from the receiver, matter to edges and cylinders only.
+        let needs_back = plan.settings.edge_law.is_some() || !plan.cylinders.is_empty();
+        let apart = transmitter != receiver;
+        let back = (apart && needs_back).then(|| Beams::grow(plan, receiver, transmitter));
+        let rough = std::mem::take(&mut out.on_rough_walls);
+        let (scattered, patches) =
+            if apart { Default::default() } else { scattering::echoes(plan, &rough) };
+        echoes.extend(scattered);
+        let found = cylinders::trace(plan, &out, back.as_ref(), ends, bound);
+        echoes.extend(found.echoes);
+        let traced = Traced {
+            ends,
+            out: Rays { beams: out, cylinders: found.out },
+            back: back.map(|beams| Rays { beams, cylinders: found.back }),
+            connections: found.connections,
+            patches,
+            double: Vec::new(),
+            level: Vec::new(),
+        };
+        (traced, echoes)
+    }
+
+    /// Echoes over walls alone.
+    fn mirrored(&self, beams: &Beams) -> Vec<Echo> {
+        let settings = &self.plan.settings;
+        beams
+            .to_receiver
+            .iter()
+            .map(|ray| Echo {
+                length_m: ray.run.length(),
+                amplitude: ray.gain * settings.air_gain(ray.run.length()),
+                phase_rad: 0.0,
+                departure: ray.departure,
+                arrival: -ray.run.normalize_or_zero(),
+                rise_rad: [0.0; 2],
+                image: 0,
+                via: Via::Walls { node: ray.node },
+            })
+            .filter(|echo| echo.amplitude >= settings.floor)
+            .collect()
+    }
+
+    /// Echoes by one or two upright edges.
+    fn add_diffraction(&self, law: EdgeLaw, traced: &mut Traced, echoes: &mut Vec<Echo>) {
+        traced.out.sort_by_edge();
+        traced.back.iter_mut().for_each(Rays::sort_by_edge);
+        let (out, back) = (&traced.out, traced.back.as_ref());
+        echoes.extend(single::echoes(&self.plan, law, out, back));
+        let (found, paths) = double::echoes(&self.plan, &self.edge_to_edge, law, out, back);
+        echoes.extend(found);
+        traced.double = paths;
+    }
+
+    /// Each echo of the plan also by way of floor and ceiling, and these by themselves.
+    fn add_images(&self, echoes: &mut Vec<Echo>, apart: DVec2) {
+        let plan = echoes.len();
+        for (image, index) in self.heights.images.iter().zip(1..) {
+            for at in 0..plan {
+                echoes.extend(image.echo(&echoes[at], index, &self.plan.settings));
+            }
+            echoes.extend(image.upright_echo(index, apart, &self.plan.settings));
+        }
+    }
+
+    /// Echoes by level edges, which have their own images by floor and ceiling.
+    fn add_level_edges(&self, law: EdgeLaw, traced: &mut Traced, echoes: &mut Vec<Echo>) {
+        let lit = |rays: &mut Rays| std::mem::take(&mut rays.beams.below_level_edges);
+        let (out_lit, back_lit) = (lit(&mut traced.out), traced.back.as_mut().map(lit));
+        let [transmitter, receiver] = traced.ends;
+        let out = level::From::new(transmitter, &traced.out.beams, out_lit);
+        let back = traced.back.as_ref().zip(back_lit);
+        let back = back.map(|(Rays { beams, .. }, lit)| level::From::new(receiver, beams, lit));
+        let scene = level::Surroundings { plan: &self.plan, heights: &self.heights, law };
+        let (found, paths) = level::echoes(scene, &out, back.as_ref());
+        echoes.extend(found);
+        traced.level = paths;
+    }
+}

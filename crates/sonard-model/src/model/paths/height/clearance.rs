@@ -1,0 +1,96 @@
+//! Whether a path of the plan, at its heights, meets what it is reflected by and nothing else.
+
+use rstar::AABB;
+
+use super::limits::{Heights, holds};
+use crate::{
+    geometry::{DVec2, SNAP_M},
+    model::{Mechanism, Reflector, paths::plan::Cylinders},
+};
+
+/// Where a path, or a part of one, begins and ends.
+pub(crate) struct Ends {
+    pub(crate) start: DVec2,
+    /// `None` for a part that ends at its last contact, the level edge of a wall.
+    pub(crate) end: Option<DVec2>,
+    /// How much higher it ends, if floor and ceiling are windows, metres.
+    pub(crate) rise_m: f64,
+}
+
+impl Heights {
+    /// Whether a path meets its contacts where they stand, and nothing else.
+    ///
+    /// If floor and ceiling were windows its height would grow evenly with its length in the plan; the
+    /// real height is that one, folded back between them.
+    pub(crate) fn is_path_clear(
+        &self,
+        cylinders: &Cylinders,
+        contacts: &[(DVec2, Mechanism)],
+        ends: &Ends,
+    ) -> bool {
+        let points = || {
+            let first = [(ends.start, None)].into_iter();
+            let last = ends.end.map(|end| (end, None));
+            first.chain(contacts.iter().map(|&(at, what)| (at, what.surface()))).chain(last)
+        };
+        let plan_m: f64 =
+            points().zip(points().skip(1)).map(|((a, _), (b, _))| a.distance(b)).sum();
+        let straight_z = |along_m: f64| self.z_m + ends.rise_m * along_m / plan_m;
+        let mut along_m = 0.0;
+        let mut left_contacts = contacts.len();
+        for ((from, left), (to, met)) in points().zip(points().skip(1)) {
+            let leg_m = from.distance(to);
+            let z_at = |share: f64| straight_z(along_m + share * leg_m);
+            if self.is_barred(cylinders, [from, to], [left, met], z_at) {
+                return false;
+            }
+            left_contacts = left_contacts.saturating_sub(1);
+            let is_level_edge = ends.end.is_none() && left_contacts == 0;
+            let z_m = self.folded_m(z_at(1.0));
+            if !is_level_edge && met.is_some_and(|met| !holds(self.limits(met), z_m)) {
+                return false;
+            }
+            along_m += leg_m;
+        }
+        true
+    }
+
+    /// Whether something with limits stands in a leg between two surfaces, whose height (as if floor
+    /// and ceiling were windows) is given for each share of it.
+    fn is_barred(
+        &self,
+        cylinders: &Cylinders,
+        [from, to]: [DVec2; 2],
+        own: [Option<Reflector>; 2],
+        z_at: impl Fn(f64) -> f64,
+    ) -> bool {
+        let around = AABB::from_corners(from.to_array(), to.to_array());
+        let by_wall = self.limited.locate_in_envelope_intersecting(around).any(|near| {
+            let (wall, ends) = near.data;
+            !own.contains(&Some(Reflector::Wall(wall)))
+                && crossing(from, to, ends)
+                    .is_some_and(|share| self.stands_at(wall, self.folded_m(z_at(share))))
+        });
+        let by_cylinder = || {
+            cylinders.circles.iter().zip(0..).any(|(circle, cylinder)| {
+                !circle.is_opaque
+                    && !own.contains(&Some(Reflector::Cylinder(cylinder)))
+                    && circle.chord(from, to).is_some_and(|chord| {
+                        self.bars(self.cylinders[cylinder as usize], chord.map(&z_at))
+                    })
+            })
+        };
+        by_wall || by_cylinder()
+    }
+}
+
+/// Where on the leg from `from` to `to` a segment is crossed, as a share of it; none at its very ends,
+/// where it comes to a corner of which that segment is the other wall.
+fn crossing(from: DVec2, to: DVec2, [a, b]: [DVec2; 2]) -> Option<f64> {
+    let (run, along) = (to - from, b - a);
+    let slant = run.perp_dot(along);
+    let share = (a - from).perp_dot(along) / slant;
+    let on_segment = (a - from).perp_dot(run) / slant;
+    let off_ends_m = share.min(1.0 - share) * run.length();
+    (off_ends_m > 2.0 * SNAP_M && (0.0..=1.0).contains(&on_segment)).then_some(share)
+}

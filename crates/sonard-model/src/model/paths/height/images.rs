@@ -1,0 +1,144 @@
+//! Floor and ceiling as mirrors.
+//!
+//! Between floor and ceiling, at `a` above the floor in a room of height `H`, the images of the
+//! ranger stand at `2 m H` and `2 m H - 2 a` above it (Allen and Berkley's lattice, in one
+//! dimension), and each path of length `L` in the plan is also heard over `sqrt(L^2 + dz^2)`. A wall
+//! at `d` and the floor, `h` below, make a corner that answers from `sqrt(d^2 + h^2)`.
+//!
+//! What the plan says of amplitudes stays: cylinders spread sound in the plan alone. Of an edge,
+//! Kouyoumjian and Pathak's coefficient grows by `1 / sin b` for a ray that is `b` off the
+//! edge's direction, and the field by the square root of that; the small part of it that shifts the
+//! transition (its distance parameter falls by `sin b`) is left out. At two edges it grows twice.
+
+use crate::{
+    geometry::DVec2,
+    model::paths::{
+        echo::{Echo, Via},
+        settings::Settings,
+    },
+};
+
+/// An image of the ranger below the floor or above the ceiling.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct VerticalImage {
+    /// Height above the ranger, metres.
+    pub(crate) rise_m: f64,
+    /// Reflections at floor and ceiling.
+    pub(crate) bounces: u16,
+    /// What these leave of the amplitude.
+    pub(crate) gain: f64,
+}
+
+/// Floor or ceiling.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct HorizontalMirror {
+    pub(crate) z_m: f64,
+    /// See [`mirror_gain`](crate::model::paths::plan::mirror_gain).
+    pub(crate) gain: f64,
+}
+
+/// The images within reach that give an echo above the floor of the settings; the ranger itself is
+/// not among them.
+pub(crate) fn images(
+    floor: Option<HorizontalMirror>,
+    ceiling: Option<HorizontalMirror>,
+    z_m: f64,
+    settings: &Settings,
+) -> Vec<VerticalImage> {
+    let reach_m = settings.max_path_m;
+    let below = floor.map(|floor| z_m - floor.z_m);
+    let above = ceiling.map(|ceiling| ceiling.z_m - z_m);
+    let [at_floor, at_ceiling] =
+        [floor, ceiling].map(|level| level.map_or(1.0, |level| level.gain));
+    let mut images = Vec::new();
+    let mut add = |rise_m: f64, bounces: u16| {
+        // In turn, beginning with the one that is nearer on the way there.
+        let (first, second) = (i32::from(bounces.div_ceil(2)), i32::from(bounces / 2));
+        let (floors, ceilings) = if rise_m < 0.0 { (first, second) } else { (second, first) };
+        let gain = at_floor.powi(floors) * at_ceiling.powi(ceilings);
+        if rise_m.abs() <= reach_m && gain >= settings.floor {
+            images.push(VerticalImage { rise_m, bounces, gain });
+        }
+    };
+    match (below, above) {
+        (None, None) => {}
+        (Some(below), None) => add(-2.0 * below, 1),
+        (None, Some(above)) => add(2.0 * above, 1),
+        (Some(below), Some(above)) => {
+            let height = below + above;
+            for turn in 0..=(reach_m / (2.0 * height)) as u16 {
+                let whole = 2.0 * f64::from(turn) * height;
+                add(-whole - 2.0 * below, 2 * turn + 1);
+                add(whole + 2.0 * above, 2 * turn + 1);
+                if turn > 0 {
+                    add(-whole, 2 * turn);
+                    add(whole, 2 * turn);
+                }
+            }
+        }
+    }
+    images
+}
+
+impl VerticalImage {
+    /// The ranger itself.
+    pub(crate) const NONE: Self = Self { rise_m: 0.0, bounces: 0, gain: 1.0 };
+
+    /// How much higher than it began a ray from this image comes to a place at a height above the ranger,
+    /// if floor and ceiling are windows, metres: each reflection at one of them turns it.
+    pub(crate) fn climb_m(&self, rise_m: f64) -> f64 {
+        let below_m = rise_m - self.rise_m;
+        if self.bounces.is_multiple_of(2) { below_m } else { -below_m }
+    }
+
+    /// An echo of the plan by way of this image, which is number `index`; `None` if it is too long
+    /// or too weak.
+    pub(crate) fn echo(&self, plan: &Echo, index: u16, settings: &Settings) -> Option<Echo> {
+        // What is scattered goes straight back; level edges have their own images by floor and ceiling.
+        if matches!(plan.via, Via::Scatter { .. } | Via::LevelEdge { .. }) {
+            return None;
+        }
+        let length_m = plan.length_m.hypot(self.rise_m);
+        let cosine = plan.length_m / length_m;
+        let bending = match plan.via {
+            Via::Edge { .. } => cosine.sqrt().recip(),
+            Via::Edges { .. } => cosine.recip(),
+            _ => 1.0,
+        };
+        let amplitude =
+            plan.amplitude * self.gain * bending * settings.air_gain(length_m - plan.length_m);
+        let leaves_rad = self.rise_m.atan2(plan.length_m);
+        // After an even number of reflections it still runs the way it left, and comes from the
+        // other side.
+        let comes_rad = if self.bounces.is_multiple_of(2) { -leaves_rad } else { leaves_rad };
+        let fits = length_m <= settings.max_path_m && amplitude >= settings.floor;
+        fits.then_some(Echo {
+            length_m,
+            amplitude,
+            rise_rad: [leaves_rad, comes_rad],
+            image: index,
+            ..*plan
+        })
+    }
+
+    /// The way by floor and ceiling alone, to a receiver that is `apart` from the transmitter.
+    pub(crate) fn upright_echo(
+        &self,
+        index: u16,
+        apart: DVec2,
+        settings: &Settings,
+    ) -> Option<Echo> {
+        let along = apart.try_normalize().unwrap_or(DVec2::X);
+        let nowhere = Echo {
+            length_m: apart.length(),
+            amplitude: 1.0,
+            phase_rad: 0.0,
+            departure: along,
+            arrival: if apart == DVec2::ZERO { along } else { -along },
+            rise_rad: [0.0; 2],
+            image: 0,
+            via: Via::Upright,
+        };
+        self.echo(&nowhere, index, settings)
+    }
+}

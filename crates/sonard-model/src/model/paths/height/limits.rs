@@ -1,0 +1,259 @@
+//! Walls and cylinders that do not reach from floor to ceiling.
+//!
+//! Without floor and ceiling all sound stays at the ranger's height, and what does not stand there
+//! is not there. With them a path has a height at each place. Beams then both turn at such a wall
+//! and pass it, and a path counts if it meets its walls where they stand and the others where they
+//! do not. What their level edges diffract is listed by itself
+//! ([`diffraction`](crate::model::paths::diffraction)).
+
+use std::collections::HashMap;
+
+use rstar::{
+    RTree,
+    primitives::{GeomWithData, Rectangle},
+};
+
+use super::images::{HorizontalMirror, VerticalImage, images};
+use crate::{
+    geometry::{Arrangement, DVec2, Piece, between},
+    model::{
+        Reflector,
+        paths::{plan::mirror_gain, settings::Settings, tolerance::TIE_M},
+    },
+    scene::{Material, Scene},
+};
+
+/// Heights of a scene around a ranger.
+#[derive(Debug, Default)]
+pub(crate) struct Heights {
+    floor_z_m: Option<f64>,
+    ceiling_z_m: Option<f64>,
+    /// The ranger's.
+    pub(crate) z_m: f64,
+    /// By wall and by cylinder, from and to where; without limits `None`.
+    walls: Vec<Option<[f64; 2]>>,
+    pub(crate) cylinders: Vec<Option<[f64; 2]>>,
+    /// Walls with limits, with their ends in the plan.
+    pub(crate) limited: RTree<Limited>,
+    /// The ranger's by floor and ceiling; none in a scene in the plane.
+    pub(crate) images: Vec<VerticalImage>,
+}
+
+/// A wall with limits, in the box around it.
+pub(crate) type Limited = GeomWithData<Rectangle<[f64; 2]>, (u32, [DVec2; 2])>;
+
+impl Heights {
+    /// For walls with these ends in the plan, and a ranger at a height.
+    pub(crate) fn new(
+        scene: &Scene,
+        segments: &[(DVec2, DVec2)],
+        z_m: f64,
+        settings: &Settings,
+    ) -> Self {
+        let walls: Vec<_> = scene.walls.iter().map(|wall| wall.z_m).collect();
+        let limited = (0..)
+            .zip(&walls)
+            .filter(|(_, limits)| limits.is_some())
+            .map(|(wall, _)| {
+                let (a, b) = segments[wall as usize];
+                let around = Rectangle::from_corners(a.to_array(), b.to_array());
+                Limited::new(around, (wall, [a, b]))
+            })
+            .collect();
+        Self {
+            floor_z_m: scene.floor_z_m,
+            ceiling_z_m: scene.ceiling_z_m,
+            z_m,
+            walls,
+            cylinders: scene.cylinders.iter().map(|cylinder| cylinder.z_m).collect(),
+            limited: RTree::bulk_load(limited),
+            images: images(
+                mirror(scene.floor_z_m, &scene.floor_material),
+                mirror(scene.ceiling_z_m, &scene.ceiling_material),
+                z_m,
+                settings,
+            ),
+        }
+    }
+
+    /// An image by its number in [`Echo::image`](crate::model::paths::echo::Echo::image).
+    pub(crate) fn image(&self, number: u16) -> VerticalImage {
+        number.checked_sub(1).map_or(VerticalImage::NONE, |image| self.images[image as usize])
+    }
+
+    /// Whether paths have different heights along them.
+    pub(crate) fn rises(&self) -> bool {
+        self.floor_z_m.is_some() || self.ceiling_z_m.is_some()
+    }
+
+    /// Whether what stands between such heights can matter at all.
+    pub(crate) fn is_there(&self, limits: Option<[f64; 2]>) -> bool {
+        self.rises() || holds(limits, self.z_m)
+    }
+
+    /// Whether nothing passes a cylinder with such limits.
+    pub(crate) fn is_opaque(&self, limits: Option<[f64; 2]>) -> bool {
+        !(self.rises() && limits.is_some())
+    }
+
+    /// By wall whether sound can pass it below or above; empty where no path rises.
+    pub(crate) fn passable(&self) -> Vec<bool> {
+        let has_limits = self.walls.iter().map(Option::is_some);
+        if self.rises() { has_limits.collect() } else { Vec::new() }
+    }
+
+    /// Walls that stand above or below the one that the plan knows at the same place, by [`between`] their
+    /// ends. Of walls that share heights there the one given first counts.
+    pub(crate) fn stacked(&self, plan: &Arrangement) -> HashMap<[u32; 2], Vec<u32>> {
+        if !self.rises() {
+            return HashMap::new();
+        }
+        let others = |piece: &Piece| {
+            let ends = between(piece.ends);
+            let mut stack = vec![piece.segment];
+            for &wall in plan.covered.get(&ends)? {
+                if stack.iter().all(|&other| self.are_apart(wall, other)) {
+                    stack.push(wall);
+                }
+            }
+            Some((ends, stack.split_off(1)))
+        };
+        plan.pieces.iter().filter_map(others).collect()
+    }
+
+    fn are_apart(&self, one: u32, other: u32) -> bool {
+        let [one, other] = [one, other].map(|wall| self.walls[wall as usize]);
+        one.zip(other).is_some_and(|([a, b], [c, d])| b <= c || d <= a)
+    }
+
+    /// How far above the ranger the level edges of a wall with limits are, metres, and whether each is
+    /// its upper one. Where it stands on the floor or reaches the ceiling it has none.
+    pub(crate) fn level_edges(&self, wall: u32) -> impl Iterator<Item = (f64, bool)> {
+        let limits = self.walls[wall as usize].unwrap_or_default();
+        let has = self.has_edges(limits);
+        let edge = move |end: usize| has[end].then_some((limits[end] - self.z_m, end == 1));
+        [0, 1].into_iter().filter_map(edge)
+    }
+
+    /// How far above the ranger a level edge of a wall is, metres.
+    pub(crate) fn edge_rise_m(&self, wall: u32, is_upper: bool) -> f64 {
+        let limits = self.walls[wall as usize].unwrap_or_default();
+        limits[usize::from(is_upper)] - self.z_m
+    }
+
+    /// Whether what stands between such heights ends above the floor, and below the ceiling.
+    fn has_edges(&self, [from_m, to_m]: [f64; 2]) -> [bool; 2] {
+        let lower = self.floor_z_m.is_none_or(|floor| from_m > floor);
+        let upper = self.ceiling_z_m.is_none_or(|ceiling| to_m < ceiling);
+        [lower, upper]
+    }
+
+    /// Whether paths have to be asked where they meet things.
+    pub(crate) fn matter(&self) -> bool {
+        let low_round = self.cylinders.iter().any(Option::is_some);
+        self.rises() && (low_round || self.limited.size() > 0)
+    }
+
+    /// Whether a wall with limits bars what crosses its line at a height. On its level edge it does not:
+    /// there the whole path counts, and the diffracted field, which is minus half of it, is added.
+    pub(crate) fn stands_at(&self, wall: u32, z_m: f64) -> bool {
+        let [from_m, to_m] = self.walls[wall as usize].unwrap_or_default();
+        let [lower, upper] = self.has_edges([from_m, to_m]);
+        (!lower || z_m > from_m + TIE_M) && (!upper || z_m < to_m - TIE_M)
+    }
+
+    pub(crate) fn limits(&self, reflector: Reflector) -> Option<[f64; 2]> {
+        match reflector {
+            Reflector::Wall(wall) => self.walls[wall as usize],
+            Reflector::Cylinder(cylinder) => self.cylinders[cylinder as usize],
+            Reflector::Floor | Reflector::Ceiling => None,
+        }
+    }
+
+    /// Whether something between such heights is met between two heights of a path that would be
+    /// there if floor and ceiling were windows.
+    ///
+    /// Folded, the heights between the two are an interval: its ends are the folded ends, or floor and
+    /// ceiling where the path turns at one of their images in between. Images of each lie `2 (ceiling - floor)`
+    /// apart.
+    pub(crate) fn bars(&self, limits: Option<[f64; 2]>, straight_m: [f64; 2]) -> bool {
+        let Some([from_m, to_m]) = limits else { return true };
+        let [low_m, high_m] = [straight_m[0].min(straight_m[1]), straight_m[0].max(straight_m[1])];
+        // Where it turns at floor and ceiling in between.
+        let images = [self.floor_z_m, self.ceiling_z_m].into_iter().flatten();
+        let turns = images.filter(|&at| {
+            let period = match (self.floor_z_m, self.ceiling_z_m) {
+                (Some(floor), Some(ceiling)) => 2.0 * (ceiling - floor),
+                _ => f64::INFINITY,
+            };
+            let next =
+                if period.is_finite() { at + ((low_m - at) / period).ceil() * period } else { at };
+            (low_m..=high_m).contains(&next)
+        });
+        let ends = [low_m, high_m].map(|z_m| self.folded_m(z_m));
+        let (low_m, high_m) = ends
+            .into_iter()
+            .chain(turns)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z_m| {
+                (low.min(z_m), high.max(z_m))
+            });
+        low_m <= to_m && high_m >= from_m
+    }
+
+    /// The height of a path that would have climbed so far if floor and ceiling were windows, metres;
+    /// `None` without either.
+    pub(crate) fn z_at(&self, climbed_m: f64) -> Option<f64> {
+        self.rises().then(|| self.folded_m(self.z_m + climbed_m))
+    }
+
+    /// Where a path is reflected that climbs so far if floor and ceiling are windows, metres, in `count`
+    /// reflections; downwards it comes to the floor first.
+    pub(crate) fn bounces(&self, climb_m: f64, count: u16) -> impl Iterator<Item = Bounce> {
+        let mut surfaces =
+            [(Reflector::Floor, self.floor_z_m), (Reflector::Ceiling, self.ceiling_z_m)];
+        if climb_m > 0.0 {
+            surfaces.reverse();
+        }
+        let first_m = surfaces[0].1.map_or(0.0, |z_m| (z_m - self.z_m).abs());
+        let apart_m =
+            self.floor_z_m.zip(self.ceiling_z_m).map_or(0.0, |(floor, ceiling)| ceiling - floor);
+        (0..count).filter_map(move |number| {
+            let (surface, z_m) = surfaces[usize::from(number % 2)];
+            let share = (first_m + f64::from(number) * apart_m) / climb_m.abs();
+            Some(Bounce { share, surface, z_m: z_m? })
+        })
+    }
+
+    /// The height of a path that would be at `z_m` if floor and ceiling were windows.
+    pub(crate) fn folded_m(&self, z_m: f64) -> f64 {
+        match (self.floor_z_m, self.ceiling_z_m) {
+            (None, None) => z_m,
+            (Some(floor), None) => floor + (z_m - floor).abs(),
+            (None, Some(ceiling)) => ceiling - (ceiling - z_m).abs(),
+            (Some(floor), Some(ceiling)) => {
+                let height = ceiling - floor;
+                let above = (z_m - floor).rem_euclid(2.0 * height);
+                floor + above.min(2.0 * height - above)
+            }
+        }
+    }
+}
+
+/// Floor or ceiling, if there is one.
+fn mirror(z_m: Option<f64>, material: &Material) -> Option<HorizontalMirror> {
+    Some(HorizontalMirror { z_m: z_m?, gain: mirror_gain(material) })
+}
+
+/// A reflection at floor or ceiling.
+pub(crate) struct Bounce {
+    /// After which share of the path's length.
+    pub(crate) share: f64,
+    pub(crate) surface: Reflector,
+    pub(crate) z_m: f64,
+}
+
+/// Whether something between such heights stands at a height.
+pub(crate) fn holds(limits: Option<[f64; 2]>, z_m: f64) -> bool {
+    // On the very end counts as met; the echo of a level edge knows that.
+    limits.is_none_or(|[from, to]| (from - TIE_M..=to + TIE_M).contains(&z_m))
+}

@@ -1,0 +1,43 @@
+//! The floor plan as sound is traced through it, and the settings of the search. All of it is made once
+//! for a scene; nothing here knows where the ranger is.
+
+mod corners;
+mod cylinders;
+mod mesh;
+mod walls;
+
+use std::sync::Arc;
+
+pub(crate) use corners::{ALONG_RAD, Corner, Corners, Facing, Flank};
+pub(crate) use cylinders::{Circle, Cylinders, Span, SurfaceArc};
+pub(crate) use mesh::{Mesh, Side};
+pub(crate) use walls::{WallMirror, mirror_gain, scattered};
+
+use super::settings::Settings;
+
+/// A scene's floor plan.
+#[derive(Debug, Clone)]
+pub(crate) struct Plan {
+    pub(crate) settings: Settings,
+    /// By wall of the scene.
+    pub(crate) walls: Arc<[WallMirror]>,
+    /// Whether sound can pass each wall below or above; empty in a scene without floor and ceiling.
+    pub(crate) passable: Arc<[bool]>,
+    pub(crate) corners: Arc<Corners>,
+    pub(crate) cylinders: Arc<Cylinders>,
+    /// `None` for a scene with nothing in it.
+    pub(crate) mesh: Option<Arc<Mesh>>,
+}
+
+impl Plan {
+    /// The same for paths up to a length, metres, which is at most the one it was prepared for.
+    pub(crate) fn within(&self, max_path_m: f64) -> Self {
+        let settings = Settings { max_path_m, ..self.settings.clone() };
+        Self { settings, ..self.clone() }
+    }
+
+    /// Whether sound can pass a wall below or above.
+    pub(crate) fn lets_pass(&self, wall: u32) -> bool {
+        self.passable.get(wall as usize).copied().unwrap_or(false)
+    }
+}

@@ -1,0 +1,208 @@
+//! Upright edges: the wedges of air at the ends of walls, by point of the plan.
+
+use std::f64::consts::TAU;
+
+use smallvec::SmallVec;
+
+use crate::{
+    acoustics::edge::{EdgeLaw, Wedge},
+    geometry::{Arrangement, DVec2, SNAP_M},
+    model::{Edge, paths::tolerance::TIE_M},
+};
+
+/// Rays along a wall's face belong to the wall's near end, radians.
+const GRAZING_RAD: f64 = 1e-9;
+
+/// Between edges a ray counts as along a wall's face to within this, radians: their points may have
+/// been moved a little off the wall's line to where walls meet.
+pub(crate) const ALONG_RAD: f64 = 1e-6;
+
+/// The edges of a scene, by point of its arrangement.
+#[derive(Debug, Default)]
+pub(crate) struct Corners {
+    points: Vec<Option<Corner>>,
+}
+
+/// A point where at least one wall ends and at which sound is diffracted.
+#[derive(Debug)]
+pub(crate) struct Corner {
+    point: DVec2,
+    edge: Edge,
+    /// Counter-clockwise around the point.
+    sectors: SmallVec<[Sector; 2]>,
+}
+
+/// The air between two walls at a point.
+#[derive(Debug, Clone, Copy)]
+struct Sector {
+    /// World direction of the wall it starts at, radians.
+    from_rad: f64,
+    /// Directions of its walls.
+    faces: [DVec2; 2],
+    wedge: Wedge,
+    /// Whether the edge law has it send anything back.
+    answers: bool,
+}
+
+/// A direction from an edge.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Facing {
+    pub(crate) sector: usize,
+    /// From the sector's first wall, radians.
+    pub(crate) from_rad: f64,
+    pub(crate) flank: Flank,
+    /// Of the wall along which it runs.
+    pub(crate) face_reflectance: Option<f64>,
+}
+
+/// On which side of a direction its air lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Flank {
+    /// On both.
+    Open,
+    /// Along a wall's face, on the left.
+    Left,
+    /// The same, on the right.
+    Right,
+}
+
+impl Corners {
+    /// Sorts the walls around each point. `walls` are their ends, `gains` their reflectances.
+    pub(crate) fn new(
+        plan: &Arrangement,
+        walls: &[(DVec2, DVec2)],
+        gains: &[f64],
+        law: EdgeLaw,
+    ) -> Self {
+        let mut around: Vec<SmallVec<[(f64, u32); 4]>> = vec![SmallVec::new(); plan.points.len()];
+        for piece in &plan.pieces {
+            let [a, b] = piece.ends.map(|end| plan.points[end as usize]);
+            // The wall's own direction: snapping and cutting may have bent the piece a little.
+            let (from, to) = walls[piece.segment as usize];
+            let along = (to - from) * (b - a).dot(to - from).signum();
+            around[piece.ends[0] as usize].push((along.to_angle(), piece.segment));
+            around[piece.ends[1] as usize].push(((-along).to_angle(), piece.segment));
+        }
+        let corner = |(point, mut faces): (DVec2, SmallVec<[(f64, u32); 4]>)| {
+            faces.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let edge = faces.iter().filter_map(|&(_, wall)| end_at(walls, wall, point)).min()?;
+            let sectors = sectors(&faces, gains, law);
+            let answers = sectors.iter().any(|sector| sector.answers);
+            answers.then_some(Corner { point, edge, sectors })
+        };
+        Self { points: plan.points.iter().copied().zip(around).map(corner).collect() }
+    }
+
+    /// Whether sound that comes to a point along `run` finds an edge there.
+    pub(crate) fn answers(&self, point: u32, run: DVec2) -> bool {
+        let corner = self.points.get(point as usize).and_then(Option::as_ref);
+        corner.is_some_and(|corner| corner.sectors.iter().any(|sector| sector.sees(-run)))
+    }
+
+    /// The end of a wall that names the edge at a point.
+    pub(crate) fn edge(&self, point: u32) -> Option<Edge> {
+        Some(self.points.get(point as usize)?.as_ref()?.edge)
+    }
+
+    /// The edge at a point, if there is one.
+    pub(crate) fn corner(&self, point: u32) -> Option<&Corner> {
+        self.points.get(point as usize)?.as_ref()
+    }
+
+    /// Where it is, metres.
+    pub(crate) fn position(&self, point: u32) -> Option<DVec2> {
+        Some(self.points.get(point as usize)?.as_ref()?.point)
+    }
+}
+
+impl Sector {
+    /// Whether it sends sound back that comes from a direction. By signs of cross products and without
+    /// an arc tangent, because every beam that passes a room's corner asks.
+    fn sees(&self, from: DVec2) -> bool {
+        let [first, second] = self.faces;
+        // Along a wall counts as seen.
+        let from_first = first.perp_dot(from) >= -TIE_M;
+        let from_second = from.perp_dot(second) >= -TIE_M;
+        // In more than half a turn, to be on either wall's side is enough.
+        let is_in = if self.wedge.is_convex() {
+            from_first || from_second
+        } else {
+            from_first && from_second
+        };
+        self.answers && is_in
+    }
+}
+
+impl Corner {
+    /// The sector in whose air a direction from the edge lies, and how far from its first wall, radians;
+    /// `None` along a wall and in a sector that answers nothing.
+    pub(crate) fn sector(&self, direction: DVec2) -> Option<(usize, f64)> {
+        let direction_rad = direction.to_angle();
+        let last = self.sectors.len() - 1;
+        let sector = self.sectors.iter().rposition(|s| s.from_rad <= direction_rad).unwrap_or(last);
+        let from_rad = (direction_rad - self.sectors[sector].from_rad).rem_euclid(TAU);
+        let opening_rad = self.sectors[sector].wedge.opening_rad;
+        let in_air = from_rad > GRAZING_RAD && from_rad < opening_rad - GRAZING_RAD;
+        (in_air && self.sectors[sector].answers).then_some((sector, from_rad))
+    }
+
+    pub(crate) fn wedge(&self, sector: usize) -> &Wedge {
+        &self.sectors[sector].wedge
+    }
+
+    /// Where a direction from the edge leads: into one sector, or along a wall into those on both
+    /// sides of it.
+    pub(crate) fn facings(&self, direction: DVec2) -> SmallVec<[Facing; 2]> {
+        let direction_rad = direction.to_angle();
+        let facing = |(sector, air): (usize, &Sector)| {
+            let Wedge { opening_rad, reflectance } = air.wedge;
+            // From just below 0, so that rounding does not take it a turn round.
+            let from_rad = (direction_rad - air.from_rad + ALONG_RAD).rem_euclid(TAU) - ALONG_RAD;
+            let at = |from_rad, flank, face_reflectance| Facing {
+                sector,
+                from_rad,
+                flank,
+                face_reflectance,
+            };
+            let [first, second] = reflectance.map(Some);
+            let mut found: SmallVec<[Facing; 2]> = SmallVec::new();
+            if from_rad < ALONG_RAD {
+                found.push(at(0.0, Flank::Left, first));
+            } else if from_rad < opening_rad - ALONG_RAD {
+                found.push(at(from_rad, Flank::Open, None));
+            }
+            // All around a free end both faces are the same direction.
+            let is_last = (from_rad - opening_rad).abs() <= ALONG_RAD
+                || opening_rad == TAU && from_rad < ALONG_RAD;
+            if is_last {
+                found.push(at(opening_rad, Flank::Right, second));
+            }
+            found
+        };
+        let answering = self.sectors.iter().enumerate().filter(|(_, sector)| sector.answers);
+        answering.flat_map(facing).collect()
+    }
+}
+
+/// The end of a wall that is at a point.
+fn end_at(walls: &[(DVec2, DVec2)], index: u32, point: DVec2) -> Option<Edge> {
+    let (a, b) = walls[index as usize];
+    let is_at = |end: DVec2| end.distance(point) < 2.0 * SNAP_M;
+    (is_at(a) || is_at(b)).then(|| Edge { wall: index, at_b: !is_at(a) })
+}
+
+/// The air between each wall of a point and the next one; `faces` by direction.
+fn sectors(faces: &[(f64, u32)], gains: &[f64], law: EdgeLaw) -> SmallVec<[Sector; 2]> {
+    let next = faces.iter().cycle().skip(1);
+    let sector = |(&(from_rad, wall), &(to_rad, next)): (&(f64, u32), &(f64, u32))| {
+        let turn = (to_rad - from_rad).rem_euclid(TAU);
+        let wedge = Wedge {
+            // A wall alone has air all around its end.
+            opening_rad: if turn == 0.0 { TAU } else { turn },
+            reflectance: [gains[wall as usize], gains[next as usize]],
+        };
+        let faces = [from_rad, to_rad].map(DVec2::from_angle);
+        Sector { from_rad, faces, wedge, answers: law.answers(&wedge) }
+    };
+    faces.iter().zip(next).map(sector).collect()
+}

@@ -1,0 +1,148 @@
+//! Cylinders, and the triangles they reach into.
+
+use std::f64::consts::{PI, TAU};
+
+use smallvec::SmallVec;
+
+use super::mesh::Mesh;
+use crate::{geometry::DVec2, model::paths::tolerance::TIE_M};
+
+/// The cylinders of a scene and the triangles they reach into.
+#[derive(Debug, Default)]
+pub(crate) struct Cylinders {
+    pub(crate) circles: Vec<Circle>,
+    /// By triangle; empty without cylinders.
+    by_triangle: Vec<SmallVec<[SurfaceArc; 1]>>,
+}
+
+/// A cylinder in the plan.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Circle {
+    pub(crate) center: DVec2,
+    /// Without size for a cylinder that is not at the ranger's height: the others keep their numbers.
+    pub(crate) radius_m: f64,
+    /// See [`super::mirror_gain`].
+    pub(crate) gain: f64,
+    /// Whether no sound passes above or below.
+    pub(crate) is_opaque: bool,
+}
+
+/// The part of a cylinder's surface that is in a triangle.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SurfaceArc {
+    pub(crate) cylinder: u32,
+    pub(crate) span: Span,
+}
+
+/// Counter-clockwise from one angle to another, at most a turn.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Span {
+    pub(crate) from_rad: f64,
+    pub(crate) to_rad: f64,
+}
+
+/// Spans shorter than this are empty, radians.
+const LEAST_RAD: f64 = 1e-12;
+
+impl Cylinders {
+    /// Finds the triangles of each.
+    pub(crate) fn new(circles: Vec<Circle>, mesh: Option<&Mesh>) -> Self {
+        let mut by_triangle = Vec::new();
+        if let Some(mesh) = mesh.filter(|_| !circles.is_empty()) {
+            by_triangle.resize(mesh.triangles.len(), SmallVec::new());
+            for (circle, cylinder) in circles.iter().zip(0..).filter(|(c, _)| c.radius_m > 0.0) {
+                for triangle in mesh.triangles_near(circle.center, circle.radius_m) {
+                    let spans = circle.spans_in(mesh, triangle);
+                    let arcs = spans.into_iter().map(|span| SurfaceArc { cylinder, span });
+                    by_triangle[triangle as usize].extend(arcs);
+                }
+            }
+        }
+        Self { circles, by_triangle }
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.circles.is_empty()
+    }
+
+    pub(crate) fn in_triangle(&self, triangle: u32) -> &[SurfaceArc] {
+        self.by_triangle.get(triangle as usize).map_or(&[], |arcs| arcs)
+    }
+
+    /// Whether a cylinder stands across the straight way between two points of a triangle.
+    pub(crate) fn hide_in(&self, triangle: u32, from: DVec2, to: DVec2) -> bool {
+        let mut circles = self.in_triangle(triangle).iter().map(|arc| arc.cylinder as usize);
+        circles.any(|at| self.circles[at].is_opaque && self.circles[at].meets(from, to))
+    }
+}
+
+impl Span {
+    /// What two spans have in common, in this one's turns.
+    pub(crate) fn common(&self, other: &Self) -> SmallVec<[Self; 2]> {
+        let turn = ((self.from_rad - other.from_rad) / TAU).floor();
+        [turn - 1.0, turn, turn + 1.0, turn + 2.0]
+            .into_iter()
+            .map(|turn| Self {
+                from_rad: self.from_rad.max(other.from_rad + turn * TAU),
+                to_rad: self.to_rad.min(other.to_rad + turn * TAU),
+            })
+            .filter(|common| common.to_rad - common.from_rad > LEAST_RAD)
+            .collect()
+    }
+}
+
+impl Circle {
+    /// The point of the surface at an angle around the centre.
+    pub(crate) fn point(&self, angle_rad: f64) -> DVec2 {
+        self.center + self.radius_m * DVec2::from_angle(angle_rad)
+    }
+
+    /// The square of the length of a tangent from a point.
+    pub(crate) fn power(&self, point: DVec2) -> f64 {
+        point.distance_squared(self.center) - self.radius_m * self.radius_m
+    }
+
+    fn spans_in(&self, mesh: &Mesh, triangle: u32) -> SmallVec<[Span; 1]> {
+        let mut cuts: SmallVec<[f64; 6]> = SmallVec::new();
+        for side in 0..3 {
+            let (a, b) = (mesh.corner(triangle, side), mesh.corner(triangle, (side + 1) % 3));
+            let along = (b - a).normalize();
+            let foot = (self.center - a).dot(along);
+            let height = along.perp_dot(self.center - a);
+            let half_chord = self.radius_m * self.radius_m - height * height;
+            if half_chord > 0.0 {
+                let ends = [foot - half_chord.sqrt(), foot + half_chord.sqrt()];
+                let on_side = ends.into_iter().filter(|end| (0.0..=a.distance(b)).contains(end));
+                cuts.extend(on_side.map(|end| (a + end * along - self.center).to_angle()));
+            }
+        }
+        cuts.sort_by(f64::total_cmp);
+        let Some(&first) = cuts.first() else {
+            let whole = mesh.holds(triangle, self.point(0.0));
+            return whole.then_some(Span { from_rad: -PI, to_rad: PI }).into_iter().collect();
+        };
+        let ends = cuts.iter().copied().skip(1).chain([first + TAU]);
+        cuts.iter()
+            .zip(ends)
+            .map(|(&from_rad, to_rad)| Span { from_rad, to_rad })
+            .filter(|span| mesh.holds(triangle, self.point(0.5 * (span.from_rad + span.to_rad))))
+            .collect()
+    }
+
+    /// Between which shares of the straight way from one point to another it is inside.
+    pub(crate) fn chord(&self, from: DVec2, to: DVec2) -> Option<[f64; 2]> {
+        let run = to - from;
+        let middle = (self.center - from).dot(run) / run.length_squared();
+        let offset_m = (from + middle * run).distance(self.center);
+        let half_m = (self.radius_m * self.radius_m - offset_m * offset_m).max(0.0).sqrt();
+        let half = half_m / run.length();
+        let ends = [(middle - half).max(0.0), (middle + half).min(1.0)];
+        (half_m > TIE_M && ends[0] < ends[1]).then_some(ends)
+    }
+
+    fn meets(&self, from: DVec2, to: DVec2) -> bool {
+        let run = to - from;
+        let nearest = ((self.center - from).dot(run) / run.length_squared()).clamp(0.0, 1.0);
+        (from + nearest * run).distance(self.center) < self.radius_m - TIE_M
+    }
+}

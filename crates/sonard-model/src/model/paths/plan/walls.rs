@@ -1,0 +1,31 @@
+//! Walls as mirrors.
+
+use crate::{
+    geometry::{DVec2, Mirror},
+    scene::Material,
+};
+
+/// A wall as the tracing of beams needs it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WallMirror {
+    pub(crate) mirror: Mirror,
+    /// [`Mirror::rotor`].
+    pub(crate) rotor: DVec2,
+    /// Amplitude of its mirror reflection; see [`mirror_gain`].
+    pub(crate) gain: f64,
+    /// The length of air that weakens as much, metres; 0 without absorption.
+    pub(crate) loss_m: f64,
+    /// Share of the energy that it scatters; see [`scattered`].
+    pub(crate) scatter: f64,
+}
+
+/// Amplitude of a material's mirror reflection: a rough surface scatters a share of the energy
+/// that it does not absorb.
+pub(crate) fn mirror_gain(material: &Material) -> f64 {
+    material.reflectance * (1.0 - material.roughness).sqrt()
+}
+
+/// Share of the energy that a material scatters.
+pub(crate) fn scattered(material: &Material) -> f64 {
+    material.reflectance.powi(2) * material.roughness
+}

@@ -1,0 +1,104 @@
+//! The part of the work that depends on the scene alone.
+
+use std::sync::Arc;
+
+use super::{
+    diffraction::EdgeToEdge,
+    height::Heights,
+    plan::{Circle, Corners, Cylinders, Mesh, Plan, WallMirror, mirror_gain, scattered},
+    settings::{Settings, usual_z_m},
+};
+use crate::{
+    geometry::{Arrangement, DVec2, Mirror, square_up},
+    scene::{Cylinder, Scene},
+};
+
+/// A scene made ready for enumerating echo paths.
+#[derive(Debug, Clone)]
+pub struct Paths {
+    pub(super) plan: Plan,
+    pub(super) heights: Arc<Heights>,
+    /// Empty without double diffraction.
+    pub(super) edge_to_edge: Arc<EdgeToEdge>,
+}
+
+impl Paths {
+    /// Prepares a scene.
+    #[must_use]
+    pub fn new(scene: &Scene, settings: Settings) -> Self {
+        let mut segments: Vec<_> = scene.walls.iter().map(|wall| (wall.a, wall.b)).collect();
+        square_up(&mut segments);
+        let usual = || usual_z_m(scene.floor_z_m, scene.ceiling_z_m);
+        let z_m = settings.sensor_z_m.unwrap_or_else(usual);
+        let heights = Heights::new(scene, &segments, z_m, &settings);
+        for (segment, wall) in segments.iter_mut().zip(&scene.walls) {
+            if !heights.is_there(wall.z_m) {
+                // A point: the others keep their numbers.
+                segment.1 = segment.0;
+            }
+        }
+        let plan = plan(scene, &segments, &heights, settings);
+        let has_double = plan.settings.double_diffraction;
+        let mesh = plan.mesh.as_ref().filter(|_| has_double);
+        let edge_to_edge = mesh.map(|mesh| EdgeToEdge::new(mesh, &plan.settings));
+        Self {
+            edge_to_edge: edge_to_edge.unwrap_or_default().into(),
+            heights: heights.into(),
+            plan,
+        }
+    }
+
+    /// The same for paths up to a length, metres, which is at most the one it was prepared for.
+    pub(super) fn within(&self, max_path_m: f64) -> Self {
+        Self { plan: self.plan.within(max_path_m), ..self.clone() }
+    }
+
+    /// The height of the transducer, metres; `None` in a scene without floor and ceiling.
+    #[must_use]
+    pub fn sensor_z_m(&self) -> Option<f64> {
+        self.heights.z_at(0.0)
+    }
+}
+
+/// The floor plan of a scene whose walls have these ends.
+fn plan(scene: &Scene, segments: &[(DVec2, DVec2)], heights: &Heights, settings: Settings) -> Plan {
+    let arrangement = Arrangement::of(segments);
+    let there = |cylinder: &&Cylinder| heights.is_there(cylinder.z_m);
+    let extra: Vec<_> = scene
+        .cylinders
+        .iter()
+        .filter(there)
+        .flat_map(|c| [c.center - c.radius_m, c.center + c.radius_m])
+        .collect();
+    // From outside the box no echo is short enough.
+    let margin_m = 0.5 * settings.max_path_m + 1.0;
+    let mesh = Mesh::new(&arrangement, heights.stacked(&arrangement), &extra, margin_m);
+    let gains: Vec<_> = scene.walls.iter().map(|wall| mirror_gain(&wall.material)).collect();
+    let wall = |number: usize| {
+        let ((a, b), gain) = (segments[number], gains[number]);
+        let mirror = Mirror::through(a, b);
+        WallMirror {
+            mirror,
+            rotor: mirror.rotor(),
+            gain,
+            loss_m: settings.same_loss_m(gain),
+            scatter: scattered(&scene.walls[number].material),
+        }
+    };
+    let circle = |c: &Cylinder| Circle {
+        center: c.center,
+        radius_m: if heights.is_there(c.z_m) { c.radius_m } else { 0.0 },
+        gain: mirror_gain(&c.material),
+        is_opaque: heights.is_opaque(c.z_m),
+    };
+    let circles = scene.cylinders.iter().map(circle).collect();
+    let corners = settings.edge_law.map(|law| Corners::new(&arrangement, segments, &gains, law));
+    Plan {
+        walls: (0..segments.len()).map(wall).collect(),
+        passable: heights.passable().into(),
+        corners: corners.unwrap_or_default().into(),
+        cylinders: Cylinders::new(circles, mesh.as_ref()).into(),
+        mesh: mesh.map(Arc::new),
+        settings,
+    }
+}

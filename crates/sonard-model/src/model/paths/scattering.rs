@@ -1,0 +1,211 @@
+//! What rough walls scatter.
+//!
+//! A wall of amplitude reflectance `R` and roughness `s` mirrors `(1 - s) R^2` of the energy that
+//! meets it and scatters `s R^2` after Lambert's law: into a solid angle `dW` at `b` from the normal
+//! goes the share `cos b / pi dW`, which over the half space is all of it. So energy is conserved,
+//! and with `s` towards 0 a mirror is left.
+//!
+//! A patch that fills the solid angle `W` around the ranger, at `b` from its normal, takes the share
+//! `W / (4 pi)` of a source and sends back to a receiver at `r` an intensity of `cos b / (pi r^2)`
+//! of that. Over what a head-on mirror at the same range gives, `1 / (4 pi (2 r)^2)` of the source,
+//! this is
+//!
+//! ```text
+//! 4 / pi  s R^2  cos b  W.
+//! ```
+//!
+//! In the plan a wall is a row of patches of an angle `da` each, as high as the beam: `W` is `da`
+//! times the integral of the two-way pattern's square over the rise
+//! ([`Settings::scatter_height_rad`]). Patches are small
+//! beside beam and pulse. Each is heard by itself, with a phase of its own; that the phases spread
+//! evenly, as those of a rough surface do, lets the powers of neighbours add.
+//!
+//! Followed are the paths that go back as they came, mirrors on the path included. What is scattered
+//! more than once is left out.
+
+use std::f64::consts::{PI, SQRT_2, TAU};
+
+use super::{
+    beams::{Leg, LitSpan},
+    echo::{Echo, Via},
+    plan::{Plan, WallMirror},
+    settings::Settings,
+};
+use crate::geometry::DVec2;
+
+/// Largest patch, radians: less than any sensor's beam.
+const PATCH_RAD: f64 = 0.03;
+
+/// Longest difference of range over a patch, metres: a third of a burst of 16 cycles.
+const PATCH_M: f64 = 0.02;
+
+/// Turns of phase from patch to patch: the golden section, whose multiples spread most evenly; and
+/// from wall to wall, and from one mirror on the way to the next, the roots of 2 and 3.
+const PHASE_TURNS: f64 = 0.618_033_988_749_895;
+const WALL_TURNS: f64 = SQRT_2;
+const ORDER_TURNS: f64 = 1.732_050_807_568_877;
+
+/// A patch that sound is scattered back from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Patch {
+    pub(super) wall: u32,
+    pub(super) leg: Leg,
+    /// Its middle.
+    pub(super) point: DVec2,
+}
+
+/// All scattered echoes of the parts of rough walls in sight, and their patches.
+pub(super) fn echoes(plan: &Plan, lit: &[LitSpan]) -> (Vec<Echo>, Vec<Patch>) {
+    let mut found = (Vec::new(), Vec::new());
+    for span in lit {
+        add(plan, span, &mut found);
+    }
+    found
+}
+
+/// Adds the patches of a lit part of a wall, one by one from its low end; the first and the last one are
+/// cut where the light ends.
+fn add(plan: &Plan, lit: &LitSpan, (echoes, patches): &mut (Vec<Echo>, Vec<Patch>)) {
+    let LitSpan { beam, wall, span_m: [low_m, high_m] } = *lit;
+    let (wall_mirror, settings) = (&plan.walls[wall as usize], &plan.settings);
+    let along = wall_mirror.mirror.normal.perp();
+    let height_m = wall_mirror.mirror.height_m(beam.image).abs();
+    let foot_m = along.dot(beam.image);
+    if height_m <= 0.0 {
+        return;
+    }
+    let rows = Row::new(height_m);
+    let angle = |place_m: f64| (place_m - foot_m).atan2(height_m);
+    let (from_rad, to_rad) = (angle(low_m), angle(high_m));
+    let (first, last) = (rows.place(from_rad).floor() as i32, rows.place(to_rad).ceil() as i32);
+    for patch in first..last {
+        let begins_rad = rows.angle_rad(patch.into());
+        let (low_rad, high_rad) =
+            (begins_rad.max(from_rad), rows.angle_rad((patch + 1).into()).min(to_rad));
+        let middle_rad = 0.5 * (low_rad + high_rad);
+        let place_m = foot_m + height_m * middle_rad.tan();
+        let point = wall_mirror.mirror.offset_m * wall_mirror.mirror.normal + place_m * along;
+        let run = point - beam.image;
+        let length_m = 2.0 * run.length();
+        let share = share(wall_mirror, middle_rad.cos(), (high_rad - low_rad).max(0.0), settings);
+        let amplitude = beam.gain * beam.gain * share.sqrt() * settings.air_gain(length_m);
+        if amplitude < settings.floor || length_m > settings.max_path_m {
+            continue;
+        }
+        let departure = beam.departure(run.normalize_or_zero());
+        let number = patches.len() as u32;
+        patches.push(Patch { wall, leg: (&beam.ray_to(point)).into(), point });
+        // The powers of two beams' parts of a patch add up if they are a quarter turn apart.
+        let turns = PHASE_TURNS * f64::from(patch)
+            + WALL_TURNS * f64::from(wall)
+            + ORDER_TURNS * f64::from(beam.order)
+            + if begins_rad < from_rad { 0.25 } else { 0.0 };
+        echoes.push(Echo {
+            length_m,
+            amplitude,
+            phase_rad: TAU * turns.rem_euclid(1.0) - PI,
+            departure,
+            arrival: departure,
+            rise_rad: [0.0; 2],
+            image: 0,
+            via: Via::Scatter { patch: number },
+        });
+    }
+}
+
+/// The patches of a wall, numbered from the foot of the perpendicular by angle, so that they look
+/// alike from the ranger, and farther out by range: where each one is does not depend on what of
+/// the wall is lit.
+struct Row {
+    height_m: f64,
+    /// Where the one goes over into the other.
+    turn_rad: f64,
+}
+
+impl Row {
+    fn new(height_m: f64) -> Self {
+        // There both patches are of a size: `h sin a / cos^2 a PATCH_RAD = PATCH_M`.
+        let q = PATCH_M / (PATCH_RAD * height_m);
+        Self { height_m, turn_rad: (2.0 * q / (1.0 + (1.0 + 4.0 * q * q).sqrt())).asin() }
+    }
+
+    /// The number of the patch at an angle from the normal, and how far through it.
+    fn place(&self, angle_rad: f64) -> f64 {
+        let inner = angle_rad.abs().min(self.turn_rad);
+        let outer_m = self.height_m / angle_rad.cos() - self.height_m / inner.cos();
+        (inner / PATCH_RAD + outer_m.max(0.0) / PATCH_M).copysign(angle_rad)
+    }
+
+    /// The other way round.
+    fn angle_rad(&self, place: f64) -> f64 {
+        let turn = self.turn_rad / PATCH_RAD;
+        let outer_m = (place.abs() - turn) * PATCH_M;
+        let angle_rad = if outer_m <= 0.0 {
+            place.abs() * PATCH_RAD
+        } else {
+            (self.height_m / (self.height_m / self.turn_rad.cos() + outer_m)).acos()
+        };
+        angle_rad.copysign(place)
+    }
+}
+
+/// Power from a patch over that of a head-on mirror.
+fn share(wall_mirror: &WallMirror, cosine: f64, angle_rad: f64, settings: &Settings) -> f64 {
+    4.0 / PI * wall_mirror.scatter * cosine * angle_rad * settings.scatter_height_rad
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        geometry::Mirror,
+        model::paths::plan::{mirror_gain, scattered},
+        scene::Material,
+    };
+
+    #[test]
+    fn patches_are_small_and_their_numbers_run_on() {
+        for height_m in [0.03, 0.4, 3.0, 9.0] {
+            let row = Row::new(height_m);
+            for patch in -40..40 {
+                let [low, high] = [patch, patch + 1].map(|end| row.angle_rad(f64::from(end)));
+                assert!(low < high && high - low < 1.0001 * PATCH_RAD, "{height_m} {patch}");
+                let range_m = |angle_rad: f64| height_m / angle_rad.cos();
+                assert!((range_m(high) - range_m(low)).abs() < 1.0001 * PATCH_M);
+                assert!((row.place(low) - f64::from(patch)).abs() < 1e-6, "{height_m} {patch}");
+            }
+        }
+    }
+
+    /// Mirrored and scattered energy together, the latter summed over the half space.
+    #[test]
+    fn a_rough_surface_keeps_its_energy() {
+        for (reflectance, roughness) in [(1.0, 0.3), (0.9, 1.0), (0.7, 0.0)] {
+            let material = Material { reflectance, roughness };
+            let mirrored = mirror_gain(&material).powi(2);
+            let steps = 100_000;
+            let lobe: f64 = (0..steps)
+                .map(|i| (f64::from(i) + 0.5) / f64::from(steps) * PI / 2.0)
+                .map(|b| b.cos() / PI * TAU * b.sin() * PI / 2.0 / f64::from(steps))
+                .sum();
+            let scattered = scattered(&material) * lobe;
+            assert!((mirrored + scattered - reflectance * reflectance).abs() < 1e-9);
+        }
+    }
+
+    /// The share of a patch, from the intensities of which it is the ratio.
+    #[test]
+    fn a_patch_follows_from_lamberts_law() {
+        let mirror = Mirror::through(DVec2::ZERO, DVec2::X);
+        let wall_mirror =
+            WallMirror { mirror, rotor: DVec2::X, gain: 0.8, loss_m: 0.0, scatter: 0.36 };
+        let settings = Settings { scatter_height_rad: 0.2, ..crate::model::paths::tests::LOSSLESS };
+        let (range_m, cosine, angle_rad): (f64, f64, f64) = (1.7, 0.6, 0.01);
+        let area = range_m * angle_rad / cosine * range_m * 0.2;
+        let meets = area * cosine / (4.0 * PI * range_m * range_m);
+        let returns = 0.36 * meets * cosine / PI / (range_m * range_m);
+        let mirror = 1.0 / (4.0 * PI * (2.0 * range_m).powi(2));
+        let found = share(&wall_mirror, cosine, angle_rad, &settings);
+        assert!((found / (returns / mirror) - 1.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,114 @@
+//! The echo paths of a place that the face can reflect.
+
+use std::f64::consts::FRAC_PI_2;
+
+use num_complex::Complex64;
+use smallvec::SmallVec;
+
+use super::{
+    bound::Best,
+    face_path::{DirectedPath, FacePath, MultipleEcho},
+    search::Search,
+};
+use crate::{
+    acoustics::{BeamPattern, Disc},
+    model::paths::{
+        direction_index::{DirectionIndex, Entry, wrap_once},
+        echo::Echo,
+        pattern::PatternEnvelope,
+        settings::Settings,
+        tolerance::SAME_RAD,
+    },
+};
+
+/// Multiple echoes are listed from this much above the weakest echo of the search, which lies 20 dB below
+/// the threshold: only those that can be detected. There are a great many of the others.
+pub(crate) const FLOOR_ABOVE: f64 = 10.0;
+
+/// Echo paths from the face to the face.
+pub(crate) struct FaceEchoes {
+    face: Disc,
+    paths: Vec<FacePath>,
+    /// By direction of departure.
+    departures: DirectionIndex,
+}
+
+impl FaceEchoes {
+    pub(crate) fn new(
+        face: Disc,
+        echoes: &[Echo],
+        envelope: &PatternEnvelope,
+        settings: &Settings,
+    ) -> Self {
+        let floor = FLOOR_ABOVE * settings.floor;
+        // A wall nearer than that is not one to see the disc's zones from.
+        let far = || {
+            let far = |(echo, _): &(&Echo, u32)| {
+                let is_level = echo.rise_rad == [0.0; 2];
+                echo.length_m > 2.0 * face.face.radius_m && is_level
+            };
+            echoes.iter().zip(0..).filter(far)
+        };
+        let best = Best::of(far().map(|(echo, _)| (echo.length_m, echo.amplitude)));
+        let mut paths = Vec::new();
+        let mut entries = Vec::new();
+        for (echo, index) in far() {
+            // What it can at most become, when the face looks into its departure.
+            let most = best.after(&face, echo.length_m, echo.amplitude);
+            let reach_rad = envelope.reach_rad(floor / most);
+            if most < floor || reach_rad == 0.0 {
+                continue;
+            }
+            let leaves_rad = echo.departure.to_angle();
+            entries.push(Entry {
+                middle_rad: leaves_rad,
+                half_rad: 0.0,
+                amplitude: echo.amplitude,
+                reach_rad,
+                echo: paths.len() as u32,
+            });
+            paths.push(FacePath {
+                path: DirectedPath { echo: index, reversed: false },
+                leaves_rad,
+                returns_rad: echo.arrival.to_angle(),
+                length_m: echo.length_m,
+                amplitude: echo.amplitude,
+                phase: Complex64::cis(echo.phase_rad),
+                own_reverse: echo.departure.distance(echo.arrival) < SAME_RAD,
+            });
+        }
+        Self { face, paths, departures: DirectionIndex::new(&entries) }
+    }
+
+    /// All multiple echoes with at least one reflection at the face, which looks into `direction_rad`.
+    pub(crate) fn multiple_echoes(
+        &self,
+        direction_rad: f64,
+        beam: &BeamPattern,
+        settings: &Settings,
+    ) -> Vec<MultipleEcho> {
+        let floor = FLOOR_ABOVE * settings.floor;
+        let mut near: SmallVec<[(&FacePath, f64); 16]> = SmallVec::new();
+        self.departures.near(direction_rad, |entry, _| {
+            let path = &self.paths[entry.echo as usize];
+            let leaves_rad = wrap_once(path.leaves_rad - direction_rad);
+            let returns_rad = wrap_once(path.returns_rad - direction_rad);
+            if returns_rad.abs() < FRAC_PI_2 {
+                near.push((path, entry.amplitude * beam.one_way(leaves_rad)));
+            }
+        });
+        // Each needs another that it can be followed by.
+        let best = Best::of(near.iter().map(|(out, leaving)| (out.length_m, *leaving)));
+        near.retain(|(out, leaving)| best.after(&self.face, out.length_m, *leaving) >= floor);
+        if near.is_empty() {
+            return Vec::new();
+        }
+        let turned = |&(path, leaving): &(&FacePath, f64)| {
+            let leaves_rad = wrap_once(path.leaves_rad - direction_rad);
+            let returns_rad = wrap_once(path.returns_rad - direction_rad);
+            (FacePath { leaves_rad, returns_rad, ..*path }, leaving)
+        };
+        let outs: SmallVec<[(FacePath, f64); 16]> = near.iter().map(turned).collect();
+        Search::new(self.face, &outs, floor, settings).run()
+    }
+}

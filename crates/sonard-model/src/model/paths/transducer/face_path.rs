@@ -1,0 +1,46 @@
+//! Echo paths as parts of multiple echoes.
+
+use num_complex::Complex64;
+use smallvec::SmallVec;
+
+use crate::acoustics::Sound;
+
+/// An echo path, run through in one of its directions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct DirectedPath {
+    pub(crate) echo: u32,
+    pub(crate) reversed: bool,
+}
+
+/// A sequence of paths, with a reflection at the face between each and the next.
+#[derive(Debug, Clone)]
+pub(crate) struct MultipleEcho {
+    pub(crate) paths: SmallVec<[DirectedPath; 4]>,
+    pub(crate) length_m: f64,
+    pub(crate) phase_rad: f64,
+    /// With the beam pattern.
+    pub(crate) amplitude: f64,
+}
+
+/// What an azimuth needs to know of a path.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FacePath {
+    pub(crate) path: DirectedPath,
+    /// World directions in which it leaves and comes back.
+    pub(crate) leaves_rad: f64,
+    pub(crate) returns_rad: f64,
+    pub(crate) length_m: f64,
+    /// Its strength and phase, apart.
+    pub(crate) amplitude: f64,
+    pub(crate) phase: Complex64,
+    /// Whether it is its own reverse.
+    pub(crate) own_reverse: bool,
+}
+
+impl MultipleEcho {
+    /// As the receiver notices it.
+    pub(crate) fn sound(&self, index: u32) -> Sound {
+        let &Self { length_m, amplitude, phase_rad, .. } = self;
+        Sound { length_m, amplitude, phase_rad, index }
+    }
+}
