@@ -1,16 +1,25 @@
 //! The layers that ARCHITECTURE.md states for the modules of each crate, held against the code: a module
-//! uses those below it, no other of its own layer, and none above.
+//! uses those below it, no other of its own layer, and none above. And files of a folder that use each other in
+//! a circle, of which there may be a few at a time.
 //!
 //! Between crates the compiler holds that; within one, `use` may go anywhere.
 
+#[path = "layers/sources.rs"]
+mod sources;
+
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs,
     path::{Path, PathBuf},
 };
 
+use sources::{Module, Sources};
+
 /// The heading of the table in ARCHITECTURE.md.
 const HEADING: &str = "### Layers within a crate";
+
+/// Files that may use each other in a circle, at most: a type, its parts and what makes it.
+const MOST_IN_A_CIRCLE: usize = 3;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -36,103 +45,82 @@ fn stated() -> Vec<(String, BTreeMap<String, usize>)> {
     .collect()
 }
 
-/// Rust files below a folder, without tests.
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).expect("a source folder") {
-        let path = entry.expect("an entry").path();
-        let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-        if stem == "tests" || stem == "fixtures" {
-            continue;
-        }
-        if path.is_dir() {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
-            found.push(path);
-        }
-    }
-}
-
-/// The code of a file: without comments, and without what is compiled for tests only.
-fn code(text: &str) -> String {
-    let lines = text.lines().take_while(|line| line.trim() != "mod tests {");
-    lines.filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n")
-}
-
-/// The first names of all paths that begin with `crate::`, also in groups.
-fn used(code: &str) -> Vec<String> {
-    let mut names = Vec::new();
-    for (at, _) in code.match_indices("crate::") {
-        let rest = &code[at + "crate::".len()..];
-        match rest.strip_prefix('{') {
-            Some(group) => names.extend(first_names(group)),
-            None => names.extend(name(rest)),
-        }
-    }
-    names
-}
-
-fn name(text: &str) -> Option<String> {
-    let name: String = text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-    (!name.is_empty()).then_some(name)
-}
-
-/// The first name of each item of a `use` group, up to its closing brace.
-fn first_names(group: &str) -> Vec<String> {
-    let (mut depth, mut item, mut names) = (0, String::new(), Vec::new());
-    for c in group.chars() {
-        match c {
-            '}' if depth == 0 => break,
-            ',' if depth == 0 => names.extend(name(std::mem::take(&mut item).trim())),
-            '{' => depth += 1,
-            '}' => depth -= 1,
-            c if depth == 0 => item.push(c),
-            _ => {}
-        }
-    }
-    names.extend(name(item.trim()));
-    names
+/// A folder of the table as the crate it is in and the module that it is there.
+fn module(folder: &str) -> (PathBuf, Module) {
+    let (source, inner) = match folder.split_once("src/") {
+        Some((before, inner)) => (format!("{before}src"), inner),
+        None => (folder.to_owned(), ""),
+    };
+    (
+        root().join(source),
+        inner.split('/').filter(|name| !name.is_empty()).map(str::to_owned).collect(),
+    )
 }
 
 #[test]
 fn modules_use_only_what_is_below_them() {
     let stated = stated();
-    assert!(stated.len() >= 3, "the table of layers was not read: {stated:?}");
-    let mut faults = Vec::new();
+    assert!(stated.len() >= 4, "the table of layers was not read: {stated:?}");
+    let mut faults = BTreeSet::new();
     for (folder, layer_of) in stated {
-        let source = root().join(&folder);
-        let mut files = Vec::new();
-        sources(&source, &mut files);
-        for file in files {
-            let inner = file.strip_prefix(&source).expect("below it");
-            let first = inner.components().next().expect("a name").as_os_str().to_string_lossy();
-            let module = first.trim_end_matches(".rs");
-            if ["lib", "main"].contains(&module) {
-                continue;
-            }
-            let Some(layer) = layer_of.get(module) else {
-                faults.push(format!("{folder}: module {module} has no layer in ARCHITECTURE.md"));
+        let (source, within) = module(&folder);
+        let sources = Sources::read(&source);
+        let name = |module: &Module| module.strip_prefix(within.as_slice())?.first().cloned();
+        for (file, used) in sources.uses() {
+            let Some(module) = name(file).filter(|module| module != "main") else { continue };
+            let Some(layer) = layer_of.get(&module) else {
+                faults.insert(format!("{folder}: module {module} has no layer in ARCHITECTURE.md"));
                 continue;
             };
-            let text = fs::read_to_string(&file).expect("a source file");
-            for other in used(&code(&text)) {
-                let Some(below) = layer_of.get(&other) else { continue };
-                if other != module && below >= layer {
-                    let file = inner.display();
-                    faults.push(format!(
-                        "{folder}/{file}: {module} uses {other}, which is not below it"
-                    ));
+            for other in used.iter().filter_map(name).filter(|other| *other != module) {
+                if layer_of.get(&other).is_some_and(|below| below >= layer) {
+                    let file = file.join("::");
+                    faults.insert(format!("{file} uses {other}, which is not below {module}"));
                 }
             }
         }
     }
-    faults.sort();
-    faults.dedup();
-    assert!(faults.is_empty(), "{}", faults.join("\n"));
+    assert!(faults.is_empty(), "{}", faults.into_iter().collect::<Vec<_>>().join("\n"));
 }
 
 #[test]
-fn groups_and_comments_are_read_as_the_compiler_does() {
-    let text = "use crate::{\n    geometry::{DVec2, Pose},\n    scene::Scene,\n};\n\
-                // crate::model\nfn f() { crate::plan::g(); }\nmod tests {\n use crate::array;\n";
-    assert_eq!(used(&code(text)), ["geometry", "scene", "plan"]);
+fn no_large_circle_of_files() {
+    let stated = stated();
+    let pure = stated.iter().filter(|(folder, _)| folder.starts_with("crates/"));
+    let crates: BTreeSet<_> = pure.map(|(folder, _)| module(folder).0).collect();
+    let large: Vec<_> = crates
+        .iter()
+        .flat_map(|source| Sources::read(source).circles())
+        .filter(|circle| circle.len() > MOST_IN_A_CIRCLE)
+        .collect();
+    assert!(large.is_empty(), "files that use each other in a circle: {large:#?}");
+}
+
+#[test]
+fn uses_are_read_as_the_compiler_does() {
+    let files = [
+        ("", "mod a;\npub mod b;\n"),
+        (
+            "a",
+            "mod deep;\npub use deep::Deep;\nuse crate::b::{self, Thing as Other};\n// use crate::c;\n",
+        ),
+        ("a::deep", "use super::super::b;\nuse crate::{c::{One, Two}, a};\npub struct Deep;\n"),
+        ("b", "use crate::a::Deep;\nfn f() { crate::c::g(); }\nmod tests {\n use crate::a;\n}\n"),
+        ("c", "use std::fs;\n"),
+    ];
+    let sources = Sources::of(files.map(|(module, code)| (path(module), code.to_owned())));
+    let uses: Vec<_> = sources
+        .uses()
+        .map(|(file, used)| {
+            let used: Vec<_> = used.iter().map(|module| module.join("::")).collect();
+            format!("{}: {}", file.join("::"), used.join(", "))
+        })
+        .collect();
+    assert_eq!(uses, [": ", "a: b", "a::deep: a, b, c", "b: a::deep, c", "c: "]);
+    let circles = sources.circles();
+    assert_eq!(circles, [vec!["a".to_owned(), "a::deep".to_owned(), "b".to_owned()]]);
+}
+
+fn path(module: &str) -> Module {
+    module.split("::").filter(|name| !name.is_empty()).map(str::to_owned).collect()
 }
