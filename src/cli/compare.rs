@@ -1,6 +1,5 @@
 //! `sonard compare`.
 
-mod predict;
 mod table;
 
 use std::{
@@ -12,13 +11,13 @@ use std::{
 
 use serde::Serialize;
 
-use super::{Failure, Outcome, logs::for_each_scan, scene_file};
+use super::{
+    Failure, Outcome, logs::for_each_scan, predictor::Predictor, scene_file, what_if::WhatIfArgs,
+};
 use crate::{
     compare::{Comparer, Comparison},
     scan::{Provenance, ScanView},
-    scene::Scene,
 };
-use predict::Predictor;
 use table::Worst;
 
 pub(super) use table::{RULED, path_text};
@@ -35,6 +34,8 @@ pub(super) struct Args {
     /// prediction beside them get one in the scene of the log, if the log holds it
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
+    #[command(flatten)]
+    what_if: WhatIfArgs,
     /// How many of the beams that fit worst to list
     #[arg(long, default_value_t = 5)]
     worst: usize,
@@ -56,8 +57,10 @@ holds no record, or the scene is wrong.";
 pub(super) fn run(args: &Args) -> Outcome {
     let scene = args.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
     let mut all = Comparer::default();
+    let what_if = args.what_if.load()?;
     for log in &args.logs {
-        compare_log(args, log, scene.as_ref(), &mut all)?;
+        let predictor = Predictor::new(log, scene.as_ref(), &what_if);
+        compare_log(args, log, predictor, &mut all)?;
     }
     let (logs, all) = (args.logs.len(), all.finish());
     if logs < 2 {
@@ -73,9 +76,13 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 /// Compares one log, and takes its scans into the comparison of all.
-fn compare_log(args: &Args, log: &Path, scene: Option<&Arc<Scene>>, all: &mut Comparer) -> Outcome {
+fn compare_log(
+    args: &Args,
+    log: &Path,
+    mut predictor: Predictor<'_>,
+    all: &mut Comparer,
+) -> Outcome {
     let (mut comparer, mut worst) = (Comparer::default(), Worst::new(args.worst));
-    let mut predictor = Predictor::new(log, scene);
     let mut all_simulated = true;
     for_each_scan(log, |mut scan| {
         predictor.predict(&mut scan)?;

@@ -2,6 +2,7 @@
 
 mod annotate;
 mod repair;
+pub(super) mod rewrite;
 mod show;
 mod verify;
 

@@ -12,6 +12,7 @@ mod explore;
 mod explore_benchmark;
 mod failure;
 mod generate;
+mod import;
 mod interpret;
 mod interpret_benchmark;
 mod lines;
@@ -29,6 +30,8 @@ mod paths;
 mod picture;
 mod place;
 mod plot;
+mod predict;
+mod predictor;
 mod preset;
 mod progress;
 mod run;
@@ -41,6 +44,7 @@ mod status;
 mod sweeps;
 mod trace;
 mod watch;
+mod what_if;
 
 pub use failure::{Failure, Outcome};
 
@@ -93,6 +97,12 @@ enum Verb {
     /// Show the echo trace of one firing, each hump with its path
     #[command(long_about = trace::ABOUT)]
     Trace(trace::Args),
+    /// Make a log of readings from elsewhere: tables, JSON, logs of CARMEN and Player
+    #[command(long_about = import::ABOUT)]
+    Import(Box<import::Args>),
+    /// Write a log again with the model's predictions beside its readings
+    #[command(long_about = predict::ABOUT)]
+    Predict(Box<predict::Args>),
     /// Compare a log's readings with the predictions beside them
     Compare(compare::Args),
     /// Tell planes, corners and edges apart in scans
@@ -176,6 +186,8 @@ pub fn main() -> ExitCode {
         Verb::Doctor(args) => doctor::run(&args),
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Paths(args) => paths::run(&args),
+        Verb::Import(args) => import::run(&args),
+        Verb::Predict(args) => predict::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Interpret(args) => interpret::run(&args),
         Verb::InterpretBenchmark(args) => interpret_benchmark::run(&args),

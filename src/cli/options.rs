@@ -33,6 +33,12 @@ pub(super) struct SensorArgs {
     /// How far the transducer's axis points up, degrees [default: the sensor's]
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     tilt_deg: Option<f64>,
+    /// How far the transducer's face is ahead of the rotation axis, metres [default: the sensor's]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    ahead_m: Option<f64>,
+    /// The same to the left [default: the sensor's]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    left_m: Option<f64>,
 }
 
 /// The air between ranger and walls.
@@ -164,8 +170,13 @@ impl SensorArgs {
         let mounting = &mut sensor.mounting;
         mounting.z_m = self.sensor_z.or(mounting.z_m);
         mounting.tilt_deg = self.tilt_deg.unwrap_or(mounting.tilt_deg);
+        mounting.ahead_m = self.ahead_m.unwrap_or(mounting.ahead_m);
+        mounting.left_m = self.left_m.unwrap_or(mounting.left_m);
         sensor.check().map_err(|error| {
-            Failure::input(error, "give --sensor-z in metres and --tilt-deg from -90 to 90")
+            Failure::input(
+                error,
+                "give --sensor-z, --ahead-m and --left-m in metres and --tilt-deg from -90 to 90",
+            )
         })?;
         Ok(sensor)
     }

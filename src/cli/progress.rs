@@ -33,7 +33,7 @@ fn later(bar: ProgressBar) -> ProgressBar {
 }
 
 /// A reader of a log that shows how much of it has been read.
-pub(super) fn reading(log: &Path, reader: impl BufRead) -> impl BufRead {
+pub(super) fn reading<R: BufRead>(log: &Path, reader: R) -> impl BufRead + use<R> {
     let bytes = fs::metadata(log).map_or(0, |file| file.len());
     let bar = match bytes >= LONG_LOG_BYTES {
         true => styled(bytes, "{bar:40} {bytes}/{total_bytes} read, {eta} left"),

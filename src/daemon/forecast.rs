@@ -79,6 +79,7 @@ impl Forecast {
             scene_text: settings.scene.as_ref().map(|scene| Arc::clone(&scene.text)),
             model: self.model.clone(),
             collection: None,
+            imported: None,
         }
     }
 }

@@ -57,6 +57,8 @@ pub struct Checker {
     session: bool,
     /// The array of the session in force.
     array: Option<RangerArray>,
+    /// Whether its readings were imported, with directions that no plan may have.
+    imported: bool,
     scan: Option<OpenScan>,
     scans: HashSet<Uuid>,
     latest: Option<Timestamp>,
@@ -123,6 +125,7 @@ impl Checker {
         self.leave_scan("when another session begins");
         self.session = true;
         self.array.clone_from(&session.array);
+        self.imported = session.imported.is_some();
         if session.format > LOG_FORMAT {
             let format = session.format;
             let detail = format!("format {format}, and this program reads up to {LOG_FORMAT}");
@@ -222,7 +225,7 @@ impl Checker {
             return self.mounted(ping, id);
         }
         let planned_deg = plan.azimuth_deg(index / plan.pings_per_stop);
-        let off = is_off(ping.azimuth_deg, planned_deg);
+        let off = !self.imported && is_off(ping.azimuth_deg, planned_deg);
         if off && ping.status != PingStatus::StepDoubtful {
             let is_deg = ping.azimuth_deg;
             let detail =

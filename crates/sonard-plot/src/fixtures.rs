@@ -140,6 +140,7 @@ pub(super) fn session() -> Session {
         scene_text: None,
         model: Some(ModelRecord { engine: "fan".into(), settings: serde_json::Map::new() }),
         collection: None,
+        imported: None,
     }
 }
 

@@ -80,6 +80,23 @@ pub struct Session {
     /// The collection that its scans were taken for, if it was one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub collection: Option<Box<CollectionRef>>,
+    /// The file that its readings were imported from, if they were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub imported: Option<Box<ImportRef>>,
+}
+
+/// What readings were imported from, and how.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ImportRef {
+    /// The file's name.
+    pub file: String,
+    /// SHA-256 of the file's bytes, hexadecimal.
+    pub sha256: String,
+    /// What its columns were taken to mean, as it would be given again.
+    pub mapping: serde_json::Map<String, serde_json::Value>,
+    /// Whether the poses of its scans come from the file or from whoever imported it; else they are not known, and
+    /// stand at the origin.
+    pub poses_known: bool,
 }
 
 /// What a scan was taken for, and what was noted about it.

@@ -72,6 +72,7 @@ impl Session {
             scene_text: Some(Arc::clone(&scene.text)).filter(|text| !text.is_empty()),
             model: Some(simulator.options().into()),
             collection: None,
+            imported: None,
         }
     }
 }

@@ -1,28 +1,26 @@
 //! `sonard log annotate`.
 
 use std::{
-    cell::RefCell,
-    collections::{HashMap, VecDeque},
-    io::{self, Write},
+    collections::HashMap,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
-use uuid::Uuid;
-
 use super::super::{
-    logs::for_each_scan_of,
     map::{EXTEND_M, MAX_RANGE_M},
-    output::{OutPath, Overwrite, Product, Stream},
+    output::{OutPath, Overwrite},
 };
-use super::{Failure, Outcome};
+use super::{
+    Failure, Outcome,
+    rewrite::{Waiting, rewrite},
+};
 use crate::{
     geometry::wrap_360,
     interpret::{
         Extents, Sweep,
         prediction::{FeaturePrediction, PredictionSettings},
     },
-    scan::{Ping, PingStatus, Record, ScanView, Session, encode_line},
+    scan::{Ping, PingStatus, ScanView, Session},
 };
 
 /// Options of `sonard log annotate`.
@@ -65,21 +63,21 @@ pub(super) fn run(args: &Args) -> Outcome {
         let help = "give a length in metres, greater than 0";
         return Err(Failure::input(format!("--max-range is {range_m}"), help));
     }
-    let out = match &args.out {
-        Some(out) => args.overwrite.begin(out, Product::Log)?,
-        None => Stream::standard(),
-    };
-    let waiting = RefCell::new(VecDeque::new());
-    let mut annotated = Annotated { args, waiting: &waiting, out, ready: HashMap::new() };
     let (mut predictor, mut any) = (Predictor { args, of_session: None }, false);
-    for_each_scan_of(
+    let waiting = Waiting::default();
+    let to = (args.out.as_ref(), args.overwrite);
+    let written = rewrite(
         &args.log,
-        |record| waiting.borrow_mut().push_back(record.clone()),
+        to,
+        &waiting,
+        |_| {},
         |scan| {
             let found = predictor.confidences(&scan)?;
             any |= !found.is_empty();
-            annotated.ready.insert(scan.scan, found);
-            annotated.write_ready()
+            Ok(Box::new(move |ping: &mut Ping| {
+                let found = found.get(&stop(ping.azimuth_deg)).copied();
+                ping.confidence = found.filter(|_| is_weighed(ping));
+            }))
         },
     )?;
     if !any {
@@ -88,70 +86,11 @@ pub(super) fn run(args: &Args) -> Outcome {
             "give a log as `sonard scan` or `sonard simulate` writes it",
         ));
     }
-    annotated.finish()
+    written.finish()
 }
 
 /// Confidences of a scan's stops, by azimuth in millionths of a degree: readings of one stop have one.
 type Confidences = HashMap<i64, f64>;
-
-/// Records on their way out, in the order of the log: at most those from the oldest scan on that has not ended.
-struct Annotated<'a> {
-    args: &'a Args,
-    /// Read and not written.
-    waiting: &'a RefCell<VecDeque<Record>>,
-    /// Scans that have ended and whose end is not written.
-    ready: HashMap<Uuid, Confidences>,
-    out: Stream,
-}
-
-impl Annotated<'_> {
-    /// Writes up to the first reading whose scan has not ended.
-    fn write_ready(&mut self) -> Outcome {
-        while let Some(record) = self.next_ready() {
-            self.write(record)?;
-        }
-        Ok(())
-    }
-
-    fn next_ready(&self) -> Option<Record> {
-        let mut waiting = self.waiting.borrow_mut();
-        let is_ready = match waiting.front()? {
-            Record::Ping(ping) => self.ready.contains_key(&ping.scan),
-            _ => true,
-        };
-        if is_ready { waiting.pop_front() } else { None }
-    }
-
-    fn write(&mut self, mut record: Record) -> Outcome {
-        match &mut record {
-            Record::Ping(ping) => {
-                let of_scan = self.ready.get(&ping.scan);
-                let found = of_scan.and_then(|found| found.get(&stop(ping.azimuth_deg)));
-                ping.confidence = found.copied().filter(|_| is_weighed(ping));
-            }
-            Record::ScanEnd(end) => drop(self.ready.remove(&end.scan)),
-            _ => {}
-        }
-        let mut line = Vec::new();
-        encode_line(&record, &mut line)
-            .map_err(|error| Failure::input(error, "correct the record in the log"))?;
-        self.out.write_all(&line).or_else(|error| self.failed(&error))
-    }
-
-    fn finish(mut self) -> Outcome {
-        let left: Vec<_> = self.waiting.borrow_mut().drain(..).collect();
-        left.into_iter().try_for_each(|record| self.write(record))?;
-        self.out.finish().or_else(|error| self.failed(&error))
-    }
-
-    fn failed(&self, error: &io::Error) -> Outcome {
-        let name = self.args.out.as_deref().map(Path::display);
-        match name {
-            Some(path) => Failure::from_write(&path.to_string(), error),
-            None => Failure::from_write("standard output", error),
-        }
-    }
-}
 
 /// Feature Prediction through the scans of a session; each session begins with nothing predicted.
 struct Predictor<'a> {

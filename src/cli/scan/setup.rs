@@ -151,6 +151,7 @@ impl Setup {
             scene_text: Some(Arc::clone(&self.scene.text)),
             model: Some(ModelRecord::from(self.simulator.options())),
             collection: None,
+            imported: None,
         }
     }
 }

@@ -1,11 +1,11 @@
-//! Predictions computed again, for a scene given.
+//! Predictions computed again: in a scene given, or for a pose, a sensor or air that the log does not say.
 
 use std::{path::Path, sync::Arc};
 
 use crate::{
     acoustics::Air,
     array::{ArrayPoseError, RangerArray},
-    cli::Failure,
+    cli::{Failure, scene_file, what_if::WhatIf},
     geometry::Pose,
     model::{ArrayModel, EngineKind, ModelError, Options, Simulator},
     scan::{Ping, Provenance, ScanView, Session, SimRecord},
@@ -19,6 +19,9 @@ pub(super) struct Predictor<'a> {
     log: &'a Path,
     /// The scene to predict in, in place of what the log has.
     given: Option<&'a Arc<Scene>>,
+    what_if: &'a WhatIf,
+    /// The session of the scan before, and what it would be.
+    supposed: Option<(Arc<Session>, Arc<Session>)>,
     /// The scene of the session of the scan before.
     logged: Option<(Arc<Session>, Option<Arc<Scene>>)>,
     /// An array's scans are many and short, and a session's share their model.
@@ -27,8 +30,12 @@ pub(super) struct Predictor<'a> {
 
 impl<'a> Predictor<'a> {
     /// For the scans of a log.
-    pub(super) const fn new(log: &'a Path, given: Option<&'a Arc<Scene>>) -> Self {
-        Self { log, given, logged: None, made: None }
+    pub(super) const fn new(
+        log: &'a Path,
+        given: Option<&'a Arc<Scene>>,
+        what_if: &'a WhatIf,
+    ) -> Self {
+        Self { log, given, what_if, supposed: None, logged: None, made: None }
     }
 
     /// Predicts a scan again in the scene given; without one, in the log's own scene what has no
@@ -38,6 +45,7 @@ impl<'a> Predictor<'a> {
     /// When the ranger can't stand in the scene where it stood, or the session's figures make no
     /// sense.
     pub(super) fn predict(&mut self, scan: &mut ScanView) -> Result<(), Failure> {
+        self.suppose(scan);
         let (Some(pose), Some(session)) = (scan.pose(), scan.session.clone()) else {
             if self.given.is_some() {
                 let (log, id) = (self.log.display(), scan.scan);
@@ -48,7 +56,7 @@ impl<'a> Predictor<'a> {
         };
         let scene = match self.given {
             Some(scene) => Some(Arc::clone(scene)),
-            None => self.own_scene(scan, &session),
+            None => self.own_scene(scan, &session)?,
         };
         let Some(scene) = scene else { return Ok(()) };
         forget(scan);
@@ -64,21 +72,53 @@ impl<'a> Predictor<'a> {
         Ok(())
     }
 
-    /// The scene that the log holds, for measured scans without predictions. A simulated scan beside
-    /// itself would say nothing.
-    fn own_scene(&mut self, scan: &ScanView, session: &Arc<Session>) -> Option<Arc<Scene>> {
-        let measured = session.provenance != Provenance::Simulated && session.model.is_some();
-        if !measured || scan.pings.iter().any(|ping| ping.sim.is_some()) {
-            return None;
+    /// Takes the scan for what it is supposed to be.
+    fn suppose(&mut self, scan: &mut ScanView) {
+        if self.what_if.is_nothing() {
+            return;
         }
-        match &self.logged {
-            Some((of, scene)) if Arc::ptr_eq(of, session) => scene.clone(),
-            _ => {
-                let scene = logged_scene(session, self.log).ok().flatten().map(Arc::new);
-                self.logged = Some((Arc::clone(session), scene.clone()));
-                scene
+        if let Some(session) = &scan.session {
+            let known = self.supposed.take().filter(|(of, _)| Arc::ptr_eq(of, session));
+            let (_, supposed) = self.supposed.insert(known.unwrap_or_else(|| {
+                let mut supposed = Session::clone(session);
+                self.what_if.change_session(&mut supposed);
+                (Arc::clone(session), Arc::new(supposed))
+            }));
+            for ping in &mut scan.pings {
+                self.what_if.change_ping(ping, supposed);
             }
+            scan.session = Some(Arc::clone(supposed));
         }
+        if let Some(start) = &mut scan.start {
+            self.what_if.change_start(start);
+        }
+    }
+
+    /// The scene that the log holds, for measured scans without predictions, and for all where something else is
+    /// supposed. A simulated scan beside itself would say nothing.
+    fn own_scene(
+        &mut self,
+        scan: &ScanView,
+        session: &Arc<Session>,
+    ) -> Result<Option<Arc<Scene>>, Failure> {
+        let has_model = session.model.is_some() || session.provenance == Provenance::Imported;
+        let measured = session.provenance != Provenance::Simulated && has_model;
+        let is_left_alone = !measured || scan.pings.iter().any(|ping| ping.sim.is_some());
+        if is_left_alone && self.what_if.is_nothing() {
+            return Ok(None);
+        }
+        if let Some((of, scene)) = &self.logged
+            && Arc::ptr_eq(of, session)
+        {
+            return Ok(scene.clone());
+        }
+        let scene = match self.what_if.is_nothing() {
+            true => logged_scene(session, self.log).ok().flatten(),
+            false => scene_file::of_session(self.log, session)?,
+        };
+        let scene = scene.map(Arc::new);
+        self.logged = Some((Arc::clone(session), scene.clone()));
+        Ok(scene)
     }
 }
 

@@ -1,0 +1,186 @@
+//! What a column may hold: a quantity in a unit, by one name.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize, de};
+
+use crate::ImportError;
+
+/// What is measured or stated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Quantity {
+    /// Direction of the beam from the robot's heading.
+    Azimuth,
+    /// Direction of the beam in the world.
+    Bearing,
+    /// Half the path of the first echo.
+    Range,
+    /// Time from firing to the first echo.
+    Tof,
+    /// When it was fired.
+    Time,
+    /// What tells scans apart: any text.
+    Scan,
+    /// Where the robot stood.
+    X,
+    /// The same.
+    Y,
+    /// Where it looked to.
+    Heading,
+    /// Of the air.
+    Temperature,
+    /// What became of the firing, in the words of the log.
+    Status,
+}
+
+impl Quantity {
+    /// In words.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Azimuth => "azimuth",
+            Self::Bearing => "bearing",
+            Self::Range => "range",
+            Self::Tof => "time of flight",
+            Self::Time => "time",
+            Self::Scan => "scan",
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Heading => "heading",
+            Self::Temperature => "temperature",
+            Self::Status => "status",
+        }
+    }
+}
+
+const DEG: f64 = 180.0 / std::f64::consts::PI;
+
+/// Names of fields, the quantity, and what turns a number into degrees, metres, microseconds, seconds or
+/// degrees Celsius; without such a factor they are text.
+const FIELDS: [(&str, Quantity, Option<f64>); 31] = [
+    ("azimuth_deg", Quantity::Azimuth, Some(1.0)),
+    ("azimuth_rad", Quantity::Azimuth, Some(DEG)),
+    ("bearing_deg", Quantity::Bearing, Some(1.0)),
+    ("bearing_rad", Quantity::Bearing, Some(DEG)),
+    ("range_m", Quantity::Range, Some(1.0)),
+    ("range_cm", Quantity::Range, Some(0.01)),
+    ("range_mm", Quantity::Range, Some(0.001)),
+    ("range_in", Quantity::Range, Some(0.0254)),
+    ("range_ft", Quantity::Range, Some(0.3048)),
+    ("tof_us", Quantity::Tof, Some(1.0)),
+    ("tof_ms", Quantity::Tof, Some(1e3)),
+    ("tof_s", Quantity::Tof, Some(1e6)),
+    ("time", Quantity::Time, None),
+    ("time_s", Quantity::Time, Some(1.0)),
+    ("time_ms", Quantity::Time, Some(1e-3)),
+    ("time_us", Quantity::Time, Some(1e-6)),
+    ("time_ns", Quantity::Time, Some(1e-9)),
+    ("scan", Quantity::Scan, None),
+    ("x_m", Quantity::X, Some(1.0)),
+    ("x_cm", Quantity::X, Some(0.01)),
+    ("x_mm", Quantity::X, Some(0.001)),
+    ("y_m", Quantity::Y, Some(1.0)),
+    ("y_cm", Quantity::Y, Some(0.01)),
+    ("y_mm", Quantity::Y, Some(0.001)),
+    ("heading_deg", Quantity::Heading, Some(1.0)),
+    ("heading_rad", Quantity::Heading, Some(DEG)),
+    ("temperature_c", Quantity::Temperature, Some(1.0)),
+    ("temperature_k", Quantity::Temperature, Some(1.0)),
+    ("status", Quantity::Status, None),
+    ("azimuth_grad", Quantity::Azimuth, Some(0.9)),
+    ("bearing_grad", Quantity::Bearing, Some(0.9)),
+];
+
+/// A quantity in a unit, such as `range_cm`.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Field(usize);
+
+impl Field {
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..FIELDS.len()).map(Self)
+    }
+
+    /// By its name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        FIELDS.iter().position(|(known, ..)| *known == name).map(Self)
+    }
+
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        FIELDS[self.0].0
+    }
+
+    /// What it is a field of.
+    #[must_use]
+    pub const fn quantity(self) -> Quantity {
+        FIELDS[self.0].1
+    }
+
+    /// The number in degrees, metres, microseconds, seconds or degrees Celsius.
+    pub(crate) fn scaled(self, number: f64) -> f64 {
+        if self.name() == "temperature_k" {
+            return number - 273.15;
+        }
+        number * FIELDS[self.0].2.unwrap_or(1.0)
+    }
+
+    /// Whether it is counted in radians.
+    pub(crate) fn is_radians(self) -> bool {
+        self.name().ends_with("_rad")
+    }
+}
+
+impl fmt::Debug for Field {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl fmt::Display for Field {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl std::str::FromStr for Field {
+    type Err = ImportError;
+
+    fn from_str(name: &str) -> Result<Self, ImportError> {
+        Self::named(name).ok_or_else(|| {
+            let known: Vec<_> = Self::all().map(Self::name).collect();
+            ImportError::mapping(
+                format!("there is no field `{name}`"),
+                format!("the fields are {}", known.join(", ")),
+            )
+        })
+    }
+}
+
+impl Serialize for Field {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for Field {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        name.parse()
+            .map_err(|error: ImportError| de::Error::custom(format!("{error}; {}", error.help())))
+    }
+}
+
+impl JsonSchema for Field {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Field".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let names: Vec<_> = Self::all().map(Self::name).collect();
+        schemars::json_schema!({ "type": "string", "enum": names })
+    }
+}

@@ -1,0 +1,29 @@
+//! Readings of ultrasonic rangers from elsewhere, as records of a log: from tables (CSV and its kin), from
+//! numbers in JSON, and from the logs of CARMEN and Player.
+//!
+//! A [`Mapping`] says what the columns mean; [`Source`] finds out how a file is written, reads it twice (once to
+//! find what speaks against the mapping, once to make records) and holds no more of it than a scan.
+
+mod carmen;
+mod doubt;
+mod error;
+mod field;
+mod guess;
+mod json;
+mod mapping;
+mod player;
+mod reading;
+mod rounds;
+mod scans;
+mod source;
+mod table;
+#[cfg(test)]
+mod tests;
+
+pub use error::{ImportError, Place};
+pub use field::{Field, Quantity};
+pub use mapping::{Column, Format, Mapping};
+pub use reading::Reading;
+pub use source::{Imported, Source, Taken};
+
+use reading::Row;

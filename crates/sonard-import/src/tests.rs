@@ -1,0 +1,64 @@
+//! Files as people have them.
+
+mod messages;
+mod tables;
+
+use std::io::{self, Cursor, Read};
+
+use jiff::Timestamp;
+use sonard_model::{acoustics::Air, geometry::Pose};
+use sonard_records::{Ping, Record, ScanStart};
+
+use crate::{ImportError, Imported, Mapping, Source, Taken};
+
+/// What is taken for true of a file that says nothing else.
+fn taken() -> Taken {
+    Taken {
+        sha256: String::new(),
+        pose: Pose { x_m: 1.0, y_m: 2.0, heading_deg: 30.0 },
+        array: None,
+        sensor: "hc-sr04".to_owned(),
+        longest_m: 4.0,
+        air: Air::default(),
+        started: Timestamp::UNIX_EPOCH,
+        as_said: false,
+    }
+}
+
+fn examine(text: &[u8], mapping: Mapping, taken: Taken) -> Result<Imported, ImportError> {
+    let open = || -> io::Result<Box<dyn Read>> { Ok(Box::new(Cursor::new(text.to_vec()))) };
+    Source { open: &open }.examine(mapping, taken)
+}
+
+/// Every record of a file.
+fn import(text: &str, mapping: Mapping) -> Result<Vec<Record>, ImportError> {
+    let found = examine(text.as_bytes(), mapping, taken())?;
+    let scans: Result<Vec<_>, _> = found.scans(text.as_bytes())?.collect();
+    Ok(scans?.into_iter().flatten().collect())
+}
+
+fn columns(text: &str) -> Mapping {
+    Mapping { columns: Mapping::columns_of(text).expect("columns"), ..Mapping::default() }
+}
+
+fn pings(records: &[Record]) -> Vec<Ping> {
+    let ping = |record: &Record| match record {
+        Record::Ping(ping) => Some(Ping::clone(ping)),
+        _ => None,
+    };
+    records.iter().filter_map(ping).collect()
+}
+
+fn starts(records: &[Record]) -> Vec<ScanStart> {
+    let start = |record: &Record| match record {
+        Record::ScanStart(start) => Some(start.clone()),
+        _ => None,
+    };
+    records.iter().filter_map(start).collect()
+}
+
+/// What an error says, and what it says to do.
+fn said<T: std::fmt::Debug>(result: Result<T, ImportError>) -> String {
+    let error = result.expect_err("this is wrong");
+    format!("{error}; {}", error.help())
+}

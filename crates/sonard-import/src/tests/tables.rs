@@ -1,0 +1,280 @@
+//! Tables and JSON.
+
+use proptest::prelude::*;
+use sonard_model::reading::PingStatus;
+
+use super::*;
+use crate::{Column, Format};
+
+/// Azimuths and ranges, metres.
+fn read(text: &str, mapping: Mapping) -> Vec<(f64, Option<f64>)> {
+    let records = import(text, mapping).expect("it is right");
+    pings(&records).iter().map(|ping| (ping.azimuth_deg, ping.range_m)).collect()
+}
+
+#[test]
+fn whatever_stands_between_values_they_are_the_same() {
+    let expected = [(10.0, Some(1.5)), (20.0, None), (30.0, Some(0.25))];
+    for text in [
+        "azimuth_deg,range_m\n10,1.5\n20,\n30,0.25\n",
+        "azimuth_deg;range_m\r\n10;1.5\r\n20;nan\r\n30;0.25\r\n",
+        "# by hand\nazimuth_deg\trange_m\n\n10\t1.5\n20\t-\n30\t0.25",
+        "azimuth_deg   range_m\n  10 1.5\n20  none\n30 0.25\n",
+        "\u{feff}\"azimuth_deg\",\"range_m\"\n\"10\", 1.5\n20,inf\n30,0.25\n",
+        "[{\"azimuth_deg\": 10, \"range_m\": 1.5}, {\"azimuth_deg\": 20, \"range_m\": null},\n \
+         {\"azimuth_deg\": 30, \"range_m\": 0.25}]",
+        "{\"azimuth_deg\": 10, \"range_m\": 1.5}\n{\"azimuth_deg\": 20, \"range_m\": null}\n\
+         {\"azimuth_deg\": 30, \"range_m\": 0.25}\n",
+        "{\"azimuth_deg\": [10, 20, 30], \"range_m\": [1.5, null, 0.25]}",
+    ] {
+        let found = read(text, Mapping::default());
+        for (is, should) in found.iter().zip(expected) {
+            assert_eq!(is.0, should.0, "{text}");
+            let off_m = is.1.zip(should.1).map_or(0.0, |(is, should)| (is - should).abs());
+            assert!(off_m < 1e-12 && is.1.is_some() == should.1.is_some(), "{text}: {is:?}");
+        }
+        assert_eq!(found.len(), 3, "{text}");
+    }
+}
+
+/// Sense, zero, unit, speed of sound and silence are each what they are said to be.
+#[test]
+fn directions_and_ranges_are_turned_into_those_of_a_log() {
+    let mapping = Mapping {
+        clockwise: true,
+        zero_deg: 90.0,
+        none: vec![255.0],
+        sound_speed_m_s: Some(340.0),
+        ..columns("azimuth_grad=1,range_cm=3")
+    };
+    let found = read("100 x 100\n0 y 255\n", mapping);
+    let sound_speed_m_s = Air::default().sound_speed_m_s();
+    assert!((found[0].0 - 0.0).abs() < 1e-9 && (found[1].0 - 90.0).abs() < 1e-9, "{found:?}");
+    assert!((found[0].1.expect("a range") - sound_speed_m_s / 340.0).abs() < 1e-12);
+    assert_eq!(found[1].1, None);
+    let by_time = read("0 5000\n", columns("azimuth_deg=1,tof_us=2"));
+    assert!((by_time[0].1.expect("a range") - 2500e-6 * sound_speed_m_s).abs() < 1e-12);
+    // A bearing is one in the world, where the robot looks to 30 degrees.
+    let in_world = read("75 1\n", columns("bearing_deg=1,range_m=2"));
+    assert!((in_world[0].0 - 45.0).abs() < 1e-9);
+    // Warmer air carries the same time of flight farther.
+    let warm = read("0 5000 30\n", columns("azimuth_deg=1,tof_us=2,temperature_c=3"));
+    let warm_m_s = Air::new(30.0, 50.0, 101.325).expect("air").sound_speed_m_s();
+    assert!((warm[0].1.expect("a range") - 2500e-6 * warm_m_s).abs() < 1e-12);
+}
+
+#[test]
+fn scans_are_told_apart_by_name_place_or_turn() {
+    let turns: String = (0..25).map(|i| format!("{},1\n", 30 * i % 360)).collect();
+    let records = import(&turns, columns("azimuth_deg=1,range_m=2")).expect("right");
+    assert_eq!(
+        starts(&records).iter().map(|start| start.plan.beams()).collect::<Vec<_>>(),
+        [12, 12, 1]
+    );
+    let named = "0,1,a\n10,1,a\n20,1,b\n";
+    let records = import(named, columns("azimuth_deg=1,range_m=2,scan=3")).expect("right");
+    assert_eq!(starts(&records).len(), 2);
+    let moved = "0,1,0.5,0.5\n10,1,0.5,0.5\n20,1,0.6,0.5\n";
+    let records = import(moved, columns("azimuth_deg=1,range_m=2,x_m=3,y_m=4")).expect("right");
+    let poses: Vec<_> = starts(&records).iter().map(|start| start.pose).collect();
+    assert_eq!(
+        poses,
+        [
+            Pose { x_m: 0.5, y_m: 0.5, heading_deg: 30.0 },
+            Pose { x_m: 0.6, y_m: 0.5, heading_deg: 30.0 },
+        ]
+    );
+    // Imported again, it makes the same records.
+    assert_eq!(
+        import(moved, columns("azimuth_deg=1,range_m=2,x_m=3,y_m=4")).expect("right"),
+        records
+    );
+}
+
+/// A plan is told where there is one, to both senses; else it only counts.
+#[test]
+fn even_directions_are_a_plan() {
+    let plan_of = |text: &str| {
+        let records = import(text, columns("azimuth_deg=1,range_m=2")).expect("right");
+        let plan = starts(&records)[0].plan;
+        let indices: Vec<_> = pings(&records).iter().map(|ping| ping.index).collect();
+        (plan.from_deg, plan.step_deg, plan.beams(), indices)
+    };
+    let (from, step, beams, indices) = plan_of("350,1\n0,1\n10,1\n20,1\n");
+    assert!((from - 350.0).abs() < 1e-9 && (step - 10.0).abs() < 1e-9);
+    assert_eq!((beams, indices), (4, vec![0, 1, 2, 3]));
+    let (from, step, beams, indices) = plan_of("20,1\n10,1\n0,1\n350,1\n");
+    assert!((from - 350.0).abs() < 1e-9 && (step - 10.0).abs() < 1e-9);
+    assert_eq!((beams, indices), (4, vec![3, 2, 1, 0]));
+    let (_, _, beams, indices) = plan_of("0,1\n10,1\n15,1\n");
+    assert_eq!((beams, indices), (3, vec![0, 1, 2]));
+}
+
+#[test]
+fn a_header_is_understood_or_asked_about() {
+    let guess = |header: &str| {
+        let text = format!("{header}\n{}\n", vec!["1"; header.split(',').count()].join(","));
+        examine(text.as_bytes(), Mapping::default(), taken()).map(|found| {
+            assert!(found.guessed && found.format == Format::Csv);
+            let columns = found.mapping.columns.into_iter();
+            columns.map(|(field, column)| format!("{field}={column}")).collect::<Vec<_>>().join(" ")
+        })
+    };
+    assert_eq!(
+        guess("Angle (deg),Distance [cm]").expect("clear"),
+        "azimuth_deg=`Angle (deg)` range_cm=`Distance [cm]`"
+    );
+    assert_eq!(
+        guess("theta_rad,echo_us,t").expect("clear"),
+        "azimuth_rad=`theta_rad` tof_us=`echo_us`"
+    );
+    let twice = said(guess("angle_deg,true_range_m,range_cm"));
+    assert!(
+        twice.contains("may both be the range") && twice.contains("--columns range_cm=range_cm"),
+        "{twice}"
+    );
+    let unit = said(guess("angle_deg,distance"));
+    assert!(unit.contains("does not say its unit") && unit.contains("range_mm=distance"), "{unit}");
+    let nothing = said(guess("foo,bar"));
+    assert!(nothing.contains("no column has the azimuth") && nothing.contains("foo"), "{nothing}");
+    let numbers = said(examine(b"1,2\n", Mapping::default(), taken()));
+    assert!(numbers.contains("the first line has no names"), "{numbers}");
+}
+
+/// An error names line, field and column, and what to do.
+#[test]
+fn what_is_wrong_is_named() {
+    let mapping = || columns("azimuth_deg=1,range_cm=2");
+    for (text, mapping, words) in [
+        ("1,2\n2,abc\n", mapping(), "line 2, range_cm (column 2): `abc` is no number"),
+        ("1,2\n,3\n", mapping(), "line 2: there is no azimuth"),
+        ("1,2\n3,-1\n", mapping(), "line 2, range_cm (column 2): a range of -1; if that means"),
+        ("1,2\n3,0\n", mapping(), "--none=VALUE"),
+        (
+            "1,2\n",
+            columns("azimuth_deg=1,range_cm=5"),
+            "there is no column 5: the first line has 2",
+        ),
+        ("1,2\n", columns("azimuth_deg=1,range_cm=dist"), "the first line has no names"),
+        ("a,b\n1,2\n", columns("azimuth_deg=a,range_cm=dist"), "the columns are a, b"),
+        ("a,b\n", columns("azimuth_deg=a,range_cm=b"), "there is no reading"),
+        ("# nothing\n", mapping(), "no line of values"),
+        ("1,2\n", columns("range_cm=2"), "no column has the azimuth or the bearing"),
+        ("1,2,3\n", columns("azimuth_deg=1,range_cm=2,range_m=3"), "both say the range"),
+        ("1,2,3\n", columns("azimuth_deg=1,range_cm=2,tof_us=3"), "both range and time of flight"),
+        ("1,2,3\n", columns("azimuth_deg=1,range_cm=2,x_m=3"), "only one of x and y"),
+        ("1,2,x\n", columns("azimuth_deg=1,range_cm=2,time=3"), "line 1, time (column 3)"),
+        ("1,2,maybe\n", columns("azimuth_deg=1,range_cm=2,status=3"), "`maybe` is no status"),
+        ("1,2,90\n", columns("azimuth_deg=1,range_cm=2,temperature_c=3"), "temperature_c is 90"),
+        (
+            "{\"a\": 1}",
+            columns("azimuth_deg=a,range_cm=b"),
+            "object 1: there is no `b`; the object has a",
+        ),
+        (
+            "{\"a\": [1, 2], \"b\": [1]}",
+            columns("azimuth_deg=a,range_cm=b"),
+            "1 numbers of range_cm and 2 of azimuth_deg",
+        ),
+        ("{\"a\": 1, \"b\": 2}\n{\"a\"\n", columns("azimuth_deg=a,range_cm=b"), "line 2: no JSON"),
+        ("[1, 2", columns("azimuth_deg=a,range_cm=b"), "no JSON"),
+        (
+            "{\"a\": [1, \"x\"], \"b\": [1, 2]}",
+            columns("azimuth_deg=a,range_cm=b"),
+            "object 1, number 2 of its lists, azimuth_deg (`a`): `x` is no number",
+        ),
+    ] {
+        let said = said(import(text, mapping));
+        assert!(said.contains(words), "{text:?}: {said}");
+    }
+    for text in ["azimuth_deg", "angle=1", "azimuth_deg=0", "azimuth_deg=1,azimuth_deg=2"] {
+        said(Mapping::columns_of(text));
+    }
+    assert_eq!(
+        columns("range_m=a=b").columns.values().next(),
+        Some(&Column::Name("a=b".to_owned()))
+    );
+}
+
+/// Numbers that can't be what they are said to be are refused, and taken when that is asked for.
+#[test]
+fn other_units_than_said_are_found_out() {
+    let table = |angle: fn(f64) -> f64, range: fn(f64) -> f64| -> String {
+        let row = |i: i32| {
+            format!("{},{}\n", angle(f64::from(i) * 3.0), range(0.3 + 0.01 * f64::from(i)))
+        };
+        (0..120).map(row).collect()
+    };
+    for (text, mapping, words) in [
+        (table(f64::to_radians, |m| m), columns("azimuth_deg=1,range_m=2"), "as radians would"),
+        (
+            table(|deg| 10.0 * deg, |m| m),
+            columns("azimuth_rad=1,range_m=2"),
+            "if these are degrees",
+        ),
+        (table(|deg| deg, |m| 100.0 * m), columns("azimuth_deg=1,range_m=2"), "is the unit right?"),
+        (table(|deg| deg, |m| 0.01 * m), columns("azimuth_deg=1,range_m=2"), "is the unit right?"),
+        (
+            table(|deg| deg, |m| if m > 1.4 { 2.55 } else { m }),
+            columns("azimuth_deg=1,range_ft=2"),
+            "",
+        ),
+        (
+            table(|deg| deg, |m| if m > 1.4 { 255.0 } else { m }),
+            columns("azimuth_deg=1,range_m=2"),
+            "mixed units? Or do these stand for silence",
+        ),
+    ] {
+        let found = import(&text, mapping.clone());
+        if words.is_empty() {
+            found.expect("that may be");
+            continue;
+        }
+        let said = said(found);
+        assert!(said.contains(words), "{said}");
+        let as_said = Taken { as_said: true, ..taken() };
+        examine(text.as_bytes(), mapping, as_said).expect("as it is said to be");
+    }
+}
+
+#[test]
+fn a_status_says_more_than_a_range() {
+    let text = "0,1.5,echo\n10,1.5,no_echo\n20,,MIN_RANGE\n30,,\n";
+    let records = import(text, columns("azimuth_deg=1,range_m=2,status=3")).expect("right");
+    let found: Vec<_> =
+        pings(&records).iter().map(|ping| (ping.status, ping.range_m.is_some())).collect();
+    assert_eq!(
+        found,
+        [
+            (PingStatus::Echo, true),
+            (PingStatus::NoEcho, false),
+            (PingStatus::MinRange, false),
+            (PingStatus::NoEcho, false),
+        ]
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    /// No file makes it panic, and what it takes has each reading once.
+    #[test]
+    fn any_bytes_are_read_or_refused(
+        bytes in prop_oneof![
+            proptest::collection::vec(any::<u8>(), 0..300),
+            "[0-9eE.,;\t \n\"#-]{0,200}".prop_map(String::into_bytes),
+            "(SONAR|ODOM|TRUEPOS)( [0-9.-]{1,6}){0,20}\n".prop_map(String::into_bytes),
+            "[0-9]{1,4} h 1 (sonar|position2d) 0 [0-9]{1,3} [0-9]{1,3}( [0-9.]{1,5}){0,9}\n".prop_map(String::into_bytes),
+            r#"\[?\{"a": ?\[?[0-9,.]{0,9}\]?, "b": ?[0-9\[\],]{0,9}\}\]?"#.prop_map(String::into_bytes),
+        ],
+        by_number in any::<bool>(),
+    ) {
+        let mapping = if by_number { columns("azimuth_deg=1,range_m=2") } else { columns("azimuth_deg=a,range_m=b") };
+        let as_said = Taken { as_said: true, ..taken() };
+        if let Ok(found) = examine(&bytes, mapping, as_said) {
+            let scans: Vec<_> = found.scans(&bytes[..]).expect("as before").collect();
+            let records: Vec<_> = scans.into_iter().flat_map(|scan| scan.expect("as before")).collect();
+            prop_assert_eq!(pings(&records).len() as u64, found.readings);
+        }
+    }
+}

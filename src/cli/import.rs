@@ -1,0 +1,326 @@
+//! `sonard import`.
+
+use std::{
+    fs::{self, File},
+    io::{self, Read as _, Write as _},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use jiff::Timestamp;
+
+use super::{
+    Failure, Outcome,
+    array::load_array,
+    options::{AirArgs, SensorArgs},
+    output::{OutPath, Overwrite, Product, Stream},
+    progress, scene_file,
+};
+use crate::{
+    acoustics::{Air, Sensor},
+    geometry::Pose,
+    import::{Format, ImportError, Imported, Mapping, Source, Taken},
+    scan::{ImportRef, LOG_FORMAT, Provenance, Record, SceneRef, Session, encode_line},
+    scene::{Scene, parse_pose},
+};
+
+/// Options of `sonard import`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(super) struct Args {
+    /// The file; - for standard input
+    file: PathBuf,
+    /// Where to write the log [default: standard output]
+    #[arg(long, value_name = "FILE")]
+    out: Option<OutPath>,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
+    columns: ColumnArgs,
+    /// Where the robot stands, as far as the file does not say: X,Y,DEG, or a pose's name in the scene
+    /// [default: not known]
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    pose: Option<String>,
+    /// The scene that the readings are from: a file, or the name of a shipped one; it goes into the log
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<PathBuf>,
+    /// Where the rangers of a CARMEN or Player log are, if it does not say: an array's name or file
+    #[arg(long, value_name = "NAME|FILE")]
+    array: Option<String>,
+    /// Take the numbers for what they are said to be, whatever speaks against it
+    #[arg(long)]
+    as_said: bool,
+    #[command(flatten)]
+    sensor: SensorArgs,
+    #[command(flatten)]
+    air: AirArgs,
+}
+
+/// What the file's columns mean.
+#[derive(Debug, Clone, clap::Args)]
+#[command(next_help_heading = "Columns")]
+struct ColumnArgs {
+    /// Which column has what: FIELD=COLUMN,... with the number of the column, from 1, or its name; of JSON,
+    /// the name of the member [default: as the header says]
+    #[arg(long, value_name = "FIELD=COLUMN,...")]
+    columns: Option<String>,
+    /// How the file is written [default: as it looks]
+    #[arg(long, value_enum)]
+    format: Option<FormatName>,
+    /// File (TOML) with all of this: the keys format, columns, clockwise, zero_deg, none, none_from and
+    /// sound_speed_m_s; options go over it
+    #[arg(long, value_name = "FILE")]
+    mapping: Option<PathBuf>,
+    /// Azimuths and bearings count clockwise
+    #[arg(long)]
+    clockwise: bool,
+    /// Where azimuth zero points, degrees counter-clockwise from the heading (bearing zero: from the x axis)
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    zero_deg: Option<f64>,
+    /// A range, in the file's unit, that means that nothing was heard; several are possible
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    none: Vec<f64>,
+    /// A range, in the file's unit, from which on nothing was heard
+    #[arg(long, value_name = "VALUE")]
+    none_from: Option<f64>,
+    /// Speed of sound that the file's ranges were computed with, metres a second: they are computed again
+    /// with that of the air
+    #[arg(long, value_name = "M/S")]
+    ranged_with: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum FormatName {
+    /// Lines of values apart by commas, semicolons, tabs or blanks
+    Csv,
+    /// A list of objects, or an object a line; numbers or lists of numbers in them
+    Json,
+    /// The log of CARMEN
+    Carmen,
+    /// The log of Player
+    Player,
+}
+
+pub(super) const ABOUT: &str = "\
+Make a log of readings from elsewhere: tables, JSON, logs of CARMEN and Player.
+
+The log is like any other, with provenance `imported`; its session says from which file, and what its \
+columns were taken to mean. Without --columns the header is asked, and what it was understood to say is \
+shown. Numbers that can't be what they are said to be (radians for degrees, centimetres for metres, a value \
+that stands for silence) are refused. A file makes the same log whenever it is imported.
+
+Scans are told apart by the field `scan`, else by where the robot stood, else by full turns.";
+
+const HELP: &str = "\
+Fields: azimuth_deg|rad|grad (from the heading) or bearing_deg|rad|grad (in the world); range_m|cm|mm|in|ft or \
+tof_us|ms|s; time (2026-01-31T12:00:00Z) or time_s|ms|us|ns (since 1970); scan; x_m|cm|mm, y_m|cm|mm, \
+heading_deg|rad; temperature_c|k; status.
+
+Examples:
+  sonard import sweep.csv --out sweep.jsonl
+  sonard import sweep.csv --columns azimuth_deg=1,range_cm=2 --clockwise --none 255 \\
+    --sensor hc-sr04 --pose 1.2,0.8,90 --scene my-room.json --out sweep.jsonl
+  sonard import sweeps.json --columns scan=id,bearing_deg=bearings,range_m=ranges,x_m=at.0,y_m=at.1 \\
+    --out sweeps.jsonl
+  sonard import robot.clf --none-from 5 --sensor pioneer --out robot.jsonl
+
+Exit codes: 0 done, 2 wrong usage or input, 3 the file can't be written.";
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let name = args.file.display().to_string();
+    let refuse = |error: ImportError| Failure::input(format!("{name}: {error}"), error.help());
+    let mapping = args.columns.mapping()?;
+    let scene = args.scene.as_deref().map(scene_file::load).transpose()?;
+    let (sensor, air) = (args.sensor.sensor()?, args.air.air()?);
+    let taken = taken(args, scene.as_ref(), &sensor, &air)?;
+    let bytes = if args.file.as_os_str() == "-" { Some(standard_input()?) } else { None };
+    let open = || -> io::Result<Box<dyn io::Read>> {
+        Ok(match &bytes {
+            Some(bytes) => Box::new(io::Cursor::new(Arc::clone(bytes))),
+            None => {
+                Box::new(progress::reading(&args.file, io::BufReader::new(File::open(&args.file)?)))
+            }
+        })
+    };
+    let found = Source { open: &open }.examine(mapping, taken).map_err(refuse)?;
+    let mut out = match &args.out {
+        Some(out) => args.overwrite.begin(out, Product::Log)?,
+        None => Stream::standard(),
+    };
+    let written = |error: &io::Error| {
+        let to = args.out.as_ref().map(|out| out.display().to_string());
+        Failure::from_write(to.as_deref().unwrap_or("standard output"), error)
+    };
+    let session = session(args, &found, scene.as_ref(), sensor, &air);
+    let (mut scans, mut line) = (0_u64, Vec::new());
+    let mut write = |record: &Record, out: &mut Stream| -> Result<io::Result<()>, Failure> {
+        line.clear();
+        encode_line(record, &mut line)
+            .map_err(|error| Failure::input(format!("{name}: {error}"), "correct the file"))?;
+        Ok(out.write_all(&line))
+    };
+    if let Err(error) = write(&Record::Session(Box::new(session)), &mut out)? {
+        return written(&error);
+    }
+    let source = open().map_err(|error| refuse(error.into()))?;
+    for scan in found.scans(source).map_err(refuse)? {
+        for record in scan.map_err(refuse)? {
+            if let Err(error) = write(&record, &mut out)? {
+                return written(&error);
+            }
+        }
+        scans += 1;
+    }
+    if let Err(error) = out.finish() {
+        return written(&error);
+    }
+    tell(args, &found, scans);
+    Ok(())
+}
+
+/// Says what was taken for what, on standard error.
+fn tell(args: &Args, found: &Imported, scans: u64) {
+    if found.guessed && !found.mapping.columns.is_empty() {
+        let said = found.mapping.columns.iter();
+        let said: Vec<_> = said.map(|(field, column)| format!("{field} from {column}")).collect();
+        anstream::eprintln!("by the header: {}", said.join(", "));
+    }
+    let silent = found.readings - found.echoes;
+    anstream::eprintln!(
+        "{scans} scans, {} readings: {} with a range, {silent} without; sensor {}",
+        found.readings,
+        found.echoes,
+        found.taken.sensor
+    );
+    let has_poses = args.pose.is_some() || found.has_poses;
+    if !has_poses {
+        anstream::eprintln!(
+            "note: where the robot stood is not known: give --pose, or columns x_m, y_m and heading_deg"
+        );
+    }
+}
+
+/// All of standard input: a file is read more than once.
+fn standard_input() -> Result<Arc<[u8]>, Failure> {
+    let mut bytes = Vec::new();
+    io::stdin().lock().take(MOST_STANDARD_INPUT).read_to_end(&mut bytes).map_err(|error| {
+        Failure::input(format!("cannot read standard input: {error}"), "give a file")
+    })?;
+    if bytes.len() as u64 == MOST_STANDARD_INPUT {
+        let what = format!("standard input is longer than {MOST_STANDARD_INPUT} bytes");
+        return Err(Failure::input(what, "give a file: what it holds is read piece by piece"));
+    }
+    Ok(bytes.into())
+}
+
+/// So much of standard input is kept, bytes.
+const MOST_STANDARD_INPUT: u64 = 256 << 20;
+
+fn taken(args: &Args, scene: Option<&Scene>, sensor: &Sensor, air: &Air) -> Result<Taken, Failure> {
+    let origin = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
+    let pose = match (&args.pose, scene) {
+        (Some(pose), Some(scene)) => scene_file::pose(scene, pose)?,
+        (Some(pose), None) => {
+            parse_pose(pose).map_err(|error| Failure::input(&error, error.help()))?
+        }
+        (None, _) => origin,
+    };
+    Ok(Taken {
+        sha256: String::new(),
+        pose,
+        array: args.array.as_deref().map(load_array).transpose()?,
+        sensor: sensor.name.clone(),
+        longest_m: sensor.max_range_m,
+        air: *air,
+        started: started(&args.file),
+        as_said: args.as_said,
+    })
+}
+
+/// When scans were taken that do not say it: at the latest when their file was last written.
+fn started(file: &Path) -> Timestamp {
+    let written = fs::metadata(file).and_then(|file| file.modified());
+    written.ok().and_then(|time| Timestamp::try_from(time).ok()).unwrap_or_else(Timestamp::now)
+}
+
+fn session(
+    args: &Args,
+    found: &Imported,
+    scene: Option<&Scene>,
+    sensor: Sensor,
+    air: &Air,
+) -> Session {
+    let mapping = match serde_json::to_value(&found.mapping) {
+        Ok(serde_json::Value::Object(mapping)) => mapping,
+        _ => serde_json::Map::new(),
+    };
+    Session {
+        format: LOG_FORMAT,
+        started: found.taken.started,
+        sonard: env!("CARGO_PKG_VERSION").to_owned(),
+        provenance: Provenance::Imported,
+        device: None,
+        sensor,
+        array: found.taken.array.clone(),
+        air: air.into(),
+        scene: scene.map(SceneRef::of),
+        scene_text: scene.map(|scene| Arc::clone(&scene.text)),
+        model: None,
+        collection: None,
+        imported: Some(Box::new(ImportRef {
+            file: args
+                .file
+                .file_name()
+                .unwrap_or(args.file.as_os_str())
+                .to_string_lossy()
+                .into_owned(),
+            sha256: found.taken.sha256.clone(),
+            mapping,
+            poses_known: args.pose.is_some() || found.has_poses,
+        })),
+    }
+}
+
+impl ColumnArgs {
+    fn mapping(&self) -> Result<Mapping, Failure> {
+        let mut mapping = match &self.mapping {
+            Some(path) => read_mapping(path)?,
+            None => Mapping::default(),
+        };
+        if let Some(columns) = &self.columns {
+            mapping.columns = Mapping::columns_of(columns)
+                .map_err(|error| Failure::input(format!("--columns: {error}"), error.help()))?;
+        }
+        let format = self.format.map(|format| match format {
+            FormatName::Csv => Format::Csv,
+            FormatName::Json => Format::Json,
+            FormatName::Carmen => Format::Carmen,
+            FormatName::Player => Format::Player,
+        });
+        mapping.format = format.or(mapping.format);
+        mapping.clockwise |= self.clockwise;
+        mapping.zero_deg = self.zero_deg.unwrap_or(mapping.zero_deg);
+        if !self.none.is_empty() {
+            mapping.none.clone_from(&self.none);
+        }
+        mapping.none_from = self.none_from.or(mapping.none_from);
+        mapping.sound_speed_m_s = self.ranged_with.or(mapping.sound_speed_m_s);
+        if let Some(speed) =
+            mapping.sound_speed_m_s.filter(|speed| !(200.0..=500.0).contains(speed))
+        {
+            let what = format!("ranges computed with a speed of sound of {speed} m/s");
+            return Err(Failure::input(what, "give metres a second, 200 to 500"));
+        }
+        Ok(mapping)
+    }
+}
+
+fn read_mapping(path: &Path) -> Result<Mapping, Failure> {
+    let name = path.display();
+    let text = fs::read_to_string(path).map_err(|error| {
+        Failure::input(format!("cannot read {name}: {error}"), "give a TOML file")
+    })?;
+    toml::from_str(&text).map_err(|error| {
+        Failure::input(format!("{name}: {error}"), "see `sonard import --help` for its keys")
+    })
+}

@@ -1,0 +1,97 @@
+//! `sonard predict`.
+
+use std::{path::PathBuf, sync::Arc};
+
+use super::{
+    Failure, Outcome,
+    log::rewrite::{Waiting, rewrite},
+    options::EngineArgs,
+    output::{OutPath, Overwrite},
+    predictor::Predictor,
+    scene_file,
+    what_if::{WhatIf, WhatIfArgs},
+};
+use crate::{
+    scan::{Ping, Record, SceneRef},
+    scene::Scene,
+};
+
+/// Options of `sonard predict`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(super) struct Args {
+    /// The log; - for standard input
+    log: PathBuf,
+    /// Scene to predict in: a file, or the name of a shipped scene [default: the log's]
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<PathBuf>,
+    /// Where to write the log with predictions [default: standard output]
+    #[arg(long, value_name = "FILE")]
+    out: Option<OutPath>,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
+    what_if: WhatIfArgs,
+    #[command(flatten)]
+    engine: EngineArgs,
+}
+
+pub(super) const ABOUT: &str = "\
+Write a log again with the model's predictions beside its readings.
+
+Each reading gets the model's for the same place and direction, with the path of its sound, in place of \
+any that it had; sessions say which scene, sensor, air and model that was. Readings stay as they are, but \
+for ranges under another speed of sound: those are computed again from their times of flight.";
+
+const HELP: &str = "\
+Examples:
+  sonard import sweep.csv --pose 1.2,0.8,90 --sensor hc-sr04 --out sweep.jsonl
+  sonard predict sweep.jsonl --scene my-room.json --out predicted.jsonl
+  sonard predict run.jsonl --temperature-c 15 --engine cone | sonard compare -
+
+Exit codes: 0 done, 2 wrong usage or input, 3 the file can't be written.";
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let given = args.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
+    let what_if = args.what_if.load()?.with_options(args.engine.options()?);
+    let mut predictor = Predictor::new(&args.log, given.as_ref(), &what_if);
+    let (waiting, mut any) = (Waiting::default(), false);
+    let to = (args.out.as_ref(), args.overwrite);
+    let change = |record: &mut Record| suppose(record, &what_if, given.as_deref());
+    let written = rewrite(&args.log, to, &waiting, change, |mut scan| {
+        predictor.predict(&mut scan)?;
+        any |= scan.pings.iter().any(|ping| ping.sim.is_some());
+        let mut predicted: Vec<Ping> = scan.pings;
+        predicted.sort_by_key(|ping| ping.index);
+        Ok(Box::new(move |ping: &mut Ping| {
+            // A reading that was fetched again has the index of the one before it, and its prediction.
+            if let Ok(at) = predicted.binary_search_by_key(&ping.index, |known| known.index) {
+                let found = &predicted[at];
+                (ping.sim, ping.range_m) = (found.sim.clone(), found.range_m);
+                (ping.residual_m, ping.pose) = (found.residual_m, found.pose);
+            }
+        }))
+    })?;
+    if !any {
+        return Err(Failure::input(
+            format!("{}: there is no reading to predict beside", args.log.display()),
+            "a log needs its session, a pose and a scene: see --scene",
+        ));
+    }
+    written.finish()
+}
+
+/// Has sessions and scans say what was predicted with.
+fn suppose(record: &mut Record, what_if: &WhatIf, scene: Option<&Scene>) {
+    match record {
+        Record::Session(session) => {
+            what_if.change_session(session);
+            if let Some(scene) = scene {
+                session.scene = Some(SceneRef::of(scene));
+                session.scene_text = Some(Arc::clone(&scene.text)).filter(|text| !text.is_empty());
+            }
+        }
+        Record::ScanStart(start) => what_if.change_start(start),
+        _ => {}
+    }
+}
