@@ -6,7 +6,9 @@ pub(super) mod rewrite;
 mod show;
 mod verify;
 
-use crate::store::StoreError;
+use std::io::{self, Write as _};
+
+use crate::{scan::Record, store::StoreError};
 
 use super::{Failure, Outcome};
 
@@ -21,6 +23,8 @@ pub(super) enum Verb {
     Show(show::Args),
     /// Write a log again with Feature Prediction's confidence in every ping
     Annotate(annotate::Args),
+    /// Print the JSON Schema of a log's lines (docs/log.md says what they mean)
+    Schema,
 }
 
 pub(super) fn run(verb: Verb) -> Outcome {
@@ -29,7 +33,16 @@ pub(super) fn run(verb: Verb) -> Outcome {
         Verb::Repair(args) => repair::run(&args),
         Verb::Show(args) => show::run(&args),
         Verb::Annotate(args) => annotate::run(&args),
+        Verb::Schema => schema(),
     }
+}
+
+fn schema() -> Outcome {
+    let schema = schemars::schema_for!(Record);
+    let printed = serde_json::to_string_pretty(&schema)
+        .map_err(io::Error::from)
+        .and_then(|text| writeln!(io::stdout(), "{text}"));
+    printed.or_else(|error| Failure::from_write("standard output", &error))
 }
 
 impl From<StoreError> for Failure {

@@ -12,6 +12,7 @@ mod explore;
 mod faults;
 mod format_1;
 mod hangup;
+mod import;
 mod interpret;
 mod live_page;
 mod log;

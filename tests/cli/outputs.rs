@@ -35,7 +35,7 @@ const fn case(
     Case { output, input, arguments }
 }
 
-const CASES: [Case; 22] = [
+const CASES: [Case; 25] = [
     case("plot --out", ("a.svg", LOG), "plot IN -o IN"),
     case("plot --out", ("a.png", LOG), "plot IN -o IN --force"),
     case("plot --out", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),
@@ -63,6 +63,9 @@ const CASES: [Case; 22] = [
         ("stops.jsonl", SCENE),
         "explore --scene IN --pose fig9 --most-stops 1 --out DIR --force",
     ),
+    case("import --out", ("a", TABLE), "import IN --out IN --force"),
+    case("predict --out", ("a.jsonl", LOG), "predict IN --out IN --force"),
+    case("predict --out", ("a.json", SCENE), "predict LOG --scene IN --out IN --force"),
     case("log annotate --out", ("a.jsonl", LOG), "log annotate IN --out IN --force"),
     case(
         "scan --out",
@@ -89,6 +92,7 @@ const WITHOUT_INPUT: [&str; 4] =
     ["map-benchmark --out", "explore-benchmark --out", "interpret-benchmark --out", "generate DIR"];
 
 const POSES: &str = "{\"x_m\":0.774,\"y_m\":0.085,\"heading_deg\":0.0}\n";
+const TABLE: &str = "azimuth_deg,range_m\n0,1\n";
 const MAP: &str = "image: map.pgm\nresolution: 0.5\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n\
                    occupied_thresh: 0.65\nfree_thresh: 0.196\n";
 const PLAN: &str = "[collection]\nfolder = \"out\"\n[place]\nscene = \"simple-room\"\n\

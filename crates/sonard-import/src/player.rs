@@ -25,26 +25,19 @@ pub(crate) fn message(place: Place, line: &str) -> Result<Option<Message>, Impor
     let words: Vec<&str> = line.split_whitespace().collect();
     let Some(interface) = words.get(3) else { return Ok(None) };
     let is_whole = |at: usize| words.get(at).is_some_and(|word| word.parse::<u32>().is_ok());
+    // Type and subtype are written with three digits, which no count is.
+    let has_types = [5, 6].iter().all(|&at| {
+        words.get(at).is_some_and(|word| word.len() == 3 && word.parse::<u32>().is_ok())
+    });
+    let from = if has_types { BEFORE } else { BEFORE_IN_OLD };
+    let subtype = words.get(6).filter(|_| has_types).and_then(|word| word.parse::<u32>().ok());
     match *interface {
-        "sonar" => {
-            let has_types = is_whole(5) && is_whole(6) && is_counted(&words, BEFORE);
-            let from = if has_types { BEFORE } else { BEFORE_IN_OLD };
-            let is_geometry = has_types && words[6].parse() == Ok(2_u32);
-            sonar(place, &words, from, is_geometry).map(Some)
-        }
-        "position2d" | "position" => {
-            let from = if is_whole(5) && is_whole(6) { BEFORE } else { BEFORE_IN_OLD };
-            let is_data = from == BEFORE_IN_OLD || words[6].parse() == Ok(1_u32);
-            if is_data { position(place, &words, from).map(Some) } else { Ok(None) }
+        "sonar" => sonar(place, &words, from, subtype == Some(2)).map(Some),
+        "position2d" | "position" if subtype.is_none_or(|subtype| subtype == 1) => {
+            position(place, &words, from).map(Some)
         }
         _ => Ok(None),
     }
-}
-
-/// Whether from here on there is a count, and at least as many words as it says.
-fn is_counted(words: &[&str], at: usize) -> bool {
-    let count = words.get(at).and_then(|word| word.parse::<usize>().ok());
-    count.is_some_and(|count| count > 0 && words.len() > at + count)
 }
 
 fn sonar(

@@ -77,8 +77,8 @@ impl Source<'_> {
     pub fn examine(&self, mapping: Mapping, taken: Taken) -> Result<Imported, ImportError> {
         let mut head = Vec::new();
         (self.open)()?.take(HEAD_BYTES).read_to_end(&mut head)?;
-        let head = String::from_utf8_lossy(&head);
-        let format = mapping.format.unwrap_or_else(|| look(&head));
+        let head = text(&head)?;
+        let format = mapping.format.unwrap_or_else(|| look(head));
         let mut found = Imported {
             format,
             guessed: mapping.columns.is_empty(),
@@ -90,7 +90,7 @@ impl Source<'_> {
             header: None,
         };
         match format {
-            Format::Csv | Format::Json => self.examine_rows(&head, &mut found)?,
+            Format::Csv | Format::Json => self.examine_rows(head, &mut found)?,
             Format::Carmen | Format::Player => self.examine_messages(&mut found)?,
         }
         Ok(found)
@@ -205,6 +205,19 @@ fn unguessed(error: &ImportError, names: &[String]) -> ImportError {
         )
     };
     ImportError::mapping(error.to_string(), help)
+}
+
+/// The beginning of a file as text; a character that its end cuts is left out.
+fn text(head: &[u8]) -> Result<&str, ImportError> {
+    let error = match std::str::from_utf8(head) {
+        Ok(text) if !text.contains('\0') => return Ok(text),
+        Ok(_) => None,
+        Err(error) => Some(error),
+    };
+    if let Some(error) = error.filter(|error| error.error_len().is_none()) {
+        return Ok(std::str::from_utf8(&head[..error.valid_up_to()]).unwrap_or_default());
+    }
+    Err(ImportError::mapping("it is no text", "is it compressed? Unpack it first: `gunzip FILE`"))
 }
 
 /// What a file looks like.

@@ -50,8 +50,9 @@ impl Header {
                 record.iter().map(str::to_owned).collect()
             }
         };
-        let is_name = |cell: &String| !cell.is_empty() && cell.parse::<f64>().is_err();
-        let has_names = cells.iter().any(is_name);
+        // A line with a number in it is a reading, which must not be lost.
+        let is_number = |cell: &String| cell.parse::<f64>().is_ok();
+        let has_names = !cells.iter().any(is_number) && cells.iter().any(|cell| !cell.is_empty());
         Ok(Self { between, cells, has_names })
     }
 

@@ -68,6 +68,17 @@ fn a_log_of_player_is_an_arrays() {
     assert_eq!(starts(&records)[0].pose, Pose { x_m: 1.0, y_m: 2.0, heading_deg: 0.0 });
 }
 
+/// Without type and subtype, as versions before 2 wrote them.
+#[test]
+fn an_older_log_of_player_is_read() {
+    let array = examine(PLAYER.as_bytes(), Mapping::default(), taken()).expect("right").taken.array;
+    let old =
+        "10.0 robot 6665 position 0 1.0 2.0 0.0 0 0 0\n10.1 robot 6665 sonar 0 2 1.500 2.500\n";
+    let found =
+        examine(old.as_bytes(), Mapping::default(), Taken { array, ..taken() }).expect("right");
+    assert_eq!((found.format, found.readings, found.has_poses), (Format::Player, 2, true));
+}
+
 #[test]
 fn messages_that_are_cut_or_change_are_named() {
     let change = CARMEN.replace("1.40 0.75 0.2", "1.40 0.75 0.3");

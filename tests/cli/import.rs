@@ -1,0 +1,208 @@
+//! Readings from elsewhere, through the whole program.
+
+use std::{fs, path::Path};
+
+use crate::common::{Log, run, sonard, stderr};
+
+/// Runs a verb that should succeed; its standard output.
+fn done(arguments: &[&str]) -> String {
+    let output = run(arguments);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// Runs a verb that should refuse; what it says.
+fn refused(arguments: &[&str]) -> String {
+    let output = run(arguments);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+    let said = stderr(&output);
+    assert!(!said.contains("panicked"), "{said}");
+    said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+}
+
+/// The readings of the model at 15 degrees, in a table as people write them: clockwise from the right, in
+/// centimetres, silence as 0.
+fn write_table(folder: &Path) -> String {
+    let log = done(&[
+        "simulate",
+        "--scene",
+        "two-surface-room",
+        "--pose",
+        "middle",
+        "--step-deg",
+        "5",
+        "--temperature-c",
+        "15",
+        "--ideal-receiver",
+    ]);
+    let mut table = "Angle [deg];Distance [cm]\n".to_owned();
+    for ping in Log::parse(&log).pings() {
+        let azimuth_deg = ping["azimuth_deg"].as_f64().expect("a direction");
+        let clockwise_deg = (90.0 - azimuth_deg).rem_euclid(360.0);
+        // As a program would that takes sound to go 340 m/s.
+        let range_cm =
+            ping["range_m"].as_f64().map_or(0.0, |m| 100.0 * m * 340.0 / sound_speed_m_s());
+        table.push_str(&format!("{clockwise_deg};{range_cm:.3}\n"));
+    }
+    let path = folder.join("table.csv").to_str().expect("a plain path").to_owned();
+    fs::write(&path, table).expect("writes");
+    path
+}
+
+fn sound_speed_m_s() -> f64 {
+    sonard::acoustics::Air::new(15.0, 50.0, 101.325).expect("air").sound_speed_m_s()
+}
+
+#[test]
+fn a_table_becomes_a_log_that_every_verb_takes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
+    let table = write_table(folder.path());
+    let [log, predicted, picture, map, trusted] =
+        ["log.jsonl", "predicted.jsonl", "picture.svg", "map", "trusted.jsonl"].map(out);
+    let import = |log: &str| {
+        let output = run(&[
+            "import",
+            &table,
+            "--clockwise",
+            "--zero-deg",
+            "90",
+            "--none",
+            "0",
+            "--ranged-with",
+            "340",
+            "--temperature-c",
+            "15",
+            "--scene",
+            "two-surface-room",
+            "--pose",
+            "middle",
+            "--out",
+            log,
+        ]);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        stderr(&output)
+    };
+    let said = import(&log);
+    assert!(
+        said.contains("azimuth_deg from `Angle [deg]`, range_cm from `Distance [cm]`"),
+        "{said}"
+    );
+    let records = Log::read(log.as_ref());
+    let session = &records.records[0];
+    assert_eq!(session["provenance"], "imported");
+    assert_eq!(session["imported"]["file"], "table.csv");
+    assert_eq!(session["imported"]["mapping"]["columns"]["range_cm"], "Distance [cm]");
+    assert_eq!(session["imported"]["sha256"].as_str().map(str::len), Some(64));
+    assert_eq!(records.pings().len(), 72);
+    assert!(done(&["log", "verify", &log]).contains("clean"));
+    // The same file makes the same log.
+    let again = out("again.jsonl");
+    import(&again);
+    assert_eq!(fs::read(&log).expect("reads"), fs::read(&again).expect("reads"));
+
+    let agree = |arguments: &[&str]| {
+        let mut all = vec!["compare", "--json"];
+        all.extend(arguments);
+        let said: serde_json::Value = serde_json::from_str(&done(&all)).expect("an object");
+        (said["agree"].as_u64().expect("a count"), said["both_echo"].as_u64().expect("a count"))
+    };
+    done(&["predict", &log, "--ideal-receiver", "--out", &predicted]);
+    let (agreeing, both) = agree(&[&predicted]);
+    assert!(both > 60 && agreeing == both, "{agreeing} of {both}");
+    // Another pose explains less, and says so; so does other air.
+    assert!(agree(&[&predicted, "--pose", "1.3,1,90"]).0 < both / 2);
+    assert!(agree(&[&predicted, "--heading", "80"]).0 < both / 2);
+    assert!(agree(&[&log, "--temperature-c", "-5"]).0 < agree(&[&log]).0);
+    let predictions = Log::read(predicted.as_ref());
+    assert_eq!(predictions.records[0]["model"]["engine"], "paths");
+    assert!(predictions.pings().iter().all(|ping| ping["sim"]["status"].is_string()));
+    for arguments in [
+        vec!["plot", &predicted, "-o", &picture],
+        vec!["plot", &predicted, "--kind", "residuals", "-o", &picture],
+        vec!["map", &predicted, "--out", &map],
+        vec!["log", "show", "--pings", &predicted],
+        vec!["log", "annotate", &predicted, "--out", &trusted],
+        vec!["interpret", &predicted],
+        vec!["lines", &predicted],
+    ] {
+        done(&arguments);
+    }
+}
+
+/// A mapping file, options over it, and a file from standard input.
+#[test]
+fn a_mapping_is_a_file_as_well() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mapping = folder.path().join("mapping.toml");
+    fs::write(
+        &mapping,
+        "none = [255.0]\nclockwise = true\n[columns]\nbearing_deg = 1\nrange_cm = \"d\"\n",
+    )
+    .expect("writes");
+    let mapping = mapping.to_str().expect("a plain path");
+    let refusal = refused(&["import", "/dev/null", "--mapping", mapping]);
+    assert!(refusal.contains("holds no line"), "{refusal}");
+    let mut child =
+        sonard(&["import", "-", "--mapping", mapping, "--columns", "bearing_deg=1,range_cm=2"])
+            .stdin(std::process::Stdio::piped())
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::null())
+            .spawn()
+            .expect("starts");
+    std::io::Write::write_all(&mut child.stdin.take().expect("piped"), b"10 255\n20 120\n")
+        .expect("writes");
+    let output = child.wait_with_output().expect("ends");
+    let log = Log::parse(std::str::from_utf8(&output.stdout).expect("text"));
+    let pings = log.pings();
+    assert_eq!((&pings[0]["status"], &pings[0]["azimuth_deg"]), (&"no_echo".into(), &350.0.into()));
+    assert!((pings[1]["range_m"].as_f64().expect("a range") - 1.2).abs() < 1e-9);
+    assert_eq!(log.records[0]["imported"]["poses_known"], false);
+    fs::write(mapping, "nome = [255.0]\n").expect("writes");
+    let refusal = refused(&["import", "-", "--mapping", mapping]);
+    assert!(refusal.contains("unknown field `nome`"), "{refusal}");
+}
+
+#[test]
+fn wrong_files_and_outputs_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let table = write_table(folder.path());
+    let before = fs::read(&table).expect("reads");
+    let over = refused(&["import", &table, "--none", "0", "--out", &table]);
+    assert!(over.contains("is read by this command"), "{over}");
+    assert_eq!(fs::read(&table).expect("reads"), before);
+    let zero = folder.path().join("zero.csv");
+    fs::write(&zero, "azimuth_deg,range_cm\n0,100\n10,0\n").expect("writes");
+    let silent = refused(&["import", zero.to_str().expect("a plain path")]);
+    assert!(silent.contains("a range of 0") && silent.contains("--none=VALUE"), "{silent}");
+    let none = refused(&["import", "/nowhere.csv"]);
+    assert!(none.contains("No such file"), "{none}");
+    let picture = folder.path().join("a.gz");
+    fs::write(&picture, [0x1f, 0x8b, 8, 0, 0xff, 0xfe]).expect("writes");
+    let packed = refused(&["import", picture.to_str().expect("a plain path")]);
+    assert!(packed.contains("compressed"), "{packed}");
+    let log = folder.path().join("log.jsonl");
+    let log = log.to_str().expect("a plain path");
+    done(&["import", &table, "--none", "0", "--out", log]);
+    let nothing = refused(&["predict", log]);
+    assert!(
+        nothing.contains("no reading to predict beside") && nothing.contains("--scene"),
+        "{nothing}"
+    );
+}
+
+/// The page about the format holds a log, and the schema knows its lines.
+#[test]
+fn the_least_log_of_the_documents_is_one() {
+    let page = include_str!("../../docs/log.md");
+    let (_, rest) = page.split_once("```json\n").expect("a log");
+    let (log, _) = rest.split_once("```").expect("its end");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("least.jsonl");
+    fs::write(&path, log).expect("writes");
+    let path = path.to_str().expect("a plain path");
+    assert!(done(&["log", "verify", path]).contains("clean"));
+    done(&["predict", path, "--scene", "two-surface-room"]);
+    let schema: serde_json::Value = serde_json::from_str(&done(&["log", "schema"])).expect("JSON");
+    assert!(schema["oneOf"].as_array().is_some_and(|kinds| kinds.len() == 5), "{schema}");
+}
