@@ -24,7 +24,6 @@ pub(crate) fn message(place: Place, line: &str) -> Result<Option<Message>, Impor
     }
     let words: Vec<&str> = line.split_whitespace().collect();
     let Some(interface) = words.get(3) else { return Ok(None) };
-    let is_whole = |at: usize| words.get(at).is_some_and(|word| word.parse::<u32>().is_ok());
     // Type and subtype are written with three digits, which no count is.
     let has_types = [5, 6].iter().all(|&at| {
         words.get(at).is_some_and(|word| word.len() == 3 && word.parse::<u32>().is_ok())
