@@ -38,12 +38,12 @@ EOF
 # How the fan of rays comes closer to the exact paths.
 cargo run --release --quiet --example fan_convergence -- "$pictures/fan-convergence.png"
 
-# Figure 2's echo traces, and the way to the false lower wall of figure 9.
+# Figure 2's echo traces, and the path to the false lower wall of figure 9.
 for pose in a b c d; do
   "$SONARD" trace --scene echo-traces --pose "$pose" --until 3 -o "$pictures/echo-trace-$pose.png"
 done
 "$SONARD" simulate --scene simple-room --pose fig9 --out "$work/fig9.jsonl"
-"$SONARD" plot "$work/fig9.jsonl" --azimuth-deg 270 -o "$pictures/simple-room-fig9-way.png"
+"$SONARD" plot "$work/fig9.jsonl" --azimuth-deg 270 -o "$pictures/simple-room-fig9-path.png"
 
 # One room explored in three ways.
 "$SONARD" explore-benchmark --rooms 2 --out "$work/rooms" >/dev/null

@@ -24,15 +24,17 @@ pub struct Convergence {
     pub errors: Vec<[f64; 2]>,
 }
 
-/// Draws the error of each case against the fineness; the titles are those of the axes, with units.
+/// Draws the error of each case against the fineness; the titles are those of the axes, with units, and
+/// `badge` says what the readings are ([`badge_of`](crate::badge_of)).
 #[must_use]
 pub fn draw_convergence(
     title: &str,
+    badge: Option<&str>,
     lines: &[String],
     [across, up]: [&str; 2],
     cases: &[Convergence],
 ) -> Picture {
-    let (heading, top) = caption::draw(title, None, lines);
+    let (heading, top) = caption::draw(title, badge, lines);
     let (left, width) = (theme::MARGIN_PX + 62.0, theme::PAGE_PX - 2.0 * theme::MARGIN_PX - 80.0);
     let panel = Rect::new(left, top + 24.0, width, PANEL_PX);
     let axes = Axes::around(panel, cases);
@@ -157,10 +159,10 @@ mod tests {
         let axes = Axes::around(Rect::new(0.0, 0.0, 100.0, 100.0), std::slice::from_ref(&case));
         assert!(axes.y(0.0) > axes.y(0.004) && axes.y(0.004) > axes.y(0.3));
         assert!(axes.x(0.1) < axes.x(0.5));
-        let svg = draw_convergence("t", &[], ["spacing", "share"], &[case]).to_svg();
+        let svg = draw_convergence("t", None, &[], ["spacing", "share"], &[case]).to_svg();
         assert_eq!(svg.matches("<title>room, ").count(), 3);
         let nothing = Convergence { name: "none".into(), errors: vec![[f64::NAN, f64::NAN]] };
-        let svg = draw_convergence("t", &[], ["x", "y"], &[nothing]).to_svg();
+        let svg = draw_convergence("t", None, &[], ["x", "y"], &[nothing]).to_svg();
         assert!(!svg.contains("NaN") && !svg.contains("inf"));
     }
 }

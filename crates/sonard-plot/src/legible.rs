@@ -58,6 +58,21 @@ fn made_up_readings_among_measured_ones_are_said() {
 }
 
 #[test]
+fn what_scans_and_methods_come_to_says_whose_the_readings_are() {
+    let some = [Provenance::Hardware, Provenance::Mock, Provenance::Hardware];
+    let series = |sources: &[Provenance]| {
+        let badge = badge_among(sources.iter().copied());
+        draw_series("drift", badge, &[], "hours", &[]).to_svg()
+    };
+    assert!(series(&some).contains("MOCK, not hardware"));
+    assert!(series(&[]).contains("PROVENANCE UNKNOWN"));
+    assert!(!series(&some[..1]).contains("class=\"provenance\""));
+    let badge = badge_of(Some(Provenance::Simulated));
+    let converged = draw_convergence("fan", badge, &[], ["spacing", "share"], &[]).to_svg();
+    assert!(converged.contains("SIMULATED"));
+}
+
+#[test]
 fn a_map_has_a_frame_round_its_cells_and_a_badge() {
     let shape = GridShape::covering(DVec2::ZERO, DVec2::new(2.0, 1.0), 0.05).expect("a shape");
     let grid = Grid::new(shape);

@@ -62,4 +62,4 @@ pub use scene::draw_scene;
 pub use series::{Point, Series, draw_series};
 pub use side_by_side::draw_side_by_side;
 pub use trace::{TraceView, draw_trace};
-pub use words::badge_of;
+pub use words::{badge_among, badge_of};

@@ -37,10 +37,17 @@ pub struct Point {
     pub aside: bool,
 }
 
-/// Draws quantities one above the other; `x_title` says what runs along, with its unit.
+/// Draws quantities one above the other; `x_title` says what runs along, with its unit, and `badge` what
+/// the readings are, if not of a real ranger ([`badge_among`](crate::badge_among)).
 #[must_use]
-pub fn draw_series(title: &str, lines: &[String], x_title: &str, strips: &[Series]) -> Picture {
-    let (heading, top) = caption::draw(title, None, lines);
+pub fn draw_series(
+    title: &str,
+    badge: Option<&str>,
+    lines: &[String],
+    x_title: &str,
+    strips: &[Series],
+) -> Picture {
+    let (heading, top) = caption::draw(title, badge, lines);
     let along = || strips.iter().flat_map(|strip| &strip.points).map(|point| point.x);
     let axis = Axis::over(along());
     let (left, width) = (theme::MARGIN_PX + 62.0, theme::PAGE_PX - 2.0 * theme::MARGIN_PX - 70.0);
@@ -177,7 +184,7 @@ mod tests {
         let of = series(&[20.0, 20.4, 21.2, 20.9]);
         let axis = Axis::around(&of);
         assert!(axis.from < 19.5 && axis.to > 21.2, "{axis:?}");
-        let svg = draw_series("drift", &[], "hours", &[of, series(&[])]).to_svg();
+        let svg = draw_series("drift", None, &[], "hours", &[of, series(&[])]).to_svg();
         assert_eq!(svg.matches("<title>scan ").count(), 4);
         for part in ["hours", "nothing known", "set aside"] {
             assert!(svg.contains(part), "{part}");
@@ -187,7 +194,8 @@ mod tests {
     #[test]
     fn nothing_and_nonsense_are_drawn_too() {
         for values in [&[][..], &[1.0], &[f64::NAN, 2.0], &[3.0, 3.0], &[f64::INFINITY]] {
-            let svg = draw_series("drift", &["a line".into()], "hours", &[series(values)]).to_svg();
+            let svg = draw_series("drift", None, &["a line".into()], "hours", &[series(values)]);
+            let svg = svg.to_svg();
             assert!(!svg.contains("NaN") && !svg.contains("inf"), "{values:?}");
         }
     }

@@ -22,10 +22,20 @@ pub(super) fn title(views: &[ScanView], scene: Option<&Scene>) -> String {
 
 /// What the readings are, in a few words; `None` for readings of a real ranger.
 pub(super) fn badge(views: &[ScanView]) -> Option<&'static str> {
-    let of_views = views.iter().filter_map(|view| Some(view.session.as_ref()?.provenance));
-    // Made-up readings among measured ones must not pass for measured.
-    let made_up = of_views.clone().find(|provenance| *provenance != Provenance::Hardware);
-    badge_of(made_up.or(of_views.clone().next()))
+    badge_among(views.iter().filter_map(|view| Some(view.session.as_ref()?.provenance)))
+}
+
+/// The same for readings of several sources: those that are made up must not pass for measured.
+#[must_use]
+pub fn badge_among(sources: impl IntoIterator<Item = Provenance>) -> Option<&'static str> {
+    let mut hardware = None;
+    for provenance in sources {
+        if provenance != Provenance::Hardware {
+            return badge_of(Some(provenance));
+        }
+        hardware = Some(provenance);
+    }
+    badge_of(hardware)
 }
 
 /// The words that every picture of readings has in its corner, unless a real ranger took them; for

@@ -12,7 +12,7 @@ use crate::{
         NamedPose, Outcome, Repeatability, Take, repeatability,
     },
     compare::{Comparison, compare},
-    plot::{Picture, Point, Series, draw_scans, draw_scene, draw_series},
+    plot::{Picture, Point, Series, badge_among, draw_scans, draw_scene, draw_series},
     scan::ScanView,
     scene::Scene,
     store::load,
@@ -79,7 +79,7 @@ fn poses(
         }
     }
     if !repeated.is_empty() {
-        draw(folder, "repeatability", &spreads(repeated))?;
+        draw(folder, "repeatability", &spreads(repeated, badge(history)))?;
         table += "\n![Spread of each beam over the repeats](report/repeatability.svg)\n";
     }
     Ok((table, details))
@@ -215,6 +215,11 @@ fn overview(scene: &Scene, history: &History) -> Picture {
     draw_scene(&Scene { poses, ..scene.clone() })
 }
 
+/// What the collection's readings are, if not of a real ranger.
+fn badge(history: &History) -> Option<&'static str> {
+    badge_among(history.starts.iter().map(|start| start.provenance))
+}
+
 /// What every scan was like over time, those set aside among them.
 fn drift(history: &History, checks: &CheckKeys) -> Picture {
     let first = history.takes.iter().filter_map(|take| take.started).min().unwrap_or_default();
@@ -243,11 +248,15 @@ fn drift(history: &History, checks: &CheckKeys) -> Picture {
             figures.home_drift_steps.map(f64::from)
         }),
     ];
-    draw_series("Every scan over time", &[], &format!("{unit} since {first:.0}"), &strips)
+    let along = format!("{unit} since {first:.0}");
+    draw_series("Every scan over time", badge(history), &[], &along, &strips)
 }
 
 /// The spread of each beam's ranges at the poses that repeat worst.
-fn spreads(mut poses: Vec<(String, Repeatability, Vec<BeamSpread>)>) -> Picture {
+fn spreads(
+    mut poses: Vec<(String, Repeatability, Vec<BeamSpread>)>,
+    badge: Option<&str>,
+) -> Picture {
     poses.sort_by(|a, b| {
         let worst = |of: &Repeatability| of.p90_spread_m.unwrap_or(0.0);
         worst(&b.1).total_cmp(&worst(&a.1))
@@ -275,7 +284,7 @@ fn spreads(mut poses: Vec<(String, Repeatability, Vec<BeamSpread>)>) -> Picture 
         false => Vec::new(),
     };
     let along = "azimuth, degrees counter-clockwise from the heading";
-    draw_series("How well beams repeat", &lines, along, &strips)
+    draw_series("How well beams repeat", badge, &lines, along, &strips)
 }
 
 /// The scans of a pose that count, by repeat.

@@ -30,7 +30,9 @@ fn a_plan_becomes_scans_a_report_and_a_manifest_that_notices_any_change() {
         assert!(report.contains(part), "{part} is not in\n{report}");
     }
     for picture in ["overview", "drift", "repeatability", "pose-001", "pose-002", "pose-003"] {
-        assert!(case.text(&format!("out/report/{picture}.svg")).contains("<svg"), "{picture}");
+        let svg = case.text(&format!("out/report/{picture}.svg"));
+        assert!(svg.contains("<svg"), "{picture}");
+        assert_eq!(svg.contains("MOCK, not hardware"), picture != "overview", "{picture}");
     }
     assert!(case.text("out/inputs/plan.toml").contains("seed = 5"));
     // Started again it finds nothing to do, and does not even need the ranger.

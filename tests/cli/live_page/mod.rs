@@ -3,6 +3,7 @@
 mod access;
 mod accessible;
 mod browser;
+mod readable;
 mod viewpoints;
 
 use std::path::Path;
@@ -29,6 +30,21 @@ fn daemon(folder: &Path, listen: &str, further: &[&str]) -> (Daemon, String) {
 
 fn scan_once(daemon: &Daemon) {
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+}
+
+/// A scan that is over, of a log with `log` in its name, shown on the page and as the API tells it.
+fn show_log(daemon: &Daemon, browser: &Browser, log: &str) -> Value {
+    let scans = daemon.get("/v1/scans").json();
+    let wanted = |scan: &&Value| {
+        !scan["end"].is_null() && scan["log"].as_str().is_some_and(|name| name.contains(log))
+    };
+    let found = scans.as_array().expect("scans").iter().find(wanted);
+    let scan = found.expect("a scan that is over")["scan"].as_str().expect("an id").to_owned();
+    let button = format!("[data-scan=\"{scan}\"]");
+    browser.until(&format!("document.querySelector('{button}') !== null"));
+    browser.eval(&format!("document.querySelector('{button}').click()"));
+    browser.until(&format!("document.querySelector('{button}').ariaPressed === 'true'"));
+    daemon.get(&format!("/v1/scans/{scan}")).json()
 }
 
 /// Beams that the page says it shows.

@@ -4,13 +4,13 @@ use std::{fs, path::Path};
 
 use serde_json::{Value, json};
 
-use super::browser::{Browser, DESK};
+use super::{
+    browser::{Browser, DESK},
+    show_log,
+};
 use crate::{
     common::{run, stderr},
-    daemon::{
-        Daemon,
-        viewpoint::{start_ahead, start_array},
-    },
+    daemon::viewpoint::{start_ahead, start_array},
 };
 
 /// Engines without envelopes: a range is half its path's length, without time walk.
@@ -39,21 +39,6 @@ fn end(reading: &Value) -> Option<Point> {
     let (sin, cos) = direction_deg.to_radians().sin_cos();
     let [x_m, y_m] = place(reading);
     Some([x_m + range_m * cos, y_m + range_m * sin])
-}
-
-/// A past scan that is over, shown on the page and as the API tells it.
-fn show_past(daemon: &Daemon, browser: &Browser, log: &str) -> Value {
-    let scans = daemon.get("/v1/scans").json();
-    let wanted = |scan: &&Value| {
-        !scan["end"].is_null() && scan["log"].as_str().is_some_and(|name| name.contains(log))
-    };
-    let found = scans.as_array().expect("scans").iter().find(wanted);
-    let scan = found.expect("a scan that is over")["scan"].as_str().expect("an id").to_owned();
-    let button = format!("[data-scan=\"{scan}\"]");
-    browser.until(&format!("document.querySelector('{button}') !== null"));
-    browser.eval(&format!("document.querySelector('{button}').click()"));
-    browser.until(&format!("document.querySelector('{button}').ariaPressed === 'true'"));
-    daemon.get(&format!("/v1/scans/{scan}")).json()
 }
 
 /// An expression of the page's plan.
@@ -155,7 +140,7 @@ fn each_sonar_of_an_array_has_its_readings_its_face_and_its_paths() {
     let daemon = start_array(folder.path(), &FAN);
     daemon.wait_for_scans(1);
     let browser = Browser::open(&daemon.address(), DESK);
-    let whole = show_past(&daemon, &browser, "");
+    let whole = show_log(&daemon, &browser, "");
     check_marks(&browser, &whole);
     let places: Vec<Point> =
         whole["pings"].as_array().expect("readings").iter().map(place).collect();
@@ -175,7 +160,7 @@ fn a_transducer_ahead_of_its_axis_has_its_readings_and_its_paths() {
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
     daemon.wait_for_scans(1);
     let browser = Browser::open(&daemon.address(), DESK);
-    let whole = show_past(&daemon, &browser, "");
+    let whole = show_log(&daemon, &browser, "");
     check_marks(&browser, &whole);
     for reading in heard(&whole).take(4) {
         check_path(&browser, reading);
@@ -189,7 +174,7 @@ fn readings_of_a_robot_that_moved_are_drawn_from_where_it_was() {
     let daemon = start_array(folder.path(), &FAN);
     daemon.wait_for_scans(1);
     let browser = Browser::open(&daemon.address(), DESK);
-    let whole = show_past(&daemon, &browser, "20260101");
+    let whole = show_log(&daemon, &browser, "20260101");
     let moved = whole["pings"].as_array().expect("readings").iter();
     assert_eq!(moved.filter(|ping| ping["pose"].is_object()).count(), 24, "two rounds of three");
     check_marks(&browser, &whole);
