@@ -50,7 +50,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     )];
     let axes = ["angle between the rays of the fan, degrees", "share of echoes that differ"];
     let badge = badge_of(Some(Provenance::Simulated));
-    let picture = draw_convergence("The fan of rays and the exact paths", badge, &lines, axes, &cases);
+    let picture =
+        draw_convergence("The fan of rays and the exact paths", badge, &lines, axes, &cases);
     fs::write(target, picture.to_png(1200)?)?;
     Ok(())
 }

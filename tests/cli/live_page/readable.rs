@@ -17,7 +17,8 @@ const LOG: &str = include_str!("../../fixtures/small.jsonl");
 
 /// Numbers of the legend by what they count.
 fn legend(browser: &Browser) -> BTreeMap<String, u64> {
-    let items = browser.eval("[...document.querySelectorAll('#legend li')].map((li) => li.textContent)");
+    let items =
+        browser.eval("[...document.querySelectorAll('#legend li')].map((li) => li.textContent)");
     let counts = items.as_array().expect("entries").iter().filter_map(|text| {
         let (words, rest) = text.as_str()?.rsplit_once(" (")?;
         Some((words.to_owned(), rest.strip_suffix(')')?.parse().ok()?))
@@ -86,7 +87,10 @@ fn counts_of_a_scan_agree_wherever_they_stand() {
     let counts = legend(&browser);
     let of = |words: &str| counts.get(words).copied().unwrap_or(0);
     assert_eq!(counts.values().sum::<u64>(), 9, "{counts:?}");
-    assert!(which.contains("9 of 9 beams") && summary.starts_with("9 beams,"), "{which}: {summary}");
+    assert!(
+        which.contains("9 of 9 beams") && summary.starts_with("9 beams,"),
+        "{which}: {summary}"
+    );
     let explained = ["direct echo", "multiple reflection", "edge", "minimum range", "silent"];
     let explained: u64 = explained.iter().map(|words| of(words)).sum();
     assert_eq!(number_before(&summary, " as the model says"), explained, "{summary}, {counts:?}");
@@ -206,7 +210,10 @@ fn rough_walls_bodies_and_transducers_are_in_the_legend() {
     let browser = Browser::open(&daemon.address(), DESK);
     show_log(&daemon, &browser, "");
     choose(&browser, 3);
-    check_legend(&browser, &["wall", "rough wall", "robot", "transducer", "nearest range that is heard"]);
+    check_legend(
+        &browser,
+        &["wall", "rough wall", "robot", "transducer", "nearest range that is heard"],
+    );
 }
 
 #[test]
@@ -281,11 +288,15 @@ fn what_is_pending_and_a_refused_configuration_are_said() {
     browser.until("document.getElementById('progress').value > 5");
     let pose = r#"{"x_m":0.5,"y_m":0.3,"heading_deg":90}"#;
     assert_eq!(daemon.send("PUT", "/v1/pose", pose).status, 202);
-    browser.until("document.getElementById('conditions').textContent.includes('From the next scan on')");
+    browser.until(
+        "document.getElementById('conditions').textContent.includes('From the next scan on')",
+    );
     let said = browser.text("#conditions");
     assert!(said.contains("0.774, 0.085 m") && said.contains("pose 0.500, 0.300 m, 90"), "{said}");
     fs::write(&file, "[plan]\nstep_dge = 3.6\n").expect("there is room");
     daemon.signal(Signal::HUP);
-    browser.until("document.getElementById('trouble').textContent.includes('configuration was refused')");
+    browser.until(
+        "document.getElementById('trouble').textContent.includes('configuration was refused')",
+    );
     assert!(browser.text("#trouble").contains("step_dge"), "{}", browser.text("#trouble"));
 }
