@@ -29,9 +29,9 @@ use crate::{
 
 /// The data files that come with the program, by name.
 const PRESETS: [(&str, &str); 3] = [
-    ("pioneer-8", include_str!("../../../../arrays/pioneer-8.json")),
-    ("pioneer-7", include_str!("../../../../arrays/pioneer-7.json")),
-    ("ring-12", include_str!("../../../../arrays/ring-12.json")),
+    ("pioneer-8", include_str!("../../../arrays/pioneer-8.json")),
+    ("pioneer-7", include_str!("../../../arrays/pioneer-7.json")),
+    ("ring-12", include_str!("../../../arrays/ring-12.json")),
 ];
 
 /// Most rangers of an array, and most firings of a round.
