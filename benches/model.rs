@@ -29,7 +29,7 @@ fn ping(criterion: &mut Criterion) {
     for engine in [EngineKind::Fan, EngineKind::Cone] {
         let (simulator, pose) = simulator(engine);
         group.bench_function(engine.name(), |bencher| {
-            bencher.iter(|| black_box(simulator.station(pose.position()).ping(black_box(-1.5))));
+            bencher.iter(|| black_box(simulator.at(pose.position()).ping(black_box(-1.5))));
         });
     }
     group.finish();

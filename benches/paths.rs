@@ -67,10 +67,10 @@ fn small_room() {
         None,
         paths.path_settings(),
     );
-    let survey = time(|| drop(black_box(engine.survey(pose.position()))));
+    let survey = time(|| drop(black_box(engine.arrivals_at(pose.position()))));
     report("paths, all echoes to 10.7 m", survey, None);
     let echoes = Paths::new(&scene, paths.path_settings()).enumerate(pose.position());
-    let place = engine.survey(pose.position());
+    let place = engine.arrivals_at(pose.position());
     let mut sounds = Vec::new();
     let mut heard = 0;
     let listen = time(|| {
@@ -265,7 +265,7 @@ fn building_plans() {
         report("paths: scan of 400 azimuths", scan, None);
         report("paths: a ping's share of it", scan.each_of(400), None);
         report("parry: 15 ray casts", cast, Some(scan.each_of(400)));
-        let station = model.station(poses[0]);
+        let station = model.at(poses[0]);
         let heard: usize =
             (0..400).map(|i| station.arrivals(f64::from(i) * TAU / 400.0).len()).sum();
         println!("  {:.1} sounds a ping", heard as f64 / 400.0);

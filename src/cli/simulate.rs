@@ -25,7 +25,7 @@ use crate::{
     acoustics::ReceiverNoise,
     collect::{PoseLine, read_lines},
     geometry::Pose,
-    model::{Prediction, Simulator, Station},
+    model::{Prediction, Simulator, ObservationPoint},
     scan::{Ping, Record, ScanEnd, ScanPlan, ScanStart, Session},
     scene::Scene,
     store::{LogWriter, Pipe, StoreError},
@@ -143,7 +143,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let noise = args.noise.noise()?;
     let mut out = Out::open(args)?;
     let mut rng = Pcg64::seed_from_u64(args.noise.seed);
-    let mut ping = |station: &Station, direction_rad| match &noise {
+    let mut ping = |station: &ObservationPoint, direction_rad| match &noise {
         Some(noise) => station.ping_in_noise(direction_rad, noise, &mut rng),
         None => station.ping(direction_rad),
     };
@@ -276,7 +276,7 @@ fn write(
     simulator: &Simulator,
     pose: &Pose,
     plan: &ScanPlan,
-    predict: &mut dyn FnMut(&Station, f64) -> Prediction,
+    predict: &mut dyn FnMut(&ObservationPoint, f64) -> Prediction,
     bar: &ProgressBar,
 ) -> Result<(), StoreError> {
     let scan = Uuid::new_v4();
@@ -290,7 +290,7 @@ fn write(
         request: None,
     };
     out.put(&Record::ScanStart(start))?;
-    let station = simulator.station(pose.position());
+    let station = simulator.at(pose.position());
     for index in 0..plan.stops() {
         let azimuth_deg = plan.azimuth_deg(index);
         let prediction = predict(&station, pose.direction_rad(azimuth_deg));

@@ -12,9 +12,9 @@ use super::{
     place::PlaceArgs,
 };
 use crate::{
-    acoustics::{EchoTrace, Hump},
+    acoustics::{EchoTrace, EnvelopePeak},
     geometry::Pose,
-    model::{Simulator, Station},
+    model::{Simulator, ObservationPoint},
     plot::{TraceView, draw_trace},
     scan::{PathRecord, PingStatus},
 };
@@ -143,7 +143,7 @@ struct Firing<'a> {
 impl<'a> Firing<'a> {
     fn new(args: &'a Args, simulator: &'a Simulator, pose: Pose) -> Self {
         let direction_rad = pose.direction_rad(args.azimuth_deg);
-        let station = simulator.station(pose.position());
+        let station = simulator.at(pose.position());
         let whole = || {
             let longest_m = simulator.receiver().max_range_m;
             let trace = station.trace(direction_rad, longest_m, args.step_us);
@@ -151,11 +151,11 @@ impl<'a> Firing<'a> {
         };
         let trace = station.trace(direction_rad, args.until.unwrap_or_else(whole), args.step_us);
         let record = |sound| {
-            let arrival = Station::arrival(&station, direction_rad, sound);
+            let arrival = ObservationPoint::arrival(&station, direction_rad, sound);
             PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m)
         };
-        let paths = trace.humps.iter().map(|hump| record(&hump.sound)).collect();
-        let path = trace.detection.sound.as_ref().map(record);
+        let paths = trace.peaks.iter().map(|hump| record(&hump.arrival)).collect();
+        let path = trace.detection.arrival.as_ref().map(record);
         Self {
             simulator,
             pose,
@@ -167,8 +167,8 @@ impl<'a> Firing<'a> {
         }
     }
 
-    fn humps(&self) -> impl Iterator<Item = (&Hump, &PathRecord)> {
-        self.trace.humps.iter().zip(&self.paths)
+    fn humps(&self) -> impl Iterator<Item = (&EnvelopePeak, &PathRecord)> {
+        self.trace.peaks.iter().zip(&self.paths)
     }
 
     fn object(&self) -> TraceObject<'_> {
@@ -280,8 +280,8 @@ impl<'a> Firing<'a> {
 /// Half a metre beyond the last hump that comes within 10 dB of the threshold, and of the blanking.
 fn interesting_m(simulator: &Simulator, trace: &EchoTrace) -> f64 {
     let receiver = simulator.receiver();
-    let near = |hump: &&Hump| hump.peak.0 > 0.3 * receiver.threshold_at(hump.tof_us);
-    let last = trace.humps.iter().rev().find(near);
-    let last_m = last.map_or(1.0, |hump| hump.sound.length_m / 2.0);
+    let near = |hump: &&EnvelopePeak| hump.peak.0 > 0.3 * receiver.threshold_at(hump.tof_us);
+    let last = trace.peaks.iter().rev().find(near);
+    let last_m = last.map_or(1.0, |hump| hump.arrival.length_m / 2.0);
     (last_m.max(receiver.min_range_m()) + 0.5).min(receiver.max_range_m)
 }

@@ -41,7 +41,7 @@ impl Soundings {
         let mounted = Pose { heading_deg: pose.heading_deg + mounting_offset_deg, ..*pose };
         let turn =
             ScanPlan { step_deg: 360.0 / f64::from(steps_per_revolution), ..ScanPlan::default() };
-        let station = simulator.station(mounted.position());
+        let station = simulator.at(mounted.position());
         let ping = |stop| station.ping_rearmed(mounted.direction_rad(turn.azimuth_deg(stop)));
         Self::from_predictions(&(0..turn.stops()).map(ping).collect::<Vec<_>>())
     }

@@ -15,7 +15,7 @@ pub use aperture::{ApertureResponse, Image, Incidence};
 pub use face::{Disc, Face, FaceAspect};
 pub use pulse::EchoShape;
 pub use receiver::{
-    Combining, Detection, EchoTrace, Hump, Incident, Latch, Receiver, ReceiverNoise, Sound,
+    Combining, Detection, EchoTrace, EnvelopePeak, Incident, Latch, Receiver, ReceiverNoise, PulseArrival,
     TracePoint, classify_tof,
 };
 pub use sensor::{

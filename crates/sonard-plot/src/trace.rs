@@ -15,13 +15,13 @@ use sonard_model::acoustics::EchoTrace;
 const FLOOR_DB: f64 = -60.0;
 const TOP_DB: f64 = 10.0;
 
-/// Most humps that get a number.
+/// Most peaks that get a number.
 const MOST_NAMED: usize = 12;
 
-/// Humps this far below the threshold get one only where they stand out, decibels.
+/// Peaks this far below the threshold get one only where they stand out, decibels.
 const NAMED_BELOW_DB: f64 = 12.0;
 
-/// A hump stands out where the envelope at its peak is at most this many times as high.
+/// A peak stands out where the envelope at its peak is at most this many times as high.
 const STANDS_OUT: f64 = 1.5;
 
 /// A firing to be drawn.
@@ -33,7 +33,7 @@ pub struct TraceView<'a> {
     pub lines: Vec<String>,
     /// The firing.
     pub trace: &'a EchoTrace,
-    /// What each of its humps is, in the same order.
+    /// What each of its peaks is, in the same order.
     pub names: Vec<String>,
     /// From firing until the receiver listens, microseconds.
     pub blanking_us: f64,
@@ -45,7 +45,7 @@ pub struct TraceView<'a> {
 
 /// Draws the trace of a firing: on top the signal as an oscilloscope shows it (the envelope on both
 /// sides of zero, as the carrier fills it), below its level with the threshold in force, the
-/// blanking and the moments at which ECHO rises; then the gain and ECHO itself. Numbers on the humps
+/// blanking and the moments at which ECHO rises; then the gain and ECHO itself. Numbers on the peaks
 /// stand for the paths listed below.
 #[must_use]
 pub fn draw_trace(view: &TraceView) -> Picture {
@@ -67,7 +67,7 @@ pub fn draw_trace(view: &TraceView) -> Picture {
     Picture::new(theme::PAGE_PX, bottom + theme::MARGIN_PX / 2.0, page)
 }
 
-/// A hump with a number: several sounds of the same name that come together are one.
+/// A peak with a number: several sounds of the same name that come together are one.
 struct Named {
     peak: f64,
     peak_us: f64,
@@ -76,7 +76,7 @@ struct Named {
     count: usize,
 }
 
-/// The strongest humps, in order of time.
+/// The strongest peaks, in order of time.
 fn named(view: &TraceView) -> Vec<Named> {
     let floor = 10f64.powf(FLOOR_DB / 20.0);
     let is_seen = |peak: f64, peak_us: f64| {
@@ -87,32 +87,32 @@ fn named(view: &TraceView) -> Vec<Named> {
                 || (peak > floor && point.envelope <= STANDS_OUT * peak)
         })
     };
-    let mut humps: Vec<Named> = Vec::new();
-    for (hump, name) in view.trace.humps.iter().zip(&view.names) {
-        let (peak, peak_us) = hump.peak;
+    let mut peaks: Vec<Named> = Vec::new();
+    for (found, name) in view.trace.peaks.iter().zip(&view.names) {
+        let (peak, peak_us) = found.peak;
         if !is_seen(peak, peak_us) {
             continue;
         }
         let same =
-            |known: &&mut Named| known.name == *name && (known.tof_us - hump.tof_us).abs() < 1.0;
-        match humps.iter_mut().find(same) {
+            |known: &&mut Named| known.name == *name && (known.tof_us - found.tof_us).abs() < 1.0;
+        match peaks.iter_mut().find(same) {
             Some(known) => {
                 known.peak = known.peak.max(peak);
                 known.count += 1;
             }
-            None => humps.push(Named {
+            None => peaks.push(Named {
                 peak,
                 peak_us,
-                tof_us: hump.tof_us,
+                tof_us: found.tof_us,
                 name: name.clone(),
                 count: 1,
             }),
         }
     }
-    humps.sort_by(|one, other| other.peak.total_cmp(&one.peak));
-    humps.truncate(MOST_NAMED);
-    humps.sort_by(|one, other| one.tof_us.total_cmp(&other.tof_us));
-    humps
+    peaks.sort_by(|one, other| other.peak.total_cmp(&one.peak));
+    peaks.truncate(MOST_NAMED);
+    peaks.sort_by(|one, other| one.tof_us.total_cmp(&other.tof_us));
+    peaks
 }
 
 struct Axes {
@@ -260,11 +260,11 @@ impl Axes {
     }
 
     fn numbers(&self, named: &[Named]) -> Layer {
-        let mut layer = Layer::new("numbers-of-humps").haloed();
+        let mut layer = Layer::new("numbers-of-peaks").haloed();
         let mut labels = Labels::new(self.levels);
-        for (number, hump) in (1..).zip(named) {
+        for (number, peak) in (1..).zip(named) {
             let text = format!("{number}");
-            let at = Px::new(self.x(hump.peak_us), self.level_y(hump.peak) - 5.0);
+            let at = Px::new(self.x(peak.peak_us), self.level_y(peak.peak) - 5.0);
             // Beside each other, or one above the other.
             let place = (0..8)
                 .flat_map(|row| [0.0, 12.0, -12.0].map(|x| at + Px::new(x, -14.0 * f64::from(row))))
@@ -332,12 +332,12 @@ fn keys() -> Vec<Entry> {
 fn list(view: &TraceView, named: &[Named], top: f64) -> (Layer, f64) {
     let mut layer = Layer::new("paths");
     let mut y = top;
-    for (number, hump) in (1..).zip(named) {
+    for (number, peak) in (1..).zip(named) {
         y += theme::TEXT_PX + 4.0;
-        let times = if hump.count > 1 { format!(" ({} ways)", hump.count) } else { String::new() };
-        let range_m = view.sound_speed_m_s * hump.tof_us * 1e-6 / 2.0;
-        let db = 20.0 * hump.peak.log10();
-        let text = format!("{number}   {range_m:.3} m, {db:.1} dB: {}{times}", hump.name);
+        let times = if peak.count > 1 { format!(" ({} ways)", peak.count) } else { String::new() };
+        let range_m = view.sound_speed_m_s * peak.tof_us * 1e-6 / 2.0;
+        let db = 20.0 * peak.peak.log10();
+        let text = format!("{number}   {range_m:.3} m, {db:.1} dB: {}{times}", peak.name);
         layer.text(Px::new(theme::MARGIN_PX + 8.0, y), Anchor::Start, theme::TEXT_PX, &text);
     }
     if named.is_empty() {

@@ -6,7 +6,7 @@ use uuid::Uuid;
 use super::{Ping, Provenance, ScanEnd, ScanStart, Session};
 use sonard_model::{
     geometry::Pose,
-    model::{ArrayModel, ArrayStand, Prediction},
+    model::{ArrayModel, ArrayAtPose, Prediction},
 };
 
 impl Session {
@@ -45,7 +45,7 @@ impl Ping {
     /// What a ranger of an array reads in the model, in a scan that began at `scan_pose`.
     #[must_use]
     pub fn of_array(
-        stand: &ArrayStand<'_>,
+        stand: &ArrayAtPose<'_>,
         scan: Uuid,
         scan_pose: &Pose,
         index: u32,

@@ -24,8 +24,8 @@ impl ScanView {
         let (sensor, air) = (session.sensor_of(ping), Air::try_from(&session.air).ok()?);
         let options = session.model.as_ref()?.options()?;
         let simulator = Simulator::new(Arc::clone(&scene), sensor, air, options).ok()?;
-        let station = simulator.station(axis.position());
-        let arrival = path.arrival(&station, axis.direction_rad(0.0))?;
+        let point = simulator.at(axis.position());
+        let arrival = path.arrival(&point, axis.direction_rad(0.0))?;
         Some(PathRecord::of(&scene, &arrival.path, arrival.length_m))
     }
 }

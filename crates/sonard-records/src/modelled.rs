@@ -2,7 +2,7 @@
 
 use sonard_model::{
     acoustics::{Air, AirError},
-    model::{Arrival, Interaction, Mechanism, Options, Path, Prediction, Simulator, Station},
+    model::{Arrival, Interaction, Mechanism, Options, Path, Prediction, Simulator, ObservationPoint},
     scene::Scene,
 };
 
@@ -99,9 +99,9 @@ impl PathRecord {
     /// model finds again where a path of a log of format 1 ran. `None` if it finds none of that kind and
     /// length.
     #[must_use]
-    pub fn arrival(&self, station: &Station<'_>, direction_rad: f64) -> Option<Arrival> {
+    pub fn arrival(&self, point: &ObservationPoint<'_>, direction_rad: f64) -> Option<Arrival> {
         let off_m = |arrival: &Arrival| (arrival.length_m - self.length_m).abs();
-        let mut arrivals = station.arrivals(direction_rad);
+        let mut arrivals = point.arrivals(direction_rad);
         arrivals
             .retain(|arrival| arrival.path.kind() == self.kind && off_m(arrival) < SAME_LENGTH_M);
         arrivals.into_iter().min_by(|one, other| off_m(one).total_cmp(&off_m(other)))

@@ -28,10 +28,10 @@ impl ScanView {
         plan: &ScanPlan,
         time: Timestamp,
     ) -> Self {
-        let station = simulator.station(pose.position());
+        let point = simulator.at(pose.position());
         let pings = (0..plan.beams()).map(|index| {
             let azimuth_deg = plan.azimuth_deg(index / plan.pings_per_stop.max(1));
-            let prediction = station.ping(pose.direction_rad(azimuth_deg));
+            let prediction = point.ping(pose.direction_rad(azimuth_deg));
             Ping::simulated(simulator, scan, index, azimuth_deg, &prediction)
         });
         Self {

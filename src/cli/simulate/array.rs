@@ -12,7 +12,7 @@ use crate::{
     acoustics::ReceiverNoise,
     cli::{Failure, Outcome, array::load_array, progress, scene_file},
     geometry::{Pose, wrap_360},
-    model::{ArrayModel, ArrayStand, ModelError},
+    model::{ArrayModel, ArrayAtPose, ModelError},
     scan::{Ping, Record, ScanEnd, ScanStart, Session},
     store::StoreError,
 };
@@ -120,7 +120,7 @@ impl Player<'_> {
         Ok(())
     }
 
-    fn listen(&mut self, stand: &ArrayStand<'_>, ranger: usize) -> crate::model::Prediction {
+    fn listen(&mut self, stand: &ArrayAtPose<'_>, ranger: usize) -> crate::model::Prediction {
         match &self.noise {
             Some(noise) => stand.ping_in_noise(ranger, noise, &mut self.rng),
             None => stand.ping(ranger),

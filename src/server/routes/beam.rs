@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use crate::{
-    acoustics::{Air, Hump},
+    acoustics::{Air, EnvelopePeak},
     api::{Beam, Echo, HumpLine, JudgedPing, point},
     geometry::Pose,
-    model::{Options, Simulator, Station},
+    model::{Options, Simulator, ObservationPoint},
     scan::{PathRecord, Ping, ScanView, Session},
     scene::Scene,
 };
@@ -93,16 +93,16 @@ fn air(view: &ScanView, session: &Session) -> Result<Air, crate::acoustics::AirE
 fn humps(simulator: &Simulator, axis: &Pose, until_m: f64) -> Vec<HumpLine> {
     let direction_rad = axis.direction_rad(0.0);
     let ends = simulator.sensor().mounting.viewpoint(axis).ends();
-    let station = simulator.station(axis.position());
+    let station = simulator.at(axis.position());
     let trace = station.trace(direction_rad, until_m, STEP_US);
     let receiver = simulator.receiver();
-    let over = |hump: &Hump| hump.peak.0 / receiver.threshold_at(hump.tof_us);
-    let mut loudest: Vec<&Hump> = trace.humps.iter().filter(|hump| over(hump) > FAINT).collect();
+    let over = |hump: &EnvelopePeak| hump.peak.0 / receiver.threshold_at(hump.tof_us);
+    let mut loudest: Vec<&EnvelopePeak> = trace.peaks.iter().filter(|hump| over(hump) > FAINT).collect();
     loudest.sort_by(|one, other| over(other).total_cmp(&over(one)));
     loudest.truncate(MOST_HUMPS);
     loudest.sort_by(|one, other| one.tof_us.total_cmp(&other.tof_us));
-    let line = |hump: &Hump| {
-        let arrival = Station::arrival(&station, direction_rad, &hump.sound);
+    let line = |hump: &EnvelopePeak| {
+        let arrival = ObservationPoint::arrival(&station, direction_rad, &hump.arrival);
         let path = PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m);
         HumpLine {
             tof_us: hump.tof_us,

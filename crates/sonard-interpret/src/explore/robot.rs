@@ -157,11 +157,11 @@ impl<R: Rng> Robot for SimulatedRobot<'_, R> {
     }
 
     fn sonar(&mut self) -> Sweep {
-        let station = self.simulator.station(self.truth.position());
+        let point = self.simulator.at(self.truth.position());
         let (azimuths_deg, step_deg) = self.settings.ranger.azimuths_deg();
         let beams = azimuths_deg.zip(0..).map(|(azimuth_deg, index)| {
             let sigma_m = self.settings.range_sigma_m;
-            let heard = station.ping(self.truth.direction_rad(azimuth_deg));
+            let heard = point.ping(self.truth.direction_rad(azimuth_deg));
             let heard = hear(&heard, sigma_m, &mut self.rng);
             Beam { azimuth_deg, index, heard, mount: DVec2::ZERO }
         });

@@ -178,17 +178,17 @@ fn read(simulator: &Simulator, pose: &Pose, settings: &TrialSettings, rng: &mut 
                 let (azimuth_deg, mount) =
                     (ranger.azimuth_deg(), DVec2::new(ranger.x_m, ranger.y_m));
                 let mounted = ranger.pose_on(pose);
-                let station = simulator.station(mounted.position());
-                let heard = heard(&station.ping(mounted.direction_rad(0.0)));
+                let point = simulator.at(mounted.position());
+                let heard = heard(&point.ping(mounted.direction_rad(0.0)));
                 Beam { azimuth_deg, index, heard, mount }
             };
             ((0..).zip(array.round()).map(beam).collect(), RING_STEP_DEG)
         }
         Arrangement::Stepper => {
-            let station = simulator.station(pose.position());
+            let point = simulator.at(pose.position());
             let beam = |index: u32| {
                 let azimuth_deg = 0.9 * f64::from(index);
-                let heard = heard(&station.ping(pose.direction_rad(azimuth_deg)));
+                let heard = heard(&point.ping(pose.direction_rad(azimuth_deg)));
                 Beam { azimuth_deg, index, heard, mount: DVec2::ZERO }
             };
             ((0..400).map(beam).collect(), 0.9)

@@ -1,8 +1,8 @@
-//! The receiver: which of the sounds at the transducer's face raise ECHO, and when.
+//! The receiver: which of the arrivals at the transducer's face raise ECHO, and when.
 //!
 //! # When
 //!
-//! A pulse rises over some tens of microseconds, so ECHO rises before or after the sound's nominal
+//! A pulse rises over some tens of microseconds, so ECHO rises before or after the arrival's nominal
 //! arrival, depending on how far it passes the threshold. What is the same for all echoes is
 //! calibration's business and left out here: times are counted so that a head-on, perfectly
 //! reflecting wall is timed by its path alone, and its range is its distance. A weaker echo is
@@ -11,7 +11,7 @@
 //!
 //! # What
 //!
-//! Sounds that overlap add up with their phases. The detector watches the envelope of the sum
+//! Arrivals that overlap add up with their phases. The detector watches the envelope of the sum
 //! against the threshold that the gain of the moment makes of the sensor's. An envelope has to stay
 //! above for the sensor's integration time; the time that takes is the same for all echoes and
 //! left out as well.
@@ -29,7 +29,7 @@ use smallvec::SmallVec;
 
 pub use self::{
     noise::ReceiverNoise,
-    trace::{EchoTrace, Hump, TracePoint},
+    trace::{EchoTrace, EnvelopePeak, TracePoint},
 };
 
 use self::hearing::Hearing;
@@ -53,9 +53,9 @@ pub enum Latch {
 /// microseconds: about one cycle at 50 kHz, 3.4 mm of range.
 const BLANKING_TOLERANCE_US: f64 = 20.0;
 
-/// A sound at the transducer's face, reduced to what the receiver notices.
+/// An arrival at the transducer's face, reduced to what the receiver notices.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sound {
+pub struct PulseArrival {
     /// Length of its path there and back, metres.
     pub length_m: f64,
     /// Strength after gain compensation and the beam pattern on both ways; a head-on, perfectly
@@ -67,7 +67,7 @@ pub struct Sound {
     pub index: u32,
 }
 
-/// How sounds are heard.
+/// How arrivals are heard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Combining {
     /// As pulses that rise and fall and, where they overlap, add up with their phases.
@@ -94,7 +94,7 @@ pub struct Receiver {
     pub sound_speed_m_s: f64,
     /// Half the longest path it waits for, metres.
     pub max_range_m: f64,
-    /// How sounds are heard.
+    /// How arrivals are heard.
     pub combining: Combining,
     gain: Gain,
     /// By step of the gain: its end, and what it makes of the threshold at 1 m.
@@ -110,7 +110,7 @@ pub struct Receiver {
     lead_us: f64,
 }
 
-/// What the full response of the face needs to know of a sound.
+/// What the full response of the face needs to know of an arrival.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Incident {
     /// Strength before the beam pattern.
@@ -126,9 +126,9 @@ pub struct Detection {
     pub status: PingStatus,
     /// Half the detected path; for `MinRange` the range of the end of blanking; metres.
     pub range_m: Option<f64>,
-    /// The sound that drove the detector, if it was sound; for `NoEcho` the one that came closest.
-    pub sound: Option<Sound>,
-    /// The most that the envelope reached with it, all sounds together.
+    /// The arrival that drove the detector, if it was sound; for `NoEcho` the one that came closest.
+    pub arrival: Option<PulseArrival>,
+    /// The most that the envelope reached with it, all arrivals together.
     pub amplitude: Option<f64>,
     /// The same above the threshold in force, decibels.
     pub margin_db: Option<f64>,
@@ -172,46 +172,46 @@ impl Receiver {
         self
     }
 
-    /// Whether it needs an [`Incident`] for each sound.
+    /// Whether it needs an [`Incident`] for each arrival.
     #[must_use]
     pub const fn asks_incidents(&self) -> bool {
         self.response.is_some() && matches!(self.combining, Combining::Coherent)
     }
 
-    /// Listens to the sounds of one firing, which come in order of their length, and is made ready
+    /// Listens to the arrivals of one firing, which come in order of their length, and is made ready
     /// again after each echo.
     ///
-    /// A sound that begins before the detector is ready and still lasts then raises ECHO at that
+    /// An arrival that begins before the detector is ready and still lasts then raises ECHO at that
     /// moment: at the end of blanking that is the minimum range, whatever is really there. A
     /// sound that is over by then is lost.
     #[must_use]
-    pub fn detect(&self, sounds: &[Sound]) -> Detection {
-        self.detection(&mut Hearing::new(self, sounds, &|_| None), Latch::Rearmed)
+    pub fn detect(&self, arrivals: &[PulseArrival]) -> Detection {
+        self.detection(&mut Hearing::new(self, arrivals, &|_| None), Latch::Rearmed)
     }
 
     /// The same with the face's full response, if the sensor asks for it: `incident` tells how a
-    /// sound meets the face, and a sound of which it tells nothing is taken by its amplitude.
+    /// sound meets the face, and an arrival of which it tells nothing is taken by its amplitude.
     #[must_use]
     pub fn detect_at_face(
         &self,
-        sounds: &[Sound],
-        incident: &dyn Fn(&Sound) -> Option<Incident>,
+        arrivals: &[PulseArrival],
+        incident: &dyn Fn(&PulseArrival) -> Option<Incident>,
         latch: Latch,
     ) -> Detection {
-        self.detect_within(f64::INFINITY, sounds, incident, latch).0
+        self.detect_within(f64::INFINITY, arrivals, incident, latch).0
     }
 
-    /// The same if only the sounds up to a length there and back are known, in metres. If longer
+    /// The same if only the arrivals up to a length there and back are known, in metres. If longer
     /// ones can't change it, also the length, at most that one, beyond which they couldn't.
     #[must_use]
     pub fn detect_within(
         &self,
         length_m: f64,
-        sounds: &[Sound],
-        incident: &dyn Fn(&Sound) -> Option<Incident>,
+        arrivals: &[PulseArrival],
+        incident: &dyn Fn(&PulseArrival) -> Option<Incident>,
         latch: Latch,
     ) -> (Detection, Option<f64>) {
-        let mut hearing = Hearing::new(self, sounds, incident);
+        let mut hearing = Hearing::new(self, arrivals, incident);
         hearing.hear_within(length_m);
         let detection = self.detection(&mut hearing, latch);
         let needed_m = (!hearing.asked_beyond()).then(|| hearing.needed_m());
@@ -222,14 +222,14 @@ impl Receiver {
     #[must_use]
     pub fn detect_in_noise(
         &self,
-        sounds: &[Sound],
-        incident: &dyn Fn(&Sound) -> Option<Incident>,
+        arrivals: &[PulseArrival],
+        incident: &dyn Fn(&PulseArrival) -> Option<Incident>,
         noise: &ReceiverNoise,
         rng: &mut impl rand::Rng,
     ) -> Detection {
         let track = noise.track(self, rng);
         let mut detection = self
-            .detection(&mut Hearing::new(self, sounds, incident).in_noise(&track), Latch::Rearmed);
+            .detection(&mut Hearing::new(self, arrivals, incident).in_noise(&track), Latch::Rearmed);
         for (i, echo_us) in detection.echoes_us.iter_mut().enumerate() {
             let jitter_us = noise.jitter(rng);
             if i > 0 || detection.status != PingStatus::MinRange {
@@ -300,7 +300,7 @@ impl Receiver {
         Detection {
             status,
             range_m: Some(self.range_m(first_us)),
-            sound: cause,
+            arrival: cause,
             amplitude: Some(peak),
             margin_db: Some(20.0 * (peak / self.threshold_at(first_us)).log10()),
             echoes_us,
@@ -311,26 +311,26 @@ impl Receiver {
     fn silence(&self, hearing: &mut Hearing) -> Detection {
         let (echoes_us, window_us) = (SmallVec::new(), self.window_us());
         // More has to be known before anything can be said.
-        let known: &[Sound] = if hearing.asked_beyond() { &[] } else { hearing.sounds };
-        let relative = |sound: &Sound| sound.amplitude / self.threshold_at(self.tof_us(sound));
-        let sound = known
+        let known: &[PulseArrival] = if hearing.asked_beyond() { &[] } else { hearing.arrivals };
+        let relative = |arrival: &PulseArrival| arrival.amplitude / self.threshold_at(self.tof_us(arrival));
+        let arrival = known
             .iter()
-            .filter(|sound| (self.blanking_us..=window_us).contains(&self.tof_us(sound)))
-            .filter(|sound| sound.amplitude > 0.0)
+            .filter(|arrival| (self.blanking_us..=window_us).contains(&self.tof_us(arrival)))
+            .filter(|arrival| arrival.amplitude > 0.0)
             .max_by(|one, other| relative(one).total_cmp(&relative(other)))
             .copied();
-        let peak = sound.map(|sound| {
+        let peak = arrival.map(|arrival| {
             hearing.rewind();
-            hearing.peak(self.tof_us(&sound), Some(&sound))
+            hearing.peak(self.tof_us(&arrival), Some(&arrival))
         });
         Detection {
             status: PingStatus::NoEcho,
             range_m: None,
-            sound,
+            arrival,
             amplitude: peak,
             // It may have been strong enough, but not for long enough.
-            margin_db: sound.zip(peak).map(|(sound, peak)| {
-                let threshold = self.threshold_at(self.tof_us(&sound));
+            margin_db: arrival.zip(peak).map(|(arrival, peak)| {
+                let threshold = self.threshold_at(self.tof_us(&arrival));
                 (20.0 * (peak / threshold).log10()).min(0.0)
             }),
             echoes_us,
@@ -353,8 +353,8 @@ impl Receiver {
         self.sound_speed_m_s * t_us * 1e-6 / 2.0
     }
 
-    fn tof_us(&self, sound: &Sound) -> f64 {
-        self.arrives_us(sound.length_m)
+    fn tof_us(&self, arrival: &PulseArrival) -> f64 {
+        self.arrives_us(arrival.length_m)
     }
 
     fn arrives_us(&self, length_m: f64) -> f64 {

@@ -30,7 +30,7 @@ pub struct ArrayModel {
 }
 
 /// An array at a pose.
-pub struct ArrayStand<'a> {
+pub struct ArrayAtPose<'a> {
     model: &'a ArrayModel,
     pose: Pose,
     /// With the body among the reflectors, where there is one.
@@ -70,12 +70,12 @@ impl ArrayModel {
     ///
     /// # Errors
     /// Never with a model that could be made.
-    pub fn at(&self, pose: Pose) -> Result<ArrayStand<'_>, ModelError> {
+    pub fn at(&self, pose: Pose) -> Result<ArrayAtPose<'_>, ModelError> {
         let own = match self.scene.robot {
             Some(_) => self.simulators_in(&Arc::new(self.scene.with_robot_at(&pose)))?,
             None => Vec::new(),
         };
-        Ok(ArrayStand { model: self, pose, own })
+        Ok(ArrayAtPose { model: self, pose, own })
     }
 
     /// The array.
@@ -106,7 +106,7 @@ impl ArrayModel {
     }
 }
 
-impl ArrayStand<'_> {
+impl ArrayAtPose<'_> {
     /// The array.
     #[must_use]
     pub fn array(&self) -> &RangerArray {
@@ -123,7 +123,7 @@ impl ArrayStand<'_> {
     #[must_use]
     pub fn ping(&self, ranger: usize) -> Prediction {
         let (simulator, pose) = self.mounted(ranger);
-        simulator.station(pose.position()).ping(pose.direction_rad(0.0))
+        simulator.at(pose.position()).ping(pose.direction_rad(0.0))
     }
 
     /// The same in noise: the same generator in the same state gives the same reading.
@@ -135,7 +135,7 @@ impl ArrayStand<'_> {
         rng: &mut impl Rng,
     ) -> Prediction {
         let (simulator, pose) = self.mounted(ranger);
-        simulator.station(pose.position()).ping_in_noise(pose.direction_rad(0.0), noise, rng)
+        simulator.at(pose.position()).ping_in_noise(pose.direction_rad(0.0), noise, rng)
     }
 
     /// The model that a ranger's predictions are to be put into words with.

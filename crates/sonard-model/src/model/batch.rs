@@ -24,7 +24,7 @@ mod tests {
     use super::*;
     use crate::{
         acoustics::{Air, BeamPattern, EchoTrace, Receiver, ReceiverNoise, Sensor},
-        model::{Options, Path, Station, paths::Paths},
+        model::{Options, Path, ObservationPoint, paths::Paths},
         scene::{Scene, shipped},
     };
 
@@ -58,7 +58,7 @@ mod tests {
         shared::<ReceiverNoise>();
         shared::<EchoTrace>();
         shared::<Simulator>();
-        shared::<Station<'_>>();
+        shared::<ObservationPoint<'_>>();
         shared::<Prediction>();
         shared::<Path>();
         shared::<Paths>();

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Arrival, Engine, Interaction, Mechanism, Path, Survey, raycast::Reflectors};
+use super::{Arrival, Engine, Interaction, Mechanism, Path, Arrivals, raycast::Reflectors};
 use crate::{
-    acoustics::Sound,
+    acoustics::PulseArrival,
     geometry::{DVec2, wrap_pi},
     scene::Scene,
 };
@@ -37,17 +37,17 @@ impl Cone {
 }
 
 impl Engine for Cone {
-    fn survey<'a>(&'a self, position: DVec2) -> Box<dyn Survey + 'a> {
-        Box::new(ConeSurvey { cone: self, position })
+    fn arrivals_at<'a>(&'a self, position: DVec2) -> Box<dyn Arrivals + 'a> {
+        Box::new(ConeArrivals { cone: self, position })
     }
 }
 
-struct ConeSurvey<'a> {
+struct ConeArrivals<'a> {
     cone: &'a Cone,
     position: DVec2,
 }
 
-impl ConeSurvey<'_> {
+impl ConeArrivals<'_> {
     fn nearest(&self, direction_rad: f64) -> Option<Arrival> {
         let cast = |offset_rad: &f64| {
             let ray_rad = wrap_pi(direction_rad + offset_rad);
@@ -79,10 +79,10 @@ impl ConeSurvey<'_> {
     }
 }
 
-impl Survey for ConeSurvey<'_> {
-    fn listen(&self, direction_rad: f64, sounds: &mut Vec<Sound>) {
-        sounds.clear();
-        sounds.extend(self.nearest(direction_rad).map(|arrival| Sound {
+impl Arrivals for ConeArrivals<'_> {
+    fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
+        arrivals.clear();
+        arrivals.extend(self.nearest(direction_rad).map(|arrival| PulseArrival {
             length_m: arrival.length_m,
             amplitude: arrival.amplitude,
             phase_rad: arrival.phase_rad,
@@ -91,8 +91,8 @@ impl Survey for ConeSurvey<'_> {
     }
 
     /// # Panics
-    /// If `sound` is not of this survey and direction.
-    fn arrival(&self, direction_rad: f64, _sound: &Sound) -> Arrival {
+    /// If `arrival` is not one of this direction.
+    fn arrival(&self, direction_rad: f64, _sound: &PulseArrival) -> Arrival {
         self.nearest(direction_rad).expect("a sound was heard in this direction")
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! Their appendix A fires a fan of rays for one direction, keeps the rays' next intersections in
 //! a heap ordered by distance, and stops at the first that is detected. Where the rays go does
-//! not depend on the direction, though: it only weights them. So [`Engine::survey`] traces one
+//! not depend on the direction, though: it only weights them. So [`Engine::arrivals_at`] traces one
 //! fan over the full circle for a place and weights it per direction; that gives every arrival,
 //! not just the first, and as all are wanted no heap is needed. [`Fan::first_echo`] is the
 //! appendix as printed, heap included, and a test holds the two together.
@@ -24,7 +24,7 @@
 //! - Everything happens in the plane: heights in the scene are ignored.
 
 mod ray;
-mod survey;
+mod arrivals;
 
 use std::{
     cmp::Ordering,
@@ -33,9 +33,9 @@ use std::{
 };
 
 use ray::Ray;
-use survey::FanSurvey;
+use arrivals::FanArrivals;
 
-use super::{Arrival, Edge, Engine, Reflector, Survey, raycast::Reflectors};
+use super::{Arrival, Edge, Engine, Reflector, Arrivals, raycast::Reflectors};
 use crate::{acoustics::BeamPattern, geometry::DVec2, scene::Scene};
 
 /// The ray model.
@@ -193,8 +193,8 @@ impl Fan {
 }
 
 impl Engine for Fan {
-    fn survey<'a>(&'a self, position: DVec2) -> Box<dyn Survey + 'a> {
-        Box::new(FanSurvey::trace(self, position))
+    fn arrivals_at<'a>(&'a self, position: DVec2) -> Box<dyn Arrivals + 'a> {
+        Box::new(FanArrivals::trace(self, position))
     }
 }
 

@@ -90,7 +90,7 @@ impl Path {
         self.reflectors().count()
     }
 
-    /// What happens to the sound, in order.
+    /// What happens to the arrival, in order.
     pub fn mechanisms(&self) -> impl DoubleEndedIterator<Item = Mechanism> {
         self.interactions.iter().map(|interaction| interaction.mechanism)
     }

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    Cone, Engine, Fan, Prediction, Station,
+    Cone, Engine, Fan, Prediction, ObservationPoint,
     paths::{self, PathEngine},
-    place::Place,
+    lazy::LazyArrivals,
 };
 use crate::{
     acoustics::{Air, BeamPattern, Disc, EdgeLawKind, Receiver, Response, Sensor, SensorError},
@@ -61,7 +61,7 @@ pub struct Options {
     pub blanking_us: Option<f64>,
     /// How the face answers to a pulse.
     pub response: Option<Response>,
-    /// Detect one sound at a time, and time it by its path alone
+    /// Detect one arrival at a time, and time it by its path alone
     /// ([`Combining::Ideal`](crate::acoustics::Combining::Ideal)); engines other than `paths` know no
     /// phases and always do.
     pub ideal_receiver: bool,
@@ -168,17 +168,17 @@ impl Simulator {
     /// Prepares for firing from `position` (world, metres). The costly part is done at the first
     /// firing that needs it and kept.
     #[must_use]
-    pub fn station(&self, position: DVec2) -> Station<'_> {
-        Station::new(self, position)
+    pub fn at(&self, position: DVec2) -> ObservationPoint<'_> {
+        ObservationPoint::new(self, position)
     }
 
     /// A reading for each firing of a checked plan, in the order of its indices.
     #[must_use]
     pub fn predict(&self, pose: &Pose, plan: &ScanPlan) -> Vec<Prediction> {
-        let station = self.station(pose.position());
+        let point = self.at(pose.position());
         (0..plan.stops())
             .flat_map(|stop| {
-                let prediction = station.ping(pose.direction_rad(plan.azimuth_deg(stop)));
+                let prediction = point.ping(pose.direction_rad(plan.azimuth_deg(stop)));
                 vec![prediction; plan.pings_per_stop as usize]
             })
             .collect()
@@ -235,8 +235,8 @@ impl Simulator {
         Some(self.sensor.mounting.z_m.unwrap_or_else(usual_z_m))
     }
 
-    pub(super) fn place(&self, at: [DVec2; 2]) -> Place<'_> {
-        Place::new(self.engine.as_ref(), at, 2.0 * self.receiver.max_range_m)
+    pub(super) fn arrivals_between(&self, at: [DVec2; 2]) -> LazyArrivals<'_> {
+        LazyArrivals::new(self.engine.as_ref(), at, 2.0 * self.receiver.max_range_m)
     }
 
     /// The options.

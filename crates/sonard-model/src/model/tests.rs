@@ -63,7 +63,7 @@ fn simulator(scene: Scene, options: Options) -> Simulator {
 }
 
 fn arrivals(scene: Scene, options: Options, from: DVec2, direction_deg: f64) -> Vec<Arrival> {
-    simulator(scene, options).station(from).arrivals(direction_deg.to_radians())
+    simulator(scene, options).at(from).arrivals(direction_deg.to_radians())
 }
 
 fn of_kind(arrivals: &[Arrival], kind: PathKind) -> impl Iterator<Item = &Arrival> {

@@ -214,10 +214,10 @@ fn take(
 ) -> ScanView {
     let mut scan = scan(simulator, number, pose);
     let Some((rng, spoil)) = spoil else { return scan };
-    let station = simulator.station(pose.position());
+    let point = simulator.at(pose.position());
     for ping in &mut scan.pings {
         let off_deg = rng.random_range(-spoil.azimuth_deg..=spoil.azimuth_deg);
-        let prediction = station.ping(pose.direction_rad(ping.azimuth_deg + off_deg));
+        let prediction = point.ping(pose.direction_rad(ping.azimuth_deg + off_deg));
         ping.status = prediction.status;
         let rounded = |m: f64| (m / spoil.range_step_m).round() * spoil.range_step_m;
         ping.range_m = prediction.range_m.map(rounded);

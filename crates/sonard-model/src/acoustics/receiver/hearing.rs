@@ -1,8 +1,8 @@
-//! The sum of a firing's sounds, and when its envelope passes the threshold.
+//! The sum of a firing's arrivals, and when its envelope passes the threshold.
 //!
-//! Time runs forward: sounds enter when they begin and leave when they are over, and only those in
+//! Time runs forward: arrivals enter when they begin and leave when they are over, and only those in
 //! between are summed. Where their strengths together can't reach the threshold nothing is summed;
-//! where one sound is alone its rise is looked up in the table of the pulse.
+//! where one arrival is alone its rise is looked up in the table of the pulse.
 
 mod ideal;
 mod rise;
@@ -10,10 +10,10 @@ mod rise;
 use num_complex::Complex64;
 use smallvec::SmallVec;
 
-use super::{Combining, Incident, Receiver, Sound, noise::NoiseTrack};
+use super::{Combining, Incident, Receiver, PulseArrival, noise::NoiseTrack};
 use crate::acoustics::{EchoShape, Gain};
 
-/// Sounds that together add less than this part to another's amplitude leave it as it is.
+/// Arrivals that together add less than this part to another's amplitude leave it as it is.
 const NEGLIGIBLE: f64 = 3e-3;
 
 /// About one cycle of the carrier, microseconds.
@@ -24,25 +24,25 @@ const WINDOW_SLACK_US: f64 = 1e-6;
 
 pub(super) struct Hearing<'a> {
     receiver: &'a Receiver,
-    pub(super) sounds: &'a [Sound],
-    incident: &'a dyn Fn(&Sound) -> Option<Incident>,
+    pub(super) arrivals: &'a [PulseArrival],
+    incident: &'a dyn Fn(&PulseArrival) -> Option<Incident>,
     noise: Option<&'a NoiseTrack>,
-    /// From then on sounds may begin that were not told.
+    /// From then on arrivals may begin that were not told.
     horizon_us: f64,
     /// The latest time that anything was asked about.
     asked_us: f64,
-    /// Sounds that have begun, the first `over` of which are over.
+    /// Arrivals that have begun, the first `over` of which are over.
     parts: SmallVec<[Part; 16]>,
     over: usize,
     /// How many of them have their fields.
     summed: usize,
-    /// The sounds that last, by [`Self::lasting`], when it was last found out that
+    /// The arrivals that last, by [`Self::lasting`], when it was last found out that
     /// they have to be watched.
     watched: Option<(usize, usize)>,
     /// Power of the time by which the gain rises.
     exponent: f64,
     least_threshold: f64,
-    /// A sound lasts from so long before its nominal time to so long after it.
+    /// An arrival lasts from so long before its nominal time to so long after it.
     span_us: (f64, f64),
 }
 
@@ -72,14 +72,14 @@ impl Part {
 impl<'a> Hearing<'a> {
     pub(super) fn new(
         receiver: &'a Receiver,
-        sounds: &'a [Sound],
-        incident: &'a dyn Fn(&Sound) -> Option<Incident>,
+        arrivals: &'a [PulseArrival],
+        incident: &'a dyn Fn(&PulseArrival) -> Option<Incident>,
     ) -> Self {
         let longest = receiver.response.as_ref().map_or(0.0, |response| response.crossing_us());
         let shape = &receiver.shape;
         Self {
             receiver,
-            sounds,
+            arrivals,
             incident,
             noise: None,
             horizon_us: f64::INFINITY,
@@ -105,7 +105,7 @@ impl<'a> Hearing<'a> {
         self
     }
 
-    /// Only the sounds up to a length, metres, are known.
+    /// Only the arrivals up to a length, metres, are known.
     pub(super) fn hear_within(&mut self, length_m: f64) {
         let arrives_us = self.receiver.arrives_us(length_m);
         self.horizon_us = match self.receiver.combining {
@@ -114,13 +114,13 @@ impl<'a> Hearing<'a> {
         };
     }
 
-    /// Whether an answer so far might have been another one if sounds beyond the horizon were
+    /// Whether an answer so far might have been another one if arrivals beyond the horizon were
     /// known.
     pub(super) fn asked_beyond(&self) -> bool {
         self.asked_us >= self.horizon_us
     }
 
-    /// Length of the longest paths, metres, whose sounds could have made an answer so far another
+    /// Length of the longest paths, metres, whose arrivals could have made an answer so far another
     /// one.
     pub(super) fn needed_m(&self) -> f64 {
         let begins_us = match self.receiver.combining {
@@ -145,8 +145,8 @@ impl<'a> Hearing<'a> {
         }
     }
 
-    /// The sound that drives the envelope one carrier cycle after a time.
-    pub(super) fn cause(&mut self, t_us: f64) -> Option<Sound> {
+    /// The arrival that drives the envelope one carrier cycle after a time.
+    pub(super) fn cause(&mut self, t_us: f64) -> Option<PulseArrival> {
         if self.receiver.combining == Combining::Ideal {
             return self.cause_of_one(t_us);
         }
@@ -159,14 +159,14 @@ impl<'a> Hearing<'a> {
             .map(|(place, part)| (place, size(part)))
             .filter(|(_, size)| *size > 0.0)
             .max_by(|one, other| one.1.total_cmp(&other.1))?;
-        self.sounds.get(self.over + place).copied()
+        self.arrivals.get(self.over + place).copied()
     }
 
-    /// The most of the envelope while a sound lasts that begins at `t_us`.
-    pub(super) fn peak(&mut self, t_us: f64, sound: Option<&Sound>) -> f64 {
+    /// The most of the envelope while an arrival lasts that begins at `t_us`.
+    pub(super) fn peak(&mut self, t_us: f64, arrival: Option<&PulseArrival>) -> f64 {
         const SAMPLES: u32 = 10;
-        if self.receiver.combining == Combining::Ideal || self.is_alone(t_us, sound) {
-            return sound.map_or(0.0, |sound| sound.amplitude);
+        if self.receiver.combining == Combining::Ideal || self.is_alone(t_us, arrival) {
+            return arrival.map_or(0.0, |arrival| arrival.amplitude);
         }
         let shape = &self.receiver.shape;
         let lasts_us = shape.first_us() + shape.last_us() - 2.0 * self.receiver.lead_us;
@@ -185,33 +185,33 @@ impl<'a> Hearing<'a> {
         self.level_of(self.over, t_us)
     }
 
-    /// Places of the sounds that last now.
+    /// Places of the arrivals that last now.
     pub(super) fn living(&self) -> std::ops::Range<usize> {
         self.over..self.parts.len()
     }
 
-    /// The part of a sound in the envelope.
+    /// The part of an arrival in the envelope.
     pub(super) fn share(&self, place: usize, t_us: f64) -> f64 {
         self.parts.get(place).map_or(0.0, |part| {
             part.size * modulus(self.shape_at(part, t_us)) * self.rise_of_gain(t_us)
         })
     }
 
-    /// Whether nothing else sounds with `sound` or within its length after it, and its strength is
+    /// Whether nothing else sounds with `arrival` or within its length after it, and its strength is
     /// its amplitude.
-    fn is_alone(&mut self, t_us: f64, sound: Option<&Sound>) -> bool {
-        let Some(sound) = sound else { return false };
+    fn is_alone(&mut self, t_us: f64, arrival: Option<&PulseArrival>) -> bool {
+        let Some(arrival) = arrival else { return false };
         if self.noise.is_some() || self.receiver.response.is_some() {
             return false;
         }
         self.enter(t_us + self.span_us.1, t_us);
         let first_us = t_us - self.span_us.1 + self.span_us.0;
-        let others = self.sounds[..self.parts.len()]
+        let others = self.arrivals[..self.parts.len()]
             .iter()
             .rev()
             .take_while(|other| self.receiver.tof_us(other) > first_us);
-        let rest: f64 = others.filter(|other| *other != sound).map(|other| other.amplitude).sum();
-        rest < NEGLIGIBLE * sound.amplitude
+        let rest: f64 = others.filter(|other| *other != arrival).map(|other| other.amplitude).sum();
+        rest < NEGLIGIBLE * arrival.amplitude
     }
 
     /// Envelope of the parts from a place on.
@@ -251,12 +251,12 @@ impl<'a> Hearing<'a> {
     }
 
     fn next_entry_us(&self) -> Option<f64> {
-        let next = self.sounds.get(self.parts.len());
+        let next = self.arrivals.get(self.parts.len());
         let entry_us = next.map(|next| self.receiver.tof_us(next) + self.span_us.0);
         entry_us.or_else(|| self.horizon_us.is_finite().then_some(self.horizon_us))
     }
 
-    /// Lets sounds enter and leave up to a time.
+    /// Lets arrivals enter and leave up to a time.
     fn advance(&mut self, t_us: f64) {
         self.enter(t_us, t_us);
         if self.receiver.combining == Combining::Coherent {
@@ -265,37 +265,37 @@ impl<'a> Hearing<'a> {
         }
     }
 
-    /// Lets sounds enter that begin up to a time; what is over by `now_us` only keeps its place.
+    /// Lets arrivals enter that begin up to a time; what is over by `now_us` only keeps its place.
     fn enter(&mut self, t_us: f64, now_us: f64) {
         self.asked_us = self.asked_us.max(t_us);
-        while let Some(sound) = self.sounds.get(self.parts.len()) {
-            let tof_us = self.receiver.tof_us(sound);
+        while let Some(arrival) = self.arrivals.get(self.parts.len()) {
+            let tof_us = self.receiver.tof_us(arrival);
             if tof_us + self.span_us.0 > t_us {
                 break;
             }
             let is_over = tof_us + self.span_us.1 < now_us;
-            let part = if is_over { Part::gone(tof_us) } else { self.part(sound, tof_us) };
+            let part = if is_over { Part::gone(tof_us) } else { self.part(arrival, tof_us) };
             self.parts.push(part);
         }
     }
 
-    fn part(&self, sound: &Sound, tof_us: f64) -> Part {
+    fn part(&self, arrival: &PulseArrival, tof_us: f64) -> Part {
         let receiver = self.receiver;
         let at_face = receiver.response.as_ref().and_then(|response| {
-            let Incident { strength, incidence } = (self.incident)(sound)?;
+            let Incident { strength, incidence } = (self.incident)(arrival)?;
             Some((strength, response.echo(&incidence)))
         });
         let (strength, shape) = match at_face {
             Some((strength, Some(shape))) => (strength, Some(Box::new(shape))),
             Some((_, None)) => (0.0, None),
-            None => (sound.amplitude, None),
+            None => (arrival.amplitude, None),
         };
         let size = strength / self.rise_of_gain(tof_us);
         let of = shape.as_deref().unwrap_or(&receiver.shape);
         Part {
             tof_us,
             size,
-            turn_rad: sound.phase_rad - receiver.omega * tof_us,
+            turn_rad: arrival.phase_rad - receiver.omega * tof_us,
             field: Complex64::ZERO,
             strength: size * of.peak(),
             steepest: size * of.steepest(),

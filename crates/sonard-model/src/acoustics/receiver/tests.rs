@@ -1,4 +1,4 @@
-//! Sounds at given times against what the module's description says of them.
+//! Arrivals at given times against what the module's description says of them.
 
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
@@ -21,10 +21,10 @@ fn receiver() -> Receiver {
 }
 
 /// Times (microseconds), amplitudes and phases.
-fn sounds(of: &[(f64, f64, f64)]) -> Vec<Sound> {
+fn arrivals(of: &[(f64, f64, f64)]) -> Vec<PulseArrival> {
     of.iter()
         .zip(0..)
-        .map(|(&(tof_us, amplitude, phase_rad), index)| Sound {
+        .map(|(&(tof_us, amplitude, phase_rad), index)| PulseArrival {
             length_m: tof_us * SPEED_M_S * 1e-6,
             amplitude,
             // The way's own phase is taken out, so that `phase_rad` is what meets.
@@ -37,7 +37,7 @@ fn sounds(of: &[(f64, f64, f64)]) -> Vec<Sound> {
 /// Expected status and times of ECHO.
 fn check(of: &[(f64, f64)], status: PingStatus, echoes_us: &[f64]) -> Detection {
     let of: Vec<_> = of.iter().map(|&(tof_us, amplitude)| (tof_us, amplitude, 0.0)).collect();
-    let detection = receiver().detect(&sounds(&of));
+    let detection = receiver().detect(&arrivals(&of));
     assert_eq!(detection.status, status, "{of:?}: {detection:?}");
     assert_eq!(detection.echoes_us.len(), echoes_us.len(), "{detection:?}");
     for (found, expected) in detection.echoes_us.iter().zip(echoes_us) {
@@ -93,7 +93,7 @@ fn the_first_loud_sound_wins_over_louder_later_ones() {
         PingStatus::Echo,
         &[4000.0 + walk_us(0.1), 5000.0 + walk_us(0.9)],
     );
-    assert_eq!(echo.sound.map(|sound| sound.index), Some(1));
+    assert_eq!(echo.arrival.map(|arrival| arrival.index), Some(1));
 }
 
 #[test]
@@ -103,10 +103,10 @@ fn silence_names_its_best_candidate_in_the_window_and_what_it_lacked() {
         PingStatus::NoEcho,
         &[],
     );
-    assert_eq!(silence.sound.map(|sound| sound.index), Some(2));
+    assert_eq!(silence.arrival.map(|arrival| arrival.index), Some(2));
     let lacked_db = 20.0 * (0.015_f64 / 0.02).log10();
     assert!((silence.margin_db.expect("a margin") - lacked_db).abs() < 1e-6);
-    assert_eq!(check(&[], PingStatus::NoEcho, &[]).sound, None);
+    assert_eq!(check(&[], PingStatus::NoEcho, &[]).arrival, None);
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn held_detector_skips_sounds_that_end_and_catches_those_that_last() {
 
 #[test]
 fn two_weak_sounds_in_phase_are_heard_and_out_of_phase_are_not() {
-    let pair = |phase_rad| sounds(&[(3000.0, 0.015, 0.0), (3001.0, 0.015, phase_rad)]);
+    let pair = |phase_rad| arrivals(&[(3000.0, 0.015, 0.0), (3001.0, 0.015, phase_rad)]);
     let together = receiver().detect(&pair(0.0));
     assert_eq!(together.status, PingStatus::Echo);
     assert!((together.amplitude.expect("an amplitude") - 0.03).abs() < 1e-3);
@@ -133,24 +133,24 @@ fn two_weak_sounds_in_phase_are_heard_and_out_of_phase_are_not() {
 
 #[test]
 fn a_strong_pair_out_of_phase_is_heard_where_it_does_not_overlap() {
-    let pair = sounds(&[(3000.0, 0.5, 0.0), (3150.0, 0.5, TAU / 2.0)]);
+    let pair = arrivals(&[(3000.0, 0.5, 0.0), (3150.0, 0.5, TAU / 2.0)]);
     let detection = receiver().detect(&pair);
     assert!((detection.echoes_us[0] - 3000.0 - walk_us(0.5)).abs() < 0.05, "{detection:?}");
     // Then both are gone from the envelope until the first one is over.
     let trace = receiver().trace(&pair, &|_| None, 4000.0, 1.0);
     let at = |t_us: f64| trace.points[t_us as usize].envelope;
     assert!(at(3130.0) > 0.45 && at(3285.0) < 0.02 && at(3450.0) > 0.45);
-    assert_eq!(trace.humps.len(), 2);
-    assert!((trace.humps[1].peak.0 - 0.5).abs() < 1e-3);
+    assert_eq!(trace.peaks.len(), 2);
+    assert!((trace.peaks[1].peak.0 - 0.5).abs() < 1e-3);
 }
 
-/// The ideal detector names the same sounds and times each by its path.
+/// The ideal detector names the same arrivals and times each by its path.
 #[test]
 fn the_ideal_receiver_is_the_limit_of_sounds_that_do_not_overlap() {
     let of = [(2600.0, 0.4, 1.0), (3500.0, 0.05, 2.0), (4400.0, 0.9, 0.3), (9000.0, 0.03, 0.0)];
-    let coherent = receiver().detect(&sounds(&of));
-    let ideal = Receiver { combining: Combining::Ideal, ..receiver() }.detect(&sounds(&of));
-    assert_eq!(coherent.sound, ideal.sound);
+    let coherent = receiver().detect(&arrivals(&of));
+    let ideal = Receiver { combining: Combining::Ideal, ..receiver() }.detect(&arrivals(&of));
+    assert_eq!(coherent.arrival, ideal.arrival);
     assert_eq!(coherent.echoes_us.len(), 4);
     for ((one, other), (tof_us, strength, _)) in
         coherent.echoes_us.iter().zip(&ideal.echoes_us).zip(of)
@@ -173,7 +173,7 @@ fn gain_steps_move_the_threshold() {
     // An echo too weak at the end of step 1 is heard once the gain has risen.
     let tof_us = 5000.0;
     let weak =
-        Sound { length_m: tof_us * 343.99e-6, amplitude: 0.8 * before, phase_rad: 0.0, index: 0 };
+        PulseArrival { length_m: tof_us * 343.99e-6, amplitude: 0.8 * before, phase_rad: 0.0, index: 0 };
     let detection = receiver.detect(&[weak]);
     assert_eq!(detection.status, PingStatus::Echo);
     assert!((detection.echoes_us[0] - 5120.0).abs() < 0.1, "{detection:?}");
@@ -195,10 +195,10 @@ fn measured_times_at_the_end_of_blanking_are_minimum_range() {
 fn noise_is_off_by_default_repeats_with_its_seed_and_shakes_weak_echoes_most() {
     let one = |strength, noise: &ReceiverNoise, seed| {
         let mut rng = Pcg64::seed_from_u64(seed);
-        receiver().detect_in_noise(&sounds(&[(4000.0, strength, 0.0)]), &|_| None, noise, &mut rng)
+        receiver().detect_in_noise(&arrivals(&[(4000.0, strength, 0.0)]), &|_| None, noise, &mut rng)
     };
     let quiet = one(0.1, &ReceiverNoise::NONE, 1);
-    let plain = receiver().detect(&sounds(&[(4000.0, 0.1, 0.0)]));
+    let plain = receiver().detect(&arrivals(&[(4000.0, 0.1, 0.0)]));
     assert!((quiet.echoes_us[0] - plain.echoes_us[0]).abs() < 0.01);
     let noise = ReceiverNoise { floor: 0.002, jitter_us: 0.0 };
     assert_eq!(one(0.1, &noise, 7), one(0.1, &noise, 7));
@@ -216,7 +216,7 @@ fn noise_is_off_by_default_repeats_with_its_seed_and_shakes_weak_echoes_most() {
     let loud = ReceiverNoise { floor: 0.05, jitter_us: 0.0 };
     let mut rng = Pcg64::seed_from_u64(3);
     let alarm = receiver().detect_in_noise(&[], &|_| None, &loud, &mut rng);
-    assert_eq!((alarm.status, alarm.sound), (PingStatus::Echo, None));
+    assert_eq!((alarm.status, alarm.arrival), (PingStatus::Echo, None));
 }
 
 /// The envelope of the noise has the size asked for.

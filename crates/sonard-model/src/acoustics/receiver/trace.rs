@@ -1,6 +1,6 @@
 //! What an oscilloscope would show of a firing.
 
-use super::{Detection, Incident, Latch, Receiver, Sound, hearing::Hearing};
+use super::{Detection, Incident, Latch, Receiver, PulseArrival, hearing::Hearing};
 
 /// The signal of one firing against time.
 #[derive(Debug, Clone, PartialEq)]
@@ -9,8 +9,8 @@ pub struct EchoTrace {
     pub points: Vec<TracePoint>,
     /// The transmission: its envelope in the same units, cut off at 1, while it lasts.
     pub transmission: Vec<(f64, f64)>,
-    /// The sounds, shortest way first.
-    pub humps: Vec<Hump>,
+    /// The envelope of each arrival, shortest path first.
+    pub peaks: Vec<EnvelopePeak>,
     /// What the receiver makes of it.
     pub detection: Detection,
 }
@@ -20,7 +20,7 @@ pub struct EchoTrace {
 pub struct TracePoint {
     /// After firing, microseconds.
     pub t_us: f64,
-    /// Envelope of all sounds together, after gain compensation.
+    /// Envelope of all arrivals together, after gain compensation.
     pub envelope: f64,
     /// Least envelope that the detector notices then.
     pub threshold: f64,
@@ -28,11 +28,11 @@ pub struct TracePoint {
     pub gain_db: f64,
 }
 
-/// A sound in a trace.
+/// The envelope peak of one arrival in a trace.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hump {
-    /// The sound.
-    pub sound: Sound,
+pub struct EnvelopePeak {
+    /// The arrival.
+    pub arrival: PulseArrival,
     /// When it arrives by its path, microseconds after firing.
     pub tof_us: f64,
     /// The most of its own envelope, and when that is, microseconds after firing.
@@ -42,21 +42,21 @@ pub struct Hump {
 impl Receiver {
     /// The trace of a firing up to `until_us`, in steps of `step_us` (at least 1 microsecond).
     ///
-    /// Sounds come in order of their length; `incident` as for
+    /// Arrivals come in order of their length; `incident` as for
     /// [`detect_at_face`](Self::detect_at_face). The transmission is the pulse as the band filter
     /// passes it: how the transducer rings after it is not modelled.
     #[must_use]
     pub fn trace(
         &self,
-        sounds: &[Sound],
-        incident: &dyn Fn(&Sound) -> Option<Incident>,
+        arrivals: &[PulseArrival],
+        incident: &dyn Fn(&PulseArrival) -> Option<Incident>,
         until_us: f64,
         step_us: f64,
     ) -> EchoTrace {
         let step_us = step_us.max(1.0);
         let count = (until_us.clamp(0.0, self.window_us()) / step_us) as usize;
-        let mut hearing = Hearing::new(self, sounds, incident);
-        let mut peaks = vec![(0.0, 0.0); sounds.len()];
+        let mut hearing = Hearing::new(self, arrivals, incident);
+        let mut peaks = vec![(0.0, 0.0); arrivals.len()];
         let points = (0..=count)
             .map(|i| {
                 let t_us = i as f64 * step_us;
@@ -75,14 +75,14 @@ impl Receiver {
             .map(|i| i as f64 * step_us)
             .map(|t_us| (t_us, self.shape.at(t_us + self.lead_us).norm()))
             .take_while(|(t_us, sent)| *t_us < self.shape.last_us() && *sent > 1e-4);
-        let humps = sounds.iter().zip(&peaks).filter(|(_, peak)| peak.0 > 0.0);
+        let reached = arrivals.iter().zip(&peaks).filter(|(_, peak)| peak.0 > 0.0);
         EchoTrace {
             points,
             transmission: sent.collect(),
-            humps: humps
-                .map(|(sound, &peak)| Hump { sound: *sound, tof_us: self.tof_us(sound), peak })
+            peaks: reached
+                .map(|(arrival, &peak)| EnvelopePeak { arrival: *arrival, tof_us: self.tof_us(arrival), peak })
                 .collect(),
-            detection: self.detect_at_face(sounds, incident, Latch::Rearmed),
+            detection: self.detect_at_face(arrivals, incident, Latch::Rearmed),
         }
     }
 }

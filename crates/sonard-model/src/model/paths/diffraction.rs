@@ -1,6 +1,6 @@
 //! Diffraction at edges.
 //!
-//! Sound is diffracted by free ends of walls and by corners that are not `pi / m`. By reciprocity the paths
+//! PulseArrival is diffracted by free ends of walls and by corners that are not `pi / m`. By reciprocity the paths
 //! back from an edge are the paths to it, so the one-way rays to each edge give all echoes with one diffraction
 //! and any reflections before and after: every ray out with every ray back ([`single`]). On request it is also
 //! followed from one upright edge to another ([`double`]). Walls that end below the ceiling or above the floor

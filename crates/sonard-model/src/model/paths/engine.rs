@@ -13,16 +13,16 @@ use super::{
     transducer::{DirectedPath, FLOOR_ABOVE, FaceEchoes, MultipleEcho},
 };
 use crate::{
-    acoustics::{BeamPattern, Disc, Image, Incidence, Incident, Sound},
+    acoustics::{BeamPattern, Disc, Image, Incidence, Incident, PulseArrival},
     geometry::{DVec2, wrap_pi},
-    model::{Arrival, Engine, Interaction, Mechanism, Path, Survey, mirrored},
+    model::{Arrival, Engine, Interaction, Mechanism, Path, Arrivals, mirrored},
     reading::PathKind,
     scene::Scene,
 };
 
 /// The exact engine: echo paths, a beam pattern and a face that reflects.
 ///
-/// [`Settings::floor`] is also the weakest sound that [`Survey::listen`] gives.
+/// [`Settings::floor`] is also the weakest sound that [`Arrivals::listen`] gives.
 #[derive(Debug)]
 pub struct PathEngine {
     pub(super) paths: Paths,
@@ -71,20 +71,20 @@ impl PathEngine {
 }
 
 impl Engine for PathEngine {
-    fn survey<'a>(&'a self, position: DVec2) -> Box<dyn Survey + 'a> {
-        self.survey_pair(position, position)
+    fn arrivals_at<'a>(&'a self, position: DVec2) -> Box<dyn Arrivals + 'a> {
+        self.arrivals_between(position, position)
     }
 
-    fn survey_pair<'a>(&'a self, transmitter: DVec2, receiver: DVec2) -> Box<dyn Survey + 'a> {
-        Box::new(PathSurvey::new(self, self.paths.clone(), [transmitter, receiver]))
+    fn arrivals_between<'a>(&'a self, transmitter: DVec2, receiver: DVec2) -> Box<dyn Arrivals + 'a> {
+        Box::new(PathArrivals::new(self, self.paths.clone(), [transmitter, receiver]))
     }
 
-    fn survey_within<'a>(
+    fn arrivals_within<'a>(
         &'a self,
         places: [DVec2; 2],
         max_path_m: f64,
-    ) -> Option<Box<dyn Survey + 'a>> {
-        Some(Box::new(PathSurvey::new(self, self.paths.within(max_path_m), places)))
+    ) -> Option<Box<dyn Arrivals + 'a>> {
+        Some(Box::new(PathArrivals::new(self, self.paths.within(max_path_m), places)))
     }
 }
 
@@ -92,7 +92,7 @@ impl Engine for PathEngine {
 const REACHES_DEG: [f64; 5] = [6.0, 10.0, 16.0, 30.0, 180.0];
 
 /// The echo paths of a place.
-struct PathSurvey<'a> {
+struct PathArrivals<'a> {
     engine: &'a PathEngine,
     /// The engine's, perhaps for shorter paths.
     paths: Paths,
@@ -105,7 +105,7 @@ struct PathSurvey<'a> {
     face_echoes: Option<FaceEchoes>,
 }
 
-impl<'a> PathSurvey<'a> {
+impl<'a> PathArrivals<'a> {
     fn new(engine: &'a PathEngine, paths: Paths, [transmitter, receiver]: [DVec2; 2]) -> Self {
         let (traced, echoes) = paths.trace(transmitter, receiver, engine.bound.as_ref());
         let settings = &paths.plan.settings;
@@ -207,9 +207,9 @@ impl<'a> PathSurvey<'a> {
     }
 }
 
-impl Survey for PathSurvey<'_> {
-    fn listen(&self, direction_rad: f64, sounds: &mut Vec<Sound>) {
-        sounds.clear();
+impl Arrivals for PathArrivals<'_> {
+    fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
+        arrivals.clear();
         let direction_rad = wrap_pi(direction_rad);
         let (beam, floor) = (&self.engine.beam, self.paths.plan.settings.floor);
         let is_flat = self.engine.is_flat();
@@ -229,23 +229,23 @@ impl Survey for PathSurvey<'_> {
                 };
                 if most >= floor {
                     let Echo { length_m, phase_rad, .. } = self.echoes[entry.echo as usize];
-                    sounds.push(Sound { length_m, amplitude, phase_rad, index: entry.echo });
+                    arrivals.push(PulseArrival { length_m, amplitude, phase_rad, index: entry.echo });
                 }
             });
         }
         // Echoes are numbered by length; multiple echoes come after all of them.
-        sounds.sort_unstable_by_key(|sound| sound.index);
+        arrivals.sort_unstable_by_key(|arrival| arrival.index);
         let multiple = self.multiple_echoes(direction_rad);
         if !multiple.is_empty() {
             let numbers = self.echoes.len() as u32..;
-            sounds.extend(multiple.iter().zip(numbers).map(|(echo, index)| echo.sound(index)));
-            sounds.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
+            arrivals.extend(multiple.iter().zip(numbers).map(|(echo, index)| echo.arrival(index)));
+            arrivals.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
         }
     }
 
-    fn incident(&self, direction_rad: f64, sound: &Sound) -> Incident {
+    fn incident(&self, direction_rad: f64, arrival: &PulseArrival) -> Incident {
         let (paths, traced) = (&self.paths, &self.traced);
-        let index = sound.index as usize;
+        let index = arrival.index as usize;
         let (strength, ends_rad, length_m, image) = if let Some(echo) = self.echoes.get(index) {
             let image = match echo.via.kind() {
                 PathKind::Specular => mirrored(paths.mirrors_met(traced, echo)),
@@ -259,24 +259,24 @@ impl Survey for PathSurvey<'_> {
             (echo.amplitude, ends_rad, echo.length_m, image)
         } else {
             let multiple = &self.multiple_echoes(wrap_pi(direction_rad))[index - self.echoes.len()];
-            let (strength, ends_rad) = self.multiple_ends(direction_rad, multiple, sound.amplitude);
+            let (strength, ends_rad) = self.multiple_ends(direction_rad, multiple, arrival.amplitude);
             (strength, ends_rad, multiple.length_m, self.multiple_image(multiple))
         };
         let [leaving_rad, arriving_rad] = ends_rad.map(|end_rad| wrap_pi(end_rad - direction_rad));
         Incident { strength, incidence: Incidence { leaving_rad, arriving_rad, length_m, image } }
     }
 
-    fn arrival(&self, direction_rad: f64, sound: &Sound) -> Arrival {
-        let index = sound.index as usize;
+    fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival {
+        let index = arrival.index as usize;
         if let Some(at) = index.checked_sub(self.echoes.len()) {
             let multiple = self.multiple_echoes(wrap_pi(direction_rad));
-            return self.multiple_arrival(direction_rad, &multiple[at], sound.amplitude);
+            return self.multiple_arrival(direction_rad, &multiple[at], arrival.amplitude);
         }
         let echo = &self.echoes[index];
         let path = self.paths.path(&self.traced, echo);
         Arrival {
             length_m: path.length_m,
-            amplitude: sound.amplitude,
+            amplitude: arrival.amplitude,
             path_amplitude: path.amplitude,
             phase_rad: path.phase_rad,
             departure_rad: path.departure_rad,

@@ -13,7 +13,7 @@
 //! Paths by floor and ceiling are left out. The beam pattern weighs the first departure and the
 //! last arrival only.
 //!
-//! The sound that passes beside the face goes on behind it: in the middle of a disc's shadow it
+//! The arrival that passes beside the face goes on behind it: in the middle of a disc's shadow it
 //! is as strong as without the disc (Arago's spot, `|exp(-i p)| = 1`), so nothing is taken from
 //! the paths that run past the ranger.
 

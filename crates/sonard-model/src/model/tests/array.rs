@@ -39,7 +39,7 @@ fn a_ring_in_the_middle_of_a_room_reads_its_walls_from_its_own_radius() {
             let range_m = stand.ping(ranger).range_m.expect("a wall ahead");
             assert!((range_m - (2.0 - 0.16)).abs() < 1e-3, "{ranger}: {range_m}");
         }
-        // At 30 degrees a mirror sends the sound away: not the wall's own distance.
+        // At 30 degrees a mirror sends the arrival away: not the wall's own distance.
         let oblique = stand.ping(1);
         assert_ne!(oblique.arrival.map(|arrival| arrival.path.order()), Some(1));
     }
@@ -56,7 +56,7 @@ fn each_ranger_reads_what_a_single_one_reads_at_its_place() {
     let stand = model.at(robot).expect("a stand");
     for (at, ranger) in model.array().rangers.iter().enumerate() {
         let pose = ranger.pose_on(&robot);
-        let alone = single.station(pose.position()).ping(pose.direction_rad(0.0));
+        let alone = single.at(pose.position()).ping(pose.direction_rad(0.0));
         assert_eq!(stand.ping(at), alone, "{}", ranger.id);
     }
 }
@@ -72,7 +72,7 @@ fn no_ranger_hears_beyond_its_turn() {
     assert!((0..8).all(|ranger| stand.ping(ranger).status == PingStatus::NoEcho));
 }
 
-/// The body of the ring of twelve is met by the sound that comes back by way of a wall behind the
+/// The body of the ring of twelve is met by the arrival that comes back by way of a wall behind the
 /// robot, and turns and moves with it.
 #[test]
 fn a_body_moves_with_the_robot_and_is_in_the_way_of_sound() {
@@ -98,8 +98,8 @@ fn a_body_moves_with_the_robot_and_is_in_the_way_of_sound() {
         }
         // Of all that arrives, nothing has passed through the body.
         let mounted = with.array().rangers[0].pose_on(&robot);
-        let station = stand.simulator(0).station(mounted.position());
-        for arrival in station.arrivals(mounted.direction_rad(0.0)) {
+        let point = stand.simulator(0).at(mounted.position());
+        for arrival in point.arrivals(mounted.direction_rad(0.0)) {
             let through = std::f64::consts::PI + mounted.direction_rad(0.0);
             let off = crate::geometry::wrap_pi(arrival.arrival_rad - through).abs();
             assert!(off > 0.5, "from behind, through the body: {arrival:?}");

@@ -29,9 +29,9 @@ fn a_wall_seen_aslant_is_weighted_twice_by_the_beam() {
     let beam = BeamPattern::new(&sensor, Air::default().sound_speed_m_s());
     let one_wall = scene(vec![wall("w", (1.3, -3.0), (1.3, 2.0), 1.0)]);
     let simulator = simulator(one_wall, BARE);
-    let station = simulator.station(DVec2::ZERO);
+    let point = simulator.at(DVec2::ZERO);
     for turned_deg in [-9.0_f64, -3.0, 0.5, 6.0, 11.0] {
-        let all = station.arrivals(turned_deg.to_radians());
+        let all = point.arrivals(turned_deg.to_radians());
         let specular = of_kind(&all, PathKind::Specular).next().expect("an echo");
         let expected = beam.one_way(turned_deg.to_radians()).powi(2);
         close(specular.amplitude, expected, 1e-6, "amplitude");
@@ -139,7 +139,7 @@ fn a_rectangle_gives_the_image_lattice() {
     ];
     let options = Options { max_range_m: Some(2.0), ..BARE };
     let simulator = simulator(scene(room), options);
-    let station = simulator.station(DVec2::new(x_m, y_m));
+    let point = simulator.at(DVec2::new(x_m, y_m));
     let axis = |size_m: f64, at_m: f64| {
         (-5..=5).flat_map(move |n| {
             let shift_m = 2.0 * f64::from(n) * size_m;
@@ -165,7 +165,7 @@ fn a_rectangle_gives_the_image_lattice() {
             }
         }
         expected.sort_by(f64::total_cmp);
-        let arrivals = station.arrivals(direction_rad);
+        let arrivals = point.arrivals(direction_rad);
         for length_m in expected {
             let found = of_kind(&arrivals, PathKind::Specular)
                 .any(|arrival| (arrival.length_m - length_m).abs() < 1e-7);
@@ -181,14 +181,14 @@ fn the_cone_reads_the_nearest_hit_within_its_aperture() {
     let options = Options { engine: EngineKind::Cone, aperture_deg: Some(15.0), ..BARE };
     let one_wall = scene(vec![wall("w", (1.0, -3.0), (1.0, 3.0), 1.0)]);
     let simulator = simulator(one_wall, options);
-    let station = simulator.station(DVec2::ZERO);
+    let point = simulator.at(DVec2::ZERO);
     for (turned_deg, nearest_deg) in [(0.0_f64, 0.5_f64), (30.0, 22.5), (-40.0, -32.5)] {
-        let prediction = station.ping(turned_deg.to_radians());
+        let prediction = point.ping(turned_deg.to_radians());
         assert_eq!(prediction.status, PingStatus::Echo);
         let expected = 1.0 / nearest_deg.to_radians().cos();
         close(prediction.range_m.expect("a range"), expected, 1e-9, "range");
     }
-    assert_eq!(station.ping(std::f64::consts::PI).status, PingStatus::NoEcho);
+    assert_eq!(point.ping(std::f64::consts::PI).status, PingStatus::NoEcho);
 }
 
 /// Ranges are measured from the face, and from the middle of a pair.
@@ -201,7 +201,7 @@ fn a_face_off_the_axis_sees_the_wall_from_where_it_is() {
         let options = Options { engine: EngineKind::Paths, ..BARE };
         let simulator = Simulator::new(Arc::new(room()), sensor, Air::default(), options)
             .expect("good options");
-        let ping = simulator.station(DVec2::ZERO).ping(f64::to_radians(direction_deg));
+        let ping = simulator.at(DVec2::ZERO).ping(f64::to_radians(direction_deg));
         ping.range_m.expect("a range")
     };
     let mounting = crate::acoustics::Mounting::default();

@@ -144,9 +144,9 @@ fn ranges_agree(reference: &Reference, double_diffraction: bool, most_db: f64) {
             let lossless =
                 Options { threshold, lossless: true, double_diffraction, ..Options::default() };
             let simulator = simulator_of(of, reference.c, lossless);
-            let station = simulator.station(DVec2::from_array(of.sensor));
+            let point = simulator.at(DVec2::from_array(of.sensor));
             for beam in &of.scan {
-                let found = station.ping(beam.azimuth.to_radians());
+                let found = point.ping(beam.azimuth.to_radians());
                 let what = format!("{name}, {} degrees, threshold {tau}", beam.azimuth);
                 score.beam(&what, beam.threshold[tau].as_ref(), &found);
                 if tau == "0.02" {

@@ -285,9 +285,9 @@ fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
                     ..Options::default()
                 };
                 let simulator = simulator(shipped.with_robot_at(pose), options);
-                let station = simulator.station(pose.position());
+                let point = simulator.at(pose.position());
                 for direction in 0..63 {
-                    for arrival in station.arrivals(0.1 * f64::from(direction)) {
+                    for arrival in point.arrivals(0.1 * f64::from(direction)) {
                         check_arrival(&simulator, &arrival, pose.position(), &mut fan_rounds);
                         let face = |met| met == Mechanism::Transducer;
                         trains += usize::from(arrival.path.mechanisms().any(face));

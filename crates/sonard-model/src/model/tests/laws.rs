@@ -38,7 +38,7 @@ fn loud(scene: Scene, from: DVec2, direction_rad: f64) -> Vec<(Vec<Mechanism>, f
     let options = Options { max_range_m: Some(2.0), ..BARE };
     let simulator = simulator(scene, options);
     let mut all: Vec<_> = simulator
-        .station(from)
+        .at(from)
         .arrivals(direction_rad)
         .into_iter()
         .filter(|arrival| arrival.amplitude > 0.05)
@@ -105,12 +105,12 @@ fn paths_are_heard_in_the_same_order_as_the_appendix_says() {
         max_order: u32::MAX,
     };
     let fan = Fan::new(&room, BeamPattern::new(&sensor, 343.99), settings);
-    let survey = fan.survey(from);
+    let arrivals = fan.arrivals_at(from);
     for direction_deg in (0..360).step_by(5) {
         let direction_rad = f64::from(direction_deg).to_radians();
         for (shortest_m, threshold) in [(0.0, 0.02), (0.818, 0.02), (1.5, 0.1)] {
             let first = fan.first_echo(from, direction_rad, shortest_m, threshold);
-            let of_all = survey
+            let of_all = arrivals
                 .arrivals(direction_rad)
                 .into_iter()
                 .find(|arrival| arrival.length_m >= shortest_m && arrival.amplitude >= threshold);
@@ -125,7 +125,7 @@ fn paths_are_heard_in_the_same_order_as_the_appendix_says() {
     }
 }
 
-/// Flat walls only: exactly. Sound that meets a round body spreads so much that two rays which
+/// Flat walls only: exactly. PulseArrival that meets a round body spreads so much that two rays which
 /// leave side by side soon meet different walls, and a fan of any spacing misses some paths.
 #[test]
 fn a_finer_fan_reads_the_same_in_every_shipped_scene() {
@@ -172,7 +172,7 @@ fn absorption_only_weakens_and_by_its_decibels() {
     let lossless = simulator(room.clone(), BARE);
     let lossy = simulator(room, Options { lossless: false, ..BARE });
     let decibels_per_m = Air::default().absorption_db_per_m(49.4e3);
-    let (lossless, lossy) = (lossless.station(from), lossy.station(from));
+    let (lossless, lossy) = (lossless.at(from), lossy.at(from));
     for direction_deg in (0..360).step_by(15) {
         let direction_rad = f64::from(direction_deg).to_radians();
         let all = lossless.arrivals(direction_rad);

@@ -57,14 +57,14 @@ fn trace(set_up: &str) -> (Vec<SeenHump>, Prediction) {
     let scene = shipped_scene("echo-traces");
     let pose = pose(&scene, set_up);
     let simulator = simulator(scene, Options::default());
-    let station = simulator.station(pose.position());
+    let point = simulator.at(pose.position());
     let direction_rad = pose.direction_rad(0.0);
-    let trace = station.trace(direction_rad, 5.0, 2.0);
-    let humps = trace.humps.iter().map(|hump| {
-        let arrival = station.arrival(direction_rad, &hump.sound);
+    let trace = point.trace(direction_rad, 5.0, 2.0);
+    let humps = trace.peaks.iter().map(|hump| {
+        let arrival = point.arrival(direction_rad, &hump.arrival);
         (arrival.length_m / 2.0, hump.peak.0, names(&simulator, &arrival))
     });
-    (humps.collect(), station.ping_rearmed(direction_rad))
+    (humps.collect(), point.ping_rearmed(direction_rad))
 }
 
 fn strongest(humps: &[SeenHump]) -> &SeenHump {
@@ -191,7 +191,7 @@ fn a_false_lower_wall_appears_at_827_mm() {
     close(upper_m + 0.827, 2.0 * 0.742, 1e-3, "width");
 }
 
-/// Figure 7: the top wall's echo (794 mm of path) still sounds when the receiver opens.
+/// Figure 7: the top wall's echo (794 mm of path) still arrivals when the receiver opens.
 #[test]
 fn the_top_wall_is_read_as_minimum_range() {
     let (simulator, readings) = scan("simple-room", "fig7", 0.9);
@@ -207,7 +207,7 @@ fn the_top_wall_is_read_as_minimum_range() {
 }
 
 /// Figure 7, on the right: the wall is 94 mm away and all its own echoes are over before the
-/// receiver opens, but the sound runs to and fro between wall and face, and the fourth round is
+/// receiver opens, but the arrival runs to and fro between wall and face, and the fourth round is
 /// still there. The paper's model, whose ranger is transparent, was silent here.
 #[test]
 fn the_near_wall_on_the_right_is_read_as_minimum_range() {
@@ -226,8 +226,8 @@ fn the_near_wall_on_the_right_is_read_as_minimum_range() {
     assert!(near.len() >= 3, "{near:?}");
 }
 
-/// Figure 9 with a robot's body behind the ranger: the body is in the way of the sound that
-/// passed the ranger, and what runs to and fro between body and wall still sounds when the
+/// Figure 9 with a robot's body behind the ranger: the body is in the way of the arrival that
+/// passed the ranger, and what runs to and fro between body and wall still arrivals when the
 /// receiver opens. Where the false lower wall was, the minimum range is read.
 #[test]
 fn a_robots_body_turns_the_false_wall_into_minimum_range() {
@@ -268,7 +268,7 @@ fn a_weak_post_explains_a_silence() {
     let mut post = scene(Vec::new());
     post.cylinders = vec![cylinder((5.0, 0.0), 0.01)];
     let simulator = simulator(post, Options::default());
-    let silence = simulator.station(DVec2::ZERO).ping(0.0);
+    let silence = simulator.at(DVec2::ZERO).ping(0.0);
     assert_eq!(silence.status, PingStatus::NoEcho);
     let candidate = silence.arrival.expect("a candidate");
     assert_eq!(reflectors(&candidate.path)[..], [Reflector::Cylinder(0)]);
@@ -285,13 +285,13 @@ fn a_plate_before_the_transducer_answers_in_a_train() {
     let pose = pose(&scene, "c");
     let simulator = simulator(scene, Options::default());
     let direction_rad = pose.direction_rad(0.0);
-    let arrivals = simulator.station(pose.position()).arrivals(direction_rad);
+    let arrivals = simulator.at(pose.position()).arrivals(direction_rad);
     let train: Vec<f64> = of_kind(&arrivals, PathKind::Specular).map(|a| a.length_m).collect();
     for (echo, round) in train.iter().zip(1..) {
         close(*echo, 1.2 * f64::from(round), 1e-9, "round");
     }
     assert!(train.len() >= 2, "{train:?}");
-    assert!(simulator.station(pose.position()).ping_rearmed(direction_rad).echoes_us.len() >= 2);
+    assert!(simulator.at(pose.position()).ping_rearmed(direction_rad).echoes_us.len() >= 2);
 }
 
 /// Figure 12: an arc around the corner's vertex, and a hole on each side of it.

@@ -1,4 +1,4 @@
-//! Short surveys give what the whole one gives.
+//! Paths up to a length give what all paths give.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::{
     scene::{Scene, shipped},
 };
 
-/// Pings of one station, by the nearest echoes that settle them, beside pings by all echoes.
+/// Pings of one point, by the nearest echoes that settle them, beside pings by all echoes.
 fn check(scene: &str, sensor: &str, options: Options) {
     let text = shipped::text(scene).expect("a shipped scene");
     let scene = Arc::new(Scene::from_json(text).expect("a valid scene"));
@@ -21,18 +21,18 @@ fn check(scene: &str, sensor: &str, options: Options) {
     let mut random = Pcg64::seed_from_u64(5);
     for pose in scene.poses.values() {
         let off = DVec2::new(random.random_range(-0.02..0.02), random.random_range(-0.02..0.02));
-        let station = simulator.station(pose.position() + off);
+        let point = simulator.at(pose.position() + off);
         for _ in 0..20 {
             let direction_rad = random.random_range(-3.1..3.1);
             assert_eq!(
-                station.ping(direction_rad),
-                station.ping_by_all(direction_rad, Latch::First),
+                point.ping(direction_rad),
+                point.ping_by_all(direction_rad, Latch::First),
                 "{} {pose:?} {direction_rad}",
                 scene.name
             );
             assert_eq!(
-                station.ping_rearmed(direction_rad),
-                station.ping_by_all(direction_rad, Latch::Rearmed),
+                point.ping_rearmed(direction_rad),
+                point.ping_by_all(direction_rad, Latch::Rearmed),
                 "{} {pose:?} {direction_rad}",
                 scene.name
             );

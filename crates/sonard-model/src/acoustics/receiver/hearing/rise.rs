@@ -1,4 +1,4 @@
-//! When the envelope of all sounds together has been above the threshold for long enough.
+//! When the envelope of all arrivals together has been above the threshold for long enough.
 
 use super::{Hearing, Part, WINDOW_SLACK_US};
 use crate::acoustics::Gain;
@@ -109,7 +109,7 @@ impl Hearing<'_> {
         }
     }
 
-    /// Nothing comes any more, which only those know who know all sounds.
+    /// Nothing comes any more, which only those know who know all arrivals.
     const fn silence(&mut self) -> Skip {
         self.asked_us = f64::MAX;
         Skip::Silence
@@ -142,7 +142,7 @@ impl Hearing<'_> {
         }
     }
 
-    /// When a sound alone passes the threshold after `t_us`, and when it is last above.
+    /// When an arrival alone passes the threshold after `t_us`, and when it is last above.
     fn lone_rise(&self, part: &Part, t_us: f64) -> Option<(f64, f64)> {
         let at = |offset_us: f64| part.tof_us + offset_us - self.receiver.lead_us;
         let level_at =
@@ -156,7 +156,7 @@ impl Hearing<'_> {
         (rise_us >= t_us).then_some((rise_us, fall_us))
     }
 
-    /// Whether the gain rises by a step while a sound lasts.
+    /// Whether the gain rises by a step while an arrival lasts.
     fn gain_steps_during(&self, part: &Part) -> bool {
         let Gain::Steps { steps } = &self.receiver.gain else { return false };
         let lasts = part.tof_us + self.span_us.0..part.tof_us + self.span_us.1;
@@ -212,7 +212,7 @@ impl Standing {
 enum Skip {
     /// Nothing more will come.
     Silence,
-    /// One sound, alone, passes the threshold.
+    /// One arrival, alone, passes the threshold.
     Lone { rise_us: f64 },
     /// Here the envelope has to be watched.
     To(f64),

@@ -258,12 +258,12 @@ fn few_readings_depend_on_what_is_left_out_below_the_threshold() {
         let own = simulator.path_settings();
         let engines = [own.clone(), Settings { repeated_contacts_above: 1.0, ..own }]
             .map(|settings| PathEngine::new(&plan, beam.clone(), None, settings));
-        let surveys = engines.each_ref().map(|engine| engine.survey(pose.position()));
+        let both = engines.each_ref().map(|engine| engine.arrivals_at(pose.position()));
         for azimuth in 0..120 {
-            let [some, every] = surveys.each_ref().map(|survey| {
-                let mut sounds = Vec::new();
-                survey.listen(pose.direction_rad(3.0 * f64::from(azimuth)), &mut sounds);
-                simulator.receiver().detect(&sounds)
+            let [some, every] = both.each_ref().map(|engine| {
+                let mut arrivals = Vec::new();
+                engine.listen(pose.direction_rad(3.0 * f64::from(azimuth)), &mut arrivals);
+                simulator.receiver().detect(&arrivals)
             });
             all += 1;
             let off_m = some.range_m.zip(every.range_m).map(|(one, other)| (one - other).abs());

@@ -4,7 +4,7 @@ use super::*;
 use crate::{
     acoustics::{Air, Sensor},
     geometry::{Pose, wrap_pi},
-    model::{Arrival, EngineKind, Options, Simulator, Station},
+    model::{Arrival, EngineKind, Options, Simulator, ObservationPoint},
     scene::shipped,
 };
 
@@ -16,8 +16,8 @@ fn simulator(scene: &Arc<Scene>, engine: EngineKind, ray_spacing_deg: f64) -> Si
 }
 
 /// Mirror echoes over the threshold; the fan's ranger is transparent.
-fn mirrored(station: &Station, pose: &Pose, azimuth_deg: f64) -> Vec<Arrival> {
-    let mut arrivals = station.arrivals(pose.direction_rad(azimuth_deg));
+fn mirrored(point: &ObservationPoint, pose: &Pose, azimuth_deg: f64) -> Vec<Arrival> {
+    let mut arrivals = point.arrivals(pose.direction_rad(azimuth_deg));
     arrivals.retain(|arrival| {
         arrival.path.kind() == PathKind::Specular
             && arrival.amplitude > 0.02
@@ -36,7 +36,7 @@ fn is_same(one: &Arrival, other: &Arrival) -> bool {
 fn agreement(scene: &Arc<Scene>, pose: &Pose, ray_spacing_deg: f64) -> (usize, usize, usize) {
     let exact = simulator(scene, EngineKind::Paths, 1.0);
     let fan = simulator(scene, EngineKind::Fan, ray_spacing_deg);
-    let [exact, fan] = [&exact, &fan].map(|simulator| simulator.station(pose.position()));
+    let [exact, fan] = [&exact, &fan].map(|simulator| simulator.at(pose.position()));
     let (mut all, mut found, mut extra) = (0, 0, 0);
     for azimuth in 0..12 {
         let azimuth_deg = 30.0 * f64::from(azimuth) + 1.0;

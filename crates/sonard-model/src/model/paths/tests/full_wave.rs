@@ -81,7 +81,7 @@ impl Chain {
         }
         let k = TAU * f / self.c;
         // Seen through an odd number of mirrors the aperture is mirrored; an edge forgets where
-        // on the aperture the sound left, but looks otherwise from each place.
+        // on the aperture the arrival left, but looks otherwise from each place.
         let bent = echo.path.kind() == PathKind::Diffracted;
         let side = if reflectors(&echo.path).len() % 2 == 1 { -1.0 } else { 1.0 };
         let point = |i: i32| self.half_width_m * (f64::from(2 * i + 1) / f64::from(POINTS) - 1.0);

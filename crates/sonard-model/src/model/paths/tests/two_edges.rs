@@ -1,4 +1,4 @@
-//! Sound that bends at two edges.
+//! PulseArrival that bends at two edges.
 
 use num_complex::Complex64;
 use serde::Deserialize;

@@ -118,7 +118,7 @@ fn the_beam_is_weighed_in_space_and_a_tilt_finds_the_floor() {
     let heard = |tilt_rad: f64, walls: &[Reflector]| {
         let settings = Settings { tilt_rad, floor: 1e-6, ..at_height(h) };
         let engine = PathEngine::new(&room, beam.clone(), None, settings);
-        let place = engine.survey(DVec2::ZERO);
+        let place = engine.arrivals_at(DVec2::ZERO);
         let arrivals = place.arrivals(FRAC_PI_2);
         arrivals.iter().find(|a| reflectors(&a.path)[..] == *walls).map_or(0.0, |a| a.amplitude)
     };
@@ -169,7 +169,7 @@ fn a_low_wall_is_missed_above_and_bars_the_way_below() {
     assert_eq!(met(&room, 0.2), [vec![low], low_again.clone(), vec![floor]]);
     // From 0.4 the corner of low wall and floor is in sight, and the high one's is hidden.
     assert_eq!(met(&room, 0.4), [low_again, vec![high], vec![floor]]);
-    // From 0.7 the sound on its way to the far corner and back is at 0.42 over the low wall.
+    // From 0.7 the arrival on its way to the far corner and back is at 0.42 over the low wall.
     let all = met(&room, 0.7);
     assert!(all.contains(&vec![high, floor]), "{all:?}");
 }

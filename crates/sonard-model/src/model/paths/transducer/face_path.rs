@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 use smallvec::SmallVec;
 
-use crate::acoustics::Sound;
+use crate::acoustics::PulseArrival;
 
 /// An echo path, run through in one of its directions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,8 +39,8 @@ pub(crate) struct FacePath {
 
 impl MultipleEcho {
     /// As the receiver notices it.
-    pub(crate) fn sound(&self, index: u32) -> Sound {
+    pub(crate) fn arrival(&self, index: u32) -> PulseArrival {
         let &Self { length_m, amplitude, phase_rad, .. } = self;
-        Sound { length_m, amplitude, phase_rad, index }
+        PulseArrival { length_m, amplitude, phase_rad, index }
     }
 }

@@ -1,29 +1,34 @@
-//! A place from which firings are predicted.
+//! An observation point, from which firings are predicted.
 
 use rand::Rng;
 
-use super::{Arrival, Prediction, Simulator, Survey, place::Place};
+use super::{
+    engine::{Arrival, Arrivals},
+    lazy::LazyArrivals,
+    prediction::Prediction,
+    simulator::Simulator,
+};
 use crate::{
-    acoustics::{Detection, EchoTrace, Incident, Latch, ReceiverNoise, Sound},
+    acoustics::{Detection, EchoTrace, Incident, Latch, ReceiverNoise, PulseArrival},
     geometry::DVec2,
 };
 
-/// A place from which firings are predicted; [`Simulator::station`] makes it.
-pub struct Station<'a> {
+/// A point from which firings are predicted; [`Simulator::at`] makes it.
+pub struct ObservationPoint<'a> {
     simulator: &'a Simulator,
     position: DVec2,
     /// Of a transducer on the axis, which stays where it is when it turns; one beside the axis is
     /// somewhere else at each azimuth.
-    axis: Option<Place<'a>>,
+    axis: Option<LazyArrivals<'a>>,
 }
 
 /// A firing that hears more has to make room for them.
-const USUAL_SOUNDS: usize = 64;
+const USUAL_ARRIVALS: usize = 64;
 
-impl<'a> Station<'a> {
+impl<'a> ObservationPoint<'a> {
     pub(super) fn new(simulator: &'a Simulator, position: DVec2) -> Self {
         let on_axis = simulator.sensor().mounting.is_on_axis();
-        let axis = on_axis.then(|| simulator.place([position; 2]));
+        let axis = on_axis.then(|| simulator.arrivals_between([position; 2]));
         Self { simulator, position, axis }
     }
 
@@ -42,17 +47,17 @@ impl<'a> Station<'a> {
 
     fn listen(&self, direction_rad: f64, latch: Latch) -> Prediction {
         let receiver = self.simulator.receiver();
-        let mut sounds = Vec::with_capacity(USUAL_SOUNDS);
-        self.at(direction_rad, |place| {
-            let (detection, survey) = place.nearest(|survey, reach_m| {
-                survey.listen(direction_rad, &mut sounds);
-                let firing = Firing { survey, direction_rad };
-                let incident = |sound: &Sound| Some(firing.incident(sound));
-                let incident: &dyn Fn(&Sound) -> Option<Incident> =
+        let mut arrivals = Vec::with_capacity(USUAL_ARRIVALS);
+        self.at(direction_rad, |all| {
+            let (detection, near) = all.nearest(|near, reach_m| {
+                near.listen(direction_rad, &mut arrivals);
+                let firing = Firing { from: near, direction_rad };
+                let incident = |arrival: &PulseArrival| Some(firing.incident(arrival));
+                let incident: &dyn Fn(&PulseArrival) -> Option<Incident> =
                     if receiver.asks_incidents() { &incident } else { &|_| None };
-                receiver.detect_within(reach_m, &sounds, incident, latch)
+                receiver.detect_within(reach_m, &arrivals, incident, latch)
             });
-            Firing { survey, direction_rad }.prediction(detection)
+            Firing { from: near, direction_rad }.prediction(detection)
         })
     }
 
@@ -60,9 +65,9 @@ impl<'a> Station<'a> {
     #[cfg(test)]
     pub(super) fn ping_by_all(&self, direction_rad: f64, latch: Latch) -> Prediction {
         self.firing(direction_rad, |firing| {
-            let incident = |sound: &Sound| Some(firing.incident(sound));
+            let incident = |arrival: &PulseArrival| Some(firing.incident(arrival));
             let receiver = self.simulator.receiver();
-            firing.prediction(receiver.detect_at_face(&firing.sounds(), &incident, latch))
+            firing.prediction(receiver.detect_at_face(&firing.arrivals(), &incident, latch))
         })
     }
 
@@ -76,75 +81,75 @@ impl<'a> Station<'a> {
         rng: &mut impl Rng,
     ) -> Prediction {
         self.firing(direction_rad, |firing| {
-            let incident = |sound: &Sound| Some(firing.incident(sound));
+            let incident = |arrival: &PulseArrival| Some(firing.incident(arrival));
             let receiver = self.simulator.receiver();
-            firing.prediction(receiver.detect_in_noise(&firing.sounds(), &incident, noise, rng))
+            firing.prediction(receiver.detect_in_noise(&firing.arrivals(), &incident, noise, rng))
         })
     }
 
     /// What an oscilloscope would show of a firing, up to a range in metres, in steps of so many
-    /// microseconds; each [`Hump`](crate::acoustics::Hump) can be named with
+    /// microseconds; each [`EnvelopePeak`](crate::acoustics::EnvelopePeak) can be named with
     /// [`arrival`](Self::arrival).
     #[must_use]
     pub fn trace(&self, direction_rad: f64, until_m: f64, step_us: f64) -> EchoTrace {
         self.firing(direction_rad, |firing| {
             let receiver = self.simulator.receiver();
             let until_us = 2e6 * until_m / receiver.sound_speed_m_s;
-            let incident = |sound: &Sound| Some(firing.incident(sound));
-            receiver.trace(&firing.sounds(), &incident, until_us, step_us)
+            let incident = |arrival: &PulseArrival| Some(firing.incident(arrival));
+            receiver.trace(&firing.arrivals(), &incident, until_us, step_us)
         })
     }
 
     /// Every echo of a firing in a world direction, detected or not, shortest path first.
     #[must_use]
     pub fn arrivals(&self, direction_rad: f64) -> Vec<Arrival> {
-        self.firing(direction_rad, |firing| firing.survey.arrivals(direction_rad))
+        self.firing(direction_rad, |firing| firing.from.arrivals(direction_rad))
     }
 
-    /// The full account of a sound of a firing in the same direction.
+    /// The full account of an arrival of a firing in the same direction.
     #[must_use]
-    pub fn arrival(&self, direction_rad: f64, sound: &Sound) -> Arrival {
-        self.firing(direction_rad, |firing| firing.survey.arrival(direction_rad, sound))
+    pub fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival {
+        self.firing(direction_rad, |firing| firing.from.arrival(direction_rad, arrival))
     }
 
     /// Fires with all echoes from where the transducer is when it looks into a direction.
     fn firing<T>(&self, direction_rad: f64, tell: impl FnOnce(&Firing) -> T) -> T {
-        self.at(direction_rad, |place| tell(&Firing { survey: place.whole(), direction_rad }))
+        self.at(direction_rad, |all| tell(&Firing { from: all.whole(), direction_rad }))
     }
 
     /// Goes where the transducer is when it looks into a direction.
-    fn at<T>(&self, direction_rad: f64, tell: impl FnOnce(&Place) -> T) -> T {
-        if let Some(place) = &self.axis {
-            return tell(place);
+    fn at<T>(&self, direction_rad: f64, tell: impl FnOnce(&LazyArrivals) -> T) -> T {
+        if let Some(all) = &self.axis {
+            return tell(all);
         }
         let mounting = &self.simulator.sensor().mounting;
-        tell(&self.simulator.place(mounting.places(self.position, direction_rad)))
+        tell(&self.simulator.arrivals_between(mounting.places(self.position, direction_rad)))
     }
 }
 
-/// The echoes of a place in a direction.
+/// The arrivals at a point in a direction.
 struct Firing<'a> {
-    survey: &'a dyn Survey,
+    from: &'a dyn Arrivals,
     direction_rad: f64,
 }
 
 impl Firing<'_> {
-    fn sounds(&self) -> Vec<Sound> {
-        let mut sounds = Vec::new();
-        self.survey.listen(self.direction_rad, &mut sounds);
-        sounds
+    fn arrivals(&self) -> Vec<PulseArrival> {
+        let mut arrivals = Vec::new();
+        self.from.listen(self.direction_rad, &mut arrivals);
+        arrivals
     }
 
-    fn incident(&self, sound: &Sound) -> Incident {
-        self.survey.incident(self.direction_rad, sound)
+    fn incident(&self, arrival: &PulseArrival) -> Incident {
+        self.from.incident(self.direction_rad, arrival)
     }
 
     fn prediction(&self, detection: Detection) -> Prediction {
-        let arrival = |sound| self.survey.arrival(self.direction_rad, &sound);
+        let arrival = |arrival| self.from.arrival(self.direction_rad, &arrival);
         Prediction {
             status: detection.status,
             range_m: detection.range_m,
-            arrival: detection.sound.map(arrival),
+            arrival: detection.arrival.map(arrival),
             amplitude: detection.amplitude,
             margin_db: detection.margin_db,
             echoes_us: detection.echoes_us,

@@ -7,12 +7,12 @@ use super::{
     ray::{Candidate, Met, Weighing},
 };
 use crate::{
-    acoustics::Sound,
+    acoustics::PulseArrival,
     geometry::DVec2,
-    model::{Arrival, Survey},
+    model::{Arrival, Arrivals},
 };
 
-pub(super) struct FanSurvey<'a> {
+pub(super) struct FanArrivals<'a> {
     fan: &'a Fan,
     position: DVec2,
     /// Shortest first, each path once.
@@ -21,7 +21,7 @@ pub(super) struct FanSurvey<'a> {
     weighings: Vec<Weighing>,
 }
 
-impl<'a> FanSurvey<'a> {
+impl<'a> FanArrivals<'a> {
     pub(super) fn trace(fan: &'a Fan, position: DVec2) -> Self {
         let mut closest = Closest::default();
         for mut ray in fan.fan(position) {
@@ -51,21 +51,21 @@ impl<'a> FanSurvey<'a> {
     }
 }
 
-impl Survey for FanSurvey<'_> {
-    fn listen(&self, direction_rad: f64, sounds: &mut Vec<Sound>) {
-        sounds.clear();
+impl Arrivals for FanArrivals<'_> {
+    fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
+        arrivals.clear();
         let facing = DVec2::from_angle(direction_rad);
-        sounds.extend(self.weighings.iter().zip(0..).filter_map(|(weighing, index)| {
+        arrivals.extend(self.weighings.iter().zip(0..).filter_map(|(weighing, index)| {
             let amplitude = weighing.amplitude(&self.fan.beam, facing);
             let length_m = weighing.length_m;
-            let sound = Sound { length_m, amplitude, phase_rad: 0.0, index };
-            (amplitude >= self.fan.settings.weakest).then_some(sound)
+            let arrival = PulseArrival { length_m, amplitude, phase_rad: 0.0, index };
+            (amplitude >= self.fan.settings.weakest).then_some(arrival)
         }));
     }
 
-    fn arrival(&self, _direction_rad: f64, sound: &Sound) -> Arrival {
-        let candidate = &self.candidates[sound.index as usize];
-        candidate.arrival(self.fan, self.position, sound.amplitude)
+    fn arrival(&self, _direction_rad: f64, arrival: &PulseArrival) -> Arrival {
+        let candidate = &self.candidates[arrival.index as usize];
+        candidate.arrival(self.fan, self.position, arrival.amplitude)
     }
 }
 

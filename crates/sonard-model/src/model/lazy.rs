@@ -1,61 +1,61 @@
-//! Where transmitter and receiver are when they are fired, surveyed as far as need be.
+//! Echo paths from one transducer position, computed lazily by range.
 //!
 //! The number of echo paths grows with the square of their length, and most firings are answered
-//! by a short one. So the near echoes are surveyed first, and farther ones only once a firing
-//! turns out to depend on them: what is found is the same.
+//! by a short one. So the short paths are found first, and longer ones only once a firing
+//! turns out to depend on them: what is read is the same.
 
 use std::sync::{
     OnceLock,
     atomic::{AtomicUsize, Ordering},
 };
 
-use super::{Engine, Survey};
+use super::engine::{Arrivals, Engine};
 use crate::geometry::DVec2;
 
-/// Reach of all surveys but the last, beside the longest path. What is found by a shorter one is
-/// found again by the next, at about a quarter of its work.
+/// Reach of all steps but the last, beside the longest path. What is found in one step is
+/// found again in the next, at about a quarter of its work.
 const REACHES: [f64; 3] = [0.125, 0.25, 0.5];
 
-/// A place with what was surveyed from it so far.
-pub(super) struct Place<'a> {
+/// Arrivals between a transmitter and a receiver, as far as they were asked for.
+pub(super) struct LazyArrivals<'a> {
     engine: &'a dyn Engine,
     /// Transmitter and receiver.
     at: [DVec2; 2],
     max_path_m: f64,
-    /// Made at the first call; `None` from an engine that surveys all at once.
-    near: [OnceLock<Option<Box<dyn Survey + 'a>>>; REACHES.len()],
-    whole: OnceLock<Box<dyn Survey + 'a>>,
-    /// Which of the surveys, from near to whole, would have settled the last firing: the next one
+    /// Found at the first call; `None` from an engine that finds all at once.
+    near: [OnceLock<Option<Box<dyn Arrivals + 'a>>>; REACHES.len()],
+    whole: OnceLock<Box<dyn Arrivals + 'a>>,
+    /// Which of the steps, from near to whole, would have settled the last firing: the next one
     /// looks beside it and is likely to need the same. The answer does not depend on it.
     enough: AtomicUsize,
 }
 
-impl<'a> Place<'a> {
+impl<'a> LazyArrivals<'a> {
     pub(super) fn new(engine: &'a dyn Engine, at: [DVec2; 2], max_path_m: f64) -> Self {
         let (near, whole) = Default::default();
         Self { engine, at, max_path_m, near, whole, enough: AtomicUsize::new(0) }
     }
 
-    /// All echoes.
-    pub(super) fn whole(&self) -> &(dyn Survey + 'a) {
+    /// All arrivals.
+    pub(super) fn whole(&self) -> &(dyn Arrivals + 'a) {
         let [transmitter, receiver] = self.at;
-        let survey = || {
+        let find = || {
             if transmitter == receiver {
-                self.engine.survey(transmitter)
+                self.engine.arrivals_at(transmitter)
             } else {
-                self.engine.survey_pair(transmitter, receiver)
+                self.engine.arrivals_between(transmitter, receiver)
             }
         };
-        self.whole.get_or_init(survey).as_ref()
+        self.whole.get_or_init(find).as_ref()
     }
 
-    /// What `listen` makes of the nearest echoes that settle it, and their survey. It is told up to
+    /// What `listen` makes of the shortest echoes that settle it, and these. It is told up to
     /// which length, in metres, all echoes are known, and says which length would have been
     /// enough, if any was.
     pub(super) fn nearest<T>(
         &self,
-        mut listen: impl FnMut(&(dyn Survey + 'a), f64) -> (T, Option<f64>),
-    ) -> (T, &(dyn Survey + 'a)) {
+        mut listen: impl FnMut(&(dyn Arrivals + 'a), f64) -> (T, Option<f64>),
+    ) -> (T, &(dyn Arrivals + 'a)) {
         let settled = |needed_m: f64| {
             let enough = REACHES.iter().position(|reach| reach * self.max_path_m > needed_m);
             self.enough.store(enough.unwrap_or(REACHES.len()), Ordering::Relaxed);
@@ -63,12 +63,12 @@ impl<'a> Place<'a> {
         let begin = self.enough.load(Ordering::Relaxed);
         for (near, reach) in self.near.iter().zip(REACHES).skip(begin) {
             let reach_m = reach * self.max_path_m;
-            let survey = near.get_or_init(|| self.engine.survey_within(self.at, reach_m));
-            let Some(survey) = survey else { break };
-            let (heard, needed_m) = listen(survey.as_ref(), reach_m);
+            let arrivals = near.get_or_init(|| self.engine.arrivals_within(self.at, reach_m));
+            let Some(arrivals) = arrivals else { break };
+            let (heard, needed_m) = listen(arrivals.as_ref(), reach_m);
             if let Some(needed_m) = needed_m {
                 settled(needed_m);
-                return (heard, survey.as_ref());
+                return (heard, arrivals.as_ref());
             }
         }
         let (heard, needed_m) = listen(self.whole(), f64::INFINITY);

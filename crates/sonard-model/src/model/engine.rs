@@ -1,0 +1,97 @@
+//! Engines: what finds the echoes that arrive at the transducer's face.
+
+use super::path::Path;
+use crate::{
+    acoustics::{Image, Incidence, Incident, PulseArrival},
+    geometry::{DVec2, wrap_pi},
+    reading::PathKind,
+};
+
+/// An echo at the transducer's face.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arrival {
+    /// Length of the path there and back, metres.
+    pub length_m: f64,
+    /// Strength after gain compensation and the beam pattern on departure and arrival; a head-on, perfectly
+    /// reflecting wall without absorption gives 1.
+    pub amplitude: f64,
+    /// The same before the beam pattern.
+    pub path_amplitude: f64,
+    /// Phase of the carrier beside that of the path's length, for `exp(+i omega t)`, radians: what an edge
+    /// adds. Mirror reflections add none.
+    pub phase_rad: f64,
+    /// World direction of departure, radians counter-clockwise from +x.
+    pub departure_rad: f64,
+    /// World direction of arrival, from the ranger towards where the echo comes from, radians.
+    pub arrival_rad: f64,
+    /// What it met, in order, and where.
+    pub path: Path,
+}
+
+/// Finds echo paths in a scene.
+pub trait Engine: Send + Sync {
+    /// The arrivals at an observation point (world, metres), for a transducer that sends and receives
+    /// there.
+    fn arrivals_at<'a>(&'a self, position: DVec2) -> Box<dyn Arrivals + 'a>;
+
+    /// The same for a transmitter and a receiver apart; engines that know one point only take
+    /// the middle.
+    fn arrivals_between<'a>(&'a self, transmitter: DVec2, receiver: DVec2) -> Box<dyn Arrivals + 'a> {
+        self.arrivals_at(0.5 * (transmitter + receiver))
+    }
+
+    /// The same of paths up to a length there and back alone, in metres, between transmitter and
+    /// receiver; `None` from engines that would gain nothing by it.
+    fn arrivals_within<'a>(
+        &'a self,
+        _ends: [DVec2; 2],
+        _max_path_m: f64,
+    ) -> Option<Box<dyn Arrivals + 'a>> {
+        None
+    }
+}
+
+/// The arrivals at an observation point, in all directions.
+///
+/// The paths depend on the point only, so they are found once and serve all directions.
+pub trait Arrivals: Send + Sync {
+    /// Replaces `arrivals` with what a firing in world direction `direction_rad` brings back,
+    /// shortest path first, weighted with the beam pattern; also arrivals too weak to be detected,
+    /// as far as the engine knows them.
+    fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>);
+
+    /// The full account of an arrival that [`listen`](Self::listen) gave for the same direction.
+    fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival;
+
+    /// How an arrival that [`listen`](Self::listen) gave for the same direction meets the face: what the
+    /// full response of the face asks of each arrival of a firing.
+    fn incident(&self, direction_rad: f64, arrival: &PulseArrival) -> Incident {
+        let arrival = self.arrival(direction_rad, arrival);
+        let image = match arrival.path.kind() {
+            PathKind::Specular => mirrored(arrival.path.interactions.len()),
+            PathKind::Diffracted | PathKind::Scattered => Image::Lost,
+        };
+        let off_rad = |end_rad: f64| wrap_pi(end_rad - direction_rad);
+        Incident {
+            strength: arrival.path_amplitude,
+            incidence: Incidence {
+                leaving_rad: off_rad(arrival.departure_rad),
+                arriving_rad: off_rad(arrival.arrival_rad),
+                length_m: arrival.length_m,
+                image,
+            },
+        }
+    }
+
+    /// All arrivals of a firing in full, shortest path first.
+    fn arrivals(&self, direction_rad: f64) -> Vec<Arrival> {
+        let mut arrivals = Vec::new();
+        self.listen(direction_rad, &mut arrivals);
+        arrivals.iter().map(|arrival| self.arrival(direction_rad, arrival)).collect()
+    }
+}
+
+/// How the transducer's face looks over a number of mirrors.
+pub(super) const fn mirrored(count: usize) -> Image {
+    if count.is_multiple_of(2) { Image::Upright } else { Image::Swapped }
+}
