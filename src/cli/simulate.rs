@@ -25,7 +25,7 @@ use crate::{
     acoustics::ReceiverNoise,
     collect::{PoseLine, read_lines},
     geometry::Pose,
-    model::{Prediction, Simulator, ObservationPoint},
+    model::{ObservationPoint, Prediction, Simulator},
     scan::{Ping, Record, ScanEnd, ScanPlan, ScanStart, Session},
     scene::Scene,
     store::{LogWriter, Pipe, StoreError},

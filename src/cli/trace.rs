@@ -14,7 +14,7 @@ use super::{
 use crate::{
     acoustics::{EchoTrace, EnvelopePeak},
     geometry::Pose,
-    model::{Simulator, ObservationPoint},
+    model::{ObservationPoint, Simulator},
     plot::{TraceView, draw_trace},
     scan::{PathRecord, PingStatus},
 };

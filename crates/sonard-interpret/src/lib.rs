@@ -3,6 +3,9 @@
 //!
 //! Nothing here knows a clock, a file or a socket; random numbers are passed in.
 
+// Modules are `foo.rs` beside `foo/`.
+#![warn(clippy::mod_module_files)]
+
 pub mod compare;
 pub mod explore;
 pub mod interpret;

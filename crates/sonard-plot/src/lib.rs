@@ -3,6 +3,9 @@
 //! Everything here is a pure function from data to a [`Picture`]; writing it to a file is the
 //! caller's business.
 
+// Modules are `foo.rs` beside `foo/`.
+#![warn(clippy::mod_module_files)]
+
 mod animation;
 mod canvas;
 mod caption;

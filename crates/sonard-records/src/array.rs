@@ -6,7 +6,7 @@ use uuid::Uuid;
 use super::{Ping, Provenance, ScanEnd, ScanStart, Session};
 use sonard_model::{
     geometry::Pose,
-    model::{ArrayModel, ArrayAtPose, Prediction},
+    model::{ArrayAtPose, ArrayModel, Prediction},
 };
 
 impl Session {

@@ -1,5 +1,8 @@
 //! Scans: the plan, the readings, and the records they are logged as.
 
+// Modules are `foo.rs` beside `foo/`.
+#![warn(clippy::mod_module_files)]
+
 mod array;
 mod codec;
 mod drawn;

@@ -2,7 +2,9 @@
 
 use sonard_model::{
     acoustics::{Air, AirError},
-    model::{Arrival, Interaction, Mechanism, Options, Path, Prediction, Simulator, ObservationPoint},
+    model::{
+        Arrival, Interaction, Mechanism, ObservationPoint, Options, Path, Prediction, Simulator,
+    },
     scene::Scene,
 };
 

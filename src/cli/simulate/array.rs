@@ -12,7 +12,7 @@ use crate::{
     acoustics::ReceiverNoise,
     cli::{Failure, Outcome, array::load_array, progress, scene_file},
     geometry::{Pose, wrap_360},
-    model::{ArrayModel, ArrayAtPose, ModelError},
+    model::{ArrayAtPose, ArrayModel, ModelError},
     scan::{Ping, Record, ScanEnd, ScanStart, Session},
     store::StoreError,
 };

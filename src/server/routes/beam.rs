@@ -6,7 +6,7 @@ use crate::{
     acoustics::{Air, EnvelopePeak},
     api::{Beam, Echo, HumpLine, JudgedPing, point},
     geometry::Pose,
-    model::{Options, Simulator, ObservationPoint},
+    model::{ObservationPoint, Options, Simulator},
     scan::{PathRecord, Ping, ScanView, Session},
     scene::Scene,
 };
@@ -97,7 +97,8 @@ fn humps(simulator: &Simulator, axis: &Pose, until_m: f64) -> Vec<HumpLine> {
     let trace = station.trace(direction_rad, until_m, STEP_US);
     let receiver = simulator.receiver();
     let over = |hump: &EnvelopePeak| hump.peak.0 / receiver.threshold_at(hump.tof_us);
-    let mut loudest: Vec<&EnvelopePeak> = trace.peaks.iter().filter(|hump| over(hump) > FAINT).collect();
+    let mut loudest: Vec<&EnvelopePeak> =
+        trace.peaks.iter().filter(|hump| over(hump) > FAINT).collect();
     loudest.sort_by(|one, other| over(other).total_cmp(&over(one)));
     loudest.truncate(MOST_HUMPS);
     loudest.sort_by(|one, other| one.tof_us.total_cmp(&other.tof_us));

@@ -228,8 +228,10 @@ impl Receiver {
         rng: &mut impl rand::Rng,
     ) -> Detection {
         let track = noise.track(self, rng);
-        let mut detection = self
-            .detection(&mut Hearing::new(self, arrivals, incident).in_noise(&track), Latch::Rearmed);
+        let mut detection = self.detection(
+            &mut Hearing::new(self, arrivals, incident).in_noise(&track),
+            Latch::Rearmed,
+        );
         for (i, echo_us) in detection.echoes_us.iter_mut().enumerate() {
             let jitter_us = noise.jitter(rng);
             if i > 0 || detection.status != PingStatus::MinRange {
@@ -312,7 +314,8 @@ impl Receiver {
         let (echoes_us, window_us) = (SmallVec::new(), self.window_us());
         // More has to be known before anything can be said.
         let known: &[PulseArrival] = if hearing.asked_beyond() { &[] } else { hearing.arrivals };
-        let relative = |arrival: &PulseArrival| arrival.amplitude / self.threshold_at(self.tof_us(arrival));
+        let relative =
+            |arrival: &PulseArrival| arrival.amplitude / self.threshold_at(self.tof_us(arrival));
         let arrival = known
             .iter()
             .filter(|arrival| (self.blanking_us..=window_us).contains(&self.tof_us(arrival)))

@@ -24,7 +24,7 @@ mod tests {
     use super::*;
     use crate::{
         acoustics::{Air, BeamPattern, EchoTrace, Receiver, ReceiverNoise, Sensor},
-        model::{Options, Path, ObservationPoint, paths::Paths},
+        model::{ObservationPoint, Options, Path, paths::Paths},
         scene::{Scene, shipped},
     };
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Arrival, Engine, Interaction, Mechanism, Path, Arrivals, raycast::Reflectors};
+use super::{Arrival, Arrivals, Engine, Interaction, Mechanism, Path, raycast::Reflectors};
 use crate::{
     acoustics::PulseArrival,
     geometry::{DVec2, wrap_pi},

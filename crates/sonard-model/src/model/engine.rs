@@ -36,7 +36,11 @@ pub trait Engine: Send + Sync {
 
     /// The same for a transmitter and a receiver apart; engines that know one point only take
     /// the middle.
-    fn arrivals_between<'a>(&'a self, transmitter: DVec2, receiver: DVec2) -> Box<dyn Arrivals + 'a> {
+    fn arrivals_between<'a>(
+        &'a self,
+        transmitter: DVec2,
+        receiver: DVec2,
+    ) -> Box<dyn Arrivals + 'a> {
         self.arrivals_at(0.5 * (transmitter + receiver))
     }
 

@@ -23,8 +23,8 @@
 //!   spacing: beside a robot's body about one reading in twenty depends on the spacing.
 //! - Everything happens in the plane: heights in the scene are ignored.
 
-mod ray;
 mod arrivals;
+mod ray;
 
 use std::{
     cmp::Ordering,
@@ -32,10 +32,10 @@ use std::{
     f64::consts::TAU,
 };
 
-use ray::Ray;
 use arrivals::FanArrivals;
+use ray::Ray;
 
-use super::{Arrival, Edge, Engine, Reflector, Arrivals, raycast::Reflectors};
+use super::{Arrival, Arrivals, Edge, Engine, Reflector, raycast::Reflectors};
 use crate::{acoustics::BeamPattern, geometry::DVec2, scene::Scene};
 
 /// The ray model.

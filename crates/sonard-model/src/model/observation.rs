@@ -9,7 +9,7 @@ use super::{
     simulator::Simulator,
 };
 use crate::{
-    acoustics::{Detection, EchoTrace, Incident, Latch, ReceiverNoise, PulseArrival},
+    acoustics::{Detection, EchoTrace, Incident, Latch, PulseArrival, ReceiverNoise},
     geometry::DVec2,
 };
 

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    Cone, Engine, Fan, Prediction, ObservationPoint,
-    paths::{self, PathEngine},
+    Cone, Engine, Fan, ObservationPoint, Prediction,
     lazy::LazyArrivals,
+    paths::{self, PathEngine},
 };
 use crate::{
     acoustics::{Air, BeamPattern, Disc, EdgeLawKind, Receiver, Response, Sensor, SensorError},

@@ -10,7 +10,7 @@ mod rise;
 use num_complex::Complex64;
 use smallvec::SmallVec;
 
-use super::{Combining, Incident, Receiver, PulseArrival, noise::NoiseTrack};
+use super::{Combining, Incident, PulseArrival, Receiver, noise::NoiseTrack};
 use crate::acoustics::{EchoShape, Gain};
 
 /// Arrivals that together add less than this part to another's amplitude leave it as it is.

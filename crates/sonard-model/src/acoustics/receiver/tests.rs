@@ -172,8 +172,12 @@ fn gain_steps_move_the_threshold() {
     assert!((receiver.threshold_at(62_210.0) / sensor.threshold - 1.0).abs() < 0.01);
     // An echo too weak at the end of step 1 is heard once the gain has risen.
     let tof_us = 5000.0;
-    let weak =
-        PulseArrival { length_m: tof_us * 343.99e-6, amplitude: 0.8 * before, phase_rad: 0.0, index: 0 };
+    let weak = PulseArrival {
+        length_m: tof_us * 343.99e-6,
+        amplitude: 0.8 * before,
+        phase_rad: 0.0,
+        index: 0,
+    };
     let detection = receiver.detect(&[weak]);
     assert_eq!(detection.status, PingStatus::Echo);
     assert!((detection.echoes_us[0] - 5120.0).abs() < 0.1, "{detection:?}");
@@ -195,7 +199,12 @@ fn measured_times_at_the_end_of_blanking_are_minimum_range() {
 fn noise_is_off_by_default_repeats_with_its_seed_and_shakes_weak_echoes_most() {
     let one = |strength, noise: &ReceiverNoise, seed| {
         let mut rng = Pcg64::seed_from_u64(seed);
-        receiver().detect_in_noise(&arrivals(&[(4000.0, strength, 0.0)]), &|_| None, noise, &mut rng)
+        receiver().detect_in_noise(
+            &arrivals(&[(4000.0, strength, 0.0)]),
+            &|_| None,
+            noise,
+            &mut rng,
+        )
     };
     let quiet = one(0.1, &ReceiverNoise::NONE, 1);
     let plain = receiver().detect(&arrivals(&[(4000.0, 0.1, 0.0)]));

@@ -1,6 +1,6 @@
 //! What an oscilloscope would show of a firing.
 
-use super::{Detection, Incident, Latch, Receiver, PulseArrival, hearing::Hearing};
+use super::{Detection, Incident, Latch, PulseArrival, Receiver, hearing::Hearing};
 
 /// The signal of one firing against time.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,7 +80,11 @@ impl Receiver {
             points,
             transmission: sent.collect(),
             peaks: reached
-                .map(|(arrival, &peak)| EnvelopePeak { arrival: *arrival, tof_us: self.tof_us(arrival), peak })
+                .map(|(arrival, &peak)| EnvelopePeak {
+                    arrival: *arrival,
+                    tof_us: self.tof_us(arrival),
+                    peak,
+                })
                 .collect(),
             detection: self.detect_at_face(arrivals, incident, Latch::Rearmed),
         }

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     acoustics::{BeamPattern, Disc, Image, Incidence, Incident, PulseArrival},
     geometry::{DVec2, wrap_pi},
-    model::{Arrival, Engine, Interaction, Mechanism, Path, Arrivals, mirrored},
+    model::{Arrival, Arrivals, Engine, Interaction, Mechanism, Path, engine::mirrored},
     reading::PathKind,
     scene::Scene,
 };
@@ -75,7 +75,11 @@ impl Engine for PathEngine {
         self.arrivals_between(position, position)
     }
 
-    fn arrivals_between<'a>(&'a self, transmitter: DVec2, receiver: DVec2) -> Box<dyn Arrivals + 'a> {
+    fn arrivals_between<'a>(
+        &'a self,
+        transmitter: DVec2,
+        receiver: DVec2,
+    ) -> Box<dyn Arrivals + 'a> {
         Box::new(PathArrivals::new(self, self.paths.clone(), [transmitter, receiver]))
     }
 
@@ -229,7 +233,12 @@ impl Arrivals for PathArrivals<'_> {
                 };
                 if most >= floor {
                     let Echo { length_m, phase_rad, .. } = self.echoes[entry.echo as usize];
-                    arrivals.push(PulseArrival { length_m, amplitude, phase_rad, index: entry.echo });
+                    arrivals.push(PulseArrival {
+                        length_m,
+                        amplitude,
+                        phase_rad,
+                        index: entry.echo,
+                    });
                 }
             });
         }
@@ -259,7 +268,8 @@ impl Arrivals for PathArrivals<'_> {
             (echo.amplitude, ends_rad, echo.length_m, image)
         } else {
             let multiple = &self.multiple_echoes(wrap_pi(direction_rad))[index - self.echoes.len()];
-            let (strength, ends_rad) = self.multiple_ends(direction_rad, multiple, arrival.amplitude);
+            let (strength, ends_rad) =
+                self.multiple_ends(direction_rad, multiple, arrival.amplitude);
             (strength, ends_rad, multiple.length_m, self.multiple_image(multiple))
         };
         let [leaving_rad, arriving_rad] = ends_rad.map(|end_rad| wrap_pi(end_rad - direction_rad));

@@ -4,7 +4,7 @@ use super::*;
 use crate::{
     acoustics::{Air, Sensor},
     geometry::{Pose, wrap_pi},
-    model::{Arrival, EngineKind, Options, Simulator, ObservationPoint},
+    model::{Arrival, EngineKind, ObservationPoint, Options, Simulator},
     scene::shipped,
 };
 
