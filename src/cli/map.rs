@@ -21,7 +21,7 @@ use crate::{
     interpret::{
         Extents, Heard, Sweep,
         grid::{BeamModel, GaussianBeam, Grid, GridShape, PhysicalBeam, Trust},
-        prediction::{FeaturePrediction, PredictionSettings, Worth},
+        prediction::{Assessment, FeaturePrediction, PredictionSettings},
     },
     plot::{MapView, badge_of, draw_map},
     scan::{Provenance, Session},
@@ -338,8 +338,8 @@ fn map(
 
 const CONFIDENCES: Product = Product::List(&["scan", "index", "confidence", "clear_m"]);
 
-fn write_confidence(bytes: &mut Vec<u8>, scan: uuid::Uuid, index: u32, worth: &Worth) {
-    let Worth { confidence, clear_m } = *worth;
+fn write_confidence(bytes: &mut Vec<u8>, scan: uuid::Uuid, index: u32, worth: &Assessment) {
+    let Assessment { confidence, clear_m } = *worth;
     let line = serde_json::json!({
         "scan": scan, "index": index, "confidence": confidence, "clear_m": clear_m
     });

@@ -1,9 +1,9 @@
 //! Arrays: several rangers at fixed bearings on a robot, fired in turn. The arrangement beside the
 //! stepper, on which one ranger turns.
 //!
-//! [`RangerArray`] is what is known about one, [`Course`] a way that its robot takes.
-//! [`ArrayModel`](crate::model::ArrayModel) predicts what its rangers read. One ranger's sound in
-//! another's ear (crosstalk) is not modelled: rangers fire in turn, each when the sound before it
+//! [`RangerArray`] is what is known about one, [`Course`] the course of its robot.
+//! [`ArrayModel`](crate::model::ArrayModel) predicts what its rangers read. Crosstalk (a ranger that
+//! receives another one's sound) is not modelled: rangers fire in turn, each when the sound before it
 //! has died away.
 
 mod body;

@@ -38,7 +38,7 @@ impl PingStatus {
 pub enum PathKind {
     /// Mirror reflections only.
     Specular,
-    /// Bent at an edge or free end once (or twice) on its way.
+    /// Diffracted at an edge or free end, once or twice.
     Diffracted,
     /// Sent back by the roughness of the last wall.
     Scattered,

@@ -27,9 +27,9 @@ pub struct PathView<'a> {
     pub scene: &'a Scene,
     /// Where the ranger stands.
     pub pose: Pose,
-    /// Where the transducer itself is; its heading is the way it looks.
+    /// Where the transducer itself is; its heading is the direction it looks in.
     pub looks: Pose,
-    /// That way, degrees from the scan's heading.
+    /// That direction, degrees from the scan's heading.
     pub azimuth_deg: f64,
     /// What was read, metres.
     pub range_m: Option<f64>,
@@ -134,7 +134,7 @@ fn path(view: &PathView, plan: &Plan, labels: &mut Labels) -> Layer {
     layer
 }
 
-/// Stretches moved a little to their left, so that the way out and the way back can be told apart.
+/// Stretches moved a little to their left, so that the path out and the path back can be told apart.
 fn apart(points: &[Px]) -> Vec<(Px, Px)> {
     let shift = |from: Px, to: Px| -2.2 * (to - from).normalize_or_zero().perp();
     points

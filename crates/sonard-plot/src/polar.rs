@@ -7,7 +7,7 @@ use super::{
     legend,
     picture::Picture,
     readings::{Kind, Readings},
-    strips::top_m,
+    scan_strips::top_m,
     theme, ticks, words,
 };
 use sonard_model::scene::Scene;

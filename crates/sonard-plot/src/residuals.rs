@@ -6,8 +6,9 @@ use super::{
     legend::{self, Entry, Sample},
     picture::Picture,
     readings::Readings,
+    scan_strips,
     strip::{AzimuthAxis, Strip},
-    strips, theme, words,
+    theme, words,
 };
 use sonard_model::scene::Scene;
 use sonard_records::ScanView;
@@ -37,9 +38,9 @@ pub fn draw_residuals(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
 
     let mut page = Layer::new("residuals");
     page.add(heading);
-    page.add(strips::residual(residual, azimuths, &readings, false));
+    page.add(scan_strips::residual(residual, azimuths, &readings, false));
     page.add(histogram(residual, azimuths, &readings));
-    page.add(strips::range(range, azimuths, &readings, true));
+    page.add(scan_strips::range(range, azimuths, &readings, true));
     let below = Px::new(theme::MARGIN_PX, range.bottom + 46.0);
     let legend_width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
     let mut entries = keys::heard(&readings);
@@ -55,7 +56,7 @@ pub fn draw_residuals(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
 /// How many residuals fall on each height of the strip beside it.
 fn histogram(beside: Rect, azimuths: AzimuthAxis, scans: &[Readings]) -> Layer {
     const BINS: usize = 50;
-    let strip = Strip { panel: beside, azimuths, scale: strips::residual_scale(scans) };
+    let strip = Strip { panel: beside, azimuths, scale: scan_strips::residual_scale(scans) };
     let mut counts = [0_usize; BINS];
     for (_, residual_m) in scans.iter().flat_map(Readings::residuals) {
         let down = (strip.y(1e3 * residual_m) - beside.top) / beside.height();

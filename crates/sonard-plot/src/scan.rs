@@ -8,9 +8,9 @@ use super::{
     picture::Picture,
     plan::Plan,
     readings::Readings,
-    region,
+    region, scan_strips,
     strip::AzimuthAxis,
-    strips, theme, words,
+    theme, words,
 };
 use sonard_model::{geometry::Pose, scene::Scene};
 use sonard_records::ScanView;
@@ -50,7 +50,7 @@ pub fn draw_scans(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     page.add(heading);
     let (floor, beyond) = floor_plan(&plan, &placed, scene);
     page.add(floor);
-    page.add(strips_beside(&layout.strips, azimuths, &readings));
+    page.add(strips_beside(&layout.scan_strips, azimuths, &readings));
     let below = Px::new(theme::MARGIN_PX, layout.bottom + 10.0);
     let width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
     let (entries, height) = legend::draw(&keys::all(&readings, scene, beyond), below, width);
@@ -167,20 +167,20 @@ fn strips_beside(panels: &[Rect; 2], azimuths: AzimuthAxis, scans: &[Readings]) 
         scans.iter().flat_map(|scan| &scan.beams).any(|beam| beam.margin_db.is_some());
     let [upper, lower] = *panels;
     let second = if has_residuals {
-        Some(strips::residual(lower, azimuths, scans, true))
+        Some(scan_strips::residual(lower, azimuths, scans, true))
     } else if has_margins {
-        Some(strips::margin(lower, azimuths, scans, true))
+        Some(scan_strips::margin(lower, azimuths, scans, true))
     } else {
         None
     };
     match second {
         Some(second) => {
-            layer.add(strips::range(upper, azimuths, scans, false));
+            layer.add(scan_strips::range(upper, azimuths, scans, false));
             layer.add(second);
         }
         None => {
             let whole = Rect { bottom: lower.bottom, ..upper };
-            layer.add(strips::range(whole, azimuths, scans, true));
+            layer.add(scan_strips::range(whole, azimuths, scans, true));
         }
     }
     layer

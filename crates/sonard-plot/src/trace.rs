@@ -334,7 +334,7 @@ fn list(view: &TraceView, named: &[Named], top: f64) -> (Layer, f64) {
     let mut y = top;
     for (number, peak) in (1..).zip(named) {
         y += theme::TEXT_PX + 4.0;
-        let times = if peak.count > 1 { format!(" ({} ways)", peak.count) } else { String::new() };
+        let times = if peak.count > 1 { format!(" ({} paths)", peak.count) } else { String::new() };
         let range_m = view.sound_speed_m_s * peak.tof_us * 1e-6 / 2.0;
         let db = 20.0 * peak.peak.log10();
         let text = format!("{number}   {range_m:.3} m, {db:.1} dB: {}{times}", peak.name);

@@ -21,7 +21,7 @@ pub use score::{MapScore, PathSettings, ScoreError, score};
 
 use thiserror::Error;
 
-use super::{Sweep, prediction::Worth};
+use super::{Sweep, prediction::Assessment};
 use sonard_model::geometry::DVec2;
 
 /// Most cells of a grid: 256 MB.
@@ -181,12 +181,12 @@ impl Grid {
         (0..self.log_odds.len()).map(|index| self.probability(index))
     }
 
-    /// Adds a set of readings; `worths` are theirs, without which all are believed. Returns how
+    /// Adds a set of readings; `assessments` are theirs, without which all are believed. Returns how
     /// many readings were left out for want of confidence.
     pub fn add(
         &mut self,
         sweep: &Sweep,
-        worths: Option<&[Worth]>,
+        assessments: Option<&[Assessment]>,
         model: &BeamModel,
         trust: &Trust,
     ) -> usize {
@@ -200,7 +200,7 @@ impl Grid {
         }
         let mut left_out = 0;
         for mount in places {
-            let table = polar::Table::of(sweep, mount, worths, model, trust, cell_m);
+            let table = polar::Table::of(sweep, mount, assessments, model, trust, cell_m);
             let turn = DVec2::from_angle(sweep.pose.direction_rad(0.0));
             let from = sweep.pose.position() + turn.rotate(mount);
             table.add_to(&self.shape, from, &mut self.log_odds);

@@ -88,9 +88,9 @@ impl PredictionSettings {
     }
 }
 
-/// What a reading is worth.
+/// How far a reading is to be trusted.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Worth {
+pub struct Assessment {
     /// 0 (not to be believed) to 0.5 (nothing speaks against it).
     pub confidence: f64,
     /// Distance to the nearest predicted feature that it did not report, metres: up to there the
@@ -102,7 +102,7 @@ pub struct Worth {
 const EXTENDED_SUPPORT: f64 = 3.0;
 
 /// A reading that nothing speaks against.
-const NEUTRAL: Worth = Worth { confidence: 0.5, clear_m: None };
+const NEUTRAL: Assessment = Assessment { confidence: 0.5, clear_m: None };
 
 /// Feature Prediction over the sets of readings of one robot.
 #[derive(Debug, Clone)]
@@ -125,9 +125,9 @@ impl FeaturePrediction {
         &self.local
     }
 
-    /// The worth of each reading of a set, in the order of its beams: steps 1 to 6. The set's
+    /// The assessment of each reading of a set, in the order of its beams: steps 1 to 6. The set's
     /// features go into the local map.
-    pub fn assess(&mut self, sweep: &Sweep) -> Vec<Worth> {
+    pub fn assess(&mut self, sweep: &Sweep) -> Vec<Assessment> {
         let beams = self.beams(sweep);
         let robot = sweep.pose.position();
         let mut seen = self.predict(&beams);
@@ -140,9 +140,9 @@ impl FeaturePrediction {
         }
         self.local.retain(|line| line.seen_from.distance(robot) <= self.settings.forget_m);
         let local = self.obstacles(&self.local);
-        let worths = beams.iter().map(|beam| self.worth(beam, &local)).collect();
+        let assessments = beams.iter().map(|beam| self.assessment(beam, &local)).collect();
         self.split_unseen(&beams);
-        worths
+        assessments
     }
 
     fn beams(&self, sweep: &Sweep) -> Vec<Ray> {
@@ -201,8 +201,9 @@ impl FeaturePrediction {
             .map(|line| {
                 let [only] = line.readings.as_slice() else { return false };
                 let beam = &beams[*only as usize];
-                maps.iter()
-                    .any(|map| self.worth(beam, map).confidence < self.settings.least_confidence)
+                maps.iter().any(|map| {
+                    self.assessment(beam, map).confidence < self.settings.least_confidence
+                })
             })
             .collect();
         let mut doubts = doubtful.into_iter();
@@ -231,10 +232,10 @@ impl FeaturePrediction {
     }
 
     /// What a map's features make of a reading.
-    fn worth(&self, beam: &Ray, map: &[Obstacle]) -> Worth {
+    fn assessment(&self, beam: &Ray, map: &[Obstacle]) -> Assessment {
         let omega_rad = self.settings.omega_deg.to_radians();
         let (cos_omega, far_m) = (omega_rad.cos(), beam.range_m - self.settings.near_m);
-        let mut worth = NEUTRAL;
+        let mut assessment = NEUTRAL;
         for obstacle in map {
             let cos_theta = obstacle.cos_to(beam.axis());
             let hidden = cos_theta < cos_omega;
@@ -248,10 +249,11 @@ impl FeaturePrediction {
             } else {
                 of_angle(cos_theta.acos() / omega_rad)
             };
-            worth.confidence = combine(worth.confidence, confidence);
-            worth.clear_m = Some(worth.clear_m.map_or(crossing_m, |clear| clear.min(crossing_m)));
+            assessment.confidence = combine(assessment.confidence, confidence);
+            assessment.clear_m =
+                Some(assessment.clear_m.map_or(crossing_m, |clear| clear.min(crossing_m)));
         }
-        worth
+        assessment
     }
 
     /// Step 6: features that should have been heard and were not are split there.

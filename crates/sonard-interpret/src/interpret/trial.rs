@@ -123,9 +123,9 @@ impl Course {
         let mut maps = [Grid::new(*self.ideal.shape()), Grid::new(*self.ideal.shape())];
         let mut predictor = FeaturePrediction::new(prediction);
         for sweep in &self.sweeps {
-            let worths = predictor.assess(sweep);
+            let assessments = predictor.assess(sweep);
             maps[0].add(sweep, None, &model, &settings.trust);
-            maps[1].add(sweep, Some(&worths), &model, &settings.trust);
+            maps[1].add(sweep, Some(&assessments), &model, &settings.trust);
         }
         let paths = PathSettings::default();
         let scores = [score(&maps[0], &self.ideal, &paths)?, score(&maps[1], &self.ideal, &paths)?];

@@ -52,13 +52,13 @@ pub struct Incidence {
     pub leaving_rad: f64,
     /// From the axis to where it comes from, radians, counter-clockwise.
     pub arriving_rad: f64,
-    /// Length of the way, metres.
+    /// Length of the path, metres.
     pub length_m: f64,
-    /// What the way does to the face's image.
+    /// What the path does to the face's image.
     pub image: Image,
 }
 
-/// The face as it is seen over an echo's way.
+/// The face as it is seen over an echo's path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Image {
     /// Over an even number of mirrors: the right way round.
@@ -140,9 +140,9 @@ impl ApertureResponse {
         2e6 * self.half_width_m / self.sound_speed_m_s
     }
 
-    /// By how much each pair of points shortens the way, metres, and its share.
+    /// By how much each pair of points shortens the path, metres, and its share.
     ///
-    /// Where the ways part into a sum over departure and one over arrival (no curvature, or an edge
+    /// Where the paths part into a sum over departure and one over arrival (no curvature, or an edge
     /// between) a grid of delays would do; the pairs are few enough to be taken one by one.
     fn leads_m(&self, incidence: &Incidence) -> Vec<(f64, Complex64)> {
         let Incidence { leaving_rad, arriving_rad, length_m, image } = *incidence;
@@ -170,7 +170,7 @@ impl ApertureResponse {
     }
 
     /// For each pair of points across a disc what is left of the sound between the chords through them
-    /// over a way of `length_m`, because they have a height: the mean of `exp(-i k (z - z')^2 / (2 L))`.
+    /// over a path of `length_m`, because they have a height: the mean of `exp(-i k (z - z')^2 / (2 L))`.
     fn heights(&self, length_m: f64) -> Vec<Vec<Complex64>> {
         let count = self.points.len();
         let Aperture::Piston { radius_m } = self.aperture else {

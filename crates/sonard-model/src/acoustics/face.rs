@@ -26,7 +26,7 @@ pub struct Disc {
     pub wave_number_per_m: f64,
 }
 
-/// The way of sound that a face turns back.
+/// The path of sound that a face reflects.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FaceAspect {
     /// From the (mirrored) source to the disc, metres.
@@ -44,7 +44,7 @@ impl Disc {
     ///
     /// Kirchhoff's integral over the disc in Fresnel's approximation (Born and Wolf, Principles
     /// of Optics, section 8.8, has the same integral for a lens). From a source at `R1` and to a
-    /// receiver at `R2` the way over a point at `rho a` from the centre is longer by
+    /// receiver at `R2` the path over a point at `rho a` from the centre is longer by
     /// `(rho a)^2 / 2 (1/R1 + 1/R2)`, and by `rho a (sin i + sin o) cos(phi)` to one side. With
     /// `p = k a^2 / 2 (1/R1 + 1/R2)` and `q = k a |sin i + sin o|` the field is
     ///

@@ -9,7 +9,7 @@ use super::{Pulse, Sensor};
 /// Complex envelope of a lone echo against time: the echo is the real part of
 /// `envelope * exp(i omega t)` at the carrier, its largest modulus is 1.
 ///
-/// Time 0 is where the sound's way would end at the speed of sound: for a burst its nominal
+/// Time 0 is where the sound's path would end at the speed of sound: for a burst its nominal
 /// onset, for a Gaussian pulse its middle. The band filter is taken without delay, so an echo
 /// begins a little before; what that does to a range is the receiver's business.
 #[derive(Debug, Clone, PartialEq)]

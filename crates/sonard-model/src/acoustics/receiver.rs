@@ -58,10 +58,10 @@ const BLANKING_TOLERANCE_US: f64 = 20.0;
 pub struct PulseArrival {
     /// Length of its path there and back, metres.
     pub length_m: f64,
-    /// Strength after gain compensation and the beam pattern on both ways; a head-on, perfectly
+    /// Strength after gain compensation and the beam pattern on departure and arrival; a head-on, perfectly
     /// reflecting wall without absorption gives 1.
     pub amplitude: f64,
-    /// Phase of the carrier beside that of the way, for `exp(+i omega t)`, radians.
+    /// Phase of the carrier beside that of the path's length, for `exp(+i omega t)`, radians.
     pub phase_rad: f64,
     /// Which of the sender's paths it took; meaningless to the receiver.
     pub index: u32,

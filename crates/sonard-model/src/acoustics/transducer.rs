@@ -175,11 +175,11 @@ impl Face {
         let times: Vec<f64> = (0..=steps).map(|i| first_us + i as f64 * step_us).collect();
         let samples: Vec<f64> = times.iter().map(|&t_us| at(t_us)).collect();
         let highest_sample = samples.iter().copied().fold(0.0, f64::max);
-        // Several humps can be nearly as high: each that may be the highest is climbed.
-        let humps = (1..steps).filter(|&i| {
+        // Several peaks can be nearly as high: each that may be the highest is climbed.
+        let peaks = (1..steps).filter(|&i| {
             samples[i] >= samples[i - 1].max(samples[i + 1]) && samples[i] > 0.8 * highest_sample
         });
-        let peak = humps.map(|i| highest(at, times[i - 1], times[i + 1])).fold(0.0, f64::max);
+        let peak = peaks.map(|i| highest(at, times[i - 1], times[i + 1])).fold(0.0, f64::max);
         // Rounding must not let any direction beat the axis.
         peak.max(highest_sample).min(1.0)
     }
@@ -210,7 +210,7 @@ impl Face {
     }
 }
 
-/// Maximum of a curve with one hump between two places, by golden section.
+/// Maximum of a curve with one peak between two places, by golden section.
 fn highest(curve: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     const PART: f64 = 0.618_033_988_749_895;
     let mut left = high - PART * (high - low);

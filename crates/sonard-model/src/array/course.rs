@@ -1,4 +1,4 @@
-//! The way that a robot takes: poses, one after the other, perhaps with times.
+//! The course that a robot takes: poses, one after the other, perhaps with times.
 
 use serde::Deserialize;
 use thiserror::Error;

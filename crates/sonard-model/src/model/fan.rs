@@ -42,7 +42,7 @@ use crate::{acoustics::BeamPattern, geometry::DVec2, scene::Scene};
 #[derive(Debug)]
 pub struct Fan {
     reflectors: Reflectors,
-    joints: Joints,
+    wall_ends: WallEnds,
     beam: BeamPattern,
     settings: FanSettings,
 }
@@ -82,7 +82,7 @@ impl FanSettings {
     /// and back.
     ///
     /// Kuc and Siegel's `1 / (2 pi sqrt(z / lambda))` for both legs of length z; for unequal
-    /// legs z is their harmonic mean, as the cylindrical wave of the edge spreads over the way
+    /// legs z is their harmonic mean, as the cylindrical wave of the edge spreads over the path
     /// back while the gain makes up for the sum of both.
     fn edge_ratio(&self, out_m: f64, back_m: f64) -> f64 {
         let mean_m = 2.0 * out_m * back_m / (out_m + back_m);
@@ -91,16 +91,16 @@ impl FanSettings {
     }
 }
 
-/// Ends of walls, each place once.
+/// Ends of walls, each point once.
 #[derive(Debug)]
-struct Joints {
+struct WallEnds {
     /// For each wall, the edges its ends are known by.
     known: Vec<[Edge; 2]>,
     /// Greatest mirrored amplitude of the walls that end there.
     mirror: HashMap<Edge, f64>,
 }
 
-impl Joints {
+impl WallEnds {
     fn new(reflectors: &Reflectors) -> Self {
         let mut first_at: HashMap<(i64, i64), Edge> = HashMap::new();
         let mut mirror: HashMap<Edge, f64> = HashMap::new();
@@ -127,8 +127,8 @@ impl Fan {
     #[must_use]
     pub fn new(scene: &Scene, beam: BeamPattern, settings: FanSettings) -> Self {
         let reflectors = Reflectors::new(scene);
-        let joints = Joints::new(&reflectors);
-        Self { reflectors, joints, beam, settings }
+        let wall_ends = WallEnds::new(&reflectors);
+        Self { reflectors, wall_ends, beam, settings }
     }
 
     /// The first arrival of at least `threshold` from a path of at least `shortest_m`: appendix

@@ -2,7 +2,7 @@
 //!
 //! # Mirror reflections
 //!
-//! PulseArrival that mirrors have turned back and forth runs straight on from an image of its source
+//! Sound that mirrors have turned back and forth runs straight on from an image of its source
 //! (Allen and Berkley, JASA 65, 1979, for boxes; Borish, JASA 75, 1984, for any polyhedron). How
 //! many images there are grows without bounds, but few are seen from where one listens. Beams
 //! find those alone (Heckbert and Hanrahan 1984; Funkhouser et al., JASA 115, 2004): a beam is

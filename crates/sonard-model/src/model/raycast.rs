@@ -107,9 +107,9 @@ impl Reflectors {
 
     /// Whether nothing stands between two points; what touches `to` does not count.
     pub(super) fn sees(&self, from: DVec2, to: DVec2) -> bool {
-        let way = to - from;
-        let distance_m = way.length();
-        self.nearest(from, way / distance_m, None)
+        let run = to - from;
+        let distance_m = run.length();
+        self.nearest(from, run / distance_m, None)
             .is_none_or(|hit| hit.distance_m > distance_m - 1e-7)
     }
 
@@ -151,9 +151,9 @@ fn mirrored(material: &Material) -> f64 {
 
 impl Segment {
     fn new(wall: &Wall) -> Self {
-        let way = wall.b - wall.a;
-        let length_m = way.length();
-        Self { start: wall.a, along: way / length_m, length_m, mirror: mirrored(&wall.material) }
+        let run = wall.b - wall.a;
+        let length_m = run.length();
+        Self { start: wall.a, along: run / length_m, length_m, mirror: mirrored(&wall.material) }
     }
 
     fn meet(&self, origin: DVec2, direction: DVec2, reflector: Reflector) -> Option<Hit> {

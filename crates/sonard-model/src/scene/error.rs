@@ -193,12 +193,7 @@ impl SceneProblem {
     pub fn help(&self) -> String {
         match self {
             Self::Syntax(found) => syntax_help(found),
-            Self::Unclosed(open) => {
-                let close = if *open == '[' { ']' } else { '}' };
-                format!(
-                    "add the `{close}` that belongs to it, and look for a missing comma before it"
-                )
-            }
+            Self::Unclosed(open) => unclosed_help(*open),
             Self::DuplicateKey(_) => "keep one of the two; only one could count".to_owned(),
             Self::UnknownField { field, known } => suggest(field, known, "fields here"),
             Self::MissingField(field) => format!("add \"{field}\" to this object"),
@@ -253,6 +248,11 @@ impl SceneProblem {
             Self::Pose(error) => error.help(),
         }
     }
+}
+
+fn unclosed_help(open: char) -> String {
+    let close = if open == '[' { ']' } else { '}' };
+    format!("add the `{close}` that belongs to it, and look for a missing comma before it")
 }
 
 fn syntax_help(found: &str) -> String {

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{BeamModel, GridShape, MOST_LOG_ODDS, Trust};
-use crate::interpret::{Beam, Heard, Sweep, prediction::Worth};
+use crate::interpret::{Beam, Heard, Sweep, prediction::Assessment};
 use sonard_model::geometry::DVec2;
 
 /// Directions of the table: 0.75 degrees each, finer than the motor's steps.
@@ -29,7 +29,7 @@ impl Table {
     pub(super) fn of(
         sweep: &Sweep,
         mount: DVec2,
-        worths: Option<&[Worth]>,
+        assessments: Option<&[Assessment]>,
         model: &BeamModel,
         trust: &Trust,
         cell_m: f64,
@@ -49,19 +49,19 @@ impl Table {
         let mut profiles = [vec![0.0; distances], vec![0.0; distances]];
         let here = |(_, beam): &(usize, &Beam)| beam.mount == mount;
         for (at, beam) in sweep.beams.iter().enumerate().filter(here) {
-            let worth = worths.and_then(|worths| worths.get(at));
+            let assessment = assessments.and_then(|assessments| assessments.get(at));
             let (range_m, echo) = match beam.heard {
                 Heard::Echo(range_m) if range_m <= model.max_range_m() => (range_m, true),
                 Heard::Echo(_) | Heard::Silent => (model.max_range_m(), false),
                 Heard::Near => continue,
             };
-            if worth.is_some_and(|worth| worth.confidence < trust.least_confidence) {
+            if assessment.is_some_and(|assessment| assessment.confidence < trust.least_confidence) {
                 table.left_out += 1;
                 if !trust.keep_clear {
                     continue;
                 }
             }
-            let reading = Reading { range_m, echo, share, worth, trust };
+            let reading = Reading { range_m, echo, share, assessment, trust };
             let axis_rad = sweep.pose.direction_rad(beam.azimuth_deg);
             table.add(&reading, axis_rad, model, &mut profiles);
         }
@@ -158,21 +158,21 @@ struct Reading<'a> {
     range_m: f64,
     echo: bool,
     share: f64,
-    worth: Option<&'a Worth>,
+    assessment: Option<&'a Assessment>,
     trust: &'a Trust,
 }
 
 impl Reading<'_> {
     /// What it counts at a distance: 1 where nothing speaks against it, 0 without confidence.
     fn weight(&self, distance_m: f64) -> f64 {
-        let Some(worth) = self.worth else { return 1.0 };
-        if self.trust.keep_clear && worth.clear_m.is_some_and(|clear_m| distance_m < clear_m) {
+        let Some(assessment) = self.assessment else { return 1.0 };
+        if self.trust.keep_clear && assessment.clear_m.is_some_and(|clear_m| distance_m < clear_m) {
             return 1.0;
         }
-        if worth.confidence < self.trust.least_confidence {
+        if assessment.confidence < self.trust.least_confidence {
             return 0.0;
         }
-        (2.0 * worth.confidence).clamp(0.0, 1.0)
+        (2.0 * assessment.confidence).clamp(0.0, 1.0)
     }
 }
 

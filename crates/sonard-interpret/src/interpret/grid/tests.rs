@@ -4,7 +4,7 @@ use super::{
     BeamModel, GaussianBeam, Grid, GridError, GridShape, ImageError, MapYaml, PathSettings,
     PhysicalBeam, Trust, from_pgm, ideal, score, to_pgm,
 };
-use crate::interpret::{Beam, Extents, Heard, Sweep, prediction::Worth};
+use crate::interpret::{Beam, Extents, Heard, Sweep, prediction::Assessment};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
@@ -48,12 +48,12 @@ fn an_echo_frees_what_is_before_it_and_fills_what_is_there() {
 
 #[test]
 fn doubted_readings_count_up_to_what_contradicts_them_only() {
-    let worth = Worth { confidence: 0.1, clear_m: Some(1.0) };
+    let assessment = Assessment { confidence: 0.1, clear_m: Some(1.0) };
     let mut believed = Grid::new(shape(5.0, 0.05));
     believed.add(&beam(Heard::Echo(2.0)), None, &gaussian(), &Trust::default());
     let add = |trust: Trust| {
         let mut grid = Grid::new(shape(5.0, 0.05));
-        let left_out = grid.add(&beam(Heard::Echo(2.0)), Some(&[worth]), &gaussian(), &trust);
+        let left_out = grid.add(&beam(Heard::Echo(2.0)), Some(&[assessment]), &gaussian(), &trust);
         (grid, left_out)
     };
     let (kept, _) = add(Trust { least_confidence: 0.0, keep_clear: true });

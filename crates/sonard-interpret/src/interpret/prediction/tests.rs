@@ -53,16 +53,16 @@ fn figures_4_to_6_three_readings_of_a_wall_outvote_a_wrong_one() {
         (270.0, 0.0),
     ];
     let mut prediction = prediction();
-    let worths = prediction.assess(&ring(ORIGIN, &readings));
+    let assessments = prediction.assess(&ring(ORIGIN, &readings));
     let [wall] = prediction.local() else { panic!("{:?}", prediction.local()) };
     assert_eq!(wall.readings, [2, 3, 4]);
     assert!(wall.normal_rad.abs() < 1e-9 && (wall.a.x - 1.0).abs() < 1e-9, "{wall:?}");
     for neutral in [0, 2, 3, 4, 6] {
-        assert_eq!(worths[neutral].confidence, 0.5, "sonar {neutral}");
+        assert_eq!(assessments[neutral].confidence, 0.5, "sonar {neutral}");
     }
     for doubtful in [1, 5] {
-        assert!(worths[doubtful].confidence < 0.5, "sonar {doubtful}: {worths:?}");
-        let clear_m = worths[doubtful].clear_m.expect("a crossing");
+        assert!(assessments[doubtful].confidence < 0.5, "sonar {doubtful}: {assessments:?}");
+        let clear_m = assessments[doubtful].clear_m.expect("a crossing");
         assert!((clear_m - 1.0).abs() < 0.1, "{clear_m}");
     }
 }
@@ -73,11 +73,11 @@ fn a_wall_seen_before_speaks_against_readings_through_it() {
     prediction.assess(&ring(ORIGIN, &[(15.0, 1.0), (0.0, 1.0), (345.0, 1.0)]));
     // From beside the wall, looking along it at 60 degrees from its normal.
     let pose = Pose { x_m: 0.5, y_m: -0.9, heading_deg: 60.0 };
-    let worth = prediction.assess(&ring(pose, &[(0.0, 0.0)]))[0];
-    let crossing_m = worth.clear_m.expect("a crossing");
+    let assessment = prediction.assess(&ring(pose, &[(0.0, 0.0)]))[0];
+    let crossing_m = assessment.clear_m.expect("a crossing");
     let expected = (crossing_m / MAX_RANGE_M).powi(2) / 2.0;
-    assert!((worth.confidence - expected).abs() < 1e-12, "{worth:?}");
-    assert!(worth.confidence < 0.02);
+    assert!((assessment.confidence - expected).abs() < 1e-12, "{assessment:?}");
+    assert!(assessment.confidence < 0.02);
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn the_far_past_is_forgotten() {
 fn a_stepper_arc_gives_the_wall_it_came_from() {
     let beams: Vec<(f64, f64)> = (-11..=11).map(|i| (f64::from(i) * 0.9 + 40.0, 1.5)).collect();
     let mut prediction = FeaturePrediction::new(PredictionSettings::stepper(20.7, MAX_RANGE_M));
-    let worths = prediction.assess(&ring(ORIGIN, &beams));
+    let assessments = prediction.assess(&ring(ORIGIN, &beams));
     let [wall] = prediction.local() else { panic!("{:?}", prediction.local()) };
     assert!((wall.normal_rad.to_degrees() - 40.0).abs() < 0.01, "{wall:?}");
     let normal = DVec2::from_angle(wall.normal_rad);
@@ -149,7 +149,7 @@ fn a_stepper_arc_gives_the_wall_it_came_from() {
         (normal.dot(wall.a) - 1.5).abs() < 1e-9,
         "the wall is at the range, not within the arc"
     );
-    assert!(worths.iter().all(|worth| worth.confidence == 0.5));
+    assert!(assessments.iter().all(|assessment| assessment.confidence == 0.5));
 }
 
 #[test]

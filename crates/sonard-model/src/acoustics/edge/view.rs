@@ -25,7 +25,7 @@ pub struct EdgeView {
 }
 
 impl EdgeView {
-    /// Field beside that from middle to middle, without the difference of the ways' lengths: from a point
+    /// Field beside that from middle to middle, without the difference of the paths' lengths: from a point
     /// of the face so many metres to the left, as one looks to where the sound goes, back to one so many
     /// to the left, as one looks to where it comes from.
     pub fn shares(&self) -> impl Fn(f64, f64) -> Complex64 + use<> {
@@ -41,7 +41,7 @@ impl EdgeView {
         }
     }
 
-    /// By how much longer the ways are, metres, to second order: what distance adds to the slant.
+    /// By how much longer the paths are, metres, to second order: what distance adds to the slant.
     #[must_use]
     pub fn bend_m(&self, sent_m: f64, heard_m: f64) -> f64 {
         let [out_m, back_m] = self.legs_m;

@@ -51,7 +51,7 @@ struct Part {
     /// To be multiplied with the shape and with what the gain adds while it sounds.
     size: f64,
     /// Phase of the carrier.
-    turn_rad: f64,
+    phase_rad: f64,
     /// Size and phase, once they are wanted.
     field: Complex64,
     /// The most of its modulus.
@@ -65,7 +65,7 @@ struct Part {
 impl Part {
     const fn gone(tof_us: f64) -> Self {
         let field = Complex64::ZERO;
-        Self { tof_us, size: 0.0, turn_rad: 0.0, field, strength: 0.0, steepest: 0.0, shape: None }
+        Self { tof_us, size: 0.0, phase_rad: 0.0, field, strength: 0.0, steepest: 0.0, shape: None }
     }
 }
 
@@ -179,7 +179,7 @@ impl<'a> Hearing<'a> {
     pub(super) fn level(&mut self, t_us: f64) -> f64 {
         self.advance(t_us);
         for part in &mut self.parts[self.summed.max(self.over)..] {
-            part.field = Complex64::from_polar(part.size, part.turn_rad);
+            part.field = Complex64::from_polar(part.size, part.phase_rad);
         }
         self.summed = self.parts.len();
         self.level_of(self.over, t_us)
@@ -295,7 +295,7 @@ impl<'a> Hearing<'a> {
         Part {
             tof_us,
             size,
-            turn_rad: arrival.phase_rad - receiver.omega * tof_us,
+            phase_rad: arrival.phase_rad - receiver.omega * tof_us,
             field: Complex64::ZERO,
             strength: size * of.peak(),
             steepest: size * of.steepest(),

@@ -15,7 +15,7 @@ pub enum Gain {
     /// Makes up for it: the threshold is the same for all ranges.
     Compensating {
         /// Power of the time with which the gain still rises while an echo sounds: 0 if each echo
-        /// is made up for by the length of its way, 0.5 in a plane, 1 in space.
+        /// is made up for by the length of its path, 0.5 in a plane, 1 in space.
         #[serde(default)]
         exponent: f64,
         /// Whether it makes up for what the air absorbs as well.

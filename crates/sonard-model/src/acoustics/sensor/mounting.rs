@@ -9,7 +9,7 @@ use crate::geometry::DVec2;
 /// Where the transducer sits on the rotation axis, and turns with it.
 ///
 /// Ranges are measured from the face, or from the middle between transmitter and receiver: half
-/// the way of the sound. What is met ahead lies `ahead_m` farther from the axis.
+/// the path of the sound. What is met ahead lies `ahead_m` farther from the axis.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mounting {

@@ -21,7 +21,7 @@ const VERTEX_M: f64 = 1e-7;
 const EXACT_M: f64 = 1e-12;
 const MOST_STEPS: usize = 30;
 
-/// A ray on its way, at the last surface it met.
+/// A ray, at the last surface it met.
 #[derive(Debug)]
 pub(super) struct Ray {
     origin: DVec2,
@@ -131,7 +131,7 @@ impl Ray {
         position: DVec2,
     ) -> SmallVec<[Candidate; 2]> {
         let Reflector::Wall(wall) = hit.reflector else { return SmallVec::new() };
-        fan.joints.known[wall as usize]
+        fan.wall_ends.known[wall as usize]
             .iter()
             .filter_map(|&edge| self.diffract_at(edge, fan, position))
             .collect()
@@ -149,7 +149,7 @@ impl Ray {
         let length_m = target.length_m + back_m;
         let gain = self.gain
             * target.tube_gain()
-            * fan.joints.mirror[&edge]
+            * fan.wall_ends.mirror[&edge]
             * settings.edge_ratio(target.length_m, back_m)
             * settings.through_air(length_m);
         let matters = length_m <= settings.longest_m && gain >= settings.weakest;
@@ -212,10 +212,10 @@ impl Ray {
         Some((ray, points))
     }
 
-    /// The neighbouring ray that passes exactly through a point at `way` from the origin.
-    fn aim(&self, way: DVec2) -> Aim {
-        let foot_m = way.dot(self.direction);
-        let offset_m = self.direction.perp_dot(way);
+    /// The neighbouring ray that passes exactly through a point at `run` from the origin.
+    fn aim(&self, run: DVec2) -> Aim {
+        let foot_m = run.dot(self.direction);
+        let offset_m = self.direction.perp_dot(run);
         let width_m = self.width_m + self.growth * foot_m;
         // Radius of curvature of the wave front; its centre is the image of the source.
         let radius_m = width_m / self.growth;
@@ -320,7 +320,7 @@ pub(super) struct Weighing {
 }
 
 impl Weighing {
-    /// Amplitude at a transducer that faces this way; 0 if the ray does not meet its face.
+    /// Amplitude at a transducer that faces this direction; 0 if the ray does not meet its face.
     pub(super) fn amplitude(&self, beam: &BeamPattern, facing: DVec2) -> f64 {
         let arriving = facing.dot(self.arrival);
         // The segment turns with the transducer: seen at an angle it is shorter. Nothing leaves
@@ -328,7 +328,7 @@ impl Weighing {
         if arriving <= self.share || facing.dot(self.departure) <= 0.0 {
             return 0.0;
         }
-        let one_way = |way: DVec2| beam.one_way(facing.perp_dot(way).atan2(facing.dot(way)));
+        let one_way = |end: DVec2| beam.one_way(facing.perp_dot(end).atan2(facing.dot(end)));
         self.gain * one_way(self.departure) * one_way(self.arrival)
     }
 }

@@ -30,7 +30,7 @@ pub struct EchoPath {
     /// Reflectances, edge, curvature and absorption; a head-on, rigid wall without absorption
     /// at the same range gives 1.
     pub amplitude: f64,
-    /// Phase beside that of the way, for `exp(+i omega t)`, radians: what an edge adds.
+    /// Phase beside that of the path's length, for `exp(+i omega t)`, radians: what an edge adds.
     pub phase_rad: f64,
     /// World direction in which the sound leaves, radians.
     pub departure_rad: f64,
@@ -38,7 +38,7 @@ pub struct EchoPath {
     pub arrival_rad: f64,
     /// How far up it leaves and comes from, radians.
     pub rise_rad: [f64; 2],
-    /// What it met on its way, and where.
+    /// What it met, in order, and where.
     pub path: Path,
 }
 

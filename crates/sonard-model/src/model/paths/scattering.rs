@@ -40,7 +40,7 @@ const PATCH_RAD: f64 = 0.03;
 const PATCH_M: f64 = 0.02;
 
 /// Turns of phase from patch to patch: the golden section, whose multiples spread most evenly; and
-/// from wall to wall, and from one mirror on the way to the next, the roots of 2 and 3.
+/// from wall to wall, and from one mirror on the path to the next, the roots of 2 and 3.
 const PHASE_TURNS: f64 = 0.618_033_988_749_895;
 const WALL_TURNS: f64 = SQRT_2;
 const ORDER_TURNS: f64 = 1.732_050_807_568_877;

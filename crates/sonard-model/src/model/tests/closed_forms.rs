@@ -157,7 +157,7 @@ fn a_rectangle_gives_the_image_lattice() {
                 // number of mirrors along an axis it leaves the other way from where it arrives.
                 let mirrored = |even: bool, d: f64| if even { -d } else { d };
                 let leaving = DVec2::new(mirrored(n % 2 == 0, dx), mirrored(m % 2 == 0, dy));
-                let ahead = |way: DVec2| way.angle_to(DVec2::from_angle(direction_rad)).abs() < 0.2;
+                let ahead = |end: DVec2| end.angle_to(DVec2::from_angle(direction_rad)).abs() < 0.2;
                 let far = to_image.length();
                 if far > 1e-9 && far < 3.99 && ahead(to_image) && ahead(leaving) {
                     expected.push(far);

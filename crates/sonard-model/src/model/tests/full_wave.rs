@@ -1,8 +1,8 @@
 //! Against the full-wave scans (tests/data/fullwave/README.md, and those of whole bodies by
 //! tests/peers/full_wave.py): the receiver's first crossing on the sum of all echoes, and the height of
-//! the hump that crosses.
+//! the envelope peak that crosses.
 //!
-//! The figures, mirrored and bent echoes apart:
+//! The figures, reflected and diffracted echoes apart:
 //! `cargo test --lib tests::full_wave -- --nocapture`
 
 use super::{
@@ -73,7 +73,7 @@ impl Errors {
 /// What is scored of all scenes.
 #[derive(Default)]
 struct Score {
-    /// Mirrored and bent.
+    /// Reflected and diffracted.
     errors: [Errors; 2],
     fragile: usize,
     /// Where one is silent and the other is not.
@@ -102,7 +102,7 @@ impl Score {
         }
     }
 
-    /// The hump that crosses, against the reference's; not where it has several maxima, of which
+    /// The envelope peak that crosses, against the reference's; not where it has several maxima, of which
     /// `found` names the highest.
     fn height(&mut self, peaks: &[(f64, f64)], c: f64, found: &Prediction) {
         let Some(range_m) = found.range_m else { return };
@@ -118,7 +118,7 @@ impl Score {
     }
 }
 
-/// 0 for a mirrored echo, 1 for a bent one.
+/// 0 for a reflected echo, 1 for a diffracted one.
 fn kind(found: &Prediction) -> usize {
     let arrival = found.arrival.as_ref().expect("an echo");
     usize::from(arrival.path.kind() == PathKind::Diffracted)
@@ -130,7 +130,7 @@ fn ranges_are_those_of_the_full_wave_reference() {
     ranges_agree(&Reference::given(), false, 0.5);
 }
 
-/// Round whole bodies and in notches sound bends twice too.
+/// Round whole bodies and in notches sound is diffracted twice too.
 #[test]
 fn ranges_of_whole_bodies_are_those_of_boundary_integrals() {
     ranges_agree(&Reference::bodies(), true, 1.0);

@@ -267,11 +267,11 @@ impl Counts {
     }
 }
 
-/// Every sound of every engine in every shipped scene, in a few directions, those by way of the
+/// Every arrival of every engine in every shipped scene, in a few directions, those by way of the
 /// transducer's face included.
 #[test]
 fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
-    let [mut trains, mut checked] = [0; 2];
+    let [mut multiple, mut checked] = [0; 2];
     let mut fan_rounds = FanRounds::default();
     for name in shipped::names() {
         let shipped = shipped_scene(name);
@@ -290,14 +290,14 @@ fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
                     for arrival in point.arrivals(0.1 * f64::from(direction)) {
                         check_arrival(&simulator, &arrival, pose.position(), &mut fan_rounds);
                         let face = |met| met == Mechanism::Transducer;
-                        trains += usize::from(arrival.path.mechanisms().any(face));
+                        multiple += usize::from(arrival.path.mechanisms().any(face));
                         checked += 1;
                     }
                 }
             }
         }
     }
-    assert!(checked > 10_000 && trains > 100, "{checked} {trains}");
+    assert!(checked > 10_000 && multiple > 100, "{checked} {multiple}");
     // Without them the law would be broken by 0.3 and more, where the bound is 1e-6.
     let FanRounds { lawful, missed } = fan_rounds;
     assert!(lawful > 500 && 50 * missed < lawful, "{fan_rounds:?}");

@@ -125,7 +125,7 @@ fn paths_are_heard_in_the_same_order_as_the_appendix_says() {
     }
 }
 
-/// Flat walls only: exactly. PulseArrival that meets a round body spreads so much that two rays which
+/// Flat walls only: exactly. Sound that meets a round body spreads so much that two rays which
 /// leave side by side soon meet different walls, and a fan of any spacing misses some paths.
 #[test]
 fn a_finer_fan_reads_the_same_in_every_shipped_scene() {

@@ -49,45 +49,45 @@ fn length_m(prediction: &Prediction) -> f64 {
     prediction.arrival.as_ref().expect("an arrival").length_m
 }
 
-/// A hump of an echo trace: half its path (metres), height, walls.
-type SeenHump = (f64, f64, Vec<String>);
+/// A peak of an echo trace: half its path (metres), height, walls.
+type SeenPeak = (f64, f64, Vec<String>);
 
 /// Echo traces of the set-ups of figure 1, looking straight ahead.
-fn trace(set_up: &str) -> (Vec<SeenHump>, Prediction) {
+fn trace(set_up: &str) -> (Vec<SeenPeak>, Prediction) {
     let scene = shipped_scene("echo-traces");
     let pose = pose(&scene, set_up);
     let simulator = simulator(scene, Options::default());
     let point = simulator.at(pose.position());
     let direction_rad = pose.direction_rad(0.0);
     let trace = point.trace(direction_rad, 5.0, 2.0);
-    let humps = trace.peaks.iter().map(|hump| {
-        let arrival = point.arrival(direction_rad, &hump.arrival);
-        (arrival.length_m / 2.0, hump.peak.0, names(&simulator, &arrival))
+    let peaks = trace.peaks.iter().map(|peak| {
+        let arrival = point.arrival(direction_rad, &peak.arrival);
+        (arrival.length_m / 2.0, peak.peak.0, names(&simulator, &arrival))
     });
-    (humps.collect(), point.ping_rearmed(direction_rad))
+    (peaks.collect(), point.ping_rearmed(direction_rad))
 }
 
-fn strongest(humps: &[SeenHump]) -> &SeenHump {
-    humps.iter().max_by(|one, other| one.1.total_cmp(&other.1)).expect("a hump")
+fn strongest(peaks: &[SeenPeak]) -> &SeenPeak {
+    peaks.iter().max_by(|one, other| one.1.total_cmp(&other.1)).expect("a peak")
 }
 
 /// Figure 2 (a): nothing but the transmission.
 #[test]
 fn an_empty_environment_gives_no_echo() {
-    let (humps, prediction) = trace("a");
-    assert!(humps.is_empty(), "{humps:?}");
+    let (peaks, prediction) = trace("a");
+    assert!(peaks.is_empty(), "{peaks:?}");
     assert_eq!((prediction.status, prediction.arrival), (PingStatus::NoEcho, None));
 }
 
 /// Figure 2 (b): one clean echo from a plate that is turned a little.
 #[test]
 fn a_turned_plate_gives_one_clean_echo() {
-    let (humps, prediction) = trace("b");
+    let (peaks, prediction) = trace("b");
     close(near_path(&prediction), 0.6 * 5f64.to_radians().cos(), 1e-3, "the plate");
-    let (_, highest, walls) = strongest(&humps);
+    let (_, highest, walls) = strongest(&peaks);
     assert_eq!(walls, &["b-plate"]);
-    let others = humps.iter().filter(|hump| hump.2 != ["b-plate"]).map(|hump| hump.1);
-    assert!(others.fold(0.0, f64::max) < 0.05 * highest, "{humps:?}");
+    let others = peaks.iter().filter(|peak| peak.2 != ["b-plate"]).map(|peak| peak.1);
+    assert!(others.fold(0.0, f64::max) < 0.05 * highest, "{peaks:?}");
     assert_eq!(prediction.echoes_us.len(), 1);
 }
 
@@ -95,11 +95,11 @@ fn a_turned_plate_gives_one_clean_echo() {
 /// one comes straight from the plate.
 #[test]
 fn a_plate_at_45_degrees_shows_the_far_object() {
-    let (humps, prediction) = trace("d");
+    let (peaks, prediction) = trace("d");
     close(near_path(&prediction), 1.8, 1e-3, "plate and far object");
-    let (_, highest, walls) = strongest(&humps);
+    let (_, highest, walls) = strongest(&peaks);
     assert_eq!(walls, &["d-plate", "d-far-object", "d-plate"]);
-    let early = humps.iter().find(|hump| hump.0 < 0.9).expect("the plate's own echo");
+    let early = peaks.iter().find(|peak| peak.0 < 0.9).expect("the plate's own echo");
     assert!(
         early.2 == ["d-plate.b"] && early.1 < 0.05 * highest,
         "an edge of the plate: {early:?}"
@@ -214,8 +214,8 @@ fn the_near_wall_on_the_right_is_read_as_minimum_range() {
     let (simulator, readings) = scan("simple-room", "fig7", 0.9);
     let (_, right) = readings.iter().find(|(at, _)| *at == 0.0).expect("a reading");
     assert_eq!(right.status, PingStatus::MinRange);
-    let rounds = ["east", "transducer"].repeat(4);
-    assert_eq!(walls_of(&simulator, right), rounds[..7]);
+    let reflections = ["east", "transducer"].repeat(4);
+    assert_eq!(walls_of(&simulator, right), reflections[..7]);
     close(length_m(right), 8.0 * 0.094, 1e-9, "length");
     let near: Vec<f64> = readings
         .iter()
@@ -286,11 +286,11 @@ fn a_plate_before_the_transducer_answers_in_a_train() {
     let simulator = simulator(scene, Options::default());
     let direction_rad = pose.direction_rad(0.0);
     let arrivals = simulator.at(pose.position()).arrivals(direction_rad);
-    let train: Vec<f64> = of_kind(&arrivals, PathKind::Specular).map(|a| a.length_m).collect();
-    for (echo, round) in train.iter().zip(1..) {
+    let multiple: Vec<f64> = of_kind(&arrivals, PathKind::Specular).map(|a| a.length_m).collect();
+    for (echo, round) in multiple.iter().zip(1..) {
         close(*echo, 1.2 * f64::from(round), 1e-9, "round");
     }
-    assert!(train.len() >= 2, "{train:?}");
+    assert!(multiple.len() >= 2, "{multiple:?}");
     assert!(simulator.at(pose.position()).ping_rearmed(direction_rad).echoes_us.len() >= 2);
 }
 

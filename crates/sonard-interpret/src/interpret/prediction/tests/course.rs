@@ -73,11 +73,11 @@ fn trusted_shares(scans: usize, seed: u64) -> Vec<[f64; 2]> {
         let (id, plan) = (Uuid::from_u128(number as u128), ScanPlan::default());
         let scan = ScanView::simulated(&simulator, id, pose, &plan, Timestamp::UNIX_EPOCH);
         let sweep = Sweep::of(&scan).expect("a sweep");
-        for (beam, worth) in sweep.beams.iter().zip(prediction.assess(&sweep)) {
+        for (beam, assessment) in sweep.beams.iter().zip(prediction.assess(&sweep)) {
             let Some(kind) = kind(&scan.pings[beam.index as usize]) else { continue };
             let [all, trusted] = &mut counts[number / 50][kind];
             *all += 1;
-            *trusted += usize::from(worth.confidence > LEAST_CONFIDENCE);
+            *trusted += usize::from(assessment.confidence > LEAST_CONFIDENCE);
         }
     }
     let share = |[all, trusted]: [usize; 2]| trusted as f64 / all as f64;

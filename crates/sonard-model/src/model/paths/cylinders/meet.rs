@@ -44,7 +44,7 @@ impl TubeGrower<'_> {
         hits
     }
 
-    /// The half_path of a part that meets a cylinder, if it is worth anything.
+    /// The half-path of a part that meets a cylinder, if it is worth anything.
     fn half_path(
         &self,
         tube: &Tube,

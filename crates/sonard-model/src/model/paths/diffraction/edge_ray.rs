@@ -55,7 +55,7 @@ impl<'a> EdgeRay<'a> {
         all
     }
 
-    /// Whether two are one ray that touches a corner on its way and was found on both sides of it.
+    /// Whether two are one ray that touches a corner on its path and was found on both sides of it.
     fn is_same(&self, other: &Self) -> bool {
         is_same_departure(self.ray, other.ray)
     }

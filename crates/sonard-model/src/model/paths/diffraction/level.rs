@@ -1,6 +1,6 @@
 //! Diffraction at level edges: the top edges of low walls, the bottom edges of hanging ones.
 //!
-//! Such an edge is a straight line at one height over its wall's run in the plan. PulseArrival comes to it from
+//! Such an edge is a straight line at one height over its wall's run in the plan. Sound comes to it from
 //! an image of the ranger in the walls (a beam of the plan that lights the wall's line) and in floor and
 //! ceiling ([`height`](crate::model::paths::height)), and goes back to one: every pair of a path out and a
 //! path back is an echo, as at an upright edge, and its reverse another.

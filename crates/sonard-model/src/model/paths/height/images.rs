@@ -52,7 +52,7 @@ pub(crate) fn images(
         [floor, ceiling].map(|level| level.map_or(1.0, |level| level.gain));
     let mut images = Vec::new();
     let mut add = |rise_m: f64, bounces: u16| {
-        // In turn, beginning with the one that is nearer on the way there.
+        // In turn, beginning with the one that is nearer on the path there.
         let (first, second) = (i32::from(bounces.div_ceil(2)), i32::from(bounces / 2));
         let (floors, ceilings) = if rise_m < 0.0 { (first, second) } else { (second, first) };
         let gain = at_floor.powi(floors) * at_ceiling.powi(ceilings);
@@ -108,7 +108,7 @@ impl VerticalImage {
         let amplitude =
             plan.amplitude * self.gain * bending * settings.air_gain(length_m - plan.length_m);
         let leaves_rad = self.rise_m.atan2(plan.length_m);
-        // After an even number of reflections it still runs the way it left, and comes from the
+        // After an even number of reflections it still runs as it left, and comes from the
         // other side.
         let comes_rad = if self.bounces.is_multiple_of(2) { -leaves_rad } else { leaves_rad };
         let fits = length_m <= settings.max_path_m && amplitude >= settings.floor;
@@ -121,7 +121,7 @@ impl VerticalImage {
         })
     }
 
-    /// The way by floor and ceiling alone, to a receiver that is `apart` from the transmitter.
+    /// The path by floor and ceiling alone, to a receiver that is `apart` from the transmitter.
     pub(crate) fn upright_echo(
         &self,
         index: u16,

@@ -69,7 +69,7 @@ impl Cylinders {
         self.by_triangle.get(triangle as usize).map_or(&[], |arcs| arcs)
     }
 
-    /// Whether a cylinder stands across the straight way between two points of a triangle.
+    /// Whether a cylinder stands across the straight line between two points of a triangle.
     pub(crate) fn hide_in(&self, triangle: u32, from: DVec2, to: DVec2) -> bool {
         let mut circles = self.in_triangle(triangle).iter().map(|arc| arc.cylinder as usize);
         circles.any(|at| self.circles[at].is_opaque && self.circles[at].meets(from, to))
@@ -129,7 +129,7 @@ impl Circle {
             .collect()
     }
 
-    /// Between which shares of the straight way from one point to another it is inside.
+    /// Between which shares of the straight line from one point to another it is inside.
     pub(crate) fn chord(&self, from: DVec2, to: DVec2) -> Option<[f64; 2]> {
         let run = to - from;
         let middle = (self.center - from).dot(run) / run.length_squared();

@@ -104,7 +104,7 @@ fn crossings(room: &Scene, from: DVec2, angle: f64, reach_m: f64, at: DVec2, rad
 }
 
 /// Energy: of rays sent out at random, as many come by as the strengths of all echoes together say.
-/// A way whose rays have spread to `w` for each radian brings `2 rho / w` of a radian to a place of
+/// A path whose rays have spread to `w` for each radian brings `2 rho / w` of a radian to a place of
 /// radius `rho`.
 #[test]
 fn echoes_bring_as_much_energy_as_random_rays_do() {
@@ -125,7 +125,7 @@ fn echoes_bring_as_much_energy_as_random_rays_do() {
 }
 
 #[test]
-fn ways_by_a_body_run_backwards_from_receiver_to_transmitter() {
+fn paths_by_a_body_run_backwards_from_receiver_to_transmitter() {
     let paths = Paths::new(&narrow_room(), Settings { max_path_m: 2.5, floor: 1e-3, ..LOSSLESS });
     let (t, r) = (DVec2::new(0.3, 0.2), DVec2::new(0.774, 0.05));
     let (there, back) = (paths.enumerate_between(t, r), paths.enumerate_between(r, t));

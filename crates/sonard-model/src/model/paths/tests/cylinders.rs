@@ -46,7 +46,7 @@ fn a_cylinder_hides_the_wall_behind_it() {
     assert_eq!(kinds(0.3), [Reflector::Cylinder(0), Reflector::Wall(0)]);
 }
 
-/// Ways from wall to cylinder and back: the reflected way is the shortest one over points of
+/// Paths from wall to cylinder and back: the reflected path is the shortest one over points of
 /// both, found here by searching.
 #[test]
 fn echoes_between_cylinder_and_walls_take_the_shortest_way() {
@@ -79,7 +79,7 @@ fn echoes_between_cylinder_and_walls_take_the_shortest_way() {
     assert_eq!(once.count(), 5);
 }
 
-/// The length of the shortest way that touches the given circles and lines in turn, by moving
+/// The length of the shortest path that touches the given circles and lines in turn, by moving
 /// each contact in turn to where it is shortest.
 fn shortest(
     start: DVec2,
@@ -113,9 +113,9 @@ fn shortest(
     while step > 1e-11 {
         let before = length(&at);
         for i in 0..at.len() {
-            for way in [-step, step] {
+            for change in [-step, step] {
                 let mut other = at.clone();
-                other[i] += way;
+                other[i] += change;
                 if length(&other) < length(&at) {
                     at = other;
                 }
@@ -211,7 +211,7 @@ fn a_huge_cylinder_is_a_wall() {
     }
 }
 
-/// An edge that a cylinder reflects to: length and way are those of the shortest way.
+/// An edge that a cylinder reflects to: length and path are those of the shortest path.
 #[test]
 fn edges_answer_by_way_of_cylinders() {
     let mut plan = scene(&[[0.0, 1.2, 2.0, 1.2]]);

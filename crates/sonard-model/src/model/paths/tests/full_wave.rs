@@ -254,7 +254,7 @@ fn arrivals_are_those_of_the_full_wave_reference() {
     arrivals_agree(&Reference::given(), false);
 }
 
-/// Round whole bodies and in notches sound bends twice too.
+/// Round whole bodies and in notches sound is diffracted twice too.
 #[test]
 fn arrivals_from_whole_bodies_are_those_of_boundary_integrals() {
     arrivals_agree(&Reference::bodies(), true);

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_4, PI};
 use num_complex::Complex64;
 
 use super::{
-    level_edges::{at_height, is_rim, pressure},
+    level_edges::{at_height, is_by_level_edge, pressure},
     *,
 };
 
@@ -38,7 +38,7 @@ impl Spot {
 /// ```
 ///
 /// for `exp(+i omega t)`, with Hankel's function of the second kind and the distance `R` from it. All of
-/// the line would be `exp(-i k R) / R`; that part of it counts to which a straight way leads (`m > 0`), and
+/// the line would be `exp(-i k R) / R`; that part of it counts to which a straight path leads (`m > 0`), and
 /// what is left is the edge's. In pairs: straight part, edge's part.
 pub(super) fn macdonald(source: Spot, place: Spot) -> [[Complex64; 2]; 2] {
     [-1.0, 1.0].map(|sign| {
@@ -54,7 +54,7 @@ pub(super) fn macdonald(source: Spot, place: Spot) -> [[Complex64; 2]; 2] {
     })
 }
 
-/// The same from `m` on, down the slope from the edge's way: at `sqrt(R^2 + u^2) = edge - i t^2 / k` it
+/// The same from `m` on, down the slope from the edge's path: at `sqrt(R^2 + u^2) = edge - i t^2 / k` it
 /// falls as `exp(-t^2)`.
 fn tail(m: f64, edge_m: f64) -> Complex64 {
     const STEPS: i32 = 20_000;
@@ -113,7 +113,7 @@ fn half_plane() -> Scene {
     plan
 }
 
-/// Straight way, mirrored way and rim together, for oblique pairs on one side of the wall and on both,
+/// Straight way, mirrored path and level edge together, for oblique pairs on one side of the wall and on both,
 /// through all boundaries: off by 3e-5 of the straight sound at most.
 #[test]
 fn over_a_half_plane_the_field_is_macdonalds() {
@@ -130,7 +130,11 @@ fn over_a_half_plane_the_field_is_macdonalds() {
             let above_m = 0.01 * f64::from(step) + 1e-4;
             let settings = Settings { floor: 1e-9, ..at_height(above_m) };
             let echoes = Paths::new(&half_plane(), settings).enumerate_between(source, target);
-            assert_eq!(echoes.iter().filter(|echo| is_rim(echo)).count(), 1, "{echoes:?}");
+            assert_eq!(
+                echoes.iter().filter(|echo| is_by_level_edge(echo)).count(),
+                1,
+                "{echoes:?}"
+            );
             let [from, to] = [source, target].map(|place| Spot::above(place, above_m));
             let parts = macdonald(from, to);
             let exact: Complex64 = parts.iter().flatten().sum();

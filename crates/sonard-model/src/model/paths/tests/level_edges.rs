@@ -14,7 +14,7 @@ pub(super) fn at_height(z_m: f64) -> Settings {
     Settings { sensor_z_m: Some(z_m), max_path_m: 8.0, edge_law: Some(EdgeLaw::Utd), ..LOSSLESS }
 }
 
-pub(super) fn is_rim(echo: &EchoPath) -> bool {
+pub(super) fn is_by_level_edge(echo: &EchoPath) -> bool {
     matches!(bends(&echo.path)[..], [Bend::Level { .. }])
 }
 
@@ -36,16 +36,16 @@ fn top_of(wall: u32) -> Mechanism {
     Mechanism::Diffraction(Bend::Level { wall, is_upper: true })
 }
 
-fn rims(plan: &Scene, at: DVec2, z_m: f64) -> Vec<EchoPath> {
+fn by_level_edges(plan: &Scene, at: DVec2, z_m: f64) -> Vec<EchoPath> {
     let mut echoes = Paths::new(plan, at_height(z_m)).enumerate(at);
-    echoes.retain(is_rim);
+    echoes.retain(is_by_level_edge);
     echoes
 }
 
 #[test]
 fn the_upper_edge_of_a_low_wall_answers_from_the_foot_of_the_perpendicular() {
     for (z_m, exact) in [(0.9, 3e-3), (1.3, 3e-3), (0.5, 3e-2)] {
-        let mut found = rims(&low_wall(), DVec2::new(0.4, 0.0), z_m);
+        let mut found = by_level_edges(&low_wall(), DVec2::new(0.4, 0.0), z_m);
         found.retain(|echo| !reflectors(&echo.path).contains(&Reflector::Floor));
         assert_eq!(found.len(), 1, "{found:?}");
         let distance_m = 1_f64.hypot(z_m - 0.3);
@@ -57,7 +57,7 @@ fn the_upper_edge_of_a_low_wall_answers_from_the_foot_of_the_perpendicular() {
         assert!((found[0].amplitude / keller - 1.0).abs() < exact, "{z_m}: {found:?} {keller}");
     }
     // Not beyond the wall's end, and not over a wall as high as the ranger.
-    assert!(rims(&low_wall(), DVec2::new(2.1, 0.0), 0.9).is_empty());
+    assert!(by_level_edges(&low_wall(), DVec2::new(2.1, 0.0), 0.9).is_empty());
     let mut hidden = low_wall();
     hidden.walls.push(Wall {
         a: DVec2::new(-2.0, 0.5),
@@ -65,7 +65,7 @@ fn the_upper_edge_of_a_low_wall_answers_from_the_foot_of_the_perpendicular() {
         z_m: Some([0.0, 0.89]),
         ..hidden.walls[0].clone()
     });
-    let mut found = rims(&hidden, DVec2::new(0.4, 0.0), 0.9);
+    let mut found = by_level_edges(&hidden, DVec2::new(0.4, 0.0), 0.9);
     found.retain(|echo| !reflectors(&echo.path).contains(&Reflector::Floor));
     assert_eq!(
         found.iter().flat_map(|echo| echo.path.mechanisms()).collect::<Vec<_>>(),
@@ -97,7 +97,7 @@ fn a_wall_ends_gradually_at_its_upper_edge() {
 
 /// Out or back by the floor: the edge's own field between the two images' heights.
 #[test]
-fn by_the_floor_a_rim_is_seen_from_an_image() {
+fn by_the_floor_a_level_edge_is_seen_from_an_image() {
     let (d, top) = (0.9, 0.35);
     let mut room = scene(&[[-40.0, 0.0, 40.0, 0.0]]);
     room.floor_z_m = Some(0.0);
@@ -106,13 +106,13 @@ fn by_the_floor_a_rim_is_seen_from_an_image() {
     let at = DVec2::new(0.3, -d);
     for z_m in [0.1, 0.34, 0.6, 1.1] {
         let mut echoes = Paths::new(&room, at_height(z_m)).enumerate(at);
-        echoes.retain(is_rim);
+        echoes.retain(is_by_level_edge);
         assert_eq!(echoes.len(), 4, "{echoes:?}");
         for echo in &echoes {
-            let (floor_rad, rim_rad) = (-((z_m + top) / d).atan(), ((top - z_m) / d).atan());
+            let (floor_rad, edge_rad) = (-((z_m + top) / d).atan(), ((top - z_m) / d).atan());
             let [out_below, back_below] = echo.rise_rad.map(|rise_rad| {
                 let is_near = |rad: f64| (rise_rad - rad).abs() < 1e-12;
-                assert!(is_near(floor_rad) || is_near(rim_rad), "{echo:?}");
+                assert!(is_near(floor_rad) || is_near(edge_rad), "{echo:?}");
                 is_near(floor_rad)
             });
             let spot = |below: bool| Spot::above(at, if below { -z_m } else { z_m } - top);
@@ -130,7 +130,7 @@ fn by_the_floor_a_rim_is_seen_from_an_image() {
     // On the floor itself the ranger is its own image: four times the edge's field.
     room.floor_material = Material::RIGID;
     let mut echoes = Paths::new(&room, at_height(0.0)).enumerate(at);
-    echoes.retain(is_rim);
+    echoes.retain(is_by_level_edge);
     let all: Complex64 = echoes.iter().map(pressure).sum();
     let distance_m = d.hypot(top);
     let around_rad = d.atan2(top);
@@ -138,18 +138,20 @@ fn by_the_floor_a_rim_is_seen_from_an_image() {
     assert!((all.norm() / expected - 1.0).abs() < 0.02, "{} {expected}", all.norm());
 }
 
-/// Where a low wall meets a high one, its rim goes on in the mirror: the way out straight and back by
-/// the high wall bends in the corner, slantwise, and with the floor on one leg beside it.
+/// Where a low wall meets a high one, its level edge goes on in the mirror: the path out straight and back by
+/// the high wall is diffracted in the corner, slantwise, and with the floor on one leg beside it.
 #[test]
-fn beside_a_high_wall_a_rim_answers_slantwise() {
+fn beside_a_high_wall_a_level_edge_answers_slantwise() {
     let (x, d, z_m, top) = (0.5, 1.0, 0.6, 0.3);
     let mut room = scene(&[[0.0, -3.0, 0.0, 3.0], [0.0, 0.0, 4.0, 0.0]]);
     room.floor_z_m = Some(0.0);
     room.walls[1].z_m = Some([0.0, top]);
     let (high, floor) = (Reflector::Wall(0), Reflector::Floor);
     let echoes = Paths::new(&room, at_height(z_m)).enumerate(DVec2::new(x, -d));
-    let slant: Vec<_> =
-        echoes.iter().filter(|e| is_rim(e) && reflectors(&e.path).contains(&high)).collect();
+    let slant: Vec<_> = echoes
+        .iter()
+        .filter(|e| is_by_level_edge(e) && reflectors(&e.path).contains(&high))
+        .collect();
     let [above_m, below_m] = [z_m - top, z_m + top];
     let [above, below] = [d.hypot(above_m), d.hypot(below_m)];
     for (offs, angles, floors, count) in [
@@ -198,11 +200,11 @@ fn furnished() -> Scene {
     room
 }
 
-/// Length, amplitude and phase of what bends at rims, and both directions in a frame.
+/// Length, amplitude and phase of what level edges diffract, and both directions in a frame.
 fn answers(echoes: &[EchoPath], turn: impl Fn(f64) -> f64) -> Vec<[f64; 7]> {
     let mut found: Vec<[f64; 7]> = echoes
         .iter()
-        .filter(|echo| is_rim(echo) && echo.amplitude > 2e-3)
+        .filter(|echo| is_by_level_edge(echo) && echo.amplitude > 2e-3)
         .map(|e| {
             let [out, back] = [e.departure_rad, e.arrival_rad].map(&turn);
             let [up, down] = e.rise_rad;
@@ -242,7 +244,7 @@ fn receiver_and_transmitter_may_change_places() {
     }
     assert!(there.len() > 30, "{}", there.len());
     assert_same(&there, &answers(&back, |angle| angle));
-    // From one place each way is heard in both directions.
+    // From one place each path is heard in both directions.
     let here = paths.enumerate(T);
     let mut reverse = here.clone();
     for echo in &mut reverse {
@@ -283,18 +285,18 @@ fn a_room_moved_turned_and_mirrored_answers_the_same() {
 
 /// Each end of a plate that floats at the ranger's height answers, at the same time.
 #[test]
-fn both_rims_of_a_plate_answer() {
+fn both_level_edges_of_a_plate_diffract() {
     let mut plan = low_wall();
     plan.walls[0].z_m = Some([0.6, 1.2]);
-    let found = rims(&plan, DVec2::ZERO, 0.9);
+    let found = by_level_edges(&plan, DVec2::ZERO, 0.9);
     let near = found.iter().filter(|echo| echo.path.interactions.len() == 1);
     assert_eq!(near.count(), 2, "{found:?}");
 }
 
-/// A wall that another one touches is cut there, and where its rim answers from the cut it does so once.
+/// A wall that another one touches is cut there, and where its level edge answers from the cut it does so once.
 #[test]
-fn a_rim_in_pieces_is_one() {
-    let whole = rims(&low_wall(), DVec2::new(0.25, 0.0), 0.9);
+fn a_level_edge_in_pieces_is_one() {
+    let whole = by_level_edges(&low_wall(), DVec2::new(0.25, 0.0), 0.9);
     let mut cut = low_wall();
     // Ends behind the wall where the perpendicular meets it, so low that it hides nothing.
     cut.walls.push(Wall {
@@ -303,18 +305,18 @@ fn a_rim_in_pieces_is_one() {
         z_m: Some([0.0, 0.01]),
         ..cut.walls[0].clone()
     });
-    let mut pieces = rims(&cut, DVec2::new(0.25, 0.0), 0.9);
+    let mut pieces = by_level_edges(&cut, DVec2::new(0.25, 0.0), 0.9);
     pieces.retain(|e| matches!(bends(&e.path)[..], [Bend::Level { wall: 0, .. }]));
     assert_eq!(pieces.len(), whole.len(), "{pieces:#?}");
 }
 
-/// The heights at which mirrored ways begin or end, and how far the sum of all sound jumps there.
+/// The heights at which mirrored paths begin or end, and how far the sum of all sound jumps there.
 fn jumps(plan: &Scene, heights_m: [f64; 2], [from, to]: [DVec2; 2]) -> Vec<(f64, f64, f64)> {
     let echoes = |z_m: f64| {
         let settings = Settings { max_order: Some(2), floor: 1e-6, ..at_height(z_m) };
         Paths::new(plan, settings).enumerate_between(from, to)
     };
-    // Long ways fade, so that none comes into reach at once.
+    // Long paths fade, so that none comes into reach at once.
     let fade = |length_m: f64| 0.5 + 0.5 * (PI * (length_m / 6.0).min(1.0)).cos();
     let sum = |echoes: &[EchoPath]| -> Complex64 {
         echoes
@@ -325,13 +327,13 @@ fn jumps(plan: &Scene, heights_m: [f64; 2], [from, to]: [DVec2; 2]) -> Vec<(f64,
             .sum()
     };
     let mirrored = |echoes: &[EchoPath]| {
-        let mut ways: Vec<_> = echoes
+        let mut paths: Vec<_> = echoes
             .iter()
             .filter(|e| bends(&e.path).is_empty() && e.length_m < 6.0)
             .map(|e| reflectors(&e.path).to_vec())
             .collect();
-        ways.sort();
-        ways
+        paths.sort();
+        paths
     };
     let steps = 100;
     let height = |step: i32| {
@@ -360,8 +362,8 @@ fn jumps(plan: &Scene, heights_m: [f64; 2], [from, to]: [DVec2; 2]) -> Vec<(f64,
     found
 }
 
-/// Where sound begins to pass over a low wall, on its way out or back, by the floor or not, rims take over
-/// by halves. What grazes the wall both ways at once would bend twice there, and what is left of its jump
+/// Where sound begins to pass over a low wall, on its way out or back, by the floor or not, level edges take over
+/// by halves. What grazes the wall both ways at once would be diffracted twice there, and what is left of its jump
 /// is of that size (0.04 of 0.5).
 #[test]
 fn sound_over_a_low_wall_begins_gradually() {

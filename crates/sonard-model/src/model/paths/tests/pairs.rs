@@ -20,7 +20,7 @@ fn plan() -> Scene {
 }
 
 #[test]
-fn lengths_are_those_of_both_ways() {
+fn lengths_are_those_of_both_halves() {
     let settings =
         Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
     let echoes = Paths::new(&plan(), settings).enumerate_between(T, R);
@@ -54,7 +54,7 @@ fn lengths_are_those_of_both_ways() {
             .collect();
         assert_eq!(found.len(), 1, "{walls:?} {expected}: {echoes:#?}");
     }
-    // The straight way from one to the other is no echo.
+    // The straight path from one to the other is no echo.
     assert!(echoes.iter().all(|echo| echo.length_m > T.distance(R) + 1e-6));
 }
 

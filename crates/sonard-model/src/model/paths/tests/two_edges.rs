@@ -1,4 +1,4 @@
-//! PulseArrival that bends at two edges.
+//! Sound diffracted at two edges.
 
 use num_complex::Complex64;
 use serde::Deserialize;
@@ -66,7 +66,7 @@ impl Case {
     }
 }
 
-/// Field at a receiver over that of a cylindrical wave at 1 m, the straight way included.
+/// Field at a receiver over that of a cylindrical wave at 1 m, the straight path included.
 fn field(plan: &Scene, paths: &Paths, source: DVec2, at: DVec2) -> Complex64 {
     let k = paths.plan.settings.wave_number_per_m;
     let wave = |length_m: f64, amplitude: f64, phase_rad: f64| {
@@ -238,7 +238,7 @@ fn where_the_second_edge_ceases_to_hide_the_first_nothing_jumps() {
         let at = |i: i32| {
             let angle = edge.to_angle() + 0.001 * f64::from(i - 60);
             let to = edge + 0.6 * DVec2::from_angle(angle);
-            // Only what goes over the ends, with the phase of the way along the edges taken off.
+            // Only what goes over the ends, with the phase of the path along the edges taken off.
             let least_m = from.length() + edge.length() + 0.6;
             let near = paths.enumerate_between(from, to);
             near.iter()

@@ -64,7 +64,7 @@ fn in_a_box_the_echoes_are_the_lattice_in_space() {
     }
 }
 
-/// Each reflection leaves what its material does, in the wall-floor corner and on any way.
+/// Each reflection leaves what its material does, in the wall-floor corner and on any path.
 #[test]
 fn floor_and_ceiling_leave_what_their_materials_do() {
     let corners = [[0.0, 0.0], [1.3, 0.0], [1.3, 0.9], [0.0, 0.9]].map(DVec2::from_array);
@@ -163,7 +163,7 @@ fn a_low_wall_is_missed_above_and_bars_the_way_below() {
     // All sound at the ranger's height.
     assert_eq!(met(&room, 0.2), [[low]]);
     assert_eq!(met(&room, 0.4), [[high]]);
-    // With a floor, the way by floor and wall meets the wall at its foot.
+    // With a floor, the path by floor and wall meets the wall at its foot.
     room.floor_z_m = Some(0.0);
     let low_again = vec![low, floor];
     assert_eq!(met(&room, 0.2), [vec![low], low_again.clone(), vec![floor]]);
@@ -208,8 +208,9 @@ fn corners_of_low_walls_answer_as_those_of_high_ones() {
         let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..at_height(0.3) };
         let level = |plan: &Scene, at: DVec2| -> Vec<f64> {
             let mut echoes = Paths::new(plan, settings.clone()).enumerate(frame.rotate(at));
-            let is_rim = |bend: &Bend| matches!(bend, Bend::Level { .. });
-            echoes.retain(|e| e.rise_rad == [0.0; 2] && !bends(&e.path).iter().any(is_rim));
+            let is_by_level_edge = |bend: &Bend| matches!(bend, Bend::Level { .. });
+            echoes
+                .retain(|e| e.rise_rad == [0.0; 2] && !bends(&e.path).iter().any(is_by_level_edge));
             echoes.iter().map(|echo| echo.length_m).collect()
         };
         for at in [DVec2::new(-0.4, 0.3), DVec2::new(0.4, -0.3)] {
@@ -217,7 +218,7 @@ fn corners_of_low_walls_answer_as_those_of_high_ones() {
             let high = level(&plan, at);
             plan.walls.iter_mut().for_each(|wall| wall.z_m = Some([0.0, 0.5]));
             let low = level(&plan, at);
-            // No way round or over a wall that sound does not pass at this height.
+            // No path round or over a wall that sound does not pass at this height.
             assert!(high.iter().any(|length_m| (length_m - 1.0).abs() < 1e-9), "{high:?}");
             assert_eq!(low.len(), high.len(), "{low:?} {high:?}");
         }

@@ -1,0 +1,149 @@
+use proptest::prelude::*;
+
+use super::*;
+
+const LOG: &str = include_str!("../../../tests/fixtures/small.jsonl");
+
+fn line_of(kind: &str) -> &'static str {
+    let tag = format!("{{\"type\":\"{kind}\"");
+    LOG.lines().find(|line| line.starts_with(&tag)).expect("the fixture has every kind")
+}
+
+#[test]
+fn every_record_of_the_fixture_comes_back_as_the_same_json() {
+    for line in LOG.lines() {
+        let record = decode_line(line.as_bytes()).expect("the fixture is clean");
+        let mut written = Vec::new();
+        encode_line(&record, &mut written).expect("it was read, so it can be written");
+        assert_eq!(written.pop(), Some(b'\n'));
+        let (was, is): (serde_json::Value, serde_json::Value) = (
+            serde_json::from_str(line).expect("JSON"),
+            serde_json::from_slice(&written).expect("JSON"),
+        );
+        assert_eq!(was, is);
+    }
+}
+
+/// Kind, column and field of the fault on a line.
+fn check(line: impl AsRef<[u8]>, kind: FaultKind, column: Option<usize>, field: &str) {
+    let shown = String::from_utf8_lossy(line.as_ref()).into_owned();
+    let fault = decode_line(line.as_ref()).expect_err(&shown);
+    assert_eq!(
+        (fault.kind, fault.column, fault.field.as_deref().unwrap_or("")),
+        (kind, column, field),
+        "{shown}: {fault}"
+    );
+    assert!(!fault.message.contains("at line 1"), "{fault}");
+}
+
+#[test]
+fn damage_is_named_with_its_place() {
+    let ping = line_of("ping");
+    check("", FaultKind::Empty, None, "");
+    check(" \r", FaultKind::Empty, None, "");
+    check("garbage", FaultKind::NotJson, Some(1), "");
+    check("[1]", FaultKind::NotJson, Some(1), "");
+    check(&ping[..40], FaultKind::NotJson, Some(40), "");
+    check(b"\0\0\0\0", FaultKind::NotText, Some(1), "");
+    check(b"{\"type\":\"ev\xffnt\"}", FaultKind::NotText, Some(12), "");
+    check("{}", FaultKind::NoType, None, "type");
+    check(r#"{"type":7}"#, FaultKind::NoType, None, "type");
+    check(r#"{"type":"pong"}"#, FaultKind::UnknownType, None, "type");
+    check(format!("{ping} {ping}"), FaultKind::NotJson, Some(ping.len() + 2), "");
+    let wrong = ping.replace("\"order\":1", "\"order\":-1");
+    let column = wrong.find(":-1").expect("just put there") + 3;
+    check(&wrong, FaultKind::BadField, Some(column), "sim.path.order");
+    let later = line_of("session").replace("\"format\":2", "\"format\":9");
+    assert!(decode_line(later.as_bytes()).is_ok(), "added fields do no harm");
+    let later = later.replace("\"started\"", "\"begun\"");
+    check(&later, FaultKind::NewerFormat, Some(later.len()), "format");
+    check("[".repeat(100_000), FaultKind::NotJson, Some(1), "");
+    let deep =
+        line_of("session").replace("\"lossless\":false", &format!("\"x\":{}", "[".repeat(9999)));
+    check(&deep, FaultKind::NotJson, Some(deep.len() - 1), "");
+    let deep = deep.replace("[}", &format!("[{}}}", "]".repeat(9999)));
+    assert_eq!(decode_line(deep.as_bytes()).expect_err("too deep").kind, FaultKind::BadField);
+}
+
+#[test]
+fn a_log_of_format_1_is_written_again_in_format_2() {
+    for line in include_str!("../../../tests/fixtures/format-1/scan.jsonl").lines() {
+        let record = decode_line(line.as_bytes()).expect(line);
+        let mut written = Vec::new();
+        encode_line(&record, &mut written).expect(line);
+        let again = decode_line(written.trim_ascii_end()).expect(line);
+        match (record, again) {
+            (Record::Session(was), Record::Session(is)) => {
+                assert_eq!((was.format, is.format), (1, 2));
+                assert_eq!(*is, Session { format: 2, ..*was });
+            }
+            (was, is) => assert_eq!(was, is),
+        }
+    }
+}
+
+#[test]
+fn unknown_fields_and_carriage_returns_do_no_harm() {
+    let ping = line_of("ping");
+    let more = ping.replace("\"index\"", "\"note\":{\"a\":[1,2]},\"index\"") + "\r";
+    assert_eq!(decode_line(more.as_bytes()), decode_line(ping.as_bytes()));
+}
+
+#[test]
+fn what_no_reader_would_take_is_not_written() {
+    let Ok(Record::Ping(ping)) = decode_line(line_of("ping").as_bytes()) else {
+        panic!("the fixture is clean")
+    };
+    let mut line = b"before".to_vec();
+    let mut bad = ping.clone();
+    bad.azimuth_deg = f64::NAN;
+    let error = encode_line(&Record::Ping(bad), &mut line).expect_err("not a number");
+    assert!(error.to_string().starts_with("azimuth_deg is NaN"), "{error}");
+    let mut long = ping.clone();
+    long.echo_ticks = vec![u32::MAX; 100_000];
+    let error = encode_line(&Record::Ping(long), &mut line).expect_err("too long");
+    assert!(matches!(error, EncodeError::TooLong(_)), "{error}");
+    assert_eq!(line, b"before");
+    // What may be unknown is written as unknown.
+    let mut unknown = ping;
+    unknown.range_m = Some(f64::INFINITY);
+    encode_line(&Record::Ping(unknown), &mut line).expect("null is a value");
+    let text = String::from_utf8(line).expect("JSON is UTF-8");
+    assert!(text.contains("\"range_m\":null"), "{text}");
+}
+
+proptest! {
+    #[test]
+    fn every_finite_number_comes_back_bit_for_bit(
+        range_m in proptest::num::f64::NORMAL | proptest::num::f64::SUBNORMAL,
+        azimuth_deg in 0.0..360.0_f64,
+        ticks in any::<u64>(),
+    ) {
+        let Ok(Record::Ping(mut ping)) = decode_line(line_of("ping").as_bytes()) else {
+            panic!("the fixture is clean")
+        };
+        ping.range_m = Some(range_m);
+        ping.azimuth_deg = azimuth_deg;
+        ping.fired_ticks = Some(ticks);
+        let record = Record::Ping(ping);
+        let mut line = Vec::new();
+        encode_line(&record, &mut line).expect("finite");
+        prop_assert_eq!(decode_line(line.trim_ascii_end()), Ok(record));
+    }
+
+    #[test]
+    fn no_bytes_make_it_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+        let _ = decode_line(&bytes);
+    }
+
+    /// Nearly right lines reach deeper than noise.
+    #[test]
+    fn no_change_of_a_record_makes_it_panic(
+        line in 0..11_usize, at in 0..2000_usize, byte in any::<u8>(), cut in any::<bool>(),
+    ) {
+        let mut bytes = LOG.lines().nth(line).expect("11 lines").as_bytes().to_vec();
+        let at = at % bytes.len();
+        if cut { bytes.truncate(at) } else { bytes[at] = byte }
+        let _ = decode_line(&bytes);
+    }
+}
