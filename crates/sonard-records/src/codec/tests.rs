@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-const LOG: &str = include_str!("../../../tests/fixtures/small.jsonl");
+const LOG: &str = include_str!("../../../../tests/fixtures/small.jsonl");
 
 fn line_of(kind: &str) -> &'static str {
     let tag = format!("{{\"type\":\"{kind}\"");
@@ -67,7 +67,7 @@ fn damage_is_named_with_its_place() {
 
 #[test]
 fn a_log_of_format_1_is_written_again_in_format_2() {
-    for line in include_str!("../../../tests/fixtures/format-1/scan.jsonl").lines() {
+    for line in include_str!("../../../../tests/fixtures/format-1/scan.jsonl").lines() {
         let record = decode_line(line.as_bytes()).expect(line);
         let mut written = Vec::new();
         encode_line(&record, &mut written).expect(line);
