@@ -45,7 +45,7 @@ pub struct ApertureResponse {
     head_on: f64,
 }
 
-/// How an echo meets the face.
+/// The incidence of an echo on the face.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Incidence {
     /// From the axis to where the sound leaves, radians, counter-clockwise.
@@ -54,7 +54,7 @@ pub struct Incidence {
     pub arriving_rad: f64,
     /// Length of the path, metres.
     pub length_m: f64,
-    /// What the path does to the face's image.
+    /// The face's image over the path.
     pub image: Image,
 }
 
@@ -135,7 +135,7 @@ impl ApertureResponse {
         Some(EchoShape::from_samples(self.first_us, STEP_US, samples))
     }
 
-    /// How much longer an echo may last at either end than one on the axis, microseconds.
+    /// Time that an echo may last longer at either end than one on the axis, microseconds.
     pub(super) fn crossing_us(&self) -> f64 {
         2e6 * self.half_width_m / self.sound_speed_m_s
     }

@@ -1,4 +1,4 @@
-//! What an edge sends back.
+//! Edge laws: the echo that an edge sends back.
 //!
 //! All laws give the echo of an edge relative to the echo that a large, rigid, head-on wall
 //! would give over a path of the same length. With legs `s'` (to the edge) and `s` (from it) a
@@ -13,7 +13,7 @@ use num_complex::Complex64;
 
 pub use view::EdgeView;
 
-/// How strong the echo of an edge is.
+/// A law for the strength of the echo of an edge.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum EdgeLaw {
     /// The uniform theory of diffraction of Kouyoumjian and Pathak (1974): the level follows from
@@ -43,7 +43,7 @@ pub struct Wedge {
     pub reflectance: [f64; 2],
 }
 
-/// How sound passes a wedge: in on one leg, out on another.
+/// Incidence on a wedge and departure from it: in on one leg, out on another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Aspect {
     /// Direction from the edge towards the source, from the wedge's first wall, radians.
@@ -209,7 +209,7 @@ impl Wedge {
 
 /// A mirror image of the source in the wedge.
 struct Image {
-    /// How far the receiver is past the boundary of the image's light, on the lit side, radians.
+    /// Angle by which the receiver is past the boundary of the image's light, on the lit side, radians.
     past_rad: f64,
     /// Whether the image counts as seen.
     is_lit: bool,

@@ -73,7 +73,7 @@ impl Disc {
         self.face.reflectance * zones(p, q)
     }
 
-    /// How strongly the disc scatters with all its zones in phase, metres: no aspect gives
+    /// Strength with which the disc scatters with all its zones in phase, metres: no aspect gives
     /// [`Self::reflection`] more than this times `1/R1 + 1/R2`.
     #[must_use]
     pub fn strength_m(&self) -> f64 {

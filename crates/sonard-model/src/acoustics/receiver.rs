@@ -67,7 +67,7 @@ pub struct PulseArrival {
     pub index: u32,
 }
 
-/// How arrivals are heard.
+/// How overlapping arrivals are combined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Combining {
     /// As pulses that rise and fall and, where they overlap, add up with their phases.
@@ -84,9 +84,9 @@ pub enum Combining {
 pub struct Receiver {
     /// From firing until it listens, microseconds.
     pub blanking_us: f64,
-    /// How long it is held after an echo, microseconds.
+    /// Time for which it is held after an echo, microseconds.
     pub rearm_us: f64,
-    /// How long the envelope has to stay above the threshold, microseconds.
+    /// Time for which the envelope has to stay above the threshold, microseconds.
     pub integration_us: f64,
     /// Least amplitude it notices where the gain makes up for the spreading.
     pub threshold: f64,
@@ -94,14 +94,14 @@ pub struct Receiver {
     pub sound_speed_m_s: f64,
     /// Half the longest path it waits for, metres.
     pub max_range_m: f64,
-    /// How arrivals are heard.
+    /// How overlapping arrivals are combined.
     pub combining: Combining,
     gain: Gain,
     /// By step of the gain: its end, and what it makes of the threshold at 1 m.
     sensitivity: SmallVec<[(f64, f64); 12]>,
     /// Carrier, radians a microsecond.
     omega: f64,
-    /// How long the pulse nominally lasts, microseconds.
+    /// Nominal duration of the pulse, microseconds.
     pulse_us: f64,
     shape: EchoShape,
     response: Option<ApertureResponse>,
@@ -110,16 +110,16 @@ pub struct Receiver {
     lead_us: f64,
 }
 
-/// What the full response of the face needs to know of an arrival.
+/// An arrival as the full response of the face needs it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Incident {
     /// Strength before the beam pattern.
     pub strength: f64,
-    /// How it meets the face.
+    /// Its incidence on the face.
     pub incidence: Incidence,
 }
 
-/// What the receiver makes of a firing.
+/// The receiver's detection of a firing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detection {
     /// `Echo`, `NoEcho` or `MinRange`.
@@ -250,7 +250,7 @@ impl Receiver {
         self.range_m(self.blanking_us)
     }
 
-    /// How long it listens, microseconds after firing.
+    /// Time for which it listens, microseconds after firing.
     #[must_use]
     pub fn window_us(&self) -> f64 {
         2e6 * self.max_range_m / self.sound_speed_m_s
@@ -309,7 +309,7 @@ impl Receiver {
         }
     }
 
-    /// What came closest within the listening window.
+    /// The arrival that came closest within the listening window.
     fn silence(&self, hearing: &mut Hearing) -> Detection {
         let (echoes_us, window_us) = (SmallVec::new(), self.window_us());
         // More has to be known before anything can be said.

@@ -1,4 +1,4 @@
-//! What the rangers of an array read.
+//! Readings of the rangers of an array.
 
 use std::sync::Arc;
 
@@ -113,13 +113,13 @@ impl ArrayAtPose<'_> {
         &self.model.array
     }
 
-    /// Where the robot is.
+    /// The robot's pose.
     #[must_use]
     pub const fn pose(&self) -> &Pose {
         &self.pose
     }
 
-    /// What a ranger reads, by its index in the array.
+    /// The reading of a ranger, by its index in the array.
     #[must_use]
     pub fn ping(&self, ranger: usize) -> Prediction {
         let (simulator, pose) = self.mounted(ranger);

@@ -1,4 +1,4 @@
-//! Engines: what finds the echoes that arrive at the transducer's face.
+//! Engines, which find the echoes that arrive at the transducer's face.
 
 use super::path::Path;
 use crate::{
@@ -24,7 +24,7 @@ pub struct Arrival {
     pub departure_rad: f64,
     /// World direction of arrival, from the ranger towards where the echo comes from, radians.
     pub arrival_rad: f64,
-    /// What it met, in order, and where.
+    /// Its interactions, in order.
     pub path: Path,
 }
 
@@ -67,7 +67,7 @@ pub trait Arrivals: Send + Sync {
     /// The full account of an arrival that [`listen`](Self::listen) gave for the same direction.
     fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival;
 
-    /// How an arrival that [`listen`](Self::listen) gave for the same direction meets the face: what the
+    /// The incidence of an arrival that [`listen`](Self::listen) gave for the same direction: what the
     /// full response of the face asks of each arrival of a firing.
     fn incident(&self, direction_rad: f64, arrival: &PulseArrival) -> Incident {
         let arrival = self.arrival(direction_rad, arrival);
@@ -95,7 +95,7 @@ pub trait Arrivals: Send + Sync {
     }
 }
 
-/// How the transducer's face looks over a number of mirrors.
+/// The image of the transducer's face over a number of mirrors.
 pub(super) const fn mirrored(count: usize) -> Image {
     if count.is_multiple_of(2) { Image::Upright } else { Image::Swapped }
 }

@@ -49,7 +49,7 @@ impl<'a> LazyArrivals<'a> {
         self.whole.get_or_init(find).as_ref()
     }
 
-    /// What `listen` makes of the shortest echoes that settle it, and these. It is told up to
+    /// The result of `listen` for the shortest echoes that settle it, and these. It is told up to
     /// which length, in metres, all echoes are known, and says which length would have been
     /// enough, if any was.
     pub(super) fn nearest<T>(

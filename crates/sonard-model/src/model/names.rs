@@ -3,7 +3,7 @@
 use super::{Bend, Edge, Mechanism, Reflector};
 use crate::scene::Scene;
 
-/// What the transducer's own face is called on a path.
+/// The name of the transducer's own face on a path.
 pub const FACE_NAME: &str = "transducer";
 /// The same of a room's floor and ceiling.
 const FLOOR: &str = "floor";

@@ -87,7 +87,7 @@ impl<'a> ObservationPoint<'a> {
         })
     }
 
-    /// What an oscilloscope would show of a firing, up to a range in metres, in steps of so many
+    /// The trace of a firing as an oscilloscope would show it, up to a range in metres, in steps of so many
     /// microseconds; each [`EnvelopePeak`](crate::acoustics::EnvelopePeak) can be named with
     /// [`arrival`](Self::arrival).
     #[must_use]

@@ -14,16 +14,16 @@ pub struct Path {
 /// A point where the sound changes its direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interaction {
-    /// What changes it.
+    /// The mechanism that changes it.
     pub mechanism: Mechanism,
-    /// Where, in the plan (world, metres).
+    /// Its point in the plan (world, metres).
     pub point: DVec2,
     /// At which height, metres; `None` in a scene without floor and ceiling, and from engines that know
     /// no heights.
     pub z_m: Option<f64>,
 }
 
-/// How a direction of propagation is changed, and by which part of the scene.
+/// A change of the direction of propagation, and the part of the scene that makes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Mechanism {
     /// Mirror reflection (by engine [`Cone`](super::Cone), which knows no mirrors: the nearest hit).
@@ -76,8 +76,8 @@ pub struct Edge {
 }
 
 impl Path {
-    /// What sends the sound back, in one word: scattering if any wall scatters it, else diffraction if
-    /// any edge bends it.
+    /// Its kind, in one word: scattering if any wall scatters it, else diffraction if
+    /// any edge diffracts it.
     #[must_use]
     pub fn kind(&self) -> PathKind {
         kind(self.mechanisms())
@@ -90,7 +90,7 @@ impl Path {
         self.reflectors().count()
     }
 
-    /// What happens to the arrival, in order.
+    /// Its mechanisms, in order.
     pub fn mechanisms(&self) -> impl DoubleEndedIterator<Item = Mechanism> {
         self.interactions.iter().map(|interaction| interaction.mechanism)
     }

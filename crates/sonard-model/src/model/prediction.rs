@@ -1,11 +1,11 @@
-//! What the model says a firing gives.
+//! Predicted readings.
 
 use smallvec::SmallVec;
 
 use super::engine::Arrival;
 use crate::reading::PingStatus;
 
-/// What the model says a firing gives.
+/// The predicted reading of a firing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prediction {
     /// `Echo`, `NoEcho` or `MinRange`.

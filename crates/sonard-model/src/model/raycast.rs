@@ -11,12 +11,12 @@ const START_M: f64 = 1e-9;
 /// Walls that share an end leave no gap between them at this size, metres.
 const JOINT_M: f64 = 1e-12;
 
-/// Where a ray meets a reflector.
+/// A point where a ray meets a reflector.
 #[derive(Debug, Clone, Copy)]
 pub struct Hit {
     /// From the ray's origin, metres.
     pub distance_m: f64,
-    /// What it meets.
+    /// The reflector.
     pub(super) reflector: Reflector,
     /// Unit normal of the surface there; out of a cylinder, to either side of a wall.
     pub(super) normal: DVec2,
@@ -86,7 +86,7 @@ impl Reflectors {
         best
     }
 
-    /// Where a ray meets one of the reflectors, walls taken without their ends and others out of the way;
+    /// The hit of a ray on one of the reflectors, walls taken without their ends and others out of the way;
     /// `None` if it is parallel to the wall or misses the cylinder.
     pub(super) fn meet(
         &self,
@@ -130,7 +130,7 @@ impl Reflectors {
         }
     }
 
-    /// Where an edge is.
+    /// The point of an edge.
     pub(super) fn edge_point(&self, edge: Edge) -> DVec2 {
         let segment = &self.segments[edge.wall as usize];
         if edge.at_b { segment.start + segment.length_m * segment.along } else { segment.start }

@@ -208,7 +208,7 @@ impl Simulator {
         &self.air
     }
 
-    /// What [`paths::Paths`] needs for this sensor, air and options.
+    /// Settings of [`paths::Paths`] for this sensor, air and options.
     #[must_use]
     pub fn path_settings(&self) -> paths::Settings {
         path_settings(

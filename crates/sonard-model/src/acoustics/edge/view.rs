@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use super::{Aspect, Wedge};
 
-/// How an edge's echo changes across a face that is not small beside the boundaries of light.
+/// The change of an edge's echo across a face that is not small beside the boundaries of light.
 ///
 /// Where a wall ends less than the face's width off the foot of the perpendicular, some points of the face
 /// see a mirrored echo of others and some do not. The mirrored echo is taken as it is between the
@@ -57,7 +57,7 @@ impl EdgeView {
         }
     }
 
-    /// Where a point to the left of the face's middle is seen from the edge, at the end of a leg.
+    /// The direction in which a point to the left of the face's middle is seen from the edge, at the end of a leg.
     fn seen_rad(&self, middle_rad: f64, leg: usize, left_m: f64) -> f64 {
         let turn_rad = left_m / self.legs_m[leg];
         let seen_rad =

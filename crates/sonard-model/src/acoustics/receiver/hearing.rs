@@ -34,7 +34,7 @@ pub(super) struct Hearing<'a> {
     /// Arrivals that have begun, the first `over` of which are over.
     parts: SmallVec<[Part; 16]>,
     over: usize,
-    /// How many of them have their fields.
+    /// Number of them that have their fields.
     summed: usize,
     /// The arrivals that last, by [`Self::lasting`], when it was last found out that
     /// they have to be watched.
@@ -241,7 +241,7 @@ impl<'a> Hearing<'a> {
         part.shape.as_deref().unwrap_or(&self.receiver.shape)
     }
 
-    /// What the gain adds while an echo sounds; the other half is in the fields.
+    /// The growth by the gain while an echo sounds; the other half is in the fields.
     fn rise_of_gain(&self, t_us: f64) -> f64 {
         if self.exponent == 0.0 { 1.0 } else { t_us.max(1.0).powf(self.exponent) }
     }

@@ -9,7 +9,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 use super::Receiver;
 use crate::acoustics::{Pulse, Sensor, pulse::filter_sigma_us};
 
-/// What disturbs a reading.
+/// Disturbances of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ReceiverNoise {
     /// Root mean square of the noise's envelope at the receiver's input, as the amplitude of an echo

@@ -1,4 +1,4 @@
-//! What an oscilloscope would show of a firing.
+//! The trace of a firing, as an oscilloscope would show it.
 
 use super::{Detection, Incident, Latch, PulseArrival, Receiver, hearing::Hearing};
 
@@ -11,7 +11,7 @@ pub struct EchoTrace {
     pub transmission: Vec<(f64, f64)>,
     /// The envelope of each arrival, shortest path first.
     pub peaks: Vec<EnvelopePeak>,
-    /// What the receiver makes of it.
+    /// The receiver's detection.
     pub detection: Detection,
 }
 

@@ -17,7 +17,7 @@ pub(super) struct FanArrivals<'a> {
     position: DVec2,
     /// Shortest first, each path once.
     candidates: Vec<Candidate>,
-    /// What weighting them takes, close together in memory.
+    /// The part of them that weighting takes, close together in memory.
     weighings: Vec<Weighing>,
 }
 

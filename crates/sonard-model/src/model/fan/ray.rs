@@ -48,7 +48,7 @@ pub(super) struct Candidate {
     pub(super) gain: f64,
     pub(super) departure_rad: f64,
     pub(super) arrival_rad: f64,
-    /// How far the ray passed from what it stands for: the receiver's centre, or the edge.
+    /// Distance at which the ray passed what it stands for: the receiver's centre, or the edge.
     pub(super) miss_m: f64,
     /// Which part of its half-length the receiver segment must show to the ray to be met.
     pub(super) share: f64,
@@ -57,7 +57,7 @@ pub(super) struct Candidate {
     pub(super) met: Met,
 }
 
-/// What a path meets: reflectors, in order, and then perhaps an edge.
+/// The interactions of a path: reflectors, in order, and then perhaps an edge.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct Met {
     reflectors: SmallVec<[Reflector; 4]>,
@@ -309,7 +309,7 @@ impl Candidate {
     }
 }
 
-/// What it takes to weight a candidate with the beam pattern.
+/// The part of a candidate that weighting it with the beam pattern takes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Weighing {
     pub(super) length_m: f64,

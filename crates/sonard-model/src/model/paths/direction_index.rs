@@ -14,13 +14,13 @@ const BINS: usize = 360;
 pub(crate) struct DirectionIndex {
     /// Bin by bin.
     entries: Vec<Entry>,
-    /// Where each bin begins in `entries`, and the end of the last.
+    /// Index at which each bin begins in `entries`, and the end of the last.
     bins: Vec<u32>,
     /// The widest reach of its entries.
     reach_rad: f64,
 }
 
-/// What an azimuth needs to know of an echo.
+/// An echo as an azimuth needs it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Entry {
     /// Half way between departure and arrival.

@@ -14,7 +14,7 @@ pub(crate) struct Echo {
     pub(crate) departure: DVec2,
     /// Unit vector towards where it comes from.
     pub(crate) arrival: DVec2,
-    /// How far up it leaves and comes from, radians.
+    /// Elevation of departure and arrival, radians.
     pub(crate) rise_rad: [f64; 2],
     /// Its image by floor and ceiling, counted from 1; 0 for a path in the plan.
     pub(crate) image: u16,
@@ -42,7 +42,7 @@ pub(crate) enum Via {
 }
 
 impl Via {
-    /// What sends the sound back.
+    /// The kind of path.
     pub(crate) const fn kind(&self) -> PathKind {
         match self {
             Self::Edge { .. } | Self::Edges { .. } | Self::LevelEdge { .. } => PathKind::Diffracted,

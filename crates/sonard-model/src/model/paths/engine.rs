@@ -29,7 +29,7 @@ pub struct PathEngine {
     pub(super) beam: BeamPattern,
     pub(super) face: Option<Disc>,
     envelope: PatternEnvelope,
-    /// What echoes by cylinders are kept by; all are where the axis is tilted, and may be nearer to
+    /// The bound by which echoes by cylinders are kept; all are where the axis is tilted, and may be nearer to
     /// a rising path than its azimuth is.
     bound: Option<TwoWayBound>,
     /// See [`Self::through_nulls`].
@@ -105,7 +105,7 @@ struct PathArrivals<'a> {
     echoes: Vec<Echo>,
     /// From narrow to wide reach: the many weak echoes are heard in few directions only.
     indexes: [DirectionIndex; REACHES_DEG.len()],
-    /// What the face can reflect.
+    /// Echoes that the face can reflect.
     face_echoes: Option<FaceEchoes>,
 }
 
@@ -197,7 +197,7 @@ impl<'a> PathArrivals<'a> {
         (amplitude / (leaving * arriving), ends_rad)
     }
 
-    /// How the face looks over a multiple echo.
+    /// The image of the face over a multiple echo.
     fn multiple_image(&self, multiple: &MultipleEcho) -> Image {
         let echoes = multiple.paths.iter().map(|path| &self.echoes[path.echo as usize]);
         let passages = multiple.paths.len() - 1;

@@ -36,13 +36,13 @@ pub struct EchoPath {
     pub departure_rad: f64,
     /// World direction towards where the sound comes from, radians.
     pub arrival_rad: f64,
-    /// How far up it leaves and comes from, radians.
+    /// Elevation of departure and arrival, radians.
     pub rise_rad: [f64; 2],
-    /// What it met, in order, and where.
+    /// Its interactions, in order.
     pub path: Path,
 }
 
-/// What a path meets within this length, metres, it meets at once.
+/// Interactions within this length, metres, are met at once.
 const AT_ONCE_M: f64 = 1e-12;
 
 /// A part of a path whose ends and contacts are known in the plan.
@@ -50,7 +50,7 @@ struct Stretch<'a> {
     from: DVec2,
     contacts: &'a [(DVec2, Mechanism)],
     to: DVec2,
-    /// How much higher it ends than it begins if floor and ceiling are windows, metres.
+    /// Height gained along it if floor and ceiling are windows, metres.
     climb_m: f64,
     /// Reflections at floor and ceiling.
     bounces: u16,
@@ -70,7 +70,7 @@ impl Paths {
         }
     }
 
-    /// How many mirrors an echo meets that is neither diffracted nor scattered.
+    /// Number of mirror reflections of an echo that is neither diffracted nor scattered.
     pub(super) fn mirrors_met(&self, traced: &Traced, echo: &Echo) -> usize {
         let (there, here) = (&traced.out, traced.back());
         let upright = match echo.via {

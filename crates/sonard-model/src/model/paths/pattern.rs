@@ -1,4 +1,4 @@
-//! Bounds by the beam pattern: how strongly an echo can be received at best, by angle.
+//! Bounds by the beam pattern: the most that can be received of an echo, by angle.
 
 use std::f64::consts::PI;
 
@@ -43,7 +43,7 @@ impl PatternEnvelope {
     }
 }
 
-/// How strongly an echo is received at best that leaves and arrives in directions some angle apart,
+/// The most that is received of an echo that leaves and arrives in directions some angle apart,
 /// whatever the azimuth: the most of `p(a) p(b)` over `|a| + |b| = ` that angle, or more, of a pattern `p`.
 #[derive(Debug)]
 pub(crate) struct TwoWayBound {

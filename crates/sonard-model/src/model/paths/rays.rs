@@ -63,7 +63,7 @@ impl Rays {
         ((self.beams.to_edges.len() + from) as u32, &all[from..from + count])
     }
 
-    /// How many walls and cylinders a ray met.
+    /// Number of walls and cylinders that a ray met.
     pub(super) fn order(&self, plan: &Plan, ray: OneWay) -> usize {
         let (leg, cylinders) = match ray {
             OneWay::Walls(leg) => (leg, 0),
@@ -118,7 +118,7 @@ pub(super) fn wall_contacts(beams: &Beams, plan: &Plan, leg: Leg, end: DVec2) ->
     contacts
 }
 
-/// Where a ray from `start` over walls ends.
+/// The end of a ray from `start` over walls.
 pub(super) fn end_of(beams: &Beams, plan: &Plan, leg: Leg, start: DVec2) -> DVec2 {
     let walls: SmallVec<[u32; 8]> = beams.walls_back(&plan.walls, leg).collect();
     let mirror = |wall: &u32| plan.walls[*wall as usize].mirror;

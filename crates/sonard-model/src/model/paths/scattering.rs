@@ -1,4 +1,4 @@
-//! What rough walls scatter.
+//! Scattering by rough walls.
 //!
 //! A wall of amplitude reflectance `R` and roughness `s` mirrors `(1 - s) R^2` of the energy that
 //! meets it and scatters `s R^2` after Lambert's law: into a solid angle `dW` at `b` from the normal

@@ -16,13 +16,12 @@ pub struct Settings {
     pub max_order: Option<u16>,
     /// Weakest amplitude, before the beam pattern, relative to a head-on, rigid wall.
     pub floor: f64,
-    /// How many times `floor` echoes that touch cylinders more than once are followed down to; see
-    /// [`REPEATED_CONTACTS_ABOVE`]. 1: as far as all others.
+    /// Floor of echoes that touch cylinders more than once, over `floor`; see [`REPEATED_CONTACTS_ABOVE`]. 1: as far as all others.
     pub repeated_contacts_above: f64,
     /// Longest path, metres, up to which these too are followed down to `floor`: where all that came
     /// back so far may still overlap when the receiver opens.
     pub crowded_m: f64,
-    /// What edges send back; `None`: mirror reflections only.
+    /// Edge law; `None`: mirror reflections only.
     pub edge_law: Option<EdgeLaw>,
     /// Also paths with two diffractions at upright edges, by the same law at each.
     pub double_diffraction: bool,
@@ -32,9 +31,9 @@ pub struct Settings {
     pub wave_number_per_m: f64,
     /// Height of the transducer in a scene with heights, metres; `None`: see [`usual_z_m`].
     pub sensor_z_m: Option<f64>,
-    /// How far the transducer's axis points up, radians.
+    /// Elevation of the transducer's axis, radians.
     pub tilt_rad: f64,
-    /// How high a strip of a rough wall it hears: the integral of the beam pattern's fourth
+    /// Height of the strip of a rough wall that it hears: the integral of the beam pattern's fourth
     /// power over the rise, radians. 0: rough walls only mirror.
     pub scatter_height_rad: f64,
 }

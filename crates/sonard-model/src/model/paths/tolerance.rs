@@ -1,4 +1,4 @@
-//! How close counts as the same.
+//! Tolerances: what counts as the same.
 
 /// Rays this close to a corner pass through it, metres: on either side of it and over it. Above
 /// rounding (1e-14 over tens of metres), below anything that sound could tell.

@@ -1,4 +1,4 @@
-//! What a search keeps of the paths that it found.
+//! The rays and connections that a search keeps, from which paths are told.
 
 use super::{
     cylinders::Connection,

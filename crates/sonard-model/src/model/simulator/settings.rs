@@ -1,4 +1,4 @@
-//! What receiver and engines are told of sensor, air and options.
+//! Settings of receiver and engines, from sensor, air and options.
 
 use std::f64::consts::{LOG10_E, TAU};
 
@@ -63,8 +63,8 @@ pub(super) fn path_settings(
     }
 }
 
-/// How far sound has come when the first echo can be noticed, metres; with a long blanking less, since
-/// beside a round body there are many times more rounds with every metre.
+/// The length of path that sound has run when the first echo can be noticed, metres; with a long blanking less, since
+/// beside a round body there are many times more paths with every metre.
 fn crowded_m(receiver: &Receiver) -> f64 {
     let opens_us = receiver.blanking_us + receiver.integration_us;
     (opens_us * 1e-6 * receiver.sound_speed_m_s).min(1.0)

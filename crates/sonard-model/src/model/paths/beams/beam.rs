@@ -20,7 +20,7 @@ pub(crate) struct Beam {
     pub(crate) gain: f64,
     /// Paths longer than this are too weak, metres.
     pub(crate) audible_m: f64,
-    /// Where it was reflected last, for [`super::Beams::walls_back`].
+    /// The node of its last reflection, for [`super::Beams::walls_back`].
     pub(crate) node: u32,
     pub(crate) triangle: u32,
     /// The side it came in by.

@@ -1,4 +1,4 @@
-//! How the tree grows.
+//! The growth of the tree of beams.
 
 use smallvec::SmallVec;
 
@@ -50,7 +50,7 @@ struct Grower<'a> {
     plan: &'a Plan,
     mesh: &'a Mesh,
     start: DVec2,
-    /// Where echoes are received: usually the start.
+    /// The receiver: usually the start.
     target: DVec2,
     /// Triangle of the target.
     home: u32,
@@ -190,7 +190,7 @@ impl<'a> Grower<'a> {
         None
     }
 
-    /// What cylinders in its triangle leave of a beam, counter-clockwise by departure.
+    /// The parts that cylinders in its triangle leave of a beam, counter-clockwise by departure.
     fn shaded(&mut self, beam: Beam) -> SmallVec<[Beam; 2]> {
         let mut passing = shade(&self.plan.cylinders, &beam, &mut self.tree.to_cylinders);
         if beam.mirrored {
@@ -288,7 +288,7 @@ impl<'a> Grower<'a> {
         self.next.push(next);
     }
 
-    /// What a wall sends back of a beam, if an echo can come of it.
+    /// The beam that a wall reflects, if an echo can come of it.
     fn reflected(&mut self, beam: &Beam, wall: u32, side: usize) -> Option<Beam> {
         let wall_mirror = &self.plan.walls[wall as usize];
         if wall_mirror.scatter > 0.0 && self.plan.settings.scatter_height_rad > 0.0 {

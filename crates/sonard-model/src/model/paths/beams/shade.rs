@@ -1,4 +1,4 @@
-//! What cylinders take from beams.
+//! Shadows of cylinders in beams.
 
 use std::f64::consts::TAU;
 
@@ -13,8 +13,8 @@ use crate::{
     model::paths::plan::{Circle, Cylinders, Span, SurfaceArc},
 };
 
-/// What of a beam passes the cylinders in its triangle, from right to left. What they take
-/// from it goes to `views`.
+/// The parts of a beam that pass the cylinders in its triangle, from right to left. The parts that are
+/// taken from it go to `views`.
 ///
 /// Invariant: the parts that pass and the parts taken by opaque cylinders together are the beam, each of its
 /// rays in one of them. Ties go to both neighbours.
@@ -36,7 +36,7 @@ pub(crate) fn shade(
     left
 }
 
-/// What of a beam passes an arc of a circle, from right to left.
+/// The parts of a beam that pass an arc of a circle, from right to left.
 fn shade_by_arc(
     circle: &Circle,
     beam: &Beam,

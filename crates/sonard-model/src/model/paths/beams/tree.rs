@@ -10,7 +10,7 @@ use crate::{geometry::DVec2, model::paths::plan::WallMirror};
 /// the beams in each.
 pub(crate) const ROOT: u32 = u32::MAX;
 
-/// What the beams from one place have met.
+/// The beams from one place: the walls they met, and the rays in them to receiver, edges and cylinders.
 #[derive(Debug, Default)]
 pub(crate) struct Beams {
     pub(crate) nodes: Vec<Node>,
@@ -26,7 +26,7 @@ pub(crate) struct Beams {
     pub(crate) below_level_edges: Vec<LitSpan>,
 }
 
-/// Where beams have been.
+/// A step in the history of beams.
 ///
 /// A node does not keep the ray, only the choice of walls: which of two merged beams a ray was in follows
 /// from the ray, by [`Beams::walls_back`].

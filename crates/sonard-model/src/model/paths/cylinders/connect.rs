@@ -47,7 +47,7 @@ pub(crate) struct Connector<'a> {
 pub(crate) struct HalfPaths<'a> {
     pub(crate) views: &'a [View],
     pub(crate) all: &'a [HalfPath],
-    /// Where rays of echoes are kept.
+    /// The store for rays of echoes.
     pub(crate) rays: &'a mut CylinderRays,
 }
 

@@ -8,9 +8,9 @@ use crate::{geometry::wrap_pi, model::paths::plan::Circle};
 pub(crate) struct Contact {
     /// Its contact with its first cylinder, radians.
     pub(crate) at_rad: f64,
-    /// Where it meets this one: angle around the centre, radians.
+    /// Its contact with this one: angle around the centre, radians.
     pub(crate) place_rad: f64,
-    /// How fast `place_rad` grows with `at_rad`.
+    /// Derivative of `place_rad` by `at_rad`.
     pub(crate) place_rate: f64,
     /// Sine of the angle of incidence, positive for a ray that runs counter-clockwise.
     pub(crate) slope: f64,
@@ -22,7 +22,7 @@ pub(crate) struct Contact {
 }
 
 impl Contact {
-    /// Where a ray that leaves its last surface like this meets a circle. `mirrored` as in
+    /// The contact of a ray that leaves its last surface like this with a circle. `mirrored` as in
     /// [`Tube`](super::tube::Tube); its angle is less than half a turn from `near_rad`.
     pub(crate) fn of(
         front: &Front,

@@ -31,12 +31,12 @@ pub(crate) struct Front {
 }
 
 impl Front {
-    /// How far a point is to the left of the ray, metres.
+    /// Distance of a point to the left of the ray, metres.
     pub(crate) fn offset_m(&self, point: DVec2) -> f64 {
         self.along.perp_dot(point - self.origin)
     }
 
-    /// How far along the ray a point is abreast of it, metres.
+    /// Distance along the ray to abreast of a point, metres.
     pub(crate) fn ahead_m(&self, point: DVec2) -> f64 {
         self.along.dot(point - self.origin)
     }

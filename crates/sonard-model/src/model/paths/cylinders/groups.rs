@@ -19,7 +19,7 @@ pub(crate) struct Group {
     pub(crate) least_m: f64,
 }
 
-/// How far apart departures in a group are, radians.
+/// Width of a group in directions of departure, radians.
 const GROUP_RAD: f64 = 0.1;
 
 impl Groups {

@@ -51,7 +51,7 @@ pub(crate) struct TubeGrower<'a> {
     waiting: Vec<Tube>,
     /// All so far, those of the last level at the end.
     pub(crate) half_paths: Vec<HalfPath>,
-    /// Where the last level begins.
+    /// Index at which the last level begins.
     last: usize,
     pub(crate) has_edges: bool,
     /// Largest cylinder, metres.
@@ -99,7 +99,7 @@ impl<'a> TubeGrower<'a> {
         self.last < self.half_paths.len()
     }
 
-    /// What the tubes have met, and the half-paths.
+    /// The rays that the tubes found, and the half-paths.
     pub(crate) fn finish(self) -> (CylinderRays, Vec<HalfPath>) {
         (self.rays, self.half_paths)
     }

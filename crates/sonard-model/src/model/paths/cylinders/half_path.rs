@@ -27,7 +27,7 @@ pub(crate) struct HalfPath {
     pub(crate) view: u32,
     /// See [`CylinderRay`](super::rays::CylinderRay); [`DIRECT`] for a beam that comes straight here.
     pub(crate) link: u32,
-    /// What it met after its first cylinder.
+    /// The surfaces that it met after its first cylinder.
     pub(crate) surfaces: Surfaces,
     /// Cylinders met before.
     pub(crate) level: u16,

@@ -1,4 +1,4 @@
-//! Where tubes meet cylinders.
+//! Contacts of tubes with cylinders.
 
 use std::f64::consts::TAU;
 

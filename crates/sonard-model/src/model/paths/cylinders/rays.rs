@@ -1,4 +1,4 @@
-//! What tubes from one place have met.
+//! Rays by way of cylinders, as they are kept.
 
 use smallvec::SmallVec;
 

@@ -19,7 +19,7 @@ const MOST_STEPS: usize = 40;
 /// A contact is found when both half-paths have it to within this, radians.
 const SAME_ANGLE_RAD: f64 = 1e-11;
 
-/// Where two half-paths meet as a mirror would have it: the contact of each, and the angle around the cylinder;
+/// The mirror reflection between two half-paths: the contact of each, and the angle around the cylinder;
 /// `None` if nowhere.
 ///
 /// The angle is where the slopes (`sin i`) of both add up to 0. Each step takes both half-paths as parabolas in

@@ -1,4 +1,4 @@
-//! How strong an echo a half-path can still become.
+//! Bounds on the echo that a half-path can still become.
 //!
 //! A half-path with a width `w1` and a front of curvature `1/R1` meets a surface of radius `r` at `i` from its
 //! normal, and another with `w2` and `1/R2` leaves it the same way. The echo out of both has spread to

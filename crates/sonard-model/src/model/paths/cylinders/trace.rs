@@ -11,7 +11,7 @@ use crate::{
     model::paths::{beams::Beams, echo::Echo, pattern::TwoWayBound, plan::Plan},
 };
 
-/// What is found by way of cylinders.
+/// Echoes by way of cylinders, and rays to edges.
 #[derive(Default)]
 pub(crate) struct Found {
     pub(crate) echoes: Vec<Echo>,

@@ -32,7 +32,7 @@ impl<'a> Tracer<'a> {
         self.surfaces.iter().fold(first, |front, &surface| self.plan.reflect(&front, surface))
     }
 
-    /// Where it touches the surfaces, the first cylinder included.
+    /// Its contacts with the surfaces, the first cylinder included.
     pub(crate) fn contacts(&self, contact_rad: f64) -> Vec<DVec2> {
         let mut front = self.first(contact_rad);
         let mut contacts = vec![front.origin];

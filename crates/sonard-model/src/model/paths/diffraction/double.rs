@@ -118,14 +118,14 @@ struct Search<'a> {
     echoes: Vec<Echo>,
 }
 
-/// How the ray between two edges leaves one of them and comes to the other, on one of its sides.
+/// Departure and arrival of the ray between two edges, on one of its sides.
 struct Passage {
     ends: [Facing; 2],
-    /// What of the wave along a face counts as incident.
+    /// Share of the wave along a face that counts as incident.
     share: f64,
 }
 
-/// What an edge makes of a ray on each passage; nothing where it is not in the same air.
+/// The diffracted field of a ray on each passage; nothing where it is not in the same air.
 type Passed = SmallVec<[Complex64; 2]>;
 
 impl Search<'_> {

@@ -80,7 +80,7 @@ impl<'a> From<'a> {
     }
 }
 
-/// What a search needs to know of the scene.
+/// The scene, as a search needs it.
 #[derive(Clone, Copy)]
 pub(crate) struct Surroundings<'a> {
     pub(crate) plan: &'a Plan,
@@ -160,7 +160,7 @@ struct EdgeBeam<'a> {
     /// Counted as in [`Echo::image`].
     image: u16,
     gain: f64,
-    /// How much higher it ends if floor and ceiling are windows, metres.
+    /// Height gained along it if floor and ceiling are windows, metres.
     climb_m: f64,
     /// Distance of the image from the line in space, metres, and the position that it is abreast of.
     off_m: f64,

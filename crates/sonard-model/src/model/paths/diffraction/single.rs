@@ -32,7 +32,7 @@ pub(crate) fn echoes(plan: &Plan, law: EdgeLaw, out: &Rays, back: Option<&Rays>)
     echoes
 }
 
-/// How the edge of an echo with one diffraction looks from where the echo begins and ends; `None` of
+/// The aspect of the edge of an echo with one diffraction, from where the echo begins and ends; `None` of
 /// other echoes, by way of a cylinder, and by laws that know no aspect.
 pub(crate) fn view(plan: &Plan, out: &Rays, back: &Rays, echo: &Echo) -> Option<EdgeView> {
     let Via::Edge { point, out: there, back: here } = echo.via else { return None };
@@ -147,7 +147,7 @@ fn aspect(out: &EdgeRay, back: &EdgeRay) -> Aspect {
     }
 }
 
-/// What cylinders on the path leave of the field at an edge, beside fronts that flat walls
+/// The share that cylinders on the path leave of the field at an edge, beside fronts that flat walls
 /// turned: these fall by `sqrt((s + s') / (s s'))`, and the distance parameter of the
 /// transition is that of the fronts' radii of curvature in the plan (Kouyoumjian and Pathak
 /// 1974, equations (24) and (33), whose other radius, along the edge, no cylinder changes).

@@ -8,12 +8,12 @@ use crate::{
     model::{Mechanism, Reflector, paths::plan::Cylinders},
 };
 
-/// Where a path, or a part of one, begins and ends.
+/// Beginning and end of a path, or of a part of one.
 pub(crate) struct Ends {
     pub(crate) start: DVec2,
     /// `None` for a part that ends at its last contact, the level edge of a wall.
     pub(crate) end: Option<DVec2>,
-    /// How much higher it ends, if floor and ceiling are windows, metres.
+    /// Height gained along it, if floor and ceiling are windows, metres.
     pub(crate) rise_m: f64,
 }
 
@@ -84,7 +84,7 @@ impl Heights {
     }
 }
 
-/// Where on the leg from `from` to `to` a segment is crossed, as a share of it; none at its very ends,
+/// The crossing of the leg from `from` to `to` with a segment, as a share of the leg; none at its very ends,
 /// where it comes to a corner of which that segment is the other wall.
 fn crossing(from: DVec2, to: DVec2, [a, b]: [DVec2; 2]) -> Option<f64> {
     let (run, along) = (to - from, b - a);

@@ -25,7 +25,7 @@ pub(crate) struct VerticalImage {
     pub(crate) rise_m: f64,
     /// Reflections at floor and ceiling.
     pub(crate) bounces: u16,
-    /// What these leave of the amplitude.
+    /// The factor that these leave of the amplitude.
     pub(crate) gain: f64,
 }
 
@@ -84,8 +84,8 @@ impl VerticalImage {
     /// The ranger itself.
     pub(crate) const NONE: Self = Self { rise_m: 0.0, bounces: 0, gain: 1.0 };
 
-    /// How much higher than it began a ray from this image comes to a place at a height above the ranger,
-    /// if floor and ceiling are windows, metres: each reflection at one of them turns it.
+    /// Height gained by a ray from this image to a point at a height above the ranger, if floor and ceiling
+    /// are windows, metres: each reflection at one of them turns it.
     pub(crate) fn climb_m(&self, rise_m: f64) -> f64 {
         let below_m = rise_m - self.rise_m;
         if self.bounces.is_multiple_of(2) { below_m } else { -below_m }

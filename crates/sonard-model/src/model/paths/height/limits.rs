@@ -126,8 +126,8 @@ impl Heights {
         one.zip(other).is_some_and(|([a, b], [c, d])| b <= c || d <= a)
     }
 
-    /// How far above the ranger the level edges of a wall with limits are, metres, and whether each is
-    /// its upper one. Where it stands on the floor or reaches the ceiling it has none.
+    /// Heights above the ranger of the level edges of a wall with limits, metres, and whether each is its
+    /// upper one. Where it stands on the floor or reaches the ceiling it has none.
     pub(crate) fn level_edges(&self, wall: u32) -> impl Iterator<Item = (f64, bool)> {
         let limits = self.walls[wall as usize].unwrap_or_default();
         let has = self.has_edges(limits);
@@ -135,7 +135,7 @@ impl Heights {
         [0, 1].into_iter().filter_map(edge)
     }
 
-    /// How far above the ranger a level edge of a wall is, metres.
+    /// Height above the ranger of a level edge of a wall, metres.
     pub(crate) fn edge_rise_m(&self, wall: u32, is_upper: bool) -> f64 {
         let limits = self.walls[wall as usize].unwrap_or_default();
         limits[usize::from(is_upper)] - self.z_m
@@ -206,7 +206,7 @@ impl Heights {
         self.rises().then(|| self.folded_m(self.z_m + climbed_m))
     }
 
-    /// Where a path is reflected that climbs so far if floor and ceiling are windows, metres, in `count`
+    /// The reflections of a path that climbs so far if floor and ceiling are windows, metres, in `count`
     /// reflections; downwards it comes to the floor first.
     pub(crate) fn bounces(&self, climb_m: f64, count: u16) -> impl Iterator<Item = Bounce> {
         let mut surfaces =

@@ -109,7 +109,7 @@ impl Corners {
         self.points.get(point as usize)?.as_ref()
     }
 
-    /// Where it is, metres.
+    /// Its position, metres.
     pub(crate) fn position(&self, point: u32) -> Option<DVec2> {
         Some(self.points.get(point as usize)?.as_ref()?.point)
     }
@@ -150,7 +150,7 @@ impl Corner {
         &self.sectors[sector].wedge
     }
 
-    /// Where a direction from the edge leads: into one sector, or along a wall into those on both
+    /// The sectors that a direction from the edge leads to: into one sector, or along a wall into those on both
     /// sides of it.
     pub(crate) fn facings(&self, direction: DVec2) -> SmallVec<[Facing; 2]> {
         let direction_rad = direction.to_angle();

@@ -77,7 +77,7 @@ impl Cylinders {
 }
 
 impl Span {
-    /// What two spans have in common, in this one's turns.
+    /// The common part of two spans, in this one's turns.
     pub(crate) fn common(&self, other: &Self) -> SmallVec<[Self; 2]> {
         let turn = ((self.from_rad - other.from_rad) / TAU).floor();
         [turn - 1.0, turn, turn + 1.0, turn + 2.0]

@@ -31,7 +31,7 @@ pub(crate) struct Triangle {
     pub(crate) sides: [Side; 3],
 }
 
-/// What is on the other side of a triangle's side.
+/// The other side of a triangle's side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Side {
     /// Another triangle, through its side of that number.

@@ -22,7 +22,7 @@ pub(crate) struct MultipleEcho {
     pub(crate) amplitude: f64,
 }
 
-/// What an azimuth needs to know of a path.
+/// An echo path from the face to the face, as an azimuth needs it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FacePath {
     pub(crate) path: DirectedPath,

@@ -27,11 +27,11 @@ pub(crate) struct Search<'a> {
     best: Best,
     /// The paths out run backwards, which a sequence may end with, and then the paths out themselves.
     paths: Vec<FacePath>,
-    /// What the beam pattern makes of each ending.
+    /// Each ending's weight by the beam pattern.
     weights: Vec<f64>,
     /// Paths that leave or come back within the beam, by their index.
     middles: Vec<usize>,
-    /// What the disc makes of each path into each, once it is known: sequences meet the same pairs
+    /// The reflection at the disc from each path into each, once it is known: sequences meet the same pairs
     /// again and again.
     reflections_m: Vec<Option<Complex64>>,
     found: Vec<MultipleEcho>,
@@ -130,7 +130,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// How strongly the disc scatters from one path into the next, metres.
+    /// Strength with which the disc scatters from one path into the next, metres.
     fn reflection_m(&mut self, last: usize, next: usize) -> Complex64 {
         let [from, to] = [last, next].map(|at| &self.paths[at]);
         let face = self.face;
