@@ -50,7 +50,7 @@ pub fn draw_scans(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     page.add(heading);
     let (floor, beyond) = floor_plan(&plan, &placed, scene);
     page.add(floor);
-    page.add(strips_beside(&layout.scan_strips, azimuths, &readings));
+    page.add(strips_beside(&layout.strips, azimuths, &readings));
     let below = Px::new(theme::MARGIN_PX, layout.bottom + 10.0);
     let width = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
     let (entries, height) = legend::draw(&keys::all(&readings, scene, beyond), below, width);
