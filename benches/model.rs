@@ -22,7 +22,7 @@ fn simulator(engine: EngineKind) -> (Simulator, Pose) {
     (simulator, pose)
 }
 
-/// One firing from a place not seen before: the survey and one weighting.
+/// One firing from an observation point not seen before: the search and one weighting.
 fn ping(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("ping");
     group.throughput(Throughput::Elements(1)).sample_size(20);
@@ -35,7 +35,7 @@ fn ping(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// A full turn of 400 firings: one survey, 400 weightings.
+/// A full turn of 400 firings: one search, 400 weightings.
 fn scan(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("scan of 400");
     let plan = ScanPlan::default();

@@ -1,8 +1,8 @@
 //! The operator of an array that the model plays: fires its rangers in turn, by the clock.
 //!
 //! After R. Arrabales' service of simulated sonars: one ranger each interval (25 Hz on a Pioneer), a
-//! scan for each round. No port is opened, and every record says that it is simulated. A survey of the model belongs to a
-//! place: a robot that stands costs nothing new, one that moves a survey for each firing.
+//! scan for each round. No port is opened, and every record says that it is simulated. The model finds the
+//! paths of an observation point once: a robot that stands costs nothing new, one that moves a search for each firing.
 
 mod rhythm;
 mod stage;

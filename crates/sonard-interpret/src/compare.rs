@@ -45,7 +45,7 @@ pub enum Verdict {
     Direct,
     /// Echoes agree; the sound was mirrored twice or more.
     Multiple,
-    /// Echoes agree; the sound bent at an edge.
+    /// Echoes agree; the sound was diffracted at an edge.
     Edge,
     /// At least one side is near, and the ranges agree; or both are near.
     MinRange,

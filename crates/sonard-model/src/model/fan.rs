@@ -4,7 +4,7 @@
 //! Their appendix A fires a fan of rays for one direction, keeps the rays' next intersections in
 //! a heap ordered by distance, and stops at the first that is detected. Where the rays go does
 //! not depend on the direction, though: it only weights them. So [`Engine::arrivals_at`] traces one
-//! fan over the full circle for a place and weights it per direction; that gives every arrival,
+//! fan over the full circle for an observation point and weights it per direction; that gives every arrival,
 //! not just the first, and as all are wanted no heap is needed. [`Fan::first_echo`] is the
 //! appendix as printed, heap included, and a test holds the two together.
 //!

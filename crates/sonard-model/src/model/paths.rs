@@ -28,7 +28,7 @@
 //! that agree in all three are one, and one is kept. The same rule covers joints of collinear
 //! walls and all corners of `pi / m`. An echo on the very end of a wall counts as seen, and the
 //! edge's echo, which is minus half of it there, knows that. Corners that are right-angled but for
-//! the rounding of their coordinates are made so first ([`square_up`]).
+//! the rounding of their coordinates are made so first ([`square_up`](crate::geometry::square_up)).
 //!
 //! # Pairs
 //!
@@ -79,7 +79,7 @@
 //! and each azimuth weighs them with the beam pattern on departure and arrival (`engine`).
 //! A transducer off the rotation axis is at a point of its own at each azimuth.
 //! Transmitter and receiver apart are two points ([`Paths::enumerate_between`]). A robot
-//! body is part of the scene ([`Scene::with_robot_at`]).
+//! body is part of the scene ([`Scene::with_robot_at`](crate::scene::Scene::with_robot_at)).
 //!
 //! # Layers
 //!

@@ -71,7 +71,7 @@ pub struct Options {
     pub max_order: Option<u32>,
     /// What edges send back (`paths`; without it, the sensor's law). `fan` has Kuc and Siegel's law only.
     pub edge_law: Option<EdgeLawKind>,
-    /// Also sound that bends at two edges (`paths`).
+    /// Also double diffraction, at two upright edges (`paths`).
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub double_diffraction: bool,
     /// Angle between the rays of `fan`, degrees. The default reads the same as a finer fan in

@@ -85,17 +85,17 @@ impl Engine for PathEngine {
 
     fn arrivals_within<'a>(
         &'a self,
-        places: [DVec2; 2],
+        ends: [DVec2; 2],
         max_path_m: f64,
     ) -> Option<Box<dyn Arrivals + 'a>> {
-        Some(Box::new(PathArrivals::new(self, self.paths.within(max_path_m), places)))
+        Some(Box::new(PathArrivals::new(self, self.paths.within(max_path_m), ends)))
     }
 }
 
 /// Widest reach of the entries of each index, degrees.
 const REACHES_DEG: [f64; 5] = [6.0, 10.0, 16.0, 30.0, 180.0];
 
-/// The echo paths of a place.
+/// The echo paths of an observation point, by direction.
 struct PathArrivals<'a> {
     engine: &'a PathEngine,
     /// The engine's, perhaps for shorter paths.

@@ -1,4 +1,4 @@
-//! The echo paths of a place: every mechanism in its turn.
+//! The echo paths of an observation point: every mechanism in its turn.
 
 use super::{
     beams::Beams,
@@ -15,7 +15,7 @@ use super::{
 use crate::{acoustics::edge::EdgeLaw, geometry::DVec2};
 
 impl Paths {
-    /// All echo paths from a place, shortest first.
+    /// All echo paths of an observation point, shortest first.
     #[must_use]
     pub fn enumerate(&self, position: DVec2) -> Vec<EchoPath> {
         self.enumerate_between(position, position)

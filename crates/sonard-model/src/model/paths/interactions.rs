@@ -151,9 +151,9 @@ impl Paths {
                 self.out_and_back([(there, ray), (there, ray)], middle)
             }
             Via::Cylinder { connection } => {
-                let Connection { cylinder, place_rad, out, back } =
+                let Connection { cylinder, angle_rad, out, back } =
                     traced.connections[connection as usize];
-                let point = self.plan.cylinders.circles[cylinder as usize].point(place_rad);
+                let point = self.plan.cylinders.circles[cylinder as usize].point(angle_rad);
                 let middle = (point, Mechanism::Reflection(Reflector::Cylinder(cylinder)));
                 self.out_and_back([(there, out), (here, back)], middle)
             }

@@ -1,4 +1,4 @@
-//! The rays from one place, over walls alone and by way of cylinders, and what they meet.
+//! The rays from one start, over walls alone and by way of cylinders, and what they meet.
 
 use smallvec::SmallVec;
 
@@ -15,7 +15,7 @@ use crate::{
 /// The interactions of a path in the plan, in order, before any height.
 pub(super) type Contacts = SmallVec<[(DVec2, Mechanism); 8]>;
 
-/// The rays from one place.
+/// The rays from one start.
 #[derive(Debug, Default)]
 pub(super) struct Rays {
     pub(super) beams: Beams,

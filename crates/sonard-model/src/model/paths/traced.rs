@@ -8,7 +8,7 @@ use super::{
 };
 use crate::geometry::DVec2;
 
-/// The rays of a place, or of transmitter and receiver, and what mechanisms made of them. The variants of
+/// The rays of an observation point, or of transmitter and receiver, and what mechanisms made of them. The variants of
 /// [`Via`](super::echo::Via) number its parts.
 #[derive(Debug)]
 pub(super) struct Traced {

@@ -1,7 +1,7 @@
 //! Multiple echoes between the transducer's face and the walls.
 //!
 //! An echo that comes back to the face is partly reflected by it ([`Disc::reflection`](crate::acoustics::Disc))
-//! and goes out once more, over the same walls or others. A multiple echo is a sequence of the place's echo
+//! and goes out once more, over the same walls or others. A multiple echo is a sequence of the point's echo
 //! paths, with a reflection at the face between each and the next. The paths do not depend on the
 //! azimuth; what the face does with them does, because it turns.
 //!

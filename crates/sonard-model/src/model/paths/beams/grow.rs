@@ -336,8 +336,8 @@ impl<'a> Grower<'a> {
         let by = |border: DVec2| {
             let hit = beam.image - height / mirror.normal.dot(border) * border;
             // Clamped, for borders that graze the wall; min and max drop a NaN.
-            let place = along.dot(hit).max(low).min(high);
-            let hit = mirror.offset_m * mirror.normal + place * along;
+            let along_m = along.dot(hit).max(low).min(high);
+            let hit = mirror.offset_m * mirror.normal + along_m * along;
             hit.distance(beam.image) + hit.distance(self.target)
         };
         by(beam.right).min(by(beam.left))
@@ -373,16 +373,16 @@ impl<'a> Grower<'a> {
     }
 
     fn meet_edge(&mut self, beam: &Beam, point: u32) {
-        let place = self.mesh.points[point as usize];
-        if self.plan.corners.answers(point, place - beam.image) {
-            self.tree.to_edges.push((point, beam.ray_to(place)));
+        let at = self.mesh.points[point as usize];
+        if self.plan.corners.answers(point, at - beam.image) {
+            self.tree.to_edges.push((point, beam.ray_to(at)));
         }
     }
 
     /// An edge in the triangle of the start, which no cylinder has shaded yet.
     fn meet_near_edge(&mut self, beam: &Beam, point: u32) {
-        let place = self.mesh.points[point as usize];
-        if !self.plan.cylinders.hide_in(beam.triangle, self.start, place) {
+        let at = self.mesh.points[point as usize];
+        if !self.plan.cylinders.hide_in(beam.triangle, self.start, at) {
             self.meet_edge(beam, point);
         }
     }

@@ -1,4 +1,4 @@
-//! The tree of beams from one place.
+//! The tree of beams from one start.
 
 use super::{
     beam::{Leg, Ray},
@@ -10,7 +10,7 @@ use crate::{geometry::DVec2, model::paths::plan::WallMirror};
 /// the beams in each.
 pub(crate) const ROOT: u32 = u32::MAX;
 
-/// The beams from one place: the walls they met, and the rays in them to receiver, edges and cylinders.
+/// The beams from one start: the walls they met, and the rays in them to receiver, edges and cylinders.
 #[derive(Debug, Default)]
 pub(crate) struct Beams {
     pub(crate) nodes: Vec<Node>,

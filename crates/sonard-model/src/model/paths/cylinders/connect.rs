@@ -28,7 +28,7 @@ use crate::model::paths::{
 pub(crate) struct Connection {
     pub(crate) cylinder: u32,
     /// Angle of the contact around its centre, radians.
-    pub(crate) place_rad: f64,
+    pub(crate) angle_rad: f64,
     /// From the transmitter to there.
     pub(crate) out: OneWay,
     /// From the receiver to there, in its own tree if it has one.
@@ -43,7 +43,7 @@ pub(crate) struct Connector<'a> {
     pub(crate) echoes: Vec<Echo>,
 }
 
-/// The half-paths from one place.
+/// The half-paths from one start.
 pub(crate) struct HalfPaths<'a> {
     pub(crate) views: &'a [View],
     pub(crate) all: &'a [HalfPath],
@@ -51,7 +51,7 @@ pub(crate) struct HalfPaths<'a> {
     pub(crate) rays: &'a mut CylinderRays,
 }
 
-/// The half-paths from one place, sorted.
+/// The half-paths from one start, sorted.
 struct Sorted<'a> {
     views: &'a [View],
     all: &'a [HalfPath],
@@ -63,7 +63,7 @@ impl<'a> Connector<'a> {
         Self { plan, bound, connections: Vec::new(), echoes: Vec::new() }
     }
 
-    /// All echoes between the half-paths from a place and those from another, or from the same.
+    /// All echoes between the half-paths from a start and those from another, or from the same.
     pub(crate) fn connect(&mut self, out: &mut HalfPaths, back: Option<&mut HalfPaths>) {
         let outs = self.sorted(out);
         match back {
@@ -87,7 +87,7 @@ impl<'a> Connector<'a> {
         Sorted { views: from.views, all: from.all, groups }
     }
 
-    /// Echoes out on half-paths from the transmitter and back on those from the receiver; from one place
+    /// Echoes out on half-paths from the transmitter and back on those from the receiver; from one start
     /// each pair once.
     fn pairs(&self, out: &Sorted, back: Option<&Sorted>) -> Vec<Pair> {
         let mut found = Vec::new();
@@ -162,10 +162,10 @@ impl<'a> Connector<'a> {
         let settings = &self.plan.settings;
         let circle = &self.plan.cylinders.circles[out.half_path.cylinder as usize];
         let gain = out.half_path.gain * back.half_path.gain * circle.gain;
-        let (contacts, place_rad) = stationary_contact(out, back, circle.radius_m)?;
+        let (contacts, angle_rad) = stationary_contact(out, back, circle.radius_m)?;
         let [one, other] = &contacts;
         let off =
-            |contact: &Contact| circle.radius_m * contact.slope * (place_rad - contact.place_rad);
+            |contact: &Contact| circle.radius_m * contact.slope * (angle_rad - contact.angle_rad);
         let length_m = one.length_m + off(one) + other.length_m + off(other);
         let amplitude = self.amplitude(&contacts, circle, gain);
         let departures = [out.departure(one.at_rad), back.departure(other.at_rad)];
@@ -183,7 +183,7 @@ impl<'a> Connector<'a> {
                     contact_rad: contact.at_rad,
                 }
             }),
-            place_rad,
+            angle_rad,
             legs: [out.leg(one.at_rad), back.leg(other.at_rad)],
             echo: Echo {
                 length_m,
@@ -211,7 +211,7 @@ impl<'a> Connector<'a> {
 
     fn push(&mut self, pair: &Pair, [out, back]: [OneWay; 2], both_ways: bool) {
         let connection =
-            Connection { cylinder: pair.cylinder, place_rad: pair.place_rad, out, back };
+            Connection { cylinder: pair.cylinder, angle_rad: pair.angle_rad, out, back };
         let number = self.connections.len() as u32;
         self.connections.push(connection);
         self.echoes.push(Echo { via: Via::Cylinder { connection: number }, ..pair.echo });
@@ -236,7 +236,7 @@ struct Pair {
     rays: [CylinderRay; 2],
     /// From the start to their first cylinders.
     legs: [Leg; 2],
-    place_rad: f64,
+    angle_rad: f64,
     echo: Echo,
 }
 

@@ -9,9 +9,9 @@ pub(crate) struct Contact {
     /// Its contact with its first cylinder, radians.
     pub(crate) at_rad: f64,
     /// Its contact with this one: angle around the centre, radians.
-    pub(crate) place_rad: f64,
-    /// Derivative of `place_rad` by `at_rad`.
-    pub(crate) place_rate: f64,
+    pub(crate) angle_rad: f64,
+    /// Derivative of `angle_rad` by `at_rad`.
+    pub(crate) angle_rate: f64,
     /// Sine of the angle of incidence, positive for a ray that runs counter-clockwise.
     pub(crate) slope: f64,
     /// Its cosine.
@@ -32,13 +32,13 @@ impl Contact {
         near_rad: f64,
     ) -> Self {
         let (hit, normal, cosine) = front.onto(circle);
-        let place_rad = near_rad + wrap_pi(normal.to_angle() - near_rad);
+        let angle_rad = near_rad + wrap_pi(normal.to_angle() - near_rad);
         // Counter-clockwise is to the right for one who looks at the surface.
         let sense = if mirrored { 1.0 } else { -1.0 };
         Self {
             at_rad,
-            place_rad,
-            place_rate: sense * hit.width_m * hit.rate / (circle.radius_m * cosine),
+            angle_rad,
+            angle_rate: sense * hit.width_m * hit.rate / (circle.radius_m * cosine),
             slope: normal.perp_dot(hit.along),
             cosine,
             length_m: hit.length_m,

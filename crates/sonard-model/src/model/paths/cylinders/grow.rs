@@ -42,7 +42,7 @@ const EDGES_ABOVE: f64 = 10.0;
 /// An edge sends back half of a mirror's echo at most: what it takes from it at its boundary.
 const EDGE_MOST: f64 = 0.5;
 
-/// Follows the tubes from one place, level by level: a tube of level `n` has met `n` cylinders.
+/// Follows the tubes from one start, level by level: a tube of level `n` has met `n` cylinders.
 pub(crate) struct TubeGrower<'a> {
     pub(crate) plan: &'a Plan,
     target: DVec2,
@@ -273,11 +273,11 @@ impl<'a> TubeGrower<'a> {
             if far.is_some_and(|far| far != index) {
                 continue;
             }
-            let place = mesh.points[corner as usize];
-            let Some((at, front)) = ray_through(tube, tracer, place) else { continue };
+            let point = mesh.points[corner as usize];
+            let Some((at, front)) = ray_through(tube, tracer, point) else { continue };
             cuts.push(at);
             if self.has_edges {
-                self.meet_edge(tube, tracer, corner, at, &front.moved(front.ahead_m(place)));
+                self.meet_edge(tube, tracer, corner, at, &front.moved(front.ahead_m(point)));
             }
         }
         cuts

@@ -74,15 +74,15 @@ impl<'a> HalfPathTracer<'a> {
     }
 
     /// The ray that comes to an angle around the cylinder between its ends.
-    pub(crate) fn contact_at(&self, place_rad: f64, near_rad: f64) -> Contact {
+    pub(crate) fn contact_at(&self, angle_rad: f64, near_rad: f64) -> Contact {
         let Span { from_rad, to_rad } = self.half_path.span;
-        let mut ends = self.half_path.ends.map(|end| end.place_rad - place_rad);
+        let mut ends = self.half_path.ends.map(|end| end.angle_rad - angle_rad);
         if !self.half_path.mirrored {
             ends.reverse();
         }
         let at_rad = zero_between([from_rad, to_rad], ends, EXACT_RAD, |at| {
             let contact = self.contact(at, near_rad);
-            (contact.place_rad - place_rad, contact.place_rate)
+            (contact.angle_rad - angle_rad, contact.angle_rate)
         });
         self.contact(at_rad, near_rad)
     }

@@ -62,7 +62,7 @@ impl TubeGrower<'_> {
         let middle = 0.5 * (from_rad + to_rad);
         let contact = |front: &Front, at, near| Contact::of(front, circle, tube.mirrored, at, near);
         let half = contact(&tracer.front(middle), middle, 0.0);
-        let near = half.place_rad;
+        let near = half.angle_rad;
         let mut ends = [(&borders[0], from_rad), (&borders[1], to_rad)]
             .map(|(front, at)| contact(front, at, near));
         if !tube.mirrored {

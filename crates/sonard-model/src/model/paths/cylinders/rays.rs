@@ -10,7 +10,7 @@ use crate::model::{
 /// Marks a tube that has met its first cylinder only.
 pub(crate) const FIRST: u32 = u32::MAX;
 
-/// Rays from one place by way of cylinders.
+/// Rays from one start by way of cylinders.
 #[derive(Debug, Default)]
 pub(crate) struct CylinderRays {
     /// Surfaces that tubes have met after their first cylinders, as linked lists from the last one back.

@@ -31,18 +31,18 @@ pub(crate) fn stationary_contact(
     radius_m: f64,
 ) -> Option<([Contact; 2], f64)> {
     let [a, b] = [&one.half_path.ends, &other.half_path.ends];
-    let middle = 0.5 * (a[0].place_rad + a[1].place_rad);
-    let others = 0.5 * (b[0].place_rad + b[1].place_rad);
+    let middle = 0.5 * (a[0].angle_rad + a[1].angle_rad);
+    let others = 0.5 * (b[0].angle_rad + b[1].angle_rad);
     let turn = middle + wrap_pi(others - middle) - others;
-    let low = a[0].place_rad.max(b[0].place_rad + turn);
-    let high = a[1].place_rad.min(b[1].place_rad + turn);
+    let low = a[0].angle_rad.max(b[0].angle_rad + turn);
+    let high = a[1].angle_rad.min(b[1].angle_rad + turn);
     if high < low {
         return None;
     }
     // Straight lines through the ends for a start.
-    let slope = |[from, to]: &[Contact; 2], place: f64| {
-        let rate = (to.slope - from.slope) / (to.place_rad - from.place_rad);
-        (from.slope + rate * (place - from.place_rad), rate)
+    let slope = |[from, to]: &[Contact; 2], angle: f64| {
+        let rate = (to.slope - from.slope) / (to.angle_rad - from.angle_rad);
+        (from.slope + rate * (angle - from.angle_rad), rate)
     };
     let ((t, rate), (u, other_rate)) = (slope(a, low), slope(b, low - turn));
     let start = (low - (t + u) / (rate + other_rate)).max(low).min(high);
@@ -50,19 +50,19 @@ pub(crate) fn stationary_contact(
     for _ in 0..MOST_STEPS {
         let p = one.contact(at[0], middle);
         let mut q = other.contact(at[1], others);
-        q.place_rad += turn;
+        q.angle_rad += turn;
         let rates =
             [&p, &q].map(|c| c.cosine + radius_m * c.cosine * c.cosine * c.growth / c.width_m);
-        let sum = rates[0] * p.place_rad + rates[1] * q.place_rad - p.slope - q.slope;
+        let sum = rates[0] * p.angle_rad + rates[1] * q.angle_rad - p.slope - q.slope;
         let best = sum / (rates[0] + rates[1]);
-        let place = best.max(low).min(high);
-        let miss = (place - p.place_rad).abs().max((place - q.place_rad).abs());
+        let angle = best.max(low).min(high);
+        let miss = (angle - p.angle_rad).abs().max((angle - q.angle_rad).abs());
         if miss < SAME_ANGLE_RAD {
-            let is_inside = (best - place).abs() * radius_m <= TIE_M;
-            return is_inside.then_some(([p, q], place));
+            let is_inside = (best - angle).abs() * radius_m <= TIE_M;
+            return is_inside.then_some(([p, q], angle));
         }
-        at[0] = step(one.half_path, &p, place);
-        at[1] = step(other.half_path, &q, place);
+        at[0] = step(one.half_path, &p, angle);
+        at[1] = step(other.half_path, &q, angle);
     }
     by_halving(one, other, [low, high], [middle, others, turn])
 }
@@ -75,13 +75,13 @@ fn by_halving(
     [low, high]: [f64; 2],
     [middle, others, turn]: [f64; 3],
 ) -> Option<([Contact; 2], f64)> {
-    let at = |place: f64| {
-        let p = one.contact_at(place, middle);
-        let mut q = other.contact_at(place - turn, others);
-        q.place_rad += turn;
+    let at = |angle: f64| {
+        let p = one.contact_at(angle, middle);
+        let mut q = other.contact_at(angle - turn, others);
+        q.angle_rad += turn;
         [p, q]
     };
-    let sum = |place: f64| at(place).map(|contact| contact.slope).iter().sum::<f64>();
+    let sum = |angle: f64| at(angle).map(|contact| contact.slope).iter().sum::<f64>();
     let ends = [low, high].map(sum);
     if ends[0] > SLACK || ends[1] < -SLACK {
         return None;
@@ -91,18 +91,18 @@ fn by_halving(
         let middle = 0.5 * (from + to);
         if sum(middle) < 0.0 { from = middle } else { to = middle }
     }
-    let place = 0.5 * (from + to);
-    Some((at(place), place))
+    let angle = 0.5 * (from + to);
+    Some((at(angle), angle))
 }
 
 /// The contact with the first cylinder of the ray to an angle, by linear interpolation.
-fn guess([from, to]: &[Contact; 2], place: f64) -> f64 {
-    let share = (place - from.place_rad) / (to.place_rad - from.place_rad);
+fn guess([from, to]: &[Contact; 2], angle: f64) -> f64 {
+    let share = (angle - from.angle_rad) / (to.angle_rad - from.angle_rad);
     from.at_rad + share.clamp(0.0, 1.0) * (to.at_rad - from.at_rad)
 }
 
 /// The same by one step from a ray near it.
-fn step(half_path: &HalfPath, contact: &Contact, place_rad: f64) -> f64 {
-    let next = contact.at_rad + (place_rad - contact.place_rad) / contact.place_rate;
+fn step(half_path: &HalfPath, contact: &Contact, angle_rad: f64) -> f64 {
+    let next = contact.at_rad + (angle_rad - contact.angle_rad) / contact.angle_rate;
     next.max(half_path.span.from_rad).min(half_path.span.to_rad)
 }

@@ -63,8 +63,8 @@ impl<'a> Tracer<'a> {
         let along = run / length_m;
         Contact {
             at_rad: contact_rad,
-            place_rad: contact_rad,
-            place_rate: 1.0,
+            angle_rad: contact_rad,
+            angle_rate: 1.0,
             slope: normal.perp_dot(along),
             cosine: (-normal.dot(along)).max(LEAST_COSINE),
             length_m,

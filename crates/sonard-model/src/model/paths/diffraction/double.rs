@@ -1,7 +1,7 @@
 //! Double diffraction: sound from one upright edge to another.
 //!
 //! The rays from edge to edge depend on the scene alone: a beams of beams from each edge that is met,
-//! grown when it is first asked for and kept for all places. Each ray out to one edge, each on
+//! grown when it is first asked for and kept for all observation points. Each ray out to one edge, each on
 //! from there to another (or by walls back to the same) and each back from that is an echo; what
 //! it is the reverse of is another.
 //!

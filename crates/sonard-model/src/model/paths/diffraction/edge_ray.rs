@@ -67,7 +67,7 @@ pub(crate) fn distance_parameter_m(one_m: f64, other_m: f64) -> f64 {
     one_m * other_m / (one_m + other_m)
 }
 
-/// Whether two rays from one place, of one length, leave it in one direction.
+/// Whether two rays from one start, of one length, leave it in one direction.
 pub(crate) fn is_same_departure(one: &Ray, other: &Ray) -> bool {
     one.departure.distance_squared(other.departure) < SAME_RAD * SAME_RAD
 }

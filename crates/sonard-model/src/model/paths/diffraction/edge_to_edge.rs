@@ -13,7 +13,7 @@ use crate::model::paths::{
 };
 
 /// Trees of beams from the edges of a scene, by point. A tree is grown when it is first asked for, for the
-/// longest paths that the scene was prepared for, and serves all places.
+/// longest paths that the scene was prepared for, and serves all observation points.
 #[derive(Debug, Default)]
 pub(crate) struct EdgeToEdge {
     from: Vec<OnceLock<FromEdge>>,

@@ -65,7 +65,7 @@ pub(crate) struct LevelDiffraction {
     pub(crate) images: [u16; 2],
 }
 
-/// Beams from one place, and what they light of walls with level edges.
+/// Beams from one start, and what they light of walls with level edges.
 pub(crate) struct From<'a> {
     start: DVec2,
     beams: &'a Beams,

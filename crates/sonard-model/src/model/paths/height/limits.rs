@@ -1,7 +1,7 @@
 //! Walls and cylinders that do not reach from floor to ceiling.
 //!
 //! Without floor and ceiling all sound stays at the ranger's height, and what does not stand there
-//! is not there. With them a path has a height at each place. Beams then both turn at such a wall
+//! is not there. With them a path has a height at each point. Beams then both turn at such a wall
 //! and pass it, and a path counts if it meets its walls where they stand and the others where they
 //! do not. What their level edges diffract is listed by itself
 //! ([`diffraction`](crate::model::paths::diffraction)).

@@ -1,4 +1,4 @@
-//! The echo paths of a place that the face can reflect.
+//! The echo paths of an observation point that the face can reflect.
 
 use std::f64::consts::FRAC_PI_2;
 
