@@ -201,6 +201,10 @@ impl<'a> Grower<'a> {
 
     /// Takes what passes cylinders through its triangle. Where the far corner splits it, the second
     /// part waits.
+    ///
+    /// Invariant: each ray leaves by one side. The sign of `border x run` (`run` from the image to the far corner)
+    /// tells on which side of the corner a border passes; parts are followed counter-clockwise by departure, which
+    /// behind an odd number of mirrors is clockwise by direction.
     fn pass(&mut self, beam: Beam) -> Option<Beam> {
         let side = beam.side as usize;
         let (right_side, left_side) = ((side + 1) % 3, (side + 2) % 3);

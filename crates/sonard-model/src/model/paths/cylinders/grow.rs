@@ -221,6 +221,9 @@ impl<'a> TubeGrower<'a> {
     }
 
     /// Whether an echo of the tube can still be short and strong enough.
+    ///
+    /// The least of length, width and growth of its borders is the least of all its rays (to within
+    /// [`LOUDER`]), and with the best partner left it bounds every echo ([`strength`](super::strength)).
     fn is_worth(&self, tube: &Tube) -> bool {
         let settings = &self.plan.settings;
         let left_m = tube.side.map_or(0.0, |side| {

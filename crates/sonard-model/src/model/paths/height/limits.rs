@@ -208,6 +208,9 @@ impl Heights {
 
     /// The reflections of a path that climbs so far if floor and ceiling are windows, metres, in `count`
     /// reflections; downwards it comes to the floor first.
+    ///
+    /// With the first surface `h` away and a room of height `H`, reflection `n` (from 0) is at the share
+    /// `(h + n H) / |climb|` of the path's length, because the unfolded path climbs evenly.
     pub(crate) fn bounces(&self, climb_m: f64, count: u16) -> impl Iterator<Item = Bounce> {
         let mut surfaces =
             [(Reflector::Floor, self.floor_z_m), (Reflector::Ceiling, self.ceiling_z_m)];

@@ -95,6 +95,8 @@ impl Mesh {
     }
 
     /// The triangle a point is in (one of them if it is on a side); `None` outside the box.
+    ///
+    /// Walks from a triangle at the nearest corner through sides that the point is beyond, by exact signs.
     pub(crate) fn locate(&self, point: DVec2) -> Option<u32> {
         let mut at = self.near.nearest_neighbor(point.to_array())?.data;
         // In a Delaunay mesh such a walk ends; walls disturb this one, so it may circle, in which
