@@ -51,6 +51,11 @@ edge), min_range (closer than can be measured, on both sides or with ranges that
 both sides), unexplained (all else). They add up to the beams compared; beams whose reading was \
 lost, whose step is in doubt or that have no prediction are counted under not_compared.
 
+What would explain the readings better is found to first order from the predictions in the log: another pose (of all \
+scans), heading, speed of sound, constant offset of all ranges, threshold, or a wall elsewhere (positive away from \
+the ranger), each by itself, with its gain in log-likelihood. Only changes with a gain of 10 and more are shown; \
+several of one size explain the same and can't be told apart so.
+
 Exit codes: 0 it ran, whatever the result, 2 a log can't be opened or \
 holds no record, or the scene is wrong.";
 

@@ -18,6 +18,7 @@
 //! - Every compared beam has one [`Verdict`], so the verdicts add up to `beams`; `agree` counts
 //!   pairs of `both_echo` only, and the residual statistics are taken over those pairs.
 
+mod explain;
 mod statistics;
 
 use std::collections::{HashMap, HashSet};
@@ -28,6 +29,7 @@ use serde::{Deserialize, Serialize};
 use sonard_model::geometry::Pose;
 use sonard_records::{PathKind, Ping, PingStatus, ScanView, SimRecord};
 
+pub use explain::{Estimate, Explanation};
 pub use statistics::quantile;
 
 /// Least tolerance within which two ranges agree, metres.
@@ -122,6 +124,8 @@ pub struct Comparison {
     pub scans: u32,
     /// Poses that they were taken at; figures are of all together.
     pub poses: u32,
+    /// What would explain the readings better, each by itself, most gain first.
+    pub explanations: Vec<Explanation>,
 }
 
 /// Beams by verdict.
@@ -191,6 +195,7 @@ pub struct Comparer {
     comparison: Comparison,
     residuals_m: Vec<(Verdict, f64)>,
     poses: HashSet<[u64; 3]>,
+    explainer: explain::Explainer,
 }
 
 impl Comparer {
@@ -207,6 +212,7 @@ impl Comparer {
             let residual_m = beam.verdict.ok().zip(beam.residual_m);
             self.residuals_m.extend(residual_m);
         }
+        self.explainer.add(scan, &judged);
         judged
     }
 
@@ -216,6 +222,7 @@ impl Comparer {
         let mut comparison = self.comparison;
         comparison.poses = self.poses.len() as u32;
         comparison.take_statistics(&self.residuals_m);
+        comparison.explanations = self.explainer.finish();
         comparison
     }
 }

@@ -1,0 +1,234 @@
+//! What would explain readings better than what they were predicted with: each change by itself, with its gain
+//! in likelihood.
+//!
+//! A path is stationary in the points of its interactions (Fermat), so to first order its length changes by what
+//! moves explicitly alone: `dL = sum dp . (u_in - u_out)`, with the unit directions of propagation before and
+//! after each point, and `-(u_departure + u_arrival) . dx` for the transducer. So records with paths are enough,
+//! and nothing is predicted again. A heading moves no path of a transducer on the axis, but all arcs: it is
+//! looked for by setting readings beside the predictions of neighbouring beams. A threshold moves where arcs end:
+//! it follows from the margins of predictions beside echoes and silences.
+//!
+//! A residual is Gaussian, [`SIGMA_M`] wide, or, once in ten, from anywhere within [`OUTLIERS_M`]. First-order
+//! changes of paths hold for some centimetres and degrees; what is farther off has to be localised.
+
+mod fit;
+mod shift;
+#[cfg(test)]
+mod tests;
+
+use serde::Serialize;
+use sonard_model::geometry::DVec2;
+use sonard_records::{InteractionKind, Ping, PingStatus, ScanView};
+
+use self::{
+    fit::{Fit, fit},
+    shift::{Headings, Thresholds},
+};
+use super::{AGREE_WITHIN_M, Judged};
+
+/// Spread of a residual that is explained, metres.
+const SIGMA_M: f64 = AGREE_WITHIN_M;
+/// Share of readings that nothing of this kind explains, and the width of where they lie, metres.
+const OUTLIERS: f64 = 0.1;
+const OUTLIERS_M: f64 = 5.0;
+/// Changes with less gain in log-likelihood than this are noise.
+const LEAST_GAIN: f64 = 10.0;
+/// And so are estimates below this many standard deviations.
+const LEAST_SIGMAS: f64 = 3.0;
+/// Pairs of echoes that are kept; of more, every second, fourth and so on.
+const MOST_PAIRS: usize = 20_000;
+
+/// A change that would explain readings better.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Explanation {
+    /// What changes: `pose`, `heading`, `sound_speed`, `range_offset`, `threshold`, or `wall ID`.
+    pub change: String,
+    /// By how much.
+    pub estimates: Vec<Estimate>,
+    /// What the log-likelihood of all readings gains, natural units.
+    pub gain: f64,
+    /// Readings that it explains and that were not explained before: residuals within twice the spread; of a
+    /// threshold, silences and echoes.
+    pub explains: u32,
+}
+
+/// A value that a change would have.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// What of: `x_m`, `y_m`, `heading_deg`, `percent`, `offset_m`, `threshold_db`. Of a wall, positive away
+    /// from where the ranger is; of a range, what is to be added to each.
+    pub name: &'static str,
+    /// How much is to be added.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
+}
+
+/// A reading with its prediction, as far as changes move it.
+#[derive(Debug, Clone, PartialEq)]
+struct Pair {
+    measured_m: f64,
+    residual_m: f64,
+    /// What the predicted range gains where the transducer moves by a metre along x and y.
+    by_place: DVec2,
+    /// The same where walls move away: places in the list of names.
+    by_wall: Vec<(u16, f64)>,
+}
+
+/// Gathers scans one by one; holds at most [`MOST_PAIRS`] pairs.
+#[derive(Debug, Default)]
+pub(super) struct Explainer {
+    pairs: Vec<Pair>,
+    walls: Vec<String>,
+    seen: usize,
+    /// Every so many pairs are kept.
+    stride: usize,
+    headings: Headings,
+    thresholds: Thresholds,
+}
+
+impl Explainer {
+    /// Takes in a scan with its beams.
+    pub(super) fn add(&mut self, scan: &ScanView, beams: &[Judged<'_>]) {
+        self.stride = self.stride.max(1);
+        for beam in beams {
+            self.thresholds.add(beam.ping);
+            let Some(residual_m) = beam.residual_m else { continue };
+            self.seen += 1;
+            if !(self.seen - 1).is_multiple_of(self.stride) {
+                continue;
+            }
+            let pair = self.pair(scan, beam.ping, residual_m);
+            self.pairs.extend(pair);
+            if self.pairs.len() > MOST_PAIRS {
+                let mut place = 0;
+                self.pairs.retain(|_| {
+                    place += 1;
+                    place % 2 == 1
+                });
+                self.stride *= 2;
+            }
+        }
+        if let Some(start) = &scan.start {
+            self.headings.add(&start.plan, beams);
+        }
+    }
+
+    fn pair(&mut self, scan: &ScanView, ping: &Ping, residual_m: f64) -> Option<Pair> {
+        let path = ping.sim.as_ref()?.path.as_ref()?;
+        let points = path.polyline(scan.viewpoint(ping)?.ends())?;
+        let is_level = path.interactions.iter().all(|met| met.id != "floor" && met.id != "ceiling");
+        if !is_level {
+            // What the ends' heights are is the model's to know.
+            return None;
+        }
+        let run = |pair: &[DVec2]| (pair[1] - pair[0]).normalize_or_zero();
+        let runs: Vec<DVec2> = points.windows(2).map(run).collect();
+        let (first, last) = (runs.first()?, runs.last()?);
+        // Half of it, because a range is half a path.
+        let mut by_place = 0.5 * (*last - *first);
+        let mut by_wall: Vec<(u16, f64)> = Vec::new();
+        for (met, runs) in path.interactions.iter().zip(runs.windows(2)) {
+            let turn = runs[0] - runs[1];
+            match met.kind {
+                InteractionKind::Reflection => {
+                    let wall = self.number(&met.id)?;
+                    match by_wall.iter_mut().find(|(known, _)| *known == wall) {
+                        Some((_, gain)) => *gain += 0.5 * turn.length(),
+                        None => by_wall.push((wall, 0.5 * turn.length())),
+                    }
+                }
+                InteractionKind::Transducer => by_place += 0.5 * turn,
+                InteractionKind::Diffraction | InteractionKind::Scattering => {}
+            }
+        }
+        Some(Pair { measured_m: ping.range_m?, residual_m, by_place, by_wall })
+    }
+
+    fn number(&mut self, wall: &str) -> Option<u16> {
+        let known = self.walls.iter().position(|known| known == wall);
+        let at = known.unwrap_or_else(|| {
+            self.walls.push(wall.to_owned());
+            self.walls.len() - 1
+        });
+        u16::try_from(at).ok()
+    }
+
+    /// What would explain the readings better, most gain first.
+    pub(super) fn finish(self) -> Vec<Explanation> {
+        let mut found: Vec<Explanation> = Vec::new();
+        let pairs = &self.pairs;
+        let place = fit(pairs, |pair| pair.by_place);
+        found.extend(self.explanation("pose", &["x_m", "y_m"], [1.0; 2], place));
+        let alone = |of: fn(&Pair) -> f64| fit(pairs, |pair| DVec2::new(of(pair), 0.0));
+        // A range that the measured one is to be multiplied by comes off the residual.
+        let speed = alone(|pair| -pair.measured_m);
+        found.extend(self.explanation("sound_speed", &["percent"], [100.0, 0.0], speed));
+        let offset = alone(|_| -1.0);
+        found.extend(self.explanation("range_offset", &["offset_m"], [1.0, 0.0], offset));
+        for (name, number) in self.walls.iter().zip(0..) {
+            let gain = |pair: &Pair| {
+                let by_wall = pair.by_wall.iter().find(|(wall, _)| *wall == number);
+                DVec2::new(by_wall.map_or(0.0, |(_, gain)| *gain), 0.0)
+            };
+            let wall = fit(pairs, gain);
+            found.extend(self.explanation(
+                &format!("wall {name}"),
+                &["offset_m"],
+                [1.0, 0.0],
+                wall,
+            ));
+        }
+        found.extend(self.headings.explanation());
+        found.extend(self.thresholds.explanation());
+        found.retain(|found| {
+            let is_far = |estimate: &Estimate| estimate.value.abs() > LEAST_SIGMAS * estimate.sigma;
+            found.gain >= LEAST_GAIN && found.estimates.iter().any(is_far)
+        });
+        found.sort_by(|one, other| other.gain.total_cmp(&one.gain));
+        found
+    }
+
+    fn explanation(
+        &self,
+        change: &str,
+        names: &[&'static str],
+        scale: [f64; 2],
+        fit: Option<Fit>,
+    ) -> Option<Explanation> {
+        let fit = fit?;
+        let estimate = |(at, name): (usize, &&'static str)| Estimate {
+            name,
+            value: fit.value[at] * scale[at],
+            sigma: fit.sigma[at] * scale[at].abs(),
+        };
+        Some(Explanation {
+            change: change.to_owned(),
+            estimates: names.iter().enumerate().map(estimate).collect(),
+            gain: fit.gain * self.stride as f64,
+            explains: fit.explains * self.stride as u32,
+        })
+    }
+}
+
+/// Log-likelihood of a residual, metres.
+fn log_likelihood(residual_m: f64) -> f64 {
+    let [explained, other] = densities(residual_m, SIGMA_M);
+    (explained + other).ln()
+}
+
+/// The two parts of a residual's density: by what is predicted, with such a spread, and by anything else.
+fn densities(residual_m: f64, sigma_m: f64) -> [f64; 2] {
+    let normal =
+        (-0.5 * (residual_m / sigma_m).powi(2)).exp() / (sigma_m * std::f64::consts::TAU.sqrt());
+    [(1.0 - OUTLIERS) * normal, OUTLIERS / OUTLIERS_M]
+}
+
+/// Whether a reading was heard; `None` of one that says neither.
+fn is_heard(status: PingStatus) -> Option<bool> {
+    match status {
+        PingStatus::Echo | PingStatus::MinRange => Some(true),
+        PingStatus::NoEcho => Some(false),
+        PingStatus::LinkLost | PingStatus::StepDoubtful | PingStatus::ModuleFault => None,
+    }
+}

@@ -1,0 +1,163 @@
+//! Changes that move no path, but where it is heard: heading and threshold.
+
+use sonard_records::{Ping, ScanPlan};
+
+use super::{Estimate, Explanation, SIGMA_M, is_heard, log_likelihood};
+use crate::compare::Judged;
+
+/// Headings that are tried: to so many degrees on both sides.
+const MOST_DEG: f64 = 12.0;
+/// And so many beams.
+const MOST_BEAMS: usize = 40;
+/// Share of readings that are heard against a prediction, or silent.
+const LAPSES: f64 = 0.05;
+
+/// The likelihood of other headings: readings beside the predictions of beams to the left and right.
+#[derive(Debug, Default)]
+pub(super) struct Headings {
+    /// Of the plans so far, degrees; only scans of one step can be added up.
+    step_deg: Option<f64>,
+    /// Log-likelihoods and explained readings, from the most to the right to the most to the left.
+    shifts: Vec<(f64, u32)>,
+}
+
+impl Headings {
+    pub(super) fn add(&mut self, plan: &ScanPlan, beams: &[Judged<'_>]) {
+        if plan.pings_per_stop != 1 || plan.beams() as usize != beams.len() || beams.len() < 8 {
+            return;
+        }
+        let step_deg = *self.step_deg.get_or_insert(plan.step_deg);
+        let in_order = beams.iter().zip(0..).all(|(beam, index)| beam.ping.index == index);
+        if (step_deg - plan.step_deg).abs() > 1e-9 || !in_order {
+            return;
+        }
+        let most = ((MOST_DEG / step_deg) as usize).clamp(1, MOST_BEAMS).min(beams.len() / 3);
+        let is_turn = (plan.to_deg - plan.from_deg - 360.0).abs() < step_deg / 2.0;
+        self.shifts.resize(2 * most + 1, (0.0, 0));
+        let count = beams.len();
+        // Of a part of a turn the same readings are asked at every shift.
+        let asked = if is_turn { 0..count } else { most..count - most };
+        for (at, (sum, explained)) in self.shifts.iter_mut().enumerate() {
+            for beam in asked.clone() {
+                let predicted = beams[(beam + count + at - most) % count].ping;
+                let Some((log, is_explained)) = beside(beams[beam].ping, predicted) else {
+                    continue;
+                };
+                *sum += log;
+                *explained += u32::from(is_explained);
+            }
+        }
+    }
+
+    pub(super) fn explanation(&self) -> Option<Explanation> {
+        let step_deg = self.step_deg?;
+        let middle = self.shifts.len() / 2;
+        let likelihood = |at: usize| self.shifts[at].0;
+        let best = (0..self.shifts.len())
+            .max_by(|&one, &other| likelihood(one).total_cmp(&likelihood(other)))?;
+        if best == 0 || best + 1 >= self.shifts.len() || best == middle {
+            return None;
+        }
+        let (peak, sigma) =
+            parabola([likelihood(best - 1), likelihood(best), likelihood(best + 1)]);
+        let beams = best as f64 - middle as f64 + peak;
+        Some(Explanation {
+            change: "heading".to_owned(),
+            estimates: vec![Estimate {
+                name: "heading_deg",
+                value: beams * step_deg,
+                sigma: sigma * step_deg,
+            }],
+            gain: likelihood(best) - likelihood(middle),
+            explains: self.shifts[best].1.saturating_sub(self.shifts[middle].1),
+        })
+    }
+}
+
+/// Log-likelihood of a reading beside the prediction of another, and whether that explains it.
+fn beside(measured: &Ping, predicted: &Ping) -> Option<(f64, bool)> {
+    let heard = is_heard(measured.status)?;
+    let sim = predicted.sim.as_ref()?;
+    match (heard, is_heard(sim.status)?) {
+        (true, true) => {
+            let residual_m = measured.range_m? - sim.range_m?;
+            let is_explained = residual_m.abs() < 2.0 * SIGMA_M;
+            Some(((1.0 - LAPSES).ln() + log_likelihood(residual_m), is_explained))
+        }
+        (false, false) => Some(((1.0 - LAPSES).ln(), true)),
+        _ => Some((LAPSES.ln() + super::log_likelihood(f64::INFINITY), false)),
+    }
+}
+
+/// Where a parabola through three values, one apart, has its peak, from the middle one; and the standard deviation of
+/// a Gaussian likelihood of that curvature, at least a tenth.
+fn parabola([before, at, after]: [f64; 3]) -> (f64, f64) {
+    let curvature = (2.0 * at - before - after).max(f64::MIN_POSITIVE);
+    ((0.5 * (after - before) / curvature).clamp(-0.5, 0.5), curvature.sqrt().recip().max(0.1))
+}
+
+/// Thresholds that are tried: to so many decibels on both sides.
+const MOST_DB: f64 = 24.0;
+const STEP_DB: f64 = 0.5;
+/// How far a margin may be off, decibels.
+const MARGIN_SIGMA_DB: f64 = 3.0;
+/// Margins beyond this say nothing of a threshold.
+const FAR_DB: f64 = 40.0;
+
+/// The likelihood of other thresholds: margins of predictions beside what was heard and what was not.
+#[derive(Debug, Default)]
+pub(super) struct Thresholds {
+    shifts: Vec<(f64, u32)>,
+    /// Echoes and silences.
+    heard: [u32; 2],
+}
+
+impl Thresholds {
+    pub(super) fn add(&mut self, ping: &Ping) {
+        let margin_db = ping.sim.as_ref().and_then(|sim| sim.margin_db);
+        let (Some(heard), Some(margin_db)) = (is_heard(ping.status), margin_db) else { return };
+        if !margin_db.is_finite() || margin_db.abs() > FAR_DB {
+            return;
+        }
+        self.heard[usize::from(!heard)] += 1;
+        let count = (2.0 * MOST_DB / STEP_DB) as usize + 1;
+        self.shifts.resize(count, (0.0, 0));
+        for (at, (sum, explained)) in self.shifts.iter_mut().enumerate() {
+            let over_db = margin_db - (STEP_DB * at as f64 - MOST_DB);
+            let share = LAPSES + (1.0 - 2.0 * LAPSES) * logistic(over_db / MARGIN_SIGMA_DB);
+            *sum += if heard { share } else { 1.0 - share }.ln();
+            *explained += u32::from(heard == (over_db > 0.0));
+        }
+    }
+
+    pub(super) fn explanation(&self) -> Option<Explanation> {
+        // Without silences nothing says where hearing ends.
+        if self.heard.contains(&0) {
+            return None;
+        }
+        let middle = self.shifts.len() / 2;
+        let likelihood = |at: usize| self.shifts[at].0;
+        let best = (0..self.shifts.len())
+            .max_by(|&one, &other| likelihood(one).total_cmp(&likelihood(other)))?;
+        if best == 0 || best + 1 >= self.shifts.len() || best == middle {
+            return None;
+        }
+        let (peak, sigma) =
+            parabola([likelihood(best - 1), likelihood(best), likelihood(best + 1)]);
+        Some(Explanation {
+            change: "threshold".to_owned(),
+            estimates: vec![Estimate {
+                name: "threshold_db",
+                value: (best as f64 - middle as f64 + peak) * STEP_DB,
+                sigma: sigma * STEP_DB,
+            }],
+            gain: likelihood(best) - likelihood(middle),
+            explains: self.shifts[best].1.saturating_sub(self.shifts[middle].1),
+        })
+    }
+}
+
+/// The logistic function that is nearest to the normal distribution's.
+fn logistic(at: f64) -> f64 {
+    (1.0 + (-1.702 * at).exp()).recip()
+}
