@@ -27,7 +27,13 @@ pub(super) fn print(
     }
     if !comparison.explanations.is_empty() {
         let table = explanations(&comparison.explanations);
-        writeln!(out, "What would explain the readings better, each by itself:\n{table}")?;
+        writeln!(out, "What would explain the readings better:\n{table}")?;
+    } else if comparison.agree_fraction.is_some_and(|share| share < FEW_AGREE) {
+        writeln!(
+            out,
+            "No change of some centimetres, degrees or percent explains the readings: is it another \
+             scene, a pose farther off, or angles that count clockwise?"
+        )?;
     }
     let apart = worst.apart();
     if !apart.is_empty() {
@@ -105,6 +111,9 @@ fn explanations(found: &[Explanation]) -> Table {
     right_align(&mut table, 2);
     table
 }
+
+/// Where fewer than this share of the pairs of echoes agree, something is wrong as a whole.
+const FEW_AGREE: f64 = 0.25;
 
 /// So many of them are shown.
 const MOST_EXPLANATIONS: usize = 6;

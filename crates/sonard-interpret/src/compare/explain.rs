@@ -15,7 +15,9 @@ mod fit;
 mod shift;
 #[cfg(test)]
 mod tests;
+mod together;
 
+use glam::DVec3;
 use serde::Serialize;
 use sonard_model::geometry::DVec2;
 use sonard_records::{InteractionKind, Ping, PingStatus, ScanView};
@@ -23,6 +25,7 @@ use sonard_records::{InteractionKind, Ping, PingStatus, ScanView};
 use self::{
     fit::{Fit, fit},
     shift::{Headings, Thresholds},
+    together::Together,
 };
 use super::{AGREE_WITHIN_M, Judged};
 
@@ -35,13 +38,19 @@ const OUTLIERS_M: f64 = 5.0;
 const LEAST_GAIN: f64 = 10.0;
 /// And so are estimates below this many standard deviations.
 const LEAST_SIGMAS: f64 = 3.0;
+/// Shares of the pairs of echoes that a change has to explain: as many arcs as it has values can always be fitted, so
+/// one that moves all readings has to explain more than one that moves a wall.
+const LEAST_BY_WALL: f64 = 0.05;
+const LEAST_BY_ONE: f64 = 0.15;
+const LEAST_TOGETHER: f64 = 0.35;
 /// Pairs of echoes that are kept; of more, every second, fourth and so on.
 const MOST_PAIRS: usize = 20_000;
 
 /// A change that would explain readings better.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Explanation {
-    /// What changes: `pose`, `heading`, `sound_speed`, `range_offset`, `threshold`, or `wall ID`.
+    /// What changes: `pose`, `heading`, `sound_speed`, `range_offset`, `threshold`, `wall ID`, or `together` for
+    /// pose, heading and speed of sound at once.
     pub change: String,
     /// By how much.
     pub estimates: Vec<Estimate>,
@@ -84,6 +93,7 @@ pub(super) struct Explainer {
     /// Every so many pairs are kept.
     stride: usize,
     headings: Headings,
+    together: Together,
     thresholds: Thresholds,
 }
 
@@ -111,9 +121,12 @@ impl Explainer {
         }
         if let Some(start) = &scan.start {
             self.headings.add(&start.plan, beams);
+            let pairs = beams.iter().map(|beam| self.pair(scan, beam.ping, 0.0)).collect();
+            self.together.add(&start.plan, beams, pairs);
         }
     }
 
+    /// `None` of a reading without a predicted path that says its points.
     fn pair(&mut self, scan: &ScanView, ping: &Ping, residual_m: f64) -> Option<Pair> {
         let path = ping.sim.as_ref()?.path.as_ref()?;
         let points = path.polyline(scan.viewpoint(ping)?.ends())?;
@@ -142,7 +155,8 @@ impl Explainer {
                 InteractionKind::Diffraction | InteractionKind::Scattering => {}
             }
         }
-        Some(Pair { measured_m: ping.range_m?, residual_m, by_place, by_wall })
+        let measured_m = ping.range_m.unwrap_or_default();
+        Some(Pair { measured_m, residual_m, by_place, by_wall })
     }
 
     fn number(&mut self, wall: &str) -> Option<u16> {
@@ -157,58 +171,66 @@ impl Explainer {
     /// What would explain the readings better, most gain first.
     pub(super) fn finish(self) -> Vec<Explanation> {
         let mut found: Vec<Explanation> = Vec::new();
-        let pairs = &self.pairs;
-        let place = fit(pairs, |pair| pair.by_place);
-        found.extend(self.explanation("pose", &["x_m", "y_m"], [1.0; 2], place));
-        let alone = |of: fn(&Pair) -> f64| fit(pairs, |pair| DVec2::new(of(pair), 0.0));
-        // A range that the measured one is to be multiplied by comes off the residual.
-        let speed = alone(|pair| -pair.measured_m);
-        found.extend(self.explanation("sound_speed", &["percent"], [100.0, 0.0], speed));
-        let offset = alone(|_| -1.0);
-        found.extend(self.explanation("range_offset", &["offset_m"], [1.0, 0.0], offset));
+        let of = |gain: &dyn Fn(&Pair) -> DVec3| {
+            fit(self.pairs.iter().map(|pair| (pair.residual_m, gain(pair))))
+        };
+        let place = of(&|pair| pair.by_place.extend(0.0));
+        found.extend(self.explanation("pose", &[("x_m", 0), ("y_m", 1)], place));
+        // What the measured range is to be multiplied by comes off the residual.
+        let speed = of(&|pair| DVec3::new(0.0, 0.0, -pair.measured_m));
+        found.extend(self.explanation("sound_speed", &[("percent", 2)], speed));
+        let offset = of(&|_| DVec3::NEG_X);
+        found.extend(self.explanation("range_offset", &[("offset_m", 0)], offset));
         for (name, number) in self.walls.iter().zip(0..) {
-            let gain = |pair: &Pair| {
+            let wall = of(&|pair| {
                 let by_wall = pair.by_wall.iter().find(|(wall, _)| *wall == number);
-                DVec2::new(by_wall.map_or(0.0, |(_, gain)| *gain), 0.0)
-            };
-            let wall = fit(pairs, gain);
-            found.extend(self.explanation(
-                &format!("wall {name}"),
-                &["offset_m"],
-                [1.0, 0.0],
-                wall,
-            ));
+                DVec3::new(by_wall.map_or(0.0, |(_, gain)| *gain), 0.0, 0.0)
+            });
+            found.extend(self.explanation(&format!("wall {name}"), &[("offset_m", 0)], wall));
         }
         found.extend(self.headings.explanation());
         found.extend(self.thresholds.explanation());
+        let explains =
+            |found: &Explanation, share: f64| f64::from(found.explains) >= share * self.seen as f64;
         found.retain(|found| {
             let is_far = |estimate: &Estimate| estimate.value.abs() > LEAST_SIGMAS * estimate.sigma;
-            found.gain >= LEAST_GAIN && found.estimates.iter().any(is_far)
+            let is_of_wall = found.change.starts_with("wall ");
+            let least = if is_of_wall { LEAST_BY_WALL } else { LEAST_BY_ONE };
+            // Of a threshold it is silences that are explained.
+            let is_shared = found.change == "threshold" || explains(found, least);
+            found.gain >= LEAST_GAIN && is_shared && found.estimates.iter().any(is_far)
         });
         found.sort_by(|one, other| other.gain.total_cmp(&one.gain));
+        // All at once explain more than one of them; what counts is by how much.
+        let most = found.first().map_or(0.0, |best| best.gain);
+        let together = self
+            .together
+            .explanation()
+            .filter(|all| all.gain > most + LEAST_GAIN && explains(all, LEAST_TOGETHER));
+        found.splice(0..0, together);
         found
     }
 
     fn explanation(
         &self,
         change: &str,
-        names: &[&'static str],
-        scale: [f64; 2],
+        values: &[(&'static str, usize)],
         fit: Option<Fit>,
     ) -> Option<Explanation> {
         let fit = fit?;
-        let estimate = |(at, name): (usize, &&'static str)| Estimate {
-            name,
-            value: fit.value[at] * scale[at],
-            sigma: fit.sigma[at] * scale[at].abs(),
-        };
         Some(Explanation {
             change: change.to_owned(),
-            estimates: names.iter().enumerate().map(estimate).collect(),
+            estimates: values.iter().map(|&(name, at)| estimate(name, &fit, at)).collect(),
             gain: fit.gain * self.stride as f64,
             explains: fit.explains * self.stride as u32,
         })
     }
+}
+
+/// One value of a fit; a share becomes percent.
+fn estimate(name: &'static str, fit: &Fit, at: usize) -> Estimate {
+    let scale = if at == 2 { 100.0 } else { 1.0 };
+    Estimate { name, value: fit.value[at] * scale, sigma: fit.sigma[at] * scale }
 }
 
 /// Log-likelihood of a residual, metres.

@@ -1,105 +1,117 @@
 //! Robust fits of a change that moves predicted ranges in proportion.
 
-use sonard_model::geometry::DVec2;
+use glam::{DMat3, DVec3};
 
-use super::{Pair, SIGMA_M, densities, log_likelihood};
+use super::{SIGMA_M, densities, log_likelihood};
 
 /// Spreads that the fit is made with in turn, metres: from wide, so that it finds its way, to the stated one.
 const SPREADS_M: [f64; 4] = [0.08, 0.04, 0.02, SIGMA_M];
 /// Steps with each.
 const STEPS: usize = 8;
-/// A change of more than this needs another prediction, metres (and a share, of the speed of sound).
+/// Standard deviation of what is believed beforehand of each value: metres, or a share of the speed of sound.
 const PRIOR: f64 = 0.3;
+/// Changes beyond these are not of first order, and need another prediction: metres, and a share of the speed of
+/// sound.
+const MOST: DVec3 = DVec3::new(0.15, 0.15, 0.06);
 /// Fewer pairs than this say nothing.
 const FEW: usize = 5;
+
+/// A residual, metres, and what the predicted range gains by each of three values: metres along x and y (or of another
+/// offset, in the place of x), and a share of the speed of sound.
+pub(super) type Moved = (f64, DVec3);
 
 /// What came of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Fit {
-    pub(super) value: [f64; 2],
-    pub(super) sigma: [f64; 2],
+    pub(super) value: DVec3,
+    pub(super) sigma: DVec3,
     /// In log-likelihood.
     pub(super) gain: f64,
     /// Readings explained that were not before.
     pub(super) explains: u32,
 }
 
-/// The change of at most two values that explains the residuals best, where the predicted range grows by
-/// `gain_of(pair) . value`. `None` if too few pairs depend on it.
+impl Fit {
+    /// What is left of a residual.
+    pub(super) fn left_m(&self, (residual_m, gain): Moved) -> f64 {
+        residual_m - gain.dot(self.value)
+    }
+}
+
+/// Whether a residual is explained.
+pub(super) fn is_near(residual_m: f64) -> bool {
+    residual_m.abs() < 2.0 * SIGMA_M
+}
+
+/// The change that explains the residuals best, where the predicted range grows by the gain times it. `None` if too
+/// few residuals depend on it, or it is too large for the first order.
 ///
 /// Expectation-maximisation: each step weighs a residual by the share of its density that is explained, and solves
 /// the normal equations of the weighted least squares. The likelihood does not fall from step to step while the
 /// spread stays.
-pub(super) fn fit(pairs: &[Pair], gain_of: impl Fn(&Pair) -> DVec2) -> Option<Fit> {
-    let moved: Vec<(f64, DVec2)> = pairs
-        .iter()
-        .map(|pair| (pair.residual_m, gain_of(pair)))
-        .filter(|(_, gain)| gain.length_squared() > 1e-12)
-        .collect();
+pub(super) fn fit(all: impl Iterator<Item = Moved>) -> Option<Fit> {
+    let moved: Vec<Moved> = all.filter(|(_, gain)| gain.length_squared() > 1e-12).collect();
     if moved.len() < FEW {
         return None;
     }
-    let mut value = DVec2::ZERO;
+    let mut value = DVec3::ZERO;
     let mut sums = Sums::default();
     for spread_m in SPREADS_M {
         for _ in 0..STEPS {
             sums = Sums::of(&moved, value, spread_m);
-            value = sums.solve();
+            value = sums.normal.inverse() * sums.right;
         }
     }
-    let sigma = sums.sigma();
-    let left = |(residual_m, gain): &(f64, DVec2)| residual_m - gain.dot(value);
-    let gain = moved.iter().map(|pair| log_likelihood(left(pair)) - log_likelihood(pair.0)).sum();
-    let is_near = |residual_m: f64| residual_m.abs() < 2.0 * SIGMA_M;
-    let explains = moved.iter().filter(|pair| is_near(left(pair)) && !is_near(pair.0)).count();
-    Some(Fit { value: value.to_array(), sigma, gain, explains: explains as u32 })
+    if !value.abs().cmple(MOST).all() {
+        return None;
+    }
+    let mut found = Fit { value, sigma: sums.sigma(), gain: 0.0, explains: 0 };
+    for &pair in &moved {
+        let left_m = found.left_m(pair);
+        found.gain += log_likelihood(left_m) - log_likelihood(pair.0);
+        found.explains += u32::from(is_near(left_m) && !is_near(pair.0));
+    }
+    Some(found)
 }
 
 /// Sums of the normal equations.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
-    xx: f64,
-    xy: f64,
-    yy: f64,
-    right: DVec2,
+    normal: DMat3,
+    right: DVec3,
     /// Of weights, and of weighted squares of what is left.
     weights: f64,
     squares: f64,
 }
 
 impl Sums {
-    fn of(moved: &[(f64, DVec2)], value: DVec2, spread_m: f64) -> Self {
-        let mut sums = Self::default();
+    fn of(moved: &[Moved], value: DVec3, spread_m: f64) -> Self {
+        // A value that no reading depends on stays at nothing.
+        let mut sums = Self {
+            normal: DMat3::from_diagonal(DVec3::splat((spread_m / PRIOR).powi(2))),
+            right: DVec3::ZERO,
+            weights: 0.0,
+            squares: 0.0,
+        };
         for &(residual_m, gain) in moved {
             let left_m = residual_m - gain.dot(value);
             let [explained, other] = densities(left_m, spread_m);
             let weight = explained / (explained + other);
-            sums.xx += weight * gain.x * gain.x;
-            sums.xy += weight * gain.x * gain.y;
-            sums.yy += weight * gain.y * gain.y;
-            sums.right += weight * residual_m * gain;
+            let weighted = weight * gain;
+            sums.normal +=
+                DMat3::from_cols(weighted * gain.x, weighted * gain.y, weighted * gain.z);
+            sums.right += residual_m * weighted;
             sums.weights += weight;
             sums.squares += weight * left_m * left_m;
         }
-        // A value that no reading depends on stays at nothing.
-        let prior = (spread_m / PRIOR).powi(2);
-        sums.xx += prior;
-        sums.yy += prior;
         sums
     }
 
-    fn determinant(&self) -> f64 {
-        self.xx * self.yy - self.xy * self.xy
-    }
-
-    fn solve(&self) -> DVec2 {
-        let Self { xx, xy, yy, right, .. } = *self;
-        DVec2::new(yy * right.x - xy * right.y, xx * right.y - xy * right.x) / self.determinant()
-    }
-
     /// Standard deviations, by how residuals really spread.
-    fn sigma(&self) -> [f64; 2] {
+    fn sigma(&self) -> DVec3 {
         let variance = self.squares / self.weights.max(f64::MIN_POSITIVE);
-        [self.yy, self.xx].map(|of| (variance * of / self.determinant()).sqrt())
+        let inverse = self.normal.inverse();
+        let of = |at: usize| (variance * inverse.col(at)[at]).max(0.0).sqrt();
+        DVec3::new(of(0), of(1), of(2))
     }
 }

@@ -1,8 +1,10 @@
 //! Changes that move no path, but where it is heard: heading and threshold.
 
+use std::ops::Range;
+
 use sonard_records::{Ping, ScanPlan};
 
-use super::{Estimate, Explanation, SIGMA_M, is_heard, log_likelihood};
+use super::{Estimate, Explanation, fit::is_near, is_heard, log_likelihood};
 use crate::compare::Judged;
 
 /// Headings that are tried: to so many degrees on both sides.
@@ -23,20 +25,10 @@ pub(super) struct Headings {
 
 impl Headings {
     pub(super) fn add(&mut self, plan: &ScanPlan, beams: &[Judged<'_>]) {
-        if plan.pings_per_stop != 1 || plan.beams() as usize != beams.len() || beams.len() < 8 {
-            return;
-        }
         let step_deg = *self.step_deg.get_or_insert(plan.step_deg);
-        let in_order = beams.iter().zip(0..).all(|(beam, index)| beam.ping.index == index);
-        if (step_deg - plan.step_deg).abs() > 1e-9 || !in_order {
-            return;
-        }
-        let most = ((MOST_DEG / step_deg) as usize).clamp(1, MOST_BEAMS).min(beams.len() / 3);
-        let is_turn = (plan.to_deg - plan.from_deg - 360.0).abs() < step_deg / 2.0;
+        let Some((most, asked)) = shifts(plan, beams, step_deg) else { return };
         self.shifts.resize(2 * most + 1, (0.0, 0));
         let count = beams.len();
-        // Of a part of a turn the same readings are asked at every shift.
-        let asked = if is_turn { 0..count } else { most..count - most };
         for (at, (sum, explained)) in self.shifts.iter_mut().enumerate() {
             for beam in asked.clone() {
                 let predicted = beams[(beam + count + at - most) % count].ping;
@@ -74,6 +66,24 @@ impl Headings {
     }
 }
 
+/// To how many beams on both sides a scan can be turned against its predictions, and which of its readings are asked
+/// at every turn; `None` of a scan whose beams are not all there, or not this far apart.
+pub(super) fn shifts(
+    plan: &ScanPlan,
+    beams: &[Judged<'_>],
+    step_deg: f64,
+) -> Option<(usize, Range<usize>)> {
+    let count = beams.len();
+    let is_whole = plan.pings_per_stop == 1 && plan.beams() as usize == count && count >= 8;
+    let in_order = beams.iter().zip(0..).all(|(beam, index)| beam.ping.index == index);
+    if !is_whole || !in_order || (step_deg - plan.step_deg).abs() > 1e-9 {
+        return None;
+    }
+    let most = ((MOST_DEG / step_deg) as usize).clamp(1, MOST_BEAMS).min(count / 3);
+    let is_turn = (plan.to_deg - plan.from_deg - 360.0).abs() < step_deg / 2.0;
+    Some((most, if is_turn { 0..count } else { most..count - most }))
+}
+
 /// Log-likelihood of a reading beside the prediction of another, and whether that explains it.
 fn beside(measured: &Ping, predicted: &Ping) -> Option<(f64, bool)> {
     let heard = is_heard(measured.status)?;
@@ -81,17 +91,26 @@ fn beside(measured: &Ping, predicted: &Ping) -> Option<(f64, bool)> {
     match (heard, is_heard(sim.status)?) {
         (true, true) => {
             let residual_m = measured.range_m? - sim.range_m?;
-            let is_explained = residual_m.abs() < 2.0 * SIGMA_M;
-            Some(((1.0 - LAPSES).ln() + log_likelihood(residual_m), is_explained))
+            Some((of_pair(residual_m), is_near(residual_m)))
         }
         (false, false) => Some(((1.0 - LAPSES).ln(), true)),
-        _ => Some((LAPSES.ln() + super::log_likelihood(f64::INFINITY), false)),
+        _ => Some((of_lapse(), false)),
     }
+}
+
+/// Log-likelihood of an echo that was predicted.
+pub(super) fn of_pair(residual_m: f64) -> f64 {
+    (1.0 - LAPSES).ln() + log_likelihood(residual_m)
+}
+
+/// The same of one that was not, or of a silence where an echo was predicted.
+pub(super) fn of_lapse() -> f64 {
+    LAPSES.ln() + log_likelihood(f64::INFINITY)
 }
 
 /// Where a parabola through three values, one apart, has its peak, from the middle one; and the standard deviation of
 /// a Gaussian likelihood of that curvature, at least a tenth.
-fn parabola([before, at, after]: [f64; 3]) -> (f64, f64) {
+pub(super) fn parabola([before, at, after]: [f64; 3]) -> (f64, f64) {
     let curvature = (2.0 * at - before - after).max(f64::MIN_POSITIVE);
     ((0.5 * (after - before) / curvature).clamp(-0.5, 0.5), curvature.sqrt().recip().max(0.1))
 }

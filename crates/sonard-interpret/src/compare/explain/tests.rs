@@ -52,10 +52,10 @@ fn compared(truth: &World, believed: &World) -> Comparison {
     let (mut scan, _) = truth.scan();
     let (predicted, simulator) = believed.scan();
     let slower = believed.air.sound_speed_m_s() / truth.air.sound_speed_m_s();
-    let station = simulator.station(believed.pose.position());
+    let point = simulator.at(believed.pose.position());
     for ping in &mut scan.pings {
         ping.range_m = ping.range_m.map(|range_m| range_m * slower);
-        let prediction = station.ping(believed.pose.direction_rad(ping.azimuth_deg));
+        let prediction = point.ping(believed.pose.direction_rad(ping.azimuth_deg));
         ping.sim = Some(SimRecord::of(&simulator, &prediction));
         (ping.path, ping.amplitude, ping.margin_db) = (None, None, None);
     }
@@ -148,4 +148,39 @@ fn a_ranger_that_hears_less_is_found() {
     truth.sensor.threshold *= 10.0_f64.powf(8.0 / 20.0);
     let comparison = compared(&truth, &believed);
     close(named(&comparison, "threshold"), 0, 8.0, 3.0);
+}
+
+/// What a user who measures a room gets wrong: two centimetres, two degrees, and five degrees of temperature. None of it
+/// explains the readings alone.
+#[test]
+fn a_place_a_heading_and_the_air_are_found_together() {
+    let believed = World::believed();
+    let mut truth = believed.clone();
+    truth.air = Air::new(15.0, 50.0, 101.325).expect("air");
+    truth.pose = Pose { x_m: 1.3 - 0.02, y_m: 0.9 + 0.015, heading_deg: 22.0 };
+    let comparison = compared(&truth, &believed);
+    let best = &comparison.explanations[0];
+    assert_eq!(best.change, "together", "{:?}", comparison.explanations);
+    close(best, 0, -0.02, 0.003);
+    close(best, 1, 0.015, 0.003);
+    close(best, 2, 2.0, 0.3);
+    let slower = 100.0 * (truth.air.sound_speed_m_s() / believed.air.sound_speed_m_s() - 1.0);
+    close(best, 3, slower, 0.1);
+    assert!(best.explains > 200, "{best:?}");
+}
+
+/// A scan of another room is explained by nothing of this kind.
+#[test]
+fn a_scan_of_another_room_is_not_explained_away() {
+    let believed = World::believed();
+    let mut truth = believed.clone();
+    truth.scene = Scene::from_json(shipped::text("mcgill-lab").expect("shipped")).expect("a scene");
+    truth.pose = truth.scene.poses.values().next().copied().expect("a pose");
+    let comparison = compared(&truth, &believed);
+    assert!(comparison.agree_fraction.expect("pairs") < 0.2);
+    assert_eq!(comparison.explanations, []);
+    // A quarter turn is as much another room.
+    let turned = Pose { heading_deg: 110.0, ..believed.pose };
+    let comparison = compared(&World { pose: turned, ..believed.clone() }, &believed);
+    assert_eq!(comparison.explanations, []);
 }
