@@ -73,6 +73,17 @@ fn what_scans_and_methods_come_to_says_whose_the_readings_are() {
 }
 
 #[test]
+fn plans_beside_each_other_have_all_their_lines_in_the_legend() {
+    let scene = room();
+    let scan = scan_of_room(scene.poses["fig9"], 9.0, 1);
+    let svg = draw_side_by_side(&[scan.clone(), scan], Some(&scene)).to_svg();
+    let said = texts(&svg);
+    for words in ["blind within", "wall, reflectance"] {
+        assert!(said.iter().any(|text| text.starts_with(words)), "{words}: {said:?}");
+    }
+}
+
+#[test]
 fn a_map_has_a_frame_round_its_cells_and_a_badge() {
     let shape = GridShape::covering(DVec2::ZERO, DVec2::new(2.0, 1.0), 0.05).expect("a shape");
     let grid = Grid::new(shape);

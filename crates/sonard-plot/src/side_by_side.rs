@@ -52,8 +52,9 @@ pub fn draw_side_by_side(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
         page.add(titles);
     }
     let below = Px::new(theme::MARGIN_PX, top + 40.0 + height + 28.0);
+    let entries = keys::all(&readings, scene, 0);
     let (key, key_height) =
-        legend::draw(&keys::heard(&readings), below, theme::PAGE_PX - 2.0 * theme::MARGIN_PX);
+        legend::draw(&entries, below, theme::PAGE_PX - 2.0 * theme::MARGIN_PX);
     page.add(key);
     Picture::new(theme::PAGE_PX, below.y + key_height + theme::MARGIN_PX / 2.0, page)
 }
@@ -83,7 +84,7 @@ fn floor(
 
 fn notes(scans: &[ScanView]) -> String {
     let beams = scans.first().map_or(0, |scan| scan.pings.len());
-    format!("{beams} beams each; ticks on the border are silent beams")
+    format!("{beams} beams each; the legend counts those of all")
 }
 
 fn engine(view: &ScanView) -> String {

@@ -276,7 +276,9 @@ watch((status) => {
 follow("/v1/live/records?format=sse&verdicts=true", take, (there) => {
   if (there) return catchUp();
   // Whether its scan goes on, the daemon says when it is back.
+  if (live?.underWay && shown === live) summary.lost(live);
   if (live) live.underWay = false;
+  plan.drawOver();
   changed = true;
 });
 requestAnimationFrame(frame);

@@ -189,7 +189,7 @@ export class Plan {
 
   drawOver() {
     this.over.clear();
-    if (!this.scan) return;
+    if (!this.scan || !this.palette) return;
     this.drawRobot((this.latest ?? this.readings().at(-1))?.pose ?? this.scan.start.pose);
     if (this.scan.underWay && this.latest?.viewpoint) this.drawRay("newest", this.latest);
     if (!this.selected?.viewpoint) return;

@@ -19,6 +19,11 @@ export class Summary {
     this.say(`Scan over: ${scan.inWords()}.`);
   }
 
+  /** The daemon is gone, and with it what it might say of the scan. */
+  lost(scan) {
+    this.say(`Heard last of the scan: ${scan.inWords()}. Whether it goes on is not known.`);
+  }
+
   /** Counts of a scan under way would be out of date at once: they stand above the plan. */
   shows(scan) {
     if (scan.replayed) this.say(`Replay of a scan of ${count(scan.planned, "beam")}.`);

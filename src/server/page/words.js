@@ -1,8 +1,11 @@
 // Figures and records in words, with their units.
 
 export const metres = (m) => (m === null || m === undefined ? "–" : `${m.toFixed(m < 10 ? 4 : 3)} m`);
-export const millimetres = (m) =>
-  m === null || m === undefined ? "–" : `${m < 0 ? "−" : "+"}${Math.abs(1e3 * m).toFixed(1)} mm`;
+export function millimetres(m) {
+  if (m === null || m === undefined) return "–";
+  const size = Math.abs(1e3 * m).toFixed(1);
+  return `${size === "0.0" ? "" : m < 0 ? "−" : "+"}${size} mm`;
+}
 export const degrees = (deg) => `${deg.toFixed(1)}°`;
 export const decibels = (db) => `${db < 0 ? "−" : "+"}${Math.abs(db).toFixed(1)} dB`;
 

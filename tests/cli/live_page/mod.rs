@@ -203,8 +203,11 @@ fn the_page_finds_back_by_itself_when_the_daemon_was_killed() {
     first.kill();
     browser.until("document.getElementById('link').textContent === 'daemon not answering'");
     browser.until("!document.getElementById('trouble').hidden");
-    // What was known last is shown still.
+    // What was known last is shown still, and nothing is claimed of what is not known.
     assert!(beams_shown(&browser) > 5);
+    let summary = browser.text("#summary");
+    assert!(summary.contains("is not known") && !summary.contains("under way"), "{summary}");
+    assert!(!browser.text("#which").starts_with("live"), "{}", browser.text("#which"));
     let (second, _) = daemon(folder.path(), &listen, &[]);
     browser.until("document.getElementById('link').textContent === 'ready'");
     browser.until("document.getElementById('trouble').hidden");
