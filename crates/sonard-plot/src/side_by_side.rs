@@ -53,8 +53,7 @@ pub fn draw_side_by_side(scans: &[ScanView], scene: Option<&Scene>) -> Picture {
     }
     let below = Px::new(theme::MARGIN_PX, top + 40.0 + height + 28.0);
     let entries = keys::all(&readings, scene, 0);
-    let (key, key_height) =
-        legend::draw(&entries, below, theme::PAGE_PX - 2.0 * theme::MARGIN_PX);
+    let (key, key_height) = legend::draw(&entries, below, theme::PAGE_PX - 2.0 * theme::MARGIN_PX);
     page.add(key);
     Picture::new(theme::PAGE_PX, below.y + key_height + theme::MARGIN_PX / 2.0, page)
 }
