@@ -16,7 +16,7 @@ fn simulator(engine: EngineKind) -> (Simulator, Pose) {
     let scene = Scene::from_json(text).expect("a scene");
     let pose = scene.poses["fig9"];
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-    let options = Options { engine, ..Options::default() };
+    let options = Options::from(engine.options());
     let simulator =
         Simulator::new(Arc::new(scene), sensor, Air::default(), options).expect("good options");
     (simulator, pose)

@@ -18,7 +18,7 @@ use sonard::{
     acoustics::{Air, BeamPattern, Sensor},
     geometry::{DVec2, Pose},
     model::{
-        Engine, EngineKind, Fan, FanSettings, Options, Prediction, Simulator,
+        Engine, Fan, FanOptions, FanSettings, Options, PathOptions, Prediction, Simulator,
         paths::{PathEngine, Paths},
     },
     scan::{PingStatus, ScanPlan},
@@ -55,8 +55,7 @@ fn small_room() {
     let text = shipped::text("simple-room").expect("a shipped scene");
     let scene = Arc::new(Scene::from_json(text).expect("a valid scene"));
     let pose = scene.poses["fig9"];
-    let range =
-        Options { engine: EngineKind::Paths, max_range_m: Some(10.7), ..Options::default() };
+    let range = Options { max_range_m: Some(10.7), ..Options::default() };
     let paths = simulator(scene.clone(), range);
     println!("simple-room, fig9, 400 azimuths to 10.7 m");
     let exact = time(|| drop(black_box(paths.predict(&pose, &FULL_SCAN))));
@@ -88,9 +87,13 @@ fn small_room() {
         let made = Simulator::new(scene.clone(), faceless.clone(), Air::default(), options);
         made.expect("valid options")
     };
-    let ideal = with(Options { ideal_receiver: true, ..range });
+    let ideal = with(Options {
+        engine: PathOptions { ideal_receiver: true, ..PathOptions::default() }.into(),
+        ..range
+    });
     for ray_spacing_deg in [1.0, 0.1, 0.02] {
-        let fan = with(Options { engine: EngineKind::Fan, ray_spacing_deg, ..range });
+        let engine = FanOptions { ray_spacing_deg, ..FanOptions::default() }.into();
+        let fan = with(Options { engine, ..range });
         let time = time(|| drop(black_box(fan.predict(&pose, &FULL_SCAN))));
         let off = readings_off(&fan, &ideal, &pose);
         report(
@@ -170,18 +173,14 @@ fn robot_room() {
     for max_range_m in [2.5, 5.0, 10.7] {
         let paths = simulator(
             scene.clone(),
-            Options {
-                engine: EngineKind::Paths,
-                max_range_m: Some(max_range_m),
-                ..Options::default()
-            },
+            Options { max_range_m: Some(max_range_m), ..Options::default() },
         );
         let exact = time(|| drop(black_box(paths.predict(&pose, &FULL_SCAN))));
         report(&format!("paths to {max_range_m} m"), exact, None);
         let fan = simulator(
             scene.clone(),
             Options {
-                engine: EngineKind::Fan,
+                engine: FanOptions::default().into(),
                 max_range_m: Some(max_range_m),
                 ..Options::default()
             },

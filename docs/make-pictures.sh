@@ -42,15 +42,15 @@ cargo run --release --quiet --example fan_convergence -- "$pictures/fan-converge
 for pose in a b c d; do
   "$SONARD" trace --scene echo-traces --pose "$pose" --until 3 -o "$pictures/echo-trace-$pose.png"
 done
-"$SONARD" simulate --scene simple-room --pose fig9 --out "$work/fig9.jsonl"
+"$SONARD" simulate --scene simple-room --pose fig9 -o "$work/fig9.jsonl"
 "$SONARD" plot "$work/fig9.jsonl" --azimuth-deg 270 -o "$pictures/simple-room-fig9-path.png"
 
 # One room explored in three ways.
-"$SONARD" explore-benchmark --rooms 2 --out "$work/rooms" >/dev/null
+"$SONARD" benchmark explore --rooms 2 --out "$work/rooms" >/dev/null
 cp "$work/rooms/room-2/maps.png" "$pictures/explored.png"
 
 # Eight sonars of a Pioneer 3-DX.
-"$SONARD" simulate --array pioneer-8 --scene mcgill-lab --pose fig4 --out "$work/array.jsonl"
+"$SONARD" simulate --array pioneer-8 --scene mcgill-lab --pose fig4 -o "$work/array.jsonl"
 "$SONARD" plot "$work/array.jsonl" -o "$pictures/array-mcgill-lab.png"
 
 # The live page, as its test sees it in Chromium.

@@ -9,7 +9,7 @@ use std::{error::Error, fs, sync::Arc};
 use sonard::{
     acoustics::{Air, Sensor},
     geometry::wrap_pi,
-    model::{Arrival, EdgeLawKind, EngineKind, Options, Simulator},
+    model::{Arrival, EdgeLawKind, EngineOptions, FanOptions, Options, PathOptions, Simulator},
     plot::{Convergence, badge_of, draw_convergence},
     scan::Provenance,
     scene::{Scene, shipped},
@@ -61,9 +61,13 @@ fn error(scene: &Scene, spacing_deg: f64) -> Result<f64, Box<dyn Error>> {
     let (mut differ, mut all) = (0, 0);
     for pose in scene.poses.values() {
         let plan = Arc::new(scene.with_robot_at(pose));
-        let [exact, fan] = [EngineKind::Paths, EngineKind::Fan]
-            .map(|engine| simulator(&plan, engine, spacing_deg));
-        let (exact, fan) = (exact?, fan?);
+        let exact = PathOptions {
+            ideal_receiver: true,
+            edge_law: Some(EdgeLawKind::KucSiegel),
+            ..PathOptions::default()
+        };
+        let fan = FanOptions { ray_spacing_deg: spacing_deg, ..FanOptions::default() };
+        let (exact, fan) = (simulator(&plan, exact.into())?, simulator(&plan, fan.into())?);
         let [exact, fan] = [&exact, &fan].map(|simulator| simulator.at(pose.position()));
         for azimuth in 0..(360.0 / STEP_DEG) as u32 {
             let direction_rad = pose.direction_rad(STEP_DEG * f64::from(azimuth) + 1.0);
@@ -86,19 +90,11 @@ fn is_loud(echo: &Arrival) -> bool {
     echo.amplitude > THRESHOLD
 }
 
-fn simulator(
-    scene: &Arc<Scene>,
-    engine: EngineKind,
-    ray_spacing_deg: f64,
-) -> Result<Simulator, Box<dyn Error>> {
+fn simulator(scene: &Arc<Scene>, engine: EngineOptions) -> Result<Simulator, Box<dyn Error>> {
     let options = Options {
         engine,
-        ray_spacing_deg,
         max_range_m: Some(MAX_RANGE_M[usize::from(!scene.cylinders.is_empty())]),
         threshold: Some(THRESHOLD),
-        ideal_receiver: true,
-        edge_law: Some(EdgeLawKind::KucSiegel),
-        ..Options::default()
     };
     let sensor = Sensor { face: None, ..Sensor::preset("senscomp-6500")? };
     Ok(Simulator::new(Arc::clone(scene), sensor, Air::default(), options)?)

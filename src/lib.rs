@@ -61,6 +61,8 @@ pub mod config;
 #[cfg(feature = "daemon")]
 pub mod daemon;
 #[cfg(feature = "daemon")]
+pub mod interrupts;
+#[cfg(feature = "daemon")]
 pub mod link;
 #[cfg(feature = "daemon")]
 pub mod mock;

@@ -10,7 +10,7 @@ use std::{fmt::Write as _, sync::Arc};
 use serde::{Deserialize, Serialize};
 use sonard::{
     acoustics::{Air, Sensor},
-    model::{EngineKind, Options, Prediction, Simulator},
+    model::{EngineKind, EngineOptions, FanOptions, Options, Prediction, Simulator},
     scan::ScanPlan,
     scene::{Scene, shipped},
 };
@@ -107,7 +107,12 @@ fn turns(scene_name: &str, text: &str) -> Vec<Turn> {
         for engine in [EngineKind::Paths, EngineKind::Fan, EngineKind::Cone] {
             let sensor = Sensor::preset(sensor_name).expect("golden predictions");
             // The default spacing is fifty times as slow and reads the same.
-            let options = Options { engine, ray_spacing_deg: 1.0, ..Options::default() };
+            let fan = FanOptions { ray_spacing_deg: 1.0, ..FanOptions::default() };
+            let options = match engine {
+                EngineKind::Fan => EngineOptions::from(fan),
+                other => other.options(),
+            };
+            let options = Options::from(options);
             let simulator = Simulator::new(Arc::clone(&scene), sensor, air, options)
                 .expect("golden predictions");
             for (pose_name, pose) in &scene.poses {

@@ -78,6 +78,22 @@ impl fmt::Debug for Emulator {
     }
 }
 
+/// Gives a fresh chip its serial line's settings and its EEPROM.
+///
+/// # Safety
+/// `avr` is a chip that was made and initialised.
+unsafe fn configure(avr: NonNull<sys::avr_t>, config: &Config) {
+    let mut flags = 0_u32;
+    let mut image = config.encode();
+    let mut eeprom =
+        sys::avr_eeprom_desc_t { ee: image.as_mut_ptr(), offset: 0, size: image.len() as u32 };
+    // SAFETY: both calls copy what they are given.
+    unsafe {
+        sys::avr_ioctl(avr.as_ptr(), UART_SET_FLAGS, (&raw mut flags).cast());
+        sys::avr_ioctl(avr.as_ptr(), EEPROM_SET, (&raw mut eeprom).cast());
+    }
+}
+
 impl Emulator {
     /// A chip with the firmware `elf` and an EEPROM that holds `config`, before its first
     /// instruction.
@@ -109,15 +125,7 @@ impl Emulator {
             avr.as_mut().frequency = HZ as u32;
             avr.as_mut().sleep = Some(keep_on);
             avr.as_mut().set_log(0);
-            let mut flags = 0_u32;
-            sys::avr_ioctl(avr.as_ptr(), UART_SET_FLAGS, (&raw mut flags).cast());
-            let mut image = config.encode();
-            let mut eeprom = sys::avr_eeprom_desc_t {
-                ee: image.as_mut_ptr(),
-                offset: 0,
-                size: image.len() as u32,
-            };
-            sys::avr_ioctl(avr.as_ptr(), EEPROM_SET, (&raw mut eeprom).cast());
+            configure(avr, config);
             let pin = |port, bit| sys::avr_io_getirq(avr.as_ptr(), port, bit);
             let mut rig = Box::new(Rig {
                 avr,

@@ -1,20 +1,12 @@
 //! `sonard collect`.
 
 mod adopt;
-mod bar;
-mod changes;
-mod daemon;
-mod device;
 mod load;
 mod own;
-mod patience;
+mod person;
 mod preview;
 mod report;
-mod run;
-mod source;
-mod taking;
 mod terminal;
-mod thermometer;
 
 use std::{
     io::Write as _,
@@ -33,11 +25,15 @@ use super::{
     runtime::{self, Interrupts},
 };
 use crate::{
-    collect::{CollectionKeys, Folder, FolderError, JOURNAL, Journal, Manifest, verify},
+    collect::{
+        ByDaemon, Choices, CollectionKeys, Device, Folder, FolderError, JOURNAL, Journal, Manifest,
+        Plan, verify,
+    },
     config::document,
 };
-use daemon::Daemon;
-use load::Loaded;
+use load::{in_words, load};
+use own::Own;
+use person::Person;
 
 /// Options of `sonard collect`.
 #[derive(Debug, clap::Args)]
@@ -48,23 +44,23 @@ pub(super) struct Args {
     /// The plan, a TOML file: `sonard collect --example` prints one with every key explained
     #[arg(value_name = "PLAN.toml", required_unless_present_any = ["example", "verify", "report"])]
     plan: Option<PathBuf>,
-    /// Folder of the collection, instead of the plan's
+    /// Folder for what is written; in place of the one that the plan names
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
-    /// Set a key of the plan, over the file; may be given several times
+    /// Set a key over the file; may be given several times
     #[arg(long, value_name = "SECTION.KEY=VALUE")]
     set: Vec<String>,
     /// Print a plan with every key, its range and its default, and end
     #[arg(long)]
     example: bool,
-    /// Check the plan and everything it names, and end
+    /// Check all that is named, and end
     #[arg(long)]
     check: bool,
     /// Say how long it takes, how it splits into acoustics, motor and link, and how much disk, and
     /// end
     #[arg(long)]
     plan_only: bool,
-    /// With --plan-only: one JSON object
+    /// JSON instead of text; one object, with --plan-only
     #[arg(long, requires = "plan_only")]
     json: bool,
     /// Check a collection's files against its manifest, and end
@@ -82,14 +78,15 @@ pub(super) struct Args {
     /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number
     #[arg(long, value_name = "PATH|ID")]
     port: Option<String>,
-    /// Use a mock ranger, which is carried to each pose
+    /// Use a mock ranger instead of a real one; it is carried to each pose
     #[arg(long)]
     mock: bool,
-    /// Use the firmware's machine code in an emulated board, one for each pose
+    /// Use the firmware's machine code in an emulated board (starts sonard-emulator); one board for
+    /// each pose
     #[arg(long)]
     emulator: bool,
-    /// Let a running daemon take the scans, with its own ranger, sensor and motion; its own scans are
-    /// held meanwhile
+    /// Let a running daemon take the scans; with its own ranger, sensor and motion, and its own
+    /// scans held meanwhile
     #[arg(long, conflicts_with_all = mock_world::OPTIONS)]
     daemon: bool,
     #[command(flatten)]
@@ -136,34 +133,46 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(root) = &args.report {
         return write_report(root);
     }
-    let mut loaded = Loaded::new(args)?;
+    let mut plan = load(args)?;
     runtime::new()?.block_on(async {
         let interrupts = Interrupts::listen();
         let daemon = match args.daemon {
-            true => Some(daemon(args, &mut loaded, interrupts.clone()).await?),
+            true => Some(daemon(args, &mut plan, interrupts.clone()).await?),
             false => None,
         };
         if args.check {
-            return say(&loaded.in_words());
+            return say(&in_words(&plan));
         }
         if args.plan_only {
-            return say(&preview::of(&loaded, args)?);
+            return say(&preview::of(&plan, args)?);
         }
         // With a handler, a file that gets too large is an error of the write and not the end.
         let _too_large = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()));
-        run::collect(args, loaded, daemon, interrupts).await
+        match daemon {
+            Some(daemon) => collect(args, plan, daemon, interrupts).await,
+            None => {
+                let own = Own::new(args, &plan, interrupts.clone());
+                collect(args, plan, own, interrupts).await
+            }
+        }
     })
 }
 
+async fn collect(args: &Args, plan: Plan, device: impl Device, interrupts: Interrupts) -> Outcome {
+    let choices = Choices {
+        accept_changed_plan: args.accept_changed_plan,
+        retry_given_up: args.retry_given_up,
+    };
+    let person = Person::new(plan.azimuths.beams());
+    Ok(crate::collect::collect(plan, choices, device, person, interrupts).await?)
+}
+
 /// The daemon that is to take the scans, if it would take those of the plan.
-async fn daemon(
-    args: &Args,
-    loaded: &mut Loaded,
-    interrupts: Interrupts,
-) -> Result<Daemon, Failure> {
-    let (daemon, status) = Daemon::find(args.at.client()?, interrupts).await?;
-    check_scene(status.scene.as_ref(), &loaded.scene)?;
-    loaded.adopt(&daemon, &status)?;
+async fn daemon(args: &Args, plan: &mut Plan, interrupts: Interrupts) -> Result<ByDaemon, Failure> {
+    let tell = |line: &str| anstream::eprintln!("{line}");
+    let (daemon, status) = ByDaemon::find(args.at.client()?, interrupts, tell).await?;
+    check_scene(status.scene.as_ref(), &plan.scene)?;
+    plan.adopt(&daemon, &status)?;
     Ok(daemon)
 }
 

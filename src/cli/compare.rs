@@ -29,17 +29,18 @@ pub(super) struct Args {
     /// Logs to compare; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// Scene file or name of a shipped scene: predict again in it, with the log's sensor, air and
-    /// model, instead of taking the predictions in the log. Without it, measured scans that have no
-    /// prediction beside them get one in the scene of the log, if the log holds it
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it again, with
+    /// the log's sensor, air and model, instead of taking the predictions in the log. Without it,
+    /// measured scans that have no prediction beside them get one in the scene of the log, if the
+    /// log holds it
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
     #[command(flatten)]
     what_if: WhatIfArgs,
     /// How many of the beams that fit worst to list
-    #[arg(long, default_value_t = 5)]
+    #[arg(long, value_name = "N", default_value_t = 5)]
     worst: usize,
-    /// One JSON object a log, and after several logs one for all of them
+    /// JSON instead of text; one object a log, and after several logs one for all of them
     #[arg(long)]
     json: bool,
 }

@@ -23,7 +23,7 @@ pub(super) struct Args {
     /// Firings
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pings: u32,
-    /// Print one JSON object
+    /// JSON instead of text; one object
     #[arg(long)]
     json: bool,
 }

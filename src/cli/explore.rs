@@ -43,13 +43,13 @@ pub(super) struct Args {
     sensing: SensingName,
     #[command(flatten)]
     robot: RobotArgs,
-    /// Seed of the noise of ranges, laser and odometry
+    /// Seed of what is random; noise of ranges, laser and odometry
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder for the map, what the laser saw, the stops and pictures
+    /// Folder for what is written; the map, what the laser saw, the stops and pictures
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
-    /// Print one JSON object
+    /// JSON instead of text; one object
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -76,9 +76,9 @@ pub(super) struct RobotArgs {
     /// Leave out sonar readings beyond this "logical" distance, metres
     #[arg(long, value_name = "M", default_value_t = ExploreSettings::default().map.logical_m)]
     logical: f64,
-    /// The sonars listen as far as this, metres
+    /// How far the sonars listen, metres
     #[arg(long, value_name = "M", default_value_t = 8.0)]
-    pub(super) max_range: f64,
+    pub(super) sonar_range: f64,
     /// Give up after so many stops
     #[arg(long, value_name = "N", default_value_t = ExploreSettings::default().most_stops)]
     most_stops: usize,
@@ -126,8 +126,8 @@ Map errors, in metres, each distance counting up to 0.5: the line error is the m
 map's lines are from walls and how far walls are from the map's lines (both along their length); the \
 endpoint error is the mean of how far ends of lines are from ends of walls and the other way round; \
 the map error is the mean of the two.
-Exit codes: 0 done, 1 stopped before everything was explored, 2 wrong usage or input, 3 a file can't \
-be written.";
+Exit codes: 0 done, 1 stopped before everything was explored, 2 wrong usage or input, 3 the disk gave \
+up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let (scene, pose) = args.place.load()?;
@@ -136,7 +136,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let sensing = args.sensing.sensing();
     let (robot, settings) = args.robot.settings()?;
-    let options = Options { max_range_m: Some(args.robot.max_range), ..Options::default() };
+    let options = Options { max_range_m: Some(args.robot.sonar_range), ..Options::default() };
     let simulator =
         Simulator::new(Arc::new(scene), args.sensor.sensor()?, args.air.air()?, options)
             .map_err(|error| Failure::input(error, "see `sonard explore --help`"))?;

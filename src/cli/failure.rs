@@ -4,7 +4,7 @@ use std::{io, process::ExitCode};
 
 use miette::Report;
 
-use crate::scan::SinkError;
+use crate::{collect::Halt, scan::SinkError};
 
 /// What a verb returns.
 pub type Outcome = Result<(), Failure>;
@@ -32,11 +32,6 @@ impl Failure {
         Self::Device(miette::miette!(help = help.to_string(), "{message}"))
     }
 
-    /// Somebody did not want the rest.
-    pub(super) fn stopped() -> Self {
-        Self::Found(Some("stopped on request".into()))
-    }
-
     /// A failed write to standard output or a file; a reader that went away is no failure.
     ///
     /// # Errors
@@ -45,10 +40,19 @@ impl Failure {
         if error.kind() == io::ErrorKind::BrokenPipe {
             return Ok(());
         }
-        Err(Self::device(
-            format!("cannot write {what}: {error}"),
-            "check free space and permissions; what was written before is kept",
-        ))
+        Err(Self::unwritable(&what, error))
+    }
+
+    /// A place that was named and can't be written to, which is wrong input, or a disk that gave up.
+    pub(super) fn unwritable(what: &dyn std::fmt::Display, error: &io::Error) -> Self {
+        let message = format!("cannot write {what}: {error}");
+        match is_wrong_place(error) {
+            true => Self::input(
+                message,
+                "give a file in a folder that exists and that you may write to",
+            ),
+            false => Self::device(message, "check free space; what was there before is kept"),
+        }
     }
 }
 
@@ -56,6 +60,44 @@ impl From<SinkError> for Failure {
     fn from(error: SinkError) -> Self {
         Self::device(&error, error.help())
     }
+}
+
+impl From<Halt> for Failure {
+    fn from(halt: Halt) -> Self {
+        match halt {
+            Halt::Stopped(why) => Self::Found(Some(why)),
+            Halt::Wrong { message, help } => Self::input(message, help),
+            Halt::Failed { message, help } => Self::device(message, help),
+        }
+    }
+}
+
+/// For what verbs lend to a collection.
+impl From<Failure> for Halt {
+    fn from(failure: Failure) -> Self {
+        let help = |report: &Report| report.help().map(|help| help.to_string()).unwrap_or_default();
+        match failure {
+            Failure::Found(why) => Self::Stopped(why.unwrap_or_default()),
+            Failure::Input(report) => Self::wrong(&report, help(&report)),
+            Failure::Device(report) => Self::failed(&report, help(&report)),
+        }
+    }
+}
+
+/// Whether another place would do: the one that was named is not there, or not for writing.
+pub(super) fn is_wrong_place(error: &io::Error) -> bool {
+    use io::ErrorKind as Kind;
+    matches!(
+        error.kind(),
+        Kind::NotFound
+            | Kind::PermissionDenied
+            | Kind::ReadOnlyFilesystem
+            | Kind::IsADirectory
+            | Kind::NotADirectory
+            | Kind::AlreadyExists
+            | Kind::InvalidFilename
+            | Kind::InvalidInput
+    )
 }
 
 /// Prints a failure and turns it into the process's exit code.

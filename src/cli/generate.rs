@@ -2,11 +2,11 @@
 
 use std::{fs, io, path::Path};
 
-use clap::{Command, CommandFactory as _};
+use clap::Command;
 use clap_complete::{Shell, generate_to};
 use clap_mangen::roff::{Roff, bold, italic, roman};
 
-use super::{Cli, Failure, Outcome, output::OutPath};
+use super::{Failure, Outcome, command_line, output::OutPath};
 use crate::config::{Key, Section, sections};
 
 /// Options of `sonard generate`.
@@ -17,10 +17,8 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    write_all(&args.dir).map_err(|error| {
-        let dir = args.dir.display();
-        Failure::device(format!("cannot write into {dir}: {error}"), "give a folder to write into")
-    })
+    write_all(&args.dir)
+        .map_err(|error| Failure::unwritable(&format!("into {}", args.dir.display()), &error))
 }
 
 fn write_all(dir: &Path) -> io::Result<()> {
@@ -29,7 +27,7 @@ fn write_all(dir: &Path) -> io::Result<()> {
         fs::create_dir_all(folder)?;
     }
     // Lines are filled by whoever shows the page.
-    let command = Cli::command().term_width(0);
+    let command = command_line().term_width(0);
     clap_mangen::generate_to(command.clone(), &pages)?;
     for shell in [Shell::Bash, Shell::Zsh, Shell::Fish] {
         generate_to(shell, &mut command.clone(), "sonard", &completions)?;
@@ -105,7 +103,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         write_all(folder.path()).expect("there is room");
         let read = |name: &str| fs::read_to_string(folder.path().join(name)).expect("it is there");
-        for verb in Cli::command().get_subcommands().filter(|verb| !verb.is_hide_set()) {
+        for verb in command_line().get_subcommands().filter(|verb| !verb.is_hide_set()) {
             let page = read(&format!("man1/sonard-{}.1", verb.get_name()));
             assert!(page.contains(".SH OPTIONS"), "{}", verb.get_name());
         }
@@ -118,7 +116,7 @@ mod tests {
             }
         }
         for name in ["sonard.bash", "_sonard", "sonard.fish"] {
-            assert!(read(&format!("completions/{name}")).contains("map-benchmark"), "{name}");
+            assert!(read(&format!("completions/{name}")).contains("benchmark"), "{name}");
         }
     }
 }

@@ -30,21 +30,23 @@ use crate::{
 pub(super) struct Args {
     /// The file; - for standard input
     file: PathBuf,
-    /// Where to write the log [default: standard output]
-    #[arg(long, value_name = "FILE")]
-    out: Option<OutPath>,
+    /// File to write; the log goes to it instead of to standard output
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<OutPath>,
     #[command(flatten)]
     overwrite: Overwrite,
     #[command(flatten)]
     columns: ColumnArgs,
-    /// Where the robot stands, as far as the file does not say: X,Y,DEG, or a pose's name in the scene
-    /// [default: not known]
+    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene; as far as
+    /// the file does not say
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
-    /// The scene that the readings are from: a file, or the name of a shipped one; it goes into the log
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it whoever asks: it
+    /// goes into the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// Where the rangers of a CARMEN or Player log are, if it does not say: an array's name or file
+    /// Array of rangers, a preset (pioneer-8, pioneer-7, ring-12) or a file with an array's data; of a
+    /// CARMEN or Player log that does not say where its rangers are
     #[arg(long, value_name = "NAME|FILE")]
     array: Option<String>,
     /// Take the numbers for what they are said to be, whatever speaks against it
@@ -117,14 +119,14 @@ tof_us|ms|s; time (2026-01-31T12:00:00Z) or time_s|ms|us|ns (since 1970); scan; 
 heading_deg|rad; temperature_c|k; status.
 
 Examples:
-  sonard import sweep.csv --out sweep.jsonl
+  sonard import sweep.csv -o sweep.jsonl
   sonard import sweep.csv --columns azimuth_deg=1,range_cm=2 --clockwise --none 255 \\
-    --sensor hc-sr04 --pose 1.2,0.8,90 --scene my-room.json --out sweep.jsonl
+    --sensor hc-sr04 --pose 1.2,0.8,90 --scene my-room.json -o sweep.jsonl
   sonard import sweeps.json --columns scan=id,bearing_deg=bearings,range_m=ranges,x_m=at.0,y_m=at.1 \\
-    --out sweeps.jsonl
-  sonard import robot.clf --none-from 5 --sensor pioneer --out robot.jsonl
+    -o sweeps.jsonl
+  sonard import robot.clf --none-from 5 --sensor pioneer -o robot.jsonl
 
-Exit codes: 0 done, 2 wrong usage or input, 3 the file can't be written.";
+Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let name = args.file.display().to_string();
@@ -143,12 +145,12 @@ pub(super) fn run(args: &Args) -> Outcome {
         })
     };
     let found = Source { open: &open }.examine(mapping, taken).map_err(refuse)?;
-    let mut out = match &args.out {
+    let mut out = match &args.output {
         Some(out) => args.overwrite.begin(out, Product::Log)?,
         None => Stream::standard(),
     };
     let written = |error: &io::Error| {
-        let to = args.out.as_ref().map(|out| out.display().to_string());
+        let to = args.output.as_ref().map(|out| out.display().to_string());
         Failure::from_write(to.as_deref().unwrap_or("standard output"), error)
     };
     let session = session(args, &found, scene.as_ref(), sensor, &air);

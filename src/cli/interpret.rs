@@ -28,12 +28,13 @@ pub(super) struct Args {
     /// Logs of scans by one ranger, from one place or more; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// One JSON object a feature
+    /// JSON instead of text; one object a feature
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     picture: PictureArgs,
-    /// Scene file or name of a shipped scene to draw; without it, the one in the log
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); only draws its walls, in
+    /// place of those of the scene in the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
     /// Strength of an edge's echo, sigma_E: for the boundary between edges and the rest
@@ -64,13 +65,13 @@ narrower than b(r), half way between what the sensor gives edges and what it giv
 corners, is an edge. A plane is seen in the same direction from a second place, a corner is not. \
 Beyond the paper, an arc may be something else: sound by way of several walls, between a wall and \
 the ranger, from a round body; it has a probability too, the greater the more nearer arcs the arc lies \
-behind. `sonard interpret-benchmark` measures how often probabilities come true. Repeats from one \
+behind. `sonard benchmark interpret` measures how often probabilities come true. Repeats from one \
 pose count as one scan. With one scan, planes and corners stay `unresolved`, with the place to scan from next that decides \
 most of them; give the log of that scan too, and they are decided.";
 
 const HELP: &str = "\
 Examples:
-  sonard simulate --scene plane-corner-edge --pose fig13 --sensor bozma-kuc-60khz --out one.jsonl
+  sonard simulate --scene plane-corner-edge --pose fig13 --sensor bozma-kuc-60khz -o one.jsonl
   sonard interpret one.jsonl -o one.png
   sonard interpret one.jsonl two.jsonl --json
 
@@ -80,7 +81,7 @@ each other), lost (not seen again), ambiguous (several arcs fit, or none), inter
 (something nearer covers a part of the arc), cut_off (the scan ends in it), extent (fits neither), \
 reflections (behind what may be walls: the sound may have come by way of them), min_range (closer than \
 can be measured, or so near to that that a part may be).
-Exit codes: 0 done, also if nothing was found, 2 wrong usage or input, 3 a picture can't be written.";
+Exit codes: 0 done, also if nothing was found, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let targets = args.picture.targets()?;

@@ -31,15 +31,16 @@ pub(super) struct Args {
     /// standard input
     #[arg(long, value_name = "FILE")]
     laser: Vec<PathBuf>,
-    /// Leave out readings beyond this "logical" distance, metres
+    /// Leave out sonar readings beyond this "logical" distance, metres
     #[arg(long, value_name = "M", default_value_t = LineMapSettings::default().logical_m)]
     logical: f64,
-    /// One JSON object a line
+    /// JSON instead of text; one object a line of the map
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     picture: PictureArgs,
-    /// Scene file or name of a shipped scene to draw; without it, the one in the log
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); only draws its walls, in
+    /// place of those of the scene in the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
 }
@@ -63,7 +64,7 @@ back: {\"pose\":{\"x_m\":1,\"y_m\":0.5,\"heading_deg\":90},\"returns\":[{\"azimu
 Lines it saw are `laser`, and `complex` where sonar lines were laid onto them; ends that it saw are \
 terminal.
 
-Exit codes: 0 done, 2 wrong usage or input, 3 a picture can't be written.";
+Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     if !(args.logical.is_finite() && args.logical > 0.0) {
@@ -91,7 +92,7 @@ fn read(args: &Args) -> Result<(Vec<ScanView>, LineMap, usize), Failure> {
         left_out += map.add_sonar(&sweep);
         count += 1;
         // A picture shows all readings; without one they need not stay in memory.
-        if !args.picture.out.is_empty() {
+        if !args.picture.output.is_empty() {
             scans.add(scan);
         }
     })?;

@@ -10,7 +10,7 @@ use std::io::{self, Write as _};
 
 use crate::{scan::Record, store::StoreError};
 
-use super::{Failure, Outcome};
+use super::{Failure, Outcome, failure::is_wrong_place};
 
 /// Verbs of `sonard log`.
 #[derive(Debug, clap::Subcommand)]
@@ -46,10 +46,15 @@ fn schema() -> Outcome {
 }
 
 impl From<StoreError> for Failure {
-    /// A path that can't be opened is wrong input; a lock or a disk that fails is not.
+    /// A path that can't be opened is wrong input; a lock or a disk that fails is not, wherever it is.
     fn from(error: StoreError) -> Self {
         match &error {
-            StoreError::Open { .. } | StoreError::Unreadable { .. } | StoreError::NoLog { .. } => {
+            StoreError::Unreadable { .. } | StoreError::NoLog { .. } => {
+                Self::input(&error, error.help())
+            }
+            StoreError::Open { source, .. } | StoreError::Write { source, .. }
+                if is_wrong_place(source) =>
+            {
                 Self::input(&error, error.help())
             }
             _ => Self::device(&error, error.help()),

@@ -1,11 +1,8 @@
 //! `sonard map`.
 
-use std::{
-    io::{self, Write},
-    path::{Path, PathBuf},
-};
+mod summary;
 
-use serde::Serialize;
+use std::path::PathBuf;
 
 use super::{
     Failure, Outcome,
@@ -42,11 +39,11 @@ pub(super) struct Args {
     /// Logs whose scans have poses; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// Folder for map.pgm, map.yaml and map.png
+    /// Folder for what is written; map.pgm, map.yaml and map.png
     #[arg(long, value_name = "DIR")]
     out: OutPath,
     /// Whether readings that predicted features contradict count less
-    #[arg(long, value_enum, default_value_t = Switch::On)]
+    #[arg(long, value_enum, value_name = "ON|OFF", default_value_t = Switch::On)]
     feature_prediction: Switch,
     /// What a reading says about the space before the ranger
     #[arg(long, value_enum, default_value_t = ModelName::Gaussian)]
@@ -54,9 +51,9 @@ pub(super) struct Args {
     /// Side of a cell, metres
     #[arg(long, value_name = "M", default_value_t = 0.05)]
     resolution: f64,
-    /// Take longer ranges as silence, metres [default: the sensor's, at most 5]
+    /// Take ranges beyond this as silence, metres [default: the sensor's, at most 5]
     #[arg(long, value_name = "M")]
-    max_range: Option<f64>,
+    silent_beyond: Option<f64>,
     /// Map this region: X0,Y0,X1,Y1 in metres [default: around what was seen]
     #[arg(long, value_name = "REGION", allow_hyphen_values = true, value_parser = region)]
     region: Option<[f64; 4]>,
@@ -82,18 +79,18 @@ pub(super) struct Args {
     /// Write the confidence of every reading to this file, one JSON object a line
     #[arg(long, value_name = "FILE")]
     confidences: Option<OutPath>,
-    /// Scene file or name of a shipped scene whose walls to draw over map.png; without it, the
-    /// one in the log
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); only draws its walls, in
+    /// place of those of the scene in the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// Print one JSON object
+    /// JSON instead of text; one object
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     overwrite: Overwrite,
 }
 
-/// What did best on the made-up rooms of `sonard map-benchmark`.
+/// What did best on the made-up rooms of `sonard benchmark map`.
 pub(super) const EXTEND_M: f64 = 2.0;
 /// The same.
 pub(super) const LEAST_CONFIDENCE: f64 = 0.48;
@@ -126,11 +123,11 @@ Examples:
   sonard map run/*.jsonl --out map
   sonard map scan.jsonl --out map --feature-prediction off --resolution 0.02 --json
   sonard map today.jsonl --onto map --out map-today
-  sonard map-score map simple-room
+  sonard benchmark score map simple-room
 
 A confidence is 0.5 where nothing speaks against a reading and less where something does; clear_m \
 is how far the reading is right in any case.
-Exit codes: 0 done, 2 wrong usage or input, 3 a file can't be written.";
+Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     if let Some(map) = &args.onto {
@@ -149,9 +146,11 @@ pub(super) fn run(args: &Args) -> Outcome {
         Failure::input(format!("session: {error}"), "correct the session's record in the log")
     })?;
     let sensor_m = extents.max_range_m.min(MAX_RANGE_M);
-    let max_range_m = args.max_range.unwrap_or(sensor_m);
+    let max_range_m = args.silent_beyond.unwrap_or(sensor_m);
     if !(max_range_m.is_finite() && max_range_m > 0.0) {
-        return Err(refuse(&format!("--max-range {max_range_m}: give a length greater than 0")));
+        return Err(refuse(&format!(
+            "--silent-beyond {max_range_m}: give a length greater than 0"
+        )));
     }
     let begun = match &args.onto {
         Some(map) => map_file::read(map)?,
@@ -345,101 +344,6 @@ fn write_confidence(bytes: &mut Vec<u8>, scan: uuid::Uuid, index: u32, worth: &A
     });
     bytes.extend_from_slice(line.to_string().as_bytes());
     bytes.push(b'\n');
-}
-
-/// What is printed.
-#[derive(Debug, Serialize)]
-struct Summary<'a> {
-    map: PathBuf,
-    scans: usize,
-    evidence: u8,
-    readings: usize,
-    feature_prediction: bool,
-    mean_confidence: Option<f64>,
-    left_out: usize,
-    poses_outside: usize,
-    resolution_m: f64,
-    width: usize,
-    height: usize,
-    origin_m: [f64; 2],
-    occupied_cells: usize,
-    free_cells: usize,
-    unknown_cells: usize,
-    #[serde(skip)]
-    out: &'a Path,
-}
-
-impl Mapped {
-    fn summary<'a>(&self, args: &'a Args, taken: &[(uuid::Uuid, Sweep)]) -> Summary<'a> {
-        let shape = self.grid.shape();
-        let of = |wanted: fn(f64) -> bool| self.grid.probabilities().filter(|p| wanted(*p)).count();
-        let predicted = args.feature_prediction == Switch::On && self.readings > 0;
-        Summary {
-            map: args.out.join("map.yaml"),
-            scans: taken.len(),
-            evidence: args.evidence(taken.len()),
-            readings: self.readings,
-            feature_prediction: args.feature_prediction == Switch::On,
-            mean_confidence: predicted.then(|| self.confidence / self.readings as f64),
-            left_out: self.left_out,
-            poses_outside: self.outside,
-            resolution_m: shape.resolution_m,
-            width: shape.width,
-            height: shape.height,
-            origin_m: shape.origin.into(),
-            occupied_cells: of(|p| p > 0.65),
-            free_cells: of(|p| p < 0.196),
-            unknown_cells: of(|p| (0.196..=0.65).contains(&p)),
-            out: &args.out,
-        }
-    }
-}
-
-impl Summary<'_> {
-    /// What stands under the picture's title.
-    fn of_cells(&self) -> String {
-        format!(
-            "{} scans, {} readings \u{b7} {}x{} cells of {} m: {} occupied, {} free, {} between",
-            self.scans,
-            self.readings,
-            self.width,
-            self.height,
-            self.resolution_m,
-            self.occupied_cells,
-            self.free_cells,
-            self.unknown_cells
-        )
-    }
-
-    fn print(&self, out: &mut impl Write) -> io::Result<()> {
-        writeln!(
-            out,
-            "{} scans, {} readings -> {}x{} cells of {} m in {}: {} occupied, {} free, {} between",
-            self.scans,
-            self.readings,
-            self.width,
-            self.height,
-            self.resolution_m,
-            self.out.display(),
-            self.occupied_cells,
-            self.free_cells,
-            self.unknown_cells
-        )?;
-        if let Some(confidence) = self.mean_confidence {
-            writeln!(out, "mean confidence {confidence:.3}, {} readings left out", self.left_out)?;
-        }
-        if self.evidence > 1 {
-            writeln!(out, "each scan counted {} times (--evidence)", self.evidence)?;
-        }
-        if self.poses_outside > 0 {
-            writeln!(
-                out,
-                "{} poses lie outside the map: give a --region around them, or none",
-                self.poses_outside
-            )?;
-        }
-        Ok(())
-    }
 }
 
 fn region(text: &str) -> Result<[f64; 4], String> {

@@ -6,12 +6,15 @@ use super::{
     Failure, Outcome,
     array::NoArray,
     mock_world::{Belief, MockWorldArgs},
-    options::{AirArgs, EngineArgs, SensorArgs},
+    options::{AirArgs, SensorArgs, engine_options},
     output::OutPath,
     place::PlaceArgs,
     runtime,
 };
-use crate::mock::{MockPort, Note};
+use crate::{
+    mock::{MockPort, Note},
+    model::OptionKeys,
+};
 
 /// Firings between two lines of output.
 const FIRINGS_A_LINE: u64 = 100;
@@ -32,7 +35,7 @@ pub(super) struct Args {
     #[command(flatten)]
     air: AirArgs,
     #[command(flatten)]
-    engine: EngineArgs,
+    engine: OptionKeys,
     #[command(flatten)]
     no_array: NoArray,
 }
@@ -56,7 +59,8 @@ Examples:
 pub(super) fn run(args: &Args) -> Outcome {
     let (scene, pose) = args.place.load()?;
     let scene = Arc::new(scene);
-    let (sensor, air, options) = (args.sensor.sensor()?, args.air.air()?, args.engine.options()?);
+    let (sensor, air, options) =
+        (args.sensor.sensor()?, args.air.air()?, engine_options(&args.engine)?);
     let belief =
         Belief { scene: &scene, pose: &pose, sensor: &sensor, air: &air, options: &options };
     let board = args.world.board(&belief)?;

@@ -42,7 +42,7 @@ pub(super) struct MockWorldArgs {
     /// Pace the mock by the wall clock instead of as fast as possible
     #[arg(long)]
     realtime: bool,
-    /// Seed of noise, missed steps and faults
+    /// Seed of what is random; noise, missed steps and faults
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Faults to play
@@ -57,7 +57,7 @@ pub(super) struct MockWorldArgs {
     /// How far the transducer is turned on the motor's shaft, degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     mounting_offset_deg: f64,
-    /// Motor steps a revolution
+    /// Motor steps a revolution, microsteps and gears counted in
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u16).range(4..=12800))]
     steps_per_revolution: u16,
 }

@@ -4,8 +4,8 @@ use std::{fs, io};
 
 use super::Failure;
 use crate::{
-    acoustics::{Air, Response, Sensor, SensorError},
-    model::{EdgeLawKind, EngineKind, Options},
+    acoustics::{Air, Sensor, SensorError},
+    model::{OptionKeys, Options},
     scene::suggest,
 };
 
@@ -54,87 +54,9 @@ pub(super) struct AirArgs {
     /// Static pressure, kilopascals
     #[arg(long, value_name = "KPA", default_value_t = 101.325)]
     pressure_kpa: f64,
-    /// Speed of sound, metres a second, instead of the one that follows from the air
+    /// Speed of sound, metres a second; instead of the one that follows from the air
     #[arg(long, value_name = "M/S")]
     sound_speed: Option<f64>,
-}
-
-/// How echoes are predicted.
-#[derive(Debug, Clone, Copy, clap::Args)]
-#[command(next_help_heading = "Model")]
-pub(super) struct EngineArgs {
-    /// How echoes are found
-    #[arg(long, value_enum, default_value_t = EngineName::Paths)]
-    engine: EngineName,
-    /// Listen up to this range, metres [default: the sensor's]
-    #[arg(long, value_name = "M")]
-    max_range: Option<f64>,
-    /// Least amplitude detected; a head-on, perfect wall gives 1 [default: the sensor's]
-    #[arg(long, value_name = "T")]
-    threshold: Option<f64>,
-    /// How the face answers to a pulse [default: the sensor's]
-    #[arg(long, value_enum)]
-    response: Option<ResponseName>,
-    /// Detect one sound at a time and time it by its path alone; `fan` and `cone` always do
-    #[arg(long)]
-    ideal_receiver: bool,
-    /// Leave out the absorption of the air
-    #[arg(long)]
-    lossless: bool,
-    /// Most mirror reflections on a path [default: as many as can matter]
-    #[arg(long, value_name = "N")]
-    max_order: Option<u32>,
-    /// How edges diffract [default: the sensor's, or utd; `fan` has kuc-siegel only]
-    #[arg(long, value_enum)]
-    edge_law: Option<EdgeLaw>,
-    /// Also follow sound that bends at two edges (`paths`)
-    #[arg(long)]
-    double_diffraction: bool,
-    /// Angle between the rays of `fan`, degrees
-    #[arg(long, value_name = "DEG", default_value_t = Options::default().ray_spacing_deg)]
-    ray_spacing_deg: f64,
-    /// Full aperture of `cone`, degrees [default: the sensor's two-way -6 dB width]
-    #[arg(long, value_name = "DEG")]
-    aperture_deg: Option<f64>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum EngineName {
-    /// Exact echo paths, all of them
-    Paths,
-    /// Rays with mirror reflections and diffraction, after Dudek, Jenkin, Milios and Wilkes
-    Fan,
-    /// Nearest hit of one ray a degree
-    Cone,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum ResponseName {
-    /// By its beam pattern
-    Stationary,
-    /// Point by point: echoes off the axis begin earlier, and the pattern's nulls fill up
-    Full,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum EdgeLaw {
-    /// Uniform coefficients for the wedge's angle and aspect (Kouyoumjian and Pathak)
-    Utd,
-    /// One ratio to a plane at the same range, whatever the aspect
-    KucSiegel,
-    /// One scattering strength, whatever the aspect, level with planes at the face
-    BozmaKuc,
-}
-
-impl EdgeLaw {
-    /// The same for the model.
-    pub(super) const fn kind(self) -> EdgeLawKind {
-        match self {
-            Self::Utd => EdgeLawKind::Utd,
-            Self::KucSiegel => EdgeLawKind::KucSiegel,
-            Self::BozmaKuc => EdgeLawKind::BozmaKuc,
-        }
-    }
 }
 
 impl SensorArgs {
@@ -242,43 +164,17 @@ impl AirArgs {
     }
 }
 
-impl EngineArgs {
-    /// The model's options; a law that the engine has not is refused.
-    pub(super) fn options(&self) -> Result<Options, Failure> {
-        let engine = match self.engine {
-            EngineName::Paths => EngineKind::Paths,
-            EngineName::Fan => EngineKind::Fan,
-            EngineName::Cone => EngineKind::Cone,
-        };
-        let of_paths = self.edge_law.is_some_and(|law| law != EdgeLaw::KucSiegel);
-        if engine == EngineKind::Fan && of_paths {
-            return Err(Failure::input(
-                "--edge-law: `fan` has kuc-siegel only",
-                "leave --edge-law out, or use --engine paths",
-            ));
-        }
-        if engine != EngineKind::Paths && self.double_diffraction {
-            return Err(Failure::input(
-                "--double-diffraction: only `paths` follows sound round two edges",
-                "leave it out, or use --engine paths",
-            ));
-        }
-        Ok(Options {
-            engine,
-            response: self.response.map(|response| match response {
-                ResponseName::Stationary => Response::Stationary,
-                ResponseName::Full => Response::Full,
-            }),
-            ideal_receiver: self.ideal_receiver,
-            max_range_m: self.max_range,
-            threshold: self.threshold,
-            lossless: self.lossless,
-            max_order: self.max_order,
-            edge_law: self.edge_law.map(EdgeLaw::kind),
-            double_diffraction: self.double_diffraction,
-            ray_spacing_deg: self.ray_spacing_deg,
-            aperture_deg: self.aperture_deg,
-            ..Options::default()
-        })
-    }
+/// The model's options, each of which the engine has to know.
+pub(super) fn engine_options(keys: &OptionKeys) -> Result<Options, Failure> {
+    keys.options().map_err(|error| {
+        let engines: Vec<_> = error.of.iter().map(|engine| engine.name()).collect();
+        Failure::input(
+            format!(
+                "--{}: {} does not know it",
+                error.option.replace('_', "-"),
+                error.engine.name()
+            ),
+            format!("leave it out, or use --engine {}", engines.join(" or --engine ")),
+        )
+    })
 }

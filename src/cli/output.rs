@@ -5,11 +5,12 @@
 //! none. A picture, a map or a list takes the place of an older one of its kind; anything else that is
 //! there is refused unless `--force` says to replace it. Measured logs are added to, never replaced.
 
+mod stream;
+
 use std::{
     ffi::OsStr,
     fs::{self, File, Metadata, OpenOptions},
-    io::{self, BufWriter, Read as _, StdoutLock, Write},
-    mem,
+    io::{self, BufWriter, Read as _, Write as _},
     os::{
         fd::{AsFd, BorrowedFd},
         unix::fs::{FileTypeExt as _, MetadataExt as _},
@@ -25,7 +26,8 @@ use clap::{
 };
 
 use super::{Failure, Outcome};
-use crate::store::{FileKind, HEAD_BYTES, WholeFile};
+use crate::store::{FileKind, HEAD_BYTES, LogWriter, RecordWriter, StoreError, WholeFile};
+pub(super) use stream::Stream;
 
 /// A path on the command line that is written to.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -281,10 +283,7 @@ impl Overwrite {
 }
 
 fn failed(path: &Path, error: &io::Error) -> Failure {
-    Failure::device(
-        format!("cannot write {}: {error}", path.display()),
-        "check that its folder exists, may be written to and has room; what was there before is kept",
-    )
+    Failure::unwritable(&path.display(), error)
 }
 
 /// The beginning of a file.
@@ -294,51 +293,22 @@ fn head(path: &Path) -> io::Result<Vec<u8>> {
     Ok(head)
 }
 
-/// What a verb writes to.
-#[derive(Debug)]
-pub(super) enum Stream {
-    Standard(BufWriter<StdoutLock<'static>>),
-    File(BufWriter<WholeFile>),
-    Device(File),
-    /// Nothing more comes.
-    Finished,
+/// Where a verb's records go: a file that takes its place when it is whole, or standard output.
+pub(super) fn records_to(
+    path: Option<&Path>,
+    overwrite: Overwrite,
+) -> Result<Box<dyn RecordWriter>, Failure> {
+    let Some(path) = path else {
+        let name = Path::new("standard output");
+        return Ok(Box::new(LogWriter::new(Stream::standard(), name)));
+    };
+    let stream = overwrite.begin(path, Product::Log)?;
+    Ok(Box::new(LogWriter::new(stream, path).with_scenes_beside()))
 }
 
-impl Stream {
-    pub(super) fn standard() -> Self {
-        Self::Standard(BufWriter::new(io::stdout().lock()))
-    }
-
-    /// Puts the file in its place.
-    pub(super) fn finish(&mut self) -> io::Result<()> {
-        self.flush()?;
-        match mem::replace(self, Self::Finished) {
-            Self::File(file) => {
-                file.into_inner().map_err(io::IntoInnerError::into_error)?.take_place()
-            }
-            Self::Standard(_) | Self::Device(_) | Self::Finished => Ok(()),
-        }
-    }
-}
-
-impl Write for Stream {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            Self::Standard(out) => out.write(bytes),
-            Self::File(out) => out.write(bytes),
-            Self::Device(out) => out.write(bytes),
-            Self::Finished => Err(io::ErrorKind::BrokenPipe.into()),
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Self::Standard(out) => out.flush(),
-            Self::File(out) => out.flush(),
-            Self::Device(out) => out.flush(),
-            Self::Finished => Ok(()),
-        }
-    }
+/// How it went to write records; that their reader went away is no failure.
+pub(super) fn closed(written: Result<(), StoreError>) -> Outcome {
+    written.or_else(|error| if error.is_broken_pipe() { Ok(()) } else { Err(error.into()) })
 }
 
 /// Refuses to write to a file that the command reads.
@@ -354,12 +324,8 @@ pub(super) fn refuse_input(path: &Path) -> Outcome {
 
 /// Makes a folder for what is to be written, if there is none.
 pub(super) fn make_folder(folder: &Path) -> Outcome {
-    fs::create_dir_all(folder).map_err(|error| {
-        Failure::input(
-            format!("cannot make the folder {}: {error}", folder.display()),
-            "give a folder that you may write to",
-        )
-    })
+    fs::create_dir_all(folder)
+        .map_err(|error| Failure::unwritable(&format!("the folder {}", folder.display()), &error))
 }
 
 /// The format of a picture, by the end of its name.

@@ -10,13 +10,13 @@ use serde::Serialize;
 
 use super::{
     Failure, Outcome,
-    options::{AirArgs, EdgeLaw, SensorArgs},
+    options::{AirArgs, SensorArgs},
     place::PlaceArgs,
 };
 use crate::{
     geometry::wrap_360,
     model::{
-        Options, Simulator,
+        EdgeLawKind, Options, PathOptions, Simulator,
         paths::{EchoPath, Paths},
     },
     scan::{InteractionRecord, PathKind, PathRecord},
@@ -28,25 +28,25 @@ use crate::{
 pub(super) struct Args {
     #[command(flatten)]
     place: PlaceArgs,
-    /// Half the longest path, metres [default: the sensor's range]
+    /// Listen and predict up to this range, metres, instead of the sensor's
     #[arg(long, value_name = "M")]
     max_range: Option<f64>,
-    /// Most mirror reflections on a path [default: as many as can matter]
+    /// Most mirror reflections on a path, instead of as many as can matter
     #[arg(long, value_name = "N")]
     max_order: Option<u32>,
     /// Leave out paths weaker than this; a head-on, perfect wall gives 1
     #[arg(long, value_name = "A", default_value_t = 0.001)]
     weakest: f64,
-    /// How edges diffract [default: the sensor's, or utd]
-    #[arg(long, value_enum)]
-    edge_law: Option<EdgeLaw>,
-    /// Also list sound that bends at two edges
+    /// How edges diffract, instead of the sensor's law, or else utd
+    #[arg(long, value_enum, value_name = "LAW")]
+    edge_law: Option<EdgeLawKind>,
+    /// Also follow sound that bends at two edges
     #[arg(long)]
     double_diffraction: bool,
     /// Leave out the absorption of the air
     #[arg(long)]
     lossless: bool,
-    /// One JSON object a line instead of a table
+    /// JSON instead of text; one object a path
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -70,7 +70,7 @@ Examples:
   sonard paths --scene mcgill-lab --pose 1,1,0 --max-order 2 --json | jq -c '.interactions[].point'
   sonard paths --scene my-room.json --pose 1.2,0.8,90 --lossless --weakest 0.05
 
-Exit codes: 0 done, 2 wrong usage or input, 3 a disk that gave up.";
+Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
 /// A path as `--json` prints it.
 #[derive(Debug, Serialize)]
@@ -97,11 +97,14 @@ pub(super) fn run(args: &Args) -> Outcome {
     let (scene, pose) = args.place.load()?;
     let options = Options {
         max_range_m: args.max_range,
-        max_order: args.max_order,
-        edge_law: args.edge_law.map(EdgeLaw::kind),
-        double_diffraction: args.double_diffraction,
-        lossless: args.lossless,
-        ..Options::default()
+        ..PathOptions {
+            max_order: args.max_order,
+            edge_law: args.edge_law,
+            double_diffraction: args.double_diffraction,
+            lossless: args.lossless,
+            ..PathOptions::default()
+        }
+        .into()
     };
     let scene = Arc::new(scene.with_robot_at(&pose));
     let simulator = Simulator::new(scene, args.sensor.sensor()?, args.air.air()?, options)

@@ -19,9 +19,10 @@ use crate::{
 /// Which pictures.
 #[derive(Debug, clap::Args)]
 pub(super) struct PictureArgs {
-    /// Picture to write, .svg or .png, or - for SVG to standard output; several are possible
-    #[arg(short = 'o', long = "out", value_name = "FILE")]
-    pub(super) out: Vec<OutPath>,
+    /// File to write; a picture, .svg or .png by its name, or - for SVG to standard output; several
+    /// are possible
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: Vec<OutPath>,
     /// Width of a PNG, pixels
     #[arg(long, value_name = "PX", default_value_t = 1000,
           value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_WIDTH_PX)))]
@@ -33,7 +34,7 @@ pub(super) struct PictureArgs {
 impl PictureArgs {
     /// Checked before anything is read, so that a wrong name costs no time.
     pub(super) fn targets(&self) -> Result<Vec<Target>, Failure> {
-        self.out.iter().map(|path| Target::of(path, self.overwrite)).collect()
+        self.output.iter().map(|path| Target::of(path, self.overwrite)).collect()
     }
 }
 
@@ -74,13 +75,13 @@ impl Target {
 
 /// Without a name the picture goes to standard output, unless that is a terminal.
 pub(super) fn targets(args: &PictureArgs) -> Result<Vec<Target>, Failure> {
-    if args.out.is_empty() && io::stdout().is_terminal() {
+    if args.output.is_empty() && io::stdout().is_terminal() {
         return Err(Failure::input(
             "the picture would go to the terminal",
             "name a file with -o scan.svg or -o scan.png, or send standard output somewhere",
         ));
     }
-    if args.out.is_empty() { Ok(vec![Target::StandardOutput]) } else { args.targets() }
+    if args.output.is_empty() { Ok(vec![Target::StandardOutput]) } else { args.targets() }
 }
 
 /// The scene named on the command line, else the one that the first of these scans with a scene was

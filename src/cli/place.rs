@@ -8,7 +8,7 @@ use crate::{geometry::Pose, scan::ScanPlan, scene::Scene};
 /// Where the ranger stands.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct PlaceArgs {
-    /// Scene file, or the name of a shipped scene (`sonard scene list`)
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it
     #[arg(long, value_name = "SCENE")]
     pub(super) scene: PathBuf,
     /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene

@@ -20,8 +20,9 @@ use crate::{
 pub(super) struct Args {
     /// The log; - for standard input
     log: PathBuf,
-    /// Scene file or name of a shipped scene; without it, the scene in the log
-    #[arg(long, value_name = "FILE|NAME")]
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); only draws its walls, in
+    /// place of those of the scene in the log
+    #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
     /// What to draw
     #[arg(long, value_enum, default_value_t = Kind::Scan)]
@@ -33,7 +34,8 @@ pub(super) struct Args {
     /// Draw the path of one beam's sound: the beam's index in the plan
     #[arg(long, value_name = "INDEX", conflicts_with = "azimuth_deg")]
     beam: Option<u32>,
-    /// The same for the beam nearest to this azimuth, degrees
+    /// Azimuth, degrees counter-clockwise from the heading; draws the path of the sound of the beam
+    /// nearest to it
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     azimuth_deg: Option<f64>,
     #[command(flatten)]
@@ -74,7 +76,7 @@ Examples:
   for e in paths fan cone; do sonard simulate --scene corridor --pose beside-wall --engine $e; done \
       | sonard plot - --kind side-by-side -o engines.png
 
-Exit codes: 0 drawn, 2 wrong usage or input, 3 a picture can't be written.";
+Exit codes: 0 drawn, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let targets = targets(&args.picture)?;

@@ -5,13 +5,14 @@ use std::{path::PathBuf, sync::Arc};
 use super::{
     Failure, Outcome,
     log::rewrite::{Waiting, rewrite},
-    options::EngineArgs,
+    options::engine_options,
     output::{OutPath, Overwrite},
     predictor::Predictor,
     scene_file,
     what_if::{WhatIf, WhatIfArgs},
 };
 use crate::{
+    model::OptionKeys,
     scan::{Ping, Record, SceneRef},
     scene::Scene,
 };
@@ -22,18 +23,19 @@ use crate::{
 pub(super) struct Args {
     /// The log; - for standard input
     log: PathBuf,
-    /// Scene to predict in: a file, or the name of a shipped scene [default: the log's]
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it, in place of the
+    /// log's
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// Where to write the log with predictions [default: standard output]
-    #[arg(long, value_name = "FILE")]
-    out: Option<OutPath>,
+    /// File to write; the log with predictions goes to it instead of to standard output
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<OutPath>,
     #[command(flatten)]
     overwrite: Overwrite,
     #[command(flatten)]
     what_if: WhatIfArgs,
     #[command(flatten)]
-    engine: EngineArgs,
+    engine: OptionKeys,
 }
 
 pub(super) const ABOUT: &str = "\
@@ -45,18 +47,18 @@ for ranges under another speed of sound: those are computed again from their tim
 
 const HELP: &str = "\
 Examples:
-  sonard import sweep.csv --pose 1.2,0.8,90 --sensor hc-sr04 --out sweep.jsonl
-  sonard predict sweep.jsonl --scene my-room.json --out predicted.jsonl
+  sonard import sweep.csv --pose 1.2,0.8,90 --sensor hc-sr04 -o sweep.jsonl
+  sonard predict sweep.jsonl --scene my-room.json -o predicted.jsonl
   sonard predict run.jsonl --temperature-c 15 --engine cone | sonard compare -
 
-Exit codes: 0 done, 2 wrong usage or input, 3 the file can't be written.";
+Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let given = args.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
-    let what_if = args.what_if.load()?.with_options(args.engine.options()?);
+    let what_if = args.what_if.load()?.with_options(engine_options(&args.engine)?);
     let mut predictor = Predictor::new(&args.log, given.as_ref(), &what_if);
     let (waiting, mut any) = (Waiting::default(), false);
-    let to = (args.out.as_ref(), args.overwrite);
+    let to = (args.output.as_ref(), args.overwrite);
     let change = |record: &mut Record| suppose(record, &what_if, given.as_deref());
     let written = rewrite(&args.log, to, &waiting, change, |mut scan| {
         predictor.predict(&mut scan)?;

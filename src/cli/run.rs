@@ -34,41 +34,45 @@ pub(super) struct Args {
     /// Configuration file [default: /etc/sonard/sonard.toml if it is there]
     #[arg(long, value_name = "FILE", env = "SONARD_CONFIG")]
     config: Option<PathBuf>,
-    /// Set a key of the configuration, over file and environment; may be given several times
+    /// Set a key over the file; over the environment, too; may be given several times
     #[arg(long, value_name = "SECTION.KEY=VALUE")]
     set: Vec<String>,
-    /// Check the configuration, say what is in force, and end
+    /// Check all that is named, and end; says what is in force
     #[arg(long)]
     check: bool,
     /// Print the configuration file that documents every key, and end
     #[arg(long)]
     print_config: bool,
-    /// Serial port of the ranger (device.port)
+    /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number; sets
+    /// device.port
     #[arg(long, value_name = "PATH|ID")]
     port: Option<String>,
-    /// Use a mock ranger in the scene instead of a real one, in real time
+    /// Use a mock ranger instead of a real one; in real time, with sound from the scene
     #[arg(long, conflicts_with = "port")]
     mock: bool,
     /// Play an array of rangers from the model, in real time, instead of using a device
     #[arg(long, conflicts_with_all = ["port", "mock"])]
     simulate: bool,
-    /// Array that --simulate plays: pioneer-8 (default), pioneer-7, ring-12, or a file
-    /// (simulate.array)
+    /// Array of rangers, a preset (pioneer-8, pioneer-7, ring-12) or a file with an array's data;
+    /// what --simulate plays (simulate.array)
     #[arg(long, value_name = "NAME|FILE", requires = "simulate")]
     array: Option<String>,
     /// Let the mock's time run as fast as the computer can
     #[arg(long, requires = "mock", conflicts_with = "realtime")]
     virtual_time: bool,
-    /// Scene file, or the name of a shipped scene (place.scene)
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it
+    /// (place.scene)
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// Where the ranger stands (place.pose)
+    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene; sets
+    /// place.pose
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
     /// Folder of the logs (log.folder)
     #[arg(long, value_name = "DIR")]
     log: Option<PathBuf>,
-    /// Unix socket of the API (server.socket); a dead one of that name is replaced, no other file
+    /// Unix socket of the daemon; sets server.socket; a dead one of that name is replaced, no other
+    /// file
     #[arg(long, value_name = "PATH")]
     socket: Option<PathBuf>,
     #[command(flatten)]
@@ -102,7 +106,7 @@ Examples:
   sonard run --config sonard.toml --check
 
 SONARD_LOG sets what is said on standard error: error, warn, info (default), debug.
-Exit codes: 0 stopped by a signal, 2 wrong configuration, 3 the log or a socket can't be had.";
+Exit codes: 0 stopped by a signal, 2 wrong configuration, 3 the log or a socket is another's, or the disk gave up.";
 
 pub(super) fn run(args: Args) -> Outcome {
     if args.print_config {
@@ -150,8 +154,7 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
         }
     };
     let log_folder = PathBuf::from(&keys.log.folder);
-    let (journal, thread) = Journal::open(&log_folder, settings.rotation())
-        .map_err(|error| Failure::device(&error, error.help()))?;
+    let (journal, thread) = Journal::open(&log_folder, settings.rotation())?;
     let listeners =
         Listeners::open(&keys.server).map_err(|error| Failure::device(&error, error.help()))?;
     for address in listeners.addresses().into_iter().flatten() {

@@ -17,7 +17,7 @@ use super::{
     array::NoArray,
     daemon::DaemonArgs,
     mock_world::{self, MockWorldArgs},
-    options::{AirArgs, EngineArgs, SensorArgs},
+    options::{AirArgs, SensorArgs},
     output::OutPath,
     place::{AzimuthArgs, PlaceArgs},
     runtime::{self, Interrupts},
@@ -25,12 +25,13 @@ use super::{
 use crate::{
     link::{self, BAUD},
     mock::{MockBoard, MockPort, Soundings},
-    ranger::{DriveError, Driver, Motion, Ranger, ScanError, ScanSummary},
+    model::OptionKeys,
+    ranger::{DriveError, Driver, Motion, PreparedScan, Ranger, ScanError, ScanSummary},
     scan::Record,
 };
 use emulator::Emulator;
 use output::Output;
-use setup::Setup;
+use setup::{belief, prepared};
 
 /// How often a request is sent before the device counts as gone: some nine seconds, in which a
 /// board that the opening of its port has reset is long awake.
@@ -48,7 +49,7 @@ const OF_THE_DAEMON: [&str; 26] = [
     "pressure_kpa",
     "sound_speed",
     "engine",
-    "max_range",
+    "max_range_m",
     "threshold",
     "response",
     "ideal_receiver",
@@ -80,15 +81,15 @@ pub(super) struct Args {
     /// Use the firmware's machine code in an emulated board (starts sonard-emulator)
     #[arg(long)]
     emulator: bool,
-    /// Let a running daemon take the scan, with its own ranger, sensor, air and model
+    /// Let a running daemon take the scans; with its own ranger, sensor, air and model
     #[arg(long, conflicts_with_all = OF_THE_DAEMON, conflicts_with_all = mock_world::OPTIONS)]
     daemon: bool,
     #[command(flatten)]
     at: DaemonArgs,
     #[command(flatten)]
     place: PlaceArgs,
-    /// Write scan.jsonl, scan.svg and scan.png to this folder instead of records to standard output; a
-    /// log that is there is added to if its scans are of the same setup
+    /// Folder for what is written; scan.jsonl, scan.svg and scan.png; without it records go to
+    /// standard output; a log that is there is added to if its scans are of the same setup
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
     /// How often to take the scan
@@ -106,7 +107,7 @@ pub(super) struct Args {
     #[command(flatten)]
     air: AirArgs,
     #[command(flatten)]
-    engine: EngineArgs,
+    engine: OptionKeys,
     #[command(flatten)]
     world: MockWorldArgs,
     #[command(flatten)]
@@ -167,7 +168,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if args.daemon {
         return daemon::run(args);
     }
-    let setup = Setup::new(args)?;
+    let setup = prepared(args)?;
     let mut output = Output::open(args.out.as_deref())?;
     let measured = runtime::new()?.block_on(measure(args, &setup, &mut output));
     // Whatever happened, what was measured is closed properly and drawn.
@@ -177,10 +178,10 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 /// Opens the port, meets the device, and takes the scans.
-async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
+async fn measure(args: &Args, setup: &PreparedScan, output: &mut Output) -> Outcome {
     let interrupts = Interrupts::listen();
     let mock = match args.mock {
-        true => Some(Mock::start(args.world.board(&setup.belief())?, None)?),
+        true => Some(Mock::start(args.world.board(&belief(setup))?, None)?),
         false => None,
     };
     let emulator = match args.emulator {
@@ -194,7 +195,7 @@ async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
         .or_else(|| args.port.clone())
         .unwrap_or_default();
     let mut ranger = meet(&port, &interrupts).await?;
-    let job = setup.job(ranger.identity())?;
+    let job = setup.job(ranger.identity()).map_err(|error| scan_failure(error.into()))?;
     let session = setup.session(ranger.identity());
     output.add_to_earlier(&session, job.pose, job.plan)?;
     output.record(&Record::Session(Box::new(session)))?;
@@ -224,7 +225,7 @@ async fn measure(args: &Args, setup: &Setup, output: &mut Output) -> Outcome {
 }
 
 /// The world that the options say, as `sonard-emulator` takes it.
-fn emulator_options(args: &Args, setup: &Setup) -> Result<Vec<String>, Failure> {
+fn emulator_options(args: &Args, setup: &PreparedScan) -> Result<Vec<String>, Failure> {
     let mut options = args.world.emulator(&args.place.scene)?;
     options.push(format!("--pose={}", setup.pose_numbers()));
     options.extend(args.sensor.emulator(&setup.sensor));
@@ -293,7 +294,9 @@ fn stopped(summary: &ScanSummary) -> Failure {
 
 pub(super) fn scan_failure(error: ScanError) -> Failure {
     match error {
-        ScanError::Plan(error) => Failure::input(error, "see `sonard scan --help`"),
+        ScanError::Plan(error) => {
+            Failure::input(error, "give --from-deg and --step-deg on the motor's steps")
+        }
         ScanError::Device(error) => device_failure(&error),
         ScanError::Sink(error) if error.is_broken_pipe() => Failure::Found(None),
         ScanError::Sink(error) => Failure::device(&error, error.help()),

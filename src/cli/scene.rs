@@ -20,7 +20,8 @@ use crate::{
 /// Verbs of `sonard scene`.
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum Verb {
-    /// Check a scene file and say in a line what it holds
+    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene;
+    /// checks that it can stand there
     #[command(long_about = CHECK_ABOUT, after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
     /// Draw a scene's floor plan as SVG or PNG
@@ -41,7 +42,8 @@ pub(super) struct CheckArgs {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(value_name = "FILE")]
     scene: PathBuf,
-    /// Also check that a ranger can stand at this pose: X,Y,DEG (metres, degrees) or a name
+    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene;
+    /// checks that it can stand there
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
 }
@@ -52,14 +54,15 @@ pub(super) struct DrawArgs {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(value_name = "FILE")]
     scene: PathBuf,
-    /// Draw this pose only: X,Y,DEG (metres, degrees) or a name [default: all named poses]
+    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene; draws
+    /// it alone, instead of all named poses
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
-    /// Where to write the picture, as .svg or .png [default: SVG to standard output]
+    /// File to write; a picture, .svg or .png by its name, instead of SVG to standard output
     #[arg(short, long, value_name = "FILE")]
     output: Option<OutPath>,
     /// Width of a PNG, pixels
-    #[arg(long, value_name = "PIXELS", default_value_t = 1200)]
+    #[arg(long, value_name = "PX", default_value_t = 1000)]
     width: u32,
     #[command(flatten)]
     overwrite: Overwrite,

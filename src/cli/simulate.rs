@@ -2,11 +2,7 @@
 
 mod array;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{fs, path::PathBuf, sync::Arc};
 
 use indicatif::ProgressBar;
 use jiff::Timestamp;
@@ -16,8 +12,8 @@ use uuid::Uuid;
 
 use super::{
     Failure, Outcome,
-    options::{AirArgs, EngineArgs, SensorArgs},
-    output::{OutPath, Overwrite, Product, Stream},
+    options::{AirArgs, SensorArgs, engine_options},
+    output::{OutPath, Overwrite, closed, records_to},
     place::AzimuthArgs,
     progress, scene_file,
 };
@@ -25,10 +21,10 @@ use crate::{
     acoustics::ReceiverNoise,
     collect::{PoseLine, read_lines},
     geometry::Pose,
-    model::{ObservationPoint, Prediction, Simulator},
+    model::{ObservationPoint, OptionKeys, Prediction, Simulator},
     scan::{Ping, Record, ScanEnd, ScanPlan, ScanStart, Session},
     scene::Scene,
-    store::{LogWriter, Pipe, StoreError},
+    store::{RecordWriter, StoreError},
 };
 
 use array::ArrayArgs;
@@ -37,7 +33,7 @@ use array::ArrayArgs;
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Args {
-    /// Scene file, or the name of a shipped scene (`sonard scene list`)
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it
     #[arg(long, value_name = "SCENE")]
     scene: PathBuf,
     /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
@@ -56,15 +52,15 @@ pub(super) struct Args {
     array: ArrayArgs,
     #[command(flatten)]
     azimuths: AzimuthArgs,
-    /// Write the records to this file instead of standard output
-    #[arg(long, value_name = "FILE")]
-    out: Option<OutPath>,
+    /// File to write; the records go to it instead of to standard output
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<OutPath>,
     #[command(flatten)]
     overwrite: Overwrite,
     #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
-    engine: EngineArgs,
+    engine: OptionKeys,
     #[command(flatten)]
     sensor: SensorArgs,
     #[command(flatten)]
@@ -81,8 +77,8 @@ struct NoiseArgs {
     /// Standard deviation of the time of flight beside what the noise does to it, microseconds
     #[arg(long, value_name = "US", default_value_t = 0.0)]
     jitter_us: f64,
-    /// Seed of the noise: the same one gives the same readings
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Seed of what is random; the same one gives the same readings
+    #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
 
@@ -115,16 +111,16 @@ where it stood (`pose`). Crosstalk, one ranger's sound in another's ear, is left
 
 const EXAMPLES: &str = "\
 Examples:
-  sonard simulate --scene simple-room --pose fig9 --out fig9.jsonl
+  sonard simulate --scene simple-room --pose fig9 -o fig9.jsonl
   sonard simulate --scene simple-room --pose fig9 --from-deg 270 --to-deg 270.9 | tail -n 2
   sonard simulate --scene corridor --pose 1,0.4,0 --engine cone --max-range 4 | sonard plot -
   sonard simulate --scene my-room.json --pose 1.2,0.8,90 --temperature-c 5 --lossless
   sonard simulate --scene two-surface-room --pose 1.2,1,30 --array pioneer-8 | sonard plot - -o a.svg
-  sonard simulate --scene mcgill-lab --poses way.csv --out course.jsonl
+  sonard simulate --scene mcgill-lab --poses way.csv -o course.jsonl
   sonard simulate --scene corridor --poses way.jsonl --array ring-12 --rounds 15 > ring.jsonl
 
 Exit codes: 0 done, 1 poses of the file were left out because nothing can stand there or their line is
-wrong, 2 wrong usage or input, 3 a disk that gave up.";
+wrong, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     if let Some(name) = &args.array.array {
@@ -141,7 +137,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         None => Some(simulator(args, &scene, &poses[0])?),
     };
     let noise = args.noise.noise()?;
-    let mut out = Out::open(args)?;
+    let mut out = records_to(args.output.as_deref(), args.overwrite)?;
     let mut rng = Pcg64::seed_from_u64(args.noise.seed);
     let mut ping = |station: &ObservationPoint, direction_rad| match &noise {
         Some(noise) => station.ping_in_noise(direction_rad, noise, &mut rng),
@@ -157,14 +153,14 @@ pub(super) fn run(args: &Args) -> Outcome {
         let Some(simulator) = shared.as_ref().or(own.as_ref()) else { break };
         let session = (number == 0 || own.is_some()).then_some(simulator);
         written = session
-            .map_or(Ok(()), |simulator| write_session(&mut out, simulator))
-            .and_then(|()| write(&mut out, simulator, pose, &plan, &mut ping, &bar));
+            .map_or(Ok(()), |simulator| write_session(&mut *out, simulator))
+            .and_then(|()| write(&mut *out, simulator, pose, &plan, &mut ping, &bar));
         if written.is_err() {
             break;
         }
     }
     bar.finish_and_clear();
-    out.close(written)?;
+    closed(written.and_then(|()| out.finish()))?;
     left_out
 }
 
@@ -225,54 +221,19 @@ fn places(
     Ok(Places { poses, left_out })
 }
 
-/// Where the records go: a log that takes its place when it is whole.
-struct Out {
-    log: LogWriter<Pipe<Stream>>,
-}
-
-impl Out {
-    fn open(args: &Args) -> Result<Self, Failure> {
-        let log = match &args.out {
-            Some(path) => {
-                let stream = args.overwrite.begin(path, Product::Log)?;
-                LogWriter::new(Pipe(stream), path).with_scenes_beside()
-            }
-            None => LogWriter::new(Pipe(Stream::standard()), Path::new("standard output")),
-        };
-        Ok(Self { log })
-    }
-
-    fn put(&mut self, record: &Record) -> Result<(), StoreError> {
-        self.log.append(record)
-    }
-
-    /// Puts the log in its place, unless writing it has failed.
-    fn close(mut self, written: Result<(), StoreError>) -> Outcome {
-        let closed = written.and_then(|()| self.log.sync()).and_then(|()| {
-            let path = self.log.path().to_path_buf();
-            let Pipe(stream) = self.log.medium_mut();
-            stream.finish().map_err(|source| StoreError::Write { path, source })
-        });
-        match closed {
-            Err(error) if !error.is_broken_pipe() => Err(Failure::device(&error, error.help())),
-            _ => Ok(()),
-        }
-    }
-}
-
 fn simulator(args: &Args, scene: &Scene, pose: &Pose) -> Result<Simulator, Failure> {
     let (sensor, air) = (args.sensor.sensor()?, args.air.air()?);
-    let options = args.engine.options()?;
+    let options = engine_options(&args.engine)?;
     Simulator::new(Arc::new(scene.with_robot_at(pose)), sensor, air, options)
         .map_err(|error| Failure::input(error, "see `sonard simulate --help`"))
 }
 
-fn write_session(out: &mut Out, simulator: &Simulator) -> Result<(), StoreError> {
-    out.put(&Record::Session(Box::new(Session::simulated(simulator, Timestamp::now()))))
+fn write_session(out: &mut dyn RecordWriter, simulator: &Simulator) -> Result<(), StoreError> {
+    out.write(&Record::Session(Box::new(Session::simulated(simulator, Timestamp::now()))))
 }
 
 fn write(
-    out: &mut Out,
+    out: &mut dyn RecordWriter,
     simulator: &Simulator,
     pose: &Pose,
     plan: &ScanPlan,
@@ -280,24 +241,16 @@ fn write(
     bar: &ProgressBar,
 ) -> Result<(), StoreError> {
     let scan = Uuid::new_v4();
-    let start = ScanStart {
-        scan,
-        time: Timestamp::now(),
-        pose: *pose,
-        plan: *plan,
-        air: None,
-        provenance: None,
-        request: None,
-    };
-    out.put(&Record::ScanStart(start))?;
+    let start = ScanStart::new(scan, Timestamp::now(), *pose, *plan);
+    out.write(&Record::ScanStart(start))?;
     let station = simulator.at(pose.position());
     for index in 0..plan.stops() {
         let azimuth_deg = plan.azimuth_deg(index);
         let prediction = predict(&station, pose.direction_rad(azimuth_deg));
         let ping = Ping::simulated(simulator, scan, index, azimuth_deg, &prediction);
-        out.put(&Record::Ping(Box::new(ping)))?;
+        out.write(&Record::Ping(Box::new(ping)))?;
         bar.inc(1);
     }
     let end = ScanEnd::simulated(simulator, scan, plan.stops(), Timestamp::now());
-    out.put(&Record::ScanEnd(end))
+    out.write(&Record::ScanEnd(end))
 }

@@ -18,7 +18,7 @@ use crate::api::{Health, LinkReport, Pending, SimulationReport, Status};
 pub(super) struct Args {
     #[command(flatten)]
     daemon: DaemonArgs,
-    /// One JSON object: status and health as the API gives them
+    /// JSON instead of text; one object: status and health as the API gives them
     #[arg(long)]
     json: bool,
 }

@@ -7,14 +7,14 @@ use serde::Serialize;
 
 use super::{
     Failure, Outcome,
-    options::{AirArgs, EngineArgs, SensorArgs},
+    options::{AirArgs, SensorArgs, engine_options},
     picture::{PictureArgs, Target},
     place::PlaceArgs,
 };
 use crate::{
     acoustics::{EchoTrace, EnvelopePeak},
     geometry::Pose,
-    model::{ObservationPoint, Simulator},
+    model::{ObservationPoint, OptionKeys, Simulator},
     plot::{TraceView, draw_trace},
     scan::{PathRecord, PingStatus},
 };
@@ -25,7 +25,7 @@ use crate::{
 pub(super) struct Args {
     #[command(flatten)]
     place: PlaceArgs,
-    /// Where the ranger looks, degrees counter-clockwise from the heading
+    /// Azimuth, degrees counter-clockwise from the heading; where the ranger looks
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     azimuth_deg: f64,
     /// Show the trace up to this range, metres [default: until nothing more comes near the threshold]
@@ -34,13 +34,13 @@ pub(super) struct Args {
     /// Spacing of the samples, microseconds
     #[arg(long, value_name = "US", default_value_t = 5.0)]
     step_us: f64,
-    /// One JSON object instead of a table
+    /// JSON instead of text; one object
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     picture: PictureArgs,
     #[command(flatten)]
-    engine: EngineArgs,
+    engine: OptionKeys,
     #[command(flatten)]
     sensor: SensorArgs,
     #[command(flatten)]
@@ -62,7 +62,7 @@ Examples:
   sonard trace --scene simple-room --pose fig9 --azimuth-deg 270 --short-blanking --until 1 -o t.svg
   sonard trace --scene corridor --pose beside-wall --azimuth-deg 90 --json | jq .detection
 
-Exit codes: 0 done, 2 wrong usage or input, 3 a picture can't be written.";
+Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
 /// A trace as `--json` prints it.
 #[derive(Debug, Serialize)]
@@ -113,7 +113,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let (scene, pose) = args.place.load()?;
     let (sensor, air) = (args.sensor.sensor()?, args.air.air()?);
     let scene = Arc::new(scene.with_robot_at(&pose));
-    let simulator = Simulator::new(scene, sensor, air, args.engine.options()?)
+    let simulator = Simulator::new(scene, sensor, air, engine_options(&args.engine)?)
         .map_err(|error| Failure::input(error, "see `sonard trace --help`"))?;
     let firing = Firing::new(args, &simulator, pose);
     if args.json {

@@ -35,7 +35,7 @@ pub(super) struct Args {
     /// Whole scans when they are over, as JSON
     #[arg(long)]
     scans: bool,
-    /// The records themselves, one a line
+    /// JSON instead of text; the records themselves, one a line
     #[arg(long)]
     json: bool,
     /// Wait for a daemon that goes away, and go on when it is back; what it measures meanwhile is not

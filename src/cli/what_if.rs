@@ -13,25 +13,27 @@ use crate::{
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "What if")]
 pub(super) struct WhatIfArgs {
-    /// Suppose that all scans were taken at X,Y,DEG (metres, degrees)
-    #[arg(long, value_name = "X,Y,DEG", allow_hyphen_values = true)]
+    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene;
+    /// supposed of all scans, and only X,Y,DEG here
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
     /// Suppose that the ranger looked there, degrees counter-clockwise from the x axis
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with = "pose")]
     heading: Option<f64>,
-    /// Suppose another sensor: a preset, or a file with a sensor's data
+    /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, hc-sr04,
+    /// fullwave-line), or a file with a sensor's data; supposed in place of the log's
     #[arg(long, value_name = "NAME|FILE")]
     sensor: Option<String>,
-    /// Suppose air of this temperature, degrees Celsius: measured ranges change with the speed of sound
+    /// Air temperature, degrees Celsius; supposed: measured ranges change with the speed of sound
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     temperature_c: Option<f64>,
-    /// Suppose this relative humidity, percent [default: the log's]
+    /// Relative humidity, percent; supposed in place of the log's
     #[arg(long, value_name = "PERCENT")]
     humidity_percent: Option<f64>,
-    /// Suppose this static pressure, kilopascals [default: the log's]
+    /// Static pressure, kilopascals; supposed in place of the log's
     #[arg(long, value_name = "KPA")]
     pressure_kpa: Option<f64>,
-    /// Suppose this speed of sound, metres a second
+    /// Speed of sound, metres a second; supposed in place of the log's
     #[arg(long, value_name = "M/S")]
     sound_speed: Option<f64>,
 }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     config::{DeviceKeys, Form, MotionKeys, PlanKeys, Section, air_section, read_sections},
-    model::EngineKind,
+    model::OptionKeys,
 };
 
 /// Things noted about a scan: name and value.
@@ -162,21 +162,15 @@ pub struct SensorKeys {
     /// From firing until the receiver listens, microseconds, instead of the sensor's.
     #[schemars(range(min = 0, max = 100_000), example = 1500)]
     pub blanking_us: Option<f64>,
-    /// Least amplitude that the model takes for detected, instead of the sensor's; a head-on,
-    /// perfect wall gives 1.
-    #[schemars(range(min = 0.000_001, max = 10), example = 0.04)]
-    pub threshold: Option<f64>,
     /// Height of the transducer in a scene with floor, ceiling or low walls, metres.
     #[schemars(range(min = -100, max = 100), example = 0.3)]
     pub height_m: Option<f64>,
     /// How far the transducer's axis points up, degrees, instead of the sensor's.
     #[schemars(range(min = -90, max = 90), example = 2)]
     pub tilt_deg: Option<f64>,
-    /// Listen and predict up to this range, metres, instead of the sensor's.
-    #[schemars(range(min = 0.1, max = 100), example = 4)]
-    pub max_range_m: Option<f64>,
-    /// How echoes are found.
-    pub engine: EngineKind,
+    /// How echoes are predicted.
+    #[serde(flatten)]
+    pub options: OptionKeys,
 }
 
 air_section! {
@@ -275,11 +269,9 @@ impl Default for SensorKeys {
             sensor: "senscomp-6500".into(),
             short_blanking: false,
             blanking_us: None,
-            threshold: None,
             height_m: None,
             tilt_deg: None,
-            max_range_m: None,
-            engine: EngineKind::default(),
+            options: OptionKeys::default(),
         }
     }
 }

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::air::AirKeys;
-use crate::model::EngineKind;
+use crate::model::OptionKeys;
 
 /// Configuration of `sonard run`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
@@ -142,11 +142,9 @@ pub struct ModelKeys {
     /// default.
     #[schemars(extend("x-default-yields" = true))]
     pub sensor: String,
-    /// How echoes are found.
-    pub engine: EngineKind,
-    /// Listen and predict up to this range, metres, instead of the sensor's.
-    #[schemars(range(min = 0.1, max = 100), example = 4)]
-    pub max_range_m: Option<f64>,
+    /// How echoes are predicted.
+    #[serde(flatten)]
+    pub options: OptionKeys,
 }
 
 /// What `sonard run --simulate` plays.
@@ -312,7 +310,7 @@ impl Default for MotionKeys {
 
 impl Default for ModelKeys {
     fn default() -> Self {
-        Self { sensor: "senscomp-6500".into(), engine: EngineKind::default(), max_range_m: None }
+        Self { sensor: "senscomp-6500".into(), options: OptionKeys::default() }
     }
 }
 

@@ -1,8 +1,9 @@
 //! File, environment and options, one over the other, with each value's place kept for errors.
 
-use std::{collections::BTreeMap, fmt, marker::PhantomData, ops::Range};
+mod error;
 
-use thiserror::Error;
+use std::{collections::BTreeMap, marker::PhantomData, ops::Range};
+
 use toml::{Value, de::DeTable};
 
 use super::{
@@ -10,46 +11,7 @@ use super::{
     schema::{Form, Key, Kind, Section},
 };
 use crate::scene::suggest;
-
-/// Where a value was given.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Origin {
-    /// In a file, at this line and column (from 1).
-    File {
-        /// Its name.
-        file: String,
-        /// Line.
-        line: usize,
-        /// Column, characters.
-        column: usize,
-    },
-    /// In the environment variable of this name.
-    Environment(String),
-    /// By this option of the command line.
-    Option(String),
-}
-
-impl fmt::Display for Origin {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::File { file, line, column } => write!(f, "{file}:{line}:{column}"),
-            Self::Environment(name) => f.write_str(name),
-            Self::Option(option) => f.write_str(option),
-        }
-    }
-}
-
-/// Something wrong with the configuration.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("{origin}: {message}")]
-pub struct ConfigError {
-    /// Where.
-    pub origin: Origin,
-    /// What.
-    pub message: String,
-    /// What would be right.
-    pub help: String,
-}
+pub use error::{ConfigError, Origin};
 
 /// Values given so far for the keys of a form, the later ones over the earlier ones.
 #[derive(Debug, Clone, Default)]

@@ -196,10 +196,13 @@ fn choices(of: &Value) -> Vec<String> {
     let listed = of.get("enum").and_then(Value::as_array).into_iter().flatten().collect::<Vec<_>>();
     let described = of.get("oneOf").and_then(Value::as_array).into_iter().flatten();
     let constants = described.filter_map(|one| one.get("const"));
+    // Where it may be left out, it is one of two: the words, or nothing.
+    let either = of.get("anyOf").and_then(Value::as_array).into_iter().flatten();
     listed
         .into_iter()
         .chain(constants)
         .filter_map(|word| word.as_str().map(str::to_owned))
+        .chain(either.flat_map(choices))
         .collect()
 }
 

@@ -43,7 +43,9 @@ pub struct Simulated {
 /// What is wrong with values that are each within their range.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mismatch {
-    /// The key to look at, as `section.key`.
+    /// The section of the key to look at.
+    pub section: &'static str,
+    /// That key.
     pub key: &'static str,
     /// What is wrong.
     pub message: String,
@@ -92,14 +94,14 @@ impl Settings {
     /// How echoes are predicted.
     #[must_use]
     pub fn options(&self) -> Options {
-        let model = &self.keys.model;
-        Options { engine: model.engine, max_range_m: model.max_range_m, ..Options::default() }
+        // Options that the engine does not know are refused by `check`.
+        self.keys.model.options.options_of_engine()
     }
 
     /// Farthest range of interest, metres.
     #[must_use]
     pub fn max_range_m(&self) -> f64 {
-        self.keys.model.max_range_m.unwrap_or(self.sensor.max_range_m)
+        self.keys.model.options.max_range_m.unwrap_or(self.sensor.max_range_m)
     }
 
     /// When another log is begun.
@@ -138,33 +140,41 @@ impl Settings {
     pub fn check(&self) -> Result<(), Mismatch> {
         let air = &self.keys.air;
         self.plan().check().map_err(|error| Mismatch {
-            key: "plan.to_deg",
+            section: "plan",
+            key: "to_deg",
             message: error.to_string(),
             help: "a full turn is from_deg = 0, to_deg = 360, step_deg = 0.9".into(),
         })?;
         let air = Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa).map_err(
             |error| Mismatch {
-                key: "air.temperature_c",
+                section: "air",
+                key: "temperature_c",
                 message: error.to_string(),
                 help: String::new(),
             },
         )?;
         // What the model plays listens until the next one of its rangers fires.
         if self.simulated.is_none() {
-            let windowed = self.motion().check_window(&listening(self, &air));
-            windowed.map_err(|deaf| Mismatch {
-                key: match self.keys.motion.window_ms {
-                    Some(_) => "motion.window_ms",
-                    None => "model.max_range_m",
-                },
+            let windowed = self.keys.motion.window_ms.is_some();
+            let checked = self.motion().check_window(&listening(self, &air));
+            checked.map_err(|deaf| Mismatch {
+                section: if windowed { "motion" } else { "model" },
+                key: if windowed { "window_ms" } else { "max_range_m" },
                 message: deaf.to_string(),
                 help: deaf.help(),
             })?;
         }
+        self.keys.model.options.options().map_err(|foreign| Mismatch {
+            section: "model",
+            key: foreign.option,
+            message: foreign.to_string(),
+            help: foreign.help(),
+        })?;
         self.check_server()?;
         if self.keys.link.retry_max_s < self.keys.link.retry_min_s {
             return Err(Mismatch {
-                key: "link.retry_max_s",
+                section: "link",
+                key: "retry_max_s",
                 message: "the longest wait is shorter than the first one".into(),
                 help: "give link.retry_max_s at least link.retry_min_s".into(),
             });
@@ -176,7 +186,8 @@ impl Settings {
         let server = &self.keys.server;
         if server.socket_permissions().is_none() {
             return Err(Mismatch {
-                key: "server.socket_mode",
+                section: "server",
+                key: "socket_mode",
                 message: format!("server.socket_mode is {}", server.socket_mode),
                 help: "three octal digits: 0660 for the socket's group, 0600 for its owner".into(),
             });
@@ -184,7 +195,8 @@ impl Settings {
         let listen = server.listen.as_deref().unwrap_or("127.0.0.1:0");
         if listen.parse::<SocketAddr>().is_err() {
             return Err(Mismatch {
-                key: "server.listen",
+                section: "server",
+                key: "listen",
                 message: format!("server.listen is {listen}"),
                 help: "an address and a port, such as 127.0.0.1:8765 or [::1]:8765".into(),
             });

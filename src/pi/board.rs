@@ -1,14 +1,15 @@
 //! Carries out on pins what the device machine decides.
 
+mod under_way;
+
 use firmware_protocol::{
     device::{Action, Board, Device, EchoReport, IndexSearch, within_half_a_turn},
-    messages::{
-        Blanking, Capabilities, Echoes, FirmwareVersion, ReadingStatus, ResetCause, limits::TICK_HZ,
-    },
+    messages::{Blanking, Capabilities, Echoes, FirmwareVersion, ReadingStatus, ResetCause},
 };
 
 use super::pins::{Output, Pins};
 use crate::motion::Trapezoid;
+use under_way::{Listening, Turn};
 
 /// How long BLNK is held, ticks: at least 0.44 ms, so that the echo just heard has passed.
 const BLNK_TICKS: u64 = 1_000;
@@ -44,33 +45,11 @@ pub struct PiBoard<P> {
     listening: Option<Listening>,
 }
 
-/// A move under way.
-#[derive(Debug)]
-struct Turn {
-    motion: Trapezoid,
-    since: u64,
-    pulses: u32,
-    /// Brake when the index sensor reads so.
-    watch: Option<bool>,
-    seen: Option<i32>,
-}
-
 #[derive(Debug)]
 struct Search {
     index: IndexSearch,
     speed: u16,
     acceleration: u32,
-}
-
-/// A firing under way. Times are ticks.
-#[derive(Debug)]
-struct Listening {
-    fired: u64,
-    until: u64,
-    binh_at: Option<u64>,
-    blnk_until: Option<u64>,
-    max_echoes: u8,
-    echoes: Echoes,
 }
 
 impl<P: Pins> PiBoard<P> {
@@ -330,52 +309,6 @@ impl<P: Pins> PiBoard<P> {
         self.boot = self.boot.checked_add(1).unwrap_or(1);
         let cause = ResetCause::Requested;
         self.device = Device::new(identity(&mut self.pins, &self.settings, self.boot, cause));
-    }
-}
-
-impl Turn {
-    const fn is_under_way(&self) -> bool {
-        self.pulses < self.motion.steps().unsigned_abs()
-    }
-
-    /// When the next pulse is to come, or the motor stands.
-    fn due(&self) -> u64 {
-        let at_s = if self.is_under_way() {
-            self.motion.pulse_s(self.pulses + 1)
-        } else {
-            self.motion.duration_s()
-        };
-        self.since + (at_s * f64::from(TICK_HZ)).ceil() as u64
-    }
-
-    /// Brakes as fast as the acceleration allows.
-    fn brake(&mut self, now: u64) {
-        self.watch = None;
-        let time_s = now.saturating_sub(self.since) as f64 / f64::from(TICK_HZ);
-        // A pulse that has gone out can't be taken back: then the motor stands after it.
-        self.motion = self.motion.braked(time_s);
-    }
-}
-
-impl Listening {
-    fn due(&self, now: u64) -> u64 {
-        let look =
-            (self.echoes.len() + 1 < usize::from(self.max_echoes)).then_some(now + LOOK_TICKS);
-        [Some(self.until), self.binh_at, self.blnk_until, look]
-            .into_iter()
-            .flatten()
-            .min()
-            .unwrap_or(self.until)
-    }
-
-    /// Takes an echo in; whether the module is to be made ready for another.
-    fn hears(&mut self, at: u64) -> bool {
-        let wanted = usize::from(self.max_echoes);
-        if at < self.fired || at > self.until || self.echoes.len() >= wanted {
-            return false;
-        }
-        let after = u32::try_from(at - self.fired).unwrap_or(u32::MAX);
-        self.echoes.push(after).is_ok() && self.echoes.len() < wanted
     }
 }
 

@@ -299,7 +299,6 @@ impl<'a> Progress<'a> {
             range_m,
             repaired,
             residual_m: range_m.zip(predicted).map(|(measured, predicted)| measured - predicted),
-            confidence: None,
             ..blank
         }
     }
@@ -309,27 +308,9 @@ impl<'a> Progress<'a> {
         let stop = index / self.job.plan.pings_per_stop.max(1);
         let (from, stride) = self.motor;
         Ping {
-            scan: self.scan,
-            index,
             step: from + stop as i32 * stride,
-            azimuth_deg: self.job.plan.azimuth_deg(stop),
-            ranger: None,
-            pose: None,
-            provenance: None,
-            time: None,
-            time_sigma_us: None,
-            status,
-            fired_ticks: None,
-            echo_ticks: Vec::new(),
-            tof_us: None,
-            range_m: None,
-            repaired: false,
-            amplitude: None,
-            margin_db: None,
-            path: None,
             sim: self.job.predictions.get(stop as usize).cloned(),
-            residual_m: None,
-            confidence: None,
+            ..Ping::new(self.scan, index, self.job.plan.azimuth_deg(stop), status)
         }
     }
 

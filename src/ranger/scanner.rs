@@ -206,7 +206,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         let step = self.reanchor();
         let time = Timestamp::now();
         let ScanJob { pose, plan, air, request, .. } = *job;
-        let start = ScanStart { scan, time, pose, plan, air, provenance: None, request };
+        let start = ScanStart { air, request, ..ScanStart::new(scan, time, pose, plan) };
         sink.record(&Record::ScanStart(start))?;
         let mut progress = Progress::new(job, scan, motor, self.wall_epoch, &self.identity, sink);
         if before != self.identity.boot {

@@ -25,6 +25,14 @@ pub trait Medium: fmt::Debug {
     /// # Errors
     /// When that can't be done; the end of the log is then torn.
     fn take_back(&mut self, bytes: u64) -> io::Result<()>;
+
+    /// Puts what was written in its place, after the last sync; most are there all along.
+    ///
+    /// # Errors
+    /// As the system says.
+    fn finish(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 impl<M: Medium + ?Sized> Medium for Box<M> {
@@ -38,6 +46,10 @@ impl<M: Medium + ?Sized> Medium for Box<M> {
 
     fn take_back(&mut self, bytes: u64) -> io::Result<()> {
         (**self).take_back(bytes)
+    }
+
+    fn finish(&mut self) -> io::Result<()> {
+        (**self).finish()
     }
 }
 

@@ -3,6 +3,7 @@
 mod checking;
 mod faults;
 mod folder;
+mod format;
 mod history;
 mod reading;
 mod repairing;

@@ -27,7 +27,7 @@ fn drive(folder: &Path, array: &str) -> String {
     let log = folder.join(format!("{array}.jsonl"));
     let [way, path] = [&way, &log].map(|path| path.to_str().expect("plain path").to_owned());
     let arguments = ["--scene", "two-surface-room", "--poses", &way, "--array", array];
-    let output = run(&[&["simulate", "--max-range", "4", "--out", &path], &arguments[..]].concat());
+    let output = run(&[&["simulate", "--max-range", "4", "-o", &path], &arguments[..]].concat());
     assert!(output.status.success(), "{}", stderr(&output));
     path
 }
@@ -55,7 +55,7 @@ fn a_ring_turned_in_place_is_one_scan_of_all_its_rounds() {
     let folder = TempDir::new().expect("a folder");
     let path = folder.path().join("ring.jsonl").to_str().expect("plain path").to_owned();
     let arguments = ["--scene", "two-surface-room", "--pose", "1.2,1,30", "--array", "ring-12"];
-    let further = ["simulate", "--rounds", "15", "--max-range", "4", "--out", &path];
+    let further = ["simulate", "--rounds", "15", "--max-range", "4", "-o", &path];
     assert!(run(&[&further, &arguments[..]].concat()).status.success());
     let log = Log::read(Path::new(&path));
     log.assert_each_beam_once(180);
@@ -94,7 +94,7 @@ fn an_arrays_readings_are_drawn_mapped_and_fitted_with_lines() {
     assert!(map.status.success(), "{}", stderr(&map));
     let map: Value = serde_json::from_slice(&map.stdout).expect("one object");
     assert_eq!((&map["scans"], &map["readings"]), (&12.into(), &(6 * 20).into()));
-    let score = run(&["map-score", &out, "two-surface-room", "--json"]);
+    let score = run(&["benchmark", "score", &out, "two-surface-room", "--json"]);
     let score: Value = serde_json::from_slice(&score.stdout).expect("one object");
     assert!(score["correlation_percent"].as_f64().is_some_and(|c| c > 20.0), "{score}");
 
@@ -114,7 +114,7 @@ fn a_map_has_walls_where_they_are() {
     let path = |name: &str| folder.path().join(name).to_str().expect("plain path").to_owned();
     let (log, out) = (path("ring.jsonl"), path("map"));
     let place = ["--scene", "two-surface-room", "--pose", "1.2,1,0", "--array", "ring-12"];
-    assert!(run(&[&["simulate", "--out", &log], &place[..]].concat()).status.success());
+    assert!(run(&[&["simulate", "-o", &log], &place[..]].concat()).status.success());
     let further = ["--out", &out, "--region", "-0.5,-0.5,4,3", "--resolution", "0.02"];
     assert!(run(&[&["map", &log], &further[..]].concat()).status.success());
     let pgm = fs::read(folder.path().join("map/map.pgm")).expect("written");

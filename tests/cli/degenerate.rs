@@ -21,7 +21,7 @@ fn scan(folder: &Path, pose: &str) -> Vec<String> {
         "--step-deg",
         "3.6",
         "--force",
-        "--out",
+        "-o",
         path,
     ]);
     assert!(output.status.success(), "{}", stderr(&output));

@@ -24,7 +24,7 @@ fn a_room_is_explored_and_what_was_seen_can_be_mapped_again() {
     let (room, out) = (path("room.json"), path("out"));
     fs::write(&room, ROOM).expect("written");
     let arguments =
-        ["explore", "--scene", &room, "--pose", "start", "--max-range", "3.5", "--json"];
+        ["explore", "--scene", &room, "--pose", "start", "--sonar-range", "3.5", "--json"];
     let output = run(&[&arguments[..], &["--sensing", "just-in-time", "--out", &out]].concat());
     assert!(output.status.success(), "{}", stderr(&output));
     let [object] = json_lines(&String::from_utf8_lossy(&output.stdout)).try_into().expect("one");
@@ -57,7 +57,7 @@ fn a_room_is_explored_and_what_was_seen_can_be_mapped_again() {
 fn the_same_seed_gives_the_same_exploration() {
     let of = |seed: &str| {
         let scene = ["explore", "--scene", "two-surface-room", "--pose", "middle", "--json"];
-        let further = ["--max-range", "3.2", "--sensing", "laser", "--odometry-noise", "0.01"];
+        let further = ["--sonar-range", "3.2", "--sensing", "laser", "--odometry-noise", "0.01"];
         let output = run(&[&scene[..], &further, &["--seed", seed]].concat());
         assert!(output.status.success(), "{}", stderr(&output));
         output.stdout
@@ -69,7 +69,7 @@ fn the_same_seed_gives_the_same_exploration() {
 #[test]
 fn the_benchmark_has_every_room_in_its_table() {
     let arguments =
-        ["explore-benchmark", "--rooms", "2", "--max-range", "3.2", "--most-stops", "60"];
+        ["benchmark", "explore", "--rooms", "2", "--sonar-range", "3.2", "--most-stops", "60"];
     let output = run(&arguments);
     assert!(output.status.success(), "{}", stderr(&output));
     let table = String::from_utf8_lossy(&output.stdout).into_owned();

@@ -33,7 +33,7 @@ fn every_verb_that_reads_logs_reads_them() {
         std::fs::copy(&log, &copy).expect("copies");
         let mut runs = vec![
             vec!["log", "verify", &log],
-            vec!["log", "show", "--pings", &log],
+            vec!["log", "show", "--readings", &log],
             vec!["log", "repair", &copy],
             vec!["compare", &log],
             vec!["compare", "--scene", &scene, &log],
@@ -48,7 +48,7 @@ fn every_verb_that_reads_logs_reads_them() {
             runs.push(vec!["plot", &log, "--scene", &scene, "--kind", kind, "-o", &picture]);
         }
         runs.push(vec!["plot", &log, "--scene", &scene, "--beam", "0", "-o", &picture]);
-        runs.push(vec!["log", "annotate", &log, "--out", &trusted]);
+        runs.push(vec!["log", "annotate", &log, "-o", &trusted]);
         // An array's few bearings are no arcs.
         let is_array = name.starts_with("array");
         assert_eq!(code(&["interpret", &log]), Some(if is_array { 2 } else { 0 }), "{name}");
@@ -92,7 +92,7 @@ fn what_is_written_again_is_of_format_2() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("trusted.jsonl");
     let [log, again] = [fixture("scan.jsonl"), out.to_str().expect("a plain path").to_owned()];
-    assert_eq!(code(&["log", "annotate", &log, "--out", &again]), Some(0));
+    assert_eq!(code(&["log", "annotate", &log, "-o", &again]), Some(0));
     assert_eq!(code(&["log", "verify", &again]), Some(0));
     let (was, is) = (Log::read(log.as_ref()), Log::read(&out));
     let format = |log: &Log| log.records[0]["format"].clone();

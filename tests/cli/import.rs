@@ -77,7 +77,7 @@ fn a_table_becomes_a_log_that_every_verb_takes() {
             "two-surface-room",
             "--pose",
             "middle",
-            "--out",
+            "-o",
             log,
         ]);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -107,7 +107,7 @@ fn a_table_becomes_a_log_that_every_verb_takes() {
         let said: serde_json::Value = serde_json::from_str(&done(&all)).expect("an object");
         (said["agree"].as_u64().expect("a count"), said["both_echo"].as_u64().expect("a count"))
     };
-    done(&["predict", &log, "--ideal-receiver", "--out", &predicted]);
+    done(&["predict", &log, "--ideal-receiver", "-o", &predicted]);
     let (agreeing, both) = agree(&[&predicted]);
     assert!(both > 60 && agreeing == both, "{agreeing} of {both}");
     // Another pose explains less, and says so; so does other air.
@@ -122,7 +122,7 @@ fn a_table_becomes_a_log_that_every_verb_takes() {
         vec!["plot", &predicted, "--kind", "residuals", "-o", &picture],
         vec!["map", &predicted, "--out", &map],
         vec!["log", "show", "--pings", &predicted],
-        vec!["log", "annotate", &predicted, "--out", &trusted],
+        vec!["log", "annotate", &predicted, "-o", &trusted],
         vec!["interpret", &predicted],
         vec!["lines", &predicted],
     ] {
@@ -168,7 +168,7 @@ fn wrong_files_and_outputs_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let table = write_table(folder.path());
     let before = fs::read(&table).expect("reads");
-    let over = refused(&["import", &table, "--none", "0", "--out", &table]);
+    let over = refused(&["import", &table, "--none", "0", "-o", &table]);
     assert!(over.contains("is read by this command"), "{over}");
     assert_eq!(fs::read(&table).expect("reads"), before);
     let zero = folder.path().join("zero.csv");
@@ -183,7 +183,7 @@ fn wrong_files_and_outputs_are_refused() {
     assert!(packed.contains("compressed"), "{packed}");
     let log = folder.path().join("log.jsonl");
     let log = log.to_str().expect("a plain path");
-    done(&["import", &table, "--none", "0", "--out", log]);
+    done(&["import", &table, "--none", "0", "-o", log]);
     let nothing = refused(&["predict", log]);
     assert!(
         nothing.contains("no reading to predict beside") && nothing.contains("--scene"),

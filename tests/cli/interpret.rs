@@ -19,7 +19,7 @@ fn simulate(folder: &Path, pose: &str) -> String {
         pose,
         "--sensor",
         "bozma-kuc-60khz",
-        "--out",
+        "-o",
         &path,
     ]);
     assert!(output.status.success(), "{}", stderr(&output));

@@ -75,7 +75,7 @@ fn what_cannot_be_opened_is_wrong_input() {
 fn a_log_is_shown() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = &log_of(folder.path(), format!("{LOG}rubbish\n"));
-    let said = check(&["log", "show", "--pings", log], 0);
+    let said = check(&["log", "show", "--readings", log], 0);
     for part in [
         "senscomp-6500",
         "simple-room",
@@ -132,7 +132,7 @@ fn a_simulated_scan_agrees_with_itself() {
     let log = folder.path().join("sim.jsonl");
     let log = log.to_str().expect("plain path");
     let pose = ["--scene", "simple-room", "--pose", "fig9"];
-    check(&[&["simulate"][..], &pose, &["--step-deg", "9", "--out", log]].concat(), 0);
+    check(&[&["simulate"][..], &pose, &["--step-deg", "9", "-o", log]].concat(), 0);
     check(&["log", "verify", "--strict", log], 0);
     let said = check(&["compare", log], 0);
     assert!(said.contains("--scene makes one"), "{said}");

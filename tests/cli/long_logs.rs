@@ -21,7 +21,7 @@ const MOST_DRAWN_MB: u64 = 180;
 fn write_log(path: &Path, folder: &Path) {
     let one = folder.join("one.jsonl");
     let one = one.to_str().expect("a plain path");
-    let made = run(&["simulate", "--scene", "simple-room", "--pose", "fig7", "--out", one]);
+    let made = run(&["simulate", "--scene", "simple-room", "--pose", "fig7", "-o", one]);
     assert!(made.status.success(), "{}", stderr(&made));
     let text = fs::read_to_string(one).expect("a log");
     let (session, scan) = text.split_once('\n').expect("lines");
@@ -69,7 +69,7 @@ fn verbs_read_a_long_log_in_little_memory() {
     for (arguments, most_mb) in [
         (&["log", "show", &log][..], MOST_MB),
         (&["log", "verify", &log], MOST_MB),
-        (&["log", "annotate", &log, "--out", &trusted], MOST_MB),
+        (&["log", "annotate", &log, "-o", &trusted], MOST_MB),
         (&["compare", &log], MOST_MB),
         (&["compare", "--scene", "simple-room", &log], MOST_MB),
         (&["map", &log, "--out", &map], MOST_MB),

@@ -1,4 +1,4 @@
-//! `sonard map`, `map-score`, `map-benchmark` and `lines` as a user runs them.
+//! `sonard map`, `benchmark score`, `benchmark map` and `lines` as a user runs them.
 
 use std::{fs, path::Path};
 
@@ -20,7 +20,7 @@ fn logs(folder: &Path) -> Vec<String> {
             place,
             "--max-range",
             "4",
-            "--out",
+            "-o",
             &path,
         ]);
         assert!(output.status.success(), "{}", stderr(&output));
@@ -68,7 +68,7 @@ fn feature_prediction_makes_the_better_map() {
                 let text = fs::read_to_string(&confidences).expect("written");
                 assert_eq!(text.lines().count(), 1200, "a confidence for every reading");
             }
-            object(&["map-score", &out, "two-surface-room", "--json"])
+            object(&["benchmark", "score", &out, "two-surface-room", "--json"])
         })
         .collect();
     let figure = |score: &Value, name: &str| score[name].as_f64().expect(name);
@@ -89,15 +89,15 @@ fn an_ideal_map_scores_full_marks_against_its_scene() {
     let further = ["--out", &map, "--region", "-0.5,-0.5,4.1,3.5", "--model", "physical", "--json"];
     let made = object(&with("map", &logs, &further));
     assert_eq!((made["width"].as_u64(), made["height"].as_u64()), (Some(92), Some(80)));
-    object(&["map-score", &map, "two-surface-room", "--save-ideal", &ideal, "--json"]);
-    let perfect = object(&["map-score", &ideal, "two-surface-room", "--json"]);
+    object(&["benchmark", "score", &map, "two-surface-room", "--save-ideal", &ideal, "--json"]);
+    let perfect = object(&["benchmark", "score", &ideal, "two-surface-room", "--json"]);
     assert_eq!(perfect["false_positive_paths_percent"].as_f64(), Some(0.0));
     assert!(perfect["correlation_percent"].as_f64().expect("it varies") > 99.9);
 }
 
 #[test]
 fn the_benchmark_gives_the_same_table_for_the_same_seed() {
-    let arguments = ["map-benchmark", "--maps", "3", "--places", "8", "--seed", "7"];
+    let arguments = ["benchmark", "map", "--maps", "3", "--places", "8", "--seed", "7"];
     let [one, two] = [run(&arguments), run(&arguments)];
     assert!(one.status.success(), "{}", stderr(&one));
     assert_eq!(one.stdout, two.stdout);
@@ -123,7 +123,7 @@ fn confidences_are_written_into_the_log_and_drawn() {
     let log = &logs(folder.path())[0];
     let path = |name: &str| folder.path().join(name).to_str().expect("plain path").to_owned();
     let (out, confidences) = (path("trusted.jsonl"), path("confidences.jsonl"));
-    let output = run(&["log", "annotate", log, "--out", &out]);
+    let output = run(&["log", "annotate", log, "-o", &out]);
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(run(&["log", "verify", &out]).status.success());
     let read = |path: &str| -> Vec<Value> {
@@ -148,7 +148,7 @@ fn confidences_are_written_into_the_log_and_drawn() {
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(fs::read_to_string(&picture).expect("written").contains("contradicted"));
     // In place is refused.
-    let output = run(&["log", "annotate", log, "--out", log]);
+    let output = run(&["log", "annotate", log, "-o", log]);
     assert_eq!(output.status.code(), Some(2));
 }
 
@@ -219,10 +219,10 @@ fn wrong_input_is_refused_with_what_would_be_right() {
         (with("map", &logs, &["--out", &out, "--resolution", "1e-9"]), "too many"),
         (with("map", &logs, &["--out", &out, "--region", "1,2,3"]), "X0,Y0,X1,Y1"),
         (with("map", &logs, &["--out", &out, "--region", "1,1,0,0"]), "no area"),
-        (with("map", &logs, &["--out", &out, "--max-range", "0"]), "greater than 0"),
-        (vec!["map-score", "nowhere", "simple-room"], "map.yaml beside map.pgm"),
-        (vec!["map-score", &out, "simple-rom"], "simple-room"),
-        (vec!["map-score", &out, "simple-room", "--spacing", "0"], "greater than 0"),
+        (with("map", &logs, &["--out", &out, "--silent-beyond", "0"]), "greater than 0"),
+        (vec!["benchmark", "score", "nowhere", "simple-room"], "map.yaml beside map.pgm"),
+        (vec!["benchmark", "score", &out, "simple-rom"], "simple-room"),
+        (vec!["benchmark", "score", &out, "simple-room", "--spacing", "0"], "greater than 0"),
         (vec!["lines", &empty], "sonard scan"),
         (with("lines", &logs, &["--logical", "0"]), "greater than 0"),
     ] {

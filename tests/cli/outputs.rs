@@ -36,37 +36,41 @@ const fn case(
 }
 
 const CASES: [Case; 25] = [
-    case("plot --out", ("a.svg", LOG), "plot IN -o IN"),
-    case("plot --out", ("a.png", LOG), "plot IN -o IN --force"),
-    case("plot --out", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),
-    case("trace --out", ("a.png", SCENE), "trace --scene IN --pose fig9 -o IN"),
-    case("interpret --out", ("a.svg", LOG), "interpret IN -o IN"),
-    case("lines --out", ("a.svg", LOG), "lines IN -o IN"),
+    case("plot --output", ("a.svg", LOG), "plot IN -o IN"),
+    case("plot --output", ("a.png", LOG), "plot IN -o IN --force"),
+    case("plot --output", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),
+    case("trace --output", ("a.png", SCENE), "trace --scene IN --pose fig9 -o IN"),
+    case("interpret --output", ("a.svg", LOG), "interpret IN -o IN"),
+    case("lines --output", ("a.svg", LOG), "lines IN -o IN"),
     case("scene draw --output", ("a.svg", SCENE), "scene draw IN -o IN"),
-    case("simulate --out", ("a.json", SCENE), "simulate --scene IN --pose fig9 --out IN --force"),
+    case("simulate --output", ("a.json", SCENE), "simulate --scene IN --pose fig9 -o IN --force"),
     case(
-        "simulate --out",
+        "simulate --output",
         ("a", POSES),
-        "simulate --scene simple-room --poses IN --out IN --force",
+        "simulate --scene simple-room --poses IN -o IN --force",
     ),
     case(
-        "simulate --out",
+        "simulate --output",
         ("a", POSES),
-        "simulate --scene simple-room --poses IN --array ring-12 --out IN --force",
+        "simulate --scene simple-room --poses IN --array ring-12 -o IN --force",
     ),
     case("map --out", ("map.pgm", LOG), "map IN --out DIR --force"),
     case("map --out", ("map.png", SCENE), "map LOG --scene IN --out DIR --force"),
     case("map --confidences", ("c.jsonl", LOG), "map IN --out DIR/map --confidences IN --force"),
-    case("map-score --save-ideal", ("map.yaml", MAP), "map-score DIR DIR --save-ideal DIR --force"),
+    case(
+        "benchmark score --save-ideal",
+        ("map.yaml", MAP),
+        "benchmark score DIR DIR --save-ideal DIR --force",
+    ),
     case(
         "explore --out",
         ("stops.jsonl", SCENE),
         "explore --scene IN --pose fig9 --most-stops 1 --out DIR --force",
     ),
-    case("import --out", ("a", TABLE), "import IN --out IN --force"),
-    case("predict --out", ("a.jsonl", LOG), "predict IN --out IN --force"),
-    case("predict --out", ("a.json", SCENE), "predict LOG --scene IN --out IN --force"),
-    case("log annotate --out", ("a.jsonl", LOG), "log annotate IN --out IN --force"),
+    case("import --output", ("a", TABLE), "import IN -o IN --force"),
+    case("predict --output", ("a.jsonl", LOG), "predict IN -o IN --force"),
+    case("predict --output", ("a.json", SCENE), "predict LOG --scene IN -o IN --force"),
+    case("log annotate --output", ("a.jsonl", LOG), "log annotate IN -o IN --force"),
     case(
         "scan --out",
         ("scan.jsonl", SCENE),
@@ -88,8 +92,12 @@ const CASES: [Case; 25] = [
 ];
 
 /// Outputs of verbs that read no file.
-const WITHOUT_INPUT: [&str; 4] =
-    ["map-benchmark --out", "explore-benchmark --out", "interpret-benchmark --out", "generate DIR"];
+const WITHOUT_INPUT: [&str; 4] = [
+    "benchmark map --out",
+    "benchmark explore --out",
+    "benchmark interpret --output",
+    "generate DIR",
+];
 
 const POSES: &str = "{\"x_m\":0.774,\"y_m\":0.085,\"heading_deg\":0.0}\n";
 const TABLE: &str = "azimuth_deg,range_m\n0,1\n";
@@ -221,7 +229,7 @@ fn a_picture_replaces_a_picture_and_nothing_else_unasked() {
 #[test]
 fn a_log_that_was_measured_or_simulated_is_not_replaced_unasked() {
     let (folder, log) = folder_with(("measured.jsonl", LOG));
-    let to_log = "simulate --scene simple-room --pose fig9 --to-deg 9 --out IN";
+    let to_log = "simulate --scene simple-room --pose fig9 --to-deg 9 -o IN";
     let refused = run_case(to_log, &log, folder.path());
     assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
     assert!(said(&refused).contains("is a log"), "{}", stderr(&refused));
@@ -236,7 +244,7 @@ fn a_log_that_was_measured_or_simulated_is_not_replaced_unasked() {
 #[test]
 fn map_and_explore_replace_their_own_files_only() {
     let (folder, log) = folder_with(("scan.jsonl", LOG));
-    let simulate = "simulate --scene simple-room --pose fig9 --out DIR/fig9.jsonl";
+    let simulate = "simulate --scene simple-room --pose fig9 -o DIR/fig9.jsonl";
     assert!(run_case(simulate, &log, folder.path()).status.success());
     let map = "map DIR/fig9.jsonl --out DIR/map --confidences DIR/c.jsonl";
     for again in ["", " again"] {
@@ -315,14 +323,14 @@ fn a_full_disk_leaves_the_old_file_or_none_and_the_command_says_so() {
     assert!(run_case("scene draw IN -o DIR/old.png", &scene, folder.path()).status.success());
     let was = fs::read(&old).expect("written");
     let course = path("course.jsonl");
-    let fine = "simulate --scene simple-room --pose fig9 --out DIR/fig9.jsonl";
+    let fine = "simulate --scene simple-room --pose fig9 -o DIR/fig9.jsonl";
     assert!(run_case(fine, &scene, folder.path()).status.success());
     for (out, arguments) in [
         (&old, vec!["scene", "draw", "simple-room", "-o", &old]),
         (&new, vec!["scene", "draw", "simple-room", "-o", &new]),
         (&new, vec!["plot", &path("fig9.jsonl"), "-o", &new]),
-        (&course, vec!["simulate", "--scene", "simple-room", "--pose", "fig9", "--out", &course]),
-        (&path("t.jsonl"), vec!["log", "annotate", &path("fig9.jsonl"), "--out", &path("t.jsonl")]),
+        (&course, vec!["simulate", "--scene", "simple-room", "--pose", "fig9", "-o", &course]),
+        (&path("t.jsonl"), vec!["log", "annotate", &path("fig9.jsonl"), "-o", &path("t.jsonl")]),
         (&path("map/map.pgm"), vec!["map", &path("fig9.jsonl"), "--out", &path("map")]),
     ] {
         // Blocks of 512 bytes: less than any of these files. Nothing is said of signals.
@@ -340,6 +348,31 @@ fn a_full_disk_leaves_the_old_file_or_none_and_the_command_says_so() {
         assert!(litter.is_empty(), "{arguments:?}: {litter:?}");
     }
     assert_eq!(fs::read(&old).expect("kept"), was);
+}
+
+#[test]
+fn a_place_that_can_not_be_written_to_is_wrong_input_in_every_verb() {
+    let (folder, scene) = folder_with(("room.json", SCENE));
+    let fine = "simulate --scene simple-room --pose fig9 --to-deg 9 -o DIR/fig9.jsonl";
+    assert!(run_case(fine, &scene, folder.path()).status.success());
+    for line in [
+        "simulate --scene simple-room --pose fig9 --to-deg 9 -o DIR/none/a.jsonl",
+        "plot DIR/fig9.jsonl -o DIR/none/a.svg",
+        "plot DIR/fig9.jsonl -o DIR/fig9.jsonl/a.svg",
+        "trace --scene simple-room --pose fig9 -o DIR/none/a.png",
+        "scene draw IN -o DIR/none/a.svg",
+        "lines DIR/fig9.jsonl -o DIR/none/a.svg",
+        "interpret DIR/fig9.jsonl -o DIR/none/a.svg",
+        "log annotate DIR/fig9.jsonl -o DIR/none/a.jsonl",
+        "map DIR/fig9.jsonl --out DIR/fig9.jsonl/map",
+        "scan --mock --scene IN --pose fig9 --to-deg 9 --out DIR/fig9.jsonl/scan",
+        "explore --scene IN --pose fig9 --most-stops 1 --out DIR/fig9.jsonl/explored",
+        "run --mock --scene IN --pose fig9 --log DIR/fig9.jsonl/log --socket DIR/s",
+        "generate DIR/fig9.jsonl/generated",
+    ] {
+        let output = run_case(line, &scene, folder.path());
+        assert_eq!(output.status.code(), Some(2), "{line}: {}", stderr(&output));
+    }
 }
 
 #[test]

@@ -109,7 +109,7 @@ fn wrong_input_is_refused_with_what_would_be_right() {
     sonard(folder.path())
         .args(["scan.jsonl", "-o", "no/such/folder.svg"])
         .assert()
-        .code(3)
+        .code(2)
         .stderr(contains("no/such/folder.svg"));
 }
 

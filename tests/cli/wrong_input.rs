@@ -44,6 +44,25 @@ fn ports() {
 }
 
 #[test]
+fn an_option_of_another_engine_is_refused_by_name() {
+    let simulate = ["simulate", "--scene", "simple-room", "--pose", "fig9", "--to-deg", "9"];
+    for (engine, option, knowing) in [
+        ("cone", &["--lossless"][..], "--engine paths or --engine fan"),
+        ("cone", &["--max-order", "2"], "--engine paths or --engine fan"),
+        ("cone", &["--response", "full"], "--engine paths"),
+        ("fan", &["--edge-law", "utd"], "--engine paths"),
+        ("fan", &["--aperture-deg", "15"], "--engine cone"),
+        ("fan", &["--ideal-receiver"], "--engine paths"),
+        ("fan", &["--double-diffraction"], "--engine paths"),
+        ("paths", &["--ray-spacing-deg", "0.1"], "--engine fan"),
+        ("paths", &["--aperture-deg", "15"], "--engine cone"),
+    ] {
+        let wrong = [&simulate[..], &["--engine", engine], option].concat();
+        check(&wrong, 2, &[option[0], &format!("{engine} does not know it"), knowing]);
+    }
+}
+
+#[test]
 fn a_port_without_permission() {
     let pty = Pty::open(None).expect("a pty");
     fs::set_permissions(pty.path(), fs::Permissions::from_mode(0o000)).expect("it is ours");
@@ -169,7 +188,7 @@ fn a_log_in_use_is_not_shared() {
     let log = folder.path().join("scan.jsonl");
     let _held = sonard::store::LogWriter::open(&log).expect("opens");
     let output = mock_scan("fig9", folder.path(), &["--to-deg", "9"]);
-    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(output.status.code(), Some(3));
     assert!(stderr(&output).contains("another process"), "{}", stderr(&output));
 }
 

@@ -11,6 +11,7 @@ mod fan;
 mod lazy;
 mod names;
 mod observation;
+mod options;
 mod path;
 pub mod paths;
 mod prediction;
@@ -25,8 +26,12 @@ pub use engine::{Arrival, Arrivals, Engine};
 pub use fan::{Fan, FanSettings};
 pub use names::FACE_NAME;
 pub use observation::ObservationPoint;
+pub use options::{
+    ConeOptions, EngineKind, EngineOptions, FanOptions, ForeignOption, OptionKeys, Options,
+    PathOptions,
+};
 pub use path::{Bend, Edge, Interaction, Mechanism, Path, Reflector};
 pub use prediction::Prediction;
-pub use simulator::{EngineKind, ModelError, Options, Simulator};
+pub use simulator::{ModelError, Simulator};
 
 pub use crate::acoustics::EdgeLawKind;

@@ -124,3 +124,21 @@ fn uses_are_read_as_the_compiler_does() {
 fn path(module: &str) -> Module {
     module.split("::").filter(|name| !name.is_empty()).map(str::to_owned).collect()
 }
+
+/// One style of module files in the shell: `foo.rs` beside the folder `foo`.
+#[test]
+fn a_module_of_the_shell_is_a_file_beside_its_folder() {
+    fn look(folder: &Path, found: &mut Vec<PathBuf>) {
+        for entry in fs::read_dir(folder).expect("a source folder") {
+            let path = entry.expect("an entry").path();
+            match path.is_dir() {
+                true => look(&path, found),
+                false if path.ends_with("mod.rs") => found.push(path),
+                false => {}
+            }
+        }
+    }
+    let mut found = Vec::new();
+    look(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../src"), &mut found);
+    assert!(found.is_empty(), "foo.rs, not foo/mod.rs: {found:?}");
+}

@@ -86,7 +86,7 @@ pub(super) fn scan_of_room(pose: Pose, step_deg: f64, seed: u64) -> ScanView {
         measure(scan, i, azimuth_deg, sim, &mut rng)
     });
     let time = jiff::Timestamp::UNIX_EPOCH;
-    let start = ScanStart { scan, time, pose, plan, air: None, provenance: None, request: None };
+    let start = ScanStart::new(scan, time, pose, plan);
     let end = ScanEnd {
         scan,
         time: jiff::Timestamp::UNIX_EPOCH,
@@ -212,26 +212,13 @@ fn measure(
         _ => {}
     }
     Ping {
-        scan,
-        index,
         step: index as i32,
-        azimuth_deg,
-        ranger: None,
-        pose: None,
-        provenance: None,
-        time: None,
         time_sigma_us: Some(12.0),
-        status,
         fired_ticks: Some(u64::from(index) * 100_000),
-        echo_ticks: Vec::new(),
         tof_us: range_m.map(|range| range * 2e6 / 343.99),
         range_m,
-        repaired: false,
-        amplitude: None,
-        margin_db: None,
-        path: None,
         residual_m: range_m.zip(sim.range_m).map(|(a, b)| a - b),
-        confidence: None,
         sim: Some(sim),
+        ..Ping::new(scan, index, azimuth_deg, status)
     }
 }

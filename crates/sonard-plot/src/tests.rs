@@ -304,11 +304,8 @@ prop_compose! {
         sim in prop::option::of(any_sim()),
     ) -> Ping {
         Ping {
-            scan: Uuid::nil(), index, step: 0, azimuth_deg, ranger: None, pose: None,
-            provenance: None, time: None, time_sigma_us: None,
-            status, fired_ticks: None, echo_ticks: Vec::new(), tof_us: None, range_m,
-            repaired: false, amplitude: None, margin_db, path: None, sim, residual_m,
-            confidence: None,
+            range_m, margin_db, sim, residual_m,
+            ..Ping::new(Uuid::nil(), index, azimuth_deg, status)
         }
     }
 }
@@ -323,16 +320,11 @@ prop_compose! {
     ) -> ScanView {
         let mut session = session();
         session.sensor.blanking_us = blanking_us;
-        let start = place.map(|[x_m, y_m, heading_deg]| ScanStart {
-            scan: Uuid::nil(),
-            time: jiff::Timestamp::UNIX_EPOCH,
-            pose: Pose { x_m, y_m, heading_deg },
-            plan: ScanPlan {
-                from_deg: plan[0], to_deg: plan[1], step_deg: plan[2], pings_per_stop: 1,
-            },
-            air: None,
-            provenance: None,
-            request: None,
+        let [from_deg, to_deg, step_deg] = plan;
+        let plan = ScanPlan { from_deg, to_deg, step_deg, pings_per_stop: 1 };
+        let start = place.map(|[x_m, y_m, heading_deg]| {
+            let pose = Pose { x_m, y_m, heading_deg };
+            ScanStart::new(Uuid::nil(), jiff::Timestamp::UNIX_EPOCH, pose, plan)
         });
         let session = with_session.then(|| session.into());
         ScanView { scan: Uuid::nil(), session, start, pings, events: Vec::new(), end: None }

@@ -29,15 +29,7 @@ impl ScanStart {
         time: Timestamp,
     ) -> Self {
         let plan = model.array().plan(rounds);
-        Self {
-            scan,
-            time,
-            pose,
-            plan,
-            air: None,
-            provenance: Some(Provenance::Simulated),
-            request: None,
-        }
+        Self { provenance: Some(Provenance::Simulated), ..Self::new(scan, time, pose, plan) }
     }
 }
 

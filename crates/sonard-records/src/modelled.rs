@@ -1,9 +1,11 @@
 //! Records of the model's words: air, settings, predictions and paths, and back from them.
 
+use serde_json::Value;
 use sonard_model::{
     acoustics::{Air, AirError},
     model::{
-        Arrival, Interaction, Mechanism, ObservationPoint, Options, Path, Prediction, Simulator,
+        Arrival, Interaction, Mechanism, ObservationPoint, OptionKeys, Options, Path, Prediction,
+        Simulator,
     },
     scene::Scene,
 };
@@ -39,25 +41,34 @@ impl TryFrom<&AirRecord> for Air {
 }
 
 impl From<&Options> for ModelRecord {
-    /// Engine and settings as they stand in a log.
+    /// Engine and settings as they stand in a log: what is not given is left out.
     fn from(options: &Options) -> Self {
         let mut settings = serde_json::Map::new();
-        if let Ok(serde_json::Value::Object(values)) = serde_json::to_value(options) {
+        if let Ok(Value::Object(values)) = serde_json::to_value(OptionKeys::from(options)) {
             settings.extend(values.into_iter().filter(|(_, value)| !value.is_null()));
         }
         settings.remove("engine");
-        Self { engine: options.engine.name().to_owned(), settings }
+        if settings.get("double_diffraction") == Some(&Value::Bool(false)) {
+            // Records had no such setting at first.
+            settings.remove("double_diffraction");
+        }
+        Self { engine: options.engine.kind().name().to_owned(), settings }
     }
 }
 
 impl ModelRecord {
     /// The options that a log's model was run with; `None` if this program has no such engine or
-    /// setting.
+    /// setting. Early logs have the defaults of all engines, which mean nothing.
     #[must_use]
     pub fn options(&self) -> Option<Options> {
         let mut settings = self.settings.clone();
         settings.insert("engine".into(), self.engine.clone().into());
-        serde_json::from_value(settings.into()).ok()
+        let known = serde_json::to_value(OptionKeys::default()).ok()?;
+        if settings.keys().any(|key| known.get(key).is_none()) {
+            return None;
+        }
+        let keys: OptionKeys = serde_json::from_value(settings.into()).ok()?;
+        Some(keys.options_of_engine())
     }
 }
 
@@ -127,6 +138,7 @@ impl From<Mechanism> for InteractionKind {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sonard_model::model::{ConeOptions, EngineKind, EngineOptions, FanOptions, PathOptions};
 
     #[test]
     fn air_survives_its_record() {
@@ -141,16 +153,37 @@ mod tests {
 
     #[test]
     fn options_survive_their_record() {
-        let options = Options {
-            max_range_m: Some(4.0),
-            double_diffraction: true,
-            ray_spacing_deg: 0.5,
-            ..Options::default()
-        };
-        for options in [Options::default(), options] {
+        let paths = PathOptions { double_diffraction: true, lossless: true, ..Default::default() };
+        let fan = FanOptions { ray_spacing_deg: 0.5, ..FanOptions::default() };
+        let cone = ConeOptions { aperture_deg: Some(15.0) };
+        let engines = [EngineOptions::default(), paths.into(), fan.into(), cone.into()];
+        for engine in engines {
+            let options = Options { max_range_m: Some(4.0), ..engine.into() };
             assert_eq!(ModelRecord::from(&options).options(), Some(options));
         }
-        let unknown = ModelRecord { engine: "rays".into(), ..ModelRecord::from(&options) };
+        let record = ModelRecord::from(&Options::default());
+        assert_eq!(
+            serde_json::to_string(&record).expect("JSON"),
+            r#"{"engine":"paths","ideal_receiver":false,"lossless":false}"#
+        );
+        let unknown = ModelRecord { engine: "rays".into(), ..record.clone() };
         assert_eq!(unknown.options(), None);
+        let mut unknown = record;
+        unknown.settings.insert("bounces".into(), 3.into());
+        assert_eq!(unknown.options(), None);
+    }
+
+    #[test]
+    fn early_records_have_the_defaults_of_all_engines() {
+        for engine in [EngineKind::Paths, EngineKind::Fan, EngineKind::Cone] {
+            let text = format!(
+                r#"{{"engine":"{}","max_range_m":4.0,"ideal_receiver":false,"lossless":false,
+                "ray_spacing_deg":0.05}}"#,
+                engine.name()
+            );
+            let record: ModelRecord = serde_json::from_str(&text).expect("a record");
+            let options = Options { max_range_m: Some(4.0), ..engine.options().into() };
+            assert_eq!(record.options(), Some(options));
+        }
     }
 }

@@ -198,6 +198,14 @@ pub struct ScanStart {
     pub request: Option<Uuid>,
 }
 
+impl ScanStart {
+    /// A scan of the session's ranger, in the session's air, that nobody asked for.
+    #[must_use]
+    pub const fn new(scan: Uuid, time: Timestamp, pose: Pose, plan: ScanPlan) -> Self {
+        Self { scan, time, pose, plan, air: None, provenance: None, request: None }
+    }
+}
+
 /// The air of a scan, as it was known when it began.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanAir {
@@ -279,6 +287,36 @@ pub struct Ping {
     /// written by `sonard log annotate`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub confidence: Option<f64>,
+}
+
+impl Ping {
+    /// A firing of which nothing is known but where it looked and what became of it.
+    #[must_use]
+    pub const fn new(scan: Uuid, index: u32, azimuth_deg: f64, status: PingStatus) -> Self {
+        Self {
+            scan,
+            index,
+            step: 0,
+            azimuth_deg,
+            ranger: None,
+            pose: None,
+            provenance: None,
+            time: None,
+            time_sigma_us: None,
+            status,
+            fired_ticks: None,
+            echo_ticks: Vec::new(),
+            tof_us: None,
+            range_m: None,
+            repaired: false,
+            amplitude: None,
+            margin_db: None,
+            path: None,
+            sim: None,
+            residual_m: None,
+            confidence: None,
+        }
+    }
 }
 
 /// A prediction.

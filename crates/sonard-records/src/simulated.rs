@@ -37,15 +37,7 @@ impl ScanView {
         Self {
             scan,
             session: Some(std::sync::Arc::new(Session::simulated(simulator, time))),
-            start: Some(ScanStart {
-                scan,
-                time,
-                pose: *pose,
-                plan: *plan,
-                air: None,
-                provenance: None,
-                request: None,
-            }),
+            start: Some(ScanStart::new(scan, time, *pose, *plan)),
             pings: pings.collect(),
             events: Vec::new(),
             end: Some(ScanEnd::simulated(simulator, scan, plan.beams(), time)),
@@ -89,27 +81,13 @@ impl Ping {
     ) -> Self {
         let said = SimRecord::of(simulator, prediction);
         Self {
-            scan,
-            index,
             step: (azimuth_deg / 360.0 * STEPS_PER_REVOLUTION).round() as i32,
-            azimuth_deg,
-            ranger: None,
-            pose: None,
-            provenance: None,
-            time: None,
-            time_sigma_us: None,
-            status: said.status,
-            fired_ticks: None,
-            echo_ticks: Vec::new(),
             tof_us: prediction.echoes_us.first().copied(),
             range_m: said.range_m,
-            repaired: false,
             amplitude: said.amplitude,
             margin_db: said.margin_db,
             path: said.path,
-            sim: None,
-            residual_m: None,
-            confidence: None,
+            ..Self::new(scan, index, azimuth_deg, said.status)
         }
     }
 }

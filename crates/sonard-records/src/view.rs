@@ -179,29 +179,7 @@ mod tests {
     use crate::{EventKind, PingStatus, ScanPlan};
 
     fn ping(scan: Uuid, index: u32) -> Record {
-        Record::Ping(Box::new(Ping {
-            scan,
-            index,
-            step: 0,
-            azimuth_deg: 0.0,
-            ranger: None,
-            pose: None,
-            provenance: None,
-            time: None,
-            time_sigma_us: None,
-            status: PingStatus::NoEcho,
-            fired_ticks: None,
-            echo_ticks: Vec::new(),
-            tof_us: None,
-            range_m: None,
-            repaired: false,
-            amplitude: None,
-            margin_db: None,
-            path: None,
-            sim: None,
-            residual_m: None,
-            confidence: None,
-        }))
+        Record::Ping(Box::new(Ping::new(scan, index, 0.0, PingStatus::NoEcho)))
     }
 
     fn start(scan: Uuid) -> Record {

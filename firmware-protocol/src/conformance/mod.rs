@@ -6,6 +6,7 @@
 
 mod bench;
 pub mod scenarios;
+mod steps;
 
 extern crate std;
 

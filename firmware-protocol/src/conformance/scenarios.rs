@@ -5,12 +5,14 @@ extern crate std;
 
 use std::vec::Vec;
 
-use super::{Bench, BenchError, DeviceUnderTest};
-use crate::frame::{Frame, FrameDecoder, Header, Received};
+use super::{
+    Bench, BenchError, DeviceUnderTest,
+    steps::{answer, assert_echoes, frame, identify, ping, readings, ready, replies, status},
+};
 use crate::host::{Command, HostError, HostEvent, Outcome};
 use crate::messages::{
-    Blanking, Capabilities, FaultKind, Identity, NakReason, Reading, ReadingStatus, Reply, Request,
-    ResetCause, Settings, Status, Sweep, SweepState,
+    Blanking, Capabilities, FaultKind, NakReason, ReadingStatus, Reply, Request, ResetCause,
+    Settings, Sweep,
 };
 
 /// 24 ms of listening, 2 ms of rest.
@@ -27,7 +29,7 @@ pub const SETTINGS: Settings = Settings {
 const SWEEP: Sweep =
     Sweep { sweep: 1, first_step: 0, stride: 1, stops: 40, pings_per_stop: 1, lease_ms: 500 };
 /// Time to boot.
-const BOOT_S: f64 = 0.1;
+pub(super) const BOOT_S: f64 = 0.1;
 
 /// Identity comes unasked after power-on, and again for each Identify.
 pub fn it_announces_itself_once_and_answers_identify_at_once(
@@ -320,93 +322,4 @@ pub fn a_restart_on_request_has_a_new_number_and_forgets_everything(
     bench.device.set_echoes(&[5_000.0]);
     let reading = ping(&mut bench);
     assert_echoes(&bench, &reading, &[5_000.0]);
-}
-
-fn ready(bench: &mut Bench<impl DeviceUnderTest>, settings: Settings) -> Identity {
-    let identity = identify(bench);
-    for command in [Command::Configure(settings), Command::Home] {
-        bench.perform(command, 20.0).expect("gets ready");
-    }
-    identity
-}
-
-fn identify(bench: &mut Bench<impl DeviceUnderTest>) -> Identity {
-    bench.run(BOOT_S).expect("boots");
-    bench.perform(Command::Identify, 5.0).expect("identifies itself");
-    *bench.host.identity().expect("identified")
-}
-
-fn status(bench: &mut Bench<impl DeviceUnderTest>) -> Status {
-    let events = bench.perform(Command::Status, 2.0).expect("answers");
-    let told = events.iter().find_map(|event| match event {
-        HostEvent::Done(Outcome::Status(status)) => Some(*status),
-        _ => None,
-    });
-    told.expect("a status")
-}
-
-fn ping(bench: &mut Bench<impl DeviceUnderTest>) -> Reading {
-    let events = bench.perform(Command::Ping, 2.0).expect("pings");
-    let readings = readings(&events);
-    assert_eq!(readings.len(), 1);
-    readings[0]
-}
-
-fn readings(events: &[HostEvent]) -> Vec<Reading> {
-    let reading = |event: &HostEvent| match event {
-        HostEvent::Reading { reading, .. } => Some(*reading),
-        _ => None,
-    };
-    assert!(!events.iter().any(|event| matches!(
-        event,
-        HostEvent::SweepDone { end, .. } if *end != SweepState::Complete
-    )));
-    events.iter().filter_map(reading).collect()
-}
-
-fn assert_echoes(bench: &Bench<impl DeviceUnderTest>, reading: &Reading, expected_us: &[f64]) {
-    assert_eq!(reading.echoes.len(), expected_us.len(), "{reading:?} for {expected_us:?}");
-    for (ticks, us) in reading.echoes.iter().zip(expected_us) {
-        let off = (f64::from(*ticks) - 2.0 * us).abs();
-        let allowed = f64::from(bench.device.tolerance_ticks());
-        assert!(off <= allowed, "{reading:?} for {expected_us:?}: {off} ticks off");
-    }
-}
-
-fn frame(boot: u16, seq: u16, request: &Request) -> Vec<u8> {
-    Frame::encode(Header { boot, seq }, request).expect("fits").to_vec()
-}
-
-/// What came over the line, with the numbers they answer. Anything that is no frame is an error.
-fn replies(bytes: &[u8]) -> Vec<(u16, Reply)> {
-    let mut decoder = FrameDecoder::new();
-    let mut replies = Vec::new();
-    for byte in bytes {
-        match decoder.push(*byte) {
-            Received::Frame(frame) => {
-                let reply = Reply::decode(frame.body).expect("a reply");
-                replies.push((frame.header.seq, reply));
-            }
-            Received::Dropped(reason) => panic!("the device sent something else: {reason:?}"),
-            Received::Nothing | Received::Empty => {}
-        }
-    }
-    replies
-}
-
-/// Sends a request past the host machine, and gives the reply to it.
-fn answer(
-    bench: &mut Bench<impl DeviceUnderTest>,
-    boot: u16,
-    seq: u16,
-    request: &Request,
-) -> Reply {
-    // Numbers far from those of the host machine, which counts from a random one.
-    let seq = bench.host.identity().and_then(|known| known.last_seq).unwrap_or(0).wrapping_add(seq);
-    bench.device.receive();
-    bench.device.send(&frame(boot, seq, request));
-    bench.device.run(30_000).expect("runs");
-    let replies = replies(&bench.device.receive());
-    let told = replies.iter().find(|(answered, _)| *answered == seq);
-    told.unwrap_or_else(|| panic!("no answer to {request:?}, number {seq}: {replies:?}")).1
 }

@@ -1,6 +1,8 @@
 //! A device made of nothing but well-formed replies, true or not, against the host machine.
 #![allow(unreachable_pub, reason = "a test file's part")]
 
+mod made_up;
+
 use firmware_protocol::frame::{Frame, FrameDecoder, Header, Received};
 use firmware_protocol::host::{Command, Host, HostConfig, HostEvent};
 use firmware_protocol::messages::{

@@ -3,24 +3,21 @@
 
 use serde_json::Value;
 
-use super::{
-    daemon::{Daemon, steps_per_revolution},
-    load::{Loaded, Places, sensor},
-};
+use super::load::{Places, sensor};
 use crate::{
     acoustics::Sensor,
-    api::{AirOrder, Setup, Status},
+    api::{Setup, Status},
     cli::{Failure, options::load_sensor},
+    collect::{ByDaemon, Plan, steps_per_revolution},
+    model::OptionKeys,
 };
 
-const AIR: [&str; 4] = ["temperature_c", "humidity_percent", "pressure_kpa", "file"];
-
-impl Loaded {
+impl Plan {
     /// Takes over what a daemon decides by itself.
     ///
     /// # Errors
     /// When the plan wants something of that otherwise: all of it, with the key to change.
-    pub(super) fn adopt(&mut self, daemon: &Daemon, status: &Status) -> Result<(), Failure> {
+    pub(super) fn adopt(&mut self, daemon: &ByDaemon, status: &Status) -> Result<(), Failure> {
         let setup = daemon.setup();
         let mut differences = self.adopt_motion(setup);
         differences.extend(self.adopt_sensor(setup)?);
@@ -42,29 +39,6 @@ impl Loaded {
         Ok(())
     }
 
-    /// Whether the plan says anything about the air.
-    pub(super) fn gives_air(&self) -> bool {
-        self.given_air().next().is_some()
-    }
-
-    /// What a daemon is told about the air; nothing if that is the daemon's to know.
-    pub(super) fn air_order(&self, temperature_c: f64) -> Option<AirOrder> {
-        let given = |key, value| self.is_given("air", key).then_some(value);
-        self.gives_air().then(|| AirOrder {
-            temperature_c,
-            humidity_percent: given("humidity_percent", self.keys.air.humidity_percent),
-            pressure_kpa: given("pressure_kpa", self.keys.air.pressure_kpa),
-        })
-    }
-
-    fn given_air(&self) -> impl Iterator<Item = &'static str> {
-        AIR.into_iter().filter(|key| self.is_given("air", key))
-    }
-
-    fn is_given(&self, section: &str, key: &str) -> bool {
-        self.layers.origin(section, key).is_some()
-    }
-
     fn adopt_motion(&mut self, setup: &Setup) -> Vec<String> {
         let [plan, daemon] = [&self.keys.motion, &setup.motion]
             .map(|keys| serde_json::to_value(keys).unwrap_or_default());
@@ -81,16 +55,17 @@ impl Loaded {
 
     fn adopt_sensor(&mut self, setup: &Setup) -> Result<Vec<String>, Failure> {
         let keys = &self.keys.sensor;
-        let reach_m = setup.model.max_range_m.unwrap_or(setup.sensor.max_range_m);
-        let mut differ: Vec<String> = [
-            ("max_range_m", value(keys.max_range_m), "model.max_range_m", value(reach_m)),
-            ("threshold", value(keys.threshold), "model.sensor", value(setup.sensor.threshold)),
-            ("engine", value(keys.engine), "model.engine", value(setup.model.engine)),
-        ]
-        .into_iter()
-        .filter(|(key, ours, _, theirs)| self.is_given("sensor", key) && ours != theirs)
-        .map(|(key, ours, there, theirs)| self.differs("sensor", key, &ours, there, &theirs))
-        .collect();
+        let reach_m = setup.model.options.max_range_m.unwrap_or(setup.sensor.max_range_m);
+        let adopted = OptionKeys { max_range_m: Some(reach_m), ..setup.model.options };
+        let threshold = adopted.threshold.or(Some(setup.sensor.threshold));
+        let (ours, theirs) = (value(keys.options), value(OptionKeys { threshold, ..adopted }));
+        let options = theirs.as_object().into_iter().flatten();
+        let mut differ: Vec<String> = options
+            .filter(|(key, theirs)| self.is_given("sensor", key) && ours[key.as_str()] != **theirs)
+            .map(|(key, theirs)| {
+                self.differs("sensor", key, &ours[key.as_str()], &format!("model.{key}"), theirs)
+            })
+            .collect();
         let base = match self.is_given("sensor", "sensor") {
             true => load_sensor(&keys.sensor)?,
             false => setup.sensor.clone(),
@@ -107,7 +82,7 @@ impl Loaded {
             ));
         }
         let keys = &mut self.keys.sensor;
-        (keys.engine, keys.max_range_m, keys.threshold) = (setup.model.engine, Some(reach_m), None);
+        keys.options = adopted;
         keys.sensor.clone_from(&setup.sensor.name);
         self.sensor = setup.sensor.clone();
         Ok(differ)

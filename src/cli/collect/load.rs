@@ -9,177 +9,104 @@ use std::{
 use super::Args;
 use crate::{
     acoustics::{Air, Sensor},
-    cli::{Failure, options::load_sensor, scan::setup::Wish, scene_file},
-    collect::{CollectionKeys, NamedPose, Order, PoseFault, read_file},
+    cli::{Failure, options::load_sensor, scene_file},
+    collect::{CollectionKeys, NamedPose, Order, Plan, PoseFault, Poses, read_file},
     config::{ConfigError, Layers},
-    model::Options,
-    ranger::Motion,
     scan::ScanPlan,
     scene::Scene,
 };
 
-/// Where poses come from.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Poses {
-    /// They are all known.
-    Listed(Vec<NamedPose>),
-    /// A person gives them.
-    Prompt,
-    /// A command that is run for each.
-    Program(String),
-    /// A command that prints them one by one.
-    Stream(String),
-}
-
-/// A plan with everything it names.
-pub(super) struct Loaded {
-    pub(super) keys: CollectionKeys,
-    pub(super) text: String,
-    pub(super) folder: PathBuf,
-    pub(super) scene: Arc<Scene>,
-    pub(super) scene_text: String,
-    pub(super) sensor: Sensor,
-    pub(super) poses: Poses,
-    pub(super) plan: ScanPlan,
-    /// Motor steps a turn.
-    pub(super) steps_per_revolution: u16,
-    /// Where the keys were given.
-    pub(super) layers: Layers<CollectionKeys>,
-    /// The plan's file, as errors call it.
-    pub(super) name: String,
-}
-
-impl Loaded {
-    pub(super) fn new(args: &Args) -> Result<Self, Failure> {
-        let path = args.plan.clone().unwrap_or_default();
-        let text = fs::read_to_string(&path).map_err(|error| {
-            Failure::input(
-                format!("cannot read the plan {}: {error}", path.display()),
-                "give a TOML file; `sonard collect --example` prints one",
-            )
-        })?;
-        let name = path.display().to_string();
-        let mut layers =
-            Layers::<CollectionKeys>::new().file(&name, &text).map_err(|error| refuse(&error))?;
-        for setting in &args.set {
-            layers = layers.option("--set", setting).map_err(|error| refuse(&error))?;
-        }
-        let keys = layers.clone().keys().map_err(|error| refuse(&error))?;
-        let at = Places { layers: &layers, file: &name };
-        let scene_text = scene_file::read(&keys.place.scene)?;
-        let scene = Arc::new(scene_file::load(&keys.place.scene)?);
-        let sensor = sensor(load_sensor(&keys.sensor.sensor)?, &keys, &at)?;
-        let plan = scan_plan(&keys, &at)?;
-        air(&keys, keys.air.temperature_c)
-            .map_err(|error| at.refuse("air", "temperature_c", error))?;
-        let poses = poses(&keys, &scene, &at)?;
-        if !matches!(poses, Poses::Listed(_)) && keys.collection.order != Order::ByPose {
-            return Err(at.refuse(
-                "collection",
-                "order",
-                Fault::new(
-                    "poses that are asked for one by one can only be taken by pose",
-                    "give all poses with poses.list or poses.file, or order = \"by-pose\"",
-                ),
-            ));
-        }
-        let given = args.port.is_some() || args.mock || args.emulator || args.daemon;
-        let needed = !(args.check || args.plan_only);
-        if needed && !given && keys.device.port.is_none() {
-            return Err(Failure::input(
-                "no device: the plan has no device.port",
-                "set device.port, give --port or --daemon, or use --mock to try without one",
-            ));
-        }
-        let folder = args
-            .out
-            .as_deref()
-            .map_or_else(|| PathBuf::from(&keys.collection.folder), Path::to_path_buf);
-        let steps_per_revolution = args.world.steps_per_revolution();
-        Ok(Self {
-            keys,
-            text,
-            folder,
-            scene,
-            scene_text,
-            sensor,
-            poses,
-            plan,
-            steps_per_revolution,
-            layers,
-            name,
-        })
-    }
-
-    /// What is measured at a pose in this air.
-    pub(super) fn wish(&self, pose: &NamedPose, air: Air) -> Wish {
-        Wish {
-            scene: Arc::clone(&self.scene),
-            pose: pose.pose,
-            pose_text: pose.label(),
-            plan: self.plan,
-            motion: self.motion(),
-            sensor: self.sensor.clone(),
-            air,
-            options: self.options(),
-        }
-    }
-
-    pub(super) fn air(&self, temperature_c: f64) -> Result<Air, Failure> {
-        air(&self.keys, temperature_c).map_err(|fault| Failure::device(fault.message, fault.help))
-    }
-
-    pub(super) fn motion(&self) -> Motion {
-        let keys = &self.keys.motion;
-        Motion {
-            window_ms: keys.window_ms,
-            settle_ms: keys.settle_ms,
-            min_interval_ms: keys.min_interval_ms,
-            max_echoes: keys.max_echoes,
-            speed: keys.speed,
-            acceleration: keys.acceleration,
-        }
-    }
-
-    fn options(&self) -> Options {
-        let keys = &self.keys.sensor;
-        Options {
-            engine: keys.engine,
-            max_range_m: keys.max_range_m,
-            threshold: keys.threshold,
-            ..Options::default()
-        }
-    }
-
-    /// Poses that will be there, as far as that is known.
-    pub(super) fn pose_count(&self) -> Option<u32> {
-        match &self.poses {
-            Poses::Listed(poses) => Some(poses.len() as u32),
-            _ => Some(self.keys.poses.count).filter(|&count| count > 0),
-        }
-    }
-
-    /// One screen about a plan that is right.
-    pub(super) fn in_words(&self) -> String {
-        let poses = match (&self.poses, self.pose_count()) {
-            (Poses::Listed(poses), _) => {
-                let names: Vec<_> = poses.iter().map(NamedPose::label).collect();
-                format!("{} poses: {}", poses.len(), names.join("; "))
-            }
-            (_, Some(count)) => format!("at most {count} poses, asked for one by one"),
-            (_, None) => "poses asked for one by one, until there are no more".into(),
-        };
-        format!(
-            "The plan is right.\n  {}\n  {} scans at each, {} beams a scan, scene {}, sensor {}\n  \
-             into {}\n",
-            textwrap::fill(&poses, textwrap::Options::new(96).subsequent_indent("    ")),
-            self.keys.collection.repeats,
-            self.plan.beams(),
-            self.scene.name,
-            self.sensor.name,
-            self.folder.display(),
+/// The plan that the options name.
+pub(super) fn load(args: &Args) -> Result<Plan, Failure> {
+    let path = args.plan.clone().unwrap_or_default();
+    let text = fs::read_to_string(&path).map_err(|error| {
+        Failure::input(
+            format!("cannot read the plan {}: {error}", path.display()),
+            "give a TOML file; `sonard collect --example` prints one",
         )
+    })?;
+    let name = path.display().to_string();
+    let mut layers =
+        Layers::<CollectionKeys>::new().file(&name, &text).map_err(|error| refuse(&error))?;
+    for setting in &args.set {
+        layers = layers.option("--set", setting).map_err(|error| refuse(&error))?;
     }
+    let keys = layers.clone().keys().map_err(|error| refuse(&error))?;
+    let at = Places { layers: &layers, file: &name };
+    let scene_text = scene_file::read(&keys.place.scene)?;
+    let scene = Arc::new(scene_file::load(&keys.place.scene)?);
+    let sensor = sensor(load_sensor(&keys.sensor.sensor)?, &keys, &at)?;
+    let plan = scan_plan(&keys, &at)?;
+    let poses = poses(&keys, &scene, &at)?;
+    check(&keys, &poses, &at)?;
+    let given = args.port.is_some() || args.mock || args.emulator || args.daemon;
+    let needed = !(args.check || args.plan_only);
+    if needed && !given && keys.device.port.is_none() {
+        return Err(Failure::input(
+            "no device: the plan has no device.port",
+            "set device.port, give --port or --daemon, or use --mock to try without one",
+        ));
+    }
+    let folder = args
+        .out
+        .as_deref()
+        .map_or_else(|| PathBuf::from(&keys.collection.folder), Path::to_path_buf);
+    let steps_per_revolution = args.world.steps_per_revolution();
+    Ok(Plan {
+        keys,
+        text,
+        folder,
+        scene,
+        scene_text,
+        sensor,
+        poses,
+        azimuths: plan,
+        steps_per_revolution,
+        layers,
+        name,
+    })
+}
+
+/// Checks what the ranges of single keys can't say.
+fn check(keys: &CollectionKeys, poses: &Poses, at: &Places<'_>) -> Result<(), Failure> {
+    let air = &keys.air;
+    Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa).map_err(|error| {
+        let fault = Fault::new(error, "degrees Celsius, percent and kilopascals");
+        at.refuse("air", "temperature_c", fault)
+    })?;
+    keys.sensor.options.options().map_err(|foreign| {
+        at.refuse("sensor", foreign.option, Fault::new(foreign, foreign.help()))
+    })?;
+    if matches!(poses, Poses::Listed(_)) || keys.collection.order == Order::ByPose {
+        return Ok(());
+    }
+    let fault = Fault::new(
+        "poses that are asked for one by one can only be taken by pose",
+        "give all poses with poses.list or poses.file, or order = \"by-pose\"",
+    );
+    Err(at.refuse("collection", "order", fault))
+}
+
+/// One screen about a plan that is right.
+pub(super) fn in_words(plan: &Plan) -> String {
+    let poses = match (&plan.poses, plan.pose_count()) {
+        (Poses::Listed(poses), _) => {
+            let names: Vec<_> = poses.iter().map(NamedPose::label).collect();
+            format!("{} poses: {}", poses.len(), names.join("; "))
+        }
+        (_, Some(count)) => format!("at most {count} poses, asked for one by one"),
+        (_, None) => "poses asked for one by one, until there are no more".into(),
+    };
+    format!(
+        "The plan is right.\n  {}\n  {} scans at each, {} beams a scan, scene {}, sensor {}\n  \
+         into {}\n",
+        textwrap::fill(&poses, textwrap::Options::new(96).subsequent_indent("    ")),
+        plan.keys.collection.repeats,
+        plan.azimuths.beams(),
+        plan.scene.name,
+        plan.sensor.name,
+        plan.folder.display(),
+    )
 }
 
 /// What is wrong with a value, before it is said where.
@@ -206,12 +133,6 @@ impl Places<'_> {
         let place = origin.map_or_else(|| self.file.to_owned(), ToString::to_string);
         Failure::input(format!("{place}: {section}.{key}: {}", fault.message), fault.help)
     }
-}
-
-fn air(keys: &CollectionKeys, temperature_c: f64) -> Result<Air, Fault> {
-    let keys = &keys.air;
-    Air::new(temperature_c, keys.humidity_percent, keys.pressure_kpa)
-        .map_err(|error| Fault::new(error, "degrees Celsius, percent and kilopascals"))
 }
 
 fn scan_plan(keys: &CollectionKeys, at: &Places<'_>) -> Result<ScanPlan, Failure> {

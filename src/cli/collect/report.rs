@@ -4,11 +4,9 @@ use std::fmt::Write as _;
 
 use jiff::Timestamp;
 
-use super::refuse;
 use crate::{
-    cli::{Failure, Outcome as Done},
     collect::{
-        BeamSpread, CheckKeys, CollectionKeys, Conditions, Figures, Folder, History, INPUTS,
+        BeamSpread, CheckKeys, CollectionKeys, Conditions, Figures, Folder, Halt, History, INPUTS,
         NamedPose, Outcome, Repeatability, Take, repeatability,
     },
     compare::{Comparison, compare},
@@ -34,9 +32,9 @@ of a beam's range over the repeats.
 ";
 
 /// Writes report and pictures into the folder.
-pub(super) fn write(folder: &Folder, history: &History) -> Done {
+pub(super) fn write(folder: &Folder, history: &History) -> Result<(), Halt> {
     let Some(plan) = history.plans.last() else {
-        return Err(Failure::input("there is no plan in the journal", "nothing was collected yet"));
+        return Err(Halt::wrong("there is no plan in the journal", "nothing was collected yet"));
     };
     let keys: CollectionKeys = serde_json::from_value(plan.keys.clone()).unwrap_or_default();
     let scene = scene(folder)?;
@@ -51,7 +49,7 @@ pub(super) fn write(folder: &Folder, history: &History) -> Done {
     draw(folder, "drift", &drift(history, &keys.checks))?;
     text += "\n## Drift\n\n![Every scan over time](report/drift.svg)\n\n";
     text += &format!("## Scans\n\n{details}");
-    folder.write("report.md", text.as_bytes()).map_err(|error| refuse(&error))
+    Ok(folder.write("report.md", text.as_bytes())?)
 }
 
 /// The table of poses, and a picture of the scans at each.
@@ -59,7 +57,7 @@ fn poses(
     folder: &Folder,
     history: &History,
     scene: Option<&Scene>,
-) -> Result<(String, String), Failure> {
+) -> Result<(String, String), Halt> {
     let (mut table, mut details) = (TABLE.to_owned(), String::new());
     let mut repeated = Vec::new();
     for (&number, pose) in &history.poses {
@@ -288,30 +286,27 @@ fn spreads(
 }
 
 /// The scans of a pose that count, by repeat.
-fn views(folder: &Folder, history: &History, pose: u32) -> Result<Vec<ScanView>, Failure> {
+fn views(folder: &Folder, history: &History, pose: u32) -> Result<Vec<ScanView>, Halt> {
     let mut takes: Vec<&Take> = history.accepted().filter(|take| take.slot.pose == pose).collect();
     takes.sort_by_key(|take| take.slot.repeat);
     let mut views = Vec::new();
     for take in takes {
-        let loaded = load(&folder.root().join(&take.file))
-            .map_err(|error| Failure::device(&error, error.help()))?;
+        let loaded = load(&folder.root().join(&take.file))?;
         views.extend(ScanView::from_records(loaded.records));
     }
     Ok(views)
 }
 
-fn scene(folder: &Folder) -> Result<Option<Scene>, Failure> {
+fn scene(folder: &Folder) -> Result<Option<Scene>, Halt> {
     let path = folder.root().join(INPUTS).join("scene.json");
     let Ok(text) = std::fs::read_to_string(&path) else { return Ok(None) };
     Scene::from_json(&text).map(Some).map_err(|error| {
-        Failure::input(format!("{}: {error}", path.display()), "it was changed: put it back")
+        Halt::wrong(format!("{}: {error}", path.display()), "it was changed: put it back")
     })
 }
 
-fn draw(folder: &Folder, name: &str, picture: &Picture) -> Done {
-    folder
-        .write(&format!("{PICTURES}/{name}.svg"), picture.to_svg().as_bytes())
-        .map_err(|error| refuse(&error))
+fn draw(folder: &Folder, name: &str, picture: &Picture) -> Result<(), Halt> {
+    Ok(folder.write(&format!("{PICTURES}/{name}.svg"), picture.to_svg().as_bytes())?)
 }
 
 /// Conditions as a paragraph; nothing if there are none.

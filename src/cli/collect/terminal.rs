@@ -4,8 +4,6 @@ use std::io::{BufRead as _, Write as _};
 
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 
-use crate::cli::{Failure, runtime::Interrupts};
-
 /// Standard input, line by line; nothing is read of it before something is asked.
 #[derive(Debug, Default)]
 pub(super) struct Terminal {
@@ -14,22 +12,12 @@ pub(super) struct Terminal {
 
 impl Terminal {
     /// Asks, and waits for a line; `None` when there is nobody to answer.
-    ///
-    /// # Errors
-    /// When it was interrupted.
-    pub(super) async fn ask(
-        &mut self,
-        question: &str,
-        interrupts: &Interrupts,
-    ) -> Result<Option<String>, Failure> {
+    pub(super) async fn ask(&mut self, question: &str) -> Option<String> {
         let mut stderr = anstream::stderr();
         // A question that can't be shown is answered or not all the same.
         drop(write!(stderr, "{question} ").and_then(|()| stderr.flush()));
         let lines = self.lines.get_or_insert_with(listen);
-        tokio::select! {
-            line = lines.recv() => Ok(line.map(|line| line.trim().to_owned())),
-            () = interrupts.clone().wait() => Err(Failure::Found(Some("stopped on request".into()))),
-        }
+        lines.recv().await.map(|line| line.trim().to_owned())
     }
 }
 

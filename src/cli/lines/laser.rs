@@ -15,7 +15,7 @@ const HELP: &str = "give one JSON object a line, {\"pose\":{\"x_m\":..,\"y_m\":.
 /// The file can't be read, or a line of it is no laser scan: named by file, line and column.
 pub(super) fn load(path: &Path) -> Result<Vec<LaserScan>, Failure> {
     let shown = path.display();
-    let reader = open_for_reading(path).map_err(|error| Failure::input(&error, error.help()))?;
+    let reader = open_for_reading(path)?;
     let mut scans = Vec::new();
     for (line, number) in reader.lines().zip(1..) {
         let refuse = |what: String| Failure::input(format!("{shown}:{number}: {what}"), HELP);

@@ -29,14 +29,14 @@ use crate::{
 pub(in crate::cli) struct Args {
     /// The log; - for standard input
     log: PathBuf,
-    /// Where to write it with confidences [default: standard output]
-    #[arg(long, value_name = "FILE")]
-    out: Option<OutPath>,
+    /// File to write; the log with confidences goes to it instead of to standard output
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<OutPath>,
     #[command(flatten)]
     overwrite: Overwrite,
-    /// Take longer ranges as silence, metres [default: the sensor's, at most 5]
+    /// Take ranges beyond this as silence, metres [default: the sensor's, at most 5]
     #[arg(long, value_name = "M")]
-    max_range: Option<f64>,
+    silent_beyond: Option<f64>,
     /// Exponent of the confidence with the distance of the feature
     #[arg(long, value_name = "E", default_value_t = 2.0)]
     exponent: f64,
@@ -47,7 +47,7 @@ pub(in crate::cli) struct Args {
 
 const HELP: &str = "\
 Examples:
-  sonard log annotate run.jsonl --out trusted.jsonl
+  sonard log annotate run.jsonl -o trusted.jsonl
   sonard plot trusted.jsonl --kind confidence -o trusted.png
 
 Feature Prediction goes through the scans in the order of the log, as in `sonard map`, and every \
@@ -55,17 +55,18 @@ ping that it weighs gets a confidence: 0.5 where nothing speaks against it, less
 predicted from other readings does. Every other record is written as it was read; lines that are no \
 records are left out and named. The log itself is not touched.
 
-Exit codes: 0 done, 2 wrong usage or input, 3 the file can't be written.";
+Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
-    if let Some(range_m) = args.max_range.filter(|range_m| !(range_m.is_finite() && *range_m > 0.0))
+    if let Some(range_m) =
+        args.silent_beyond.filter(|range_m| !(range_m.is_finite() && *range_m > 0.0))
     {
         let help = "give a length in metres, greater than 0";
-        return Err(Failure::input(format!("--max-range is {range_m}"), help));
+        return Err(Failure::input(format!("--silent-beyond is {range_m}"), help));
     }
     let (mut predictor, mut any) = (Predictor { args, of_session: None }, false);
     let waiting = Waiting::default();
-    let to = (args.out.as_ref(), args.overwrite);
+    let to = (args.output.as_ref(), args.overwrite);
     let written = rewrite(
         &args.log,
         to,
@@ -128,7 +129,7 @@ fn settings(args: &Args, session: &Session) -> Result<PredictionSettings, Failur
     let extents = Extents::of_session(session).map_err(|error| {
         Failure::input(format!("session: {error}"), "correct the session's record in the log")
     })?;
-    let max_range_m = args.max_range.unwrap_or(extents.max_range_m.min(MAX_RANGE_M));
+    let max_range_m = args.silent_beyond.unwrap_or(extents.max_range_m.min(MAX_RANGE_M));
     let plane_deg = extents.plane_corner_deg(1.0, 1.0);
     Ok(PredictionSettings {
         exponent: args.exponent,

@@ -3,7 +3,6 @@
 use std::{
     cell::RefCell,
     collections::{HashMap, VecDeque},
-    io::{self, Write as _},
     path::Path,
 };
 
@@ -11,10 +10,13 @@ use uuid::Uuid;
 
 use super::super::{
     logs::for_each_scan_of,
-    output::{OutPath, Overwrite, Product, Stream},
+    output::{OutPath, Overwrite, closed, records_to},
 };
 use super::{Failure, Outcome};
-use crate::scan::{Ping, Record, ScanView, encode_line};
+use crate::{
+    scan::{Ping, Record, ScanView},
+    store::{RecordWriter, StoreError},
+};
 
 /// What is done to each reading of a scan.
 pub(in crate::cli) type PingChange = Box<dyn Fn(&mut Ping)>;
@@ -24,8 +26,8 @@ pub(in crate::cli) struct Rewritten<'a> {
     waiting: &'a RefCell<VecDeque<Record>>,
     /// Scans that have ended and whose end is not written.
     ready: HashMap<Uuid, PingChange>,
-    name: Option<&'a Path>,
-    out: Stream,
+    /// Nobody, once its reader has gone.
+    out: Option<Box<dyn RecordWriter>>,
 }
 
 /// Records that were read and not written: at most those from the oldest scan on that has not ended.
@@ -38,17 +40,13 @@ pub(in crate::cli) type Waiting = RefCell<VecDeque<Record>>;
 /// The log can't be read, or what the two refuse; nothing is at the output's name then.
 pub(in crate::cli) fn rewrite<'a>(
     log: &Path,
-    (out, overwrite): (Option<&'a OutPath>, Overwrite),
+    (out, overwrite): (Option<&OutPath>, Overwrite),
     waiting: &'a Waiting,
     change: impl Fn(&mut Record),
     mut of_scan: impl FnMut(ScanView) -> Result<PingChange, Failure>,
 ) -> Result<Rewritten<'a>, Failure> {
-    let stream = match out {
-        Some(out) => overwrite.begin(out, Product::Log)?,
-        None => Stream::standard(),
-    };
-    let name = out.map(|out| &**out);
-    let mut written = Rewritten { waiting, ready: HashMap::new(), name, out: stream };
+    let out = Some(records_to(out.map(|out| &**out), overwrite)?);
+    let mut written = Rewritten { waiting, ready: HashMap::new(), out };
     for_each_scan_of(
         log,
         |record| {
@@ -93,21 +91,21 @@ impl Rewritten<'_> {
             Record::ScanEnd(end) => drop(self.ready.remove(&end.scan)),
             _ => {}
         }
-        let mut line = Vec::new();
-        encode_line(&record, &mut line)
-            .map_err(|error| Failure::input(error, "correct the record in the log"))?;
-        self.out.write_all(&line).or_else(|error| self.failed(&error))
+        let Some(out) = &mut self.out else { return Ok(()) };
+        match out.write(&record) {
+            Err(error) if error.is_broken_pipe() => self.out = None,
+            Err(error @ StoreError::Record { .. }) => {
+                return Err(Failure::input(error, "correct the record in the log"));
+            }
+            written => written?,
+        }
+        Ok(())
     }
 
     /// Puts the log in its place.
     pub(in crate::cli) fn finish(mut self) -> Outcome {
         let left: Vec<_> = self.waiting.borrow_mut().drain(..).collect();
         left.into_iter().try_for_each(|record| self.write(record))?;
-        self.out.finish().or_else(|error| self.failed(&error))
-    }
-
-    fn failed(&self, error: &io::Error) -> Outcome {
-        let name = self.name.map(|name| name.display().to_string());
-        Failure::from_write(name.as_deref().unwrap_or("standard output"), error)
+        self.out.map_or(Ok(()), |out| closed(out.finish()))
     }
 }

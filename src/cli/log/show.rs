@@ -24,12 +24,12 @@ pub(in crate::cli) struct Args {
     log: PathBuf,
     /// List every reading too
     #[arg(long)]
-    pings: bool,
+    readings: bool,
     /// Print what is in the log line by line, and go on as records are added
     #[arg(long, conflicts_with = "json")]
     follow: bool,
-    /// One JSON object for each session, scan, event and damaged line
-    #[arg(long, conflicts_with = "pings")]
+    /// JSON instead of text; one object for each session, scan, event and damaged line
+    #[arg(long, conflicts_with = "readings")]
     json: bool,
 }
 
@@ -51,7 +51,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             serde_json::to_writer(&mut out, item)?;
             writeln!(out)
         })
-    } else if args.pings {
+    } else if args.readings {
         let readings = Readings::of(&args.log)?;
         text::print(&mut out, &summary, Some(readings))
     } else {
@@ -62,7 +62,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 /// Goes through the log once; with its readings listed, once more afterwards.
 fn read(args: &Args) -> Result<Summary, Failure> {
-    if args.pings && args.log.as_os_str() == "-" {
+    if args.readings && args.log.as_os_str() == "-" {
         return Err(Failure::input(
             "readings of standard input can't be listed: they are read twice",
             "name the log's file, or use --follow",
@@ -88,7 +88,7 @@ fn follow(args: &Args) -> Outcome {
     let mut out = io::stdout().lock();
     for line in read_log(reader) {
         let line = line.map_err(|source| StoreError::Read { path: args.log.clone(), source })?;
-        let printed = text::print_line(&mut out, &line, args.pings).and_then(|()| out.flush());
+        let printed = text::print_line(&mut out, &line, args.readings).and_then(|()| out.flush());
         if let Err(error) = printed {
             return Failure::from_write("standard output", &error);
         }

@@ -31,7 +31,7 @@ pub(in crate::cli) struct Args {
     /// Print every finding, however many
     #[arg(long)]
     all: bool,
-    /// One JSON object a finding, and one with the totals for each log
+    /// JSON instead of text; one object a finding, and one with the totals for each log
     #[arg(long)]
     json: bool,
 }

@@ -48,7 +48,7 @@ fn every_plain_path_of_the_command_line_is_read() {
         "map logs",
         "map onto",
         "map scene",
-        "map-score map",
+        "benchmark score map",
         "mock scene",
         "mock truth",
         "paths scene",

@@ -17,7 +17,7 @@ use crate::{
         scene_file,
     },
     config::{ConfigError, Keys, Layers, Mode},
-    daemon::{Settings, Simulated},
+    daemon::{Mismatch, Settings, Simulated},
     scene::{PoseError, parse_pose},
 };
 
@@ -48,11 +48,10 @@ impl Loader {
             false => settings(keys)?,
         };
         settings.check().map_err(|mismatch| {
-            let origin = mismatch
-                .key
-                .split_once('.')
-                .and_then(|(section, key)| layers.origin(section, key))
-                .map_or_else(|| mismatch.key.to_owned(), ToString::to_string);
+            let Mismatch { section, key, .. } = mismatch;
+            let origin = layers
+                .origin(section, key)
+                .map_or_else(|| format!("{section}.{key}"), ToString::to_string);
             Failure::input(format!("{origin}: {}", mismatch.message), &mismatch.help)
         })?;
         if settings.keys.device.port.is_none() && !self.args.mock && !self.args.simulate {

@@ -93,8 +93,7 @@ impl Output {
     pub(super) fn close(mut self, scene: &Scene) -> Outcome {
         if let Some(log) = self.log.take() {
             log.close()
-                .or_else(|error| if error.is_broken_pipe() { Ok(()) } else { Err(error) })
-                .map_err(|error| Failure::device(&error, error.help()))?;
+                .or_else(|error| if error.is_broken_pipe() { Ok(()) } else { Err(error) })?;
         }
         let Some(folder) = &self.folder else { return Ok(()) };
         let views = self.views();
@@ -140,6 +139,6 @@ fn open_log(folder: &Path) -> Result<(LogWriter, Option<Earlier>), Failure> {
     }
     let path = folder.join(LOG);
     let earlier = Earlier::of(&path)?;
-    let log = LogWriter::open(&path).map_err(|error| Failure::input(&error, error.help()))?;
+    let log = LogWriter::open(&path)?;
     Ok((log.with_scenes_beside(), earlier))
 }

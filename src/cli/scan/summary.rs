@@ -2,17 +2,17 @@
 
 use firmware_protocol::{host::LinkStats, messages::Identity};
 
-use super::{output::Output, setup::Setup};
+use super::output::Output;
 use crate::{
     compare::{Comparison, compare},
-    ranger::{ScanSummary, provenance, serial_text},
+    ranger::{PreparedScan, ScanSummary, provenance, serial_text},
     scan::{PingStatus, Provenance, ScanEnd, ScanView},
 };
 
 /// Prints it on standard error, where it is in no pipe's way. The line's figures are counted from the
 /// first of two moments to the second.
 pub(super) fn print(
-    setup: &Setup,
+    setup: &PreparedScan,
     summary: &ScanSummary,
     identity: &Identity,
     [before, now]: &[LinkStats; 2],
@@ -22,7 +22,7 @@ pub(super) fn print(
     for line in [
         Some(headline(setup, identity)),
         Some(beams(&summary.end, views.last())),
-        Some(agreement(&compare(&views).0, setup.simulator.options().engine.name())),
+        Some(agreement(&compare(&views).0, setup.simulator.options().engine.kind().name())),
         Some(time(&summary.end)),
         Some(traffic(before, now)),
         warnings(summary),
@@ -58,7 +58,7 @@ fn provenance_text(provenance: Provenance) -> String {
     text.as_str().unwrap_or("ranger").to_owned()
 }
 
-fn headline(setup: &Setup, identity: &Identity) -> String {
+fn headline(setup: &PreparedScan, identity: &Identity) -> String {
     format!(
         "{} at {} by {} {}",
         setup.scene.name,

@@ -7,22 +7,28 @@ use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use uuid::Uuid;
 
-use super::{Args, Out, Places, places};
+use super::{Args, Places, places};
 use crate::{
     acoustics::ReceiverNoise,
-    cli::{Failure, Outcome, array::load_array, progress, scene_file},
+    cli::{
+        Failure, Outcome,
+        array::load_array,
+        options::engine_options,
+        output::{closed, records_to},
+        progress, scene_file,
+    },
     geometry::{Pose, wrap_360},
     model::{ArrayAtPose, ArrayModel, ModelError},
     scan::{Ping, Record, ScanEnd, ScanStart, Session},
-    store::StoreError,
+    store::{RecordWriter, StoreError},
 };
 
 /// Several rangers instead of one that turns.
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Array")]
 pub(super) struct ArrayArgs {
-    /// Fire the rangers of an array in turn instead of turning one: a preset (pioneer-8, pioneer-7,
-    /// ring-12), or a file with an array's data; the pose is then the robot's
+    /// Array of rangers, a preset (pioneer-8, pioneer-7, ring-12) or a file with an array's data;
+    /// they fire in turn, and the pose is the robot's
     #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["from_deg", "to_deg", "step_deg"])]
     pub(super) array: Option<String>,
     /// Rounds at each pose, between which the robot turns in place: of an even ring, so that
@@ -43,18 +49,19 @@ pub(super) fn run(args: &Args, name: &str) -> Outcome {
     })?;
     let rounds: Vec<Vec<Pose>> = poses.iter().map(|pose| turned(args, *pose, &array)).collect();
     let (sensor, air) = (args.sensor.sensor_or(&array.sensor)?, args.air.air()?);
-    let model = ArrayModel::new(Arc::new(array), &scene, sensor, air, args.engine.options()?)
-        .map_err(|error| refuse(&error))?;
+    let model =
+        ArrayModel::new(Arc::new(array), &scene, sensor, air, engine_options(&args.engine)?)
+            .map_err(|error| refuse(&error))?;
     let noise = args.noise.noise()?;
-    let mut out = Out::open(args)?;
+    let mut out = records_to(args.output.as_deref(), args.overwrite)?;
     let mut player = Player { model: &model, noise, rng: Pcg64::seed_from_u64(args.noise.seed) };
-    match player.play(&mut out, &rounds) {
+    match player.play(&mut *out, &rounds) {
         Ok(()) => {
-            out.close(Ok(()))?;
+            closed(out.finish())?;
             left_out
         }
         Err(Stop::Model(error)) => Err(refuse(&error)),
-        Err(Stop::Write(error)) => out.close(Err(error)),
+        Err(Stop::Write(error)) => closed(Err(error)),
     }
 }
 
@@ -92,8 +99,8 @@ struct Player<'a> {
 
 impl Player<'_> {
     /// Writes the session, and a scan for each place with its rounds.
-    fn play(&mut self, out: &mut Out, places: &[Vec<Pose>]) -> Result<(), Stop> {
-        out.put(&Record::Session(Box::new(Session::of_array(self.model, Timestamp::now()))))?;
+    fn play(&mut self, out: &mut dyn RecordWriter, places: &[Vec<Pose>]) -> Result<(), Stop> {
+        out.write(&Record::Session(Box::new(Session::of_array(self.model, Timestamp::now()))))?;
         let firings =
             self.model.array().round().count() * places.iter().map(Vec::len).sum::<usize>();
         let progress = progress::bar(firings as u64, "beams");
@@ -101,20 +108,20 @@ impl Player<'_> {
             let Some(first) = rounds.first() else { continue };
             let (scan, count) = (Uuid::new_v4(), rounds.len() as u32);
             let start = ScanStart::of_array(self.model, scan, *first, count, Timestamp::now());
-            out.put(&Record::ScanStart(start))?;
+            out.write(&Record::ScanStart(start))?;
             let mut index = 0;
             for pose in rounds {
                 let stand = self.model.at(*pose).map_err(Stop::Model)?;
                 for ranger in self.model.array().round() {
                     let prediction = self.listen(&stand, ranger);
                     let ping = Ping::of_array(&stand, scan, first, index, ranger, &prediction);
-                    out.put(&Record::Ping(Box::new(ping)))?;
+                    out.write(&Record::Ping(Box::new(ping)))?;
                     index += 1;
                     progress.inc(1);
                 }
             }
             let end = ScanEnd::of_array(self.model, scan, [index, 0], Timestamp::now());
-            out.put(&Record::ScanEnd(end))?;
+            out.write(&Record::ScanEnd(end))?;
         }
         progress.finish_and_clear();
         Ok(())

@@ -12,7 +12,7 @@ use prometheus_client::{
 };
 
 use crate::{
-    api::Status,
+    api::{Health, Status},
     daemon::Handle,
     scan::Provenance,
     server::{Api, answer::Failed, openapi::Endpoint},
@@ -49,7 +49,18 @@ fn is_made_up(status: &Status) -> bool {
 fn registry(daemon: &Handle) -> Registry {
     let (status, health) = (daemon.status(), daemon.health());
     let mut registry = Registry::with_prefix("sonard");
-    for (name, help, value) in [
+    for (name, help, value) in counters(&status, &health) {
+        registry.register(name, help, ConstCounter::new(value));
+    }
+    for (name, help, value) in gauges(&status, &health) {
+        registry.register(name, help, ConstGauge::new(value));
+    }
+    registry
+}
+
+/// What only ever grows: name, meaning, value.
+fn counters(status: &Status, health: &Health) -> [(&'static str, &'static str, u64); 20] {
+    [
         ("line_sent_bytes", "Bytes sent to the device", health.line.bytes_sent),
         ("line_received_bytes", "Bytes received from the device", health.line.bytes_received),
         ("line_frames", "Frames received whole", health.line.frames_received),
@@ -78,9 +89,11 @@ fn registry(daemon: &Handle) -> Registry {
             "Clients cut off because they took nothing",
             status.subscribers.cut_off,
         ),
-    ] {
-        registry.register(name, help, ConstCounter::new(value));
-    }
+    ]
+}
+
+/// What goes up and down, as far as it is known.
+fn gauges(status: &Status, health: &Health) -> Vec<(&'static str, &'static str, f64)> {
     let mut gauges = vec![
         ("healthy", "Whether all is well", f64::from(u8::from(health.healthy))),
         (
@@ -91,7 +104,7 @@ fn registry(daemon: &Handle) -> Registry {
         (
             "simulated",
             "Whether readings are made up: by a mock, or by the model; 0 also before a device tells",
-            f64::from(u8::from(is_made_up(&status))),
+            f64::from(u8::from(is_made_up(status))),
         ),
         (
             "simulation_skipped_turns",
@@ -110,8 +123,5 @@ fn registry(daemon: &Handle) -> Registry {
         ("clock_sigma_microseconds", "Standard deviation of times", health.clock.sigma_us),
     ];
     gauges.extend(known.iter().filter_map(|&(name, help, value)| Some((name, help, value?))));
-    for (name, help, value) in gauges {
-        registry.register(name, help, ConstGauge::new(value));
-    }
-    registry
+    gauges
 }

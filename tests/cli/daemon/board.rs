@@ -60,7 +60,7 @@ fn settings(port: String) -> Settings {
     let mut keys = Keys::default();
     keys.device.port = Some(port);
     keys.scanning.mode = Mode::Continuous;
-    keys.model.max_range_m = Some(2.0);
+    keys.model.options.max_range_m = Some(2.0);
     keys.link.attempts = 2;
     (keys.link.retry_min_s, keys.link.retry_max_s) = (0.05, 0.3);
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");

@@ -58,6 +58,16 @@ fn wrong_configurations_end_with_the_place_and_a_way_out() {
             &["simple-rom", "did you mean `simple-room`"],
         ),
         ("[place]\nscene = \"simple-room\"\npose = \"99,99\"\n", &port[..], &["room spans"]),
+        (
+            "[model]\nengine = \"fan\"\nedge_law = \"utd\"\n",
+            &port[..],
+            &["s.toml:3:12", "edge_law is nothing that", "the engine paths"],
+        ),
+        (
+            "[model]\nray_spacing_deg = 0.1\n",
+            &port[..],
+            &["s.toml:2:19", "ray_spacing_deg is nothing that", "choose the engine fan"],
+        ),
         ("[model]\nsensor = \"hc\"\n", &port[..], &["presets"]),
         ("", &[][..], &["device.port is not set", "--mock"]),
         ("", &["--mock"][..], &["needs a scene"]),

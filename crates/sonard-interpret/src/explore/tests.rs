@@ -158,7 +158,7 @@ fn an_exploration_can_be_repeated() {
     assert_eq!(made, make());
 }
 
-/// The aims of issue and paper, on the ten rooms of `sonard explore-benchmark`.
+/// The aims of issue and paper, on the ten rooms of `sonard benchmark explore`.
 #[test]
 fn just_in_time_is_as_good_as_laser_only_with_a_quarter_of_its_shots() {
     let rooms: Vec<[(Exploration, MapError); 2]> = (0..10_u64)

@@ -15,7 +15,7 @@ use super::{Extents, Feature, Settings, Sweep, interpret};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::Pose,
-    model::{EdgeLawKind, Options, Simulator},
+    model::{EdgeLawKind, PathOptions, Simulator},
     scene::Scene,
 };
 use sonard_records::{ScanPlan, ScanView};
@@ -24,13 +24,13 @@ use sonard_records::{ScanPlan, ScanView};
 /// knows no time walk, and its edges.
 fn simulator(scene: Arc<Scene>) -> Simulator {
     let sensor = Sensor::preset("bozma-kuc-60khz").expect("a preset");
-    let options = Options {
+    let options = PathOptions {
         lossless: true,
         edge_law: Some(EdgeLawKind::BozmaKuc),
         ideal_receiver: true,
-        ..Options::default()
+        ..PathOptions::default()
     };
-    Simulator::new(scene, sensor, Air::default(), options).expect("sensible figures")
+    Simulator::new(scene, sensor, Air::default(), options.into()).expect("sensible figures")
 }
 
 fn scan(simulator: &Simulator, number: u128, pose: &Pose) -> ScanView {

@@ -83,25 +83,27 @@ pub struct Sensor {
 
 /// What edges send back; see [`EdgeLaw`](super::edge::EdgeLaw).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum EdgeLawKind {
-    /// By the wedge's angle and the aspect.
+    /// Uniform coefficients for the wedge's angle and aspect (Kouyoumjian and Pathak).
     Utd,
-    /// One ratio to a plane at the same range.
+    /// One ratio to a plane at the same range, whatever the aspect.
     KucSiegel,
-    /// One scattering strength, level with planes at the face.
+    /// One scattering strength, whatever the aspect, level with planes at the face.
     BozmaKuc,
 }
 
 /// How the face answers to a pulse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 pub enum Response {
     /// By its beam pattern: every echo has the shape of one on the axis, only weaker.
     #[default]
     Stationary,
-    /// Point by point: echoes off the axis are longer and begin earlier, and nulls fill up (see
-    /// [`ApertureResponse`](super::ApertureResponse)).
+    /// Point by point: echoes off the axis are longer and begin earlier, and the pattern's nulls fill
+    /// up.
     Full,
 }
 

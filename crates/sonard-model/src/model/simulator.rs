@@ -2,17 +2,15 @@
 
 use std::sync::Arc;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    Cone, Engine, Fan, ObservationPoint, Prediction,
+    Cone, Engine, EngineOptions, Fan, ObservationPoint, Options, PathOptions, Prediction,
     lazy::LazyArrivals,
     paths::{self, PathEngine},
 };
 use crate::{
-    acoustics::{Air, BeamPattern, Disc, EdgeLawKind, Receiver, Response, Sensor, SensorError},
+    acoustics::{Air, BeamPattern, Disc, Receiver, Sensor, SensorError},
     geometry::{DVec2, Pose},
     plan::ScanPlan,
     scene::Scene,
@@ -21,84 +19,6 @@ use crate::{
 mod settings;
 
 use settings::{fan_settings, path_settings, receiver};
-
-/// How echoes are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum EngineKind {
-    /// [`PathEngine`]: all echo paths, exactly.
-    #[default]
-    Paths,
-    /// [`Fan`]: the ray model with reflections and diffraction.
-    Fan,
-    /// [`Cone`]: nearest hit within an aperture.
-    Cone,
-}
-
-impl EngineKind {
-    /// Its name in records and on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Paths => "paths",
-            Self::Fan => "fan",
-            Self::Cone => "cone",
-        }
-    }
-}
-
-/// Settings of the model; what is `None` comes from the sensor or the engine.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Options {
-    /// How echoes are found.
-    pub engine: EngineKind,
-    /// Half the longest path listened for, metres.
-    pub max_range_m: Option<f64>,
-    /// Least amplitude detected, relative to a head-on, perfectly reflecting wall.
-    pub threshold: Option<f64>,
-    /// From firing until the receiver listens, microseconds.
-    pub blanking_us: Option<f64>,
-    /// How the face answers to a pulse.
-    pub response: Option<Response>,
-    /// Detect one arrival at a time, and time it by its path alone
-    /// ([`Combining::Ideal`](crate::acoustics::Combining::Ideal)); engines other than `paths` know no
-    /// phases and always do.
-    pub ideal_receiver: bool,
-    /// Leave out the absorption of the air.
-    pub lossless: bool,
-    /// Most mirror reflections on a path (`paths`, `fan`); without it, as many as can matter.
-    pub max_order: Option<u32>,
-    /// What edges send back (`paths`; without it, the sensor's law). `fan` has Kuc and Siegel's law only.
-    pub edge_law: Option<EdgeLawKind>,
-    /// Also double diffraction, at two upright edges (`paths`).
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub double_diffraction: bool,
-    /// Angle between the rays of `fan`, degrees. The default reads the same as a finer fan in
-    /// every shipped scene as long as no round body is met (there is a test).
-    pub ray_spacing_deg: f64,
-    /// Full aperture of `cone`, degrees; without it, the sensor's two-way -6 dB width.
-    pub aperture_deg: Option<f64>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            engine: EngineKind::default(),
-            max_range_m: None,
-            threshold: None,
-            blanking_us: None,
-            response: None,
-            ideal_receiver: false,
-            lossless: false,
-            max_order: None,
-            edge_law: None,
-            double_diffraction: false,
-            ray_spacing_deg: 0.05,
-            aperture_deg: None,
-        }
-    }
-}
 
 /// Why a simulator can't be made.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -146,20 +66,19 @@ impl Simulator {
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
         let scatter_height_rad = beam.two_way_power_rad();
         let engine: Box<dyn Engine> = match options.engine {
-            EngineKind::Paths => {
-                let settings =
-                    path_settings(&sensor, &air, &options, &receiver, scatter_height_rad);
+            EngineOptions::Paths(paths) => {
+                let settings = path_settings(&sensor, &air, &paths, &receiver, scatter_height_rad);
                 let wave_number_per_m = settings.wave_number_per_m;
                 let face = sensor.face.map(|face| Disc { face, wave_number_per_m });
                 let engine = PathEngine::new(&scene, beam, face, settings);
                 Box::new(engine.through_nulls(receiver.asks_incidents()))
             }
-            EngineKind::Fan => {
-                Box::new(Fan::new(&scene, beam, fan_settings(&sensor, &air, &options, &receiver)))
+            EngineOptions::Fan(fan) => {
+                Box::new(Fan::new(&scene, beam, fan_settings(&sensor, &air, &fan, &receiver)))
             }
-            EngineKind::Cone => {
+            EngineOptions::Cone(cone) => {
                 let two_way_deg = || 2.0 * beam.angle_at(0.5_f64.sqrt()).to_degrees();
-                Box::new(Cone::new(&scene, options.aperture_deg.unwrap_or_else(two_way_deg)))
+                Box::new(Cone::new(&scene, cone.aperture_deg.unwrap_or_else(two_way_deg)))
             }
         };
         Ok(Self { scene, sensor, air, options, receiver, scatter_height_rad, engine })
@@ -208,16 +127,16 @@ impl Simulator {
         &self.air
     }
 
-    /// Settings of [`paths::Paths`] for this sensor, air and options.
+    /// Settings of [`paths::Paths`] for this sensor, air and options; for another engine with the defaults
+    /// of `paths`.
     #[must_use]
     pub fn path_settings(&self) -> paths::Settings {
-        path_settings(
-            &self.sensor,
-            &self.air,
-            &self.options,
-            &self.receiver,
-            self.scatter_height_rad,
-        )
+        let options = match self.options.engine {
+            EngineOptions::Paths(options) => options,
+            EngineOptions::Fan(_) | EngineOptions::Cone(_) => PathOptions::default(),
+        };
+        let Self { sensor, air, receiver, scatter_height_rad, .. } = self;
+        path_settings(sensor, air, &options, receiver, *scatter_height_rad)
     }
 
     /// The scene.
@@ -243,30 +162,5 @@ impl Simulator {
     #[must_use]
     pub const fn options(&self) -> &Options {
         &self.options
-    }
-}
-
-impl Options {
-    fn check(&self) -> Result<(), ModelError> {
-        let within = |option, value: f64, min: f64, max: f64, expected| {
-            if (min..=max).contains(&value) {
-                Ok(())
-            } else {
-                Err(ModelError::Option { option, value, expected })
-            }
-        };
-        if let Some(range_m) = self.max_range_m {
-            within("max_range_m", range_m, 0.01, 100.0, "from 0.01 to 100 metres")?;
-        }
-        if let Some(threshold) = self.threshold {
-            within("threshold", threshold, 1e-6, 1.0, "from 0.000001 to 1")?;
-        }
-        if let Some(blanking_us) = self.blanking_us {
-            within("blanking_us", blanking_us, 0.0, 1e5, "from 0 to 100000 microseconds")?;
-        }
-        if let Some(aperture_deg) = self.aperture_deg {
-            within("aperture_deg", aperture_deg, 0.0, 180.0, "from 0 to 180 degrees")?;
-        }
-        within("ray_spacing_deg", self.ray_spacing_deg, 1e-4, 5.0, "from 0.0001 to 5 degrees")
     }
 }

@@ -12,7 +12,10 @@ pub(in crate::model) mod reference;
 
 use std::sync::Arc;
 
-use super::{Arrival, Bend, EngineKind, Options, Path, Reflector, Simulator};
+use super::{
+    Arrival, Bend, ConeOptions, EngineKind, EngineOptions, FanOptions, Options, Path, PathOptions,
+    Reflector, Simulator,
+};
 use crate::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
@@ -20,21 +23,8 @@ use crate::{
     scene::{Cylinder, Material, Scene, Wall, shipped},
 };
 
-/// Free space without blanking or absorption: geometry alone.
-const BARE: Options = Options {
-    engine: EngineKind::Fan,
-    max_range_m: None,
-    threshold: None,
-    blanking_us: Some(0.0),
-    response: None,
-    ideal_receiver: true,
-    lossless: true,
-    max_order: None,
-    edge_law: None,
-    double_diffraction: false,
-    ray_spacing_deg: 0.1,
-    aperture_deg: None,
-};
+/// Free space without absorption: geometry alone.
+const BARE: FanOptions = FanOptions { lossless: true, max_order: None, ray_spacing_deg: 0.1 };
 
 fn shipped_scene(name: &str) -> Scene {
     Scene::from_json(shipped::text(name).expect(name)).expect(name)
@@ -57,12 +47,17 @@ fn scene(walls: Vec<Wall>) -> Scene {
     scene
 }
 
-fn simulator(scene: Scene, options: Options) -> Simulator {
+fn simulator(scene: Scene, options: impl Into<Options>) -> Simulator {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-    Simulator::new(Arc::new(scene), sensor, Air::default(), options).expect("good options")
+    Simulator::new(Arc::new(scene), sensor, Air::default(), options.into()).expect("good options")
 }
 
-fn arrivals(scene: Scene, options: Options, from: DVec2, direction_deg: f64) -> Vec<Arrival> {
+fn arrivals(
+    scene: Scene,
+    options: impl Into<Options>,
+    from: DVec2,
+    direction_deg: f64,
+) -> Vec<Arrival> {
     simulator(scene, options).at(from).arrivals(direction_deg.to_radians())
 }
 

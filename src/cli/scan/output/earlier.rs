@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::{
     cli::{Failure, Outcome, output},
     geometry::Pose,
-    scan::{Record, ScanPlan, ScanStart, Session},
+    scan::{ModelRecord, Record, ScanPlan, ScanStart, Session},
     store::{StoreError, open_for_reading, read_log},
 };
 
@@ -91,7 +91,7 @@ impl Earlier {
                 let (was, is) = (&was.sensor.name, &session.sensor.name);
                 return told("sensor", was, &format!("{is} with other data"));
             }
-            if was.model != session.model {
+            if !is_same(was.model.as_ref(), session.model.as_ref()) {
                 let engine = |of: &Session| {
                     of.model
                         .as_ref()
@@ -114,6 +114,13 @@ impl Earlier {
         }
         None
     }
+}
+
+/// Whether two models are set alike, whatever their records leave out.
+fn is_same(one: Option<&ModelRecord>, other: Option<&ModelRecord>) -> bool {
+    let options = |model: Option<&ModelRecord>| model.and_then(ModelRecord::options);
+    one == other
+        || options(one).is_some_and(|options_of_one| Some(options_of_one) == options(other))
 }
 
 fn name(provenance: crate::scan::Provenance) -> String {

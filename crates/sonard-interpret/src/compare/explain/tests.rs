@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::Pose,
-    model::{Options, Simulator},
+    model::{PathOptions, Simulator},
     plan::ScanPlan,
     scene::{Scene, shipped},
 };
@@ -35,7 +35,7 @@ impl World {
     }
 
     fn scan(&self) -> (ScanView, Simulator) {
-        let options = Options { ideal_receiver: true, ..Options::default() };
+        let options = PathOptions { ideal_receiver: true, ..PathOptions::default() }.into();
         let scene = Arc::new(self.scene.clone());
         let simulator =
             Simulator::new(scene, self.sensor.clone(), self.air, options).expect("a model");

@@ -2,10 +2,9 @@
 
 use std::f64::consts::{LOG10_E, TAU};
 
-use super::{EngineKind, Options};
 use crate::{
     acoustics::{Air, Combining, EdgeLawKind, Receiver, Sensor, edge::EdgeLaw},
-    model::{FanSettings, paths},
+    model::{EngineOptions, FanOptions, FanSettings, Options, PathOptions, paths},
 };
 
 /// Paths this far below the threshold are given up, decibels: a silence is still explained by
@@ -20,12 +19,15 @@ const SIGMA_E: f64 = 0.095;
 
 /// The sensor's receiver with the options applied. Only `paths` knows phases.
 pub(super) fn receiver(sensor: &Sensor, air: &Air, options: &Options) -> Receiver {
-    let sensor = Sensor { response: options.response.unwrap_or(sensor.response), ..sensor.clone() };
+    let response = match options.engine {
+        EngineOptions::Paths(paths) => paths.response.unwrap_or(sensor.response),
+        EngineOptions::Fan(_) | EngineOptions::Cone(_) => sensor.response,
+    };
+    let sensor = Sensor { response, ..sensor.clone() };
     let mut receiver = Receiver::new(&sensor, air.sound_speed_m_s())
         .with_threshold(options.threshold.unwrap_or(sensor.threshold));
-    receiver.blanking_us = options.blanking_us.unwrap_or(sensor.blanking_us);
     receiver.max_range_m = options.max_range_m.unwrap_or(sensor.max_range_m);
-    if options.ideal_receiver || options.engine != EngineKind::Paths {
+    if options.engine.has_ideal_receiver() {
         receiver.combining = Combining::Ideal;
     }
     receiver
@@ -34,7 +36,7 @@ pub(super) fn receiver(sensor: &Sensor, air: &Air, options: &Options) -> Receive
 pub(super) fn path_settings(
     sensor: &Sensor,
     air: &Air,
-    options: &Options,
+    options: &PathOptions,
     receiver: &Receiver,
     scatter_height_rad: f64,
 ) -> paths::Settings {
@@ -55,7 +57,7 @@ pub(super) fn path_settings(
         crowded_m: crowded_m(receiver),
         edge_law: Some(law),
         double_diffraction: options.double_diffraction,
-        absorption_np_per_m: absorption_db_per_m(sensor, air, options) / (20.0 * LOG10_E),
+        absorption_np_per_m: absorption_db_per_m(sensor, air, options.lossless) / (20.0 * LOG10_E),
         wave_number_per_m,
         sensor_z_m: sensor.mounting.z_m,
         tilt_rad: sensor.mounting.tilt_deg.to_radians(),
@@ -70,8 +72,8 @@ fn crowded_m(receiver: &Receiver) -> f64 {
     (opens_us * 1e-6 * receiver.sound_speed_m_s).min(1.0)
 }
 
-fn absorption_db_per_m(sensor: &Sensor, air: &Air, options: &Options) -> f64 {
-    if options.lossless || sensor.gain.makes_up_for_air() {
+fn absorption_db_per_m(sensor: &Sensor, air: &Air, lossless: bool) -> f64 {
+    if lossless || sensor.gain.makes_up_for_air() {
         return 0.0;
     }
     air.absorption_db_per_m(sensor.frequency_hz)
@@ -80,14 +82,14 @@ fn absorption_db_per_m(sensor: &Sensor, air: &Air, options: &Options) -> f64 {
 pub(super) fn fan_settings(
     sensor: &Sensor,
     air: &Air,
-    options: &Options,
+    options: &FanOptions,
     receiver: &Receiver,
 ) -> FanSettings {
     FanSettings {
         spacing_rad: options.ray_spacing_deg.to_radians(),
         half_face_m: sensor.half_width_m(),
         wavelength_m: receiver.sound_speed_m_s / sensor.frequency_hz,
-        absorption_db_per_m: absorption_db_per_m(sensor, air, options),
+        absorption_db_per_m: absorption_db_per_m(sensor, air, options.lossless),
         longest_m: 2.0 * receiver.max_range_m,
         weakest: receiver.threshold * 10f64.powf(-MARGIN_KEPT_DB / 20.0),
         max_order: options.max_order.unwrap_or(u32::MAX),

@@ -6,7 +6,7 @@ use crate::{
     acoustics::{Air, Sensor},
     array::RangerArray,
     geometry::Pose,
-    model::{ArrayModel, Options, Simulator},
+    model::{ArrayModel, Options, PathOptions, Simulator},
     reading::PingStatus,
     scene::Scene,
 };
@@ -31,7 +31,7 @@ fn model(array: &str, scene: &Scene, options: Options) -> ArrayModel {
 /// half the room less the ring's radius.
 #[test]
 fn a_ring_in_the_middle_of_a_room_reads_its_walls_from_its_own_radius() {
-    let options = Options { ideal_receiver: true, ..Options::default() };
+    let options = PathOptions { ideal_receiver: true, ..PathOptions::default() }.into();
     let model = model("ring-12", &room(4.0), options);
     for heading_deg in [0.0, 90.0, 180.0] {
         let stand = model.at(Pose { x_m: 2.0, y_m: 2.0, heading_deg }).expect("a stand");

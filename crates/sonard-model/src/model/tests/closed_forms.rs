@@ -6,7 +6,7 @@ use crate::{acoustics::BeamPattern, model::Edge, reading::PingStatus};
 const SPACINGS_DEG: [f64; 3] = [0.4, 0.2, 0.05];
 
 fn at_spacing(ray_spacing_deg: f64) -> Options {
-    Options { ray_spacing_deg, ..BARE }
+    FanOptions { ray_spacing_deg, ..BARE }.into()
 }
 
 #[test]
@@ -137,7 +137,7 @@ fn a_rectangle_gives_the_image_lattice() {
         wall("north", (width_m, depth_m), (0.0, depth_m), 1.0),
         wall("west", (0.0, depth_m), (0.0, 0.0), 1.0),
     ];
-    let options = Options { max_range_m: Some(2.0), ..BARE };
+    let options = Options { max_range_m: Some(2.0), ..BARE.into() };
     let simulator = simulator(scene(room), options);
     let point = simulator.at(DVec2::new(x_m, y_m));
     let axis = |size_m: f64, at_m: f64| {
@@ -178,7 +178,7 @@ fn a_rectangle_gives_the_image_lattice() {
 
 #[test]
 fn the_cone_reads_the_nearest_hit_within_its_aperture() {
-    let options = Options { engine: EngineKind::Cone, aperture_deg: Some(15.0), ..BARE };
+    let options = ConeOptions { aperture_deg: Some(15.0) };
     let one_wall = scene(vec![wall("w", (1.0, -3.0), (1.0, 3.0), 1.0)]);
     let simulator = simulator(one_wall, options);
     let point = simulator.at(DVec2::ZERO);
@@ -198,8 +198,10 @@ fn a_face_off_the_axis_sees_the_wall_from_where_it_is() {
     let range_m = |mounting: crate::acoustics::Mounting, direction_deg: f64| {
         let mut sensor = Sensor::preset("senscomp-6500").expect("a preset");
         sensor.mounting = mounting;
-        let options = Options { engine: EngineKind::Paths, ..BARE };
-        let simulator = Simulator::new(Arc::new(room()), sensor, Air::default(), options)
+        sensor.blanking_us = 0.0;
+        let options =
+            PathOptions { ideal_receiver: true, lossless: true, ..PathOptions::default() };
+        let simulator = Simulator::new(Arc::new(room()), sensor, Air::default(), options.into())
             .expect("good options");
         let ping = simulator.at(DVec2::ZERO).ping(f64::to_radians(direction_deg));
         ping.range_m.expect("a range")

@@ -142,7 +142,8 @@ fn ranges_agree(reference: &Reference, double_diffraction: bool, most_db: f64) {
         for tau in ["0.02", "0.05", "0.1"] {
             let threshold = Some(tau.parse().expect("a number"));
             let lossless =
-                Options { threshold, lossless: true, double_diffraction, ..Options::default() };
+                PathOptions { lossless: true, double_diffraction, ..PathOptions::default() };
+            let lossless = Options { threshold, ..lossless.into() };
             let simulator = simulator_of(of, reference.c, lossless);
             let point = simulator.at(DVec2::from_array(of.sensor));
             for beam in &of.scan {

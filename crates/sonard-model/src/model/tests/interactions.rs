@@ -276,14 +276,11 @@ fn paths_of_shipped_scenes_obey_the_laws_at_every_point() {
     for name in shipped::names() {
         let shipped = shipped_scene(name);
         for pose in shipped.poses.values() {
-            for engine in [EngineKind::Paths, EngineKind::Fan, EngineKind::Cone] {
-                let options = Options {
-                    engine,
-                    max_range_m: Some(2.0),
-                    ray_spacing_deg: 0.5,
-                    double_diffraction: true,
-                    ..Options::default()
-                };
+            let paths = PathOptions { double_diffraction: true, ..PathOptions::default() };
+            let fan = FanOptions { ray_spacing_deg: 0.5, ..FanOptions::default() };
+            let cone = ConeOptions::default();
+            for engine in [EngineOptions::Paths(paths), fan.into(), cone.into()] {
+                let options = Options { max_range_m: Some(2.0), ..engine.into() };
                 let simulator = simulator(shipped.with_robot_at(pose), options);
                 let point = simulator.at(pose.position());
                 for direction in 0..63 {
@@ -316,7 +313,7 @@ fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2, fan_rounds
     let plan = Room { scene: Scene::clone(simulator.scene()), z_m: None };
     let off_m = || length_m(&points(path, ends, None)) - arrival.length_m;
     let round = path.reflectors().filter(|met| matches!(met, Reflector::Cylinder(_))).count();
-    match (simulator.options().engine, round) {
+    match (simulator.options().engine.kind(), round) {
         (EngineKind::Paths, _) => {
             let room = Room::new(simulator.scene(), simulator.sensor_z_m());
             room.check(path, ends, arrival.length_m, if round > 0 { 1e-7 } else { 1e-9 });

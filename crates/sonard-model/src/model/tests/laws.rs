@@ -35,7 +35,7 @@ fn moved(mut scene: Scene, to: impl Fn(DVec2) -> DVec2) -> Scene {
 /// Loud arrivals by path. Faint ones, and paths that only graze the receiver, may come and go
 /// with the grid of rays, which is fixed in the world.
 fn loud(scene: Scene, from: DVec2, direction_rad: f64) -> Vec<(Vec<Mechanism>, f64, f64)> {
-    let options = Options { max_range_m: Some(2.0), ..BARE };
+    let options = Options { max_range_m: Some(2.0), ..BARE.into() };
     let simulator = simulator(scene, options);
     let mut all: Vec<_> = simulator
         .at(from)
@@ -134,11 +134,11 @@ fn a_finer_fan_reads_the_same_in_every_shipped_scene() {
         let scene = shipped_scene(name);
         for (pose_name, pose) in &scene.poses {
             let read = |ray_spacing_deg: f64| {
-                let options =
-                    Options { ray_spacing_deg, max_range_m: Some(6.0), ..Options::default() };
+                let fan = FanOptions { ray_spacing_deg, ..FanOptions::default() };
+                let options = Options { max_range_m: Some(6.0), ..fan.into() };
                 simulator(scene.with_robot_at(pose), options).predict(pose, &plan)
             };
-            let default = read(Options::default().ray_spacing_deg);
+            let default = read(FanOptions::default().ray_spacing_deg);
             let mut other_path = 0;
             for (one, other) in default.iter().zip(read(0.021)) {
                 if met_round_body(one) || met_round_body(&other) {
@@ -170,7 +170,7 @@ fn range_differs(one: &Prediction, other: &Prediction, tolerance_m: f64) -> bool
 fn absorption_only_weakens_and_by_its_decibels() {
     let (room, from) = room();
     let lossless = simulator(room.clone(), BARE);
-    let lossy = simulator(room, Options { lossless: false, ..BARE });
+    let lossy = simulator(room, FanOptions { lossless: false, ..BARE });
     let decibels_per_m = Air::default().absorption_db_per_m(49.4e3);
     let (lossless, lossy) = (lossless.at(from), lossy.at(from));
     for direction_deg in (0..360).step_by(15) {
@@ -200,7 +200,10 @@ proptest! {
                 .map(|&(a, b)| wall("w", a, b, reflectance))
                 .collect::<Vec<_>>()
         };
-        let options = Options { max_range_m: Some(2.5), ray_spacing_deg: 0.5, ..BARE };
+        let options = Options {
+            max_range_m: Some(2.5),
+            ..FanOptions { ray_spacing_deg: 0.5, ..BARE }.into()
+        };
         let hear = |reflectance| arrivals(scene(walls(reflectance)), options, DVec2::ZERO, direction_deg);
         let bright = hear(1.0);
         for arrival in &bright {

@@ -235,8 +235,8 @@ fn a_robots_body_turns_the_false_wall_into_minimum_range() {
     let pose = pose(&scene, "fig9");
     let plan = ScanPlan::default();
     let scene = scene.with_robot_at(&pose);
-    let read = |engine| {
-        let options = Options { engine, max_range_m: Some(2.0), ..Options::default() };
+    let read = |engine: EngineKind| {
+        let options = Options { max_range_m: Some(2.0), ..engine.options().into() };
         simulator(scene.clone(), options).predict(&pose, &plan)
     };
     let (paths, fan) = (read(EngineKind::Paths), read(EngineKind::Fan));

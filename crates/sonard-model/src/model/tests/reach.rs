@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 use crate::{
     acoustics::{Air, Latch, Sensor},
     geometry::DVec2,
-    model::{Options, Simulator},
+    model::{Options, PathOptions, Simulator},
     scene::{Scene, shipped},
 };
 
@@ -57,7 +57,8 @@ fn the_nearest_echoes_settle_what_all_of_them_would() {
         "senscomp-6500",
         Options { max_range_m: Some(3.0), ..Options::default() },
     );
-    check("simple-room", "senscomp-6500", Options { ideal_receiver: true, ..Options::default() });
+    let ideal = PathOptions { ideal_receiver: true, ..PathOptions::default() };
+    check("simple-room", "senscomp-6500", ideal.into());
     check("plane-corner-edge", "bozma-kuc-60khz", Options::default());
     check("oblique-corner", "hc-sr04", Options::default());
 }

@@ -4,13 +4,13 @@ use super::*;
 use crate::{
     acoustics::{Air, Sensor},
     geometry::{Pose, wrap_pi},
-    model::{Arrival, EngineKind, ObservationPoint, Options, Simulator},
+    model::{Arrival, EngineOptions, FanOptions, ObservationPoint, Options, Simulator},
     scene::shipped,
 };
 
 /// Engines of the same ranger in a scene.
-fn simulator(scene: &Arc<Scene>, engine: EngineKind, ray_spacing_deg: f64) -> Simulator {
-    let options = Options { engine, ray_spacing_deg, max_range_m: Some(2.5), ..Options::default() };
+fn simulator(scene: &Arc<Scene>, engine: EngineOptions) -> Simulator {
+    let options = Options { max_range_m: Some(2.5), ..engine.into() };
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     Simulator::new(scene.clone(), sensor, Air::default(), options).expect("valid options")
 }
@@ -34,8 +34,8 @@ fn is_same(one: &Arrival, other: &Arrival) -> bool {
 
 /// Of the echoes of `paths`, how many the fan finds; and of the fan's, how many `paths` has not.
 fn agreement(scene: &Arc<Scene>, pose: &Pose, ray_spacing_deg: f64) -> (usize, usize, usize) {
-    let exact = simulator(scene, EngineKind::Paths, 1.0);
-    let fan = simulator(scene, EngineKind::Fan, ray_spacing_deg);
+    let exact = simulator(scene, EngineOptions::default());
+    let fan = simulator(scene, FanOptions { ray_spacing_deg, ..FanOptions::default() }.into());
     let [exact, fan] = [&exact, &fan].map(|simulator| simulator.at(pose.position()));
     let (mut all, mut found, mut extra) = (0, 0, 0);
     for azimuth in 0..12 {

@@ -2,6 +2,7 @@
 
 mod answer;
 mod array;
+mod benchmark;
 #[cfg(feature = "pi")]
 mod board;
 mod collect;
@@ -9,19 +10,16 @@ mod compare;
 mod daemon;
 mod doctor;
 mod explore;
-mod explore_benchmark;
 mod failure;
 mod generate;
+mod groups;
 mod import;
 mod interpret;
-mod interpret_benchmark;
 mod lines;
 mod log;
 mod logs;
 mod map;
-mod map_benchmark;
 mod map_file;
-mod map_score;
 mod mock;
 mod mock_world;
 mod options;
@@ -34,6 +32,7 @@ mod predict;
 mod predictor;
 mod preset;
 mod progress;
+mod renamed;
 mod run;
 mod runtime;
 mod scan;
@@ -54,14 +53,15 @@ use clap::{Command, CommandFactory as _, FromArgMatches as _, Parser, Subcommand
 
 /// Drives an ultrasonic ranger on a stepper, and predicts what it reads.
 #[derive(Debug, Parser)]
-#[command(version, about, after_help = EXIT_CODES, max_term_width = 100)]
+#[command(version, about, max_term_width = 100)]
 struct Cli {
     #[command(subcommand)]
     verb: Verb,
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 done, 1 ran and found a failure, 2 wrong usage or input, \
-3 device or link.";
+/// What holds for every verb that says nothing else.
+const EXIT_CODES: &str = "Exit codes: 0 done, 1 ran and found a failure, 2 wrong usage or input (also a \
+place that can't be written to), 3 device, link or disk.";
 
 #[derive(Debug, Subcommand)]
 enum Verb {
@@ -108,33 +108,24 @@ enum Verb {
     /// Tell planes, corners and edges apart in scans
     #[command(long_about = interpret::ABOUT)]
     Interpret(interpret::Args),
-    /// Measure on made-up rooms how often the probabilities of `interpret` come true
-    #[command(long_about = interpret_benchmark::ABOUT)]
-    InterpretBenchmark(interpret_benchmark::Args),
     /// Make a map of line segments of the scans of logs
     #[command(long_about = lines::ABOUT)]
     Lines(lines::Args),
     /// Make an occupancy grid of the scans of logs
     #[command(long_about = map::ABOUT)]
     Map(map::Args),
-    /// Set a map beside the ideal one
-    #[command(long_about = map_score::ABOUT)]
-    MapScore(map_score::Args),
-    /// Map simulated courses without and with Feature Prediction, and score the maps
-    #[command(long_about = map_benchmark::ABOUT)]
-    MapBenchmark(map_benchmark::Args),
     /// Let a simulated robot explore a scene and map it with lines
     #[command(long_about = explore::ABOUT)]
     Explore(explore::Args),
-    /// Explore made-up rooms with sonar, laser, and laser just in time, and compare the maps
-    #[command(long_about = explore_benchmark::ABOUT)]
-    ExploreBenchmark(explore_benchmark::Args),
     /// Draw scans: floor plan, polar, residuals
     #[command(long_about = plot::ABOUT)]
     Plot(plot::Args),
     /// Check, repair or show a log
     #[command(subcommand)]
     Log(log::Verb),
+    /// Measure how well maps, interpretations and explorations do, as papers count it
+    #[command(subcommand)]
+    Benchmark(benchmark::Verb),
     /// Write manual pages and shell completions, for packages
     #[command(hide = true)]
     Generate(generate::Args),
@@ -149,18 +140,25 @@ enum Verb {
     Array(preset::ArrayVerb),
 }
 
-/// The command line, in which every value may be a negative number: what begins with a digit after
-/// the minus is no option.
+/// The command line: verbs in groups, exit codes with every verb, and values that may be negative
+/// numbers, so that what begins with a digit after the minus is no option.
 fn command_line() -> Command {
-    fn with_negative_numbers(command: Command) -> Command {
+    fn complete(command: Command) -> Command {
+        let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+        let help = match (help.contains("Exit codes:"), help.is_empty()) {
+            (true, _) => help,
+            (false, true) => EXIT_CODES.to_owned(),
+            (false, false) => format!("{help}\n\n{EXIT_CODES}"),
+        };
         command
+            .after_help(help)
             .mut_args(|arg| match arg.get_action().takes_values() {
                 true => arg.allow_negative_numbers(true),
                 false => arg,
             })
-            .mut_subcommands(with_negative_numbers)
+            .mut_subcommands(complete)
     }
-    with_negative_numbers(Cli::command())
+    groups::in_groups(complete(Cli::command()))
 }
 
 /// Runs the command line of this process.
@@ -168,7 +166,11 @@ fn command_line() -> Command {
 pub fn main() -> ExitCode {
     outlive_file_size_limit();
     let mut command = command_line();
-    let matches = command.get_matches_mut();
+    let (arguments, hints) = renamed::translated(std::env::args_os());
+    for hint in hints {
+        anstream::eprintln!("{hint}");
+    }
+    let matches = command.try_get_matches_from_mut(arguments).unwrap_or_else(|error| error.exit());
     if let Err(failure) = output::guard(&command, &matches) {
         return failure::report(Err(failure));
     }
@@ -190,16 +192,13 @@ pub fn main() -> ExitCode {
         Verb::Predict(args) => predict::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Interpret(args) => interpret::run(&args),
-        Verb::InterpretBenchmark(args) => interpret_benchmark::run(&args),
         Verb::Lines(args) => lines::run(&args),
         Verb::Map(args) => map::run(&args),
-        Verb::MapScore(args) => map_score::run(&args),
-        Verb::MapBenchmark(args) => map_benchmark::run(&args),
         Verb::Explore(args) => explore::run(&args),
-        Verb::ExploreBenchmark(args) => explore_benchmark::run(&args),
         Verb::Trace(args) => trace::run(&args),
         Verb::Plot(args) => plot::run(&args),
         Verb::Log(verb) => log::run(verb),
+        Verb::Benchmark(verb) => benchmark::run(verb),
         Verb::Generate(args) => generate::run(&args),
         Verb::Scene(verb) => scene::run(verb),
         Verb::Sensor(verb) => preset::sensor(&verb),
@@ -223,41 +222,4 @@ fn outlive_file_size_limit() {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use clap::error::ErrorKind;
-
-    /// Each option of each verb with a value, as the words that lead to it, and the value's name.
-    fn options(command: &Command, path: &[String]) -> Vec<(Vec<String>, String)> {
-        let of_this = command.get_arguments().filter(|arg| arg.get_action().takes_values());
-        let mut found: Vec<_> = of_this
-            .filter_map(|arg| {
-                let option = format!("--{}", arg.get_long()?);
-                let name = arg.get_value_names()?.first()?.to_string();
-                Some(([path, &[option]].concat(), name))
-            })
-            .collect();
-        for verb in command.get_subcommands() {
-            found.extend(options(verb, &[path, &[verb.get_name().to_owned()]].concat()));
-        }
-        found
-    }
-
-    #[test]
-    fn a_negative_number_is_a_value_and_no_option_everywhere() {
-        let command = command_line();
-        let options = options(&command, &["sonard".to_owned()]);
-        assert!(options.len() > 200, "{}", options.len());
-        for (words, name) in options {
-            let value = match name.as_str() {
-                "POSE" => "-1,2,90",
-                "REGION" => "-1,-2,3,4",
-                _ => "-1.5",
-            };
-            let words = [&words[..], &[value.to_owned()]].concat();
-            let error = command.clone().try_get_matches_from(&words).err();
-            let kind = error.map(|error| error.kind());
-            assert_ne!(kind, Some(ErrorKind::UnknownArgument), "{words:?}");
-        }
-    }
-}
+mod tests;

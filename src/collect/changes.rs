@@ -2,18 +2,20 @@
 
 use serde_json::Value;
 
-use super::load::{Loaded, Poses};
-use crate::collect::{History, numbers_of};
+use super::{CollectionKeys, History, Plan, Poses, numbers_of};
 
 /// Keys that do not matter for what is collected.
 const FREE: [&str; 3] = ["collection.folder", "collection.patience_s", "device.port"];
 
 /// What differs from the plan the journal knows, one line each; nothing if it is the same.
-pub(super) fn since(history: &History, now: &Loaded, sensor_sha256: &str) -> Vec<String> {
+pub(super) fn since(history: &History, now: &Plan, sensor_sha256: &str) -> Vec<String> {
     let Some(before) = history.plans.last() else { return Vec::new() };
     let keys = serde_json::to_value(&now.keys).unwrap_or_default();
     let mut changes = Vec::new();
-    compare("", &before.keys, &keys, &mut changes);
+    // What an earlier version did not know yet was as it is by default.
+    let mut then = serde_json::to_value(CollectionKeys::default()).unwrap_or_default();
+    merge(&mut then, &before.keys);
+    compare("", &then, &keys, &mut changes);
     if before.scene.sha256 != now.scene.sha256 {
         changes.push(format!("the scene {} is not the one it was", now.scene.name));
     }
@@ -27,6 +29,18 @@ pub(super) fn since(history: &History, now: &Loaded, sensor_sha256: &str) -> Vec
         changes.push("the poses in the file are not those they were".into());
     }
     changes
+}
+
+/// Puts values over others, deep.
+fn merge(under: &mut Value, over: &Value) {
+    match (under, over) {
+        (Value::Object(under), Value::Object(over)) => {
+            for (key, over) in over {
+                merge(under.entry(key.clone()).or_insert(Value::Null), over);
+            }
+        }
+        (under, over) => *under = over.clone(),
+    }
 }
 
 fn compare(at: &str, before: &Value, now: &Value, changes: &mut Vec<String>) {
@@ -82,5 +96,16 @@ mod tests {
         );
         compare("", &now, &now, &mut changes);
         assert_eq!(changes.len(), 3);
+    }
+
+    #[test]
+    fn values_are_put_over_others_key_by_key() {
+        let mut values = json!({"sensor": {"lossless": false, "engine": "paths"}, "poses": {}});
+        merge(&mut values, &json!({"sensor": {"engine": "fan"}, "conditions": {"door": "open"}}));
+        let expected = json!({
+            "sensor": {"lossless": false, "engine": "fan"},
+            "poses": {}, "conditions": {"door": "open"},
+        });
+        assert_eq!(values, expected);
     }
 }

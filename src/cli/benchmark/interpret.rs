@@ -1,13 +1,15 @@
-//! `sonard interpret-benchmark`.
+//! `sonard benchmark interpret`.
 
 use std::io::{self, Write};
 
 use comfy_table::{CellAlignment, Table};
 use serde::Serialize;
 
-use super::{Failure, Outcome, answer::answer, compare::RULED, picture::PictureArgs, progress};
 use crate::{
-    acoustics::Sensor,
+    cli::{
+        Outcome, answer::answer, compare::RULED, options::load_sensor, picture::PictureArgs,
+        progress,
+    },
     interpret::{
         Settings,
         calibration::{Judged, Reliability, judge_room},
@@ -15,20 +17,21 @@ use crate::{
     plot::draw_reliability,
 };
 
-/// Options of `sonard interpret-benchmark`.
+/// Options of `sonard benchmark interpret`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
-pub(super) struct Args {
-    /// How many rooms
+pub(in crate::cli) struct Args {
+    /// How many made-up rooms, each read from one or two places
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
-    rooms: u64,
-    /// Seed of rooms, places and noise
+    trials: u64,
+    /// Seed of what is random; rooms, places and noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// The ranger: name of a shipped sensor, with its whole receiver
-    #[arg(long, value_name = "NAME", default_value = "senscomp-6500")]
+    /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, hc-sr04,
+    /// fullwave-line), or a file with a sensor's data; with its whole receiver
+    #[arg(long, value_name = "NAME|FILE", default_value = "senscomp-6500")]
     sensor: String,
-    /// One JSON object instead of the table
+    /// JSON instead of text; one object
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -45,8 +48,8 @@ each arc is of. For each arc there are four claims, of plane, corner, edge and s
 
 const HELP: &str = "\
 Examples:
-  sonard interpret-benchmark -o reliability.png     1,000 rooms; the same seed gives the same table
-  sonard interpret-benchmark --rooms 100 --seed 2 --json
+  sonard benchmark interpret -o reliability.png     1,000 rooms; the same seed gives the same table
+  sonard benchmark interpret --trials 100 --seed 2 --json
 
 The expected calibration error is the mean distance of claim and share over all claims in ten bins; the \
 Brier score is the mean squared distance of a claim from what is.";
@@ -71,13 +74,11 @@ struct Row {
 
 pub(super) fn run(args: &Args) -> Outcome {
     let targets = args.picture.targets()?;
-    let sensor = Sensor::preset(&args.sensor).map_err(|error| {
-        Failure::input(error.to_string(), "`sonard simulate --help` says which there are")
-    })?;
+    let sensor = load_sensor(&args.sensor)?;
     let settings = Settings::default();
-    let bar = progress::bar(args.rooms, "rooms");
+    let bar = progress::bar(args.trials, "rooms");
     let mut judged: Vec<Judged> = Vec::new();
-    for number in 0..args.rooms {
+    for number in 0..args.trials {
         judged.extend(judge_room(args.seed, number, &sensor, &settings));
         bar.inc(1);
     }
@@ -98,7 +99,7 @@ impl Answer {
             came_true: bin.came_true,
         });
         Self {
-            rooms: args.rooms,
+            rooms: args.trials,
             seed: args.seed,
             arcs,
             expected_calibration_error: reliability.expected_error,

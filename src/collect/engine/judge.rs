@@ -1,31 +1,31 @@
 //! What becomes of a scan: accepted, refused or cut.
 
-use std::time::Duration;
+use std::{collections::HashSet, path::Path, time::Duration};
 
 use tokio::time::sleep;
 
 use super::{
     super::{
-        patience::Patience,
-        refuse,
+        Action, Device, Entry, Figures, Finding, Halt, Outcome, Patience, Sealed, Slot, Take,
+        Watcher, check, is_cut,
+        source::answered,
         taking::{self, Taken},
+        verdict,
     },
     Collector, Next,
 };
 use crate::{
-    cli::{Failure, Outcome as Done},
-    collect::{Action, Entry, Figures, Finding, Outcome, Slot, Take, check, is_cut, verdict},
     scan::{PingStatus, ScanView},
-    store::load,
+    store::{LogWriter, load},
 };
 
-impl Collector<'_> {
+impl<D: Device, W: Watcher> Collector<D, W> {
     /// Lets a scan count, or sets it aside, and says what is next.
     pub(super) async fn judge(
         &mut self,
         slot: Slot,
         (taken, change_c): (Taken, Option<f64>),
-    ) -> Result<Next, Failure> {
+    ) -> Result<Next, Halt> {
         let Taken { view, lost, stopped, wall_s, gone: _ } = taken;
         let lost =
             lost.or_else(|| view.as_ref().filter(|view| lacks_readings(view)).map(|_| gone()));
@@ -36,7 +36,7 @@ impl Collector<'_> {
             self.losses = None;
         }
         let figures = Figures::of(&view, change_c);
-        let findings = check(&figures, &self.loaded.keys.checks);
+        let findings = check(&figures, &self.plan.keys.checks);
         let mut action = verdict(&findings);
         self.tell(slot, &figures, &findings);
         if action == Action::Ask {
@@ -64,9 +64,9 @@ impl Collector<'_> {
     async fn broken_off(
         &mut self,
         slot: Slot,
-        lost: Option<Failure>,
+        lost: Option<Halt>,
         stopped: bool,
-    ) -> Result<Next, Failure> {
+    ) -> Result<Next, Halt> {
         let stop = match (self.interrupts.happened(), stopped) {
             (true, _) => Some("stopped on request"),
             (_, true) => Some("the daemon was told to stop"),
@@ -77,7 +77,7 @@ impl Collector<'_> {
         {
             self.set_aside(slot, None, Outcome::Cut, Vec::new(), "it was broken off")?;
         } else {
-            self.folder.discard(slot).map_err(|error| refuse(&error))?;
+            self.folder.discard(slot)?;
         }
         if let Some(why) = stop {
             return Ok(Next::Stop(why.into()));
@@ -87,18 +87,18 @@ impl Collector<'_> {
 
     /// Gives a ranger that lost a scan time before the next one, longer each time. That says nothing
     /// about the pose, so it is no refusal: the collection ends when the plan's patience does.
-    async fn wait_for_ranger(&mut self, lost: Failure) -> Result<Next, Failure> {
-        let patience = Duration::from_secs_f64(self.loaded.keys.collection.patience_s);
+    async fn wait_for_ranger(&mut self, lost: Halt) -> Result<Next, Halt> {
+        let patience = Duration::from_secs_f64(self.plan.keys.collection.patience_s);
         let losses = self.losses.get_or_insert_with(|| Patience::with_losses(patience));
-        let (Failure::Device(report), Some(wait)) = (&lost, losses.next_wait()) else {
+        let (Halt::Failed { .. }, Some(wait)) = (&lost, losses.next_wait()) else {
             return match lost {
                 // The daemon wants no more of it.
-                Failure::Found(Some(why)) => Ok(Next::Stop(why)),
+                Halt::Stopped(why) => Ok(Next::Stop(why)),
                 lost => Err(lost),
             };
         };
-        self.bar.say(&format!(
-            "the ranger was lost, the scan is taken again in {} s: {report}",
+        self.watcher.say(&format!(
+            "the ranger was lost, the scan is taken again in {} s: {lost}",
             wait.as_secs()
         ));
         tokio::select! {
@@ -109,25 +109,22 @@ impl Collector<'_> {
 
     /// Takes in what an earlier run left behind: a scan that was whole counts as if nothing had
     /// happened, another one is kept beside.
-    pub(super) fn take_in_left_overs(&mut self) -> Done {
+    pub(super) fn take_in_left_overs(&mut self) -> Result<(), Halt> {
         // Renamed, but not told: the rename is what counts.
-        let told: std::collections::HashSet<Slot> =
-            self.journal.history().accepted().map(|take| take.slot).collect();
-        let scans = self.folder.scans().map_err(|error| refuse(&error))?;
+        let told: HashSet<Slot> = self.journal.history().accepted().map(|take| take.slot).collect();
+        let scans = self.folder.scans()?;
         for slot in scans.into_iter().filter(|slot| !told.contains(slot)) {
-            let sealed = self.folder.sealed(slot).map_err(|error| refuse(&error))?;
+            let sealed = self.folder.sealed(slot)?;
             let path = self.folder.root().join(&sealed.file);
             let Some(view) = read(&path)? else { continue };
             let figures = Figures::of(&view, None);
-            let findings = check(&figures, &self.loaded.keys.checks);
+            let findings = check(&figures, &self.plan.keys.checks);
             self.note(take_entry(slot, Some(&view), Outcome::Accepted, sealed, figures, findings))?;
         }
-        for slot in self.folder.left_over().map_err(|error| refuse(&error))? {
+        for slot in self.folder.left_over()? {
             let path = self.folder.taking(slot);
             // Opening mends an end that was torn off.
-            crate::store::LogWriter::open(&path)
-                .and_then(crate::store::LogWriter::close)
-                .map_err(|error| Failure::device(&error, error.help()))?;
+            LogWriter::open(&path).and_then(LogWriter::close)?;
             let view = read(&path)?.filter(|view| !is_cut(view));
             let done = self.folder.sealed(slot).is_ok();
             match view {
@@ -141,9 +138,9 @@ impl Collector<'_> {
         Ok(())
     }
 
-    fn judge_left_over(&mut self, slot: Slot, view: &ScanView) -> Done {
+    fn judge_left_over(&mut self, slot: Slot, view: &ScanView) -> Result<(), Halt> {
         let figures = Figures::of(view, None);
-        let findings = check(&figures, &self.loaded.keys.checks);
+        let findings = check(&figures, &self.plan.keys.checks);
         if verdict(&findings) == Action::Note {
             return self.accept(slot, view, figures, findings, None);
         }
@@ -159,15 +156,15 @@ impl Collector<'_> {
         figures: Figures,
         findings: Vec<Finding>,
         wall_s: Option<f64>,
-    ) -> Done {
-        let sealed = self.folder.accept(slot).map_err(|error| refuse(&error))?;
+    ) -> Result<(), Halt> {
+        let sealed = self.folder.accept(slot)?;
         let mut entry = take_entry(slot, Some(view), Outcome::Accepted, sealed, figures, findings);
         if let Entry::Take(take) = &mut entry {
             take.wall_s = wall_s;
         }
         self.note(entry)?;
         if let Some(wall_s) = wall_s {
-            self.bar.learn(wall_s);
+            self.pace.learn(wall_s);
         }
         self.write_manifest()
     }
@@ -179,10 +176,10 @@ impl Collector<'_> {
         outcome: Outcome,
         findings: Vec<Finding>,
         why: &str,
-    ) -> Done {
+    ) -> Result<(), Halt> {
         let path = self.folder.taking(slot);
         taking::mark(&path, why)?;
-        let sealed = self.folder.set_aside(slot).map_err(|error| refuse(&error))?;
+        let sealed = self.folder.set_aside(slot)?;
         let kept = match of {
             Some(_) => None,
             None => read(&self.folder.root().join(&sealed.file))?,
@@ -201,20 +198,20 @@ impl Collector<'_> {
     }
 
     /// One refusal more; after too many the scan is given up.
-    fn count_refusal(&mut self, slot: Slot) -> Result<Next, Failure> {
+    fn count_refusal(&mut self, slot: Slot) -> Result<Next, Halt> {
         let refused = self.refused.entry(slot).or_default();
         *refused += 1;
-        if *refused > self.loaded.keys.collection.retakes {
+        if *refused > self.plan.keys.collection.retakes {
             return self.give_up(slot);
         }
         Ok(Next::GoOn)
     }
 
-    async fn ask_what_to_do(&mut self) -> Result<Action, Failure> {
-        self.bar.hide();
+    async fn ask_what_to_do(&mut self) -> Result<Action, Halt> {
+        self.watcher.rest();
         loop {
             let question = "keep it, retake it or stop? [k/r/s]";
-            let answer = self.terminal.ask(question, &self.interrupts).await?;
+            let answer = answered(&mut self.watcher, question, &self.interrupts).await?;
             match answer.as_deref() {
                 Some("k" | "keep") => return Ok(Action::Note),
                 Some("r" | "retake") => return Ok(Action::Retake),
@@ -229,7 +226,7 @@ impl Collector<'_> {
         let percent = |share: Option<f64>| {
             share.map_or_else(|| "-".into(), |share| format!("{:.0} %", 100.0 * share))
         };
-        self.bar.say(&format!(
+        self.watcher.say(&format!(
             "pose {} ({}), repeat {}: {} of {} beams, {} of the echo pairs agree",
             slot.pose,
             self.pose(slot.pose).label(),
@@ -245,7 +242,7 @@ impl Collector<'_> {
                 Action::Ask => "asking",
                 Action::Stop => "stopping",
             };
-            self.bar.say(&format!("  {}: {done}", finding.detail));
+            self.watcher.say(&format!("  {}: {done}", finding.detail));
         }
     }
 }
@@ -260,8 +257,8 @@ fn lacks_readings(view: &ScanView) -> bool {
     view.pings.iter().any(|ping| ping.status == PingStatus::LinkLost)
 }
 
-fn gone() -> Failure {
-    Failure::device(
+fn gone() -> Halt {
+    Halt::failed(
         "the ranger was lost during the scan",
         "look at its cable and supply: `sonard doctor --port PORT` examines them",
     )
@@ -280,7 +277,7 @@ fn take_entry(
     slot: Slot,
     view: Option<&ScanView>,
     outcome: Outcome,
-    sealed: crate::collect::Sealed,
+    sealed: Sealed,
     figures: Figures,
     findings: Vec<Finding>,
 ) -> Entry {
@@ -301,7 +298,7 @@ fn take_entry(
 }
 
 /// The scan in a file, if it holds one.
-fn read(path: &std::path::Path) -> Result<Option<ScanView>, Failure> {
-    let loaded = load(path).map_err(|error| Failure::device(&error, error.help()))?;
+fn read(path: &Path) -> Result<Option<ScanView>, Halt> {
+    let loaded = load(path)?;
     Ok(ScanView::from_records(loaded.records).into_iter().next())
 }

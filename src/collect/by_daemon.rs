@@ -1,14 +1,13 @@
 //! A daemon that takes the scans of a collection: asked for each with its pose and plan, and left as
 //! it was found.
 
-use std::{path::Path, time::Duration};
+use std::time::Duration;
 
 use serde::Serialize;
 use tokio::time::{Instant, sleep};
 
 use super::{
-    bar::Bar,
-    device::Met,
+    AirBefore, Borrowed, Connected, Device, Halt, Plan, ScanOrder,
     taking::{Taken, Taking},
 };
 use crate::{
@@ -16,15 +15,11 @@ use crate::{
         AirOrder, AirStatus, InForce, LinkReport, ScanRequest, Scanning, ScanningReport, Setup,
         Status,
     },
-    cli::{
-        Failure,
-        daemon::{refuse, refuse_scans},
-        runtime::Interrupts,
-    },
     client::{Client, RequestedScans, ScansError},
-    collect::{AirBefore, Borrowed},
     config::{Mode, ScanningKeys},
-    scan::{AirSource, CollectionRef, EventKind, Record, STOPPED_ON_REQUEST, Sink as _},
+    interrupts::Interrupts,
+    ranger::PreparedScan,
+    scan::{AirSource, EventKind, Record, STOPPED_ON_REQUEST, Sink as _},
 };
 
 const WAIT: Duration = Duration::from_secs(1);
@@ -32,7 +27,7 @@ const WAIT: Duration = Duration::from_secs(1);
 const LOOK: Duration = Duration::from_secs(5);
 
 /// A daemon, and what a collection wants of it.
-pub(super) struct Daemon {
+pub struct ByDaemon {
     client: Client,
     /// What it decided about every scan when the collection began.
     setup: Setup,
@@ -40,7 +35,12 @@ pub(super) struct Daemon {
     interrupts: Interrupts,
     /// What it did by itself before, as far as that was changed.
     borrowed: Option<Borrowed>,
+    /// Tells whoever looks on.
+    tell: Tell,
 }
+
+/// Tells whoever looks on.
+type Tell = Box<dyn Fn(&str) + Send + Sync>;
 
 /// The air that the next scan of a daemon will be taken in.
 fn next_air(status: &Status) -> &AirStatus {
@@ -48,62 +48,50 @@ fn next_air(status: &Status) -> &AirStatus {
 }
 
 /// Motor steps a turn of its ranger, once that told them.
-pub(super) fn steps_per_revolution(status: &Status) -> Option<u16> {
+#[must_use]
+pub fn steps_per_revolution(status: &Status) -> Option<u16> {
     status.device.as_ref().and_then(|device| device.steps_per_revolution.try_into().ok())
 }
 
-fn trouble(link: &LinkReport) -> Failure {
+fn trouble(link: &LinkReport) -> Halt {
     let trouble = link.trouble.as_deref().unwrap_or("no more is known");
-    Failure::device(
+    Halt::failed(
         format!("the daemon has no ranger, it is {}: {trouble}", link.state.name()),
         "see `sonard status`; the collection goes on where it stopped when it is started again",
     )
 }
 
-impl Daemon {
-    /// Looks at a daemon, and changes nothing of it yet.
-    pub(super) async fn find(
-        client: Client,
-        interrupts: Interrupts,
-    ) -> Result<(Self, Status), Failure> {
-        let refuse = |error| refuse(&error);
-        let status: Status = client.get_json("/v1/status").await.map_err(refuse)?;
-        if status.simulation.is_some() {
-            return Err(Failure::input(
-                "the daemon plays an array and measures nothing",
-                "collect by a daemon that drives a ranger, or see `sonard simulate --array`",
-            ));
-        }
-        let setup = client.get_json("/v1/setup").await.map_err(refuse)?;
-        let patience = Duration::ZERO;
-        Ok((Self { client, setup, patience, interrupts, borrowed: None }, status))
+impl Device for ByDaemon {
+    fn is_local(&self) -> bool {
+        false
     }
 
-    pub(super) const fn setup(&self) -> &Setup {
-        &self.setup
+    fn prepare(&mut self, _plan: &Plan, _first: &PreparedScan) -> Result<(), Halt> {
+        Ok(())
+    }
+
+    fn carry_to(&mut self, _to: &PreparedScan) -> Result<(), Halt> {
+        Ok(())
     }
 
     /// Goes on where an earlier run left it.
-    pub(super) fn go_on(&mut self, patience: Duration, borrowed: Option<Borrowed>) {
+    fn go_on(&mut self, patience: Duration, borrowed: Option<Borrowed>) {
         (self.patience, self.borrowed) = (patience, borrowed);
     }
 
     /// Waits until it has a ranger that can be used.
-    pub(super) async fn meet(&self) -> Result<Met, Failure> {
+    async fn meet(&mut self) -> Result<Connected, Halt> {
         let status = self.ready().await?;
         match (status.device, status.provenance) {
-            (Some(device), Some(provenance)) => Ok(Met { device, provenance }),
-            _ => Err(Failure::device("the daemon does not know its ranger", "see `sonard status`")),
+            (Some(device), Some(provenance)) => Ok(Connected { device, provenance }),
+            _ => Err(Halt::failed("the daemon does not know its ranger", "see `sonard status`")),
         }
     }
 
     /// What is about to be changed of what it does by itself, beyond what is known already: its own
     /// scans are held, because only the collection knows where the ranger stands, and the air is
     /// what the plan says, if it says anything.
-    pub(super) async fn to_borrow(
-        &self,
-        air: Option<&AirOrder>,
-    ) -> Result<Option<Borrowed>, Failure> {
+    async fn to_borrow(&self, air: Option<&AirOrder>) -> Result<Option<Borrowed>, Halt> {
         let status = self.ready().await?;
         let ScanningReport { mode, every_s, .. } = status.scanning;
         let mut before = self.borrowed.clone();
@@ -122,17 +110,17 @@ impl Daemon {
     }
 
     /// Lets the collection decide when scans are taken, and in which air.
-    pub(super) async fn borrow(
+    async fn borrow(
         &mut self,
         before: Option<Borrowed>,
         air: Option<&AirOrder>,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), Halt> {
         if before.is_some() {
             self.borrowed = before;
         }
         let on_request = Scanning { mode: Mode::OnRequest, every_s: None };
         self.put("/v1/scanning", &on_request).await?;
-        let status: Status = self.client.get_json("/v1/status").await.map_err(|e| refuse(&e))?;
+        let status: Status = self.client.get_json("/v1/status").await?;
         match air.filter(|air| !is(next_air(&status), air)) {
             Some(air) => self.put("/v1/air", air).await,
             None => Ok(()),
@@ -140,7 +128,7 @@ impl Daemon {
     }
 
     /// Leaves it as it was found; whether there was anything to give back.
-    pub(super) async fn give_back(&mut self) -> Result<bool, Failure> {
+    async fn give_back(&mut self) -> Result<bool, Halt> {
         let Some(before) = self.borrowed.take() else { return Ok(false) };
         if let Some(ScanningKeys { mode, every_s }) = before.scanning {
             let scanning = Scanning { mode, every_s: Some(every_s) };
@@ -149,7 +137,7 @@ impl Daemon {
         match before.air {
             Some(AirBefore::Given(air)) => self.put("/v1/air", &air).await?,
             Some(AirBefore::Own) => {
-                self.client.delete("/v1/air").await.map_err(|error| refuse(&error))?;
+                self.client.delete("/v1/air").await?;
             }
             None => {}
         }
@@ -157,22 +145,18 @@ impl Daemon {
     }
 
     /// The temperature that somebody measured for it, degrees Celsius.
-    pub(super) async fn temperature_c(&self) -> Option<f64> {
+    async fn temperature_c(&self) -> Option<f64> {
         let InForce::<AirStatus> { now, pending } = self.client.get_json("/v1/air").await.ok()?;
         let air = pending.unwrap_or(now);
         (air.source != AirSource::Configuration).then_some(air.temperature_c)
     }
 
-    /// Has a scan taken into `path`.
-    pub(super) async fn take(
-        &self,
-        (wish, of): (&ScanRequest, CollectionRef),
-        path: &Path,
-        bar: &Bar,
-    ) -> Result<Taken, Failure> {
-        let (mut scans, first) = self.begin(wish).await?;
+    async fn take(&mut self, scan: ScanOrder<'_>, beam: &(dyn Fn() + Sync)) -> Result<Taken, Halt> {
+        let ScanOrder { plan, pose, of, path, .. } = scan;
+        let request = ScanRequest { scans: Some(1), plan: Some(plan), pose: Some(pose) };
+        let (mut scans, first) = self.begin(&request).await?;
         let began = Instant::now();
-        let mut sink = Taking::open(path, bar)?;
+        let mut sink = Taking::open(path, beam)?;
         let (mut lost, mut stopped) = (None, false);
         let mut next = Some(first);
         while let Some(mut record) = next.take() {
@@ -187,7 +171,7 @@ impl Daemon {
             tokio::select! {
                 record = scans.next() => match record {
                     Ok(record) => next = Some(record),
-                    Err(error) => lost = Some(refuse_scans(&error)),
+                    Err(error) => lost = Some(error.into()),
                 },
                 () = self.interrupts.clone().wait() => {
                     // What can't be had any more is in the daemon's log.
@@ -202,82 +186,110 @@ impl Daemon {
         Ok(Taken { view: sink.close()?, gone: lost.is_some(), lost, stopped, wall_s })
     }
 
+    async fn close(self) {}
+}
+
+impl ByDaemon {
+    /// Looks at a daemon, and changes nothing of it yet. What a person should know meanwhile goes to
+    /// `tell`.
+    ///
+    /// # Errors
+    /// When it does not answer, or measures nothing.
+    pub async fn find(
+        client: Client,
+        interrupts: Interrupts,
+        tell: impl Fn(&str) + Send + Sync + 'static,
+    ) -> Result<(Self, Status), Halt> {
+        let status: Status = client.get_json("/v1/status").await?;
+        if status.simulation.is_some() {
+            return Err(Halt::wrong(
+                "the daemon plays an array and measures nothing",
+                "collect by a daemon that drives a ranger, or see `sonard simulate --array`",
+            ));
+        }
+        let setup = client.get_json("/v1/setup").await?;
+        let patience = Duration::ZERO;
+        let tell = Box::new(tell);
+        Ok((Self { client, setup, patience, interrupts, borrowed: None, tell }, status))
+    }
+
+    /// What it decides about every scan.
+    #[must_use]
+    pub const fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
     /// Asks for the scan and waits for its first record; a daemon that restarts meanwhile is asked
     /// again.
-    async fn begin(&self, wish: &ScanRequest) -> Result<(RequestedScans, Record), Failure> {
+    async fn begin(&self, request: &ScanRequest) -> Result<(RequestedScans, Record), Halt> {
         loop {
             self.ready().await?;
-            let mut scans = match RequestedScans::ask(self.client.clone(), wish).await {
+            let mut scans = match RequestedScans::ask(self.client.clone(), request).await {
                 Ok(scans) => scans,
-                Err(error) if error.is_final() => return Err(refuse(&error)),
+                Err(error) if error.is_final() => return Err(error.into()),
                 Err(_) => continue,
             };
             match self.first(&mut scans).await? {
                 Ok(record) => return Ok((scans, record)),
                 Err(error @ ScansError::Forgotten(_)) => {
-                    return Err(Failure::Found(Some(format!(
+                    return Err(Halt::Stopped(format!(
                         "{error}\nstart it again with the same plan: it goes on where it stopped"
-                    ))));
+                    )));
                 }
                 Err(_) => {}
             }
         }
     }
 
-    async fn first(
-        &self,
-        scans: &mut RequestedScans,
-    ) -> Result<Result<Record, ScansError>, Failure> {
+    async fn first(&self, scans: &mut RequestedScans) -> Result<Result<Record, ScansError>, Halt> {
         loop {
             tokio::select! {
                 record = scans.next() => return Ok(record),
                 () = sleep(LOOK) => drop(self.ready().await?),
                 () = self.interrupts.clone().wait() => {
                     drop(scans.cancel().await);
-                    return Err(Failure::stopped());
+                    return Err(Halt::on_request());
                 }
             }
         }
     }
 
     /// Waits, for as long as the plan's patience, until the daemon answers and has its ranger.
-    async fn ready(&self) -> Result<Status, Failure> {
+    async fn ready(&self) -> Result<Status, Halt> {
         let (until, mut told) = (Instant::now() + self.patience, false);
         loop {
             let failure = match self.look().await {
                 Ok(status) if status.link.state.is_up() => return Ok(status),
                 Ok(status) => trouble(&status.link),
-                Err(failure @ Failure::Device(_)) => failure,
+                Err(failure @ Halt::Failed { .. }) => failure,
                 Err(failure) => return Err(failure),
             };
             if Instant::now() + WAIT > until {
                 return Err(failure);
             }
-            if let (Failure::Device(report), false) = (&failure, std::mem::replace(&mut told, true))
-            {
-                anstream::eprintln!("waiting: {report}");
+            if !std::mem::replace(&mut told, true) {
+                (self.tell)(&format!("waiting: {failure}"));
             }
             tokio::select! {
                 () = sleep(WAIT) => {}
-                () = self.interrupts.clone().wait() => return Err(Failure::stopped()),
+                () = self.interrupts.clone().wait() => return Err(Halt::on_request()),
             }
         }
     }
 
-    async fn look(&self) -> Result<Status, Failure> {
-        let refuse = |error| refuse(&error);
-        let setup: Setup = self.client.get_json("/v1/setup").await.map_err(refuse)?;
+    async fn look(&self) -> Result<Status, Halt> {
+        let setup: Setup = self.client.get_json("/v1/setup").await?;
         if setup != self.setup {
-            return Err(Failure::input(
+            return Err(Halt::wrong(
                 "the daemon's sensor, model or motion is not what it was when this began",
                 "put its configuration back, or start the collection again: it says what changed",
             ));
         }
-        self.client.get_json("/v1/status").await.map_err(refuse)
+        Ok(self.client.get_json("/v1/status").await?)
     }
 
-    async fn put(&self, path: &str, body: &impl Serialize) -> Result<(), Failure> {
-        self.client.put(path, body).await.map_err(|error| refuse(&error))
+    async fn put(&self, path: &str, body: &impl Serialize) -> Result<(), Halt> {
+        Ok(self.client.put(path, body).await?)
     }
 }
 

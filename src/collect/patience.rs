@@ -5,7 +5,8 @@ use std::time::Duration;
 use tokio::time::Instant;
 
 /// Waits between tries to get something of a ranger.
-pub(super) struct Patience {
+#[derive(Debug)]
+pub struct Patience {
     until: Instant,
     wait: Duration,
     factor: u32,
@@ -14,12 +15,14 @@ pub(super) struct Patience {
 
 impl Patience {
     /// For finding a ranger that does not answer: a try costs nothing.
-    pub(super) fn with_absence(patience: Duration) -> Self {
+    #[must_use]
+    pub fn with_absence(patience: Duration) -> Self {
         Self::new(patience, Duration::from_millis(300), 2, Duration::from_secs(10))
     }
 
     /// For a ranger that answers and loses one scan after the other: a try costs a scan.
-    pub(super) fn with_losses(patience: Duration) -> Self {
+    #[must_use]
+    pub fn with_losses(patience: Duration) -> Self {
         Self::new(patience, Duration::from_secs(1), 4, Duration::from_secs(300))
     }
 
@@ -28,7 +31,7 @@ impl Patience {
     }
 
     /// How long to wait before the next try; `None` when there is to be no other.
-    pub(super) fn next_wait(&mut self) -> Option<Duration> {
+    pub fn next_wait(&mut self) -> Option<Duration> {
         let wait = self.wait;
         self.wait = (wait * self.factor).min(self.max);
         (Instant::now() + wait < self.until).then_some(wait)

@@ -1,4 +1,4 @@
-//! `sonard map-benchmark`.
+//! `sonard benchmark map`.
 
 use std::{
     io::{self, Write},
@@ -14,37 +14,37 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use serde::Serialize;
 
-use super::{
-    Failure, Outcome,
-    answer::answer,
-    compare::RULED,
-    map::{EXTEND_M, LEAST_CONFIDENCE},
-    output::{OutPath, Overwrite, Product, make_folder},
-    progress,
-};
 use crate::{
     acoustics::{Air, Sensor},
     array::RangerArray,
+    cli::{
+        Failure, Outcome,
+        answer::answer,
+        compare::RULED,
+        map::{EXTEND_M, LEAST_CONFIDENCE, MAX_RANGE_M},
+        output::{OutPath, Overwrite, Product, make_folder},
+        progress,
+    },
     geometry::DVec2,
     interpret::{
         Extents,
         grid::{MapScore, Trust},
         trial::{Arrangement, Course, Trial, TrialSettings, random_room},
     },
-    model::{Options, Simulator},
+    model::{Options, PathOptions, Simulator},
     plot::{MapView, badge_of, draw_map},
     scan::Provenance,
     scene::{Scene, shipped},
 };
 
-/// Options of `sonard map-benchmark`.
+/// Options of `sonard benchmark map`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
-pub(super) struct Args {
+pub(in crate::cli) struct Args {
     /// How many courses, each mapped without and with Feature Prediction
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     maps: u32,
-    /// Seed of rooms, courses and noise
+    /// Seed of what is random; rooms, courses and noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Sets of readings in each course
@@ -53,10 +53,10 @@ pub(super) struct Args {
     /// Side of a cell, metres
     #[arg(long, value_name = "M", default_value_t = 0.05)]
     resolution: f64,
-    /// Ranges longer than this are taken as silence, metres
-    #[arg(long, value_name = "M", default_value_t = 5.0)]
-    max_range: f64,
-    /// Exponent of the confidence with the distance of the feature (2; the text also says 1)
+    /// Take ranges beyond this as silence, metres [default: the sensor's, at most 5]
+    #[arg(long, value_name = "M")]
+    silent_beyond: Option<f64>,
+    /// Exponent of the confidence with the distance of the feature; the paper also says 1
     #[arg(long, value_name = "E", default_value_t = 2.0)]
     exponent: f64,
     /// How far walls are taken to go on beyond what was seen of them, metres
@@ -65,16 +65,16 @@ pub(super) struct Args {
     /// Weigh whole readings, also what they say of the space before the feature, as the paper does
     #[arg(long)]
     whole_readings: bool,
-    /// Leave readings of less confidence out
+    /// Leave readings of less confidence out; 0.5 is full confidence
     #[arg(long, value_name = "C", default_value_t = LEAST_CONFIDENCE)]
     least_confidence: f64,
-    /// Hear one sound at a time, timed by its path, instead of the receiver's envelope
+    /// Detect one sound at a time and time it by its path alone
     #[arg(long)]
     ideal_receiver: bool,
-    /// One JSON object for each course instead of the table
+    /// JSON instead of text; one object for each course
     #[arg(long)]
     json: bool,
-    /// Folder for PNG pictures of the maps: ideal, without, with
+    /// Folder for what is written; pictures of the maps: ideal, without, with
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
     #[command(flatten)]
@@ -91,9 +91,9 @@ each scene.";
 
 const HELP: &str = "\
 Examples:
-  sonard map-benchmark                         128 courses; the same seed gives the same table
-  sonard map-benchmark --maps 16 --out maps    and pictures of the maps
-  sonard map-benchmark --extend 0 --whole-readings --least-confidence 0     the paper's way, but for splits
+  sonard benchmark map                         128 courses; the same seed gives the same table
+  sonard benchmark map --maps 16 --out maps    and pictures of the maps
+  sonard benchmark map --extend 0 --whole-readings --least-confidence 0     the paper's way, but for splits
 
 The benchmarks, in percent: correlation of the two maps (more is better); map score, the mean \
 squared difference of cells; the same of cells occupied in either map; and of the shortest ways \
@@ -175,7 +175,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 /// One course: its scene, arrangement and random numbers follow from its number and the seed.
 fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
     let refuse = |error: &dyn std::fmt::Display| {
-        Failure::input(error.to_string(), "see `sonard map-benchmark --help`")
+        Failure::input(error.to_string(), "see `sonard benchmark map --help`")
     };
     let mut rng = Pcg64::seed_from_u64(args.seed.wrapping_mul(1_000_003) ^ course as u64);
     let (name, scene, start) = scene(course % 8, &mut rng)?;
@@ -201,9 +201,11 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
     let sensor = Sensor::preset("senscomp-6500").map_err(|error| refuse(&error))?;
     let air = Air::default();
     let extents = Extents::new(&sensor, &air, false).map_err(|error| refuse(&error))?;
+    let silent_beyond_m = args.silent_beyond.unwrap_or(sensor.max_range_m.min(MAX_RANGE_M));
     let options = Options {
-        max_range_m: Some(args.max_range),
-        ideal_receiver: args.ideal_receiver,
+        max_range_m: Some(silent_beyond_m),
+        engine: PathOptions { ideal_receiver: args.ideal_receiver, ..PathOptions::default() }
+            .into(),
         ..Options::default()
     };
     let simulator =
@@ -211,7 +213,7 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
     let course_taken = Course::through(&simulator, start, &settings, &mut rng)
         .ok_or_else(|| refuse(&format!("{name}: there is no room for the robot to move")))?;
     let trial =
-        course_taken.map(&extents, args.max_range, &settings).map_err(|error| refuse(&error))?;
+        course_taken.map(&extents, silent_beyond_m, &settings).map_err(|error| refuse(&error))?;
     let arrangement = if ring { "ring" } else { "stepper" };
     if let Some(folder) = &args.out {
         let stem = format!("{course:03}-{}-{arrangement}", name.replace([' ', ','], "-"));

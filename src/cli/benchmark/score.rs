@@ -1,26 +1,26 @@
-//! `sonard map-score`.
+//! `sonard benchmark score`.
 
 use std::{
     io::{self, Write},
     path::{Path, PathBuf},
 };
 
-use super::{
-    Failure, Outcome,
-    answer::answer,
-    map_file,
-    output::{OutPath, Overwrite, make_folder},
-    scene_file,
-};
 use crate::{
+    cli::{
+        Failure, Outcome,
+        answer::answer,
+        map_file,
+        output::{OutPath, Overwrite, make_folder},
+        scene_file,
+    },
     geometry::{DVec2, Pose},
     interpret::grid::{Grid, GridShape, MapScore, PathSettings, ideal, score},
 };
 
-/// Options of `sonard map-score`.
+/// Options of `sonard benchmark score`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
-pub(super) struct Args {
+pub(in crate::cli) struct Args {
     /// The map: its .yaml, or the folder that holds map.yaml
     #[arg(value_name = "MAP")]
     map: PathBuf,
@@ -33,7 +33,7 @@ pub(super) struct Args {
     /// Also write the ideal map drawn from the scene into this folder
     #[arg(long, value_name = "DIR")]
     save_ideal: Option<OutPath>,
-    /// Print one JSON object
+    /// JSON instead of text; one object
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -53,9 +53,9 @@ from the scene's poses is free, the rest is unknown.";
 
 const HELP: &str = "\
 Examples:
-  sonard map-score map simple-room
-  sonard map-score map/map.yaml ideal/map.yaml --json
-Exit codes: 0 done, 2 wrong usage or input, 3 the ideal map can't be written.";
+  sonard benchmark score map simple-room
+  sonard benchmark score map/map.yaml ideal/map.yaml --json
+Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     if !(args.spacing.is_finite() && args.spacing > 0.0) {

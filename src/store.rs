@@ -8,6 +8,7 @@
 mod check;
 mod error;
 mod folder;
+mod format;
 mod history;
 mod kind;
 mod medium;
@@ -21,6 +22,7 @@ mod writer;
 pub use check::{Checker, Finding, FindingKind, Severity, Totals, check};
 pub use error::StoreError;
 pub use folder::{LogFile, LogFolder, Rotation, log_files};
+pub use format::RecordWriter;
 pub use history::{History, Passage, PassageLines, PastScan};
 pub use kind::{FileKind, HEAD_BYTES};
 pub use medium::{FileMedium, Medium, Pipe};

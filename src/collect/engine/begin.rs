@@ -1,7 +1,7 @@
 //! The beginning of a run: the journal, the plan it knows, what was left over, the device.
 
 use std::{
-    collections::{BTreeMap, HashMap},
+    collections::{BTreeMap, HashMap, HashSet},
     time::Duration,
 };
 
@@ -10,57 +10,46 @@ use uuid::Uuid;
 
 use super::{
     super::{
-        Args,
-        bar::Bar,
-        changes,
-        daemon::Daemon,
-        device::{Device, Met},
-        load::Loaded,
-        load::Poses,
-        own::Own,
-        preview, refuse,
-        source::Source,
-        terminal::Terminal,
+        Conditions, Connected, Device, Entry, Folder, Halt, INPUTS, Journal, Plan, PlanEntry,
+        Poses, Started, Watcher, changes,
+        estimate::{Pace, budget},
+        numbers_of, sha256,
+        source::{Source, answered},
         thermometer::Thermometer,
     },
-    Collector, warn_of_disk,
+    Choices, Collector, warn_of_disk,
 };
-use crate::{
-    cli::{Failure, Outcome, runtime::Interrupts},
-    collect::{Conditions, Entry, Folder, INPUTS, Journal, PlanEntry, Started, numbers_of, sha256},
-    scan::SceneRef,
-};
+use crate::{interrupts::Interrupts, scan::SceneRef};
 
-impl<'a> Collector<'a> {
+impl<D: Device, W: Watcher> Collector<D, W> {
     pub(super) async fn begin(
-        args: &'a Args,
-        loaded: Loaded,
-        mut daemon: Option<Daemon>,
+        plan: Plan,
+        choices: Choices,
+        mut device: D,
+        watcher: W,
         interrupts: Interrupts,
-    ) -> Result<Self, Failure> {
-        let thermometer = Thermometer::new(loaded.keys.air.file.as_deref());
+    ) -> Result<Self, Halt> {
+        let thermometer = Thermometer::new(plan.keys.air.file.as_deref());
         let measured_c = thermometer.read().await.map_err(|error| {
-            Failure::device(
+            Halt::failed(
                 format!("the thermometer can't be read: {error}"),
                 "correct air.file in the plan, or leave it out",
             )
         })?;
-        let told_c = match &daemon {
-            Some(daemon) if !loaded.gives_air() => daemon.temperature_c().await,
-            _ => measured_c,
+        let told_c = match device.is_local() || plan.gives_air() {
+            true => measured_c,
+            false => device.temperature_c().await,
         };
-        let air = loaded.air(told_c.unwrap_or(loaded.keys.air.temperature_c))?;
-        let folder = Folder::open(&loaded.folder).map_err(|error| refuse(&error))?;
-        let journal = Journal::open(&folder.journal()).map_err(|error| refuse(&error))?;
+        let air = plan.air(told_c.unwrap_or(plan.keys.air.temperature_c))?;
+        let folder = Folder::open(&plan.folder)?;
+        let journal = Journal::open(&folder.journal())?;
         let id = journal.history().plans.last().map_or_else(Uuid::new_v4, |plan| plan.collection);
-        let scan_s = preview::budget(&loaded)?.total_s();
-        if let Some(daemon) = &mut daemon {
-            let patience = Duration::from_secs_f64(loaded.keys.collection.patience_s);
-            daemon.go_on(patience, journal.history().borrowed.clone());
-        }
+        let scan_s = budget(&plan)?.total_s();
+        let patience = Duration::from_secs_f64(plan.keys.collection.patience_s);
+        device.go_on(patience, journal.history().borrowed.clone());
         let mut collector = Self {
-            args,
-            source: Source::of(&loaded.poses),
+            choices,
+            source: Source::of(&plan.poses),
             more: true,
             thermometer,
             air,
@@ -68,36 +57,35 @@ impl<'a> Collector<'a> {
             folder,
             journal,
             interrupts,
-            terminal: Terminal::default(),
-            setups: HashMap::new(),
-            device: daemon.map(|daemon| Device::Daemon(Box::new(daemon))),
+            prepared: HashMap::new(),
+            device,
             here: None,
             carried_to: None,
             losses: None,
             refused: BTreeMap::new(),
             conditions: Conditions::new(),
-            bar: Bar::new(scan_s, loaded.keys.collection.pause_s, loaded.plan.beams()),
-            loaded,
+            pace: Pace::new(scan_s, plan.keys.collection.pause_s),
+            watcher,
+            plan,
         };
-        collector.folder.remove_drafts().map_err(|error| refuse(&error))?;
+        collector.folder.remove_drafts()?;
         collector.adopt_plan()?;
         collector.take_in_left_overs()?;
         collector.write_manifest()?;
-        collector.start_device().await?;
         Ok(collector)
     }
 
     /// Goes on with the plan that the journal knows, or begins with this one.
-    fn adopt_plan(&mut self) -> Outcome {
-        let sensor = serde_json::to_string_pretty(&self.loaded.sensor).unwrap_or_default();
+    fn adopt_plan(&mut self) -> Result<(), Halt> {
+        let sensor = serde_json::to_string_pretty(&self.plan.sensor).unwrap_or_default();
         let sensor_sha256 = sha256(sensor.as_bytes());
         if !self.journal.history().plans.is_empty() {
-            let changes = changes::since(self.journal.history(), &self.loaded, &sensor_sha256);
+            let changes = changes::since(self.journal.history(), &self.plan, &sensor_sha256);
             if changes.is_empty() {
                 return Ok(());
             }
-            if !self.args.accept_changed_plan {
-                return Err(Failure::input(
+            if !self.choices.accept_changed_plan {
+                return Err(Halt::wrong(
                     format!(
                         "{} holds a collection by another plan: {}",
                         self.folder.root().display(),
@@ -110,20 +98,20 @@ impl<'a> Collector<'a> {
         }
         // The files first: a plan that the journal knows is there to be read.
         for (name, text) in [
-            ("plan.toml", &self.loaded.text),
-            ("scene.json", &self.loaded.scene_text),
+            ("plan.toml", &self.plan.text),
+            ("scene.json", &self.plan.scene_text),
             ("sensor.json", &sensor),
         ] {
             let path = format!("{INPUTS}/{name}");
-            self.folder.write(&path, text.as_bytes()).map_err(|error| refuse(&error))?;
+            self.folder.write(&path, text.as_bytes())?;
         }
         let poses = self.number_poses()?;
-        let scene = &self.loaded.scene;
+        let scene = &self.plan.scene;
         let plan = PlanEntry {
             time: Timestamp::now(),
             collection: self.id,
             sonard: env!("CARGO_PKG_VERSION").into(),
-            keys: serde_json::to_value(&self.loaded.keys).unwrap_or_default(),
+            keys: serde_json::to_value(&self.plan.keys).unwrap_or_default(),
             scene: SceneRef::of(scene),
             sensor_sha256,
             poses,
@@ -132,8 +120,8 @@ impl<'a> Collector<'a> {
     }
 
     /// Gives each listed pose that has none a number, and returns them all in order.
-    fn number_poses(&mut self) -> Result<Option<Vec<u32>>, Failure> {
-        let Poses::Listed(listed) = self.loaded.poses.clone() else { return Ok(None) };
+    fn number_poses(&mut self) -> Result<Option<Vec<u32>>, Halt> {
+        let Poses::Listed(listed) = self.plan.poses.clone() else { return Ok(None) };
         let known = &self.journal.history().poses;
         let mut last = known.keys().last().copied().unwrap_or(0);
         let mut numbers = Vec::new();
@@ -151,26 +139,23 @@ impl<'a> Collector<'a> {
     }
 
     /// Meets the device, unless nothing is left to do.
-    async fn start_device(&mut self) -> Outcome {
+    pub(super) async fn start(&mut self) -> Result<(), Halt> {
         let history = self.journal.history();
-        let done: std::collections::HashSet<_> = history.accepted().map(|take| take.slot).collect();
+        let done: HashSet<_> = history.accepted().map(|take| take.slot).collect();
         let wanted = history.wanted();
         let open: Vec<_> = wanted
             .iter()
             .filter(|slot| !done.contains(slot))
-            .filter(|slot| self.args.retry_given_up || !history.is_given_up(**slot))
+            .filter(|slot| self.choices.retry_given_up || !history.is_given_up(**slot))
             .collect();
-        let listed = matches!(self.loaded.poses, Poses::Listed(_));
+        let listed = matches!(self.plan.poses, Poses::Listed(_));
         if open.is_empty() && listed {
             return Ok(());
         }
         let left = open.len() as u32;
         if listed {
-            anstream::eprintln!(
-                "{left} scans to take, about {}",
-                preview::human(self.bar.left_s(left))
-            );
-            warn_of_disk(&self.loaded, &self.folder, left);
+            self.watcher.announce(left, self.pace.left_s(left));
+            warn_of_disk(&self.plan, &self.folder, left, &self.watcher);
         }
         let first = match open.first() {
             Some(slot) => slot.pose,
@@ -182,18 +167,12 @@ impl<'a> Collector<'a> {
                 self.journal.history().wanted().first().map_or(1, |slot| slot.pose)
             }
         };
-        let mut device = match self.device.take() {
-            Some(device) => device,
-            None => {
-                let setup = self.setup(first)?;
-                self.carried_to = Some(first);
-                let interrupts = self.interrupts.clone();
-                Device::Own(Box::new(Own::new(self.args, &self.loaded, &setup, interrupts)?))
-            }
-        };
-        let met = device.meet().await;
-        self.device = Some(device);
-        let Met { device, provenance } = met?;
+        if self.device.is_local() {
+            let prepared = self.prepared(first)?;
+            self.carried_to = Some(first);
+            self.device.prepare(&self.plan, &prepared)?;
+        }
+        let Connected { device, provenance } = self.device.meet().await?;
         self.check_device(&device.serial)?;
         self.ask_at_start().await?;
         let time = Timestamp::now();
@@ -202,18 +181,18 @@ impl<'a> Collector<'a> {
     }
 
     /// Refuses another ranger than the plan or the journal knows.
-    fn check_device(&self, serial: &str) -> Outcome {
-        let wanted = self.loaded.keys.device.serial.as_deref();
+    fn check_device(&self, serial: &str) -> Result<(), Halt> {
+        let wanted = self.plan.keys.device.serial.as_deref();
         if let Some(wanted) = wanted.filter(|wanted| *wanted != serial) {
-            return Err(Failure::device(
+            return Err(Halt::failed(
                 format!("the ranger says it is {serial}, not {wanted}"),
                 "connect that one, or change device.serial in the plan",
             ));
         }
         let before = self.journal.history().starts.last().map(|start| start.device.serial.as_str());
         match before {
-            Some(before) if before != serial && !self.args.accept_changed_plan => {
-                Err(Failure::device(
+            Some(before) if before != serial && !self.choices.accept_changed_plan => {
+                Err(Halt::failed(
                     format!("the ranger says it is {serial}; so far {before} measured"),
                     "connect that one, or go on with this one by --accept-changed-plan",
                 ))
@@ -222,9 +201,9 @@ impl<'a> Collector<'a> {
         }
     }
 
-    async fn ask_at_start(&mut self) -> Outcome {
-        for key in self.loaded.keys.ask.at_start.clone() {
-            let answer = self.terminal.ask(&format!("{key}:"), &self.interrupts).await?;
+    async fn ask_at_start(&mut self) -> Result<(), Halt> {
+        for key in self.plan.keys.ask.at_start.clone() {
+            let answer = answered(&mut self.watcher, &format!("{key}:"), &self.interrupts).await?;
             self.conditions.insert(key, answer.unwrap_or_default().into());
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! `sonard explore-benchmark`.
+//! `sonard benchmark explore`.
 
 use std::{
     io::{self, Write},
@@ -12,38 +12,39 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{
-    Failure, Outcome,
-    answer::answer,
-    compare::RULED,
-    explore::{RobotArgs, Summary, explored, write_all},
-    output::{OutPath, Overwrite, Product},
-    progress,
-};
 use crate::{
     acoustics::{Air, Sensor},
+    cli::{
+        Failure, Outcome,
+        answer::answer,
+        compare::RULED,
+        explore::{RobotArgs, Summary, explored, write_all},
+        output::{OutPath, Overwrite, Product},
+        progress,
+    },
     explore::{Exploration, Sensing},
     interpret::trial::gallery,
     model::{Options, Simulator},
     plot::draw_explorations,
 };
 
-/// Options of `sonard explore-benchmark`.
+/// Options of `sonard benchmark explore`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
-pub(super) struct Args {
+pub(in crate::cli) struct Args {
     /// How many rooms, each explored three times
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     rooms: u32,
-    /// Seed of rooms and noise
+    /// Seed of what is random; rooms and noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
     robot: RobotArgs,
-    /// One JSON object for each exploration instead of the table
+    /// JSON instead of text; one object for each exploration
     #[arg(long)]
     json: bool,
-    /// Folder for what `sonard explore --out` writes, and a picture of each room's three maps
+    /// Folder for what is written; what `sonard explore --out` writes, and a picture of each room's
+    /// three maps
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
     #[command(flatten)]
@@ -58,8 +59,8 @@ three robots begin at the same place; the table has every room, and the means.";
 
 const HELP: &str = "\
 Examples:
-  sonard explore-benchmark                       ten rooms; the same seed gives the same table
-  sonard explore-benchmark --seed 2 --out rooms  others, with pictures
+  sonard benchmark explore                       ten rooms; the same seed gives the same table
+  sonard benchmark explore --seed 2 --out rooms  others, with pictures
 
 For how map errors are counted see `sonard explore --help`.";
 
@@ -83,14 +84,14 @@ pub(super) fn run(args: &Args) -> Outcome {
 /// One room, explored in each way.
 fn room(args: &Args, number: u32, bar: &ProgressBar) -> Result<Vec<Row>, Failure> {
     let refuse = |error: &dyn std::fmt::Display| {
-        Failure::input(error.to_string(), "see `sonard explore-benchmark --help`")
+        Failure::input(error.to_string(), "see `sonard benchmark explore --help`")
     };
     let (robot, settings) = args.robot.settings()?;
     let seed = args.seed.wrapping_mul(1_000_003) ^ u64::from(number);
     let scene = gallery(&format!("room {}", number + 1), &mut Pcg64::seed_from_u64(seed));
     let pose = scene.poses["start"];
     let sensor = Sensor::preset("senscomp-6500").map_err(|error| refuse(&error))?;
-    let options = Options { max_range_m: Some(args.robot.max_range), ..Options::default() };
+    let options = Options { max_range_m: Some(args.robot.sonar_range), ..Options::default() };
     let simulator = Simulator::new(Arc::new(scene), sensor, Air::default(), options)
         .map_err(|error| refuse(&error))?;
     let scene = simulator.scene();

@@ -9,12 +9,8 @@ use std::{
 use rustix::process::{Pid, Signal, kill_process_group};
 use tokio::sync::mpsc::{Receiver, channel};
 
-use super::{load::Poses, terminal::Terminal};
-use crate::{
-    cli::{Failure, runtime::Interrupts},
-    collect::NamedPose,
-    scene::Scene,
-};
+use super::{Halt, NamedPose, Poses, Watcher};
+use crate::{interrupts::Interrupts, scene::Scene};
 
 /// Tells programs which pose is wanted.
 const VARIABLE: &str = "SONARD_POSE";
@@ -65,18 +61,18 @@ impl Source {
         &mut self,
         number: u32,
         scene: &Scene,
-        terminal: &mut Terminal,
+        watcher: &mut impl Watcher,
         interrupts: &Interrupts,
-    ) -> Result<Option<NamedPose>, Failure> {
+    ) -> Result<Option<NamedPose>, Halt> {
         match self {
             Self::Listed => Ok(None),
-            Self::Prompt => prompt(number, scene, terminal, interrupts).await,
+            Self::Prompt => prompt(number, scene, watcher, interrupts).await,
             Self::Program(command) => {
                 let ran = command.clone();
                 let output = tokio::task::spawn_blocking(move || run_once(&ran, number));
                 let text = tokio::select! {
                     output = output => output.unwrap_or_else(|error| Err(error.to_string())),
-                    () = interrupts.clone().wait() => return Err(Failure::stopped()),
+                    () = interrupts.clone().wait() => return Err(Halt::on_request()),
                 };
                 let text = text.map_err(|why| failed(command, &why))?;
                 parse(command, text.trim(), scene)
@@ -88,7 +84,7 @@ impl Source {
                 let Some(stream) = running else { return Ok(None) };
                 let line = tokio::select! {
                     line = stream.lines.recv() => line,
-                    () = interrupts.clone().wait() => return Err(Failure::stopped()),
+                    () = interrupts.clone().wait() => return Err(Halt::on_request()),
                 };
                 match line {
                     Some(line) => parse(command, line.trim(), scene),
@@ -110,29 +106,40 @@ impl Source {
 async fn prompt(
     number: u32,
     scene: &Scene,
-    terminal: &mut Terminal,
+    watcher: &mut impl Watcher,
     interrupts: &Interrupts,
-) -> Result<Option<NamedPose>, Failure> {
+) -> Result<Option<NamedPose>, Halt> {
     let question =
         format!("pose {number} (X,Y,DEG or a name; an empty line when there are no more):");
     loop {
-        let answer = terminal.ask(&question, interrupts).await?;
+        let answer = answered(watcher, &question, interrupts).await?;
         let Some(text) = answer.filter(|text| !text.is_empty()) else { return Ok(None) };
         match NamedPose::parse(&text, scene) {
             Ok(pose) => return Ok(Some(pose)),
-            Err(fault) => anstream::eprintln!("{fault}; {}", fault.help),
+            Err(fault) => watcher.say(&format!("{fault}; {}", fault.help)),
         }
     }
 }
 
-fn parse(command: &str, text: &str, scene: &Scene) -> Result<Option<NamedPose>, Failure> {
+/// An answer, unless it is interrupted.
+pub(super) async fn answered(
+    watcher: &mut impl Watcher,
+    question: &str,
+    interrupts: &Interrupts,
+) -> Result<Option<String>, Halt> {
+    tokio::select! {
+        answer = watcher.ask(question) => Ok(answer),
+        () = interrupts.clone().wait() => Err(Halt::on_request()),
+    }
+}
+
+fn parse(command: &str, text: &str, scene: &Scene) -> Result<Option<NamedPose>, Halt> {
     if text.is_empty() {
         return Ok(None);
     }
     let pose = NamedPose::parse(text, scene);
-    pose.map(Some).map_err(|fault| {
-        Failure::input(format!("`{command}` printed no pose: {fault}"), &fault.help)
-    })
+    pose.map(Some)
+        .map_err(|fault| Halt::wrong(format!("`{command}` printed no pose: {fault}"), &fault.help))
 }
 
 fn shell(command: &str, number: u32) -> Command {
@@ -152,7 +159,7 @@ fn run_once(command: &str, number: u32) -> Result<String, String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-fn start(command: &str, number: u32) -> Result<Stream, Failure> {
+fn start(command: &str, number: u32) -> Result<Stream, Halt> {
     let mut child = shell(command, number)
         .stdout(Stdio::piped())
         .process_group(0)
@@ -172,8 +179,8 @@ fn start(command: &str, number: u32) -> Result<Stream, Failure> {
     Ok(Stream { child, lines })
 }
 
-fn failed(command: &str, why: &str) -> Failure {
-    Failure::input(
+fn failed(command: &str, why: &str) -> Halt {
+    Halt::wrong(
         format!("`{command}`, which is to give poses, failed: {why}"),
         "run it by itself; what was collected is kept, and the collection goes on when started again",
     )

@@ -1,0 +1,68 @@
+//! How far a collection is, on the terminal.
+
+use std::time::Duration;
+
+use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+
+use super::{report, terminal::Terminal};
+use crate::collect::{Folder, Halt, History, Watcher};
+
+/// The person at the terminal: a bar over all beams, lines above it, and answers.
+pub(super) struct Person {
+    bar: ProgressBar,
+    terminal: Terminal,
+    beams_a_scan: u32,
+}
+
+impl Person {
+    pub(super) fn new(beams_a_scan: u32) -> Self {
+        let bar = ProgressBar::new(0);
+        let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} beams");
+        if let Ok(style) = style {
+            bar.set_style(style);
+        }
+        Self { bar, terminal: Terminal::default(), beams_a_scan }
+    }
+}
+
+impl Watcher for Person {
+    fn begin(&self, doing: &str, done: u32, of: u32, left_s: f64) {
+        if self.bar.is_finished() {
+            self.bar.reset();
+        }
+        self.bar.set_length(u64::from(of) * u64::from(self.beams_a_scan));
+        self.bar.set_position(u64::from(done) * u64::from(self.beams_a_scan));
+        self.bar.set_message(format!("{doing}, {} left,", human(left_s)));
+    }
+
+    fn beam(&self) {
+        self.bar.inc(1);
+    }
+
+    /// Prints a line above the bar.
+    fn say(&self, line: &str) {
+        self.bar.suspend(|| anstream::eprintln!("{line}"));
+    }
+
+    fn announce(&self, scans: u32, left_s: f64) {
+        anstream::eprintln!("{scans} scans to take, about {}", human(left_s));
+    }
+
+    /// Takes the bar away, for a question or for good, until the next scan begins: drawn again
+    /// earlier, it would be drawn over the question.
+    fn rest(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    async fn ask(&mut self, question: &str) -> Option<String> {
+        self.terminal.ask(question).await
+    }
+
+    fn report(&self, folder: &Folder, history: &History) -> Result<(), Halt> {
+        report::write(folder, history)
+    }
+}
+
+pub(super) fn human(seconds: f64) -> HumanDuration {
+    HumanDuration(Duration::from_secs_f64(seconds.clamp(0.0, 1e9)))
+}

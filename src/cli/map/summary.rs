@@ -1,0 +1,106 @@
+//! What came of a map, in words and figures.
+
+use std::{
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use serde::Serialize;
+
+use super::{Args, Mapped, Switch};
+use crate::interpret::Sweep;
+
+/// What is printed.
+#[derive(Debug, Serialize)]
+pub(super) struct Summary<'a> {
+    map: PathBuf,
+    scans: usize,
+    evidence: u8,
+    readings: usize,
+    feature_prediction: bool,
+    mean_confidence: Option<f64>,
+    left_out: usize,
+    poses_outside: usize,
+    resolution_m: f64,
+    width: usize,
+    height: usize,
+    origin_m: [f64; 2],
+    occupied_cells: usize,
+    free_cells: usize,
+    unknown_cells: usize,
+    #[serde(skip)]
+    out: &'a Path,
+}
+
+impl Mapped {
+    pub(super) fn summary<'a>(&self, args: &'a Args, taken: &[(uuid::Uuid, Sweep)]) -> Summary<'a> {
+        let shape = self.grid.shape();
+        let of = |wanted: fn(f64) -> bool| self.grid.probabilities().filter(|p| wanted(*p)).count();
+        let predicted = args.feature_prediction == Switch::On && self.readings > 0;
+        Summary {
+            map: args.out.join("map.yaml"),
+            scans: taken.len(),
+            evidence: args.evidence(taken.len()),
+            readings: self.readings,
+            feature_prediction: args.feature_prediction == Switch::On,
+            mean_confidence: predicted.then(|| self.confidence / self.readings as f64),
+            left_out: self.left_out,
+            poses_outside: self.outside,
+            resolution_m: shape.resolution_m,
+            width: shape.width,
+            height: shape.height,
+            origin_m: shape.origin.into(),
+            occupied_cells: of(|p| p > 0.65),
+            free_cells: of(|p| p < 0.196),
+            unknown_cells: of(|p| (0.196..=0.65).contains(&p)),
+            out: &args.out,
+        }
+    }
+}
+
+impl Summary<'_> {
+    /// What stands under the picture's title.
+    pub(super) fn of_cells(&self) -> String {
+        format!(
+            "{} scans, {} readings \u{b7} {}x{} cells of {} m: {} occupied, {} free, {} between",
+            self.scans,
+            self.readings,
+            self.width,
+            self.height,
+            self.resolution_m,
+            self.occupied_cells,
+            self.free_cells,
+            self.unknown_cells
+        )
+    }
+
+    pub(super) fn print(&self, out: &mut impl Write) -> io::Result<()> {
+        writeln!(
+            out,
+            "{} scans, {} readings -> {}x{} cells of {} m in {}: {} occupied, {} free, {} between",
+            self.scans,
+            self.readings,
+            self.width,
+            self.height,
+            self.resolution_m,
+            self.out.display(),
+            self.occupied_cells,
+            self.free_cells,
+            self.unknown_cells
+        )?;
+        if let Some(confidence) = self.mean_confidence {
+            writeln!(out, "mean confidence {confidence:.3}, {} readings left out", self.left_out)?;
+        }
+        if self.evidence > 1 {
+            writeln!(out, "each scan counted {} times (--evidence)", self.evidence)?;
+        }
+        if self.poses_outside > 0 {
+            writeln!(
+                out,
+                "{} poses lie outside the map: give a --region around them, or none",
+                self.poses_outside
+            )?;
+        }
+        Ok(())
+    }
+}

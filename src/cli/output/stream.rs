@@ -1,0 +1,74 @@
+//! What a verb writes to.
+
+use std::{
+    fs::File,
+    io::{self, BufWriter, StdoutLock, Write},
+    mem,
+};
+
+use crate::store::{Medium, WholeFile};
+
+/// What a verb writes to.
+#[derive(Debug)]
+pub(in crate::cli) enum Stream {
+    Standard(BufWriter<StdoutLock<'static>>),
+    File(BufWriter<WholeFile>),
+    Device(File),
+    /// Nothing more comes.
+    Finished,
+}
+
+impl Stream {
+    pub(in crate::cli) fn standard() -> Self {
+        Self::Standard(BufWriter::new(io::stdout().lock()))
+    }
+
+    /// Puts the file in its place.
+    pub(in crate::cli) fn finish(&mut self) -> io::Result<()> {
+        self.flush()?;
+        match mem::replace(self, Self::Finished) {
+            Self::File(file) => {
+                file.into_inner().map_err(io::IntoInnerError::into_error)?.take_place()
+            }
+            Self::Standard(_) | Self::Device(_) | Self::Finished => Ok(()),
+        }
+    }
+}
+
+impl Write for Stream {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Standard(out) => out.write(bytes),
+            Self::File(out) => out.write(bytes),
+            Self::Device(out) => out.write(bytes),
+            Self::Finished => Err(io::ErrorKind::BrokenPipe.into()),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Standard(out) => out.flush(),
+            Self::File(out) => out.flush(),
+            Self::Device(out) => out.flush(),
+            Self::Finished => Ok(()),
+        }
+    }
+}
+
+impl Medium for Stream {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        Write::write(self, bytes)
+    }
+
+    fn sync(&mut self) -> io::Result<()> {
+        self.flush()
+    }
+
+    fn take_back(&mut self, bytes: u64) -> io::Result<()> {
+        if bytes == 0 { Ok(()) } else { Err(io::ErrorKind::Unsupported.into()) }
+    }
+
+    fn finish(&mut self) -> io::Result<()> {
+        Self::finish(self)
+    }
+}

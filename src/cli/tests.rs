@@ -1,0 +1,174 @@
+//! Rules that hold for the whole command line.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use clap::{Arg, error::ErrorKind};
+
+use super::*;
+
+/// Each option of each verb with a value, as the words that lead to it, and the value's name.
+fn options(command: &Command, path: &[String]) -> Vec<(Vec<String>, String)> {
+    let of_this = command.get_arguments().filter(|arg| arg.get_action().takes_values());
+    let mut found: Vec<_> = of_this
+        .filter_map(|arg| {
+            let option = format!("--{}", arg.get_long()?);
+            let name = arg.get_value_names()?.first()?.to_string();
+            Some(([path, &[option]].concat(), name))
+        })
+        .collect();
+    for verb in command.get_subcommands() {
+        found.extend(options(verb, &[path, &[verb.get_name().to_owned()]].concat()));
+    }
+    found
+}
+
+#[test]
+fn a_negative_number_is_a_value_and_no_option_everywhere() {
+    let command = command_line();
+    let options = options(&command, &["sonard".to_owned()]);
+    assert!(options.len() > 200, "{}", options.len());
+    for (words, name) in options {
+        let value = match name.as_str() {
+            "POSE" => "-1,2,90",
+            "REGION" => "-1,-2,3,4",
+            _ => "-1.5",
+        };
+        let words = [&words[..], &[value.to_owned()]].concat();
+        let error = command.clone().try_get_matches_from(&words).err();
+        let kind = error.map(|error| error.kind());
+        assert_ne!(kind, Some(ErrorKind::UnknownArgument), "{words:?}");
+    }
+}
+
+/// Every verb with the words that lead to it, the groups of verbs among them.
+fn verbs(command: &Command, path: &str) -> Vec<(String, Command)> {
+    let shown = command.get_subcommands().filter(|verb| !verb.is_hide_set());
+    let below = shown.flat_map(|verb| {
+        let path = format!("{path} {}", verb.get_name());
+        [vec![(path.clone(), verb.clone())], verbs(verb, &path)].concat()
+    });
+    below.filter(|(_, verb)| verb.get_name() != "help").collect()
+}
+
+/// Every option that is shown, by its long name, with the verb that it is of.
+fn by_name() -> BTreeMap<String, Vec<(String, Arg)>> {
+    let mut by_name: BTreeMap<_, Vec<_>> = BTreeMap::new();
+    for (path, verb) in verbs(&command_line(), "sonard") {
+        for arg in verb.get_arguments().filter(|arg| !arg.is_hide_set()) {
+            if let Some(long) = arg.get_long() {
+                by_name.entry(long.to_owned()).or_default().push((path.clone(), arg.clone()));
+            }
+        }
+    }
+    by_name
+}
+
+/// The values of a trait of each name's options where there are several.
+fn several<T: Ord + std::fmt::Debug>(of: impl Fn(&Arg) -> Option<T>) -> Vec<String> {
+    let mut faults = Vec::new();
+    for (name, args) in by_name() {
+        let values: BTreeSet<T> = args.iter().filter_map(|(_, arg)| of(arg)).collect();
+        if values.len() > 1 {
+            let paths: Vec<_> = args.iter().map(|(path, _)| path.as_str()).collect();
+            faults.push(format!("--{name} has {values:?} in {}", paths.join(", ")));
+        }
+    }
+    faults
+}
+
+#[test]
+fn an_option_has_one_meaning_wherever_it_is() {
+    // What follows a semicolon says what this verb makes of it, brackets what is in force without.
+    let meaning = |arg: &Arg| {
+        let help = arg.get_help()?.to_string();
+        Some(help.split([';', '[']).next().unwrap_or_default().trim().to_owned())
+    };
+    assert_eq!(several(meaning), Vec::<String>::new());
+}
+
+#[test]
+fn an_option_has_one_placeholder_one_short_name_and_one_default_wherever_it_is() {
+    let placeholder = |arg: &Arg| {
+        let takes = arg.get_action().takes_values();
+        Some(takes.then(|| arg.get_value_names().map(|names| format!("{names:?}"))))
+    };
+    assert_eq!(several(placeholder), Vec::<String>::new());
+    assert_eq!(several(|arg| Some(arg.get_short())), Vec::<String>::new());
+    // Where there is none, the option chooses something that otherwise is not.
+    let default =
+        |arg: &Arg| Some(format!("{:?}", arg.get_default_values())).filter(|values| values != "[]");
+    assert_eq!(several(default), Vec::<String>::new());
+}
+
+#[test]
+fn placeholders_are_words_and_outputs_are_files_or_folders() {
+    for (name, args) in by_name() {
+        for (path, arg) in args {
+            let placeholder = match arg.get_action().takes_values() {
+                true => {
+                    arg.get_value_names().and_then(|names| names.first()).map(ToString::to_string)
+                }
+                false => None,
+            };
+            let placeholder = placeholder.unwrap_or_default();
+            assert!(!placeholder.contains('_'), "{path} --{name} <{placeholder}>");
+            assert!(arg.get_help().is_some(), "{path} --{name} says nothing");
+            match name.as_str() {
+                "out" => {
+                    assert_eq!((placeholder.as_str(), arg.get_short()), ("DIR", None), "{path}");
+                }
+                "output" => {
+                    assert_eq!(
+                        (placeholder.as_str(), arg.get_short()),
+                        ("FILE", Some('o')),
+                        "{path}"
+                    );
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+#[test]
+fn a_scene_is_said_to_be_predicted_in_or_only_drawn() {
+    for (path, arg) in by_name().remove("scene").expect("it is an option") {
+        let help = arg.get_help().expect("help").to_string();
+        let said = help.contains("; predicts in it") != help.contains("; only draws its walls");
+        assert!(said, "{path}: {help}");
+    }
+}
+
+#[test]
+fn every_verb_says_its_exit_codes_and_stands_in_one_group() {
+    let command = command_line();
+    for (path, verb) in verbs(&command, "sonard") {
+        let help = verb.clone().render_long_help().to_string();
+        assert_eq!(help.matches("Exit codes:").count(), 1, "{path}");
+    }
+    let mut grouped: Vec<_> = groups::GROUPS.iter().flat_map(|(_, verbs)| *verbs).collect();
+    grouped.sort();
+    let shown = command.get_subcommands().filter(|verb| !verb.is_hide_set());
+    let mut shown: Vec<_> = shown.map(Command::get_name).filter(|name| *name != "help").collect();
+    shown.sort_unstable();
+    let there = |verb: &&&str| shown.contains(*verb) || **verb == "board";
+    assert!(grouped.iter().all(there), "{grouped:?}");
+    assert!(shown.iter().all(|verb| grouped.iter().filter(|one| **one == verb).count() == 1));
+    let help = command.clone().render_help().to_string();
+    for (group, _) in groups::GROUPS {
+        assert!(help.contains(&format!("\n{group}:\n")), "{group}: {help}");
+    }
+}
+
+#[test]
+fn former_names_are_gone_and_their_successors_are_there() {
+    let options = by_name();
+    for (verb, old, new) in renamed::OPTIONS {
+        let path = format!("sonard {}", verb.join(" "));
+        let has = |name: &str| {
+            let of_name = options.get(name.trim_start_matches("--"));
+            of_name.is_some_and(|args| args.iter().any(|(of, _)| *of == path))
+        };
+        assert!(has(new) && !has(old), "{path} {old} {new}");
+    }
+}
