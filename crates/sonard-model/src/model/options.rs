@@ -4,7 +4,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::ModelError;
 use crate::acoustics::{EdgeLawKind, Response};
 
 /// How echoes are found.
@@ -343,8 +342,17 @@ const OPTIONS: [(&str, &[EngineKind]); 8] = [
     ("aperture_deg", &[EngineKind::Cone]),
 ];
 
+/// An option that is out of its range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct OutOfRange {
+    pub(super) option: &'static str,
+    pub(super) value: f64,
+    pub(super) expected: &'static str,
+}
+
 impl Options {
-    pub(super) fn check(&self) -> Result<(), ModelError> {
+    /// Checks that every figure is in its range.
+    pub(super) fn check(&self) -> Result<(), OutOfRange> {
         if let Some(range_m) = self.max_range_m {
             within("max_range_m", range_m, [0.01, 100.0], "from 0.01 to 100 metres")?;
         }
@@ -371,11 +379,11 @@ fn within(
     value: f64,
     [min, max]: [f64; 2],
     expected: &'static str,
-) -> Result<(), ModelError> {
+) -> Result<(), OutOfRange> {
     if (min..=max).contains(&value) {
         Ok(())
     } else {
-        Err(ModelError::Option { option, value, expected })
+        Err(OutOfRange { option, value, expected })
     }
 }
 

@@ -8,6 +8,7 @@ use super::{
     Cone, Engine, EngineOptions, Fan, ObservationPoint, Options, PathOptions, Prediction,
     lazy::LazyArrivals,
     paths::{self, PathEngine},
+    options::OutOfRange,
 };
 use crate::{
     acoustics::{Air, BeamPattern, Disc, Receiver, Sensor, SensorError},
@@ -61,7 +62,9 @@ impl Simulator {
         options: Options,
     ) -> Result<Self, ModelError> {
         sensor.check()?;
-        options.check()?;
+        options.check().map_err(|OutOfRange { option, value, expected }| {
+            ModelError::Option { option, value, expected }
+        })?;
         let receiver = receiver(&sensor, &air, &options);
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
         let scatter_height_rad = beam.two_way_power_rad();
