@@ -380,11 +380,7 @@ fn within(
     [min, max]: [f64; 2],
     expected: &'static str,
 ) -> Result<(), OutOfRange> {
-    if (min..=max).contains(&value) {
-        Ok(())
-    } else {
-        Err(OutOfRange { option, value, expected })
-    }
+    if (min..=max).contains(&value) { Ok(()) } else { Err(OutOfRange { option, value, expected }) }
 }
 
 #[cfg(test)]

@@ -7,8 +7,8 @@ use thiserror::Error;
 use super::{
     Cone, Engine, EngineOptions, Fan, ObservationPoint, Options, PathOptions, Prediction,
     lazy::LazyArrivals,
-    paths::{self, PathEngine},
     options::OutOfRange,
+    paths::{self, PathEngine},
 };
 use crate::{
     acoustics::{Air, BeamPattern, Disc, Receiver, Sensor, SensorError},
@@ -62,8 +62,10 @@ impl Simulator {
         options: Options,
     ) -> Result<Self, ModelError> {
         sensor.check()?;
-        options.check().map_err(|OutOfRange { option, value, expected }| {
-            ModelError::Option { option, value, expected }
+        options.check().map_err(|OutOfRange { option, value, expected }| ModelError::Option {
+            option,
+            value,
+            expected,
         })?;
         let receiver = receiver(&sensor, &air, &options);
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
