@@ -8,32 +8,31 @@
 //! looked for by setting readings beside the predictions of neighbouring beams. A threshold moves where arcs end:
 //! it follows from the margins of predictions beside echoes and silences.
 //!
-//! A residual is Gaussian, [`SIGMA_M`] wide, or, once in ten, from anywhere within [`OUTLIERS_M`]. First-order
+//! A residual is Gaussian, or once in ten from anywhere (`likelihood`). First-order
 //! changes of paths hold for some centimetres and degrees; what is farther off has to be localised.
 
 mod fit;
+mod found;
+mod likelihood;
 mod shift;
 #[cfg(test)]
 mod tests;
 mod together;
 
 use glam::DVec3;
-use serde::Serialize;
 use sonard_model::geometry::DVec2;
-use sonard_records::{InteractionKind, Ping, PingStatus, ScanView};
+use sonard_records::{InteractionKind, Ping, ScanView};
 
 use self::{
     fit::{Fit, fit},
+    found::Pair,
     shift::{Headings, Thresholds},
     together::Together,
 };
-use super::{AGREE_WITHIN_M, Judged};
+use super::Judged;
 
-/// Spread of a residual that is explained, metres.
-const SIGMA_M: f64 = AGREE_WITHIN_M;
-/// Share of readings that nothing of this kind explains, and the width of where they lie, metres.
-const OUTLIERS: f64 = 0.1;
-const OUTLIERS_M: f64 = 5.0;
+pub use found::{Estimate, Explanation};
+
 /// Changes with less gain in log-likelihood than this are noise.
 const LEAST_GAIN: f64 = 10.0;
 /// And so are estimates below this many standard deviations.
@@ -45,44 +44,6 @@ const LEAST_BY_ONE: f64 = 0.15;
 const LEAST_TOGETHER: f64 = 0.35;
 /// Pairs of echoes that are kept; of more, every second, fourth and so on.
 const MOST_PAIRS: usize = 20_000;
-
-/// A change that would explain readings better.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Explanation {
-    /// What changes: `pose`, `heading`, `sound_speed`, `range_offset`, `threshold`, `wall ID`, or `together` for
-    /// pose, heading and speed of sound at once.
-    pub change: String,
-    /// By how much.
-    pub estimates: Vec<Estimate>,
-    /// What the log-likelihood of all readings gains, natural units.
-    pub gain: f64,
-    /// Readings that it explains and that were not explained before: residuals within twice the spread; of a
-    /// threshold, silences and echoes.
-    pub explains: u32,
-}
-
-/// A value that a change would have.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Estimate {
-    /// What of: `x_m`, `y_m`, `heading_deg`, `percent`, `offset_m`, `threshold_db`. Of a wall, positive away
-    /// from where the ranger is; of a range, what is to be added to each.
-    pub name: &'static str,
-    /// How much is to be added.
-    pub value: f64,
-    /// Its standard deviation.
-    pub sigma: f64,
-}
-
-/// A reading with its prediction, as far as changes move it.
-#[derive(Debug, Clone, PartialEq)]
-struct Pair {
-    measured_m: f64,
-    residual_m: f64,
-    /// What the predicted range gains where the transducer moves by a metre along x and y.
-    by_place: DVec2,
-    /// The same where walls move away: places in the list of names.
-    by_wall: Vec<(u16, f64)>,
-}
 
 /// Gathers scans one by one; holds at most [`MOST_PAIRS`] pairs.
 #[derive(Debug, Default)]
@@ -220,37 +181,9 @@ impl Explainer {
         let fit = fit?;
         Some(Explanation {
             change: change.to_owned(),
-            estimates: values.iter().map(|&(name, at)| estimate(name, &fit, at)).collect(),
+            estimates: values.iter().map(|&(name, at)| fit.estimate(name, at)).collect(),
             gain: fit.gain * self.stride as f64,
             explains: fit.explains * self.stride as u32,
         })
-    }
-}
-
-/// One value of a fit; a share becomes percent.
-fn estimate(name: &'static str, fit: &Fit, at: usize) -> Estimate {
-    let scale = if at == 2 { 100.0 } else { 1.0 };
-    Estimate { name, value: fit.value[at] * scale, sigma: fit.sigma[at] * scale }
-}
-
-/// Log-likelihood of a residual, metres.
-fn log_likelihood(residual_m: f64) -> f64 {
-    let [explained, other] = densities(residual_m, SIGMA_M);
-    (explained + other).ln()
-}
-
-/// The two parts of a residual's density: by what is predicted, with such a spread, and by anything else.
-fn densities(residual_m: f64, sigma_m: f64) -> [f64; 2] {
-    let normal =
-        (-0.5 * (residual_m / sigma_m).powi(2)).exp() / (sigma_m * std::f64::consts::TAU.sqrt());
-    [(1.0 - OUTLIERS) * normal, OUTLIERS / OUTLIERS_M]
-}
-
-/// Whether a reading was heard; `None` of one that says neither.
-fn is_heard(status: PingStatus) -> Option<bool> {
-    match status {
-        PingStatus::Echo | PingStatus::MinRange => Some(true),
-        PingStatus::NoEcho => Some(false),
-        PingStatus::LinkLost | PingStatus::StepDoubtful | PingStatus::ModuleFault => None,
     }
 }

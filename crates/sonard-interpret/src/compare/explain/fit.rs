@@ -2,7 +2,10 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{SIGMA_M, densities, log_likelihood};
+use super::{
+    found::Estimate,
+    likelihood::{SIGMA_M, densities, is_near, log_likelihood},
+};
 
 /// Spreads that the fit is made with in turn, metres: from wide, so that it finds its way, to the stated one.
 const SPREADS_M: [f64; 4] = [0.08, 0.04, 0.02, SIGMA_M];
@@ -32,15 +35,16 @@ pub(super) struct Fit {
 }
 
 impl Fit {
+    /// One of its values; a share becomes percent.
+    pub(super) fn estimate(&self, name: &'static str, at: usize) -> Estimate {
+        let scale = if at == 2 { 100.0 } else { 1.0 };
+        Estimate { name, value: self.value[at] * scale, sigma: self.sigma[at] * scale }
+    }
+
     /// What is left of a residual.
     pub(super) fn left_m(&self, (residual_m, gain): Moved) -> f64 {
         residual_m - gain.dot(self.value)
     }
-}
-
-/// Whether a residual is explained.
-pub(super) fn is_near(residual_m: f64) -> bool {
-    residual_m.abs() < 2.0 * SIGMA_M
 }
 
 /// The change that explains the residuals best, where the predicted range grows by the gain times it. `None` if too

@@ -4,7 +4,10 @@ use std::ops::Range;
 
 use sonard_records::{Ping, ScanPlan};
 
-use super::{Estimate, Explanation, fit::is_near, is_heard, log_likelihood};
+use super::{
+    found::{Estimate, Explanation},
+    likelihood::{is_heard, is_near, log_likelihood},
+};
 use crate::compare::Judged;
 
 /// Headings that are tried: to so many degrees on both sides.

@@ -5,8 +5,9 @@ use glam::DVec3;
 use sonard_records::ScanPlan;
 
 use super::{
-    Estimate, Explanation, Pair, estimate,
-    fit::{Fit, Moved, fit, is_near},
+    fit::{Fit, Moved, fit},
+    found::{Estimate, Explanation, Pair},
+    likelihood::is_near,
     shift::{of_lapse, of_pair, parabola, shifts},
 };
 use crate::compare::Judged;
@@ -119,7 +120,7 @@ impl Together {
         };
         let values = [("x_m", 0), ("y_m", 1), ("percent", 2)];
         let mut estimates: Vec<_> =
-            values.into_iter().map(|(name, at)| estimate(name, &fit, at)).collect();
+            values.into_iter().map(|(name, at)| fit.estimate(name, at)).collect();
         estimates.insert(2, heading);
         Some(Explanation {
             change: "together".to_owned(),
