@@ -34,7 +34,7 @@ pub struct Options {
 /// An engine with its settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum EngineOptions {
-    /// [`PathEngine`](super::PathEngine): all echo paths, exactly.
+    /// [`PathEngine`](super::paths::PathEngine): all echo paths, exactly.
     Paths(PathOptions),
     /// [`Fan`](super::Fan): the ray model with reflections and diffraction.
     Fan(FanOptions),
