@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File},
-    io::{self, Read as _, Write as _},
+    io::{self, Read as _},
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -13,15 +13,16 @@ use super::{
     Failure, Outcome,
     array::load_array,
     options::{AirArgs, SensorArgs},
-    output::{OutPath, Overwrite, Product, Stream},
+    output::{OutPath, Overwrite, closed, records_to},
     progress, scene_file,
 };
 use crate::{
     acoustics::{Air, Sensor},
     geometry::Pose,
     import::{Format, ImportError, Imported, Mapping, Source, Taken},
-    scan::{ImportRef, LOG_FORMAT, Provenance, Record, SceneRef, Session, encode_line},
+    scan::{ImportRef, Provenance, Record, Session},
     scene::{Scene, parse_pose},
+    store::{RecordWriter, StoreError},
 };
 
 /// Options of `sonard import`.
@@ -145,43 +146,66 @@ pub(super) fn run(args: &Args) -> Outcome {
         })
     };
     let found = Source { open: &open }.examine(mapping, taken).map_err(refuse)?;
-    let mut out = match &args.output {
-        Some(out) => args.overwrite.begin(out, Product::Log)?,
-        None => Stream::standard(),
-    };
-    let written = |error: &io::Error| {
-        let to = args.output.as_ref().map(|out| out.display().to_string());
-        Failure::from_write(to.as_deref().unwrap_or("standard output"), error)
-    };
-    let session = session(args, &found, scene.as_ref(), sensor, &air);
-    let (mut scans, mut line) = (0_u64, Vec::new());
-    let mut write = |record: &Record, out: &mut Stream| -> Result<io::Result<()>, Failure> {
-        line.clear();
-        encode_line(record, &mut line)
-            .map_err(|error| Failure::input(format!("{name}: {error}"), "correct the file"))?;
-        Ok(out.write_all(&line))
-    };
-    if let Err(error) = write(&Record::Session(Box::new(session)), &mut out)? {
-        return written(&error);
-    }
+    let mut out = records_to(args.output.as_deref(), args.overwrite)?;
     let source = open().map_err(|error| refuse(error.into()))?;
-    for scan in found.scans(source).map_err(refuse)? {
-        for record in scan.map_err(refuse)? {
-            if let Err(error) = write(&record, &mut out)? {
-                return written(&error);
-            }
+    let session = session(args, &found, scene.as_ref(), sensor, &air);
+    match write(&found, source, session, &mut *out) {
+        Ok(scans) => {
+            closed(out.finish())?;
+            tell(&found, scans, has_poses(args, &found));
+            Ok(())
+        }
+        Err(Stop::File(error)) => Err(refuse(error)),
+        Err(Stop::Write(error @ StoreError::Record { .. })) => {
+            Err(Failure::input(error, "correct the file"))
+        }
+        Err(Stop::Write(error)) => closed(Err(error)),
+    }
+}
+
+/// Why it ended before the last scan.
+enum Stop {
+    File(ImportError),
+    Write(StoreError),
+}
+
+impl From<ImportError> for Stop {
+    fn from(error: ImportError) -> Self {
+        Self::File(error)
+    }
+}
+
+impl From<StoreError> for Stop {
+    fn from(error: StoreError) -> Self {
+        Self::Write(error)
+    }
+}
+
+/// Writes the session and all scans; how many these are.
+fn write(
+    found: &Imported,
+    source: impl io::Read,
+    session: Session,
+    out: &mut dyn RecordWriter,
+) -> Result<u64, Stop> {
+    out.write(&Record::Session(Box::new(session)))?;
+    let mut scans = 0;
+    for scan in found.scans(source)? {
+        for record in scan? {
+            out.write(&record)?;
         }
         scans += 1;
     }
-    if let Err(error) = out.finish() {
-        return written(&error);
-    }
-    tell(args, &found, scans);
-    Ok(())
+    Ok(scans)
+}
+
+/// Whether it is known where the robot stood.
+const fn has_poses(args: &Args, found: &Imported) -> bool {
+    args.pose.is_some() || found.has_poses
 }
 
 /// Says what was taken for what, on standard error.
-fn tell(args: &Args, found: &Imported, scans: u64) {
+fn tell(found: &Imported, scans: u64, has_poses: bool) {
     if found.guessed && !found.mapping.columns.is_empty() {
         let said = found.mapping.columns.iter();
         let said: Vec<_> = said.map(|(field, column)| format!("{field} from {column}")).collect();
@@ -194,7 +218,6 @@ fn tell(args: &Args, found: &Imported, scans: u64) {
         found.echoes,
         found.taken.sensor
     );
-    let has_poses = args.pose.is_some() || found.has_poses;
     if !has_poses {
         anstream::eprintln!(
             "note: where the robot stood is not known: give --pose, or columns x_m, y_m and heading_deg"
@@ -256,31 +279,19 @@ fn session(
         Ok(serde_json::Value::Object(mapping)) => mapping,
         _ => serde_json::Map::new(),
     };
-    Session {
-        format: LOG_FORMAT,
-        started: found.taken.started,
-        sonard: env!("CARGO_PKG_VERSION").to_owned(),
-        provenance: Provenance::Imported,
-        device: None,
-        sensor,
-        array: found.taken.array.clone(),
-        air: air.into(),
-        scene: scene.map(SceneRef::of),
-        scene_text: scene.map(|scene| Arc::clone(&scene.text)),
-        model: None,
-        collection: None,
-        imported: Some(Box::new(ImportRef {
-            file: args
-                .file
-                .file_name()
-                .unwrap_or(args.file.as_os_str())
-                .to_string_lossy()
-                .into_owned(),
-            sha256: found.taken.sha256.clone(),
-            mapping,
-            poses_known: args.pose.is_some() || found.has_poses,
-        })),
+    let name = args.file.file_name().unwrap_or(args.file.as_os_str());
+    let mut session = Session::new(found.taken.started, Provenance::Imported, sensor, air);
+    session.array.clone_from(&found.taken.array);
+    if let Some(scene) = scene {
+        session.set_scene(scene);
     }
+    session.imported = Some(Box::new(ImportRef {
+        file: name.to_string_lossy().into_owned(),
+        sha256: found.taken.sha256.clone(),
+        mapping,
+        poses_known: has_poses(args, found),
+    }));
+    session
 }
 
 impl ColumnArgs {

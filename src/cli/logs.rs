@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Failure, progress};
 use crate::{
+    compare::keep_every_second,
     scan::{Record, ScanView},
     store::{FileKind, LineError, StoreError, open_for_reading, read_log},
 };
@@ -136,11 +137,7 @@ impl Drawn {
         self.readings += scan.pings.len();
         self.scans.push(scan);
         while self.readings > MOST_DRAWN && self.scans.len() > 1 {
-            let mut place = 0;
-            self.scans.retain(|_| {
-                place += 1;
-                place % 2 == 1
-            });
+            keep_every_second(&mut self.scans);
             self.readings = self.scans.iter().map(|scan| scan.pings.len()).sum();
             self.every *= 2;
         }

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     model::OptionKeys,
-    scan::{Ping, Record, SceneRef},
+    scan::{Ping, Record},
     scene::Scene,
 };
 
@@ -89,8 +89,7 @@ fn suppose(record: &mut Record, what_if: &WhatIf, scene: Option<&Scene>) {
         Record::Session(session) => {
             what_if.change_session(session);
             if let Some(scene) = scene {
-                session.scene = Some(SceneRef::of(scene));
-                session.scene_text = Some(Arc::clone(&scene.text)).filter(|text| !text.is_empty());
+                session.set_scene(scene);
             }
         }
         Record::ScanStart(start) => what_if.change_start(start),

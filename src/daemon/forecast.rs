@@ -11,7 +11,7 @@ use crate::{
     geometry::Pose,
     model::Simulator,
     ranger::{Listening, ScanJob, device_record, provenance},
-    scan::{LOG_FORMAT, ModelRecord, ScanAir, ScanPlan, SceneRef, Session, SimRecord},
+    scan::{ModelRecord, ScanAir, ScanPlan, Session, SimRecord},
 };
 
 /// What predictions depend on, besides scene and sensor.
@@ -66,21 +66,14 @@ impl Forecast {
 
     /// The session's record for scans with this air.
     pub(super) fn session(&self, settings: &Settings, air: &Air, identity: &Identity) -> Session {
-        Session {
-            format: LOG_FORMAT,
-            started: Timestamp::now(),
-            sonard: env!("CARGO_PKG_VERSION").into(),
-            provenance: provenance(identity),
-            device: Some(device_record(identity)),
-            sensor: settings.sensor.clone(),
-            array: None,
-            air: air.into(),
-            scene: settings.scene.as_deref().map(SceneRef::of),
-            scene_text: settings.scene.as_ref().map(|scene| Arc::clone(&scene.text)),
-            model: self.model.clone(),
-            collection: None,
-            imported: None,
+        let sensor = settings.sensor.clone();
+        let mut session = Session::new(Timestamp::now(), provenance(identity), sensor, air);
+        if let Some(scene) = &settings.scene {
+            session.set_scene(scene);
         }
+        session.device = Some(device_record(identity));
+        session.model.clone_from(&self.model);
+        session
     }
 }
 

@@ -11,7 +11,7 @@ use crate::{
     acoustics::{Air, Sensor},
     geometry::Pose,
     model::{ModelError, Options, Simulator},
-    scan::{AirRecord, LOG_FORMAT, ModelRecord, PlanError, ScanPlan, SceneRef, Session, SimRecord},
+    scan::{ModelRecord, PlanError, ScanPlan, Session, SimRecord},
     scene::Scene,
 };
 
@@ -147,20 +147,11 @@ impl PreparedScan {
     /// The session's record: what is true for every reading, and who measured.
     #[must_use]
     pub fn session(&self, identity: &Identity) -> Session {
-        Session {
-            format: LOG_FORMAT,
-            started: Timestamp::now(),
-            sonard: env!("CARGO_PKG_VERSION").into(),
-            provenance: provenance(identity),
-            device: Some(device_record(identity)),
-            sensor: self.sensor.clone(),
-            array: None,
-            air: AirRecord::from(&self.air),
-            scene: Some(SceneRef::of(&self.scene)),
-            scene_text: Some(Arc::clone(&self.scene.text)),
-            model: Some(ModelRecord::from(self.simulator.options())),
-            collection: None,
-            imported: None,
-        }
+        let (sensor, air) = (self.sensor.clone(), &self.air);
+        let mut session = Session::new(Timestamp::now(), provenance(identity), sensor, air);
+        session.set_scene(&self.scene);
+        session.device = Some(device_record(identity));
+        session.model = Some(ModelRecord::from(self.simulator.options()));
+        session
     }
 }

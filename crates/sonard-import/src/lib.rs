@@ -1,8 +1,9 @@
 //! Readings of ultrasonic rangers from elsewhere, as records of a log: from tables (CSV and its kin), from
 //! numbers in JSON, and from the logs of CARMEN and Player.
 //!
-//! A [`Mapping`] says what the columns mean; [`Source`] finds out how a file is written, reads it twice (once to
-//! find what speaks against the mapping, once to make records) and holds no more of it than a scan.
+//! A [`Mapping`] says what the columns mean; [`Source`] finds out how a file is written, reads it once for
+//! its hash, once to find what speaks against the mapping and once to make records, and holds no
+//! more of it than a scan (of JSON that is no object a line, all).
 
 mod carmen;
 mod doubt;

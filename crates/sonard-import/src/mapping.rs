@@ -110,6 +110,11 @@ impl Mapping {
         self.columns.keys().copied().find(|field| field.quantity() == quantity)
     }
 
+    /// Whether a range of the file, in its unit, means that nothing was heard.
+    pub(crate) fn is_silence(&self, range: f64) -> bool {
+        self.none.contains(&range) || self.none_from.is_some_and(|from| range >= from)
+    }
+
     /// Whether it says enough to make readings, and nothing twice.
     ///
     /// # Errors

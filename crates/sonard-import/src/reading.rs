@@ -132,10 +132,8 @@ impl<'a> Reader<'a> {
         sound_speed_m_s: f64,
     ) -> Result<Option<f64>, ImportError> {
         let Some((field, number)) = measured else { return Ok(None) };
-        let stands_for_none = self.mapping.none.contains(&number)
-            || self.mapping.none_from.is_some_and(|from| number >= from);
         let is_silent = status.is_some_and(|status| status != PingStatus::Echo);
-        if stands_for_none || number.is_infinite() || is_silent {
+        if self.mapping.is_silence(number) || number.is_infinite() || is_silent {
             return Ok(None);
         }
         if number <= 0.0 {

@@ -90,9 +90,8 @@ impl<'a> Rounds<'a> {
                         ImportError::at(place, error.to_string(), "correct that time")
                     })?;
                 let heard = |range_m: f64| {
-                    let none = self.mapping.none.contains(&range_m)
-                        || self.mapping.none_from.is_some_and(|from| range_m >= from);
-                    (!none && range_m.is_finite() && range_m > 0.0).then_some(range_m)
+                    let silent = self.mapping.is_silence(range_m);
+                    (!silent && range_m.is_finite() && range_m > 0.0).then_some(range_m)
                 };
                 let ranges_m = ranges_m.into_iter().map(heard).collect();
                 Ok(Some(Round { time, pose: self.pose, ranges_m }))

@@ -88,11 +88,11 @@ pub(crate) fn records(taken: &Taken, number: u64, readings: &[Reading]) -> Vec<R
             let own = reading.pose(&taken.pose);
             Ping {
                 step: (azimuth_deg / 360.0 * STEPS_PER_REVOLUTION).round() as i32,
-                azimuth_deg,
                 pose: Some(own).filter(|own| *own != pose),
                 time: reading.time,
                 tof_us: reading.tof_us,
-                ..ping(scan, index, reading.status, reading.range_m)
+                range_m: reading.range_m,
+                ..Ping::new(scan, index, azimuth_deg, reading.status)
             }
         });
     let air = readings.iter().find_map(|reading| reading.air).map(|air| ScanAir {
@@ -112,11 +112,11 @@ pub(crate) fn round(taken: &Taken, number: u64, round: &Round) -> Vec<Record> {
     let pings = (0..).zip(rangers.zip(&round.ranges_m)).map(|(index, (ranger, range_m))| {
         let status = if range_m.is_some() { PingStatus::Echo } else { PingStatus::NoEcho };
         Ping {
-            azimuth_deg: ranger.azimuth_deg(),
             ranger: Some(ranger.id.clone()),
             time: round.time,
             tof_us: range_m.map(|range_m| 2e6 * range_m / taken.air.sound_speed_m_s()),
-            ..ping(scan, index, status, *range_m)
+            range_m: *range_m,
+            ..Ping::new(scan, index, ranger.azimuth_deg(), status)
         }
     });
     let pose = round.pose.unwrap_or(taken.pose);
@@ -134,15 +134,8 @@ fn whole(
 ) -> Vec<Record> {
     let began = times.clone().min().unwrap_or(taken.started);
     let ended = times.max().unwrap_or(began);
-    let mut records = vec![Record::ScanStart(ScanStart {
-        scan,
-        time: began,
-        pose,
-        plan,
-        air,
-        provenance: None,
-        request: None,
-    })];
+    let start = ScanStart { air, ..ScanStart::new(scan, began, pose, plan) };
+    let mut records = vec![Record::ScanStart(start)];
     records.extend(pings.map(|ping| Record::Ping(Box::new(ping))));
     records.push(Record::ScanEnd(ScanEnd {
         scan,
@@ -156,32 +149,6 @@ fn whole(
         provenance: None,
     }));
     records
-}
-
-fn ping(scan: Uuid, index: u32, status: PingStatus, range_m: Option<f64>) -> Ping {
-    Ping {
-        scan,
-        index,
-        step: 0,
-        azimuth_deg: 0.0,
-        ranger: None,
-        pose: None,
-        provenance: None,
-        time: None,
-        time_sigma_us: None,
-        status,
-        fired_ticks: None,
-        echo_ticks: Vec::new(),
-        tof_us: None,
-        range_m,
-        repaired: false,
-        amplitude: None,
-        margin_db: None,
-        path: None,
-        sim: None,
-        residual_m: None,
-        confidence: None,
-    }
 }
 
 /// The plan of these azimuths, and the place of each in it. Of stops that are not evenly apart it has as many

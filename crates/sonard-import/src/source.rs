@@ -13,7 +13,7 @@ use crate::{
     doubt::Doubts,
     json, player,
     reading::Reader,
-    rounds::{self, Message, Round, Rounds},
+    rounds::{self, Message, Rounds},
     scans::{self, Cutter},
     table::{self, Header, Lines},
 };
@@ -155,10 +155,10 @@ impl Source<'_> {
     fn examine_messages(&self, found: &mut Imported) -> Result<(), ImportError> {
         let mapping = found.mapping.clone();
         let mut rounds = Rounds::new(&mapping);
-        for line in Lines::of((self.open)()?) {
-            let (number, line) = line?;
-            let Some(message) = found.message(number, &line)? else { continue };
-            if let Some(round) = rounds.take(Place::Line(number), message)? {
+        let format = found.format;
+        for message in messages(format, (self.open)()?) {
+            let (place, message) = message?;
+            if let Some(round) = rounds.take(place, message)? {
                 found.readings += round.ranges_m.len() as u64;
                 found.echoes += round.ranges_m.iter().flatten().count() as u64;
                 found.has_poses |= round.pose.is_some();
@@ -250,13 +250,6 @@ fn look(head: &str) -> Format {
 type Scan = Result<Vec<Record>, ImportError>;
 
 impl Imported {
-    fn message(&self, number: u64, line: &str) -> Result<Option<Message>, ImportError> {
-        match self.format {
-            Format::Carmen => carmen::message(Place::Line(number), line),
-            _ => player::message(Place::Line(number), line),
-        }
-    }
-
     fn readings<'a>(
         &'a self,
         source: impl Read + 'a,
@@ -304,20 +297,28 @@ impl Imported {
 
     fn rounds<'a>(&'a self, source: impl Read + 'a) -> impl Iterator<Item = Scan> + 'a {
         let mut rounds = Rounds::new(&self.mapping);
-        let mut number = 0;
-        let found = Lines::of(source).filter_map(move |line| {
-            let next = || -> Result<Option<Round>, ImportError> {
-                let (number, line) = line?;
-                match self.message(number, &line)? {
-                    Some(message) => rounds.take(Place::Line(number), message),
-                    None => Ok(None),
-                }
-            };
-            next().transpose()
+        let found = messages(self.format, source).filter_map(move |message| {
+            let round = message.and_then(|(place, message)| rounds.take(place, message));
+            round.transpose()
         });
-        found.map(move |round| {
-            number += 1;
-            Ok(scans::round(&self.taken, number, &round?))
-        })
+        (1..).zip(found).map(|(number, round)| Ok(scans::round(&self.taken, number, &round?)))
     }
+}
+
+/// The messages of a robot's log that are of ranges or poses, and where they stand.
+fn messages(
+    format: Format,
+    source: impl Read,
+) -> impl Iterator<Item = Result<(Place, Message), ImportError>> {
+    Lines::of(source).filter_map(move |line| {
+        let read = |(number, line): (u64, String)| {
+            let place = Place::Line(number);
+            let message = match format {
+                Format::Carmen => carmen::message(place, &line),
+                _ => player::message(place, &line),
+            };
+            message.map(|message| message.map(|message| (place, message)))
+        };
+        line.and_then(read).transpose()
+    })
 }

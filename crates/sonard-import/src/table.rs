@@ -107,7 +107,7 @@ pub(crate) fn rows<'a>(
     let places: Vec<_> =
         mapping.columns.values().map(|column| header.find(column)).collect::<Result<_, _>>()?;
     let (between, mut names) = (header.between, header.has_names);
-    let lines = Lines { source: BufReader::new(source), count: 0 };
+    let lines = Lines::of(source);
     Ok(lines.filter_map(move |line| {
         let (number, line) = match line {
             Ok(line) => line,

@@ -30,7 +30,7 @@ use sonard_model::geometry::Pose;
 use sonard_records::{PathKind, Ping, PingStatus, ScanView, SimRecord};
 
 pub use explain::{Estimate, Explanation};
-pub use statistics::quantile;
+pub use statistics::{keep_every_second, quantile};
 
 /// Least tolerance within which two ranges agree, metres.
 pub const AGREE_WITHIN_M: f64 = 0.010;

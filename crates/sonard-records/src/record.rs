@@ -8,7 +8,12 @@ use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 use crate::{PathRecord, PingStatus, ScanPlan};
-use sonard_model::{acoustics::Sensor, array::RangerArray, geometry::Pose, scene::Scene};
+use sonard_model::{
+    acoustics::{Air, Sensor},
+    array::RangerArray,
+    geometry::Pose,
+    scene::Scene,
+};
 
 /// Version of the record format, written into every session. Format 1, in which paths had `walls` in place
 /// of `interactions`, is read as well.
@@ -83,6 +88,34 @@ pub struct Session {
     /// The file that its readings were imported from, if they were.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub imported: Option<Box<ImportRef>>,
+}
+
+impl Session {
+    /// One of this program without device, array, scene and model.
+    #[must_use]
+    pub fn new(started: Timestamp, provenance: Provenance, sensor: Sensor, air: &Air) -> Self {
+        Self {
+            format: LOG_FORMAT,
+            started,
+            sonard: env!("CARGO_PKG_VERSION").to_owned(),
+            provenance,
+            device: None,
+            sensor,
+            array: None,
+            air: air.into(),
+            scene: None,
+            scene_text: None,
+            model: None,
+            collection: None,
+            imported: None,
+        }
+    }
+
+    /// Says which scene it is of, with its text; a scene that was never a file has none.
+    pub fn set_scene(&mut self, scene: &Scene) {
+        self.scene = Some(SceneRef::of(scene));
+        self.scene_text = Some(Arc::clone(&scene.text)).filter(|text| !text.is_empty());
+    }
 }
 
 /// What readings were imported from, and how.

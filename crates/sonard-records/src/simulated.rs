@@ -1,14 +1,9 @@
 //! Scans made by the model alone.
 
-use std::sync::Arc;
-
 use jiff::Timestamp;
 use uuid::Uuid;
 
-use super::{
-    LOG_FORMAT, Ping, Provenance, ScanEnd, ScanPlan, ScanStart, ScanView, SceneRef, Session,
-    SimRecord,
-};
+use super::{Ping, Provenance, ScanEnd, ScanPlan, ScanStart, ScanView, Session, SimRecord};
 use sonard_model::{
     geometry::Pose,
     model::{Prediction, Simulator},
@@ -49,23 +44,11 @@ impl Session {
     /// The session of a simulated log.
     #[must_use]
     pub fn simulated(simulator: &Simulator, started: Timestamp) -> Self {
-        let scene = simulator.scene();
-        Self {
-            format: LOG_FORMAT,
-            started,
-            sonard: env!("CARGO_PKG_VERSION").to_owned(),
-            provenance: Provenance::Simulated,
-            device: None,
-            sensor: simulator.sensor().clone(),
-            array: None,
-            air: simulator.air().into(),
-            scene: Some(SceneRef::of(scene)),
-            // A scene that was never a file has no text.
-            scene_text: Some(Arc::clone(&scene.text)).filter(|text| !text.is_empty()),
-            model: Some(simulator.options().into()),
-            collection: None,
-            imported: None,
-        }
+        let (sensor, air) = (simulator.sensor().clone(), simulator.air());
+        let mut session = Self::new(started, Provenance::Simulated, sensor, air);
+        session.set_scene(simulator.scene());
+        session.model = Some(simulator.options().into());
+        session
     }
 }
 

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 
 use crate::{
-    compare::{Comparison, Estimate, Explanation, Judged, Verdict},
+    compare::{Comparison, Estimate, Explanation, Judged, Verdict, keep_every_second},
     scan::{PathKind, PathRecord, Ping, PingStatus},
 };
 
@@ -207,11 +207,7 @@ impl Worst {
         self.apart.sort_by(|a, b| size(b).total_cmp(&size(a)));
         self.apart.truncate(self.count);
         while self.one_sided.len() > KEPT.max(2 * self.count) {
-            let mut place = 0;
-            self.one_sided.retain(|_| {
-                place += 1;
-                place % 2 == 1
-            });
+            keep_every_second(&mut self.one_sided);
             self.stride *= 2;
         }
     }

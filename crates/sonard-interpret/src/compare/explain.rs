@@ -26,10 +26,10 @@ use sonard_records::{InteractionKind, Ping, ScanView};
 use self::{
     fit::{Fit, fit},
     found::Pair,
-    shift::{Headings, Thresholds},
+    shift::{Headings, Thresholds, Turns},
     together::Together,
 };
-use super::Judged;
+use super::{Judged, keep_every_second};
 
 pub use found::{Estimate, Explanation};
 
@@ -53,6 +53,8 @@ pub(super) struct Explainer {
     seen: usize,
     /// Every so many pairs are kept.
     stride: usize,
+    /// How scans can be turned against their predictions; scans of another plan are not.
+    turns: Option<Turns>,
     headings: Headings,
     together: Together,
     thresholds: Thresholds,
@@ -61,34 +63,47 @@ pub(super) struct Explainer {
 impl Explainer {
     /// Takes in a scan with its beams.
     pub(super) fn add(&mut self, scan: &ScanView, beams: &[Judged<'_>]) {
-        self.stride = self.stride.max(1);
+        let turns = scan.start.as_ref().and_then(|start| Turns::of(&start.plan, beams));
+        let turns =
+            turns.filter(|turns| self.turns.get_or_insert_with(|| turns.clone()).is_like(turns));
+        let is_turned = turns.is_some() && self.together.has_room(beams.len());
+        let mut pairs = Vec::new();
         for beam in beams {
             self.thresholds.add(beam.ping);
-            let Some(residual_m) = beam.residual_m else { continue };
-            self.seen += 1;
-            if !(self.seen - 1).is_multiple_of(self.stride) {
-                continue;
+            let is_kept = self.is_kept(beam.residual_m);
+            let pair = if is_turned || is_kept {
+                self.pair(scan, beam.ping, beam.residual_m)
+            } else {
+                None
+            };
+            if is_turned {
+                pairs.push(pair.clone());
             }
-            let pair = self.pair(scan, beam.ping, residual_m);
-            self.pairs.extend(pair);
+            self.pairs.extend(pair.filter(|_| is_kept));
             if self.pairs.len() > MOST_PAIRS {
-                let mut place = 0;
-                self.pairs.retain(|_| {
-                    place += 1;
-                    place % 2 == 1
-                });
+                keep_every_second(&mut self.pairs);
                 self.stride *= 2;
             }
         }
-        if let Some(start) = &scan.start {
-            self.headings.add(&start.plan, beams);
-            let pairs = beams.iter().map(|beam| self.pair(scan, beam.ping, 0.0)).collect();
-            self.together.add(&start.plan, beams, pairs);
+        let Some(turns) = turns else { return };
+        self.headings.add(&turns, beams);
+        if is_turned {
+            self.together.add(&turns, beams, pairs);
         }
     }
 
+    /// Whether a pair of echoes is one of those that are kept.
+    fn is_kept(&mut self, residual_m: Option<f64>) -> bool {
+        if residual_m.is_none() {
+            return false;
+        }
+        self.stride = self.stride.max(1);
+        self.seen += 1;
+        (self.seen - 1).is_multiple_of(self.stride)
+    }
+
     /// `None` of a reading without a predicted path that says its points.
-    fn pair(&mut self, scan: &ScanView, ping: &Ping, residual_m: f64) -> Option<Pair> {
+    fn pair(&mut self, scan: &ScanView, ping: &Ping, residual_m: Option<f64>) -> Option<Pair> {
         let path = ping.sim.as_ref()?.path.as_ref()?;
         let points = path.polyline(scan.viewpoint(ping)?.ends())?;
         let is_level = path.interactions.iter().all(|met| met.id != "floor" && met.id != "ceiling");
@@ -117,6 +132,7 @@ impl Explainer {
             }
         }
         let measured_m = ping.range_m.unwrap_or_default();
+        let residual_m = residual_m.unwrap_or_default();
         Some(Pair { measured_m, residual_m, by_place, by_wall })
     }
 
@@ -149,7 +165,8 @@ impl Explainer {
             });
             found.extend(self.explanation(&format!("wall {name}"), &[("offset_m", 0)], wall));
         }
-        found.extend(self.headings.explanation());
+        let step_deg = self.turns.as_ref().map_or(0.0, |turns| turns.step_deg);
+        found.extend(self.headings.explanation(step_deg));
         found.extend(self.thresholds.explanation());
         let explains =
             |found: &Explanation, share: f64| f64::from(found.explains) >= share * self.seen as f64;
@@ -166,7 +183,7 @@ impl Explainer {
         let most = found.first().map_or(0.0, |best| best.gain);
         let together = self
             .together
-            .explanation()
+            .explanation(step_deg)
             .filter(|all| all.gain > most + LEAST_GAIN && explains(all, LEAST_TOGETHER));
         found.splice(0..0, together);
         found

@@ -11,3 +11,12 @@ pub fn quantile(mut values: Vec<f64>, p: f64) -> Option<f64> {
     let above = (below + 1).min(last);
     Some(values[below] + part * (values[above] - values[below]))
 }
+
+/// Keeps the first, the third, and so on: for what may not grow without bounds.
+pub fn keep_every_second<T>(kept: &mut Vec<T>) {
+    let mut place = 0;
+    kept.retain(|_| {
+        place += 1;
+        place % 2 == 1
+    });
+}

@@ -17,24 +17,79 @@ const MOST_BEAMS: usize = 40;
 /// Share of readings that are heard against a prediction, or silent.
 const LAPSES: f64 = 0.05;
 
-/// The likelihood of other headings: readings beside the predictions of beams to the left and right.
+/// Log-likelihoods and explained readings for a row of shifts that are evenly apart, none in the middle.
 #[derive(Debug, Default)]
-pub(super) struct Headings {
-    /// Of the plans so far, degrees; only scans of one step can be added up.
-    step_deg: Option<f64>,
-    /// Log-likelihoods and explained readings, from the most to the right to the most to the left.
-    shifts: Vec<(f64, u32)>,
+struct Shifts(Vec<(f64, u32)>);
+
+impl Shifts {
+    /// The same row, or as many shifts if there is none yet.
+    fn of(&mut self, count: usize) -> impl Iterator<Item = (usize, &mut (f64, u32))> {
+        self.0.resize(count, (0.0, 0));
+        self.0.iter_mut().enumerate()
+    }
+
+    /// The shift that explains most, if it is another than none, and none at an end. `step` is from one to the next.
+    fn explanation(&self, change: &str, name: &'static str, step: f64) -> Option<Explanation> {
+        let (middle, likelihood) = (self.0.len() / 2, |at: usize| self.0[at].0);
+        let best = (0..self.0.len())
+            .max_by(|&one, &other| likelihood(one).total_cmp(&likelihood(other)))?;
+        if best == 0 || best + 1 >= self.0.len() || best == middle {
+            return None;
+        }
+        let (peak, sigma) =
+            parabola([likelihood(best - 1), likelihood(best), likelihood(best + 1)]);
+        let value = (best as f64 - middle as f64 + peak) * step;
+        Some(Explanation {
+            change: change.to_owned(),
+            estimates: vec![Estimate { name, value, sigma: sigma * step }],
+            gain: likelihood(best) - likelihood(middle),
+            explains: self.0[best].1.saturating_sub(self.0[middle].1),
+        })
+    }
 }
 
+/// How a scan can be turned against its predictions, by whole beams.
+#[derive(Debug, Clone)]
+pub(super) struct Turns {
+    /// From beam to beam, degrees.
+    pub(super) step_deg: f64,
+    /// To how many beams on both sides.
+    pub(super) most: usize,
+    /// Readings that are asked at every turn: of a part of a turn, those that have a neighbour then.
+    pub(super) asked: Range<usize>,
+}
+
+impl Turns {
+    /// `None` of a scan whose beams are not all there, in order and evenly apart.
+    pub(super) fn of(plan: &ScanPlan, beams: &[Judged<'_>]) -> Option<Self> {
+        let (count, step_deg) = (beams.len(), plan.step_deg);
+        let is_whole = plan.pings_per_stop == 1 && plan.beams() as usize == count && count >= 8;
+        let in_order = beams.iter().zip(0..).all(|(beam, index)| beam.ping.index == index);
+        if !is_whole || !in_order {
+            return None;
+        }
+        let most = ((MOST_DEG / step_deg) as usize).clamp(1, MOST_BEAMS).min(count / 3);
+        let is_turn = (plan.to_deg - plan.from_deg - 360.0).abs() < step_deg / 2.0;
+        Some(Self { step_deg, most, asked: if is_turn { 0..count } else { most..count - most } })
+    }
+
+    /// Whether the shifts of both are the same, so that they can be added up.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        (self.step_deg - other.step_deg).abs() < 1e-9 && self.most == other.most
+    }
+}
+
+/// The likelihood of other headings: readings beside the predictions of beams to the left and right, from the
+/// most to the right to the most to the left.
+#[derive(Debug, Default)]
+pub(super) struct Headings(Shifts);
+
 impl Headings {
-    pub(super) fn add(&mut self, plan: &ScanPlan, beams: &[Judged<'_>]) {
-        let step_deg = *self.step_deg.get_or_insert(plan.step_deg);
-        let Some((most, asked)) = shifts(plan, beams, step_deg) else { return };
-        self.shifts.resize(2 * most + 1, (0.0, 0));
+    pub(super) fn add(&mut self, turns: &Turns, beams: &[Judged<'_>]) {
         let count = beams.len();
-        for (at, (sum, explained)) in self.shifts.iter_mut().enumerate() {
-            for beam in asked.clone() {
-                let predicted = beams[(beam + count + at - most) % count].ping;
+        for (at, (sum, explained)) in self.0.of(2 * turns.most + 1) {
+            for beam in turns.asked.clone() {
+                let predicted = beams[(beam + count + at - turns.most) % count].ping;
                 let Some((log, is_explained)) = beside(beams[beam].ping, predicted) else {
                     continue;
                 };
@@ -44,47 +99,9 @@ impl Headings {
         }
     }
 
-    pub(super) fn explanation(&self) -> Option<Explanation> {
-        let step_deg = self.step_deg?;
-        let middle = self.shifts.len() / 2;
-        let likelihood = |at: usize| self.shifts[at].0;
-        let best = (0..self.shifts.len())
-            .max_by(|&one, &other| likelihood(one).total_cmp(&likelihood(other)))?;
-        if best == 0 || best + 1 >= self.shifts.len() || best == middle {
-            return None;
-        }
-        let (peak, sigma) =
-            parabola([likelihood(best - 1), likelihood(best), likelihood(best + 1)]);
-        let beams = best as f64 - middle as f64 + peak;
-        Some(Explanation {
-            change: "heading".to_owned(),
-            estimates: vec![Estimate {
-                name: "heading_deg",
-                value: beams * step_deg,
-                sigma: sigma * step_deg,
-            }],
-            gain: likelihood(best) - likelihood(middle),
-            explains: self.shifts[best].1.saturating_sub(self.shifts[middle].1),
-        })
+    pub(super) fn explanation(&self, step_deg: f64) -> Option<Explanation> {
+        self.0.explanation("heading", "heading_deg", step_deg)
     }
-}
-
-/// To how many beams on both sides a scan can be turned against its predictions, and which of its readings are asked
-/// at every turn; `None` of a scan whose beams are not all there, or not this far apart.
-pub(super) fn shifts(
-    plan: &ScanPlan,
-    beams: &[Judged<'_>],
-    step_deg: f64,
-) -> Option<(usize, Range<usize>)> {
-    let count = beams.len();
-    let is_whole = plan.pings_per_stop == 1 && plan.beams() as usize == count && count >= 8;
-    let in_order = beams.iter().zip(0..).all(|(beam, index)| beam.ping.index == index);
-    if !is_whole || !in_order || (step_deg - plan.step_deg).abs() > 1e-9 {
-        return None;
-    }
-    let most = ((MOST_DEG / step_deg) as usize).clamp(1, MOST_BEAMS).min(count / 3);
-    let is_turn = (plan.to_deg - plan.from_deg - 360.0).abs() < step_deg / 2.0;
-    Some((most, if is_turn { 0..count } else { most..count - most }))
 }
 
 /// Log-likelihood of a reading beside the prediction of another, and whether that explains it.
@@ -129,7 +146,7 @@ const FAR_DB: f64 = 40.0;
 /// The likelihood of other thresholds: margins of predictions beside what was heard and what was not.
 #[derive(Debug, Default)]
 pub(super) struct Thresholds {
-    shifts: Vec<(f64, u32)>,
+    shifts: Shifts,
     /// Echoes and silences.
     heard: [u32; 2],
 }
@@ -143,8 +160,7 @@ impl Thresholds {
         }
         self.heard[usize::from(!heard)] += 1;
         let count = (2.0 * MOST_DB / STEP_DB) as usize + 1;
-        self.shifts.resize(count, (0.0, 0));
-        for (at, (sum, explained)) in self.shifts.iter_mut().enumerate() {
+        for (at, (sum, explained)) in self.shifts.of(count) {
             let over_db = margin_db - (STEP_DB * at as f64 - MOST_DB);
             let share = LAPSES + (1.0 - 2.0 * LAPSES) * logistic(over_db / MARGIN_SIGMA_DB);
             *sum += if heard { share } else { 1.0 - share }.ln();
@@ -157,25 +173,7 @@ impl Thresholds {
         if self.heard.contains(&0) {
             return None;
         }
-        let middle = self.shifts.len() / 2;
-        let likelihood = |at: usize| self.shifts[at].0;
-        let best = (0..self.shifts.len())
-            .max_by(|&one, &other| likelihood(one).total_cmp(&likelihood(other)))?;
-        if best == 0 || best + 1 >= self.shifts.len() || best == middle {
-            return None;
-        }
-        let (peak, sigma) =
-            parabola([likelihood(best - 1), likelihood(best), likelihood(best + 1)]);
-        Some(Explanation {
-            change: "threshold".to_owned(),
-            estimates: vec![Estimate {
-                name: "threshold_db",
-                value: (best as f64 - middle as f64 + peak) * STEP_DB,
-                sigma: sigma * STEP_DB,
-            }],
-            gain: likelihood(best) - likelihood(middle),
-            explains: self.shifts[best].1.saturating_sub(self.shifts[middle].1),
-        })
+        self.shifts.explanation("threshold", "threshold_db", STEP_DB)
     }
 }
 

@@ -2,13 +2,12 @@
 //! them explains alone.
 
 use glam::DVec3;
-use sonard_records::ScanPlan;
 
 use super::{
     fit::{Fit, Moved, fit},
     found::{Estimate, Explanation, Pair},
     likelihood::is_near,
-    shift::{of_lapse, of_pair, parabola, shifts},
+    shift::{Turns, of_lapse, of_pair, parabola},
 };
 use crate::compare::Judged;
 
@@ -18,8 +17,7 @@ const MOST_BEAMS: usize = 20_000;
 /// Scans whose beams are evenly apart, each as readings and predictions.
 #[derive(Debug, Default)]
 pub(super) struct Together {
-    step_deg: Option<f64>,
-    /// To how many beams on both sides all scans can be turned.
+    /// To how many beams on both sides they can be turned.
     most: usize,
     scans: Vec<Turnable>,
     beams: usize,
@@ -47,20 +45,20 @@ impl Turnable {
 }
 
 impl Together {
-    pub(super) fn add(&mut self, plan: &ScanPlan, beams: &[Judged<'_>], pairs: Vec<Option<Pair>>) {
-        if self.beams + beams.len() > MOST_BEAMS {
-            return;
-        }
-        let step_deg = *self.step_deg.get_or_insert(plan.step_deg);
-        let Some((most, asked)) = shifts(plan, beams, step_deg) else { return };
-        self.most = if self.scans.is_empty() { most } else { self.most.min(most) };
+    /// Whether so many beams more are kept.
+    pub(super) const fn has_room(&self, beams: usize) -> bool {
+        self.beams + beams <= MOST_BEAMS
+    }
+
+    pub(super) fn add(&mut self, turns: &Turns, beams: &[Judged<'_>], pairs: Vec<Option<Pair>>) {
+        self.most = turns.most;
         self.beams += beams.len();
         let predicted = beams.iter().zip(pairs).map(|(beam, pair)| {
             let range_m = beam.ping.sim.as_ref()?.range_m?;
             Some((range_m, pair?.by_place.to_array()))
         });
         self.scans.push(Turnable {
-            asked,
+            asked: turns.asked.clone(),
             measured_m: beams.iter().map(|beam| beam.ping.range_m).collect(),
             predicted: predicted.collect(),
         });
@@ -92,8 +90,8 @@ impl Together {
     }
 
     /// The turn, place and speed of sound that explain most, if they are within what the first order holds for.
-    pub(super) fn explanation(&self) -> Option<Explanation> {
-        let (step_deg, most) = (self.step_deg?, self.most as isize);
+    pub(super) fn explanation(&self, step_deg: f64) -> Option<Explanation> {
+        let most = self.most as isize;
         let at = |beams: isize| -> (f64, u32, Option<Fit>) {
             match fit(self.moved(beams)) {
                 Some(fit) => {
