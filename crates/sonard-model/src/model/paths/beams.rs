@@ -8,8 +8,10 @@ mod beam;
 mod grow;
 mod lit;
 mod shade;
+mod slopes;
 mod tree;
 
 pub(crate) use beam::{Leg, Ray};
 pub(crate) use lit::{LitSpan, View};
+pub(crate) use slopes::ALL as ALL_SLOPES;
 pub(crate) use tree::Beams;

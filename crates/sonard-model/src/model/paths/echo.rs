@@ -18,6 +18,8 @@ pub(crate) struct Echo {
     pub(crate) rise_rad: [f64; 2],
     /// Its image by floor and ceiling, counted from 1; 0 for a path in the plan.
     pub(crate) image: u16,
+    /// How steeply a path of the plan can climb, by the numbers in the beams from transmitter and from receiver.
+    pub(crate) slopes: [u32; 2],
     pub(crate) via: Via,
 }
 

@@ -1,10 +1,11 @@
 //! The echo paths of an observation point: every mechanism in its turn.
 
 use super::{
-    beams::Beams,
+    beams::{ALL_SLOPES, Beams},
     cylinders,
     diffraction::{double, level, single},
     echo::{Echo, Via, sorted},
+    height::VerticalImage,
     interactions::EchoPath,
     pattern::TwoWayBound,
     prepare::Paths,
@@ -41,7 +42,7 @@ impl Paths {
         if let Some(law) = self.plan.settings.edge_law {
             self.add_diffraction(law, &mut traced, &mut echoes);
         }
-        self.add_images(&mut echoes, receiver - transmitter);
+        self.add_images(&traced, &mut echoes);
         self.retain_clear(&traced, &mut echoes);
         if let Some(law) = self.plan.settings.edge_law {
             self.add_level_edges(law, &mut traced, &mut echoes);
@@ -91,6 +92,7 @@ impl Paths {
                 arrival: -ray.run.normalize_or_zero(),
                 rise_rad: [0.0; 2],
                 image: 0,
+                slopes: [ray.slopes, ALL_SLOPES],
                 via: Via::Walls { node: ray.node },
             })
             .filter(|echo| echo.amplitude >= settings.floor)
@@ -109,14 +111,23 @@ impl Paths {
     }
 
     /// Each echo of the plan also by way of floor and ceiling, and these by themselves.
-    fn add_images(&self, echoes: &mut Vec<Echo>, apart: DVec2) {
+    fn add_images(&self, traced: &Traced, echoes: &mut Vec<Echo>) {
+        let [transmitter, receiver] = traced.ends;
+        let settings = &self.plan.settings;
         let plan = echoes.len();
         for (image, index) in self.heights.images.iter().zip(1..) {
             for at in 0..plan {
-                echoes.extend(image.echo(&echoes[at], index, &self.plan.settings));
+                if traced.can_climb(&echoes[at], image) {
+                    echoes.extend(image.echo(&echoes[at], index, settings));
+                }
             }
-            echoes.extend(image.upright_echo(index, apart, &self.plan.settings));
+            echoes.extend(image.upright_echo(index, receiver - transmitter, settings));
         }
+        let mut number = 0;
+        echoes.retain(|echo| {
+            number += 1;
+            number > plan || traced.can_climb(echo, &VerticalImage::NONE)
+        });
     }
 
     /// Echoes by level edges, which have their own images by floor and ceiling.

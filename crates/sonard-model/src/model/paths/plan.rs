@@ -1,6 +1,7 @@
 //! The floor plan as sound is traced through it, and the settings of the search. All of it is made once
 //! for a scene; nothing here knows where the ranger is.
 
+mod climbs;
 mod corners;
 mod cylinders;
 mod mesh;
@@ -8,6 +9,7 @@ mod walls;
 
 use std::sync::Arc;
 
+pub(crate) use climbs::{Climbs, Spans, WallClimbs, united};
 pub(crate) use corners::{ALONG_RAD, Corner, Corners, Facing, Flank};
 pub(crate) use cylinders::{Circle, Cylinders, Span, SurfaceArc};
 pub(crate) use mesh::{Mesh, Side};
@@ -21,8 +23,7 @@ pub(crate) struct Plan {
     pub(crate) settings: Settings,
     /// By wall of the scene.
     pub(crate) walls: Arc<[WallMirror]>,
-    /// Whether sound can pass each wall below or above; empty in a scene without floor and ceiling.
-    pub(crate) passable: Arc<[bool]>,
+    pub(crate) climbs: Arc<Climbs>,
     pub(crate) corners: Arc<Corners>,
     pub(crate) cylinders: Arc<Cylinders>,
     /// `None` for a scene with nothing in it.
@@ -38,6 +39,6 @@ impl Plan {
 
     /// Whether sound can pass a wall below or above.
     pub(crate) fn lets_pass(&self, wall: u32) -> bool {
-        self.passable.get(wall as usize).copied().unwrap_or(false)
+        self.climbs.of_wall(wall).is_some()
     }
 }

@@ -95,7 +95,7 @@ fn plan(scene: &Scene, segments: &[(DVec2, DVec2)], heights: &Heights, settings:
     let corners = settings.edge_law.map(|law| Corners::new(&arrangement, segments, &gains, law));
     Plan {
         walls: (0..segments.len()).map(wall).collect(),
-        passable: heights.passable().into(),
+        climbs: heights.climbs(&settings).into(),
         corners: corners.unwrap_or_default().into(),
         cylinders: Cylinders::new(circles, mesh.as_ref()).into(),
         mesh: mesh.map(Arc::new),

@@ -26,7 +26,7 @@
 use std::f64::consts::{PI, SQRT_2, TAU};
 
 use super::{
-    beams::{Leg, LitSpan},
+    beams::{ALL_SLOPES, Leg, LitSpan},
     echo::{Echo, Via},
     plan::{Plan, WallMirror},
     settings::Settings,
@@ -108,6 +108,7 @@ fn add(plan: &Plan, lit: &LitSpan, (echoes, patches): &mut (Vec<Echo>, Vec<Patch
             arrival: departure,
             rise_rad: [0.0; 2],
             image: 0,
+            slopes: [beam.slopes, ALL_SLOPES],
             via: Via::Scatter { patch: number },
         });
     }

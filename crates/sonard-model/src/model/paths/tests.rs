@@ -7,6 +7,7 @@ mod full_wave;
 mod half_plane;
 mod laws;
 mod level_edges;
+mod low_walls;
 mod pairs;
 mod peers;
 mod rough;
@@ -45,6 +46,20 @@ pub(in crate::model) const LOSSLESS: Settings = Settings {
     tilt_rad: 0.0,
     scatter_height_rad: 0.0,
 };
+
+impl Paths {
+    /// The same with all beams followed at any height.
+    fn without_cuts(mut self) -> Self {
+        let climbs = plan::Climbs { ends_beams: false, ..plan::Climbs::clone(&self.plan.climbs) };
+        self.plan.climbs = climbs.into();
+        self
+    }
+
+    /// How many beams were turned by walls on the way out from a point.
+    fn beams_from(&self, start: DVec2) -> usize {
+        beams::Beams::grow(&self.plan, start, start).nodes.len()
+    }
+}
 
 fn scene(walls: &[[f64; 4]]) -> Scene {
     let wall = |(i, &[ax, ay, bx, by]): (usize, &[f64; 4])| Wall {

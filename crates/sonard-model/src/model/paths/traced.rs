@@ -3,6 +3,8 @@
 use super::{
     cylinders::Connection,
     diffraction::{double::DoubleDiffraction, level::LevelDiffraction},
+    echo::Echo,
+    height::VerticalImage,
     rays::Rays,
     scattering::Patch,
 };
@@ -25,6 +27,16 @@ pub(super) struct Traced {
 }
 
 impl Traced {
+    /// Whether an echo of the plan can run by way of an image, as far as the slopes of its rays tell. Seen from its
+    /// end it falls as it climbed, but for an odd number of reflections at floor and ceiling.
+    pub(super) fn can_climb(&self, echo: &Echo, image: &VerticalImage) -> bool {
+        let climb_m = image.rise_m;
+        let back_m = if image.bounces.is_multiple_of(2) { -climb_m } else { climb_m };
+        let [out, back] = [&self.out, self.back()].map(|rays| &rays.beams.slopes);
+        out.holds(echo.slopes[0], climb_m, echo.length_m)
+            && back.holds(echo.slopes[1], back_m, echo.length_m)
+    }
+
     /// From the receiver.
     pub(super) fn back(&self) -> &Rays {
         self.back.as_ref().unwrap_or(&self.out)

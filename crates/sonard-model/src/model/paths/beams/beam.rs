@@ -28,6 +28,8 @@ pub(crate) struct Beam {
     /// Whether it was reflected an odd number of times.
     pub(crate) mirrored: bool,
     pub(crate) order: u16,
+    /// How steeply its rays can climb, by number in [`super::Beams::slopes`].
+    pub(crate) slopes: u32,
 }
 
 /// A path by mirror reflections, unfolded: a straight ray from an image of the start.
@@ -40,6 +42,8 @@ pub(crate) struct Ray {
     pub(crate) gain: f64,
     pub(crate) node: u32,
     pub(crate) order: u16,
+    /// See [`Beam::slopes`].
+    pub(crate) slopes: u32,
 }
 
 /// A ray from the start by what its walls follow from.
@@ -85,6 +89,7 @@ impl Beam {
             gain: self.gain,
             node: self.node,
             order: self.order,
+            slopes: self.slopes,
         }
     }
 

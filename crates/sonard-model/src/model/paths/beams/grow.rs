@@ -1,11 +1,14 @@
 //! The growth of the tree of beams.
 
+mod low_walls;
+
 use smallvec::SmallVec;
 
 use super::{
     beam::{Beam, reaches, reaches_well},
     lit::LitSpan,
     shade::shade,
+    slopes::ALL,
     tree::{Beams, Node, ROOT},
 };
 use crate::{
@@ -35,7 +38,10 @@ impl Beams {
         let Some(mesh) = &plan.mesh else { return Self::default() };
         let Some(&(home, _)) = around.first() else { return Self::default() };
         let start = mesh.points[point as usize];
-        let tree = Grower::new(plan, mesh, start, start, home).grow_from_corner(around);
+        let mut grower = Grower::new(plan, mesh, start, start, home);
+        // An edge sends sound on from any height.
+        grower.starts_level = false;
+        let tree = grower.grow_from_corner(around);
         Self { nodes: tree.nodes, to_edges: tree.to_edges, ..Self::default() }
     }
 }
@@ -55,6 +61,8 @@ struct Grower<'a> {
     /// Triangle of the target.
     home: u32,
     most_reflections: u16,
+    /// Whether beams start at the transducer's height, so that their slopes tell heights.
+    starts_level: bool,
     /// Parts of the beam at hand still to be followed, each before it leaves by a side; without one,
     /// what cylinders have left of it.
     parts: Vec<(Beam, Option<usize>)>,
@@ -71,7 +79,20 @@ impl<'a> Grower<'a> {
             plan.settings.max_order.unwrap_or(MOST_REFLECTIONS).min(MOST_REFLECTIONS);
         let (parts, next, stacked) = Default::default();
         let tree = Beams::default();
-        Self { plan, mesh, start, target, home, most_reflections, parts, next, stacked, tree }
+        let starts_level = true;
+        Self {
+            plan,
+            mesh,
+            start,
+            target,
+            home,
+            most_reflections,
+            starts_level,
+            parts,
+            next,
+            stacked,
+            tree,
+        }
     }
 
     /// All beams of a start in a triangle.
@@ -112,6 +133,7 @@ impl<'a> Grower<'a> {
             side: 0,
             mirrored: false,
             order: 0,
+            slopes: ALL,
         }
     }
 
@@ -243,11 +265,9 @@ impl<'a> Grower<'a> {
                     let next = self.reflected(&beam, other, side);
                     self.stacked.extend(next);
                 }
-                if !self.plan.lets_pass(wall) {
-                    return None;
-                }
+                let slopes = self.slopes_behind(&beam, wall, side)?;
                 let (triangle, side) = self.mesh.beyond(beam.triangle, side)?;
-                let next = Beam { triangle, side, ..beam };
+                let next = Beam { triangle, side, slopes, ..beam };
                 self.may_return(&next).then_some(next)
             }
             Side::Outside => None,
@@ -280,6 +300,7 @@ impl<'a> Grower<'a> {
         if let Some(last) = self.next.last_mut() {
             let border = if next.mirrored { next.left } else { next.right };
             if last.merge(&next) {
+                last.slopes = self.tree.slopes.either(last.slopes, next.slopes);
                 let nodes = &mut self.tree.nodes;
                 let (left, right) =
                     if next.mirrored { (last.node, next.node) } else { (next.node, last.node) };
@@ -294,14 +315,20 @@ impl<'a> Grower<'a> {
 
     /// The beam that a wall reflects, if an echo can come of it.
     fn reflected(&mut self, beam: &Beam, wall: u32, side: usize) -> Option<Beam> {
+        let slopes = self.slopes_at(beam, wall, side)?;
         let wall_mirror = &self.plan.walls[wall as usize];
-        if wall_mirror.scatter > 0.0 && self.plan.settings.scatter_height_rad > 0.0 {
+        // What is scattered goes straight back, level.
+        if wall_mirror.scatter > 0.0
+            && self.plan.settings.scatter_height_rad > 0.0
+            && self.tree.slopes.any_in(slopes, [0.0; 2])
+        {
             let span_m = self.lit_span_m(beam, wall_mirror, side);
             self.tree.on_rough_walls.push(LitSpan { beam: *beam, wall, span_m });
         }
         if self.plan.lets_pass(wall) {
             let span_m = self.lit_span_m(beam, wall_mirror, side);
-            self.tree.below_level_edges.push(LitSpan { beam: *beam, wall, span_m });
+            let beam = Beam { slopes, ..*beam };
+            self.tree.below_level_edges.push(LitSpan { beam, wall, span_m });
         }
         let gain = beam.gain * wall_mirror.gain;
         if beam.order >= self.most_reflections || gain < self.plan.settings.floor {
@@ -310,6 +337,7 @@ impl<'a> Grower<'a> {
         let next = Beam {
             gain,
             audible_m: beam.audible_m - wall_mirror.loss_m,
+            slopes,
             side: side as u8,
             ..beam.reflected(&wall_mirror.mirror, wall_mirror.rotor)
         };

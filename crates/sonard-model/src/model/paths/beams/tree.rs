@@ -3,6 +3,7 @@
 use super::{
     beam::{Leg, Ray},
     lit::{LitSpan, View},
+    slopes::Slopes,
 };
 use crate::{geometry::DVec2, model::paths::plan::WallMirror};
 
@@ -14,6 +15,8 @@ pub(crate) const ROOT: u32 = u32::MAX;
 #[derive(Debug, Default)]
 pub(crate) struct Beams {
     pub(crate) nodes: Vec<Node>,
+    /// How steeply the rays of beams can climb.
+    pub(crate) slopes: Slopes,
     /// Rays that come to the receiver.
     pub(crate) to_receiver: Vec<Ray>,
     /// Rays that end at an edge, with the index of its point.

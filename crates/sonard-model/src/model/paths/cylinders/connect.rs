@@ -193,6 +193,7 @@ impl<'a> Connector<'a> {
                 arrival: departures[1],
                 rise_rad: [0.0; 2],
                 image: 0,
+                slopes: [out.slopes(), back.slopes()],
                 via: Via::Cylinder { connection: 0 },
             },
         })
@@ -220,6 +221,7 @@ impl<'a> Connector<'a> {
             self.echoes.push(Echo {
                 departure: pair.echo.arrival,
                 arrival: pair.echo.departure,
+                slopes: [pair.echo.slopes[1], pair.echo.slopes[0]],
                 via: Via::Cylinder { connection: number + 1 },
                 ..pair.echo
             });

@@ -300,6 +300,7 @@ impl<'a> TubeGrower<'a> {
             gain: tube.gain,
             node: rays.len() as u32 - 1,
             order: tube.order,
+            slopes: tracer.view.beam.slopes,
         };
         let (width_m, radius_m) = (end.width_m, end.radius_m());
         self.rays.to_edges.push(SpreadRay { point, ray, width_m, radius_m });

@@ -62,6 +62,11 @@ impl<'a> HalfPathTracer<'a> {
         Self { half_path, tracer: Tracer { plan, view, surfaces: &half_path.surfaces } }
     }
 
+    /// How steeply its rays can climb, as far as the beam before its first cylinder tells.
+    pub(crate) fn slopes(&self) -> u32 {
+        self.tracer.view.beam.slopes
+    }
+
     /// The ray that met its first cylinder at `at_rad`, where it meets this one, less
     /// than half a turn from `near_rad`.
     pub(crate) fn contact(&self, at_rad: f64, near_rad: f64) -> Contact {

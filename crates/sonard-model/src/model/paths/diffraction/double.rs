@@ -192,6 +192,7 @@ impl Search<'_> {
             arrival: back.ray.departure,
             rise_rad: [0.0; 2],
             image: 0,
+            slopes: [out.slopes, back.slopes],
             via: Via::Edges { double: self.paths.len() as u32 },
         });
         let EdgePair { points, leg, .. } = *pair;

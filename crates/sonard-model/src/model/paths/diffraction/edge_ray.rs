@@ -1,7 +1,11 @@
 //! Rays to an upright edge, as the edge sees them.
 
 use crate::model::paths::{
-    beams::Ray, echo::drop_repeats, plan::Corner, rays::Rays, tolerance::SAME_RAD,
+    beams::{ALL_SLOPES, Ray},
+    echo::drop_repeats,
+    plan::Corner,
+    rays::Rays,
+    tolerance::{SAME_M, SAME_RAD},
 };
 
 /// A ray to an edge.
@@ -19,6 +23,8 @@ pub(crate) struct EdgeRay<'a> {
     pub(crate) sector: usize,
     /// Direction from the edge towards the source, from the sector's first wall, radians.
     pub(crate) from_rad: f64,
+    /// How steeply it can climb; see [`Ray::slopes`].
+    pub(crate) slopes: u32,
 }
 
 impl<'a> EdgeRay<'a> {
@@ -31,7 +37,8 @@ impl<'a> EdgeRay<'a> {
     ) -> Option<Self> {
         let (sector, from_rad) = corner.sector(-ray.run)?;
         let length_m = ray.run.length();
-        Some(Self { ray, number, length_m, width_m, radius_m, sector, from_rad })
+        let slopes = ray.slopes;
+        Some(Self { ray, number, length_m, width_m, radius_m, sector, from_rad, slopes })
     }
 
     /// A ray over walls alone.
@@ -51,6 +58,7 @@ impl<'a> EdgeRay<'a> {
         });
         let mut all: Vec<Self> = by_walls.chain(spread).collect();
         all.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
+        free_repeats(&mut all);
         drop_repeats(&mut all, |ray| ray.length_m, Self::is_same);
         all
     }
@@ -58,6 +66,21 @@ impl<'a> EdgeRay<'a> {
     /// Whether two are one ray that touches a corner on its path and was found on both sides of it.
     fn is_same(&self, other: &Self) -> bool {
         is_same_departure(self.ray, other.ray)
+    }
+}
+
+/// Lets a ray that was found on both sides of a corner climb as on either side. Sorted by length.
+fn free_repeats(rays: &mut [EdgeRay]) {
+    for at in 1..rays.len() {
+        let ray = rays[at];
+        for before in (0..at).rev() {
+            if ray.length_m - rays[before].length_m >= SAME_M {
+                break;
+            }
+            if rays[before].is_same(&ray) && rays[before].slopes != ray.slopes {
+                (rays[before].slopes, rays[at].slopes) = (ALL_SLOPES, ALL_SLOPES);
+            }
+        }
     }
 }
 

@@ -43,7 +43,7 @@ use crate::{
     model::{
         Bend, Mechanism,
         paths::{
-            beams::{Beams, Leg, LitSpan, Ray},
+            beams::{ALL_SLOPES, Beams, Leg, LitSpan, Ray},
             echo::{Echo, Via, drop_repeats},
             height::{Ends, Heights, VerticalImage},
             plan::{Plan, WallMirror},
@@ -102,10 +102,13 @@ pub(crate) fn echoes(
         for (rise_m, is_upper) in scene.heights.level_edges(wall) {
             let edge = LevelEdge::new(scene.plan, wall, rise_m, is_upper);
             let search = Search { scene, ends: [out, back.unwrap_or(out)], edge };
-            let outs = edge.beams(scene, outs);
+            let outs = edge.beams(scene, out.beams, outs);
             let mut found = match backs {
                 None => search.pairs(&outs),
-                Some(backs) => search.pairs_between(&outs, &edge.beams(scene, backs)),
+                Some(backs) => {
+                    let beams = back.map_or(out.beams, |back| back.beams);
+                    search.pairs_between(&outs, &edge.beams(scene, beams, backs))
+                }
             };
             found.sort_by(|(one, _), (other, _)| one.length_m.total_cmp(&other.length_m));
             drop_repeats(&mut found, |(echo, _)| echo.length_m, is_same);
@@ -162,6 +165,8 @@ struct EdgeBeam<'a> {
     gain: f64,
     /// Height gained along it if floor and ceiling are windows, metres.
     climb_m: f64,
+    /// Distance of the beam's image from the line in the plan, metres; negative behind it.
+    before_m: f64,
     /// Distance of the image from the line in space, metres, and the position that it is abreast of.
     off_m: f64,
     foot_m: f64,
@@ -179,16 +184,22 @@ impl LevelEdge {
     }
 
     /// The beams to it, shortest first. Left out are those too long or weak for any path back.
-    fn beams<'a>(&self, scene: Surroundings, lit: &'a [LitSpan]) -> Vec<EdgeBeam<'a>> {
+    fn beams<'a>(
+        &self,
+        scene: Surroundings,
+        beams: &Beams,
+        lit: &'a [LitSpan],
+    ) -> Vec<EdgeBeam<'a>> {
         let settings = &scene.plan.settings;
         let images = || std::iter::once(&VerticalImage::NONE).chain(&scene.heights.images).zip(0..);
-        let mut beams: Vec<EdgeBeam> = lit
+        let mut found: Vec<EdgeBeam> = lit
             .iter()
             .flat_map(|lit| images().filter_map(|(image, index)| self.beam(lit, image, index)))
             .filter(|beam| 2.0 * beam.gain >= settings.floor && beam.least_m <= settings.max_path_m)
+            .filter(|beam| beams.slopes.any_in(beam.lit.beam.slopes, beam.slopes()))
             .collect();
-        beams.sort_by(|one, other| one.least_m.total_cmp(&other.least_m));
-        beams
+        found.sort_by(|one, other| one.least_m.total_cmp(&other.least_m));
+        found
     }
 
     /// None from within the wall's own plane.
@@ -213,6 +224,7 @@ impl LevelEdge {
             image: index,
             gain: lit.beam.gain * image.gain,
             climb_m: image.climb_m(self.rise_m),
+            before_m,
             off_m,
             foot_m,
             around_rad: before_m.atan2(along_face_m).rem_euclid(TAU),
@@ -227,6 +239,23 @@ impl LevelEdge {
 }
 
 impl EdgeBeam<'_> {
+    /// The least and the greatest slope of its rays.
+    fn slopes(&self) -> [f64; 2] {
+        let [low_m, high_m] = self.lit.span_m;
+        let beside_m = [low_m, high_m].map(|end| (end - self.foot_m).abs());
+        let nearest_m = (low_m - self.foot_m).max(self.foot_m - high_m).max(0.0);
+        let [near_m, far_m] = [nearest_m, beside_m[0].max(beside_m[1])].map(|m| m.hypot(self.before_m));
+        let [one, other] = [near_m, far_m].map(|run_m| self.climb_m / run_m);
+        [one.min(other), one.max(other)]
+    }
+
+    /// Whether the slopes of its beam leave it a ray to a position along the wall's line.
+    fn climbs_to(&self, beams: &Beams, along_m: f64) -> bool {
+        let beside_m = along_m - self.foot_m;
+        let run_m = (self.before_m * self.before_m + beside_m * beside_m).sqrt();
+        beams.slopes.holds(self.lit.beam.slopes, self.climb_m, run_m)
+    }
+
     fn lights(&self, along_m: f64) -> bool {
         let [low_m, high_m] = self.lit.span_m;
         (low_m - TIE_M..=high_m + TIE_M).contains(&along_m)
@@ -286,7 +315,12 @@ impl Search<'_> {
         if !(out.lights(along_m) && back.lights(along_m)) {
             return None;
         }
-        let length_m = across_m.hypot(out.foot_m - back.foot_m);
+        let [from, to] = self.ends.map(|from| from.beams);
+        if !(out.climbs_to(from, along_m) && back.climbs_to(to, along_m)) {
+            return None;
+        }
+        let beside_m = out.foot_m - back.foot_m;
+        let length_m = (across_m * across_m + beside_m * beside_m).sqrt();
         let field = self.field(out, back, length_m)?;
         let point = self.edge.point(along_m);
         let [to, from] = [out, back].map(|beam| beam.lit.beam.ray_to(point));
@@ -304,6 +338,7 @@ impl Search<'_> {
             arrival: from.departure,
             rise_rad: [rise_rad(out, &to), rise_rad(back, &from)],
             image: 0,
+            slopes: [ALL_SLOPES; 2],
             via: Via::LevelEdge { level: 0 },
         };
         let LevelEdge { wall, is_upper, .. } = self.edge;

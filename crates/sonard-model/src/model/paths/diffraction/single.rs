@@ -70,6 +70,7 @@ impl Search<'_> {
                     echoes.push(Echo {
                         departure: echo.arrival,
                         arrival: echo.departure,
+                        slopes: [back.slopes, out.slopes],
                         via: Via::Edge { point, out: back.number, back: out.number },
                         ..echo
                     });
@@ -107,6 +108,7 @@ impl Search<'_> {
             arrival: back.ray.departure,
             rise_rad: [0.0; 2],
             image: 0,
+            slopes: [out.slopes, back.slopes],
             via: Via::Edge { point, out: out.number, back: back.number },
         })
     }

@@ -13,6 +13,7 @@
 use crate::{
     geometry::DVec2,
     model::paths::{
+        beams::ALL_SLOPES,
         echo::{Echo, Via},
         settings::Settings,
     },
@@ -137,6 +138,7 @@ impl VerticalImage {
             arrival: if apart == DVec2::ZERO { along } else { -along },
             rise_rad: [0.0; 2],
             image: 0,
+            slopes: [ALL_SLOPES; 2],
             via: Via::Upright,
         };
         self.echo(&nowhere, index, settings)

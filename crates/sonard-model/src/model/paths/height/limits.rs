@@ -18,7 +18,11 @@ use crate::{
     geometry::{Arrangement, DVec2, Piece, between},
     model::{
         Reflector,
-        paths::{plan::mirror_gain, settings::Settings, tolerance::TIE_M},
+        paths::{
+            plan::{Climbs, Spans, WallClimbs, mirror_gain, united},
+            settings::Settings,
+            tolerance::TIE_M,
+        },
     },
     scene::{Material, Scene},
 };
@@ -38,6 +42,10 @@ pub(crate) struct Heights {
     /// The ranger's by floor and ceiling; none in a scene in the plane.
     pub(crate) images: Vec<VerticalImage>,
 }
+
+/// This close to the level edge of a wall sound counts as meeting it and as passing it, metres: twice what it is
+/// asked by in the end.
+const NEAR_EDGE_M: f64 = 2.0 * TIE_M;
 
 /// A wall with limits, in the box around it.
 pub(crate) type Limited = GeomWithData<Rectangle<[f64; 2]>, (u32, [DVec2; 2])>;
@@ -96,10 +104,64 @@ impl Heights {
         !(self.rises() && limits.is_some())
     }
 
-    /// By wall whether sound can pass it below or above; empty where no path rises.
-    pub(crate) fn passable(&self) -> Vec<bool> {
-        let has_limits = self.walls.iter().map(Option::is_some);
-        if self.rises() { has_limits.collect() } else { Vec::new() }
+    /// By wall the climbs at which sound meets and passes it; none where no path rises.
+    pub(crate) fn climbs(&self, settings: &Settings) -> Climbs {
+        if !self.rises() {
+            return Climbs::default();
+        }
+        // A path to a level edge ends up to so much beside the image that it runs to.
+        let beside = |limits: &[f64; 2]| limits.map(|z_m| (z_m - self.z_m).abs());
+        let beside_m = self.walls.iter().flatten().flat_map(beside).fold(0.0, f64::max);
+        let highest_m = beside_m + settings.max_path_m;
+        let of_wall = |limits: &[f64; 2]| {
+            let [lower, upper] = self.has_edges(*limits);
+            let [from_m, to_m] = [limits[0] + NEAR_EDGE_M, limits[1] - NEAR_EDGE_M];
+            let below = lower.then_some([f64::NEG_INFINITY, from_m]);
+            let above = upper.then_some([to_m, f64::INFINITY]);
+            let passed = [below, above].into_iter().flatten();
+            WallClimbs {
+                met: self.unfolded([[limits[0] - NEAR_EDGE_M, limits[1] + NEAR_EDGE_M]], highest_m),
+                passed: self.unfolded(passed, highest_m),
+            }
+        };
+        let images = [VerticalImage::NONE].iter().chain(&self.images);
+        let mut highest: Vec<[f64; 2]> =
+            images.map(|image| [image.gain, image.rise_m.abs() + beside_m]).collect();
+        highest.sort_by(|one, other| other[0].total_cmp(&one[0]));
+        let mut most_m = 0.0_f64;
+        for [_, climb_m] in &mut highest {
+            most_m = most_m.max(*climb_m);
+            *climb_m = most_m;
+        }
+        let walls = self.walls.iter().map(|limits| limits.as_ref().map(of_wall)).collect();
+        Climbs { ends_beams: true, walls, highest }
+    }
+
+    /// The climbs up to `highest_m`, up or down, that end within one of these stretches of height.
+    fn unfolded(
+        &self,
+        stretches: impl IntoIterator<Item = [f64; 2]>,
+        highest_m: f64,
+    ) -> Spans {
+        let ends = [self.floor_z_m, self.ceiling_z_m];
+        let [low_m, high_m] = [ends[0].unwrap_or(f64::MIN), ends[1].unwrap_or(f64::MAX)];
+        // Mirrored at one of them, the heights repeat themselves after both.
+        let mirror_m = ends[0].or(ends[1]).unwrap_or(self.z_m);
+        let period_m = 2.0 * (high_m - low_m);
+        let turns = if period_m.is_finite() { (highest_m / period_m).ceil() as i32 + 1 } else { 0 };
+        let images = |stretch: [f64; 2]| {
+            let [from, to] = [stretch[0].max(low_m), stretch[1].min(high_m)];
+            let here = [from - self.z_m, to - self.z_m];
+            let there = [2.0 * mirror_m - to - self.z_m, 2.0 * mirror_m - from - self.z_m];
+            let copies = (-turns..=turns).flat_map(move |turn| {
+                let by_m = if turn == 0 { 0.0 } else { f64::from(turn) * period_m };
+                [here, there].map(|[from, to]| [from + by_m, to + by_m])
+            });
+            copies.filter(|[from, to]| from <= to).collect::<Vec<_>>()
+        };
+        let all = stretches.into_iter().flat_map(images);
+        let near = all.filter(|[from, to]| *from <= highest_m && *to >= -highest_m);
+        united(near.map(|span| span.map(|end| end.clamp(-highest_m, highest_m))).collect())
     }
 
     /// Walls that stand above or below the one that the plan knows at the same place, by [`between`] their
