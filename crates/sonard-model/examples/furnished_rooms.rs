@@ -109,9 +109,10 @@ fn furnished_room(rng: &mut Pcg64) -> Result<(Scene, Pose), Box<dyn Error>> {
     for piece in 0..rng.random_range(0..6) {
         let half = DVec2::new(rng.random_range(0.1..0.6), rng.random_range(0.1..0.45));
         let Some(center) = place(rng, half.length()) else { continue };
-        if boxes.iter().any(|(other, radius_m)| {
-            center.distance(*other) < half.length() + radius_m + 0.05
-        }) {
+        if boxes
+            .iter()
+            .any(|(other, radius_m)| center.distance(*other) < half.length() + radius_m + 0.05)
+        {
             continue;
         }
         boxes.push((center, half.length()));

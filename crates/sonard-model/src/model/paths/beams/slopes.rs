@@ -32,9 +32,10 @@ const EACH: [[f64; 2]; 1] = [[f64::NEG_INFINITY, f64::INFINITY]];
 impl Slopes {
     /// A set: closed intervals, rising and apart.
     fn spans(&self, set: u32) -> &[[f64; 2]] {
-        (set as usize).checked_sub(1).and_then(|index| self.sets.get(index)).map_or(&EACH, |set| {
-            &self.spans[set.start as usize..set.end as usize]
-        })
+        (set as usize)
+            .checked_sub(1)
+            .and_then(|index| self.sets.get(index))
+            .map_or(&EACH, |set| &self.spans[set.start as usize..set.end as usize])
     }
 
     /// Whether a set has a slope from `low` to `high`.

@@ -244,7 +244,8 @@ impl EdgeBeam<'_> {
         let [low_m, high_m] = self.lit.span_m;
         let beside_m = [low_m, high_m].map(|end| (end - self.foot_m).abs());
         let nearest_m = (low_m - self.foot_m).max(self.foot_m - high_m).max(0.0);
-        let [near_m, far_m] = [nearest_m, beside_m[0].max(beside_m[1])].map(|m| m.hypot(self.before_m));
+        let [near_m, far_m] =
+            [nearest_m, beside_m[0].max(beside_m[1])].map(|m| m.hypot(self.before_m));
         let [one, other] = [near_m, far_m].map(|run_m| self.climb_m / run_m);
         [one.min(other), one.max(other)]
     }

@@ -138,11 +138,7 @@ impl Heights {
     }
 
     /// The climbs up to `highest_m`, up or down, that end within one of these stretches of height.
-    fn unfolded(
-        &self,
-        stretches: impl IntoIterator<Item = [f64; 2]>,
-        highest_m: f64,
-    ) -> Spans {
+    fn unfolded(&self, stretches: impl IntoIterator<Item = [f64; 2]>, highest_m: f64) -> Spans {
         let ends = [self.floor_z_m, self.ceiling_z_m];
         let [low_m, high_m] = [ends[0].unwrap_or(f64::MIN), ends[1].unwrap_or(f64::MAX)];
         // Mirrored at one of them, the heights repeat themselves after both.
