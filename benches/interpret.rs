@@ -33,7 +33,8 @@ fn sweeps() -> (Extents, Vec<Sweep>) {
     let sweep = |i: u32| {
         let pose = Pose { x_m: 0.5 + 0.1 * f64::from(i), y_m: 0.9, heading_deg: 0.0 };
         let (id, plan) = (Uuid::from_u128(i.into()), ScanPlan::default());
-        let scan = ScanView::simulated(&simulator, id, &pose, &plan, Timestamp::UNIX_EPOCH);
+        let scan = ScanView::simulated(&simulator, id, &pose, &plan, Timestamp::UNIX_EPOCH)
+            .expect("few paths");
         Sweep::of(&scan).expect("a sweep")
     };
     (extents, (0..20).map(sweep).collect())

@@ -29,7 +29,9 @@ fn ping(criterion: &mut Criterion) {
     for engine in [EngineKind::Fan, EngineKind::Cone] {
         let (simulator, pose) = simulator(engine);
         group.bench_function(engine.name(), |bencher| {
-            bencher.iter(|| black_box(simulator.at(pose.position()).ping(black_box(-1.5))));
+            bencher.iter(|| {
+                black_box(simulator.at(pose.position()).ping(black_box(-1.5)).expect("few paths"))
+            });
         });
     }
     group.finish();
@@ -43,7 +45,7 @@ fn scan(criterion: &mut Criterion) {
     for engine in [EngineKind::Fan, EngineKind::Cone] {
         let (simulator, pose) = simulator(engine);
         group.bench_function(engine.name(), |bencher| {
-            bencher.iter(|| black_box(simulator.predict(&pose, &plan)));
+            bencher.iter(|| black_box(simulator.predict(&pose, &plan).expect("few paths")));
         });
     }
     group.finish();

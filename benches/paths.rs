@@ -58,7 +58,7 @@ fn small_room() {
     let range = Options { max_range_m: Some(10.7), ..Options::default() };
     let paths = simulator(scene.clone(), range);
     println!("simple-room, fig9, 400 azimuths to 10.7 m");
-    let exact = time(|| drop(black_box(paths.predict(&pose, &FULL_SCAN))));
+    let exact = time(|| drop(black_box(paths.predict(&pose, &FULL_SCAN).expect("few paths"))));
     report("paths, the whole scan", exact, None);
     let engine = PathEngine::new(
         &scene,
@@ -66,10 +66,11 @@ fn small_room() {
         None,
         paths.path_settings(),
     );
-    let survey = time(|| drop(black_box(engine.arrivals_at(pose.position()))));
+    let survey = time(|| drop(black_box(engine.arrivals_at(pose.position()).expect("few paths"))));
     report("paths, all echoes to 10.7 m", survey, None);
-    let echoes = Paths::new(&scene, paths.path_settings()).enumerate(pose.position());
-    let place = engine.arrivals_at(pose.position());
+    let echoes =
+        Paths::new(&scene, paths.path_settings()).enumerate(pose.position()).expect("few paths");
+    let place = engine.arrivals_at(pose.position()).expect("few paths");
     let mut sounds = Vec::new();
     let mut heard = 0;
     let listen = time(|| {
@@ -94,7 +95,7 @@ fn small_room() {
     for ray_spacing_deg in [1.0, 0.1, 0.02] {
         let engine = FanOptions { ray_spacing_deg, ..FanOptions::default() }.into();
         let fan = with(Options { engine, ..range });
-        let time = time(|| drop(black_box(fan.predict(&pose, &FULL_SCAN))));
+        let time = time(|| drop(black_box(fan.predict(&pose, &FULL_SCAN).expect("few paths"))));
         let off = readings_off(&fan, &ideal, &pose);
         report(
             &format!("fan at {ray_spacing_deg} degrees, {off} readings off by 1 mm"),
@@ -102,7 +103,7 @@ fn small_room() {
             Some(exact),
         );
     }
-    let truth = ideal.predict(&pose, &FULL_SCAN);
+    let truth = ideal.predict(&pose, &FULL_SCAN).expect("few paths");
     for spacing_deg in [1.0, 0.1] {
         let fan = PrintedFan::new(&scene, &paths, spacing_deg);
         let (off, echoes) = fan.readings_off(&pose, &truth);
@@ -175,7 +176,7 @@ fn robot_room() {
             scene.clone(),
             Options { max_range_m: Some(max_range_m), ..Options::default() },
         );
-        let exact = time(|| drop(black_box(paths.predict(&pose, &FULL_SCAN))));
+        let exact = time(|| drop(black_box(paths.predict(&pose, &FULL_SCAN).expect("few paths"))));
         report(&format!("paths to {max_range_m} m"), exact, None);
         let fan = simulator(
             scene.clone(),
@@ -185,7 +186,7 @@ fn robot_room() {
                 ..Options::default()
             },
         );
-        let time = time(|| drop(black_box(fan.predict(&pose, &FULL_SCAN))));
+        let time = time(|| drop(black_box(fan.predict(&pose, &FULL_SCAN).expect("few paths"))));
         report("fan at its usual spacing", time, Some(exact));
     }
 }
@@ -193,7 +194,11 @@ fn robot_room() {
 /// How many readings of one differ from the other's by more than a millimetre, or are silent where
 /// it is not.
 fn readings_off(one: &Simulator, other: &Simulator, pose: &Pose) -> usize {
-    let readings = one.predict(pose, &FULL_SCAN).into_iter().zip(other.predict(pose, &FULL_SCAN));
+    let readings = one
+        .predict(pose, &FULL_SCAN)
+        .expect("few paths")
+        .into_iter()
+        .zip(other.predict(pose, &FULL_SCAN).expect("few paths"));
     let is_off = |pair: &(Prediction, Prediction)| match (pair.0.range_m, pair.1.range_m) {
         (Some(one), Some(other)) => (one - other).abs() > 1e-3,
         (one, other) => one.is_some() != other.is_some(),
@@ -224,8 +229,8 @@ fn l_room() {
     };
     let paths = Paths::new(&room, settings);
     let at = DVec2::new(1.13, 0.87);
-    println!("\nL-room, order 8: {} echoes", paths.enumerate(at).len());
-    report("paths", time(|| drop(black_box(paths.enumerate(at)))), None);
+    println!("\nL-room, order 8: {} echoes", paths.enumerate(at).expect("few paths").len());
+    report("paths", time(|| drop(black_box(paths.enumerate(at).expect("few paths")))), None);
 }
 
 /// Offices along corridors: a ping beside ray casts, and growth with the number of walls.
@@ -257,7 +262,7 @@ fn building_plans() {
         let scan = time(|| {
             for at in &poses {
                 let pose = Pose { x_m: at.x, y_m: at.y, heading_deg: 0.0 };
-                black_box(model.predict(&pose, &FULL_SCAN));
+                black_box(model.predict(&pose, &FULL_SCAN).expect("few paths"));
             }
         })
         .each_of(poses.len());

@@ -71,7 +71,7 @@ fn error(scene: &Scene, spacing_deg: f64) -> Result<f64, Box<dyn Error>> {
         let [exact, fan] = [&exact, &fan].map(|simulator| simulator.at(pose.position()));
         for azimuth in 0..(360.0 / STEP_DEG) as u32 {
             let direction_rad = pose.direction_rad(STEP_DEG * f64::from(azimuth) + 1.0);
-            let (exact, fan) = (exact.arrivals(direction_rad), fan.arrivals(direction_rad));
+            let (exact, fan) = (exact.arrivals(direction_rad)?, fan.arrivals(direction_rad)?);
             let missing = lacks(&exact, &fan) + lacks(&fan, &exact);
             differ += missing;
             all += exact.iter().filter(|echo| is_loud(echo)).count();

@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let sensor = Sensor::preset("senscomp-6500")?;
     let simulator = Simulator::new(scene, sensor, Air::default(), Options::default())?;
     let plan = ScanPlan { step_deg: 9.0, ..ScanPlan::default() };
-    for (stop, reading) in (0..).zip(simulator.predict(&pose, &plan)) {
+    for (stop, reading) in (0..).zip(simulator.predict(&pose, &plan)?) {
         let path = reading
             .arrival
             .map(|arrival| PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m));

@@ -116,7 +116,7 @@ fn turns(scene_name: &str, text: &str) -> Vec<Turn> {
             let simulator = Simulator::new(Arc::clone(&scene), sensor, air, options)
                 .expect("golden predictions");
             for (pose_name, pose) in &scene.poses {
-                let predictions = simulator.predict(pose, &PLAN);
+                let predictions = simulator.predict(pose, &PLAN).expect("few paths");
                 turns.push(Turn::of([scene_name, pose_name, sensor_name], engine, &predictions));
             }
         }

@@ -182,7 +182,7 @@ fn world(args: &Args) -> Result<World, Box<dyn Error>> {
     let scene = Arc::new(scene.with_robot_at(&pose));
     let simulator = Simulator::new(scene, sensor, air, Options::default())?;
     let soundings =
-        Soundings::of(&simulator, &pose, args.steps_per_revolution, args.mounting_offset_deg);
+        Soundings::of(&simulator, &pose, args.steps_per_revolution, args.mounting_offset_deg)?;
     Ok(World::new(soundings, noise, 0.0, args.seed))
 }
 

@@ -181,7 +181,10 @@ pub(super) fn explored(
         bar.set_position(so_far.stops.len() as u64);
         bar.set_message(format!("{:.0} m driven", so_far.travel_m));
     });
-    Ok(made)
+    match robot.refusal() {
+        Some(refusal) => Err(Failure::input(refusal, "see `sonard explore --help`")),
+        None => Ok(made),
+    }
 }
 
 impl SensingName {

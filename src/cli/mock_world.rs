@@ -115,7 +115,8 @@ impl MockWorldArgs {
         )
         .map_err(|error| Failure::input(error, "see `sonard mock --help`"))?;
         let steps = self.steps_per_revolution;
-        Ok(Soundings::of(&simulator, belief.pose, steps, self.mounting_offset_deg))
+        Soundings::of(&simulator, belief.pose, steps, self.mounting_offset_deg)
+            .map_err(|error| Failure::input(error, "give a simpler scene"))
     }
 
     /// Motor steps a revolution.

@@ -111,9 +111,14 @@ pub(super) fn run(args: &Args) -> Outcome {
         .map_err(|error| Failure::input(error, "see `sonard paths --help`"))?;
     let settings =
         crate::model::paths::Settings { floor: args.weakest, ..simulator.path_settings() };
-    let paths = Paths::new(simulator.scene(), settings).enumerate(pose.position());
-    let lines = paths.iter().map(|path| line(&simulator, path));
-    let written = if args.json { write_json(lines) } else { write_table(lines, paths.len()) };
+    let paths = Paths::new(simulator.scene(), settings);
+    let at = pose.position();
+    let told = paths.each_between(at, at, |paths| {
+        let count = paths.len();
+        let lines = paths.map(|path| line(&simulator, &path));
+        if args.json { write_json(lines) } else { write_table(lines, count) }
+    });
+    let written = told.map_err(|error| Failure::input(error, "see `sonard paths --help`"))?;
     written.or_else(|error| Failure::from_write("to standard output", &error))
 }
 

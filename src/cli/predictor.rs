@@ -7,7 +7,7 @@ use crate::{
     array::{ArrayPoseError, RangerArray},
     cli::{Failure, scene_file, what_if::WhatIf},
     geometry::Pose,
-    model::{ArrayModel, EngineKind, ModelError, Options, Simulator},
+    model::{ArrayModel, EngineKind, ModelError, Options, Simulator, TooCostly},
     scan::{Ping, Provenance, ScanView, Session, SimRecord},
     scene::Scene,
     store::logged_scene,
@@ -143,7 +143,8 @@ fn predict_stepper(
         let station = simulator.at(robot.position());
         for ping in pings {
             let Some(axis) = ping.axis(Some(session), pose) else { continue };
-            let prediction = station.ping(axis.direction_rad(0.0));
+            let prediction =
+                station.ping(axis.direction_rad(0.0)).map_err(|error| too_costly(log, &error))?;
             set_beside(ping, SimRecord::of(&simulator, &prediction));
         }
     }
@@ -161,7 +162,8 @@ fn predict_array(scan: &mut ScanView, pose: &Pose, model: &ArrayModel) -> Result
         let pose = ping.pose.unwrap_or(*pose);
         model.array().check_pose(model.scene(), &pose).map_err(refuse_pose)?;
         let stand = model.at(pose).map_err(refuse)?;
-        set_beside(ping, SimRecord::of(stand.simulator(ranger), &stand.ping(ranger)));
+        let prediction = stand.ping(ranger).map_err(|error| refuse(error.into()))?;
+        set_beside(ping, SimRecord::of(stand.simulator(ranger), &prediction));
     }
     Ok(())
 }
@@ -187,6 +189,13 @@ fn array_model(
     let (air, options) = conditions(log, session)?;
     ArrayModel::new(Arc::new(array.clone()), scene, session.sensor.clone(), air, options)
         .map_err(|error| refuse(log, &error))
+}
+
+fn too_costly(log: &Path, error: &TooCostly) -> Failure {
+    Failure::input(
+        format!("{}: no prediction: {error}", log.display()),
+        "give a simpler scene, or settings in the session's record",
+    )
 }
 
 fn refuse(log: &Path, error: &dyn std::fmt::Display) -> Failure {

@@ -21,7 +21,7 @@ use crate::{
     acoustics::ReceiverNoise,
     collect::{PoseLine, read_lines},
     geometry::Pose,
-    model::{ObservationPoint, OptionKeys, Prediction, Simulator},
+    model::{ModelError, ObservationPoint, OptionKeys, Prediction, Simulator, TooCostly},
     scan::{Ping, Record, ScanEnd, ScanPlan, ScanStart, Session},
     scene::Scene,
     store::{RecordWriter, StoreError},
@@ -144,7 +144,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         None => station.ping(direction_rad),
     };
     let bar = progress::bar(u64::from(plan.stops()) * poses.len() as u64, "beams");
-    let mut written = Ok(());
+    let mut written: Result<(), Stop> = Ok(());
     for (number, pose) in poses.iter().enumerate() {
         let own = match shared {
             Some(_) => None,
@@ -154,14 +154,39 @@ pub(super) fn run(args: &Args) -> Outcome {
         let session = (number == 0 || own.is_some()).then_some(simulator);
         written = session
             .map_or(Ok(()), |simulator| write_session(&mut *out, simulator))
+            .map_err(Stop::from)
             .and_then(|()| write(&mut *out, simulator, pose, &plan, &mut ping, &bar));
         if written.is_err() {
             break;
         }
     }
     bar.finish_and_clear();
-    closed(written.and_then(|()| out.finish()))?;
+    match written {
+        Ok(()) => closed(out.finish())?,
+        Err(Stop::Model(error)) => {
+            return Err(Failure::input(error, "see `sonard simulate --help`"));
+        }
+        Err(Stop::Write(error)) => closed(Err(error))?,
+    }
     left_out
+}
+
+/// Why it ended before the last scan.
+enum Stop {
+    Model(ModelError),
+    Write(StoreError),
+}
+
+impl From<StoreError> for Stop {
+    fn from(error: StoreError) -> Self {
+        Self::Write(error)
+    }
+}
+
+impl From<TooCostly> for Stop {
+    fn from(error: TooCostly) -> Self {
+        Self::Model(error.into())
+    }
 }
 
 /// Where scans are to be taken.
@@ -237,20 +262,20 @@ fn write(
     simulator: &Simulator,
     pose: &Pose,
     plan: &ScanPlan,
-    predict: &mut dyn FnMut(&ObservationPoint, f64) -> Prediction,
+    predict: &mut dyn FnMut(&ObservationPoint, f64) -> Result<Prediction, TooCostly>,
     bar: &ProgressBar,
-) -> Result<(), StoreError> {
+) -> Result<(), Stop> {
     let scan = Uuid::new_v4();
     let start = ScanStart::new(scan, Timestamp::now(), *pose, *plan);
     out.write(&Record::ScanStart(start))?;
     let station = simulator.at(pose.position());
     for index in 0..plan.stops() {
         let azimuth_deg = plan.azimuth_deg(index);
-        let prediction = predict(&station, pose.direction_rad(azimuth_deg));
+        let prediction = predict(&station, pose.direction_rad(azimuth_deg))?;
         let ping = Ping::simulated(simulator, scan, index, azimuth_deg, &prediction);
         out.write(&Record::Ping(Box::new(ping)))?;
         bar.inc(1);
     }
     let end = ScanEnd::simulated(simulator, scan, plan.stops(), Timestamp::now());
-    out.write(&Record::ScanEnd(end))
+    Ok(out.write(&Record::ScanEnd(end))?)
 }

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     acoustics::{EchoTrace, EnvelopePeak},
     geometry::Pose,
-    model::{ObservationPoint, OptionKeys, Simulator},
+    model::{ObservationPoint, OptionKeys, Simulator, TooCostly},
     plot::{TraceView, draw_trace},
     scan::{PathRecord, PingStatus},
 };
@@ -115,7 +115,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let scene = Arc::new(scene.with_robot_at(&pose));
     let simulator = Simulator::new(scene, sensor, air, engine_options(&args.engine)?)
         .map_err(|error| Failure::input(error, "see `sonard trace --help`"))?;
-    let firing = Firing::new(args, &simulator, pose);
+    let firing = Firing::new(args, &simulator, pose)
+        .map_err(|error| Failure::input(error, "see `sonard trace --help`"))?;
     if args.json {
         let printed = serde_json::to_writer(std::io::stdout().lock(), &firing.object())
             .map_err(std::io::Error::from)
@@ -141,22 +142,24 @@ struct Firing<'a> {
 }
 
 impl<'a> Firing<'a> {
-    fn new(args: &'a Args, simulator: &'a Simulator, pose: Pose) -> Self {
+    fn new(args: &'a Args, simulator: &'a Simulator, pose: Pose) -> Result<Self, TooCostly> {
         let direction_rad = pose.direction_rad(args.azimuth_deg);
         let station = simulator.at(pose.position());
         let whole = || {
             let longest_m = simulator.receiver().max_range_m;
-            let trace = station.trace(direction_rad, longest_m, args.step_us);
-            interesting_m(simulator, &trace)
+            let trace = station.trace(direction_rad, longest_m, args.step_us)?;
+            Ok(interesting_m(simulator, &trace))
         };
-        let trace = station.trace(direction_rad, args.until.unwrap_or_else(whole), args.step_us);
+        let until_m = args.until.map_or_else(whole, Ok)?;
+        let trace = station.trace(direction_rad, until_m, args.step_us)?;
         let record = |sound| {
-            let arrival = ObservationPoint::arrival(&station, direction_rad, sound);
-            PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m)
+            let arrival = ObservationPoint::arrival(&station, direction_rad, sound)?;
+            Ok(PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m))
         };
-        let paths = trace.peaks.iter().map(|hump| record(&hump.arrival)).collect();
-        let path = trace.detection.arrival.as_ref().map(record);
-        Self {
+        let paths =
+            trace.peaks.iter().map(|hump| record(&hump.arrival)).collect::<Result<_, _>>()?;
+        let path = trace.detection.arrival.as_ref().map(record).transpose()?;
+        Ok(Self {
             simulator,
             pose,
             pose_text: &args.place.pose,
@@ -164,7 +167,7 @@ impl<'a> Firing<'a> {
             trace,
             paths,
             path,
-        }
+        })
     }
 
     fn humps(&self) -> impl Iterator<Item = (&EnvelopePeak, &PathRecord)> {

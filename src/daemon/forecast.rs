@@ -9,7 +9,7 @@ use super::settings::Settings;
 use crate::{
     acoustics::Air,
     geometry::Pose,
-    model::Simulator,
+    model::{Simulator, TooCostly},
     ranger::{Listening, ScanJob, device_record, provenance},
     scan::{ModelRecord, ScanAir, ScanPlan, Session, SimRecord},
 };
@@ -17,8 +17,16 @@ use crate::{
 /// What predictions depend on, besides scene and sensor.
 pub(super) type Place = (Pose, ScanPlan, Air);
 
-/// For each stop what the model says, and which model that was.
-pub(super) type Predicted = (Vec<SimRecord>, Option<ModelRecord>);
+/// What the model says.
+#[derive(Debug, Default)]
+pub(super) struct Predicted {
+    /// For each stop.
+    predictions: Vec<SimRecord>,
+    /// Which model that was.
+    model: Option<ModelRecord>,
+    /// Why it says nothing although it was asked.
+    pub(super) refusal: Option<TooCostly>,
+}
 
 /// The predictions made last, kept for as long as nothing they depend on changes.
 #[derive(Debug, Default)]
@@ -40,7 +48,8 @@ impl Forecast {
     }
 
     /// Takes predictions in.
-    pub(super) fn learn(&mut self, what: Place, (predictions, model): Predicted) {
+    pub(super) fn learn(&mut self, what: Place, predicted: Predicted) {
+        let Predicted { predictions, model, .. } = predicted;
         *self = Self { made_for: Some(what), predictions, model };
     }
 
@@ -86,10 +95,11 @@ pub(super) fn listening(settings: &Settings, air: &Air) -> Listening {
     }
 }
 
-/// Asks the model, beside everything else: it may take its time. Nothing without a scene.
+/// Asks the model, beside everything else: it may take its time. Nothing without a scene, and where there are
+/// too many paths.
 ///
 /// # Errors
-/// When the model refuses, in words.
+/// When the model refuses sensor or options, in words.
 pub(super) fn predict(
     settings: &Settings,
     (pose, plan, air): Place,
@@ -97,16 +107,22 @@ pub(super) fn predict(
     let (scene, sensor) = (settings.scene.clone(), settings.sensor.clone());
     let options = settings.options();
     async move {
-        let Some(scene) = scene else { return Ok((Vec::new(), None)) };
+        let Some(scene) = scene else { return Ok(Predicted::default()) };
         let predicting = tokio::task::spawn_blocking(move || {
             let scene = Arc::new(scene.with_robot_at(&pose));
             let simulator =
                 Simulator::new(scene, sensor, air, options).map_err(|error| error.to_string())?;
             // All firings at a stop have the same prediction.
             let stops = ScanPlan { pings_per_stop: 1, ..plan };
-            let predictions = simulator.predict(&pose, &stops);
-            let records = predictions.iter().map(|one| SimRecord::of(&simulator, one)).collect();
-            Ok((records, Some(ModelRecord::from(simulator.options()))))
+            let told = match simulator.predict(&pose, &stops) {
+                Ok(told) => told,
+                Err(error) => {
+                    return Ok(Predicted { refusal: Some(error), ..Predicted::default() });
+                }
+            };
+            let predictions = told.iter().map(|one| SimRecord::of(&simulator, one)).collect();
+            let model = Some(ModelRecord::from(simulator.options()));
+            Ok(Predicted { predictions, model, refusal: None })
         });
         predicting.await.map_err(|error| format!("the model failed: {error}"))?
     }

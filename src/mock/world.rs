@@ -9,7 +9,7 @@ use smallvec::SmallVec;
 use crate::{
     acoustics::TofNoise,
     geometry::Pose,
-    model::{Prediction, Simulator},
+    model::{Prediction, Simulator, TooCostly},
     scan::{PingStatus, ScanPlan},
 };
 
@@ -31,19 +31,22 @@ impl Soundings {
     /// Asks the model for every step of a revolution.
     ///
     /// `mounting_offset_deg`: how far the transducer is turned on the motor's shaft.
-    #[must_use]
+    ///
+    /// # Errors
+    /// When there are more paths than the model can find.
     pub fn of(
         simulator: &Simulator,
         pose: &Pose,
         steps_per_revolution: u16,
         mounting_offset_deg: f64,
-    ) -> Self {
+    ) -> Result<Self, TooCostly> {
         let mounted = Pose { heading_deg: pose.heading_deg + mounting_offset_deg, ..*pose };
         let turn =
             ScanPlan { step_deg: 360.0 / f64::from(steps_per_revolution), ..ScanPlan::default() };
         let station = simulator.at(mounted.position());
         let ping = |stop| station.ping_rearmed(mounted.direction_rad(turn.azimuth_deg(stop)));
-        Self::from_predictions(&(0..turn.stops()).map(ping).collect::<Vec<_>>())
+        let predictions = (0..turn.stops()).map(ping).collect::<Result<Vec<_>, _>>()?;
+        Ok(Self::from_predictions(&predictions))
     }
 
     /// One prediction for each step of a revolution, from azimuth 0 on.

@@ -89,6 +89,7 @@ impl PreparedScan {
         let stops = ScanPlan { pings_per_stop: 1, ..plan };
         let predictions = simulator
             .predict(&pose, &stops)
+            .map_err(ModelError::from)?
             .iter()
             .map(|prediction| SimRecord::of(&simulator, prediction))
             .collect();

@@ -61,7 +61,7 @@ fn scan(scene: &Scene, pose: &Pose) -> Result<usize, Box<dyn Error>> {
     let sensor = Sensor::preset("senscomp-6500")?;
     let simulator =
         Simulator::new(Arc::new(scene.clone()), sensor, Air::default(), Options::default())?;
-    let predictions = simulator.predict(pose, &ScanPlan::default());
+    let predictions = simulator.predict(pose, &ScanPlan::default())?;
     Ok(predictions.iter().filter(|prediction| prediction.range_m.is_some()).count())
 }
 

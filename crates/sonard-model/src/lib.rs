@@ -16,7 +16,7 @@
 //! let sensor = Sensor::preset("senscomp-6500")?;
 //! let simulator = Simulator::new(room.into(), sensor, Air::default(), Options::default())?;
 //! let pose = Pose { x_m: 1.0, y_m: 1.0, heading_deg: 0.0 };
-//! let readings = simulator.predict(&pose, &ScanPlan::default());
+//! let readings = simulator.predict(&pose, &ScanPlan::default())?;
 //! // Straight ahead the wall is 3 m away; a weak echo passes the threshold a little late.
 //! let range_m = readings[0].range_m.ok_or("silent")?;
 //! assert!((3.0..3.005).contains(&range_m));

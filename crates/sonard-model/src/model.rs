@@ -6,6 +6,7 @@
 mod array;
 mod batch;
 mod cone;
+mod cost;
 mod engine;
 mod fan;
 mod lazy;
@@ -22,6 +23,7 @@ mod tests;
 
 pub use array::{ArrayAtPose, ArrayModel};
 pub use cone::Cone;
+pub use cost::{SearchPart, TooCostly};
 pub use engine::{Arrival, Arrivals, Engine};
 pub use fan::{Fan, FanSettings};
 pub use names::FACE_NAME;

@@ -103,6 +103,7 @@ const fn kind(kind: EventKind) -> &'static str {
         EventKind::Gap => "gap",
         EventKind::Stopped => "stopped",
         EventKind::ClockStep => "clock step",
+        EventKind::NoPrediction => "no prediction",
     }
 }
 

@@ -103,7 +103,14 @@ mod tests {
         let [from, to] = [0.0, 10.0].map(|heading_deg| Pose { x_m: 1.0, y_m: 1.0, heading_deg });
         let pings = [from, to].into_iter().zip(0..).map(|(pose, index)| {
             let stand = model.at(pose).expect("a stand");
-            Record::Ping(Box::new(Ping::of_array(&stand, scan, &from, index, 1, &stand.ping(1))))
+            Record::Ping(Box::new(Ping::of_array(
+                &stand,
+                scan,
+                &from,
+                index,
+                1,
+                &stand.ping(1).expect("few paths"),
+            )))
         });
         let records = [
             Record::Session(Box::new(Session::of_array(&model, time))),

@@ -110,11 +110,11 @@ impl PathRecord {
 
     /// The arrival that is this path, among those that a firing in a world direction brings, radians: the
     /// model finds again where a path of a log of format 1 ran. `None` if it finds none of that kind and
-    /// length.
+    /// length, or there are too many paths.
     #[must_use]
     pub fn arrival(&self, point: &ObservationPoint<'_>, direction_rad: f64) -> Option<Arrival> {
         let off_m = |arrival: &Arrival| (arrival.length_m - self.length_m).abs();
-        let mut arrivals = point.arrivals(direction_rad);
+        let mut arrivals = point.arrivals(direction_rad).ok()?;
         arrivals
             .retain(|arrival| arrival.path.kind() == self.kind && off_m(arrival) < SAME_LENGTH_M);
         arrivals.into_iter().min_by(|one, other| off_m(one).total_cmp(&off_m(other)))

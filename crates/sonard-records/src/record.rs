@@ -429,4 +429,6 @@ pub enum EventKind {
     Stopped,
     /// The computer's wall clock was set.
     ClockStep,
+    /// The model could not say what would be heard; the readings that follow have no predictions.
+    NoPrediction,
 }

@@ -6,7 +6,7 @@ use uuid::Uuid;
 use super::{Ping, Provenance, ScanEnd, ScanPlan, ScanStart, ScanView, Session, SimRecord};
 use sonard_model::{
     geometry::Pose,
-    model::{Prediction, Simulator},
+    model::{Prediction, Simulator, TooCostly},
 };
 
 /// Motor steps a revolution that `step` counts in.
@@ -15,28 +15,31 @@ const STEPS_PER_REVOLUTION: f64 = 400.0;
 impl ScanView {
     /// What the model reads at a pose, as a whole scan with its session; `time` is what all of it
     /// is stamped with.
-    #[must_use]
+    ///
+    /// # Errors
+    /// When there are more paths than the model can find.
     pub fn simulated(
         simulator: &Simulator,
         scan: Uuid,
         pose: &Pose,
         plan: &ScanPlan,
         time: Timestamp,
-    ) -> Self {
+    ) -> Result<Self, TooCostly> {
         let point = simulator.at(pose.position());
-        let pings = (0..plan.beams()).map(|index| {
+        let ping = |index| {
             let azimuth_deg = plan.azimuth_deg(index / plan.pings_per_stop.max(1));
-            let prediction = point.ping(pose.direction_rad(azimuth_deg));
-            Ping::simulated(simulator, scan, index, azimuth_deg, &prediction)
-        });
-        Self {
+            let prediction = point.ping(pose.direction_rad(azimuth_deg))?;
+            Ok(Ping::simulated(simulator, scan, index, azimuth_deg, &prediction))
+        };
+        let pings = (0..plan.beams()).map(ping).collect::<Result<_, TooCostly>>()?;
+        Ok(Self {
             scan,
             session: Some(std::sync::Arc::new(Session::simulated(simulator, time))),
             start: Some(ScanStart::new(scan, time, *pose, *plan)),
-            pings: pings.collect(),
+            pings,
             events: Vec::new(),
             end: Some(ScanEnd::simulated(simulator, scan, plan.beams(), time)),
-        }
+        })
     }
 }
 

@@ -24,7 +24,8 @@ fn world() -> World {
         Air::default(),
         Options::default(),
     );
-    let soundings = Soundings::of(&simulator.expect("a model"), &pose, 400, 0.0);
+    let soundings =
+        Soundings::of(&simulator.expect("a model"), &pose, 400, 0.0).expect("few paths");
     World::new(soundings, TofNoise::NONE, 0.0, 1)
 }
 

@@ -211,6 +211,7 @@ fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
     let simulator =
         Simulator::new(Arc::new(scene), sensor, air, options).map_err(|error| refuse(&error))?;
     let course_taken = Course::through(&simulator, start, &settings, &mut rng)
+        .map_err(|error| refuse(&error))?
         .ok_or_else(|| refuse(&format!("{name}: there is no room for the robot to move")))?;
     let trial =
         course_taken.map(&extents, silent_beyond_m, &settings).map_err(|error| refuse(&error))?;

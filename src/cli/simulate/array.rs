@@ -7,7 +7,7 @@ use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use uuid::Uuid;
 
-use super::{Args, Places, places};
+use super::{Args, Places, Stop, places};
 use crate::{
     acoustics::ReceiverNoise,
     cli::{
@@ -18,9 +18,9 @@ use crate::{
         progress, scene_file,
     },
     geometry::{Pose, wrap_360},
-    model::{ArrayAtPose, ArrayModel, ModelError},
+    model::{ArrayAtPose, ArrayModel, ModelError, Prediction, TooCostly},
     scan::{Ping, Record, ScanEnd, ScanStart, Session},
-    store::{RecordWriter, StoreError},
+    store::RecordWriter,
 };
 
 /// Several rangers instead of one that turns.
@@ -79,18 +79,6 @@ fn refuse(error: &ModelError) -> Failure {
     Failure::input(error, "see `sonard simulate --help`")
 }
 
-/// Why it ended before the last scan.
-enum Stop {
-    Model(ModelError),
-    Write(StoreError),
-}
-
-impl From<StoreError> for Stop {
-    fn from(error: StoreError) -> Self {
-        Self::Write(error)
-    }
-}
-
 struct Player<'a> {
     model: &'a ArrayModel,
     noise: Option<ReceiverNoise>,
@@ -113,7 +101,7 @@ impl Player<'_> {
             for pose in rounds {
                 let stand = self.model.at(*pose).map_err(Stop::Model)?;
                 for ranger in self.model.array().round() {
-                    let prediction = self.listen(&stand, ranger);
+                    let prediction = self.listen(&stand, ranger)?;
                     let ping = Ping::of_array(&stand, scan, first, index, ranger, &prediction);
                     out.write(&Record::Ping(Box::new(ping)))?;
                     index += 1;
@@ -127,7 +115,7 @@ impl Player<'_> {
         Ok(())
     }
 
-    fn listen(&mut self, stand: &ArrayAtPose<'_>, ranger: usize) -> crate::model::Prediction {
+    fn listen(&mut self, stand: &ArrayAtPose<'_>, ranger: usize) -> Result<Prediction, TooCostly> {
         match &self.noise {
             Some(noise) => stand.ping_in_noise(ranger, noise, &mut self.rng),
             None => stand.ping(ranger),

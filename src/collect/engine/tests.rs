@@ -113,6 +113,7 @@ fn simulated(scene: &Scene, order: &ScanOrder<'_>) -> ScanView {
     let simulator =
         Simulator::new(scene, sensor, Air::default(), Options::default()).expect("good options");
     ScanView::simulated(&simulator, Uuid::new_v4(), &order.pose, &order.plan, Timestamp::now())
+        .expect("few paths")
 }
 
 /// Nobody, who keeps what was said.

@@ -80,7 +80,13 @@ impl Operator {
                     return None;
                 }
                 Ok(Err(why)) => return self.give_up_scans(&why, asked),
-                Ok(Ok(predicted)) => self.forecast.learn(what, predicted),
+                Ok(Ok(predicted)) => {
+                    if let Some(why) = &predicted.refusal {
+                        tracing::warn!("scans are taken without predictions: {why}");
+                        self.out.event(EventKind::NoPrediction, why.to_string());
+                    }
+                    self.forecast.learn(what, predicted);
+                }
             }
         }
         let session = self.forecast.session(&self.desk.settings, &air, identity);

@@ -103,7 +103,8 @@ impl Stage {
 
 fn ask(model: &ArrayModel, ranger: usize, pose: Pose) -> Result<Ping, String> {
     let stand = model.at(pose).map_err(|error| error.to_string())?;
-    Ok(Ping::of_array(&stand, Uuid::nil(), &pose, 0, ranger, &stand.ping(ranger)))
+    let prediction = stand.ping(ranger).map_err(|error| error.to_string())?;
+    Ok(Ping::of_array(&stand, Uuid::nil(), &pose, 0, ranger, &prediction))
 }
 
 /// Where the robot is: along the configured course until that ends or somebody puts it elsewhere.

@@ -6,7 +6,7 @@ use crate::{
     acoustics::{Air, EnvelopePeak},
     api::{Beam, Echo, HumpLine, JudgedPing, point},
     geometry::Pose,
-    model::{ObservationPoint, Options, Simulator},
+    model::{ObservationPoint, Options, Simulator, TooCostly},
     scan::{PathRecord, Ping, ScanView, Session},
     scene::Scene,
 };
@@ -77,7 +77,7 @@ fn ask_model(
     let options = Options { max_range_m: Some(until_m), ..options };
     let simulator = Simulator::new(Arc::clone(&scene), sensor, air, options)
         .map_err(|error| error.to_string())?;
-    Ok(humps(&simulator, &axis, until_m))
+    humps(&simulator, &axis, until_m).map_err(|error| error.to_string())
 }
 
 /// The session's air, at the temperature that was known when the scan began.
@@ -90,11 +90,11 @@ fn air(view: &ScanView, session: &Session) -> Result<Air, crate::acoustics::AirE
     }
 }
 
-fn humps(simulator: &Simulator, axis: &Pose, until_m: f64) -> Vec<HumpLine> {
+fn humps(simulator: &Simulator, axis: &Pose, until_m: f64) -> Result<Vec<HumpLine>, TooCostly> {
     let direction_rad = axis.direction_rad(0.0);
     let ends = simulator.sensor().mounting.viewpoint(axis).ends();
     let station = simulator.at(axis.position());
-    let trace = station.trace(direction_rad, until_m, STEP_US);
+    let trace = station.trace(direction_rad, until_m, STEP_US)?;
     let receiver = simulator.receiver();
     let over = |hump: &EnvelopePeak| hump.peak.0 / receiver.threshold_at(hump.tof_us);
     let mut loudest: Vec<&EnvelopePeak> =
@@ -103,16 +103,16 @@ fn humps(simulator: &Simulator, axis: &Pose, until_m: f64) -> Vec<HumpLine> {
     loudest.truncate(MOST_HUMPS);
     loudest.sort_by(|one, other| one.tof_us.total_cmp(&other.tof_us));
     let line = |hump: &EnvelopePeak| {
-        let arrival = ObservationPoint::arrival(&station, direction_rad, &hump.arrival);
+        let arrival = ObservationPoint::arrival(&station, direction_rad, &hump.arrival)?;
         let path = PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m);
-        HumpLine {
+        Ok(HumpLine {
             tof_us: hump.tof_us,
             range_m: arrival.length_m / 2.0,
             peak: hump.peak.0,
             margin_db: 20.0 * over(hump).log10(),
             polyline: path.polyline(ends).into_iter().flatten().map(point).collect(),
             path,
-        }
+        })
     };
     loudest.into_iter().map(line).collect()
 }

@@ -37,7 +37,8 @@ impl Rig {
         let pose = scene.pose("fig9").expect("its pose");
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
         let simulator = Simulator::new(Arc::new(scene), sensor, Air::default(), Options::default());
-        let soundings = Soundings::of(&simulator.expect("it is right"), &pose, 400, 0.0);
+        let soundings =
+            Soundings::of(&simulator.expect("it is right"), &pose, 400, 0.0).expect("few paths");
         Self {
             link: folder.join("ranger"),
             runtime: Runtime::new().expect("threads"),

@@ -4,10 +4,10 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::laser::{Laser, side_by_side};
-use crate::interpret::{Beam, Sweep, lines::LaserScan, trial::hear};
+use crate::interpret::{Beam, Heard, Sweep, lines::LaserScan, trial::hear};
 use sonard_model::{
     geometry::{DVec2, Pose, wrap_360, wrap_pi},
-    model::{Simulator, raycast::Reflectors},
+    model::{Simulator, TooCostly, raycast::Reflectors},
 };
 
 /// What an exploration can do and know: no more than this.
@@ -91,6 +91,7 @@ pub struct SimulatedRobot<'a, R> {
     rng: R,
     truth: Pose,
     believed: Pose,
+    refusal: Option<TooCostly>,
 }
 
 /// How far a robot that ran into something backs off, metres.
@@ -101,7 +102,14 @@ impl<'a, R: Rng> SimulatedRobot<'a, R> {
     #[must_use]
     pub fn new(simulator: &'a Simulator, pose: Pose, settings: RobotSettings, rng: R) -> Self {
         let room = Reflectors::new(simulator.scene());
-        Self { simulator, room, settings, rng, truth: pose, believed: pose }
+        Self { simulator, room, settings, rng, truth: pose, believed: pose, refusal: None }
+    }
+
+    /// Why the model could not say what its sonars heard, if that was so anywhere; they were silent there, and
+    /// an exploration with that is worth nothing.
+    #[must_use]
+    pub const fn refusal(&self) -> Option<&TooCostly> {
+        self.refusal.as_ref()
     }
 
     /// Where it really is.
@@ -161,8 +169,13 @@ impl<R: Rng> Robot for SimulatedRobot<'_, R> {
         let (azimuths_deg, step_deg) = self.settings.ranger.azimuths_deg();
         let beams = azimuths_deg.zip(0..).map(|(azimuth_deg, index)| {
             let sigma_m = self.settings.range_sigma_m;
-            let heard = point.ping(self.truth.direction_rad(azimuth_deg));
-            let heard = hear(&heard, sigma_m, &mut self.rng);
+            let heard = match point.ping(self.truth.direction_rad(azimuth_deg)) {
+                Ok(heard) => hear(&heard, sigma_m, &mut self.rng),
+                Err(refusal) => {
+                    self.refusal = Some(refusal);
+                    Heard::Silent
+                }
+            };
             Beam { azimuth_deg, index, heard, mount: DVec2::ZERO }
         });
         Sweep { beams: beams.collect(), pose: self.believed, step_deg, closed: true }

@@ -14,7 +14,7 @@ use rand_pcg::Pcg64;
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
-    model::{Options, Simulator},
+    model::{Options, Simulator, TooCostly},
     scene::Scene,
 };
 use sonard_records::{PathKind, Ping, PingStatus, ScanPlan, ScanView};
@@ -120,7 +120,7 @@ impl Reliability {
 
 /// Interprets one made-up room, number `number` of those of a seed, as `sensor` reads it from one place
 /// and, where a next one is proposed within the room, from that as well. Arcs by which nothing can be
-/// told (covered, cut off, too near) are left out.
+/// told (covered, cut off, too near) are left out, and so are rooms with more paths than the model can find.
 ///
 /// # Panics
 /// Never: with a sensor whose data make no sense there is just nothing to judge.
@@ -135,11 +135,13 @@ pub fn judge_room(seed: u64, number: u64, sensor: &Sensor, settings: &Settings) 
     let Ok(simulator) = Simulator::new(Arc::new(scene), sensor, air, Options::default()) else {
         return Vec::new();
     };
-    let mut scans = vec![take(&simulator, place, 1, &mut rng)];
+    let Ok(scan) = take(&simulator, place, 1, &mut rng) else { return Vec::new() };
+    let mut scans = vec![scan];
     let mut found = features(&scans, &extents, settings);
     let next = found.iter().find_map(|feature| feature.next).map(|n| DVec2::new(n.x_m, n.y_m));
     if let Some(next) = next.filter(|next| is_way(simulator.scene(), place, *next)) {
-        scans.push(take(&simulator, next, 2, &mut rng));
+        let Ok(scan) = take(&simulator, next, 2, &mut rng) else { return Vec::new() };
+        scans.push(scan);
         found = features(&scans, &extents, settings);
     }
     let truth = |feature: &Feature| {
@@ -174,15 +176,20 @@ fn is_way(scene: &Scene, from: DVec2, to: DVec2) -> bool {
     scene.clearance_m(to) >= CLEARANCE_M && !scene.walls.iter().any(|wall| crosses(wall.a, wall.b))
 }
 
-fn take(simulator: &Simulator, at: DVec2, number: u128, rng: &mut impl Rng) -> ScanView {
+fn take(
+    simulator: &Simulator,
+    at: DVec2,
+    number: u128,
+    rng: &mut impl Rng,
+) -> Result<ScanView, TooCostly> {
     let pose = Pose { x_m: at.x, y_m: at.y, heading_deg: rng.random_range(0.0..360.0) };
     let (id, plan) = (Uuid::from_u128(number), ScanPlan::default());
-    let mut scan = ScanView::simulated(simulator, id, &pose, &plan, Timestamp::UNIX_EPOCH);
+    let mut scan = ScanView::simulated(simulator, id, &pose, &plan, Timestamp::UNIX_EPOCH)?;
     for ping in &mut scan.pings {
         let unit: f64 = StandardNormal.sample(rng);
         ping.range_m = ping.range_m.map(|range_m| range_m + RANGE_SIGMA_M * unit);
     }
-    scan
+    Ok(scan)
 }
 
 fn features(scans: &[ScanView], extents: &Extents, settings: &Settings) -> Vec<Feature> {

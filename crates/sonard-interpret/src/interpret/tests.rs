@@ -35,7 +35,7 @@ fn simulator(scene: Arc<Scene>) -> Simulator {
 
 fn scan(simulator: &Simulator, number: u128, pose: &Pose) -> ScanView {
     let (id, plan) = (Uuid::from_u128(number), ScanPlan::default());
-    ScanView::simulated(simulator, id, pose, &plan, Timestamp::UNIX_EPOCH)
+    ScanView::simulated(simulator, id, pose, &plan, Timestamp::UNIX_EPOCH).expect("few paths")
 }
 
 fn features(scans: &[ScanView], settings: &Settings) -> Vec<Feature> {

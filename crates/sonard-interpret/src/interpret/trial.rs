@@ -22,7 +22,7 @@ use super::{
 use sonard_model::{
     array::RangerArray,
     geometry::{DVec2, Pose},
-    model::{Prediction, Simulator},
+    model::{Prediction, Simulator, TooCostly},
     scene::Scene,
 };
 use sonard_records::PingStatus;
@@ -79,22 +79,20 @@ pub struct Trial {
 
 impl Course {
     /// Sends a robot through a scene from a place in it; `None` if it can't move there.
+    ///
+    /// # Errors
+    /// When there are more paths than the model can find.
     pub fn through(
         simulator: &Simulator,
         start: DVec2,
         settings: &TrialSettings,
         rng: &mut impl Rng,
-    ) -> Option<Self> {
-        let scene = simulator.scene();
-        let margin = DVec2::splat(0.5);
-        let ends = || scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
-        let (low, high) =
-            (ends().reduce(DVec2::min)? - margin, ends().reduce(DVec2::max)? + margin);
-        let shape = GridShape::covering(low, high, settings.resolution_m).ok()?;
-        let ideal = ideal(scene, shape, &[start]);
-        let poses = wander(scene, &ideal, start, settings, rng)?;
-        let sweeps = poses.iter().map(|pose| read(simulator, pose, settings, rng)).collect();
-        Some(Self { ideal, sweeps })
+    ) -> Result<Option<Self>, TooCostly> {
+        let Some((ideal, poses)) = way(simulator.scene(), start, settings, rng) else {
+            return Ok(None);
+        };
+        let sweeps = poses.iter().map(|pose| read(simulator, pose, settings, rng));
+        Ok(Some(Self { sweeps: sweeps.collect::<Result<_, _>>()?, ideal }))
     }
 
     /// Maps the course with both ways and scores the maps.
@@ -133,6 +131,22 @@ impl Course {
     }
 }
 
+/// The map of a scene as it should be, and poses on a way through it.
+fn way(
+    scene: &Scene,
+    start: DVec2,
+    settings: &TrialSettings,
+    rng: &mut impl Rng,
+) -> Option<(Grid, Vec<Pose>)> {
+    let margin = DVec2::splat(0.5);
+    let ends = || scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
+    let (low, high) = (ends().reduce(DVec2::min)? - margin, ends().reduce(DVec2::max)? + margin);
+    let shape = GridShape::covering(low, high, settings.resolution_m).ok()?;
+    let ideal = ideal(scene, shape, &[start]);
+    let poses = wander(scene, &ideal, start, settings, rng)?;
+    Some((ideal, poses))
+}
+
 /// A way through free space that keeps clear of walls, turning where it can't go on.
 fn wander(
     scene: &Scene,
@@ -169,7 +183,12 @@ fn wander(
 }
 
 /// A set of readings at a pose.
-fn read(simulator: &Simulator, pose: &Pose, settings: &TrialSettings, rng: &mut impl Rng) -> Sweep {
+fn read(
+    simulator: &Simulator,
+    pose: &Pose,
+    settings: &TrialSettings,
+    rng: &mut impl Rng,
+) -> Result<Sweep, TooCostly> {
     let mut heard = |prediction: &Prediction| hear(prediction, settings.range_sigma_m, rng);
     let (mut beams, step_deg): (Vec<Beam>, f64) = match &settings.arrangement {
         Arrangement::Ring(array) => {
@@ -179,24 +198,25 @@ fn read(simulator: &Simulator, pose: &Pose, settings: &TrialSettings, rng: &mut 
                     (ranger.azimuth_deg(), DVec2::new(ranger.x_m, ranger.y_m));
                 let mounted = ranger.pose_on(pose);
                 let point = simulator.at(mounted.position());
-                let heard = heard(&point.ping(mounted.direction_rad(0.0)));
-                Beam { azimuth_deg, index, heard, mount }
+                let heard = heard(&point.ping(mounted.direction_rad(0.0))?);
+                Ok(Beam { azimuth_deg, index, heard, mount })
             };
-            ((0..).zip(array.round()).map(beam).collect(), RING_STEP_DEG)
+            let beams = (0..).zip(array.round()).map(beam);
+            (beams.collect::<Result<_, TooCostly>>()?, RING_STEP_DEG)
         }
         Arrangement::Stepper => {
             let point = simulator.at(pose.position());
             let beam = |index: u32| {
                 let azimuth_deg = 0.9 * f64::from(index);
-                let heard = heard(&point.ping(pose.direction_rad(azimuth_deg)));
-                Beam { azimuth_deg, index, heard, mount: DVec2::ZERO }
+                let heard = heard(&point.ping(pose.direction_rad(azimuth_deg))?);
+                Ok(Beam { azimuth_deg, index, heard, mount: DVec2::ZERO })
             };
-            ((0..400).map(beam).collect(), 0.9)
+            ((0..400).map(beam).collect::<Result<_, TooCostly>>()?, 0.9)
         }
     };
     beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
     let closed = settings.arrangement == Arrangement::Stepper;
-    Sweep { pose: *pose, step_deg, beams, closed }
+    Ok(Sweep { pose: *pose, step_deg, beams, closed })
 }
 
 /// Rangers of a ring are so far apart that each counts by itself, degrees.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rand::Rng;
 
-use super::{ModelError, Options, Prediction, Simulator};
+use super::{ModelError, Options, Prediction, Simulator, TooCostly};
 use crate::{
     acoustics::{Air, ReceiverNoise, Sensor},
     array::RangerArray,
@@ -120,20 +120,24 @@ impl ArrayAtPose<'_> {
     }
 
     /// The reading of a ranger, by its index in the array.
-    #[must_use]
-    pub fn ping(&self, ranger: usize) -> Prediction {
+    ///
+    /// # Errors
+    /// When there are more paths than can be found within bounds of work and memory.
+    pub fn ping(&self, ranger: usize) -> Result<Prediction, TooCostly> {
         let (simulator, pose) = self.mounted(ranger);
         simulator.at(pose.position()).ping(pose.direction_rad(0.0))
     }
 
     /// The same in noise: the same generator in the same state gives the same reading.
-    #[must_use]
+    ///
+    /// # Errors
+    /// As [`Self::ping`].
     pub fn ping_in_noise(
         &self,
         ranger: usize,
         noise: &ReceiverNoise,
         rng: &mut impl Rng,
-    ) -> Prediction {
+    ) -> Result<Prediction, TooCostly> {
         let (simulator, pose) = self.mounted(ranger);
         simulator.at(pose.position()).ping_in_noise(pose.direction_rad(0.0), noise, rng)
     }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Prediction, Simulator};
+use super::{Prediction, Simulator, TooCostly};
 use crate::{geometry::Pose, plan::ScanPlan};
 
 impl Simulator {
@@ -11,8 +11,14 @@ impl Simulator {
     ///
     /// The scene is the same for all poses: a robot's body has to stand in it already, so for poses
     /// of a robot make a simulator each.
-    #[must_use]
-    pub fn predict_many(&self, poses: &[Pose], plan: &ScanPlan) -> Vec<Vec<Prediction>> {
+    ///
+    /// # Errors
+    /// When there are more paths than can be found within bounds of work and memory, at any pose.
+    pub fn predict_many(
+        &self,
+        poses: &[Pose],
+        plan: &ScanPlan,
+    ) -> Result<Vec<Vec<Prediction>>, TooCostly> {
         poses.par_iter().map(|pose| self.predict(pose, plan)).collect()
     }
 }
@@ -42,9 +48,10 @@ mod tests {
         };
         let poses: Vec<Pose> = (0..20).map(pose).collect();
         let plan = ScanPlan { step_deg: 9.0, ..ScanPlan::default() };
-        let together = simulator.predict_many(&poses, &plan);
-        let alone: Vec<_> = poses.iter().map(|pose| simulator.predict(pose, &plan)).collect();
-        assert_eq!(together, alone);
+        let together = simulator.predict_many(&poses, &plan).expect("few paths");
+        let alone: Result<Vec<_>, _> =
+            poses.iter().map(|pose| simulator.predict(pose, &plan)).collect();
+        assert_eq!(Ok(together), alone);
     }
 
     #[test]

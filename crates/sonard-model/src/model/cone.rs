@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Arrival, Arrivals, Engine, Interaction, Mechanism, Path, raycast::Reflectors};
+use super::{
+    Arrival, Arrivals, Engine, Interaction, Mechanism, Path, TooCostly, raycast::Reflectors,
+};
 use crate::{
     acoustics::PulseArrival,
     geometry::{DVec2, wrap_pi},
@@ -37,8 +39,8 @@ impl Cone {
 }
 
 impl Engine for Cone {
-    fn arrivals_at<'a>(&'a self, position: DVec2) -> Box<dyn Arrivals + 'a> {
-        Box::new(ConeArrivals { cone: self, position })
+    fn arrivals_at<'a>(&'a self, position: DVec2) -> Result<Box<dyn Arrivals + 'a>, TooCostly> {
+        Ok(Box::new(ConeArrivals { cone: self, position }))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Engines, which find the echoes that arrive at the transducer's face.
 
-use super::path::Path;
+use super::{cost::TooCostly, path::Path};
 use crate::{
     acoustics::{Image, Incidence, Incident, PulseArrival},
     geometry::{DVec2, wrap_pi},
@@ -32,26 +32,35 @@ pub struct Arrival {
 pub trait Engine: Send + Sync {
     /// The arrivals at an observation point (world, metres), for a transducer that sends and receives
     /// there.
-    fn arrivals_at<'a>(&'a self, position: DVec2) -> Box<dyn Arrivals + 'a>;
+    ///
+    /// # Errors
+    /// When there are more paths than can be found within bounds of work and memory.
+    fn arrivals_at<'a>(&'a self, position: DVec2) -> Result<Box<dyn Arrivals + 'a>, TooCostly>;
 
     /// The same for a transmitter and a receiver apart; engines that know one point only take
     /// the middle.
+    ///
+    /// # Errors
+    /// As [`Self::arrivals_at`].
     fn arrivals_between<'a>(
         &'a self,
         transmitter: DVec2,
         receiver: DVec2,
-    ) -> Box<dyn Arrivals + 'a> {
+    ) -> Result<Box<dyn Arrivals + 'a>, TooCostly> {
         self.arrivals_at(0.5 * (transmitter + receiver))
     }
 
     /// The same of paths up to a length there and back alone, in metres, between transmitter and
     /// receiver; `None` from engines that would gain nothing by it.
+    ///
+    /// # Errors
+    /// As [`Self::arrivals_at`].
     fn arrivals_within<'a>(
         &'a self,
         _ends: [DVec2; 2],
         _max_path_m: f64,
-    ) -> Option<Box<dyn Arrivals + 'a>> {
-        None
+    ) -> Result<Option<Box<dyn Arrivals + 'a>>, TooCostly> {
+        Ok(None)
     }
 }
 

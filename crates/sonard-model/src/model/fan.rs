@@ -35,7 +35,7 @@ use std::{
 use arrivals::FanArrivals;
 use ray::Ray;
 
-use super::{Arrival, Arrivals, Edge, Engine, Reflector, raycast::Reflectors};
+use super::{Arrival, Arrivals, Edge, Engine, Reflector, TooCostly, raycast::Reflectors};
 use crate::{acoustics::BeamPattern, geometry::DVec2, scene::Scene};
 
 /// The ray model.
@@ -193,8 +193,8 @@ impl Fan {
 }
 
 impl Engine for Fan {
-    fn arrivals_at<'a>(&'a self, position: DVec2) -> Box<dyn Arrivals + 'a> {
-        Box::new(FanArrivals::trace(self, position))
+    fn arrivals_at<'a>(&'a self, position: DVec2) -> Result<Box<dyn Arrivals + 'a>, TooCostly> {
+        Ok(Box::new(FanArrivals::trace(self, position)))
     }
 }
 

@@ -9,12 +9,18 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
-use super::engine::{Arrivals, Engine};
+use super::{
+    cost::TooCostly,
+    engine::{Arrivals, Engine},
+};
 use crate::geometry::DVec2;
 
 /// Reach of all steps but the last, beside the longest path. What is found in one step is
 /// found again in the next, at about a quarter of its work.
 const REACHES: [f64; 3] = [0.125, 0.25, 0.5];
+
+/// What a search came to.
+type Found<'a> = Box<dyn Arrivals + 'a>;
 
 /// Arrivals between a transmitter and a receiver, as far as they were asked for.
 pub(super) struct LazyArrivals<'a> {
@@ -23,8 +29,8 @@ pub(super) struct LazyArrivals<'a> {
     at: [DVec2; 2],
     max_path_m: f64,
     /// Found at the first call; `None` from an engine that finds all at once.
-    near: [OnceLock<Option<Box<dyn Arrivals + 'a>>>; REACHES.len()],
-    whole: OnceLock<Box<dyn Arrivals + 'a>>,
+    near: [OnceLock<Result<Option<Found<'a>>, TooCostly>>; REACHES.len()],
+    whole: OnceLock<Result<Found<'a>, TooCostly>>,
     /// Which of the steps, from near to whole, would have settled the last firing: the next one
     /// looks beside it and is likely to need the same. The answer does not depend on it.
     enough: AtomicUsize,
@@ -37,7 +43,7 @@ impl<'a> LazyArrivals<'a> {
     }
 
     /// All arrivals.
-    pub(super) fn whole(&self) -> &(dyn Arrivals + 'a) {
+    pub(super) fn whole(&self) -> Result<&(dyn Arrivals + 'a), TooCostly> {
         let [transmitter, receiver] = self.at;
         let find = || {
             if transmitter == receiver {
@@ -46,7 +52,10 @@ impl<'a> LazyArrivals<'a> {
                 self.engine.arrivals_between(transmitter, receiver)
             }
         };
-        self.whole.get_or_init(find).as_ref()
+        match self.whole.get_or_init(find) {
+            Ok(arrivals) => Ok(arrivals.as_ref()),
+            Err(error) => Err(error.clone()),
+        }
     }
 
     /// The result of `listen` for the shortest echoes that settle it, and these. It is told up to
@@ -55,7 +64,7 @@ impl<'a> LazyArrivals<'a> {
     pub(super) fn nearest<T>(
         &self,
         mut listen: impl FnMut(&(dyn Arrivals + 'a), f64) -> (T, Option<f64>),
-    ) -> (T, &(dyn Arrivals + 'a)) {
+    ) -> Result<(T, &(dyn Arrivals + 'a)), TooCostly> {
         let settled = |needed_m: f64| {
             let enough = REACHES.iter().position(|reach| reach * self.max_path_m > needed_m);
             self.enough.store(enough.unwrap_or(REACHES.len()), Ordering::Relaxed);
@@ -64,15 +73,16 @@ impl<'a> LazyArrivals<'a> {
         for (near, reach) in self.near.iter().zip(REACHES).skip(begin) {
             let reach_m = reach * self.max_path_m;
             let arrivals = near.get_or_init(|| self.engine.arrivals_within(self.at, reach_m));
-            let Some(arrivals) = arrivals else { break };
+            let Some(arrivals) = arrivals.as_ref().map_err(TooCostly::clone)? else { break };
             let (heard, needed_m) = listen(arrivals.as_ref(), reach_m);
             if let Some(needed_m) = needed_m {
                 settled(needed_m);
-                return (heard, arrivals.as_ref());
+                return Ok((heard, arrivals.as_ref()));
             }
         }
-        let (heard, needed_m) = listen(self.whole(), f64::INFINITY);
+        let whole = self.whole()?;
+        let (heard, needed_m) = listen(whole, f64::INFINITY);
         settled(needed_m.unwrap_or(f64::INFINITY));
-        (heard, self.whole())
+        Ok((heard, whole))
     }
 }

@@ -3,6 +3,7 @@
 use rand::Rng;
 
 use super::{
+    cost::TooCostly,
     engine::{Arrival, Arrivals},
     lazy::LazyArrivals,
     prediction::Prediction,
@@ -34,18 +35,22 @@ impl<'a> ObservationPoint<'a> {
 
     /// The reading of a firing in a world direction, radians counter-clockwise from +x: the first
     /// echo, which latches ECHO.
-    #[must_use]
-    pub fn ping(&self, direction_rad: f64) -> Prediction {
+    ///
+    /// # Errors
+    /// When there are more paths than can be found within bounds of work and memory, here and in all that follows.
+    pub fn ping(&self, direction_rad: f64) -> Result<Prediction, TooCostly> {
         self.listen(direction_rad, Latch::First)
     }
 
     /// The same with the receiver made ready again after each echo, up to eight times.
-    #[must_use]
-    pub fn ping_rearmed(&self, direction_rad: f64) -> Prediction {
+    ///
+    /// # Errors
+    /// As [`Self::ping`].
+    pub fn ping_rearmed(&self, direction_rad: f64) -> Result<Prediction, TooCostly> {
         self.listen(direction_rad, Latch::Rearmed)
     }
 
-    fn listen(&self, direction_rad: f64, latch: Latch) -> Prediction {
+    fn listen(&self, direction_rad: f64, latch: Latch) -> Result<Prediction, TooCostly> {
         let receiver = self.simulator.receiver();
         let mut arrivals = Vec::with_capacity(USUAL_ARRIVALS);
         self.at(direction_rad, |all| {
@@ -56,14 +61,18 @@ impl<'a> ObservationPoint<'a> {
                 let incident: &dyn Fn(&PulseArrival) -> Option<Incident> =
                     if receiver.asks_incidents() { &incident } else { &|_| None };
                 receiver.detect_within(reach_m, &arrivals, incident, latch)
-            });
-            Firing { from: near, direction_rad }.prediction(detection)
+            })?;
+            Ok(Firing { from: near, direction_rad }.prediction(detection))
         })
     }
 
     /// The same by all echoes at once, however far they come from.
     #[cfg(test)]
-    pub(super) fn ping_by_all(&self, direction_rad: f64, latch: Latch) -> Prediction {
+    pub(super) fn ping_by_all(
+        &self,
+        direction_rad: f64,
+        latch: Latch,
+    ) -> Result<Prediction, TooCostly> {
         self.firing(direction_rad, |firing| {
             let incident = |arrival: &PulseArrival| Some(firing.incident(arrival));
             let receiver = self.simulator.receiver();
@@ -73,13 +82,15 @@ impl<'a> ObservationPoint<'a> {
 
     /// [`ping_rearmed`](Self::ping_rearmed) in noise: the same generator in the same state gives
     /// the same reading.
-    #[must_use]
+    ///
+    /// # Errors
+    /// As [`Self::ping`].
     pub fn ping_in_noise(
         &self,
         direction_rad: f64,
         noise: &ReceiverNoise,
         rng: &mut impl Rng,
-    ) -> Prediction {
+    ) -> Result<Prediction, TooCostly> {
         self.firing(direction_rad, |firing| {
             let incident = |arrival: &PulseArrival| Some(firing.incident(arrival));
             let receiver = self.simulator.receiver();
@@ -90,8 +101,15 @@ impl<'a> ObservationPoint<'a> {
     /// The trace of a firing as an oscilloscope would show it, up to a range in metres, in steps of so many
     /// microseconds; each [`EnvelopePeak`](crate::acoustics::EnvelopePeak) can be named with
     /// [`arrival`](Self::arrival).
-    #[must_use]
-    pub fn trace(&self, direction_rad: f64, until_m: f64, step_us: f64) -> EchoTrace {
+    ///
+    /// # Errors
+    /// As [`Self::ping`].
+    pub fn trace(
+        &self,
+        direction_rad: f64,
+        until_m: f64,
+        step_us: f64,
+    ) -> Result<EchoTrace, TooCostly> {
         self.firing(direction_rad, |firing| {
             let receiver = self.simulator.receiver();
             let until_us = 2e6 * until_m / receiver.sound_speed_m_s;
@@ -101,20 +119,32 @@ impl<'a> ObservationPoint<'a> {
     }
 
     /// Every echo of a firing in a world direction, detected or not, shortest path first.
-    #[must_use]
-    pub fn arrivals(&self, direction_rad: f64) -> Vec<Arrival> {
+    ///
+    /// # Errors
+    /// As [`Self::ping`].
+    pub fn arrivals(&self, direction_rad: f64) -> Result<Vec<Arrival>, TooCostly> {
         self.firing(direction_rad, |firing| firing.from.arrivals(direction_rad))
     }
 
     /// The full account of an arrival of a firing in the same direction.
-    #[must_use]
-    pub fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival {
+    ///
+    /// # Errors
+    /// As [`Self::ping`].
+    pub fn arrival(
+        &self,
+        direction_rad: f64,
+        arrival: &PulseArrival,
+    ) -> Result<Arrival, TooCostly> {
         self.firing(direction_rad, |firing| firing.from.arrival(direction_rad, arrival))
     }
 
     /// Fires with all echoes from where the transducer is when it looks into a direction.
-    fn firing<T>(&self, direction_rad: f64, tell: impl FnOnce(&Firing) -> T) -> T {
-        self.at(direction_rad, |all| tell(&Firing { from: all.whole(), direction_rad }))
+    fn firing<T>(
+        &self,
+        direction_rad: f64,
+        tell: impl FnOnce(&Firing) -> T,
+    ) -> Result<T, TooCostly> {
+        self.at(direction_rad, |all| Ok(tell(&Firing { from: all.whole()?, direction_rad })))
     }
 
     /// Goes where the transducer is when it looks into a direction.

@@ -92,6 +92,7 @@ mod cylinders;
 mod diffraction;
 mod direction_index;
 mod echo;
+mod effort;
 mod engine;
 mod enumerate;
 mod height;

@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use super::{
     Cone, Engine, EngineOptions, Fan, ObservationPoint, Options, PathOptions, Prediction,
+    cost::TooCostly,
     lazy::LazyArrivals,
     options::OutOfRange,
     paths::{self, PathEngine},
@@ -27,6 +28,9 @@ pub enum ModelError {
     /// The sensor's data make no sense.
     #[error("sensor: {0}")]
     Sensor(#[from] SensorError),
+    /// There are more echo paths than can be found.
+    #[error(transparent)]
+    TooCostly(#[from] TooCostly),
     /// An option out of range.
     #[error("{option} is {value}: it must be {expected}")]
     Option {
@@ -97,15 +101,17 @@ impl Simulator {
     }
 
     /// A reading for each firing of a checked plan, in the order of its indices.
-    #[must_use]
-    pub fn predict(&self, pose: &Pose, plan: &ScanPlan) -> Vec<Prediction> {
+    ///
+    /// # Errors
+    /// When there are more paths than can be found within bounds of work and memory.
+    pub fn predict(&self, pose: &Pose, plan: &ScanPlan) -> Result<Vec<Prediction>, TooCostly> {
         let point = self.at(pose.position());
-        (0..plan.stops())
-            .flat_map(|stop| {
-                let prediction = point.ping(pose.direction_rad(plan.azimuth_deg(stop)));
-                vec![prediction; plan.pings_per_stop as usize]
-            })
-            .collect()
+        let mut predictions = Vec::with_capacity(plan.beams() as usize);
+        for stop in 0..plan.stops() {
+            let prediction = point.ping(pose.direction_rad(plan.azimuth_deg(stop)))?;
+            predictions.extend(vec![prediction; plan.pings_per_stop as usize]);
+        }
+        Ok(predictions)
     }
 
     /// Speed of sound, metres a second.

@@ -58,7 +58,7 @@ fn arrivals(
     from: DVec2,
     direction_deg: f64,
 ) -> Vec<Arrival> {
-    simulator(scene, options).at(from).arrivals(direction_deg.to_radians())
+    simulator(scene, options).at(from).arrivals(direction_deg.to_radians()).expect("few paths")
 }
 
 fn of_kind(arrivals: &[Arrival], kind: PathKind) -> impl Iterator<Item = &Arrival> {

@@ -41,7 +41,8 @@ impl World {
             Simulator::new(scene, self.sensor.clone(), self.air, options).expect("a model");
         let plan = ScanPlan { step_deg: 0.9, ..ScanPlan::default() };
         let scan =
-            ScanView::simulated(&simulator, Uuid::nil(), &self.pose, &plan, Timestamp::UNIX_EPOCH);
+            ScanView::simulated(&simulator, Uuid::nil(), &self.pose, &plan, Timestamp::UNIX_EPOCH)
+                .expect("few paths");
         (scan, simulator)
     }
 }
@@ -55,7 +56,8 @@ fn compared(truth: &World, believed: &World) -> Comparison {
     let point = simulator.at(believed.pose.position());
     for ping in &mut scan.pings {
         ping.range_m = ping.range_m.map(|range_m| range_m * slower);
-        let prediction = point.ping(believed.pose.direction_rad(ping.azimuth_deg));
+        let prediction =
+            point.ping(believed.pose.direction_rad(ping.azimuth_deg)).expect("few paths");
         ping.sim = Some(SimRecord::of(&simulator, &prediction));
         (ping.path, ping.amplitude, ping.margin_db) = (None, None, None);
     }

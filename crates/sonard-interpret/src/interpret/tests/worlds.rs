@@ -217,7 +217,8 @@ fn take(
     let point = simulator.at(pose.position());
     for ping in &mut scan.pings {
         let off_deg = rng.random_range(-spoil.azimuth_deg..=spoil.azimuth_deg);
-        let prediction = point.ping(pose.direction_rad(ping.azimuth_deg + off_deg));
+        let prediction =
+            point.ping(pose.direction_rad(ping.azimuth_deg + off_deg)).expect("few paths");
         ping.status = prediction.status;
         let rounded = |m: f64| (m / spoil.range_step_m).round() * spoil.range_step_m;
         ping.range_m = prediction.range_m.map(rounded);

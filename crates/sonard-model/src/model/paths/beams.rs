@@ -13,5 +13,4 @@ mod tree;
 
 pub(crate) use beam::{Leg, Ray};
 pub(crate) use lit::{LitSpan, View};
-pub(crate) use slopes::ALL as ALL_SLOPES;
 pub(crate) use tree::Beams;

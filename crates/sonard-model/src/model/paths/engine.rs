@@ -15,7 +15,7 @@ use super::{
 use crate::{
     acoustics::{BeamPattern, Disc, Image, Incidence, Incident, PulseArrival},
     geometry::{DVec2, wrap_pi},
-    model::{Arrival, Arrivals, Engine, Interaction, Mechanism, Path, engine::mirrored},
+    model::{Arrival, Arrivals, Engine, Interaction, Mechanism, Path, TooCostly, engine::mirrored},
     reading::PathKind,
     scene::Scene,
 };
@@ -71,7 +71,7 @@ impl PathEngine {
 }
 
 impl Engine for PathEngine {
-    fn arrivals_at<'a>(&'a self, position: DVec2) -> Box<dyn Arrivals + 'a> {
+    fn arrivals_at<'a>(&'a self, position: DVec2) -> Result<Box<dyn Arrivals + 'a>, TooCostly> {
         self.arrivals_between(position, position)
     }
 
@@ -79,16 +79,17 @@ impl Engine for PathEngine {
         &'a self,
         transmitter: DVec2,
         receiver: DVec2,
-    ) -> Box<dyn Arrivals + 'a> {
-        Box::new(PathArrivals::new(self, self.paths.clone(), [transmitter, receiver]))
+    ) -> Result<Box<dyn Arrivals + 'a>, TooCostly> {
+        let arrivals = PathArrivals::new(self, self.paths.clone(), [transmitter, receiver])?;
+        Ok(Box::new(arrivals))
     }
 
     fn arrivals_within<'a>(
         &'a self,
         ends: [DVec2; 2],
         max_path_m: f64,
-    ) -> Option<Box<dyn Arrivals + 'a>> {
-        Some(Box::new(PathArrivals::new(self, self.paths.within(max_path_m), ends)))
+    ) -> Result<Option<Box<dyn Arrivals + 'a>>, TooCostly> {
+        Ok(Some(Box::new(PathArrivals::new(self, self.paths.within(max_path_m), ends)?)))
     }
 }
 
@@ -110,8 +111,12 @@ struct PathArrivals<'a> {
 }
 
 impl<'a> PathArrivals<'a> {
-    fn new(engine: &'a PathEngine, paths: Paths, [transmitter, receiver]: [DVec2; 2]) -> Self {
-        let (traced, echoes) = paths.trace(transmitter, receiver, engine.bound.as_ref());
+    fn new(
+        engine: &'a PathEngine,
+        paths: Paths,
+        [transmitter, receiver]: [DVec2; 2],
+    ) -> Result<Self, TooCostly> {
+        let (traced, echoes) = paths.trace(transmitter, receiver, engine.bound.as_ref())?;
         let settings = &paths.plan.settings;
         let mut entries: [Vec<Entry>; REACHES_DEG.len()] = Default::default();
         for (echo, index) in echoes.iter().zip(0..) {
@@ -133,7 +138,7 @@ impl<'a> PathArrivals<'a> {
             .face
             .filter(|_| faces_level)
             .map(|face| FaceEchoes::new(face, &echoes, &engine.envelope, settings));
-        Self { engine, paths, traced, echoes, indexes, face_echoes }
+        Ok(Self { engine, paths, traced, echoes, indexes, face_echoes })
     }
 
     /// Echoes by way of the face, in a direction in (-pi, pi].

@@ -1,38 +1,77 @@
 //! The echo paths of an observation point: every mechanism in its turn.
 
 use super::{
-    beams::{ALL_SLOPES, Beams},
+    beams::Beams,
     cylinders,
     diffraction::{double, level, single},
     echo::{Echo, Via, sorted},
     height::VerticalImage,
     interactions::EchoPath,
     pattern::TwoWayBound,
+    plan::ALL_SLOPES,
     prepare::Paths,
     rays::Rays,
     scattering,
     traced::Traced,
 };
-use crate::{acoustics::edge::EdgeLaw, geometry::DVec2};
+use crate::{
+    acoustics::edge::EdgeLaw,
+    geometry::DVec2,
+    model::{SearchPart, TooCostly},
+};
 
 impl Paths {
     /// All echo paths of an observation point, shortest first.
-    #[must_use]
-    pub fn enumerate(&self, position: DVec2) -> Vec<EchoPath> {
+    ///
+    /// # Errors
+    /// When there are too many.
+    pub fn enumerate(&self, position: DVec2) -> Result<Vec<EchoPath>, TooCostly> {
         self.enumerate_between(position, position)
     }
 
     /// All echo paths from a transmitter to a receiver, shortest first, without the direct path
     /// from one to the other.
-    #[must_use]
-    pub fn enumerate_between(&self, transmitter: DVec2, receiver: DVec2) -> Vec<EchoPath> {
-        let (traced, echoes) = self.trace(transmitter, receiver, None);
-        echoes.iter().map(|echo| self.path(&traced, echo)).collect()
+    ///
+    /// # Errors
+    /// When there are too many.
+    pub fn enumerate_between(
+        &self,
+        transmitter: DVec2,
+        receiver: DVec2,
+    ) -> Result<Vec<EchoPath>, TooCostly> {
+        self.each_between(transmitter, receiver, |paths| paths.collect())
+    }
+
+    /// The same one by one: each takes up its place among all in full only while it is told.
+    ///
+    /// # Errors
+    /// When there are too many.
+    pub fn each_between<T>(
+        &self,
+        transmitter: DVec2,
+        receiver: DVec2,
+        tell: impl FnOnce(&mut dyn ExactSizeIterator<Item = EchoPath>) -> T,
+    ) -> Result<T, TooCostly> {
+        let (traced, echoes) = self.trace(transmitter, receiver, None)?;
+        Ok(tell(&mut echoes.iter().map(|echo| self.path(&traced, echo))))
     }
 
     /// The same, with what their paths are found from. With `bound`, echoes by cylinders only that can be
     /// heard.
     pub(super) fn trace(
+        &self,
+        transmitter: DVec2,
+        receiver: DVec2,
+        bound: Option<&TwoWayBound>,
+    ) -> Result<(Traced, Vec<Echo>), TooCostly> {
+        let search = Self { plan: self.plan.for_search(self.bound), ..self.clone() };
+        let found = search.trace_all(transmitter, receiver, bound);
+        let settings = &self.plan.settings;
+        search.plan.effort.check(settings).and(self.edge_to_edge.effort.check(settings))?;
+        Ok(found)
+    }
+
+    pub(super) fn trace_all(
         &self,
         transmitter: DVec2,
         receiver: DVec2,
@@ -116,12 +155,17 @@ impl Paths {
         let settings = &self.plan.settings;
         let plan = echoes.len();
         for (image, index) in self.heights.images.iter().zip(1..) {
+            let before = echoes.len();
+            if !self.plan.effort.step(SearchPart::Images, plan) {
+                return;
+            }
             for at in 0..plan {
                 if traced.can_climb(&echoes[at], image) {
                     echoes.extend(image.echo(&echoes[at], index, settings));
                 }
             }
             echoes.extend(image.upright_echo(index, receiver - transmitter, settings));
+            self.plan.effort.keep::<Echo>(echoes.len() - before);
         }
         let mut number = 0;
         echoes.retain(|echo| {

@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     geometry::DVec2,
-    model::{Bend, Interaction, Mechanism, Path, Reflector},
+    model::{Bend, Interaction, Mechanism, Path, Reflector, SearchPart},
 };
 
 /// An echo path, before the beam pattern.
@@ -41,6 +41,9 @@ pub struct EchoPath {
     /// Its interactions, in order.
     pub path: Path,
 }
+
+/// Effort of asking where a path runs, in steps.
+const STEPS_A_PATH: usize = 10;
 
 /// Interactions within this length, metres, are met at once.
 const AT_ONCE_M: f64 = 1e-12;
@@ -90,6 +93,9 @@ impl Paths {
     pub(super) fn retain_clear(&self, traced: &Traced, echoes: &mut Vec<Echo>) {
         let [start, target] = traced.ends;
         let is_clear = |echo: &Echo| {
+            if !self.plan.effort.step(SearchPart::Images, STEPS_A_PATH) {
+                return false;
+            }
             let rise_m = self.heights.image(echo.image).rise_m;
             let ends = Ends { start, end: Some(target), rise_m };
             let contacts = self.contacts(traced, echo, target);

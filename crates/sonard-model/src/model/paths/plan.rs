@@ -9,18 +9,23 @@ mod walls;
 
 use std::sync::Arc;
 
-pub(crate) use climbs::{Climbs, Spans, WallClimbs, united};
+pub(crate) use climbs::{ALL_SLOPES, Climbs, Spans, WallClimbs, united};
 pub(crate) use corners::{ALONG_RAD, Corner, Corners, Facing, Flank};
 pub(crate) use cylinders::{Circle, Cylinders, Span, SurfaceArc};
 pub(crate) use mesh::{Mesh, Side};
 pub(crate) use walls::{WallMirror, mirror_gain, scattered};
 
-use super::settings::Settings;
+use super::{
+    effort::{Bound, Effort},
+    settings::Settings,
+};
 
 /// A scene's floor plan.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     pub(crate) settings: Settings,
+    /// Of the search at hand.
+    pub(crate) effort: Arc<Effort>,
     /// By wall of the scene.
     pub(crate) walls: Arc<[WallMirror]>,
     pub(crate) climbs: Arc<Climbs>,
@@ -31,6 +36,11 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
+    /// The same for a search of its own.
+    pub(crate) fn for_search(&self, most: Bound) -> Self {
+        Self { effort: Arc::new(Effort::new(most)), ..self.clone() }
+    }
+
     /// The same for paths up to a length, metres, which is at most the one it was prepared for.
     pub(crate) fn within(&self, max_path_m: f64) -> Self {
         let settings = Settings { max_path_m, ..self.settings.clone() };

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{
     diffraction::EdgeToEdge,
+    effort::{BOUND, Bound, Effort},
     height::Heights,
     plan::{Circle, Corners, Cylinders, Mesh, Plan, WallMirror, mirror_gain, scattered},
     settings::{Settings, usual_z_m},
@@ -20,6 +21,8 @@ pub struct Paths {
     pub(super) heights: Arc<Heights>,
     /// Empty without double diffraction.
     pub(super) edge_to_edge: Arc<EdgeToEdge>,
+    /// The most that a search may cost.
+    pub(super) bound: Bound,
 }
 
 impl Paths {
@@ -45,6 +48,7 @@ impl Paths {
             edge_to_edge: edge_to_edge.unwrap_or_default().into(),
             heights: heights.into(),
             plan,
+            bound: BOUND,
         }
     }
 
@@ -99,6 +103,7 @@ fn plan(scene: &Scene, segments: &[(DVec2, DVec2)], heights: &Heights, settings:
         corners: corners.unwrap_or_default().into(),
         cylinders: Cylinders::new(circles, mesh.as_ref()).into(),
         mesh: mesh.map(Arc::new),
+        effort: Arc::new(Effort::new(BOUND)),
         settings,
     }
 }

@@ -26,12 +26,12 @@
 use std::f64::consts::{PI, SQRT_2, TAU};
 
 use super::{
-    beams::{ALL_SLOPES, Leg, LitSpan},
+    beams::{Leg, LitSpan},
     echo::{Echo, Via},
-    plan::{Plan, WallMirror},
+    plan::{ALL_SLOPES, Plan, WallMirror},
     settings::Settings,
 };
-use crate::geometry::DVec2;
+use crate::{geometry::DVec2, model::SearchPart};
 
 /// Largest patch, radians: less than any sensor's beam.
 const PATCH_RAD: f64 = 0.03;
@@ -58,6 +58,9 @@ pub(super) struct Patch {
 pub(super) fn echoes(plan: &Plan, lit: &[LitSpan]) -> (Vec<Echo>, Vec<Patch>) {
     let mut found = (Vec::new(), Vec::new());
     for span in lit {
+        if plan.effort.is_over() {
+            break;
+        }
         add(plan, span, &mut found);
     }
     found
@@ -79,6 +82,9 @@ fn add(plan: &Plan, lit: &LitSpan, (echoes, patches): &mut (Vec<Echo>, Vec<Patch
     let (from_rad, to_rad) = (angle(low_m), angle(high_m));
     let (first, last) = (rows.place(from_rad).floor() as i32, rows.place(to_rad).ceil() as i32);
     for patch in first..last {
+        if !plan.effort.step(SearchPart::Images, 1) {
+            return;
+        }
         let begins_rad = rows.angle_rad(patch.into());
         let (low_rad, high_rad) =
             (begins_rad.max(from_rad), rows.angle_rad((patch + 1).into()).min(to_rad));
@@ -93,6 +99,7 @@ fn add(plan: &Plan, lit: &LitSpan, (echoes, patches): &mut (Vec<Echo>, Vec<Patch
             continue;
         }
         let departure = beam.departure(run.normalize_or_zero());
+        plan.effort.keep::<(Patch, Echo, Echo)>(1);
         let number = patches.len() as u32;
         patches.push(Patch { wall, leg: (&beam.ray_to(point)).into(), point });
         // The powers of two beams' parts of a patch add up if they are a quarter turn apart.

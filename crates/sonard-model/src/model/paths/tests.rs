@@ -1,4 +1,5 @@
 mod bodies;
+mod bounds;
 mod closed_forms;
 mod creeping;
 mod cylinders;
@@ -52,7 +53,7 @@ impl Paths {
     fn without_cuts(mut self) -> Self {
         let climbs = plan::Climbs { ends_beams: false, ..plan::Climbs::clone(&self.plan.climbs) };
         self.plan.climbs = climbs.into();
-        self
+        Self { bound: effort::Bound { steps: u64::MAX, bytes: u64::MAX }, ..self }
     }
 
     /// How many beams were turned by walls on the way out from a point.
@@ -122,7 +123,7 @@ fn in_rectangles_the_echoes_are_the_image_lattice() {
         let world = |p: DVec2| origin + frame.rotate(p);
         let corners = [DVec2::ZERO, DVec2::new(size.x, 0.0), size, DVec2::new(0.0, size.y)];
         let room = polygon(&corners.map(world));
-        let echoes = Paths::new(&room, LOSSLESS).enumerate(world(at));
+        let echoes = Paths::new(&room, LOSSLESS).enumerate(world(at)).expect("few paths");
 
         let mut expected = lattice(size, at, LOSSLESS.max_path_m);
         expected.sort_by(|a, b| a.length().total_cmp(&b.length()));

@@ -36,11 +36,11 @@ fn a_ring_in_the_middle_of_a_room_reads_its_walls_from_its_own_radius() {
     for heading_deg in [0.0, 90.0, 180.0] {
         let stand = model.at(Pose { x_m: 2.0, y_m: 2.0, heading_deg }).expect("a stand");
         for ranger in [0, 3, 6, 9] {
-            let range_m = stand.ping(ranger).range_m.expect("a wall ahead");
+            let range_m = stand.ping(ranger).expect("few paths").range_m.expect("a wall ahead");
             assert!((range_m - (2.0 - 0.16)).abs() < 1e-3, "{ranger}: {range_m}");
         }
         // At 30 degrees a mirror sends the arrival away: not the wall's own distance.
-        let oblique = stand.ping(1);
+        let oblique = stand.ping(1).expect("few paths");
         assert_ne!(oblique.arrival.map(|arrival| arrival.path.order()), Some(1));
     }
 }
@@ -56,8 +56,8 @@ fn each_ranger_reads_what_a_single_one_reads_at_its_place() {
     let stand = model.at(robot).expect("a stand");
     for (at, ranger) in model.array().rangers.iter().enumerate() {
         let pose = ranger.pose_on(&robot);
-        let alone = single.at(pose.position()).ping(pose.direction_rad(0.0));
-        assert_eq!(stand.ping(at), alone, "{}", ranger.id);
+        let alone = single.at(pose.position()).ping(pose.direction_rad(0.0)).expect("few paths");
+        assert_eq!(stand.ping(at).expect("few paths"), alone, "{}", ranger.id);
     }
 }
 
@@ -69,7 +69,9 @@ fn no_ranger_hears_beyond_its_turn() {
     let heard_m = model.simulator().receiver().max_range_m;
     assert!((heard_m - 0.5 * 0.04 * Air::default().sound_speed_m_s()).abs() < 1e-9, "{heard_m}");
     let stand = model.at(Pose { x_m: 15.0, y_m: 15.0, heading_deg: 0.0 }).expect("a stand");
-    assert!((0..8).all(|ranger| stand.ping(ranger).status == PingStatus::NoEcho));
+    assert!(
+        (0..8).all(|ranger| stand.ping(ranger).expect("few paths").status == PingStatus::NoEcho)
+    );
 }
 
 /// The body of the ring of twelve is met by the arrival that comes back by way of a wall behind the
@@ -92,14 +94,15 @@ fn a_body_moves_with_the_robot_and_is_in_the_way_of_sound() {
             .expect("right options");
         let bare = bare.at(robot).expect("a stand");
         for ranger in [0, 3, 6, 9].into_iter().filter(|_| heading_deg != 200.0) {
-            let [own, alone] = [&stand, &bare].map(|stand| stand.ping(ranger).range_m);
+            let [own, alone] =
+                [&stand, &bare].map(|stand| stand.ping(ranger).expect("few paths").range_m);
             let off_m = own.zip(alone).map(|(own, alone)| (own - alone).abs());
             assert!(off_m.is_some_and(|m| m < 0.01), "{ranger}: {own:?} {alone:?}");
         }
         // Of all that arrives, nothing has passed through the body.
         let mounted = with.array().rangers[0].pose_on(&robot);
         let point = stand.simulator(0).at(mounted.position());
-        for arrival in point.arrivals(mounted.direction_rad(0.0)) {
+        for arrival in point.arrivals(mounted.direction_rad(0.0)).expect("few paths") {
             let through = std::f64::consts::PI + mounted.direction_rad(0.0);
             let off = crate::geometry::wrap_pi(arrival.arrival_rad - through).abs();
             assert!(off > 0.5, "from behind, through the body: {arrival:?}");
@@ -124,6 +127,9 @@ fn rangers_of_two_heights_hear_the_floor_differently() {
     let [mixed, level] = [&mixed, &level].map(|model| model.at(robot).expect("a stand"));
     assert_eq!(mixed.simulator(3).sensor().mounting.z_m, Some(0.05));
     assert_eq!(mixed.simulator(2).sensor().mounting.z_m, sensor.mounting.z_m);
-    assert_eq!(mixed.ping(2), level.ping(2));
-    assert_ne!(mixed.ping(3).amplitude, level.ping(3).amplitude);
+    assert_eq!(mixed.ping(2).expect("few paths"), level.ping(2).expect("few paths"));
+    assert_ne!(
+        mixed.ping(3).expect("few paths").amplitude,
+        level.ping(3).expect("few paths").amplitude
+    );
 }

@@ -67,6 +67,7 @@ fn planes_corners_and_edges_have_bozma_and_kucs_extents() {
     let plan = ScanPlan { step_deg: STEP_DEG, ..ScanPlan::default() };
     let readings: Vec<_> = simulator
         .predict(&pose, &plan)
+        .expect("few paths")
         .into_iter()
         .zip(0..)
         .map(|(prediction, stop)| (plan.azimuth_deg(stop), prediction))

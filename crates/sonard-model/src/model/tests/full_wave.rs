@@ -147,7 +147,7 @@ fn ranges_agree(reference: &Reference, double_diffraction: bool, most_db: f64) {
             let simulator = simulator_of(of, reference.c, lossless);
             let point = simulator.at(DVec2::from_array(of.sensor));
             for beam in &of.scan {
-                let found = point.ping(beam.azimuth.to_radians());
+                let found = point.ping(beam.azimuth.to_radians()).expect("few paths");
                 let what = format!("{name}, {} degrees, threshold {tau}", beam.azimuth);
                 score.beam(&what, beam.threshold[tau].as_ref(), &found);
                 if tau == "0.02" {

@@ -12,7 +12,7 @@ fn scan(scene_name: &str, pose_name: &str, step_deg: f64) -> (Simulator, Vec<(f6
     let pose = pose(&scene, pose_name);
     let plan = ScanPlan { step_deg, ..ScanPlan::default() };
     let simulator = simulator(scene, Options::default());
-    let predictions = simulator.predict(&pose, &plan);
+    let predictions = simulator.predict(&pose, &plan).expect("few paths");
     let readings = (0..).map(|stop| plan.azimuth_deg(stop)).zip(predictions).collect::<Vec<_>>();
     (simulator, readings)
 }
@@ -59,12 +59,12 @@ fn trace(set_up: &str) -> (Vec<SeenPeak>, Prediction) {
     let simulator = simulator(scene, Options::default());
     let point = simulator.at(pose.position());
     let direction_rad = pose.direction_rad(0.0);
-    let trace = point.trace(direction_rad, 5.0, 2.0);
+    let trace = point.trace(direction_rad, 5.0, 2.0).expect("few paths");
     let peaks = trace.peaks.iter().map(|peak| {
-        let arrival = point.arrival(direction_rad, &peak.arrival);
+        let arrival = point.arrival(direction_rad, &peak.arrival).expect("few paths");
         (arrival.length_m / 2.0, peak.peak.0, names(&simulator, &arrival))
     });
-    (peaks.collect(), point.ping_rearmed(direction_rad))
+    (peaks.collect(), point.ping_rearmed(direction_rad).expect("few paths"))
 }
 
 fn strongest(peaks: &[SeenPeak]) -> &SeenPeak {
@@ -237,7 +237,7 @@ fn a_robots_body_turns_the_false_wall_into_minimum_range() {
     let scene = scene.with_robot_at(&pose);
     let read = |engine: EngineKind| {
         let options = Options { max_range_m: Some(2.0), ..engine.options().into() };
-        simulator(scene.clone(), options).predict(&pose, &plan)
+        simulator(scene.clone(), options).predict(&pose, &plan).expect("few paths")
     };
     let (paths, fan) = (read(EngineKind::Paths), read(EngineKind::Fan));
     for readings in [&paths, &fan] {
@@ -268,7 +268,7 @@ fn a_weak_post_explains_a_silence() {
     let mut post = scene(Vec::new());
     post.cylinders = vec![cylinder((5.0, 0.0), 0.01)];
     let simulator = simulator(post, Options::default());
-    let silence = simulator.at(DVec2::ZERO).ping(0.0);
+    let silence = simulator.at(DVec2::ZERO).ping(0.0).expect("few paths");
     assert_eq!(silence.status, PingStatus::NoEcho);
     let candidate = silence.arrival.expect("a candidate");
     assert_eq!(reflectors(&candidate.path)[..], [Reflector::Cylinder(0)]);
@@ -285,13 +285,21 @@ fn a_plate_before_the_transducer_answers_in_a_train() {
     let pose = pose(&scene, "c");
     let simulator = simulator(scene, Options::default());
     let direction_rad = pose.direction_rad(0.0);
-    let arrivals = simulator.at(pose.position()).arrivals(direction_rad);
+    let arrivals = simulator.at(pose.position()).arrivals(direction_rad).expect("few paths");
     let multiple: Vec<f64> = of_kind(&arrivals, PathKind::Specular).map(|a| a.length_m).collect();
     for (echo, round) in multiple.iter().zip(1..) {
         close(*echo, 1.2 * f64::from(round), 1e-9, "round");
     }
     assert!(multiple.len() >= 2, "{multiple:?}");
-    assert!(simulator.at(pose.position()).ping_rearmed(direction_rad).echoes_us.len() >= 2);
+    assert!(
+        simulator
+            .at(pose.position())
+            .ping_rearmed(direction_rad)
+            .expect("few paths")
+            .echoes_us
+            .len()
+            >= 2
+    );
 }
 
 /// Figure 12: an arc around the corner's vertex, and a hole on each side of it.

@@ -25,14 +25,14 @@ fn check(scene: &str, sensor: &str, options: Options) {
         for _ in 0..20 {
             let direction_rad = random.random_range(-3.1..3.1);
             assert_eq!(
-                point.ping(direction_rad),
-                point.ping_by_all(direction_rad, Latch::First),
+                point.ping(direction_rad).expect("few paths"),
+                point.ping_by_all(direction_rad, Latch::First).expect("few paths"),
                 "{} {pose:?} {direction_rad}",
                 scene.name
             );
             assert_eq!(
-                point.ping_rearmed(direction_rad),
-                point.ping_by_all(direction_rad, Latch::Rearmed),
+                point.ping_rearmed(direction_rad).expect("few paths"),
+                point.ping_by_all(direction_rad, Latch::Rearmed).expect("few paths"),
                 "{} {pose:?} {direction_rad}",
                 scene.name
             );

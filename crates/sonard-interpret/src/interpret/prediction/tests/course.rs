@@ -71,7 +71,8 @@ fn trusted_shares(scans: usize, seed: u64) -> Vec<[f64; 2]> {
     let mut counts = vec![[[0_usize; 2]; 2]; scans.div_ceil(50)];
     for (number, pose) in wander(simulator.scene(), scans, seed).iter().enumerate() {
         let (id, plan) = (Uuid::from_u128(number as u128), ScanPlan::default());
-        let scan = ScanView::simulated(&simulator, id, pose, &plan, Timestamp::UNIX_EPOCH);
+        let scan = ScanView::simulated(&simulator, id, pose, &plan, Timestamp::UNIX_EPOCH)
+            .expect("few paths");
         let sweep = Sweep::of(&scan).expect("a sweep");
         for (beam, assessment) in sweep.beams.iter().zip(prediction.assess(&sweep)) {
             let Some(kind) = kind(&scan.pings[beam.index as usize]) else { continue };

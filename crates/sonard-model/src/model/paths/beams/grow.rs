@@ -5,17 +5,19 @@ mod low_walls;
 use smallvec::SmallVec;
 
 use super::{
-    beam::{Beam, reaches, reaches_well},
-    lit::LitSpan,
+    beam::{Beam, Ray, reaches, reaches_well},
+    lit::{LitSpan, View},
     shade::shade,
-    slopes::ALL,
     tree::{Beams, Node, ROOT},
 };
 use crate::{
     geometry::DVec2,
-    model::paths::{
-        plan::{Mesh, Plan, Side, WallMirror},
-        tolerance::TIE_M,
+    model::{
+        SearchPart,
+        paths::{
+            plan::{ALL_SLOPES, Mesh, Plan, Side, WallMirror},
+            tolerance::TIE_M,
+        },
     },
 };
 
@@ -133,7 +135,7 @@ impl<'a> Grower<'a> {
             side: 0,
             mirrored: false,
             order: 0,
-            slopes: ALL,
+            slopes: ALL_SLOPES,
         }
     }
 
@@ -147,6 +149,9 @@ impl<'a> Grower<'a> {
                 break;
             }
             for beam in beams.drain(..) {
+                if self.plan.effort.is_over() {
+                    break;
+                }
                 self.follow(Some(beam));
             }
         }
@@ -214,7 +219,9 @@ impl<'a> Grower<'a> {
 
     /// The parts that cylinders in its triangle leave of a beam, counter-clockwise by departure.
     fn shaded(&mut self, beam: Beam) -> SmallVec<[Beam; 2]> {
+        let known = self.tree.to_cylinders.len();
         let mut passing = shade(&self.plan.cylinders, &beam, &mut self.tree.to_cylinders);
+        self.plan.effort.keep::<View>(self.tree.to_cylinders.len() - known);
         if beam.mirrored {
             passing.reverse();
         }
@@ -254,6 +261,9 @@ impl<'a> Grower<'a> {
 
     /// The beam in the triangle behind a side; none if a wall reflects it or no echo can come.
     fn leave(&mut self, beam: Beam, side: usize) -> Option<Beam> {
+        if !self.plan.effort.step(SearchPart::Beams, 1) {
+            return None;
+        }
         match self.mesh.triangles[beam.triangle as usize].sides[side] {
             Side::Open { triangle, side } => {
                 let next = Beam { triangle, side, ..beam };
@@ -323,11 +333,13 @@ impl<'a> Grower<'a> {
             && self.tree.slopes.any_in(slopes, [0.0; 2])
         {
             let span_m = self.lit_span_m(beam, wall_mirror, side);
+            self.plan.effort.keep::<LitSpan>(1);
             self.tree.on_rough_walls.push(LitSpan { beam: *beam, wall, span_m });
         }
         if self.plan.lets_pass(wall) {
             let span_m = self.lit_span_m(beam, wall_mirror, side);
             let beam = Beam { slopes, ..*beam };
+            self.plan.effort.keep::<LitSpan>(1);
             self.tree.below_level_edges.push(LitSpan { beam, wall, span_m });
         }
         let gain = beam.gain * wall_mirror.gain;
@@ -344,6 +356,7 @@ impl<'a> Grower<'a> {
         if self.least_path_m(beam, &next, wall_mirror, side) > self.longest_m(&next) {
             return None;
         }
+        self.plan.effort.keep::<(Beam, Node)>(1);
         let nodes = &mut self.tree.nodes;
         nodes.push(Node::Wall { wall, before: beam.node });
         Some(Beam { node: nodes.len() as u32 - 1, ..next })
@@ -407,6 +420,7 @@ impl<'a> Grower<'a> {
     fn meet_edge(&mut self, beam: &Beam, point: u32) {
         let at = self.mesh.points[point as usize];
         if self.plan.corners.answers(point, at - beam.image) {
+            self.plan.effort.keep::<(u32, Ray)>(1);
             self.tree.to_edges.push((point, beam.ray_to(at)));
         }
     }

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use smallvec::SmallVec;
 
-use crate::model::paths::plan::united;
+use crate::model::paths::plan::{ALL_SLOPES, united};
 
 /// Distances to walls may be off by this much where walls were snapped and rays run on ties, metres.
 const LOOSE_M: f64 = 1e-5;
@@ -24,9 +24,6 @@ pub(crate) struct Slopes {
     spans: Vec<[f64; 2]>,
 }
 
-/// The set of all slopes.
-pub(crate) const ALL: u32 = 0;
-
 const EACH: [[f64; 2]; 1] = [[f64::NEG_INFINITY, f64::INFINITY]];
 
 impl Slopes {
@@ -36,6 +33,11 @@ impl Slopes {
             .checked_sub(1)
             .and_then(|index| self.sets.get(index))
             .map_or(&EACH, |set| &self.spans[set.start as usize..set.end as usize])
+    }
+
+    /// How many intervals are kept, and sets, of half an interval each.
+    pub(crate) fn kept(&self) -> usize {
+        self.spans.len() + self.sets.len() / 2
     }
 
     /// Whether a set has a slope from `low` to `high`.
@@ -48,7 +50,7 @@ impl Slopes {
     /// Whether a ray that gains so much height over so much of the plan is in a set, metres.
     pub(crate) fn holds(&self, set: u32, climb_m: f64, run_m: f64) -> bool {
         let slope = climb_m / run_m;
-        set == ALL || slope.is_nan() || self.any_in(set, [slope; 2])
+        set == ALL_SLOPES || slope.is_nan() || self.any_in(set, [slope; 2])
     }
 
     /// Those of a set that climb to one of `climbs` at some distance, and no steeper than `steepest`; `None` if
@@ -88,8 +90,8 @@ impl Slopes {
 
     /// The slopes of either set.
     pub(crate) fn either(&mut self, one: u32, other: u32) -> u32 {
-        if one == other || one == ALL || other == ALL {
-            return if one == other { one } else { ALL };
+        if one == other || one == ALL_SLOPES || other == ALL_SLOPES {
+            return if one == other { one } else { ALL_SLOPES };
         }
         let both = [self.spans(one), self.spans(other)].concat();
         self.add(&united(both))

@@ -16,12 +16,18 @@ use super::{
     stationary::{SLACK, stationary_contact},
     strength::Strength,
 };
-use crate::model::paths::{
-    beams::{Leg, View},
-    echo::{Echo, Via},
-    pattern::TwoWayBound,
-    plan::{Circle, Plan},
+use crate::model::{
+    SearchPart,
+    paths::{
+        beams::{Leg, View},
+        echo::{Echo, Via},
+        pattern::TwoWayBound,
+        plan::{Circle, Plan},
+    },
 };
+
+/// Effort of finding where two half-paths meet, in steps of a beam.
+const STEPS_A_PAIR: usize = 20;
 
 /// The contact in the middle of an echo path.
 #[derive(Debug, Clone, Copy)]
@@ -134,9 +140,15 @@ impl<'a> Connector<'a> {
                 if half_path.strength.with(&most) < floor(group.least_m) {
                     break;
                 }
+                if !self.plan.effort.step(SearchPart::Cylinders, 1) {
+                    return;
+                }
                 if self.may_meet(half_path, other, floor(other.least_m)) {
                     let other = HalfPathTracer::new(self.plan, back.views, other);
-                    found.extend(self.pair(&tracer, &other));
+                    self.plan.effort.step(SearchPart::Cylinders, STEPS_A_PAIR);
+                    let pair = self.pair(&tracer, &other);
+                    self.plan.effort.keep::<(Pair, Echo, Echo)>(pair.iter().len());
+                    found.extend(pair);
                 }
             }
         }

@@ -27,7 +27,7 @@ use super::{
 use crate::{
     geometry::{DVec2, distance_to_segment, wrap_pi},
     model::{
-        Reflector,
+        Reflector, SearchPart,
         paths::{
             beams::{Beams, Ray, View},
             plan::{Circle, Plan, Side, Span},
@@ -38,6 +38,9 @@ use crate::{
 /// Rays that cylinders have turned to edges are followed from this much above the weakest sound
 /// that is asked for, so with 20 dB below the threshold for that, down to the threshold.
 const EDGES_ABOVE: f64 = 10.0;
+
+/// Effort of a tube in a triangle, in steps of a beam.
+const STEPS_A_TUBE: usize = 10;
 
 /// An edge sends back half of a mirror's echo at most: what it takes from it at its boundary.
 const EDGE_MOST: f64 = 0.5;
@@ -93,10 +96,13 @@ impl<'a> TubeGrower<'a> {
         for index in level {
             self.launch(index, partners);
             while let Some(tube) = self.waiting.pop() {
+                let known = [self.half_paths.len(), self.rays.to_edges.len()];
                 self.follow(&tube);
+                self.plan.effort.keep::<HalfPath>(self.half_paths.len() - known[0]);
+                self.plan.effort.keep::<SpreadRay>(2 * (self.rays.to_edges.len() - known[1]));
             }
         }
-        self.last < self.half_paths.len()
+        self.last < self.half_paths.len() && !self.plan.effort.is_over()
     }
 
     /// The rays that the tubes found, and the half-paths.
@@ -193,7 +199,7 @@ impl<'a> TubeGrower<'a> {
 
     /// Takes a tube through its triangle: what is in it, what it meets there, where it leaves.
     fn follow(&mut self, tube: &Tube) {
-        if !self.is_worth(tube) {
+        if !self.plan.effort.step(SearchPart::Cylinders, STEPS_A_TUBE) || !self.is_worth(tube) {
             return;
         }
         let surfaces = surfaces_to(&self.rays.links, tube.link);

@@ -38,12 +38,15 @@ use super::{
 };
 use crate::{
     acoustics::edge::{Aspect, EdgeLaw},
-    model::paths::{
-        beams::Ray,
-        echo::{Echo, Via},
-        plan::{Corner, Facing, Flank, Plan},
-        rays::Rays,
-        settings::Settings,
+    model::{
+        SearchPart,
+        paths::{
+            beams::Ray,
+            echo::{Echo, Via},
+            plan::{Corner, Facing, Flank, Plan},
+            rays::Rays,
+            settings::Settings,
+        },
     },
 };
 
@@ -74,12 +77,15 @@ pub(crate) fn echoes(
         return Default::default();
     }
     let mut search =
-        Search { settings: &plan.settings, law, paths: Vec::new(), echoes: Vec::new() };
+        Search { plan, settings: &plan.settings, law, paths: Vec::new(), echoes: Vec::new() };
     let outs = rays_to_edges(plan, out);
     let apart = back.map(|back| rays_to_edges(plan, back));
     let backs = apart.as_ref().unwrap_or(&outs);
     for (first, corner, outs) in &outs {
         let from = edge_to_edge.at(plan, *first);
+        if plan.effort.is_over() || edge_to_edge.effort.is_over() {
+            break;
+        }
         for (second, far_corner, backs) in backs {
             let (number, rays) = from.beams.rays_to_edge(*second);
             for (leg, (_, ray)) in (number..).zip(rays) {
@@ -112,6 +118,7 @@ struct EdgePair<'a> {
 
 /// Connects rays out, from edge to edge and back.
 struct Search<'a> {
+    plan: &'a Plan,
     settings: &'a Settings,
     law: EdgeLaw,
     paths: Vec<DoubleDiffraction>,
@@ -145,6 +152,9 @@ impl Search<'_> {
         if out.length_m + leg_m + back.length_m > self.settings.max_path_m {
             return false;
         }
+        if !self.plan.effort.step(SearchPart::TwoEdges, 4 * (outs.len() + backs.len())) {
+            return false;
+        }
         let passages = self.passages(pair, corners);
         let passed = |end: usize, rays: &[EdgeRay]| -> Vec<Passed> {
             rays.iter().map(|ray| self.passed(corners[end], end, ray, &passages, leg_m)).collect()
@@ -158,7 +168,9 @@ impl Search<'_> {
             }
             for (back, from_back) in backs.iter().zip(&from_backs) {
                 let length_m = out.length_m + leg_m + back.length_m;
-                if length_m > self.settings.max_path_m {
+                if length_m > self.settings.max_path_m
+                    || !self.plan.effort.step(SearchPart::TwoEdges, 1)
+                {
                     break;
                 }
                 let parts = passages.iter().zip(from_out.iter().zip(from_back));
@@ -184,6 +196,7 @@ impl Search<'_> {
         if amplitude < settings.floor || !settings.allows(order) {
             return;
         }
+        self.plan.effort.keep::<(Echo, Echo, DoubleDiffraction)>(1);
         self.echoes.push(Echo {
             length_m,
             amplitude,

@@ -1,9 +1,9 @@
 //! Rays to an upright edge, as the edge sees them.
 
 use crate::model::paths::{
-    beams::{ALL_SLOPES, Ray},
+    beams::Ray,
     echo::drop_repeats,
-    plan::Corner,
+    plan::{ALL_SLOPES, Corner},
     rays::Rays,
     tolerance::{SAME_M, SAME_RAD},
 };

@@ -1,12 +1,13 @@
 //! The rays from each upright edge to others.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use smallvec::SmallVec;
 
 use super::edge_ray::is_same_departure;
 use crate::model::paths::{
     beams::{Beams, Ray},
+    effort::{BOUND, Effort},
     plan::{ALONG_RAD, Mesh, Plan},
     settings::Settings,
     tolerance::SAME_M,
@@ -14,12 +15,14 @@ use crate::model::paths::{
 
 /// Trees of beams from the edges of a scene, by point. A tree is grown when it is first asked for, for the
 /// longest paths that the scene was prepared for, and serves all observation points.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct EdgeToEdge {
     from: Vec<OnceLock<FromEdge>>,
     /// The triangles around each point and which corner of each it is, counter-clockwise.
     around: Vec<SmallVec<[(u32, u8); 6]>>,
     max_path_m: f64,
+    /// Of all trees together: they are kept.
+    pub(crate) effort: Arc<Effort>,
 }
 
 /// The rays from an edge to edges.
@@ -32,16 +35,25 @@ pub(crate) struct FromEdge {
     pub(crate) flanks: Vec<[bool; 2]>,
 }
 
+impl Default for EdgeToEdge {
+    /// Without any edge.
+    fn default() -> Self {
+        let effort = Arc::new(Effort::new(BOUND));
+        Self { from: Vec::new(), around: Vec::new(), max_path_m: 0.0, effort }
+    }
+}
+
 impl EdgeToEdge {
     pub(crate) fn new(mesh: &Mesh, settings: &Settings) -> Self {
         let from = mesh.points.iter().map(|_| OnceLock::new()).collect();
-        Self { from, around: mesh.around_points(), max_path_m: settings.max_path_m }
+        let effort = Arc::new(Effort::new(BOUND));
+        Self { from, around: mesh.around_points(), max_path_m: settings.max_path_m, effort }
     }
 
     /// The rays from an edge to edges.
     pub(crate) fn at(&self, plan: &Plan, point: u32) -> &FromEdge {
         let grow = || {
-            let plan = plan.within(self.max_path_m);
+            let plan = Plan { effort: self.effort.clone(), ..plan.within(self.max_path_m) };
             FromEdge::grow(&plan, point, &self.around[point as usize])
         };
         self.from[point as usize].get_or_init(grow)

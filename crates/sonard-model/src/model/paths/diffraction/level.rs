@@ -41,12 +41,12 @@ use crate::{
     acoustics::edge::{Aspect, EdgeLaw, Wedge},
     geometry::{DVec2, Mirror},
     model::{
-        Bend, Mechanism,
+        Bend, Mechanism, SearchPart,
         paths::{
-            beams::{ALL_SLOPES, Beams, Leg, LitSpan, Ray},
+            beams::{Beams, Leg, LitSpan, Ray},
             echo::{Echo, Via, drop_repeats},
             height::{Ends, Heights, VerticalImage},
-            plan::{Plan, WallMirror},
+            plan::{ALL_SLOPES, Plan, WallMirror},
             rays::wall_contacts,
             tolerance::{SAME_M, SAME_RAD, TIE_M},
         },
@@ -191,13 +191,17 @@ impl LevelEdge {
         lit: &'a [LitSpan],
     ) -> Vec<EdgeBeam<'a>> {
         let settings = &scene.plan.settings;
+        let effort = &scene.plan.effort;
         let images = || std::iter::once(&VerticalImage::NONE).chain(&scene.heights.images).zip(0..);
         let mut found: Vec<EdgeBeam> = lit
             .iter()
             .flat_map(|lit| images().filter_map(|(image, index)| self.beam(lit, image, index)))
             .filter(|beam| 2.0 * beam.gain >= settings.floor && beam.least_m <= settings.max_path_m)
             .filter(|beam| beams.slopes.any_in(beam.lit.beam.slopes, beam.slopes()))
+            .take_while(|_| !effort.is_over())
+            .inspect(|_| effort.keep::<EdgeBeam>(1))
             .collect();
+        effort.step(SearchPart::LevelEdges, lit.len() * (1 + scene.heights.images.len()));
         found.sort_by(|one, other| one.least_m.total_cmp(&other.least_m));
         found
     }
@@ -304,8 +308,10 @@ impl Search<'_> {
         found
     }
 
+    /// Whether a pair and all that follow it are too long, or would cost too much.
     fn is_too_long(&self, out: &EdgeBeam, back: &EdgeBeam) -> bool {
-        out.least_m + back.least_m > self.scene.plan.settings.max_path_m
+        let Plan { settings, effort, .. } = self.scene.plan;
+        out.least_m + back.least_m > settings.max_path_m || !effort.step(SearchPart::LevelEdges, 1)
     }
 
     /// The path on Keller's cone, if both beams light the point of diffraction, it is strong enough and
@@ -343,6 +349,7 @@ impl Search<'_> {
             via: Via::LevelEdge { level: 0 },
         };
         let LevelEdge { wall, is_upper, .. } = self.edge;
+        self.scene.plan.effort.keep::<(Echo, LevelDiffraction)>(4);
         Some((echo, LevelDiffraction { wall, is_upper, legs, images: [out.image, back.image] }))
     }
 

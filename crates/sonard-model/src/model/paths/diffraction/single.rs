@@ -5,18 +5,22 @@ use num_complex::Complex64;
 use super::edge_ray::{EdgeRay, distance_parameter_m};
 use crate::{
     acoustics::edge::{Aspect, EdgeLaw, EdgeView},
-    model::paths::{
-        echo::{Echo, Via},
-        plan::{Corner, Plan},
-        rays::Rays,
-        settings::Settings,
+    model::{
+        SearchPart,
+        paths::{
+            echo::{Echo, Via},
+            effort::Effort,
+            plan::{Corner, Plan},
+            rays::Rays,
+            settings::Settings,
+        },
     },
 };
 
 /// All echoes with one diffraction: out on one ray to an edge, back on another or the same. The rays are
 /// sorted by edge.
 pub(crate) fn echoes(plan: &Plan, law: EdgeLaw, out: &Rays, back: Option<&Rays>) -> Vec<Echo> {
-    let search = Search { law, settings: &plan.settings };
+    let search = Search { law, settings: &plan.settings, effort: &plan.effort };
     let mut echoes = Vec::new();
     for point in out.edges() {
         let Some(corner) = plan.corners.corner(point) else { continue };
@@ -54,6 +58,7 @@ pub(crate) fn view(plan: &Plan, out: &Rays, back: &Rays, echo: &Echo) -> Option<
 struct Search<'a> {
     law: EdgeLaw,
     settings: &'a Settings,
+    effort: &'a Effort,
 }
 
 impl Search<'_> {
@@ -62,7 +67,9 @@ impl Search<'_> {
         for (i, out) in rays.iter().enumerate() {
             for (j, back) in rays.iter().enumerate().skip(i) {
                 // Sorted by length.
-                if out.length_m + back.length_m > self.settings.max_path_m {
+                if out.length_m + back.length_m > self.settings.max_path_m
+                    || !self.effort.step(SearchPart::UprightEdges, 1)
+                {
                     break;
                 }
                 let Some(echo) = self.echo(corner, point, out, back) else { continue };
@@ -90,7 +97,9 @@ impl Search<'_> {
     ) {
         for out in outs {
             for back in backs {
-                if out.length_m + back.length_m > self.settings.max_path_m {
+                if out.length_m + back.length_m > self.settings.max_path_m
+                    || !self.effort.step(SearchPart::UprightEdges, 1)
+                {
                     break;
                 }
                 echoes.extend(self.echo(corner, point, out, back));
@@ -100,6 +109,7 @@ impl Search<'_> {
 
     fn echo(&self, corner: &Corner, point: u32, out: &EdgeRay, back: &EdgeRay) -> Option<Echo> {
         let field = self.field(corner, out, back)?;
+        self.effort.keep::<Echo>(2);
         Some(Echo {
             length_m: out.length_m + back.length_m,
             amplitude: field.norm(),
@@ -118,7 +128,7 @@ impl Search<'_> {
     /// Cheapest test first: what walls and air leave of a mirror's echo, then the law's bound at this aspect,
     /// then the law.
     fn field(&self, corner: &Corner, out: &EdgeRay, back: &EdgeRay) -> Option<Complex64> {
-        let Self { law, settings } = self;
+        let Self { law, settings, .. } = self;
         if out.sector != back.sector || !settings.allows(out.ray.order + back.ray.order) {
             return None;
         }

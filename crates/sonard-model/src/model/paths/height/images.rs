@@ -13,8 +13,8 @@
 use crate::{
     geometry::DVec2,
     model::paths::{
-        beams::ALL_SLOPES,
         echo::{Echo, Via},
+        plan::ALL_SLOPES,
         settings::Settings,
     },
 };

@@ -5,6 +5,9 @@
 //! a wall would stand once at its own height and again at each of its images by floor and ceiling. So what a
 //! ray can meet follows from one number, its slope.
 
+/// The number of the set of all slopes.
+pub(crate) const ALL_SLOPES: u32 = 0;
+
 /// Heights above the transducer if floor and ceiling are windows, metres: closed, rising and apart.
 pub(crate) type Spans = Vec<[f64; 2]>;
 

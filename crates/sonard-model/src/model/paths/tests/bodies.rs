@@ -29,7 +29,7 @@ fn rounds_between_body_and_wall_spread_as_the_power_of_one_round() {
     let mut plan = scene(&[[-30.0, 0.0, 30.0, 0.0]]);
     plan.cylinders = vec![body(DVec2::new(0.0, gap + r), r)];
     let settings = Settings { max_path_m: 4.0, floor: 1e-5, ..LOSSLESS };
-    let echoes = Paths::new(&plan, settings).enumerate(DVec2::new(0.0, height));
+    let echoes = Paths::new(&plan, settings).enumerate(DVec2::new(0.0, height)).expect("few paths");
 
     // Off the body, over to the wall and back: `w += D g`, then `g += 2 w / r`.
     let flight = 2.0 * gap;
@@ -112,7 +112,7 @@ fn echoes_bring_as_much_energy_as_random_rays_do() {
     let (from, at, reach_m, radius_m) = (DVec2::new(0.3, 0.2), DVec2::new(0.25, 0.5), 1.9, 0.005);
     let room = narrow_room();
     let settings = Settings { max_path_m: reach_m, floor: 1e-5, ..LOSSLESS };
-    let echoes = Paths::new(&room, settings).enumerate_between(from, at);
+    let echoes = Paths::new(&room, settings).enumerate_between(from, at).expect("few paths");
     assert!(echoes.len() > 40, "{}", echoes.len());
     let share: f64 = echoes.iter().map(|echo| echo.amplitude.powi(2) / echo.length_m).sum();
     let expected = share * radius_m / PI * f64::from(RAYS);
@@ -128,7 +128,10 @@ fn echoes_bring_as_much_energy_as_random_rays_do() {
 fn paths_by_a_body_run_backwards_from_receiver_to_transmitter() {
     let paths = Paths::new(&narrow_room(), Settings { max_path_m: 2.5, floor: 1e-3, ..LOSSLESS });
     let (t, r) = (DVec2::new(0.3, 0.2), DVec2::new(0.774, 0.05));
-    let (there, back) = (paths.enumerate_between(t, r), paths.enumerate_between(r, t));
+    let (there, back) = (
+        paths.enumerate_between(t, r).expect("few paths"),
+        paths.enumerate_between(r, t).expect("few paths"),
+    );
     let strong = |echoes: &[EchoPath]| echoes.iter().filter(|echo| echo.amplitude > 0.0101).count();
     assert!(strong(&there) > 300, "{}", strong(&there));
     assert_eq!(strong(&there), strong(&back));
@@ -150,7 +153,13 @@ fn contacts_go_on_as_long_as_they_are_heard() {
         let at_body = |echo: &EchoPath| {
             reflectors(&echo.path).iter().filter(|wall| **wall == Reflector::Cylinder(0)).count()
         };
-        paths.enumerate(DVec2::new(0.774, 0.085)).iter().map(at_body).max().unwrap_or(0)
+        paths
+            .enumerate(DVec2::new(0.774, 0.085))
+            .expect("few paths")
+            .iter()
+            .map(at_body)
+            .max()
+            .unwrap_or(0)
     };
     let (few, more) = (most(1e-2), most(1e-3));
     assert!(few >= 3 && more >= few + 3, "{few} {more}");

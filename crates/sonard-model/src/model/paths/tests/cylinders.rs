@@ -24,7 +24,7 @@ fn a_cylinder_answers_from_its_nearest_point_and_spreads() {
     let mut plan = scene(&[]);
     plan.cylinders = vec![cylinder(1.0, 2.0, 0.3)];
     let at = DVec2::new(2.5, 0.0);
-    let echoes = Paths::new(&plan, LOSSLESS).enumerate(at);
+    let echoes = Paths::new(&plan, LOSSLESS).enumerate(at).expect("few paths");
     assert_eq!(echoes.len(), 1);
     let distance = 2.5 - 0.3;
     assert!((echoes[0].length_m - 2.0 * distance).abs() < 1e-12);
@@ -39,7 +39,7 @@ fn a_cylinder_hides_the_wall_behind_it() {
     let settings = Settings { max_order: Some(1), ..LOSSLESS };
     let paths = Paths::new(&plan, settings);
     let kinds = |x: f64| {
-        let echoes = paths.enumerate(DVec2::new(x, 0.0));
+        let echoes = paths.enumerate(DVec2::new(x, 0.0)).expect("few paths");
         echoes.iter().map(|echo| reflectors(&echo.path)[0]).collect::<Vec<_>>()
     };
     assert_eq!(kinds(0.1), [Reflector::Cylinder(0)]);
@@ -54,7 +54,7 @@ fn echoes_between_cylinder_and_walls_take_the_shortest_way() {
     plan.cylinders = vec![cylinder(0.9, 0.8, 0.25)];
     let at = DVec2::new(-0.4, 0.5);
     let settings = Settings { max_path_m: 6.0, ..LOSSLESS };
-    let echoes = Paths::new(&plan, settings).enumerate(at);
+    let echoes = Paths::new(&plan, settings).enumerate(at).expect("few paths");
     let below = DVec2::new(at.x, -at.y);
     let over = |p: DVec2, q: DVec2| {
         (0..200_000)
@@ -134,7 +134,9 @@ fn echoes_by_two_cylinders_take_the_shortest_way() {
     let mut plan = scene(&[[-3.0, -0.9, 3.0, -0.9]]);
     plan.cylinders = vec![cylinder(1.0, 0.3, 0.25), cylinder(-0.9, 0.6, 0.35)];
     let at = DVec2::new(0.1, -0.2);
-    let echoes = Paths::new(&plan, Settings { max_path_m: 6.0, ..LOSSLESS }).enumerate(at);
+    let echoes = Paths::new(&plan, Settings { max_path_m: 6.0, ..LOSSLESS })
+        .enumerate(at)
+        .expect("few paths");
     let (a, b, w) = (Reflector::Cylinder(0), Reflector::Cylinder(1), Reflector::Wall(0));
     for (surfaces, guess) in [
         (vec![a, b], vec![3.3, 0.0]),
@@ -160,7 +162,9 @@ fn cylinders_spread_sound_as_rays_beside_it_diverge() {
     let mut plan = scene(&[]);
     plan.cylinders = vec![cylinder(0.8, 0.3, 0.25), cylinder(-0.9, 0.1, 0.35)];
     let at = DVec2::new(0.1, 0.0);
-    let echoes = Paths::new(&plan, Settings { max_path_m: 6.0, ..LOSSLESS }).enumerate(at);
+    let echoes = Paths::new(&plan, Settings { max_path_m: 6.0, ..LOSSLESS })
+        .enumerate(at)
+        .expect("few paths");
     let echo = echoes.iter().find(|echo| reflectors(&echo.path).len() == 2).expect("by both");
     // A ray of its own: on to the first and the second circle, and to abreast of the start.
     let trace = |angle: f64| {
@@ -192,7 +196,7 @@ fn a_huge_cylinder_is_a_wall() {
     let settings =
         Settings { max_path_m: 7.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-3, ..LOSSLESS };
     let at = DVec2::new(0.2, 0.35);
-    let all = |plan: &Scene| Paths::new(plan, settings.clone()).enumerate(at);
+    let all = |plan: &Scene| Paths::new(plan, settings.clone()).enumerate(at).expect("few paths");
     let (round, flat) = (all(&round), all(&flat));
     // Ways by more than one contact are followed down to ten times the floor.
     let at_round = |echo: &&EchoPath| {
@@ -219,7 +223,7 @@ fn edges_answer_by_way_of_cylinders() {
     let at = DVec2::new(0.0, 0.0);
     let settings =
         Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
-    let echoes = Paths::new(&plan, settings).enumerate(at);
+    let echoes = Paths::new(&plan, settings).enumerate(at).expect("few paths");
     let edge = DVec2::new(0.0, 1.2);
     let by = (0..1_000_000)
         .map(|i| {
@@ -258,7 +262,9 @@ fn few_readings_depend_on_what_is_left_out_below_the_threshold() {
         let own = simulator.path_settings();
         let engines = [own.clone(), Settings { repeated_contacts_above: 1.0, ..own }]
             .map(|settings| PathEngine::new(&plan, beam.clone(), None, settings));
-        let both = engines.each_ref().map(|engine| engine.arrivals_at(pose.position()));
+        let both = engines
+            .each_ref()
+            .map(|engine| engine.arrivals_at(pose.position()).expect("few paths"));
         for azimuth in 0..120 {
             let [some, every] = both.each_ref().map(|engine| {
                 let mut arrivals = Vec::new();

@@ -17,7 +17,7 @@ fn simulator(scene: &Arc<Scene>, engine: EngineOptions) -> Simulator {
 
 /// Mirror echoes over the threshold; the fan's ranger is transparent.
 fn mirrored(point: &ObservationPoint, pose: &Pose, azimuth_deg: f64) -> Vec<Arrival> {
-    let mut arrivals = point.arrivals(pose.direction_rad(azimuth_deg));
+    let mut arrivals = point.arrivals(pose.direction_rad(azimuth_deg)).expect("few paths");
     arrivals.retain(|arrival| {
         arrival.path.kind() == PathKind::Specular
             && arrival.amplitude > 0.02

@@ -57,7 +57,7 @@ impl Chain {
                     ..LOSSLESS
                 };
                 let paths = Paths::new(&plan, settings);
-                let (traced, echoes) = paths.trace(at, at, None);
+                let (traced, echoes) = paths.trace(at, at, None).expect("few paths");
                 let heard = |echo: &Echo| Heard {
                     echo: paths.path(&traced, echo),
                     edge: single::view(&paths.plan, &traced.out, traced.back(), echo),

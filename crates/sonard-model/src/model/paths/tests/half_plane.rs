@@ -129,7 +129,9 @@ fn over_a_half_plane_the_field_is_macdonalds() {
         for step in -60..=60 {
             let above_m = 0.01 * f64::from(step) + 1e-4;
             let settings = Settings { floor: 1e-9, ..at_height(above_m) };
-            let echoes = Paths::new(&half_plane(), settings).enumerate_between(source, target);
+            let echoes = Paths::new(&half_plane(), settings)
+                .enumerate_between(source, target)
+                .expect("few paths");
             assert_eq!(
                 echoes.iter().filter(|echo| is_by_level_edge(echo)).count(),
                 1,

@@ -35,7 +35,7 @@ const AT: DVec2 = DVec2::new(1.3, 0.6);
 
 #[test]
 fn every_way_can_be_run_through_backwards() {
-    let echoes = Paths::new(&scene(&clutter()), settings()).enumerate(AT);
+    let echoes = Paths::new(&scene(&clutter()), settings()).enumerate(AT).expect("few paths");
     assert!(echoes.len() > 100, "{}", echoes.len());
     for echo in &echoes {
         let backwards: Vec<_> = echo.path.mechanisms().rev().collect();
@@ -57,7 +57,7 @@ fn wrap(angle: f64) -> f64 {
 
 #[test]
 fn turning_moving_and_mirroring_the_world_changes_nothing() {
-    let here = Paths::new(&scene(&clutter()), settings()).enumerate(AT);
+    let here = Paths::new(&scene(&clutter()), settings()).enumerate(AT).expect("few paths");
     for (turn, shift, mirrored) in
         [(0.7, DVec2::new(31.0, -8.0), false), (PI, DVec2::ZERO, true), (4.4, DVec2::X, true)]
     {
@@ -72,7 +72,8 @@ fn turning_moving_and_mirroring_the_world_changes_nothing() {
                 [a.x, a.y, b.x, b.y]
             })
             .collect();
-        let there = Paths::new(&scene(&walls), settings()).enumerate(to(AT.x, AT.y));
+        let there =
+            Paths::new(&scene(&walls), settings()).enumerate(to(AT.x, AT.y)).expect("few paths");
         assert_eq!(here.len(), there.len());
         for (one, other) in here.iter().zip(&there) {
             assert!((one.length_m - other.length_m).abs() < 1e-9);
@@ -93,8 +94,9 @@ fn each_echo_of_a_seen_wall_turns_with_the_world() {
             [a.x, a.y, b.x, b.y]
         })
         .collect();
-    let here = Paths::new(&scene(&clutter()), settings()).enumerate(AT);
-    let there = Paths::new(&scene(&walls), settings()).enumerate(AT.rotate(rotor));
+    let here = Paths::new(&scene(&clutter()), settings()).enumerate(AT).expect("few paths");
+    let there =
+        Paths::new(&scene(&walls), settings()).enumerate(AT.rotate(rotor)).expect("few paths");
     for one in &here {
         let found = there.iter().any(|other| {
             other.path.mechanisms().eq(one.path.mechanisms())
@@ -107,7 +109,7 @@ fn each_echo_of_a_seen_wall_turns_with_the_world() {
 #[test]
 fn no_echo_gains_energy_and_more_loss_leaves_less() {
     let lossless = Settings { absorption_np_per_m: 0.0, ..settings() };
-    let loud = Paths::new(&scene(&clutter()), lossless).enumerate(AT);
+    let loud = Paths::new(&scene(&clutter()), lossless).enumerate(AT).expect("few paths");
     assert!(loud.iter().all(|echo| echo.amplitude <= 1.0 + 1e-12));
 
     let with = |reflectance: f64, absorption_np_per_m: f64| {
@@ -115,7 +117,9 @@ fn no_echo_gains_energy_and_more_loss_leaves_less() {
         for wall in &mut plan.walls {
             wall.material.reflectance = reflectance;
         }
-        Paths::new(&plan, Settings { absorption_np_per_m, ..settings() }).enumerate(AT)
+        Paths::new(&plan, Settings { absorption_np_per_m, ..settings() })
+            .enumerate(AT)
+            .expect("few paths")
     };
     let steps = [(1.0, 0.0), (0.9, 0.0), (0.9, 0.1), (0.5, 0.1), (0.5, 0.5)];
     for pair in steps.windows(2) {
@@ -131,9 +135,9 @@ fn no_echo_gains_energy_and_more_loss_leaves_less() {
 #[test]
 fn a_lower_floor_or_a_longer_path_only_adds() {
     let plan = scene(&clutter());
-    let few = Paths::new(&plan, settings()).enumerate(AT);
+    let few = Paths::new(&plan, settings()).enumerate(AT).expect("few paths");
     let more = Settings { floor: 2e-4, max_path_m: 11.0, ..settings() };
-    let many = Paths::new(&plan, more).enumerate(AT);
+    let many = Paths::new(&plan, more).enumerate(AT).expect("few paths");
     let kept: Vec<_> =
         many.iter().filter(|e| e.amplitude >= 1e-3 && e.length_m <= 9.0).cloned().collect();
     assert_eq!(few.len(), kept.len());
@@ -151,7 +155,7 @@ fn a_corner_that_opens_changes_its_echo_gradually() {
         let corner = scene(&[[0.0, 0.0, 9.0, 0.0], [b.x, b.y, 0.0, 0.0]]);
         let at = range * DVec2::from_angle(0.6);
         let settings = Settings { max_path_m: 1.7, edge_law: Some(EdgeLaw::Utd), ..LOSSLESS };
-        let echoes = Paths::new(&corner, settings).enumerate(at);
+        let echoes = Paths::new(&corner, settings).enumerate(at).expect("few paths");
         // The echoes of the single walls are shorter.
         let of_corner = echoes.iter().filter(|echo| echo.length_m > 1.5);
         of_corner
@@ -180,8 +184,8 @@ fn places_on_walls_joints_and_outside_are_harmless() {
     let plan = scene(&clutter());
     let paths = Paths::new(&plan, settings());
     for at in [DVec2::ZERO, DVec2::new(1.55, 0.1), DVec2::new(1e4, 0.0), DVec2::new(1.9, 0.9)] {
-        let echoes = paths.enumerate(at);
+        let echoes = paths.enumerate(at).expect("few paths");
         assert!(echoes.iter().all(|echo| echo.length_m.is_finite() && echo.amplitude.is_finite()));
     }
-    assert!(Paths::new(&scene(&[]), settings()).enumerate(AT).is_empty());
+    assert!(Paths::new(&scene(&[]), settings()).enumerate(AT).expect("few paths").is_empty());
 }

@@ -37,7 +37,7 @@ fn top_of(wall: u32) -> Mechanism {
 }
 
 fn by_level_edges(plan: &Scene, at: DVec2, z_m: f64) -> Vec<EchoPath> {
-    let mut echoes = Paths::new(plan, at_height(z_m)).enumerate(at);
+    let mut echoes = Paths::new(plan, at_height(z_m)).enumerate(at).expect("few paths");
     echoes.retain(is_by_level_edge);
     echoes
 }
@@ -78,7 +78,7 @@ fn the_upper_edge_of_a_low_wall_answers_from_the_foot_of_the_perpendicular() {
 fn a_wall_ends_gradually_at_its_upper_edge() {
     let field = |z_m: f64| {
         let settings = Settings { max_path_m: 2.3, ..at_height(z_m) };
-        let echoes = Paths::new(&low_wall(), settings).enumerate(DVec2::ZERO);
+        let echoes = Paths::new(&low_wall(), settings).enumerate(DVec2::ZERO).expect("few paths");
         // Without what comes by the floor.
         let level =
             echoes.iter().filter(|echo| !reflectors(&echo.path).contains(&Reflector::Floor));
@@ -105,7 +105,7 @@ fn by_the_floor_a_level_edge_is_seen_from_an_image() {
     room.walls[0].z_m = Some([0.0, top]);
     let at = DVec2::new(0.3, -d);
     for z_m in [0.1, 0.34, 0.6, 1.1] {
-        let mut echoes = Paths::new(&room, at_height(z_m)).enumerate(at);
+        let mut echoes = Paths::new(&room, at_height(z_m)).enumerate(at).expect("few paths");
         echoes.retain(is_by_level_edge);
         assert_eq!(echoes.len(), 4, "{echoes:?}");
         for echo in &echoes {
@@ -129,7 +129,7 @@ fn by_the_floor_a_level_edge_is_seen_from_an_image() {
     }
     // On the floor itself the ranger is its own image: four times the edge's field.
     room.floor_material = Material::RIGID;
-    let mut echoes = Paths::new(&room, at_height(0.0)).enumerate(at);
+    let mut echoes = Paths::new(&room, at_height(0.0)).enumerate(at).expect("few paths");
     echoes.retain(is_by_level_edge);
     let all: Complex64 = echoes.iter().map(pressure).sum();
     let distance_m = d.hypot(top);
@@ -147,7 +147,7 @@ fn beside_a_high_wall_a_level_edge_answers_slantwise() {
     room.floor_z_m = Some(0.0);
     room.walls[1].z_m = Some([0.0, top]);
     let (high, floor) = (Reflector::Wall(0), Reflector::Floor);
-    let echoes = Paths::new(&room, at_height(z_m)).enumerate(DVec2::new(x, -d));
+    let echoes = Paths::new(&room, at_height(z_m)).enumerate(DVec2::new(x, -d)).expect("few paths");
     let slant: Vec<_> = echoes
         .iter()
         .filter(|e| is_by_level_edge(e) && reflectors(&e.path).contains(&high))
@@ -236,8 +236,8 @@ fn in_the_room(z_m: f64) -> Settings {
 #[test]
 fn receiver_and_transmitter_may_change_places() {
     let paths = Paths::new(&furnished(), in_the_room(0.77));
-    let there = answers(&paths.enumerate_between(T, R), |angle| angle);
-    let mut back = paths.enumerate_between(R, T);
+    let there = answers(&paths.enumerate_between(T, R).expect("few paths"), |angle| angle);
+    let mut back = paths.enumerate_between(R, T).expect("few paths");
     for echo in &mut back {
         std::mem::swap(&mut echo.departure_rad, &mut echo.arrival_rad);
         echo.rise_rad.reverse();
@@ -245,7 +245,7 @@ fn receiver_and_transmitter_may_change_places() {
     assert!(there.len() > 30, "{}", there.len());
     assert_same(&there, &answers(&back, |angle| angle));
     // From one place each path is heard in both directions.
-    let here = paths.enumerate(T);
+    let here = paths.enumerate(T).expect("few paths");
     let mut reverse = here.clone();
     for echo in &mut reverse {
         std::mem::swap(&mut echo.departure_rad, &mut echo.arrival_rad);
@@ -256,7 +256,8 @@ fn receiver_and_transmitter_may_change_places() {
 
 #[test]
 fn a_room_moved_turned_and_mirrored_answers_the_same() {
-    let plain = Paths::new(&furnished(), in_the_room(0.77)).enumerate_between(T, R);
+    let plain =
+        Paths::new(&furnished(), in_the_room(0.77)).enumerate_between(T, R).expect("few paths");
     let plain = answers(&plain, |angle| angle);
     let frame = DVec2::from_angle(0.83);
     let moved = |p: DVec2| DVec2::new(7.0, -3.0) + frame.rotate(p);
@@ -266,7 +267,9 @@ fn a_room_moved_turned_and_mirrored_answers_the_same() {
         for wall in &mut room.walls {
             (wall.a, wall.b) = (place(wall.a), place(wall.b));
         }
-        Paths::new(&room, in_the_room(0.77)).enumerate_between(place(T), place(R))
+        Paths::new(&room, in_the_room(0.77))
+            .enumerate_between(place(T), place(R))
+            .expect("few paths")
     };
     assert_same(&plain, &answers(&at(&moved), |angle| angle - 0.83));
     assert_same(&plain, &answers(&at(&mirrored), |angle| PI - angle));
@@ -276,7 +279,8 @@ fn a_room_moved_turned_and_mirrored_answers_the_same() {
         *limits = [2.3 - limits[1], 2.3 - limits[0]];
     }
     std::mem::swap(&mut room.floor_material, &mut room.ceiling_material);
-    let mut turned = Paths::new(&room, in_the_room(2.3 - 0.77)).enumerate_between(T, R);
+    let mut turned =
+        Paths::new(&room, in_the_room(2.3 - 0.77)).enumerate_between(T, R).expect("few paths");
     for echo in &mut turned {
         echo.rise_rad = echo.rise_rad.map(|rise| -rise);
     }
@@ -314,7 +318,7 @@ fn a_level_edge_in_pieces_is_one() {
 fn jumps(plan: &Scene, heights_m: [f64; 2], [from, to]: [DVec2; 2]) -> Vec<(f64, f64, f64)> {
     let echoes = |z_m: f64| {
         let settings = Settings { max_order: Some(2), floor: 1e-6, ..at_height(z_m) };
-        Paths::new(plan, settings).enumerate_between(from, to)
+        Paths::new(plan, settings).enumerate_between(from, to).expect("few paths")
     };
     // Long paths fade, so that none comes into reach at once.
     let fade = |length_m: f64| 0.5 + 0.5 * (PI * (length_m / 6.0).min(1.0)).cos();

@@ -86,8 +86,8 @@ fn no_echo_is_lost_with_the_beams_that_end_by_their_heights() {
         };
         let paths = Paths::new(&room, settings);
         let all = paths.clone().without_cuts();
-        let [found, expected] =
-            [&paths, &all].map(|paths| told(&paths.enumerate_between(from, to)));
+        let [found, expected] = [&paths, &all]
+            .map(|paths| told(&paths.enumerate_between(from, to).expect("few paths")));
         assert_eq!(found.len(), expected.len(), "case {case}: {from} {to} {room:?}");
         for (one, other) in found.iter().zip(&expected) {
             let is_same = one.iter().zip(other).all(|(a, b)| (a - b).abs() < 1e-6);

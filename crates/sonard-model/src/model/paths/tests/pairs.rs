@@ -23,7 +23,7 @@ fn plan() -> Scene {
 fn lengths_are_those_of_both_halves() {
     let settings =
         Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
-    let echoes = Paths::new(&plan(), settings).enumerate_between(T, R);
+    let echoes = Paths::new(&plan(), settings).enumerate_between(T, R).expect("few paths");
     let below = DVec2::new(R.x, -0.8 - R.y);
     let edge = DVec2::new(0.4, 1.5);
     let by_round = |p: DVec2, q: DVec2| {
@@ -63,7 +63,10 @@ fn the_same_way_back_from_receiver_to_transmitter() {
     let settings =
         Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-4, ..LOSSLESS };
     let paths = Paths::new(&plan(), settings);
-    let (there, back) = (paths.enumerate_between(T, R), paths.enumerate_between(R, T));
+    let (there, back) = (
+        paths.enumerate_between(T, R).expect("few paths"),
+        paths.enumerate_between(R, T).expect("few paths"),
+    );
     assert!(there.len() >= 15, "{}", there.len());
     for echo in there.iter().filter(|echo| echo.amplitude > 2e-3) {
         let mut walls = reflectors(&echo.path);
@@ -84,8 +87,8 @@ fn a_pair_in_one_place_is_one_transducer() {
     let settings =
         Settings { max_path_m: 5.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-3, ..LOSSLESS };
     let paths = Paths::new(&plan(), settings);
-    let one = paths.enumerate(T);
-    let two = paths.enumerate_between(T, T + DVec2::new(1e-7, 0.0));
+    let one = paths.enumerate(T).expect("few paths");
+    let two = paths.enumerate_between(T, T + DVec2::new(1e-7, 0.0)).expect("few paths");
     let strong = |echoes: &[EchoPath]| {
         echoes.iter().filter(|echo| echo.amplitude > 0.02).map(|echo| echo.length_m).collect()
     };

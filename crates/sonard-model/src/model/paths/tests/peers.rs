@@ -32,7 +32,8 @@ fn in_random_polygons_the_images_are_those_of_pyroomacoustics() {
     for (number, case) in vectors.cases.iter().enumerate() {
         let corners: Vec<_> = case.corners.iter().copied().map(DVec2::from_array).collect();
         let at = DVec2::from_array(case.at);
-        let echoes = Paths::new(&polygon(&corners), settings.clone()).enumerate(at);
+        let echoes =
+            Paths::new(&polygon(&corners), settings.clone()).enumerate(at).expect("few paths");
         let mut images = case.images.clone();
         for echo in &echoes {
             let image = at + echo.length_m * DVec2::from_angle(echo.arrival_rad);

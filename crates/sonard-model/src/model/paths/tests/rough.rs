@@ -18,7 +18,8 @@ fn power(reflectance: f64, roughness: f64, aside_rad: f64, sensor: &Sensor) -> (
     let settings = Settings { scatter_height_rad: HEIGHT_RAD, floor: 1e-7, ..LOSSLESS };
     let beam = BeamPattern::new(sensor, 343.99);
     let engine = PathEngine::new(&plan, beam, None, settings);
-    let arrivals = engine.arrivals_at(DVec2::ZERO).arrivals(FRAC_PI_2 - aside_rad);
+    let arrivals =
+        engine.arrivals_at(DVec2::ZERO).expect("few paths").arrivals(FRAC_PI_2 - aside_rad);
     let of = |kind: PathKind| {
         arrivals.iter().filter(|a| a.path.kind() == kind).map(|a| a.amplitude.powi(2)).sum()
     };

@@ -31,7 +31,7 @@ fn echoes(room: &Scene, z_m: f64, edge_law: Option<EdgeLaw>) -> Vec<EchoPath> {
         edge_law,
         ..LOSSLESS
     };
-    Paths::new(room, settings).enumerate(AT)
+    Paths::new(room, settings).enumerate(AT).expect("few paths")
 }
 
 #[test]

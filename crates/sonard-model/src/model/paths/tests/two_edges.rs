@@ -74,6 +74,7 @@ fn field(plan: &Scene, paths: &Paths, source: DVec2, at: DVec2) -> Complex64 {
     };
     let bent: Complex64 = paths
         .enumerate_between(source, at)
+        .expect("few paths")
         .iter()
         .map(|echo| wave(echo.length_m, echo.amplitude, echo.phase_rad))
         .sum();
@@ -146,7 +147,8 @@ fn bent_twice(echoes: Vec<EchoPath>) -> Vec<EchoPath> {
 fn between_two_free_ends_it_is_the_product_of_their_coefficients() {
     let plan = scene(&[[0.0, 0.0, 0.0, -3.0], [0.5, 0.2, 0.5, -3.0]]);
     let (from, to) = (DVec2::new(-0.6, -0.5), DVec2::new(0.9, -0.4));
-    let echoes = bent_twice(Paths::new(&plan, double()).enumerate_between(from, to));
+    let echoes =
+        bent_twice(Paths::new(&plan, double()).enumerate_between(from, to).expect("few paths"));
     let ends = [DVec2::ZERO, DVec2::new(0.5, 0.2)];
     let [out, across, back] =
         [from.distance(ends[0]), ends[0].distance(ends[1]), to.distance(ends[1])];
@@ -202,8 +204,8 @@ fn each_way_can_be_run_through_backwards() {
     let paths = Paths::new(&plan, Settings { floor: 3e-5, ..double() });
     let (here, there) = (DVec2::new(-0.1, -0.3), DVec2::new(0.3, 0.2));
     for [one, other] in [[here, here], [here, there]] {
-        let out = bent_twice(paths.enumerate_between(one, other));
-        let back = bent_twice(paths.enumerate_between(other, one));
+        let out = bent_twice(paths.enumerate_between(one, other).expect("few paths"));
+        let back = bent_twice(paths.enumerate_between(other, one).expect("few paths"));
         assert!(out.len() > 30 && out.len() == back.len(), "{} {}", out.len(), back.len());
         assert!(out.iter().any(|echo| {
             reflectors(&echo.path)
@@ -240,7 +242,7 @@ fn where_the_second_edge_ceases_to_hide_the_first_nothing_jumps() {
             let to = edge + 0.6 * DVec2::from_angle(angle);
             // Only what goes over the ends, with the phase of the path along the edges taken off.
             let least_m = from.length() + edge.length() + 0.6;
-            let near = paths.enumerate_between(from, to);
+            let near = paths.enumerate_between(from, to).expect("few paths");
             near.iter()
                 .filter(|echo| {
                     reflectors(&echo.path).is_empty() && (echo.length_m - least_m).abs() < 1e-2
@@ -266,12 +268,12 @@ fn where_the_second_edge_ceases_to_hide_the_first_nothing_jumps() {
 fn a_plate_is_crossed_from_end_to_end() {
     let plan = scene(&[[-0.15, 0.6, 0.15, 0.6]]);
     let at = DVec2::new(0.02, 0.0);
-    let echoes = bent_twice(Paths::new(&plan, double()).enumerate(at));
+    let echoes = bent_twice(Paths::new(&plan, double()).enumerate(at).expect("few paths"));
     let way_m = at.distance(DVec2::new(-0.15, 0.6)) + 0.3 + at.distance(DVec2::new(0.15, 0.6));
     assert_eq!(echoes.len(), 2, "one in each direction: {echoes:?}");
     for echo in &echoes {
         assert!((echo.length_m - way_m).abs() < 1e-12);
     }
     let single = Settings { double_diffraction: false, ..double() };
-    assert!(bent_twice(Paths::new(&plan, single).enumerate(at)).is_empty());
+    assert!(bent_twice(Paths::new(&plan, single).enumerate(at).expect("few paths")).is_empty());
 }

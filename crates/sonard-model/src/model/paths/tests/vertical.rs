@@ -17,7 +17,7 @@ fn a_wall_and_the_floor_answer_from_their_corner() {
     let (d, h) = (0.8, 0.35);
     let mut room = scene(&[[-9.0, d, 9.0, d]]);
     room.floor_z_m = Some(0.0);
-    let echoes = Paths::new(&room, at_height(h)).enumerate(DVec2::ZERO);
+    let echoes = Paths::new(&room, at_height(h)).enumerate(DVec2::ZERO).expect("few paths");
     let lengths: Vec<f64> = echoes.iter().map(|echo| echo.length_m).collect();
     for (length_m, expected) in lengths.iter().zip([2.0 * h, 2.0 * d, 2.0 * d.hypot(h)]) {
         assert!((length_m - expected).abs() < 1e-12, "{lengths:?}");
@@ -41,7 +41,8 @@ fn in_a_box_the_echoes_are_the_lattice_in_space() {
     let mut room = polygon(&corners);
     (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(size[2]));
     let settings = Settings { max_path_m: 6.0, ..at_height(at[2]) };
-    let echoes = Paths::new(&room, settings).enumerate(DVec2::new(at[0], at[1]));
+    let echoes =
+        Paths::new(&room, settings).enumerate(DVec2::new(at[0], at[1])).expect("few paths");
     let along = |axis: usize| {
         (-4..=4).flat_map(move |m| {
             let shift = 2.0 * f64::from(m) * size[axis];
@@ -77,7 +78,8 @@ fn floor_and_ceiling_leave_what_their_materials_do() {
         wall.material = material(0.8, 0.0);
     }
     let settings = Settings { max_path_m: 6.0, floor: 0.02, ..at_height(0.3) };
-    let echoes = Paths::new(&room, settings.clone()).enumerate(DVec2::new(0.4, 0.25));
+    let echoes =
+        Paths::new(&room, settings.clone()).enumerate(DVec2::new(0.4, 0.25)).expect("few paths");
     for echo in &echoes {
         let gains = echo.path.reflectors().map(|met| match met {
             Reflector::Floor => 0.5,
@@ -96,8 +98,9 @@ fn floor_and_ceiling_leave_what_their_materials_do() {
         ceiling_material: Material::RIGID,
         ..room.clone()
     };
-    let all =
-        Paths::new(&rigid, Settings { floor: 1e-4, ..settings }).enumerate(DVec2::new(0.4, 0.25));
+    let all = Paths::new(&rigid, Settings { floor: 1e-4, ..settings })
+        .enumerate(DVec2::new(0.4, 0.25))
+        .expect("few paths");
     let strong = all.iter().filter(|echo| {
         let hits =
             |level| reflectors(&echo.path).iter().filter(|met| **met == level).count() as i32;
@@ -118,7 +121,7 @@ fn the_beam_is_weighed_in_space_and_a_tilt_finds_the_floor() {
     let heard = |tilt_rad: f64, walls: &[Reflector]| {
         let settings = Settings { tilt_rad, floor: 1e-6, ..at_height(h) };
         let engine = PathEngine::new(&room, beam.clone(), None, settings);
-        let place = engine.arrivals_at(DVec2::ZERO);
+        let place = engine.arrivals_at(DVec2::ZERO).expect("few paths");
         let arrivals = place.arrivals(FRAC_PI_2);
         arrivals.iter().find(|a| reflectors(&a.path)[..] == *walls).map_or(0.0, |a| a.amplitude)
     };
@@ -138,9 +141,9 @@ fn the_beam_is_weighed_in_space_and_a_tilt_finds_the_floor() {
 fn a_scene_in_the_plane_stays_in_the_plane() {
     let plan = scene(&[[-1.0, 0.5, 4.0, 0.5], [0.3, -1.0, 4.0, 0.2]]);
     let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..LOSSLESS };
-    let flat = Paths::new(&plan, settings.clone()).enumerate(DVec2::ZERO);
+    let flat = Paths::new(&plan, settings.clone()).enumerate(DVec2::ZERO).expect("few paths");
     let high = Settings { sensor_z_m: Some(3.0), ..settings };
-    assert_eq!(Paths::new(&plan, high).enumerate(DVec2::ZERO), flat);
+    assert_eq!(Paths::new(&plan, high).enumerate(DVec2::ZERO).expect("few paths"), flat);
     assert!(flat.len() > 3);
 }
 
@@ -154,6 +157,7 @@ fn a_low_wall_is_missed_above_and_bars_the_way_below() {
         let settings = Settings { max_order: Some(1), ..at_height(z_m) };
         let mut met: Vec<_> = Paths::new(room, settings)
             .enumerate(DVec2::ZERO)
+            .expect("few paths")
             .into_iter()
             .map(|echo| reflectors(&echo.path).to_vec())
             .collect();
@@ -187,7 +191,7 @@ fn a_low_cylinder_hides_only_what_is_behind_it() {
         z_m: Some([0.0, 0.5]),
     }];
     let level = |z_m: f64| {
-        let echoes = Paths::new(&plan, at_height(z_m)).enumerate(DVec2::ZERO);
+        let echoes = Paths::new(&plan, at_height(z_m)).enumerate(DVec2::ZERO).expect("few paths");
         let level = echoes.iter().filter(|echo| echo.rise_rad == [0.0; 2]);
         level.map(|echo| reflectors(&echo.path)[0]).collect::<Vec<_>>()
     };
@@ -207,7 +211,8 @@ fn corners_of_low_walls_answer_as_those_of_high_ones() {
         plan.floor_z_m = Some(0.0);
         let settings = Settings { edge_law: Some(EdgeLaw::Utd), ..at_height(0.3) };
         let level = |plan: &Scene, at: DVec2| -> Vec<f64> {
-            let mut echoes = Paths::new(plan, settings.clone()).enumerate(frame.rotate(at));
+            let mut echoes =
+                Paths::new(plan, settings.clone()).enumerate(frame.rotate(at)).expect("few paths");
             let is_by_level_edge = |bend: &Bend| matches!(bend, Bend::Level { .. });
             echoes
                 .retain(|e| e.rise_rad == [0.0; 2] && !bends(&e.path).iter().any(is_by_level_edge));

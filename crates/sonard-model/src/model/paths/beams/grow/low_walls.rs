@@ -3,9 +3,12 @@
 use super::Grower;
 use crate::{
     geometry::DVec2,
-    model::paths::{
-        beams::{beam::Beam, slopes::ALL},
-        plan::WallMirror,
+    model::{
+        SearchPart,
+        paths::{
+            beams::beam::Beam,
+            plan::{ALL_SLOPES, WallMirror},
+        },
     },
 };
 
@@ -34,7 +37,7 @@ impl Grower<'_> {
         climbs: &[[f64; 2]],
     ) -> Option<u32> {
         if !(self.starts_level && self.plan.climbs.ends_beams) {
-            return (!climbs.is_empty()).then_some(ALL);
+            return (!climbs.is_empty()).then_some(ALL_SLOPES);
         }
         let wall_mirror = &self.plan.walls[wall as usize];
         let span_m = self.lit_span_m(beam, wall_mirror, side);
@@ -46,7 +49,11 @@ impl Grower<'_> {
         let least_gain = self.plan.settings.floor / (2.0 * beam.gain * longer);
         let highest_m = self.plan.climbs.highest_m(least_gain);
         let steepest = (longer * longer - 1.0).sqrt().min(highest_m / run_m[0]);
-        self.tree.slopes.reaching(beam.slopes, climbs, run_m, steepest)
+        let known = self.tree.slopes.kept();
+        let slopes = self.tree.slopes.reaching(beam.slopes, climbs, run_m, steepest);
+        self.plan.effort.step(SearchPart::Beams, 1);
+        self.plan.effort.keep::<[f64; 2]>(self.tree.slopes.kept() - known);
+        slopes
     }
 }
 
