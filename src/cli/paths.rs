@@ -62,7 +62,8 @@ All mirror reflections, and one diffraction (two with --double-diffraction) with
 and after. The amplitude \
 counts reflectances, edges, curvature and absorption but no beam pattern: what the echo would be \
 if the ranger faced it both on leaving and on arriving. A path that can be run through in both \
-directions is listed twice, with departure and arrival swapped.";
+directions is listed twice, with departure and arrival swapped. Departure and arrival are directions in the world, \
+degrees counter-clockwise from +x; those of `sonard simulate` (azimuth_deg) count from the heading.";
 
 const EXAMPLES: &str = "\
 Examples:

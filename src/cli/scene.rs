@@ -1,6 +1,7 @@
 //! `sonard scene`.
 
 use std::{
+    fmt::Write as _,
     io::{self, Write as _},
     path::PathBuf,
 };
@@ -16,6 +17,9 @@ use crate::{
     plot::draw_scene,
     scene::{Scene, json_schema, shipped},
 };
+
+/// Changes of the plan that are listed, at most.
+const MOST_CHANGES: usize = 100;
 
 /// Verbs of `sonard scene`.
 #[derive(Debug, clap::Subcommand)]
@@ -76,7 +80,11 @@ another, or a polyline), cylinders, and named poses of the ranger. With floor_z_
 it has a height: these reflect too, as floor_material and ceiling_material say (rigid without), \
 and walls and cylinders may end below or above (z_m). Lengths are metres, angles degrees \
 counter-clockwise from +x. A fault is shown at its line and column, with what would be \
-right, and the exit code is 2.";
+right, and the exit code is 2.
+
+Below the line stands what is not taken as it was drawn: ends of walls nearer to each other, or to a wall, than \
+the scene's snap_m (2 mm without it) meet, what runs past a wall by less is cut, and of walls \
+drawn over each other one counts. snap_m 0 takes the plan as it is drawn.";
 
 const CHECK_EXAMPLES: &str = r#"Examples:
   sonard scene check my-room.json
@@ -93,7 +101,7 @@ The smallest useful scene:
 const DRAW_ABOUT: &str = "\
 Draw a scene's floor plan as SVG or PNG.
 
-Shows the walls by material with their ids, cylinders, the poses with an arrow along azimuth 0, \
+Shows the walls by material with their ids, as the model has them after what `sonard scene check` lists, cylinders, the poses with an arrow along azimuth 0, \
 the robot's body where the scene has one, a scale in metres, and what the scene says of its \
 source and of what is approximate. Heights, and what floor and ceiling are made of, are not drawn.";
 
@@ -129,7 +137,15 @@ fn check(args: &CheckArgs) -> Outcome {
     if let Some(pose) = &args.pose {
         scene_file::pose(&scene, pose)?;
     }
-    print(&summary(&scene))
+    let plan = scene.floor_plan();
+    let mut said = summary(&scene);
+    for change in plan.changes.iter().take(MOST_CHANGES) {
+        let _ = write!(said, "\n  {}", change.describe(&scene));
+    }
+    if let Some(more) = plan.changes.len().checked_sub(MOST_CHANGES).filter(|more| *more > 0) {
+        let _ = write!(said, "\n  and {more} changes more");
+    }
+    print(&said)
 }
 
 fn draw(args: &DrawArgs) -> Outcome {
@@ -153,7 +169,7 @@ fn drawn(mut scene: Scene, pose: Option<&str>) -> Result<Scene, Failure> {
         scene.robot.clone_from(&robot);
         scene = scene.with_robot_at(pose);
     }
-    Ok(scene)
+    Ok(scene.floor_plan().scene(&scene))
 }
 
 fn list() -> Outcome {

@@ -8,7 +8,7 @@ use super::{Failure, output::note_input};
 use crate::{
     geometry::Pose,
     scan::Session,
-    scene::{PoseError, Scene, SceneError, shipped, suggest},
+    scene::{PoseError, Scene, SceneError, shipped, shown, suggest},
     store::{SceneLost, logged_scene},
 };
 
@@ -106,12 +106,29 @@ fn no_such_scene(path_or_name: &str) -> Failure {
     )
 }
 
+/// Lines up to this length are shown whole, bytes.
+const LONGEST_LINE: usize = 400;
+
+/// So are parts of the file up to this length.
+const LONGEST_PART: usize = 10_000;
+
 /// Shows the line of the file that is wrong. The headline alone says `file:line:column` too,
 /// for whoever greps.
 fn report(name: &str, text: String, error: &SceneError) -> Report {
-    let label = if error.path.is_empty() { "here".to_owned() } else { error.path.clone() };
-    let diagnostic = MietteDiagnostic::new(format!("{name}:{error}"))
-        .with_help(error.help())
-        .with_label(LabeledSpan::at(error.span.clone(), label));
+    let label = if error.path.is_empty() { "here".to_owned() } else { shown(&error.path) };
+    let diagnostic = MietteDiagnostic::new(format!("{name}:{error}")).with_help(error.help());
+    let (before, after) = text.split_at(error.span.start);
+    let near = before.rsplit('\n').take(3).chain(after.split('\n').take(3));
+    let longest = near.map(str::len).max().unwrap_or_default();
+    if longest > LONGEST_LINE || error.span.len() > LONGEST_PART {
+        // The place says line and column; a line of a hundred megabytes would say nothing more.
+        let excerpt: String = after.chars().take(LONGEST_LINE).collect();
+        return Report::new(diagnostic.with_help(format!(
+            "{}\nthere: {}",
+            error.help(),
+            shown(&excerpt)
+        )));
+    }
+    let diagnostic = diagnostic.with_label(LabeledSpan::at(error.span.clone(), label));
     Report::new(diagnostic).with_source_code(NamedSource::new(name, text).with_language("json"))
 }

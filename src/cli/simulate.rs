@@ -107,7 +107,8 @@ carries the candidate that came closest, with a negative margin.
 
 With --array, several rangers at fixed bearings on a robot fire in turn, each from its own place. \
 Their readings say which ranger (`ranger`) and, where the robot turned or moved within a scan, \
-where it stood (`pose`). Crosstalk, one ranger's sound in another's ear, is left out.";
+where it stood (`pose`). azimuth_deg counts counter-clockwise from the heading; the directions of `sonard paths` \
+are the world's. Crosstalk, one ranger's sound in another's ear, is left out.";
 
 const EXAMPLES: &str = "\
 Examples:

@@ -42,6 +42,72 @@ fn check_points_at_the_line_and_exits_with_2() {
 }
 
 #[test]
+fn check_lists_what_is_not_taken_as_drawn_and_draw_shows_the_plan() {
+    let folder = tempdir().expect("a folder");
+    let wall = |id: &str, ends: [[f64; 2]; 2]| serde_json::json!({"id": id, "from": ends[0], "to": ends[1], "material": "m"});
+    let walls = [
+        wall("south", [[0.0, 0.0], [4.0, 0.0]]),
+        wall("east", [[4.0, 0.0005], [4.0, 3.0]]),
+        wall("screen", [[2.0, 0.001], [2.0, 1.0]]),
+        wall("rail", [[1.0, -0.0012], [1.0, 1.0]]),
+        wall("again", [[3.0, 0.0], [3.5, 0.0]]),
+    ];
+    let mut scene_file = serde_json::json!(
+        {"name": "r", "materials": {"m": {"reflectance": 0.9}}, "walls": walls, "poses": {}}
+    );
+    let path = written(folder.path(), &scene_file.to_string());
+    scene(&["check", &path]).success().stdout(
+        contains("r: 5 walls")
+            .and(contains(
+                "east.a at (4.0000, 0.0005): moved by 0.500 mm, it was 0.500 mm from south.b",
+            ))
+            .and(contains(
+                "screen.a at (2.0000, 0.0010): moved by 1.000 mm, it stopped short of south",
+            ))
+            .and(contains("rail.a at (1.0000, -0.0012): moved by 1.200 mm, it ran past south"))
+            .and(contains("again lies on south for 0.500 m: south counts there")),
+    );
+    let drawn = |path: &str| {
+        let out = scene(&["draw", path]).success().get_output().stdout.clone();
+        String::from_utf8(out).expect("SVG")
+    };
+    let snapped = drawn(&path);
+    scene_file["snap_m"] = serde_json::json!(0);
+    let path = written(folder.path(), &scene_file.to_string());
+    scene(&["check", &path])
+        .success()
+        .stdout(contains("\n").count(2).and(contains("again lies on")));
+    assert_ne!(drawn(&path), snapped);
+    scene_file["snap_m"] = serde_json::json!(0.1);
+    let path = written(folder.path(), &scene_file.to_string());
+    scene(&["check", &path]).code(2).stderr(contains("snap_m is 0.1").and(contains("0.005")));
+}
+
+#[test]
+fn a_fault_in_a_line_without_end_is_shown_in_part() {
+    let folder = tempdir().expect("a folder");
+    let walls = "[1,".repeat(1_000_000);
+    let path = written(folder.path(), &format!("{{\"name\": \"r\", \"walls\": [1 2{walls}"));
+    let refused = scene(&["check", &path]).code(2);
+    let said = &refused.get_output().stderr;
+    assert!(said.len() < 5000, "{} bytes", said.len());
+    assert!(String::from_utf8_lossy(said).contains("room.json:1:"));
+}
+
+#[test]
+fn a_transducer_in_the_floor_is_refused() {
+    let folder = tempdir().expect("a folder");
+    let room = r#"{"name": "r", "materials": {}, "floor_z_m": 0, "ceiling_z_m": 2.5}"#;
+    let path = written(folder.path(), room);
+    for verb in ["simulate", "paths"] {
+        let refused = program()
+            .args([verb, "--scene", &path, "--pose", "0,0,0", "--sensor-z", "-0.2"])
+            .assert();
+        refused.code(2).stderr(contains("outside the scene's floor at 0 m"));
+    }
+}
+
+#[test]
 fn check_refuses_a_pose_outside_the_room() {
     scene(&["check", "simple-room", "--pose", "2,0.3"])
         .code(2)

@@ -24,7 +24,7 @@ pub use error::{ArrayError, ArrayPoseError};
 use crate::{
     geometry::{DVec2, Pose, wrap_360},
     plan::ScanPlan,
-    scene::{PoseError, Scene},
+    scene::Scene,
 };
 
 /// The data files that come with the program, by name.
@@ -220,23 +220,12 @@ impl RangerArray {
     /// Which ranger can't be there, and why.
     pub fn check_pose(&self, scene: &Scene, robot: &Pose) -> Result<(), ArrayPoseError> {
         let scene = self.in_scene(scene);
-        scene.check_pose(robot).map_err(|error| ArrayPoseError { ranger: None, error })?;
-        let whole = scene.with_robot_at(robot);
         let places: Vec<DVec2> =
             self.rangers.iter().map(|ranger| ranger.pose_on(robot).position()).collect();
-        let refuse = |(at, error): (usize, PoseError)| ArrayPoseError {
-            ranger: Some(self.rangers[at].id.clone()),
+        scene.check_places(robot, &places).map_err(|(at, error)| ArrayPoseError {
+            ranger: at.map(|at| self.rangers[at].id.clone()),
             error,
-        };
-        whole.check_places(&places).map_err(refuse)?;
-        let behind = |place: &DVec2| {
-            let reflector = scene.wall_between(robot.position(), *place)?.to_owned();
-            Some(PoseError::BehindWall { x_m: place.x, y_m: place.y, reflector })
-        };
-        match places.iter().enumerate().find_map(|(at, place)| Some((at, behind(place)?))) {
-            Some(separated) => Err(refuse(separated)),
-            None => Ok(()),
-        }
+        })
     }
 }
 

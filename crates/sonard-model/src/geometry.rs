@@ -2,14 +2,16 @@
 
 mod arrangement;
 mod mirror;
-mod square;
+mod outline;
+mod snap;
 
-pub use arrangement::{Arrangement, Piece, SNAP_M, between};
+pub use arrangement::{Arrangement, Piece, between};
 pub use glam::DVec2;
 pub use mirror::Mirror;
+pub use outline::{enclosed_area, encloses};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-pub use square::square_up;
+pub use snap::{Cause, End, Move, snap};
 
 /// Where the ranger's rotation axis stands and where azimuth 0 points.
 ///

@@ -8,9 +8,11 @@ mod builder;
 mod check;
 mod error;
 mod file;
+mod floor_plan;
 mod locate;
 mod outline;
 mod parse;
+mod plain;
 mod pose;
 mod robot;
 mod schema;
@@ -19,7 +21,8 @@ pub mod shipped;
 mod tests;
 
 pub use builder::SceneBuilder;
-pub use error::{SceneError, SceneProblem, suggest};
+pub use error::{SceneError, SceneProblem, shown, suggest};
+pub use floor_plan::{Change, DEFAULT_SNAP_M, FloorPlan};
 pub use pose::{PoseError, parse_pose};
 pub use robot::{Robot, RobotShape};
 pub use schema::json_schema;
@@ -54,6 +57,8 @@ pub struct Scene {
     pub floor_material: Material,
     /// The ceiling's.
     pub ceiling_material: Material,
+    /// What is drawn closer together than this was meant to meet, metres; see [`FloorPlan`].
+    pub snap_m: f64,
     /// Named poses of the ranger.
     pub poses: BTreeMap<String, Pose>,
     /// Body of the robot that carries the ranger; see [`Scene::with_robot_at`].

@@ -9,7 +9,7 @@ use uuid::Uuid;
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose, wrap_pi},
-    scene::{Cylinder, Material, Scene, Wall},
+    scene::{Cylinder, DEFAULT_SNAP_M, Material, Scene, Wall},
 };
 use sonard_records::{
     InteractionKind, InteractionRecord, LOG_FORMAT, ModelRecord, PathKind, PathRecord, Ping,
@@ -43,6 +43,7 @@ pub(super) fn room() -> Scene {
         ceiling_z_m: None,
         floor_material: Material::RIGID,
         ceiling_material: Material::RIGID,
+        snap_m: DEFAULT_SNAP_M,
         poses: BTreeMap::from([
             ("fig7".into(), Pose { x_m: 0.834, y_m: 0.345, heading_deg: 0.0 }),
             ("fig9".into(), Pose { x_m: 0.774, y_m: 0.085, heading_deg: 0.0 }),

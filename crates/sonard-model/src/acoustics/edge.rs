@@ -7,7 +7,7 @@
 //! the plane as for a point source in space. For a ranger that looks straight at the edge,
 //! `2 L` is the range. Time convention `exp(+i omega t)`.
 
-use std::f64::consts::{FRAC_PI_4, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
 use num_complex::Complex64;
 
@@ -116,11 +116,16 @@ const ON_BOUNDARY_RAD: f64 = 1e-9;
 
 impl Wedge {
     /// Whether mirror images alone are the exact field: an opening of `pi / m` (a flat wall, a
-    /// right-angled corner, ...), which diffracts nothing.
+    /// right-angled corner, ...), which diffracts nothing. With an odd `m` both walls have to reflect alike:
+    /// else the image in the last one jumps, as where two materials meet on one line.
     #[must_use]
     pub fn is_regular(&self) -> bool {
         let count = (PI / self.opening_rad).round();
-        count >= 1.0 && (self.opening_rad - PI / count).abs() < REGULAR_RAD
+        let [first, second] = self.reflectance;
+        let is_even = (0.5 * count).fract() == 0.0;
+        count >= 1.0
+            && (self.opening_rad - PI / count).abs() < REGULAR_RAD
+            && (is_even || first == second)
     }
 
     /// Whether the air takes up more than half a turn.
@@ -136,8 +141,9 @@ impl Wedge {
     /// Each of its four cotangents belongs to one mirror image of the source in the wedge, and
     /// takes away half of that image's field where it comes into sight. It is weighed with the
     /// reflectances that made the image, so that the sum stays continuous for walls that absorb
-    /// too (after Luebbers, IEEE Trans. Antennas Propag. 32, 1984). Error below 1 % from half
-    /// a wavelength off the edge, without multiple diffraction between near edges.
+    /// too (after Luebbers, IEEE Trans. Antennas Propag. 32, 1984). An image that comes into sight only
+    /// beyond the walls is weighed so that less and less is left towards a flat wall, which diffracts nothing.
+    /// Error below 1 % from half a wavelength off the edge, without multiple diffraction between near edges.
     ///
     /// Between `from` and `aspect` the coefficient runs on without the jumps that it has where an image
     /// comes into sight: the field there beside images as they are seen at `from`. The same twice
@@ -174,25 +180,41 @@ impl Wedge {
     /// The images whose boundaries are nearest on each side of `from`, for the source and its first
     /// image.
     fn images(&self, aspect: &Aspect, from: &Aspect) -> [Image; 4] {
+        let difference = [aspect, from].map(|at| at.out_rad - at.in_rad);
+        let sum = [aspect, from].map(|at| at.out_rad + at.in_rad);
+        let [one, two] = self.pair(difference, [-self.opening_rad, self.opening_rad], false);
+        let [three, four] = self.pair(sum, [0.0, 2.0 * self.opening_rad], true);
+        [one, two, three, four]
+    }
+
+    /// The two of them at an angle `here`, as they are seen `there`, for angles within `air`.
+    ///
+    /// Towards an opening of `pi / m` the boundary of one leaves the air where that of the other comes in, and
+    /// both images become one. So the one whose boundary is outside, where nothing asks for its strength, is given
+    /// more and more of the other's.
+    fn pair(&self, [here, there]: [f64; 2], air: [f64; 2], mirrored: bool) -> [Image; 2] {
         let turn = 2.0 * self.opening_rad;
-        let image = |[here, there]: [f64; 2], side: f64, mirrored: bool| {
+        let mut outside = [0.0; 2];
+        let mut images = [1.0, -1.0].map(|side| {
             let count = ((PI + side * there) / turn).round();
             let past_rad = |beta: f64| PI + side * beta - count * turn;
-            let number = (side * count) as i32;
+            let boundary = side * (count * turn - PI);
+            outside[usize::from(side < 0.0)] = (air[0] - boundary).max(boundary - air[1]);
             Image {
                 past_rad: past_rad(here),
                 is_lit: past_rad(there) > -ON_BOUNDARY_RAD,
-                reflectance: self.image_reflectance(number, mirrored),
+                reflectance: self.image_reflectance((side * count) as i32, mirrored),
             }
-        };
-        let difference = [aspect, from].map(|at| at.out_rad - at.in_rad);
-        let sum = [aspect, from].map(|at| at.out_rad + at.in_rad);
-        [
-            image(difference, 1.0, false),
-            image(difference, -1.0, false),
-            image(sum, 1.0, true),
-            image(sum, -1.0, true),
-        ]
+        });
+        let own = [images[0].reflectance, images[1].reflectance];
+        for (at, image) in images.iter_mut().enumerate() {
+            if outside[at] > -ON_BOUNDARY_RAD && outside[1 - at] <= ON_BOUNDARY_RAD {
+                let share = (outside[at] / FRAC_PI_2).clamp(0.0, 1.0);
+                image.reflectance = own[1 - at] + share * (own[at] - own[1 - at]);
+                break;
+            }
+        }
+        images
     }
 
     /// Product of the reflectances for the image at `2 number opening +- in_rad` (minus: mirrored).

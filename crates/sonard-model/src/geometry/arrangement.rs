@@ -9,8 +9,12 @@ use rstar::{
 
 use super::DVec2;
 
-/// Points closer than this are one point, metres. Far above rounding, far below a wavelength.
-pub const SNAP_M: f64 = 1e-7;
+/// Points closer than this are one point, metres: what the rounding of coordinates and crossings leaves.
+/// What was drawn apart is brought together before ([`snap`](super::snap())).
+const SAME_M: f64 = 1e-9;
+
+/// The ends of a segment of which nothing is left.
+const NOWHERE: [u32; 2] = [u32::MAX; 2];
 
 /// Cutting once can bring pieces into contact by rounding; it settles in one or two rounds.
 const ROUNDS: usize = 4;
@@ -18,12 +22,14 @@ const ROUNDS: usize = 4;
 /// Segments that touch at their ends only.
 #[derive(Debug, Clone, Default)]
 pub struct Arrangement {
-    /// Ends of pieces, no two closer than [`SNAP_M`].
+    /// Ends of pieces, each once.
     pub points: Vec<DVec2>,
     /// What is left of the segments; no two between the same points.
     pub pieces: Vec<Piece>,
     /// Segments that lie on one of these and were given later, by [`between`] its ends.
     pub covered: HashMap<[u32; 2], Vec<u32>>,
+    /// For each segment the points where it ends.
+    pub ends: Vec<[u32; 2]>,
 }
 
 /// A part of a segment between two points of an [`Arrangement`].
@@ -55,7 +61,7 @@ impl Arrangement {
             }
             parts = parts.iter().zip(cuts).flat_map(|(part, cuts)| part.cut(cuts)).collect();
         }
-        join(&parts)
+        join(&parts, segments.len())
     }
 }
 
@@ -75,7 +81,7 @@ impl Part {
         let mut pieces = Vec::with_capacity(points.len());
         let mut from = self.a;
         for to in points {
-            if from.distance(to) > SNAP_M {
+            if from.distance(to) > SAME_M {
                 pieces.push(Self { a: from, b: to, ..self });
                 from = to;
             }
@@ -84,7 +90,7 @@ impl Part {
     }
 
     fn bounds(&self) -> AABB<[f64; 2]> {
-        let (low, high) = (self.a.min(self.b) - SNAP_M, self.a.max(self.b) + SNAP_M);
+        let (low, high) = (self.a.min(self.b) - SAME_M, self.a.max(self.b) + SAME_M);
         AABB::from_corners(low.to_array(), high.to_array())
     }
 
@@ -94,10 +100,10 @@ impl Part {
         let length = along.length();
         let place = (point - self.a).dot(along) / length;
         let height = along.perp_dot(point - self.a) / length;
-        height.abs() < SNAP_M
+        height.abs() < SAME_M
             && (0.0..length).contains(&place)
-            && point.distance(self.a) > SNAP_M
-            && point.distance(self.b) > SNAP_M
+            && point.distance(self.a) > SAME_M
+            && point.distance(self.b) > SAME_M
     }
 
     /// Where two parts cross, both away from their ends.
@@ -140,13 +146,13 @@ fn cuts(parts: &[Part]) -> Vec<Vec<DVec2>> {
     cuts
 }
 
-/// Makes ends that are closer than [`SNAP_M`] one point, and puts pieces that lie on others aside.
-fn join(parts: &[Part]) -> Arrangement {
+/// Makes ends that are closer than [`SAME_M`] one point, and puts pieces that lie on others aside.
+fn join(parts: &[Part], segments: usize) -> Arrangement {
     let ends: Vec<DVec2> = parts.iter().flat_map(|part| [part.a, part.b]).collect();
     let tree = RTree::bulk_load(
         ends.iter().enumerate().map(|(i, end)| GeomWithData::new(end.to_array(), i)).collect(),
     );
-    let mut result = Arrangement::default();
+    let mut result = Arrangement { ends: vec![NOWHERE; segments], ..Arrangement::default() };
     let mut point_of = vec![u32::MAX; ends.len()];
     for (i, &end) in ends.iter().enumerate() {
         if point_of[i] != u32::MAX {
@@ -154,7 +160,7 @@ fn join(parts: &[Part]) -> Arrangement {
         }
         let point = result.points.len() as u32;
         result.points.push(end);
-        for same in tree.locate_within_distance(end.to_array(), SNAP_M * SNAP_M) {
+        for same in tree.locate_within_distance(end.to_array(), SAME_M * SAME_M) {
             if point_of[same.data] == u32::MAX {
                 point_of[same.data] = point;
             }
@@ -163,6 +169,9 @@ fn join(parts: &[Part]) -> Arrangement {
     let mut seen = HashSet::new();
     for (i, part) in parts.iter().enumerate() {
         let ends = [point_of[2 * i], point_of[2 * i + 1]];
+        let [first, last] = &mut result.ends[part.segment as usize];
+        *first = if *first == u32::MAX { ends[0] } else { *first };
+        *last = ends[1];
         if ends[0] == ends[1] {
             continue;
         }
@@ -190,9 +199,9 @@ mod tests {
             ("apart", vec![line, segment(0.0, 1.0, 2.0, 1.0)], 4, 2),
             ("cross", vec![line, segment(1.0, -1.0, 1.0, 1.0)], 5, 4),
             ("end on the middle", vec![line, segment(1.0, 0.0, 1.0, 1.0)], 4, 3),
-            ("end on the middle, nearly", vec![line, segment(1.0, 3e-9, 1.0, 1.0)], 4, 3),
+            ("end on the middle, nearly", vec![line, segment(1.0, 3e-11, 1.0, 1.0)], 4, 3),
             ("common end", vec![line, segment(2.0, 0.0, 2.0, 1.0)], 3, 2),
-            ("common end, nearly", vec![line, segment(2.0, 3e-9, 2.0, 1.0)], 3, 2),
+            ("common end, nearly", vec![line, segment(2.0, 3e-11, 2.0, 1.0)], 3, 2),
             ("overlap", vec![line, segment(1.0, 0.0, 3.0, 0.0)], 4, 3),
             ("twice", vec![line, segment(2.0, 0.0, 0.0, 0.0)], 2, 1),
             ("a gap that counts", vec![line, segment(1.0, 1e-4, 1.0, 1.0)], 4, 2),
@@ -200,6 +209,10 @@ mod tests {
         for (name, segments, points, pieces) in cases {
             let made = Arrangement::of(&segments);
             assert_eq!((made.points.len(), made.pieces.len()), (points, pieces), "{name}");
+            for (ends, (a, b)) in made.ends.iter().zip(&segments) {
+                let [p, q] = ends.map(|end| made.points[end as usize]);
+                assert!(p.distance(*a) < 1e-9 && q.distance(*b) < 1e-9, "{name}");
+            }
         }
     }
 

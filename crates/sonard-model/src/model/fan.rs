@@ -15,7 +15,7 @@
 //! - A ray that meets the receiver beside its centre stands for its neighbour that meets the
 //!   centre: length and both angles are those of the neighbour, found from the curvature of the
 //!   wave front (for flat walls: from the image of the source, exactly).
-//! - Edges diffract wherever a wall ends, also where it joins another. The ray goes from the edge
+//! - Edges diffract wherever a wall ends, also where it joins another, unless that goes straight on. The ray goes from the edge
 //!   straight to the receiver; the same path backwards (straight out, back over walls) is left
 //!   out, as in the paper.
 //! - Cylinders widen the ray tube by geometric optics; the paper has flat walls only. Beyond a
@@ -34,9 +34,14 @@ use std::{
 
 use arrivals::FanArrivals;
 use ray::Ray;
+use smallvec::SmallVec;
 
 use super::{Arrival, Arrivals, Edge, Engine, Reflector, TooCostly, raycast::Reflectors};
-use crate::{acoustics::BeamPattern, geometry::DVec2, scene::Scene};
+use crate::{
+    acoustics::BeamPattern,
+    geometry::DVec2,
+    scene::{FloorPlan, Scene},
+};
 
 /// The ray model.
 #[derive(Debug)]
@@ -94,28 +99,27 @@ impl FanSettings {
 /// Ends of walls, each point once.
 #[derive(Debug)]
 struct WallEnds {
-    /// For each wall, the edges its ends are known by.
-    known: Vec<[Edge; 2]>,
+    /// For each wall, the edges its ends are known by; none where it goes straight on as another wall.
+    known: Vec<SmallVec<[Edge; 2]>>,
     /// Greatest mirrored amplitude of the walls that end there.
     mirror: HashMap<Edge, f64>,
 }
 
 impl WallEnds {
-    fn new(reflectors: &Reflectors) -> Self {
-        let mut first_at: HashMap<(i64, i64), Edge> = HashMap::new();
+    fn new(scene: &Scene, plan: &FloorPlan, reflectors: &Reflectors) -> Self {
+        let goes_on = plan.straight_joints(scene);
+        let mut first_at: HashMap<u32, Edge> = HashMap::new();
         let mut mirror: HashMap<Edge, f64> = HashMap::new();
-        let mut known: Vec<[Edge; 2]> = Vec::new();
-        for edge in reflectors.edges() {
-            let point = (reflectors.edge_point(edge) * 1e9).round();
-            let name = *first_at.entry((point.x as i64, point.y as i64)).or_insert(edge);
-            let strength = mirror.entry(name).or_default();
-            *strength = strength.max(reflectors.mirror(Reflector::Wall(edge.wall)));
-            if edge.at_b {
-                if let Some([_, at_b]) = known.last_mut() {
-                    *at_b = name;
+        let mut known: Vec<SmallVec<[Edge; 2]>> = vec![SmallVec::new(); plan.walls.len()];
+        for (ends, wall) in plan.arrangement.ends.iter().zip(0..) {
+            for (&point, at_b) in ends.iter().zip([false, true]) {
+                if goes_on.get(point as usize).copied().unwrap_or(true) {
+                    continue;
                 }
-            } else {
-                known.push([name, name]);
+                let name = *first_at.entry(point).or_insert(Edge { wall, at_b });
+                let strength = mirror.entry(name).or_default();
+                *strength = strength.max(reflectors.mirror(Reflector::Wall(wall)));
+                known[wall as usize].push(name);
             }
         }
         Self { known, mirror }
@@ -126,8 +130,9 @@ impl Fan {
     /// For a scene, a beam pattern and settings.
     #[must_use]
     pub fn new(scene: &Scene, beam: BeamPattern, settings: FanSettings) -> Self {
-        let reflectors = Reflectors::new(scene);
-        let wall_ends = WallEnds::new(&reflectors);
+        let plan = scene.floor_plan();
+        let reflectors = Reflectors::new(scene, &plan);
+        let wall_ends = WallEnds::new(scene, &plan, &reflectors);
         Self { reflectors, wall_ends, beam, settings }
     }
 

@@ -28,7 +28,8 @@
 //! that agree in all three are one, and one is kept. The same rule covers joints of collinear
 //! walls and all corners of `pi / m`. An echo on the very end of a wall counts as seen, and the
 //! edge's echo, which is minus half of it there, knows that. Corners that are right-angled but for
-//! the rounding of their coordinates are made so first ([`square_up`](crate::geometry::square_up)).
+//! the rounding of their coordinates are made so before, with all else that a drawn plan needs
+//! ([`FloorPlan`](crate::scene::FloorPlan)).
 //!
 //! # Pairs
 //!

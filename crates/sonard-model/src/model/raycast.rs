@@ -3,7 +3,7 @@
 use crate::{
     geometry::DVec2,
     model::{Edge, Reflector},
-    scene::{Cylinder, Material, Scene, Wall},
+    scene::{Cylinder, FloorPlan, Material, Scene},
 };
 
 /// A ray starts this far off the surface it leaves, metres, so as not to meet it again.
@@ -27,7 +27,10 @@ pub struct Hit {
 /// A scene's reflectors, ready for ray casts.
 #[derive(Debug)]
 pub struct Reflectors {
-    segments: Vec<Segment>,
+    /// By wall, from end to end.
+    walls: Vec<Segment>,
+    /// What of each wall no other one covers.
+    segments: Vec<(u32, Segment)>,
     circles: Vec<Circle>,
 }
 
@@ -47,11 +50,18 @@ struct Circle {
 }
 
 impl Reflectors {
-    /// Those of a scene.
+    /// Those of a scene and its plan.
     #[must_use]
-    pub fn new(scene: &Scene) -> Self {
+    pub fn new(scene: &Scene, plan: &FloorPlan) -> Self {
+        let mirror = |wall: u32| mirrored(&scene.walls[wall as usize].material);
+        let walls = plan.walls.iter().zip(0..);
+        let stretches = plan.stretches();
         Self {
-            segments: scene.walls.iter().map(Segment::new).collect(),
+            walls: walls.map(|(&ends, wall)| Segment::new(ends, mirror(wall))).collect(),
+            segments: stretches
+                .into_iter()
+                .map(|(wall, ends)| (wall, Segment::new(ends, mirror(wall))))
+                .collect(),
             circles: scene.cylinders.iter().map(Circle::new).collect(),
         }
     }
@@ -70,8 +80,8 @@ impl Reflectors {
                 best = Some(hit);
             }
         };
-        for (segment, index) in self.segments.iter().zip(0..) {
-            let reflector = Reflector::Wall(index);
+        for (wall, segment) in &self.segments {
+            let reflector = Reflector::Wall(*wall);
             if leaving != Some(reflector)
                 && let Some(hit) = segment.meet(origin, direction, reflector)
             {
@@ -96,7 +106,7 @@ impl Reflectors {
     ) -> Option<Hit> {
         match reflector {
             Reflector::Wall(index) => {
-                self.segments[index as usize].meet_line(origin, direction, reflector)
+                self.walls[index as usize].meet_line(origin, direction, reflector)
             }
             Reflector::Cylinder(index) => {
                 self.circles[index as usize].meet(origin, direction, reflector)
@@ -116,7 +126,7 @@ impl Reflectors {
     /// Amplitude that a reflector mirrors, 0 to 1.
     pub(super) fn mirror(&self, reflector: Reflector) -> f64 {
         match reflector {
-            Reflector::Wall(index) => self.segments[index as usize].mirror,
+            Reflector::Wall(index) => self.walls[index as usize].mirror,
             Reflector::Cylinder(index) => self.circles[index as usize].mirror,
             Reflector::Floor | Reflector::Ceiling => 0.0,
         }
@@ -132,14 +142,8 @@ impl Reflectors {
 
     /// The point of an edge.
     pub(super) fn edge_point(&self, edge: Edge) -> DVec2 {
-        let segment = &self.segments[edge.wall as usize];
+        let segment = &self.walls[edge.wall as usize];
         if edge.at_b { segment.start + segment.length_m * segment.along } else { segment.start }
-    }
-
-    /// Both ends of every wall.
-    pub(super) fn edges(&self) -> impl Iterator<Item = Edge> {
-        (0..self.segments.len() as u32)
-            .flat_map(|wall| [false, true].map(|at_b| Edge { wall, at_b }))
     }
 }
 
@@ -150,10 +154,10 @@ fn mirrored(material: &Material) -> f64 {
 }
 
 impl Segment {
-    fn new(wall: &Wall) -> Self {
-        let run = wall.b - wall.a;
+    fn new((a, b): (DVec2, DVec2), mirror: f64) -> Self {
+        let run = b - a;
         let length_m = run.length();
-        Self { start: wall.a, along: run / length_m, length_m, mirror: mirrored(&wall.material) }
+        Self { start: a, along: run / length_m, length_m, mirror }
     }
 
     fn meet(&self, origin: DVec2, direction: DVec2, reflector: Reflector) -> Option<Hit> {

@@ -28,6 +28,19 @@ pub enum ModelError {
     /// The sensor's data make no sense.
     #[error("sensor: {0}")]
     Sensor(#[from] SensorError),
+    /// A transducer in the floor or above the ceiling.
+    #[error(
+        "the transducer's height is {z_m} m, outside the scene's {level} at {level_z_m} m: choose one between floor \
+         and ceiling"
+    )]
+    SensorHeight {
+        /// The transducer's, metres.
+        z_m: f64,
+        /// "floor" or "ceiling".
+        level: &'static str,
+        /// Its height, metres.
+        level_z_m: f64,
+    },
     /// There are more echo paths than can be found.
     #[error(transparent)]
     TooCostly(#[from] TooCostly),
@@ -54,6 +67,19 @@ pub struct Simulator {
     engine: Box<dyn Engine>,
 }
 
+fn check_height(scene: &Scene, sensor: &Sensor) -> Result<(), ModelError> {
+    let Some(z_m) = sensor.mounting.z_m else { return Ok(()) };
+    let levels = [("floor", scene.floor_z_m, 1.0), ("ceiling", scene.ceiling_z_m, -1.0)];
+    for (level, level_z_m, up) in levels {
+        if let Some(level_z_m) = level_z_m
+            && up * (z_m - level_z_m) <= 0.0
+        {
+            return Err(ModelError::SensorHeight { z_m, level, level_z_m });
+        }
+    }
+    Ok(())
+}
+
 impl Simulator {
     /// For a scene, a sensor in some air, and options.
     ///
@@ -71,6 +97,7 @@ impl Simulator {
             value,
             expected,
         })?;
+        check_height(&scene, &sensor)?;
         let receiver = receiver(&sensor, &air, &options);
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
         let scatter_height_rad = beam.two_way_power_rad();
@@ -173,5 +200,28 @@ impl Simulator {
     #[must_use]
     pub const fn options(&self) -> &Options {
         &self.options
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_transducer_outside_floor_and_ceiling_is_refused() {
+        let mut room = Scene::builder("room").build().expect("an empty room");
+        let made = |room: &Scene, z_m: f64| {
+            let mut sensor = Sensor::preset("senscomp-6500").expect("a preset");
+            sensor.mounting.z_m = Some(z_m);
+            let made =
+                Simulator::new(Arc::new(room.clone()), sensor, Air::default(), Options::default());
+            made.err().map_or_else(String::new, |error| error.to_string())
+        };
+        assert_eq!(made(&room, -7.0), "");
+        (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(2.4));
+        assert_eq!(made(&room, 1.0), "");
+        for (z_m, level) in [(-0.1, "floor"), (0.0, "floor"), (2.4, "ceiling"), (3.0, "ceiling")] {
+            assert!(made(&room, z_m).contains(level), "{z_m}");
+        }
     }
 }

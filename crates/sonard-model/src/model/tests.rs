@@ -3,6 +3,7 @@
 mod array;
 mod closed_forms;
 mod extents;
+mod floor_plans;
 mod full_wave;
 mod interactions;
 mod laws;

@@ -8,7 +8,7 @@ use std::{
 use sha2::{Digest, Sha256};
 
 use super::{
-    Cylinder, Material, Robot, RobotShape, Scene, SceneProblem, Wall,
+    Cylinder, DEFAULT_SNAP_M, Material, Robot, RobotShape, Scene, SceneProblem, Wall,
     error::MAX_COORDINATE_M,
     file::{CircleFile, CylinderFile, Point, RobotFile, SceneFile, WallFile},
     locate::{JsonPath, Part},
@@ -20,6 +20,9 @@ use crate::geometry::{DVec2, Pose, distance_to_segment};
 /// Shortest wall, metres: far below the wavelength, far above rounding.
 const MIN_WALL_M: f64 = 1e-4;
 
+/// Most that `snap_m` can be, metres: below the wavelength of any ranger.
+const MAX_SNAP_M: f64 = 5e-3;
+
 /// A rule that is broken, and the member of the file that breaks it.
 pub(super) struct Fault {
     pub(super) path: JsonPath,
@@ -30,15 +33,16 @@ pub(super) struct Fault {
 /// Turns a well-formed file into a scene; `text` is what it was read from.
 pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
     let root = JsonPath::root();
-    not_empty(&file.name, &root.key("name"))?;
+    is_name(&file.name, &root.key("name"))?;
     let mut rules = Rules::new(file.materials)?;
     let mut walls = Vec::new();
     for (index, wall) in file.walls.iter().enumerate() {
-        walls.extend(rules.walls(wall, &root.key("walls").index(index))?);
+        walls.extend(rules.walls(wall, index, &root.key("walls").index(index))?);
     }
     let mut cylinders = Vec::new();
     for (index, cylinder) in file.cylinders.into_iter().enumerate() {
-        cylinders.push(rules.cylinder(cylinder, &root.key("cylinders").index(index))?);
+        let path = root.key("cylinders").index(index);
+        cylinders.push(rules.cylinder(cylinder, index, &path)?);
     }
     let robot = file.robot.map(|robot| rules.robot(robot, &root.key("robot"))).transpose()?;
     floor_below_ceiling(file.floor_z_m, file.ceiling_z_m, &root)?;
@@ -59,6 +63,7 @@ pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
         ceiling_z_m: file.ceiling_z_m,
         floor_material,
         ceiling_material,
+        snap_m: snap(file.snap_m, &root.key("snap_m"))?,
         poses: file.poses,
         robot,
         sha256: Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect(),
@@ -68,46 +73,60 @@ pub(super) fn checked(file: SceneFile, text: &str) -> Result<Scene, Fault> {
     Ok(scene)
 }
 
+/// What has an id: the list that it is in, and its place there.
+type Owner = (&'static str, Option<usize>);
+
 /// What the parts of a scene share: the materials there are, and the ids taken so far.
 struct Rules {
     materials: BTreeMap<String, Material>,
-    ids: HashMap<String, String>,
+    ids: HashMap<Arc<str>, Owner>,
 }
 
 impl Rules {
     fn new(materials: BTreeMap<String, Material>) -> Result<Self, Fault> {
         for (name, material) in &materials {
             let path = JsonPath::root().key("materials").key(name);
-            not_empty(name, &path).map_err(|fault| Fault { part: Part::Key, ..fault })?;
+            is_name(name, &path).map_err(|fault| Fault { part: Part::Key, ..fault })?;
             share("reflectance", material.reflectance, &path)?;
             share("roughness", material.roughness, &path)?;
         }
         Ok(Self { materials, ids: HashMap::new() })
     }
 
-    fn walls(&mut self, file: &WallFile, path: &JsonPath) -> Result<Vec<Wall>, Fault> {
+    fn walls(
+        &mut self,
+        file: &WallFile,
+        number: usize,
+        path: &JsonPath,
+    ) -> Result<Vec<Wall>, Fault> {
         let material = self.material(&file.material, path)?;
         let z_m = heights(file.z_m, path)?;
         let corners = corners(file, path)?;
-        not_empty(&file.id, &path.key("id"))?;
+        is_name(&file.id, &path.key("id"))?;
         let single = file.polyline.is_none();
         corners
             .into_iter()
             .enumerate()
             .map(|(index, (a, b))| {
                 let id = if single { file.id.clone() } else { format!("{}.{index}", file.id) };
-                Ok(Wall { id: self.take_id(id, path)?, a, b, material, z_m })
+                let id = self.take_id(id, ("walls", Some(number)), path)?;
+                Ok(Wall { id, a, b, material, z_m })
             })
             .collect()
     }
 
-    fn cylinder(&mut self, file: CylinderFile, path: &JsonPath) -> Result<Cylinder, Fault> {
+    fn cylinder(
+        &mut self,
+        file: CylinderFile,
+        number: usize,
+        path: &JsonPath,
+    ) -> Result<Cylinder, Fault> {
         Ok(Cylinder {
             center: point(file.center, &path.key("center"))?,
             radius_m: radius(file.radius_m, &path.key("radius_m"))?,
             material: self.material(&file.material, path)?,
             z_m: heights(file.z_m, path)?,
-            id: self.take_id(file.id, path)?,
+            id: self.take_id(file.id, ("cylinders", Some(number)), path)?,
         })
     }
 
@@ -121,7 +140,7 @@ impl Rules {
             shape,
             material: self.material(&file.material, path)?,
             z_m: heights(file.z_m, path)?,
-            id: self.take_id(file.id, path)?,
+            id: self.take_id(file.id, ("robot", None), path)?,
         })
     }
 
@@ -153,14 +172,16 @@ impl Rules {
         })
     }
 
-    fn take_id(&mut self, id: String, path: &JsonPath) -> Result<Arc<str>, Fault> {
-        not_empty(&id, &path.key("id"))?;
-        if let Some(first) = self.ids.get(&id) {
-            let first = first.clone();
+    fn take_id(&mut self, id: String, owner: Owner, path: &JsonPath) -> Result<Arc<str>, Fault> {
+        is_name(&id, &path.key("id"))?;
+        if let Some(&(list, number)) = self.ids.get(id.as_str()) {
+            let first = JsonPath::root().key(list);
+            let first = number.map_or(first.clone(), |number| first.index(number)).to_string();
             return fault(&path.key("id"), SceneProblem::DuplicateId { id, first });
         }
-        self.ids.insert(id.clone(), path.to_string());
-        Ok(id.into())
+        let id: Arc<str> = id.into();
+        self.ids.insert(Arc::clone(&id), owner);
+        Ok(id)
     }
 }
 
@@ -234,13 +255,14 @@ fn flat_body(outline: &[Point], path: &JsonPath) -> Result<RobotShape, Fault> {
 }
 
 fn check_poses(scene: &Scene, path: &JsonPath) -> Result<(), Fault> {
+    if scene.poses.is_empty() {
+        return Ok(());
+    }
     let outlines = Outlines::of(scene);
     for (name, pose) in &scene.poses {
         let path = path.key(name);
         let bad_name = |problem| Fault { path: path.clone(), part: Part::Key, problem };
-        if name.trim().is_empty() {
-            return Err(bad_name(SceneProblem::EmptyName));
-        }
+        is_name(name, &path).map_err(|fault| bad_name(fault.problem))?;
         if name.contains(',') {
             return Err(bad_name(SceneProblem::CommaInName(name.clone())));
         }
@@ -313,6 +335,14 @@ fn radius(radius_m: f64, path: &JsonPath) -> Result<f64, Fault> {
     fault(path, SceneProblem::Radius(radius_m))
 }
 
+fn snap(snap_m: Option<f64>, path: &JsonPath) -> Result<f64, Fault> {
+    let snap_m = snap_m.unwrap_or(DEFAULT_SNAP_M);
+    if (0.0..=MAX_SNAP_M).contains(&snap_m) {
+        return Ok(snap_m);
+    }
+    fault(path, SceneProblem::Snap(snap_m))
+}
+
 fn share(field: &'static str, value: f64, path: &JsonPath) -> Result<(), Fault> {
     if (0.0..=1.0).contains(&value) {
         return Ok(());
@@ -320,8 +350,14 @@ fn share(field: &'static str, value: f64, path: &JsonPath) -> Result<(), Fault> 
     fault(&path.key(field), SceneProblem::Share { field, value })
 }
 
-fn not_empty(name: &str, path: &JsonPath) -> Result<(), Fault> {
-    if name.trim().is_empty() { fault(path, SceneProblem::EmptyName) } else { Ok(()) }
+fn is_name(name: &str, path: &JsonPath) -> Result<(), Fault> {
+    if name.trim().is_empty() {
+        return fault(path, SceneProblem::EmptyName);
+    }
+    match name.chars().find(|found| found.is_control()) {
+        Some(found) => fault(path, SceneProblem::ControlCharacter(found)),
+        None => Ok(()),
+    }
 }
 
 fn fault<T>(path: &JsonPath, problem: SceneProblem) -> Result<T, Fault> {

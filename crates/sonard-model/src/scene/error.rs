@@ -35,13 +35,13 @@ impl SceneError {
     /// What is wrong, with the offending text.
     #[must_use]
     pub fn message(&self) -> String {
-        self.problem.to_string()
+        shown(&self.problem.to_string())
     }
 
     /// What would be right.
     #[must_use]
     pub fn help(&self) -> String {
-        self.problem.help()
+        shown(&self.problem.help())
     }
 }
 
@@ -49,13 +49,31 @@ impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:{}: ", self.line, self.column)?;
         if !self.path.is_empty() {
-            write!(f, "{}: ", self.path)?;
+            write!(f, "{}: ", shown(&self.path))?;
         }
-        self.problem.fmt(f)
+        f.write_str(&self.message())
     }
 }
 
 impl Error for SceneError {}
+
+/// Longest part of a message, characters.
+const LONGEST: usize = 1000;
+
+/// What of a text can go to a terminal: its control characters written out, and the middle of a long one left out.
+#[must_use]
+pub fn shown(text: &str) -> String {
+    let written = |found: char| {
+        let escaped = found.is_control().then(|| found.escape_debug());
+        escaped.into_iter().flatten().chain((!found.is_control()).then_some(found))
+    };
+    if text.len() <= LONGEST {
+        return text.chars().flat_map(written).collect();
+    }
+    let start = text.chars().take(LONGEST / 2).flat_map(written);
+    let end: String = text.chars().rev().take(LONGEST / 4).collect();
+    start.chain(" [...] ".chars()).chain(end.chars().rev().flat_map(written)).collect()
+}
 
 /// Line and column (in characters) of a byte offset, both counted from 1.
 pub(super) fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
@@ -100,6 +118,9 @@ pub enum SceneProblem {
     /// A name without a character.
     #[error("this name is empty")]
     EmptyName,
+    /// A name that a terminal would obey, and no one could read.
+    #[error("this name has the character {} in it", .0.escape_debug())]
+    ControlCharacter(char),
     /// A pose name that reads like coordinates.
     #[error("the pose name `{0}` contains a comma")]
     CommaInName(String),
@@ -156,6 +177,9 @@ pub enum SceneProblem {
     /// A radius of zero or less, or too large.
     #[error("a radius of {0} m is not possible")]
     Radius(f64),
+    /// A tolerance of the plan that is none.
+    #[error("snap_m is {0}")]
+    Snap(f64),
     /// A share outside 0..1.
     #[error("{field} is {value}")]
     Share {
@@ -202,6 +226,9 @@ impl SceneProblem {
                     .to_owned()
             }
             Self::EmptyName => "give it a name of one character or more".to_owned(),
+            Self::ControlCharacter(_) => {
+                "leave out tabs, line ends and other control characters".to_owned()
+            }
             Self::CommaInName(_) => {
                 "leave the comma out: on the command line X,Y,DEG is a pose by its numbers"
                     .to_owned()
@@ -239,6 +266,10 @@ impl SceneProblem {
             Self::Heading(_) => "use degrees between -360 and 360".to_owned(),
             Self::Radius(_) => {
                 format!("use metres, greater than 0 and at most {MAX_COORDINATE_M}")
+            }
+            Self::Snap(_) => {
+                "use metres, from 0 (the plan is taken as drawn) to 0.005; without it 0.002"
+                    .to_owned()
             }
             Self::Share { .. } => "use a number from 0 to 1".to_owned(),
             Self::HeightsReversed { .. } => "write the lower height first, in metres".to_owned(),

@@ -50,6 +50,12 @@ pub(super) struct SceneFile {
     /// Name of the ceiling's material. Without it the ceiling is a perfect mirror.
     #[serde(default)]
     pub(super) ceiling_material: Option<String>,
+    /// What is drawn closer together than this was meant to meet, metres (0.002 without it): corners that gape
+    /// are closed, walls that stop short of another or run past it end on it, and walls drawn over each other
+    /// are one. 0 takes the plan as it is drawn.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 0.005))]
+    pub(super) snap_m: Option<f64>,
     /// Named poses of the ranger: where its rotation axis stands and where azimuth 0 points.
     #[serde(default)]
     pub(super) poses: BTreeMap<String, Pose>,

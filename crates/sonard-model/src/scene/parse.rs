@@ -6,19 +6,33 @@ use super::{
     error::{floor_char_boundary, line_and_column},
     file::SceneFile,
     locate::{JsonPath, Located, Part},
+    plain::is_plain,
 };
 
+/// The mark that some editors begin a text with.
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
 pub(super) fn scene_from_json(text: &str) -> Result<Scene, SceneError> {
-    let value: serde_json::Value =
-        serde_json::from_str(text).map_err(|error| syntax_error(text, &error))?;
-    let located = Located::new(text);
+    let Some(after_mark) = text.strip_prefix(BYTE_ORDER_MARK) else { return read(text, text) };
+    let mark = BYTE_ORDER_MARK.len_utf8();
+    read(after_mark, text).map_err(|error| SceneError {
+        span: error.span.start + mark..error.span.end + mark,
+        ..error
+    })
+}
+
+/// The scene of some JSON, which `whole` is kept as.
+fn read(text: &str, whole: &str) -> Result<Scene, SceneError> {
+    // Only a fault is looked for in a tree of the whole document, which takes thirty times the text.
     let at = |path: &JsonPath, part: Part| {
-        located.as_ref().map_or(0..text.len(), |located| located.find(path, part))
+        Located::new(text).map_or(0..text.len(), |located| located.find(path, part))
     };
-    if let Some(located) = &located {
-        refuse_ambiguous(text, located)?;
+    let is_plain = is_plain(text).map_err(|error| syntax_error(text, &error))?;
+    if !is_plain && let Some(located) = Located::new(text) {
+        refuse_ambiguous(text, &located)?;
     }
-    let file: SceneFile = serde_path_to_error::deserialize(value).map_err(|error| {
+    let mut json = serde_json::Deserializer::from_str(text);
+    let file: SceneFile = serde_path_to_error::deserialize(&mut json).map_err(|error| {
         let path = JsonPath::from(error.path());
         let problem = shape_problem(error.inner());
         let part = match problem {
@@ -27,7 +41,7 @@ pub(super) fn scene_from_json(text: &str) -> Result<Scene, SceneError> {
         };
         SceneError::new(text, at(&path, part), &path, problem)
     })?;
-    checked(file, text).map_err(|fault| {
+    checked(file, whole).map_err(|fault| {
         SceneError::new(text, at(&fault.path, fault.part), &fault.path, fault.problem)
     })
 }

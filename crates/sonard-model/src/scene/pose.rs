@@ -3,9 +3,10 @@
 use thiserror::Error;
 
 use super::{
-    Scene,
+    FloorPlan, Scene,
     error::{MAX_COORDINATE_M, suggest},
-    outline::{Outline, Outlines},
+    outline::Outlines,
+    robot::wall_between,
 };
 use crate::geometry::{DVec2, Pose, distance_to_segment};
 
@@ -182,9 +183,9 @@ impl Scene {
         parse_pose(spec)
     }
 
-    /// Whether a ranger can stand at a pose: inside the room (if the walls close one round
-    /// everything else), in no closed body, a millimetre from every surface, and the robot's
-    /// body, if there is one, in nothing's way.
+    /// Whether a ranger can stand at a pose: inside a room (if the walls close some, and nothing stands
+    /// outside them), in no closed body, a millimetre from every surface, and the robot's
+    /// body, if there is one, in nothing's way. The plan decides ([`Scene::floor_plan`]), not the order of walls.
     ///
     /// # Errors
     /// Which of these fails, and the room's extent.
@@ -200,36 +201,52 @@ impl Scene {
     ) -> Result<(), PoseError> {
         within("DEG", pose.heading_deg, MAX_HEADING_DEG)?;
         self.check_place(outlines, pose.position())?;
-        self.check_robot(pose)
+        self.check_robot(outlines.plan(), pose)
     }
 
-    /// Whether the faces of rangers can stand at some places: inside the room, in no body, and a
-    /// millimetre from every surface.
+    /// Whether a robot can stand at a pose whose rangers have their faces at some places: inside the room, in
+    /// no body, a millimetre from every surface, its own body's too, and no wall between a face and the pose.
     ///
     /// # Errors
-    /// The first place that fails, by its index, and why.
-    pub fn check_places(&self, places: &[DVec2]) -> Result<(), (usize, PoseError)> {
+    /// Why the pose fails, or the first place that does, by its index.
+    pub fn check_places(
+        &self,
+        pose: &Pose,
+        places: &[DVec2],
+    ) -> Result<(), (Option<usize>, PoseError)> {
         let outlines = Outlines::of(self);
-        places.iter().enumerate().try_for_each(|(at, place)| {
-            self.check_place(&outlines, *place).map_err(|error| (at, error))
-        })
+        self.check_pose_among(&outlines, pose).map_err(|error| (None, error))?;
+        let check = |place: DVec2| {
+            self.check_place(&outlines, place)?;
+            self.check_off_robot(pose, place, outlines.room)
+        };
+        for (at, &place) in places.iter().enumerate() {
+            check(place).map_err(|error| (Some(at), error))?;
+        }
+        for (at, &place) in places.iter().enumerate() {
+            if let Some(wall) = wall_between(outlines.plan(), pose.position(), place) {
+                let reflector = self.walls[wall].id.to_string();
+                let error = PoseError::BehindWall { x_m: place.x, y_m: place.y, reflector };
+                return Err((Some(at), error));
+            }
+        }
+        Ok(())
     }
 
     fn check_place(&self, outlines: &Outlines, position: DVec2) -> Result<(), PoseError> {
         let DVec2 { x: x_m, y: y_m } = position;
         within("X", x_m, MAX_COORDINATE_M)?;
         within("Y", y_m, MAX_COORDINATE_M)?;
-        let room = outlines.room.as_ref().map(Outline::extent);
-        if let Some((reflector, distance_m)) = self.nearest_surface(position)
+        let room = outlines.room;
+        if let Some((reflector, distance_m)) = self.nearest_surface(outlines.plan(), position)
             && distance_m < CLEARANCE_M
         {
             let reflector = reflector.to_owned();
             return Err(PoseError::TooClose { x_m, y_m, reflector, distance_m, room });
         }
-        if let Some(outline) = &outlines.room
-            && !outline.contains(position)
+        if let Some([low, high]) = room
+            && outlines.is_outside(position)
         {
-            let [low, high] = outline.extent();
             return Err(PoseError::OutsideRoom { x_m, y_m, low, high });
         }
         match self.body_around(outlines, position) {
@@ -239,11 +256,12 @@ impl Scene {
     }
 
     /// Name and distance (metres) of the nearest surface.
-    fn nearest_surface(&self, position: DVec2) -> Option<(&str, f64)> {
+    fn nearest_surface(&self, plan: &FloorPlan, position: DVec2) -> Option<(&str, f64)> {
         let walls = self
             .walls
             .iter()
-            .map(|wall| (&*wall.id, distance_to_segment(position, wall.a, wall.b)));
+            .zip(&plan.walls)
+            .map(|(wall, &(a, b))| (&*wall.id, distance_to_segment(position, a, b)));
         let cylinders = self.cylinders.iter().map(|cylinder| {
             (&*cylinder.id, (position.distance(cylinder.center) - cylinder.radius_m).abs())
         });
@@ -257,10 +275,7 @@ impl Scene {
             .iter()
             .find(|cylinder| position.distance(cylinder.center) < cylinder.radius_m)
             .map(|cylinder| cylinder.id.to_string());
-        cylinder.or_else(|| {
-            let solid = outlines.solids.iter().find(|solid| solid.contains(position))?;
-            Some(solid.name(self))
-        })
+        cylinder.or_else(|| outlines.body_around(self, position))
     }
 }
 

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Cylinder, Material, PoseError, Scene, Wall, outline::contains};
+use super::{
+    Cylinder, FloorPlan, Material, PoseError, Scene, Wall, outline::contains, pose::CLEARANCE_M,
+};
 use crate::geometry::{DVec2, Pose, distance_to_segment};
 
 /// A robot's body, in a frame that moves and turns with the pose.
@@ -50,6 +52,17 @@ impl Robot {
         }
     }
 
+    /// Whether a place is inside the body, with the ranger at `pose`, and how far it is from its surface, metres.
+    fn off_surface(&self, pose: &Pose, place: DVec2) -> (bool, f64) {
+        if let RobotShape::Circle { center, radius_m } = self.shape {
+            let off_m = to_world(pose, center).distance(place) - radius_m;
+            return (off_m < 0.0, off_m.abs());
+        }
+        let sides = self.sides_at(pose);
+        let off_m = sides.iter().map(|&(a, b)| distance_to_segment(place, a, b));
+        (contains(&sides, place), off_m.fold(f64::INFINITY, f64::min))
+    }
+
     /// Whether the body, with the ranger at `pose`, touches the segment `a`-`b` or has it inside.
     fn meets_segment(&self, pose: &Pose, a: DVec2, b: DVec2) -> bool {
         if let RobotShape::Circle { center, radius_m } = self.shape {
@@ -95,17 +108,29 @@ impl Scene {
         scene
     }
 
-    /// Name of a wall that stands between two places, if there is one.
-    #[must_use]
-    pub fn wall_between(&self, from: DVec2, to: DVec2) -> Option<&str> {
-        let between = self.walls.iter().find(|wall| cross(from, to, wall.a, wall.b));
-        between.map(|wall| &*wall.id)
+    /// Whether a place is off the surface of the robot's body at a pose, and outside of it.
+    pub(super) fn check_off_robot(
+        &self,
+        pose: &Pose,
+        place: DVec2,
+        room: Option<[[f64; 2]; 2]>,
+    ) -> Result<(), PoseError> {
+        let Some(robot) = &self.robot else { return Ok(()) };
+        let (inside, distance_m) = robot.off_surface(pose, place);
+        let DVec2 { x: x_m, y: y_m } = place;
+        let name = robot.id.to_string();
+        if distance_m < CLEARANCE_M {
+            return Err(PoseError::TooClose { x_m, y_m, reflector: name, distance_m, room });
+        }
+        if inside { Err(PoseError::InsideBody { x_m, y_m, body: name, room }) } else { Ok(()) }
     }
 
     /// Whether the robot's body fits at a pose.
-    pub(super) fn check_robot(&self, pose: &Pose) -> Result<(), PoseError> {
+    pub(super) fn check_robot(&self, plan: &FloorPlan, pose: &Pose) -> Result<(), PoseError> {
         let Some(robot) = &self.robot else { return Ok(()) };
-        let wall = self.walls.iter().find(|wall| robot.meets_segment(pose, wall.a, wall.b));
+        let walls = self.walls.iter().zip(&plan.walls);
+        let mut met = walls.filter(|(_, (a, b))| robot.meets_segment(pose, *a, *b));
+        let wall = met.next().map(|(wall, _)| wall);
         let cylinder =
             || self.cylinders.iter().find(|c| robot.meets_circle(pose, c.center, c.radius_m));
         match wall.map(|wall| &wall.id).or_else(|| cylinder().map(|cylinder| &cylinder.id)) {
@@ -123,6 +148,11 @@ impl Scene {
 
 fn to_world(pose: &Pose, point: DVec2) -> DVec2 {
     pose.position() + DVec2::from_angle(pose.direction_rad(0.0)).rotate(point)
+}
+
+/// Index of a wall of a plan that stands between two places, if there is one.
+pub(super) fn wall_between(plan: &FloorPlan, from: DVec2, to: DVec2) -> Option<usize> {
+    plan.walls.iter().position(|&(a, b)| cross(from, to, a, b))
 }
 
 /// Whether two segments cross or touch.

@@ -249,6 +249,161 @@ fn walls_that_do_not_close_enclose_nothing() {
 }
 
 #[test]
+fn a_byte_order_mark_is_let_pass() {
+    let marked = format!("\u{feff}{GOOD}");
+    assert_eq!(Scene::from_json(&marked).expect("with a mark").walls, good().walls);
+    let wrong = marked.replace("\"closed\"", "\"close\"");
+    let error = Scene::from_json(&wrong).expect_err("a wrong field");
+    assert_eq!(&wrong[error.span.clone()], "\"close\"");
+}
+
+#[test]
+fn no_text_of_a_scene_reaches_a_terminal_as_a_command_or_without_end() {
+    for (name, text) in [
+        ("an id", GOOD.replace("\"leg\"", r#""\u001b[2Jleg""#)),
+        ("a pose", GOOD.replace("\"desk\"", r#""de\u0007sk""#)),
+        ("a material", GOOD.replace("\"board\"", r#""bo\nard""#)),
+        ("a field", GOOD.replace("\"closed\"", r#""clo\u001bsed""#)),
+        ("a long field", GOOD.replace("closed", &"x".repeat(1 << 20))),
+        (
+            "a long material",
+            GOOD.replacen(
+                "\"material\": \"board\"",
+                &format!("\"material\": \"{}\"", "y".repeat(1 << 20)),
+                1,
+            ),
+        ),
+        ("a long value", GOOD.replace("true", &format!("\"{}\"", "z".repeat(1 << 20)))),
+        ("a long key twice", {
+            let key = "k".repeat(1 << 20);
+            format!(r#"{{"{key}": 1, "{key}": 1}}"#)
+        }),
+    ] {
+        let error = Scene::from_json(&text).expect_err(name);
+        for said in [error.to_string(), error.help()] {
+            assert!(said.len() < 4000, "{name}: {} characters", said.len());
+            assert!(!said.contains(char::is_control), "{name}: {said:?}");
+        }
+    }
+}
+
+/// A scene of walls and what `more` says.
+fn plan_of(walls: &[&str], more: &str) -> Scene {
+    let text = format!(
+        r#"{{"name": "plan", "materials": {{"m": {{"reflectance": 0.9}}}}, "walls": [{}] {more}}}"#,
+        walls.join(",")
+    );
+    Scene::from_json(&text).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn ring(id: &str, [x, y]: [f64; 2], [width, depth]: [f64; 2]) -> String {
+    let (right, top) = (x + width, y + depth);
+    format!(
+        r#"{{"id": "{id}", "polyline": [[{x},{y}],[{right},{y}],[{right},{top}],[{x},{top}]], "closed": true, "material": "m"}}"#
+    )
+}
+
+fn single(id: &str, from: [f64; 2], to: [f64; 2]) -> String {
+    format!(r#"{{"id": "{id}", "from": {from:?}, "to": {to:?}, "material": "m"}}"#)
+}
+
+#[test]
+fn where_a_ranger_can_stand_follows_from_the_plan_alone() {
+    let refusal = |scene: &Scene, [x_m, y_m]: [f64; 2]| {
+        let error = scene.check_pose(&Pose { x_m, y_m, heading_deg: 0.0 }).err();
+        error.map_or_else(String::new, |error| error.to_string())
+    };
+    let room = || ring("A", [0.0, 0.0], [4.0, 3.0]);
+    let beyond = || ring("B", [4.0, 0.0], [3.0, 3.0]);
+    let three_sides = || {
+        vec![
+            single("s", [4.0, 0.0], [7.0, 0.0]),
+            single("e", [7.0, 0.0], [7.0, 3.0]),
+            single("n", [7.0, 3.0], [4.0, 3.0]),
+        ]
+    };
+    type Case = (&'static str, Vec<String>, &'static [([f64; 2], &'static str)]);
+    let cases: Vec<Case> = vec![
+        (
+            "two rooms with a common wall",
+            vec![room(), beyond()],
+            &[([1.0, 1.0], ""), ([5.0, 1.0], ""), ([9.0, 1.0], "outside")],
+        ),
+        (
+            "a room on another one's wall",
+            [vec![room()], three_sides()].concat(),
+            &[([1.0, 1.0], ""), ([5.0, 1.0], ""), ([9.0, 1.0], "outside")],
+        ),
+        (
+            "two rooms, the wall by hand",
+            vec![room(), ring("B", [4.0007, 0.0004], [3.0, 2.9992])],
+            &[([1.0, 1.0], ""), ([5.0, 1.0], ""), ([9.0, 1.0], "outside")],
+        ),
+        (
+            "a pillar outside",
+            vec![room(), ring("P", [6.0, 1.0], [0.3, 0.3])],
+            &[([1.0, 1.0], ""), ([6.1, 1.1], "inside `P`"), ([5.0, 1.0], "")],
+        ),
+        (
+            "a box poking out",
+            vec![room(), ring("P", [3.5, 1.0], [1.0, 0.5])],
+            &[
+                ([1.0, 1.0], ""),
+                ([3.7, 1.2], "inside `P`"),
+                ([4.2, 1.2], "inside `P`"),
+                ([9.0, 1.0], "outside"),
+            ],
+        ),
+        (
+            "a partition past its wall",
+            vec![room(), single("p", [2.0, -0.2], [2.0, 1.5])],
+            &[
+                ([1.0, 1.0], ""),
+                ([3.0, 1.0], ""),
+                ([2.1, -0.1], "outside"),
+                ([9.0, 1.0], "outside"),
+            ],
+        ),
+        (
+            "a partition from wall to wall",
+            vec![room(), single("p", [2.0, 0.0], [2.0, 3.0])],
+            &[([1.0, 1.0], ""), ([3.0, 1.0], ""), ([9.0, 1.0], "outside")],
+        ),
+        (
+            "a box against the wall",
+            vec![room(), ring("P", [0.0, 1.0], [0.5, 0.5])],
+            &[([1.0, 1.0], ""), ([0.2, 1.2], "inside `P`"), ([9.0, 1.0], "outside")],
+        ),
+        (
+            "a room drawn twice",
+            vec![room(), ring("again", [0.0004, 0.0], [3.9992, 3.0005])],
+            &[([1.0, 1.0], ""), ([9.0, 1.0], "outside")],
+        ),
+        (
+            "a screen in the garden",
+            vec![room(), single("p", [6.0, 0.0], [6.0, 3.0])],
+            &[([1.0, 1.0], ""), ([5.0, 1.0], "")],
+        ),
+    ];
+    for (name, mut walls, places) in cases {
+        for turn in 0..2 * walls.len() {
+            walls.rotate_left(1);
+            if turn == walls.len() {
+                walls.reverse();
+            }
+            let texts: Vec<&str> = walls.iter().map(String::as_str).collect();
+            let scene = plan_of(&texts, "");
+            for (at, expected) in places {
+                let found = refusal(&scene, *at);
+                let fits =
+                    if expected.is_empty() { found.is_empty() } else { found.contains(expected) };
+                assert!(fits, "{name}, {turn}: {at:?} is `{found}`, not `{expected}`");
+            }
+        }
+    }
+}
+
+#[test]
 fn shipped_scenes_pass_their_check() {
     for (name, text) in shipped::SCENES {
         let scene = Scene::from_json(text).unwrap_or_else(|error| panic!("{name}: {error}"));

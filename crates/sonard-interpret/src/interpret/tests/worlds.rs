@@ -10,7 +10,7 @@ use crate::interpret::{Extents, Feature, FeatureKind, Settings};
 use sonard_model::{
     geometry::{DVec2, Pose, wrap_pi},
     model::Simulator,
-    scene::{Material, Scene, Wall},
+    scene::{DEFAULT_SNAP_M, Material, Scene, Wall},
 };
 use sonard_records::{PathKind, PingStatus, ScanView};
 
@@ -141,6 +141,7 @@ impl World {
             ceiling_z_m: None,
             floor_material: Material::RIGID,
             ceiling_material: Material::RIGID,
+            snap_m: DEFAULT_SNAP_M,
             poses: BTreeMap::new(),
             robot: None,
             sha256: String::new(),

@@ -6,7 +6,7 @@ use rand::{Rng, RngExt};
 
 use sonard_model::{
     geometry::{DVec2, Pose},
-    scene::{Material, Scene, Wall},
+    scene::{DEFAULT_SNAP_M, Material, Scene, Wall},
 };
 
 /// A rectangular room with `boxes` boxes and `partitions` partition walls in it, its walls turned
@@ -109,6 +109,7 @@ impl Room {
             ceiling_z_m: None,
             floor_material: Material::RIGID,
             ceiling_material: Material::RIGID,
+            snap_m: DEFAULT_SNAP_M,
             poses: BTreeMap::from([(
                 "start".to_owned(),
                 Pose { x_m: start.x, y_m: start.y, heading_deg: 0.0 },

@@ -214,3 +214,37 @@ fn a_view_has_no_jumps() {
     }
     assert!((shares[190] - 1.0).norm() < 1e-12);
 }
+
+/// Where walls that absorb stand at little more or less than `pi / m` there is no more of an edge than at that
+/// angle; and two materials on one line are the limit of walls that bend ever less.
+#[test]
+fn edges_fade_towards_the_angles_at_which_there_is_none() {
+    for opening_deg in [60.0, 90.0, 180.0] {
+        for reflectance in [[1.0; 2], [0.6; 2], [0.0; 2], [0.9, 0.3]] {
+            let wedge = |off_rad: f64| Wedge {
+                opening_rad: f64::to_radians(opening_deg) + off_rad,
+                reflectance,
+            };
+            for (into, out) in [(0.1, 0.1), (0.3, 0.5), (0.5, 0.9), (0.7, 0.25), (0.95, 0.9)] {
+                let echo = |off_rad: f64| {
+                    let opening_rad = wedge(off_rad).opening_rad;
+                    let (in_rad, out_rad) = (into * opening_rad, out * opening_rad);
+                    EdgeLaw::Utd.echo(
+                        &wedge(off_rad),
+                        &Aspect { in_rad, out_rad, distance_m: 0.25 },
+                        K,
+                    )
+                };
+                let limit = echo(0.0);
+                for off_rad in [1e-9, -1e-9, 1e-6, -1e-6, 1e-3, -1e-3] {
+                    let apart = (echo(off_rad) - limit).norm();
+                    let bound = 1e-7 + 2.0 * off_rad.abs();
+                    assert!(
+                        apart < bound,
+                        "{opening_deg} {reflectance:?} {into} {out} {off_rad}: {apart}"
+                    );
+                }
+            }
+        }
+    }
+}

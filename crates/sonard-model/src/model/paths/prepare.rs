@@ -10,8 +10,8 @@ use super::{
     settings::{Settings, usual_z_m},
 };
 use crate::{
-    geometry::{Arrangement, DVec2, Mirror, square_up},
-    scene::{Cylinder, Scene},
+    geometry::{Arrangement, DVec2, Mirror},
+    scene::{Cylinder, FloorPlan, Scene},
 };
 
 /// A scene made ready for enumerating echo paths.
@@ -29,18 +29,11 @@ impl Paths {
     /// Prepares a scene.
     #[must_use]
     pub fn new(scene: &Scene, settings: Settings) -> Self {
-        let mut segments: Vec<_> = scene.walls.iter().map(|wall| (wall.a, wall.b)).collect();
-        square_up(&mut segments);
+        let drawn = scene.floor_plan();
         let usual = || usual_z_m(scene.floor_z_m, scene.ceiling_z_m);
         let z_m = settings.sensor_z_m.unwrap_or_else(usual);
-        let heights = Heights::new(scene, &segments, z_m, &settings);
-        for (segment, wall) in segments.iter_mut().zip(&scene.walls) {
-            if !heights.is_there(wall.z_m) {
-                // A point: the others keep their numbers.
-                segment.1 = segment.0;
-            }
-        }
-        let plan = plan(scene, &segments, &heights, settings);
+        let heights = Heights::new(scene, &drawn.walls, z_m, &settings);
+        let plan = plan(scene, &drawn, &heights, settings);
         let has_double = plan.settings.double_diffraction;
         let mesh = plan.mesh.as_ref().filter(|_| has_double);
         let edge_to_edge = mesh.map(|mesh| EdgeToEdge::new(mesh, &plan.settings));
@@ -64,9 +57,11 @@ impl Paths {
     }
 }
 
-/// The floor plan of a scene whose walls have these ends.
-fn plan(scene: &Scene, segments: &[(DVec2, DVec2)], heights: &Heights, settings: Settings) -> Plan {
-    let arrangement = Arrangement::of(segments);
+/// The plan of what is at heights that matter.
+fn plan(scene: &Scene, drawn: &FloorPlan, heights: &Heights, settings: Settings) -> Plan {
+    let is_there = |wall: u32| heights.is_there(scene.walls[wall as usize].z_m);
+    let arrangement: Arrangement = drawn.of_walls(is_there);
+    let segments: &[(DVec2, DVec2)] = &drawn.walls;
     let there = |cylinder: &&Cylinder| heights.is_there(cylinder.z_m);
     let extra: Vec<_> = scene
         .cylinders

@@ -30,7 +30,7 @@ use crate::{
         tests::{bends, reflectors},
     },
     reading::PathKind,
-    scene::{Material, Scene, Wall},
+    scene::{DEFAULT_SNAP_M, Material, Scene, Wall},
 };
 
 pub(in crate::model) const LOSSLESS: Settings = Settings {
@@ -81,6 +81,7 @@ fn scene(walls: &[[f64; 4]]) -> Scene {
         ceiling_z_m: None,
         floor_material: Material::RIGID,
         ceiling_material: Material::RIGID,
+        snap_m: DEFAULT_SNAP_M,
         poses: Default::default(),
         robot: None,
         sha256: String::new(),

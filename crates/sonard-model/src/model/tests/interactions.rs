@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 use super::*;
 use crate::{
     acoustics::edge::EdgeLaw,
-    geometry::{DVec2, Mirror, SNAP_M, distance_to_segment, square_up, wrap_pi},
+    geometry::{DVec2, Mirror, distance_to_segment, wrap_pi},
     model::{
         Edge, Interaction, Mechanism,
         paths::{EchoPath, Paths, Settings},
@@ -43,13 +43,7 @@ struct Room {
 
 impl Room {
     fn new(scene: &Scene, z_m: Option<f64>) -> Self {
-        let mut scene = scene.clone();
-        let mut segments: Vec<_> = scene.walls.iter().map(|wall| (wall.a, wall.b)).collect();
-        square_up(&mut segments);
-        for (wall, (a, b)) in scene.walls.iter_mut().zip(segments) {
-            (wall.a, wall.b) = (a, b);
-        }
-        Self { scene, z_m }
+        Self { scene: scene.floor_plan().scene(scene), z_m }
     }
 
     /// Whether a path obeys the laws; `length_off_m` is what its length may differ by.
@@ -121,8 +115,10 @@ impl Room {
             Mechanism::Reflection(Reflector::Ceiling) => off_z_m(self.scene.ceiling_z_m),
             Mechanism::Diffraction(Bend::Upright(Edge { wall, at_b })) => {
                 let wall = &self.scene.walls[wall as usize];
-                let end = if at_b { wall.b } else { wall.a };
-                (point.distance(end) - 2.0 * SNAP_M).max(0.0)
+                // Where walls cross, the edge is called by the nearer end of one.
+                let (near, far) = if at_b { (wall.b, wall.a) } else { (wall.a, wall.b) };
+                assert!(point.distance(near) <= point.distance(far), "{interaction:?}");
+                distance_to_segment(point, wall.a, wall.b)
             }
             Mechanism::Diffraction(Bend::Level { wall, is_upper }) => {
                 let limits = self.scene.walls[wall as usize].z_m.expect("a wall with limits");
@@ -310,7 +306,7 @@ struct FanRounds {
 
 fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2, fan_rounds: &mut FanRounds) {
     let (path, ends) = (&arrival.path, [at; 2]);
-    let plan = Room { scene: Scene::clone(simulator.scene()), z_m: None };
+    let plan = Room::new(simulator.scene(), None);
     let off_m = || length_m(&points(path, ends, None)) - arrival.length_m;
     let round = path.reflectors().filter(|met| matches!(met, Reflector::Cylinder(_))).count();
     match (simulator.options().engine.kind(), round) {

@@ -4,8 +4,11 @@ use rstar::AABB;
 
 use super::limits::{Heights, holds};
 use crate::{
-    geometry::{DVec2, SNAP_M},
-    model::{Mechanism, Reflector, paths::plan::Cylinders},
+    geometry::DVec2,
+    model::{
+        Mechanism, Reflector,
+        paths::{plan::Cylinders, tolerance::TIE_M},
+    },
 };
 
 /// Beginning and end of a path, or of a part of one.
@@ -92,5 +95,5 @@ fn crossing(from: DVec2, to: DVec2, [a, b]: [DVec2; 2]) -> Option<f64> {
     let share = (a - from).perp_dot(along) / slant;
     let on_segment = (a - from).perp_dot(run) / slant;
     let off_ends_m = share.min(1.0 - share) * run.length();
-    (off_ends_m > 2.0 * SNAP_M && (0.0..=1.0).contains(&on_segment)).then_some(share)
+    (off_ends_m > TIE_M && (0.0..=1.0).contains(&on_segment)).then_some(share)
 }

@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 
 use crate::{
     acoustics::edge::{EdgeLaw, Wedge},
-    geometry::{Arrangement, DVec2, SNAP_M},
+    geometry::{Arrangement, DVec2},
     model::{Edge, paths::tolerance::TIE_M},
 };
 
@@ -77,20 +77,24 @@ impl Corners {
         let mut around: Vec<SmallVec<[(f64, u32); 4]>> = vec![SmallVec::new(); plan.points.len()];
         for piece in &plan.pieces {
             let [a, b] = piece.ends.map(|end| plan.points[end as usize]);
-            // The wall's own direction: snapping and cutting may have bent the piece a little.
+            // The wall's own direction: rounding may have bent the piece a little.
             let (from, to) = walls[piece.segment as usize];
             let along = (to - from) * (b - a).dot(to - from).signum();
             around[piece.ends[0] as usize].push((along.to_angle(), piece.segment));
             around[piece.ends[1] as usize].push(((-along).to_angle(), piece.segment));
         }
-        let corner = |(point, mut faces): (DVec2, SmallVec<[(f64, u32); 4]>)| {
+        let corner = |(index, mut faces): (u32, SmallVec<[(f64, u32); 4]>)| {
             faces.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let edge = faces.iter().filter_map(|&(_, wall)| end_at(walls, wall, point)).min()?;
+            let point = plan.points[index as usize];
+            let ending = faces.iter().filter_map(|&(_, wall)| end_at(plan, wall, index)).min();
+            // Where walls cross none of them ends.
+            let crossing = || faces.iter().map(|&(_, wall)| nearer_end(walls, wall, point)).min();
+            let edge = ending.or_else(crossing)?;
             let sectors = sectors(&faces, gains, law);
             let answers = sectors.iter().any(|sector| sector.answers);
             answers.then_some(Corner { point, edge, sectors })
         };
-        Self { points: plan.points.iter().copied().zip(around).map(corner).collect() }
+        Self { points: (0..).zip(around).map(corner).collect() }
     }
 
     /// Whether sound that comes to a point along `run` finds an edge there.
@@ -184,11 +188,16 @@ impl Corner {
     }
 }
 
-/// The end of a wall that is at a point.
-fn end_at(walls: &[(DVec2, DVec2)], index: u32, point: DVec2) -> Option<Edge> {
-    let (a, b) = walls[index as usize];
-    let is_at = |end: DVec2| end.distance(point) < 2.0 * SNAP_M;
-    (is_at(a) || is_at(b)).then(|| Edge { wall: index, at_b: !is_at(a) })
+/// The end of a wall that is at a point of the plan.
+fn end_at(plan: &Arrangement, wall: u32, point: u32) -> Option<Edge> {
+    let [a, b] = plan.ends[wall as usize];
+    (a == point || b == point).then_some(Edge { wall, at_b: a != point })
+}
+
+/// The end by which an edge within a wall is called.
+fn nearer_end(walls: &[(DVec2, DVec2)], wall: u32, point: DVec2) -> Edge {
+    let (a, b) = walls[wall as usize];
+    Edge { wall, at_b: b.distance_squared(point) < a.distance_squared(point) }
 }
 
 /// The air between each wall of a point and the next one; `faces` by direction.

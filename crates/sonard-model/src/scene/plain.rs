@@ -1,0 +1,101 @@
+//! A first look at a scene's text: whether it is JSON, and whether serde would read it as it stands there.
+
+use std::{collections::HashSet, fmt};
+
+use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
+
+/// Whether no object names a member twice, and nothing is an array where an object belongs: of both serde's
+/// derived code would make something. Takes no memory but for the names of the objects that are open.
+///
+/// # Errors
+/// Text that is not JSON.
+pub(super) fn is_plain(text: &str) -> serde_json::Result<bool> {
+    let mut json = serde_json::Deserializer::from_str(text);
+    let is_plain = Place::Scene.deserialize(&mut json)?;
+    json.end()?;
+    Ok(is_plain)
+}
+
+/// What a value stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    Scene,
+    /// A list of objects.
+    Objects,
+    /// An object of objects.
+    Named,
+    Object,
+    Robot,
+    Any,
+}
+
+impl Place {
+    fn of_member(self, name: &str) -> Self {
+        match (self, name) {
+            (Self::Scene, "walls" | "cylinders") => Self::Objects,
+            (Self::Scene, "materials" | "poses") => Self::Named,
+            (Self::Scene, "robot") => Self::Robot,
+            (Self::Named, _) | (Self::Robot, "circle") => Self::Object,
+            _ => Self::Any,
+        }
+    }
+}
+
+impl<'de> DeserializeSeed<'de> for Place {
+    type Value = bool;
+
+    fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<bool, D::Error> {
+        json.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Place {
+    type Value = bool;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a value")
+    }
+
+    fn visit_bool<E>(self, _: bool) -> Result<bool, E> {
+        Ok(true)
+    }
+
+    fn visit_i64<E>(self, _: i64) -> Result<bool, E> {
+        Ok(true)
+    }
+
+    fn visit_u64<E>(self, _: u64) -> Result<bool, E> {
+        Ok(true)
+    }
+
+    fn visit_f64<E>(self, _: f64) -> Result<bool, E> {
+        Ok(true)
+    }
+
+    fn visit_str<E>(self, _: &str) -> Result<bool, E> {
+        Ok(true)
+    }
+
+    fn visit_unit<E>(self) -> Result<bool, E> {
+        Ok(true)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<bool, A::Error> {
+        let element = if self == Self::Objects { Self::Object } else { Self::Any };
+        let mut is_plain = matches!(self, Self::Objects | Self::Any);
+        while let Some(is_element_plain) = list.next_element_seed(element)? {
+            is_plain &= is_element_plain;
+        }
+        Ok(is_plain)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut object: A) -> Result<bool, A::Error> {
+        let mut names: HashSet<String> = HashSet::new();
+        let mut is_plain = true;
+        while let Some(name) = object.next_key::<String>()? {
+            is_plain &= object.next_value_seed(self.of_member(&name))?;
+            is_plain &= names.insert(name);
+        }
+        Ok(is_plain)
+    }
+}
