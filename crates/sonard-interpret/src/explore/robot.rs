@@ -101,7 +101,7 @@ impl<'a, R: Rng> SimulatedRobot<'a, R> {
     /// At a pose of the simulator's scene that it knows exactly.
     #[must_use]
     pub fn new(simulator: &'a Simulator, pose: Pose, settings: RobotSettings, rng: R) -> Self {
-        let room = Reflectors::new(simulator.scene(), &simulator.scene().floor_plan());
+        let room = Reflectors::new(simulator.scene(), &simulator.scene().ray_plan());
         Self { simulator, room, settings, rng, truth: pose, believed: pose, refusal: None }
     }
 

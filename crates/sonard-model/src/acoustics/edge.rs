@@ -7,7 +7,7 @@
 //! the plane as for a point source in space. For a ranger that looks straight at the edge,
 //! `2 L` is the range. Time convention `exp(+i omega t)`.
 
-use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
+use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 use num_complex::Complex64;
 
@@ -111,6 +111,9 @@ pub fn bozma_kuc(range_m: f64, sigma: f64, far_field_m: f64) -> f64 {
 /// of which rounding leaves 1e-14.
 const REGULAR_RAD: f64 = 1e-10;
 
+/// Over which angle an edge fades towards an opening at which there is none, radians.
+const FADES_RAD: f64 = 0.1;
+
 /// On a boundary the edge counts as lit; this far from it at most, radians.
 const ON_BOUNDARY_RAD: f64 = 1e-9;
 
@@ -209,7 +212,7 @@ impl Wedge {
         let own = [images[0].reflectance, images[1].reflectance];
         for (at, image) in images.iter_mut().enumerate() {
             if outside[at] > -ON_BOUNDARY_RAD && outside[1 - at] <= ON_BOUNDARY_RAD {
-                let share = (outside[at] / FRAC_PI_2).clamp(0.0, 1.0);
+                let share = (outside[at] / FADES_RAD).clamp(0.0, 1.0);
                 image.reflectance = own[1 - at] + share * (own[at] - own[1 - at]);
                 break;
             }

@@ -34,7 +34,7 @@ impl Cone {
         let offsets_rad = (0..=gaps as u32)
             .map(|i| ((f64::from(i) - gaps / 2.0) * SPACING_DEG).to_radians())
             .collect();
-        Self { reflectors: Reflectors::new(scene, &scene.floor_plan()), offsets_rad }
+        Self { reflectors: Reflectors::new(scene, &scene.ray_plan()), offsets_rad }
     }
 }
 

@@ -130,7 +130,7 @@ impl Fan {
     /// For a scene, a beam pattern and settings.
     #[must_use]
     pub fn new(scene: &Scene, beam: BeamPattern, settings: FanSettings) -> Self {
-        let plan = scene.floor_plan();
+        let plan = scene.ray_plan();
         let reflectors = Reflectors::new(scene, &plan);
         let wall_ends = WallEnds::new(scene, &plan, &reflectors);
         Self { reflectors, wall_ends, beam, settings }

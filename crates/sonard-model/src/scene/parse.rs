@@ -32,7 +32,16 @@ fn read(text: &str, whole: &str) -> Result<Scene, SceneError> {
         refuse_ambiguous(text, &located)?;
     }
     let mut json = serde_json::Deserializer::from_str(text);
-    let file: SceneFile = serde_path_to_error::deserialize(&mut json).map_err(|error| {
+    let file = serde_path_to_error::deserialize(&mut json).or_else(|error| {
+        // An array of too many: from the text serde does not say how many.
+        let value = || serde_json::from_str::<serde_json::Value>(text).ok();
+        let is_vague = without_place(error.inner()) == "trailing characters";
+        match is_vague.then(value).flatten() {
+            Some(value) => serde_path_to_error::deserialize(value),
+            None => Err(error),
+        }
+    });
+    let file: SceneFile = file.map_err(|error| {
         let path = JsonPath::from(error.path());
         let problem = shape_problem(error.inner());
         let part = match problem {

@@ -43,9 +43,15 @@ struct Within {
 /// A corner turned in a plan and written down to a tenth of a millimetre is 90.003 degrees, say.
 /// Sound cannot tell, but a mirror image can: above 90 degrees no ray comes back by both walls,
 /// below it two do.
-pub(super) fn square_up(vertices: &mut Vertices, joints: &Joints, most_m: f64) {
+pub(super) fn square_up(
+    vertices: &mut Vertices,
+    joints: &Joints,
+    most_m: f64,
+    number: &dyn Fn(End) -> u32,
+) {
     let most_m = most_m.min(MOST_M);
-    let (corners, within) = sides(vertices, joints);
+    let (mut corners, within) = sides(vertices, joints);
+    corners.sort_by_key(|corner| vertices.ends(corner.vertex).map(number).min());
     let mut is_moved = false;
     for _ in 0..ROUNDS {
         let mut is_settled = true;

@@ -28,6 +28,7 @@ fn readings(scene: &Scene, at: DVec2, engine: EngineKind) -> Vec<Prediction> {
     };
     simulator(scene.clone(), options)
         .predict(&Pose { x_m: at.x, y_m: at.y, heading_deg: 0.0 }, &PLAN)
+        .expect("a plan that can be searched")
 }
 
 /// A room of 3 by 2 metres with a partition from one wall and a slanted screen; the ranger's place in it.
@@ -164,7 +165,7 @@ fn two_materials_on_one_line_go_over_into_each_other() {
     };
     let mut before = None;
     for step in -50..=50 {
-        let at = DVec2::new(f64::from(step) * 1e-3, 0.5);
+        let at = DVec2::new((f64::from(step) + 0.37) * 1e-3, 0.5);
         let flat = field(&walls(0.0), at, -90.0);
         for bend_m in [1e-9, -1e-9] {
             let bent = field(&walls(bend_m), at, -90.0);
@@ -329,6 +330,6 @@ proptest! {
         readings(&drawn, DVec2::splat(-0.05), EngineKind::Cone);
         let settings = crate::model::paths::Settings { max_path_m: 0.3, ..crate::model::paths::tests::LOSSLESS };
         let found = crate::model::paths::Paths::new(&drawn, settings).enumerate(DVec2::splat(-0.05));
-        prop_assert!(found.iter().all(|echo| echo.length_m.is_finite()));
+        prop_assert!(found.iter().flatten().all(|echo| echo.length_m.is_finite()));
     }
 }

@@ -306,7 +306,8 @@ struct FanRounds {
 
 fn check_arrival(simulator: &Simulator, arrival: &Arrival, at: DVec2, fan_rounds: &mut FanRounds) {
     let (path, ends) = (&arrival.path, [at; 2]);
-    let plan = Room::new(simulator.scene(), None);
+    let drawn = simulator.scene();
+    let plan = Room { scene: drawn.ray_plan().scene(drawn), z_m: None };
     let off_m = || length_m(&points(path, ends, None)) - arrival.length_m;
     let round = path.reflectors().filter(|met| matches!(met, Reflector::Cylinder(_))).count();
     match (simulator.options().engine.kind(), round) {
