@@ -183,7 +183,7 @@ fn random_scene(rng: &mut Pcg64) -> Scene {
     if rng.random_bool(0.6) {
         scene.floor_z_m = rng.random_bool(0.8).then_some(0.0);
         scene.ceiling_z_m = (scene.floor_z_m.is_none() || rng.random_bool(0.6)).then_some(1.3);
-        for wall in scene.walls.iter_mut().step_by(3) {
+        for wall in scene.walls.iter_mut().step_by(2) {
             let low = rng.random_bool(0.5);
             let at = 0.2 + 0.8 * rng.random::<f64>();
             wall.z_m = Some(if low { [0.0, at] } else { [at, 1.3] });

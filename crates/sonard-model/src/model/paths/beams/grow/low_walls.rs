@@ -43,10 +43,14 @@ impl Grower<'_> {
         let span_m = self.lit_span_m(beam, wall_mirror, side);
         let run_m = distances_m(wall_mirror, span_m, beam.image);
         let [back_m, _] = distances_m(wall_mirror, span_m, self.target);
+        let settings = &self.plan.settings;
         // How many times longer a run may be in space: the way back is no shorter than in the plan.
-        let longer = ((self.longest_m(beam) - back_m) / run_m[0]).max(1.0);
-        // An edge makes up for no more than that, and a wall's echo and the image that it replaces.
-        let least_gain = self.plan.settings.floor / (2.0 * beam.gain * longer);
+        let longer = |longest_m: f64| ((longest_m - back_m) / run_m[0]).max(1.0);
+        // An edge makes up for no more than that, and for a wall's echo and the image that it replaces.
+        let bending = 2.0 * longer(settings.max_path_m);
+        let audible_m = beam.audible_m + settings.same_loss_m(bending.recip());
+        let longer = longer(audible_m.min(settings.max_path_m));
+        let least_gain = settings.floor / (beam.gain * bending);
         let highest_m = self.plan.climbs.highest_m(least_gain);
         let steepest = (longer * longer - 1.0).sqrt().min(highest_m / run_m[0]);
         let known = self.tree.slopes.kept();
