@@ -99,7 +99,10 @@ impl Beam {
         if self.right == DVec2::ZERO {
             return true;
         }
-        reaches(self.right, run) && reaches(run, self.left) && run.dot(self.right + self.left) > 0.0
+        // Within less than half a turn a ray is less than a right angle from the nearer border. Each is asked by
+        // itself: of a sum the longer one would decide.
+        let is_ahead = run.dot(self.right) > 0.0 || run.dot(self.left) > 0.0;
+        is_ahead && reaches(self.right, run) && reaches(run, self.left)
     }
 
     /// Merges a beam that leaves the start beside this one (`next` is counter-clockwise of it there)

@@ -6,6 +6,11 @@ use crate::{model::Reflector, scene::Cylinder};
 const T: DVec2 = DVec2::new(0.3, 0.2);
 const R: DVec2 = DVec2::new(0.7, 0.25);
 
+/// With echoes by several contacts as far as all others.
+fn to_the_floor() -> Settings {
+    Settings { repeated_contacts_above: 1.0, ..LOSSLESS }
+}
+
 /// A wall whose end both see, and a cylinder.
 fn plan() -> Scene {
     let mut plan = scene(&[[-5.0, -0.4, 5.0, -0.4], [0.4, 1.5, 0.4, 3.0]]);
@@ -61,7 +66,7 @@ fn lengths_are_those_of_both_halves() {
 #[test]
 fn the_same_way_back_from_receiver_to_transmitter() {
     let settings =
-        Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-4, ..LOSSLESS };
+        Settings { max_path_m: 6.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-4, ..to_the_floor() };
     let paths = Paths::new(&plan(), settings);
     let (there, back) = (
         paths.enumerate_between(T, R).expect("few paths"),
@@ -96,5 +101,23 @@ fn a_pair_in_one_place_is_one_transducer() {
     assert_eq!(one.len(), two.len());
     for (a, b) in one.iter().zip(&two) {
         assert!((a - b).abs() < 1e-6, "{a} {b}");
+    }
+}
+
+/// One wall, and a pair of transducers that stands closer to it than to the point at which its beam was cut.
+#[test]
+fn a_pair_hears_the_wall_before_it_wherever_it_stands_along_it() {
+    let wall = scene(&[[-1.0, 0.0, 1.0, 0.0]]);
+    let paths = Paths::new(&wall, Settings { max_path_m: 8.0, ..LOSSLESS });
+    for step in -9..=9 {
+        for (off_m, half) in [(0.07, DVec2::new(0.013, 0.0)), (0.03, DVec2::new(0.01, 0.008))] {
+            let middle = DVec2::new(0.1 * f64::from(step), -off_m);
+            let [transmitter, receiver] = [middle - half, middle + half];
+            let lengths = |echoes: Vec<EchoPath>| echoes.iter().map(|e| e.length_m).collect();
+            let found: Vec<f64> = lengths(paths.enumerate_between(transmitter, receiver));
+            let expected = transmitter.distance(DVec2::new(receiver.x, -receiver.y));
+            assert_eq!(found.len(), 1, "at {middle}: {found:?}");
+            assert!((found[0] - expected).abs() < 1e-12, "at {middle}: {found:?} {expected}");
+        }
     }
 }
