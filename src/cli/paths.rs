@@ -34,7 +34,8 @@ pub(super) struct Args {
     /// Most mirror reflections on a path, instead of as many as can matter
     #[arg(long, value_name = "N")]
     max_order: Option<u32>,
-    /// Leave out paths weaker than this; a head-on, perfect wall gives 1
+    /// Leave out paths weaker than this; a head-on, perfect wall gives 1. Those that touch cylinders more than once,
+    /// or a cylinder and an edge, are listed from ten times this where they are longer than the blanking covers
     #[arg(long, value_name = "A", default_value_t = 0.001)]
     weakest: f64,
     /// How edges diffract, instead of the sensor's law, or else utd

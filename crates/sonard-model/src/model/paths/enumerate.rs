@@ -82,6 +82,7 @@ impl Paths {
             self.add_diffraction(law, &mut traced, &mut echoes);
         }
         self.add_images(&traced, &mut echoes);
+        self.retain_allowed(&traced, &mut echoes);
         self.retain_clear(&traced, &mut echoes);
         if let Some(law) = self.plan.settings.edge_law {
             self.add_level_edges(law, &mut traced, &mut echoes);

@@ -89,6 +89,23 @@ impl Paths {
         upright + usize::from(self.heights.image(echo.image).bounces)
     }
 
+    /// Leaves out echoes that floor and ceiling reflect too often.
+    pub(super) fn retain_allowed(&self, traced: &Traced, echoes: &mut Vec<Echo>) {
+        let settings = &self.plan.settings;
+        if settings.max_order.is_none() {
+            return;
+        }
+        echoes.retain(|echo| {
+            let bounces = self.heights.image(echo.image).bounces;
+            bounces == 0 || {
+                let contacts = self.contacts(traced, echo, traced.ends[1]);
+                let is_mirror =
+                    |met: &&(DVec2, Mechanism)| matches!(met.1, Mechanism::Reflection(_));
+                settings.allows(bounces + contacts.iter().filter(is_mirror).count() as u16)
+            }
+        });
+    }
+
     /// Leaves out echoes whose path misses a wall above or below, or is barred by one.
     pub(super) fn retain_clear(&self, traced: &Traced, echoes: &mut Vec<Echo>) {
         let [start, target] = traced.ends;

@@ -16,7 +16,8 @@ pub struct Settings {
     pub max_order: Option<u16>,
     /// Weakest amplitude, before the beam pattern, relative to a head-on, rigid wall.
     pub floor: f64,
-    /// Floor of echoes that touch cylinders more than once, over `floor`; see [`REPEATED_CONTACTS_ABOVE`]. 1: as far as all others.
+    /// Floor of echoes that touch cylinders more than once, or a cylinder and an upright edge, over `floor`; see
+    /// [`REPEATED_CONTACTS_ABOVE`]. 1: as far as all others.
     pub repeated_contacts_above: f64,
     /// Longest path, metres, up to which these too are followed down to `floor`: where all that came
     /// back so far may still overlap when the receiver opens.
@@ -67,7 +68,7 @@ impl Settings {
     }
 
     /// The weakest echo that is asked for of those of at least this length whose middle contact with a
-    /// cylinder has `level` others before it.
+    /// cylinder has `level` others before it. One by a cylinder and an edge counts as of level 1.
     pub(crate) fn contact_floor(&self, level: u16, least_m: f64) -> f64 {
         if level == 0 || least_m <= self.crowded_m {
             self.floor

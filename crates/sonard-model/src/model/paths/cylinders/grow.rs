@@ -18,6 +18,7 @@ use super::{
     departures::Departures,
     front::Front,
     half_path::{DIRECT, HalfPath},
+    meet::Hits,
     partners::Partners,
     rays::{CylinderRay, CylinderRays, FIRST, Link, SpreadRay, Surfaces, surfaces_to},
     strength::{LOUDER, Strength},
@@ -35,15 +36,11 @@ use crate::{
     },
 };
 
-/// Rays that cylinders have turned to edges are followed from this much above the weakest sound
-/// that is asked for, so with 20 dB below the threshold for that, down to the threshold.
-const EDGES_ABOVE: f64 = 10.0;
-
 /// Effort of a tube in a triangle, in steps of a beam.
 const STEPS_A_TUBE: usize = 10;
 
-/// An edge sends back half of a mirror's echo at most: what it takes from it at its boundary.
-const EDGE_MOST: f64 = 0.5;
+/// An edge sends back as much as a mirror at most: half of each of two images whose boundaries lie together.
+const EDGE_MOST: f64 = 1.0;
 
 /// Follows the tubes from one start, level by level: a tube of level `n` has met `n` cylinders.
 pub(crate) struct TubeGrower<'a> {
@@ -160,8 +157,10 @@ impl<'a> TubeGrower<'a> {
         let order = half_path.order + 1;
         let circle = &self.plan.cylinders.circles[half_path.cylinder as usize];
         let floor = self.plan.settings.contact_floor(1, half_path.least_m + self.back_m(circle));
-        let is_heard = half_path.strength.with(&partner) >= floor.powi(2);
-        if !(is_heard || self.has_edges) || !self.plan.settings.allows(order + 1) {
+        let is_heard = half_path.strength.with(&partner) >= floor.powi(2)
+            && self.plan.settings.allows(order + 1);
+        // An edge adds no order.
+        if !(is_heard || self.has_edges && self.plan.settings.allows(order)) {
             return;
         }
         let surface = Reflector::Cylinder(half_path.cylinder);
@@ -206,8 +205,8 @@ impl<'a> TubeGrower<'a> {
         let view = &self.views[tube.view as usize];
         let tracer = Tracer { plan: self.plan, view, surfaces: &surfaces };
         let mut cuts: SmallVec<[f64; 8]> = self.meet_corners(tube, &tracer);
-        let hits = self.meet_arcs(tube, &tracer);
-        cuts.extend(hits.iter().flat_map(|span| [span.from_rad, span.to_rad]));
+        let mut hits = Hits::of(tube, &tracer);
+        cuts.extend(hits.cuts());
         cuts.sort_by(f64::total_cmp);
         let inside = cuts.iter().filter(|&&at| tube.span.from_rad < at && at < tube.span.to_rad);
         let inside = inside.map(|&at| (at, tracer.front(at)));
@@ -217,13 +216,19 @@ impl<'a> TubeGrower<'a> {
             [first].into_iter().chain(inside).chain([(tube.span.to_rad, to)]).collect();
         for pair in ends.windows(2) {
             let span = Span { from_rad: pair[0].0, to_rad: pair[1].0 };
-            let middle = 0.5 * (span.from_rad + span.to_rad);
-            let is_hit = hits.iter().any(|hit| hit.from_rad < middle && middle < hit.to_rad);
-            if !is_hit && span.to_rad > span.from_rad {
+            if span.to_rad <= span.from_rad {
+                continue;
+            }
+            let middle = tracer.front(0.5 * (span.from_rad + span.to_rad));
+            if hits.lets_pass(span, &middle) {
                 let part = Tube { span, borders: [pair[0].1, pair[1].1], ..*tube };
-                self.leave(&part, &tracer.front(middle));
+                self.leave(&part, &middle);
             }
         }
+        let met = hits.met();
+        let met = met.filter_map(|(cylinder, span)| self.half_path(tube, &tracer, cylinder, span));
+        let met: SmallVec<[HalfPath; 2]> = met.collect();
+        self.half_paths.extend(met);
     }
 
     /// Whether an echo of the tube can still be short and strong enough.
@@ -246,20 +251,22 @@ impl<'a> TubeGrower<'a> {
         let spread = [length_m, width_m, growth];
         let strength = Strength::of(tube.gain, spread, self.radius_m, &self.plan.settings);
         strength.with(&tube.partner) >= settings.contact_floor(1, least_m).powi(2)
-            || self.has_edges && self.is_worth_an_edge(tube.gain, spread)
+            || self.has_edges && self.is_worth_an_edge(tube.gain, spread, least_m)
     }
 
-    /// Whether an edge could send back enough of rays that have spread so. With any partner the
-    /// power is at most `L / w + 1 / g` of a mirror's, by the same reasoning as for half-paths ([`strength`](super::strength)).
+    /// Whether an edge could send back enough of rays that have spread so, in echoes of at least a length. With
+    /// any partner the power is at most `L / w + 1 / g` of a mirror's, by the same reasoning as for half-paths
+    /// ([`strength`](super::strength)).
     pub(crate) fn is_worth_an_edge(
         &self,
         gain: f64,
         [length_m, width_m, growth]: [f64; 3],
+        least_m: f64,
     ) -> bool {
         let settings = &self.plan.settings;
         let loss = EDGE_MOST * gain * settings.air_gain(length_m);
         LOUDER * loss * loss * (length_m / width_m + 1.0 / growth)
-            >= (EDGES_ABOVE * settings.floor).powi(2)
+            >= settings.contact_floor(1, least_m).powi(2)
     }
 
     /// Length of the shortest path back from a cylinder, metres.
@@ -285,7 +292,8 @@ impl<'a> TubeGrower<'a> {
             let point = mesh.points[corner as usize];
             let Some((at, front)) = ray_through(tube, tracer, point) else { continue };
             cuts.push(at);
-            if self.has_edges {
+            let is_hidden = || self.plan.cylinders.hide_in(tube.triangle, front.origin, point);
+            if self.has_edges && !is_hidden() {
                 self.meet_edge(tube, tracer, corner, at, &front.moved(front.ahead_m(point)));
             }
         }
@@ -294,8 +302,9 @@ impl<'a> TubeGrower<'a> {
 
     fn meet_edge(&mut self, tube: &Tube, tracer: &Tracer, point: u32, at: f64, end: &Front) {
         let spread = [end.length_m, end.width_m, end.growth];
-        if !self.plan.corners.answers(point, end.along) || !self.is_worth_an_edge(tube.gain, spread)
-        {
+        let least_m = end.length_m + end.origin.distance(self.target);
+        let is_worth = || self.is_worth_an_edge(tube.gain, spread, least_m);
+        if !self.plan.corners.answers(point, end.along) || !is_worth() {
             return;
         }
         let rays = &mut self.rays.rays;

@@ -22,30 +22,81 @@ use crate::{
     },
 };
 
-impl TubeGrower<'_> {
-    /// Makes half-paths of the parts that meet cylinders in this triangle, and says which can't pass.
-    pub(crate) fn meet_arcs(&mut self, tube: &Tube, tracer: &Tracer) -> SmallVec<[Span; 2]> {
-        let mut hits = SmallVec::new();
-        for &arc in self.plan.cylinders.in_triangle(tube.triangle) {
-            let surface = Reflector::Cylinder(arc.cylinder);
-            let first = Reflector::Cylinder(tracer.view.cylinder);
+/// The arcs that a tube meets in its triangle, and the parts of it that come to each before anything else.
+///
+/// Invariant: between two [`cuts`](Self::cuts) side by side all rays meet the same arcs in the same order, since
+/// arcs do not cross.
+pub(crate) struct Hits<'a> {
+    arcs: SmallVec<[Hit<'a>; 2]>,
+}
+
+/// The part of a tube that meets an arc, as far as nothing else is asked.
+struct Hit<'a> {
+    circle: &'a Circle,
+    cylinder: u32,
+    span: Span,
+    /// Of it what comes there.
+    seen: SmallVec<[Span; 1]>,
+}
+
+impl<'a> Hits<'a> {
+    /// Those of a tube whose parts in front of each other are still to be told.
+    pub(crate) fn of(tube: &Tube, tracer: &Tracer<'a>) -> Self {
+        let cylinders = &tracer.plan.cylinders;
+        let first = Reflector::Cylinder(tracer.view.cylinder);
+        let last = tracer.surfaces.last().copied().unwrap_or(first);
+        let mut arcs = SmallVec::new();
+        for arc in cylinders.in_triangle(tube.triangle) {
             // A circle is convex: what leaves it does not come back to it by itself.
-            if tracer.surfaces.last().copied().unwrap_or(first) == surface {
+            if last == Reflector::Cylinder(arc.cylinder) {
                 continue;
             }
-            let circle = &self.plan.cylinders.circles[arc.cylinder as usize];
-            for span in met_spans(tube, tracer, circle, &arc) {
-                if circle.is_opaque {
-                    hits.push(span);
-                }
-                self.half_paths.extend(self.half_path(tube, tracer, arc.cylinder, span));
-            }
+            let (cylinder, circle) = (arc.cylinder, &cylinders.circles[arc.cylinder as usize]);
+            let spans = met_spans(tube, tracer, circle, arc);
+            let hit = |span| Hit { circle, cylinder, span, seen: SmallVec::new() };
+            arcs.extend(spans.into_iter().map(hit));
         }
-        hits
+        Self { arcs }
     }
 
+    /// Where rays begin or cease to meet an arc.
+    pub(crate) fn cuts(&self) -> impl Iterator<Item = f64> {
+        self.arcs.iter().flat_map(|hit| [hit.span.from_rad, hit.span.to_rad])
+    }
+
+    /// Takes a part between two cuts, with its middle ray: gives it to the arcs that it comes to, in order, up to
+    /// the first that nothing passes. Whether it passes them all. Parts come by growing contact.
+    pub(crate) fn lets_pass(&mut self, part: Span, middle: &Front) -> bool {
+        let at = 0.5 * (part.from_rad + part.to_rad);
+        let is_met = |hit: &&mut Hit| hit.span.from_rad < at && at < hit.span.to_rad;
+        let mut met: SmallVec<[(f64, &mut Hit); 2]> = self
+            .arcs
+            .iter_mut()
+            .filter(is_met)
+            .map(|hit| (middle.onto(hit.circle).0.length_m, hit))
+            .collect();
+        met.sort_by(|one, other| one.0.total_cmp(&other.0));
+        for (_, hit) in met {
+            match hit.seen.last_mut() {
+                Some(last) if last.to_rad == part.from_rad => last.to_rad = part.to_rad,
+                _ => hit.seen.push(part),
+            }
+            if hit.circle.is_opaque {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// The cylinders that are met, and by which parts.
+    pub(crate) fn met(&self) -> impl Iterator<Item = (u32, Span)> {
+        self.arcs.iter().flat_map(|hit| hit.seen.iter().map(|&span| (hit.cylinder, span)))
+    }
+}
+
+impl TubeGrower<'_> {
     /// The half-path of a part that meets a cylinder, if it is worth anything.
-    fn half_path(
+    pub(crate) fn half_path(
         &self,
         tube: &Tube,
         tracer: &Tracer,
@@ -73,7 +124,7 @@ impl TubeGrower<'_> {
         let strength = Strength::of(tube.gain, spread, self.radius_m, settings);
         let least_m = spread[0] + self.back_m(circle);
         let is_worth = strength.with(&tube.partner) >= settings.contact_floor(1, least_m).powi(2)
-            || self.has_edges && self.is_worth_an_edge(tube.gain, spread);
+            || self.has_edges && self.is_worth_an_edge(tube.gain, spread, least_m);
         if !is_worth || least_m > settings.max_path_m {
             return None;
         }

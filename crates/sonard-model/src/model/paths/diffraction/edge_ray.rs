@@ -2,9 +2,11 @@
 
 use crate::model::paths::{
     beams::Ray,
+    cylinders::SpreadRay,
     echo::drop_repeats,
     plan::{ALL_SLOPES, Corner},
     rays::Rays,
+    settings::Settings,
     tolerance::{SAME_M, SAME_RAD},
 };
 
@@ -19,6 +21,8 @@ pub(crate) struct EdgeRay<'a> {
     pub(crate) width_m: f64,
     /// Radius of curvature of the wave front at the edge, metres: without cylinders its length.
     pub(crate) radius_m: f64,
+    /// Whether it comes by way of a cylinder.
+    pub(crate) is_spread: bool,
     /// The sector of air between the edge's walls that it comes in.
     pub(crate) sector: usize,
     /// Direction from the edge towards the source, from the sector's first wall, radians.
@@ -29,21 +33,19 @@ pub(crate) struct EdgeRay<'a> {
 
 impl<'a> EdgeRay<'a> {
     /// `None` for a ray along a wall, and in a sector that sends nothing back.
-    fn new(
-        corner: &Corner,
-        ray: &'a Ray,
-        number: u32,
-        [width_m, radius_m]: [f64; 2],
-    ) -> Option<Self> {
+    fn new(corner: &Corner, ray: &'a Ray, number: u32, spread: Option<&SpreadRay>) -> Option<Self> {
         let (sector, from_rad) = corner.sector(-ray.run)?;
         let length_m = ray.run.length();
         let slopes = ray.slopes;
-        Some(Self { ray, number, length_m, width_m, radius_m, sector, from_rad, slopes })
+        let [width_m, radius_m] =
+            spread.map_or([length_m; 2], |spread| [spread.width_m, spread.radius_m]);
+        let is_spread = spread.is_some();
+        Some(Self { ray, number, length_m, width_m, radius_m, is_spread, sector, from_rad, slopes })
     }
 
     /// A ray over walls alone.
     pub(crate) fn by_walls(corner: &Corner, ray: &'a Ray, number: u32) -> Option<Self> {
-        Self::new(corner, ray, number, [ray.run.length(); 2])
+        Self::new(corner, ray, number, None)
     }
 
     /// The rays to an edge, by length, each once.
@@ -53,9 +55,9 @@ impl<'a> EdgeRay<'a> {
         let by_walls = (first..)
             .zip(by_walls)
             .filter_map(|(number, (_, ray))| Self::by_walls(corner, ray, number));
-        let spread = (first_spread..).zip(spread).filter_map(|(number, spread)| {
-            Self::new(corner, &spread.ray, number, [spread.width_m, spread.radius_m])
-        });
+        let spread = (first_spread..)
+            .zip(spread)
+            .filter_map(|(number, spread)| Self::new(corner, &spread.ray, number, Some(spread)));
         let mut all: Vec<Self> = by_walls.chain(spread).collect();
         all.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
         free_repeats(&mut all);
@@ -93,4 +95,11 @@ pub(crate) fn distance_parameter_m(one_m: f64, other_m: f64) -> f64 {
 /// Whether two rays from one start, of one length, leave it in one direction.
 pub(crate) fn is_same_departure(one: &Ray, other: &Ray) -> bool {
     one.departure.distance_squared(other.departure) < SAME_RAD * SAME_RAD
+}
+
+/// The weakest echo that is asked for of those of a length, out on one ray to an edge and back on one to the same or
+/// another.
+pub(crate) fn floor(settings: &Settings, out: &EdgeRay, back: &EdgeRay, length_m: f64) -> f64 {
+    let is_spread = out.is_spread || back.is_spread;
+    if is_spread { settings.contact_floor(1, length_m) } else { settings.floor }
 }

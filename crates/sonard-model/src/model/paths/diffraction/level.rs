@@ -162,6 +162,8 @@ struct EdgeBeam<'a> {
     lit: &'a LitSpan,
     /// Counted as in [`Echo::image`].
     image: u16,
+    /// Reflections at walls, floor and ceiling.
+    order: u16,
     gain: f64,
     /// Height gained along it if floor and ceiling are windows, metres.
     climb_m: f64,
@@ -226,6 +228,7 @@ impl LevelEdge {
         Some(EdgeBeam {
             lit,
             image: index,
+            order: lit.beam.order + image.bounces,
             gain: lit.beam.gain * image.gain,
             climb_m: image.climb_m(self.rise_m),
             before_m,
@@ -356,8 +359,7 @@ impl Search<'_> {
     /// Relative field of such a path, `None` if it is below the floor or longer than any that is asked for.
     fn field(&self, out: &EdgeBeam, back: &EdgeBeam, length_m: f64) -> Option<Complex64> {
         let settings = &self.scene.plan.settings;
-        let order = out.lit.beam.order + back.lit.beam.order;
-        if length_m > settings.max_path_m || !settings.allows(order) {
+        if length_m > settings.max_path_m || !settings.allows(out.order + back.order) {
             return None;
         }
         let strength = out.gain * back.gain * settings.air_gain(length_m);

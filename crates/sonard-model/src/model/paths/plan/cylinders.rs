@@ -51,9 +51,13 @@ impl Cylinders {
         if let Some(mesh) = mesh.filter(|_| !circles.is_empty()) {
             by_triangle.resize(mesh.triangles.len(), SmallVec::new());
             for (circle, cylinder) in circles.iter().zip(0..).filter(|(c, _)| c.radius_m > 0.0) {
+                let free = free_spans(&circles, cylinder);
                 for triangle in mesh.triangles_near(circle.center, circle.radius_m) {
                     let spans = circle.spans_in(mesh, triangle);
-                    let arcs = spans.into_iter().map(|span| SurfaceArc { cylinder, span });
+                    let spans = spans
+                        .iter()
+                        .flat_map(|span| free.iter().flat_map(|free| span.common(free)));
+                    let arcs = spans.map(|span| SurfaceArc { cylinder, span });
                     by_triangle[triangle as usize].extend(arcs);
                 }
             }
@@ -74,6 +78,23 @@ impl Cylinders {
         let mut circles = self.in_triangle(triangle).iter().map(|arc| arc.cylinder as usize);
         circles.any(|at| self.circles[at].is_opaque && self.circles[at].meets(from, to))
     }
+}
+
+/// The parts of a circle that no opaque one covers. Of two at the same place the first one is there.
+fn free_spans(circles: &[Circle], number: u32) -> Vec<Span> {
+    let circle = &circles[number as usize];
+    let mut free = vec![Span { from_rad: -PI, to_rad: PI }];
+    for (other, index) in circles.iter().zip(0..) {
+        if index != number && other.is_opaque && other.radius_m > 0.0 {
+            match circle.outside(other, index < number) {
+                Some(outside) => {
+                    free = free.iter().flat_map(|span| span.common(&outside)).collect();
+                }
+                None => return Vec::new(),
+            }
+        }
+    }
+    free
 }
 
 impl Span {
@@ -100,6 +121,25 @@ impl Circle {
     /// The square of the length of a tangent from a point.
     pub(crate) fn power(&self, point: DVec2) -> f64 {
         point.distance_squared(self.center) - self.radius_m * self.radius_m
+    }
+
+    /// The part that is outside another circle, `None` if none is; of two that are the same the one that
+    /// does not `yield`.
+    fn outside(&self, other: &Self, yields: bool) -> Option<Span> {
+        let apart = other.center - self.center;
+        let apart_m = apart.length();
+        if apart_m <= other.radius_m - self.radius_m {
+            let is_same = apart_m == 0.0 && other.radius_m == self.radius_m;
+            return (is_same && !yields).then_some(Span { from_rad: -PI, to_rad: PI });
+        }
+        if apart_m >= self.radius_m + other.radius_m || apart_m <= self.radius_m - other.radius_m {
+            return Some(Span { from_rad: -PI, to_rad: PI });
+        }
+        // By the law of cosines, to where both cross.
+        let (r, reach) = (self.radius_m, other.radius_m);
+        let half_rad = ((apart_m * apart_m + r * r - reach * reach) / (2.0 * apart_m * r)).acos();
+        let middle = apart.to_angle();
+        Some(Span { from_rad: middle + half_rad, to_rad: middle - half_rad + TAU })
     }
 
     fn spans_in(&self, mesh: &Mesh, triangle: u32) -> SmallVec<[Span; 1]> {

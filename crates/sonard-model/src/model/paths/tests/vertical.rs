@@ -154,7 +154,7 @@ fn a_low_wall_is_missed_above_and_bars_the_way_below() {
     room.walls[0].z_m = Some([0.0, 0.3]);
     let (low, high, floor) = (Reflector::Wall(0), Reflector::Wall(1), Reflector::Floor);
     let met = |room: &Scene, z_m: f64| {
-        let settings = Settings { max_order: Some(1), ..at_height(z_m) };
+        let settings = Settings { max_order: Some(2), ..at_height(z_m) };
         let mut met: Vec<_> = Paths::new(room, settings)
             .enumerate(DVec2::ZERO)
             .expect("few paths")
