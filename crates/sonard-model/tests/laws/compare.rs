@@ -1,0 +1,85 @@
+//! Listings of echoes, compared.
+
+use sonard_model::{
+    geometry::{DVec2, wrap_pi},
+    model::{
+        Mechanism, Reflector,
+        paths::{EchoPath, Settings},
+    },
+};
+
+/// What two listings of the same echoes may differ by, beside rounding.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Turned {
+    /// Directions of the second listing are these, radians; `None`: they are not compared.
+    pub(crate) direction: Option<fn(f64, f64) -> f64>,
+    pub(crate) by_rad: f64,
+}
+
+/// Directions are as they are.
+pub(crate) const AS_IS: Turned = Turned { direction: Some(|direction, _| direction), by_rad: 0.0 };
+
+/// Whether two echoes are the same: length to 0.1 um, field to 1e-5, directions to a microradian.
+fn is_same(one: &EchoPath, other: &EchoPath, turned: Turned) -> bool {
+    let field = |echo: &EchoPath| {
+        let (sine, cosine) = echo.phase_rad.sin_cos();
+        echo.amplitude * DVec2::new(cosine, sine)
+    };
+    let looks = |one: f64, other: f64| {
+        turned.direction.is_none_or(|to| wrap_pi(to(one, turned.by_rad) - other).abs() < 1e-6)
+    };
+    (one.length_m - other.length_m).abs() < 1e-7
+        && field(one).distance(field(other)) < 1e-5 * one.amplitude
+        && looks(one.departure_rad, other.departure_rad)
+        && looks(one.arrival_rad, other.arrival_rad)
+}
+
+/// Every echo of a listing that is not at its very limits is in another one.
+#[track_caller]
+pub(crate) fn assert_has_all(
+    all: &[EchoPath],
+    of: &[EchoPath],
+    settings: &Settings,
+    turned: Turned,
+) {
+    for echo in of.iter().filter(|echo| is_well_within(echo, settings)) {
+        let found = all.iter().any(|other| is_same(echo, other, turned));
+        assert!(found, "{echo:?} is missing: {:?}", nearest(all, echo));
+    }
+}
+
+/// Two listings have the same echoes, apart from those at their very limits.
+#[track_caller]
+pub(crate) fn assert_same(
+    one: &[EchoPath],
+    other: &[EchoPath],
+    settings: &Settings,
+    turned: Turned,
+) {
+    assert_has_all(other, one, settings, turned);
+    let back = Turned { by_rad: -turned.by_rad, ..turned };
+    assert_has_all(one, other, settings, back);
+    let count = |echoes: &[EchoPath]| echoes.iter().filter(|e| is_well_within(e, settings)).count();
+    let slack = one.iter().chain(other).filter(|e| !is_well_within(e, settings)).count();
+    assert!(count(one).abs_diff(count(other)) <= slack, "some are listed twice");
+}
+
+/// Whether an echo is above the floor that holds for it and within reach by more than rounding.
+pub(crate) fn is_well_within(echo: &EchoPath, settings: &Settings) -> bool {
+    echo.amplitude > 1.0001 * floor_of(echo, settings) && echo.length_m < settings.max_path_m - 1e-6
+}
+
+/// The floor down to which all echoes of such paths are listed.
+pub(crate) fn floor_of(echo: &EchoPath, settings: &Settings) -> f64 {
+    let is_round = |m: &Mechanism| matches!(m, Mechanism::Reflection(Reflector::Cylinder(_)));
+    let is_bend = |m: &Mechanism| matches!(m, Mechanism::Diffraction(_));
+    let contacts = echo.path.mechanisms().filter(is_round).count();
+    let bends = echo.path.mechanisms().filter(is_bend).count();
+    let is_kept = contacts < 2 && (contacts == 0 || bends == 0);
+    if is_kept { settings.floor } else { settings.repeated_contacts_above * settings.floor }
+}
+
+fn nearest<'a>(all: &'a [EchoPath], echo: &EchoPath) -> Option<&'a EchoPath> {
+    let off = |other: &&EchoPath| (other.length_m - echo.length_m).abs();
+    all.iter().min_by(|one, other| off(one).total_cmp(&off(other)))
+}

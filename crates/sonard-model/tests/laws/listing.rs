@@ -1,0 +1,161 @@
+//! Which echoes are listed: each once, none missing, backwards as forwards.
+
+use rand::{Rng, RngExt};
+use sonard_model::{
+    geometry::DVec2,
+    model::paths::{EchoPath, Settings},
+};
+
+use crate::{
+    compare::{AS_IS, assert_same, floor_of},
+    worlds::*,
+};
+
+/// The same world with transmitter and receiver in each other's places.
+fn swapped(world: &World) -> World {
+    let [transmitter, receiver] = world.ends;
+    World { ends: [receiver, transmitter], ..world.clone() }
+}
+
+/// Listed from the other end.
+fn from_the_other_end(mut echoes: Vec<EchoPath>) -> Vec<EchoPath> {
+    for echo in &mut echoes {
+        std::mem::swap(&mut echo.departure_rad, &mut echo.arrival_rad);
+    }
+    echoes
+}
+
+#[test]
+fn transmitter_and_receiver_can_change_places() {
+    for (kind, name) in [(FURNISHED_PAIR, "swap"), (WITH_LEGS_PAIR, "swap legs")] {
+        on_random_worlds(name, kind, |world, _| {
+            let there = world.echoes(&settings());
+            let back = from_the_other_end(swapped(world).echoes(&settings()));
+            assert_same(&there, &back, &settings(), AS_IS);
+        });
+    }
+}
+
+#[test]
+fn from_one_place_every_path_is_listed_backwards_too() {
+    for (kind, name) in [(FURNISHED, "backwards"), (WITH_LEGS, "backwards legs")] {
+        on_random_worlds(name, kind, |world, _| {
+            let there = world.echoes(&settings());
+            assert_same(&there, &from_the_other_end(there.clone()), &settings(), AS_IS);
+        });
+    }
+}
+
+/// A room of four right angles: every image of the transmitter in the lattice is heard, and nothing else.
+#[test]
+fn before_the_walls_of_a_rectangle_a_pair_hears_every_image() {
+    let listed = Settings {
+        max_path_m: 6.0,
+        floor: 1e-4,
+        edge_law: None,
+        absorption_np_per_m: 0.0,
+        ..settings()
+    };
+    for case in 0..cases() {
+        let mut random = generator("rectangle", case);
+        let (world, size, ends) = rectangle(&mut random);
+        let mut found: Vec<f64> = world.echoes(&listed).iter().map(|e| e.length_m).collect();
+        let mut expected = lattice(size, ends, listed.max_path_m);
+        found.sort_by(f64::total_cmp);
+        expected.sort_by(f64::total_cmp);
+        assert_eq!(found.len(), expected.len(), "scene {case}: {}", world.text());
+        let off_m = found.iter().zip(&expected).map(|(one, other)| (one - other).abs());
+        let off_m = off_m.fold(0.0, f64::max);
+        assert!(off_m < 1e-9, "scene {case}: off by {off_m} m: {}", world.text());
+    }
+}
+
+/// A rigid rectangle anywhere, with an `hc-sr04` 3 to 12 cm before one of its walls; also its size and the
+/// places of both ends in its own frame.
+fn rectangle(random: &mut impl Rng) -> (World, DVec2, [DVec2; 2]) {
+    let size = DVec2::new(random.random_range(0.5..4.0), random.random_range(0.5..4.0));
+    let from_wall_m = random.random_range(0.03..0.12);
+    let along_m = random.random_range(0.05..0.95) * size.x;
+    let half = 0.013 * DVec2::from_angle(any_direction(random));
+    let middle = DVec2::new(along_m, from_wall_m);
+    let ends = [middle - half, middle + half];
+    let corners = [DVec2::ZERO, DVec2::new(size.x, 0.0), size, DVec2::new(0.0, size.y)];
+    let wall = |i: usize| Wall {
+        ends: [corners[i], corners[(i + 1) % 4]],
+        reflectance: 1.0,
+        roughness: 0.0,
+    };
+    let world = World { walls: (0..4).map(wall).collect(), rounds: Vec::new(), ends };
+    let turn = DVec2::from_angle(any_direction(random));
+    let shift = DVec2::new(random.random_range(-5.0..5.0), random.random_range(-5.0..5.0));
+    (world.moved(|p| p.rotate(turn) + shift), size, ends)
+}
+
+fn any_direction(random: &mut impl Rng) -> f64 {
+    random.random_range(0.0..std::f64::consts::TAU)
+}
+
+/// Lengths from each image of the transmitter to the receiver, as Allen and Berkley have them.
+fn lattice(size: DVec2, [transmitter, receiver]: [DVec2; 2], max_path_m: f64) -> Vec<f64> {
+    let images = |side: f64, at: f64| {
+        let most = (max_path_m / (2.0 * side)).ceil() as i32 + 1;
+        let all = (-most..=most).flat_map(move |m| {
+            let shift = 2.0 * f64::from(m) * side;
+            [shift + at, shift - at]
+        });
+        all.collect::<Vec<f64>>()
+    };
+    let (xs, ys) = (images(size.x, transmitter.x), images(size.y, transmitter.y));
+    xs.iter()
+        .flat_map(|&x| ys.iter().map(move |&y| DVec2::new(x, y)))
+        .filter(|image| image.distance(transmitter) > 1e-9)
+        .map(|image| image.distance(receiver))
+        .filter(|length_m| *length_m <= max_path_m)
+        .collect()
+}
+
+#[test]
+fn a_longer_range_only_adds() {
+    for (kind, name) in [(FURNISHED_PAIR, "range"), (WITH_LEGS, "range legs")] {
+        on_random_worlds(name, kind, |world, random| {
+            let near = Settings { max_path_m: random.random_range(1.0..4.5), ..settings() };
+            let within: Vec<_> = world
+                .echoes(&settings())
+                .into_iter()
+                .filter(|echo| echo.length_m <= near.max_path_m)
+                .collect();
+            assert_same(&world.echoes(&near), &within, &near, AS_IS);
+        });
+    }
+}
+
+#[test]
+fn a_lower_floor_only_adds_and_that_of_repeated_contacts_and_edges_by_cylinders_is_ten_times_it() {
+    for (kind, name) in [(FURNISHED_PAIR, "floor"), (WITH_LEGS, "floor legs")] {
+        on_random_worlds(name, kind, |world, random| {
+            let loud = Settings { floor: random.random_range(0.01..0.05), ..settings() };
+            let above = |echoes: Vec<EchoPath>| -> Vec<EchoPath> {
+                echoes.into_iter().filter(|e| e.amplitude >= floor_of(e, &loud)).collect()
+            };
+            let (some, all) = (world.echoes(&loud), world.echoes(&settings()));
+            assert_eq!(above(some.clone()).len(), some.len(), "none is below its floor");
+            assert_same(&some, &above(all), &loud, AS_IS);
+        });
+    }
+}
+
+#[test]
+fn a_higher_order_only_adds() {
+    for (kind, name) in [(FURNISHED_PAIR, "order"), (WITH_LEGS, "order legs")] {
+        on_random_worlds(name, kind, |world, random| {
+            let most = random.random_range(0..5);
+            let low = Settings { max_order: Some(most), ..settings() };
+            let up_to: Vec<_> = world
+                .echoes(&settings())
+                .into_iter()
+                .filter(|echo| echo.path.order() <= usize::from(most))
+                .collect();
+            assert_same(&world.echoes(&low), &up_to, &low, AS_IS);
+        });
+    }
+}

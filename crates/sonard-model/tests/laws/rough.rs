@@ -1,0 +1,59 @@
+//! Rough walls, whose patches scatter with phases of their own.
+
+use rand::RngExt;
+use sonard_model::{geometry::DVec2, model::paths::Settings};
+
+use crate::{
+    compare::{AS_IS, Turned, assert_same},
+    worlds::*,
+};
+
+const ROUGH: Kind = Kind { partitions: 2, strips: 0, rounds: 1, roughness: 0.5, is_pair: false };
+
+fn listed() -> Settings {
+    Settings { edge_law: None, floor: 0.005, max_path_m: 4.0, ..settings() }
+}
+
+/// What is compared: the last patches before the longest range may be cut there, by a hand's breadth.
+fn compared() -> Settings {
+    Settings { max_path_m: 3.9, ..listed() }
+}
+
+#[test]
+fn the_speckle_of_rough_walls_is_the_same_in_pieces() {
+    on_random_worlds("rough split", ROUGH, |world, random| {
+        let pieces = world.split(random);
+        let lists = [world, &pieces].map(|world| world.echoes(&listed()));
+        assert_same(&lists[0], &lists[1], &compared(), AS_IS);
+    });
+}
+
+#[test]
+fn the_speckle_of_rough_walls_is_the_same_in_another_order_and_from_other_ends() {
+    on_random_worlds("rough reorder", ROUGH, |world, random| {
+        let other = world.reordered(random);
+        let lists = [world, &other].map(|world| world.echoes(&listed()));
+        assert_same(&lists[0], &lists[1], &compared(), AS_IS);
+    });
+}
+
+#[test]
+fn the_speckle_of_rough_walls_moves_and_turns_with_them_but_a_mirrored_wall_has_its_own() {
+    on_random_worlds("rough move", ROUGH, |world, random| {
+        let by_rad = any_angle(random);
+        let shift = DVec2::new(random.random_range(-5.0..5.0), 1.0);
+        let there = world.clone().moved(|p| p.rotate(DVec2::from_angle(by_rad)) + shift);
+        let lists = [world, &there].map(|world| world.echoes(&listed()));
+        let turned = Turned { direction: Some(|direction, by| direction + by), by_rad };
+        assert_same(&lists[0], &lists[1], &compared(), turned);
+    });
+}
+
+#[test]
+fn what_stands_behind_closed_rough_walls_is_not_heard() {
+    on_random_worlds("rough hide", ROUGH, |world, random| {
+        let more = world.with_hidden(random);
+        let lists = [world, &more].map(|world| world.echoes(&listed()));
+        assert_same(&lists[0], &lists[1], &compared(), AS_IS);
+    });
+}

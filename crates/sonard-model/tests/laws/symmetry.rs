@@ -1,0 +1,98 @@
+//! What does not change when the world is moved, or described in other words.
+
+use rand::RngExt;
+use sonard_model::geometry::DVec2;
+
+use crate::{
+    compare::{AS_IS, Turned, assert_same},
+    worlds::*,
+};
+
+#[test]
+fn moving_the_world_changes_nothing() {
+    for (kind, name) in [(FURNISHED, "move"), (WITH_LEGS_PAIR, "move legs")] {
+        on_random_worlds(name, kind, |world, random| {
+            let shift =
+                DVec2::new(random.random_range(-50.0..50.0), random.random_range(-9.0..9.0));
+            let there = world.clone().moved(|p| p + shift);
+            let lists = [world, &there].map(|world| world.echoes(&settings()));
+            assert_same(&lists[0], &lists[1], &settings(), AS_IS);
+        });
+    }
+}
+
+#[test]
+fn turning_the_world_turns_the_directions() {
+    for (kind, name) in [(FURNISHED_PAIR, "turn"), (WITH_LEGS, "turn legs")] {
+        on_random_worlds(name, kind, |world, random| {
+            let by_rad = any_angle(random);
+            let there = world.clone().moved(|p| p.rotate(DVec2::from_angle(by_rad)));
+            let lists = [world, &there].map(|world| world.echoes(&settings()));
+            let turned = Turned { direction: Some(|direction, by| direction + by), by_rad };
+            assert_same(&lists[0], &lists[1], &settings(), turned);
+        });
+    }
+}
+
+#[test]
+fn a_mirrored_world_mirrors_the_directions() {
+    for (kind, name) in [(FURNISHED_PAIR, "mirror"), (WITH_LEGS, "mirror legs")] {
+        on_random_worlds(name, kind, |world, _| {
+            let there = world.clone().moved(|p| DVec2::new(p.x, -p.y));
+            let lists = [world, &there].map(|world| world.echoes(&settings()));
+            let turned = Turned { direction: Some(|direction, _| -direction), by_rad: 0.0 };
+            assert_same(&lists[0], &lists[1], &settings(), turned);
+        });
+    }
+}
+
+/// Everything larger, and the wavelength with it.
+#[test]
+fn a_larger_world_with_a_longer_wavelength_is_the_same_world() {
+    on_random_worlds("scale", WITH_LEGS_PAIR, |world, random| {
+        let by = random.random_range(0.5..2.0);
+        let mut there = world.clone().moved(|p| by * p);
+        there.rounds.iter_mut().for_each(|round| round.radius_m *= by);
+        let mut larger = settings();
+        larger.max_path_m *= by;
+        larger.absorption_np_per_m /= by;
+        larger.wave_number_per_m /= by;
+        let here = world.echoes(&settings());
+        let mut there = there.echoes(&larger);
+        there.iter_mut().for_each(|echo| echo.length_m /= by);
+        assert_same(&here, &there, &settings(), AS_IS);
+    });
+}
+
+#[test]
+fn splitting_walls_changes_nothing() {
+    for (kind, name) in [(FURNISHED, "split"), (WITH_LEGS_PAIR, "split legs")] {
+        on_random_worlds(name, kind, |world, random| {
+            let pieces = world.split(random);
+            let lists = [world, &pieces].map(|world| world.echoes(&settings()));
+            assert_same(&lists[0], &lists[1], &settings(), AS_IS);
+        });
+    }
+}
+
+#[test]
+fn walls_in_another_order_and_from_their_other_ends_are_the_same_walls() {
+    for (kind, name) in [(FURNISHED_PAIR, "reorder"), (WITH_LEGS, "reorder legs")] {
+        on_random_worlds(name, kind, |world, random| {
+            let other = world.reordered(random);
+            let lists = [world, &other].map(|world| world.echoes(&settings()));
+            assert_same(&lists[0], &lists[1], &settings(), AS_IS);
+        });
+    }
+}
+
+#[test]
+fn what_stands_behind_closed_walls_is_not_heard() {
+    for (kind, name) in [(FURNISHED, "hide"), (WITH_LEGS_PAIR, "hide legs")] {
+        on_random_worlds(name, kind, |world, random| {
+            let more = world.with_hidden(random);
+            let lists = [world, &more].map(|world| world.echoes(&settings()));
+            assert_same(&lists[0], &lists[1], &settings(), AS_IS);
+        });
+    }
+}

@@ -1,0 +1,333 @@
+//! Random scenes.
+
+use std::f64::consts::{PI, TAU};
+
+use rand::{RngExt, SeedableRng, seq::SliceRandom};
+use rand_pcg::Pcg64;
+use sonard_model::{
+    acoustics::edge::EdgeLaw,
+    geometry::{DVec2, distance_to_segment},
+    model::paths::{EchoPath, Paths, REPEATED_CONTACTS_ABOVE, Settings},
+    scene::Scene,
+};
+
+/// A flat wall.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wall {
+    pub(crate) ends: [DVec2; 2],
+    pub(crate) reflectance: f64,
+    pub(crate) roughness: f64,
+}
+
+/// An upright cylinder.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Round {
+    pub(crate) center: DVec2,
+    pub(crate) radius_m: f64,
+    pub(crate) reflectance: f64,
+}
+
+/// A scene in the plane with a transmitter and a receiver in it.
+#[derive(Debug, Clone)]
+pub(crate) struct World {
+    pub(crate) walls: Vec<Wall>,
+    pub(crate) rounds: Vec<Round>,
+    /// Transmitter and receiver.
+    pub(crate) ends: [DVec2; 2],
+}
+
+/// What a world is made of.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Kind {
+    /// Walls that stand in the room.
+    pub(crate) partitions: usize,
+    /// Walls of less than a wavelength.
+    pub(crate) strips: usize,
+    pub(crate) rounds: usize,
+    /// Of all walls.
+    pub(crate) roughness: f64,
+    /// Whether transmitter and receiver stand apart.
+    pub(crate) is_pair: bool,
+}
+
+/// A furnished room.
+pub(crate) const FURNISHED: Kind =
+    Kind { partitions: 3, strips: 1, rounds: 0, roughness: 0.0, is_pair: false };
+/// The same with a transmitter and a receiver.
+pub(crate) const FURNISHED_PAIR: Kind = Kind { is_pair: true, ..FURNISHED };
+/// A room with walls and legs in it.
+pub(crate) const WITH_LEGS: Kind = Kind { partitions: 1, rounds: 3, ..FURNISHED };
+/// The same with a transmitter and a receiver.
+pub(crate) const WITH_LEGS_PAIR: Kind = Kind { is_pair: true, ..WITH_LEGS };
+
+/// Nothing stands closer to anything else, metres: far above the ties of geometry, and a pose has to be off walls.
+const GAP_M: f64 = 0.04;
+
+/// Walls shorter than this are narrow strips, which sound goes round: less than a wavelength.
+pub(crate) const STRIP_M: f64 = 0.0065;
+
+/// Tries until something finds a place.
+const TRIES: usize = 200;
+
+/// Number of scenes that each law is tried on.
+pub(crate) fn cases() -> u64 {
+    let asked = std::env::var("SONARD_LAWS").ok().and_then(|count| count.parse().ok());
+    asked.unwrap_or(200)
+}
+
+/// The generator of a law's scene.
+pub(crate) fn generator(law: &str, case: u64) -> Pcg64 {
+    let seed = law.bytes().fold(case, |seed, byte| {
+        (seed ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(5)
+    });
+    Pcg64::seed_from_u64(seed)
+}
+
+/// Tries a law on its scenes; a failure says which one it was.
+pub(crate) fn on_random_worlds(law: &str, kind: Kind, check: impl Fn(&World, &mut Pcg64)) {
+    for case in 0..cases() {
+        let mut random = generator(law, case);
+        let world = World::random(kind, &mut random);
+        let _told = Told { law, case, world: &world };
+        check(&world, &mut random);
+    }
+}
+
+/// Says on a panic on which scene it was.
+struct Told<'a> {
+    law: &'a str,
+    case: u64,
+    world: &'a World,
+}
+
+impl Drop for Told<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            let World { ends, .. } = self.world;
+            eprintln!(
+                "`{}` broke on scene {}, {ends:?}: {}",
+                self.law,
+                self.case,
+                self.world.text()
+            );
+        }
+    }
+}
+
+/// What is listed: paths to 5 m by UTD, whose air takes what it usually does.
+pub(crate) fn settings() -> Settings {
+    Settings {
+        max_path_m: 5.0,
+        max_order: None,
+        floor: 0.01,
+        repeated_contacts_above: REPEATED_CONTACTS_ABOVE,
+        crowded_m: 0.0,
+        edge_law: Some(EdgeLaw::Utd),
+        double_diffraction: false,
+        absorption_np_per_m: 0.19,
+        wave_number_per_m: TAU * 49_400.0 / 343.2,
+        sensor_z_m: None,
+        tilt_rad: 0.0,
+        scatter_height_rad: 0.16,
+    }
+}
+
+impl World {
+    /// A room of four walls at some angle, with what `kind` says in it.
+    pub(crate) fn random(kind: Kind, random: &mut Pcg64) -> Self {
+        let size = DVec2::new(random.random_range(1.0..4.0), random.random_range(1.0..4.0));
+        let mut off = || random.random_range(-0.15..0.15);
+        let corners = loop {
+            let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
+                .map(|(x, y)| size * DVec2::new(x, y) + DVec2::new(off(), off()));
+            if !is_nearly_right(&corners) {
+                break corners;
+            }
+        };
+        let mut world = Self { walls: Vec::new(), rounds: Vec::new(), ends: [DVec2::ZERO; 2] };
+        for i in 0..4 {
+            let wall = wall([corners[i], corners[(i + 1) % 4]], kind, random);
+            world.walls.push(wall);
+        }
+        let place = |random: &mut Pcg64| {
+            DVec2::new(random.random_range(0.0..size.x), random.random_range(0.0..size.y))
+        };
+        for _ in 0..kind.rounds {
+            let radius_m = random.random_range(0.015..0.2);
+            let found = (0..TRIES).map(|_| place(random)).find(|at| world.is_free(*at, radius_m));
+            let reflectance = random.random_range(0.7..1.0);
+            let round = |center| Round { center, radius_m, reflectance };
+            world.rounds.extend(found.map(round));
+        }
+        for number in 0..kind.partitions + kind.strips {
+            let lengths_m = if number < kind.partitions { 0.1..0.9 } else { 0.0015..STRIP_M };
+            let found = (0..TRIES)
+                .map(|_| {
+                    let a = place(random);
+                    let turn = DVec2::from_angle(random.random_range(0.0..TAU));
+                    [a, a + random.random_range(lengths_m.clone()) * turn]
+                })
+                .find(|ends| world.has_room_for(*ends));
+            if let Some(ends) = found {
+                let partition = wall(ends, kind, random);
+                world.walls.push(partition);
+            }
+        }
+        world.place_ends(kind, size, random);
+        let (turn, shift) = (random.random_range(0.0..TAU), place(random));
+        world.moved(|p| p.rotate(DVec2::from_angle(turn)) + shift)
+    }
+
+    /// Puts transmitter and receiver where nothing else is.
+    fn place_ends(&mut self, kind: Kind, size: DVec2, random: &mut Pcg64) {
+        let apart_m = if kind.is_pair { 0.026 } else { 0.0 };
+        loop {
+            let share = DVec2::new(random.random(), random.random());
+            let side = apart_m * DVec2::from_angle(random.random_range(0.0..TAU));
+            self.ends = [size * share, size * share + side];
+            if self.ends.iter().all(|&end| self.is_free(end, 0.0)) && self.is_inside(self.ends[0]) {
+                return;
+            }
+        }
+    }
+
+    /// Whether a point is within the first four walls.
+    fn is_inside(&self, at: DVec2) -> bool {
+        self.walls[..4].iter().all(|wall| {
+            let [a, b] = wall.ends;
+            (b - a).perp_dot(at - a) > 0.0
+        })
+    }
+
+    /// Whether a disc is in the room and off everything.
+    fn is_free(&self, at: DVec2, radius_m: f64) -> bool {
+        let walls = self.walls.iter().map(|w| distance_to_segment(at, w.ends[0], w.ends[1]));
+        let rounds = self.rounds.iter().map(|round| at.distance(round.center) - round.radius_m);
+        self.is_inside(at) && walls.chain(rounds).all(|off_m| off_m > radius_m + GAP_M)
+    }
+
+    /// Whether a wall is in the room and off everything.
+    fn has_room_for(&self, [a, b]: [DVec2; 2]) -> bool {
+        let steps = (a.distance(b) / (0.5 * GAP_M)).ceil();
+        (0..=steps as u32).all(|step| self.is_free(a.lerp(b, f64::from(step) / steps), 0.0))
+    }
+
+    /// The same with every point moved by a motion that keeps lengths.
+    pub(crate) fn moved(mut self, to: impl Fn(DVec2) -> DVec2) -> Self {
+        for wall in &mut self.walls {
+            wall.ends = wall.ends.map(&to);
+        }
+        for round in &mut self.rounds {
+            round.center = to(round.center);
+        }
+        Self { ends: self.ends.map(to), ..self }
+    }
+
+    /// The same with every wall in two or three pieces.
+    pub(crate) fn split(&self, random: &mut Pcg64) -> Self {
+        let mut walls = Vec::new();
+        for wall in &self.walls {
+            let [a, b] = wall.ends;
+            let mut cuts = vec![0.0, random.random_range(0.1..0.5), 1.0];
+            if random.random() {
+                cuts.insert(2, random.random_range(0.6..0.9));
+            }
+            let pieces = cuts.windows(2).map(|cut| [a.lerp(b, cut[0]), a.lerp(b, cut[1])]);
+            walls.extend(pieces.map(|ends| Wall { ends, ..*wall }));
+        }
+        Self { walls, ..self.clone() }
+    }
+
+    /// The same in another order, and walls from their other ends.
+    pub(crate) fn reordered(&self, random: &mut Pcg64) -> Self {
+        let mut world = self.clone();
+        world.walls.shuffle(random);
+        world.rounds.shuffle(random);
+        for wall in &mut world.walls {
+            if random.random() {
+                wall.ends.reverse();
+            }
+        }
+        world
+    }
+
+    /// The same with walls and cylinders behind its own outer walls.
+    pub(crate) fn with_hidden(&self, random: &mut Pcg64) -> Self {
+        let mut world = self.clone();
+        let middle = self.walls[..4].iter().map(|wall| 0.25 * wall.ends[0]).sum::<DVec2>();
+        for wall in &self.walls[..4] {
+            let [a, b] = wall.ends;
+            let out = (a - b).perp().normalize();
+            let out = if out.dot(a - middle) > 0.0 { out } else { -out };
+            let at = |along: f64, off_m: f64| a.lerp(b, along) + off_m * out;
+            let ends = [
+                at(random.random(), random.random_range(0.02..0.5)),
+                at(random.random(), random.random_range(0.5..0.8)),
+            ];
+            world.walls.push(Wall { ends, reflectance: 1.0, roughness: 0.5 });
+            let center = at(random.random_range(0.3..0.7), 1.1);
+            world.rounds.push(Round { center, radius_m: 0.1, reflectance: 1.0 });
+        }
+        world
+    }
+
+    /// The same with every surface's reflectance changed.
+    pub(crate) fn with_reflectance(&self, of: impl Fn(f64) -> f64) -> Self {
+        let mut world = self.clone();
+        world.walls.iter_mut().for_each(|wall| wall.reflectance = of(wall.reflectance));
+        world.rounds.iter_mut().for_each(|round| round.reflectance = of(round.reflectance));
+        world
+    }
+
+    /// As a scene.
+    pub(crate) fn scene(&self) -> Scene {
+        Scene::from_json(&self.text()).expect("a valid scene")
+    }
+
+    /// As a scene file.
+    pub(crate) fn text(&self) -> String {
+        let mut builder = Scene::builder("random");
+        for (number, wall) in self.walls.iter().enumerate() {
+            let (id, ends) = (format!("w{number}"), wall.ends.map(|end| end.to_array()));
+            let material = format!("m{number}");
+            builder = builder
+                .rough_material(&material, wall.reflectance, wall.roughness)
+                .walls(&id, &ends, &material);
+        }
+        for (number, round) in self.rounds.iter().enumerate() {
+            let material = format!("n{number}");
+            let center = round.center.to_array();
+            builder = builder.material(&material, round.reflectance).cylinder(
+                &format!("c{number}"),
+                center,
+                round.radius_m,
+                &material,
+            );
+        }
+        builder.text()
+    }
+
+    /// All its echoes.
+    pub(crate) fn echoes(&self, settings: &Settings) -> Vec<EchoPath> {
+        let [transmitter, receiver] = self.ends;
+        let paths = Paths::new(&self.scene(), settings.clone());
+        paths.enumerate_between(transmitter, receiver).expect("few paths")
+    }
+}
+
+/// Whether a corner is so nearly right that it is made so before sound is traced, by moving it a little.
+fn is_nearly_right(corners: &[DVec2; 4]) -> bool {
+    (0..4).any(|i| {
+        let [a, b, c] = [0, 1, 2].map(|next| corners[(i + next) % 4]);
+        (b - a).normalize().dot((c - b).normalize()).abs() < 1e-3
+    })
+}
+
+fn wall(ends: [DVec2; 2], kind: Kind, random: &mut Pcg64) -> Wall {
+    Wall { ends, reflectance: random.random_range(0.6..1.0), roughness: kind.roughness }
+}
+
+/// A turn by an angle of the generator.
+pub(crate) fn any_angle(random: &mut Pcg64) -> f64 {
+    random.random_range(-PI..PI)
+}
