@@ -11,6 +11,7 @@ use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 use num_complex::Complex64;
 
+pub use strip::{MOST_WAVELENGTHS, Strip};
 pub use view::EdgeView;
 
 /// A law for the strength of the echo of an edge.
@@ -291,6 +292,7 @@ fn transition_fraction(x: f64, ix: Complex64) -> Complex64 {
     2.0 * ix / (2.0 * ix + 1.0 - rest)
 }
 
+mod strip;
 mod view;
 
 #[cfg(test)]

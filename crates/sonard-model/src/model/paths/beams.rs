@@ -11,6 +11,6 @@ mod shade;
 mod slopes;
 mod tree;
 
-pub(crate) use beam::{Leg, Ray};
+pub(crate) use beam::{Beam, Leg, Ray};
 pub(crate) use lit::{LitSpan, View};
 pub(crate) use tree::Beams;

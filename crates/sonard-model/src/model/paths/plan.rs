@@ -5,6 +5,7 @@ mod climbs;
 mod corners;
 mod cylinders;
 mod mesh;
+mod strips;
 mod walls;
 
 use std::sync::Arc;
@@ -13,6 +14,7 @@ pub(crate) use climbs::{ALL_SLOPES, Climbs, Spans, WallClimbs, united};
 pub(crate) use corners::{ALONG_RAD, Corner, Corners, Facing, Flank};
 pub(crate) use cylinders::{Circle, Cylinders, Span, SurfaceArc};
 pub(crate) use mesh::{Mesh, Side};
+pub(crate) use strips::take_strips;
 pub(crate) use walls::{WallMirror, mirror_gain, scattered};
 
 use super::{

@@ -6,10 +6,13 @@ use super::{
     diffraction::EdgeToEdge,
     effort::{BOUND, Bound, Effort},
     height::Heights,
-    plan::{Circle, Corners, Cylinders, Mesh, Plan, WallMirror, mirror_gain, scattered},
+    plan::{
+        Circle, Corners, Cylinders, Mesh, Plan, WallMirror, mirror_gain, scattered, take_strips,
+    },
     settings::{Settings, usual_z_m},
 };
 use crate::{
+    acoustics::edge::EdgeLaw,
     geometry::{Arrangement, DVec2, Mirror},
     scene::{Cylinder, FloorPlan, Scene},
 };
@@ -60,8 +63,18 @@ impl Paths {
 /// The plan of what is at heights that matter.
 fn plan(scene: &Scene, drawn: &FloorPlan, heights: &Heights, settings: Settings) -> Plan {
     let is_there = |wall: u32| heights.is_there(scene.walls[wall as usize].z_m);
-    let arrangement: Arrangement = drawn.of_walls(is_there);
+    let mut arrangement: Arrangement = drawn.of_walls(is_there);
     let segments: &[(DVec2, DVec2)] = &drawn.walls;
+    let gains: Vec<_> = scene.walls.iter().map(|wall| mirror_gain(&wall.material)).collect();
+    let climbs = heights.climbs(&settings);
+    // Other laws know no aspect, and mirrors alone no edges.
+    let strips = match settings.edge_law {
+        Some(EdgeLaw::Utd) => {
+            let lets_pass = |wall| climbs.of_wall(wall).is_some();
+            take_strips(&mut arrangement, &gains, lets_pass, settings.wave_number_per_m)
+        }
+        _ => Vec::new(),
+    };
     let there = |cylinder: &&Cylinder| heights.is_there(cylinder.z_m);
     let extra: Vec<_> = scene
         .cylinders
@@ -72,7 +85,6 @@ fn plan(scene: &Scene, drawn: &FloorPlan, heights: &Heights, settings: Settings)
     // From outside the box no echo is short enough.
     let margin_m = 0.5 * settings.max_path_m + 1.0;
     let mesh = Mesh::new(&arrangement, heights.stacked(&arrangement), &extra, margin_m);
-    let gains: Vec<_> = scene.walls.iter().map(|wall| mirror_gain(&wall.material)).collect();
     let wall = |number: usize| {
         let ((a, b), gain) = (segments[number], gains[number]);
         let mirror = Mirror::through(a, b);
@@ -82,6 +94,7 @@ fn plan(scene: &Scene, drawn: &FloorPlan, heights: &Heights, settings: Settings)
             gain,
             loss_m: settings.same_loss_m(gain),
             scatter: scattered(&scene.walls[number].material),
+            z_m: scene.walls[number].z_m,
         }
     };
     let circle = |c: &Cylinder| Circle {
@@ -91,10 +104,11 @@ fn plan(scene: &Scene, drawn: &FloorPlan, heights: &Heights, settings: Settings)
         is_opaque: heights.is_opaque(c.z_m),
     };
     let circles = scene.cylinders.iter().map(circle).collect();
-    let corners = settings.edge_law.map(|law| Corners::new(&arrangement, segments, &gains, law));
+    let corners =
+        settings.edge_law.map(|law| Corners::new(&arrangement, segments, &gains, law, strips));
     Plan {
         walls: (0..segments.len()).map(wall).collect(),
-        climbs: heights.climbs(&settings).into(),
+        climbs: climbs.into(),
         corners: corners.unwrap_or_default().into(),
         cylinders: Cylinders::new(circles, mesh.as_ref()).into(),
         mesh: mesh.map(Arc::new),

@@ -22,16 +22,25 @@
 //!
 //! Followed are the paths that go back as they came, mirrors on the path included. What is scattered
 //! more than once is left out.
+//!
+//! Patches are numbered from the foot of the perpendicular on, and their phases follow from the numbers. So they
+//! are a matter of where surface and ranger are alone: the same however walls are cut in pieces, in whatever
+//! order they are given and from whichever end, and they turn and move with the scene. A mirrored scene has
+//! others: if it had not, the two halves of a wall would always be heard in phase by a ranger before its middle.
 
-use std::f64::consts::{PI, SQRT_2, TAU};
+use std::f64::consts::{PI, TAU};
 
 use super::{
-    beams::{Leg, LitSpan},
+    beams::{Beam, Leg, LitSpan},
     echo::{Echo, Via},
     plan::{ALL_SLOPES, Plan, WallMirror},
     settings::Settings,
+    tolerance::TIE_M,
 };
-use crate::{geometry::DVec2, model::SearchPart};
+use crate::{
+    geometry::{DVec2, Mirror},
+    model::SearchPart,
+};
 
 /// Largest patch, radians: less than any sensor's beam.
 const PATCH_RAD: f64 = 0.03;
@@ -39,10 +48,9 @@ const PATCH_RAD: f64 = 0.03;
 /// Longest difference of range over a patch, metres: a third of a burst of 16 cycles.
 const PATCH_M: f64 = 0.02;
 
-/// Turns of phase from patch to patch: the golden section, whose multiples spread most evenly; and
-/// from wall to wall, and from one mirror on the path to the next, the roots of 2 and 3.
+/// Turns of phase from patch to patch: the golden section, whose multiples spread most evenly; and from one
+/// mirror on the path to the next, the root of 3.
 const PHASE_TURNS: f64 = 0.618_033_988_749_895;
-const WALL_TURNS: f64 = SQRT_2;
 const ORDER_TURNS: f64 = 1.732_050_807_568_877;
 
 /// A patch that sound is scattered back from.
@@ -57,31 +65,88 @@ pub(super) struct Patch {
 /// All scattered echoes of the parts of rough walls in sight, and their patches.
 pub(super) fn echoes(plan: &Plan, lit: &[LitSpan]) -> (Vec<Echo>, Vec<Patch>) {
     let mut found = (Vec::new(), Vec::new());
-    for span in lit {
-        if plan.effort.is_over() {
-            break;
+    let mut parts: Vec<LitPart> = lit.iter().filter_map(|span| LitPart::of(plan, span)).collect();
+    group(&mut parts, &LitPart::surface, 0, &mut |parts| {
+        parts.sort_by(|one, other| one.from_m.total_cmp(&other.from_m));
+        for side_by_side in parts.chunk_by(|one, next| (next.from_m - one.to_m).abs() <= TIE_M) {
+            if plan.effort.is_over() {
+                break;
+            }
+            add(plan, side_by_side, &mut found);
         }
-        add(plan, span, &mut found);
-    }
+    });
     found
 }
 
-/// Adds the patches of a lit part of a wall, one by one from its low end; the first and the last one are
-/// cut where the light ends.
-fn add(plan: &Plan, lit: &LitSpan, (echoes, patches): &mut (Vec<Echo>, Vec<Patch>)) {
-    let LitSpan { beam, wall, span_m: [low_m, high_m] } = *lit;
-    let (wall_mirror, settings) = (&plan.walls[wall as usize], &plan.settings);
-    let along = wall_mirror.mirror.normal.perp();
-    let height_m = wall_mirror.mirror.height_m(beam.image).abs();
-    let foot_m = along.dot(beam.image);
-    if height_m <= 0.0 {
-        return;
+/// What a beam lights of a rough wall, as seen from the beam's image.
+///
+/// Where it lies is told by what does not depend on how the wall was drawn: in pieces, and from which end.
+struct LitPart<'a> {
+    beam: &'a Beam,
+    wall: u32,
+    wall_mirror: &'a WallMirror,
+    /// From the image to the foot of its perpendicular on the wall's line.
+    to_foot: DVec2,
+    /// From and to where it lies beside the foot, counter-clockwise around the image, metres.
+    from_m: f64,
+    to_m: f64,
+}
+
+impl<'a> LitPart<'a> {
+    /// `None` in line with the wall.
+    fn of(plan: &'a Plan, lit: &'a LitSpan) -> Option<Self> {
+        let LitSpan { beam, wall, span_m: [low_m, high_m] } = lit;
+        let wall_mirror = &plan.walls[*wall as usize];
+        let Mirror { normal, .. } = wall_mirror.mirror;
+        let height_m = wall_mirror.mirror.height_m(beam.image);
+        if height_m == 0.0 {
+            return None;
+        }
+        let foot_m = normal.perp().dot(beam.image);
+        // Along its line is counter-clockwise where the normal points away from the image.
+        let (from_m, to_m) = if height_m < 0.0 {
+            (low_m - foot_m, high_m - foot_m)
+        } else {
+            (foot_m - high_m, foot_m - low_m)
+        };
+        let to_foot = -height_m * normal;
+        Some(Self { beam, wall: *wall, wall_mirror, to_foot, from_m, to_m })
     }
+
+    /// Parts that agree in all of this are parts of one surface, seen from one image.
+    fn surface(&self) -> [f64; 9] {
+        let Self { beam: Beam { image, gain, .. }, wall_mirror: wall, to_foot, .. } = self;
+        let [bottom_m, top_m] = wall.z_m.unwrap_or([f64::MIN, f64::MAX]);
+        let WallMirror { gain: own, scatter, .. } = wall;
+        [image.x, image.y, to_foot.x, to_foot.y, *gain, *own, *scatter, bottom_m, top_m]
+    }
+}
+
+/// Hands on items in groups that agree in all figures from the given one on, but for rounding.
+fn group<T, const N: usize>(
+    items: &mut [T],
+    figures: &impl Fn(&T) -> [f64; N],
+    from: usize,
+    each: &mut impl FnMut(&mut [T]),
+) {
+    if from == N {
+        return each(items);
+    }
+    let figure = |item: &T| figures(item)[from];
+    items.sort_by(|one, other| figure(one).total_cmp(&figure(other)));
+    let same = |one: &T, next: &T| figure(next) - figure(one) <= TIE_M;
+    items.chunk_by_mut(same).for_each(|items| group(items, figures, from + 1, each));
+}
+
+/// Adds the patches of lit parts side by side, clockwise first; the first and the last one are cut where the light
+/// ends.
+fn add(plan: &Plan, lit: &[LitPart], (echoes, patches): &mut (Vec<Echo>, Vec<Patch>)) {
+    let (Some(first), Some(last)) = (lit.first(), lit.last()) else { return };
+    let (settings, height_m) = (&plan.settings, first.to_foot.length());
     let rows = Row::new(height_m);
-    let angle = |place_m: f64| (place_m - foot_m).atan2(height_m);
-    let (from_rad, to_rad) = (angle(low_m), angle(high_m));
-    let (first, last) = (rows.place(from_rad).floor() as i32, rows.place(to_rad).ceil() as i32);
-    for patch in first..last {
+    let (from_rad, to_rad) = (first.from_m.atan2(height_m), last.to_m.atan2(height_m));
+    let numbers = rows.place(from_rad).floor() as i32..rows.place(to_rad).ceil() as i32;
+    for patch in numbers {
         if !plan.effort.step(SearchPart::Images, 1) {
             return;
         }
@@ -89,9 +154,11 @@ fn add(plan: &Plan, lit: &LitSpan, (echoes, patches): &mut (Vec<Echo>, Vec<Patch
         let (low_rad, high_rad) =
             (begins_rad.max(from_rad), rows.angle_rad((patch + 1).into()).min(to_rad));
         let middle_rad = 0.5 * (low_rad + high_rad);
-        let place_m = foot_m + height_m * middle_rad.tan();
-        let point = wall_mirror.mirror.offset_m * wall_mirror.mirror.normal + place_m * along;
-        let run = point - beam.image;
+        let place_m = height_m * middle_rad.tan();
+        let own = lit.partition_point(|part| part.from_m <= place_m).saturating_sub(1);
+        let LitPart { beam, wall, wall_mirror, .. } = lit[own];
+        let run = first.to_foot + place_m / height_m * first.to_foot.perp();
+        let point = beam.image + run;
         let length_m = 2.0 * run.length();
         let share = share(wall_mirror, middle_rad.cos(), (high_rad - low_rad).max(0.0), settings);
         let amplitude = beam.gain * beam.gain * share.sqrt() * settings.air_gain(length_m);
@@ -104,7 +171,6 @@ fn add(plan: &Plan, lit: &LitSpan, (echoes, patches): &mut (Vec<Echo>, Vec<Patch
         patches.push(Patch { wall, leg: (&beam.ray_to(point)).into(), point });
         // The powers of two beams' parts of a patch add up if they are a quarter turn apart.
         let turns = PHASE_TURNS * f64::from(patch)
-            + WALL_TURNS * f64::from(wall)
             + ORDER_TURNS * f64::from(beam.order)
             + if begins_rad < from_rad { 0.25 } else { 0.0 };
         echoes.push(Echo {
@@ -166,7 +232,6 @@ fn share(wall_mirror: &WallMirror, cosine: f64, angle_rad: f64, settings: &Setti
 mod tests {
     use super::*;
     use crate::{
-        geometry::Mirror,
         model::paths::plan::{mirror_gain, scattered},
         scene::Material,
     };
@@ -205,8 +270,14 @@ mod tests {
     #[test]
     fn a_patch_follows_from_lamberts_law() {
         let mirror = Mirror::through(DVec2::ZERO, DVec2::X);
-        let wall_mirror =
-            WallMirror { mirror, rotor: DVec2::X, gain: 0.8, loss_m: 0.0, scatter: 0.36 };
+        let wall_mirror = WallMirror {
+            mirror,
+            rotor: DVec2::X,
+            gain: 0.8,
+            loss_m: 0.0,
+            scatter: 0.36,
+            z_m: None,
+        };
         let settings = Settings { scatter_height_rad: 0.2, ..crate::model::paths::tests::LOSSLESS };
         let (range_m, cosine, angle_rad): (f64, f64, f64) = (1.7, 0.6, 0.01);
         let area = range_m * angle_rad / cosine * range_m * 0.2;

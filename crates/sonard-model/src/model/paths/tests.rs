@@ -13,6 +13,7 @@ mod pairs;
 mod peers;
 mod rough;
 mod stacked;
+mod strips;
 mod two_edges;
 mod vertical;
 

@@ -27,6 +27,8 @@ pub(crate) struct Beam {
     pub(crate) side: u8,
     /// Whether it was reflected an odd number of times.
     pub(crate) mirrored: bool,
+    /// Whether rays at the transducer's own height, which do not climb, come so far.
+    pub(crate) is_level: bool,
     pub(crate) order: u16,
     /// How steeply its rays can climb, by number in [`super::Beams::slopes`].
     pub(crate) slopes: u32,
@@ -110,6 +112,7 @@ impl Beam {
     pub(crate) fn merge(&mut self, next: &Self) -> bool {
         let same = self.triangle == next.triangle
             && self.side == next.side
+            && self.is_level == next.is_level
             && self.image.distance_squared(next.image) < TIE_M * TIE_M
             && (self.gain - next.gain).abs() <= 1e-12 * self.gain;
         if !same {

@@ -134,6 +134,7 @@ impl<'a> Grower<'a> {
             triangle,
             side: 0,
             mirrored: false,
+            is_level: true,
             order: 0,
             slopes: ALL_SLOPES,
         }
@@ -277,7 +278,8 @@ impl<'a> Grower<'a> {
                 }
                 let slopes = self.slopes_behind(&beam, wall, side)?;
                 let (triangle, side) = self.mesh.beyond(beam.triangle, side)?;
-                let next = Beam { triangle, side, slopes, ..beam };
+                let is_level = beam.is_level && self.plan.climbs.passes_level(wall);
+                let next = Beam { triangle, side, slopes, is_level, ..beam };
                 self.may_return(&next).then_some(next)
             }
             Side::Outside => None,
@@ -326,12 +328,10 @@ impl<'a> Grower<'a> {
     /// The beam that a wall reflects, if an echo can come of it.
     fn reflected(&mut self, beam: &Beam, wall: u32, side: usize) -> Option<Beam> {
         let slopes = self.slopes_at(beam, wall, side)?;
+        let is_level = beam.is_level && self.plan.climbs.meets_level(wall);
         let wall_mirror = &self.plan.walls[wall as usize];
         // What is scattered goes straight back, level.
-        if wall_mirror.scatter > 0.0
-            && self.plan.settings.scatter_height_rad > 0.0
-            && self.tree.slopes.any_in(slopes, [0.0; 2])
-        {
+        if wall_mirror.scatter > 0.0 && self.plan.settings.scatter_height_rad > 0.0 && is_level {
             let span_m = self.lit_span_m(beam, wall_mirror, side);
             self.plan.effort.keep::<LitSpan>(1);
             self.tree.on_rough_walls.push(LitSpan { beam: *beam, wall, span_m });
@@ -350,6 +350,7 @@ impl<'a> Grower<'a> {
             gain,
             audible_m: beam.audible_m - wall_mirror.loss_m,
             slopes,
+            is_level,
             side: side as u8,
             ..beam.reflected(&wall_mirror.mirror, wall_mirror.rotor)
         };

@@ -33,7 +33,7 @@ use num_complex::Complex64;
 use smallvec::SmallVec;
 
 use super::{
-    edge_ray::{EdgeRay, distance_parameter_m},
+    edge_ray::{EdgeRay, distance_parameter_m, floor},
     edge_to_edge::EdgeToEdge,
 };
 use crate::{
@@ -193,7 +193,7 @@ impl Search<'_> {
         let gain = pair.ray.gain * settings.air_gain(length_m);
         let amplitude = gain * field.norm();
         let order = out.ray.order + pair.ray.order + back.ray.order;
-        if amplitude < settings.floor || !settings.allows(order) {
+        if amplitude < floor(settings, out, back, length_m) || !settings.allows(order) {
             return;
         }
         self.plan.effort.keep::<(Echo, Echo, DoubleDiffraction)>(1);
@@ -270,8 +270,8 @@ impl Search<'_> {
                 Flank::Right => ray.from_rad - INTO_SHADOW_RAD,
             };
             let aspect = Aspect { in_rad, out_rad: facing.from_rad, distance_m };
-            let wedge = corner.wedge(ray.sector);
-            ray.ray.gain * self.law.echo(wedge, &aspect, self.settings.wave_number_per_m)
+            let k = self.settings.wave_number_per_m;
+            ray.ray.gain * corner.echo(self.law, ray.sector, &aspect, k)
         };
         passages.iter().map(through).collect()
     }

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::edge_ray::{EdgeRay, distance_parameter_m};
+use super::edge_ray::{EdgeRay, distance_parameter_m, floor};
 use crate::{
     acoustics::edge::{Aspect, EdgeLaw, EdgeView},
     model::{
@@ -37,11 +37,12 @@ pub(crate) fn echoes(plan: &Plan, law: EdgeLaw, out: &Rays, back: Option<&Rays>)
 }
 
 /// The aspect of the edge of an echo with one diffraction, from where the echo begins and ends; `None` of
-/// other echoes, by way of a cylinder, and by laws that know no aspect.
+/// other echoes, by way of a cylinder or a narrow strip, and by laws that know no aspect.
 pub(crate) fn view(plan: &Plan, out: &Rays, back: &Rays, echo: &Echo) -> Option<EdgeView> {
     let Via::Edge { point, out: there, back: here } = echo.via else { return None };
     let is_utd = plan.settings.edge_law == Some(EdgeLaw::Utd);
-    let corner = plan.corners.corner(point).filter(|_| is_utd)?;
+    let is_edge = |corner: &&Corner| is_utd && !corner.is_strip();
+    let corner = plan.corners.corner(point).filter(is_edge)?;
     let rays = [out.to_edge_by_walls(there)?, back.to_edge_by_walls(here)?];
     let [out, back] = rays.map(|ray| EdgeRay::by_walls(corner, ray, 0));
     let (out, back) = (out?, back?);
@@ -134,19 +135,19 @@ impl Search<'_> {
         }
         let length_m = out.length_m + back.length_m;
         let strength = out.ray.gain * back.ray.gain * settings.air_gain(length_m);
+        let floor = floor(settings, out, back, length_m);
         // No law gives more than a wall's echo and the images that its edge replaces.
-        if 2.0 * strength < settings.floor {
+        if 2.0 * strength < floor {
             return None;
         }
-        let wedge = corner.wedge(out.sector);
         let aspect = aspect(out, back);
         let strength = strength * spreading(out, back, &aspect);
         let k = settings.wave_number_per_m;
-        if strength * law.bound(wedge, &aspect, k) < settings.floor {
+        if strength * corner.bound(*law, out.sector, &aspect, k) < floor {
             return None;
         }
-        let field = strength * law.echo(wedge, &aspect, k);
-        (field.norm() >= settings.floor).then_some(field)
+        let field = strength * corner.echo(*law, out.sector, &aspect, k);
+        (field.norm() >= floor).then_some(field)
     }
 }
 

@@ -37,12 +37,26 @@ impl Climbs {
         self.walls.get(wall as usize)?.as_ref()
     }
 
+    /// Whether level sound meets a wall.
+    pub(crate) fn meets_level(&self, wall: u32) -> bool {
+        self.of_wall(wall).is_none_or(|climbs| is_level_in(&climbs.met))
+    }
+
+    /// Whether level sound passes a wall with limits.
+    pub(crate) fn passes_level(&self, wall: u32) -> bool {
+        self.of_wall(wall).is_some_and(|climbs| is_level_in(&climbs.passed))
+    }
+
     /// The highest climb after which floor and ceiling leave at least the share `least_gain` of the amplitude,
     /// metres.
     pub(crate) fn highest_m(&self, least_gain: f64) -> f64 {
         let count = self.highest.partition_point(|[gain, _]| *gain >= least_gain);
         count.checked_sub(1).map_or(0.0, |last| self.highest[last][1])
     }
+}
+
+fn is_level_in(spans: &Spans) -> bool {
+    spans.iter().any(|[from_m, to_m]| *from_m <= 0.0 && 0.0 <= *to_m)
 }
 
 /// What two lists of intervals cover together, as [`Spans`].

@@ -2,10 +2,12 @@
 
 use std::f64::consts::TAU;
 
+use num_complex::Complex64;
 use smallvec::SmallVec;
 
+use super::strips::PlanStrip;
 use crate::{
-    acoustics::edge::{EdgeLaw, Wedge},
+    acoustics::edge::{Aspect, EdgeLaw, Strip, Wedge},
     geometry::{Arrangement, DVec2},
     model::{Edge, paths::tolerance::TIE_M},
 };
@@ -30,6 +32,8 @@ pub(crate) struct Corner {
     edge: Edge,
     /// Counter-clockwise around the point.
     sectors: SmallVec<[Sector; 2]>,
+    /// The narrow strip whose middle this is.
+    strip: Option<Box<Strip>>,
 }
 
 /// The air between two walls at a point.
@@ -73,6 +77,7 @@ impl Corners {
         walls: &[(DVec2, DVec2)],
         gains: &[f64],
         law: EdgeLaw,
+        strips: Vec<PlanStrip>,
     ) -> Self {
         let mut around: Vec<SmallVec<[(f64, u32); 4]>> = vec![SmallVec::new(); plan.points.len()];
         for piece in &plan.pieces {
@@ -92,9 +97,14 @@ impl Corners {
             let edge = ending.or_else(crossing)?;
             let sectors = sectors(&faces, gains, law);
             let answers = sectors.iter().any(|sector| sector.answers);
-            answers.then_some(Corner { point, edge, sectors })
+            answers.then_some(Corner { point, edge, sectors, strip: None })
         };
-        Self { points: (0..).zip(around).map(corner).collect() }
+        let mut points: Vec<_> = (0..).zip(around).map(corner).collect();
+        for strip in strips {
+            let at = strip.point as usize;
+            points[at] = Some(Corner::of_strip(plan.points[at], strip));
+        }
+        Self { points }
     }
 
     /// Whether sound that comes to a point along `run` finds an edge there.
@@ -148,6 +158,40 @@ impl Corner {
         let opening_rad = self.sectors[sector].wedge.opening_rad;
         let in_air = from_rad > GRAZING_RAD && from_rad < opening_rad - GRAZING_RAD;
         (in_air && self.sectors[sector].answers).then_some((sector, from_rad))
+    }
+
+    /// A strip's middle: air all around it.
+    fn of_strip(point: DVec2, PlanStrip { wall, along, strip, .. }: PlanStrip) -> Self {
+        let sector = Sector {
+            from_rad: along.to_angle(),
+            faces: [along.normalize(); 2],
+            wedge: Wedge { opening_rad: TAU, reflectance: [1.0; 2] },
+            answers: true,
+        };
+        let sectors = SmallVec::from_buf_and_len([sector; 2], 1);
+        let edge = Edge { wall, at_b: false };
+        Self { point, edge, sectors, strip: Some(Box::new(strip)) }
+    }
+
+    /// Whether it is the middle of a narrow strip and no edge.
+    pub(crate) fn is_strip(&self) -> bool {
+        self.strip.is_some()
+    }
+
+    /// Field of what is here relative to that of a head-on rigid wall: see [`EdgeLaw::echo`].
+    pub(crate) fn echo(&self, law: EdgeLaw, sector: usize, aspect: &Aspect, k: f64) -> Complex64 {
+        match &self.strip {
+            Some(strip) => strip.echo(aspect),
+            None => law.echo(&self.sectors[sector].wedge, aspect, k),
+        }
+    }
+
+    /// An upper bound of its magnitude.
+    pub(crate) fn bound(&self, law: EdgeLaw, sector: usize, aspect: &Aspect, k: f64) -> f64 {
+        match &self.strip {
+            Some(strip) => strip.echo(aspect).norm(),
+            None => law.bound(&self.sectors[sector].wedge, aspect, k),
+        }
     }
 
     pub(crate) fn wedge(&self, sector: usize) -> &Wedge {

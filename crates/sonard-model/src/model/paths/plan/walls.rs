@@ -17,6 +17,8 @@ pub(crate) struct WallMirror {
     pub(crate) loss_m: f64,
     /// Share of the energy that it scatters; see [`scattered`].
     pub(crate) scatter: f64,
+    /// From and to what height it stands, metres; `None`: without end.
+    pub(crate) z_m: Option<[f64; 2]>,
 }
 
 /// Amplitude of a material's mirror reflection: a rough surface scatters a share of the energy

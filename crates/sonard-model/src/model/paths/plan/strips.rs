@@ -1,0 +1,117 @@
+//! Narrow strips of the floor plan: free-standing walls of a wavelength or less, which scatter from their middles.
+
+use std::f64::consts::TAU;
+
+use smallvec::SmallVec;
+
+use crate::{
+    acoustics::edge::{MOST_WAVELENGTHS, Strip},
+    geometry::{Arrangement, DVec2},
+};
+
+/// Pieces of a wall that go on straight to within this are one, radians.
+const STRAIGHT_RAD: f64 = 1e-6;
+
+/// A narrow strip in the plan.
+#[derive(Debug)]
+pub(crate) struct PlanStrip {
+    /// The point of its middle.
+    pub(crate) point: u32,
+    /// The first of its walls.
+    pub(crate) wall: u32,
+    pub(crate) along: DVec2,
+    pub(crate) strip: Strip,
+}
+
+/// Takes strips out of a plan, which keeps a point in the middle of each: sound goes round them. `gains` are the
+/// walls' reflectances; walls that sound passes above or below stay.
+pub(crate) fn take_strips(
+    plan: &mut Arrangement,
+    gains: &[f64],
+    lets_pass: impl Fn(u32) -> bool,
+    wave_number_per_m: f64,
+) -> Vec<PlanStrip> {
+    let most_m = TAU * MOST_WAVELENGTHS / wave_number_per_m;
+    let chains = Chains::of(plan);
+    let mut taken = vec![false; plan.pieces.len()];
+    let mut strips = Vec::new();
+    for from in 0..plan.points.len() as u32 {
+        let Some((to, pieces)) = chains.from(from, most_m) else { continue };
+        let walls = pieces.iter().map(|&piece| plan.pieces[piece as usize].segment);
+        let Some(wall) = walls.clone().min() else { continue };
+        let gain = gains[wall as usize];
+        let is_one = walls.clone().all(|w| gains[w as usize] == gain && !lets_pass(w));
+        let [a, b] = [from, to].map(|end| plan.points[end as usize]);
+        // Each is found from both ends.
+        let strip =
+            (from < to && is_one).then(|| Strip::new(a.distance(b), gain, wave_number_per_m));
+        if let Some(strip) = strip.flatten() {
+            pieces.iter().for_each(|&piece| taken[piece as usize] = true);
+            strips.push(([a, b], wall, strip));
+        }
+    }
+    let mut taken = taken.into_iter();
+    plan.pieces.retain(|_| !taken.next().unwrap_or(false));
+    let add = |([a, b], wall, strip): ([DVec2; 2], u32, Strip)| {
+        plan.points.push(0.5 * (a + b));
+        PlanStrip { point: plan.points.len() as u32 - 1, wall, along: b - a, strip }
+    };
+    strips.into_iter().map(add).collect()
+}
+
+/// Pieces that go on in line from a free end to another.
+struct Chains<'a> {
+    plan: &'a Arrangement,
+    /// By point, the pieces that end there.
+    around: Vec<SmallVec<[u32; 2]>>,
+}
+
+impl<'a> Chains<'a> {
+    fn of(plan: &'a Arrangement) -> Self {
+        let mut around = vec![SmallVec::new(); plan.points.len()];
+        for (piece, number) in plan.pieces.iter().zip(0..) {
+            piece.ends.iter().for_each(|&end| around[end as usize].push(number));
+        }
+        Self { plan, around }
+    }
+
+    /// The other free end of what begins with one at a point, and the pieces between, if it is no longer than
+    /// `most_m`.
+    fn from(&self, point: u32, most_m: f64) -> Option<(u32, SmallVec<[u32; 2]>)> {
+        let [first] = self.around[point as usize][..] else { return None };
+        let mut pieces: SmallVec<[u32; 2]> = SmallVec::from_slice(&[first]);
+        let mut at = self.other_end(first, point);
+        while self.position(point).distance(self.position(at)) <= most_m {
+            let last = pieces[pieces.len() - 1];
+            let next = match self.around[at as usize][..] {
+                [_] => return Some((at, pieces)),
+                [one, other] => {
+                    if one == last {
+                        other
+                    } else {
+                        one
+                    }
+                }
+                _ => return None,
+            };
+            let far = self.other_end(next, at);
+            let so_far = self.position(at) - self.position(point);
+            let bend_rad = so_far.angle_to(self.position(far) - self.position(at));
+            if bend_rad.abs() > STRAIGHT_RAD {
+                return None;
+            }
+            pieces.push(next);
+            at = far;
+        }
+        None
+    }
+
+    fn other_end(&self, piece: u32, point: u32) -> u32 {
+        let [a, b] = self.plan.pieces[piece as usize].ends;
+        if a == point { b } else { a }
+    }
+
+    fn position(&self, point: u32) -> DVec2 {
+        self.plan.points[point as usize]
+    }
+}
