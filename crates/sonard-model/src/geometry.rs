@@ -64,6 +64,13 @@ pub fn wrap_360(angle_deg: f64) -> f64 {
     if wrapped >= 360.0 { 0.0 } else { wrapped }
 }
 
+/// An angle in degrees brought into (-180, 180].
+#[must_use]
+pub fn wrap_180(angle_deg: f64) -> f64 {
+    let wrapped = wrap_360(angle_deg);
+    if wrapped > 180.0 { wrapped - 360.0 } else { wrapped }
+}
+
 /// An angle in radians brought into (-pi, pi].
 #[must_use]
 pub fn wrap_pi(angle_rad: f64) -> f64 {

@@ -10,7 +10,7 @@ use super::{
     simulator::Simulator,
 };
 use crate::{
-    acoustics::{Detection, EchoTrace, Incident, Latch, PulseArrival, ReceiverNoise},
+    acoustics::{Detection, EchoTrace, Incident, Latch, PulseArrival, Receiver, ReceiverNoise},
     geometry::DVec2,
 };
 
@@ -39,7 +39,20 @@ impl<'a> ObservationPoint<'a> {
     /// # Errors
     /// When there are more paths than can be found within bounds of work and memory, here and in all that follows.
     pub fn ping(&self, direction_rad: f64) -> Result<Prediction, TooCostly> {
-        self.listen(direction_rad, Latch::First)
+        self.listen(self.simulator.receiver(), direction_rad, Latch::First)
+    }
+
+    /// The same as another receiver takes it: the simulator's own with another threshold, for what a firing is
+    /// that was a little more or less sensitive than usual.
+    ///
+    /// # Errors
+    /// As [`Self::ping`].
+    pub fn ping_with(
+        &self,
+        receiver: &Receiver,
+        direction_rad: f64,
+    ) -> Result<Prediction, TooCostly> {
+        self.listen(receiver, direction_rad, Latch::First)
     }
 
     /// The same with the receiver made ready again after each echo, up to eight times.
@@ -47,11 +60,15 @@ impl<'a> ObservationPoint<'a> {
     /// # Errors
     /// As [`Self::ping`].
     pub fn ping_rearmed(&self, direction_rad: f64) -> Result<Prediction, TooCostly> {
-        self.listen(direction_rad, Latch::Rearmed)
+        self.listen(self.simulator.receiver(), direction_rad, Latch::Rearmed)
     }
 
-    fn listen(&self, direction_rad: f64, latch: Latch) -> Result<Prediction, TooCostly> {
-        let receiver = self.simulator.receiver();
+    fn listen(
+        &self,
+        receiver: &Receiver,
+        direction_rad: f64,
+        latch: Latch,
+    ) -> Result<Prediction, TooCostly> {
         let mut arrivals = Vec::with_capacity(USUAL_ARRIVALS);
         self.at(direction_rad, |all| {
             let (detection, near) = all.nearest(|near, reach_m| {

@@ -63,6 +63,7 @@ pub struct Simulator {
     air: Air,
     options: Options,
     receiver: Receiver,
+    beam: BeamPattern,
     scatter_height_rad: f64,
     engine: Box<dyn Engine>,
 }
@@ -101,23 +102,24 @@ impl Simulator {
         let receiver = receiver(&sensor, &air, &options);
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
         let scatter_height_rad = beam.two_way_power_rad();
+        let of_engine = beam.clone();
         let engine: Box<dyn Engine> = match options.engine {
             EngineOptions::Paths(paths) => {
                 let settings = path_settings(&sensor, &air, &paths, &receiver, scatter_height_rad);
                 let wave_number_per_m = settings.wave_number_per_m;
                 let face = sensor.face.map(|face| Disc { face, wave_number_per_m });
-                let engine = PathEngine::new(&scene, beam, face, settings);
+                let engine = PathEngine::new(&scene, of_engine, face, settings);
                 Box::new(engine.through_nulls(receiver.asks_incidents()))
             }
             EngineOptions::Fan(fan) => {
-                Box::new(Fan::new(&scene, beam, fan_settings(&sensor, &air, &fan, &receiver)))
+                Box::new(Fan::new(&scene, of_engine, fan_settings(&sensor, &air, &fan, &receiver)))
             }
             EngineOptions::Cone(cone) => {
                 let two_way_deg = || 2.0 * beam.angle_at(0.5_f64.sqrt()).to_degrees();
                 Box::new(Cone::new(&scene, cone.aperture_deg.unwrap_or_else(two_way_deg)))
             }
         };
-        Ok(Self { scene, sensor, air, options, receiver, scatter_height_rad, engine })
+        Ok(Self { scene, sensor, air, options, receiver, beam, scatter_height_rad, engine })
     }
 
     /// Prepares for firing from `position` (world, metres). The costly part is done at the first
@@ -151,6 +153,12 @@ impl Simulator {
     #[must_use]
     pub const fn receiver(&self) -> &Receiver {
         &self.receiver
+    }
+
+    /// The beam pattern of the sensor in the air.
+    #[must_use]
+    pub const fn beam(&self) -> &BeamPattern {
+        &self.beam
     }
 
     /// The sensor.

@@ -233,6 +233,13 @@ impl Scene {
         Ok(())
     }
 
+    /// At which of some places the face of a ranger can stand, as [`check_places`](Self::check_places) says.
+    #[must_use]
+    pub fn can_stand(&self, places: &[DVec2]) -> Vec<bool> {
+        let outlines = Outlines::of(self);
+        places.iter().map(|place| self.check_place(&outlines, *place).is_ok()).collect()
+    }
+
     fn check_place(&self, outlines: &Outlines, position: DVec2) -> Result<(), PoseError> {
         let DVec2 { x: x_m, y: y_m } = position;
         within("X", x_m, MAX_COORDINATE_M)?;

@@ -1,0 +1,218 @@
+//! What a ranger would read at every place of a scene, for finding a sweep's pose without a guess.
+
+use rayon::prelude::*;
+use sonard_model::{
+    geometry::{DVec2, Pose},
+    scene::Scene,
+};
+use thiserror::Error;
+
+use crate::{
+    sweep::{Heard, Sweep},
+    world::{World, WorldError},
+};
+
+/// Directions of the readings at each place, 3 degrees apart.
+pub(crate) const DIRECTIONS: usize = 120;
+/// What stands for silence among ranges: far from every echo.
+const SILENCE_M: f32 = 1e3;
+/// Spread of ranges between places of the grid, as a share of their spacing.
+const SPREAD: f32 = 0.5;
+/// A reading that does not fit costs as much as one this many spreads off.
+const MOST_SPREADS: f32 = 3.0;
+/// More places than this are not predicted at: the grid is made coarser.
+const MOST_PLACES: f64 = 40_000.0;
+/// Room beside the outermost wall of a scene without a closed room, metres.
+const BESIDE_M: f64 = 1.0;
+
+/// The readings that a world has on a grid of places.
+#[derive(Debug, Clone)]
+pub struct Atlas {
+    spacing_m: f64,
+    places: Vec<DVec2>,
+    /// [`DIRECTIONS`] ranges a place, counter-clockwise from +x, metres.
+    ranges_m: Vec<f32>,
+}
+
+/// Why there is no atlas of a world.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum AtlasError {
+    /// There is nothing to predict with.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// No place to stand.
+    #[error("there is no place in the scene where a ranger could stand")]
+    NoPlace,
+}
+
+/// A pose that a sweep may have been taken from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Match {
+    pub(crate) pose: Pose,
+    /// Less is better.
+    pub(crate) cost: f32,
+}
+
+impl Atlas {
+    /// Predicts on a grid with places so far apart, metres: wherever a ranger can stand, in a scene without a
+    /// closed room up to a metre beside it.
+    ///
+    /// # Errors
+    /// When the world can't be predicted in, or has no room.
+    pub fn new(world: &World, spacing_m: f64) -> Result<Self, AtlasError> {
+        let (places, spacing_m) = standing_places(&world.scene, spacing_m);
+        if places.is_empty() {
+            return Err(AtlasError::NoPlace);
+        }
+        let alone = World { scene: without_robot(&world.scene), ..world.clone() };
+        let simulator = alone.simulator(&Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 })?;
+        let readings = |place: &DVec2| {
+            let point = simulator.at(*place);
+            let range_m = |direction: usize| {
+                let direction_rad = std::f64::consts::TAU * direction as f64 / DIRECTIONS as f64;
+                let range_m = point.ping(direction_rad).range_m;
+                range_m.map_or(SILENCE_M, |range_m| (range_m + world.delay_m) as f32)
+            };
+            (0..DIRECTIONS).map(range_m).collect::<Vec<f32>>()
+        };
+        let ranges_m = places.par_iter().flat_map_iter(readings).collect();
+        Ok(Self { spacing_m, places, ranges_m })
+    }
+
+    /// Distance of neighbouring places, metres.
+    #[must_use]
+    pub const fn spacing_m(&self) -> f64 {
+        self.spacing_m
+    }
+
+    /// How many places there are.
+    #[must_use]
+    pub const fn places(&self) -> usize {
+        self.places.len()
+    }
+
+    /// The poses that a sweep fits best, best first; none within twice the grid's spacing and 9 degrees of a better
+    /// one.
+    pub(crate) fn matches(&self, world: &World, sweep: &Sweep, count: usize) -> Vec<Match> {
+        let heard = resampled(world, sweep);
+        if heard.is_empty() {
+            return Vec::new();
+        }
+        let spread_m = SPREAD * self.spacing_m as f32;
+        let mut all: Vec<(f32, usize, usize)> = self
+            .ranges_m
+            .par_chunks_exact(DIRECTIONS)
+            .enumerate()
+            .flat_map_iter(|(place, ranges_m)| {
+                best_turns(&heard, ranges_m, spread_m).map(move |(cost, turn)| (cost, place, turn))
+            })
+            .collect();
+        all.sort_by(|one, other| one.0.total_cmp(&other.0));
+        let mut found: Vec<Match> = Vec::new();
+        for (cost, place, turn) in all {
+            let heading_deg = 360.0 * turn as f64 / DIRECTIONS as f64;
+            let [x_m, y_m] = self.places[place].to_array();
+            let pose = Pose { x_m, y_m, heading_deg };
+            if found.iter().all(|known| is_apart(&known.pose, &pose, 2.0 * self.spacing_m)) {
+                found.push(Match { pose, cost });
+            }
+            if found.len() == count {
+                break;
+            }
+        }
+        found
+    }
+}
+
+/// Whether two poses are farther apart than that, or look elsewhere.
+pub(crate) fn is_apart(one: &Pose, other: &Pose, distance_m: f64) -> bool {
+    let turn_deg = sonard_model::geometry::wrap_180(one.heading_deg - other.heading_deg).abs();
+    one.position().distance(other.position()) > distance_m || turn_deg > 9.0
+}
+
+fn without_robot(scene: &std::sync::Arc<Scene>) -> std::sync::Arc<Scene> {
+    match scene.robot {
+        None => std::sync::Arc::clone(scene),
+        // Its own body hides little, and would have to be turned with it.
+        Some(_) => std::sync::Arc::new(Scene { robot: None, ..Scene::clone(scene) }),
+    }
+}
+
+/// The sweep's reading that looked nearest to each direction of the atlas, as places in it with ranges; a direction
+/// that none looked near is left out.
+fn resampled(world: &World, sweep: &Sweep) -> Vec<(usize, f32)> {
+    let step_deg = 360.0 / DIRECTIONS as f64;
+    let mut nearest: Vec<Option<(f64, f32)>> = vec![None; DIRECTIONS];
+    let half_m_per_us = 0.5e-6 * world.air.sound_speed_m_s();
+    for beam in &sweep.beams {
+        let azimuth_deg =
+            (world.heading_zero_deg + world.gear * beam.azimuth_deg).rem_euclid(360.0);
+        let place = azimuth_deg / step_deg;
+        let off = (place - place.round()).abs();
+        let range_m = match beam.heard {
+            Heard::Echo { tof_us } => (half_m_per_us * tof_us) as f32,
+            Heard::Silence => SILENCE_M,
+        };
+        let slot = &mut nearest[place.round() as usize % DIRECTIONS];
+        if slot.is_none_or(|known| off < known.0) {
+            *slot = Some((off, range_m));
+        }
+    }
+    let of = |(at, known): (usize, Option<(f64, f32)>)| known.map(|(_, range_m)| (at, range_m));
+    nearest.into_iter().enumerate().filter_map(of).collect()
+}
+
+/// The turns of the heard ranges that fit those of a place best: local minima, at most four.
+fn best_turns(
+    heard: &[(usize, f32)],
+    ranges_m: &[f32],
+    spread_m: f32,
+) -> impl Iterator<Item = (f32, usize)> + use<> {
+    // Twice over, so that no index has to be wrapped.
+    let twice: Vec<f32> = ranges_m.iter().chain(ranges_m).copied().collect();
+    let scale = 0.5 / (spread_m * spread_m);
+    let most = 0.5 * MOST_SPREADS * MOST_SPREADS;
+    let cost = |turn: usize| -> f32 {
+        let of = |&(at, range_m): &(usize, f32)| {
+            let off_m = twice[at + turn] - range_m;
+            (scale * off_m * off_m).min(most)
+        };
+        heard.iter().map(of).sum()
+    };
+    let costs: Vec<f32> = (0..DIRECTIONS).map(cost).collect();
+    let is_least = |&turn: &usize| {
+        let [before, after] =
+            [turn + DIRECTIONS - 1, turn + 1].map(|beside| costs[beside % DIRECTIONS]);
+        costs[turn] <= before && costs[turn] < after
+    };
+    let mut least: Vec<(f32, usize)> =
+        (0..DIRECTIONS).filter(is_least).map(|turn| (costs[turn], turn)).collect();
+    least.sort_by(|one, other| one.0.total_cmp(&other.0));
+    least.truncate(4);
+    least.into_iter()
+}
+
+/// A grid of places where a ranger can stand, and its spacing.
+fn standing_places(scene: &Scene, spacing_m: f64) -> (Vec<DVec2>, f64) {
+    let ends = scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
+    let round = scene.cylinders.iter().map(|cylinder| cylinder.center);
+    let named = scene.poses.values().map(Pose::position);
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    for point in ends.chain(round).chain(named) {
+        (low, high) = (low.min(point), high.max(point));
+    }
+    if !low.is_finite() {
+        return (Vec::new(), spacing_m);
+    }
+    (low, high) = (low - BESIDE_M, high + BESIDE_M);
+    let size = high - low;
+    let spacing_m = spacing_m.max((size.x * size.y / MOST_PLACES).sqrt());
+    let [columns, rows] = (size / spacing_m).to_array().map(|count| count.ceil() as u32 + 1);
+    let all: Vec<DVec2> = (0..rows)
+        .flat_map(|y| (0..columns).map(move |x| DVec2::new(f64::from(x), f64::from(y))))
+        .map(|cell| low + spacing_m * cell)
+        .collect();
+    let stands = scene.can_stand(&all);
+    let places = all.into_iter().zip(stands).filter(|(_, stands)| *stands);
+    (places.map(|(place, _)| place).collect(), spacing_m)
+}

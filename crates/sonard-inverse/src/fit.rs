@@ -1,0 +1,300 @@
+//! The most likely values of parameters, and how sure they are.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use serde::Serialize;
+use sonard_model::geometry::{Pose, wrap_180};
+use thiserror::Error;
+
+use crate::{
+    likelihood::ErrorModel,
+    linear::{Curve, Linear},
+    parameter::Parameter,
+    sweep::Sweep,
+    world::{World, WorldError},
+};
+
+/// A parameter to fit, and what is known of it beforehand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prior {
+    /// Which.
+    pub parameter: Parameter,
+    /// Standard deviation of what is believed, about the value that is started from; in its unit.
+    pub sigma: f64,
+}
+
+/// What to fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// Parameters with their priors.
+    pub priors: Vec<Prior>,
+    /// Spread of ranges to begin with, metres: as far off as predictions may be.
+    pub widest_m: f64,
+    /// Least spread of ranges that is believed, metres.
+    pub least_sigma_m: f64,
+    /// Least spread of the threshold that is believed, decibels.
+    pub least_sigma_db: f64,
+}
+
+/// A value found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// What the parameter is to be changed by, in its unit.
+    pub change: f64,
+    /// Standard deviation of it.
+    pub sigma: f64,
+    /// Whether the readings say more about it than was believed beforehand.
+    pub identified: bool,
+}
+
+/// What came of a fit.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// In the order of the parameters.
+    pub estimates: Vec<Estimate>,
+    /// Covariance of the changes, in their order.
+    pub covariance: DMatrix<f64>,
+    /// The world with all changes made.
+    pub world: World,
+    /// The poses of the sweeps.
+    pub poses: Vec<Pose>,
+    /// How readings spread about it.
+    pub errors: ErrorModel,
+    /// Log-likelihood of all readings, and how many there are.
+    pub log_likelihood: f64,
+    /// How many readings there are.
+    pub readings: usize,
+    /// Log-likelihood with the priors.
+    pub log_posterior: f64,
+}
+
+/// Why a fit failed.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum FitError {
+    /// There is nothing to predict with.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// Nothing to fit.
+    #[error("there is no parameter to fit, or no sweep to fit it to")]
+    Nothing,
+    /// The numbers don't hold.
+    #[error("the readings don't hold the parameters: their information can't be inverted")]
+    Degenerate,
+}
+
+/// Where a fit stands.
+struct State<'a> {
+    fit: &'a Fit,
+    start: &'a World,
+    sweeps: &'a [Sweep],
+    parameters: Vec<&'a Parameter>,
+    /// Changes since the start.
+    values: DVector<f64>,
+}
+
+/// Spreads that a fit goes through, as shares of the widest, with the spread of the threshold, decibels: from so wide
+/// that it finds its way to what readings really spread by.
+const STAGES: [(f64, f64); 5] = [(1.0, 6.0), (0.5, 5.0), (0.25, 4.0), (0.12, 3.0), (0.06, 2.5)];
+/// Improvements of the spread itself at the end.
+const LAST_STAGES: usize = 5;
+/// Steps on one linearisation.
+const STEPS: usize = 12;
+/// Spreads of the threshold that are tried, decibels.
+const SPREADS_DB: [f64; 7] = [0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0];
+
+/// Fits parameters to sweeps, from a world that is believed.
+///
+/// Maximises the likelihood of all readings times the priors: Levenberg's and Marquardt's steps on a linearisation of
+/// all that each reading could have been, and new predictions after each set of them, with spreads that shrink from
+/// `widest_m` to what the readings have.
+///
+/// # Errors
+/// When the world can't be predicted in, or the readings don't hold the parameters.
+pub fn fit(world: &World, sweeps: &[Sweep], fit: &Fit) -> Result<Fitted, FitError> {
+    if fit.priors.is_empty() || sweeps.is_empty() {
+        return Err(FitError::Nothing);
+    }
+    let mut state = State {
+        fit,
+        start: world,
+        sweeps,
+        parameters: fit.priors.iter().map(|prior| &prior.parameter).collect(),
+        values: DVector::zeros(fit.priors.len()),
+    };
+    let reach_m = world.options.max_range_m.unwrap_or(world.sensor.max_range_m);
+    let mut errors = ErrorModel::rough(fit.widest_m, STAGES[0].1, reach_m);
+    let mut linear = state.linear()?;
+    for (share, sigma_db) in STAGES {
+        errors.sigma_m = (fit.widest_m * share).max(fit.least_sigma_m);
+        errors.sigma_db = sigma_db;
+        for _ in 0..3 {
+            let moved = state.improve(&linear, &errors)?;
+            linear = state.linear()?;
+            if moved < 0.2 {
+                break;
+            }
+        }
+    }
+    let mut best: Option<(f64, DVector<f64>, ErrorModel)> = None;
+    for _ in 0..LAST_STAGES {
+        errors = state.spread(&linear, &errors);
+        let value = linear.log_likelihood(&state.still(), &errors) + state.log_prior(&state.values);
+        if best.as_ref().is_none_or(|best| value > best.0 + 1e-3) {
+            best = Some((value, state.values.clone(), errors));
+        } else {
+            break;
+        }
+        state.improve(&linear, &errors)?;
+        linear = state.linear()?;
+    }
+    if let Some((_, values, spread)) = best
+        && values != state.values
+    {
+        (state.values, errors) = (values, spread);
+        linear = state.linear()?;
+    }
+    state.finish(&linear, errors)
+}
+
+impl State<'_> {
+    fn still(&self) -> DVector<f64> {
+        DVector::zeros(self.parameters.len())
+    }
+
+    fn changes(&self, values: &DVector<f64>) -> Vec<(&Parameter, f64)> {
+        self.parameters.iter().copied().zip(values.iter().copied()).collect()
+    }
+
+    fn poses(&self) -> Vec<Pose> {
+        let mut poses: Vec<Pose> = self.sweeps.iter().map(|sweep| sweep.pose).collect();
+        for (parameter, &by) in self.parameters.iter().zip(&self.values) {
+            match parameter {
+                Parameter::X(sweep) => poses[*sweep].x_m += by,
+                Parameter::Y(sweep) => poses[*sweep].y_m += by,
+                Parameter::Heading(sweep) => {
+                    poses[*sweep].heading_deg = wrap_180(poses[*sweep].heading_deg + by);
+                }
+                _ => {}
+            }
+        }
+        poses
+    }
+
+    fn world(&self) -> Result<World, WorldError> {
+        self.start.changed(&self.changes(&self.values))
+    }
+
+    fn linear(&self) -> Result<Linear, FitError> {
+        let reference_m_s = self.start.air.sound_speed_m_s();
+        let (world, poses) = (self.world()?, self.poses());
+        Ok(Linear::about(&world, self.sweeps, &poses, &self.parameters, reference_m_s)?)
+    }
+
+    fn precision(&self, at: usize) -> f64 {
+        self.fit.priors[at].sigma.powi(-2)
+    }
+
+    fn log_prior(&self, values: &DVector<f64>) -> f64 {
+        let of = |(at, value): (usize, &f64)| -0.5 * self.precision(at) * value * value;
+        values.iter().enumerate().map(of).sum()
+    }
+
+    /// Goes where the linearisation is best, within what it holds for. Gives the largest step, as a share of that.
+    fn improve(&mut self, linear: &Linear, errors: &ErrorModel) -> Result<f64, FitError> {
+        let mut change = self.still();
+        let mut damping = 1e-3;
+        let mut curve = linear.curve(&change, errors);
+        let mut value = curve.value + self.log_prior(&self.values);
+        for _ in 0..STEPS {
+            let step = self.step(&curve, &change, damping).ok_or(FitError::Degenerate)?;
+            let next = self.bounded(&(&change + step));
+            let next_value =
+                linear.log_likelihood(&next, errors) + self.log_prior(&(&self.values + &next));
+            if next_value > value {
+                let is_done = next_value - value < 1e-4;
+                (change, value) = (next, next_value);
+                if is_done {
+                    break;
+                }
+                curve = linear.curve(&change, errors);
+                damping = (damping * 0.3).max(1e-6);
+            } else {
+                damping *= 8.0;
+                if damping > 1e6 {
+                    break;
+                }
+            }
+        }
+        let shares = change.iter().zip(&self.parameters).map(|(by, of)| by.abs() / of.step());
+        let largest = shares.fold(0.0, f64::max);
+        self.values += change;
+        Ok(largest)
+    }
+
+    fn step(&self, curve: &Curve, change: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+        let mut normal = curve.curvature.clone();
+        let mut right = curve.gradient.clone();
+        for at in 0..right.len() {
+            normal[(at, at)] *= 1.0 + damping;
+            normal[(at, at)] += self.precision(at) * (1.0 + damping);
+            right[at] -= self.precision(at) * (self.values[at] + change[at]);
+        }
+        Some(Cholesky::new(normal)?.solve(&right))
+    }
+
+    fn bounded(&self, change: &DVector<f64>) -> DVector<f64> {
+        let bounds = self.parameters.iter().map(|parameter| parameter.step());
+        DVector::from_iterator(
+            change.len(),
+            change.iter().zip(bounds).map(|(by, most)| by.clamp(-most, most)),
+        )
+    }
+
+    /// The spread of readings about the present predictions: one step of expectation-maximisation.
+    fn spread(&self, linear: &Linear, errors: &ErrorModel) -> ErrorModel {
+        let (residuals, unexplained) = linear.residuals(errors);
+        let mut spread = *errors;
+        spread.clutter = unexplained.clamp(0.002, 0.5);
+        // Standard deviation of the normal part: from the median of what is explained, which the tail moves little.
+        let mut sizes: Vec<f64> = residuals
+            .iter()
+            .filter(|(_, share)| *share > 0.5)
+            .map(|(residual_m, _)| residual_m.abs())
+            .collect();
+        sizes.sort_by(f64::total_cmp);
+        if let Some(median_m) = sizes.get(sizes.len() / 2) {
+            // 0.6745 of a normal one alone; with a tail of a tenth, twice as long, 0.72.
+            spread.sigma_m = (median_m / 0.72).max(self.fit.least_sigma_m).min(self.fit.widest_m);
+        }
+        let still = self.still();
+        let likely = |sigma_db: &f64| {
+            linear.log_likelihood(&still, &ErrorModel { sigma_db: *sigma_db, ..spread })
+        };
+        let tried = SPREADS_DB.iter().filter(|sigma_db| **sigma_db >= self.fit.least_sigma_db);
+        let best = tried.max_by(|one, other| likely(one).total_cmp(&likely(other)));
+        spread.sigma_db = best.copied().unwrap_or(self.fit.least_sigma_db);
+        spread
+    }
+
+    fn finish(self, linear: &Linear, errors: ErrorModel) -> Result<Fitted, FitError> {
+        let curve = linear.curve(&self.still(), &errors);
+        let mut information = curve.information;
+        for at in 0..self.parameters.len() {
+            information[(at, at)] += self.precision(at);
+        }
+        let covariance = Cholesky::new(information).ok_or(FitError::Degenerate)?.inverse();
+        let estimates = self.values.iter().enumerate().map(|(at, &change)| {
+            let sigma = covariance[(at, at)].max(0.0).sqrt();
+            Estimate { change, sigma, identified: sigma < 0.5 * self.fit.priors[at].sigma }
+        });
+        Ok(Fitted {
+            estimates: estimates.collect(),
+            covariance,
+            world: self.world()?,
+            poses: self.poses(),
+            errors,
+            log_likelihood: curve.value,
+            readings: linear.len(),
+            log_posterior: curve.value + self.log_prior(&self.values),
+        })
+    }
+}

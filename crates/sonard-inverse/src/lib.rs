@@ -1,0 +1,33 @@
+//! From readings back to the world: what a sensor, the air, a scene and a pose must be for the model to explain
+//! what was measured.
+//!
+//! [`fit`] improves the [`Parameter`]s of a [`World`] until the readings of some [`Sweep`]s are as likely as they
+//! can be, and says how sure that is. [`Atlas`] finds where a sweep was taken without any guess.
+//!
+//! A reading is taken for what a receiver says whose threshold differs a little from firing to firing: from the
+//! lowest to the highest it would have reported one arrival after the other and in the end nothing
+//! (`candidates`). So an echo may be of any arrival near the threshold, a silence says that none was strong
+//! enough, and where arcs begin and end counts as much as their ranges (`likelihood`).
+
+mod atlas;
+mod candidates;
+mod fit;
+mod likelihood;
+mod linear;
+mod locate;
+mod motion;
+mod parameter;
+mod sweep;
+mod walls;
+#[cfg(test)]
+mod tests;
+mod world;
+
+pub use atlas::{Atlas, AtlasError};
+pub use fit::{Estimate, Fit, FitError, Fitted, Prior, fit};
+pub use likelihood::ErrorModel;
+pub use locate::{Mode, locate};
+pub use motion::{Motion, length_rate};
+pub use parameter::Parameter;
+pub use sweep::{Beam, Heard, Sweep, SweepError};
+pub use world::{World, WorldError};

@@ -1,0 +1,103 @@
+//! How likely a reading is, given what the receiver could have reported.
+
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+
+/// The spread of readings about what is predicted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorModel {
+    /// Standard deviation of the range of an echo, metres.
+    pub sigma_m: f64,
+    /// Share of echoes in the far tail, 0 to 1.
+    pub tail_share: f64,
+    /// Mean extra range of those, as a multiple of `sigma_m`.
+    pub tail_ratio: f64,
+    /// Standard deviation of the threshold from firing to firing, decibels; it also has to cover by how much the
+    /// model misses strengths.
+    pub sigma_db: f64,
+    /// Share of readings that the scene does not explain: people, furniture, the robot itself.
+    pub clutter: f64,
+    /// Share of those that are silences.
+    pub clutter_silent: f64,
+    /// Where their echoes lie, metres: anywhere up to here.
+    pub clutter_m: f64,
+}
+
+impl ErrorModel {
+    /// Spread as of a first look: centimetres, some decibels, one reading in ten unexplained.
+    #[must_use]
+    pub const fn rough(sigma_m: f64, sigma_db: f64, reach_m: f64) -> Self {
+        Self {
+            sigma_m,
+            tail_share: 0.1,
+            tail_ratio: 2.0,
+            sigma_db,
+            clutter: 0.1,
+            clutter_silent: 0.3,
+            clutter_m: reach_m,
+        }
+    }
+
+    /// Density of the error of a range (measured less predicted, metres), and its derivative: normal, or later by an
+    /// exponentially distributed excess (`TofNoise`), whose density is the convolution of both.
+    pub(crate) fn range(&self, error_m: f64) -> [f64; 2] {
+        let Self { sigma_m, tail_share, .. } = *self;
+        let normal = (-0.5 * (error_m / sigma_m).powi(2)).exp() / (sigma_m * TAU.sqrt());
+        let tail_m = self.tail_ratio * sigma_m;
+        // The convolution solves f' = (normal - f) / tail.
+        let tail = exponentially_modified(error_m, sigma_m, tail_m);
+        let slope = -error_m / (sigma_m * sigma_m) * normal;
+        [
+            (1.0 - tail_share) * normal + tail_share * tail,
+            (1.0 - tail_share) * slope + tail_share * (normal - tail) / tail_m,
+        ]
+    }
+
+    /// Density of a reading that nothing explains: of a range in metres, or the probability of a silence.
+    pub(crate) fn of_clutter(&self, is_echo: bool) -> f64 {
+        match is_echo {
+            true => self.clutter * (1.0 - self.clutter_silent) / self.clutter_m,
+            false => self.clutter * self.clutter_silent,
+        }
+    }
+}
+
+fn exponentially_modified(error_m: f64, sigma_m: f64, tail_m: f64) -> f64 {
+    let ratio = sigma_m / tail_m;
+    let late = FRAC_1_SQRT_2 * (ratio - error_m / sigma_m);
+    if late > 20.0 {
+        // Below 1e-170 of the peak.
+        return 0.0;
+    }
+    0.5 / tail_m * (0.5 * ratio * ratio - error_m / tail_m).exp() * libm::erfc(late)
+}
+
+/// The standard normal distribution: its integral up to a value.
+pub(crate) fn normal_up_to(value: f64) -> f64 {
+    0.5 * libm::erfc(-value * FRAC_1_SQRT_2)
+}
+
+/// Its density.
+pub(crate) fn normal_density(value: f64) -> f64 {
+    (-0.5 * value * value).exp() / TAU.sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_density_of_errors_integrates_to_one_and_has_its_derivative() {
+        let model = ErrorModel::rough(0.002, 2.0, 5.0);
+        let step_m = 1e-5;
+        let errors = (-4000..12_000).map(|at| f64::from(at) * step_m);
+        let integral: f64 = errors.clone().map(|error_m| model.range(error_m)[0] * step_m).sum();
+        assert!((integral - 1.0).abs() < 1e-9, "{integral}");
+        for error_m in errors.step_by(97) {
+            let [low, high] = [-1e-7, 1e-7].map(|by| model.range(error_m + by)[0]);
+            let slope = model.range(error_m)[1];
+            assert!((slope - (high - low) / 2e-7).abs() < 1e-2 * slope.abs().max(1.0), "{error_m}");
+        }
+        // Far before the predicted range it must neither overflow nor be no number.
+        assert!(model.range(-5.0)[0] == 0.0 && model.range(5.0)[0].is_finite());
+    }
+}

@@ -1,0 +1,185 @@
+//! Derivatives of path lengths against finite differences.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use sonard_model::{
+    geometry::{DVec2, Pose},
+    model::{Arrival, Mechanism},
+    scene::Scene,
+};
+
+use super::{first_pose, shipped, world};
+use crate::{Motion, Parameter, World, length_rate, walls};
+
+/// Half of the step of a difference, metres.
+const BY_M: f64 = 1e-6;
+
+type Key = Vec<Mechanism>;
+
+/// The arrivals in a direction by what they met. Paths that meet the same things at other places are left out.
+fn arrivals(world: &World, pose: &Pose, direction_rad: f64) -> BTreeMap<Key, Arrival> {
+    let simulator = world.simulator(pose).expect("a model");
+    let (mut found, mut twice) = (BTreeMap::new(), BTreeSet::new());
+    for arrival in simulator.at(pose.position()).arrivals(direction_rad) {
+        let key: Key = arrival.path.mechanisms().collect();
+        // Scattering is by the strip of wall that the beam is on and not by a stationary point.
+        let is_left_out = key.iter().any(|met| matches!(met, Mechanism::Scattering { .. }));
+        if is_left_out || found.insert(key.clone(), arrival).is_some() {
+            twice.insert(key);
+        }
+    }
+    twice.iter().for_each(|key| {
+        found.remove(key);
+    });
+    found
+}
+
+/// Compares rates of all arrivals of some directions with differences between two worlds; gives how many.
+fn compare(
+    name: &str,
+    moved: impl Fn(f64) -> (World, Pose),
+    motion: impl Fn(&World, f64) -> Motion,
+) -> usize {
+    let (here, pose) = moved(0.0);
+    let mut compared = 0;
+    for step in 0..24 {
+        let azimuth_deg = 15.0 * f64::from(step);
+        let direction_rad = here.direction_rad(&pose, azimuth_deg);
+        let ends = here.sensor.mounting.places(pose.position(), direction_rad);
+        let simulator = here.simulator(&pose).expect("a model");
+        let z_m = simulator.sensor_z_m().unwrap_or(0.0);
+        let [before, after] = [-BY_M, BY_M].map(|by| {
+            let (world, pose) = moved(by);
+            let direction_rad = world.direction_rad(&pose, azimuth_deg);
+            arrivals(&world, &pose, direction_rad)
+        });
+        for (key, arrival) in arrivals(&here, &pose, direction_rad) {
+            let (Some(before), Some(after)) = (before.get(&key), after.get(&key)) else { continue };
+            let expected = (after.length_m - before.length_m) / (2.0 * BY_M);
+            let motion = motion(&here, direction_rad);
+            let rate = length_rate(&arrival, ends, z_m, simulator.scene(), &motion);
+            let error = (rate - expected).abs();
+            assert!(error < 1e-5, "{name}: {rate} for {expected} of {key:?} at {azimuth_deg}");
+            compared += 1;
+        }
+    }
+    compared
+}
+
+fn at(scene: &str) -> (World, Pose) {
+    // To 3 m: in a room that is up to four reflections.
+    let mut world = world(scene, "senscomp-6500");
+    world.options.max_range_m = Some(3.0);
+    let pose = first_pose(&shipped(scene));
+    (world, Pose { heading_deg: 17.3, ..pose })
+}
+
+#[test]
+fn places_of_the_ranger() {
+    let mut compared = 0;
+    for scene in ["simple-room", "mcgill-lab", "oblique-corner", "corridor", "simple-room-robot"] {
+        let (world, pose) = at(scene);
+        let axes = [(Parameter::X(0), DVec2::X), (Parameter::Y(0), DVec2::Y)];
+        for (parameter, along) in axes {
+            compared += compare(
+                scene,
+                |by| {
+                    let place = pose.position() + by * along;
+                    (world.clone(), Pose { x_m: place.x, y_m: place.y, ..pose })
+                },
+                |world, direction_rad| world.motion(&parameter, direction_rad).expect("moves"),
+            );
+        }
+    }
+    assert!(compared > 2000, "{compared}");
+}
+
+#[test]
+fn mountings() {
+    let (mut world, pose) = at("simple-room");
+    world.sensor.mounting.separation_m = 0.03;
+    world.sensor.mounting.ahead_m = 0.04;
+    world.options.max_range_m = Some(2.0);
+    let mut compared = 0;
+    for parameter in [Parameter::Ahead, Parameter::Left] {
+        compared += compare(
+            "mounting",
+            |by| (world.changed(&[(&parameter, by)]).expect("a world"), pose),
+            |world, direction_rad| world.motion(&parameter, direction_rad).expect("moves"),
+        );
+    }
+    // A thousandth of a degree for a metre: the step is the same share of each.
+    let scaled = |by: f64| Pose { heading_deg: pose.heading_deg + by, ..pose };
+    compared += compare(
+        "heading",
+        |by| (world.clone(), scaled(by)),
+        |world, direction_rad| world.motion(&Parameter::Heading(0), direction_rad).expect("moves"),
+    );
+    assert!(compared > 200, "{compared}");
+}
+
+#[test]
+fn walls_with_their_corners_and_edges() {
+    let mut compared = 0;
+    for scene in ["simple-room", "oblique-corner", "two-surface-room"] {
+        let (world, pose) = at(scene);
+        for wall in 0..world.scene.walls.len() {
+            compared += compare(
+                scene,
+                |by| (world.changed(&[(&Parameter::Wall(wall), by)]).expect("a world"), pose),
+                |world, direction_rad| {
+                    world.motion(&Parameter::Wall(wall), direction_rad).expect("moves")
+                },
+            );
+        }
+    }
+    assert!(compared > 500, "{compared}");
+}
+
+#[test]
+fn cylinders_that_move_or_grow() {
+    let text = r#"{"name": "legs", "materials": {"wood": {"reflectance": 0.95}},
+        "walls": [{"id": "w", "polyline": [[0, 0], [4, 0], [4, 3], [0, 3]], "closed": true, "material": "wood"}],
+        "cylinders": [{"id": "c", "center": [2.5, 1.0], "radius_m": 0.1, "material": "wood"}],
+        "floor_z_m": 0.0, "ceiling_z_m": 2.5,
+        "poses": {"here": {"x_m": 1.0, "y_m": 1.2, "heading_deg": 20}}}"#;
+    let scene = Scene::from_json(text).expect("a scene");
+    let mut here = world("simple-room", "senscomp-6500");
+    here.options.max_range_m = Some(2.5);
+    let pose = scene.poses["here"];
+    let of = |change: &dyn Fn(&mut Scene, f64), motion: Motion| {
+        compare(
+            "cylinder",
+            |by| {
+                let mut moved = scene.clone();
+                change(&mut moved, by);
+                (World { scene: moved.into(), ..here.clone() }, pose)
+            },
+            |_, _| motion.clone(),
+        )
+    };
+    let moving = |velocity: DVec2, growth: f64| Motion {
+        cylinders: vec![(0, velocity, growth)],
+        ..Motion::default()
+    };
+    let compared = of(&|scene, by| scene.cylinders[0].center.x += by, moving(DVec2::X, 0.0))
+        + of(&|scene, by| scene.cylinders[0].center.y += by, moving(DVec2::Y, 0.0))
+        + of(&|scene, by| scene.cylinders[0].radius_m += by, moving(DVec2::ZERO, 1.0));
+    assert!(compared > 50, "{compared}");
+}
+
+#[test]
+fn a_wall_that_moves_takes_its_corners_along_their_other_walls() {
+    let scene = shipped("simple-room");
+    for wall in 0..scene.walls.len() {
+        let moved = walls::moved_ends(&scene, &[(wall, 0.05)]);
+        let normal = walls::normal(&scene.walls[wall]);
+        let off = |point: DVec2| (point - scene.walls[wall].a).dot(normal);
+        assert!(moved[wall].iter().all(|end| (off(*end) - 0.05).abs() < 1e-9), "{wall}");
+        for (at, ends) in moved.iter().enumerate().filter(|(at, _)| *at != wall) {
+            let other = &scene.walls[at];
+            let off = |point: DVec2| (point - other.a).dot(walls::normal(other)).abs();
+            assert!(ends.iter().all(|end| off(*end) < 1e-9), "{wall} moves the line of {at}");
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Everything that predictions depend on, and what becomes of it when parameters change.
+
+use std::sync::Arc;
+
+use glam::DVec2;
+use sonard_model::{
+    acoustics::{Air, Aperture, Sensor},
+    geometry::Pose,
+    model::{ModelError, Options, Simulator},
+    scene::{PoseError, Scene},
+};
+use thiserror::Error;
+
+use crate::{
+    motion::Motion,
+    parameter::Parameter,
+    walls::{self, moved_ends},
+};
+
+/// A scene, a sensor in some air, and the stepper that turns it.
+#[derive(Debug, Clone)]
+pub struct World {
+    /// The scene.
+    pub scene: Arc<Scene>,
+    /// The sensor.
+    pub sensor: Sensor,
+    /// The air.
+    pub air: Air,
+    /// The model.
+    pub options: Options,
+    /// What is added to every range, metres.
+    pub delay_m: f64,
+    /// What is added to every azimuth, degrees.
+    pub heading_zero_deg: f64,
+    /// What every azimuth is multiplied with.
+    pub gear: f64,
+}
+
+/// Why a world can't be had.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum WorldError {
+    /// Its sensor or options make no sense.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The ranger can't stand there.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
+    /// Air that there is not.
+    #[error("air: {0}")]
+    Air(#[from] sonard_model::acoustics::AirError),
+}
+
+impl World {
+    /// A world with a range without delay and an exact stepper.
+    #[must_use]
+    pub fn new(scene: Arc<Scene>, sensor: Sensor, air: Air, options: Options) -> Self {
+        Self { scene, sensor, air, options, delay_m: 0.0, heading_zero_deg: 0.0, gear: 1.0 }
+    }
+
+    /// The model of this world around a robot.
+    ///
+    /// # Errors
+    /// When sensor, air or options make no sense.
+    pub fn simulator(&self, robot: &Pose) -> Result<Simulator, WorldError> {
+        let scene = match self.scene.robot {
+            Some(_) => Arc::new(self.scene.with_robot_at(robot)),
+            None => Arc::clone(&self.scene),
+        };
+        Ok(Simulator::new(scene, self.sensor.clone(), self.air, self.options)?)
+    }
+
+    /// The world direction of a firing, radians.
+    #[must_use]
+    pub fn direction_rad(&self, pose: &Pose, azimuth_deg: f64) -> f64 {
+        pose.direction_rad(self.heading_zero_deg + self.gear * azimuth_deg)
+    }
+
+    /// The world with its parameters changed by so much; those of single sweeps leave it as it is.
+    ///
+    /// # Errors
+    /// When the air would be none.
+    pub fn changed(&self, changes: &[(&Parameter, f64)]) -> Result<Self, WorldError> {
+        let mut world = self.clone();
+        let mut offsets_m = Vec::new();
+        let mut reflectances = Vec::new();
+        for &(parameter, by) in changes {
+            match parameter {
+                Parameter::X(_) | Parameter::Y(_) | Parameter::Heading(_) => {}
+                Parameter::HeadingZero => world.heading_zero_deg += by,
+                Parameter::Gear => world.gear *= 1.0 + by,
+                Parameter::Ahead => world.sensor.mounting.ahead_m += by,
+                Parameter::Left => world.sensor.mounting.left_m += by,
+                Parameter::Height => {
+                    let z_m = world.sensor.mounting.z_m.unwrap_or(0.0);
+                    world.sensor.mounting.z_m = Some(z_m + by);
+                }
+                Parameter::SoundSpeed => {
+                    let speed_m_s = world.air.sound_speed_m_s() * (1.0 + by);
+                    world.air = world.air.with_sound_speed(speed_m_s)?;
+                }
+                Parameter::Delay => world.delay_m += by,
+                Parameter::Threshold => world.sensor.threshold *= 10f64.powf(by / 20.0),
+                Parameter::Aperture => scale_aperture(&mut world.sensor.aperture, by.exp()),
+                Parameter::Reflectance(material) => reflectances.push((material.as_str(), by)),
+                Parameter::Wall(wall) => offsets_m.push((*wall, by)),
+            }
+        }
+        if !offsets_m.is_empty() || !reflectances.is_empty() {
+            world.scene = Arc::new(changed_scene(&self.scene, &offsets_m, &reflectances));
+        }
+        Ok(world)
+    }
+
+    /// How the world moves with a parameter, for a firing in a direction; `None` where that changes no length.
+    pub(crate) fn motion(&self, parameter: &Parameter, direction_rad: f64) -> Option<Motion> {
+        let ahead = DVec2::from_angle(direction_rad);
+        match parameter {
+            Parameter::X(_) => Some(self.with_body(DVec2::X)),
+            Parameter::Y(_) => Some(self.with_body(DVec2::Y)),
+            Parameter::Ahead => Some(Motion::of_transducer(ahead)),
+            Parameter::Left => Some(Motion::of_transducer(ahead.perp())),
+            Parameter::Heading(_) | Parameter::HeadingZero => {
+                self.turned(direction_rad, 1f64.to_radians())
+            }
+            Parameter::Wall(wall) => {
+                Some(Motion { walls: walls::rates(&self.scene, *wall), ..Motion::default() })
+            }
+            _ => None,
+        }
+    }
+
+    /// The transducer's own motion as it turns, where it is not on the axis.
+    pub(crate) fn turned(&self, direction_rad: f64, by_rad: f64) -> Option<Motion> {
+        let mounting = &self.sensor.mounting;
+        if mounting.is_on_axis() {
+            return None;
+        }
+        let places = mounting.places(DVec2::ZERO, direction_rad);
+        Some(Motion { transducer: places.map(|place| by_rad * place.perp()), ..Motion::default() })
+    }
+
+    /// The robot's body moves along.
+    fn with_body(&self, velocity: DVec2) -> Motion {
+        let mut motion = Motion::of_transducer(velocity);
+        if let Some(robot) = &self.scene.robot {
+            let around = self.scene.with_robot_at(&Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 });
+            debug_assert!(around.walls.len() + around.cylinders.len() > 0, "{robot:?}");
+            let of = |from: usize, to: usize| from as u32..to as u32;
+            let walls = of(self.scene.walls.len(), around.walls.len());
+            motion.walls = walls.map(|wall| (wall, [velocity; 2])).collect();
+            let cylinders = of(self.scene.cylinders.len(), around.cylinders.len());
+            motion.cylinders = cylinders.map(|cylinder| (cylinder, velocity, 0.0)).collect();
+        }
+        motion
+    }
+}
+
+fn scale_aperture(aperture: &mut Aperture, by: f64) {
+    match aperture {
+        Aperture::Piston { radius_m } => *radius_m *= by,
+        Aperture::Line { half_length_m, .. } => *half_length_m *= by,
+        Aperture::Gaussian { half_angle_deg, .. } => *half_angle_deg /= by,
+    }
+}
+
+fn changed_scene(scene: &Scene, offsets_m: &[(usize, f64)], reflectances: &[(&str, f64)]) -> Scene {
+    let mut changed = scene.clone();
+    if !offsets_m.is_empty() {
+        for (wall, [a, b]) in changed.walls.iter_mut().zip(moved_ends(scene, offsets_m)) {
+            (wall.a, wall.b) = (a, b);
+        }
+    }
+    for &(name, by) in reflectances {
+        let Some(material) = scene.materials.get(name) else { continue };
+        let new = sonard_model::scene::Material {
+            reflectance: (material.reflectance * by.exp()).clamp(0.0, 1.0),
+            ..*material
+        };
+        let of = changed.walls.iter_mut().map(|wall| &mut wall.material);
+        let of = of.chain(changed.cylinders.iter_mut().map(|cylinder| &mut cylinder.material));
+        let of = of.chain([&mut changed.floor_material, &mut changed.ceiling_material]);
+        of.filter(|known| **known == *material).for_each(|known| *known = new);
+        changed.materials.insert(name.to_owned(), new);
+    }
+    changed
+}
