@@ -5,6 +5,7 @@ mod array;
 mod benchmark;
 #[cfg(feature = "pi")]
 mod board;
+mod calibrate;
 mod collect;
 mod compare;
 mod daemon;
@@ -16,6 +17,7 @@ mod groups;
 mod import;
 mod interpret;
 mod lines;
+mod locate;
 mod log;
 mod logs;
 mod map;
@@ -44,6 +46,7 @@ mod sweeps;
 mod trace;
 mod watch;
 mod what_if;
+mod worlds;
 
 pub use failure::{Failure, Outcome};
 
@@ -105,6 +108,12 @@ enum Verb {
     Predict(Box<predict::Args>),
     /// Compare a log's readings with the predictions beside them
     Compare(compare::Args),
+    /// Fit sensor, air, scene and poses to what was measured
+    #[command(long_about = calibrate::ABOUT)]
+    Calibrate(Box<calibrate::Args>),
+    /// Find where sweeps were taken, without any guess
+    #[command(long_about = locate::ABOUT)]
+    Locate(Box<locate::Args>),
     /// Tell planes, corners and edges apart in scans
     #[command(long_about = interpret::ABOUT)]
     Interpret(interpret::Args),
@@ -191,6 +200,8 @@ pub fn main() -> ExitCode {
         Verb::Import(args) => import::run(&args),
         Verb::Predict(args) => predict::run(&args),
         Verb::Compare(args) => compare::run(&args),
+        Verb::Calibrate(args) => calibrate::run(&args),
+        Verb::Locate(args) => locate::run(&args),
         Verb::Interpret(args) => interpret::run(&args),
         Verb::Lines(args) => lines::run(&args),
         Verb::Map(args) => map::run(&args),

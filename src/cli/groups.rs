@@ -5,10 +5,11 @@ use std::fmt::Write as _;
 use clap::Command;
 
 /// What the verbs are for, in the order in which a person comes to them.
-pub(super) const GROUPS: [(&str, &[&str]); 7] = [
+pub(super) const GROUPS: [(&str, &[&str]); 8] = [
     ("Measure", &["scan", "collect", "run", "status", "watch", "import"]),
     ("Model", &["simulate", "paths", "trace", "predict"]),
     ("Look at scans", &["plot", "compare", "interpret", "log"]),
+    ("Explain", &["calibrate", "locate"]),
     ("Map", &["map", "lines", "explore"]),
     ("Device", &["doctor", "mock", "board"]),
     ("Scenes and presets", &["scene", "sensor", "array"]),

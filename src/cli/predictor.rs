@@ -206,7 +206,10 @@ fn refuse(log: &Path, error: &dyn std::fmt::Display) -> Failure {
 }
 
 /// The air and the settings of the model that a session's readings were predicted with.
-fn conditions(log: &Path, session: &Session) -> Result<(Air, Options), Failure> {
+///
+/// # Errors
+/// Air that there is not.
+pub(super) fn conditions(log: &Path, session: &Session) -> Result<(Air, Options), Failure> {
     let air = Air::try_from(&session.air).map_err(|error| refuse(log, &error))?;
     let options = session.model.as_ref().map_or_else(Options::default, |model| {
         model.options().unwrap_or_else(|| {

@@ -1,11 +1,13 @@
 //! Another pose, sensor or air than a log says.
 
+use std::sync::Arc;
+
 use super::{Failure, options::load_sensor};
 use crate::{
     acoustics::{Air, Sensor},
     geometry::Pose,
     model::Options,
-    scan::{Ping, ScanStart, Session},
+    scan::{Ping, ScanStart, ScanView, Session},
     scene::parse_pose,
 };
 
@@ -20,6 +22,14 @@ pub(super) struct WhatIfArgs {
     /// Suppose that the ranger looked there, degrees counter-clockwise from the x axis
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with = "pose")]
     heading: Option<f64>,
+    #[command(flatten)]
+    instead: InsteadArgs,
+}
+
+/// What to suppose in place of the sensor and the air that the log says.
+#[derive(Debug, Clone, clap::Args)]
+#[command(next_help_heading = "What if")]
+pub(super) struct InsteadArgs {
     /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, hc-sr04,
     /// fullwave-line), or a file with a sensor's data; supposed in place of the log's
     #[arg(long, value_name = "NAME|FILE")]
@@ -58,20 +68,29 @@ impl WhatIfArgs {
     /// # Errors
     /// No such sensor, or figures that make no sense.
     pub(super) fn load(&self) -> Result<WhatIf, Failure> {
+        let pose = match &self.pose {
+            Some(pose) => {
+                Some(parse_pose(pose).map_err(|error| Failure::input(&error, error.help()))?)
+            }
+            None => None,
+        };
+        Ok(WhatIf { pose, heading_deg: self.heading, ..self.instead.load()? })
+    }
+}
+
+impl InsteadArgs {
+    /// Reads what is named.
+    ///
+    /// # Errors
+    /// No such sensor, or figures that make no sense.
+    pub(super) fn load(&self) -> Result<WhatIf, Failure> {
         let what_if = WhatIf {
-            pose: match &self.pose {
-                Some(pose) => {
-                    Some(parse_pose(pose).map_err(|error| Failure::input(&error, error.help()))?)
-                }
-                None => None,
-            },
-            heading_deg: self.heading,
             sensor: self.sensor.as_deref().map(load_sensor).transpose()?,
             temperature_c: self.temperature_c,
             humidity_percent: self.humidity_percent,
             pressure_kpa: self.pressure_kpa,
             sound_speed_m_s: self.sound_speed,
-            options: None,
+            ..WhatIf::default()
         };
         // Said now rather than at the first scan.
         what_if.air(&Air::default())?;
@@ -139,6 +158,24 @@ impl WhatIf {
     fn posed(&self, logged: Pose) -> Pose {
         let pose = self.pose.unwrap_or(logged);
         Pose { heading_deg: self.heading_deg.unwrap_or(pose.heading_deg), ..pose }
+    }
+
+    /// Takes a whole scan for what it is supposed to be.
+    pub(super) fn change(&self, scan: &mut ScanView) {
+        if self.is_nothing() {
+            return;
+        }
+        if let Some(session) = &mut scan.session {
+            let mut supposed = Session::clone(session);
+            self.change_session(&mut supposed);
+            for ping in &mut scan.pings {
+                self.change_ping(ping, &supposed);
+            }
+            *session = Arc::new(supposed);
+        }
+        if let Some(start) = &mut scan.start {
+            self.change_start(start);
+        }
     }
 
     /// Takes a reading for one of the supposed pose, and computes its range again for the supposed air of its

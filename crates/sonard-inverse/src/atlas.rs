@@ -64,14 +64,14 @@ impl Atlas {
         if places.is_empty() {
             return Err(AtlasError::NoPlace);
         }
-        let alone = World { scene: without_robot(&world.scene), ..world.clone() };
+        let alone = World { scene: without_robot(&world.scene), ..world.on_axis() };
         let simulator = alone.simulator(&Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 })?;
         let readings = |place: &DVec2| {
             let point = simulator.at(*place);
             let range_m = |direction: usize| {
                 let direction_rad = std::f64::consts::TAU * direction as f64 / DIRECTIONS as f64;
                 let range_m = point.ping(direction_rad).range_m;
-                range_m.map_or(SILENCE_M, |range_m| (range_m + world.delay_m) as f32)
+                range_m.map_or(SILENCE_M, |range_m| (range_m + alone.delay_m) as f32)
             };
             (0..DIRECTIONS).map(range_m).collect::<Vec<f32>>()
         };

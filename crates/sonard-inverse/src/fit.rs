@@ -96,6 +96,10 @@ struct State<'a> {
 const STAGES: [(f64, f64); 5] = [(1.0, 6.0), (0.5, 5.0), (0.25, 4.0), (0.12, 3.0), (0.06, 2.5)];
 /// Improvements of the spread itself at the end.
 const LAST_STAGES: usize = 5;
+/// Turns that are tried at each of them, degrees, and how many to both sides.
+const TURNS: [(f64, i32); STAGES.len()] = [(1.5, 8), (1.5, 8), (1.0, 10), (0.75, 12), (0.5, 10)];
+/// Decibels of the threshold that are tried for each degree of turn: what two-way beams fall by near the ends of arcs.
+const THRESHOLD_OF_TURN: f64 = 1.0;
 /// Steps on one linearisation.
 const STEPS: usize = 12;
 /// Spreads of the threshold that are tried, decibels.
@@ -110,22 +114,20 @@ const SPREADS_DB: [f64; 7] = [0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0];
 /// # Errors
 /// When the world can't be predicted in, or the readings don't hold the parameters.
 pub fn fit(world: &World, sweeps: &[Sweep], fit: &Fit) -> Result<Fitted, FitError> {
-    if fit.priors.is_empty() || sweeps.is_empty() {
-        return Err(FitError::Nothing);
-    }
-    let mut state = State {
-        fit,
-        start: world,
-        sweeps,
-        parameters: fit.priors.iter().map(|prior| &prior.parameter).collect(),
-        values: DVector::zeros(fit.priors.len()),
-    };
+    let mut state = State::new(world, sweeps, fit)?;
     let reach_m = world.options.max_range_m.unwrap_or(world.sensor.max_range_m);
     let mut errors = ErrorModel::rough(fit.widest_m, STAGES[0].1, reach_m);
     let mut linear = state.linear()?;
-    for (share, sigma_db) in STAGES {
-        errors.sigma_m = (fit.widest_m * share).max(fit.least_sigma_m);
-        errors.sigma_db = sigma_db;
+    for (stage, (share, sigma_db)) in STAGES.into_iter().enumerate() {
+        // Never narrower than what readings really spread by: else those few that happen to agree would be believed
+        // and all others taken for clutter.
+        let spread = state.spread(&linear, &errors);
+        errors.sigma_m = (fit.widest_m * share).max(spread.sigma_m.min(errors.sigma_m));
+        errors.sigma_db = sigma_db.max(fit.least_sigma_db);
+        let (step_deg, steps) = TURNS[stage];
+        if state.turn(&errors, step_deg, steps)? {
+            linear = state.linear()?;
+        }
         for _ in 0..3 {
             let moved = state.improve(&linear, &errors)?;
             linear = state.linear()?;
@@ -155,7 +157,40 @@ pub fn fit(world: &World, sweeps: &[Sweep], fit: &Fit) -> Result<Fitted, FitErro
     state.finish(&linear, errors)
 }
 
-impl State<'_> {
+/// Standard deviations that no unbiased estimate from such readings can fall below (Cramer and Rao), where `world` and
+/// the sweeps' poses are the truth and readings spread as `errors` says; with what is known beforehand.
+///
+/// # Errors
+/// As [`fit`].
+pub fn bound(
+    world: &World,
+    sweeps: &[Sweep],
+    fit: &Fit,
+    errors: &ErrorModel,
+) -> Result<Vec<f64>, FitError> {
+    let state = State::new(world, sweeps, fit)?;
+    let curve = state.linear()?.curve(&state.still(), errors);
+    let covariance = state.covariance(curve.information).ok_or(FitError::Degenerate)?;
+    Ok((0..fit.priors.len()).map(|at| covariance[(at, at)].sqrt()).collect())
+}
+
+impl<'a> State<'a> {
+    fn new(start: &'a World, sweeps: &'a [Sweep], fit: &'a Fit) -> Result<Self, FitError> {
+        if fit.priors.is_empty() || sweeps.is_empty() {
+            return Err(FitError::Nothing);
+        }
+        let parameters = fit.priors.iter().map(|prior| &prior.parameter).collect();
+        let values = DVector::zeros(fit.priors.len());
+        Ok(Self { fit, start, sweeps, parameters, values })
+    }
+
+    fn covariance(&self, mut information: DMatrix<f64>) -> Option<DMatrix<f64>> {
+        for at in 0..self.parameters.len() {
+            information[(at, at)] += self.precision(at);
+        }
+        Some(Cholesky::new(information)?.inverse())
+    }
+
     fn still(&self) -> DVector<f64> {
         DVector::zeros(self.parameters.len())
     }
@@ -187,6 +222,38 @@ impl State<'_> {
         let reference_m_s = self.start.air.sound_speed_m_s();
         let (world, poses) = (self.world()?, self.poses());
         Ok(Linear::about(&world, self.sweeps, &poses, &self.parameters, reference_m_s)?)
+    }
+
+    /// Turns each sweep whose heading is in doubt to where it fits best as a whole, in so many steps to both sides:
+    /// headings move no path of a transducer on the axis, only the ends of arcs, which say little from afar. Of a
+    /// single sweep the threshold, which moves all ends of arcs too, is tried with it.
+    fn turn(&mut self, errors: &ErrorModel, step_deg: f64, steps: i32) -> Result<bool, FitError> {
+        let (world, poses) = (self.world()?, self.poses());
+        let place = |wanted: &Parameter| self.parameters.iter().position(|of| **of == *wanted);
+        let threshold = place(&Parameter::Threshold).filter(|_| self.sweeps.len() == 1);
+        let step_db = THRESHOLD_OF_TURN * step_deg;
+        let thresholds_db: Vec<f64> = match threshold {
+            Some(_) => (-steps..=steps).map(|step| f64::from(step) * step_db).collect(),
+            None => vec![0.0],
+        };
+        let mut changes: Vec<(usize, f64)> = Vec::new();
+        for at in 0..self.parameters.len() {
+            let Parameter::Heading(sweep) = *self.parameters[at] else { continue };
+            let turns = (-steps..=steps).map(|step| f64::from(step) * step_deg);
+            let (sweep, pose) = (&self.sweeps[sweep], &poses[sweep]);
+            let tried = Linear::turned(&world, sweep, pose, turns, &thresholds_db, errors)?;
+            let cost = |at: usize, by: f64| 0.5 * self.precision(at) * (self.values[at] + by).powi(2);
+            let value = |&(by, db, likely): &(f64, f64, f64)| {
+                likely - cost(at, by) - threshold.map_or(0.0, |threshold| cost(threshold, db))
+            };
+            let best = tried.iter().max_by(|one, other| value(one).total_cmp(&value(other)));
+            if let Some(&(by, db, _)) = best {
+                changes.push((at, by));
+                changes.extend(threshold.map(|threshold| (threshold, db)));
+            }
+        }
+        changes.iter().for_each(|&(at, by)| self.values[at] += by);
+        Ok(changes.iter().any(|(_, by)| *by != 0.0))
     }
 
     fn precision(&self, at: usize) -> f64 {
@@ -231,7 +298,7 @@ impl State<'_> {
     }
 
     fn step(&self, curve: &Curve, change: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
-        let mut normal = curve.curvature.clone();
+        let mut normal = curve.information.clone();
         let mut right = curve.gradient.clone();
         for at in 0..right.len() {
             normal[(at, at)] *= 1.0 + damping;
@@ -277,11 +344,7 @@ impl State<'_> {
 
     fn finish(self, linear: &Linear, errors: ErrorModel) -> Result<Fitted, FitError> {
         let curve = linear.curve(&self.still(), &errors);
-        let mut information = curve.information;
-        for at in 0..self.parameters.len() {
-            information[(at, at)] += self.precision(at);
-        }
-        let covariance = Cholesky::new(information).ok_or(FitError::Degenerate)?.inverse();
+        let covariance = self.covariance(curve.information).ok_or(FitError::Degenerate)?;
         let estimates = self.values.iter().enumerate().map(|(at, &change)| {
             let sigma = covariance[(at, at)].max(0.0).sqrt();
             Estimate { change, sigma, identified: sigma < 0.5 * self.fit.priors[at].sigma }

@@ -11,6 +11,7 @@
 
 mod atlas;
 mod candidates;
+mod doubt;
 mod fit;
 mod likelihood;
 mod linear;
@@ -24,7 +25,8 @@ mod tests;
 mod world;
 
 pub use atlas::{Atlas, AtlasError};
-pub use fit::{Estimate, Fit, FitError, Fitted, Prior, fit};
+pub use doubt::{Doubt, doubts};
+pub use fit::{Estimate, Fit, FitError, Fitted, Prior, bound, fit};
 pub use likelihood::ErrorModel;
 pub use locate::{Mode, locate};
 pub use motion::{Motion, length_rate};

@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 use sonard_model::{
     acoustics::BeamPattern,
     geometry::{DVec2, Pose, wrap_pi},
-    model::{Arrival, Mechanism, Reflector, Simulator},
+    model::{Arrival, Mechanism, ObservationPoint, Reflector, Simulator},
     scene::{Material, Scene},
 };
 
@@ -54,9 +54,8 @@ pub(crate) struct Linear {
 pub(crate) struct Curve {
     pub(crate) value: f64,
     pub(crate) gradient: DVector<f64>,
-    /// Of the range terms as Gauss and Newton have it.
-    pub(crate) curvature: DMatrix<f64>,
-    /// The sum of the outer products of the readings' scores: Fisher's information, where the model is right.
+    /// Fisher's information: of ranges as Gauss and Newton have it, of thresholds what a reading is expected to say. What
+    /// single surprising readings seem to say would make far too sure.
     pub(crate) information: DMatrix<f64>,
 }
 
@@ -85,11 +84,50 @@ impl Linear {
             };
             let rates =
                 RateFinder { world, simulator, parameters, number, wider: wider.as_ref(), reference_m_s };
-            Ok(rates.sweep(sweep, pose))
+            Ok(rates.sweep(&simulator.at(pose.position()), sweep, pose))
         };
         let beams: Result<Vec<Vec<Judged>>, WorldError> =
             sweeps.par_iter().zip(poses).enumerate().map(of).collect();
         Ok(Self { beams: beams?.into_iter().flatten().collect(), count: parameters.len() })
+    }
+
+    /// Log-likelihoods of one sweep from a pose turned by so many degrees each and at thresholds higher by so many
+    /// decibels each: the turn, the threshold, and how likely that is.
+    pub(crate) fn turned(
+        world: &World,
+        sweep: &Sweep,
+        pose: &Pose,
+        turns_deg: impl Iterator<Item = f64>,
+        thresholds_db: &[f64],
+        errors: &ErrorModel,
+    ) -> Result<Vec<(f64, f64, f64)>, WorldError> {
+        let turned = |by: f64| Pose { heading_deg: pose.heading_deg + by, ..*pose };
+        let reference_m_s = world.air.sound_speed_m_s();
+        let likely = |simulator: &Simulator, point: &ObservationPoint, by: f64| {
+            let parameters = &[&Parameter::Threshold];
+            let rates =
+                RateFinder { world, simulator, parameters, number: 0, wider: None, reference_m_s };
+            let beams = rates.sweep(point, sweep, &turned(by));
+            let linear = Self { beams, count: 1 };
+            let at = |db: f64| linear.log_likelihood(&DVector::from_element(1, db), errors);
+            thresholds_db.iter().map(|db| (by, *db, at(*db))).collect::<Vec<_>>()
+        };
+        let mut found = Vec::new();
+        let alone = match world.scene.robot {
+            Some(_) => None,
+            None => Some(world.simulator(pose)?),
+        };
+        let point = alone.as_ref().map(|simulator| simulator.at(pose.position()));
+        for by in turns_deg {
+            match (&alone, &point) {
+                (Some(simulator), Some(point)) => found.extend(likely(simulator, point, by)),
+                _ => {
+                    let simulator = world.simulator(&turned(by))?;
+                    found.extend(likely(&simulator, &simulator.at(pose.position()), by));
+                }
+            }
+        }
+        Ok(found)
     }
 
     /// Log-likelihood of all readings after a change of the parameters.
@@ -99,40 +137,24 @@ impl Linear {
 
     /// The same with what it takes to improve it.
     pub(crate) fn curve(&self, change: &DVector<f64>, errors: &ErrorModel) -> Curve {
-        let zero = DMatrix::zeros(self.count, self.count);
         let mut curve = Curve {
             value: 0.0,
             gradient: DVector::zeros(self.count),
-            curvature: zero.clone(),
-            information: zero,
+            information: DMatrix::zeros(self.count, self.count),
         };
-        let mut score = DVector::zeros(self.count);
         for beam in &self.beams {
             let terms = beam.terms(change, errors);
             curve.value += terms.density.ln();
-            score.fill(0.0);
-            let mut touched: SmallVec<[u32; 16]> = SmallVec::new();
             for (possible, term) in beam.possible.iter().zip(&terms.of) {
                 for &(at, rate) in &possible.range_rates {
-                    score[at as usize] += term.by_range * rate;
-                    touched.push(at);
+                    curve.gradient[at as usize] += term.by_range * rate;
                 }
                 for &(at, rate) in &possible.until_rates {
-                    score[at as usize] += term.by_until * rate;
-                    touched.push(at);
+                    curve.gradient[at as usize] += term.by_until * rate;
                 }
                 let weight = term.share / (errors.sigma_m * errors.sigma_m);
-                add_outer(&mut curve.curvature, &possible.range_rates, weight);
-                add_outer(&mut curve.curvature, &possible.until_rates, term.by_until.powi(2));
-            }
-            touched.sort_unstable();
-            touched.dedup();
-            for &one in &touched {
-                curve.gradient[one as usize] += score[one as usize];
-                for &other in &touched {
-                    curve.information[(one as usize, other as usize)] +=
-                        score[one as usize] * score[other as usize];
-                }
+                add_outer(&mut curve.information, &possible.range_rates, weight);
+                add_outer(&mut curve.information, &possible.until_rates, term.expected_of_until);
             }
         }
         curve
@@ -184,6 +206,8 @@ struct Term {
     by_range: f64,
     /// By the threshold up to which it is.
     by_until: f64,
+    /// What a reading is expected to say about that threshold, as information.
+    expected_of_until: f64,
 }
 
 impl Judged {
@@ -223,6 +247,15 @@ impl Judged {
                 share: explained * probability * own,
                 by_range: explained * probability * slope,
                 by_until: if by_until.is_finite() { by_until } else { 0.0 },
+                expected_of_until: match is_last {
+                    true => 0.0,
+                    false => {
+                        explained
+                            * expected_of_step(until)
+                            * self.distinct(at, errors.sigma_m)
+                            / errors.sigma_db.powi(2)
+                    }
+                },
             });
         }
         for term in &mut of {
@@ -232,6 +265,27 @@ impl Judged {
         }
         Terms { density, unexplained: unexplained / density, of }
     }
+}
+
+impl Judged {
+    /// How well one of the possible readings can be told from the next, from 0 to 1.
+    fn distinct(&self, at: usize, sigma_m: f64) -> f64 {
+        match (self.possible[at].range_m, self.possible[at + 1].range_m) {
+            (Some(one_m), Some(other_m)) => {
+                1.0 - (-((one_m - other_m) / sigma_m).powi(2) / 8.0).exp()
+            }
+            (None, None) => 0.0,
+            _ => 1.0,
+        }
+    }
+}
+
+/// What one reading, of either side of a step of the probability at `place` standard deviations, is expected to say
+/// about the step's place: `density^2 / (up_to (1 - up_to))`.
+fn expected_of_step(place: f64) -> f64 {
+    let up_to = normal_up_to(place);
+    let spread = up_to * (1.0 - up_to);
+    if spread > 1e-12 { normal_density(place).powi(2) / spread } else { 0.0 }
 }
 
 /// Beam patterns of a slightly wider face, if that is asked for, and by how much.
@@ -254,18 +308,18 @@ struct RateFinder<'a> {
 }
 
 impl RateFinder<'_> {
-    fn sweep(&self, sweep: &Sweep, pose: &Pose) -> Vec<Judged> {
-        let point = self.simulator.at(pose.position());
+    fn sweep(&self, point: &ObservationPoint, sweep: &Sweep, pose: &Pose) -> Vec<Judged> {
         let mut listener = Listener::new(self.simulator.receiver());
+        let lead_m_per_db = listener.lead_m_per_db();
         sweep
             .beams
             .iter()
             .map(|beam| {
                 let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
-                let found = listener.candidates(&point, direction_rad);
+                let found = listener.candidates(point, direction_rad);
                 let possible = found
                     .iter()
-                    .map(|candidate| self.possible(candidate, pose.position(), direction_rad, beam))
+                    .map(|candidate| self.possible(candidate, lead_m_per_db, pose.position(), direction_rad, beam))
                     .collect();
                 let heard_m = match beam.heard {
                     Heard::Echo { tof_us } => Some(0.5e-6 * self.reference_m_s * tof_us),
@@ -279,6 +333,7 @@ impl RateFinder<'_> {
     fn possible(
         &self,
         candidate: &Candidate,
+        lead_m_per_db: f64,
         axis: DVec2,
         direction_rad: f64,
         beam: &Beam,
@@ -293,15 +348,18 @@ impl RateFinder<'_> {
                 if parameter.sweep().is_some_and(|sweep| sweep != self.number) {
                     continue;
                 }
-                let by_range = match parameter {
+                let by_db = self.margin_rate(parameter, arrival, direction_rad, beam);
+                let mut by_range = match parameter {
                     Parameter::SoundSpeed => -stretch * predicted_m,
                     Parameter::Delay => 1.0,
+                    Parameter::Threshold => stretch * lead_m_per_db,
                     _ => 0.5 * stretch * self.length_rate(parameter, arrival, ends, direction_rad, beam),
                 };
+                // A stronger echo is earlier, as at a lower threshold.
+                by_range -= stretch * candidate.walk_m_per_db * by_db;
                 if by_range != 0.0 {
                     range_rates.push((at, by_range));
                 }
-                let by_db = self.margin_rate(parameter, arrival, direction_rad, beam);
                 if by_db != 0.0 {
                     until_rates.push((at, by_db));
                 }
@@ -344,9 +402,13 @@ impl RateFinder<'_> {
             off_rad.map(|off| decibels(pattern.one_way(wrap_pi(off - by_rad)))).iter().sum::<f64>()
         };
         let by_turn = |turn_rad: f64| {
-            const BY_RAD: f64 = 2e-3;
+            // Over half a degree to both sides, and no steeper than a main lobe's flank: a null is steeper, but what is
+            // heard there is the sum of several arrivals.
+            const BY_RAD: f64 = 0.01;
+            const STEEPEST_DB_PER_RAD: f64 = 250.0;
             let pattern = self.simulator.beam();
-            turn_rad * (level_db(pattern, BY_RAD) - level_db(pattern, -BY_RAD)) / (2.0 * BY_RAD)
+            let slope = (level_db(pattern, BY_RAD) - level_db(pattern, -BY_RAD)) / (2.0 * BY_RAD);
+            turn_rad * slope.clamp(-STEEPEST_DB_PER_RAD, STEEPEST_DB_PER_RAD)
         };
         match parameter {
             Parameter::Heading(_) | Parameter::HeadingZero => by_turn(1f64.to_radians()),

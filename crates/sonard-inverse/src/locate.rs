@@ -52,9 +52,10 @@ const FAR_BELOW: f64 = 60.0;
 pub fn locate(world: &World, atlas: &Atlas, sweep: &Sweep) -> Result<Vec<Mode>, FitError> {
     let matches = atlas.matches(world, sweep, MATCHES);
     let few = thinned(sweep, FEW_BEAMS);
+    let simple = world.on_axis();
     let mut rough: Vec<Fitted> = Vec::new();
     for Match { pose, .. } in matches.iter().take(ROUGH) {
-        rough.extend(improved(world, &few, pose, 0.08).ok());
+        rough.extend(improved(&simple, &few, pose, 0.08).ok());
     }
     rough.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
     let best = rough.first().map_or(0.0, |best| best.log_posterior);
@@ -75,7 +76,7 @@ fn improved(world: &World, sweep: &Sweep, pose: &Pose, widest_m: f64) -> Result<
         of(Parameter::Heading(0), 20.0),
     ];
     let from = Sweep { pose: *pose, ..sweep.clone() };
-    let what = Fit { priors, widest_m, least_sigma_m: 5e-4, least_sigma_db: 0.5 };
+    let what = Fit { priors, widest_m, least_sigma_m: 5e-4, least_sigma_db: 1.0 };
     fit(world, std::slice::from_ref(&from), &what)
 }
 

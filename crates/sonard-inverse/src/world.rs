@@ -69,6 +69,17 @@ impl World {
         Ok(Simulator::new(scene, self.sensor.clone(), self.air, self.options)?)
     }
 
+    /// Nearly the same with the transducer on the axis, where all directions share their paths: for first looks. What
+    /// is met ahead reads shorter by how far the face is ahead.
+    #[must_use]
+    pub(crate) fn on_axis(&self) -> Self {
+        let mut world = self.clone();
+        let mounting = &mut world.sensor.mounting;
+        world.delay_m -= mounting.ahead_m;
+        (mounting.ahead_m, mounting.left_m, mounting.separation_m) = (0.0, 0.0, 0.0);
+        world
+    }
+
     /// The world direction of a firing, radians.
     #[must_use]
     pub fn direction_rad(&self, pose: &Pose, azimuth_deg: f64) -> f64 {

@@ -14,6 +14,7 @@ mod outline;
 mod parse;
 mod plain;
 mod pose;
+mod rewrite;
 mod robot;
 mod schema;
 pub mod shipped;

@@ -24,6 +24,8 @@ fn every_plain_path_of_the_command_line_is_read() {
     let mut found = BTreeSet::new();
     paths(&Cli::command(), "", &mut found);
     let read = [
+        "calibrate logs",
+        "calibrate scene",
         "collect plan",
         "collect report",
         "collect socket",
@@ -41,6 +43,8 @@ fn every_plain_path_of_the_command_line_is_read() {
         "lines laser",
         "lines logs",
         "lines scene",
+        "locate logs",
+        "locate scene",
         "log annotate log",
         "log repair log",
         "log show log",

@@ -1,0 +1,163 @@
+//! `sonard calibrate`.
+
+mod report;
+mod what;
+
+use std::{
+    io::{self, Write},
+    path::PathBuf,
+    sync::Arc,
+};
+
+use comfy_table::{CellAlignment, Table};
+
+use super::{
+    Failure, Outcome,
+    compare::RULED,
+    output::{OutPath, Overwrite},
+    progress,
+    what_if::WhatIfArgs,
+    worlds::Worlds,
+};
+use crate::inverse::{Fit, Fitted, Sweep, World, fit};
+use report::{Line, lines, write_folder};
+use what::{Group, PriorSigma, parameters};
+
+/// Options of `sonard calibrate`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(super) struct Args {
+    /// Logs of sweeps; - for standard input
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); explains the readings by it, in
+    /// place of the log's
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<PathBuf>,
+    /// What to fit, separated by commas
+    #[arg(long, value_name = "WHAT", value_delimiter = ',', default_value = "pose,air,threshold")]
+    fit: Vec<Group>,
+    /// Standard deviation of what is believed beforehand about a parameter, in its unit; several are possible
+    #[arg(long, value_name = "NAME=SIGMA")]
+    prior: Vec<PriorSigma>,
+    /// How far off predicted ranges may be at first, metres
+    #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = spread)]
+    widest_m: f64,
+    /// Folder to write; the fitted sensor, scene, air and poses, the estimates and a report
+    #[arg(long, value_name = "DIR")]
+    out: Option<OutPath>,
+    #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
+    what_if: WhatIfArgs,
+    /// JSON instead of text; one object a parameter
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) const ABOUT: &str = "\
+Fit sensor, air, scene and poses to what was measured.
+
+Starts from what the logs and files say, with the stated doubt about each parameter, and finds the values with which \
+the model explains the readings best: the ranges of echoes by any path that the receiver may have reported, silences, \
+and where arcs begin and end. Each value comes with its standard deviation, and with a word whether the readings say \
+more about it than was believed before: what they can't tell stays where it was. The share of readings that nothing \
+explains is part of the answer.";
+
+const HELP: &str = "\
+What to fit (--fit), with the doubt that is assumed:
+  pose        x_m and y_m (0.1 m) and heading_deg (8 degrees) of each scan
+  heading     heading_zero_deg of the stepper, for all scans (8)
+  gear        how much further than said the stepper turns (0.02)
+  mounting    ahead_m and left_m, of the face before the axis (0.03 m)
+  height      height_m of the transducer, in a scene with floor or ceiling (0.1 m)
+  air         sound_speed, as a share (0.015: 8 degrees Celsius)
+  delay       delay_m, added to every range (0.03 m)
+  threshold   threshold_db of the receiver (6 dB)
+  beam        aperture: size of the radiating face, as a logarithm (0.3)
+  materials   reflectance of each material, as a logarithm (0.1)
+  walls       each wall along its normal (0.05 m)
+
+Examples:
+  sonard simulate --scene simple-room --pose 0.80,0.05,92 --temperature-c 15 -o room.jsonl
+  sonard calibrate room.jsonl --pose 0.774,0.085,90
+  sonard calibrate *.jsonl --scene arena.json --fit pose,delay,threshold,beam --prior x_m=0.05 --out fitted
+
+Of --json: name, scan (of a pose), value, change, sigma, low, high (95 %), prior, prior_sigma, identified; values that \
+are logarithms or shares are told as what they make of the file's figure.
+Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let what_if = args.what_if.load()?;
+    if let Some(out) = &args.out {
+        report::check(out, args.overwrite)?;
+    }
+    let (mut sweeps, mut world): (Vec<Sweep>, Option<Arc<World>>) = (Vec::new(), None);
+    let mut worlds = Worlds::new(args.scene.as_deref(), &what_if)?;
+    worlds.for_each_sweep(&args.logs, |log, _, sweep, of| {
+        let known = world.get_or_insert_with(|| Arc::clone(of));
+        if known.sensor != of.sensor || known.scene.sha256 != of.scene.sha256 {
+            return Err(Failure::input(
+                format!("{}: another sensor or scene than in the scans before", log.display()),
+                "calibrate what belongs together, or name one with --sensor or --scene",
+            ));
+        }
+        sweeps.push(sweep);
+        Ok(())
+    })?;
+    let Some(world) = world else {
+        return Err(Failure::input("there is no sweep to fit to", "give logs of a ranger on a stepper"));
+    };
+    let what = Fit {
+        priors: parameters(&args.fit, &args.prior, &world, sweeps.len())?,
+        widest_m: args.widest_m,
+        least_sigma_m: 2e-4,
+        least_sigma_db: 1.0,
+    };
+    let bar = progress::spinner("scans fitted to");
+    bar.set_position(sweeps.len() as u64);
+    let fitted = fit(&world, &sweeps, &what).map_err(|error| {
+        Failure::input(error, "see that poses are in the scene, and fit fewer parameters")
+    })?;
+    bar.finish_and_clear();
+    let lines = lines(&world, &sweeps, &what, &fitted);
+    if let Some(out) = &args.out {
+        write_folder(out, args.overwrite, &world, &sweeps, &fitted, &lines)?;
+    }
+    let mut out = io::stdout().lock();
+    let printed = if args.json {
+        lines.iter().try_for_each(|line| {
+            serde_json::to_writer(&mut out, line)?;
+            writeln!(out)
+        })
+    } else {
+        print(&mut out, &lines, &fitted)
+    };
+    printed.or_else(|error| Failure::from_write("standard output", &error))
+}
+
+fn spread(text: &str) -> Result<f64, String> {
+    let metres: f64 = text.parse().map_err(|_| "it is not a number".to_owned())?;
+    if (0.005..=1.0).contains(&metres) { Ok(metres) } else { Err("it must be from 0.005 to 1".to_owned()) }
+}
+
+fn print(out: &mut impl Write, lines: &[Line], fitted: &Fitted) -> io::Result<()> {
+    let mut table = Table::new();
+    table.load_style(RULED);
+    table.set_header(["parameter", "was", "is", "\u{b1}", "95 %", ""]);
+    for line in lines {
+        table.add_row([
+            line.title(),
+            format!("{:.5}", line.prior),
+            format!("{:.5}", line.value),
+            format!("{:.5}", line.sigma),
+            format!("{:.5} to {:.5}", line.low, line.high),
+            if line.identified { String::new() } else { "left at its prior".to_owned() },
+        ]);
+    }
+    for column in table.column_iter_mut().skip(1).take(4) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    writeln!(out, "{table}")?;
+    report::fit_words(fitted).iter().try_for_each(|line| writeln!(out, "{line}"))
+}

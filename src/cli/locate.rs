@@ -1,0 +1,144 @@
+//! `sonard locate`.
+
+use std::{
+    io::{self, Write},
+    path::PathBuf,
+    sync::Arc,
+};
+
+use comfy_table::{CellAlignment, Table};
+use serde::Serialize;
+use uuid::Uuid;
+
+use super::{
+    Failure, Outcome, compare::RULED, progress, what_if::InsteadArgs, worlds::Worlds,
+};
+use crate::inverse::{Atlas, Doubt, Mode, World, doubts, locate};
+
+/// Options of `sonard locate`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(super) struct Args {
+    /// Logs of sweeps; - for standard input
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); looks for the ranger in it, in
+    /// place of the log's
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<PathBuf>,
+    #[command(flatten)]
+    instead: InsteadArgs,
+    /// Distance of the places that are tried first, metres
+    #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = spacing)]
+    spacing_m: f64,
+    /// JSON instead of text; one object a pose, most probable first
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) const ABOUT: &str = "\
+Find where sweeps were taken, without any guess.
+
+Each scan's readings alone say where in the scene the ranger stood and where it looked: every pose that explains them \
+is listed with its probability, because rooms with a symmetry have several. First the model predicts what would be \
+read on a grid of places all over the scene; the best matches are then improved until all readings - echoes by any \
+path, silences, the ends of arcs - are as likely as they can be. The pose in the log is not used.
+
+A scan that nothing in the scene explains gets its best pose all the same, with the share of readings that it explains \
+and, where the readings can tell, what may be wrong with them: azimuths counted clockwise, another unit.";
+
+const HELP: &str = "\
+Examples:
+  sonard simulate --scene mcgill-lab --pose center -o scan.jsonl
+  sonard locate scan.jsonl
+  sonard locate sweep.jsonl --scene my-room.json --sensor hc-sr04 --json
+
+Of --json: log, scan, x_m, y_m, heading_deg, probability, sigma_x_m, sigma_y_m, sigma_heading_deg, explained (share of \
+the readings), doubts.
+Exit codes: 0 done, 2 wrong usage or input.";
+
+/// A line of `--json`.
+#[derive(Serialize)]
+struct Answer<'a> {
+    log: String,
+    scan: Uuid,
+    #[serde(flatten)]
+    mode: &'a Mode,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    doubts: &'a [Doubt],
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    let what_if = args.instead.load()?;
+    let mut known: Option<(Arc<World>, Atlas)> = None;
+    let mut any = false;
+    let mut worlds = Worlds::new(args.scene.as_deref(), &what_if)?;
+    worlds.for_each_sweep(&args.logs, |log, _, sweep, world| {
+        if known.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, world)) {
+            known = Some((Arc::clone(world), atlas(world, args.spacing_m)?));
+        }
+        let Some((_, atlas)) = &known else { return Ok(()) };
+        let modes = locate(world, atlas, &sweep).map_err(|error| refuse(&error))?;
+        let doubts = doubts(world, atlas, &sweep, &modes);
+        any = true;
+        let mut out = io::stdout().lock();
+        let log = log.display().to_string();
+        let printed = if args.json {
+            let of = |mode| Answer { log: log.clone(), scan: sweep.scan, mode, doubts: &doubts };
+            modes.iter().map(of).try_for_each(|answer| {
+                serde_json::to_writer(&mut out, &answer)?;
+                writeln!(out)
+            })
+        } else {
+            print(&mut out, &log, sweep.scan, &modes, &doubts)
+        };
+        printed.or_else(|error| Failure::from_write("standard output", &error))
+    })?;
+    if any {
+        return Ok(());
+    }
+    Err(Failure::input("there is no sweep to locate", "give a log of a ranger on a stepper"))
+}
+
+fn atlas(world: &World, spacing_m: f64) -> Result<Atlas, Failure> {
+    let bar = progress::spinner("scenes looked over");
+    let atlas = Atlas::new(world, spacing_m).map_err(|error| refuse(&error))?;
+    bar.finish_and_clear();
+    Ok(atlas)
+}
+
+fn refuse(error: &dyn std::fmt::Display) -> Failure {
+    Failure::input(error, "see `sonard scene check` for the scene, and give sensor and air that make sense")
+}
+
+fn spacing(text: &str) -> Result<f64, String> {
+    let metres: f64 = text.parse().map_err(|_| "it is not a number".to_owned())?;
+    if (0.01..=2.0).contains(&metres) { Ok(metres) } else { Err("it must be from 0.01 to 2".to_owned()) }
+}
+
+fn print(
+    out: &mut impl Write,
+    log: &str,
+    scan: Uuid,
+    modes: &[Mode],
+    doubts: &[Doubt],
+) -> io::Result<()> {
+    writeln!(out, "{log}: scan {scan}")?;
+    let mut table = Table::new();
+    table.load_style(RULED);
+    table.set_header(["probability", "x m", "y m", "heading deg", "explained"]);
+    for mode in modes {
+        table.add_row([
+            format!("{:.3}", mode.probability),
+            format!("{:.3} \u{b1} {:.3}", mode.x_m, mode.sigma_x_m),
+            format!("{:.3} \u{b1} {:.3}", mode.y_m, mode.sigma_y_m),
+            format!("{:.2} \u{b1} {:.2}", mode.heading_deg, mode.sigma_heading_deg),
+            format!("{:.0} %", 100.0 * mode.explained),
+        ]);
+    }
+    for column in table.column_iter_mut() {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    writeln!(out, "{table}")?;
+    doubts.iter().try_for_each(|doubt| writeln!(out, "doubt: {doubt}"))
+}
