@@ -30,8 +30,8 @@ pub(super) struct Args {
     /// Logs of sweeps; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// Scene file, or the name of a shipped scene (`sonard scene list`); explains the readings by it, in
-    /// place of the log's
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it, in place of the
+    /// log's
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
     /// What to fit, separated by commas
@@ -43,7 +43,7 @@ pub(super) struct Args {
     /// How far off predicted ranges may be at first, metres
     #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = spread)]
     widest_m: f64,
-    /// Folder to write; the fitted sensor, scene, air and poses, the estimates and a report
+    /// Folder for what is written; the fitted sensor, scene, air and poses, the estimates and a report
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
     #[command(flatten)]

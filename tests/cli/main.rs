@@ -14,6 +14,7 @@ mod format_1;
 mod hangup;
 mod import;
 mod interpret;
+mod inverse;
 mod live_page;
 mod log;
 mod long_logs;

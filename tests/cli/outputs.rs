@@ -35,7 +35,7 @@ const fn case(
     Case { output, input, arguments }
 }
 
-const CASES: [Case; 25] = [
+const CASES: [Case; 27] = [
     case("plot --output", ("a.svg", LOG), "plot IN -o IN"),
     case("plot --output", ("a.png", LOG), "plot IN -o IN --force"),
     case("plot --output", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),
@@ -68,6 +68,8 @@ const CASES: [Case; 25] = [
         "explore --scene IN --pose fig9 --most-stops 1 --out DIR --force",
     ),
     case("import --output", ("a", TABLE), "import IN -o IN --force"),
+    case("calibrate --out", ("sensor.json", LOG), "calibrate IN --out DIR --force"),
+    case("calibrate --out", ("scene.json", SCENE), "calibrate LOG --scene IN --out DIR --force"),
     case("predict --output", ("a.jsonl", LOG), "predict IN -o IN --force"),
     case("predict --output", ("a.json", SCENE), "predict LOG --scene IN -o IN --force"),
     case("log annotate --output", ("a.jsonl", LOG), "log annotate IN -o IN --force"),

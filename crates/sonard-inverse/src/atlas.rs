@@ -54,8 +54,8 @@ pub(crate) struct Match {
 }
 
 impl Atlas {
-    /// Predicts on a grid with places so far apart, metres: wherever a ranger can stand, in a scene without a
-    /// closed room up to a metre beside it.
+    /// Predicts on a grid with places so far apart, metres: wherever a ranger can stand with something in most
+    /// directions, or in a scene without such places, wherever it can stand up to a metre beside it.
     ///
     /// # Errors
     /// When the world can't be predicted in, or has no room.
@@ -64,14 +64,16 @@ impl Atlas {
         if places.is_empty() {
             return Err(AtlasError::NoPlace);
         }
-        let alone = World { scene: without_robot(&world.scene), ..world.on_axis() };
+        let alone = World { scene: without_robot(&world.scene), ..world.with_face_on_axis() };
+        // What is met ahead is nearer to a face before the axis.
+        let nearer_m = world.sensor.mounting.ahead_m;
         let simulator = alone.simulator(&Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 })?;
         let readings = |place: &DVec2| {
             let point = simulator.at(*place);
             let range_m = |direction: usize| {
                 let direction_rad = std::f64::consts::TAU * direction as f64 / DIRECTIONS as f64;
                 let range_m = point.ping(direction_rad).range_m;
-                range_m.map_or(SILENCE_M, |range_m| (range_m + alone.delay_m) as f32)
+                range_m.map_or(SILENCE_M, |range_m| (range_m + alone.delay_m - nearer_m) as f32)
             };
             (0..DIRECTIONS).map(range_m).collect::<Vec<f32>>()
         };
@@ -214,5 +216,57 @@ fn standing_places(scene: &Scene, spacing_m: f64) -> (Vec<DVec2>, f64) {
         .collect();
     let stands = scene.can_stand(&all);
     let places = all.into_iter().zip(stands).filter(|(_, stands)| *stands);
-    (places.map(|(place, _)| place).collect(), spacing_m)
+    let places: Vec<DVec2> = places.map(|(place, _)| place).collect();
+    // Behind the walls of a room lies its mirror image, which fits nearly as well.
+    let within: Vec<DVec2> =
+        places.iter().copied().filter(|place| is_surrounded(scene, *place)).collect();
+    (if within.is_empty() { places } else { within }, spacing_m)
+}
+
+/// Whether there is something in most directions.
+fn is_surrounded(scene: &Scene, place: DVec2) -> bool {
+    const RAYS: u32 = 24;
+    let meets = |ray: u32| {
+        let along = DVec2::from_angle(std::f64::consts::TAU * f64::from(ray) / f64::from(RAYS));
+        let wall = scene.walls.iter().any(|wall| {
+            let (a, b) = (wall.a - place, wall.b - place);
+            let [side_a, side_b] = [along.perp_dot(a), along.perp_dot(b)];
+            // Where it crosses the ray's line it is ahead.
+            side_a * side_b <= 0.0 && a.perp_dot(b) * (side_b - side_a) > 0.0
+        });
+        wall || scene.cylinders.iter().any(|cylinder| {
+            let to = cylinder.center - place;
+            along.dot(to) > 0.0 && along.perp_dot(to).abs() < cylinder.radius_m
+        })
+    };
+    4 * (0..RAYS).filter(|ray| meets(*ray)).count() >= 3 * RAYS as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use sonard_model::scene::Scene;
+
+    use super::*;
+
+    #[test]
+    fn a_place_is_surrounded_within_walls_and_not_beside_them() {
+        let room = Scene::builder("room").material("m", 1.0);
+        // A corner is open, so that nothing says it is a room.
+        let room = room
+            .walls("w", &[[0.2, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0], [0.0, 0.2]], "m")
+            .build()
+            .expect("a scene");
+        for (place, expected) in
+            [([1.0, 1.0], true), ([2.9, 1.9], true), ([-0.5, 1.0], false), ([1.5, 3.0], false)]
+        {
+            assert_eq!(is_surrounded(&room, place.into()), expected, "{place:?}");
+        }
+        let (places, spacing_m) = standing_places(&room, 0.1);
+        assert!(places.iter().all(|place| place.cmpge(DVec2::ZERO).all()), "some are outside");
+        assert!((places.len() as f64 * spacing_m * spacing_m - 6.0).abs() < 0.6, "{}", places.len());
+        // Beside a single wall nothing is, so all places count.
+        let wall = Scene::builder("wall").material("m", 1.0).walls("w", &[[0.0, 0.0], [1.0, 0.0]], "m");
+        let (places, _) = standing_places(&wall.build().expect("a scene"), 0.1);
+        assert!(places.len() > 400, "{}", places.len());
+    }
 }

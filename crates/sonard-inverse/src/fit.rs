@@ -117,43 +117,12 @@ pub fn fit(world: &World, sweeps: &[Sweep], fit: &Fit) -> Result<Fitted, FitErro
     let mut state = State::new(world, sweeps, fit)?;
     let reach_m = world.options.max_range_m.unwrap_or(world.sensor.max_range_m);
     let mut errors = ErrorModel::rough(fit.widest_m, STAGES[0].1, reach_m);
-    let mut linear = state.linear()?;
-    for (stage, (share, sigma_db)) in STAGES.into_iter().enumerate() {
-        // Never narrower than what readings really spread by: else those few that happen to agree would be believed
-        // and all others taken for clutter.
-        let spread = state.spread(&linear, &errors);
-        errors.sigma_m = (fit.widest_m * share).max(spread.sigma_m.min(errors.sigma_m));
-        errors.sigma_db = sigma_db.max(fit.least_sigma_db);
-        let (step_deg, steps) = TURNS[stage];
-        if state.turn(&errors, step_deg, steps)? {
-            linear = state.linear()?;
-        }
-        for _ in 0..3 {
-            let moved = state.improve(&linear, &errors)?;
-            linear = state.linear()?;
-            if moved < 0.2 {
-                break;
-            }
-        }
+    let linear = state.approach(&mut errors)?;
+    state.settle(linear, &mut errors)?;
+    if !world.sensor.mounting.is_on_axis() {
+        state.improve(&state.linear(true)?, &errors)?;
     }
-    let mut best: Option<(f64, DVector<f64>, ErrorModel)> = None;
-    for _ in 0..LAST_STAGES {
-        errors = state.spread(&linear, &errors);
-        let value = linear.log_likelihood(&state.still(), &errors) + state.log_prior(&state.values);
-        if best.as_ref().is_none_or(|best| value > best.0 + 1e-3) {
-            best = Some((value, state.values.clone(), errors));
-        } else {
-            break;
-        }
-        state.improve(&linear, &errors)?;
-        linear = state.linear()?;
-    }
-    if let Some((_, values, spread)) = best
-        && values != state.values
-    {
-        (state.values, errors) = (values, spread);
-        linear = state.linear()?;
-    }
+    let linear = state.linear(true)?;
     state.finish(&linear, errors)
 }
 
@@ -169,7 +138,7 @@ pub fn bound(
     errors: &ErrorModel,
 ) -> Result<Vec<f64>, FitError> {
     let state = State::new(world, sweeps, fit)?;
-    let curve = state.linear()?.curve(&state.still(), errors);
+    let curve = state.linear(true)?.curve(&state.still(), errors);
     let covariance = state.covariance(curve.information).ok_or(FitError::Degenerate)?;
     Ok((0..fit.priors.len()).map(|at| covariance[(at, at)].sqrt()).collect())
 }
@@ -218,10 +187,12 @@ impl<'a> State<'a> {
         self.start.changed(&self.changes(&self.values))
     }
 
-    fn linear(&self) -> Result<Linear, FitError> {
+    /// Predictions where it stands.
+    fn linear(&self, is_exact: bool) -> Result<Linear, FitError> {
         let reference_m_s = self.start.air.sound_speed_m_s();
         let (world, poses) = (self.world()?, self.poses());
-        Ok(Linear::about(&world, self.sweeps, &poses, &self.parameters, reference_m_s)?)
+        let parameters = &self.parameters;
+        Ok(Linear::about(&world, self.sweeps, &poses, parameters, reference_m_s, is_exact)?)
     }
 
     /// Turns each sweep whose heading is in doubt to where it fits best as a whole, in so many steps to both sides:
@@ -263,6 +234,48 @@ impl<'a> State<'a> {
     fn log_prior(&self, values: &DVector<f64>) -> f64 {
         let of = |(at, value): (usize, &f64)| -0.5 * self.precision(at) * value * value;
         values.iter().enumerate().map(of).sum()
+    }
+
+    /// Goes from spread to spread, and gives the predictions where that ends.
+    fn approach(&mut self, errors: &mut ErrorModel) -> Result<Linear, FitError> {
+        let mut linear = self.linear(false)?;
+        for ((share, sigma_db), (step_deg, steps)) in STAGES.into_iter().zip(TURNS) {
+            // Never narrower than what readings really spread by: else those few that happen to agree would be
+            // believed and all others taken for clutter.
+            let spread = self.spread(&linear, errors);
+            errors.sigma_m = (self.fit.widest_m * share).max(spread.sigma_m.min(errors.sigma_m));
+            errors.sigma_db = sigma_db.max(self.fit.least_sigma_db);
+            if self.turn(errors, step_deg, steps)? {
+                linear = self.linear(false)?;
+            }
+            for _ in 0..3 {
+                let moved = self.improve(&linear, errors)?;
+                linear = self.linear(false)?;
+                if moved < 0.2 {
+                    break;
+                }
+            }
+        }
+        Ok(linear)
+    }
+
+    /// Finds the spread and the values in turn, as long as both get likelier.
+    fn settle(&mut self, mut linear: Linear, errors: &mut ErrorModel) -> Result<(), FitError> {
+        let mut best: Option<(f64, DVector<f64>, ErrorModel)> = None;
+        for _ in 0..LAST_STAGES {
+            *errors = self.spread(&linear, errors);
+            let value = linear.log_likelihood(&self.still(), errors) + self.log_prior(&self.values);
+            if best.as_ref().is_some_and(|best| value <= best.0 + 1e-3) {
+                break;
+            }
+            best = Some((value, self.values.clone(), *errors));
+            self.improve(&linear, errors)?;
+            linear = self.linear(false)?;
+        }
+        if let Some((_, values, spread)) = best {
+            (self.values, *errors) = (values, spread);
+        }
+        Ok(())
     }
 
     /// Goes where the linearisation is best, within what it holds for. Gives the largest step, as a share of that.

@@ -52,10 +52,9 @@ const FAR_BELOW: f64 = 60.0;
 pub fn locate(world: &World, atlas: &Atlas, sweep: &Sweep) -> Result<Vec<Mode>, FitError> {
     let matches = atlas.matches(world, sweep, MATCHES);
     let few = thinned(sweep, FEW_BEAMS);
-    let simple = world.on_axis();
     let mut rough: Vec<Fitted> = Vec::new();
     for Match { pose, .. } in matches.iter().take(ROUGH) {
-        rough.extend(improved(&simple, &few, pose, 0.08).ok());
+        rough.extend(improved(world, &few, pose, 0.08).ok());
     }
     rough.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
     let best = rough.first().map_or(0.0, |best| best.log_posterior);

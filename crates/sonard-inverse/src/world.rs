@@ -69,13 +69,11 @@ impl World {
         Ok(Simulator::new(scene, self.sensor.clone(), self.air, self.options)?)
     }
 
-    /// Nearly the same with the transducer on the axis, where all directions share their paths: for first looks. What
-    /// is met ahead reads shorter by how far the face is ahead.
+    /// The same with the transducer on the axis, where all directions share their paths.
     #[must_use]
-    pub(crate) fn on_axis(&self) -> Self {
+    pub(crate) fn with_face_on_axis(&self) -> Self {
         let mut world = self.clone();
         let mounting = &mut world.sensor.mounting;
-        world.delay_m -= mounting.ahead_m;
         (mounting.ahead_m, mounting.left_m, mounting.separation_m) = (0.0, 0.0, 0.0);
         world
     }

@@ -172,13 +172,6 @@ impl Receiver {
         self
     }
 
-    /// From the nominal onset of the reference echo until it passes the threshold, microseconds: what all times are
-    /// counted less by.
-    #[must_use]
-    pub const fn lead_us(&self) -> f64 {
-        self.lead_us
-    }
-
     /// Whether it needs an [`Incident`] for each arrival.
     #[must_use]
     pub const fn asks_incidents(&self) -> bool {

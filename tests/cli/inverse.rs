@@ -1,0 +1,104 @@
+//! From readings back to poses and parameters, through the whole program.
+
+use std::{fs, path::Path};
+
+use serde_json::Value;
+
+use crate::common::{run, stderr};
+
+/// Runs a verb that should succeed; the objects that it prints.
+fn lines(arguments: &[&str]) -> Vec<Value> {
+    let output = run(arguments);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+    let text = String::from_utf8(output.stdout).expect("text");
+    text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
+}
+
+/// A sweep of a shipped scene, in a file.
+fn sweep(folder: &Path, scene: &str, pose: &str, further: &[&str]) -> String {
+    let path = folder.join("sweep.jsonl").to_str().expect("a plain path").to_owned();
+    let simulate = ["simulate", "--scene", scene, "--pose", pose, "-o", &path, "--force"];
+    let output = run(&[&simulate[..], further].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    path
+}
+
+/// Air other than usual, and a millimetre of noise.
+const COLD: [&str; 4] = ["--temperature-c", "15", "--jitter-us", "6"];
+
+fn number(line: &Value, name: &str) -> f64 {
+    line[name].as_f64().unwrap_or_else(|| panic!("{name} of {line}"))
+}
+
+#[test]
+fn what_was_believed_wrongly_is_found_and_written_as_files_that_verbs_take() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = sweep(folder.path(), "simple-room", "0.80,0.05,92", &COLD);
+    let out = folder.path().join("out");
+    let out = out.to_str().expect("a plain path");
+    let believed = ["--pose", "0.774,0.085,90", "--temperature-c", "20"];
+    let calibrate = ["calibrate", &log, "--json", "--out", out];
+    let found = lines(&[&calibrate[..], &believed].concat());
+    let speed_m_s = sonard::acoustics::Air::new(15.0, 50.0, 101.325).expect("air").sound_speed_m_s();
+    let expected =
+        [("x_m", 0.80), ("y_m", 0.05), ("heading_deg", 92.0), ("sound_speed", speed_m_s)];
+    for (line, (name, value)) in found.iter().zip(expected) {
+        assert_eq!(line["name"], name);
+        assert!((number(line, "value") - value).abs() < 4.0 * number(line, "sigma"), "{line}");
+        assert!(number(line, "low") < value && value < number(line, "high"), "{line}");
+        assert_eq!(line["identified"], true);
+    }
+    assert!(number(&found[0], "sigma") < 1e-3 && number(&found[2], "sigma") < 0.5);
+    let poses = fs::read_to_string(format!("{out}/poses.jsonl")).expect("there");
+    let pose: Value = serde_json::from_str(&poses).expect("JSON");
+    assert!((number(&pose, "x_m") - 0.80).abs() < 1e-3);
+    // Sensor and scene are taken by other verbs, under which the readings then agree.
+    let pose = ["x_m", "y_m", "heading_deg"].map(|name| number(&pose, name).to_string()).join(",");
+    let (sensor, scene) = (format!("{out}/sensor.json"), format!("{out}/scene.json"));
+    let speed = number(&found[3], "value").to_string();
+    let compare = ["compare", &log, "--json", "--scene", &scene, "--sensor", &sensor];
+    let judged = lines(&[&compare[..], &["--pose", &pose, "--sound-speed", &speed]].concat());
+    let agree = number(&judged[0], "agree") / number(&judged[0], "pairs");
+    assert!(agree > 0.97, "{}", judged[0]);
+    // A second time it keeps what is there.
+    let again = run(&[&calibrate[..], &believed].concat());
+    assert_eq!(again.status.code(), Some(2), "{}", stderr(&again));
+    assert!(stderr(&again).contains("--force"), "{}", stderr(&again));
+}
+
+#[test]
+fn a_symmetric_room_has_its_poses_listed_and_another_room_is_doubted() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = sweep(folder.path(), "simple-room", "0.774,0.085,0", &[]);
+    let found = lines(&["locate", &log, "--json"]);
+    assert_eq!(found.len(), 2, "{found:?}");
+    let total: f64 = found.iter().map(|mode| number(mode, "probability")).sum();
+    assert!((total - 1.0).abs() < 1e-6);
+    let is_there = |mode: &&Value| (number(mode, "x_m") - 0.774).abs() < 0.02;
+    let mode = found.iter().find(is_there).expect("the right one");
+    assert!((number(mode, "y_m") - 0.085).abs() < 0.02, "{mode}");
+    assert!(number(mode, "heading_deg").abs() < 1.0, "{mode}");
+    assert!(number(mode, "explained") > 0.95 && mode["doubts"].is_null(), "{mode}");
+    let elsewhere = lines(&["locate", &log, "--scene", "oblique-corner", "--json"]);
+    assert!(elsewhere[0]["doubts"][0]["kind"].is_string(), "{}", elsewhere[0]);
+}
+
+#[test]
+fn what_can_not_be_fitted_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = sweep(folder.path(), "simple-room", "0.774,0.085,0", &["--step-deg", "9"]);
+    for (arguments, part) in [
+        (vec!["calibrate", &log, "--prior", "gear=0.1"], "is not fitted"),
+        (vec!["calibrate", &log, "--prior", "x_m=-1"], "greater than 0"),
+        (vec!["calibrate", &log, "--fit", "height"], "neither floor nor ceiling"),
+        (vec!["calibrate", &log, "--fit", "everything"], "possible values"),
+        (vec!["calibrate", "nowhere.jsonl"], "nowhere.jsonl"),
+        (vec!["locate", &log, "--scene", "nowhere"], "nowhere"),
+        (vec!["locate", &log, "--spacing-m", "0"], "0.01 to 2"),
+    ] {
+        let output = run(&arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        let said = stderr(&output);
+        assert!(said.contains(part) && !said.contains("panicked"), "{arguments:?}: {said}");
+    }
+}
