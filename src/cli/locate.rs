@@ -22,8 +22,8 @@ pub(super) struct Args {
     /// Logs of sweeps; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// Scene file, or the name of a shipped scene (`sonard scene list`); looks for the ranger in it, in
-    /// place of the log's
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it, in place of the
+    /// log's
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
     #[command(flatten)]

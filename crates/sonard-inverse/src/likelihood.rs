@@ -113,7 +113,9 @@ mod tests {
         let normal = ErrorModel { tail_share: 0.0, ..model };
         let [with_tail, without] =
             [model, normal].map(|model| model.range_information() * model.sigma_m.powi(2));
-        assert!((without - 1.0).abs() < 1e-6 && (0.7..0.95).contains(&with_tail), "{with_tail}");
+        // Five standard deviations leave out 2e-5.
+        assert!((without - 1.0).abs() < 1e-4, "{without}");
+        assert!((0.7..0.95).contains(&with_tail), "{with_tail}");
         // Far before the predicted range it must neither overflow nor be no number.
         assert!(model.range(-5.0)[0] == 0.0 && model.range(5.0)[0].is_finite());
     }
