@@ -124,7 +124,7 @@ fn readings(truth: &World, pose: &Pose, rng: &mut Pcg64) -> Option<Vec<Beam>> {
     let noise = TofNoise::of_range_mm(NOISE_MM, speed_m_s);
     let beam = |at: u32| {
         let azimuth_deg = 360.0 * f64::from(at) / f64::from(BEAMS);
-        let read = point.ping(truth.direction_rad(pose, azimuth_deg));
+        let read = point.ping(truth.direction_rad(pose, azimuth_deg)).ok()?;
         let late_us = noise.sample_us(rng);
         let heard = match (read.status, read.range_m) {
             (PingStatus::Echo, Some(range_m)) => {

@@ -72,13 +72,14 @@ impl Atlas {
             let point = simulator.at(*place);
             let range_m = |direction: usize| {
                 let direction_rad = std::f64::consts::TAU * direction as f64 / DIRECTIONS as f64;
-                let range_m = point.ping(direction_rad).range_m;
-                range_m.map_or(SILENCE_M, |range_m| (range_m + alone.delay_m - nearer_m) as f32)
+                let range_m = point.ping(direction_rad)?.range_m;
+                let shown = |range_m| (range_m + alone.delay_m - nearer_m) as f32;
+                Ok(range_m.map_or(SILENCE_M, shown))
             };
-            (0..DIRECTIONS).map(range_m).collect::<Vec<f32>>()
+            (0..DIRECTIONS).map(range_m).collect::<Result<Vec<f32>, WorldError>>()
         };
-        let ranges_m = places.par_iter().flat_map_iter(readings).collect();
-        Ok(Self { spacing_m, places, ranges_m })
+        let ranges_m: Result<Vec<Vec<f32>>, WorldError> = places.par_iter().map(readings).collect();
+        Ok(Self { spacing_m, places, ranges_m: ranges_m?.concat() })
     }
 
     /// Distance of neighbouring places, metres.

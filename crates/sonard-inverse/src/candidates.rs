@@ -3,7 +3,7 @@
 use smallvec::SmallVec;
 use sonard_model::{
     acoustics::Receiver,
-    model::{ObservationPoint, Prediction},
+    model::{ObservationPoint, Prediction, TooCostly},
 };
 
 /// Thresholds that are looked at, decibels to both sides of the nominal one.
@@ -38,13 +38,18 @@ impl Listener {
         Self { receiver: receiver.clone(), threshold: receiver.threshold }
     }
 
-    fn ping(&mut self, point: &ObservationPoint, direction_rad: f64, by_db: f64) -> Candidate {
+    fn ping(
+        &mut self,
+        point: &ObservationPoint,
+        direction_rad: f64,
+        by_db: f64,
+    ) -> Result<Candidate, TooCostly> {
         // The time that a firing with another threshold is late by stays in: `with_threshold` would take it out.
         self.receiver.threshold = self.threshold * 10f64.powf(by_db / 20.0);
-        let prediction = point.ping_with(&self.receiver, direction_rad);
+        let prediction = point.ping_with(&self.receiver, direction_rad)?;
         let margin_db = prediction.margin_db.unwrap_or(0.0).max(0.0);
         let until_db = if prediction.status.has_range() { by_db + margin_db } else { f64::INFINITY };
-        Candidate { prediction, until_db }
+        Ok(Candidate { prediction, until_db })
     }
 
     /// All that a firing could come to.
@@ -52,32 +57,32 @@ impl Listener {
         &mut self,
         point: &ObservationPoint,
         direction_rad: f64,
-    ) -> Candidates {
-        let usual = self.ping(point, direction_rad, 0.0);
+    ) -> Result<Candidates, TooCostly> {
+        let usual = self.ping(point, direction_rad, 0.0)?;
         let mut found = Candidates::new();
         // What comes before it at lower thresholds.
         let mut by_db = -SPAN_DB;
         while by_db < 0.0 && found.len() < MOST {
-            let mut lower = self.ping(point, direction_rad, by_db);
+            let mut lower = self.ping(point, direction_rad, by_db)?;
             if is_same(&lower.prediction, &usual.prediction) {
                 break;
             }
-            lower.until_db = self.lost(point, direction_rad, by_db, &lower, 0.0);
+            lower.until_db = self.lost(point, direction_rad, by_db, &lower, 0.0)?;
             by_db = lower.until_db.max(by_db + STEP_DB) + ABOVE_DB;
             push(&mut found, lower);
         }
         // And once it is lost.
         let (mut by_db, mut next) = (0.0, usual);
         while found.len() < MOST {
-            next.until_db = self.lost(point, direction_rad, by_db, &next, SPAN_DB);
+            next.until_db = self.lost(point, direction_rad, by_db, &next, SPAN_DB)?;
             by_db = next.until_db.max(by_db + STEP_DB) + ABOVE_DB;
             push(&mut found, next);
             if by_db >= SPAN_DB {
                 break;
             }
-            next = self.ping(point, direction_rad, by_db);
+            next = self.ping(point, direction_rad, by_db)?;
         }
-        found
+        Ok(found)
     }
 
     /// The threshold at which an arrival is no longer reported that is at `from_db`. The peak of its envelope says
@@ -89,25 +94,25 @@ impl Listener {
         from_db: f64,
         reported: &Candidate,
         most_db: f64,
-    ) -> f64 {
+    ) -> Result<f64, TooCostly> {
         let said_db = reported.until_db;
         let beyond = if said_db < most_db { said_db - STEP_DB } else { most_db };
         if said_db.is_infinite() || beyond <= from_db {
-            return said_db.min(most_db.max(from_db));
+            return Ok(said_db.min(most_db.max(from_db)));
         }
         let mut is_reported = |by_db: f64| {
-            let read = self.ping(point, direction_rad, by_db);
-            is_same(&read.prediction, &reported.prediction)
+            let read = self.ping(point, direction_rad, by_db)?;
+            Ok(is_same(&read.prediction, &reported.prediction))
         };
-        if is_reported(beyond) {
-            return said_db;
+        if is_reported(beyond)? {
+            return Ok(said_db);
         }
         let (mut low, mut high) = (from_db, beyond);
         while high - low > STEP_DB {
             let middle = 0.5 * (low + high);
-            if is_reported(middle) { low = middle } else { high = middle }
+            if is_reported(middle)? { low = middle } else { high = middle }
         }
-        0.5 * (low + high)
+        Ok(0.5 * (low + high))
     }
 }
 

@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 use sonard_model::{
     acoustics::BeamPattern,
     geometry::{DVec2, Pose, wrap_pi},
-    model::{Arrival, Mechanism, ObservationPoint, Reflector, Simulator},
+    model::{Arrival, Mechanism, ObservationPoint, Reflector, Simulator, TooCostly},
     scene::{Material, Scene},
 };
 
@@ -90,7 +90,7 @@ impl Linear {
             };
             let rates =
                 RateFinder { world, simulator, parameters, number, wider: wider.as_ref(), reference_m_s };
-            Ok(rates.sweep(&simulator.at(pose.position()), sweep, pose))
+            Ok(rates.sweep(&simulator.at(pose.position()), sweep, pose)?)
         };
         let beams: Result<Vec<Vec<Judged>>, WorldError> =
             sweeps.par_iter().zip(poses).enumerate().map(of).collect();
@@ -114,10 +114,10 @@ impl Linear {
             let parameters = &[&Parameter::Threshold];
             let rates =
                 RateFinder { world, simulator, parameters, number: 0, wider: None, reference_m_s };
-            let beams = rates.sweep(point, sweep, &turned(by));
+            let beams = rates.sweep(point, sweep, &turned(by))?;
             let linear = Self { beams, count: 1 };
             let at = |db: f64| linear.log_likelihood(&DVector::from_element(1, db), errors);
-            thresholds_db.iter().map(|db| (by, *db, at(*db))).collect::<Vec<_>>()
+            Ok::<_, WorldError>(thresholds_db.iter().map(|db| (by, *db, at(*db))).collect::<Vec<_>>())
         };
         let mut found = Vec::new();
         let alone = match world.scene.robot {
@@ -127,10 +127,10 @@ impl Linear {
         let point = alone.as_ref().map(|simulator| simulator.at(pose.position()));
         for by in turns_deg {
             match (&alone, &point) {
-                (Some(simulator), Some(point)) => found.extend(likely(simulator, point, by)),
+                (Some(simulator), Some(point)) => found.extend(likely(simulator, point, by)?),
                 _ => {
                     let simulator = traced.simulator(&turned(by))?;
-                    found.extend(likely(&simulator, &simulator.at(pose.position()), by));
+                    found.extend(likely(&simulator, &simulator.at(pose.position()), by)?);
                 }
             }
         }
@@ -316,14 +316,19 @@ struct RateFinder<'a> {
 }
 
 impl RateFinder<'_> {
-    fn sweep(&self, point: &ObservationPoint, sweep: &Sweep, pose: &Pose) -> Vec<Judged> {
+    fn sweep(
+        &self,
+        point: &ObservationPoint,
+        sweep: &Sweep,
+        pose: &Pose,
+    ) -> Result<Vec<Judged>, TooCostly> {
         let mut listener = Listener::new(self.simulator.receiver());
         sweep
             .beams
             .iter()
             .map(|beam| {
                 let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
-                let found = listener.candidates(point, direction_rad);
+                let found = listener.candidates(point, direction_rad)?;
                 let possible = found
                     .iter()
                     .map(|candidate| self.possible(candidate, pose.position(), direction_rad, beam))
@@ -332,7 +337,7 @@ impl RateFinder<'_> {
                     Heard::Echo { tof_us } => Some(0.5e-6 * self.reference_m_s * tof_us),
                     Heard::Silence => None,
                 };
-                Judged { heard_m, possible }
+                Ok(Judged { heard_m, possible })
             })
             .collect()
     }

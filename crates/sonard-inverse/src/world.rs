@@ -6,7 +6,7 @@ use glam::DVec2;
 use sonard_model::{
     acoustics::{Air, Aperture, Sensor},
     geometry::Pose,
-    model::{ModelError, Options, Simulator},
+    model::{ModelError, Options, Simulator, TooCostly},
     scene::{PoseError, Scene},
 };
 use thiserror::Error;
@@ -42,6 +42,9 @@ pub enum WorldError {
     /// Its sensor or options make no sense.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// More paths than can be found.
+    #[error(transparent)]
+    TooCostly(#[from] TooCostly),
     /// The ranger can't stand there.
     #[error(transparent)]
     Pose(#[from] PoseError),

@@ -20,7 +20,7 @@ type Key = Vec<Mechanism>;
 fn arrivals(world: &World, pose: &Pose, direction_rad: f64) -> BTreeMap<Key, Arrival> {
     let simulator = world.simulator(pose).expect("a model");
     let (mut found, mut twice) = (BTreeMap::new(), BTreeSet::new());
-    for arrival in simulator.at(pose.position()).arrivals(direction_rad) {
+    for arrival in simulator.at(pose.position()).arrivals(direction_rad).expect("paths") {
         let key: Key = arrival.path.mechanisms().collect();
         // Scattering is by the strip of wall that the beam is on and not by a stationary point.
         let is_left_out = key.iter().any(|met| matches!(met, Mechanism::Scattering { .. }));

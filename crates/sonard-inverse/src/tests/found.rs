@@ -16,7 +16,7 @@ fn sweep(world: &World, pose: &Pose, believed: &Pose, beams: u32, noise: TofNois
     let us_per_m = 2e6 / simulator.sound_speed_m_s();
     let beams = (0..beams).filter_map(|at| {
         let azimuth_deg = 360.0 * f64::from(at) / f64::from(beams);
-        let read = point.ping(world.direction_rad(pose, azimuth_deg));
+        let read = point.ping(world.direction_rad(pose, azimuth_deg)).expect("paths");
         let late_us = noise.sample_us(&mut rng);
         let tof_us = |range_m: f64| (range_m + world.delay_m) * us_per_m + late_us;
         let heard = match (read.status, read.range_m) {
