@@ -10,6 +10,8 @@ use sonard_model::{
 pub(crate) const SPAN_DB: f64 = 12.0;
 /// Least step from one to the next, decibels.
 const STEP_DB: f64 = 0.25;
+/// Step by which time walk is found out, decibels.
+const WALK_DB: f64 = 0.5;
 /// Just above where an echo is lost.
 const ABOVE_DB: f64 = 0.02;
 /// More than this many changes of the first echo are not followed.
@@ -22,6 +24,8 @@ pub(crate) struct Candidate {
     pub(crate) prediction: Prediction,
     /// Up to this threshold, decibels above the nominal one.
     pub(crate) until_db: f64,
+    /// What its range gains with the threshold, metres a decibel (time walk).
+    pub(crate) walk_m_per_db: f64,
 }
 
 /// The readings of a firing from the lowest threshold up; the last holds for all thresholds above.
@@ -49,7 +53,7 @@ impl Listener {
         let prediction = point.ping_with(&self.receiver, direction_rad)?;
         let margin_db = prediction.margin_db.unwrap_or(0.0).max(0.0);
         let until_db = if prediction.status.has_range() { by_db + margin_db } else { f64::INFINITY };
-        Ok(Candidate { prediction, until_db })
+        Ok(Candidate { prediction, until_db, walk_m_per_db: 0.0 })
     }
 
     /// All that a firing could come to.
@@ -67,6 +71,7 @@ impl Listener {
             if is_same(&lower.prediction, &usual.prediction) {
                 break;
             }
+            lower.walk_m_per_db = self.walk(point, direction_rad, by_db, &lower)?;
             lower.until_db = self.lost(point, direction_rad, by_db, &lower, 0.0)?;
             by_db = lower.until_db.max(by_db + STEP_DB) + ABOVE_DB;
             push(&mut found, lower);
@@ -74,6 +79,7 @@ impl Listener {
         // And once it is lost.
         let (mut by_db, mut next) = (0.0, usual);
         while found.len() < MOST {
+            next.walk_m_per_db = self.walk(point, direction_rad, by_db, &next)?;
             next.until_db = self.lost(point, direction_rad, by_db, &next, SPAN_DB)?;
             by_db = next.until_db.max(by_db + STEP_DB) + ABOVE_DB;
             push(&mut found, next);
@@ -83,6 +89,24 @@ impl Listener {
             next = self.ping(point, direction_rad, by_db)?;
         }
         Ok(found)
+    }
+
+    /// How the range of an arrival that is reported at `by_db` moves with the threshold.
+    fn walk(
+        &mut self,
+        point: &ObservationPoint,
+        direction_rad: f64,
+        by_db: f64,
+        reported: &Candidate,
+    ) -> Result<f64, TooCostly> {
+        for step_db in [WALK_DB, -WALK_DB] {
+            let beside = self.ping(point, direction_rad, by_db + step_db)?.prediction;
+            let ranges = beside.range_m.zip(reported.prediction.range_m);
+            if let (true, Some((other_m, range_m))) = (is_same(&beside, &reported.prediction), ranges) {
+                return Ok((other_m - range_m) / step_db);
+            }
+        }
+        Ok(0.0)
     }
 
     /// The threshold at which an arrival is no longer reported that is at `from_db`. The peak of its envelope says

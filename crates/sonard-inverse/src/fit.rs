@@ -102,6 +102,8 @@ const TURNS: [(f64, i32); STAGES.len()] = [(1.5, 8), (1.5, 8), (1.0, 10), (0.75,
 const THRESHOLD_OF_TURN: f64 = 1.0;
 /// Steps on one linearisation.
 const STEPS: usize = 12;
+/// Doubt of a threshold that is not fitted, decibels.
+const NOT_FITTED_DB: f64 = 0.5;
 /// Shares of readings in the far tail that are tried.
 const TAILS: [f64; 5] = [0.0, 0.03, 0.06, 0.1, 0.2];
 /// Spreads of the threshold that are tried, decibels.
@@ -365,7 +367,12 @@ impl<'a> State<'a> {
 
     fn finish(self, linear: &Linear, errors: ErrorModel) -> Result<Fitted, FitError> {
         let curve = linear.curve(&self.still(), &errors);
-        let covariance = self.covariance(curve.information).ok_or(FitError::Degenerate)?;
+        let mut covariance = self.covariance(curve.information).ok_or(FitError::Degenerate)?;
+        // Ranges depend on the threshold, too, by their time walk; what its doubt does to the other values comes on top.
+        let threshold = self.parameters.iter().position(|of| **of == Parameter::Threshold);
+        let sigma_db = threshold.map_or(NOT_FITTED_DB, |at| covariance[(at, at)].sqrt());
+        let moved = &covariance * linear.walk(&errors) * sigma_db;
+        covariance += &moved * moved.transpose();
         let estimates = self.values.iter().enumerate().map(|(at, &change)| {
             let sigma = covariance[(at, at)].max(0.0).sqrt();
             Estimate { change, sigma, identified: sigma < 0.5 * self.fit.priors[at].sigma }

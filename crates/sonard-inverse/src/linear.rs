@@ -31,6 +31,8 @@ struct Possible {
     /// The threshold up to which it is, decibels above the nominal one.
     until_db: f64,
     until_rates: Rates,
+    /// What the range gains with the threshold, metres a decibel.
+    walk_m_per_db: f64,
 }
 
 /// A reading beside what it could have been.
@@ -166,6 +168,22 @@ impl Linear {
             }
         }
         curve
+    }
+
+    /// What the gradient would gain by each decibel that the threshold is wrong, because of time walk.
+    pub(crate) fn walk(&self, errors: &ErrorModel) -> DVector<f64> {
+        let still = DVector::zeros(self.count);
+        let mut walk = DVector::zeros(self.count);
+        let of_range = errors.range_information();
+        for beam in &self.beams {
+            let terms = beam.terms(&still, errors);
+            for (possible, term) in beam.possible.iter().zip(&terms.of) {
+                for &(at, rate) in &possible.range_rates {
+                    walk[at as usize] += term.share * of_range * rate * possible.walk_m_per_db;
+                }
+            }
+        }
+        walk
     }
 
     /// Ranges of echoes that are explained, as differences from the likeliest explanation, with the probability that
@@ -377,7 +395,13 @@ impl RateFinder<'_> {
                 }
             }
         }
-        Possible { range_m, range_rates, until_db: candidate.until_db, until_rates }
+        Possible {
+            range_m,
+            range_rates,
+            until_db: candidate.until_db,
+            until_rates,
+            walk_m_per_db: stretch * candidate.walk_m_per_db,
+        }
     }
 
     /// What a path from the axis gains where the face is beside it, to first order.
@@ -414,7 +438,7 @@ impl RateFinder<'_> {
 
     /// What an arrival's margin above the threshold gains, decibels for each unit. That a stronger echo is also a little
     /// earlier (time walk) is in the predictions and not in the rates: where several arrivals overlap they are not
-    /// known so well that tenths of a millimetre could be believed.
+    /// known so well that tenths of a millimetre could be believed. See [`Linear::walk`].
     fn margin_rate(
         &self,
         parameter: &Parameter,
