@@ -112,7 +112,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         priors: parameters(&args.fit, &args.prior, &world, sweeps.len())?,
         widest_m: args.widest_m,
         least_sigma_m: 2e-4,
-        least_sigma_db: 1.0,
+        least_sigma_db: 0.5,
     };
     let bar = progress::spinner("scans fitted to");
     bar.set_position(sweeps.len() as u64);

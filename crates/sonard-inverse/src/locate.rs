@@ -75,7 +75,7 @@ fn improved(world: &World, sweep: &Sweep, pose: &Pose, widest_m: f64) -> Result<
         of(Parameter::Heading(0), 20.0),
     ];
     let from = Sweep { pose: *pose, ..sweep.clone() };
-    let what = Fit { priors, widest_m, least_sigma_m: 5e-4, least_sigma_db: 1.0 };
+    let what = Fit { priors, widest_m, least_sigma_m: 5e-4, least_sigma_db: 0.5 };
     fit(world, std::slice::from_ref(&from), &what)
 }
 
