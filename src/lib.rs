@@ -40,8 +40,8 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub use sonard_import as import;
-pub use sonard_inverse as inverse;
 pub use sonard_interpret::{compare, explore, interpret};
+pub use sonard_inverse as inverse;
 pub use sonard_model::{acoustics, array, geometry, model, motion, scene, viewpoint};
 #[cfg(feature = "plot")]
 pub use sonard_plot as plot;

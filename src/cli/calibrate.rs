@@ -106,7 +106,10 @@ pub(super) fn run(args: &Args) -> Outcome {
         Ok(())
     })?;
     let Some(world) = world else {
-        return Err(Failure::input("there is no sweep to fit to", "give logs of a ranger on a stepper"));
+        return Err(Failure::input(
+            "there is no sweep to fit to",
+            "give logs of a ranger on a stepper",
+        ));
     };
     let what = Fit {
         priors: parameters(&args.fit, &args.prior, &world, sweeps.len())?,
@@ -138,7 +141,11 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 fn spread(text: &str) -> Result<f64, String> {
     let metres: f64 = text.parse().map_err(|_| "it is not a number".to_owned())?;
-    if (0.005..=1.0).contains(&metres) { Ok(metres) } else { Err("it must be from 0.005 to 1".to_owned()) }
+    if (0.005..=1.0).contains(&metres) {
+        Ok(metres)
+    } else {
+        Err("it must be from 0.005 to 1".to_owned())
+    }
 }
 
 fn print(out: &mut impl Write, lines: &[Line], fitted: &Fitted) -> io::Result<()> {

@@ -10,9 +10,7 @@ use comfy_table::{CellAlignment, Table};
 use serde::Serialize;
 use uuid::Uuid;
 
-use super::{
-    Failure, Outcome, compare::RULED, progress, what_if::InsteadArgs, worlds::Worlds,
-};
+use super::{Failure, Outcome, compare::RULED, progress, what_if::InsteadArgs, worlds::Worlds};
 use crate::inverse::{Atlas, Doubt, Mode, World, doubts, locate};
 
 /// Options of `sonard locate`.
@@ -108,12 +106,19 @@ fn atlas(world: &World, spacing_m: f64) -> Result<Atlas, Failure> {
 }
 
 fn refuse(error: &dyn std::fmt::Display) -> Failure {
-    Failure::input(error, "see `sonard scene check` for the scene, and give sensor and air that make sense")
+    Failure::input(
+        error,
+        "see `sonard scene check` for the scene, and give sensor and air that make sense",
+    )
 }
 
 fn spacing(text: &str) -> Result<f64, String> {
     let metres: f64 = text.parse().map_err(|_| "it is not a number".to_owned())?;
-    if (0.01..=2.0).contains(&metres) { Ok(metres) } else { Err("it must be from 0.01 to 2".to_owned()) }
+    if (0.01..=2.0).contains(&metres) {
+        Ok(metres)
+    } else {
+        Err("it must be from 0.01 to 2".to_owned())
+    }
 }
 
 fn print(

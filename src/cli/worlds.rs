@@ -1,6 +1,9 @@
 //! Sweeps of logs with the worlds that they were taken in.
 
-use std::{path::{Path, PathBuf}, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use super::{Failure, logs::for_each_scan, predictor::conditions, scene_file, what_if::WhatIf};
 use crate::{

@@ -39,7 +39,8 @@ fn what_was_believed_wrongly_is_found_and_written_as_files_that_verbs_take() {
     let believed = ["--pose", "0.774,0.085,90", "--temperature-c", "20"];
     let calibrate = ["calibrate", &log, "--json", "--out", out];
     let found = lines(&[&calibrate[..], &believed].concat());
-    let speed_m_s = sonard::acoustics::Air::new(15.0, 50.0, 101.325).expect("air").sound_speed_m_s();
+    let speed_m_s =
+        sonard::acoustics::Air::new(15.0, 50.0, 101.325).expect("air").sound_speed_m_s();
     let expected =
         [("x_m", 0.80), ("y_m", 0.05), ("heading_deg", 92.0), ("sound_speed", speed_m_s)];
     for (line, (name, value)) in found.iter().zip(expected) {

@@ -11,9 +11,7 @@ use std::sync::Arc;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
-use sonard_inverse::{
-    Beam, ErrorModel, Fit, Heard, Parameter, Prior, Sweep, World, bound, fit,
-};
+use sonard_inverse::{Beam, ErrorModel, Fit, Heard, Parameter, Prior, Sweep, World, bound, fit};
 use sonard_model::{
     acoustics::{Air, Sensor, TofNoise},
     geometry::{DVec2, Pose},
@@ -47,8 +45,10 @@ struct Trial {
 fn main() {
     let mut arguments = std::env::args().skip(1).filter_map(|text| text.parse::<u64>().ok());
     let (count, seed) = (arguments.next().unwrap_or(50), arguments.next().unwrap_or(1));
-    let trials: Vec<Trial> =
-        (0..count).into_par_iter().filter_map(|at| trial(seed.wrapping_mul(1_000_003) + at)).collect();
+    let trials: Vec<Trial> = (0..count)
+        .into_par_iter()
+        .filter_map(|at| trial(seed.wrapping_mul(1_000_003) + at))
+        .collect();
     print(&trials, count);
 }
 
@@ -89,8 +89,10 @@ fn trial(seed: u64) -> Option<Trial> {
         heading_deg: pose.heading_deg + turn_deg,
     };
     let here = Sweep { pose: said, ..there.clone() };
-    let priors = parameters.iter().map(|(of, _, sigma)| Prior { parameter: of.clone(), sigma: *sigma });
-    let what = Fit { priors: priors.collect(), widest_m: 0.15, least_sigma_m: 2e-4, least_sigma_db: 0.5 };
+    let priors =
+        parameters.iter().map(|(of, _, sigma)| Prior { parameter: of.clone(), sigma: *sigma });
+    let what =
+        Fit { priors: priors.collect(), widest_m: 0.15, least_sigma_m: 2e-4, least_sigma_db: 0.5 };
     let errors = ErrorModel {
         sigma_m: NOISE_MM * 1e-3,
         tail_share: 0.1,
@@ -115,7 +117,12 @@ fn trial(seed: u64) -> Option<Trial> {
             bound,
         },
     );
-    Some(Trial { scene: name, found: found.collect(), took_s, explained: 1.0 - fitted.errors.clutter })
+    Some(Trial {
+        scene: name,
+        found: found.collect(),
+        took_s,
+        explained: 1.0 - fitted.errors.clutter,
+    })
 }
 
 fn readings(truth: &World, pose: &Pose, rng: &mut Pcg64) -> Option<Vec<Beam>> {
@@ -159,14 +166,20 @@ fn print(trials: &[Trial], count: u64) {
     if let Some(median) = times.get(times.len() / 2) {
         println!("a fit took {median:.2} s (median), {:.2} s (most)", times[times.len() - 1]);
     }
-    println!("{:16} {:>10} {:>10} {:>10} {:>9} {:>8}", "", "rms", "rms/bound", "median/b.", "95 % hold", "wrong");
+    println!(
+        "{:16} {:>10} {:>10} {:>10} {:>9} {:>8}",
+        "", "rms", "rms/bound", "median/b.", "95 % hold", "wrong"
+    );
     let names = trials.first().map_or(0, |trial| trial.found.len());
     for at in 0..names {
         let of: Vec<&Found> = trials.iter().map(|trial| &trial.found[at]).collect();
         let count = of.len() as f64;
         let rms = (of.iter().map(|found| found.error.powi(2)).sum::<f64>() / count).sqrt();
-        let ratio = (of.iter().map(|found| (found.error / found.bound).powi(2)).sum::<f64>() / count).sqrt();
-        let mut sizes: Vec<f64> = of.iter().map(|found| (found.error / found.bound).abs()).collect();
+        let ratio = (of.iter().map(|found| (found.error / found.bound).powi(2)).sum::<f64>()
+            / count)
+            .sqrt();
+        let mut sizes: Vec<f64> =
+            of.iter().map(|found| (found.error / found.bound).abs()).collect();
         sizes.sort_by(f64::total_cmp);
         let holds = of.iter().filter(|found| found.error.abs() < 1.96 * found.sigma).count();
         let wrong = of.iter().filter(|found| found.error.abs() > 6.0 * found.sigma).count();
@@ -178,11 +191,24 @@ fn print(trials: &[Trial], count: u64) {
         );
     }
     for trial in trials {
-        let worst = trial.found.iter().map(|found| (found.error / found.sigma).abs()).fold(0.0, f64::max);
+        let worst =
+            trial.found.iter().map(|found| (found.error / found.sigma).abs()).fold(0.0, f64::max);
         if worst > 6.0 {
-            let of = |found: &Found| format!("{} {:.4} ({:.1} sigma)", found.name, found.error, found.error / found.sigma);
+            let of = |found: &Found| {
+                format!(
+                    "{} {:.4} ({:.1} sigma)",
+                    found.name,
+                    found.error,
+                    found.error / found.sigma
+                )
+            };
             let all: Vec<String> = trial.found.iter().map(of).collect();
-            println!("{}: {:.0} % explained, {}", trial.scene, 100.0 * trial.explained, all.join(", "));
+            println!(
+                "{}: {:.0} % explained, {}",
+                trial.scene,
+                100.0 * trial.explained,
+                all.join(", ")
+            );
         }
     }
 }

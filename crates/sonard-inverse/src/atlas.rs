@@ -264,9 +264,14 @@ mod tests {
         }
         let (places, spacing_m) = standing_places(&room, 0.1);
         assert!(places.iter().all(|place| place.cmpge(DVec2::ZERO).all()), "some are outside");
-        assert!((places.len() as f64 * spacing_m * spacing_m - 6.0).abs() < 0.6, "{}", places.len());
+        assert!(
+            (places.len() as f64 * spacing_m * spacing_m - 6.0).abs() < 0.6,
+            "{}",
+            places.len()
+        );
         // Beside a single wall nothing is, so all places count.
-        let wall = Scene::builder("wall").material("m", 1.0).walls("w", &[[0.0, 0.0], [1.0, 0.0]], "m");
+        let wall =
+            Scene::builder("wall").material("m", 1.0).walls("w", &[[0.0, 0.0], [1.0, 0.0]], "m");
         let (places, _) = standing_places(&wall.build().expect("a scene"), 0.1);
         assert!(places.len() > 400, "{}", places.len());
     }

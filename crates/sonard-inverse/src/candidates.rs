@@ -52,7 +52,8 @@ impl Listener {
         self.receiver.threshold = self.threshold * 10f64.powf(by_db / 20.0);
         let prediction = point.ping_with(&self.receiver, direction_rad)?;
         let margin_db = prediction.margin_db.unwrap_or(0.0).max(0.0);
-        let until_db = if prediction.status.has_range() { by_db + margin_db } else { f64::INFINITY };
+        let until_db =
+            if prediction.status.has_range() { by_db + margin_db } else { f64::INFINITY };
         Ok(Candidate { prediction, until_db, walk_m_per_db: 0.0 })
     }
 
@@ -102,7 +103,9 @@ impl Listener {
         for step_db in [WALK_DB, -WALK_DB] {
             let beside = self.ping(point, direction_rad, by_db + step_db)?.prediction;
             let ranges = beside.range_m.zip(reported.prediction.range_m);
-            if let (true, Some((other_m, range_m))) = (is_same(&beside, &reported.prediction), ranges) {
+            if let (true, Some((other_m, range_m))) =
+                (is_same(&beside, &reported.prediction), ranges)
+            {
                 return Ok((other_m - range_m) / step_db);
             }
         }

@@ -82,7 +82,9 @@ pub fn doubts(world: &World, atlas: &Atlas, sweep: &Sweep, modes: &[Mode]) -> Ve
     };
     let scaled = |factor: f64| {
         cost(&changed(&|beam| match beam.heard {
-            Heard::Echo { tof_us } => Beam { heard: Heard::Echo { tof_us: factor * tof_us }, ..beam },
+            Heard::Echo { tof_us } => {
+                Beam { heard: Heard::Echo { tof_us: factor * tof_us }, ..beam }
+            }
             Heard::Silence => beam,
         }))
     };

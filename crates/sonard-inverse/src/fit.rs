@@ -217,7 +217,8 @@ impl<'a> State<'a> {
             let turns = (-steps..=steps).map(|step| f64::from(step) * step_deg);
             let (sweep, pose) = (&self.sweeps[sweep], &poses[sweep]);
             let tried = Linear::turned(&world, sweep, pose, turns, &thresholds_db, errors)?;
-            let cost = |at: usize, by: f64| 0.5 * self.precision(at) * (self.values[at] + by).powi(2);
+            let cost =
+                |at: usize, by: f64| 0.5 * self.precision(at) * (self.values[at] + by).powi(2);
             let value = |&(by, db, likely): &(f64, f64, f64)| {
                 likely - cost(at, by) - threshold.map_or(0.0, |threshold| cost(threshold, db))
             };

@@ -19,9 +19,9 @@ mod locate;
 mod motion;
 mod parameter;
 mod sweep;
-mod walls;
 #[cfg(test)]
 mod tests;
+mod walls;
 mod world;
 
 pub use atlas::{Atlas, AtlasError};

@@ -90,8 +90,14 @@ impl Linear {
                     &own
                 }
             };
-            let rates =
-                RateFinder { world, simulator, parameters, number, wider: wider.as_ref(), reference_m_s };
+            let rates = RateFinder {
+                world,
+                simulator,
+                parameters,
+                number,
+                wider: wider.as_ref(),
+                reference_m_s,
+            };
             Ok(rates.sweep(&simulator.at(pose.position()), sweep, pose)?)
         };
         let beams: Result<Vec<Vec<Judged>>, WorldError> =
@@ -119,7 +125,9 @@ impl Linear {
             let beams = rates.sweep(point, sweep, &turned(by))?;
             let linear = Self { beams, count: 1 };
             let at = |db: f64| linear.log_likelihood(&DVector::from_element(1, db), errors);
-            Ok::<_, WorldError>(thresholds_db.iter().map(|db| (by, *db, at(*db))).collect::<Vec<_>>())
+            Ok::<_, WorldError>(
+                thresholds_db.iter().map(|db| (by, *db, at(*db))).collect::<Vec<_>>(),
+            )
         };
         let mut found = Vec::new();
         let alone = match world.scene.robot {
@@ -276,9 +284,7 @@ impl Judged {
                 expected_of_until: match is_last {
                     true => 0.0,
                     false => {
-                        explained
-                            * expected_of_step(until)
-                            * self.distinct(at, errors.sigma_m)
+                        explained * expected_of_step(until) * self.distinct(at, errors.sigma_m)
                             / errors.sigma_db.powi(2)
                     }
                 },
@@ -369,9 +375,10 @@ impl RateFinder<'_> {
     ) -> Possible {
         let prediction = &candidate.prediction;
         let stretch = self.reference_m_s / self.simulator.sound_speed_m_s();
-        let beside_m = prediction.arrival.as_ref().map_or(0.0, |arrival| {
-            0.5 * self.longer_m(arrival, axis, direction_rad)
-        });
+        let beside_m = prediction
+            .arrival
+            .as_ref()
+            .map_or(0.0, |arrival| 0.5 * self.longer_m(arrival, axis, direction_rad));
         let range_m =
             prediction.range_m.map(|range_m| stretch * (range_m + beside_m) + self.world.delay_m);
         let (mut range_rates, mut until_rates) = (Rates::new(), Rates::new());
@@ -385,7 +392,10 @@ impl RateFinder<'_> {
                 let by_range = match parameter {
                     Parameter::SoundSpeed => -stretch * predicted_m,
                     Parameter::Delay => 1.0,
-                    _ => 0.5 * stretch * self.length_rate(parameter, arrival, ends, direction_rad, beam),
+                    _ => {
+                        0.5 * stretch
+                            * self.length_rate(parameter, arrival, ends, direction_rad, beam)
+                    }
                 };
                 if by_range != 0.0 {
                     range_rates.push((at, by_range));
@@ -426,14 +436,11 @@ impl RateFinder<'_> {
     ) -> f64 {
         let z_m = self.simulator.sensor_z_m().unwrap_or(0.0);
         let motion = match parameter {
-            Parameter::Gear => {
-                self.world.turned(direction_rad, beam.azimuth_deg.to_radians())
-            }
+            Parameter::Gear => self.world.turned(direction_rad, beam.azimuth_deg.to_radians()),
             _ => self.world.motion(parameter, direction_rad),
         };
-        motion.map_or(0.0, |motion| {
-            length_rate(arrival, ends, z_m, self.simulator.scene(), &motion)
-        })
+        motion
+            .map_or(0.0, |motion| length_rate(arrival, ends, z_m, self.simulator.scene(), &motion))
     }
 
     /// What an arrival's margin above the threshold gains, decibels for each unit. That a stronger echo is also a little
@@ -469,7 +476,8 @@ impl RateFinder<'_> {
             }),
             Parameter::Reflectance(name) => {
                 let scene = self.simulator.scene();
-                let times = scene.materials.get(name).map_or(0, |of| reflections(scene, arrival, of));
+                let times =
+                    scene.materials.get(name).map_or(0, |of| reflections(scene, arrival, of));
                 20.0 * std::f64::consts::LOG10_E * times as f64
             }
             _ => 0.0,

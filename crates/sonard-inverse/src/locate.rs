@@ -40,6 +40,9 @@ const ROUGH: usize = 8;
 const WHOLE: usize = 4;
 /// Beams of a rough look.
 const FEW_BEAMS: usize = 60;
+/// Readings that share what the model misses of an arc, and so count as one where poses are weighed against each
+/// other: taken for independent they would make sure of what they can't tell.
+const READINGS_OF_ARC: f64 = 8.0;
 /// Modes this much less likely than the best are not listed.
 const LEAST_PROBABILITY: f64 = 1e-3;
 /// Logarithm of how much less likely a rough fit may be and still be improved.
@@ -69,11 +72,8 @@ pub fn locate(world: &World, atlas: &Atlas, sweep: &Sweep) -> Result<Vec<Mode>, 
 
 fn improved(world: &World, sweep: &Sweep, pose: &Pose, widest_m: f64) -> Result<Fitted, FitError> {
     let of = |parameter, sigma| Prior { parameter, sigma };
-    let priors = vec![
-        of(Parameter::X(0), 0.5),
-        of(Parameter::Y(0), 0.5),
-        of(Parameter::Heading(0), 20.0),
-    ];
+    let priors =
+        vec![of(Parameter::X(0), 0.5), of(Parameter::Y(0), 0.5), of(Parameter::Heading(0), 20.0)];
     let from = Sweep { pose: *pose, ..sweep.clone() };
     let what = Fit { priors, widest_m, least_sigma_m: 5e-4, least_sigma_db: 0.5 };
     fit(world, std::slice::from_ref(&from), &what)
@@ -100,7 +100,9 @@ fn distinct(sorted: Vec<Fitted>, within_m: f64) -> Vec<Fitted> {
 
 /// Modes with their probabilities, by Laplace's approximation of each one's evidence.
 fn modes(found: &[Fitted]) -> Vec<Mode> {
-    let evidence = |fitted: &Fitted| fitted.log_posterior + 0.5 * log_volume(&fitted.covariance);
+    let evidence = |fitted: &Fitted| {
+        (fitted.log_posterior + 0.5 * log_volume(&fitted.covariance)) / READINGS_OF_ARC
+    };
     let all: Vec<f64> = found.iter().map(evidence).collect();
     let most = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let sum: f64 = all.iter().map(|evidence| (evidence - most).exp()).sum();

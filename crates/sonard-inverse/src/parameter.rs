@@ -49,7 +49,9 @@ impl Parameter {
     /// How far it may be moved at a time before predictions have to be made again, in its unit.
     pub(crate) const fn step(&self) -> f64 {
         match self {
-            Self::X(_) | Self::Y(_) | Self::Ahead | Self::Left | Self::Wall(_) | Self::Height => 0.04,
+            Self::X(_) | Self::Y(_) | Self::Ahead | Self::Left | Self::Wall(_) | Self::Height => {
+                0.04
+            }
             Self::Heading(_) | Self::HeadingZero => 3.0,
             Self::Gear => 0.02,
             Self::SoundSpeed => 0.015,

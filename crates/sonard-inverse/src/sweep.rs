@@ -50,7 +50,9 @@ pub enum SweepError {
     #[error("scan {0}: the ranger was moved while it was taken")]
     Moved(Uuid),
     /// Not enough of it.
-    #[error("scan {scan}: {beams} of its readings say something: at least {LEAST_BEAMS} are needed")]
+    #[error(
+        "scan {scan}: {beams} of its readings say something: at least {LEAST_BEAMS} are needed"
+    )]
     TooFew {
         /// Which scan.
         scan: Uuid,

@@ -16,12 +16,12 @@ pub(crate) fn normal(wall: &Wall) -> DVec2 {
 /// The ends of all walls once some have moved along their normals by so many metres. A wall stays on its line:
 /// where a moved one meets it, it is made longer or shorter.
 pub(crate) fn moved_ends(scene: &Scene, offsets_m: &[(usize, f64)]) -> Vec<[DVec2; 2]> {
-    let offset = |at: usize| offsets_m.iter().find(|moved| moved.0 == at).map_or(0.0, |moved| moved.1);
+    let offset =
+        |at: usize| offsets_m.iter().find(|moved| moved.0 == at).map_or(0.0, |moved| moved.1);
     let end = |at: usize, point: DVec2| {
         let wall = &scene.walls[at];
-        let meets = |other: &Wall| {
-            other.a.distance(point) < MEET_M || other.b.distance(point) < MEET_M
-        };
+        let meets =
+            |other: &Wall| other.a.distance(point) < MEET_M || other.b.distance(point) < MEET_M;
         // Of several walls that meet here, the one that fixes the place best.
         let partner = scene
             .walls
@@ -40,11 +40,15 @@ pub(crate) fn moved_ends(scene: &Scene, offsets_m: &[(usize, f64)]) -> Vec<[DVec
                 let [a, b] = [offset(at), offset(other)];
                 point + DVec2::new(a * two.y - b * one.y, b * one.x - a * two.x) / det
             }
-            Some((other, _)) if offset(at) == 0.0 => point + offset(other) * normal(&scene.walls[other]),
+            Some((other, _)) if offset(at) == 0.0 => {
+                point + offset(other) * normal(&scene.walls[other])
+            }
             _ => point + own,
         }
     };
-    (0..scene.walls.len()).map(|at| [end(at, scene.walls[at].a), end(at, scene.walls[at].b)]).collect()
+    (0..scene.walls.len())
+        .map(|at| [end(at, scene.walls[at].a), end(at, scene.walls[at].b)])
+        .collect()
 }
 
 /// What the ends of walls move for each metre that one moves along its normal.

@@ -61,7 +61,9 @@ pub(super) fn lines(world: &World, sweeps: &[Sweep], what: &Fit, fitted: &Fitted
         let value = |by: f64| value(world, sweeps, parameter, by);
         let half_width = 1.959_964 * estimate.sigma;
         // A logarithm or a share is told as what it makes of the figure.
-        let per_unit = |sigma: f64| 0.5 * (value(estimate.change + sigma) - value(estimate.change - sigma)).abs();
+        let per_unit = |sigma: f64| {
+            0.5 * (value(estimate.change + sigma) - value(estimate.change - sigma)).abs()
+        };
         Line {
             name: name(parameter, world),
             scan: parameter.sweep().and_then(|at| sweeps.get(at)).map(|sweep| sweep.scan),
@@ -210,7 +212,9 @@ fn report(lines: &[Line], fitted: &Fitted) -> String {
     for line in fit_words(fitted) {
         let _ = writeln!(text, "{line}\n");
     }
-    text.push_str("| parameter | was | believed within | is | standard deviation | told by the readings |\n");
+    text.push_str(
+        "| parameter | was | believed within | is | standard deviation | told by the readings |\n",
+    );
     text.push_str("| --- | --- | --- | --- | --- | --- |\n");
     for line in lines {
         let told = if line.identified { "yes" } else { "no: left at its prior" };

@@ -137,7 +137,9 @@ fn of_group(group: Group, world: &World, sweeps: usize) -> Result<Vec<Parameter>
         Group::Delay => vec![Parameter::Delay],
         Group::Threshold => vec![Parameter::Threshold],
         Group::Beam => vec![Parameter::Aperture],
-        Group::Materials => world.scene.materials.keys().cloned().map(Parameter::Reflectance).collect(),
+        Group::Materials => {
+            world.scene.materials.keys().cloned().map(Parameter::Reflectance).collect()
+        }
         Group::Walls => (0..world.scene.walls.len()).map(Parameter::Wall).collect(),
     })
 }

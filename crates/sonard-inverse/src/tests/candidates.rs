@@ -31,8 +31,15 @@ fn at_each_threshold_the_candidate_is_what_a_receiver_with_it_reports() {
                 asked += 1;
                 wrong += u32::from(off > 0.02);
                 if off > 0.02 {
-                    eprintln!("{scene} {step} {by_db}: {:?} for {:?}; {:?}", said.range_m, read.range_m,
-                        found.iter().map(|c| (c.prediction.range_m, c.until_db)).collect::<Vec<_>>());
+                    eprintln!(
+                        "{scene} {step} {by_db}: {:?} for {:?}; {:?}",
+                        said.range_m,
+                        read.range_m,
+                        found
+                            .iter()
+                            .map(|c| (c.prediction.range_m, c.until_db))
+                            .collect::<Vec<_>>()
+                    );
                 }
             }
         }

@@ -2,14 +2,25 @@
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
-use sonard_model::{acoustics::TofNoise, geometry::{Pose, wrap_180}, reading::PingStatus};
+use sonard_model::{
+    acoustics::TofNoise,
+    geometry::{Pose, wrap_180},
+    reading::PingStatus,
+};
 use uuid::Uuid;
 
 use super::{first_pose, world};
 use crate::{Atlas, Beam, Fit, Heard, Parameter, Prior, Sweep, World, fit, locate};
 
 /// A sweep as a world has it, with noise, said to be from another pose.
-fn sweep(world: &World, pose: &Pose, believed: &Pose, beams: u32, noise: TofNoise, seed: u64) -> Sweep {
+fn sweep(
+    world: &World,
+    pose: &Pose,
+    believed: &Pose,
+    beams: u32,
+    noise: TofNoise,
+    seed: u64,
+) -> Sweep {
     let mut rng = Pcg64::seed_from_u64(seed);
     let simulator = world.simulator(pose).expect("a model");
     let point = simulator.at(pose.position());
@@ -36,7 +47,8 @@ fn pose_air_and_threshold_come_back() {
     let truth = here
         .changed(&[(&Parameter::SoundSpeed, 0.008), (&Parameter::Threshold, 4.0)])
         .expect("a world");
-    let believed = Pose { x_m: pose.x_m + 0.05, y_m: pose.y_m - 0.06, heading_deg: pose.heading_deg + 5.0 };
+    let believed =
+        Pose { x_m: pose.x_m + 0.05, y_m: pose.y_m - 0.06, heading_deg: pose.heading_deg + 5.0 };
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
     let sweep = sweep(&truth, &pose, &believed, 400, noise, 1);
     let of = |parameter, sigma| Prior { parameter, sigma };
@@ -53,7 +65,6 @@ fn pose_air_and_threshold_come_back() {
         least_sigma_db: 0.5,
     };
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
-    eprintln!("{:?} {:?}", fitted.estimates, fitted.errors);
     let expected = [-0.05, 0.06, -5.0, 0.008, 4.0];
     for (estimate, expected) in fitted.estimates.iter().zip(expected) {
         let off = (estimate.change - expected).abs();
@@ -68,25 +79,27 @@ fn a_sweep_is_found_without_a_guess() {
     let atlas = Atlas::new(&here, 0.1).expect("an atlas");
     let mut rng = Pcg64::seed_from_u64(3);
     let noise = TofNoise::of_range_mm(1.0, here.air.sound_speed_m_s());
-    let began = std::time::Instant::now();
-    let mut right = 0;
-    for trial in 0..12 {
+    for trial in 0..6 {
         let pose = loop {
             let heading_deg = rng.random_range(-180.0..180.0);
-            let pose = Pose { x_m: rng.random_range(-3.0..5.0), y_m: rng.random_range(-3.0..5.0), heading_deg };
-            if here.scene.check_pose(&pose).is_ok() && here.scene.clearance_m(pose.position()) > 0.15 {
+            let pose = Pose {
+                x_m: rng.random_range(-3.0..5.0),
+                y_m: rng.random_range(-3.0..5.0),
+                heading_deg,
+            };
+            if here.scene.check_pose(&pose).is_ok()
+                && here.scene.clearance_m(pose.position()) > 0.15
+            {
                 break pose;
             }
         };
-        let swept = sweep(&here, &pose, &Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 }, 400, noise, trial);
+        let swept =
+            sweep(&here, &pose, &Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 }, 400, noise, trial);
         let modes = locate(&here, &atlas, &swept).expect("modes");
         let is_right = modes.iter().any(|mode| {
             let off_m = (mode.x_m - pose.x_m).hypot(mode.y_m - pose.y_m);
             off_m < 0.02 && wrap_180(mode.heading_deg - pose.heading_deg).abs() < 1.0
         });
-        right += u32::from(is_right);
-        eprintln!("{is_right} {pose:?} {:?}", modes.first());
+        assert!(is_right, "{pose:?}: {modes:?}");
     }
-    eprintln!("{:?} places {}", began.elapsed(), atlas.places());
-    assert!(right >= 11, "{right}");
 }

@@ -57,7 +57,10 @@ mod tests {
             let scene = Scene::from_json(shipped::text(name).expect("shipped")).expect("a scene");
             let again = Scene::from_json(&scene.rewritten()).expect("a scene");
             assert_eq!(again.walls, scene.walls, "{name}");
-            assert_eq!((again.poses, again.materials), (scene.poses.clone(), scene.materials.clone()));
+            assert_eq!(
+                (again.poses, again.materials),
+                (scene.poses.clone(), scene.materials.clone())
+            );
             let mut moved = scene.clone();
             // No farther than that all named poses stay where one can stand.
             let by = DVec2::new(0.02, -0.01);
