@@ -46,7 +46,8 @@ fn what_was_believed_wrongly_is_found_and_written_as_files_that_verbs_take() {
     for (line, (name, value)) in found.iter().zip(expected) {
         assert_eq!(line["name"], name);
         assert!((number(line, "value") - value).abs() < 4.0 * number(line, "sigma"), "{line}");
-        assert!(number(line, "low") < value && value < number(line, "high"), "{line}");
+        let [low, at, high] = ["low", "value", "high"].map(|name| number(line, name));
+        assert!(low < at && at < high, "{line}");
         assert_eq!(line["identified"], true);
     }
     assert!(number(&found[0], "sigma") < 1e-3 && number(&found[2], "sigma") < 0.5);
