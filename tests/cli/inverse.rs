@@ -60,7 +60,7 @@ fn what_was_believed_wrongly_is_found_and_written_as_files_that_verbs_take() {
     let speed = number(&found[3], "value").to_string();
     let compare = ["compare", &log, "--json", "--scene", &scene, "--sensor", &sensor];
     let judged = lines(&[&compare[..], &["--pose", &pose, "--sound-speed", &speed]].concat());
-    let agree = number(&judged[0], "agree") / number(&judged[0], "pairs");
+    let agree = number(&judged[0], "agree") / number(&judged[0], "both_echo");
     assert!(agree > 0.97, "{}", judged[0]);
     // A second time it keeps what is there.
     let again = run(&[&calibrate[..], &believed].concat());
