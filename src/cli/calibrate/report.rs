@@ -48,7 +48,7 @@ pub(super) struct Line {
 impl Line {
     pub(super) fn title(&self) -> String {
         match self.scan {
-            Some(scan) => format!("{} of {}", self.name, scan.as_fields().0),
+            Some(scan) => format!("{} of {:08x}", self.name, scan.as_fields().0),
             None => self.name.clone(),
         }
     }

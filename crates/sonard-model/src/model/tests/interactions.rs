@@ -195,7 +195,7 @@ fn random_scene(rng: &mut Pcg64) -> Scene {
 #[test]
 fn paths_of_random_scenes_obey_the_laws_at_every_point() {
     let mut rng = Pcg64::seed_from_u64(19);
-    let mut found = Counts::default();
+    let (mut found, mut refused) = (Counts::default(), 0);
     for case in 0..100 {
         let scene = random_scene(&mut rng);
         let mut place = || loop {
@@ -217,11 +217,19 @@ fn paths_of_random_scenes_obey_the_laws_at_every_point() {
         };
         let paths = Paths::new(&scene, settings);
         let room = Room::new(&scene, paths.sensor_z_m());
-        for echo in paths.enumerate_between(from, to).expect("few paths") {
+        // Mirrors that cross one another, low and high, between floor and ceiling: with double diffraction a scene can
+        // hold more paths than may be looked for, and is refused.
+        let Ok(echoes) = paths.enumerate_between(from, to) else {
+            assert!(case % 3 == 0, "{case}");
+            refused += 1;
+            continue;
+        };
+        for echo in echoes {
             check_echo(&room, &echo, [from, to]);
             found.add(&echo.path);
         }
     }
+    assert!(refused <= 2, "{refused} of 100 scenes are refused");
     found.assert_at_least(50);
 }
 
