@@ -23,7 +23,7 @@
 //! let pose = scene.pose("fig9")?;
 //! let sensor = Sensor::preset("senscomp-6500")?;
 //! let simulator = Simulator::new(scene, sensor, Air::default(), Options::default())?;
-//! let readings = simulator.predict(&pose, &ScanPlan::default());
+//! let readings = simulator.predict(&pose, &ScanPlan::default())?;
 //! // At azimuth 270 the wall is 85 mm away; what is heard took the way near, far, near wall.
 //! let range_m = readings[300].range_m.ok_or("silent")?;
 //! let path = readings[300].arrival.as_ref().ok_or("silent")?;
