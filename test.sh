@@ -13,6 +13,7 @@
 #   BOOT=0 ./test.sh            leave the units under a booted systemd out (systemd/boot-test.sh)
 #   PACKAGE=1 ./test.sh         build, install, upgrade and remove the Debian package, too; PACKAGE=all
 #                               also cross-builds that for a Raspberry Pi and runs it in an emulator
+#   PROPTEST_RNG_SEED=$RANDOM PROPTEST_CASES=5000 ./test.sh quick   other random cases than each time's
 #   SONARD_SOAK_FAULTS=1000 SONARD_KILLS=200 SONARD_COLLECT_KILLS=200 ./test.sh   longer runs of daemon
 #                               and collection among faults
 #
@@ -209,6 +210,8 @@ if cargo nextest --version >/dev/null 2>&1; then runner=nextest; fi
 # What the runner says of all tests, with an empty line around it.
 closing_lines=3
 features=()
+# A change is judged by the same random cases as the one before it.
+export PROPTEST_RNG_SEED=${PROPTEST_RNG_SEED:-2026}
 export SONARD_FIRMWARE=${SONARD_FIRMWARE:-$PWD/firmware/target/avr-none/release/sonard-firmware.elf}
 
 finish() {

@@ -3,6 +3,7 @@
 mod arrangement;
 mod mirror;
 mod outline;
+mod sets;
 mod snap;
 
 pub use arrangement::{Arrangement, Piece, between};

@@ -18,12 +18,17 @@ pub(super) struct Bounds {
     pub(super) max: DVec2,
 }
 
+/// What is farther from the origin than this is no place on any floor, metres; regions are reckoned with
+/// without overflow up to here.
+const FARTHEST_M: f64 = 1e100;
+
 impl Bounds {
-    /// The smallest region around the finite points; `None` without any.
+    /// The smallest region around the points that are places at all; `None` without any.
     pub(super) fn around(points: impl IntoIterator<Item = DVec2>) -> Option<Self> {
+        let is_place = |point: &DVec2| point.is_finite() && point.abs().max_element() < FARTHEST_M;
         points
             .into_iter()
-            .filter(|point| point.is_finite())
+            .filter(is_place)
             .map(|point| Self { min: point, max: point })
             .reduce(|a, b| Self { min: a.min.min(b.min), max: a.max.max(b.max) })
     }

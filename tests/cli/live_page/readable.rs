@@ -135,25 +135,27 @@ fn while_readings_come_no_count_is_out_of_date() {
     assert!(which.contains("100 of 100 beams") && summary.contains("100 beams,"), "{summary}");
 }
 
-/// Colours of the style that some canvases have: exactly, or anyhow, as thin lines do.
-fn colours_of(browser: &Browser, canvases: &str, exactly: bool) -> Vec<String> {
-    let (alpha, off) = if exactly { (255, 0) } else { (60, 12) };
-    let found = browser.eval(&format!(
-        "(() => {{ const style = getComputedStyle(document.documentElement); \
+/// Colours of the style that the legend's canvases have anyhow, as thin lines do, and those that the stage's have
+/// exactly: both of one moment, because in a scan the next reading may bring another one.
+fn colours(browser: &Browser) -> [Vec<String>; 2] {
+    let found = browser.eval(
+        "(() => { const style = getComputedStyle(document.documentElement); \
          const names = ['--wall', '--edge', '--ink', '--min-range', '--ray', '--path', '--direct', '--multiple', \
            '--edge-mark', '--unexplained', '--silent', '--lost', '--model']; \
          const all = names.map((name) => style.getPropertyValue(name).trim()); \
          const parts = all.map((hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16))); \
-         const seen = all.map(() => 0); \
-         for (const c of document.querySelectorAll('{canvases}')) {{ \
-           const copy = new OffscreenCanvas(c.width, c.height); \
-           const look = copy.getContext('2d', {{willReadFrequently: true}}); look.drawImage(c, 0, 0); \
-           const d = look.getImageData(0, 0, c.width, c.height).data; \
-           for (let i = 0; i < d.length; i += 4) if (d[i + 3] >= {alpha}) parts.forEach((part, n) => {{ \
-             if (part.every((v, k) => Math.abs(v - d[i + k]) <= {off})) seen[n]++; }}); }} \
-         return all.filter((_, n) => seen[n] > 3); }})()"
-    ));
-    found.as_array().expect("colours").iter().map(|hex| hex.as_str().unwrap_or("").into()).collect()
+         const of = (canvases, alpha, off) => { \
+           const seen = all.map(() => 0); \
+           for (const c of document.querySelectorAll(canvases)) { \
+             const copy = new OffscreenCanvas(c.width, c.height); \
+             const look = copy.getContext('2d', {willReadFrequently: true}); look.drawImage(c, 0, 0); \
+             const d = look.getImageData(0, 0, c.width, c.height).data; \
+             for (let i = 0; i < d.length; i += 4) if (d[i + 3] >= alpha) parts.forEach((part, n) => { \
+               if (part.every((v, k) => Math.abs(v - d[i + k]) <= off)) seen[n]++; }); } \
+           return all.filter((_, n) => seen[n] > 3); }; \
+         return [of('#legend canvas', 60, 12), of('#stage canvas', 255, 0)]; })()",
+    );
+    serde_json::from_value(found).expect("two lists of colours")
 }
 
 fn check_legend(browser: &Browser, words: &[&str]) {
@@ -161,8 +163,8 @@ fn check_legend(browser: &Browser, words: &[&str]) {
     for words in words {
         assert!(legend_has(browser, words), "{words:?} is not in: {}", browser.text("#legend"));
     }
-    let known = colours_of(browser, "#legend canvas", false);
-    for colour in colours_of(browser, "#stage canvas", true) {
+    let [known, drawn] = colours(browser);
+    for colour in drawn {
         assert!(known.contains(&colour), "{colour} is drawn and not in the legend, {known:?}");
     }
 }

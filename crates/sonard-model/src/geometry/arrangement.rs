@@ -16,8 +16,9 @@ const SAME_M: f64 = 1e-9;
 /// The ends of a segment of which nothing is left.
 const NOWHERE: [u32; 2] = [u32::MAX; 2];
 
-/// Cutting once can bring pieces into contact by rounding; it settles in one or two rounds.
-const ROUNDS: usize = 4;
+/// Cutting and joining can bring pieces into contact by rounding, which settles in a round or two; dozens of
+/// walls scribbled on a few millimetres need some more.
+const ROUNDS: usize = 50;
 
 /// Segments that touch at their ends only.
 #[derive(Debug, Clone, Default)]
@@ -54,14 +55,17 @@ impl Arrangement {
     pub fn of(segments: &[(DVec2, DVec2)]) -> Self {
         let mut parts: Vec<Part> =
             segments.iter().zip(0..).map(|(&(a, b), segment)| Part { a, b, segment }).collect();
+        let mut joined = join(&mut parts);
+        // In each round ends are the same or farther apart than SAME_M, and what crosses or touches is cut there.
         for _ in 0..ROUNDS {
             let cuts = cuts(&parts);
             if cuts.iter().all(Vec::is_empty) {
                 break;
             }
             parts = parts.iter().zip(cuts).flat_map(|(part, cuts)| part.cut(cuts)).collect();
+            joined = join(&mut parts);
         }
-        join(&parts, segments.len())
+        listed(&parts, joined, segments.len())
     }
 }
 
@@ -75,6 +79,9 @@ struct Part {
 impl Part {
     /// This part in pieces, cut at `points` near it.
     fn cut(self, mut points: Vec<DVec2>) -> Vec<Self> {
+        if points.is_empty() {
+            return vec![self];
+        }
         let along = self.b - self.a;
         points.sort_by(|p, q| (*p - self.a).dot(along).total_cmp(&(*q - self.a).dot(along)));
         points.push(self.b);
@@ -106,16 +113,25 @@ impl Part {
             && point.distance(self.b) > SAME_M
     }
 
-    /// Where two parts cross, both away from their ends.
+    /// Where two parts that have no end in common cross.
     fn crossing(&self, other: &Self) -> Option<DVec2> {
-        let (u, v) = (self.b - self.a, other.b - other.a);
-        let parallel = u.perp_dot(v);
-        if parallel == 0.0 {
+        // The exact signs: a crossing within rounding of an end is none or a cut, as its neighbours say.
+        if !self.parts_ends_of(other) || !other.parts_ends_of(self) {
             return None;
         }
-        let place = (other.a - self.a).perp_dot(v) / parallel;
-        let point = self.a + place * u;
-        (self.has_inside(point) && other.has_inside(point)).then_some(point)
+        let (u, v) = (self.b - self.a, other.b - other.a);
+        let point = self.a + (other.a - self.a).perp_dot(v) / u.perp_dot(v) * u;
+        let ends = [self.a, self.b, other.a, other.b];
+        let near = ends.into_iter().find(|end| end.distance(point) <= SAME_M);
+        Some(near.unwrap_or(point)).filter(|point| point.is_finite())
+    }
+
+    /// Whether the ends of `other` lie to both sides of this part's line.
+    fn parts_ends_of(&self, other: &Self) -> bool {
+        let [a, b, c, d] =
+            [self.a, self.b, other.a, other.b].map(|p| robust::Coord { x: p.x, y: p.y });
+        let sides = [c, d].map(|end| robust::orient2d(a, b, end));
+        sides[0] < 0.0 && sides[1] > 0.0 || sides[1] < 0.0 && sides[0] > 0.0
     }
 }
 
@@ -138,37 +154,59 @@ fn cuts(parts: &[Part]) -> Vec<Vec<DVec2>> {
                 && !ends_meet
                 && let Some(point) = part.crossing(other)
             {
-                cuts[i].push(point);
-                cuts[near.data].push(point);
+                for (index, part) in [(i, part), (near.data, other)] {
+                    if point != part.a && point != part.b {
+                        cuts[index].push(point);
+                    }
+                }
             }
         }
     }
     cuts
 }
 
-/// Makes ends that are closer than [`SAME_M`] one point, and puts pieces that lie on others aside.
-fn join(parts: &[Part], segments: usize) -> Arrangement {
+/// Points where parts end, and for each part the indices of its own.
+struct Joined {
+    points: Vec<DVec2>,
+    ends: Vec<[u32; 2]>,
+}
+
+/// Makes ends that are closer than [`SAME_M`] one point: the first of them.
+fn join(parts: &mut [Part]) -> Joined {
     let ends: Vec<DVec2> = parts.iter().flat_map(|part| [part.a, part.b]).collect();
     let tree = RTree::bulk_load(
         ends.iter().enumerate().map(|(i, end)| GeomWithData::new(end.to_array(), i)).collect(),
     );
-    let mut result = Arrangement { ends: vec![NOWHERE; segments], ..Arrangement::default() };
+    let mut points = Vec::new();
     let mut point_of = vec![u32::MAX; ends.len()];
     for (i, &end) in ends.iter().enumerate() {
         if point_of[i] != u32::MAX {
             continue;
         }
-        let point = result.points.len() as u32;
-        result.points.push(end);
+        let point = points.len() as u32;
+        points.push(end);
         for same in tree.locate_within_distance(end.to_array(), SAME_M * SAME_M) {
             if point_of[same.data] == u32::MAX {
                 point_of[same.data] = point;
             }
         }
     }
+    let ends: Vec<[u32; 2]> = point_of.chunks(2).map(|ends| [ends[0], ends[1]]).collect();
+    for (part, ends) in parts.iter_mut().zip(&ends) {
+        [part.a, part.b] = ends.map(|end| points[end as usize]);
+    }
+    Joined { points, ends }
+}
+
+/// What is left of the segments; pieces that lie on others are put aside.
+fn listed(parts: &[Part], joined: Joined, segments: usize) -> Arrangement {
+    let mut result = Arrangement {
+        points: joined.points,
+        ends: vec![NOWHERE; segments],
+        ..Arrangement::default()
+    };
     let mut seen = HashSet::new();
-    for (i, part) in parts.iter().enumerate() {
-        let ends = [point_of[2 * i], point_of[2 * i + 1]];
+    for (part, ends) in parts.iter().zip(joined.ends) {
         let [first, last] = &mut result.ends[part.segment as usize];
         *first = if *first == u32::MAX { ends[0] } else { *first };
         *last = ends[1];

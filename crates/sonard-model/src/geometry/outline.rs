@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use super::{Arrangement, DVec2};
+use super::{Arrangement, DVec2, sets::Sets};
 
 impl Arrangement {
     /// Once round the outside of each group of pieces that hang together: the points in order, clockwise. A
@@ -10,7 +10,7 @@ impl Arrangement {
     #[must_use]
     pub fn outlines(&self) -> Vec<Vec<u32>> {
         let ways = Ways::of(self);
-        let mut groups = Groups::new(self.points.len());
+        let mut groups = Sets::new(self.points.len());
         for piece in &self.pieces {
             groups.join(piece.ends[0], piece.ends[1]);
         }
@@ -77,28 +77,6 @@ impl<'a> Ways<'a> {
             ahead = Some(self.next[way as usize]).filter(|&next| next != start);
             Some(way)
         })
-    }
-}
-
-/// Points that pieces join.
-struct Groups(Vec<u32>);
-
-impl Groups {
-    fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    fn root(&mut self, mut point: u32) -> u32 {
-        while self.0[point as usize] != point {
-            self.0[point as usize] = self.0[self.0[point as usize] as usize];
-            point = self.0[point as usize];
-        }
-        point
-    }
-
-    fn join(&mut self, one: u32, other: u32) {
-        let [one, other] = [one, other].map(|point| self.root(point));
-        self.0[one as usize] = other;
     }
 }
 

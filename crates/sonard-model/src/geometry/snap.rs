@@ -49,24 +49,19 @@ pub enum Cause {
 ///
 /// - Ends closer than the tolerance become one vertex, where their segments' lines meet if that is as near.
 /// - Vertices closer than the tolerance to the inside of a segment come to lie on it, along their own line.
-/// - Corners of two segments become right-angled where a tenth of a millimetre does it, if they are asked for by
-///   a number for each end: where corners depend on each other, the lower goes first.
+/// - If `is_squared`, corners of two segments become right-angled where a tenth of a millimetre does it.
 ///
 /// A segment shorter than the tolerance stays, with both its ends. What comes out does not depend on the
 /// segments' directions, and on their order only if two are the same. With a tolerance of 0 nothing is moved.
-pub fn snap(
-    segments: &mut [(DVec2, DVec2)],
-    tolerance_m: f64,
-    squared_in_order: Option<&dyn Fn(End) -> u32>,
-) -> Vec<Move> {
+pub fn snap(segments: &mut [(DVec2, DVec2)], tolerance_m: f64, is_squared: bool) -> Vec<Move> {
     if tolerance_m <= 0.0 {
         return Vec::new();
     }
     let drawn = segments.to_vec();
     let mut vertices = Vertices::of(&drawn, tolerance_m);
     let joints = joints::find(&vertices, tolerance_m);
-    if let Some(number) = squared_in_order {
-        square_up(&mut vertices, &joints, tolerance_m, number);
+    if is_squared {
+        square_up(&mut vertices, &joints, tolerance_m);
     }
     joints::close(&mut vertices, &joints, tolerance_m);
     let mut moves = Vec::new();

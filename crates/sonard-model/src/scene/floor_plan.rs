@@ -73,8 +73,7 @@ impl Scene {
 
 impl FloorPlan {
     /// Whatever is decided between two is decided by place and name, so that neither the order of the file nor
-    /// the direction of walls matters; but for corners that are squared one after the other, by some hundredths
-    /// of a millimetre.
+    /// the direction of walls matters.
     fn of(scene: &Scene, is_squared: bool) -> Self {
         let mut by_place: Vec<u32> = (0..scene.walls.len() as u32).collect();
         let wall = |index: u32| &scene.walls[index as usize];
@@ -86,15 +85,7 @@ impl FloorPlan {
         };
         let mut segments: Vec<_> =
             by_place.iter().map(|&at| turned(at, (wall(at).a, wall(at).b))).collect();
-        let number = |(segment, at_b): (u32, bool)| {
-            let index = by_place[segment as usize];
-            2 * index + u32::from(at_b != is_turned[index as usize])
-        };
-        let moves = snap(
-            &mut segments,
-            scene.snap_m,
-            is_squared.then_some(&number as &dyn Fn((u32, bool)) -> u32),
-        );
+        let moves = snap(&mut segments, scene.snap_m, is_squared);
         let mut walls = vec![(DVec2::ZERO, DVec2::ZERO); segments.len()];
         for (&index, &segment) in by_place.iter().zip(&segments) {
             walls[index as usize] = turned(index, segment);

@@ -17,8 +17,13 @@ const LEAST_M: f64 = 1e-13;
 /// Segments go straight on where the bend is off the line by less than this, metres: rounding.
 const STRAIGHT_M: f64 = 1e-9;
 
-/// Moving one corner turns the next one's sides; a chain of them settles quickly.
-const ROUNDS: usize = 50;
+/// Moving one corner turns the next one's sides; each round halves what is off in a rectangle, and takes a
+/// 2 pi^2 / n^2 off it in a ring of n corners.
+const ROUNDS: usize = 500;
+
+/// How much of the way each corner goes in a round. All go at once, so that their order does not matter; with
+/// the whole way a parallelogram would swing to and fro for ever.
+const SHARE: f64 = 0.5;
 
 /// Segments that a side is followed along, at most.
 const LONGEST: usize = 1000;
@@ -43,30 +48,24 @@ struct Within {
 /// A corner turned in a plan and written down to a tenth of a millimetre is 90.003 degrees, say.
 /// Sound cannot tell, but a mirror image can: above 90 degrees no ray comes back by both walls,
 /// below it two do.
-pub(super) fn square_up(
-    vertices: &mut Vertices,
-    joints: &Joints,
-    most_m: f64,
-    number: &dyn Fn(End) -> u32,
-) {
+pub(super) fn square_up(vertices: &mut Vertices, joints: &Joints, most_m: f64) {
     let most_m = most_m.min(MOST_M);
-    let (mut corners, within) = sides(vertices, joints);
-    corners.sort_by_key(|corner| vertices.ends(corner.vertex).map(number).min());
+    let (corners, within) = sides(vertices, joints);
     let mut is_moved = false;
     for _ in 0..ROUNDS {
-        let mut is_settled = true;
-        for corner in &corners {
+        let off = |corner: &Corner| {
             let at = vertices.at[corner.vertex as usize];
             let [a, b] = corner.far.map(|far| vertices.at[far as usize]);
-            let place = right_angled(at, a, b);
-            if (LEAST_M..=most_m).contains(&place.distance(at)) {
-                vertices.at[corner.vertex as usize] = place;
-                is_settled = false;
-            }
-        }
-        is_moved |= !is_settled;
-        if is_settled {
+            let off = right_angled(at, a, b) - at;
+            (LEAST_M..=most_m).contains(&off.length()).then_some((corner.vertex, off))
+        };
+        let moves: Vec<(u32, DVec2)> = corners.iter().filter_map(off).collect();
+        if moves.is_empty() {
             break;
+        }
+        is_moved = true;
+        for (vertex, off) in moves {
+            vertices.at[vertex as usize] += SHARE * off;
         }
     }
     for Within { vertex, ends, share } in within.iter().filter(|_| is_moved) {

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use rstar::{RTree, primitives::GeomWithData};
 use smallvec::SmallVec;
 
-use crate::geometry::DVec2;
+use crate::geometry::{DVec2, sets::Sets};
 
 /// Places that are looked at around each, and that one vertex can be made of: bounds the work in plans that
 /// crowd a thousand ends on a millimetre.
@@ -207,26 +207,4 @@ fn numbered(group_of: &[u32]) -> Vec<u32> {
         *numbers.entry(*group).or_insert(next)
     };
     group_of.iter().map(number).collect()
-}
-
-/// Disjoint sets of places.
-struct Sets(Vec<u32>);
-
-impl Sets {
-    fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
-    }
-
-    fn root(&mut self, mut place: u32) -> u32 {
-        while self.0[place as usize] != place {
-            self.0[place as usize] = self.0[self.0[place as usize] as usize];
-            place = self.0[place as usize];
-        }
-        place
-    }
-
-    fn join(&mut self, one: u32, other: u32) {
-        let [one, other] = [one, other].map(|place| self.root(place));
-        self.0[one as usize] = other;
-    }
 }
