@@ -11,6 +11,7 @@ mod compare;
 mod daemon;
 mod doctor;
 mod explore;
+mod export;
 mod failure;
 mod generate;
 mod groups;
@@ -103,6 +104,9 @@ enum Verb {
     /// Make a log of readings from elsewhere: tables, JSON, logs of CARMEN and Player
     #[command(long_about = import::ABOUT)]
     Import(Box<import::Args>),
+    /// Write logs for other tools: tables
+    #[command(long_about = export::ABOUT)]
+    Export(export::Args),
     /// Write a log again with the model's predictions beside its readings
     #[command(long_about = predict::ABOUT)]
     Predict(Box<predict::Args>),
@@ -198,6 +202,7 @@ pub fn main() -> ExitCode {
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Paths(args) => paths::run(&args),
         Verb::Import(args) => import::run(&args),
+        Verb::Export(args) => export::run(&args),
         Verb::Predict(args) => predict::run(&args),
         Verb::Compare(args) => compare::run(&args),
         Verb::Calibrate(args) => calibrate::run(&args),

@@ -39,6 +39,7 @@
 //! keeps a collection of scans that is taken over days.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
+pub use sonard_export as export;
 pub use sonard_import as import;
 pub use sonard_interpret::{compare, explore, interpret};
 pub use sonard_inverse as inverse;

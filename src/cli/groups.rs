@@ -8,7 +8,7 @@ use clap::Command;
 pub(super) const GROUPS: [(&str, &[&str]); 8] = [
     ("Measure", &["scan", "collect", "run", "status", "watch", "import"]),
     ("Model", &["simulate", "paths", "trace", "predict"]),
-    ("Look at scans", &["plot", "compare", "interpret", "log"]),
+    ("Look at scans", &["plot", "compare", "interpret", "log", "export"]),
     ("Explain", &["calibrate", "locate"]),
     ("Map", &["map", "lines", "explore"]),
     ("Device", &["doctor", "mock", "board"]),

@@ -1,9 +1,13 @@
 //! Logs as verbs read them: scan by scan, so that a collection of days need not be in memory, and with
 //! what is wrong in them told once.
 
-use std::path::{Path, PathBuf};
+use std::{
+    ffi::OsStr,
+    fs, io,
+    path::{Path, PathBuf},
+};
 
-use super::{Failure, progress};
+use super::{Failure, output::note_input, progress};
 use crate::{
     compare::keep_every_second,
     scan::{Record, ScanView},
@@ -37,6 +41,47 @@ impl Damage {
             );
         }
     }
+}
+
+/// The logs that are meant: a folder stands for those in it, one of a collection for its scans, in the order of
+/// their names. They are noted as read.
+///
+/// # Errors
+/// A folder can't be read, or has no log in it.
+pub(super) fn logs_in(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut logs = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            logs.push(path.clone());
+            continue;
+        }
+        let scans = path.join("scans");
+        let folder = if scans.is_dir() { &scans } else { path };
+        let found = logs_of(folder).map_err(|error| {
+            Failure::input(
+                format!("cannot read the folder {}: {error}", folder.display()),
+                "give a folder that you may read, or logs",
+            )
+        })?;
+        if found.is_empty() {
+            return Err(Failure::input(
+                format!("there is no log in the folder {}", folder.display()),
+                "give a folder as `sonard run --log` or `sonard collect` writes it, or logs: they end in .jsonl",
+            ));
+        }
+        found.iter().for_each(|log| note_input(log));
+        logs.extend(found);
+    }
+    Ok(logs)
+}
+
+fn logs_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let entries = fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.path()));
+    let paths: Vec<_> = entries.collect::<io::Result<_>>()?;
+    let is_log = |path: &PathBuf| path.extension() == Some(OsStr::new("jsonl")) && path.is_file();
+    let mut logs: Vec<_> = paths.into_iter().filter(is_log).collect();
+    logs.sort();
+    Ok(logs)
 }
 
 fn kind_of(reader: &mut impl std::io::BufRead) -> FileKind {

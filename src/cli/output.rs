@@ -2,7 +2,7 @@
 //!
 //! A file that a command reads is never written over, by whatever name it goes. What is written is
 //! made beside its place, synced and renamed, so that a full disk or a crash leaves the old file or
-//! none. A picture, a map or a list takes the place of an older one of its kind; anything else that is
+//! none. A picture, a map, a list or a table takes the place of an older one of its kind; anything else that is
 //! there is refused unless `--force` says to replace it. Measured logs are added to, never replaced.
 
 mod stream;
@@ -26,7 +26,10 @@ use clap::{
 };
 
 use super::{Failure, Outcome};
-use crate::store::{FileKind, HEAD_BYTES, LogWriter, RecordWriter, StoreError, WholeFile};
+use crate::{
+    export::CsvExport,
+    store::{FileKind, HEAD_BYTES, LogWriter, RecordWriter, StoreError, WholeFile},
+};
 pub(super) use stream::Stream;
 
 /// A path on the command line that is written to.
@@ -67,6 +70,8 @@ pub(super) enum Product {
     MapYaml,
     /// JSON objects, one a line, that all have these members.
     List(&'static [&'static str]),
+    /// A table of the readings of logs.
+    Table,
     /// A log: never replaced unasked.
     Log,
 }
@@ -82,6 +87,7 @@ impl Product {
             Self::Pgm => kind == FileKind::Pgm,
             Self::MapYaml => kind == FileKind::MapYaml,
             Self::List(members) => is_list(head, members),
+            Self::Table => head.starts_with(CsvExport::<Vec<u8>>::head().as_bytes()),
             Self::Log => false,
         }
     }

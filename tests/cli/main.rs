@@ -9,6 +9,7 @@ mod daemon;
 mod degenerate;
 mod doctor;
 mod explore;
+mod export;
 mod faults;
 mod format_1;
 mod hangup;

@@ -35,7 +35,7 @@ const fn case(
     Case { output, input, arguments }
 }
 
-const CASES: [Case; 27] = [
+const CASES: [Case; 29] = [
     case("plot --output", ("a.svg", LOG), "plot IN -o IN"),
     case("plot --output", ("a.png", LOG), "plot IN -o IN --force"),
     case("plot --output", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),
@@ -68,6 +68,8 @@ const CASES: [Case; 27] = [
         "explore --scene IN --pose fig9 --most-stops 1 --out DIR --force",
     ),
     case("import --output", ("a", TABLE), "import IN -o IN --force"),
+    case("export --output", ("a.csv", LOG), "export IN -o IN --force"),
+    case("export --output", ("log.csv", LOG), "export IN --to csv -o IN --force"),
     case("calibrate --out", ("sensor.json", LOG), "calibrate IN --out DIR --force"),
     case("calibrate --out", ("scene.json", SCENE), "calibrate LOG --scene IN --out DIR --force"),
     case("predict --output", ("a.jsonl", LOG), "predict IN -o IN --force"),
@@ -333,6 +335,7 @@ fn a_full_disk_leaves_the_old_file_or_none_and_the_command_says_so() {
         (&new, vec!["plot", &path("fig9.jsonl"), "-o", &new]),
         (&course, vec!["simulate", "--scene", "simple-room", "--pose", "fig9", "-o", &course]),
         (&path("t.jsonl"), vec!["log", "annotate", &path("fig9.jsonl"), "-o", &path("t.jsonl")]),
+        (&path("t.csv"), vec!["export", &path("fig9.jsonl"), "-o", &path("t.csv")]),
         (&path("map/map.pgm"), vec!["map", &path("fig9.jsonl"), "--out", &path("map")]),
     ] {
         // Blocks of 512 bytes: less than any of these files. Nothing is said of signals.
@@ -366,6 +369,7 @@ fn a_place_that_can_not_be_written_to_is_wrong_input_in_every_verb() {
         "lines DIR/fig9.jsonl -o DIR/none/a.svg",
         "interpret DIR/fig9.jsonl -o DIR/none/a.svg",
         "log annotate DIR/fig9.jsonl -o DIR/none/a.jsonl",
+        "export DIR/fig9.jsonl -o DIR/none/a.csv",
         "map DIR/fig9.jsonl --out DIR/fig9.jsonl/map",
         "scan --mock --scene IN --pose fig9 --to-deg 9 --out DIR/fig9.jsonl/scan",
         "explore --scene IN --pose fig9 --most-stops 1 --out DIR/fig9.jsonl/explored",

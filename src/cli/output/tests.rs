@@ -35,6 +35,7 @@ fn every_plain_path_of_the_command_line_is_read() {
         "compare logs",
         "compare scene",
         "explore scene",
+        "export logs",
         "import file",
         "import mapping",
         "import scene",

@@ -1,0 +1,59 @@
+//! Scans in the formats of other tools: tables (CSV) of readings beside predictions.
+//!
+//! An [`Export`] takes scans one by one and writes to whatever takes bytes, so that what it has in memory
+//! does not grow with the number of scans.
+
+#![warn(clippy::mod_module_files)]
+
+mod columns;
+mod error;
+mod sessions;
+mod table;
+
+use std::io::Read;
+
+use jiff::Timestamp;
+
+use sonard_records::ScanView;
+
+pub use columns::{COLUMNS, Column, Kind, Row, Value};
+pub use error::{ExportError, LeftOut};
+pub use table::CsvExport;
+
+/// Takes scans, in the order in which they were taken, and writes them in its format.
+pub trait Export {
+    /// Writes a scan of the log of this name; says so if the format has no place for it.
+    ///
+    /// # Errors
+    /// What the output refuses.
+    fn scan(&mut self, log: &str, scan: &ScanView) -> Result<Option<LeftOut>, ExportError>;
+
+    /// Keeps a log itself beside what was made of it, in formats that can; others take no notice.
+    ///
+    /// # Errors
+    /// What the output refuses, and a log that can't be read or ends before its length.
+    fn attach(&mut self, log: &LogFile<'_>, bytes: &mut dyn Read) -> Result<(), ExportError> {
+        let _ = (log, bytes);
+        Ok(())
+    }
+
+    /// Writes what belongs to the end; the output is whole then.
+    ///
+    /// # Errors
+    /// What the output refuses.
+    fn finish(self: Box<Self>) -> Result<(), ExportError>;
+}
+
+/// A log as it is attached to what was made of it.
+#[derive(Debug, Clone, Copy)]
+pub struct LogFile<'a> {
+    /// Its name, without folders.
+    pub name: &'a str,
+    /// How long it is, bytes.
+    pub bytes: u64,
+    /// When it was last written.
+    pub written: Timestamp,
+}
+
+#[cfg(test)]
+mod tests;

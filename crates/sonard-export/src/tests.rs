@@ -1,0 +1,4 @@
+//! Exports of one log that has something of everything.
+
+mod csv;
+mod scans;

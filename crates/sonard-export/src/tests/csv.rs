@@ -1,0 +1,155 @@
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    io,
+};
+
+use crate::{COLUMNS, CsvExport, Export as _, ExportError};
+use sonard_records::ScanView;
+
+use super::scans::{bare, measured};
+
+fn exported(scans: &[ScanView]) -> String {
+    let mut bytes = Vec::new();
+    let mut export = Box::new(CsvExport::new(&mut bytes).expect("memory takes it"));
+    for scan in scans {
+        assert_eq!(export.scan("small.jsonl", scan).expect("memory takes it"), None);
+    }
+    export.finish().expect("memory takes it");
+    String::from_utf8(bytes).expect("UTF-8")
+}
+
+/// The rows as name and text of each cell.
+fn rows(table: &str) -> Vec<BTreeMap<String, String>> {
+    let mut reader = csv::Reader::from_reader(table.as_bytes());
+    reader.deserialize().map(|row| row.expect("a row")).collect()
+}
+
+#[test]
+fn every_reading_is_a_row_that_says_what_the_log_says() {
+    let scans = measured();
+    let table = exported(&scans);
+    assert_eq!(table.lines().next(), Some(CsvExport::<Vec<u8>>::head().as_str()));
+    let rows = rows(&table);
+    let pings: Vec<_> = scans.iter().flat_map(|scan| &scan.pings).collect();
+    assert_eq!(rows.len(), pings.len());
+    for (row, ping) in rows.iter().zip(&pings) {
+        // What a record of the log has under the same name stands in the row.
+        let record = serde_json::to_value(ping).expect("JSON");
+        let sim = record.get("sim").cloned().unwrap_or_default();
+        for (name, cell) in row {
+            let of_record = match name.strip_prefix("sim_") {
+                Some(name) => sim.get(name),
+                None => record.get(name),
+            };
+            match of_record {
+                _ if name == "path" || name == "sim_path" => {}
+                None if name == "repaired" => assert_eq!(cell, "false"),
+                None => {}
+                Some(serde_json::Value::Null) => assert_eq!(cell, "", "{name}"),
+                Some(serde_json::Value::String(text)) => assert_eq!(cell, text, "{name}"),
+                Some(serde_json::Value::Number(number)) => {
+                    assert_eq!(cell.parse().ok(), number.as_f64(), "{name}");
+                }
+                Some(serde_json::Value::Array(list)) => {
+                    let told: Vec<_> = list.iter().map(ToString::to_string).collect();
+                    assert_eq!(*cell, told.join(" "), "{name}");
+                }
+                Some(other) => assert_eq!(*cell, other.to_string(), "{name}"),
+            }
+        }
+        assert_eq!((row["log"].as_str(), row["session"].as_str()), ("small.jsonl", "1"));
+        assert_eq!(
+            (row["sensor"].as_str(), row["scene"].as_str()),
+            ("senscomp-6500", "simple-room")
+        );
+    }
+    assert_eq!(rows[1]["sim_path"], "south, north, south");
+    assert_eq!(
+        (rows[1]["transducer_x_m"].as_str(), rows[1]["direction_deg"].as_str()),
+        ("0.774", "0.9")
+    );
+}
+
+#[test]
+fn a_scan_of_which_the_log_says_little_is_a_table_with_empty_cells() {
+    let rows = rows(&exported(&bare()));
+    assert!(!rows.is_empty());
+    for row in rows {
+        assert!(!row["azimuth_deg"].is_empty() && !row["status"].is_empty());
+        for name in ["session", "x_m", "transducer_x_m", "sound_speed_m_s", "scan_started"] {
+            assert_eq!(row[name], "", "{name}");
+        }
+    }
+}
+
+#[test]
+fn sessions_are_counted_as_they_change() {
+    let mut scans = measured();
+    scans.extend(measured());
+    let mut warmer = measured();
+    for scan in &mut warmer {
+        let mut session = scan.session.as_deref().expect("it has one").clone();
+        session.air.temperature_c += 1.0;
+        scan.session = Some(session.into());
+    }
+    scans.extend(warmer);
+    let numbers: BTreeSet<_> = rows(&exported(&scans))
+        .iter()
+        .map(|row| (row["session"].clone(), row["temperature_c"].clone()))
+        .collect();
+    assert_eq!(
+        numbers,
+        [("1", "20"), ("2", "21")].map(|(a, b)| (a.to_owned(), b.to_owned())).into()
+    );
+}
+
+#[test]
+fn columns_have_each_a_name_of_their_own_and_cells_of_their_kind() {
+    let names: BTreeSet<_> = COLUMNS.iter().map(|column| column.name).collect();
+    assert_eq!(names.len(), COLUMNS.len());
+    for scan in measured() {
+        for ping in &scan.pings {
+            let row = crate::Row::new("small.jsonl", Some(1), &scan, ping);
+            for column in COLUMNS {
+                let kind = column.cell(&row).map_or(column.kind, |value| value.kind());
+                assert_eq!(kind, column.kind, "{}", column.name);
+            }
+        }
+    }
+}
+
+/// Takes so many bytes and no more.
+struct Full(usize);
+
+impl io::Write for Full {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0 = self.0.checked_sub(bytes.len()).ok_or(io::ErrorKind::StorageFull)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_full_disk_is_told() {
+    let mut export = Box::new(CsvExport::new(Full(500)).expect("the first line waits"));
+    let taken = measured().iter().try_for_each(|scan| export.scan("a", scan).map(drop));
+    match taken.and_then(|()| export.finish()) {
+        Err(ExportError::Write(error)) => assert_eq!(error.kind(), io::ErrorKind::StorageFull),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The columns that docs/export.md explains, in their order.
+#[test]
+fn the_documentation_explains_every_column() {
+    let text = include_str!("../../../../docs/export.md");
+    let (_, table) = text.split_once("| columns | what they hold |\n").expect("the table");
+    let rows = table.lines().skip(1).take_while(|line| line.starts_with('|'));
+    let cells = rows.filter_map(|row| row.split('|').nth(1));
+    let names: Vec<_> =
+        cells.flat_map(|cell| cell.split(',')).map(|name| name.trim().trim_matches('`')).collect();
+    assert_eq!(names, COLUMNS.iter().map(|column| column.name).collect::<Vec<_>>());
+}
