@@ -9,6 +9,7 @@
 #   PAGE=0 ./test.sh            leave the live page out, where there is no Chromium to look at it
 #   AXE=0 ./test.sh             leave axe-core out of that, where there is no npm to get it with
 #   SCHEMATHESIS=0 ./test.sh    leave the fuzzer of the API out, where there is no Python or PyPI
+#   PYTHON=0 ./test.sh          leave the package for Python out, where there is no Python or PyPI
 #   FAKETIME=0 ./test.sh        leave the clock that is set out, where there is no libfaketime
 #   BOOT=0 ./test.sh            leave the units under a booted systemd out (systemd/boot-test.sh)
 #   PACKAGE=1 ./test.sh         build, install, upgrade and remove the Debian package, too; PACKAGE=all
@@ -78,6 +79,7 @@ check_text() {
   step "format"
   cargo fmt --all -- --check
   cargo fmt --manifest-path fuzz/Cargo.toml -- --check
+  cargo fmt --manifest-path python/Cargo.toml -- --check
   step "clippy, warnings denied"
   cargo clippy --workspace --all-targets "${features[@]}" --quiet -- -D warnings
 }
@@ -184,6 +186,15 @@ check_api() {
   }
 }
 
+check_python() {
+  if [ "${PYTHON:-1}" = 0 ]; then
+    step "the package for Python: LEFT OUT, because PYTHON=0"
+    return
+  fi
+  step "the package for Python"
+  python/test.sh || fail "the package for Python: see above. Where it can't be built, PYTHON=0 leaves it out"
+}
+
 # run_tests [ARGUMENT...]: the closing lines are kept for the end.
 run_tests() {
   if [ "$runner" = nextest ]; then
@@ -241,6 +252,7 @@ quick)
   play_emulator
   check_examples
   check_api
+  check_python
   test_page
   step "tests"
   run_tests || finish $?

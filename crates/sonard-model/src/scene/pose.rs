@@ -193,6 +193,16 @@ impl Scene {
         self.check_pose_among(&Outlines::of(self), pose)
     }
 
+    /// The same for many poses, with the outlines found once.
+    ///
+    /// # Errors
+    /// The first pose that fails, by its index, and why.
+    pub fn check_poses(&self, poses: &[Pose]) -> Result<(), (usize, PoseError)> {
+        let outlines = Outlines::of(self);
+        let check = |(at, pose)| self.check_pose_among(&outlines, pose).map_err(|error| (at, error));
+        poses.iter().enumerate().try_for_each(check)
+    }
+
     /// The same with the outlines found before.
     pub(super) fn check_pose_among(
         &self,

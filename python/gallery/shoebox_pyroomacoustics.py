@@ -1,0 +1,75 @@
+"""Image sources of a box-shaped room, by sonard and by pyroomacoustics: the same, and how long each takes.
+
+Needs ``pip install pyroomacoustics``.
+"""
+
+import time
+from typing import Any
+
+import numpy as np
+import pyroomacoustics as pra
+from numpy.typing import NDArray
+
+import sonard
+
+
+def by_sonard(size: list[float], place: list[float], order: int) -> tuple[NDArray[np.float64], float]:
+    """Places of the images of a source at the receiver's own place, and seconds."""
+    width, depth, *height = size
+    scene = sonard.Scene.from_points(
+        [[0.0, 0.0], [width, 0.0], [width, depth], [0.0, depth]],
+        reflectance=1.0,
+        floor_z_m=0.0 if height else None,
+        ceiling_z_m=height[0] if height else None,
+    )
+    # In the plane of the scan alone the ranger has no height.
+    sensor = sonard.Sensor.preset("senscomp-6500")
+    if height:
+        sensor = sensor.replace(mounting={"z_m": place[2]})
+    model = sonard.Model(scene, sensor, lossless=True, max_order=order, max_range_m=100.0)
+    began = time.perf_counter()
+    paths = model.paths([*place[:2], 0.0], weakest=1e-6)
+    took_s = time.perf_counter() - began
+    walls = [path for path in paths if path.order == len(path.interactions)]
+    return np.array([image(path, np.array(place)) for path in walls]), took_s
+
+
+def image(path: sonard.Path, place: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where the sound seems to come from: as far as it went, in the direction of what it met last."""
+    towards = path.points[-1] - place
+    return np.asarray(place + path.length_m * towards / np.linalg.norm(towards))
+
+
+def by_pyroomacoustics(size: list[float], place: list[float], order: int) -> tuple[NDArray[np.float64], float]:
+    """The same."""
+    room: Any = pra.ShoeBox(size, max_order=order, materials=pra.Material(0.0))
+    room.add_source(place)
+    room.add_microphone(place)
+    began = time.perf_counter()
+    room.image_source_model()
+    took_s = time.perf_counter() - began
+    source = room.sources[0]
+    return np.asarray(source.images.T[source.orders > 0]), took_s
+
+
+def in_order(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The points in an order that does not depend on whose they are."""
+    return points[np.lexsort(np.round(points, 6).T)]
+
+
+def main() -> None:
+    for size, place, order in [([4.0, 3.0], [1.1, 0.7], 20), ([4.0, 3.0, 2.5], [1.1, 0.7, 0.9], 8)]:
+        ours, ours_s = by_sonard(size, place, order)
+        theirs, theirs_s = by_pyroomacoustics(size, place, order)
+        assert ours.shape == theirs.shape, (ours.shape, theirs.shape)
+        off_m = np.abs(in_order(ours) - in_order(theirs)).max()
+        assert off_m < 1e-5, off_m
+        print(
+            f"{len(size)} dimensions, up to {order} reflections: {len(ours)} images, equal to {off_m:.0e} m; "
+            f"{ours_s * 1e3:.1f} ms by sonard, {theirs_s * 1e3:.1f} ms by pyroomacoustics, "
+            f"ratio {ours_s / theirs_s:.1f}"
+        )
+
+
+if __name__ == "__main__":
+    main()

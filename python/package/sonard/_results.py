@@ -1,0 +1,109 @@
+"""What the model answers beside arrays: plain, immutable, picklable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._status import Status
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Path:
+    """The way that sound took from the transmitter to the receiver; ``str(path)`` says what it met."""
+
+    kind: Literal["specular", "diffracted", "scattered"]
+    """Mirror reflections only, diffraction at an edge (once or twice), or scattering by a rough wall."""
+    order: int
+    """Number of mirror reflections."""
+    length_m: float
+    """Length there and back, metres."""
+    amplitude: float
+    """Amplitude before the beam pattern; a head-on, perfectly reflecting wall gives 1."""
+    phase_deg: float
+    """Phase beside that of the length, degrees: what edges add."""
+    departure_deg: float
+    """Direction in which the sound leaves, degrees in the world, counter-clockwise from +x, 0 to 360."""
+    arrival_deg: float
+    """Direction from the ranger towards where the sound comes from, likewise."""
+    interactions: tuple[tuple[Literal["reflection", "diffraction", "scattering", "transducer"], str], ...]
+    """What the sound meets, in order: the kind, and the name of the wall, cylinder or edge."""
+    points: NDArray[np.float64]
+    """Where it meets them, metres: shape (interactions, 2), or (interactions, 3) in a scene with heights."""
+
+    @property
+    def range_m(self) -> float:
+        """Half the length, metres: the range at which a strong echo of it is read."""
+        return self.length_m / 2
+
+    def __str__(self) -> str:
+        return ", ".join(f"edge {name}" if kind == "diffraction" else name for kind, name in self.interactions)
+
+    def __repr__(self) -> str:
+        return f"<Path {self.kind}, {self.length_m:.4f} m, amplitude {self.amplitude:.4f}: {self}>"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Reading:
+    """A single predicted reading with its path."""
+
+    status: Status
+    """What became of the firing."""
+    range_m: float | None
+    """Range, metres; ``None`` of a silence."""
+    amplitude: float | None
+    """The most that the envelope reached with the echo; a head-on, perfectly reflecting wall gives 1."""
+    margin_db: float | None
+    """The same above the threshold in force, decibels; negative of a silence: what it lacked."""
+    tof_us: float | None
+    """When ECHO rises, microseconds after firing; ``None`` of a silence."""
+    path: Path | None
+    """The path of the echo; of a silence that of the candidate that came closest, if there was any."""
+
+    def __repr__(self) -> str:
+        at = "" if self.range_m is None else f" at {self.range_m:.4f} m"
+        margin = "" if self.margin_db is None else f", margin {self.margin_db:.1f} dB"
+        by = "" if self.path is None else f", by {self.path}"
+        return f"<Reading {self.status.name}{at}{margin}{by}>"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Peak:
+    """The envelope of one arrival in a trace."""
+
+    tof_us: float
+    """When it arrives by the length of its path, microseconds after firing."""
+    peak_us: float
+    """When its envelope is largest, microseconds after firing."""
+    peak: float
+    """The most of its envelope; a head-on, perfectly reflecting wall gives 1."""
+    path: Path
+    """Its path."""
+
+    def __repr__(self) -> str:
+        return f"<Peak {self.peak:.4f}, arrives at {self.tof_us:.1f} us: {self.path}>"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Trace:
+    """What an oscilloscope would show of one firing."""
+
+    t_us: NDArray[np.float64]
+    """Times of the samples after firing, microseconds: shape (samples,)."""
+    envelope: NDArray[np.float64]
+    """Envelope of all arrivals together after gain compensation: shape (samples,)."""
+    threshold: NDArray[np.float64]
+    """Least envelope that the detector notices then: shape (samples,)."""
+    gain_db: NDArray[np.float64]
+    """Gain, decibels above what makes up for the spreading from a wall at 1 m: shape (samples,)."""
+    echoes_us: NDArray[np.float64]
+    """Moments at which ECHO rises where it is made ready again, microseconds after firing: shape (0 to 8,)."""
+    peaks: tuple[Peak, ...]
+    """The envelope of each arrival, shortest path first."""
+
+    def __repr__(self) -> str:
+        until_us = self.t_us[-1] if self.t_us.size else 0.0
+        return f"<Trace of {until_us:.0f} us: {len(self.peaks)} arrivals, ECHO rises {self.echoes_us.size} times>"

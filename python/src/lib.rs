@@ -1,0 +1,38 @@
+//! The package `sonard` for Python: the crates of the pure part behind NumPy arrays.
+//!
+//! What a user sees is described in `package/sonard/__init__.pyi`; `stubtest` holds the two together.
+
+mod air;
+mod arrays;
+mod error;
+mod json;
+mod model;
+mod path;
+mod pool;
+mod scene;
+mod sensor;
+mod status;
+mod trace;
+
+/// The compiled part of `sonard`.
+#[pyo3::pymodule]
+mod _sonard {
+    #[pymodule_export]
+    use crate::{
+        air::Air,
+        error::{
+            AirError, OptionError, PoseError, SceneError, SensorError, SonardError,
+            TooManyPathsError,
+        },
+        model::{Model, predict::seconds_of_predict_many},
+        scene::Scene,
+        sensor::Sensor,
+    };
+
+    #[pymodule_init]
+    fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        use pyo3::types::PyModuleMethods as _;
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("READING", crate::arrays::reading_dtype(module.py())?)
+    }
+}

@@ -1,0 +1,319 @@
+//! Scenes.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    hash::{DefaultHasher, Hash as _, Hasher as _},
+    path::PathBuf,
+    sync::Arc,
+};
+
+use numpy::PyArray1;
+use pyo3::{
+    exceptions::{PyTypeError, PyValueError},
+    prelude::*,
+    types::{PyTuple, PyType},
+};
+use sonard_model::{
+    geometry::{DVec2, Pose},
+    scene::{self, SceneBuilder, shipped, suggest},
+};
+
+use crate::{
+    arrays,
+    error::{self, SceneError, refuse},
+};
+
+/// The material of scenes made from points.
+const MATERIAL: &str = "wall";
+
+/// Walls and cylinders of some material, with named poses.
+///
+/// ``Scene.shipped("simple-room")``, ``Scene.from_points(corners)``, ``Scene.from_json(text)`` and
+/// ``Scene.load(path)`` make one. Lengths are metres.
+#[pyclass(frozen, module = "sonard")]
+pub(crate) struct Scene {
+    pub(crate) scene: Arc<scene::Scene>,
+}
+
+/// Pose as Python has it: x, y (metres) and heading (degrees).
+type PoseTuple = (f64, f64, f64);
+
+#[pymethods]
+impl Scene {
+    /// A room from its corners.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array_like, shape (n, 2)
+    ///     Corners of the walls in their order, x and y in metres. A last corner that is the first again is let
+    ///     pass.
+    /// closed : bool
+    ///     Whether a wall leads from the last corner back to the first.
+    /// obstacles : sequence of array_like, each of shape (m, 2)
+    ///     Closed outlines that stand in the room.
+    /// cylinders : array_like, shape (k, 3), optional
+    ///     Upright round bodies: x, y and radius, metres.
+    /// reflectance : float
+    ///     Amplitude of the mirror reflection relative to the incident wave, 0 to 1, of everything.
+    /// roughness : float
+    ///     Share of what is not absorbed that is scattered in place of mirrored, 0 to 1.
+    /// floor_z_m, ceiling_z_m : float, optional
+    ///     Heights, metres, both or none; without them the scene is a plane.
+    /// name : str
+    ///     The scene's name.
+    #[staticmethod]
+    #[pyo3(signature = (points, *, closed = true, obstacles = None, cylinders = None, reflectance = 0.97, roughness = 0.0, floor_z_m = None, ceiling_z_m = None, name = "scene"))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
+    fn from_points(
+        py: Python<'_>,
+        points: &Bound<'_, PyAny>,
+        closed: bool,
+        obstacles: Option<&Bound<'_, PyAny>>,
+        cylinders: Option<&Bound<'_, PyAny>>,
+        reflectance: f64,
+        roughness: f64,
+        floor_z_m: Option<f64>,
+        ceiling_z_m: Option<f64>,
+        name: &str,
+    ) -> PyResult<Self> {
+        let mut builder =
+            scene::Scene::builder(name).rough_material(MATERIAL, reflectance, roughness);
+        builder = with_outline(builder, "wall", points, "points", closed)?;
+        for (number, outline) in
+            obstacles.map(|given| given.try_iter()).transpose()?.into_iter().flatten().enumerate()
+        {
+            let id = format!("obstacle-{number}");
+            builder = with_outline(builder, &id, &outline?, &format!("obstacles[{number}]"), true)?;
+        }
+        if let Some(cylinders) = cylinders {
+            let (numbers, _) = arrays::rows(cylinders, "cylinders", 3, "x_m, y_m, radius_m")?;
+            for (number, row) in numbers.chunks_exact(3).enumerate() {
+                let id = format!("cylinder-{number}");
+                builder = builder.cylinder(&id, [row[0], row[1]], row[2], MATERIAL);
+            }
+        }
+        match (floor_z_m, ceiling_z_m) {
+            (Some(floor_z_m), Some(ceiling_z_m)) => {
+                builder = builder.heights(floor_z_m, ceiling_z_m);
+            }
+            (None, None) => {}
+            _ => {
+                return Err(PyValueError::new_err(
+                    "give floor_z_m and ceiling_z_m, or none of them",
+                ));
+            }
+        }
+        let scene = builder.build().map_err(|error| error::scene(py, &error, false))?;
+        Ok(Self { scene: Arc::new(scene) })
+    }
+
+    /// A scene from the text of a scene file (``sonard scene schema`` describes it).
+    #[staticmethod]
+    fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
+        let scene =
+            scene::Scene::from_json(text).map_err(|error| error::scene(py, &error, true))?;
+        Ok(Self { scene: Arc::new(scene) })
+    }
+
+    /// A scene from a file.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let text =
+            fs::read_to_string(&path).map_err(|error| error::unreadable(py, path, &error))?;
+        Self::from_json(py, &text)
+    }
+
+    /// A scene that comes with the package, by its name.
+    #[staticmethod]
+    fn shipped(py: Python<'_>, name: &str) -> PyResult<Self> {
+        let Some(text) = shipped::text(name) else {
+            let message = format!("there is no shipped scene `{name}`");
+            return Err(refuse::<SceneError>(
+                py,
+                &message,
+                &suggest(name, &names(), "shipped scenes"),
+            ));
+        };
+        Self::from_json(py, text)
+    }
+
+    /// The names of the scenes that come with the package.
+    #[staticmethod]
+    fn shipped_names() -> Vec<String> {
+        names()
+    }
+
+    /// The scene's name.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.scene.name
+    }
+
+    /// Where its dimensions come from.
+    #[getter]
+    fn source(&self) -> Option<&str> {
+        self.scene.source.as_deref()
+    }
+
+    /// The walls' ends, metres: array of shape (walls, 2, 2), last axis x and y.
+    #[getter]
+    fn walls<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let walls = &self.scene.walls;
+        let ends = walls.iter().flat_map(|wall| [wall.a.x, wall.a.y, wall.b.x, wall.b.y]);
+        arrays::shaped(py, ends.collect(), &[walls.len(), 2, 2])
+    }
+
+    /// The walls' names, in the order of ``walls``.
+    #[getter]
+    fn wall_ids(&self) -> Vec<String> {
+        self.scene.walls.iter().map(|wall| wall.id.to_string()).collect()
+    }
+
+    /// Upright round bodies, metres: array of shape (cylinders, 3) of x, y and radius.
+    #[getter]
+    fn cylinders<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let cylinders = &self.scene.cylinders;
+        let numbers = cylinders.iter().flat_map(|c| [c.center.x, c.center.y, c.radius_m]);
+        arrays::shaped(py, numbers.collect(), &[cylinders.len(), 3])
+    }
+
+    /// The cylinders' names, in the order of ``cylinders``.
+    #[getter]
+    fn cylinder_ids(&self) -> Vec<String> {
+        self.scene.cylinders.iter().map(|cylinder| cylinder.id.to_string()).collect()
+    }
+
+    /// Height of the floor, metres; ``None`` in a scene in the plane.
+    #[getter]
+    fn floor_z_m(&self) -> Option<f64> {
+        self.scene.floor_z_m
+    }
+
+    /// Height of the ceiling, metres.
+    #[getter]
+    fn ceiling_z_m(&self) -> Option<f64> {
+        self.scene.ceiling_z_m
+    }
+
+    /// Named poses: x, y (metres) and heading (degrees counter-clockwise from +x).
+    #[getter]
+    fn poses(&self) -> BTreeMap<String, PoseTuple> {
+        self.scene.poses.iter().map(|(name, pose)| (name.clone(), tuple_of(pose))).collect()
+    }
+
+    /// The pose of that name, or the one written ``X,Y,DEG``, as x, y (metres) and heading (degrees).
+    fn pose(&self, py: Python<'_>, spec: &str) -> PyResult<PoseTuple> {
+        let pose = self.scene.pose(spec).map_err(|error| error::pose(py, &[], &error))?;
+        Ok(tuple_of(&pose))
+    }
+
+    /// At which places a ranger can stand: in the room, in no body, a millimetre off every surface.
+    ///
+    /// Parameters
+    /// ----------
+    /// places : array_like, shape (..., 2)
+    ///     x and y, metres.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of bool, shape (...)
+    fn can_stand<'py>(
+        &self,
+        py: Python<'py>,
+        places: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (places, shape) = arrays::points(places, "places")?;
+        let scene = &self.scene;
+        let stand: Vec<bool> = py.detach(|| scene.can_stand(&places));
+        PyArray1::from_vec(py, stand).call_method1("reshape", (PyTuple::new(py, shape)?,))
+    }
+
+    /// Distance of places (shape (..., 2), metres) from the nearest wall or cylinder, metres (shape (...));
+    /// negative inside a cylinder, infinite in an empty scene.
+    fn clearance_m<'py>(
+        &self,
+        py: Python<'py>,
+        places: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (places, shape) = arrays::points(places, "places")?;
+        let scene = &self.scene;
+        let distances_m: Vec<f64> =
+            py.detach(|| places.iter().map(|place| scene.clearance_m(*place)).collect());
+        arrays::shaped(py, distances_m, &shape)
+    }
+
+    /// The text of its scene file.
+    fn to_json(&self) -> &str {
+        &self.scene.text
+    }
+
+    /// SHA-256 of that text, hexadecimal: what logs name the scene by.
+    #[getter]
+    fn sha256(&self) -> &str {
+        &self.scene.sha256
+    }
+
+    fn __repr__(&self) -> String {
+        let scene::Scene { name, walls, cylinders, .. } = &*self.scene;
+        format!("<Scene '{name}': {} walls, {} cylinders>", walls.len(), cylinders.len())
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|other| self.scene.text == other.get().scene.text)
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.scene.sha256.hash(&mut hasher);
+        hasher.finish()
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        Ok((PyType::new::<Self>(py).getattr("from_json")?, (self.scene.text.to_string(),)))
+    }
+}
+
+fn names() -> Vec<String> {
+    shipped::names().map(str::to_owned).collect()
+}
+
+const fn tuple_of(pose: &Pose) -> PoseTuple {
+    (pose.x_m, pose.y_m, pose.heading_deg)
+}
+
+/// Walls along an outline that was given as an array.
+fn with_outline(
+    builder: SceneBuilder,
+    id: &str,
+    given: &Bound<'_, PyAny>,
+    name: &str,
+    closed: bool,
+) -> PyResult<SceneBuilder> {
+    let (mut corners, _) = arrays::points(given, name)?;
+    let corners: Vec<[f64; 2]> = {
+        if closed && corners.len() > 1 && corners.first() == corners.last() {
+            corners.pop();
+        }
+        corners.into_iter().map(DVec2::into).collect()
+    };
+    Ok(if closed {
+        builder.room(id, &corners, MATERIAL)
+    } else {
+        builder.walls(id, &corners, MATERIAL)
+    })
+}
+
+/// The scene meant by a `Scene` or by a shipped one's name.
+pub(crate) fn meant(given: &Bound<'_, PyAny>) -> PyResult<Py<Scene>> {
+    if let Ok(scene) = given.cast::<Scene>() {
+        return Ok(scene.clone().unbind());
+    }
+    let Ok(name) = given.extract::<String>() else {
+        let kind = given.get_type();
+        return Err(PyTypeError::new_err(format!(
+            "scene is a {kind}: give a Scene or the name of a shipped one"
+        )));
+    };
+    Py::new(given.py(), Scene::shipped(given.py(), &name)?)
+}

@@ -1,0 +1,48 @@
+"""What the tests share."""
+
+import json
+import os
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import sonard
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+Command = Callable[..., list[dict[str, Any]]]
+
+
+@pytest.fixture(scope="session")
+def command() -> Command:
+    """Runs the command `sonard` and gives what it printed, line by line."""
+    target = Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target"))
+    program = os.environ.get("SONARD", str(target / "debug/sonard"))
+
+    def run(*arguments: object) -> list[dict[str, Any]]:
+        done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return [json.loads(line) for line in done.stdout.splitlines()]
+
+    return run
+
+
+@pytest.fixture
+def room() -> sonard.Scene:
+    return sonard.Scene.shipped("simple-room")
+
+
+def places_in(scene: sonard.Scene, count: int, seed: int = 1) -> NDArray[np.float64]:
+    """Random poses at which a ranger can stand, shape (count, 3)."""
+    rng = np.random.default_rng(seed)
+    ends = scene.walls.reshape(-1, 2)
+    places = np.empty((0, 2))
+    while len(places) < count:
+        drawn = rng.uniform(ends.min(axis=0), ends.max(axis=0), (4 * count, 2))
+        places = np.concatenate([places, drawn[scene.can_stand(drawn)]])
+    return np.column_stack([places[:count], rng.uniform(-180, 180, count)])

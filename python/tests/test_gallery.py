@@ -1,0 +1,58 @@
+"""Every script of the gallery and every example of the documentation runs."""
+
+import doctest
+import os
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+import sonard
+
+from .conftest import REPOSITORY
+
+GALLERY = REPOSITORY / "python/gallery"
+SCRIPTS = sorted(GALLERY.glob("*.py"))
+
+
+def run(program: list[str], folder: Path) -> str:
+    environment = {**os.environ, "MPLCONFIGDIR": str(folder / ".matplotlib")}
+    done = subprocess.run(
+        [sys.executable, "-W", "error", *program], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+def test_the_gallery_runs(script: Path, tmp_path: Path) -> None:
+    needs = set(re.findall(r"^import (\w+)", script.read_text(), re.MULTILINE))
+    lacking = [name for name in needs if find_spec(name) is None]
+    if lacking:
+        pytest.skip(f"{lacking} is not installed here")
+    said = run([str(script)], tmp_path)
+    assert said.strip()
+    print(said)
+    if "savefig" in script.read_text() and find_spec("matplotlib"):
+        assert (tmp_path / f"{script.stem}.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("page", ["README.md", "python/README.md", "docs/python.md"])
+def test_examples_of_the_documentation_run_as_pasted(page: str, tmp_path: Path) -> None:
+    text = (REPOSITORY / page).read_text()
+    blocks = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    assert blocks
+    program = "\n".join(blocks)
+    if "matplotlib" in program and not find_spec("matplotlib"):
+        pytest.skip("matplotlib is not installed here")
+    said = run(["-c", program], tmp_path)
+    expected = re.findall(r"^# (<.*)$", program, re.MULTILINE)
+    assert [line for line in said.splitlines() if line.startswith("<")] == expected
+
+
+def test_the_docstring_is_true() -> None:
+    failed, tried = doctest.testmod(sonard)
+    assert (failed, tried > 4) == (0, True)
