@@ -199,7 +199,8 @@ impl Scene {
     /// The first pose that fails, by its index, and why.
     pub fn check_poses(&self, poses: &[Pose]) -> Result<(), (usize, PoseError)> {
         let outlines = Outlines::of(self);
-        let check = |(at, pose)| self.check_pose_among(&outlines, pose).map_err(|error| (at, error));
+        let check =
+            |(at, pose)| self.check_pose_among(&outlines, pose).map_err(|error| (at, error));
         poses.iter().enumerate().try_for_each(check)
     }
 
