@@ -169,9 +169,16 @@ impl World {
 
 fn scale_aperture(aperture: &mut Aperture, by: f64) {
     match aperture {
-        Aperture::Piston { radius_m } => *radius_m *= by,
+        Aperture::Piston { radius_m, .. } => *radius_m *= by,
         Aperture::Line { half_length_m, .. } => *half_length_m *= by,
         Aperture::Gaussian { half_angle_deg, .. } => *half_angle_deg /= by,
+        Aperture::Table { points, .. } => {
+            points.iter_mut().for_each(|point| point.angle_deg = (point.angle_deg / by).min(180.0));
+            // What no longer fits in front and behind is cut off.
+            let fits = 1 + points.iter().take_while(|point| point.angle_deg < 180.0).count();
+            points.truncate(fits);
+            points.last_mut().expect("a point").level_db = None;
+        }
     }
 }
 

@@ -19,7 +19,7 @@ pub use receiver::{
     ReceiverNoise, TracePoint, classify_tof,
 };
 pub use sensor::{
-    Aperture, ChirpPart, EdgeLawKind, Gain, GainStep, Mounting, Pulse, Response, Sensor,
+    Aperture, BeamPoint, ChirpPart, EdgeLawKind, Gain, GainStep, Mounting, Pulse, Response, Sensor,
     SensorError,
 };
 pub use tof_noise::TofNoise;

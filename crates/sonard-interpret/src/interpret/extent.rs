@@ -21,6 +21,7 @@ pub struct Extents {
     half_width_m: f64,
     half_beam_rad: f64,
     absorption_db_per_m: f64,
+    threshold_rise_db_per_m: f64,
     /// Range of the end of blanking, metres.
     pub min_range_m: f64,
     /// Farthest range listened to, metres.
@@ -61,6 +62,7 @@ impl Extents {
             half_width_m,
             half_beam_rad: (0.61 * wavelength_m / half_width_m).min(1.0).asin(),
             absorption_db_per_m: absorption,
+            threshold_rise_db_per_m: sensor.threshold_rise_db_per_m,
             min_range_m: speed_m_s * sensor.blanking_us * 1e-6 / 2.0,
             max_range_m: sensor.max_range_m,
         })
@@ -165,9 +167,11 @@ impl Extents {
         self.far_field_m
     }
 
-    /// Level at the receiver of an echo that is `level` relative to a perfect wall's.
+    /// Level of an echo that is `level` relative to a perfect wall's, beside what the receiver notices at that range
+    /// as it does `threshold` at none.
     fn heard_level(&self, range_m: f64, level: f64) -> f64 {
-        level * 10_f64.powf(-self.absorption_db_per_m * 2.0 * range_m / 20.0)
+        let loss_db_per_m = 2.0 * self.absorption_db_per_m + self.threshold_rise_db_per_m;
+        level * 10_f64.powf(-loss_db_per_m * range_m / 20.0)
     }
 
     /// Twice the angle at which the beam, out and back, takes `level` down to the threshold.

@@ -76,7 +76,10 @@ impl ApertureResponse {
     /// its beam only.
     #[must_use]
     pub fn new(sensor: &Sensor, sound_speed_m_s: f64) -> Option<Self> {
-        let aperture = sensor.aperture;
+        let aperture = sensor.aperture.clone();
+        if let Aperture::Piston { skirts_db: Some(_), .. } = aperture {
+            return None;
+        }
         let points = points(&aperture, POINTS)?;
         let pulse = EchoShape::of(sensor);
         let crossing_us = 2e6 * sensor.half_width_m() / sound_speed_m_s;
@@ -173,7 +176,7 @@ impl ApertureResponse {
     /// over a path of `length_m`, because they have a height: the mean of `exp(-i k (z - z')^2 / (2 L))`.
     fn heights(&self, length_m: f64) -> Vec<Vec<Complex64>> {
         let count = self.points.len();
-        let Aperture::Piston { radius_m } = self.aperture else {
+        let Aperture::Piston { radius_m, .. } = self.aperture else {
             return vec![vec![Complex64::ONE; count]; count];
         };
         let bend = PI * self.carrier_hz / self.sound_speed_m_s / length_m;
@@ -226,7 +229,7 @@ fn spectrum(sensor: &Sensor, pulse: &EchoShape, period_us: f64) -> Vec<(f64, Com
 /// that is given by its beam only.
 pub(super) fn points(aperture: &Aperture, count: usize) -> Option<Vec<(f64, f64)>> {
     match *aperture {
-        Aperture::Piston { radius_m } => {
+        Aperture::Piston { radius_m, .. } => {
             // Chords shorten towards the rim: Gauss-Chebyshev quadrature of the second kind has
             // their weight `sqrt(1 - s^2)`.
             let angle = |i: usize| PI * i as f64 / (count + 1) as f64;
@@ -237,7 +240,7 @@ pub(super) fn points(aperture: &Aperture, count: usize) -> Option<Vec<(f64, f64)
             let scaled = |(place, weight): (f64, f64)| (half_length_m * place, 0.5 * weight);
             Some(gauss_legendre(count).into_iter().map(scaled).collect())
         }
-        Aperture::Gaussian { .. } => None,
+        Aperture::Gaussian { .. } | Aperture::Table { .. } => None,
     }
 }
 
@@ -307,7 +310,7 @@ mod tests {
     #[test]
     fn a_disc_convolves_the_pulse_with_both_responses() {
         let sensor = preset("senscomp-6500");
-        let Aperture::Piston { radius_m } = sensor.aperture else { panic!("a disc") };
+        let Aperture::Piston { radius_m, .. } = sensor.aperture else { panic!("a disc") };
         let pulse = EchoShape::of(&sensor);
         let (leaving, arriving) = (0.15_f64, -0.3_f64);
         let omega = TAU * sensor.frequency_hz;
@@ -342,7 +345,7 @@ mod tests {
     #[test]
     fn a_disc_before_a_near_mirror_is_lommels() {
         let sensor = preset("senscomp-6500");
-        let Aperture::Piston { radius_m } = sensor.aperture else { panic!("a disc") };
+        let Aperture::Piston { radius_m, .. } = sensor.aperture else { panic!("a disc") };
         let response = ApertureResponse::new(&sensor, SPEED_M_S).expect("a face");
         let k = TAU * sensor.frequency_hz / SPEED_M_S;
         // Bessel's integral, exact to rounding on a periodic grid.

@@ -18,6 +18,7 @@
 
 mod hearing;
 mod noise;
+mod threshold;
 mod trace;
 
 #[cfg(test)]
@@ -32,8 +33,8 @@ pub use self::{
     trace::{EchoTrace, EnvelopePeak, TracePoint},
 };
 
-use self::hearing::Hearing;
-use super::{ApertureResponse, EchoShape, Gain, GainStep, Incidence, Response, Sensor};
+use self::{hearing::Hearing, threshold::sensitivity};
+use super::{ApertureResponse, EchoShape, Gain, Incidence, Response, Sensor};
 use crate::reading::PingStatus;
 
 /// Most echoes a firing reports.
@@ -88,8 +89,12 @@ pub struct Receiver {
     pub rearm_us: f64,
     /// Time for which the envelope has to stay above the threshold, microseconds.
     pub integration_us: f64,
-    /// Least amplitude it notices where the gain makes up for the spreading.
+    /// Least amplitude it notices where the gain makes up for the spreading, at range 0.
     pub threshold: f64,
+    /// What that gains with each metre of range, decibels.
+    pub threshold_rise_db_per_m: f64,
+    /// Whole steps in which ranges are told, metres; 0 for ranges as they are.
+    pub range_step_m: f64,
     /// Speed of sound, metres a second.
     pub sound_speed_m_s: f64,
     /// Half the longest path it waits for, metres.
@@ -149,6 +154,8 @@ impl Receiver {
             rearm_us: sensor.rearm_us,
             integration_us: sensor.integration_us,
             threshold: sensor.threshold,
+            threshold_rise_db_per_m: sensor.threshold_rise_db_per_m,
+            range_step_m: sensor.range_step_m,
             sound_speed_m_s,
             max_range_m: sensor.max_range_m,
             combining: Combining::Coherent,
@@ -186,7 +193,8 @@ impl Receiver {
     /// sound that is over by then is lost.
     #[must_use]
     pub fn detect(&self, arrivals: &[PulseArrival]) -> Detection {
-        self.detection(&mut Hearing::new(self, arrivals, &|_| None), Latch::Rearmed)
+        let mut hearing = Hearing::new(self, arrivals, &|_| None);
+        self.told(self.detection(&mut hearing, Latch::Rearmed))
     }
 
     /// The same with the face's full response, if the sensor asks for it: `incident` tells how a
@@ -215,7 +223,7 @@ impl Receiver {
         hearing.hear_within(length_m);
         let detection = self.detection(&mut hearing, latch);
         let needed_m = (!hearing.asked_beyond()).then(|| hearing.needed_m());
-        (detection, needed_m)
+        (self.told(detection), needed_m)
     }
 
     /// The same in noise.
@@ -241,7 +249,7 @@ impl Receiver {
         if detection.status == PingStatus::Echo {
             detection.range_m = detection.echoes_us.first().map(|echo_us| self.range_m(*echo_us));
         }
-        detection
+        self.told(detection)
     }
 
     /// The range that belongs to the end of blanking, metres.
@@ -254,27 +262,6 @@ impl Receiver {
     #[must_use]
     pub fn window_us(&self) -> f64 {
         2e6 * self.max_range_m / self.sound_speed_m_s
-    }
-
-    /// The least amplitude noticed at a time after firing, microseconds.
-    #[must_use]
-    pub fn threshold_at(&self, t_us: f64) -> f64 {
-        let step = self.sensitivity.iter().find(|step| t_us < step.0).or(self.sensitivity.last());
-        step.map_or(self.threshold, |step| self.threshold * self.range_m(t_us).max(1e-3) * step.1)
-    }
-
-    /// Gain at a time after firing, decibels above what makes up for the spreading from a wall
-    /// at 1 m.
-    #[must_use]
-    pub fn gain_db(&self, t_us: f64) -> f64 {
-        match &self.gain {
-            Gain::Compensating { .. } => 20.0 * self.range_m(t_us).max(1e-3).log10(),
-            Gain::Steps { steps } => steps
-                .iter()
-                .find(|step| step.until_us.is_none_or(|until_us| t_us < until_us))
-                .or(steps.last())
-                .map_or(0.0, |step| step.gain_db),
-        }
     }
 
     fn detection(&self, hearing: &mut Hearing, latch: Latch) -> Detection {
@@ -307,6 +294,23 @@ impl Receiver {
             margin_db: Some(20.0 * (peak / self.threshold_at(first_us)).log10()),
             echoes_us,
         }
+    }
+
+    /// As the module tells it: in whole steps of range. The end of the blanking is no range.
+    fn told(&self, mut detection: Detection) -> Detection {
+        if self.range_step_m == 0.0 {
+            return detection;
+        }
+        let us_per_m = 2e6 / self.sound_speed_m_s;
+        let stepped_m = |range_m: f64| (range_m / self.range_step_m).round() * self.range_step_m;
+        let blanked = usize::from(detection.status == PingStatus::MinRange);
+        for echo_us in detection.echoes_us.iter_mut().skip(blanked) {
+            *echo_us = us_per_m * stepped_m(self.range_m(*echo_us));
+        }
+        if detection.status == PingStatus::Echo {
+            detection.range_m = detection.range_m.map(stepped_m);
+        }
+        detection
     }
 
     /// The arrival that came closest within the listening window.
@@ -363,13 +367,6 @@ impl Receiver {
     fn arrives_us(&self, length_m: f64) -> f64 {
         length_m / self.sound_speed_m_s * 1e6
     }
-}
-
-/// The ends of the gain's steps, microseconds, and the reciprocals of their gains.
-fn sensitivity(gain: &Gain) -> SmallVec<[(f64, f64); 12]> {
-    let Gain::Steps { steps } = gain else { return SmallVec::new() };
-    let end_us = |step: &GainStep| step.until_us.unwrap_or(f64::INFINITY);
-    steps.iter().map(|step| (end_us(step), 10f64.powf(-step.gain_db / 20.0))).collect()
 }
 
 /// The status of a measured reading from its first time of flight, microseconds, if any.

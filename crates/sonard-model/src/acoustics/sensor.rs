@@ -6,7 +6,8 @@ mod gain;
 mod mounting;
 mod pulse;
 
-pub use aperture::Aperture;
+pub(super) use aperture::level_at;
+pub use aperture::{Aperture, BeamPoint};
 pub use gain::{Gain, GainStep};
 pub use mounting::Mounting;
 pub use pulse::{ChirpPart, Pulse};
@@ -17,7 +18,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use self::figures::{at_most_1, not_negative, positive};
+use self::figures::{at_most_1, from_0_to, not_negative, positive};
 use super::Face;
 
 /// The data files that come with the program, by name.
@@ -29,6 +30,11 @@ const PRESETS: [(&str, &str); 6] = [
     ("fullwave-line", include_str!("../../../../sensors/fullwave-line.json")),
     ("hc-sr04", include_str!("../../../../sensors/hc-sr04.json")),
 ];
+
+/// A threshold that rises faster is a range at which the module gives up.
+const MOST_RISE_DB_PER_M: f64 = 100.0;
+/// Coarser ones are no ranges.
+const MOST_RANGE_STEP_M: f64 = 1.0;
 
 /// A ranger's data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -77,6 +83,13 @@ pub struct Sensor {
     /// Least amplitude that is detected, relative to a head-on, perfectly reflecting wall with
     /// gain compensation.
     pub threshold: f64,
+    /// What the threshold gains with each metre of range beside what the gain says, decibels: a module that hears
+    /// worse and worse from afar, for whatever reason. `threshold` is the one at range 0.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub threshold_rise_db_per_m: f64,
+    /// Whole steps in which the module tells ranges, metres, each rounded to the nearest; 0 for ranges as they are.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub range_step_m: f64,
     /// For each figure above, by field name, where it comes from.
     pub sources: BTreeMap<String, String>,
 }
@@ -202,7 +215,9 @@ impl Sensor {
         not_negative("integration_us", self.integration_us)?;
         self.gain.check()?;
         positive("max_range_m", self.max_range_m)?;
-        positive("threshold", self.threshold)
+        positive("threshold", self.threshold)?;
+        from_0_to("threshold_rise_db_per_m", self.threshold_rise_db_per_m, MOST_RISE_DB_PER_M)?;
+        from_0_to("range_step_m", self.range_step_m, MOST_RANGE_STEP_M)
     }
 
     /// How long the pulse lasts, seconds (a Gaussian one: three sigma to each side).
@@ -221,7 +236,9 @@ impl Sensor {
     #[must_use]
     pub const fn half_width_m(&self) -> f64 {
         match self.aperture {
-            Aperture::Piston { radius_m } | Aperture::Gaussian { radius_m, .. } => radius_m,
+            Aperture::Piston { radius_m, .. }
+            | Aperture::Gaussian { radius_m, .. }
+            | Aperture::Table { radius_m, .. } => radius_m,
             Aperture::Line { half_length_m, .. } => half_length_m,
         }
     }
@@ -269,6 +286,10 @@ mod tests {
     #[test]
     fn wrong_data_are_named() {
         let text = PRESETS[0].1;
+        let with_points = |points: &str| {
+            let table = format!(r#""aperture": {{"shape": "table", "points": [{points}], "radius_m": 0.01}}"#);
+            text.replace(r#""aperture": {"shape": "piston", "radius_m": 0.0193}"#, &table)
+        };
         for (wrong, part) in [
             (text.replace("49400.0", "-1"), "frequency_hz is -1"),
             (text.replace("0.0193", "0"), "aperture.radius_m"),
@@ -280,6 +301,14 @@ mod tests {
                 "gain.steps.until_us is 120",
             ),
             (text.replace("\"until_us\": 5120.0", "\"until_us\": null"), "gain.steps.until_us"),
+            (text.replace("\"threshold\": 0.0175", "\"threshold\": 0.0175, \"threshold_rise_db_per_m\": -1"),
+                "threshold_rise_db_per_m is -1"),
+            (text.replace("\"threshold\": 0.0175", "\"threshold\": 0.0175, \"range_step_m\": 2"), "range_step_m is 2"),
+            (text.replace("0.0193", "0.0193, \"skirts_db\": 3"), "aperture.skirts_db is 3"),
+            (with_points(r#"{"angle_deg": 0, "level_db": 0}"#), "aperture.points (how many) is 1"),
+            (with_points(r#"{"angle_deg": 0, "level_db": 0}, {"angle_deg": 20, "level_db": -3}"#), "null at the last point"),
+            (with_points(r#"{"angle_deg": 0, "level_db": -1}, {"angle_deg": 20, "level_db": null}"#), "0 at 0 degrees"),
+            (with_points(r#"{"angle_deg": 0, "level_db": 0}, {"angle_deg": 0, "level_db": null}"#), "farther out"),
             (text.trim_end().trim_end_matches('}').to_owned(), "EOF"),
             (format!("{text} x"), "end of file"),
         ] {

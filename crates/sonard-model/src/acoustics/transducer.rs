@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use num_complex::Complex64;
 
-use super::{Aperture, EchoShape, Pulse, Sensor, aperture::points};
+use super::{Aperture, EchoShape, Pulse, Sensor, aperture::points, sensor::level_at};
 
 /// Table spacing: 0.05 degrees. For a 19 mm face at 50 kHz a straight line between entries errs by
 /// less than 2e-5 in the main lobe, and by less than 4e-4 where a side lobe's steady part overtakes
@@ -34,17 +34,21 @@ impl BeamPattern {
     /// [`piston_directivity`] times `cos(theta)`; a short one fills the nulls.
     #[must_use]
     pub fn new(sensor: &Sensor, sound_speed_m_s: f64) -> Self {
+        let tabulated = |level: &dyn Fn(f64) -> f64| {
+            let mut table: Vec<f64> = (0..TABLE_LENGTH)
+                .map(|i| i as f64 * STEP_RAD)
+                .take_while(|theta_rad| sensor.aperture.obliquity(*theta_rad) > 1e-12)
+                .map(level)
+                .collect();
+            table.push(0.0);
+            Shape::Table(table)
+        };
         Self(match sensor.aperture {
             Aperture::Piston { .. } | Aperture::Line { .. } => {
                 let face = Face::new(sensor, sound_speed_m_s);
-                let mut table: Vec<f64> = (0..TABLE_LENGTH)
-                    .map(|i| i as f64 * STEP_RAD)
-                    .take_while(|theta_rad| sensor.aperture.obliquity(*theta_rad) > 1e-12)
-                    .map(|theta_rad| face.peak(theta_rad))
-                    .collect();
-                table.push(0.0);
-                Shape::Table(table)
+                tabulated(&|theta_rad| face.peak(theta_rad))
             }
+            Aperture::Table { ref points, .. } => tabulated(&|theta_rad| level_at(points, theta_rad)),
             Aperture::Gaussian { half_angle_deg, .. } => {
                 Shape::Gaussian { half_angle_rad: half_angle_deg.to_radians() }
             }
@@ -153,7 +157,7 @@ impl Face {
     fn new(sensor: &Sensor, sound_speed_m_s: f64) -> Self {
         let omega = TAU * sensor.frequency_hz;
         let ka = omega / sound_speed_m_s * sensor.half_width_m();
-        let (aperture, pulse) = (sensor.aperture, EchoShape::of(sensor));
+        let (aperture, pulse) = (sensor.aperture.clone(), EchoShape::of(sensor));
         let middle_us = match sensor.pulse {
             Pulse::Burst { .. } => Some(0.5e6 * sensor.pulse_s()),
             Pulse::Gaussian { .. } => Some(0.0),
@@ -162,8 +166,16 @@ impl Face {
         Self { aperture, omega, sound_speed_m_s, ka, pulse, middle_us }
     }
 
-    /// Peak over time of `|h * pulse|` at an angle, relative to the axis.
+    /// Peak over time of `|h * pulse|` at an angle, relative to the axis, with the skirts' power if there are any.
     fn peak(&self, theta_rad: f64) -> f64 {
+        let alone = self.peak_of_face(theta_rad);
+        let Aperture::Piston { skirts_db: Some(level_db), .. } = self.aperture else { return alone };
+        let skirts = 10f64.powf(level_db / 20.0) * self.aperture.obliquity(theta_rad);
+        // Nothing is added on the axis.
+        (alone * alone + (1.0 - alone * alone) * skirts * skirts).sqrt()
+    }
+
+    fn peak_of_face(&self, theta_rad: f64) -> f64 {
         let points = self.quadrature(theta_rad);
         let reach_us = points.iter().map(|point| point.0.abs()).fold(0.0, f64::max);
         // An even pulse has an even response: its first half will do.
@@ -233,6 +245,7 @@ fn highest(curve: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::acoustics::BeamPoint;
 
     const SPEED_M_S: f64 = 343.99;
     const RADIUS_M: f64 = 19.3e-3;
@@ -351,6 +364,60 @@ mod tests {
         // Extent of a plane between tau = 0.02 on both sides, two ways: 23.3 degrees.
         let extent_deg = 2.0 * beam.angle_at(0.02_f64.sqrt()).to_degrees();
         assert!((extent_deg - 23.3).abs() < 0.05, "{extent_deg}");
+    }
+
+    fn with_skirts(level_db: Option<f64>) -> Sensor {
+        let aperture = Aperture::Piston { radius_m: 6.5e-3, skirts_db: level_db };
+        Sensor { aperture, ..preset("hc-sr04") }
+    }
+
+    /// Above the piston by the skirts' power, and falling with the angle where the piston does.
+    #[test]
+    fn skirts_hold_up_what_a_piston_lets_fall() {
+        let [without, with] =
+            [None, Some(-8.0)].map(|db| BeamPattern::new(&with_skirts(db), SPEED_M_S));
+        let level = 10f64.powf(-8.0 / 20.0);
+        let mut last = 1.0;
+        for i in 0..=900 {
+            let theta_rad = f64::from(i).to_radians() / 10.0;
+            let [alone, held] = [&without, &with].map(|beam| beam.one_way(theta_rad));
+            let skirts = level * theta_rad.cos();
+            let expected = (alone.powi(2) + (1.0 - alone.powi(2)) * skirts.powi(2)).sqrt();
+            assert!((held - expected).abs() < 1e-5, "{i}: {held} for {expected}");
+            assert!(held <= last + 1e-12 && last - held < 0.01, "{i}: {held} after {last}");
+            last = held;
+        }
+        assert!((with.one_way(0.0) - 1.0).abs() < 1e-6 && with.one_way(FRAC_PI_2) == 0.0);
+        // Weaker skirts are less, down to none.
+        let faint = BeamPattern::new(&with_skirts(Some(-120.0)), SPEED_M_S);
+        for i in 0..900 {
+            let theta_rad = f64::from(i).to_radians() / 10.0;
+            assert!((faint.one_way(theta_rad) - without.one_way(theta_rad)).abs() < 2e-6);
+        }
+    }
+
+    #[test]
+    fn a_table_is_met_at_its_points_and_is_straight_between() {
+        let points = [(0.0, Some(0.0)), (20.0, Some(-4.0)), (45.0, Some(-9.0)), (100.0, None)];
+        let points = points.map(|(angle_deg, level_db)| BeamPoint { angle_deg, level_db }).to_vec();
+        let aperture = Aperture::Table { points, radius_m: 6.5e-3 };
+        let beam = BeamPattern::new(&Sensor { aperture, ..preset("hc-sr04") }, SPEED_M_S);
+        let level_db = |degrees: f64| 20.0 * beam.one_way(degrees.to_radians()).log10();
+        for (degrees, expected_db) in
+            [(0.0, 0.0), (10.0, -2.0), (20.0, -4.0), (32.5, -6.5), (45.0, -9.0)]
+        {
+            assert!((level_db(degrees) - expected_db).abs() < 1e-4, "{degrees}");
+        }
+        // In a straight line to nothing.
+        assert!((level_db(72.5) - (-9.0 + 20.0 * 0.5_f64.log10())).abs() < 1e-4);
+        assert_eq!([100.1_f64, 179.0].map(|degrees| beam.one_way(degrees.to_radians())), [0.0; 2]);
+        for i in 0..2000 {
+            let [here, next] = [i, i + 1].map(|i| beam.one_way(f64::from(i).to_radians() / 20.0));
+            assert!(next <= here && here - next < 0.002, "{i}: {here} {next}");
+        }
+        for level in [0.9, 0.5, 0.36] {
+            assert!((beam.one_way(beam.angle_at(level)) - level).abs() < 1e-9, "{level}");
+        }
     }
 
     #[test]

@@ -310,8 +310,8 @@ fn modulus(number: Complex64) -> f64 {
     number.norm_sqr().sqrt()
 }
 
-/// The least that the threshold in force ever is after blanking: it rises with the range within a
-/// step of the gain, so it is least at the start of one.
+/// Nothing below it is noticed after blanking, at any time: the threshold in force rises with the range within a
+/// step of the gain, so it is least at the start of one. What it gains by its own rise is left out.
 fn least_threshold(receiver: &Receiver) -> f64 {
     // As `Receiver::threshold_at` reckons.
     let least_us = 1e-3 / receiver.range_m(1.0);

@@ -1,6 +1,6 @@
 //! Arrivals at given times against what the module's description says of them.
 
-use rand::SeedableRng as _;
+use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 
 use super::*;
@@ -181,6 +181,109 @@ fn gain_steps_move_the_threshold() {
     let detection = receiver.detect(&[weak]);
     assert_eq!(detection.status, PingStatus::Echo);
     assert!((detection.echoes_us[0] - 5120.0).abs() < 0.1, "{detection:?}");
+}
+
+/// Sounds at random, of which a receiver hears some: times in microseconds, amplitudes, phases.
+fn random_sounds(rng: &mut Pcg64) -> Vec<(f64, f64, f64)> {
+    let count = rng.random_range(1..6);
+    let mut sounds: Vec<(f64, f64, f64)> = (0..count)
+        .map(|_| {
+            let level_db: f64 = rng.random_range(-40.0..-10.0);
+            let tof_us = rng.random_range(2500.0..18_000.0);
+            (tof_us, 10f64.powf(level_db / 20.0), rng.random_range(0.0..TAU))
+        })
+        .collect();
+    sounds.sort_by(|one, other| one.0.total_cmp(&other.0));
+    sounds
+}
+
+#[test]
+fn a_threshold_that_rises_is_continuous_and_never_hears_more_or_earlier() {
+    let flat = receiver();
+    let mut rng = Pcg64::seed_from_u64(1);
+    for _ in 0..300 {
+        let sounds = arrivals(&random_sounds(&mut rng));
+        let mut last_us = 0.0;
+        for rise_db in [0.0, 0.5, 2.0, 6.0, 15.0] {
+            let mut rising = receiver();
+            rising.threshold_rise_db_per_m = rise_db;
+            let found = rising.detect(&sounds);
+            let first_us = found.echoes_us.first().copied().unwrap_or(f64::INFINITY);
+            assert!(first_us >= last_us - 0.02, "{rise_db}: {first_us} after {last_us}");
+            last_us = first_us;
+            if rise_db == 0.0 {
+                assert_eq!(found, flat.detect(&sounds));
+            }
+        }
+    }
+    let mut rising = receiver();
+    rising.threshold_rise_db_per_m = 4.0;
+    // 6000 us are 1.02 m.
+    assert!((rising.threshold_at(6000.0) / 0.02 - 10f64.powf(4.08 / 20.0)).abs() < 1e-9);
+    let steps = (0..20_000).map(|t_us| rising.threshold_at(f64::from(t_us)));
+    let steps: Vec<f64> = steps.collect();
+    for pair in steps.windows(2) {
+        assert!((1.0..1.0001).contains(&(pair[1] / pair[0])), "{pair:?}");
+    }
+}
+
+/// Whether the receiver hears worse or the sounds are weaker is the same.
+#[test]
+fn a_threshold_that_rises_is_sound_that_falls() {
+    let mut rng = Pcg64::seed_from_u64(2);
+    let (mut same, mut heard) = (0, 0);
+    for _ in 0..400 {
+        let sounds = random_sounds(&mut rng);
+        let mut rising = receiver();
+        rising.threshold_rise_db_per_m = 5.0;
+        // At the middle of the pulse, which lasts 324 us.
+        let weaker = |&(tof_us, amplitude, phase): &(f64, f64, f64)| {
+            let range_m = 0.5e-6 * SPEED_M_S * (tof_us + 100.0);
+            (tof_us, amplitude * 10f64.powf(-5.0 * range_m / 20.0), phase)
+        };
+        let weaker: Vec<_> = sounds.iter().map(weaker).collect();
+        let [one, other] =
+            [rising.detect(&arrivals(&sounds)), receiver().detect(&arrivals(&weaker))];
+        let firsts = [&one, &other].map(|found| found.echoes_us.first().copied());
+        match firsts {
+            [Some(one_us), Some(other_us)] if (one_us - other_us).abs() < 4.0 => {
+                heard += 1;
+                same += 1;
+            }
+            [None, None] => same += 1,
+            _ => {}
+        }
+    }
+    // Some stand within a few tenths of a decibel of the threshold.
+    assert!(same >= 385 && heard > 150, "{same} of 400, {heard} heard");
+}
+
+#[test]
+fn ranges_are_told_in_whole_steps_to_the_nearest() {
+    let mut coarse = receiver();
+    coarse.range_step_m = 0.01;
+    let mut rng = Pcg64::seed_from_u64(3);
+    let mut told = 0;
+    for _ in 0..300 {
+        let sounds = arrivals(&random_sounds(&mut rng));
+        let [fine, coarse] = [receiver().detect(&sounds), coarse.detect(&sounds)];
+        assert_eq!(fine.status, coarse.status);
+        assert_eq!(fine.echoes_us.len(), coarse.echoes_us.len());
+        if fine.status == PingStatus::MinRange {
+            assert_eq!(fine.range_m, coarse.range_m, "the end of the blanking is no range");
+        }
+        let (Some(fine_m), Some(coarse_m), PingStatus::Echo) =
+            (fine.range_m, coarse.range_m, fine.status)
+        else {
+            continue;
+        };
+        told += 1;
+        assert!((fine_m - coarse_m).abs() <= 0.005 + 1e-12, "{fine_m} {coarse_m}");
+        assert!((coarse_m * 100.0 - (coarse_m * 100.0).round()).abs() < 1e-9, "{coarse_m}");
+        let of_time_m = 0.5e-6 * SPEED_M_S * coarse.echoes_us[0];
+        assert!((of_time_m - coarse_m).abs() < 1e-9, "{of_time_m} {coarse_m}");
+    }
+    assert!(told > 150, "{told}");
 }
 
 #[test]

@@ -19,6 +19,10 @@ pub(super) fn not_negative(field: &'static str, value: f64) -> Result<(), Sensor
     hold(value.is_finite() && value >= 0.0, field, value, "a finite number, 0 or more")
 }
 
+pub(super) fn not_positive(field: &'static str, value: f64) -> Result<(), SensorError> {
+    hold(value.is_finite() && value <= 0.0, field, value, "a finite number, 0 or less")
+}
+
 pub(super) fn within(
     field: &'static str,
     value: f64,
@@ -26,6 +30,15 @@ pub(super) fn within(
     expected: &'static str,
 ) -> Result<(), SensorError> {
     hold(value.abs() <= most, field, value, expected)
+}
+
+pub(super) fn from_0_to(
+    field: &'static str,
+    value: f64,
+    most: f64,
+) -> Result<(), SensorError> {
+    let expected = if most > 1.0 { "from 0 to 100" } else { "from 0 to 1" };
+    hold((0.0..=most).contains(&value), field, value, expected)
 }
 
 pub(super) fn at_most_1(field: &'static str, value: f64) -> Result<(), SensorError> {
