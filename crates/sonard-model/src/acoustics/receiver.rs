@@ -16,9 +16,9 @@
 //! above for the sensor's integration time; the time that takes is the same for all echoes and
 //! left out as well.
 
+mod gain;
 mod hearing;
 mod noise;
-mod threshold;
 mod trace;
 
 #[cfg(test)]
@@ -33,7 +33,10 @@ pub use self::{
     trace::{EchoTrace, EnvelopePeak, TracePoint},
 };
 
-use self::{hearing::Hearing, threshold::sensitivity};
+use self::{
+    gain::{Sensitivity, gain_db},
+    hearing::Hearing,
+};
 use super::{ApertureResponse, EchoShape, Gain, Incidence, Response, Sensor};
 use crate::reading::PingStatus;
 
@@ -91,8 +94,6 @@ pub struct Receiver {
     pub integration_us: f64,
     /// Least amplitude it notices where the gain makes up for the spreading, at range 0.
     pub threshold: f64,
-    /// What that gains with each metre of range, decibels.
-    pub threshold_rise_db_per_m: f64,
     /// Whole steps in which ranges are told, metres; 0 for ranges as they are.
     pub range_step_m: f64,
     /// Speed of sound, metres a second.
@@ -102,8 +103,7 @@ pub struct Receiver {
     /// How overlapping arrivals are combined.
     pub combining: Combining,
     gain: Gain,
-    /// By step of the gain: its end, and what it makes of the threshold at 1 m.
-    sensitivity: SmallVec<[(f64, f64); 12]>,
+    sensitivity: Sensitivity,
     /// Carrier, radians a microsecond.
     omega: f64,
     /// Nominal duration of the pulse, microseconds.
@@ -154,12 +154,11 @@ impl Receiver {
             rearm_us: sensor.rearm_us,
             integration_us: sensor.integration_us,
             threshold: sensor.threshold,
-            threshold_rise_db_per_m: sensor.threshold_rise_db_per_m,
             range_step_m: sensor.range_step_m,
             sound_speed_m_s,
             max_range_m: sensor.max_range_m,
             combining: Combining::Coherent,
-            sensitivity: sensitivity(&sensor.gain),
+            sensitivity: Sensitivity::of(sensor),
             gain: sensor.gain.clone(),
             omega: 1e-6 * TAU * sensor.frequency_hz,
             pulse_us: 1e6 * sensor.pulse_s(),
@@ -262,6 +261,19 @@ impl Receiver {
     #[must_use]
     pub fn window_us(&self) -> f64 {
         2e6 * self.max_range_m / self.sound_speed_m_s
+    }
+
+    /// The least amplitude noticed at a time after firing, microseconds.
+    #[must_use]
+    pub fn threshold_at(&self, t_us: f64) -> f64 {
+        self.sensitivity.threshold(self.threshold, t_us, self.range_m(t_us))
+    }
+
+    /// Gain at a time after firing, decibels above what makes up for the spreading from a wall
+    /// at 1 m.
+    #[must_use]
+    pub fn gain_db(&self, t_us: f64) -> f64 {
+        gain_db(&self.gain, t_us, self.range_m(t_us))
     }
 
     fn detection(&self, hearing: &mut Hearing, latch: Latch) -> Detection {

@@ -287,7 +287,9 @@ mod tests {
     fn wrong_data_are_named() {
         let text = PRESETS[0].1;
         let with_points = |points: &str| {
-            let table = format!(r#""aperture": {{"shape": "table", "points": [{points}], "radius_m": 0.01}}"#);
+            let table = format!(
+                r#""aperture": {{"shape": "table", "points": [{points}], "radius_m": 0.01}}"#
+            );
             text.replace(r#""aperture": {"shape": "piston", "radius_m": 0.0193}"#, &table)
         };
         for (wrong, part) in [
@@ -301,14 +303,37 @@ mod tests {
                 "gain.steps.until_us is 120",
             ),
             (text.replace("\"until_us\": 5120.0", "\"until_us\": null"), "gain.steps.until_us"),
-            (text.replace("\"threshold\": 0.0175", "\"threshold\": 0.0175, \"threshold_rise_db_per_m\": -1"),
-                "threshold_rise_db_per_m is -1"),
-            (text.replace("\"threshold\": 0.0175", "\"threshold\": 0.0175, \"range_step_m\": 2"), "range_step_m is 2"),
+            (
+                text.replace(
+                    "\"threshold\": 0.0175",
+                    "\"threshold\": 0.0175, \"threshold_rise_db_per_m\": -1",
+                ),
+                "threshold_rise_db_per_m is -1",
+            ),
+            (
+                text.replace("\"threshold\": 0.0175", "\"threshold\": 0.0175, \"range_step_m\": 2"),
+                "range_step_m is 2",
+            ),
             (text.replace("0.0193", "0.0193, \"skirts_db\": 3"), "aperture.skirts_db is 3"),
             (with_points(r#"{"angle_deg": 0, "level_db": 0}"#), "aperture.points (how many) is 1"),
-            (with_points(r#"{"angle_deg": 0, "level_db": 0}, {"angle_deg": 20, "level_db": -3}"#), "null at the last point"),
-            (with_points(r#"{"angle_deg": 0, "level_db": -1}, {"angle_deg": 20, "level_db": null}"#), "0 at 0 degrees"),
-            (with_points(r#"{"angle_deg": 0, "level_db": 0}, {"angle_deg": 0, "level_db": null}"#), "farther out"),
+            (
+                with_points(
+                    r#"{"angle_deg": 0, "level_db": 0}, {"angle_deg": 20, "level_db": -3}"#,
+                ),
+                "null at the last point",
+            ),
+            (
+                with_points(
+                    r#"{"angle_deg": 0, "level_db": -1}, {"angle_deg": 20, "level_db": null}"#,
+                ),
+                "0 at 0 degrees",
+            ),
+            (
+                with_points(
+                    r#"{"angle_deg": 0, "level_db": 0}, {"angle_deg": 0, "level_db": null}"#,
+                ),
+                "farther out",
+            ),
             (text.trim_end().trim_end_matches('}').to_owned(), "EOF"),
             (format!("{text} x"), "end of file"),
         ] {

@@ -316,7 +316,7 @@ fn least_threshold(receiver: &Receiver) -> f64 {
     // As `Receiver::threshold_at` reckons.
     let least_us = 1e-3 / receiver.range_m(1.0);
     let (mut from_us, mut least) = (receiver.blanking_us, f64::INFINITY);
-    for &(until_us, sensitivity) in &receiver.sensitivity {
+    for &(until_us, sensitivity) in &receiver.sensitivity.steps {
         if from_us < until_us {
             least = least.min(from_us.max(least_us) * sensitivity);
             from_us = until_us;

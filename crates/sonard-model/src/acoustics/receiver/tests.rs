@@ -11,7 +11,13 @@ const SPEED_M_S: f64 = 340.0;
 /// The 6500's timing and pulse with a gain that makes up for the spreading: the reference echo
 /// rises 47 us before its nominal onset at 0.02 and sounds for 417 us.
 fn receiver() -> Receiver {
+    rising(0.0)
+}
+
+/// The same whose threshold rises with the range, decibels a metre.
+fn rising(threshold_rise_db_per_m: f64) -> Receiver {
     let sensor = Sensor {
+        threshold_rise_db_per_m,
         gain: Gain::default(),
         threshold: 0.02,
         max_range_m: 3.4,
@@ -205,9 +211,7 @@ fn a_threshold_that_rises_is_continuous_and_never_hears_more_or_earlier() {
         let sounds = arrivals(&random_sounds(&mut rng));
         let mut last_us = 0.0;
         for rise_db in [0.0, 0.5, 2.0, 6.0, 15.0] {
-            let mut rising = receiver();
-            rising.threshold_rise_db_per_m = rise_db;
-            let found = rising.detect(&sounds);
+            let found = rising(rise_db).detect(&sounds);
             let first_us = found.echoes_us.first().copied().unwrap_or(f64::INFINITY);
             assert!(first_us >= last_us - 0.02, "{rise_db}: {first_us} after {last_us}");
             last_us = first_us;
@@ -216,8 +220,7 @@ fn a_threshold_that_rises_is_continuous_and_never_hears_more_or_earlier() {
             }
         }
     }
-    let mut rising = receiver();
-    rising.threshold_rise_db_per_m = 4.0;
+    let rising = rising(4.0);
     // 6000 us are 1.02 m.
     assert!((rising.threshold_at(6000.0) / 0.02 - 10f64.powf(4.08 / 20.0)).abs() < 1e-9);
     let steps = (0..20_000).map(|t_us| rising.threshold_at(f64::from(t_us)));
@@ -234,8 +237,6 @@ fn a_threshold_that_rises_is_sound_that_falls() {
     let (mut same, mut heard) = (0, 0);
     for _ in 0..400 {
         let sounds = random_sounds(&mut rng);
-        let mut rising = receiver();
-        rising.threshold_rise_db_per_m = 5.0;
         // At the middle of the pulse, which lasts 324 us.
         let weaker = |&(tof_us, amplitude, phase): &(f64, f64, f64)| {
             let range_m = 0.5e-6 * SPEED_M_S * (tof_us + 100.0);
@@ -243,7 +244,7 @@ fn a_threshold_that_rises_is_sound_that_falls() {
         };
         let weaker: Vec<_> = sounds.iter().map(weaker).collect();
         let [one, other] =
-            [rising.detect(&arrivals(&sounds)), receiver().detect(&arrivals(&weaker))];
+            [rising(5.0).detect(&arrivals(&sounds)), receiver().detect(&arrivals(&weaker))];
         let firsts = [&one, &other].map(|found| found.echoes_us.first().copied());
         match firsts {
             [Some(one_us), Some(other_us)] if (one_us - other_us).abs() < 4.0 => {

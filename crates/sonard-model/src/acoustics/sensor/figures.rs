@@ -32,11 +32,7 @@ pub(super) fn within(
     hold(value.abs() <= most, field, value, expected)
 }
 
-pub(super) fn from_0_to(
-    field: &'static str,
-    value: f64,
-    most: f64,
-) -> Result<(), SensorError> {
+pub(super) fn from_0_to(field: &'static str, value: f64, most: f64) -> Result<(), SensorError> {
     let expected = if most > 1.0 { "from 0 to 100" } else { "from 0 to 1" };
     hold((0.0..=most).contains(&value), field, value, expected)
 }

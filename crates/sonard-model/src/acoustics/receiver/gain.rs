@@ -1,0 +1,50 @@
+//! How the threshold moves, by time after firing.
+
+use smallvec::SmallVec;
+
+use crate::acoustics::{Gain, GainStep, Sensor};
+
+/// What moves a threshold with time.
+#[derive(Debug, Clone)]
+pub(super) struct Sensitivity {
+    /// The ends of the gain's steps, microseconds, and the reciprocals of their gains; none of one that makes up for
+    /// the spreading.
+    pub(super) steps: SmallVec<[(f64, f64); 12]>,
+    rise_db_per_m: f64,
+}
+
+impl Sensitivity {
+    pub(super) fn of(sensor: &Sensor) -> Self {
+        let rise_db_per_m = sensor.threshold_rise_db_per_m;
+        let Gain::Steps { steps } = &sensor.gain else {
+            return Self { steps: SmallVec::new(), rise_db_per_m };
+        };
+        let end_us = |step: &GainStep| step.until_us.unwrap_or(f64::INFINITY);
+        let reciprocal = |step: &GainStep| 10f64.powf(-step.gain_db / 20.0);
+        let steps = steps.iter().map(|step| (end_us(step), reciprocal(step))).collect();
+        Self { steps, rise_db_per_m }
+    }
+
+    /// What a threshold is at a time after firing, which belongs to a range.
+    #[inline]
+    pub(super) fn threshold(&self, nominal: f64, t_us: f64, range_m: f64) -> f64 {
+        let step = self.steps.iter().find(|step| t_us < step.0).or(self.steps.last());
+        let threshold = step.map_or(nominal, |step| nominal * range_m.max(1e-3) * step.1);
+        if self.rise_db_per_m == 0.0 {
+            return threshold;
+        }
+        threshold * 10f64.powf(self.rise_db_per_m * range_m / 20.0)
+    }
+}
+
+/// Gain at a time after firing, decibels above what makes up for the spreading from a wall at 1 m.
+pub(super) fn gain_db(gain: &Gain, t_us: f64, range_m: f64) -> f64 {
+    match gain {
+        Gain::Compensating { .. } => 20.0 * range_m.max(1e-3).log10(),
+        Gain::Steps { steps } => steps
+            .iter()
+            .find(|step| step.until_us.is_none_or(|until_us| t_us < until_us))
+            .or(steps.last())
+            .map_or(0.0, |step| step.gain_db),
+    }
+}
