@@ -6,25 +6,22 @@
 //! Prints for each parameter the root mean square of the errors, the same as a multiple of the bound, the share of
 //! 95 % intervals that hold the truth, and how many trials went wrong with a small interval.
 
+mod rooms;
+
 use std::sync::Arc;
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
-use sonard_inverse::{Beam, ErrorModel, Fit, Heard, Parameter, Prior, Sweep, World, bound, fit};
+use rooms::{BEAMS, NOISE_MM, place, readings};
+use sonard_inverse::{ErrorModel, Fit, Parameter, Prior, Sweep, World, bound, fit};
 use sonard_model::{
-    acoustics::{Air, Sensor, TofNoise},
+    acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
     model::Options,
-    reading::PingStatus,
     scene::{Scene, shipped},
 };
 use uuid::Uuid;
-
-/// Beams of a sweep.
-const BEAMS: u32 = 400;
-/// Spread of ranges, millimetres.
-const NOISE_MM: f64 = 1.0;
 
 /// What a trial found of a parameter.
 #[derive(Clone)]
@@ -122,40 +119,6 @@ fn trial(seed: u64) -> Option<Trial> {
         found: found.collect(),
         took_s,
         explained: 1.0 - fitted.errors.clutter,
-    })
-}
-
-fn readings(truth: &World, pose: &Pose, rng: &mut Pcg64) -> Option<Vec<Beam>> {
-    let simulator = truth.simulator(pose).ok()?;
-    let (point, speed_m_s) = (simulator.at(pose.position()), simulator.sound_speed_m_s());
-    let noise = TofNoise::of_range_mm(NOISE_MM, speed_m_s);
-    let beam = |at: u32| {
-        let azimuth_deg = 360.0 * f64::from(at) / f64::from(BEAMS);
-        let read = point.ping(truth.direction_rad(pose, azimuth_deg)).ok()?;
-        let late_us = noise.sample_us(rng);
-        let heard = match (read.status, read.range_m) {
-            (PingStatus::Echo, Some(range_m)) => {
-                Heard::Echo { tof_us: 2e6 * range_m / speed_m_s + late_us }
-            }
-            (PingStatus::NoEcho, _) => Heard::Silence,
-            _ => return None,
-        };
-        Some(Beam { azimuth_deg, heard })
-    };
-    Some((0..BEAMS).filter_map(beam).collect())
-}
-
-/// A place with room about it, within the extent of the walls.
-fn place(scene: &Scene, rng: &mut Pcg64) -> Option<Pose> {
-    let ends = || scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
-    let low = ends().fold(DVec2::INFINITY, DVec2::min);
-    let high = ends().fold(DVec2::NEG_INFINITY, DVec2::max);
-    (0..1000).find_map(|_| {
-        let share = DVec2::new(rng.random(), rng.random());
-        let [x_m, y_m] = (low + share * (high - low).max(DVec2::splat(0.5))).to_array();
-        let pose = Pose { x_m, y_m, heading_deg: rng.random_range(-180.0..180.0) };
-        let has_room = scene.clearance_m(pose.position()) > 0.3;
-        (has_room && scene.check_pose(&pose).is_ok()).then_some(pose)
     })
 }
 

@@ -8,8 +8,8 @@ use sonard_model::{
 use thiserror::Error;
 
 use crate::{
-    sweep::{Heard, Sweep},
-    world::{World, WorldError},
+    sweep::Sweep,
+    world::{Models, World, WorldError},
 };
 
 /// Directions of the readings at each place, 3 degrees apart.
@@ -26,12 +26,14 @@ const MOST_PLACES: f64 = 40_000.0;
 const BESIDE_M: f64 = 1.0;
 
 /// The readings that a world has on a grid of places.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Atlas {
     spacing_m: f64,
     places: Vec<DVec2>,
     /// [`DIRECTIONS`] ranges a place, counter-clockwise from +x, metres.
     ranges_m: Vec<f32>,
+    /// By which they were predicted, with the transducer on the axis.
+    models: Models,
 }
 
 /// Why there is no atlas of a world.
@@ -67,19 +69,23 @@ impl Atlas {
         let alone = World { scene: without_robot(&world.scene), ..world.with_face_on_axis() };
         // What is met ahead is nearer to a face before the axis.
         let nearer_m = world.sensor.mounting.ahead_m;
-        let simulator = alone.simulator(&Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 })?;
+        let shift_m = world.delay_m - nearer_m;
+        let models = Models::of(&alone)?;
+        let shown =
+            |range_m: Option<f64>| range_m.map_or(SILENCE_M, |far_m| (far_m + shift_m) as f32);
         let readings = |place: &DVec2| {
-            let point = simulator.at(*place);
-            let range_m = |direction: usize| {
-                let direction_rad = std::f64::consts::TAU * direction as f64 / DIRECTIONS as f64;
-                let range_m = point.ping(direction_rad)?.range_m;
-                let shown = |range_m| (range_m + alone.delay_m - nearer_m) as f32;
-                Ok(range_m.map_or(SILENCE_M, shown))
-            };
-            (0..DIRECTIONS).map(range_m).collect::<Result<Vec<f32>, WorldError>>()
+            let pose = Pose { x_m: place.x, y_m: place.y, heading_deg: 0.0 };
+            models.at(&pose, |_, point| {
+                let range_m = |direction: usize| {
+                    let direction_rad =
+                        std::f64::consts::TAU * direction as f64 / DIRECTIONS as f64;
+                    Ok(shown(point.ping(direction_rad)?.range_m))
+                };
+                (0..DIRECTIONS).map(range_m).collect::<Result<Vec<f32>, WorldError>>()
+            })
         };
         let ranges_m: Result<Vec<Vec<f32>>, WorldError> = places.par_iter().map(readings).collect();
-        Ok(Self { spacing_m, places, ranges_m: ranges_m?.concat() })
+        Ok(Self { spacing_m, places, ranges_m: ranges_m?.concat(), models })
     }
 
     /// Distance of neighbouring places, metres.
@@ -92,6 +98,11 @@ impl Atlas {
     #[must_use]
     pub const fn places(&self) -> usize {
         self.places.len()
+    }
+
+    /// Models of a world that may be the one predicted with.
+    pub(crate) fn models(&self, world: &World) -> Result<Models, WorldError> {
+        self.models.changed_to(&world.with_face_on_axis())
     }
 
     /// The poses that a sweep fits best, best first; none within twice the grid's spacing and 9 degrees of a better
@@ -146,16 +157,14 @@ fn without_robot(scene: &std::sync::Arc<Scene>) -> std::sync::Arc<Scene> {
 fn resampled(world: &World, sweep: &Sweep) -> Vec<(usize, f32)> {
     let step_deg = 360.0 / DIRECTIONS as f64;
     let mut nearest: Vec<Option<(f64, f32)>> = vec![None; DIRECTIONS];
-    let half_m_per_us = 0.5e-6 * world.air.sound_speed_m_s();
+    let sound_speed_m_s = world.air.sound_speed_m_s();
     for beam in &sweep.beams {
         let azimuth_deg =
             (world.heading_zero_deg + world.gear * beam.azimuth_deg).rem_euclid(360.0);
         let place = azimuth_deg / step_deg;
         let off = (place - place.round()).abs();
-        let range_m = match beam.heard {
-            Heard::Echo { tof_us } => (half_m_per_us * tof_us) as f32,
-            Heard::Silence => SILENCE_M,
-        };
+        let range_m =
+            beam.heard.range_m(sound_speed_m_s).map_or(SILENCE_M, |range_m| range_m as f32);
         let slot = &mut nearest[place.round() as usize % DIRECTIONS];
         if slot.is_none_or(|known| off < known.0) {
             *slot = Some((off, range_m));

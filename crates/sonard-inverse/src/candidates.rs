@@ -24,7 +24,7 @@ pub(crate) struct Candidate {
     pub(crate) prediction: Prediction,
     /// Up to this threshold, decibels above the nominal one.
     pub(crate) until_db: f64,
-    /// What its range gains with the threshold, metres a decibel (time walk).
+    /// What its range gains with the threshold, metres a decibel (time walk); 0 unless it is asked for.
     pub(crate) walk_m_per_db: f64,
 }
 
@@ -35,11 +35,13 @@ pub(crate) type Candidates = SmallVec<[Candidate; 3]>;
 pub(crate) struct Listener {
     receiver: Receiver,
     threshold: f64,
+    /// Whether time walk is asked for: a firing or two more for each candidate.
+    with_walk: bool,
 }
 
 impl Listener {
-    pub(crate) fn new(receiver: &Receiver) -> Self {
-        Self { receiver: receiver.clone(), threshold: receiver.threshold }
+    pub(crate) fn new(receiver: &Receiver, with_walk: bool) -> Self {
+        Self { receiver: receiver.clone(), threshold: receiver.threshold, with_walk }
     }
 
     fn ping(
@@ -100,6 +102,9 @@ impl Listener {
         by_db: f64,
         reported: &Candidate,
     ) -> Result<f64, TooCostly> {
+        if !self.with_walk {
+            return Ok(0.0);
+        }
         for step_db in [WALK_DB, -WALK_DB] {
             let beside = self.ping(point, direction_rad, by_db + step_db)?.prediction;
             let ranges = beside.range_m.zip(reported.prediction.range_m);

@@ -10,7 +10,7 @@ use crate::{
     linear::{Curve, Linear},
     parameter::Parameter,
     sweep::Sweep,
-    world::{World, WorldError},
+    world::{Models, World, WorldError},
 };
 
 /// A parameter to fit, and what is known of it beforehand.
@@ -89,6 +89,8 @@ struct State<'a> {
     parameters: Vec<&'a Parameter>,
     /// Changes since the start.
     values: DVector<f64>,
+    /// Of the world as it was last asked for, with the transducer on the axis.
+    models: Models,
 }
 
 /// Spreads that a fit goes through, as shares of the widest, with the spread of the threshold, decibels: from so wide
@@ -118,13 +120,24 @@ const SPREADS_DB: [f64; 7] = [0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0];
 /// # Errors
 /// When the world can't be predicted in, or the readings don't hold the parameters.
 pub fn fit(world: &World, sweeps: &[Sweep], fit: &Fit) -> Result<Fitted, FitError> {
-    let mut state = State::new(world, sweeps, fit)?;
+    fit_with(Models::of(&world.with_face_on_axis())?, world, sweeps, fit)
+}
+
+/// The same with models of the world with the transducer on its axis, which it may have in common with other fits.
+pub(crate) fn fit_with(
+    models: Models,
+    world: &World,
+    sweeps: &[Sweep],
+    fit: &Fit,
+) -> Result<Fitted, FitError> {
+    let mut state = State::new(models, world, sweeps, fit)?;
     let reach_m = world.options.max_range_m.unwrap_or(world.sensor.max_range_m);
     let mut errors = ErrorModel::rough(fit.widest_m, STAGES[0].1, reach_m);
     let linear = state.approach(&mut errors)?;
     state.settle(linear, &mut errors)?;
     if !world.sensor.mounting.is_on_axis() {
-        state.improve(&state.linear(true)?, &errors)?;
+        let exact = state.linear(true)?;
+        state.improve(&exact, &errors)?;
     }
     let linear = state.linear(true)?;
     state.finish(&linear, errors)
@@ -141,20 +154,26 @@ pub fn bound(
     fit: &Fit,
     errors: &ErrorModel,
 ) -> Result<Vec<f64>, FitError> {
-    let state = State::new(world, sweeps, fit)?;
+    let models = Models::of(&world.with_face_on_axis())?;
+    let mut state = State::new(models, world, sweeps, fit)?;
     let curve = state.linear(true)?.curve(&state.still(), errors);
     let covariance = state.covariance(curve.information).ok_or(FitError::Degenerate)?;
     Ok((0..fit.priors.len()).map(|at| covariance[(at, at)].sqrt()).collect())
 }
 
 impl<'a> State<'a> {
-    fn new(start: &'a World, sweeps: &'a [Sweep], fit: &'a Fit) -> Result<Self, FitError> {
+    fn new(
+        models: Models,
+        start: &'a World,
+        sweeps: &'a [Sweep],
+        fit: &'a Fit,
+    ) -> Result<Self, FitError> {
         if fit.priors.is_empty() || sweeps.is_empty() {
             return Err(FitError::Nothing);
         }
         let parameters = fit.priors.iter().map(|prior| &prior.parameter).collect();
         let values = DVector::zeros(fit.priors.len());
-        Ok(Self { fit, start, sweeps, parameters, values })
+        Ok(Self { fit, start, sweeps, parameters, values, models })
     }
 
     fn covariance(&self, mut information: DMatrix<f64>) -> Option<DMatrix<f64>> {
@@ -191,19 +210,28 @@ impl<'a> State<'a> {
         self.start.changed(&self.changes(&self.values))
     }
 
-    /// Predictions where it stands.
-    fn linear(&self, is_exact: bool) -> Result<Linear, FitError> {
+    /// Predictions where it stands; exact ones with the transducer where it is, and with time walk.
+    fn linear(&mut self, is_exact: bool) -> Result<Linear, FitError> {
         let reference_m_s = self.start.air.sound_speed_m_s();
-        let (world, poses) = (self.world()?, self.poses());
-        let parameters = &self.parameters;
-        Ok(Linear::about(&world, self.sweeps, &poses, parameters, reference_m_s, is_exact)?)
+        let (world, poses) = (self.moved_world()?, self.poses());
+        let exact = is_exact.then(|| self.models.changed_to(&world)).transpose()?;
+        let models = exact.as_ref().unwrap_or(&self.models);
+        let (sweeps, parameters) = (self.sweeps, &self.parameters);
+        Ok(Linear::about(models, &world, sweeps, &poses, parameters, reference_m_s, is_exact)?)
+    }
+
+    /// The world where it stands, with its models.
+    fn moved_world(&mut self) -> Result<World, WorldError> {
+        let world = self.world()?;
+        self.models = self.models.changed_to(&world.with_face_on_axis())?;
+        Ok(world)
     }
 
     /// Turns each sweep whose heading is in doubt to where it fits best as a whole, in so many steps to both sides:
     /// headings move no path of a transducer on the axis, only the ends of arcs, which say little from afar. Of a
     /// single sweep the threshold, which moves all ends of arcs too, is tried with it.
     fn turn(&mut self, errors: &ErrorModel, step_deg: f64, steps: i32) -> Result<bool, FitError> {
-        let (world, poses) = (self.world()?, self.poses());
+        let (world, poses) = (self.moved_world()?, self.poses());
         let place = |wanted: &Parameter| self.parameters.iter().position(|of| **of == *wanted);
         let threshold = place(&Parameter::Threshold).filter(|_| self.sweeps.len() == 1);
         let step_db = THRESHOLD_OF_TURN * step_deg;
@@ -214,9 +242,10 @@ impl<'a> State<'a> {
         let mut changes: Vec<(usize, f64)> = Vec::new();
         for at in 0..self.parameters.len() {
             let Parameter::Heading(sweep) = *self.parameters[at] else { continue };
-            let turns = (-steps..=steps).map(|step| f64::from(step) * step_deg);
+            let turns: Vec<f64> = (-steps..=steps).map(|step| f64::from(step) * step_deg).collect();
             let (sweep, pose) = (&self.sweeps[sweep], &poses[sweep]);
-            let tried = Linear::turned(&world, sweep, pose, turns, &thresholds_db, errors)?;
+            let tried =
+                Linear::turned(&self.models, &world, sweep, pose, &turns, &thresholds_db, errors)?;
             let cost =
                 |at: usize, by: f64| 0.5 * self.precision(at) * (self.values[at] + by).powi(2);
             let value = |&(by, db, likely): &(f64, f64, f64)| {
@@ -267,15 +296,17 @@ impl<'a> State<'a> {
     /// Finds the spread and the values in turn, as long as both get likelier.
     fn settle(&mut self, mut linear: Linear, errors: &mut ErrorModel) -> Result<(), FitError> {
         let mut best: Option<(f64, DVector<f64>, ErrorModel)> = None;
-        for _ in 0..LAST_STAGES {
+        for stage in 1..=LAST_STAGES {
             *errors = self.spread(&linear, errors);
             let value = linear.log_likelihood(&self.still(), errors) + self.log_prior(&self.values);
             if best.as_ref().is_some_and(|best| value <= best.0 + 1e-3) {
                 break;
             }
             best = Some((value, self.values.clone(), *errors));
-            self.improve(&linear, errors)?;
-            linear = self.linear(false)?;
+            if stage < LAST_STAGES {
+                self.improve(&linear, errors)?;
+                linear = self.linear(false)?;
+            }
         }
         if let Some((_, values, spread)) = best {
             (self.values, *errors) = (values, spread);
@@ -368,11 +399,12 @@ impl<'a> State<'a> {
 
     fn finish(self, linear: &Linear, errors: ErrorModel) -> Result<Fitted, FitError> {
         let curve = linear.curve(&self.still(), &errors);
-        let mut covariance = self.covariance(curve.information).ok_or(FitError::Degenerate)?;
+        let mut covariance =
+            self.covariance(curve.information.clone()).ok_or(FitError::Degenerate)?;
         // Ranges depend on the threshold, too, by their time walk; what its doubt does to the other values comes on top.
         let threshold = self.parameters.iter().position(|of| **of == Parameter::Threshold);
         let sigma_db = threshold.map_or(NOT_FITTED_DB, |at| covariance[(at, at)].sqrt());
-        let moved = &covariance * linear.walk(&errors) * sigma_db;
+        let moved = &covariance * &curve.walk * sigma_db;
         covariance += &moved * moved.transpose();
         let estimates = self.values.iter().enumerate().map(|(at, &change)| {
             let sigma = covariance[(at, at)].max(0.0).sqrt();

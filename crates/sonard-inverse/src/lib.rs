@@ -13,11 +13,13 @@ mod atlas;
 mod candidates;
 mod doubt;
 mod fit;
+mod judged;
 mod likelihood;
 mod linear;
 mod locate;
 mod motion;
 mod parameter;
+mod rates;
 mod sweep;
 #[cfg(test)]
 mod tests;

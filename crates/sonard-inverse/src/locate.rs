@@ -6,10 +6,10 @@ use sonard_model::geometry::{Pose, wrap_180};
 
 use crate::{
     atlas::{Atlas, Match, is_apart},
-    fit::{Fit, FitError, Fitted, Prior, fit},
+    fit::{Fit, FitError, Fitted, Prior, fit_with},
     parameter::Parameter,
     sweep::Sweep,
-    world::World,
+    world::{Models, World},
 };
 
 /// A pose that explains a sweep.
@@ -33,9 +33,7 @@ pub struct Mode {
     pub explained: f64,
 }
 
-/// Matches of the atlas that are looked at by all that their readings say.
-const MATCHES: usize = 40;
-/// Of those, how many are improved roughly, and how many with all beams.
+/// Matches of the atlas that are improved roughly, and of those how many with all beams.
 const ROUGH: usize = 8;
 const WHOLE: usize = 4;
 /// Beams of a rough look.
@@ -53,30 +51,39 @@ const FAR_BELOW: f64 = 60.0;
 /// # Errors
 /// When there is nothing to predict with.
 pub fn locate(world: &World, atlas: &Atlas, sweep: &Sweep) -> Result<Vec<Mode>, FitError> {
-    let matches = atlas.matches(world, sweep, MATCHES);
+    let models = atlas.models(world)?;
+    let improved = |sweep: &Sweep, pose: &Pose, widest_m: f64| {
+        improved(models.clone(), world, sweep, pose, widest_m)
+    };
     let few = thinned(sweep, FEW_BEAMS);
     let mut rough: Vec<Fitted> = Vec::new();
-    for Match { pose, .. } in matches.iter().take(ROUGH) {
-        rough.extend(improved(world, &few, pose, 0.08).ok());
+    for Match { pose, .. } in atlas.matches(world, sweep, ROUGH) {
+        rough.extend(improved(&few, &pose, 0.08).ok());
     }
     rough.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
     let best = rough.first().map_or(0.0, |best| best.log_posterior);
     rough.retain(|found| found.log_posterior > best - FAR_BELOW);
     let mut whole: Vec<Fitted> = Vec::new();
     for found in distinct(rough, 0.05).into_iter().take(WHOLE) {
-        whole.extend(improved(world, sweep, &found.poses[0], 0.03).ok());
+        whole.extend(improved(sweep, &found.poses[0], 0.03).ok());
     }
     whole.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
     Ok(modes(&distinct(whole, 0.05)))
 }
 
-fn improved(world: &World, sweep: &Sweep, pose: &Pose, widest_m: f64) -> Result<Fitted, FitError> {
+fn improved(
+    models: Models,
+    world: &World,
+    sweep: &Sweep,
+    pose: &Pose,
+    widest_m: f64,
+) -> Result<Fitted, FitError> {
     let of = |parameter, sigma| Prior { parameter, sigma };
     let priors =
         vec![of(Parameter::X(0), 0.5), of(Parameter::Y(0), 0.5), of(Parameter::Heading(0), 20.0)];
     let from = Sweep { pose: *pose, ..sweep.clone() };
     let what = Fit { priors, widest_m, least_sigma_m: 5e-4, least_sigma_db: 0.5 };
-    fit(world, std::slice::from_ref(&from), &what)
+    fit_with(models, world, std::slice::from_ref(&from), &what)
 }
 
 /// Every so many of a sweep's beams.

@@ -10,8 +10,10 @@ use sonard_model::{
 /// Velocities of what sound meets, as one parameter grows: metres for each unit of it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Motion {
-    /// Of transmitter and receiver.
+    /// Of transmitter and receiver, in the plane.
     pub transducer: [DVec2; 2],
+    /// Of both, upwards.
+    pub up: f64,
     /// Of walls' ends, by their index in the scene.
     pub walls: Vec<(u32, [DVec2; 2])>,
     /// Of cylinders' axes, and the growth of their radii.
@@ -38,8 +40,8 @@ impl Motion {
         at_a.lerp(at_b, share)
     }
 
-    fn of(&self, scene: &Scene, mechanism: Mechanism, point: DVec2) -> DVec2 {
-        match mechanism {
+    fn of(&self, scene: &Scene, mechanism: Mechanism, point: DVec2) -> DVec3 {
+        let in_plane = match mechanism {
             Mechanism::Reflection(Reflector::Wall(wall))
             | Mechanism::Scattering { wall }
             | Mechanism::Diffraction(Bend::Level { wall, .. }) => self.on_wall(scene, wall, point),
@@ -48,13 +50,16 @@ impl Motion {
             }
             Mechanism::Reflection(Reflector::Cylinder(cylinder)) => {
                 let moved = self.cylinders.iter().find(|moved| moved.0 == cylinder);
-                let Some((_, velocity, growth)) = moved else { return DVec2::ZERO };
+                let Some((_, velocity, growth)) = moved else { return DVec3::ZERO };
                 let center = scene.cylinders.get(cylinder as usize).map_or(point, |c| c.center);
                 *velocity + *growth * (point - center).normalize_or_zero()
             }
             Mechanism::Reflection(Reflector::Floor | Reflector::Ceiling) => DVec2::ZERO,
-            Mechanism::Transducer => 0.5 * (self.transducer[0] + self.transducer[1]),
-        }
+            Mechanism::Transducer => {
+                return (0.5 * (self.transducer[0] + self.transducer[1])).extend(self.up);
+            }
+        };
+        in_plane.extend(0.0)
     }
 }
 
@@ -81,14 +86,14 @@ pub fn length_rate(
         return 0.0;
     };
     let toward = |from: DVec3, to: DVec3| (to - from).normalize_or_zero();
-    let velocity = |velocity: DVec2| velocity.extend(0.0);
+    let velocity = |velocity: DVec2| velocity.extend(motion.up);
     let mut rate = -toward(transmitter, point(0)).dot(velocity(motion.transducer[0]))
         - toward(receiver, point(last)).dot(velocity(motion.transducer[1]));
     for (at, interaction) in met.iter().enumerate() {
         let before = if at == 0 { transmitter } else { point(at - 1) };
         let after = if at == last { receiver } else { point(at + 1) };
         let turn = toward(before, point(at)) - toward(point(at), after);
-        rate += turn.dot(velocity(motion.of(scene, interaction.mechanism, interaction.point)));
+        rate += turn.dot(motion.of(scene, interaction.mechanism, interaction.point));
     }
     rate
 }

@@ -37,6 +37,17 @@ pub enum Heard {
     Silence,
 }
 
+impl Heard {
+    /// The range of an echo where sound is so fast, metres.
+    #[must_use]
+    pub fn range_m(&self, sound_speed_m_s: f64) -> Option<f64> {
+        match self {
+            Self::Echo { tof_us } => Some(0.5e-6 * sound_speed_m_s * tof_us),
+            Self::Silence => None,
+        }
+    }
+}
+
 /// Why a scan can't be used.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum SweepError {

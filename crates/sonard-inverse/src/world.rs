@@ -6,7 +6,7 @@ use glam::DVec2;
 use sonard_model::{
     acoustics::{Air, Aperture, Sensor},
     geometry::Pose,
-    model::{ModelError, Options, Simulator, TooCostly},
+    model::{ModelError, ObservationPoint, Options, Simulator, TooCostly},
     scene::{PoseError, Scene},
 };
 use thiserror::Error;
@@ -53,6 +53,9 @@ pub enum WorldError {
     Air(#[from] sonard_model::acoustics::AirError),
 }
 
+/// A pose for what does not depend on it.
+const ANYWHERE: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
+
 impl World {
     /// A world with a range without delay and an exact stepper.
     #[must_use]
@@ -65,11 +68,15 @@ impl World {
     /// # Errors
     /// When sensor, air or options make no sense.
     pub fn simulator(&self, robot: &Pose) -> Result<Simulator, WorldError> {
-        let scene = match self.scene.robot {
+        Ok(Simulator::new(self.scene_around(robot), self.sensor.clone(), self.air, self.options)?)
+    }
+
+    /// The scene with a robot's body, if it has one.
+    fn scene_around(&self, robot: &Pose) -> Arc<Scene> {
+        match self.scene.robot {
             Some(_) => Arc::new(self.scene.with_robot_at(robot)),
             None => Arc::clone(&self.scene),
-        };
-        Ok(Simulator::new(scene, self.sensor.clone(), self.air, self.options)?)
+        }
     }
 
     /// The same with the transducer on the axis, where all directions share their paths.
@@ -103,8 +110,7 @@ impl World {
                 Parameter::Ahead => world.sensor.mounting.ahead_m += by,
                 Parameter::Left => world.sensor.mounting.left_m += by,
                 Parameter::Height => {
-                    let z_m = world.sensor.mounting.z_m.unwrap_or(0.0);
-                    world.sensor.mounting.z_m = Some(z_m + by);
+                    world.sensor.mounting.z_m = self.sensor_z_m().map(|z_m| z_m + by);
                 }
                 Parameter::SoundSpeed => {
                     let speed_m_s = world.air.sound_speed_m_s() * (1.0 + by);
@@ -123,17 +129,18 @@ impl World {
         Ok(world)
     }
 
-    /// How the world moves with a parameter, for a firing in a direction; `None` where that changes no length.
-    pub(crate) fn motion(&self, parameter: &Parameter, direction_rad: f64) -> Option<Motion> {
-        let ahead = DVec2::from_angle(direction_rad);
+    /// The height of the transducer, metres; `None` in a scene without floor and ceiling.
+    #[must_use]
+    pub fn sensor_z_m(&self) -> Option<f64> {
+        sonard_model::model::sensor_z_m(&self.scene, &self.sensor)
+    }
+
+    /// How the world moves with a parameter, if that is the same whichever way the transducer looks.
+    pub(crate) fn steady_motion(&self, parameter: &Parameter) -> Option<Motion> {
         match parameter {
             Parameter::X(_) => Some(self.with_body(DVec2::X)),
             Parameter::Y(_) => Some(self.with_body(DVec2::Y)),
-            Parameter::Ahead => Some(Motion::of_transducer(ahead)),
-            Parameter::Left => Some(Motion::of_transducer(ahead.perp())),
-            Parameter::Heading(_) | Parameter::HeadingZero => {
-                self.turned(direction_rad, 1f64.to_radians())
-            }
+            Parameter::Height => Some(Motion { up: 1.0, ..Motion::default() }),
             Parameter::Wall(wall) => {
                 Some(Motion { walls: walls::rates(&self.scene, *wall), ..Motion::default() })
             }
@@ -141,8 +148,27 @@ impl World {
         }
     }
 
+    /// How the transducer moves with a parameter in a firing at an azimuth; `None` where that changes no length.
+    pub(crate) fn turning_motion(
+        &self,
+        parameter: &Parameter,
+        direction_rad: f64,
+        azimuth_deg: f64,
+    ) -> Option<Motion> {
+        let ahead = DVec2::from_angle(direction_rad);
+        match parameter {
+            Parameter::Ahead => Some(Motion::of_transducer(ahead)),
+            Parameter::Left => Some(Motion::of_transducer(ahead.perp())),
+            Parameter::Heading(_) | Parameter::HeadingZero => {
+                self.turned(direction_rad, 1f64.to_radians())
+            }
+            Parameter::Gear => self.turned(direction_rad, azimuth_deg.to_radians()),
+            _ => None,
+        }
+    }
+
     /// The transducer's own motion as it turns, where it is not on the axis.
-    pub(crate) fn turned(&self, direction_rad: f64, by_rad: f64) -> Option<Motion> {
+    fn turned(&self, direction_rad: f64, by_rad: f64) -> Option<Motion> {
         let mounting = &self.sensor.mounting;
         if mounting.is_on_axis() {
             return None;
@@ -155,7 +181,7 @@ impl World {
     fn with_body(&self, velocity: DVec2) -> Motion {
         let mut motion = Motion::of_transducer(velocity);
         if let Some(robot) = &self.scene.robot {
-            let around = self.scene.with_robot_at(&Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 });
+            let around = self.scene.with_robot_at(&ANYWHERE);
             debug_assert!(around.walls.len() + around.cylinders.len() > 0, "{robot:?}");
             let of = |from: usize, to: usize| from as u32..to as u32;
             let walls = of(self.scene.walls.len(), around.walls.len());
@@ -164,6 +190,49 @@ impl World {
             motion.cylinders = cylinders.map(|cylinder| (cylinder, velocity, 0.0)).collect();
         }
         motion
+    }
+}
+
+/// The models of a world at any poses: one for all, unless a robot's body moves along.
+#[derive(Clone)]
+pub(crate) struct Models {
+    world: World,
+    anywhere: Arc<Simulator>,
+}
+
+impl Models {
+    pub(crate) fn of(world: &World) -> Result<Self, WorldError> {
+        Ok(Self { world: world.clone(), anywhere: Arc::new(world.simulator(&ANYWHERE)?) })
+    }
+
+    /// Those of another world, which may have the ranger in common, and the scene.
+    pub(crate) fn changed_to(&self, world: &World) -> Result<Self, WorldError> {
+        let World { scene, sensor, air, options, .. } = &self.world;
+        if *sensor != world.sensor || *air != world.air || *options != world.options {
+            return Self::of(world);
+        }
+        let anywhere = match Arc::ptr_eq(scene, &world.scene) {
+            true => Arc::clone(&self.anywhere),
+            false => Arc::new(self.anywhere.in_scene(world.scene_around(&ANYWHERE))?),
+        };
+        Ok(Self { world: world.clone(), anywhere })
+    }
+
+    /// Asks the model of a robot at a pose what is heard there.
+    pub(crate) fn at<T>(
+        &self,
+        pose: &Pose,
+        ask: impl FnOnce(&Simulator, &ObservationPoint) -> Result<T, WorldError>,
+    ) -> Result<T, WorldError> {
+        let own;
+        let simulator = match self.world.scene.robot {
+            None => &*self.anywhere,
+            Some(_) => {
+                own = self.anywhere.in_scene(self.world.scene_around(pose))?;
+                &own
+            }
+        };
+        ask(simulator, &simulator.at(pose.position()))
     }
 }
 

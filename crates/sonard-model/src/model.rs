@@ -34,6 +34,6 @@ pub use options::{
 };
 pub use path::{Bend, Edge, Interaction, Mechanism, Path, Reflector};
 pub use prediction::Prediction;
-pub use simulator::{ModelError, Simulator};
+pub use simulator::{ModelError, Simulator, sensor_z_m};
 
 pub use crate::acoustics::EdgeLawKind;

@@ -13,7 +13,7 @@ fn at_each_threshold_the_candidate_is_what_a_receiver_with_it_reports() {
         let pose = first_pose(&here.scene);
         let simulator = here.simulator(&pose).expect("a model");
         let point = simulator.at(pose.position());
-        let mut listener = Listener::new(simulator.receiver());
+        let mut listener = Listener::new(simulator.receiver(), false);
         let mut receiver = simulator.receiver().clone();
         for step in 0..200 {
             let direction_rad = here.direction_rad(&pose, 1.8 * f64::from(step));

@@ -87,7 +87,7 @@ fn places_of_the_ranger() {
                     let place = pose.position() + by * along;
                     (world.clone(), Pose { x_m: place.x, y_m: place.y, ..pose })
                 },
-                |world, direction_rad| world.motion(&parameter, direction_rad).expect("moves"),
+                |world, _| world.steady_motion(&parameter).expect("moves"),
             );
         }
     }
@@ -105,7 +105,9 @@ fn mountings() {
         compared += compare(
             "mounting",
             |by| (world.changed(&[(&parameter, by)]).expect("a world"), pose),
-            |world, direction_rad| world.motion(&parameter, direction_rad).expect("moves"),
+            |world, direction_rad| {
+                world.turning_motion(&parameter, direction_rad, 0.0).expect("moves")
+            },
         );
     }
     // A thousandth of a degree for a metre: the step is the same share of each.
@@ -113,9 +115,30 @@ fn mountings() {
     compared += compare(
         "heading",
         |by| (world.clone(), scaled(by)),
-        |world, direction_rad| world.motion(&Parameter::Heading(0), direction_rad).expect("moves"),
+        |world, direction_rad| {
+            world.turning_motion(&Parameter::Heading(0), direction_rad, 0.0).expect("moves")
+        },
     );
     assert!(compared > 200, "{compared}");
+}
+
+#[test]
+fn heights_between_floor_and_ceiling() {
+    let (mut world, pose) = at("simple-room");
+    let mut room = Scene::clone(&world.scene);
+    (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(0.9));
+    world.scene = room.into();
+    world.options.max_range_m = Some(2.0);
+    let usual_z_m = world.sensor_z_m().expect("heights");
+    let moved = |by: f64| world.changed(&[(&Parameter::Height, by)]).expect("a world");
+    assert_eq!(moved(0.1).sensor_z_m(), Some(usual_z_m + 0.1));
+    // Off the middle, so that floor and ceiling are not alike.
+    let compared = compare(
+        "height",
+        |by| (moved(0.1 + by), pose),
+        |world, _| world.steady_motion(&Parameter::Height).expect("moves"),
+    );
+    assert!(compared > 100, "{compared}");
 }
 
 #[test]
@@ -127,9 +150,7 @@ fn walls_with_their_corners_and_edges() {
             compared += compare(
                 scene,
                 |by| (world.changed(&[(&Parameter::Wall(wall), by)]).expect("a world"), pose),
-                |world, direction_rad| {
-                    world.motion(&Parameter::Wall(wall), direction_rad).expect("moves")
-                },
+                |world, _| world.steady_motion(&Parameter::Wall(wall)).expect("moves"),
             );
         }
     }

@@ -1,6 +1,9 @@
 //! The transducer's face: how strong a sound leaves or arrives at an angle to its axis.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::{
+    f64::consts::{FRAC_PI_2, PI, TAU},
+    sync::Arc,
+};
 
 use num_complex::Complex64;
 
@@ -21,7 +24,7 @@ pub struct BeamPattern(Shape);
 #[derive(Debug, Clone)]
 enum Shape {
     /// The face's response to the pulse, from 0 degrees to straight backwards.
-    Table(Vec<f64>),
+    Table(Arc<[f64]>),
     /// `exp(-2 theta^2 / half_angle^2)`.
     Gaussian { half_angle_rad: f64 },
 }
@@ -41,7 +44,7 @@ impl BeamPattern {
                 .map(level)
                 .collect();
             table.push(0.0);
-            Shape::Table(table)
+            Shape::Table(table.into())
         };
         Self(match sensor.aperture {
             Aperture::Piston { .. } | Aperture::Line { .. } => {

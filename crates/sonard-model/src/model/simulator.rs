@@ -59,13 +59,48 @@ pub enum ModelError {
 /// Predicts readings in a scene.
 pub struct Simulator {
     scene: Arc<Scene>,
+    ranger: Ranger,
+    engine: Box<dyn Engine>,
+}
+
+/// What predictions depend on besides the scene.
+#[derive(Clone)]
+struct Ranger {
     sensor: Sensor,
     air: Air,
     options: Options,
     receiver: Receiver,
     beam: BeamPattern,
     scatter_height_rad: f64,
-    engine: Box<dyn Engine>,
+}
+
+impl Ranger {
+    fn simulator(self, scene: Arc<Scene>) -> Result<Simulator, ModelError> {
+        check_height(&scene, &self.sensor)?;
+        let engine = self.engine(&scene);
+        Ok(Simulator { scene, ranger: self, engine })
+    }
+
+    fn engine(&self, scene: &Scene) -> Box<dyn Engine> {
+        let Self { sensor, air, receiver, beam, .. } = self;
+        match &self.options.engine {
+            EngineOptions::Paths(paths) => {
+                let settings = path_settings(sensor, air, paths, receiver, self.scatter_height_rad);
+                let wave_number_per_m = settings.wave_number_per_m;
+                let face = sensor.face.map(|face| Disc { face, wave_number_per_m });
+                let engine = PathEngine::new(scene, beam.clone(), face, settings);
+                Box::new(engine.through_nulls(receiver.asks_incidents()))
+            }
+            EngineOptions::Fan(fan) => {
+                let settings = fan_settings(sensor, air, fan, receiver);
+                Box::new(Fan::new(scene, beam.clone(), settings))
+            }
+            EngineOptions::Cone(cone) => {
+                let two_way_deg = || 2.0 * beam.angle_at(0.5_f64.sqrt()).to_degrees();
+                Box::new(Cone::new(scene, cone.aperture_deg.unwrap_or_else(two_way_deg)))
+            }
+        }
+    }
 }
 
 fn check_height(scene: &Scene, sensor: &Sensor) -> Result<(), ModelError> {
@@ -98,28 +133,19 @@ impl Simulator {
             value,
             expected,
         })?;
-        check_height(&scene, &sensor)?;
         let receiver = receiver(&sensor, &air, &options);
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
         let scatter_height_rad = beam.two_way_power_rad();
-        let of_engine = beam.clone();
-        let engine: Box<dyn Engine> = match options.engine {
-            EngineOptions::Paths(paths) => {
-                let settings = path_settings(&sensor, &air, &paths, &receiver, scatter_height_rad);
-                let wave_number_per_m = settings.wave_number_per_m;
-                let face = sensor.face.map(|face| Disc { face, wave_number_per_m });
-                let engine = PathEngine::new(&scene, of_engine, face, settings);
-                Box::new(engine.through_nulls(receiver.asks_incidents()))
-            }
-            EngineOptions::Fan(fan) => {
-                Box::new(Fan::new(&scene, of_engine, fan_settings(&sensor, &air, &fan, &receiver)))
-            }
-            EngineOptions::Cone(cone) => {
-                let two_way_deg = || 2.0 * beam.angle_at(0.5_f64.sqrt()).to_degrees();
-                Box::new(Cone::new(&scene, cone.aperture_deg.unwrap_or_else(two_way_deg)))
-            }
-        };
-        Ok(Self { scene, sensor, air, options, receiver, beam, scatter_height_rad, engine })
+        Ranger { sensor, air, options, receiver, beam, scatter_height_rad }.simulator(scene)
+    }
+
+    /// The same ranger in another scene. Its receiver and its beam pattern, which take longer to make than a room's
+    /// plan, are taken over.
+    ///
+    /// # Errors
+    /// When the transducer would be in the floor or above the ceiling.
+    pub fn in_scene(&self, scene: Arc<Scene>) -> Result<Self, ModelError> {
+        self.ranger.clone().simulator(scene)
     }
 
     /// Prepares for firing from `position` (world, metres). The costly part is done at the first
@@ -146,42 +172,42 @@ impl Simulator {
     /// Speed of sound, metres a second.
     #[must_use]
     pub fn sound_speed_m_s(&self) -> f64 {
-        self.receiver.sound_speed_m_s
+        self.ranger.receiver.sound_speed_m_s
     }
 
     /// The receiver in force: the sensor's, with the options applied.
     #[must_use]
     pub const fn receiver(&self) -> &Receiver {
-        &self.receiver
+        &self.ranger.receiver
     }
 
     /// The beam pattern of the sensor in the air.
     #[must_use]
     pub const fn beam(&self) -> &BeamPattern {
-        &self.beam
+        &self.ranger.beam
     }
 
     /// The sensor.
     #[must_use]
     pub const fn sensor(&self) -> &Sensor {
-        &self.sensor
+        &self.ranger.sensor
     }
 
     /// The air.
     #[must_use]
     pub const fn air(&self) -> &Air {
-        &self.air
+        &self.ranger.air
     }
 
     /// Settings of [`paths::Paths`] for this sensor, air and options; for another engine with the defaults
     /// of `paths`.
     #[must_use]
     pub fn path_settings(&self) -> paths::Settings {
-        let options = match self.options.engine {
+        let options = match self.ranger.options.engine {
             EngineOptions::Paths(options) => options,
             EngineOptions::Fan(_) | EngineOptions::Cone(_) => PathOptions::default(),
         };
-        let Self { sensor, air, receiver, scatter_height_rad, .. } = self;
+        let Ranger { sensor, air, receiver, scatter_height_rad, .. } = &self.ranger;
         path_settings(sensor, air, &options, receiver, *scatter_height_rad)
     }
 
@@ -194,21 +220,26 @@ impl Simulator {
     /// The height of the transducer, metres; `None` in a scene without floor and ceiling.
     #[must_use]
     pub fn sensor_z_m(&self) -> Option<f64> {
-        let (floor_z_m, ceiling_z_m) = (self.scene.floor_z_m, self.scene.ceiling_z_m);
-        floor_z_m.or(ceiling_z_m)?;
-        let usual_z_m = || paths::usual_z_m(floor_z_m, ceiling_z_m);
-        Some(self.sensor.mounting.z_m.unwrap_or_else(usual_z_m))
+        sensor_z_m(&self.scene, &self.ranger.sensor)
     }
 
     pub(super) fn arrivals_between(&self, at: [DVec2; 2]) -> LazyArrivals<'_> {
-        LazyArrivals::new(self.engine.as_ref(), at, 2.0 * self.receiver.max_range_m)
+        LazyArrivals::new(self.engine.as_ref(), at, 2.0 * self.ranger.receiver.max_range_m)
     }
 
     /// The options.
     #[must_use]
     pub const fn options(&self) -> &Options {
-        &self.options
+        &self.ranger.options
     }
+}
+
+/// The height of a transducer in a scene, metres; `None` in one without floor and ceiling.
+#[must_use]
+pub fn sensor_z_m(scene: &Scene, sensor: &Sensor) -> Option<f64> {
+    let (floor_z_m, ceiling_z_m) = (scene.floor_z_m, scene.ceiling_z_m);
+    floor_z_m.or(ceiling_z_m)?;
+    Some(sensor.mounting.z_m.unwrap_or_else(|| paths::usual_z_m(floor_z_m, ceiling_z_m)))
 }
 
 #[cfg(test)]

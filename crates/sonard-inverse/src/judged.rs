@@ -1,0 +1,125 @@
+//! A reading beside all that could have been reported, and how likely it is.
+
+use nalgebra::DVector;
+use smallvec::SmallVec;
+
+use crate::likelihood::{ErrorModel, normal_density, normal_up_to};
+
+/// What a number gains for each unit of some of the parameters.
+pub(crate) type Rates = SmallVec<[(u32, f64); 6]>;
+
+/// One of the readings that a firing could have had.
+#[derive(Debug, Clone)]
+pub(crate) struct Possible {
+    /// Its range, metres at the reference speed of sound; `None` of silence.
+    pub(crate) range_m: Option<f64>,
+    pub(crate) range_rates: Rates,
+    /// The threshold up to which it is, decibels above the nominal one.
+    pub(crate) until_db: f64,
+    pub(crate) until_rates: Rates,
+    /// What the range gains with the threshold, metres a decibel.
+    pub(crate) walk_m_per_db: f64,
+}
+
+/// A reading beside what it could have been.
+#[derive(Debug, Clone)]
+pub(crate) struct Judged {
+    /// Metres at the reference speed of sound; `None` of silence.
+    pub(crate) heard_m: Option<f64>,
+    pub(crate) possible: SmallVec<[Possible; 3]>,
+}
+
+/// A reading's density and its derivatives.
+pub(crate) struct Terms {
+    pub(crate) density: f64,
+    /// Probability that the scene does not explain it.
+    pub(crate) unexplained: f64,
+    pub(crate) of: SmallVec<[Term; 3]>,
+}
+
+/// What one of the possible readings has to do with it.
+pub(crate) struct Term {
+    /// Probability that the reading is this one.
+    pub(crate) share: f64,
+    /// Derivative of the log-density by its range.
+    pub(crate) by_range: f64,
+    /// By the threshold up to which it is.
+    pub(crate) by_until: f64,
+    /// What a reading is expected to say about that threshold, as information.
+    pub(crate) expected_of_until: f64,
+}
+
+impl Judged {
+    /// How likely the reading is after a change of the parameters.
+    pub(crate) fn terms(&self, change: &DVector<f64>, errors: &ErrorModel) -> Terms {
+        let after = |value: f64, rates: &Rates| {
+            value + rates.iter().map(|&(at, rate)| rate * change[at as usize]).sum::<f64>()
+        };
+        let explained = 1.0 - errors.clutter;
+        let unexplained = errors.of_clutter(self.heard_m.is_some());
+        // Density of the reading if it is this one, and its derivative by the range.
+        let densities: SmallVec<[[f64; 2]; 3]> = self
+            .possible
+            .iter()
+            .map(|possible| match (self.heard_m, possible.range_m) {
+                (Some(heard_m), Some(range_m)) => {
+                    let [density, slope] =
+                        errors.range(heard_m - after(range_m, &possible.range_rates));
+                    [density, -slope]
+                }
+                (None, None) => [1.0, 0.0],
+                _ => [0.0, 0.0],
+            })
+            .collect();
+        let mut below = 0.0;
+        let mut density = unexplained;
+        let mut of: SmallVec<[Term; 3]> = SmallVec::new();
+        for (at, (possible, &[own, slope])) in self.possible.iter().zip(&densities).enumerate() {
+            let is_last = at + 1 == self.possible.len();
+            let until = after(possible.until_db, &possible.until_rates) / errors.sigma_db;
+            let up_to = if is_last { 1.0 } else { normal_up_to(until).max(below) };
+            let probability = up_to - below;
+            below = up_to;
+            let gain = if is_last { 0.0 } else { own - densities[at + 1][0] };
+            let by_until = explained * normal_density(until) / errors.sigma_db * gain;
+            density += explained * probability * own;
+            of.push(Term {
+                share: explained * probability * own,
+                by_range: explained * probability * slope,
+                by_until: if by_until.is_finite() { by_until } else { 0.0 },
+                expected_of_until: match is_last {
+                    true => 0.0,
+                    false => {
+                        explained * expected_of_step(until) * self.distinct(at, errors.sigma_m)
+                            / errors.sigma_db.powi(2)
+                    }
+                },
+            });
+        }
+        for term in &mut of {
+            term.share /= density;
+            term.by_range /= density;
+            term.by_until /= density;
+        }
+        Terms { density, unexplained: unexplained / density, of }
+    }
+
+    /// How well one of the possible readings can be told from the next, from 0 to 1.
+    fn distinct(&self, at: usize, sigma_m: f64) -> f64 {
+        match (self.possible[at].range_m, self.possible[at + 1].range_m) {
+            (Some(one_m), Some(other_m)) => {
+                1.0 - (-((one_m - other_m) / sigma_m).powi(2) / 8.0).exp()
+            }
+            (None, None) => 0.0,
+            _ => 1.0,
+        }
+    }
+}
+
+/// What one reading, of either side of a step of the probability at `place` standard deviations, is expected to say
+/// about the step's place: `density^2 / (up_to (1 - up_to))`.
+fn expected_of_step(place: f64) -> f64 {
+    let up_to = normal_up_to(place);
+    let spread = up_to * (1.0 - up_to);
+    if spread > 1e-12 { normal_density(place).powi(2) / spread } else { 0.0 }
+}

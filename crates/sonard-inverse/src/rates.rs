@@ -1,0 +1,260 @@
+//! What could have been reported of each firing, and how that moves with the parameters.
+
+use std::collections::{HashMap, hash_map::Entry};
+
+use smallvec::SmallVec;
+use sonard_model::{
+    acoustics::BeamPattern,
+    geometry::{DVec2, Pose, wrap_360, wrap_pi},
+    model::{Arrival, Mechanism, ObservationPoint, Reflector, Simulator, TooCostly},
+    scene::{Material, Scene},
+};
+
+use crate::{
+    candidates::{Candidate, Listener},
+    judged::{Judged, Possible, Rates},
+    motion::{Motion, length_rate},
+    parameter::Parameter,
+    sweep::{Beam, Sweep},
+    world::World,
+};
+
+/// Step of the directions that turned sweeps share, degrees.
+const GRID_DEG: f64 = 0.5;
+
+/// Predicts sweeps in a world, with what they gain for each unit of the parameters.
+pub(crate) struct RateFinder<'a> {
+    world: &'a World,
+    parameters: &'a [&'a Parameter],
+    /// By parameter, what moves whichever way the transducer looks.
+    steady: Vec<Option<Motion>>,
+    /// Beam patterns of a slightly wider face, if that is asked for, and by how much.
+    wider: Option<(BeamPattern, f64)>,
+    reference_m_s: f64,
+    /// Whether time walk is found out, too, which takes a firing or two for each candidate.
+    with_walk: bool,
+}
+
+/// A firing.
+struct Firing<'a> {
+    simulator: &'a Simulator,
+    /// Where the stepper says it points, degrees.
+    azimuth_deg: f64,
+    /// Where the stepper's axis is.
+    axis: DVec2,
+    direction_rad: f64,
+}
+
+impl<'a> RateFinder<'a> {
+    /// Ranges are in metres at `reference_m_s`.
+    pub(crate) fn new(
+        world: &'a World,
+        parameters: &'a [&'a Parameter],
+        reference_m_s: f64,
+        with_walk: bool,
+    ) -> Self {
+        let steady = parameters.iter().map(|parameter| world.steady_motion(parameter)).collect();
+        let wider = wider(world, parameters);
+        Self { world, parameters, steady, wider, reference_m_s, with_walk }
+    }
+
+    /// The firings of the sweep with this number.
+    pub(crate) fn sweep(
+        &self,
+        simulator: &Simulator,
+        point: &ObservationPoint,
+        number: usize,
+        sweep: &Sweep,
+        pose: &Pose,
+    ) -> Result<Vec<Judged>, TooCostly> {
+        let mut listener = Listener::new(simulator.receiver(), self.with_walk);
+        let concerns = |parameter: &Parameter| parameter.sweep().is_none_or(|of| of == number);
+        let all = self.parameters.iter().zip(0u32..);
+        let concerning: Vec<u32> =
+            all.filter(|(parameter, _)| concerns(parameter)).map(|(_, at)| at).collect();
+        let mut judged = |beam: &Beam| {
+            let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
+            let firing = Firing {
+                simulator,
+                azimuth_deg: beam.azimuth_deg,
+                axis: pose.position(),
+                direction_rad,
+            };
+            let possible = self.all_possible(&mut listener, point, &firing, &concerning)?;
+            Ok(Judged { heard_m: beam.heard.range_m(self.reference_m_s), possible })
+        };
+        sweep.beams.iter().map(&mut judged).collect()
+    }
+
+    /// What each beam of a sweep could have been after turns by so many degrees, up to half a step of [`GRID_DEG`]:
+    /// directions are predicted once for all beams that come to look there. A robot's body stays as it stands.
+    pub(crate) fn turned(
+        &self,
+        simulator: &Simulator,
+        point: &ObservationPoint,
+        sweep: &Sweep,
+        pose: &Pose,
+        turns_deg: &[f64],
+    ) -> Result<Vec<Vec<Judged>>, TooCostly> {
+        let mut listener = Listener::new(simulator.receiver(), self.with_walk);
+        let all: Vec<u32> = (0..self.parameters.len() as u32).collect();
+        let mut known: HashMap<i64, SmallVec<[Possible; 3]>> = HashMap::new();
+        let mut judged = |beam: &Beam, by_deg: f64| {
+            let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
+            let place = (wrap_360(direction_rad.to_degrees() + by_deg) / GRID_DEG).round() as i64;
+            let possible = match known.entry(place) {
+                Entry::Occupied(known) => known.get().clone(),
+                Entry::Vacant(unknown) => {
+                    let direction_rad = (place as f64 * GRID_DEG).to_radians();
+                    let axis = pose.position();
+                    let azimuth_deg = beam.azimuth_deg;
+                    let firing = Firing { simulator, azimuth_deg, axis, direction_rad };
+                    let possible = self.all_possible(&mut listener, point, &firing, &all)?;
+                    unknown.insert(possible).clone()
+                }
+            };
+            Ok(Judged { heard_m: beam.heard.range_m(self.reference_m_s), possible })
+        };
+        let mut turned =
+            |by_deg: &f64| sweep.beams.iter().map(|beam| judged(beam, *by_deg)).collect();
+        turns_deg.iter().map(&mut turned).collect()
+    }
+
+    fn all_possible(
+        &self,
+        listener: &mut Listener,
+        point: &ObservationPoint,
+        firing: &Firing,
+        concerning: &[u32],
+    ) -> Result<SmallVec<[Possible; 3]>, TooCostly> {
+        let found = listener.candidates(point, firing.direction_rad)?;
+        Ok(found.iter().map(|candidate| self.possible(candidate, firing, concerning)).collect())
+    }
+
+    fn possible(&self, candidate: &Candidate, firing: &Firing, concerning: &[u32]) -> Possible {
+        let prediction = &candidate.prediction;
+        let stretch = self.reference_m_s / firing.simulator.sound_speed_m_s();
+        let beside_m =
+            prediction.arrival.as_ref().map_or(0.0, |arrival| 0.5 * self.longer_m(arrival, firing));
+        let range_m =
+            prediction.range_m.map(|range_m| stretch * (range_m + beside_m) + self.world.delay_m);
+        let (mut range_rates, mut until_rates) = (Rates::new(), Rates::new());
+        if let (Some(arrival), Some(predicted_m)) = (&prediction.arrival, prediction.range_m) {
+            for &at in concerning {
+                let by_range = match self.parameters[at as usize] {
+                    Parameter::SoundSpeed => -stretch * predicted_m,
+                    Parameter::Delay => 1.0,
+                    _ => 0.5 * stretch * self.length_rate(at, arrival, firing),
+                };
+                let by_db = self.margin_rate(at, arrival, firing);
+                range_rates.extend((by_range != 0.0).then_some((at, by_range)));
+                until_rates.extend((by_db != 0.0).then_some((at, by_db)));
+            }
+        }
+        Possible {
+            range_m,
+            range_rates,
+            until_db: candidate.until_db,
+            until_rates,
+            walk_m_per_db: stretch * candidate.walk_m_per_db,
+        }
+    }
+
+    /// What a path from the axis gains where the face is beside it, to first order.
+    fn longer_m(&self, arrival: &Arrival, firing: &Firing) -> f64 {
+        let mounting = &self.world.sensor.mounting;
+        if mounting.is_on_axis() || !firing.simulator.sensor().mounting.is_on_axis() {
+            return 0.0;
+        }
+        let places = mounting.places(DVec2::ZERO, firing.direction_rad);
+        let motion = Motion { transducer: places, ..Motion::default() };
+        firing.length_rate(arrival, [firing.axis; 2], &motion)
+    }
+
+    fn length_rate(&self, at: u32, arrival: &Arrival, firing: &Firing) -> f64 {
+        let at = at as usize;
+        let turning;
+        let motion = match &self.steady[at] {
+            Some(motion) => motion,
+            None => {
+                let parameter = self.parameters[at];
+                turning =
+                    self.world.turning_motion(parameter, firing.direction_rad, firing.azimuth_deg);
+                let Some(motion) = &turning else { return 0.0 };
+                motion
+            }
+        };
+        let mounting = &firing.simulator.sensor().mounting;
+        let ends = mounting.places(firing.axis, firing.direction_rad);
+        firing.length_rate(arrival, ends, motion)
+    }
+
+    /// What an arrival's margin above the threshold gains, decibels for each unit. That a stronger echo is also a little
+    /// earlier (time walk) is in the predictions and not in the rates: where several arrivals overlap they are not
+    /// known so well that tenths of a millimetre could be believed. See [`Curve::walk`](crate::linear::Curve).
+    fn margin_rate(&self, at: u32, arrival: &Arrival, firing: &Firing) -> f64 {
+        let off_rad = [arrival.departure_rad, arrival.arrival_rad]
+            .map(|end| wrap_pi(end - firing.direction_rad));
+        let level_db = |pattern: &BeamPattern, by_rad: f64| {
+            off_rad.map(|off| decibels(pattern.one_way(wrap_pi(off - by_rad)))).iter().sum::<f64>()
+        };
+        let by_turn = |turn_rad: f64| {
+            // Over half a degree to both sides, and no steeper than a main lobe's flank: a null is steeper, but what is
+            // heard there is the sum of several arrivals.
+            const BY_RAD: f64 = 0.01;
+            const STEEPEST_DB_PER_RAD: f64 = 250.0;
+            let pattern = firing.simulator.beam();
+            let slope = (level_db(pattern, BY_RAD) - level_db(pattern, -BY_RAD)) / (2.0 * BY_RAD);
+            turn_rad * slope.clamp(-STEEPEST_DB_PER_RAD, STEEPEST_DB_PER_RAD)
+        };
+        match self.parameters[at as usize] {
+            Parameter::Heading(_) | Parameter::HeadingZero => by_turn(1f64.to_radians()),
+            Parameter::Gear => by_turn(firing.azimuth_deg.to_radians()),
+            Parameter::Threshold => -1.0,
+            Parameter::Aperture => self.wider.as_ref().map_or(0.0, |(pattern, by)| {
+                (level_db(pattern, 0.0) - level_db(firing.simulator.beam(), 0.0)) / by
+            }),
+            Parameter::Reflectance(name) => {
+                let scene = firing.simulator.scene();
+                let times =
+                    scene.materials.get(name).map_or(0, |of| reflections(scene, arrival, of));
+                20.0 * std::f64::consts::LOG10_E * times as f64
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+impl Firing<'_> {
+    fn length_rate(&self, arrival: &Arrival, ends: [DVec2; 2], motion: &Motion) -> f64 {
+        let z_m = self.simulator.sensor_z_m().unwrap_or(0.0);
+        length_rate(arrival, ends, z_m, self.simulator.scene(), motion)
+    }
+}
+
+fn wider(world: &World, parameters: &[&Parameter]) -> Option<(BeamPattern, f64)> {
+    const BY: f64 = 0.01;
+    let is_asked = parameters.iter().any(|parameter| **parameter == Parameter::Aperture);
+    let changed = is_asked.then(|| world.changed(&[(&Parameter::Aperture, BY)]).ok())??;
+    Some((BeamPattern::new(&changed.sensor, changed.air.sound_speed_m_s()), BY))
+}
+
+fn decibels(amplitude: f64) -> f64 {
+    20.0 * amplitude.max(1e-6).log10()
+}
+
+/// How often an arrival was reflected by a material.
+fn reflections(scene: &Scene, arrival: &Arrival, material: &Material) -> usize {
+    let is_of = |mechanism: Mechanism| match mechanism {
+        Mechanism::Reflection(Reflector::Wall(wall)) => {
+            scene.walls.get(wall as usize).is_some_and(|wall| wall.material == *material)
+        }
+        Mechanism::Reflection(Reflector::Cylinder(cylinder)) => {
+            scene.cylinders.get(cylinder as usize).is_some_and(|of| of.material == *material)
+        }
+        Mechanism::Reflection(Reflector::Floor) => scene.floor_material == *material,
+        Mechanism::Reflection(Reflector::Ceiling) => scene.ceiling_material == *material,
+        _ => false,
+    };
+    arrival.path.mechanisms().filter(|&mechanism| is_of(mechanism)).count()
+}
