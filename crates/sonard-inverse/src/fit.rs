@@ -279,15 +279,21 @@ impl<'a> State<'a> {
             let spread = self.spread(&linear, errors);
             errors.sigma_m = (self.fit.widest_m * share).max(spread.sigma_m.min(errors.sigma_m));
             errors.sigma_db = sigma_db.max(self.fit.least_sigma_db);
-            if self.turn(errors, step_deg, steps)? {
+            let is_turned = self.turn(errors, step_deg, steps)?;
+            if is_turned {
                 linear = self.linear(false)?;
             }
+            let mut moved = f64::INFINITY;
             for _ in 0..3 {
-                let moved = self.improve(&linear, errors)?;
+                moved = self.improve(&linear, errors)?;
                 linear = self.linear(false)?;
                 if moved < 0.2 {
                     break;
                 }
+            }
+            // What the readings spread by is reached, and nothing moves: narrower it does not get.
+            if !is_turned && moved < 0.02 && errors.sigma_m > self.fit.widest_m * share {
+                break;
             }
         }
         Ok(linear)

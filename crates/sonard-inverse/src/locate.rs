@@ -36,6 +36,8 @@ pub struct Mode {
 /// Matches of the atlas that are improved roughly, and of those how many with all beams.
 const ROUGH: usize = 8;
 const WHOLE: usize = 4;
+/// What a pose is off by at least after a rough look, metres.
+const LEAST_WIDEST_M: f64 = 4e-3;
 /// Beams of a rough look.
 const FEW_BEAMS: usize = 60;
 /// Readings that share what the model misses of an arc, and so count as one where poses are weighed against each
@@ -65,7 +67,9 @@ pub fn locate(world: &World, atlas: &Atlas, sweep: &Sweep) -> Result<Vec<Mode>, 
     rough.retain(|found| found.log_posterior > best - FAR_BELOW);
     let mut whole: Vec<Fitted> = Vec::new();
     for found in distinct(rough, 0.05).into_iter().take(WHOLE) {
-        whole.extend(improved(sweep, &found.poses[0], 0.03).ok());
+        // A rough fit is off by little more than its readings spread.
+        let widest_m = (3.0 * found.errors.sigma_m).clamp(LEAST_WIDEST_M, 0.03);
+        whole.extend(improved(sweep, &found.poses[0], widest_m).ok());
     }
     whole.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
     Ok(modes(&distinct(whole, 0.05)))
