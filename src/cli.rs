@@ -25,6 +25,7 @@ mod map;
 mod map_file;
 mod mock;
 mod mock_world;
+mod numbers;
 mod options;
 mod output;
 mod paths;

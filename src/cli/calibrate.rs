@@ -5,7 +5,6 @@ mod what;
 
 use std::{
     io::{self, Write},
-    path::PathBuf,
     sync::Arc,
 };
 
@@ -13,11 +12,13 @@ use comfy_table::{CellAlignment, Table};
 
 use super::{
     Failure, Outcome,
+    answer::answer,
     compare::RULED,
+    numbers::within,
     output::{OutPath, Overwrite},
     progress,
     what_if::WhatIfArgs,
-    worlds::Worlds,
+    worlds::SweepArgs,
 };
 use crate::inverse::{Fit, Fitted, Sweep, World, fit};
 use report::{Line, lines, write_folder};
@@ -27,13 +28,8 @@ use what::{Group, PriorSigma, parameters};
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(super) struct Args {
-    /// Logs of sweeps; - for standard input
-    #[arg(required = true, value_name = "LOG")]
-    logs: Vec<PathBuf>,
-    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it, in place of the
-    /// log's
-    #[arg(long, value_name = "SCENE")]
-    scene: Option<PathBuf>,
+    #[command(flatten)]
+    sweeps: SweepArgs,
     /// What to fit, separated by commas
     #[arg(long, value_name = "WHAT", value_delimiter = ',', default_value = "pose,air,threshold")]
     fit: Vec<Group>,
@@ -41,7 +37,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "NAME=SIGMA")]
     prior: Vec<PriorSigma>,
     /// How far off predicted ranges may be at first, metres
-    #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = spread)]
+    #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = within(0.005..=1.0))]
     widest_m: f64,
     /// Folder for what is written; the fitted sensor, scene, air and poses, the estimates and a report
     #[arg(long, value_name = "DIR")]
@@ -93,8 +89,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         report::check(out, args.overwrite)?;
     }
     let (mut sweeps, mut world): (Vec<Sweep>, Option<Arc<World>>) = (Vec::new(), None);
-    let mut worlds = Worlds::new(args.scene.as_deref(), &what_if)?;
-    worlds.for_each_sweep(&args.logs, |log, _, sweep, of| {
+    args.sweeps.for_each(&what_if, |log, sweep, of| {
         let known = world.get_or_insert_with(|| Arc::clone(of));
         if known.sensor != of.sensor || known.scene.sha256 != of.scene.sha256 {
             return Err(Failure::input(
@@ -127,25 +122,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     if let Some(out) = &args.out {
         write_folder(out, args.overwrite, &world, &sweeps, &fitted, &lines)?;
     }
-    let mut out = io::stdout().lock();
-    let printed = if args.json {
-        lines.iter().try_for_each(|line| {
-            serde_json::to_writer(&mut out, line)?;
-            writeln!(out)
-        })
-    } else {
-        print(&mut out, &lines, &fitted)
-    };
-    printed.or_else(|error| Failure::from_write("standard output", &error))
-}
-
-fn spread(text: &str) -> Result<f64, String> {
-    let metres: f64 = text.parse().map_err(|_| "it is not a number".to_owned())?;
-    if (0.005..=1.0).contains(&metres) {
-        Ok(metres)
-    } else {
-        Err("it must be from 0.005 to 1".to_owned())
-    }
+    answer(args.json, &lines, |out| print(out, &lines, &fitted))
 }
 
 fn print(out: &mut impl Write, lines: &[Line], fitted: &Fitted) -> io::Result<()> {
@@ -166,5 +143,5 @@ fn print(out: &mut impl Write, lines: &[Line], fitted: &Fitted) -> io::Result<()
         column.set_cell_alignment(CellAlignment::Right);
     }
     writeln!(out, "{table}")?;
-    report::fit_words(fitted).iter().try_for_each(|line| writeln!(out, "{line}"))
+    report::fit_words(lines, fitted).iter().try_for_each(|line| writeln!(out, "{line}"))
 }

@@ -12,6 +12,7 @@ use super::{
     answer::answer,
     compare::RULED,
     logs::first_of,
+    numbers::{not_negative, positive, probability},
     picture::{PictureArgs, scene_for},
     sweeps::for_each_sweep,
 };
@@ -216,21 +217,4 @@ fn row(feature: &Feature) -> [String; 10] {
         format!("{:.4}", feature.probabilities.other),
         reason.unwrap_or_default(),
     ]
-}
-
-fn within(text: &str, least: f64, most: f64, what: &str) -> Result<f64, String> {
-    let value = text.parse::<f64>().ok().filter(|value| (least..=most).contains(value));
-    value.ok_or_else(|| format!("give {what}"))
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    within(text, f64::MIN_POSITIVE, 1e6, "a number greater than 0")
-}
-
-fn not_negative(text: &str) -> Result<f64, String> {
-    within(text, 0.0, 1e6, "a number, 0 or more")
-}
-
-fn probability(text: &str) -> Result<f64, String> {
-    within(text, 0.0, 1.0, "a number from 0 to 1")
 }

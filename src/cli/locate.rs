@@ -2,7 +2,6 @@
 
 use std::{
     io::{self, Write},
-    path::PathBuf,
     sync::Arc,
 };
 
@@ -10,24 +9,22 @@ use comfy_table::{CellAlignment, Table};
 use serde::Serialize;
 use uuid::Uuid;
 
-use super::{Failure, Outcome, compare::RULED, progress, what_if::InsteadArgs, worlds::Worlds};
+use super::{
+    Failure, Outcome, answer::answer, compare::RULED, numbers::within, progress,
+    what_if::InsteadArgs, worlds::SweepArgs,
+};
 use crate::inverse::{Atlas, Doubt, Mode, World, doubts, locate};
 
 /// Options of `sonard locate`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(super) struct Args {
-    /// Logs of sweeps; - for standard input
-    #[arg(required = true, value_name = "LOG")]
-    logs: Vec<PathBuf>,
-    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it, in place of the
-    /// log's
-    #[arg(long, value_name = "SCENE")]
-    scene: Option<PathBuf>,
+    #[command(flatten)]
+    sweeps: SweepArgs,
     #[command(flatten)]
     instead: InsteadArgs,
     /// Distance of the places that are tried first, metres
-    #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = spacing)]
+    #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = within(0.01..=2.0))]
     spacing_m: f64,
     /// JSON instead of text; one object a pose, most probable first
     #[arg(long)]
@@ -70,8 +67,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let what_if = args.instead.load()?;
     let mut known: Option<(Arc<World>, Atlas)> = None;
     let mut any = false;
-    let mut worlds = Worlds::new(args.scene.as_deref(), &what_if)?;
-    worlds.for_each_sweep(&args.logs, |log, _, sweep, world| {
+    args.sweeps.for_each(&what_if, |log, sweep, world| {
         if known.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, world)) {
             known = Some((Arc::clone(world), atlas(world, args.spacing_m)?));
         }
@@ -79,18 +75,9 @@ pub(super) fn run(args: &Args) -> Outcome {
         let modes = locate(world, atlas, &sweep).map_err(|error| refuse(&error))?;
         let doubts = doubts(world, atlas, &sweep, &modes);
         any = true;
-        let mut out = io::stdout().lock();
         let log = log.display().to_string();
-        let printed = if args.json {
-            let of = |mode| Answer { log: log.clone(), scan: sweep.scan, mode, doubts: &doubts };
-            modes.iter().map(of).try_for_each(|answer| {
-                serde_json::to_writer(&mut out, &answer)?;
-                writeln!(out)
-            })
-        } else {
-            print(&mut out, &log, sweep.scan, &modes, &doubts)
-        };
-        printed.or_else(|error| Failure::from_write("standard output", &error))
+        let of = |mode| Answer { log: log.clone(), scan: sweep.scan, mode, doubts: &doubts };
+        answer(args.json, modes.iter().map(of), |out| print(out, &log, sweep.scan, &modes, &doubts))
     })?;
     if any {
         return Ok(());
@@ -110,15 +97,6 @@ fn refuse(error: &dyn std::fmt::Display) -> Failure {
         error,
         "see `sonard scene check` for the scene, and give sensor and air that make sense",
     )
-}
-
-fn spacing(text: &str) -> Result<f64, String> {
-    let metres: f64 = text.parse().map_err(|_| "it is not a number".to_owned())?;
-    if (0.01..=2.0).contains(&metres) {
-        Ok(metres)
-    } else {
-        Err("it must be from 0.01 to 2".to_owned())
-    }
 }
 
 fn print(

@@ -7,7 +7,11 @@ use std::{
 
 use rand::RngExt as _;
 
-use super::{Failure, scene_file};
+use super::{
+    Failure,
+    numbers::{not_negative, probability},
+    scene_file,
+};
 use crate::{
     acoustics::{Air, Sensor, TofNoise},
     geometry::Pose,
@@ -164,14 +168,4 @@ impl MockWorldArgs {
         Air::new(temperature_c, believed.humidity_percent(), believed.pressure_kpa())
             .map_err(|error| Failure::input(error, "give --truth-temperature-c in degrees Celsius"))
     }
-}
-
-fn probability(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| "a probability, 0 to 1".to_owned())?;
-    if (0.0..=1.0).contains(&value) { Ok(value) } else { Err("a probability, 0 to 1".into()) }
-}
-
-fn not_negative(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| "a number, 0 or greater".to_owned())?;
-    if value >= 0.0 && value.is_finite() { Ok(value) } else { Err("a number, 0 or greater".into()) }
 }

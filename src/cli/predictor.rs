@@ -5,7 +5,10 @@ use std::{path::Path, sync::Arc};
 use crate::{
     acoustics::Air,
     array::{ArrayPoseError, RangerArray},
-    cli::{Failure, scene_file, what_if::WhatIf},
+    cli::{
+        Failure, scene_file,
+        what_if::{Supposer, WhatIf},
+    },
     geometry::Pose,
     model::{ArrayModel, EngineKind, ModelError, Options, Simulator, TooCostly},
     scan::{Ping, Provenance, ScanView, Session, SimRecord},
@@ -20,8 +23,7 @@ pub(super) struct Predictor<'a> {
     /// The scene to predict in, in place of what the log has.
     given: Option<&'a Arc<Scene>>,
     what_if: &'a WhatIf,
-    /// The session of the scan before, and what it would be.
-    supposed: Option<(Arc<Session>, Arc<Session>)>,
+    supposer: Supposer<'a>,
     /// The scene of the session of the scan before.
     logged: Option<(Arc<Session>, Option<Arc<Scene>>)>,
     /// An array's scans are many and short, and a session's share their model.
@@ -35,7 +37,8 @@ impl<'a> Predictor<'a> {
         given: Option<&'a Arc<Scene>>,
         what_if: &'a WhatIf,
     ) -> Self {
-        Self { log, given, what_if, supposed: None, logged: None, made: None }
+        let supposer = Supposer::new(what_if);
+        Self { log, given, what_if, supposer, logged: None, made: None }
     }
 
     /// Predicts a scan again in the scene given; without one, in the log's own scene what has no
@@ -45,7 +48,7 @@ impl<'a> Predictor<'a> {
     /// When the ranger can't stand in the scene where it stood, or the session's figures make no
     /// sense.
     pub(super) fn predict(&mut self, scan: &mut ScanView) -> Result<(), Failure> {
-        self.suppose(scan);
+        self.supposer.suppose(scan);
         let (Some(pose), Some(session)) = (scan.pose(), scan.session.clone()) else {
             if self.given.is_some() {
                 let (log, id) = (self.log.display(), scan.scan);
@@ -70,28 +73,6 @@ impl<'a> Predictor<'a> {
         predict_array(scan, &pose, &model)?;
         self.made = Some((session, model));
         Ok(())
-    }
-
-    /// Takes the scan for what it is supposed to be.
-    fn suppose(&mut self, scan: &mut ScanView) {
-        if self.what_if.is_nothing() {
-            return;
-        }
-        if let Some(session) = &scan.session {
-            let known = self.supposed.take().filter(|(of, _)| Arc::ptr_eq(of, session));
-            let (_, supposed) = self.supposed.insert(known.unwrap_or_else(|| {
-                let mut supposed = Session::clone(session);
-                self.what_if.change_session(&mut supposed);
-                (Arc::clone(session), Arc::new(supposed))
-            }));
-            for ping in &mut scan.pings {
-                self.what_if.change_ping(ping, supposed);
-            }
-            scan.session = Some(Arc::clone(supposed));
-        }
-        if let Some(start) = &mut scan.start {
-            self.what_if.change_start(start);
-        }
     }
 
     /// The scene that the log holds, for measured scans without predictions, and for all where something else is

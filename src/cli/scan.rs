@@ -17,6 +17,7 @@ use super::{
     array::NoArray,
     daemon::DaemonArgs,
     mock_world::{self, MockWorldArgs},
+    numbers::within,
     options::{AirArgs, SensorArgs},
     output::OutPath,
     place::{AzimuthArgs, PlaceArgs},
@@ -119,13 +120,13 @@ pub(super) struct Args {
 #[command(next_help_heading = "Motion and listening")]
 struct MotionArgs {
     /// Listening window after each firing, milliseconds, instead of the time to the maximum range
-    #[arg(long, value_name = "MS", value_parser = positive)]
+    #[arg(long, value_name = "MS", value_parser = within(0.0..=8_000.0))]
     window_ms: Option<f64>,
     /// Rest between the end of a step and firing, milliseconds
-    #[arg(long, value_name = "MS", default_value_t = 5.0, value_parser = positive)]
+    #[arg(long, value_name = "MS", default_value_t = 5.0, value_parser = within(0.0..=8_000.0))]
     settle_ms: f64,
     /// Least time from firing to firing, milliseconds, to protect the module
-    #[arg(long, value_name = "MS", default_value_t = 20.0, value_parser = positive)]
+    #[arg(long, value_name = "MS", default_value_t = 20.0, value_parser = within(0.0..=8_000.0))]
     min_interval_ms: f64,
     /// Echoes to record for each firing, at most
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=8))]
@@ -305,9 +306,4 @@ pub(super) fn scan_failure(error: ScanError) -> Failure {
 
 pub(super) fn device_failure(error: &DriveError) -> Failure {
     Failure::device(error, error.help())
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| "a number of milliseconds".to_owned())?;
-    if (0.0..=8_000.0).contains(&value) { Ok(value) } else { Err("0 to 8000 milliseconds".into()) }
 }

@@ -160,27 +160,9 @@ impl WhatIf {
         Pose { heading_deg: self.heading_deg.unwrap_or(pose.heading_deg), ..pose }
     }
 
-    /// Takes a whole scan for what it is supposed to be.
-    pub(super) fn change(&self, scan: &mut ScanView) {
-        if self.is_nothing() {
-            return;
-        }
-        if let Some(session) = &mut scan.session {
-            let mut supposed = Session::clone(session);
-            self.change_session(&mut supposed);
-            for ping in &mut scan.pings {
-                self.change_ping(ping, &supposed);
-            }
-            *session = Arc::new(supposed);
-        }
-        if let Some(start) = &mut scan.start {
-            self.change_start(start);
-        }
-    }
-
     /// Takes a reading for one of the supposed pose, and computes its range again for the supposed air of its
     /// session.
-    pub(super) fn change_ping(&self, ping: &mut Ping, session: &Session) {
+    fn change_ping(&self, ping: &mut Ping, session: &Session) {
         if self.pose.is_some() {
             ping.pose = None;
         }
@@ -189,6 +171,40 @@ impl WhatIf {
             && let Some(tof_us) = ping.tof_us
         {
             ping.range_m = Some(tof_us * 1e-6 * session.air.sound_speed_m_s / 2.0);
+        }
+    }
+}
+
+/// Takes scans for what they are supposed to be; those of a session get one supposed session.
+pub(super) struct Supposer<'a> {
+    what_if: &'a WhatIf,
+    /// The session of the scan before, and what it would be.
+    known: Option<(Arc<Session>, Arc<Session>)>,
+}
+
+impl<'a> Supposer<'a> {
+    pub(super) const fn new(what_if: &'a WhatIf) -> Self {
+        Self { what_if, known: None }
+    }
+
+    pub(super) fn suppose(&mut self, scan: &mut ScanView) {
+        if self.what_if.is_nothing() {
+            return;
+        }
+        if let Some(session) = &scan.session {
+            let known = self.known.take().filter(|(of, _)| Arc::ptr_eq(of, session));
+            let (_, supposed) = self.known.insert(known.unwrap_or_else(|| {
+                let mut supposed = Session::clone(session);
+                self.what_if.change_session(&mut supposed);
+                (Arc::clone(session), Arc::new(supposed))
+            }));
+            for ping in &mut scan.pings {
+                self.what_if.change_ping(ping, supposed);
+            }
+            scan.session = Some(Arc::clone(supposed));
+        }
+        if let Some(start) = &mut scan.start {
+            self.what_if.change_start(start);
         }
     }
 }

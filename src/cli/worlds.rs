@@ -5,65 +5,75 @@ use std::{
     sync::Arc,
 };
 
-use super::{Failure, logs::for_each_scan, predictor::conditions, scene_file, what_if::WhatIf};
+use super::{
+    Failure,
+    logs::for_each_scan,
+    predictor::conditions,
+    scene_file,
+    what_if::{Supposer, WhatIf},
+};
 use crate::{
     inverse::{Sweep, World},
     scan::{ScanView, Session},
     scene::Scene,
 };
 
-/// Finds the world of each scan: the scene given, or the log's own; the session's sensor, air and model, or what is
-/// supposed in their place.
-pub(super) struct Worlds<'a> {
-    given: Option<Arc<Scene>>,
-    what_if: &'a WhatIf,
-    /// Of the session of the scan before.
-    known: Option<(Arc<Session>, Arc<World>)>,
+/// Options of verbs that explain sweeps.
+#[derive(Debug, clap::Args)]
+pub(super) struct SweepArgs {
+    /// Logs of sweeps; - for standard input
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it, in place of the
+    /// log's
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<PathBuf>,
 }
 
-impl<'a> Worlds<'a> {
-    /// With a scene in place of those that logs hold.
+impl SweepArgs {
+    /// Hands over each sweep of the logs with its world; says which scans are none.
     ///
     /// # Errors
-    /// No such scene, or a fault in it.
-    pub(super) fn new(scene: Option<&Path>, what_if: &'a WhatIf) -> Result<Self, Failure> {
-        let given = scene.map(scene_file::load).transpose()?.map(Arc::new);
-        Ok(Self { given, what_if, known: None })
-    }
-
-    /// Hands over each sweep of some logs with its world; says which scans are none.
-    ///
-    /// # Errors
-    /// A log that can't be read, a scene that is not known, or what `take` refuses.
-    pub(super) fn for_each_sweep(
-        &mut self,
-        logs: &[PathBuf],
-        mut take: impl FnMut(&Path, &ScanView, Sweep, &Arc<World>) -> Result<(), Failure>,
+    /// A log or a scene that can't be read, a scene that is not known, or what `take` refuses.
+    pub(super) fn for_each(
+        &self,
+        what_if: &WhatIf,
+        mut take: impl FnMut(&Path, Sweep, &Arc<World>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        for log in logs {
+        let given = self.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
+        let mut worlds = Worlds { given, known: None };
+        let mut supposer = Supposer::new(what_if);
+        for log in &self.logs {
             for_each_scan(log, |mut scan| {
-                self.what_if.change(&mut scan);
-                let sweep = match Sweep::of(&scan) {
-                    Ok(sweep) => sweep,
+                supposer.suppose(&mut scan);
+                match Sweep::of(&scan) {
+                    Ok(sweep) => take(log, sweep, &worlds.world(log, &scan)?),
                     Err(error) => {
                         anstream::eprintln!("warning: {}: {error}; it is left out", log.display());
-                        return Ok(());
+                        Ok(())
                     }
-                };
-                let world = self.world(log, &scan)?;
-                take(log, &scan, sweep, &world)
+                }
             })?;
         }
         Ok(())
     }
+}
 
+/// Finds the world of each scan: the scene given, or the log's own; the session's sensor, air and model.
+struct Worlds {
+    given: Option<Arc<Scene>>,
+    /// Of the session of the scan before.
+    known: Option<(Arc<Session>, Arc<World>)>,
+}
+
+impl Worlds {
     fn world(&mut self, log: &Path, scan: &ScanView) -> Result<Arc<World>, Failure> {
         // A sweep has its session.
         let Some(session) = &scan.session else {
             return Err(Failure::input("a scan lacks its session", "give a whole log"));
         };
         if let Some((of, world)) = &self.known
-            && **of == **session
+            && Arc::ptr_eq(of, session)
         {
             return Ok(Arc::clone(world));
         }

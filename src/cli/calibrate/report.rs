@@ -92,7 +92,7 @@ fn value(world: &World, sweeps: &[Sweep], parameter: &Parameter, by: f64) -> f64
         Parameter::Gear => world.gear * (1.0 + by),
         Parameter::Ahead => mounting.ahead_m + by,
         Parameter::Left => mounting.left_m + by,
-        Parameter::Height => mounting.z_m.unwrap_or(0.0) + by,
+        Parameter::Height => world.sensor_z_m().map_or(by, |z_m| z_m + by),
         Parameter::SoundSpeed => world.air.sound_speed_m_s() * (1.0 + by),
         Parameter::Delay => world.delay_m + by,
         Parameter::Threshold => 20.0 * world.sensor.threshold.log10() + by,
@@ -105,7 +105,7 @@ fn value(world: &World, sweeps: &[Sweep], parameter: &Parameter, by: f64) -> f64
 }
 
 /// How well it fits, in sentences.
-pub(super) fn fit_words(fitted: &Fitted) -> Vec<String> {
+pub(super) fn fit_words(lines: &[Line], fitted: &Fitted) -> Vec<String> {
     let errors = &fitted.errors;
     let mut said = vec![format!(
         "{} readings: {:.0} % explained, ranges within {:.1} mm (standard deviation), strengths within {:.1} dB",
@@ -122,12 +122,13 @@ pub(super) fn fit_words(fitted: &Fitted) -> Vec<String> {
         );
     }
     for (one, other, correlation) in strongest(fitted) {
+        let [one, other] = [&lines[one], &lines[other]].map(Line::title);
         said.push(format!("hardly told apart: {one} and {other} (correlation {correlation:.2})"));
     }
     said
 }
 
-/// Pairs of parameters by number that can hardly be told apart.
+/// Pairs of parameters, by their place in the list, that can hardly be told apart.
 fn strongest(fitted: &Fitted) -> Vec<(usize, usize, f64)> {
     let sigma = |at: usize| fitted.covariance[(at, at)].sqrt();
     let mut found = Vec::new();
@@ -209,7 +210,7 @@ fn json(value: &impl Serialize) -> String {
 
 fn report(lines: &[Line], fitted: &Fitted) -> String {
     let mut text = String::from("# Calibration\n\n");
-    for line in fit_words(fitted) {
+    for line in fit_words(lines, fitted) {
         let _ = writeln!(text, "{line}\n");
     }
     text.push_str(
