@@ -104,3 +104,24 @@ fn what_can_not_be_fitted_is_said() {
         assert!(said.contains(part) && !said.contains("panicked"), "{arguments:?}: {said}");
     }
 }
+
+#[test]
+fn a_height_is_told_from_where_it_usually_is_and_what_goes_together_by_name() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let room = r#"{"name": "low room", "materials": {"plaster": {"reflectance": 0.95}},
+        "walls": [{"id": "w", "polyline": [[0, 0], [3, 0], [3, 2], [0, 2]], "closed": true, "material": "plaster"}],
+        "floor_z_m": 0.0, "ceiling_z_m": 1.6, "poses": {"here": {"x_m": 1.0, "y_m": 0.8, "heading_deg": 20}}}"#;
+    let scene = folder.path().join("room.json");
+    fs::write(&scene, room).expect("room on the disk");
+    let log = sweep(folder.path(), scene.to_str().expect("a plain path"), "here", &[]);
+    let fit = ["calibrate", &log, "--fit", "pose,height,air,delay"];
+    let found = lines(&[&fit[..], &["--json"]].concat());
+    let height = found.iter().find(|line| line["name"] == "height_m").expect("a height");
+    // Half a metre above the floor, if nothing else is said.
+    assert_eq!(number(height, "prior"), 0.5);
+    assert!((number(height, "value") - 0.5).abs() < 2.0 * number(height, "sigma"), "{height}");
+    let output = run(&fit);
+    let said = String::from_utf8(output.stdout).expect("text");
+    let mut together = said.lines().filter(|line| line.starts_with("hardly told apart: y_m of "));
+    assert!(together.any(|line| line.contains(" and delay_m (correlation")), "{said}");
+}
