@@ -109,6 +109,8 @@ impl Air {
 
 impl From<acoustics::Air> for Air {
     fn from(air: acoustics::Air) -> Self {
-        Self { air, given_m_s: None }
+        let (t, h, p) = (air.temperature_c(), air.humidity_percent(), air.pressure_kpa());
+        let computed = acoustics::Air::new(t, h, p).is_ok_and(|computed| computed == air);
+        Self { air, given_m_s: (!computed).then(|| air.sound_speed_m_s()) }
     }
 }

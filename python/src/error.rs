@@ -42,6 +42,12 @@ create_exception!(
 );
 create_exception!(
     sonard,
+    LogError,
+    SonardError,
+    "A log that can't be read, or that lacks what is asked of it."
+);
+create_exception!(
+    sonard,
     TooManyPathsError,
     SonardError,
     "More echo paths than can be found within bounds of work and memory."
@@ -120,12 +126,18 @@ pub(crate) fn too_costly(py: Python<'_>, error: &model::TooCostly) -> PyErr {
 
 /// A file that can't be read, as `open` would say it.
 pub(crate) fn unreadable(py: Python<'_>, path: PathBuf, error: &io::Error) -> PyErr {
-    let Some(number) = error.raw_os_error() else {
-        return PyOSError::new_err(format!("{}: {error}", path.display()));
-    };
-    let words = py.import("os").and_then(|os| os.call_method1("strerror", (number,)));
-    match words {
-        Ok(words) => PyOSError::new_err((number, words.unbind(), path.into_os_string())),
-        Err(error) => error,
+    match number_and_words(py, error) {
+        Some((number, words)) => PyOSError::new_err((number, words, path.into_os_string())),
+        None => PyOSError::new_err(format!("{}: {error}", path.display())),
     }
+}
+
+fn number_and_words(py: Python<'_>, error: &io::Error) -> Option<(i32, String)> {
+    let number = error.raw_os_error().or_else(|| match error.kind() {
+        // The library says this one by itself.
+        io::ErrorKind::IsADirectory => py.import("errno").ok()?.getattr("EISDIR").ok()?.extract().ok(),
+        _ => None,
+    })?;
+    let words = py.import("os").ok()?.call_method1("strerror", (number,)).ok()?;
+    Some((number, words.extract().ok()?))
 }

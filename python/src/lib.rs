@@ -6,10 +6,13 @@ mod air;
 mod arrays;
 mod error;
 mod json;
+mod log;
 mod model;
 mod path;
 mod pool;
+mod readings;
 mod scene;
+mod sense;
 mod sensor;
 mod status;
 mod trace;
@@ -21,11 +24,13 @@ mod _sonard {
     use crate::{
         air::Air,
         error::{
-            AirError, OptionError, PoseError, SceneError, SensorError, SonardError,
+            AirError, LogError, OptionError, PoseError, SceneError, SensorError, SonardError,
             TooManyPathsError,
         },
+        log::{Log, Scan, read_log},
         model::{Model, predict::seconds_of_predict_many},
         scene::Scene,
+        sense::{Locator, compare, find_features, make_map},
         sensor::Sensor,
     };
 
@@ -33,6 +38,7 @@ mod _sonard {
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use pyo3::types::PyModuleMethods as _;
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-        module.add("READING", crate::arrays::reading_dtype(module.py())?)
+        module.add("READING", crate::arrays::reading_dtype(module.py())?)?;
+        module.add("LOGGED", crate::log::logged_dtype(module.py())?)
     }
 }

@@ -10,6 +10,7 @@ use pyo3::{
     types::{PyDict, PyTuple},
 };
 use serde::de::DeserializeOwned;
+use sonard::inverse::World;
 use sonard_model::{
     acoustics,
     geometry::Pose,
@@ -361,6 +362,26 @@ impl Model {
 }
 
 impl Model {
+    pub(crate) fn of(
+        py: Python<'_>,
+        scene: Py<Scene>,
+        sensor: Py<Sensor>,
+        air: Air,
+        options: Options,
+    ) -> PyResult<Self> {
+        let (of, kind) = (&scene.get().scene, &sensor.get().sensor);
+        let parts = Parts { scene: of, sensor: kind, air: air.air, options };
+        let simulator =
+            py.detach(|| parts.simulator()).map_err(|error| error::model(py, &error))?;
+        Ok(Self { scene, sensor, air, options, simulator: OfProcess::new(simulator) })
+    }
+
+    /// What readings are explained by.
+    pub(crate) fn world(&self) -> World {
+        let Parts { scene, sensor, air, options } = self.parts();
+        World::new(scene.clone(), sensor.clone(), air, options)
+    }
+
     fn parts(&self) -> Parts<'_> {
         Parts {
             scene: &self.scene.get().scene,

@@ -37,7 +37,7 @@ pub(crate) struct Scene {
 }
 
 /// Pose as Python has it: x, y (metres) and heading (degrees).
-type PoseTuple = (f64, f64, f64);
+pub(crate) type PoseTuple = (f64, f64, f64);
 
 #[pymethods]
 impl Scene {
@@ -278,7 +278,7 @@ fn names() -> Vec<String> {
     shipped::names().map(str::to_owned).collect()
 }
 
-const fn tuple_of(pose: &Pose) -> PoseTuple {
+pub(crate) const fn tuple_of(pose: &Pose) -> PoseTuple {
     (pose.x_m, pose.y_m, pose.heading_deg)
 }
 

@@ -19,3 +19,10 @@ pub(crate) const fn code(status: PingStatus) -> u8 {
 pub(crate) fn member<'py>(py: Python<'py>, status: PingStatus) -> PyResult<Bound<'py, PyAny>> {
     py.import("sonard._status")?.getattr("Status")?.call1((code(status),))
 }
+
+/// The status of a number, if it is of one.
+pub(crate) fn of_code(number: u8) -> Option<PingStatus> {
+    use PingStatus::{Echo, LinkLost, MinRange, ModuleFault, NoEcho, StepDoubtful};
+    let all = [Echo, NoEcho, MinRange, LinkLost, StepDoubtful, ModuleFault];
+    all.into_iter().find(|status| code(*status) == number)
+}

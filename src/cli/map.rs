@@ -16,21 +16,16 @@ use super::{
 use crate::{
     geometry::DVec2,
     interpret::{
-        Extents, Heard, Sweep,
-        grid::{BeamModel, GaussianBeam, Grid, GridShape, PhysicalBeam, Trust},
-        prediction::{Assessment, FeaturePrediction, PredictionSettings},
+        Extents, Sweep,
+        grid::Grid,
+        mapping::{Mapper, Mapping},
+        prediction::Assessment,
     },
     plot::{MapView, badge_of, draw_map},
     scan::{Provenance, Session},
     scene::Scene,
     store::logged_scene,
 };
-
-/// Without a word on it, ranges beyond this are not mapped, metres.
-pub(super) const MAX_RANGE_M: f64 = 5.0;
-
-/// Around what was seen, metres.
-const MARGIN_M: f64 = 0.5;
 
 /// Options of `sonard map`.
 #[derive(Debug, clap::Args)]
@@ -49,7 +44,7 @@ pub(super) struct Args {
     #[arg(long, value_enum, default_value_t = ModelName::Gaussian)]
     model: ModelName,
     /// Side of a cell, metres
-    #[arg(long, value_name = "M", default_value_t = 0.05)]
+    #[arg(long, value_name = "M", default_value_t = Mapping::default().resolution_m)]
     resolution: f64,
     /// Take ranges beyond this as silence, metres [default: the sensor's, at most 5]
     #[arg(long, value_name = "M")]
@@ -64,13 +59,13 @@ pub(super) struct Args {
     #[arg(long, value_name = "DEG")]
     beam_deg: Option<f64>,
     /// Exponent of the confidence with the distance of the feature
-    #[arg(long, value_name = "E", default_value_t = 2.0)]
+    #[arg(long, value_name = "E", default_value_t = Mapping::default().exponent)]
     exponent: f64,
     /// How far walls are taken to go on beyond what was seen of them, metres
-    #[arg(long, value_name = "M", default_value_t = EXTEND_M)]
+    #[arg(long, value_name = "M", default_value_t = Mapping::default().extend_m)]
     extend: f64,
     /// Leave readings of less confidence out; 0.5 is full confidence
-    #[arg(long, value_name = "C", default_value_t = LEAST_CONFIDENCE)]
+    #[arg(long, value_name = "C", default_value_t = Mapping::default().least_confidence)]
     least_confidence: f64,
     /// Count each scan so many times [default: 5 over the number of scans, rounded up: few scans
     /// would leave every cell undecided; 1 with --onto]
@@ -89,11 +84,6 @@ pub(super) struct Args {
     #[command(flatten)]
     overwrite: Overwrite,
 }
-
-/// What did best on the made-up rooms of `sonard benchmark map`.
-pub(super) const EXTEND_M: f64 = 2.0;
-/// The same.
-pub(super) const LEAST_CONFIDENCE: f64 = 0.48;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Switch {
@@ -145,8 +135,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let extents = Extents::of_session(&session).map_err(|error| {
         Failure::input(format!("session: {error}"), "correct the session's record in the log")
     })?;
-    let sensor_m = extents.max_range_m.min(MAX_RANGE_M);
-    let max_range_m = args.silent_beyond.unwrap_or(sensor_m);
+    let mapping = args.mapping();
+    let max_range_m = mapping.max_range_m(&extents);
     if !(max_range_m.is_finite() && max_range_m > 0.0) {
         return Err(refuse(&format!(
             "--silent-beyond {max_range_m}: give a length greater than 0"
@@ -154,9 +144,13 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let begun = match &args.onto {
         Some(map) => map_file::read(map)?,
-        None => Grid::new(shape(args, &taken, max_range_m)?),
+        None => {
+            Grid::new(mapping.shape(taken.iter().map(|(_, sweep)| sweep), max_range_m).map_err(
+                |error| Failure::input(error, "choose another --resolution or --region"),
+            )?)
+        }
     };
-    let (model, prediction) = models(args, extents, max_range_m, session.array.is_some());
+    let mapper = Mapper::new(&mapping, begun, extents, session.array.is_some(), taken.len());
     let scene = match &args.scene {
         Some(given) => Some(scene_file::load(given)?),
         // Walls under the map are a help: a log that lacks them is mapped as well.
@@ -164,7 +158,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     };
     make_folder(&args.out)?;
 
-    let mapped = map(args, &taken, begun, &model, prediction)?;
+    let mapped = map(args, &taken, mapper)?;
     let way: Vec<DVec2> = taken.iter().map(|(_, sweep)| sweep.pose.position()).collect();
     let summary = mapped.summary(args, &taken);
     let png = draw_map(&MapView {
@@ -189,19 +183,22 @@ fn title(session: &Session, scene: Option<&Scene>) -> String {
 }
 
 impl Args {
-    /// How often each of so many scans counts. A reading's odds are set for maps of many scans: one
-    /// scan brings a cell before it from 0.5 to about 0.41, four to 0.19, which map_server calls free.
-    fn evidence(&self, scans: usize) -> u8 {
-        let by_default = match self.onto {
-            Some(_) => 1,
-            None => ENOUGH_SCANS.div_ceil(scans.clamp(1, ENOUGH_SCANS)) as u8,
-        };
-        self.evidence.unwrap_or(by_default)
+    fn mapping(&self) -> Mapping {
+        Mapping {
+            resolution_m: self.resolution,
+            region: self.region.map(|[x0, y0, x1, y1]| [DVec2::new(x0, y0), DVec2::new(x1, y1)]),
+            silent_beyond_m: self.silent_beyond,
+            beam_deg: self.beam_deg,
+            exponent: self.exponent,
+            extend_m: self.extend,
+            least_confidence: self.least_confidence,
+            // What is there already has its scans.
+            evidence: self.evidence.or_else(|| self.onto.is_some().then_some(1)),
+            predicts_features: self.feature_prediction == Switch::On,
+            is_physical: self.model == ModelName::Physical,
+        }
     }
 }
-
-/// From so many scans on each counts once.
-const ENOUGH_SCANS: usize = 5;
 
 /// The scans that can be mapped.
 struct Taken {
@@ -234,58 +231,6 @@ fn sweeps(args: &Args) -> Result<Taken, Failure> {
     Ok(Taken { session, provenance, sweeps })
 }
 
-/// The region asked for, else around poses and echoes within range.
-fn shape(
-    args: &Args,
-    taken: &[(uuid::Uuid, Sweep)],
-    max_range_m: f64,
-) -> Result<GridShape, Failure> {
-    let (low, high) = match args.region {
-        Some([x0, y0, x1, y1]) => (DVec2::new(x0, y0), DVec2::new(x1, y1)),
-        None => {
-            let points = taken.iter().flat_map(|(_, sweep)| {
-                let echoes = sweep.beams.iter().filter_map(|beam| match beam.heard {
-                    Heard::Echo(m) if m <= max_range_m => Some(sweep.point(beam, m)),
-                    _ => None,
-                });
-                echoes.chain([sweep.pose.position()])
-            });
-            let corners = points.map(|p| (p, p)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-            let (low, high) = corners.unwrap_or((DVec2::ZERO, DVec2::ONE));
-            // Corners on whole cells, so that maps of one place lie on each other.
-            let cell = args.resolution;
-            let low = ((low - MARGIN_M) / cell).floor() * cell;
-            (low, ((high + MARGIN_M) / cell).ceil() * cell)
-        }
-    };
-    GridShape::covering(low, high, args.resolution)
-        .map_err(|error| Failure::input(error, "choose another --resolution or --region"))
-}
-
-fn models(
-    args: &Args,
-    extents: Extents,
-    max_range_m: f64,
-    of_array: bool,
-) -> (BeamModel, PredictionSettings) {
-    let ring = PredictionSettings::ring(max_range_m);
-    let of_sensor = || if of_array { ring.beam_deg } else { extents.plane_corner_deg(1.0, 1.0) };
-    let beam_deg = args.beam_deg.unwrap_or_else(of_sensor);
-    let prediction = match of_array {
-        true => PredictionSettings { beam_deg, omega_deg: beam_deg, ..ring },
-        false => PredictionSettings::stepper(beam_deg, max_range_m),
-    };
-    let (exponent, extend_m) = (args.exponent, args.extend);
-    let prediction = PredictionSettings { exponent, extend_m, ..prediction };
-    let model = match args.model {
-        ModelName::Gaussian => BeamModel::Gaussian(GaussianBeam::new(beam_deg, max_range_m)),
-        ModelName::Physical => {
-            BeamModel::Physical(Box::new(PhysicalBeam::new(extents, max_range_m)))
-        }
-    };
-    (model, prediction)
-}
-
 /// A finished map and what was noticed on the way.
 struct Mapped {
     grid: Grid,
@@ -295,33 +240,16 @@ struct Mapped {
     confidence: f64,
 }
 
-fn map(
-    args: &Args,
-    taken: &[(uuid::Uuid, Sweep)],
-    grid: Grid,
-    model: &BeamModel,
-    prediction: PredictionSettings,
-) -> Result<Mapped, Failure> {
-    let trust = Trust { least_confidence: args.least_confidence, keep_clear: true };
-    let mut predictor = FeaturePrediction::new(prediction);
+fn map(args: &Args, taken: &[(uuid::Uuid, Sweep)], mut mapper: Mapper) -> Result<Mapped, Failure> {
+    let (mut readings, mut left_out, mut confidence) = (0, 0, 0.0);
     let mut confidences = Vec::new();
-    let shape = *grid.shape();
-    let mut mapped = Mapped { grid, readings: 0, left_out: 0, outside: 0, confidence: 0.0 };
     let bar = progress::bar(taken.len() as u64, "scans");
     for (scan, sweep) in taken {
-        let worths = match args.feature_prediction {
-            Switch::On => Some(predictor.assess(sweep)),
-            Switch::Off => None,
-        };
-        let mut left_out = 0;
-        for _ in 0..args.evidence(taken.len()) {
-            left_out = mapped.grid.add(sweep, worths.as_deref(), model, &trust);
-        }
-        mapped.left_out += left_out;
-        mapped.readings += sweep.beams.len();
-        mapped.outside += usize::from(shape.index_at(sweep.pose.position()).is_none());
-        for (beam, worth) in sweep.beams.iter().zip(worths.unwrap_or_default()) {
-            mapped.confidence += worth.confidence;
+        let added = mapper.add(sweep);
+        left_out += added.left_out;
+        readings += sweep.beams.len();
+        for (beam, worth) in sweep.beams.iter().zip(added.assessments.unwrap_or_default()) {
+            confidence += worth.confidence;
             if args.confidences.is_some() {
                 write_confidence(&mut confidences, *scan, beam.index, &worth);
             }
@@ -332,7 +260,10 @@ fn map(
     if let Some(path) = &args.confidences {
         args.overwrite.save(path, CONFIDENCES, &confidences)?;
     }
-    Ok(mapped)
+    let grid = mapper.finish();
+    let is_outside = |sweep: &Sweep| grid.shape().index_at(sweep.pose.position()).is_none();
+    let outside = taken.iter().filter(|(_, sweep)| is_outside(sweep)).count();
+    Ok(Mapped { grid, readings, left_out, outside, confidence })
 }
 
 const CONFIDENCES: Product = Product::List(&["scan", "index", "confidence", "clear_m"]);

@@ -19,6 +19,7 @@ mod extent;
 mod feature;
 pub mod grid;
 pub mod lines;
+pub mod mapping;
 mod next;
 pub mod prediction;
 mod region;

@@ -13,12 +13,17 @@ All lengths are metres, angles degrees counter-clockwise, times microseconds, as
 """
 
 from ._sonard import (
+    LOGGED,
     READING,
     Air,
     AirError,
+    Locator,
+    Log,
+    LogError,
     Model,
     OptionError,
     PoseError,
+    Scan,
     Scene,
     SceneError,
     Sensor,
@@ -26,20 +31,31 @@ from ._sonard import (
     SonardError,
     TooManyPathsError,
     __version__,
+    compare,
+    interpret,
+    read_log,
 )
-from ._results import Path, Peak, Reading, Trace
+from ._sonard import map as map
+from ._results import Map, Path, Peak, Reading, Trace
 from ._status import Status
 
+# Not `map`, which a star import would put in place of Python's.
 __all__ = [
+    "LOGGED",
     "READING",
     "Air",
     "AirError",
+    "Locator",
+    "Log",
+    "LogError",
+    "Map",
     "Model",
     "OptionError",
     "Path",
     "Peak",
     "PoseError",
     "Reading",
+    "Scan",
     "Scene",
     "SceneError",
     "Sensor",
@@ -49,4 +65,7 @@ __all__ = [
     "TooManyPathsError",
     "Trace",
     "__version__",
+    "compare",
+    "interpret",
+    "read_log",
 ]

@@ -107,3 +107,25 @@ class Trace:
     def __repr__(self) -> str:
         until_us = self.t_us[-1] if self.t_us.size else 0.0
         return f"<Trace of {until_us:.0f} us: {len(self.peaks)} arrivals, ECHO rises {self.echoes_us.size} times>"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Map:
+    """An occupancy grid."""
+
+    occupancy: NDArray[np.float64]
+    """Probability that a cell is occupied, 0.5 where nothing is known: shape (rows, columns), from the lower left."""
+    origin_m: tuple[float, float]
+    """Lower left corner of the first cell, x and y in metres."""
+    resolution_m: float
+    """Side of a cell, metres."""
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom and top, metres: what ``matplotlib``'s ``imshow(..., origin="lower")`` takes."""
+        (x, y), (rows, columns) = self.origin_m, self.occupancy.shape
+        return x, x + columns * self.resolution_m, y, y + rows * self.resolution_m
+
+    def __repr__(self) -> str:
+        rows, columns = self.occupancy.shape
+        return f"<Map of {columns} x {rows} cells of {self.resolution_m} m at {self.origin_m}>"

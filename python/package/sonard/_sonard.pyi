@@ -1,18 +1,25 @@
+import pathlib
+from collections.abc import Iterable, Iterator
 from os import PathLike
 from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._results import Path, Reading, Trace
+from ._results import Map, Path, Reading, Trace
 
 __all__ = [
+    "LOGGED",
     "READING",
     "Air",
     "AirError",
+    "Locator",
+    "Log",
+    "LogError",
     "Model",
     "OptionError",
     "PoseError",
+    "Scan",
     "Scene",
     "SceneError",
     "Sensor",
@@ -21,10 +28,15 @@ __all__ = [
     "TooManyPathsError",
     "__version__",
     "_seconds_of_predict_many",
+    "compare",
+    "interpret",
+    "map",
+    "read_log",
 ]
 
 __version__: str
 READING: np.dtype[np.void]
+LOGGED: np.dtype[np.void]
 
 class SonardError(ValueError):
     help: str
@@ -40,6 +52,7 @@ class PoseError(SonardError):
 class SensorError(SonardError): ...
 class AirError(SonardError): ...
 class OptionError(SonardError): ...
+class LogError(SonardError): ...
 class TooManyPathsError(SonardError): ...
 
 @final
@@ -221,3 +234,66 @@ class Model:
     def __getnewargs_ex__(self) -> tuple[tuple[Scene, Sensor, Air, str], dict[str, Any]]: ...
 
 def _seconds_of_predict_many(model: Model, poses: ArrayLike, threads: int | None = None) -> float: ...
+
+@final
+class Log:
+    @property
+    def path(self) -> pathlib.Path: ...
+    @property
+    def damaged(self) -> list[tuple[int, str]]: ...
+    @property
+    def readings(self) -> NDArray[np.void]: ...
+    def __len__(self) -> int: ...
+    def __iter__(self) -> Iterator[Scan]: ...
+    def __getitem__(self, index: int, /) -> Scan: ...
+
+@final
+class Scan:
+    @property
+    def id(self) -> str: ...
+    @property
+    def pose(self) -> tuple[float, float, float] | None: ...
+    @property
+    def provenance(self) -> str | None: ...
+    @property
+    def session(self) -> dict[str, Any] | None: ...
+    @property
+    def start(self) -> dict[str, Any] | None: ...
+    @property
+    def end(self) -> dict[str, Any] | None: ...
+    @property
+    def events(self) -> list[dict[str, Any]]: ...
+    @property
+    def readings(self) -> NDArray[np.void]: ...
+    @property
+    def sensor(self) -> Sensor: ...
+    @property
+    def air(self) -> Air: ...
+    @property
+    def scene(self) -> Scene | None: ...
+    def model(self, scene: Scene | str | None = None) -> Model: ...
+
+@final
+class Locator:
+    def __new__(cls, model: Model, spacing_m: float = 0.1) -> Locator: ...
+    def locate(self, readings: Scan | ArrayLike, azimuths_deg: ArrayLike | None = None) -> list[dict[str, float]]: ...
+    def __getnewargs__(self) -> tuple[Model, float]: ...
+
+def read_log(path: str | PathLike[str]) -> Log: ...
+def compare(scans: Log | Scan | Iterable[Log | Scan]) -> dict[str, Any]: ...
+def interpret(
+    scans: Log | Scan | Iterable[Log | Scan],
+    *,
+    min_confidence: float = 0.9,
+    depth_tolerance_m: float = 0.01,
+) -> list[dict[str, Any]]: ...
+def map(
+    scans: Log | Scan | Iterable[Log | Scan],
+    *,
+    resolution_m: float = 0.05,
+    region: tuple[float, float, float, float] | None = None,
+    silent_beyond_m: float | None = None,
+    feature_prediction: bool = True,
+    extend_m: float = 2.0,
+    least_confidence: float = 0.48,
+) -> Map: ...

@@ -70,7 +70,7 @@ pub(super) fn predict<'py>(
 }
 
 /// The azimuths of a scan that was asked nothing else.
-fn full_turn() -> Vec<f64> {
+pub(crate) fn full_turn() -> Vec<f64> {
     let plan = ScanPlan::default();
     (0..plan.stops()).map(|stop| plan.azimuth_deg(stop)).collect()
 }

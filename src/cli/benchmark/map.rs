@@ -21,7 +21,6 @@ use crate::{
         Failure, Outcome,
         answer::answer,
         compare::RULED,
-        map::{EXTEND_M, LEAST_CONFIDENCE, MAX_RANGE_M},
         output::{OutPath, Overwrite, Product, make_folder},
         progress,
     },
@@ -29,6 +28,7 @@ use crate::{
     interpret::{
         Extents,
         grid::{MapScore, Trust},
+        mapping::{MAX_RANGE_M, Mapping},
         trial::{Arrangement, Course, Trial, TrialSettings, random_room},
     },
     model::{Options, PathOptions, Simulator},
@@ -60,13 +60,13 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "E", default_value_t = 2.0)]
     exponent: f64,
     /// How far walls are taken to go on beyond what was seen of them, metres
-    #[arg(long, value_name = "M", default_value_t = EXTEND_M)]
+    #[arg(long, value_name = "M", default_value_t = Mapping::default().extend_m)]
     extend: f64,
     /// Weigh whole readings, also what they say of the space before the feature, as the paper does
     #[arg(long)]
     whole_readings: bool,
     /// Leave readings of less confidence out; 0.5 is full confidence
-    #[arg(long, value_name = "C", default_value_t = LEAST_CONFIDENCE)]
+    #[arg(long, value_name = "C", default_value_t = Mapping::default().least_confidence)]
     least_confidence: f64,
     /// Detect one sound at a time and time it by its path alone
     #[arg(long)]

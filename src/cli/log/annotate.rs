@@ -6,10 +6,7 @@ use std::{
     sync::Arc,
 };
 
-use super::super::{
-    map::{EXTEND_M, MAX_RANGE_M},
-    output::{OutPath, Overwrite},
-};
+use super::super::output::{OutPath, Overwrite};
 use super::{
     Failure, Outcome,
     rewrite::{Waiting, rewrite},
@@ -18,6 +15,7 @@ use crate::{
     geometry::wrap_360,
     interpret::{
         Extents, Sweep,
+        mapping::{MAX_RANGE_M, Mapping},
         prediction::{FeaturePrediction, PredictionSettings},
     },
     scan::{Ping, PingStatus, ScanView, Session},
@@ -41,7 +39,7 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "E", default_value_t = 2.0)]
     exponent: f64,
     /// How far walls are taken to go on beyond what was seen of them, metres
-    #[arg(long, value_name = "M", default_value_t = EXTEND_M)]
+    #[arg(long, value_name = "M", default_value_t = Mapping::default().extend_m)]
     extend: f64,
 }
 

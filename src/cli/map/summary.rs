@@ -40,7 +40,7 @@ impl Mapped {
         Summary {
             map: args.out.join("map.yaml"),
             scans: taken.len(),
-            evidence: args.evidence(taken.len()),
+            evidence: args.mapping().evidence(taken.len()),
             readings: self.readings,
             feature_prediction: args.feature_prediction == Switch::On,
             mean_confidence: predicted.then(|| self.confidence / self.readings as f64),

@@ -1,0 +1,100 @@
+//! The readings of logs as an array.
+
+use numpy::PyArray1;
+use pyo3::{prelude::*, types::PyDict};
+use sonard::scan::{Ping, PingStatus, ScanView};
+
+use crate::status;
+
+/// Numbers of a logged reading, behind its scan, index and statuses.
+const NUMBERS: [&str; 14] = [
+    "azimuth_deg",
+    "x_m",
+    "y_m",
+    "heading_deg",
+    "range_m",
+    "tof_us",
+    "amplitude",
+    "margin_db",
+    "sim_range_m",
+    "sim_amplitude",
+    "sim_margin_db",
+    "residual_m",
+    "confidence",
+    "time",
+];
+
+/// Words of eight bytes that a logged reading takes.
+const WORDS: usize = 2 + NUMBERS.len();
+
+/// The status of a prediction that is not there.
+const NO_PREDICTION: u8 = 255;
+
+/// The type of a logged reading in an array.
+pub(crate) fn logged_dtype(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+    let heads =
+        [("scan", "u4", 0), ("index", "u4", 4), ("status", "u1", 8), ("sim_status", "u1", 9)];
+    let format = |name| if name == "time" { "M8[ns]" } else { "f8" };
+    let numbers = NUMBERS.iter().enumerate().map(|(at, name)| (*name, format(*name), 8 * (at + 2)));
+    let all: Vec<(&str, &str, usize)> = heads.into_iter().chain(numbers).collect();
+    let layout = PyDict::new(py);
+    layout.set_item("names", all.iter().map(|field| field.0).collect::<Vec<_>>())?;
+    layout.set_item("formats", all.iter().map(|field| field.1).collect::<Vec<_>>())?;
+    layout.set_item("offsets", all.iter().map(|field| field.2).collect::<Vec<_>>())?;
+    layout.set_item("itemsize", 8 * WORDS)?;
+    py.import("numpy")?.call_method1("dtype", (layout,))
+}
+
+/// The readings of some scans, each with its place in the log.
+pub(crate) fn shaped_readings<'a, 'py>(
+    py: Python<'py>,
+    scans: impl IntoIterator<Item = (usize, &'a ScanView)>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let mut words = Vec::new();
+    for (at, scan) in scans {
+        scan.pings.iter().for_each(|ping| words.extend(words_of(at, scan, ping)));
+    }
+    PyArray1::from_vec(py, words).call_method1("view", (logged_dtype(py)?,))
+}
+
+fn words_of(at: usize, scan: &ScanView, ping: &Ping) -> [f64; WORDS] {
+    let mut head = [0; 8];
+    head[..4].copy_from_slice(&(at as u32).to_ne_bytes());
+    head[4..].copy_from_slice(&ping.index.to_ne_bytes());
+    let sim = ping.sim.as_ref();
+    let mut statuses = [0; 8];
+    statuses[0] = status::code(ping.status);
+    statuses[1] = sim.map_or(NO_PREDICTION, |sim| status::code(sim.status));
+    let pose = ping.pose.or_else(|| scan.pose());
+
+    let time_ns = ping.time.and_then(|time| i64::try_from(time.as_nanosecond()).ok());
+    let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    let none = silence(Some(ping.status));
+    [
+        f64::from_bits(u64::from_ne_bytes(head)),
+        f64::from_bits(u64::from_ne_bytes(statuses)),
+        ping.azimuth_deg,
+        number(pose.map(|pose| pose.x_m)),
+        number(pose.map(|pose| pose.y_m)),
+        number(pose.map(|pose| pose.heading_deg)),
+        ping.range_m.unwrap_or(none),
+        ping.tof_us.unwrap_or(none),
+        number(ping.amplitude),
+        number(ping.margin_db),
+        sim.and_then(|sim| sim.range_m).unwrap_or(silence(sim.map(|sim| sim.status))),
+        number(sim.and_then(|sim| sim.amplitude)),
+        number(sim.and_then(|sim| sim.margin_db)),
+        number(ping.residual_m),
+        number(ping.confidence),
+        // NumPy takes the least integer for no time.
+        f64::from_bits(time_ns.unwrap_or(i64::MIN).cast_unsigned()),
+    ]
+}
+
+/// What stands for the range of a firing without one.
+const fn silence(status: Option<PingStatus>) -> f64 {
+    match status {
+        Some(PingStatus::NoEcho) => f64::INFINITY,
+        _ => f64::NAN,
+    }
+}

@@ -1,0 +1,61 @@
+//! Readings that a user gives.
+
+use pyo3::{exceptions::PyValueError, prelude::*};
+use sonard_model::reading::PingStatus;
+
+use crate::{arrays, model::predict::full_turn, status};
+
+/// Readings of one place.
+pub(crate) struct Heard {
+    /// Azimuth in degrees, what became of the firing, and the range in metres if it has one.
+    pub(crate) beams: Vec<(f64, PingStatus, f64)>,
+}
+
+impl Heard {
+    /// Of an array of readings with `status` and `range_m`, or of ranges alone.
+    pub(crate) fn of(
+        readings: &Bound<'_, PyAny>,
+        azimuths_deg: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let numpy = readings.py().import("numpy")?;
+        let array = numpy.call_method1("asarray", (readings,))?;
+        let has_fields = !array.getattr("dtype")?.getattr("names")?.is_none();
+        let (ranges_m, statuses) = if has_fields {
+            let ranges_m = arrays::list(&array.get_item("range_m")?, "readings")?;
+            let codes = arrays::list(&array.get_item("status")?, "readings")?;
+            (ranges_m, codes.into_iter().map(|code| status::of_code(code as u8)).collect())
+        } else {
+            let ranges_m = arrays::list(&array, "readings")?;
+            let statuses = ranges_m.iter().map(|range_m| status_of(*range_m)).collect();
+            (ranges_m, statuses)
+        };
+        let statuses: Vec<Option<PingStatus>> = statuses;
+        let azimuths_deg = match azimuths_deg {
+            Some(given) => arrays::list(given, "azimuths_deg")?,
+            None => full_turn(),
+        };
+        if azimuths_deg.len() != ranges_m.len() {
+            return Err(PyValueError::new_err(format!(
+                "{} readings, but {} azimuths_deg: give one for each",
+                ranges_m.len(),
+                azimuths_deg.len()
+            )));
+        }
+        let beams = azimuths_deg.into_iter().zip(statuses).zip(ranges_m);
+        let beams = beams.filter_map(|((azimuth_deg, status), range_m)| {
+            let status = status?;
+            let usable =
+                azimuth_deg.is_finite() && (status != PingStatus::Echo || range_m.is_finite());
+            usable.then_some((azimuth_deg, status, range_m))
+        });
+        Ok(Self { beams: beams.collect() })
+    }
+}
+
+/// What a range says alone: infinite for a silence; of what is no range nothing is known.
+fn status_of(range_m: f64) -> Option<PingStatus> {
+    if range_m == f64::INFINITY {
+        return Some(PingStatus::NoEcho);
+    }
+    (range_m.is_finite() && range_m > 0.0).then_some(PingStatus::Echo)
+}
