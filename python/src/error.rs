@@ -135,7 +135,9 @@ pub(crate) fn unreadable(py: Python<'_>, path: PathBuf, error: &io::Error) -> Py
 fn number_and_words(py: Python<'_>, error: &io::Error) -> Option<(i32, String)> {
     let number = error.raw_os_error().or_else(|| match error.kind() {
         // The library says this one by itself.
-        io::ErrorKind::IsADirectory => py.import("errno").ok()?.getattr("EISDIR").ok()?.extract().ok(),
+        io::ErrorKind::IsADirectory => {
+            py.import("errno").ok()?.getattr("EISDIR").ok()?.extract().ok()
+        }
         _ => None,
     })?;
     let words = py.import("os").ok()?.call_method1("strerror", (number,)).ok()?;
