@@ -105,7 +105,7 @@ enum Verb {
     /// Make a log of readings from elsewhere: tables, JSON, logs of CARMEN and Player
     #[command(long_about = import::ABOUT)]
     Import(Box<import::Args>),
-    /// Write logs for other tools: tables
+    /// Write logs for other tools: recordings of ROS 2, tables
     #[command(long_about = export::ABOUT)]
     Export(export::Args),
     /// Write a log again with the model's predictions beside its readings

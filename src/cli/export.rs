@@ -2,15 +2,19 @@
 
 use std::{
     ffi::OsStr,
+    fs::File,
+    io::{self, IsTerminal as _},
     path::{Path, PathBuf},
 };
+
+use jiff::Timestamp;
 
 use super::{
     Failure, Outcome,
     logs::{for_each_scan, logs_in},
     output::{OutPath, Overwrite, Product, Stream},
 };
-use crate::export::{CsvExport, Export, ExportError};
+use crate::export::{CsvExport, Export, ExportError, LogFile, McapExport, Profile, Settings};
 
 /// Options of `sonard export`.
 #[derive(Debug, clap::Args)]
@@ -27,33 +31,70 @@ pub(super) struct Args {
     output: Option<OutPath>,
     #[command(flatten)]
     overwrite: Overwrite,
+    #[command(flatten)]
+    recording: RecordingArgs,
+}
+
+/// How a recording is made.
+#[derive(Debug, Clone, PartialEq, clap::Args)]
+#[command(next_help_heading = "Recordings (mcap)")]
+struct RecordingArgs {
+    /// What a Range says of silence and of what is too near
+    #[arg(long, value_enum, value_name = "PROFILE")]
+    profile: Option<ProfileName>,
+    /// Full angle that a Range is said to be valid for, degrees [default: where the beam is 6 dB down, there and
+    /// back]
+    #[arg(long, value_name = "DEG", value_parser = angle)]
+    field_of_view_deg: Option<f64>,
+    /// Frame of the transducer, which the others are named after [default: sonar]
+    #[arg(long, value_name = "FRAME", value_parser = frame)]
+    frame: Option<String>,
+    /// Leave the logs themselves out of the recording
+    #[arg(long)]
+    without_log: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum FormatName {
+    /// A recording of ROS 2: Range, LaserScan, PointCloud2, TF and markers, with the log attached
+    Mcap,
     /// A table: a reading a line, its prediction beside it
     Csv,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum ProfileName {
+    /// Infinite ranges, as REP 117 says
+    Rep117,
+    /// The greatest range for silence and the least for what is too near, as nav2's range layer asks for
+    Nav2,
+}
+
 pub(super) const ABOUT: &str = "\
-Write logs for other tools: tables.
+Write logs for other tools: recordings of ROS 2 (MCAP), tables.
 
 All logs go into one output, scan by scan in their order. Of a folder the logs in it are taken, of a \
 collection's those in its folder `scans`, in the order of their names.";
 
 const HELP: &str = "\
 Examples:
+  sonard export out/fig7/scan.jsonl -o fig7.mcap      # for RViz, Foxglove, rosbag2
   sonard export out/fig7/scan.jsonl -o readings.csv
   sonard export trial -o trial.csv                    # a collection, or a daemon's folder
   sonard simulate --scene corridor --pose beside-wall | sonard export - --to csv | head -n 3
 
-A column has the name that the field has in the log, with the unit in it; those that begin with sim_ are \
+A recording has /sonar/range (of arrays /sonar/RANGER/range), /sonar/scan, /sonar/points, /sonar/paths, /tf, \
+/tf_static, and below /sonar/predicted what the model says; stamps are those of the firing. A sonar is no laser: see \
+docs/export.md before a map is made of its scans.
+
+In tables a column has the name that the field has in the log, with the unit in it; those that begin with sim_ are \
 the prediction's. What the log does not say is empty: no range is no number.
 
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let format = args.format()?;
+    args.check(format)?;
     let logs = logs_in(&args.logs)?;
     let mut stream = match args.output.as_deref() {
         Some(path) => args.overwrite.begin(path, format.product())?,
@@ -66,7 +107,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             Err(Failure::input(error, "give logs that nobody writes meanwhile"))
         }
     };
-    match write(&logs, format, &mut stream) {
+    match write(&logs, format, args, &mut stream) {
         Ok(told) => {
             stream.finish().or_else(|error| refuse(error.into()))?;
             told.tell();
@@ -82,6 +123,7 @@ impl Args {
         let path = self.output.as_deref();
         let ending = path.and_then(Path::extension).map(OsStr::to_ascii_lowercase);
         let by_ending = match ending.as_deref().and_then(OsStr::to_str) {
+            Some("mcap") => Some(FormatName::Mcap),
             Some("csv") => Some(FormatName::Csv),
             _ => None,
         };
@@ -89,15 +131,68 @@ impl Args {
             let what = path.map_or("no format is named".to_owned(), |path| {
                 format!("{}: its ending says no format", path.display())
             });
-            Failure::input(what, "say which with --to csv")
+            Failure::input(what, "say which with --to mcap or --to csv")
         })?;
         Ok(format)
+    }
+
+    /// Refuses what the format has no place for, before any work.
+    fn check(&self, format: FormatName) -> Outcome {
+        if format == FormatName::Mcap {
+            let to_terminal = self.output.is_none() && io::stdout().is_terminal();
+            return match to_terminal {
+                true => Err(Failure::input(
+                    "a recording is nothing to read on a terminal",
+                    "name a file with -o",
+                )),
+                false => Ok(()),
+            };
+        }
+        match self.recording == RecordingArgs::NONE {
+            true => Ok(()),
+            false => Err(Failure::input(
+                "--profile, --field-of-view-deg, --frame and --without-log are of recordings",
+                "leave them out, or write a recording with --to mcap",
+            )),
+        }
+    }
+}
+
+impl RecordingArgs {
+    const NONE: Self =
+        Self { profile: None, field_of_view_deg: None, frame: None, without_log: false };
+
+    fn settings(&self) -> Settings {
+        let by_default = Settings::default();
+        Settings {
+            profile: match self.profile {
+                Some(ProfileName::Nav2) => Profile::Nav2,
+                Some(ProfileName::Rep117) | None => Profile::Rep117,
+            },
+            field_of_view_deg: self.field_of_view_deg,
+            frame: self.frame.clone().unwrap_or(by_default.frame),
+        }
+    }
+}
+
+fn angle(text: &str) -> Result<f64, String> {
+    let angle = text.parse().ok().filter(|deg: &f64| *deg > 0.0 && *deg <= 360.0);
+    angle.ok_or_else(|| "give degrees, more than 0 and at most 360".to_owned())
+}
+
+/// A frame as tf2 takes it: without a slash before it.
+fn frame(text: &str) -> Result<String, String> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '/';
+    match !text.is_empty() && !text.starts_with('/') && text.chars().all(plain) {
+        true => Ok(text.to_owned()),
+        false => Err("give letters, digits, underscores and slashes, no slash first".to_owned()),
     }
 }
 
 impl FormatName {
     const fn product(self) -> Product {
         match self {
+            Self::Mcap => Product::Recording,
             Self::Csv => Product::Table,
         }
     }
@@ -131,8 +226,14 @@ impl Told {
 }
 
 /// Writes all scans of the logs, and what belongs to the end.
-fn write(logs: &[PathBuf], format: FormatName, stream: &mut Stream) -> Result<Told, Stop> {
+fn write(
+    logs: &[PathBuf],
+    format: FormatName,
+    args: &Args,
+    stream: &mut Stream,
+) -> Result<Told, Stop> {
     let mut export: Box<dyn Export + '_> = match format {
+        FormatName::Mcap => Box::new(McapExport::new(stream, args.recording.settings())?),
         FormatName::Csv => Box::new(CsvExport::new(stream)?),
     };
     let mut told = Told { logs: logs.len(), ..Told::default() };
@@ -158,6 +259,9 @@ fn write(logs: &[PathBuf], format: FormatName, stream: &mut Stream) -> Result<To
             return Err(error.into());
         }
         read.map_err(Stop::Input)?;
+        if format == FormatName::Mcap && !args.recording.without_log && log.is_file() {
+            attach(&mut *export, log, &name)?;
+        }
     }
     if told.scans == 0 {
         return Err(Stop::Input(Failure::input(
@@ -167,6 +271,18 @@ fn write(logs: &[PathBuf], format: FormatName, stream: &mut Stream) -> Result<To
     }
     export.finish()?;
     Ok(told)
+}
+
+/// Keeps a log beside what was made of it, up to where it ended just now.
+fn attach(export: &mut dyn Export, log: &Path, name: &str) -> Result<(), Stop> {
+    let opened = File::open(log).and_then(|file| {
+        let metadata = file.metadata()?;
+        Ok((file, metadata.len(), metadata.modified()?))
+    });
+    let (mut file, bytes, written) =
+        opened.map_err(|source| ExportError::Attach { name: log.display().to_string(), source })?;
+    let written = Timestamp::try_from(written).unwrap_or(Timestamp::UNIX_EPOCH);
+    Ok(export.attach(&LogFile { name, bytes, written }, &mut file)?)
 }
 
 /// What a log is called in its export.

@@ -2,7 +2,7 @@
 //!
 //! A file that a command reads is never written over, by whatever name it goes. What is written is
 //! made beside its place, synced and renamed, so that a full disk or a crash leaves the old file or
-//! none. A picture, a map, a list or a table takes the place of an older one of its kind; anything else that is
+//! none. A picture, a map, a list, a table or a recording takes the place of an older one of its kind; anything else that is
 //! there is refused unless `--force` says to replace it. Measured logs are added to, never replaced.
 
 mod stream;
@@ -27,7 +27,7 @@ use clap::{
 
 use super::{Failure, Outcome};
 use crate::{
-    export::CsvExport,
+    export::{CsvExport, McapExport},
     store::{FileKind, HEAD_BYTES, LogWriter, RecordWriter, StoreError, WholeFile},
 };
 pub(super) use stream::Stream;
@@ -72,6 +72,8 @@ pub(super) enum Product {
     List(&'static [&'static str]),
     /// A table of the readings of logs.
     Table,
+    /// A recording of ROS 2 that this program made of logs.
+    Recording,
     /// A log: never replaced unasked.
     Log,
 }
@@ -88,6 +90,7 @@ impl Product {
             Self::MapYaml => kind == FileKind::MapYaml,
             Self::List(members) => is_list(head, members),
             Self::Table => head.starts_with(CsvExport::<Vec<u8>>::head().as_bytes()),
+            Self::Recording => McapExport::<Vec<u8>>::begins(head),
             Self::Log => false,
         }
     }

@@ -69,7 +69,7 @@ fn the_format_follows_from_the_ending_or_is_asked_for() {
     for arguments in [&["export", &log][..], &["export", &log, "-o", &path("a.txt")]] {
         let refused = run(arguments);
         assert_eq!(refused.status.code(), Some(2), "{arguments:?}");
-        assert!(said(&refused).contains("--to csv"), "{}", said(&refused));
+        assert!(said(&refused).contains("--to mcap or --to csv"), "{}", said(&refused));
     }
     assert!(!folder.path().join("a.txt").exists());
     assert!(run(&["export", &log, "-o", &path("a.csv")]).status.success());
@@ -79,6 +79,40 @@ fn the_format_follows_from_the_ending_or_is_asked_for() {
     let refused = run(&["export", &log, "-o", &path("b.csv")]);
     assert!(said(&refused).contains("comma-separated"), "{}", said(&refused));
     assert_eq!(refused.status.code(), Some(2));
+}
+
+#[test]
+fn a_recording_keeps_the_log_and_takes_only_its_own_place() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
+    let log = path("small.jsonl");
+    fs::write(&log, SMALL).expect("writable");
+    let record = |out: &str, further: &[&str]| {
+        let out = path(out);
+        run(&[&["export", &log, "-o", &out][..], further].concat())
+    };
+    for further in [&[][..], &["--profile", "nav2", "--frame", "front/sonar", "--field-of-view-deg", "15"]] {
+        let output = record("a.mcap", further);
+        assert!(output.status.success(), "{further:?}: {}", stderr(&output));
+        let bytes = fs::read(path("a.mcap")).expect("written");
+        assert!(bytes.windows(SMALL.len()).any(|piece| piece == SMALL.as_bytes()));
+    }
+    assert!(record("a.mcap", &["--without-log"]).status.success());
+    assert!(fs::metadata(path("a.mcap")).expect("written").len() < 20_000);
+    // Somebody's recording, of another program.
+    fs::write(path("b.mcap"), b"\x89MCAP0\r\n\x01robot").expect("writable");
+    assert_eq!(record("b.mcap", &[]).status.code(), Some(2));
+    for (out, wrong) in [
+        ("c.mcap", &["--frame", "/sonar"][..]),
+        ("c.mcap", &["--field-of-view-deg", "0"]),
+        ("c.mcap", &["--profile", "laser"]),
+        ("c.csv", &["--profile", "nav2"]),
+        ("c.csv", &["--without-log"]),
+    ] {
+        let refused = record(out, wrong);
+        assert_eq!(refused.status.code(), Some(2), "{wrong:?}: {}", said(&refused));
+        assert!(!Path::new(&path(out)).exists());
+    }
 }
 
 #[test]

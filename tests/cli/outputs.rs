@@ -35,7 +35,7 @@ const fn case(
     Case { output, input, arguments }
 }
 
-const CASES: [Case; 29] = [
+const CASES: [Case; 30] = [
     case("plot --output", ("a.svg", LOG), "plot IN -o IN"),
     case("plot --output", ("a.png", LOG), "plot IN -o IN --force"),
     case("plot --output", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),
@@ -69,6 +69,7 @@ const CASES: [Case; 29] = [
     ),
     case("import --output", ("a", TABLE), "import IN -o IN --force"),
     case("export --output", ("a.csv", LOG), "export IN -o IN --force"),
+    case("export --output", ("a.mcap", LOG), "export IN -o IN --force"),
     case("export --output", ("log.csv", LOG), "export IN --to csv -o IN --force"),
     case("calibrate --out", ("sensor.json", LOG), "calibrate IN --out DIR --force"),
     case("calibrate --out", ("scene.json", SCENE), "calibrate LOG --scene IN --out DIR --force"),
@@ -336,6 +337,7 @@ fn a_full_disk_leaves_the_old_file_or_none_and_the_command_says_so() {
         (&course, vec!["simulate", "--scene", "simple-room", "--pose", "fig9", "-o", &course]),
         (&path("t.jsonl"), vec!["log", "annotate", &path("fig9.jsonl"), "-o", &path("t.jsonl")]),
         (&path("t.csv"), vec!["export", &path("fig9.jsonl"), "-o", &path("t.csv")]),
+        (&path("t.mcap"), vec!["export", &path("fig9.jsonl"), "-o", &path("t.mcap")]),
         (&path("map/map.pgm"), vec!["map", &path("fig9.jsonl"), "--out", &path("map")]),
     ] {
         // Blocks of 512 bytes: less than any of these files. Nothing is said of signals.

@@ -1,4 +1,5 @@
-//! Scans in the formats of other tools: tables (CSV) of readings beside predictions.
+//! Scans in the formats of other tools: tables (CSV) of readings beside predictions, and recordings of ROS 2
+//! (MCAP).
 //!
 //! An [`Export`] takes scans one by one and writes to whatever takes bytes, so that what it has in memory
 //! does not grow with the number of scans.
@@ -7,6 +8,8 @@
 
 mod columns;
 mod error;
+mod recording;
+mod ros;
 mod sessions;
 mod table;
 
@@ -18,6 +21,7 @@ use sonard_records::ScanView;
 
 pub use columns::{COLUMNS, Column, Kind, Row, Value};
 pub use error::{ExportError, LeftOut};
+pub use recording::{McapExport, Profile, Settings};
 pub use table::CsvExport;
 
 /// Takes scans, in the order in which they were taken, and writes them in its format.

@@ -1,4 +1,6 @@
 //! Exports of one log that has something of everything.
 
+mod cdr;
 mod csv;
+mod mcap;
 mod scans;

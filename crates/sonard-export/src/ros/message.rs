@@ -1,0 +1,212 @@
+//! The messages, field by field as ROS 2's interfaces have them.
+
+use super::cdr::{Cdr, Encode};
+
+/// A moment, nanoseconds since 1970.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Stamp(pub(crate) u64);
+
+impl Encode for Stamp {
+    fn encode(&self, cdr: &mut Cdr) {
+        const SECOND: u64 = 1_000_000_000;
+        // Seconds are signed and end in 2038.
+        cdr.i32(i32::try_from(self.0 / SECOND).unwrap_or(i32::MAX));
+        cdr.u32((self.0 % SECOND) as u32);
+    }
+}
+
+/// `std_msgs/Header`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Header<'a> {
+    pub(crate) stamp: Stamp,
+    pub(crate) frame: &'a str,
+}
+
+impl Encode for Header<'_> {
+    fn encode(&self, cdr: &mut Cdr) {
+        self.stamp.encode(cdr);
+        cdr.text(self.frame);
+    }
+}
+
+/// `sensor_msgs/Range` of an ultrasonic ranger, as it is since Iron.
+#[derive(Debug)]
+pub(crate) struct Range<'a> {
+    pub(crate) header: Header<'a>,
+    /// Full angle, radians.
+    pub(crate) field_of_view: f32,
+    pub(crate) min_range: f32,
+    pub(crate) max_range: f32,
+    pub(crate) range: f32,
+}
+
+impl Encode for Range<'_> {
+    fn encode(&self, cdr: &mut Cdr) {
+        const ULTRASOUND: u8 = 0;
+        /// The variance of a range of which none is known.
+        const UNKNOWN: f32 = 0.0;
+        self.header.encode(cdr);
+        cdr.u8(ULTRASOUND);
+        for value in [self.field_of_view, self.min_range, self.max_range, self.range, UNKNOWN] {
+            cdr.f32(value);
+        }
+    }
+}
+
+/// `sensor_msgs/LaserScan`.
+#[derive(Debug)]
+pub(crate) struct LaserScan<'a> {
+    pub(crate) header: Header<'a>,
+    /// First and last, and from one to the next, radians.
+    pub(crate) angles: [f32; 3],
+    /// From one firing to the next, and of the whole scan, seconds.
+    pub(crate) times: [f32; 2],
+    pub(crate) range_limits: [f32; 2],
+    pub(crate) ranges: Vec<f32>,
+    pub(crate) intensities: Vec<f32>,
+}
+
+impl Encode for LaserScan<'_> {
+    fn encode(&self, cdr: &mut Cdr) {
+        self.header.encode(cdr);
+        let figures = self.angles.iter().chain(&self.times).chain(&self.range_limits);
+        figures.for_each(|value| cdr.f32(*value));
+        cdr.f32s(&self.ranges);
+        cdr.f32s(&self.intensities);
+    }
+}
+
+/// What the fields of a point are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PointNumber {
+    I32 = 5,
+    U32 = 6,
+    F32 = 7,
+}
+
+/// `sensor_msgs/PointCloud2`, in a row, of points whose fields have four bytes each.
+#[derive(Debug)]
+pub(crate) struct PointCloud<'a> {
+    pub(crate) header: Header<'a>,
+    pub(crate) fields: &'a [(&'static str, PointNumber)],
+    /// The fields of one point after the other, little-endian.
+    pub(crate) data: Vec<u8>,
+}
+
+impl Encode for PointCloud<'_> {
+    fn encode(&self, cdr: &mut Cdr) {
+        let point_bytes = 4 * self.fields.len();
+        let points = self.data.len() / point_bytes.max(1);
+        self.header.encode(cdr);
+        // Height, width.
+        cdr.u32(1);
+        cdr.u32(points as u32);
+        cdr.u32(self.fields.len() as u32);
+        for (place, (name, number)) in self.fields.iter().enumerate() {
+            cdr.text(name);
+            cdr.u32(4 * place as u32);
+            cdr.u8(*number as u8);
+            cdr.u32(1);
+        }
+        // Not big-endian.
+        cdr.flag(false);
+        cdr.u32(point_bytes as u32);
+        cdr.u32(self.data.len() as u32);
+        cdr.bytes(&self.data);
+        // No point without a place.
+        cdr.flag(true);
+    }
+}
+
+/// `geometry_msgs/TransformStamped`: where a frame is in another one.
+#[derive(Debug)]
+pub(crate) struct Transform<'a> {
+    pub(crate) header: Header<'a>,
+    pub(crate) child: &'a str,
+    pub(crate) translation: [f64; 3],
+    /// Quaternion x, y, z, w.
+    pub(crate) rotation: [f64; 4],
+}
+
+impl Encode for Transform<'_> {
+    fn encode(&self, cdr: &mut Cdr) {
+        self.header.encode(cdr);
+        cdr.text(self.child);
+        self.translation.iter().chain(&self.rotation).for_each(|value| cdr.f64(*value));
+    }
+}
+
+/// `tf2_msgs/TFMessage`.
+#[derive(Debug)]
+pub(crate) struct Transforms<'a>(pub(crate) Vec<Transform<'a>>);
+
+impl Encode for Transforms<'_> {
+    fn encode(&self, cdr: &mut Cdr) {
+        cdr.list(&self.0);
+    }
+}
+
+/// `visualization_msgs/Marker` of the kind `LINE_LIST`: each two points are a line.
+#[derive(Debug)]
+pub(crate) struct Lines<'a> {
+    pub(crate) header: Header<'a>,
+    pub(crate) namespace: &'a str,
+    pub(crate) width_m: f64,
+    /// Red, green, blue, opacity.
+    pub(crate) colour: [f32; 4],
+    pub(crate) points: Vec<[f64; 3]>,
+}
+
+impl Encode for Lines<'_> {
+    fn encode(&self, cdr: &mut Cdr) {
+        const LINE_LIST: i32 = 5;
+        // What is not drawn any more has to be taken away.
+        const ADD: i32 = 0;
+        const DELETE: i32 = 2;
+        self.header.encode(cdr);
+        cdr.text(self.namespace);
+        cdr.i32(0);
+        cdr.i32(LINE_LIST);
+        cdr.i32(if self.points.is_empty() { DELETE } else { ADD });
+        // Pose: the origin. Scale: only the width counts.
+        for value in [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, self.width_m, 0.0, 0.0] {
+            cdr.f64(value);
+        }
+        self.colour.iter().for_each(|value| cdr.f32(*value));
+        // Lifetime: for ever.
+        cdr.i32(0);
+        cdr.u32(0);
+        cdr.flag(false);
+        cdr.u32(self.points.len() as u32);
+        self.points.iter().flatten().for_each(|value| cdr.f64(*value));
+        no_pictures(cdr);
+    }
+}
+
+/// The fields of a marker from `colors` on, which are those of other kinds.
+fn no_pictures(cdr: &mut Cdr) {
+    // Colours.
+    cdr.u32(0);
+    // The resource of a texture, the texture's header, format and data, and where it lies.
+    cdr.text("");
+    Header { stamp: Stamp(0), frame: "" }.encode(cdr);
+    cdr.text("");
+    cdr.u32(0);
+    cdr.u32(0);
+    // Text, resource and file of a mesh.
+    cdr.text("");
+    cdr.text("");
+    cdr.text("");
+    cdr.u32(0);
+    cdr.flag(false);
+}
+
+/// `visualization_msgs/MarkerArray`.
+#[derive(Debug)]
+pub(crate) struct Markers<'a>(pub(crate) Vec<Lines<'a>>);
+
+impl Encode for Markers<'_> {
+    fn encode(&self, cdr: &mut Cdr) {
+        cdr.list(&self.0);
+    }
+}

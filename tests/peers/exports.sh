@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# Has programs of others read what `sonard export` writes, and holds every field against the logs (exports.py;
+# tools from PyPI, in an environment of their own under target/tools).
+#
+#   tests/peers/exports.sh [PROGRAM]    without a program, it is built
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+packages=(mcap==1.6.0 mcap-ros2-support==0.6.0 rosbags==0.11.9 duckdb==2.0.0 pyarrow==26.0.1 numpy==2.4.6)
+target=${CARGO_TARGET_DIR:-target}
+tools=$target/tools/exports-1
+if [ ! -e "$tools/whole" ]; then
+  if ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
+    if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
+      apt-get update -qq && apt-get install -y -qq --no-install-recommends python3-venv >/dev/null
+    else
+      echo "tests/peers/exports.sh: Python's venv is missing: sudo apt-get install python3-venv, or leave it out with EXPORT_PEERS=0" >&2
+      exit 1
+    fi
+  fi
+  python3 -m venv "$tools"
+  "$tools/bin/pip" install --quiet --disable-pip-version-check "${packages[@]}"
+  touch "$tools/whole"
+fi
+program=$(realpath "${1:-$target/debug/sonard}")
+if [ $# = 0 ]; then cargo build --workspace --quiet; fi
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+made() { "$program" "$@" 2>"$work/said" >/dev/null || { cat "$work/said" >&2; exit 1; }; }
+# Simulated, without times, also on a course and of an array; of a mock in virtual time by ticks, and in real time by
+# its clock.
+made simulate --scene simple-room --pose fig9 -o "$work/simulated.jsonl"
+printf 'x_m,y_m,heading_deg\n2,1.5,0\n2.6,1.5,0\n3.2,1.6,30\n' >"$work/course"
+made simulate --scene mcgill-lab --poses "$work/course" --max-range 5 -o "$work/course.jsonl"
+made simulate --array pioneer-8 --scene mcgill-lab --poses "$work/course" -o "$work/array.jsonl"
+made scan --mock --scene simple-room --pose fig7 --max-range 4 --repeat 2 --out "$work/mock"
+mv "$work/mock/scan.jsonl" "$work/mock.jsonl"
+made scan --mock --realtime --scene simple-room --pose fig9 --to-deg 36 --max-range 2 --out "$work/clock"
+mv "$work/clock/scan.jsonl" "$work/clock.jsonl"
+for log in "$work"/*.jsonl; do
+  made export "$log" -o "${log%.jsonl}-rep117.mcap"
+  made export "$log" --profile nav2 -o "${log%.jsonl}-nav2.mcap"
+  made export "$log" -o "${log%.jsonl}.csv"
+done
+"$tools/bin/python" tests/peers/exports.py "$work"
