@@ -91,7 +91,9 @@ fn a_recording_keeps_the_log_and_takes_only_its_own_place() {
         let out = path(out);
         run(&[&["export", &log, "-o", &out][..], further].concat())
     };
-    for further in [&[][..], &["--profile", "nav2", "--frame", "front/sonar", "--field-of-view-deg", "15"]] {
+    for further in
+        [&[][..], &["--profile", "nav2", "--frame", "front/sonar", "--field-of-view-deg", "15"]]
+    {
         let output = record("a.mcap", further);
         assert!(output.status.success(), "{further:?}: {}", stderr(&output));
         let bytes = fs::read(path("a.mcap")).expect("written");

@@ -24,8 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some("nav2") => Profile::Nav2,
         _ => Profile::Rep117,
     };
-    let mut export =
-        Box::new(McapExport::new(out, Settings { profile, ..Settings::default() })?);
+    let mut export = Box::new(McapExport::new(out, Settings { profile, ..Settings::default() })?);
     let lines = BufReader::new(File::open(&log)?).split(b'\n').map_while(Result::ok);
     let records = lines.filter_map(|line| decode_line(&line).ok());
     let began = Instant::now();
