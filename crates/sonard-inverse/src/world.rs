@@ -246,7 +246,9 @@ fn scale_aperture(aperture: &mut Aperture, by: f64) {
             // What no longer fits in front and behind is cut off.
             let fits = 1 + points.iter().take_while(|point| point.angle_deg < 180.0).count();
             points.truncate(fits);
-            points.last_mut().expect("a point").level_db = None;
+            if let Some(last) = points.last_mut() {
+                last.level_db = None;
+            }
         }
     }
 }

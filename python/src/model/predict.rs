@@ -129,7 +129,7 @@ fn fire_all(
 }
 
 /// Seconds that the library's `predict_many` takes for full turns at some poses, on threads as above: what
-/// `tests/test_speed.py` holds `predict` against.
+/// `benches/predict.py` holds `predict` against.
 #[pyfunction]
 #[pyo3(name = "_seconds_of_predict_many", signature = (model, poses, threads = None))]
 pub(crate) fn seconds_of_predict_many(
