@@ -70,7 +70,9 @@ What to fit (--fit), with the doubt that is assumed:
   air         sound_speed, as a share (0.015: 8 degrees Celsius)
   delay       delay_m, added to every range (0.03 m)
   threshold   threshold_db of the receiver (6 dB)
+  rise        threshold_rise_db_per_m, how the threshold rises with range (5 dB a metre)
   beam        aperture: size of the radiating face, as a logarithm (0.3)
+  skirts      skirts_db, what the face hears far off its axis, if the sensor's file has some (6 dB)
   materials   reflectance of each material, as a logarithm (0.1)
   walls       each wall along its normal (0.05 m)
 

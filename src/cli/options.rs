@@ -17,7 +17,7 @@ const SENSOR: &str = "senscomp-6500";
 #[command(next_help_heading = "Sensor and air")]
 pub(super) struct SensorArgs {
     /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, hc-sr04,
-    /// fullwave-line), or a file with a sensor's data [default: senscomp-6500; of an array, its own]
+    /// lego-nxt, fullwave-line), or a file with a sensor's data [default: senscomp-6500; of an array, its own]
     #[arg(long, value_name = "NAME|FILE")]
     sensor: Option<String>,
     /// End the blanking by hand as early as the sensor allows, as BINH does

@@ -27,8 +27,12 @@ pub enum Parameter {
     Delay,
     /// Higher threshold, decibels.
     Threshold,
+    /// Threshold that rises faster with the range, decibels a metre.
+    ThresholdRise,
     /// Natural logarithm of how much wider the radiating face is; a wider one has a narrower beam.
     Aperture,
+    /// Stronger skirts of the beam, decibels; only of a piston that has some.
+    Skirts,
     /// Natural logarithm of how much more a material reflects.
     Reflectance(String),
     /// A wall farther along its normal, which is left of the way from its first to its second end, by its index in
@@ -56,7 +60,8 @@ impl Parameter {
             Self::Gear => 0.02,
             Self::SoundSpeed => 0.015,
             Self::Delay => 0.05,
-            Self::Threshold => 3.0,
+            Self::Threshold | Self::Skirts => 3.0,
+            Self::ThresholdRise => 2.0,
             Self::Aperture | Self::Reflectance(_) => 0.15,
         }
     }
@@ -76,7 +81,9 @@ impl fmt::Display for Parameter {
             Self::SoundSpeed => f.write_str("sound_speed"),
             Self::Delay => f.write_str("delay_m"),
             Self::Threshold => f.write_str("threshold_db"),
+            Self::ThresholdRise => f.write_str("threshold_rise_db_per_m"),
             Self::Aperture => f.write_str("aperture"),
+            Self::Skirts => f.write_str("skirts_db"),
             Self::Reflectance(material) => write!(f, "reflectance {material}"),
             Self::Wall(wall) => write!(f, "wall {wall}"),
         }

@@ -28,8 +28,8 @@ pub(crate) struct RateFinder<'a> {
     parameters: &'a [&'a Parameter],
     /// By parameter, what moves whichever way the transducer looks.
     steady: Vec<Option<Motion>>,
-    /// Beam patterns of a slightly wider face, if that is asked for, and by how much.
-    wider: Option<(BeamPattern, f64)>,
+    /// By parameter, the beam pattern slightly changed by it, if it is about the beam, and by how much.
+    changed_beams: Vec<Option<(BeamPattern, f64)>>,
     reference_m_s: f64,
     /// Whether time walk is found out, too, which takes a firing or two for each candidate.
     with_walk: bool,
@@ -54,8 +54,9 @@ impl<'a> RateFinder<'a> {
         with_walk: bool,
     ) -> Self {
         let steady = parameters.iter().map(|parameter| world.steady_motion(parameter)).collect();
-        let wider = wider(world, parameters);
-        Self { world, parameters, steady, wider, reference_m_s, with_walk }
+        let changed = |parameter: &&Parameter| changed_beam(world, parameter);
+        let changed_beams = parameters.iter().map(changed).collect();
+        Self { world, parameters, steady, changed_beams, reference_m_s, with_walk }
     }
 
     /// The firings of the sweep with this number.
@@ -146,7 +147,10 @@ impl<'a> RateFinder<'a> {
                     Parameter::Delay => 1.0,
                     _ => 0.5 * stretch * self.length_rate(at, arrival, firing),
                 };
-                let by_db = self.margin_rate(at, arrival, firing);
+                let by_db = match self.parameters[at as usize] {
+                    Parameter::ThresholdRise => -predicted_m,
+                    _ => self.margin_rate(at, arrival, firing),
+                };
                 range_rates.extend((by_range != 0.0).then_some((at, by_range)));
                 until_rates.extend((by_db != 0.0).then_some((at, by_db)));
             }
@@ -211,9 +215,11 @@ impl<'a> RateFinder<'a> {
             Parameter::Heading(_) | Parameter::HeadingZero => by_turn(1f64.to_radians()),
             Parameter::Gear => by_turn(firing.azimuth_deg.to_radians()),
             Parameter::Threshold => -1.0,
-            Parameter::Aperture => self.wider.as_ref().map_or(0.0, |(pattern, by)| {
-                (level_db(pattern, 0.0) - level_db(firing.simulator.beam(), 0.0)) / by
-            }),
+            Parameter::Aperture | Parameter::Skirts => {
+                self.changed_beams[at as usize].as_ref().map_or(0.0, |(pattern, by)| {
+                    (level_db(pattern, 0.0) - level_db(firing.simulator.beam(), 0.0)) / by
+                })
+            }
             Parameter::Reflectance(name) => {
                 let scene = firing.simulator.scene();
                 let times =
@@ -232,11 +238,16 @@ impl Firing<'_> {
     }
 }
 
-fn wider(world: &World, parameters: &[&Parameter]) -> Option<(BeamPattern, f64)> {
-    const BY: f64 = 0.01;
-    let is_asked = parameters.iter().any(|parameter| **parameter == Parameter::Aperture);
-    let changed = is_asked.then(|| world.changed(&[(&Parameter::Aperture, BY)]).ok())??;
-    Some((BeamPattern::new(&changed.sensor, changed.air.sound_speed_m_s()), BY))
+/// The beam pattern slightly changed by a parameter, if it is about the beam, and by how much.
+fn changed_beam(world: &World, parameter: &Parameter) -> Option<(BeamPattern, f64)> {
+    let by = match parameter {
+        Parameter::Aperture => 0.01,
+        // Downwards, where there is always room.
+        Parameter::Skirts => -0.1,
+        _ => return None,
+    };
+    let changed = world.changed(&[(parameter, by)]).ok()?;
+    Some((BeamPattern::new(&changed.sensor, changed.air.sound_speed_m_s()), by))
 }
 
 fn decibels(amplitude: f64) -> f64 {

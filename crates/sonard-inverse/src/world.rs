@@ -118,6 +118,16 @@ impl World {
                 }
                 Parameter::Delay => world.delay_m += by,
                 Parameter::Threshold => world.sensor.threshold *= 10f64.powf(by / 20.0),
+                Parameter::ThresholdRise => {
+                    let rise_db_per_m = &mut world.sensor.threshold_rise_db_per_m;
+                    *rise_db_per_m = (*rise_db_per_m + by).max(0.0);
+                }
+                Parameter::Skirts => {
+                    if let Aperture::Piston { skirts_db: Some(db), .. } = &mut world.sensor.aperture
+                    {
+                        *db = (*db + by).min(0.0);
+                    }
+                }
                 Parameter::Aperture => scale_aperture(&mut world.sensor.aperture, by.exp()),
                 Parameter::Reflectance(material) => reflectances.push((material.as_str(), by)),
                 Parameter::Wall(wall) => offsets_m.push((*wall, by)),

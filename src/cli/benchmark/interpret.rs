@@ -28,7 +28,7 @@ pub(in crate::cli) struct Args {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, hc-sr04,
-    /// fullwave-line), or a file with a sensor's data; with its whole receiver
+    /// lego-nxt, fullwave-line), or a file with a sensor's data; with its whole receiver
     #[arg(long, value_name = "NAME|FILE", default_value = "senscomp-6500")]
     sensor: String,
     /// JSON instead of text; one object

@@ -7,6 +7,7 @@ use uuid::Uuid;
 
 use super::what::name;
 use crate::{
+    acoustics::Aperture,
     cli::{
         Outcome,
         output::{Overwrite, Product, make_folder},
@@ -96,6 +97,11 @@ fn value(world: &World, sweeps: &[Sweep], parameter: &Parameter, by: f64) -> f64
         Parameter::SoundSpeed => world.air.sound_speed_m_s() * (1.0 + by),
         Parameter::Delay => world.delay_m + by,
         Parameter::Threshold => 20.0 * world.sensor.threshold.log10() + by,
+        Parameter::ThresholdRise => (world.sensor.threshold_rise_db_per_m + by).max(0.0),
+        Parameter::Skirts => match world.sensor.aperture {
+            Aperture::Piston { skirts_db: Some(db), .. } => (db + by).min(0.0),
+            _ => by,
+        },
         Parameter::Aperture => world.sensor.half_width_m() * by.exp(),
         Parameter::Reflectance(name) => {
             world.scene.materials.get(name).map_or(1.0, |material| material.reflectance) * by.exp()
@@ -171,6 +177,10 @@ pub(super) fn write_folder(
         for (field, changed) in [
             ("aperture", sensor.aperture != world.sensor.aperture),
             ("threshold", sensor.threshold != world.sensor.threshold),
+            (
+                "threshold_rise_db_per_m",
+                sensor.threshold_rise_db_per_m != world.sensor.threshold_rise_db_per_m,
+            ),
             ("mounting", sensor.mounting != world.sensor.mounting),
         ] {
             if changed {

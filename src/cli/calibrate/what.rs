@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use crate::{
+    acoustics::Aperture,
     cli::Failure,
     inverse::{Parameter, Prior, World},
 };
@@ -26,8 +27,12 @@ pub(super) enum Group {
     Delay,
     /// Threshold of the receiver.
     Threshold,
+    /// How the threshold rises with range.
+    Rise,
     /// Width of the beam.
     Beam,
+    /// Skirts of the beam.
+    Skirts,
     /// Reflectances.
     Materials,
     /// Places of walls.
@@ -63,6 +68,8 @@ fn usual_sigma(parameter: &Parameter) -> f64 {
         Parameter::Ahead | Parameter::Left | Parameter::Delay => 0.03,
         Parameter::SoundSpeed => 0.015,
         Parameter::Threshold => 6.0,
+        Parameter::ThresholdRise => 5.0,
+        Parameter::Skirts => 6.0,
         Parameter::Aperture => 0.3,
         Parameter::Reflectance(_) => 0.1,
         Parameter::Wall(_) => 0.05,
@@ -136,7 +143,17 @@ fn of_group(group: Group, world: &World, sweeps: usize) -> Result<Vec<Parameter>
         Group::Air => vec![Parameter::SoundSpeed],
         Group::Delay => vec![Parameter::Delay],
         Group::Threshold => vec![Parameter::Threshold],
+        Group::Rise => vec![Parameter::ThresholdRise],
         Group::Beam => vec![Parameter::Aperture],
+        Group::Skirts => match world.sensor.aperture {
+            Aperture::Piston { skirts_db: Some(_), .. } => vec![Parameter::Skirts],
+            _ => {
+                return Err(Failure::input(
+                    format!("--fit skirts: the aperture of {} has none", world.sensor.name),
+                    "give the sensor's file a piston with skirts_db to begin with, such as -12",
+                ));
+            }
+        },
         Group::Materials => {
             world.scene.materials.keys().cloned().map(Parameter::Reflectance).collect()
         }

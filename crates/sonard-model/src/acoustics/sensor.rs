@@ -22,13 +22,14 @@ use self::figures::{at_most_1, from_0_to, not_negative, positive};
 use super::Face;
 
 /// The data files that come with the program, by name.
-const PRESETS: [(&str, &str); 6] = [
+const PRESETS: [(&str, &str); 7] = [
     ("senscomp-6500", include_str!("../../../../sensors/senscomp-6500.json")),
     ("polaroid-chirp", include_str!("../../../../sensors/polaroid-chirp.json")),
     ("bozma-kuc-60khz", include_str!("../../../../sensors/bozma-kuc-60khz.json")),
     ("pioneer", include_str!("../../../../sensors/pioneer.json")),
     ("fullwave-line", include_str!("../../../../sensors/fullwave-line.json")),
     ("hc-sr04", include_str!("../../../../sensors/hc-sr04.json")),
+    ("lego-nxt", include_str!("../../../../sensors/lego-nxt.json")),
 ];
 
 /// A threshold that rises faster is a range at which the module gives up.
@@ -262,6 +263,7 @@ fn form_error(field: String, error: &serde_json::Error) -> SensorError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::acoustics::{Air, BeamPattern, Receiver};
 
     #[test]
     fn every_figure_of_every_preset_has_a_source() {
@@ -342,6 +344,27 @@ mod tests {
         }
         let error = Sensor::preset("sonar").expect_err("unknown").to_string();
         assert!(error.contains("senscomp-6500"), "{error}");
+    }
+
+    /// Half the arc over which a rigid wall is heard at a range, degrees.
+    fn half_arc_deg(sensor: &Sensor, range_m: f64) -> f64 {
+        let air = Air::default();
+        let receiver = Receiver::new(sensor, air.sound_speed_m_s());
+        let beam = BeamPattern::new(sensor, air.sound_speed_m_s());
+        let loss_db = 2.0 * range_m * air.absorption_db_per_m(sensor.frequency_hz);
+        let threshold = receiver.threshold_at(2e6 * range_m / air.sound_speed_m_s());
+        beam.angle_at((threshold * 10f64.powf(loss_db / 20.0)).sqrt()).to_degrees()
+    }
+
+    /// The arena's sweeps (docs/reality.md): a wall before the ranger answers over some 100 degrees at 0.28 m and over
+    /// 60 at 0.81 m, and that at 1.8 m over a score or less.
+    #[test]
+    fn a_lego_nxt_hears_walls_over_narrower_arcs_from_afar() {
+        let sensor = Sensor::preset("lego-nxt").expect("a preset");
+        let [near, middle, far] = [0.28, 0.81, 1.8].map(|range_m| half_arc_deg(&sensor, range_m));
+        assert!((45.0..60.0).contains(&near), "{near}");
+        assert!((28.0..42.0).contains(&middle), "{middle}");
+        assert!((5.0..22.0).contains(&far), "{far}");
     }
 
     #[test]
