@@ -35,13 +35,12 @@ def main():
     placed = work.located("blind", blind, sensor)
     located_table(blind, placed)
     found = [(sweep, modes[0]) for sweep, modes in zip(blind, placed) if modes]
-    for title, name, options in (
-        ("calibrated, poses by locate", sensor, ()),
-        ("hc-sr04, same poses", "hc-sr04", ()),
-        ("nearest hit, same poses", sensor, ("--engine", "cone")),
-    ):
-        score(title, work, found, name, options)
+    score("calibrated, poses by locate", work, found, sensor, ())
     by_range(work, found, sensor)
+    score("nearest hit, same poses", work, found, sensor, ("--engine", "cone"))
+    by_hand = [by_hand_of(sweep) for sweep in blind]
+    score("hc-sr04, poses by hand", work, by_hand, "hc-sr04", ())
+    score("nearest hit, poses by hand", work, by_hand, "hc-sr04", ("--engine", "cone"))
     panels(work, data)
 
 
@@ -91,6 +90,13 @@ class Work:
                         "--step-deg", "1", "--max-range", REACH_M, *options)
         pings = (line for line in map(json.loads, said.splitlines()) if line["type"] == "ping")
         return {round(ping["azimuth_deg"]) % 360: ping.get("range_m") for ping in pings}
+
+
+def by_hand_of(sweep):
+    """A sweep with ranges from the axis, and the pose that was found by hand."""
+    ranges = [range_m and range_m + sweep["radial_offset_m"] for range_m in sweep["range_m"]]
+    x_m, y_m = sweep["fit_m"]
+    return dict(sweep, range_m=ranges), {"x_m": x_m, "y_m": y_m, "heading_deg": 0.0}
 
 
 def start_sensor(work):

@@ -115,7 +115,7 @@ fn margins_above_the_threshold() {
         for ((here, before), after) in found.iter().zip(&before).zip(&after) {
             let rate = here.until_rates.iter().find(|(of, _)| *of == at).map_or(0.0, |of| of.1);
             // Lost below the lowest threshold or kept above the highest, it has no margin to compare.
-            if here.range_m.is_none() || !(here.until_db.abs() < 11.0) {
+            if here.range_m.is_none() || here.until_db.abs() >= 11.0 {
                 continue;
             }
             let expected = (after.until_db - before.until_db) / (2.0 * by);
