@@ -11,7 +11,7 @@ use pyo3::{
     prelude::*,
     types::{PyDict, PyType},
 };
-use serde_json::{Map, Value};
+use serde_json::Value;
 use sonard_model::{acoustics, scene::suggest};
 
 use crate::{
@@ -65,23 +65,15 @@ impl Sensor {
         let Some(figures) = figures else { return Ok(Self { sensor: self.sensor.clone() }) };
         let given: Value = parsed(py, &json::text_of(figures)?)?;
         let mut data: Value = parsed(py, &self.to_json(py)?)?;
-        let mut known: Map<String, Value> = data.as_object().cloned().unwrap_or_default();
-        let optional = [
-            "face",
-            "mounting",
-            "short_blanking_us",
-            "integration_us",
-            "gain",
-            "response",
-            "edge_law",
-        ];
-        known.extend(optional.map(|name| (name.to_owned(), Value::Null)));
+        let schema = schemars::schema_for!(acoustics::Sensor);
+        let known = schema.get("properties").and_then(Value::as_object);
+        let known: Vec<String> =
+            known.into_iter().flatten().map(|(name, _)| name.clone()).collect();
         for (name, value) in given.as_object().into_iter().flatten() {
-            if !known.contains_key(name) {
-                let names: Vec<String> = known.keys().cloned().collect();
+            if !known.contains(name) {
                 return Err(PyTypeError::new_err(format!(
                     "a sensor has no figure `{name}`: {}",
-                    suggest(name, &names, "figures")
+                    suggest(name, &known, "figures")
                 )));
             }
             match (name.as_str(), value, &mut data["mounting"]) {

@@ -1,6 +1,7 @@
 """Scenes, sensors, air and single firings."""
 
 import copy
+import json
 import pickle
 from pathlib import Path
 from typing import Any
@@ -93,6 +94,9 @@ def test_a_sensor_with_other_figures(tmp_path: Path) -> None:
     assert (other.threshold, other.mounting["z_m"], other.edge_law) == (0.5, 1.0, "kuc-siegel")
     assert other.aperture == sensor.aperture and other != sensor and other.replace() == other
     assert other.replace(mounting={"left_m": 0.1}).mounting["z_m"] == 1.0
+    # Figures that the preset's file leaves out are known, too.
+    stepped = sensor.replace(range_step_m=0.01, integration_us=50.0)
+    assert stepped.integration_us == 50.0 and json.loads(stepped.to_json())["range_step_m"] == 0.01
     file = tmp_path / "sensor.json"
     file.write_text(other.to_json())
     assert sonard.Sensor.load(file) == other
