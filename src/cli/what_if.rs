@@ -31,7 +31,7 @@ pub(super) struct WhatIfArgs {
 #[command(next_help_heading = "What if")]
 pub(super) struct InsteadArgs {
     /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, hc-sr04,
-    /// fullwave-line), or a file with a sensor's data; supposed in place of the log's
+    /// lego-nxt, fullwave-line), or a file with a sensor's data; supposed in place of the log's
     #[arg(long, value_name = "NAME|FILE")]
     sensor: Option<String>,
     /// Air temperature, degrees Celsius; supposed: measured ranges change with the speed of sound
