@@ -9,11 +9,8 @@
 #   PAGE=0 ./test.sh            leave the live page out, where there is no Chromium to look at it
 #   AXE=0 ./test.sh             leave axe-core out of that, where there is no npm to get it with
 #   SCHEMATHESIS=0 ./test.sh    leave the fuzzer of the API out, where there is no Python or PyPI
-<<<<<<< HEAD
 #   PYTHON=0 ./test.sh          leave the package for Python out, where there is no Python or PyPI
-=======
 #   EXPORT_PEERS=0 ./test.sh    leave the other programs that read exports out, where there is no PyPI
->>>>>>> ef345f5 (Export recordings of ROS 2, which its tools and Foxglove read without sonard)
 #   FAKETIME=0 ./test.sh        leave the clock that is set out, where there is no libfaketime
 #   BOOT=0 ./test.sh            leave the units under a booted systemd out (systemd/boot-test.sh)
 #   PACKAGE=1 ./test.sh         build, install, upgrade and remove the Debian package, too; PACKAGE=all
@@ -81,6 +78,8 @@ check_tools() {
 
 check_text() {
   step "format"
+  if git grep -nE '^(<<<<<<<|>>>>>>>) '; then fail "a merge was left unfinished: see above"; fi
+  git ls-files -z '*.sh' .ci/run | xargs -0 -n 1 bash -n
   cargo fmt --all -- --check
   cargo fmt --manifest-path fuzz/Cargo.toml -- --check
   cargo fmt --manifest-path python/Cargo.toml -- --check
@@ -190,7 +189,6 @@ check_api() {
   }
 }
 
-<<<<<<< HEAD
 check_python() {
   if [ "${PYTHON:-1}" = 0 ]; then
     step "the package for Python: LEFT OUT, because PYTHON=0"
@@ -198,7 +196,8 @@ check_python() {
   fi
   step "the package for Python"
   python/test.sh || fail "the package for Python: see above. Where it can't be built, PYTHON=0 leaves it out"
-=======
+}
+
 check_exports() {
   if [ "${EXPORT_PEERS:-1}" = 0 ]; then
     step "exports as other programs read them: LEFT OUT, because EXPORT_PEERS=0"
@@ -207,7 +206,6 @@ check_exports() {
   step "exports as other programs read them"
   tests/peers/exports.sh "${CARGO_TARGET_DIR:-target}/debug/sonard" ||
     fail "an export does not say what its log does, or the readers can't be had: EXPORT_PEERS=0 leaves them out"
->>>>>>> ef345f5 (Export recordings of ROS 2, which its tools and Foxglove read without sonard)
 }
 
 # run_tests [ARGUMENT...]: the closing lines are kept for the end.
@@ -267,11 +265,8 @@ quick)
   play_emulator
   check_examples
   check_api
-<<<<<<< HEAD
   check_python
-=======
   check_exports
->>>>>>> ef345f5 (Export recordings of ROS 2, which its tools and Foxglove read without sonard)
   test_page
   step "tests"
   run_tests || finish $?

@@ -15,28 +15,8 @@ export SONARD=${SONARD:-${CARGO_TARGET_DIR:-$root/target}/debug/sonard}
 export CARGO_TARGET_DIR=$PWD/target
 needed=(maturin mypy numpy pytest hypothesis matplotlib pyroomacoustics)
 
-fail() { printf 'python/test.sh: %s\n' "$*" >&2; exit 1; }
-
-# environment FOLDER INTERPRETER PACKAGE...: a virtual environment with these packages.
-environment() {
-  local folder=$1 interpreter=$2
-  shift 2
-  if [ "$(cat "$folder/needed" 2>/dev/null)" = "$*" ]; then return; fi
-  rm -rf "$folder"
-  "$interpreter" -m venv "$folder"
-  "$folder/bin/pip" install --quiet --disable-pip-version-check "$@"
-  printf '%s' "$*" >"$folder/needed"
-}
-
-if ! python3 -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 10))' 2>/dev/null; then
-  if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
-    apt-get update -qq && apt-get install -y -qq --no-install-recommends python3 python3-venv >/dev/null
-  else
-    fail "Python 3.10 or newer with venv is missing: sudo apt-get install python3-venv, or leave this out with PYTHON=0"
-  fi
-fi
 [ -x "$SONARD" ] || (cd .. && unset CARGO_TARGET_DIR && cargo build --workspace --quiet)
-environment target/venv python3 "${needed[@]}"
+../tests/venv.sh target/venv PYTHON=0 "${needed[@]}"
 
 rm -rf target/wheels
 target/venv/bin/maturin build --release --locked --quiet --interpreter target/venv/bin/python
@@ -55,7 +35,7 @@ tool python -m mypy --config-file "$PWD/pyproject.toml" --cache-dir "$work/mypy"
 target/venv/bin/pytest --durations=5 -rs
 for interpreter in ${PYTHON_INTERPRETERS:-}; do
   folder=target/venv-$(basename "$interpreter")
-  environment "$folder" "$interpreter" numpy pytest hypothesis matplotlib
+  INTERPRETER=$interpreter ../tests/venv.sh "$folder" PYTHON=0 numpy pytest hypothesis matplotlib
   "$folder/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps "$wheel"
   "$folder/bin/python" --version
   "$folder/bin/pytest"

@@ -6,21 +6,9 @@
 #   tests/schemathesis.sh [PROGRAM]    without a program, it is built
 set -euo pipefail
 cd "$(dirname "$0")/.."
-version=4.32.5
 target=${CARGO_TARGET_DIR:-target}
-tools=$target/tools/schemathesis-$version
-if [ ! -x "$tools/bin/schemathesis" ]; then
-  if ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
-    if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
-      apt-get update -qq && apt-get install -y -qq --no-install-recommends python3-venv >/dev/null
-    else
-      echo "tests/schemathesis.sh: Python's venv is missing: sudo apt-get install python3-venv, or leave it out with SCHEMATHESIS=0" >&2
-      exit 1
-    fi
-  fi
-  python3 -m venv "$tools"
-  "$tools/bin/pip" install --quiet --disable-pip-version-check "schemathesis==$version"
-fi
+tools=$target/tools/schemathesis
+tests/venv.sh "$tools" SCHEMATHESIS=0 schemathesis==4.32.5
 program=${1:-$target/debug/sonard}
 if [ $# = 0 ]; then cargo build --workspace --quiet; fi
 

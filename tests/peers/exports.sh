@@ -7,20 +7,8 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 packages=(mcap==1.6.0 mcap-ros2-support==0.6.0 rosbags==0.11.9 duckdb==2.0.0 pyarrow==26.0.1 numpy==2.4.6)
 target=${CARGO_TARGET_DIR:-target}
-tools=$target/tools/exports-1
-if [ ! -e "$tools/whole" ]; then
-  if ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
-    if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
-      apt-get update -qq && apt-get install -y -qq --no-install-recommends python3-venv >/dev/null
-    else
-      echo "tests/peers/exports.sh: Python's venv is missing: sudo apt-get install python3-venv, or leave it out with EXPORT_PEERS=0" >&2
-      exit 1
-    fi
-  fi
-  python3 -m venv "$tools"
-  "$tools/bin/pip" install --quiet --disable-pip-version-check "${packages[@]}"
-  touch "$tools/whole"
-fi
+tools=$target/tools/exports
+tests/venv.sh "$tools" EXPORT_PEERS=0 "${packages[@]}"
 program=$(realpath "${1:-$target/debug/sonard}")
 if [ $# = 0 ]; then cargo build --workspace --quiet; fi
 
