@@ -148,11 +148,15 @@ const fn time(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>
 }
 
 /// A word of the records, as a log has it.
-fn word<'a>(value: impl Serialize) -> Option<Value<'a>> {
+pub(crate) fn logged_word(value: impl Serialize) -> Option<String> {
     match serde_json::to_value(value) {
-        Ok(serde_json::Value::String(word)) => Some(Value::Text(word.into())),
+        Ok(serde_json::Value::String(word)) => Some(word),
         _ => None,
     }
+}
+
+fn word<'a>(value: impl Serialize) -> Option<Value<'a>> {
+    logged_word(value).map(|word| Value::Text(word.into()))
 }
 
 fn words(path: &PathRecord) -> Value<'_> {

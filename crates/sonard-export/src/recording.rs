@@ -15,10 +15,11 @@ use mcap::{
     write::NoSeek,
 };
 
-use sonard_records::{Ping, Provenance, ScanView};
+use sonard_records::{Ping, ScanView};
 
 use crate::{
     Export, ExportError, LeftOut, LogFile,
+    columns::logged_word,
     ros::{
         cdr::{Cdr, Encode},
         interface::{Interface, LASER_SCAN, MARKERS, POINT_CLOUD, RANGE, TRANSFORMS},
@@ -295,7 +296,7 @@ impl<W: Write> Export for McapExport<W> {
         if scan.pose().is_none() {
             return Ok(Some(LeftOut::NoPose));
         }
-        self.provenances.insert(in_words(session.provenance));
+        self.provenances.extend(logged_word(session.provenance));
         let Some(figures) = self.figures.take() else { return Ok(Some(LeftOut::NoSession)) };
         let written = self.write_scan(scan, &figures);
         self.figures = Some(figures);
@@ -336,13 +337,6 @@ const LIBRARY: &str = "sonard ";
 
 fn library() -> String {
     format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION"))
-}
-
-fn in_words(provenance: Provenance) -> String {
-    serde_json::to_value(provenance)
-        .ok()
-        .and_then(|word| word.as_str().map(str::to_owned))
-        .unwrap_or_default()
 }
 
 /// The profile that a topic was offered with, as rosbag2 has it in its text: what stands still is kept for those

@@ -43,6 +43,8 @@ struct Firing<'a> {
     /// Where the stepper's axis is.
     axis: DVec2,
     direction_rad: f64,
+    /// Transmitter and receiver.
+    ends: [DVec2; 2],
 }
 
 impl<'a> RateFinder<'a> {
@@ -75,12 +77,7 @@ impl<'a> RateFinder<'a> {
             all.filter(|(parameter, _)| concerns(parameter)).map(|(_, at)| at).collect();
         let mut judged = |beam: &Beam| {
             let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
-            let firing = Firing {
-                simulator,
-                azimuth_deg: beam.azimuth_deg,
-                axis: pose.position(),
-                direction_rad,
-            };
+            let firing = Firing::new(simulator, pose, direction_rad, beam);
             let possible = self.all_possible(&mut listener, point, &firing, &concerning)?;
             Ok(Judged { heard_m: beam.heard.range_m(self.reference_m_s), possible })
         };
@@ -107,9 +104,7 @@ impl<'a> RateFinder<'a> {
                 Entry::Occupied(known) => known.get().clone(),
                 Entry::Vacant(unknown) => {
                     let direction_rad = (place as f64 * GRID_DEG).to_radians();
-                    let axis = pose.position();
-                    let azimuth_deg = beam.azimuth_deg;
-                    let firing = Firing { simulator, azimuth_deg, axis, direction_rad };
+                    let firing = Firing::new(simulator, pose, direction_rad, beam);
                     let possible = self.all_possible(&mut listener, point, &firing, &all)?;
                     unknown.insert(possible).clone()
                 }
@@ -188,9 +183,7 @@ impl<'a> RateFinder<'a> {
                 motion
             }
         };
-        let mounting = &firing.simulator.sensor().mounting;
-        let ends = mounting.places(firing.axis, firing.direction_rad);
-        firing.length_rate(arrival, ends, motion)
+        firing.length_rate(arrival, firing.ends, motion)
     }
 
     /// What an arrival's margin above the threshold gains, decibels for each unit. That a stronger echo is also a little
@@ -231,7 +224,13 @@ impl<'a> RateFinder<'a> {
     }
 }
 
-impl Firing<'_> {
+impl<'a> Firing<'a> {
+    fn new(simulator: &'a Simulator, pose: &Pose, direction_rad: f64, beam: &Beam) -> Self {
+        let axis = pose.position();
+        let ends = simulator.sensor().mounting.places(axis, direction_rad);
+        Self { simulator, azimuth_deg: beam.azimuth_deg, axis, direction_rad, ends }
+    }
+
     fn length_rate(&self, arrival: &Arrival, ends: [DVec2; 2], motion: &Motion) -> f64 {
         let z_m = self.simulator.sensor_z_m().unwrap_or(0.0);
         length_rate(arrival, ends, z_m, self.simulator.scene(), motion)

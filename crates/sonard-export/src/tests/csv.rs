@@ -6,7 +6,7 @@ use std::{
 use crate::{COLUMNS, CsvExport, Export as _, ExportError};
 use sonard_records::ScanView;
 
-use super::scans::{bare, measured};
+use super::scans::{Full, bare, measured};
 
 fn exported(scans: &[ScanView]) -> String {
     let mut bytes = Vec::new();
@@ -115,20 +115,6 @@ fn columns_have_each_a_name_of_their_own_and_cells_of_their_kind() {
                 assert_eq!(kind, column.kind, "{}", column.name);
             }
         }
-    }
-}
-
-/// Takes so many bytes and no more.
-struct Full(usize);
-
-impl io::Write for Full {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0 = self.0.checked_sub(bytes.len()).ok_or(io::ErrorKind::StorageFull)?;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
     }
 }
 

@@ -13,7 +13,7 @@ use crate::{
 };
 use sonard_records::{PingStatus, ScanView};
 
-use super::scans::{bare, every_status, measured, of_array, simulated};
+use super::scans::{Full, bare, every_status, measured, of_array, simulated};
 
 fn recorded_with(scans: &[ScanView], settings: Settings) -> Vec<u8> {
     let mut bytes = Vec::new();
@@ -308,20 +308,6 @@ fn topics_declare_their_types_and_how_they_were_offered() {
         used.insert(schema.name.clone());
     }
     assert_eq!(used.len(), INTERFACES.len());
-}
-
-/// Takes so many bytes and no more.
-struct Full(usize);
-
-impl io::Write for Full {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0 = self.0.checked_sub(bytes.len()).ok_or(io::ErrorKind::StorageFull)?;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
 }
 
 #[test]

@@ -79,3 +79,17 @@ pub(super) fn every_status() -> ScanView {
     }
     scan
 }
+
+/// Takes so many bytes and no more.
+pub(super) struct Full(pub(super) usize);
+
+impl std::io::Write for Full {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0 = self.0.checked_sub(bytes.len()).ok_or(std::io::ErrorKind::StorageFull)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
