@@ -78,8 +78,10 @@ check_tools() {
 
 check_text() {
   step "format"
-  if git grep -nE '^(<<<<<<<|>>>>>>>) '; then fail "a merge was left unfinished: see above"; fi
-  git ls-files -z '*.sh' .ci/run | xargs -0 -n 1 bash -n
+  if grep -rnIE '^(<<<<<<<|>>>>>>>) ' --exclude-dir=.git --exclude-dir=target .; then
+    fail "a merge was left unfinished: see above"
+  fi
+  find . \( -name .git -o -name target \) -prune -o \( -name '*.sh' -o -path ./.ci/run \) -print0 | xargs -0 -n 1 bash -n
   cargo fmt --all -- --check
   cargo fmt --manifest-path fuzz/Cargo.toml -- --check
   cargo fmt --manifest-path python/Cargo.toml -- --check
