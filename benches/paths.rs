@@ -226,6 +226,7 @@ fn l_room() {
         sensor_z_m: None,
         tilt_rad: 0.0,
         scatter_height_rad: 0.0,
+        direct: false,
     };
     let paths = Paths::new(&room, settings);
     let at = DVec2::new(1.13, 0.87);

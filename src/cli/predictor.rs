@@ -136,15 +136,21 @@ fn predict_stepper(
 fn predict_array(scan: &mut ScanView, pose: &Pose, model: &ArrayModel) -> Result<(), Failure> {
     let refuse_pose = |error: ArrayPoseError| Failure::input(&error, error.help());
     let refuse = |error: ModelError| Failure::input(error, "compare without --scene");
+    let round: Vec<usize> = model.array().round().collect();
     for ping in &mut scan.pings {
         let Some(ranger) = ping.ranger.as_ref().and_then(|id| model.array().index_of(id)) else {
             continue;
         };
+        // Imported readings may have another order than the array's own.
+        let firing = ping.index as usize % round.len().max(1);
+        let in_round = (round.get(firing) == Some(&ranger)).then_some(firing);
         let pose = ping.pose.unwrap_or(*pose);
         model.array().check_pose(model.scene(), &pose).map_err(refuse_pose)?;
         let stand = model.at(pose).map_err(refuse)?;
-        let prediction = stand.ping(ranger).map_err(|error| refuse(error.into()))?;
-        set_beside(ping, SimRecord::of(stand.simulator(ranger), &prediction));
+        let prediction =
+            in_round.map_or_else(|| stand.ping(ranger), |firing| stand.ping_in_round(firing));
+        let prediction = prediction.map_err(|error| refuse(error.into()))?;
+        set_beside(ping, SimRecord::of_array(&stand, ranger, &prediction));
     }
     Ok(())
 }
@@ -168,7 +174,7 @@ fn array_model(
 ) -> Result<ArrayModel, Failure> {
     array.check().map_err(|error| refuse(log, &error))?;
     let (air, options) = conditions(log, session)?;
-    ArrayModel::new(Arc::new(array.clone()), scene, session.sensor.clone(), air, options)
+    ArrayModel::new(Arc::new(array.clone()), scene, &session.sensor, air, options)
         .map_err(|error| refuse(log, &error))
 }
 

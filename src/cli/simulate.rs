@@ -108,7 +108,8 @@ carries the candidate that came closest, with a negative margin.
 With --array, several rangers at fixed bearings on a robot fire in turn, each from its own place. \
 Their readings say which ranger (`ranger`) and, where the robot turned or moved within a scan, \
 where it stood (`pose`). azimuth_deg counts counter-clockwise from the heading; the directions of `sonard paths` \
-are the world's. Crosstalk, one ranger's sound in another's ear, is left out.";
+are the world's. Where rangers fire at once, or before the sound of an earlier turn has died away, each also hears \
+the others; a reading that is another's sound says whose (`crosstalk`).";
 
 const EXAMPLES: &str = "\
 Examples:

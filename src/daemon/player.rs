@@ -1,4 +1,4 @@
-//! The operator of an array that the model plays: fires its rangers in turn, by the clock.
+//! The operator of an array that the model plays: fires its rangers turn by turn, by the clock.
 //!
 //! After R. Arrabales' service of simulated sonars: one ranger each interval (25 Hz on a Pioneer), a
 //! scan for each round. No port is opened, and every record says that it is simulated. The model finds the
@@ -107,7 +107,7 @@ impl Player {
             return ControlFlow::Continue(());
         }
         let Some(stage) = &self.stage else { return ControlFlow::Continue(()) };
-        let (model, order) = (stage.model(), stage.order());
+        let (model, turns) = (stage.model(), stage.turns());
         self.enter(LinkState::Scanning);
         self.desk.agenda.begun(self.desk.now());
         self.rhythm.resume(Instant::now());
@@ -119,13 +119,17 @@ impl Player {
             ..ScanStart::of_array(&model, round.scan, round.pose, 1, Timestamp::now())
         };
         self.put(&Record::ScanStart(start));
-        let (mut fired, mut halted) = (0, None);
-        for (index, &ranger) in (0..).zip(&order) {
+        let (mut index, mut fired, mut halted) = (0, 0, None);
+        for turn in &turns {
             halted = self.attend_until(self.rhythm.next()).await;
             if halted.is_some() {
                 break;
             }
-            fired += u32::from(self.fire(round, index, ranger).await);
+            let at = (Instant::now(), Timestamp::now());
+            for &ranger in turn {
+                fired += u32::from(self.fire(round, index, ranger, at).await);
+                index += 1;
+            }
             self.rhythm.advance(Instant::now(), self.interval());
         }
         if let Some(interrupt) = halted {
@@ -133,7 +137,7 @@ impl Player {
             let why = if stopping { "the daemon is stopping" } else { STOPPED_ON_REQUEST };
             self.out.event(EventKind::Stopped, why.to_owned());
         }
-        let missing = order.len() as u32 - fired;
+        let missing = turns.iter().map(Vec::len).sum::<usize>() as u32 - fired;
         let counts = [fired, missing];
         self.put(&Record::ScanEnd(ScanEnd::of_array(&model, round.scan, counts, Timestamp::now())));
         self.count(counts);
@@ -143,13 +147,18 @@ impl Player {
         }
     }
 
-    /// Fires one ranger, and tells of its reading when its echo is back or its turn is over; not if
-    /// the model failed.
-    async fn fire(&mut self, round: Round, index: u32, ranger: usize) -> bool {
-        let (slot, time) = (Instant::now(), Timestamp::now());
+    /// Fires one ranger in a turn that began at a time, and tells of its reading when its echo is back or its turn
+    /// is over; not if the model failed.
+    async fn fire(
+        &mut self,
+        round: Round,
+        index: u32,
+        ranger: usize,
+        (slot, time): (Instant, Timestamp),
+    ) -> bool {
         let pose = self.drive.pose(&mut self.desk, &self.out);
         let Some(stage) = &mut self.stage else { return false };
-        let heard = match stage.reading(ranger, pose).await {
+        let heard = match stage.reading(index as usize, pose).await {
             Ok(heard) => heard,
             Err(why) => {
                 tracing::error!("ranger {ranger}: {why}");

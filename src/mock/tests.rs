@@ -22,6 +22,7 @@ pub(super) fn board(faults: FaultPlan) -> MockBoard {
             amplitude: None,
             margin_db: None,
             echoes_us: [echo_us(step)].into_iter().collect(),
+            crosstalk: None,
         })
         .collect();
     let world = World::new(Soundings::from_predictions(&predictions), TofNoise::NONE, 0.0, 1);
@@ -203,6 +204,7 @@ mod conformance {
                 amplitude: None,
                 margin_db: None,
                 echoes_us: after_us.iter().copied().collect(),
+                crosstalk: None,
             };
             self.world().set_soundings(Soundings::from_predictions(&[everywhere]));
         }

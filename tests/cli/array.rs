@@ -50,6 +50,75 @@ fn each_ranger_of_an_array_has_its_reading_from_its_own_place() {
     log.assert_each_beam_once(8);
 }
 
+/// The ring of a Pioneer that is polled in 12 ms instead of 40, and one of which two rangers fire at once.
+#[test]
+fn rangers_that_fire_too_soon_or_at_once_hear_one_another() {
+    let folder = TempDir::new().expect("a folder");
+    let shipped = fs::read_to_string("arrays/pioneer-8.json").expect("the preset's file");
+    let write = |name: &str, text: String| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).expect("writes");
+        path.to_str().expect("plain path").to_owned()
+    };
+    let hasty = write("hasty.json", shipped.replace("40.0", "12.0"));
+    let place = ["--scene", "mcgill-lab", "--pose", "2.4,1.2,20", "--array"];
+    let hasty_log = folder.path().join("hasty.jsonl").to_str().expect("plain path").to_owned();
+    let output = run(&[&["simulate", "-o", &hasty_log], &place[..], &[&hasty]].concat());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let log = Log::read(Path::new(&hasty_log));
+    let strays: Vec<&Value> =
+        log.pings().into_iter().filter(|ping| !ping["crosstalk"].is_null()).collect();
+    assert!(!strays.is_empty());
+    for ping in strays {
+        let before_us = ping["crosstalk"]["before_us"].as_f64().expect("a time");
+        assert!(before_us >= 12_000.0 && before_us % 12_000.0 == 0.0, "{before_us}");
+        if ping["status"] == "echo" {
+            // Its path is longer by what sound runs in that time, give or take the time walk.
+            let path_m = ping["path"]["length_m"].as_f64().expect("a length");
+            let speed_m_s =
+                log.of_type("session").next().expect("a session")["air"]["sound_speed_m_s"]
+                    .as_f64();
+            let gone_m = before_us * 1e-6 * speed_m_s.expect("a speed");
+            let seems_m = 2.0 * ping["range_m"].as_f64().expect("a range");
+            assert!((path_m - gone_m - seems_m).abs() < 0.03, "{ping}");
+        }
+    }
+    // What is predicted again is the same, and nobody hears anybody where that is left out.
+    let again = folder.path().join("again.jsonl").to_str().expect("plain path").to_owned();
+    let predicted = run(&["predict", &hasty_log, "--scene", "mcgill-lab", "--out", &again]);
+    assert!(predicted.status.success(), "{}", stderr(&predicted));
+    for ping in Log::read(Path::new(&again)).pings() {
+        assert_eq!(ping["sim"]["crosstalk"], ping["crosstalk"], "{ping}");
+        assert_eq!(ping["sim"]["range_m"], ping["range_m"], "{ping}");
+    }
+    let alone = simulate(&[&place[..], &[&hasty, "--without-crosstalk"]].concat());
+    assert!(alone.pings().iter().all(|ping| ping["crosstalk"].is_null()));
+    let plotted = run(&["plot", &hasty_log, "-o", &format!("{hasty_log}.svg")]);
+    assert!(plotted.status.success(), "{}", stderr(&plotted));
+
+    let order = r#""firing_order": [["s3", "s4"], "s0", ["s1", "s7"]], "rangers": ["#;
+    let pairs = write("pairs.json", shipped.replace("\"rangers\": [", order));
+    let log = simulate(&[&place[..], &[&pairs]].concat());
+    let rangers: Vec<_> = log.pings().iter().map(|ping| ping["ranger"].clone()).collect();
+    assert_eq!(rangers, ["s3", "s4", "s0", "s1", "s7"]);
+    let end = log.of_type("scan_end").next().expect("an end");
+    assert_eq!(end["duration_s"], 0.12, "three turns of 40 ms");
+    for (wrong, said) in [
+        (r#""firing_order": [[]], "rangers": ["#, "firing_order[0] is an empty list"),
+        (
+            r#""firing_order": ["s1", ["s2", "s2"]], "rangers": ["#,
+            "firing_order[1] has \"s2\" twice",
+        ),
+        (r#""firing_order": [["s2", "x"]], "rangers": ["#, "firing_order[0] is \"x\""),
+        (r#""firing_order": [3], "rangers": ["#, "firing_order[0]: a ranger's id, or a list"),
+    ] {
+        let file = write("wrong.json", shipped.replace("\"rangers\": [", wrong));
+        let output = run(&[&["simulate"], &place[..], &[&file]].concat());
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+        assert!(stderr(&output).contains(said), "{} lacks {said}", stderr(&output));
+    }
+}
+
 #[test]
 fn a_ring_turned_in_place_is_one_scan_of_all_its_rounds() {
     let folder = TempDir::new().expect("a folder");

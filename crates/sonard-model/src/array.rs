@@ -2,13 +2,13 @@
 //! stepper, on which one ranger turns.
 //!
 //! [`RangerArray`] is what is known about one, [`Course`] the course of its robot.
-//! [`ArrayModel`](crate::model::ArrayModel) predicts what its rangers read. Crosstalk (a ranger that
-//! receives another one's sound) is not modelled: rangers fire in turn, each when the sound before it
-//! has died away.
+//! [`ArrayModel`](crate::model::ArrayModel) predicts what its rangers read, with crosstalk: rangers that fire
+//! at once, or before the sound of the turn before has died away, receive one another.
 
 mod body;
 mod course;
 mod error;
+mod firing;
 #[cfg(test)]
 mod tests;
 
@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 pub use body::{Body, BodyShape};
 pub use course::{Course, CourseError};
 pub use error::{ArrayError, ArrayPoseError};
+pub use firing::{OtherFiring, Turn};
 
 use crate::{
     geometry::{DVec2, Pose, wrap_360},
@@ -53,10 +54,10 @@ pub struct RangerArray {
     pub interval_ms: f64,
     /// The rangers.
     pub rangers: Vec<MountedRanger>,
-    /// Ids in the order in which they are fired, some perhaps more than once or not at all;
-    /// without it, all in the order above.
+    /// Ids in the order in which they are fired, some perhaps more than once or not at all, a list of ids for
+    /// rangers that fire at once; without it, all in the order above, one after the other.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub firing_order: Vec<String>,
+    pub firing_order: Vec<Turn>,
     /// The body of the robot, which sound does not pass. Without it, the one that the scene has, or
     /// none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -147,11 +148,9 @@ impl RangerArray {
     /// Names the first that does not.
     pub fn check(&self) -> Result<(), ArrayError> {
         within("interval_ms", self.interval_ms, 1.0, 10_000.0)?;
-        let (rangers, ordered) = (self.rangers.len(), self.firing_order.len());
-        for (field, count, least) in [("rangers", rangers, 1), ("firing_order", ordered, 0)] {
-            if !(least..=MOST).contains(&count) {
-                return Err(ArrayError::Count { field, count, most: MOST });
-            }
+        let count = self.rangers.len();
+        if !(1..=MOST).contains(&count) {
+            return Err(ArrayError::Count { field: "rangers", count, most: MOST });
         }
         for (at, ranger) in self.rangers.iter().enumerate() {
             let field = |name| format!("rangers[{at}].{name}");
@@ -169,21 +168,7 @@ impl RangerArray {
             within(field("z_m"), ranger.z_m.unwrap_or(0.0), -1000.0, 1000.0)?;
         }
         self.body.as_ref().map_or(Ok(()), Body::check)?;
-        match self.firing_order.iter().enumerate().find(|(_, id)| self.index_of(id).is_none()) {
-            None => Ok(()),
-            Some((at, id)) => Err(ArrayError::NoSuchRanger {
-                field: format!("firing_order[{at}]"),
-                id: id.clone(),
-                known: self.rangers.iter().map(|ranger| ranger.id.clone()).collect(),
-            }),
-        }
-    }
-
-    /// Indices into `rangers` in the order in which a round fires them.
-    pub fn round(&self) -> impl Iterator<Item = usize> {
-        let listed = self.firing_order.iter().filter_map(|id| self.index_of(id));
-        let all = if self.firing_order.is_empty() { 0..self.rangers.len() } else { 0..0 };
-        listed.chain(all)
+        self.check_order()
     }
 
     /// The ranger of an id, as an index into `rangers`.

@@ -7,6 +7,7 @@ mod array;
 mod batch;
 mod cone;
 mod cost;
+mod crosstalk;
 mod engine;
 mod fan;
 mod lazy;

@@ -185,6 +185,7 @@ fn predict(pose: &Pose, azimuth_deg: f64) -> SimRecord {
         range_m: if ringing { Some(BLANKING_M) } else { found.map(|f| f.0 / 2.0) },
         amplitude: best.map(|b| b.1),
         margin_db: best.map(|b| margin(b.1)),
+        crosstalk: None,
         path: best.map(|(length_m, _, order)| PathRecord {
             kind: if order % 5 == 4 { PathKind::Diffracted } else { PathKind::Specular },
             order: *order,

@@ -289,7 +289,14 @@ prop_compose! {
             interactions: vec![InteractionRecord::unplaced(InteractionKind::Reflection, "south")],
             length_m,
         };
-        SimRecord { status, range_m, amplitude: margin_db, margin_db, path: Some(path) }
+        SimRecord {
+            status,
+            range_m,
+            amplitude: margin_db,
+            margin_db,
+            path: Some(path),
+            crosstalk: None,
+        }
     }
 }
 

@@ -3,8 +3,9 @@
 use jiff::Timestamp;
 use uuid::Uuid;
 
-use super::{Ping, Provenance, ScanEnd, ScanStart, Session};
+use super::{CrosstalkRecord, Ping, Provenance, ScanEnd, ScanStart, Session, SimRecord};
 use sonard_model::{
+    array::{OtherFiring, RangerArray},
     geometry::Pose,
     model::{ArrayAtPose, ArrayModel, Prediction},
 };
@@ -50,11 +51,26 @@ impl Ping {
         Self {
             step: 0,
             ranger: Some(mounted.id.clone()),
+            crosstalk: crosstalk(stand.array(), prediction),
             pose: Some(*stand.pose()).filter(|pose| pose != scan_pose),
             provenance: Some(Provenance::Simulated),
             ..ping
         }
     }
+}
+
+impl SimRecord {
+    /// The prediction of an array's ranger as it stands in a log.
+    #[must_use]
+    pub fn of_array(stand: &ArrayAtPose<'_>, ranger: usize, prediction: &Prediction) -> Self {
+        let crosstalk = crosstalk(stand.array(), prediction);
+        Self { crosstalk, ..Self::of(stand.simulator(ranger), prediction) }
+    }
+}
+
+fn crosstalk(array: &RangerArray, prediction: &Prediction) -> Option<CrosstalkRecord> {
+    let OtherFiring { ranger, before_us } = prediction.crosstalk?;
+    Some(CrosstalkRecord { ranger: array.rangers[ranger].id.clone(), before_us })
 }
 
 impl ScanEnd {
@@ -67,7 +83,7 @@ impl ScanEnd {
         time: Timestamp,
     ) -> Self {
         let end = Self::simulated(model.simulator(), scan, beams, time);
-        let duration_s = f64::from(beams) * model.array().interval_ms * 1e-3;
+        let duration_s = model.array().duration_s(beams);
         Self { missing, duration_s, provenance: Some(Provenance::Simulated), ..end }
     }
 }
@@ -98,7 +114,7 @@ mod tests {
         let room = Scene::from_json(ROOM).expect("a scene");
         let (air, options) = (Air::default(), Options::default());
         let model =
-            ArrayModel::new(Arc::new(array), &room, sensor, air, options).expect("right options");
+            ArrayModel::new(Arc::new(array), &room, &sensor, air, options).expect("right options");
         let (time, scan) = (jiff::Timestamp::UNIX_EPOCH, uuid::Uuid::from_u128(1));
         let [from, to] = [0.0, 10.0].map(|heading_deg| Pose { x_m: 1.0, y_m: 1.0, heading_deg });
         let pings = [from, to].into_iter().zip(0..).map(|(pose, index)| {

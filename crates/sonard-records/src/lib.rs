@@ -18,9 +18,9 @@ mod viewpoint;
 pub use codec::{EncodeError, FaultKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};
 pub use path::{InteractionKind, InteractionRecord, PathRecord, Point};
 pub use record::{
-    AirRecord, AirSource, CollectionRef, Device, Event, EventKind, ImportRef, LOG_FORMAT,
-    ModelRecord, Ping, Provenance, Record, STOPPED_ON_REQUEST, ScanAir, ScanEnd, ScanStart,
-    SceneRef, Session, SimRecord,
+    AirRecord, AirSource, CollectionRef, CrosstalkRecord, Device, Event, EventKind, ImportRef,
+    LOG_FORMAT, ModelRecord, Ping, Provenance, Record, STOPPED_ON_REQUEST, ScanAir, ScanEnd,
+    ScanStart, SceneRef, Session, SimRecord,
 };
 pub use remaining::Segment;
 pub use sink::{Sink, SinkError};

@@ -48,9 +48,11 @@ impl From<&Options> for ModelRecord {
             settings.extend(values.into_iter().filter(|(_, value)| !value.is_null()));
         }
         settings.remove("engine");
-        if settings.get("double_diffraction") == Some(&Value::Bool(false)) {
-            // Records had no such setting at first.
-            settings.remove("double_diffraction");
+        // Records had no such settings at first.
+        for later in ["double_diffraction", "without_crosstalk"] {
+            if settings.get(later) == Some(&Value::Bool(false)) {
+                settings.remove(later);
+            }
         }
         Self { engine: options.engine.kind().name().to_owned(), settings }
     }
@@ -84,6 +86,7 @@ impl SimRecord {
             margin_db: prediction.margin_db,
             path: arrival
                 .map(|arrival| PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m)),
+            crosstalk: None,
         }
     }
 }

@@ -311,6 +311,9 @@ pub struct Ping {
     /// Simulated readings only: the path the sound took.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<PathRecord>,
+    /// Simulated readings only: whose sound it was, if not this firing's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crosstalk: Option<CrosstalkRecord>,
     /// What the model predicts for this firing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sim: Option<SimRecord>,
@@ -345,6 +348,7 @@ impl Ping {
             amplitude: None,
             margin_db: None,
             path: None,
+            crosstalk: None,
             sim: None,
             residual_m: None,
             confidence: None,
@@ -366,6 +370,19 @@ pub struct SimRecord {
     pub margin_db: Option<f64>,
     /// The path the sound took (for `no_echo`, the best candidate's).
     pub path: Option<PathRecord>,
+    /// Crosstalk: whose sound it was, if not this firing's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crosstalk: Option<CrosstalkRecord>,
+}
+
+/// Another firing of an array, whose sound a ranger received as an echo of its own.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CrosstalkRecord {
+    /// The ranger that fired.
+    pub ranger: String,
+    /// How long before, microseconds; 0 for one at the same time. The path is longer than twice the range by
+    /// what sound runs meanwhile.
+    pub before_us: f64,
 }
 
 /// A scan is over.

@@ -50,7 +50,7 @@ pub(super) fn run(args: &Args, name: &str) -> Outcome {
     let rounds: Vec<Vec<Pose>> = poses.iter().map(|pose| turned(args, *pose, &array)).collect();
     let (sensor, air) = (args.sensor.sensor_or(&array.sensor)?, args.air.air()?);
     let model =
-        ArrayModel::new(Arc::new(array), &scene, sensor, air, engine_options(&args.engine)?)
+        ArrayModel::new(Arc::new(array), &scene, &sensor, air, engine_options(&args.engine)?)
             .map_err(|error| refuse(&error))?;
     let noise = args.noise.noise()?;
     let mut out = records_to(args.output.as_deref(), args.overwrite)?;
@@ -89,8 +89,8 @@ impl Player<'_> {
     /// Writes the session, and a scan for each place with its rounds.
     fn play(&mut self, out: &mut dyn RecordWriter, places: &[Vec<Pose>]) -> Result<(), Stop> {
         out.write(&Record::Session(Box::new(Session::of_array(self.model, Timestamp::now()))))?;
-        let firings =
-            self.model.array().round().count() * places.iter().map(Vec::len).sum::<usize>();
+        let round: Vec<usize> = self.model.array().round().collect();
+        let firings = round.len() * places.iter().map(Vec::len).sum::<usize>();
         let progress = progress::bar(firings as u64, "beams");
         for rounds in places {
             let Some(first) = rounds.first() else { continue };
@@ -100,8 +100,8 @@ impl Player<'_> {
             let mut index = 0;
             for pose in rounds {
                 let stand = self.model.at(*pose).map_err(Stop::Model)?;
-                for ranger in self.model.array().round() {
-                    let prediction = self.listen(&stand, ranger)?;
+                for (firing, &ranger) in round.iter().enumerate() {
+                    let prediction = self.listen(&stand, firing)?;
                     let ping = Ping::of_array(&stand, scan, first, index, ranger, &prediction);
                     out.write(&Record::Ping(Box::new(ping)))?;
                     index += 1;
@@ -115,10 +115,10 @@ impl Player<'_> {
         Ok(())
     }
 
-    fn listen(&mut self, stand: &ArrayAtPose<'_>, ranger: usize) -> Result<Prediction, TooCostly> {
+    fn listen(&mut self, stand: &ArrayAtPose<'_>, firing: usize) -> Result<Prediction, TooCostly> {
         match &self.noise {
-            Some(noise) => stand.ping_in_noise(ranger, noise, &mut self.rng),
-            None => stand.ping(ranger),
+            Some(noise) => stand.ping_in_noise(firing, noise, &mut self.rng),
+            None => stand.ping_in_round(firing),
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::{
     scan::{EventKind, Ping, PingStatus},
 };
 
-/// The model in force, with each ranger's last reading and the pose it is of.
+/// The model in force, with the last reading of each firing of a round and the pose it is of.
 pub(super) struct Stage {
     model: Arc<ArrayModel>,
     air: Air,
@@ -33,8 +33,8 @@ impl Stage {
         };
         let (array, scene) = (Arc::clone(&simulated.array), Arc::clone(scene));
         let (sensor, options) = (settings.sensor.clone(), settings.options());
-        let rangers = array.rangers.len();
-        let making = move || ArrayModel::new(array, &scene, sensor, air, options);
+        let firings = array.round().count();
+        let making = move || ArrayModel::new(array, &scene, &sensor, air, options);
         let model = tokio::task::spawn_blocking(making)
             .await
             .map_err(|error| format!("the model failed: {error}"))?
@@ -43,7 +43,7 @@ impl Stage {
         Ok(Self {
             model: Arc::new(model),
             air,
-            heard: vec![None; rangers],
+            heard: vec![None; firings],
             noise: TofNoise::of_range_mm(keys.noise_mm, air.sound_speed_m_s()),
             rng: Pcg64::seed_from_u64(keys.seed),
         })
@@ -53,9 +53,9 @@ impl Stage {
         Arc::clone(&self.model)
     }
 
-    /// The rangers of a round, by index.
-    pub(super) fn order(&self) -> Vec<usize> {
-        self.model.array().round().collect()
+    /// The rangers of a round by turn, by index.
+    pub(super) fn turns(&self) -> Vec<Vec<usize>> {
+        self.model.array().turns()
     }
 
     pub(super) fn is_of(&self, air: &Air) -> bool {
@@ -67,18 +67,18 @@ impl Stage {
         2.0 * self.model.simulator().receiver().max_range_m / self.air.sound_speed_m_s()
     }
 
-    /// What a ranger reads with the robot at a pose, with noise. The model is asked for another
+    /// What a firing of a round reads with the robot at a pose, with noise. The model is asked for another
     /// pose than last time only.
-    pub(super) async fn reading(&mut self, ranger: usize, pose: Pose) -> Result<Ping, String> {
-        let known = self.heard.get(ranger).and_then(Option::as_ref);
+    pub(super) async fn reading(&mut self, firing: usize, pose: Pose) -> Result<Ping, String> {
+        let known = self.heard.get(firing).and_then(Option::as_ref);
         let known = known.filter(|(of, _)| *of == pose).map(|(_, ping)| ping.clone());
         let ping = match known {
             Some(ping) => ping,
             None => {
                 let model = Arc::clone(&self.model);
-                let asking = tokio::task::spawn_blocking(move || ask(&model, ranger, pose));
+                let asking = tokio::task::spawn_blocking(move || ask(&model, firing, pose));
                 let ping = asking.await.map_err(|error| format!("the model failed: {error}"))??;
-                if let Some(heard) = self.heard.get_mut(ranger) {
+                if let Some(heard) = self.heard.get_mut(firing) {
                     *heard = Some((pose, ping.clone()));
                 }
                 ping
@@ -101,9 +101,10 @@ impl Stage {
     }
 }
 
-fn ask(model: &ArrayModel, ranger: usize, pose: Pose) -> Result<Ping, String> {
+fn ask(model: &ArrayModel, firing: usize, pose: Pose) -> Result<Ping, String> {
+    let ranger = model.array().round().nth(firing).ok_or("a round has no such firing")?;
     let stand = model.at(pose).map_err(|error| error.to_string())?;
-    let prediction = stand.ping(ranger).map_err(|error| error.to_string())?;
+    let prediction = stand.ping_in_round(firing).map_err(|error| error.to_string())?;
     Ok(Ping::of_array(&stand, Uuid::nil(), &pose, 0, ranger, &prediction))
 }
 

@@ -137,6 +137,8 @@ function reading(ping) {
       ["Path", words.path(ping.sim.path)],
     );
   }
+  const crosstalk = ping.crosstalk ?? ping.sim?.crosstalk;
+  if (crosstalk) facts.push(["Crosstalk", words.crosstalk(crosstalk)]);
   if (ping.repaired) facts.push(["Line", "fetched again after the line lost it"]);
   words.facts(list, facts);
   return [title, list];

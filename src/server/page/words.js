@@ -20,7 +20,11 @@ export const clock = (time) =>
 export function path(record) {
   if (!record) return "nothing came near";
   const met = record.interactions.map(({ kind, id }) => (kind === "diffraction" ? `edge ${id}` : id));
-  return (record.kind === "scattered" ? "scattered by " : "") + met.join(", ");
+  return (record.kind === "scattered" ? "scattered by " : "") + (met.join(", ") || "straight");
+}
+
+export function crosstalk({ ranger, before_us }) {
+  return before_us === 0 ? `sound of ${ranger}, fired at once` : `sound of ${ranger}, fired ${before_us / 1000} ms before`;
 }
 
 const STATES = {

@@ -67,6 +67,20 @@ pub enum ArrayError {
         /// The names there are.
         known: Vec<String>,
     },
+    /// A turn in which nobody fires.
+    #[error("{field} is an empty list: it must have the id of at least one ranger")]
+    EmptyTurn {
+        /// Which field.
+        field: String,
+    },
+    /// A ranger that is to fire twice at once.
+    #[error("{field} has \"{id}\" twice: a ranger fires once in a turn")]
+    FiredTwice {
+        /// Which field.
+        field: String,
+        /// The ranger's id.
+        id: String,
+    },
     /// No preset of that name.
     #[error("there is no array preset \"{name}\"")]
     UnknownPreset {
@@ -90,9 +104,12 @@ impl ArrayError {
     pub fn help(&self) -> String {
         match self {
             Self::Form { .. } => "start from a preset in the folder arrays/ of the source".into(),
-            Self::Figure { .. } | Self::Count { .. } | Self::NoId { .. } | Self::SameId { .. } => {
-                "correct that in the array's file".into()
-            }
+            Self::Figure { .. }
+            | Self::Count { .. }
+            | Self::NoId { .. }
+            | Self::SameId { .. }
+            | Self::EmptyTurn { .. }
+            | Self::FiredTwice { .. } => "correct that in the array's file".into(),
             Self::NoSuchRanger { id, known, .. } => suggest(id, known, "rangers"),
             Self::UnknownPreset { name, known } => suggest(name, known, "presets"),
         }

@@ -56,7 +56,7 @@ fn the_firing_order_may_leave_out_and_repeat_and_defaults_to_all() {
     let mut array = preset("pioneer-7");
     assert_eq!(array.round().collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5, 6]);
     assert_eq!((array.plan(1).beams(), array.plan(3).beams()), (7, 21));
-    array.firing_order = ["s3", "s2", "s3"].map(str::to_owned).into();
+    array.firing_order = ["s3", "s2", "s3"].map(Turn::from).into();
     assert_eq!(array.check(), Ok(()));
     assert_eq!(array.round().collect::<Vec<_>>(), [3, 2, 3]);
     for rounds in 1..=200 {

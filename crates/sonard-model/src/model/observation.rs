@@ -4,6 +4,7 @@ use rand::Rng;
 
 use super::{
     cost::TooCostly,
+    crosstalk::{Medley, Others, Sorted},
     engine::{Arrival, Arrivals},
     lazy::LazyArrivals,
     prediction::Prediction,
@@ -69,17 +70,89 @@ impl<'a> ObservationPoint<'a> {
         direction_rad: f64,
         latch: Latch,
     ) -> Result<Prediction, TooCostly> {
+        self.listen_alone(receiver, direction_rad, latch).map(|(prediction, _)| prediction)
+    }
+
+    /// The same, and up to which length there and back arrivals matter to it, metres.
+    fn listen_alone(
+        &self,
+        receiver: &Receiver,
+        direction_rad: f64,
+        latch: Latch,
+    ) -> Result<(Prediction, f64), TooCostly> {
         let mut arrivals = Vec::with_capacity(USUAL_ARRIVALS);
         self.at(direction_rad, |all| {
-            let (detection, near) = all.nearest(|near, reach_m| {
+            let ((detection, needed_m), near) = all.nearest(|near, reach_m| {
                 near.listen(direction_rad, &mut arrivals);
                 let firing = Firing { from: near, direction_rad };
                 let incident = |arrival: &PulseArrival| Some(firing.incident(arrival));
                 let incident: &dyn Fn(&PulseArrival) -> Option<Incident> =
                     if receiver.asks_incidents() { &incident } else { &|_| None };
-                receiver.detect_within(reach_m, &arrivals, incident, latch)
+                let (detection, needed_m) =
+                    receiver.detect_within(reach_m, &arrivals, incident, latch);
+                ((detection, needed_m.unwrap_or(f64::INFINITY)), needed_m)
             })?;
-            Ok(Firing { from: near, direction_rad }.prediction(detection))
+            Ok((Firing { from: near, direction_rad }.prediction(detection), needed_m))
+        })
+    }
+
+    /// The same with the sound of other firings in the ear.
+    pub(super) fn ping_among(
+        &self,
+        direction_rad: f64,
+        others: &Others,
+    ) -> Result<Prediction, TooCostly> {
+        let receiver = self.simulator.receiver();
+        let (alone, needed_m) = self.listen_alone(receiver, direction_rad, Latch::First)?;
+        if others.is_silent() {
+            return Ok(alone);
+        }
+        others.settle(needed_m, |medley| self.listen_among(direction_rad, medley))
+    }
+
+    fn listen_among(
+        &self,
+        direction_rad: f64,
+        medley: &Medley,
+    ) -> Result<(Prediction, f64), TooCostly> {
+        let (receiver, mut own) = (self.simulator.receiver(), Vec::new());
+        self.at(direction_rad, |all| {
+            let ((detection, sorted, needed_m), near) = all.nearest(|near, reach_m| {
+                near.listen(direction_rad, &mut own);
+                let sorted = medley.sorted(&own);
+                let firing = Firing { from: near, direction_rad };
+                let incident = |arrival: &PulseArrival| {
+                    Some(medley.incident(&sorted, arrival, |own| firing.incident(own)))
+                };
+                let known_m = reach_m.min(medley.known_m);
+                let (detection, needed_m) =
+                    receiver.detect_within(known_m, &sorted.arrivals, &incident, Latch::First);
+                ((detection, sorted, needed_m.unwrap_or(f64::INFINITY)), needed_m)
+            })?;
+            let firing = Firing { from: near, direction_rad };
+            Ok((firing.prediction_among(detection, medley, &sorted), needed_m))
+        })
+    }
+
+    /// [`ping_in_noise`](Self::ping_in_noise) with the sound of other firings in the ear.
+    pub(super) fn ping_among_in_noise(
+        &self,
+        direction_rad: f64,
+        others: &Others,
+        noise: &ReceiverNoise,
+        rng: &mut impl Rng,
+    ) -> Result<Prediction, TooCostly> {
+        let receiver = self.simulator.receiver();
+        others.settle(f64::INFINITY, |medley| {
+            let heard = self.firing(direction_rad, |firing| {
+                let sorted = medley.sorted(&firing.arrivals());
+                let incident = |arrival: &PulseArrival| {
+                    Some(medley.incident(&sorted, arrival, |own| firing.incident(own)))
+                };
+                let detection = receiver.detect_in_noise(&sorted.arrivals, &incident, noise, rng);
+                firing.prediction_among(detection, medley, &sorted)
+            })?;
+            Ok((heard, f64::INFINITY))
         })
     }
 
@@ -200,6 +273,20 @@ impl Firing<'_> {
             amplitude: detection.amplitude,
             margin_db: detection.margin_db,
             echoes_us: detection.echoes_us,
+            crosstalk: None,
         }
+    }
+
+    fn prediction_among(
+        &self,
+        mut detection: Detection,
+        medley: &Medley,
+        sorted: &Sorted,
+    ) -> Prediction {
+        let cause = detection.arrival.take();
+        let (arrival, crosstalk) = cause
+            .map(|arrival| medley.arrival(sorted, &arrival, (self.from, self.direction_rad)))
+            .unzip();
+        Prediction { arrival, crosstalk: crosstalk.flatten(), ..self.prediction(detection) }
     }
 }

@@ -59,6 +59,8 @@ pub struct PathOptions {
     pub edge_law: Option<EdgeLawKind>,
     /// Also sound that bends at two edges.
     pub double_diffraction: bool,
+    /// Leave out what an array's ranger receives of other firings than its own.
+    pub without_crosstalk: bool,
 }
 
 /// Settings of the engine `fan`, whose edges follow Kuc and Siegel's law.
@@ -118,6 +120,10 @@ pub struct OptionKeys {
     /// Also follow sound that bends at two edges; with paths.
     #[cfg_attr(feature = "clap", arg(long))]
     pub double_diffraction: bool,
+    /// Leave out what a ranger of an array receives of other firings than its own; with paths, the others know no
+    /// crosstalk.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub without_crosstalk: bool,
     /// Angle between the rays, degrees, instead of 0.05; with fan.
     #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
     #[schemars(range(min = 0.0001, max = 5), example = 0.1)]
@@ -261,6 +267,7 @@ impl From<&Options> for OptionKeys {
                 max_order: paths.max_order,
                 edge_law: paths.edge_law,
                 double_diffraction: paths.double_diffraction,
+                without_crosstalk: paths.without_crosstalk,
                 ..keys
             },
             EngineOptions::Fan(fan) => Self {
@@ -300,6 +307,7 @@ impl OptionKeys {
                 max_order: self.max_order,
                 edge_law: self.edge_law,
                 double_diffraction: self.double_diffraction,
+                without_crosstalk: self.without_crosstalk,
             }),
             EngineKind::Fan => EngineOptions::Fan(FanOptions {
                 lossless: self.lossless,
@@ -324,6 +332,7 @@ impl OptionKeys {
             "max_order" => self.max_order.is_some(),
             "edge_law" => self.edge_law.is_some(),
             "double_diffraction" => self.double_diffraction,
+            "without_crosstalk" => self.without_crosstalk,
             "ray_spacing_deg" => self.ray_spacing_deg.is_some(),
             _ => self.aperture_deg.is_some(),
         }
@@ -331,13 +340,14 @@ impl OptionKeys {
 }
 
 /// The options that not every engine knows, and who does.
-const OPTIONS: [(&str, &[EngineKind]); 8] = [
+const OPTIONS: [(&str, &[EngineKind]); 9] = [
     ("response", &[EngineKind::Paths]),
     ("ideal_receiver", &[EngineKind::Paths]),
     ("lossless", &[EngineKind::Paths, EngineKind::Fan]),
     ("max_order", &[EngineKind::Paths, EngineKind::Fan]),
     ("edge_law", &[EngineKind::Paths]),
     ("double_diffraction", &[EngineKind::Paths]),
+    ("without_crosstalk", &[EngineKind::Paths]),
     ("ray_spacing_deg", &[EngineKind::Fan]),
     ("aperture_deg", &[EngineKind::Cone]),
 ];
@@ -399,6 +409,7 @@ mod tests {
             max_order: Some(2),
             edge_law: Some(EdgeLawKind::Utd),
             double_diffraction: true,
+            without_crosstalk: true,
             ray_spacing_deg: Some(0.2),
             aperture_deg: Some(20.0),
         }

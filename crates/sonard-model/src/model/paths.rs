@@ -74,6 +74,11 @@
 //!
 //! It reflects too, and turns with the azimuth: echoes come back from it once more (`transducer`).
 //!
+//! # Crosstalk
+//!
+//! What one transducer sends and another one receives runs between two places, too, each with an axis of its own
+//! (`crosstalk`).
+//!
 //! # Scans
 //!
 //! Paths depend on the observation point alone. [`PathEngine`] finds them,
@@ -89,6 +94,7 @@
 //! `enumerate` asks every mechanism in its turn, and `interactions` tells what a path met.
 
 mod beams;
+mod crosstalk;
 mod cylinders;
 mod diffraction;
 mod direction_index;
@@ -96,6 +102,7 @@ mod echo;
 mod effort;
 mod engine;
 mod enumerate;
+mod found;
 mod height;
 mod interactions;
 mod pattern;
@@ -110,6 +117,7 @@ mod tolerance;
 mod traced;
 mod transducer;
 
+pub(super) use crosstalk::{Aimed, AimedPaths};
 pub use engine::PathEngine;
 pub use interactions::EchoPath;
 pub use prepare::Paths;

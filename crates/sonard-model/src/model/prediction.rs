@@ -3,7 +3,7 @@
 use smallvec::SmallVec;
 
 use super::engine::Arrival;
-use crate::reading::PingStatus;
+use crate::{array::OtherFiring, reading::PingStatus};
 
 /// The predicted reading of a firing.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,4 +23,7 @@ pub struct Prediction {
     /// Times after firing at which the module raises ECHO, microseconds: the first, or up to eight
     /// where the receiver was made ready again.
     pub echoes_us: SmallVec<[f64; 8]>,
+    /// Crosstalk: the firing whose sound the arrival was, if not this one's. Its path begins at that firing's
+    /// ranger, and is longer than twice the range if that was an earlier one.
+    pub crosstalk: Option<OtherFiring>,
 }

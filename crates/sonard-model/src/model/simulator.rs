@@ -88,8 +88,7 @@ impl Ranger {
                 let settings = path_settings(sensor, air, paths, receiver, self.scatter_height_rad);
                 let wave_number_per_m = settings.wave_number_per_m;
                 let face = sensor.face.map(|face| Disc { face, wave_number_per_m });
-                let engine = PathEngine::new(scene, beam.clone(), face, settings);
-                Box::new(engine.through_nulls(receiver.asks_incidents()))
+                Box::new(self.path_engine(scene, face, settings))
             }
             EngineOptions::Fan(fan) => {
                 let settings = fan_settings(sensor, air, fan, receiver);
@@ -100,6 +99,16 @@ impl Ranger {
                 Box::new(Cone::new(scene, cone.aperture_deg.unwrap_or_else(two_way_deg)))
             }
         }
+    }
+
+    fn path_engine(
+        &self,
+        scene: &Scene,
+        face: Option<Disc>,
+        settings: paths::Settings,
+    ) -> PathEngine {
+        let engine = PathEngine::new(scene, self.beam.clone(), face, settings);
+        engine.through_nulls(self.receiver.asks_incidents())
     }
 }
 
@@ -209,6 +218,14 @@ impl Simulator {
         };
         let Ranger { sensor, air, receiver, scatter_height_rad, .. } = &self.ranger;
         path_settings(sensor, air, &options, receiver, *scatter_height_rad)
+    }
+
+    /// An engine for sound of other transducers that arrives while this one listens, up to a length of path in
+    /// metres; `None` if the simulator's own is not `paths`.
+    pub(super) fn stray_engine(&self, max_path_m: f64) -> Option<PathEngine> {
+        let EngineOptions::Paths(_) = self.ranger.options.engine else { return None };
+        let settings = paths::Settings { max_path_m, direct: true, ..self.path_settings() };
+        Some(self.ranger.path_engine(&self.scene, None, settings))
     }
 
     /// The scene.

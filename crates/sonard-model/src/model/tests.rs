@@ -2,6 +2,7 @@
 
 mod array;
 mod closed_forms;
+mod crosstalk;
 mod extents;
 mod floor_plans;
 mod full_wave;

@@ -129,6 +129,7 @@ pub(crate) fn settings() -> Settings {
         sensor_z_m: None,
         tilt_rad: 0.0,
         scatter_height_rad: 0.16,
+        direct: false,
     }
 }
 

@@ -3,13 +3,12 @@
 use std::f64::consts::PI;
 
 use super::{
-    diffraction::single,
     direction_index::{DirectionIndex, Entry},
     echo::Echo,
+    found::Found,
     pattern::{PatternEnvelope, TwoWayBound},
     prepare::Paths,
     settings::Settings,
-    traced::Traced,
     transducer::{DirectedPath, FLOOR_ABOVE, FaceEchoes, MultipleEcho},
 };
 use crate::{
@@ -61,9 +60,20 @@ impl PathEngine {
         self.paths.heights.images.is_empty() && self.paths.plan.settings.tilt_rad == 0.0
     }
 
+    /// The weakest sound that is told.
+    pub(crate) fn floor(&self) -> f64 {
+        self.paths.plan.settings.floor
+    }
+
+    /// The most that an echo's pulse may have, if a steady tone with the beam pattern at its ends, radians off the
+    /// axis, has `amplitude`.
+    pub(super) fn most(&self, path_amplitude: f64, amplitude: f64, ends_rad: &[f64; 2]) -> f64 {
+        if self.through_nulls { path_amplitude * self.envelope.beyond(ends_rad) } else { amplitude }
+    }
+
     /// Angle between the transducer's axis and a direction that is `azimuth_rad` beside it in the
     /// plan and points up by `rise_rad`, radians.
-    fn off_axis(&self, azimuth_rad: f64, rise_rad: f64) -> f64 {
+    pub(super) fn off_axis(&self, azimuth_rad: f64, rise_rad: f64) -> f64 {
         let (tilt_sin, tilt_cos) = self.paths.plan.settings.tilt_rad.sin_cos();
         let (rise_sin, rise_cos) = rise_rad.sin_cos();
         (tilt_cos * rise_cos * azimuth_rad.cos() + tilt_sin * rise_sin).clamp(-1.0, 1.0).acos()
@@ -99,11 +109,8 @@ const REACHES_DEG: [f64; 5] = [6.0, 10.0, 16.0, 30.0, 180.0];
 /// The echo paths of an observation point, by direction.
 struct PathArrivals<'a> {
     engine: &'a PathEngine,
-    /// The engine's, perhaps for shorter paths.
-    paths: Paths,
-    traced: Traced,
-    /// Shortest first.
-    echoes: Vec<Echo>,
+    /// By the engine's plan, perhaps up to a shorter length.
+    found: Found,
     /// From narrow to wide reach: the many weak echoes are heard in few directions only.
     indexes: [DirectionIndex; REACHES_DEG.len()],
     /// Echoes that the face can reflect.
@@ -116,8 +123,8 @@ impl<'a> PathArrivals<'a> {
         paths: Paths,
         [transmitter, receiver]: [DVec2; 2],
     ) -> Result<Self, TooCostly> {
-        let (traced, echoes) = paths.trace(transmitter, receiver, engine.bound.as_ref())?;
-        let settings = &paths.plan.settings;
+        let found = Found::between(paths, [transmitter, receiver], engine.bound.as_ref())?;
+        let (settings, echoes) = (&found.paths.plan.settings, &found.echoes);
         let mut entries: [Vec<Entry>; REACHES_DEG.len()] = Default::default();
         for (echo, index) in echoes.iter().zip(0..) {
             if let Some(mut entry) = Entry::of(echo, index, &engine.envelope, settings.floor) {
@@ -137,13 +144,13 @@ impl<'a> PathArrivals<'a> {
         let face_echoes = engine
             .face
             .filter(|_| faces_level)
-            .map(|face| FaceEchoes::new(face, &echoes, &engine.envelope, settings));
-        Ok(Self { engine, paths, traced, echoes, indexes, face_echoes })
+            .map(|face| FaceEchoes::new(face, echoes, &engine.envelope, settings));
+        Ok(Self { engine, found, indexes, face_echoes })
     }
 
     /// Echoes by way of the face, in a direction in (-pi, pi].
     fn multiple_echoes(&self, direction_rad: f64) -> Vec<MultipleEcho> {
-        let (beam, settings) = (&self.engine.beam, &self.paths.plan.settings);
+        let (beam, settings) = (&self.engine.beam, &self.found.paths.plan.settings);
         let found = |echoes: &FaceEchoes| echoes.multiple_echoes(direction_rad, beam, settings);
         self.face_echoes.as_ref().map_or_else(Vec::new, found)
     }
@@ -154,15 +161,16 @@ impl<'a> PathArrivals<'a> {
         multiple: &MultipleEcho,
         amplitude: f64,
     ) -> Arrival {
+        let Found { paths, traced, echoes } = &self.found;
         let run_through = |directed: &DirectedPath| {
-            let echo = &self.echoes[directed.echo as usize];
-            let path = self.paths.path(&self.traced, echo).path;
+            let echo = &echoes[directed.echo as usize];
+            let path = paths.path(traced, echo).path;
             if directed.reversed { path.reversed() } else { path }
         };
         let at_face = Interaction {
             mechanism: Mechanism::Transducer,
-            point: self.traced.ends[0],
-            z_m: self.paths.sensor_z_m(),
+            point: traced.ends[0],
+            z_m: paths.sensor_z_m(),
         };
         let mut interactions = Vec::new();
         for (number, path) in multiple.paths.iter().enumerate() {
@@ -190,7 +198,7 @@ impl<'a> PathArrivals<'a> {
         amplitude: f64,
     ) -> (f64, [f64; 2]) {
         let ends_rad = |path: &DirectedPath| {
-            let echo = &self.echoes[path.echo as usize];
+            let echo = &self.found.echoes[path.echo as usize];
             let ends_rad = [echo.departure, echo.arrival].map(DVec2::to_angle);
             if path.reversed { [ends_rad[1], ends_rad[0]] } else { ends_rad }
         };
@@ -204,15 +212,15 @@ impl<'a> PathArrivals<'a> {
 
     /// The image of the face over a multiple echo.
     fn multiple_image(&self, multiple: &MultipleEcho) -> Image {
-        let echoes = multiple.paths.iter().map(|path| &self.echoes[path.echo as usize]);
+        let Found { paths, traced, echoes } = &self.found;
+        let met = multiple.paths.iter().map(|path| &echoes[path.echo as usize]);
         let passages = multiple.paths.len() - 1;
-        echoes
-            .map(|echo| match echo.via.kind() {
-                PathKind::Specular => Some(self.paths.mirrors_met(&self.traced, echo)),
-                PathKind::Diffracted | PathKind::Scattered => None,
-            })
-            .try_fold(passages, |met, more| Some(met + more?))
-            .map_or(Image::Lost, mirrored)
+        met.map(|echo| match echo.via.kind() {
+            PathKind::Specular => Some(paths.mirrors_met(traced, echo)),
+            PathKind::Diffracted | PathKind::Scattered => None,
+        })
+        .try_fold(passages, |met, more| Some(met + more?))
+        .map_or(Image::Lost, mirrored)
     }
 }
 
@@ -220,24 +228,20 @@ impl Arrivals for PathArrivals<'_> {
     fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
         arrivals.clear();
         let direction_rad = wrap_pi(direction_rad);
-        let (beam, floor) = (&self.engine.beam, self.paths.plan.settings.floor);
+        let Found { paths, echoes, .. } = &self.found;
+        let (beam, floor) = (&self.engine.beam, paths.plan.settings.floor);
         let is_flat = self.engine.is_flat();
         for directions in &self.indexes {
             directions.near(direction_rad, |entry, off_rad| {
                 let mut ends = [off_rad + entry.half_rad, off_rad - entry.half_rad];
                 if !is_flat {
-                    let rise_rad = self.echoes[entry.echo as usize].rise_rad;
+                    let rise_rad = echoes[entry.echo as usize].rise_rad;
                     ends = [0, 1].map(|end| self.engine.off_axis(ends[end], rise_rad[end]));
                 }
                 let [leaving, arriving] = ends.map(|angle| beam.one_way(angle));
                 let amplitude = entry.amplitude * leaving * arriving;
-                let most = if self.engine.through_nulls {
-                    entry.amplitude * self.engine.envelope.beyond(&ends)
-                } else {
-                    amplitude
-                };
-                if most >= floor {
-                    let Echo { length_m, phase_rad, .. } = self.echoes[entry.echo as usize];
+                if self.engine.most(entry.amplitude, amplitude, &ends) >= floor {
+                    let Echo { length_m, phase_rad, .. } = echoes[entry.echo as usize];
                     arrivals.push(PulseArrival {
                         length_m,
                         amplitude,
@@ -251,52 +255,33 @@ impl Arrivals for PathArrivals<'_> {
         arrivals.sort_unstable_by_key(|arrival| arrival.index);
         let multiple = self.multiple_echoes(direction_rad);
         if !multiple.is_empty() {
-            let numbers = self.echoes.len() as u32..;
+            let numbers = echoes.len() as u32..;
             arrivals.extend(multiple.iter().zip(numbers).map(|(echo, index)| echo.arrival(index)));
             arrivals.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
         }
     }
 
     fn incident(&self, direction_rad: f64, arrival: &PulseArrival) -> Incident {
-        let (paths, traced) = (&self.paths, &self.traced);
-        let index = arrival.index as usize;
-        let (strength, ends_rad, length_m, image) = if let Some(echo) = self.echoes.get(index) {
-            let image = match echo.via.kind() {
-                PathKind::Specular => mirrored(paths.mirrors_met(traced, echo)),
-                PathKind::Diffracted => {
-                    let view = single::view(&paths.plan, &traced.out, traced.back(), echo);
-                    view.map_or(Image::Lost, Image::Bent)
-                }
-                PathKind::Scattered => Image::Lost,
-            };
-            let ends_rad = [echo.departure, echo.arrival].map(DVec2::to_angle);
-            (echo.amplitude, ends_rad, echo.length_m, image)
-        } else {
-            let multiple = &self.multiple_echoes(wrap_pi(direction_rad))[index - self.echoes.len()];
-            let (strength, ends_rad) =
-                self.multiple_ends(direction_rad, multiple, arrival.amplitude);
-            (strength, ends_rad, multiple.length_m, self.multiple_image(multiple))
-        };
+        let (echoes, index) = (&self.found.echoes, arrival.index as usize);
+        if let Some(echo) = echoes.get(index) {
+            return self.found.incident(echo, [direction_rad; 2]);
+        }
+        let multiple = &self.multiple_echoes(wrap_pi(direction_rad))[index - echoes.len()];
+        let (strength, ends_rad) = self.multiple_ends(direction_rad, multiple, arrival.amplitude);
         let [leaving_rad, arriving_rad] = ends_rad.map(|end_rad| wrap_pi(end_rad - direction_rad));
+        let (length_m, image) = (multiple.length_m, self.multiple_image(multiple));
         Incident { strength, incidence: Incidence { leaving_rad, arriving_rad, length_m, image } }
     }
 
     fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival {
-        let index = arrival.index as usize;
-        if let Some(at) = index.checked_sub(self.echoes.len()) {
-            let multiple = self.multiple_echoes(wrap_pi(direction_rad));
-            return self.multiple_arrival(direction_rad, &multiple[at], arrival.amplitude);
-        }
-        let echo = &self.echoes[index];
-        let path = self.paths.path(&self.traced, echo);
-        Arrival {
-            length_m: path.length_m,
-            amplitude: arrival.amplitude,
-            path_amplitude: path.amplitude,
-            phase_rad: path.phase_rad,
-            departure_rad: path.departure_rad,
-            arrival_rad: path.arrival_rad,
-            path: path.path,
+        let (echoes, index) = (&self.found.echoes, arrival.index as usize);
+        match echoes.get(index) {
+            Some(echo) => self.found.arrival(echo, arrival.amplitude),
+            None => {
+                let multiple = self.multiple_echoes(wrap_pi(direction_rad));
+                let multiple = &multiple[index - echoes.len()];
+                self.multiple_arrival(direction_rad, multiple, arrival.amplitude)
+            }
         }
     }
 }

@@ -165,7 +165,10 @@ impl Paths {
                     echoes.extend(image.echo(&echoes[at], index, settings));
                 }
             }
-            echoes.extend(image.upright_echo(index, receiver - transmitter, settings));
+            // The straight path, where it is asked for, is one of the plan.
+            if !settings.direct || transmitter == receiver {
+                echoes.extend(image.upright_echo(index, receiver - transmitter, settings));
+            }
             self.plan.effort.keep::<Echo>(echoes.len() - before);
         }
         let mut number = 0;

@@ -37,6 +37,8 @@ pub struct Settings {
     /// Height of the strip of a rough wall that it hears: the integral of the beam pattern's fourth
     /// power over the rise, radians. 0: rough walls only mirror.
     pub scatter_height_rad: f64,
+    /// Also the straight path from the transmitter to a receiver elsewhere, and by floor and ceiling.
+    pub direct: bool,
 }
 
 /// The height of a transducer of which nothing is said, metres: half a metre above the floor, or

@@ -47,6 +47,7 @@ pub(in crate::model) const LOSSLESS: Settings = Settings {
     sensor_z_m: None,
     tilt_rad: 0.0,
     scatter_height_rad: 0.0,
+    direct: false,
 };
 
 impl Paths {

@@ -62,6 +62,7 @@ pub(super) fn path_settings(
         sensor_z_m: sensor.mounting.z_m,
         tilt_rad: sensor.mounting.tilt_deg.to_radians(),
         scatter_height_rad,
+        direct: false,
     }
 }
 

@@ -24,7 +24,8 @@ fn room(side_m: f64) -> Scene {
 fn model(array: &str, scene: &Scene, options: Options) -> ArrayModel {
     let array = RangerArray::preset(array).expect("a preset");
     let sensor = Sensor::preset(&array.sensor).expect("a preset");
-    ArrayModel::new(Arc::new(array), scene, sensor, Air::default(), options).expect("right options")
+    ArrayModel::new(Arc::new(array), scene, &sensor, Air::default(), options)
+        .expect("right options")
 }
 
 /// Of a ring in the middle of a square room, the four rangers that look straight at a wall read
@@ -90,7 +91,7 @@ fn a_body_moves_with_the_robot_and_is_in_the_way_of_sound() {
         bare.body = None;
         let (scene, sensor) = (room(3.0), with.simulator().sensor().clone());
         let options = *with.simulator().options();
-        let bare = ArrayModel::new(Arc::new(bare), &scene, sensor, Air::default(), options)
+        let bare = ArrayModel::new(Arc::new(bare), &scene, &sensor, Air::default(), options)
             .expect("right options");
         let bare = bare.at(robot).expect("a stand");
         for ranger in [0, 3, 6, 9].into_iter().filter(|_| heading_deg != 200.0) {
@@ -118,7 +119,7 @@ fn rangers_of_two_heights_hear_the_floor_differently() {
     scene.floor_z_m = Some(0.0);
     let sensor = Sensor::preset("pioneer").expect("a preset");
     let build = |array: RangerArray| {
-        ArrayModel::new(Arc::new(array), &scene, sensor.clone(), Air::default(), Options::default())
+        ArrayModel::new(Arc::new(array), &scene, &sensor, Air::default(), Options::default())
             .expect("right options")
     };
     let robot = Pose { x_m: 3.0, y_m: 3.0, heading_deg: 0.0 };

@@ -27,12 +27,21 @@ const MOST_REFLECTIONS: u16 = 4096;
 impl Beams {
     /// All beams from `start` that can still give an echo at `target`.
     pub(crate) fn grow(plan: &Plan, start: DVec2, target: DVec2) -> Self {
-        let triangles = || {
-            let mesh = plan.mesh.as_ref()?;
-            Some((mesh, mesh.locate(start)?, mesh.locate(target)?))
-        };
-        let Some((mesh, first, home)) = triangles() else { return Self::default() };
+        let Some(mesh) = &plan.mesh else { return Self::in_the_open(plan, start, target) };
+        let triangles = || Some((mesh.locate(start)?, mesh.locate(target)?));
+        let Some((first, home)) = triangles() else { return Self::default() };
         Grower::new(plan, mesh, start, target, home).grow(first)
+    }
+
+    /// Where there is nothing but perhaps floor and ceiling.
+    fn in_the_open(plan: &Plan, start: DVec2, target: DVec2) -> Self {
+        let run = target - start;
+        let (gain, node, order, slopes) = (1.0, ROOT, 0, ALL_SLOPES);
+        let departure = run.normalize_or_zero();
+        let straight = Ray { run, departure, gain, node, order, slopes };
+        let is_told = plan.settings.direct && run != DVec2::ZERO;
+        let to_receiver = is_told.then_some(straight).into_iter().collect();
+        Self { to_receiver, ..Self::default() }
     }
 
     /// All beams from a point of the mesh, whose triangles these are, for the rays in them to edges.
@@ -169,6 +178,9 @@ impl<'a> Grower<'a> {
             None => triangle.corners.iter().for_each(|&corner| self.meet_near_edge(&first, corner)),
             Some(side) => self.meet_near_edge(&first, triangle.corners[(side + 2) % 3]),
         }
+        if first.triangle == self.home && self.plan.settings.direct {
+            self.meet_near_target(&first);
+        }
         // Counter-clockwise, from the side after the one it came in by.
         let from = entered_by.map_or(0, |side| side + 1);
         for side in (from..from + 3).map(|side| side % 3).filter(|&s| Some(s) != entered_by) {
@@ -207,7 +219,7 @@ impl<'a> Grower<'a> {
 
     /// Takes a beam through its triangle, past the cylinders in it.
     fn cross(&mut self, beam: Beam) -> Option<Beam> {
-        if beam.triangle == self.home && beam.node != ROOT {
+        if beam.triangle == self.home && (beam.node != ROOT || self.plan.settings.direct) {
             self.meet_target(&beam);
         }
         if self.plan.cylinders.in_triangle(beam.triangle).is_empty() {
@@ -415,6 +427,15 @@ impl<'a> Grower<'a> {
         };
         if beam.holds(run) && is_in_reach && !is_hidden() {
             self.tree.to_receiver.push(beam.ray_to(self.target));
+        }
+    }
+
+    /// A target in the triangle of the start.
+    fn meet_near_target(&mut self, first: &Beam) {
+        let length_m = self.target.distance(self.start);
+        let is_in_reach = length_m > 0.0 && length_m <= self.plan.settings.max_path_m;
+        if is_in_reach && !self.plan.cylinders.hide_in(first.triangle, self.start, self.target) {
+            self.tree.to_receiver.push(first.ray_to(self.target));
         }
     }
 

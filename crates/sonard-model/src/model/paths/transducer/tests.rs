@@ -32,6 +32,7 @@ fn settings(max_path_m: f64) -> Settings {
         sensor_z_m: None,
         tilt_rad: 0.0,
         scatter_height_rad: 0.0,
+        direct: false,
     }
 }
 
