@@ -7,6 +7,7 @@
 #   FIRMWARE=0 ./test.sh        leave firmware and emulator out, where they can't be built: they
 #                               need Debian's packages (firmware/test.sh)
 #   PAGE=0 ./test.sh            leave the live page out, where there is no Chromium to look at it
+#   PLAYGROUND=0 ./test.sh      leave the playground out, where there is no npm, node or WebAssembly target
 #   AXE=0 ./test.sh             leave axe-core out of that, where there is no npm to get it with
 #   SCHEMATHESIS=0 ./test.sh    leave the fuzzer of the API out, where there is no Python or PyPI
 #   PYTHON=0 ./test.sh          leave the package for Python out, where there is no Python or PyPI
@@ -85,6 +86,7 @@ check_text() {
   cargo fmt --all -- --check
   cargo fmt --manifest-path fuzz/Cargo.toml -- --check
   cargo fmt --manifest-path python/Cargo.toml -- --check
+  cargo fmt --manifest-path web/wasm/Cargo.toml -- --check
   step "clippy, warnings denied"
   cargo clippy --workspace --all-targets "${features[@]}" --quiet -- -D warnings
 }
@@ -142,6 +144,19 @@ prepare_browser() {
   fi
   if [ "${AXE:-1}" = 0 ]; then printf 'axe-core: LEFT OUT, because AXE=0\n'; else tests/axe.sh; fi
   chromium --version
+}
+
+# The playground needs a browser to be looked at.
+has_playground() { [ "${PAGE:-1}" != 0 ] && [ "${PLAYGROUND:-1}" != 0 ]; }
+
+build_playground() {
+  if ! has_playground; then
+    step "the playground: LEFT OUT, because PAGE=0 or PLAYGROUND=0"
+    return
+  fi
+  step "the playground"
+  if ! command -v node >/dev/null; then get_packages ", or leave the playground out with PLAYGROUND=0" nodejs npm; fi
+  web/build.sh || fail "the playground: see above. Where it can't be built, PLAYGROUND=0 leaves it out"
 }
 
 check_units_and_package() {
@@ -213,13 +228,13 @@ check_exports() {
 # run_tests [ARGUMENT...]: the closing lines are kept for the end.
 run_tests() {
   if [ "$runner" = nextest ]; then
-    local filter=(-E 'not test(/^live_page::/)')
-    if [ "${PAGE:-1}" != 0 ]; then filter=(); fi
+    local filter=(-E 'not test(/^(live_page|playground)::/)')
+    if has_playground; then filter=(); elif [ "${PAGE:-1}" != 0 ]; then filter=(-E 'not test(/^playground::/)'); fi
     cargo nextest run --workspace "${features[@]}" "$@" "${filter[@]}" --cargo-quiet --no-fail-fast \
       --status-level slow --final-status-level fail 2>&1
   else
     if [ $# = 0 ]; then set -- --lib --bins --tests; fi
-    cargo test --workspace "${features[@]}" "$@" --no-fail-fast --quiet -- --skip live_page:: 2>&1
+    cargo test --workspace "${features[@]}" "$@" --no-fail-fast --quiet -- --skip live_page:: --skip playground:: 2>&1
   fi | tee "$work/tests" | head -n "-$closing_lines"
 }
 
@@ -229,6 +244,7 @@ test_page() {
   if [ "${PAGE:-1}" = 0 ] || [ "$runner" = nextest ]; then return; fi
   step "the live page"
   cargo test --workspace "${features[@]}" --test cli --quiet live_page::
+  if has_playground; then cargo test --workspace "${features[@]}" --test cli --quiet playground::; fi
 }
 
 runner=cargo
@@ -263,6 +279,7 @@ quick)
   check_documentation
   fuzz
   prepare_browser
+  build_playground
   check_units_and_package
   play_emulator
   check_examples

@@ -58,4 +58,9 @@ tests/axe.sh
 cargo test --quiet --test cli live_page::accessible
 cp target/page/desk.png "$pictures/page-desk.png"
 cp target/page/phone-dark.png "$pictures/page-phone.png"
+
+# The playground, likewise.
+web/build.sh
+cargo test --quiet --test cli playground::pictures
+for picture in desk phone engines; do cp "target/page/playground-$picture.png" "$pictures/"; done
 ls -l "$pictures"

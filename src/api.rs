@@ -12,24 +12,27 @@ mod logs;
 mod orders;
 mod problem;
 mod scans;
-mod scene;
 mod setup;
 mod simulation;
 mod status;
 
 pub use air::{AirOrder, AirStatus};
-pub use beam::{Beam, Echo, HumpLine};
+pub use beam::{Beam, Echo};
 pub use health::{ClockReport, Health, LineTotals, ScanTotals};
 pub use link::{LinkReport, LinkState, Trouble};
 pub use logs::LogEntry;
 pub use orders::{Accepted, CancelRequest, ScanRequest, Scanning, Started};
 pub use problem::Problem;
-pub use scans::{Beside, JudgedPing, ListedScan, ScanReport, WholeScan, Word};
-pub(crate) use scene::point;
-pub use scene::{Body, Circle, FloorPlan, Point, WallLine};
+pub use scans::{ListedScan, ScanReport, WholeScan};
 pub use setup::Setup;
 pub use simulation::{RangerReading, SimulationReport};
 pub use status::{
     ConfigurationReport, InForce, LogStatus, Pending, ScanProgress, ScanningReport, Status,
     SubscriberReport,
+};
+
+// Those that the pure part makes.
+pub use crate::{
+    compare::{Beside, JudgedPing, Word},
+    scan::{Body, Circle, FloorPlan, HumpLine, PlanPoint, WallLine},
 };

@@ -3,8 +3,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{scans::JudgedPing, scene::Point};
-use crate::scan::PathRecord;
+use crate::{
+    compare::JudgedPing,
+    scan::{HumpLine, PlanPoint},
+};
 
 /// A beam with all that is known about it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -15,7 +17,7 @@ pub struct Beam {
     pub echoes: Vec<Echo>,
     /// The path of the reading's sound, or else of the predicted echo, in the plan: the transmitter, each
     /// interaction, the receiver.
-    pub polyline: Option<Vec<Point>>,
+    pub polyline: Option<Vec<PlanPoint>>,
     /// What the model hears, in order of time, faint sounds included; `null` if it could not be
     /// asked.
     pub humps: Option<Vec<HumpLine>>,
@@ -32,21 +34,4 @@ pub struct Echo {
     pub tof_us: Option<f64>,
     /// Half the way that sound goes in that time, metres.
     pub range_m: Option<f64>,
-}
-
-/// A hump of the echo trace that the model predicts.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct HumpLine {
-    /// When it begins to rise, microseconds after firing.
-    pub tof_us: f64,
-    /// Half its path's length, metres.
-    pub range_m: f64,
-    /// Its peak, relative to a head-on, perfectly reflecting wall.
-    pub peak: f64,
-    /// Its peak above the threshold in force then, decibels.
-    pub margin_db: f64,
-    /// The path the sound took.
-    pub path: PathRecord,
-    /// The same in the plan: the transmitter, each interaction, the receiver.
-    pub polyline: Vec<Point>,
 }

@@ -22,6 +22,7 @@ mod long_logs;
 mod map;
 mod outputs;
 mod paths;
+mod playground;
 mod plot;
 mod readme;
 mod scan;

@@ -18,6 +18,7 @@
 //! - Every compared beam has one [`Verdict`], so the verdicts add up to `beams`; `agree` counts
 //!   pairs of `both_echo` only, and the residual statistics are taken over those pairs.
 
+mod beside;
 mod explain;
 mod statistics;
 
@@ -29,6 +30,7 @@ use serde::{Deserialize, Serialize};
 use sonard_model::geometry::Pose;
 use sonard_records::{PathKind, Ping, PingStatus, ScanView, SimRecord};
 
+pub use beside::{Beside, JudgedPing, Word};
 pub use explain::{Estimate, Explanation};
 pub use statistics::{keep_every_second, quantile};
 

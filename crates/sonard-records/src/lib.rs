@@ -6,6 +6,8 @@
 mod array;
 mod codec;
 mod drawn;
+mod floor_plan;
+mod hump;
 mod modelled;
 mod path;
 mod record;
@@ -16,6 +18,8 @@ mod view;
 mod viewpoint;
 
 pub use codec::{EncodeError, FaultKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};
+pub use floor_plan::{Body, Circle, FloorPlan, PlanPoint, WallLine};
+pub use hump::HumpLine;
 pub use path::{InteractionKind, InteractionRecord, PathRecord, Point};
 pub use record::{
     AirRecord, AirSource, CollectionRef, CrosstalkRecord, Device, Event, EventKind, ImportRef,

@@ -1,7 +1,6 @@
-// The panel of the selected beam: its reading at once, its echoes and the model's paths when the
-// daemon has told them.
+// The panel of the selected beam: its reading at once, its echoes and the model's paths when they
+// have been told.
 
-import { ask } from "./api.js";
 import { MARKS } from "./verdicts.js";
 import * as words from "./words.js";
 
@@ -11,10 +10,14 @@ const PAUSE_MS = 120;
 const ANEW_MS = 2000;
 
 export class BeamPanel {
-  /** Calls `onPath(points)` when the path of some sound is to be drawn. */
-  constructor(panel, onPath) {
+  /**
+   * Calls `onPath(points)` when the path of some sound is to be drawn. `askAbout(ping, signal)` gets the
+   * details of a reading; without it whoever has them calls `showDetails`.
+   */
+  constructor(panel, onPath, askAbout = null) {
     this.panel = panel;
     this.onPath = onPath;
+    this.askAbout = askAbout;
     this.request = new AbortController();
     this.facts = document.createElement("div");
     this.details = document.createElement("div");
@@ -39,7 +42,7 @@ export class BeamPanel {
     this.facts.replaceChildren(...reading(ping));
     if (!anew) this.details.replaceChildren();
     this.panel.replaceChildren(this.facts, this.details);
-    if (!anew || !this.asking) this.learn(anew ? this.asked + ANEW_MS - performance.now() : 0);
+    if (this.askAbout && (!anew || !this.asking)) this.learn(anew ? this.asked + ANEW_MS - performance.now() : 0);
   }
 
   /** Asks the daemon about the reading, after a pause, and about the one that has come meanwhile. */
@@ -51,17 +54,23 @@ export class BeamPanel {
     await new Promise((done) => setTimeout(done, Math.max(PAUSE_MS, pause_ms)));
     if (signal.aborted) return;
     this.asked = performance.now();
-    const { scan, index } = this.ping;
+    const { scan } = this.ping;
     try {
-      const beam = await ask(`/v1/scans/${scan}/beams/${index}`, { signal });
+      const beam = await this.askAbout(this.ping, signal);
       this.onPath(beam.polyline);
-      this.details.replaceChildren(...echoes(beam), ...this.humps(beam));
-    } catch (error) {
+      this.showDetails(beam);
+    } catch (/** @type {any} */ error) {
       if (!signal.aborted) this.details.replaceChildren(note(`The daemon did not tell more: ${error.message}`));
     }
     if (signal.aborted) return;
     this.asking = false;
     if (this.ping.scan !== scan) this.learn(ANEW_MS);
+  }
+
+  /** Echoes and paths; of readings of the model alone, which have no echoes, paths. */
+  showDetails(beam) {
+    const heard = beam.echoes ? echoes(beam) : [];
+    this.details.replaceChildren(...heard, ...this.humps(beam));
   }
 
   /** What the model hears; each sound draws its path. */
@@ -136,6 +145,8 @@ function reading(ping) {
       ["Over the threshold", ping.sim.margin_db === null ? "–" : words.decibels(ping.sim.margin_db)],
       ["Path", words.path(ping.sim.path)],
     );
+  } else if (ping.path) {
+    facts.push(["Over the threshold", words.decibels(ping.margin_db)], ["Path", words.path(ping.path)]);
   }
   const crosstalk = ping.crosstalk ?? ping.sim?.crosstalk;
   if (crosstalk) facts.push(["Crosstalk", words.crosstalk(crosstalk)]);

@@ -32,10 +32,14 @@ let again = false;
 export const plan = new Plan(byId("stage"), select);
 const strip = new Strip(byId("strip"), select);
 const table = new BeamTable(byId("table"));
-const panel = new BeamPanel(byId("beam-panel"), (path) => {
-  plan.select(selected, path);
-  changed = true;
-});
+const panel = new BeamPanel(
+  byId("beam-panel"),
+  (path) => {
+    plan.select(selected, path);
+    changed = true;
+  },
+  ({ scan, index }, signal) => ask(`/v1/scans/${scan}/beams/${index}`, { signal }),
+);
 const summary = new Summary(byId("summary"));
 const history = new History(
   { list: byId("scans-list"), live: byId("live"), replay: byId("replay"), speed: byId("speed") },

@@ -26,6 +26,8 @@ export class Layer {
     this.canvas = canvas;
     this.c = canvas.getContext("2d");
     this.used = new Set();
+    this.width = 0;
+    this.height = 0;
   }
 
   resize(width, height) {
@@ -63,13 +65,20 @@ export function line(c, points) {
   c.stroke();
 }
 
+/** @param {CanvasRenderingContext2D} c @param {number[]} at @param {number} radius */
 export function circle(c, [x, y], radius) {
   c.beginPath();
   c.arc(x, y, radius, 0, 2 * Math.PI);
   c.stroke();
 }
 
-/** A filled triangle with its tip `tip` pixels ahead of a point, `turn` radians clockwise from the right. */
+/**
+ * A filled triangle with its tip `tip` pixels ahead of a point, `turn` radians clockwise from the right.
+ * @param {CanvasRenderingContext2D} c
+ * @param {number[]} at
+ * @param {number} turn
+ * @param {[tip: number, back: number, half: number]} size
+ */
 export function arrow(c, [x, y], turn, [tip, back, half]) {
   const [dx, dy] = [Math.cos(turn), Math.sin(turn)];
   c.beginPath();
@@ -79,13 +88,19 @@ export function arrow(c, [x, y], turn, [tip, back, half]) {
   c.fill();
 }
 
-/** Where a robot stands and where it heads. */
+/** Where a robot stands and where it heads. @param {CanvasRenderingContext2D} c @param {number[]} at @param {number} turn */
 export function drawPose(c, [x, y], turn) {
   circle(c, [x, y], 4);
   line(c, [[x, y], [x + 15 * Math.cos(turn), y + 15 * Math.sin(turn)]]);
 }
 
-/** A transducer's face, across its direction, `half` pixels to each side. */
+/**
+ * A transducer's face, across its direction, `half` pixels to each side.
+ * @param {CanvasRenderingContext2D} c
+ * @param {number[]} at
+ * @param {number} turn
+ * @param {number} half
+ */
 export function drawFace(c, [x, y], turn, half) {
   const [dx, dy] = [half * Math.sin(turn), -half * Math.cos(turn)];
   line(c, [[x - dx, y - dy], [x + dx, y + dy]]);

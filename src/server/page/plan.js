@@ -21,13 +21,20 @@ export class Plan {
   constructor(stage, onPick) {
     this.stage = stage;
     this.layers = [...stage.querySelectorAll("canvas")].map((canvas) => new Layer(canvas));
-    [this.ground, this.marks, this.over] = this.layers;
+    this.ground = this.layers[0];
+    this.marks = this.layers[1];
+    this.over = this.layers[2];
     this.view = new View();
+    /** While somebody drags something the view stays. */
+    this.held = false;
     this.scene = null;
     this.scan = null;
     this.selected = null;
     this.latest = null;
     this.path = null;
+    this.palette = null;
+    /** Scene and pose that the view was fitted to. */
+    this.fitted = "";
     this.onPick = onPick;
     new ResizeObserver(() => this.resize()).observe(stage);
     this.over.canvas.addEventListener("click", (event) => this.pick([event.offsetX, event.offsetY]));
@@ -37,7 +44,7 @@ export class Plan {
   redraw(palette = this.palette) {
     this.palette = palette;
     if (!this.view.width) return;
-    this.fit();
+    if (!this.held || !this.view.box) this.fit();
     this.ground.clear();
     drawGrid(this.ground, this.view, palette);
     if (this.sceneFits()) drawScene(this.ground, this.view, palette, this.scene);

@@ -10,6 +10,11 @@ export class Strip {
   /** Calls `onPick(index)` when somebody clicks at a beam. */
   constructor(canvas, onPick) {
     this.c = canvas.getContext("2d");
+    this.width = 0;
+    this.height = 0;
+    this.palette = null;
+    /** The largest residual that the scale shows, millimetres. */
+    this.most = SCALES_MM[0];
     this.scan = null;
     this.selected = null;
     this.onPick = onPick;

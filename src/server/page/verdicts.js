@@ -68,6 +68,7 @@ export function draw(c, mark, x, y, r, colour, direction = -Math.PI / 2) {
 export function colours() {
   const style = getComputedStyle(document.documentElement);
   return new Proxy({}, {
+    /** @param {Record<string, string>} known @param {string} name */
     get(known, name) {
       return (known[name] ??= style.getPropertyValue(name).trim());
     },

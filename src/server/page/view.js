@@ -10,11 +10,21 @@ export class View {
   constructor() {
     /** What is shown: "near" (room and the readings around it), "room" or "all". */
     this.what = "near";
+    /** Left, low, right, high, metres. @type {number[] | null} */
     this.box = null;
-    [this.width, this.height, this.scale, this.x0, this.y0] = [0, 0, 1, 0, 0];
+    this.width = 0;
+    this.height = 0;
+    this.scale = 1;
+    this.x0 = 0;
+    this.y0 = 0;
   }
 
-  /** Sets scale and origin. `room` and `readings` are points, metres; `grow` keeps what is in view now. */
+  /**
+   * Sets scale and origin. `room` and `readings` are points, metres; `grow` keeps what is in view now.
+   * @param {number[][]} room
+   * @param {number[][]} readings
+   * @param {boolean} grow
+   */
   fit(room, readings, grow) {
     const inner = boxOf(room.length ? room : readings) ?? boxOf([[-1, -1], [1, 1]]);
     const around = { room: 0.06, near: NEAR, all: Infinity }[this.what] * Math.max(...sizes(inner));
@@ -28,16 +38,17 @@ export class View {
     this.y0 = (this.height + MARGIN_PX - FOOT_PX) / 2 + (this.scale * (low + high)) / 2;
   }
 
-  /** Where a point is, pixels. */
+  /** Where a point is, pixels. @param {number[]} point @returns {[number, number]} */
   px([x, y]) {
     return [this.x0 + this.scale * x, this.y0 - this.scale * y];
   }
 
-  /** The point at a pixel, metres. */
+  /** The point at a pixel, metres. @param {number[]} px @returns {[number, number]} */
   world([x, y]) {
     return [(x - this.x0) / this.scale, (this.y0 - y) / this.scale];
   }
 
+  /** @param {number[]} px */
   isBeyond([x, y]) {
     return x < 2 || y < 2 || x > this.width - 2 || y > this.height - 2;
   }
@@ -45,11 +56,17 @@ export class View {
   /** Whether a reading there would widen the view. */
   wouldGrow(point) {
     if (this.what === "room" || !this.box) return false;
+    /** @type {(point: number[], box: number[]) => boolean} */
     const inside = ([x, y], [left, low, right, high]) => x >= left && y >= low && x <= right && y <= high;
     return this.isBeyond(this.px(point)) && !inside(point, this.box);
   }
 
-  /** Where a ray from a pixel leaves the view; `turn` in radians clockwise from the right. */
+  /**
+   * Where a ray from a pixel leaves the view; `turn` in radians clockwise from the right.
+   * @param {number[]} px
+   * @param {number} turn
+   * @returns {[number, number]}
+   */
   border([x, y], turn) {
     const inset = 3;
     const [dx, dy] = [Math.cos(turn), Math.sin(turn)];
@@ -68,6 +85,7 @@ function boxOf(points) {
   return [least(xs), least(ys), most(xs), most(ys)];
 }
 
+/** @param {number[]} box */
 const sizes = ([left, low, right, high]) => [right - left, high - low];
 
 const union = (one, other) =>

@@ -3,20 +3,16 @@
 use std::sync::Arc;
 
 use crate::{
-    acoustics::{Air, EnvelopePeak},
-    api::{Beam, Echo, HumpLine, JudgedPing, point},
+    acoustics::Air,
+    api::{Beam, Echo, HumpLine, JudgedPing, PlanPoint},
     geometry::Pose,
-    model::{ObservationPoint, Options, Simulator, TooCostly},
-    scan::{PathRecord, Ping, ScanView, Session},
+    model::{Options, Simulator, TooCostly},
+    scan::{Ping, ScanView, Session},
     scene::Scene,
 };
 
 /// The model is asked so far beyond what was heard or predicted, metres.
 const BEYOND_M: f64 = 0.5;
-/// Humps this far below the threshold are left out, as a factor of amplitude.
-const FAINT: f64 = 0.1;
-/// The strongest so many humps are told.
-const MOST_HUMPS: usize = 24;
 /// Spacing of the samples that find a hump's peak, microseconds.
 const STEP_US: f64 = 20.0;
 
@@ -34,7 +30,7 @@ pub(super) fn look(view: &ScanView, ping: Ping, scene: Option<&Scene>) -> Beam {
         Some(scene) if lacks.is_none() => view.polyline(&ping, path, scene),
         _ => path.polyline(view.ends(&ping, path)?),
     });
-    let polyline = polyline.map(|points| points.into_iter().map(point).collect());
+    let polyline = polyline.map(|points| points.into_iter().map(PlanPoint::from).collect());
     Beam { reading: JudgedPing::of(ping, view), echoes, polyline, humps, lacks }
 }
 
@@ -91,28 +87,7 @@ fn air(view: &ScanView, session: &Session) -> Result<Air, crate::acoustics::AirE
 }
 
 fn humps(simulator: &Simulator, axis: &Pose, until_m: f64) -> Result<Vec<HumpLine>, TooCostly> {
-    let direction_rad = axis.direction_rad(0.0);
-    let ends = simulator.sensor().mounting.viewpoint(axis).ends();
     let station = simulator.at(axis.position());
-    let trace = station.trace(direction_rad, until_m, STEP_US)?;
-    let receiver = simulator.receiver();
-    let over = |hump: &EnvelopePeak| hump.peak.0 / receiver.threshold_at(hump.tof_us);
-    let mut loudest: Vec<&EnvelopePeak> =
-        trace.peaks.iter().filter(|hump| over(hump) > FAINT).collect();
-    loudest.sort_by(|one, other| over(other).total_cmp(&over(one)));
-    loudest.truncate(MOST_HUMPS);
-    loudest.sort_by(|one, other| one.tof_us.total_cmp(&other.tof_us));
-    let line = |hump: &EnvelopePeak| {
-        let arrival = ObservationPoint::arrival(&station, direction_rad, &hump.arrival)?;
-        let path = PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m);
-        Ok(HumpLine {
-            tof_us: hump.tof_us,
-            range_m: arrival.length_m / 2.0,
-            peak: hump.peak.0,
-            margin_db: 20.0 * over(hump).log10(),
-            polyline: path.polyline(ends).into_iter().flatten().map(point).collect(),
-            path,
-        })
-    };
-    loudest.into_iter().map(line).collect()
+    let trace = station.trace(axis.direction_rad(0.0), until_m, STEP_US)?;
+    HumpLine::of_trace(simulator, &station, axis, &trace)
 }

@@ -57,7 +57,7 @@ fn everything_has_a_name_and_contrast_on_desk_and_phone_in_light_and_dark() {
 }
 
 /// Roles of controls and pictures that a screen reader would find without a name.
-fn nameless(browser: &Browser) -> Vec<String> {
+pub(crate) fn nameless(browser: &Browser) -> Vec<String> {
     let tree = browser.devtools("Accessibility.getFullAXTree", &json!({}));
     let nodes = tree["nodes"].as_array().expect("a tree");
     let named: Vec<&Value> = nodes
@@ -113,7 +113,7 @@ fn luminance(hex: &str) -> f64 {
 }
 
 /// What axe-core finds fault with. It is not part of this repository: `tests/axe.sh` fetches it.
-fn axe(browser: &Browser) -> Vec<String> {
+pub(crate) fn axe(browser: &Browser) -> Vec<String> {
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("tools/axe-core/axe.min.js");
     let script = match fs::read_to_string(&file) {
         Ok(script) => script,

@@ -48,6 +48,11 @@ pub(crate) struct Browser {
 impl Browser {
     /// Opens the page of a daemon at `address`.
     pub(crate) fn open(address: &str, screen: Screen) -> Self {
+        Self::open_at(&format!("http://{address}/"), screen)
+    }
+
+    /// Opens a page by its address, of a file for instance.
+    pub(crate) fn open_at(address: &str, screen: Screen) -> Self {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let (driver, port) = start_driver();
         let runtime = Runtime::new().expect("threads");
@@ -56,7 +61,7 @@ impl Browser {
         let driver_address = format!("http://127.0.0.1:{port}");
         let connecting = builder.connect(&driver_address);
         let client = runtime.block_on(connecting).expect("Chromium starts; is `chromium` there?");
-        let base = format!("http://{address}/");
+        let base = address.to_owned();
         let browser = Self { runtime, client: Some(client), driver, base, _turn: turn };
         browser.look_through(screen);
         browser.go();

@@ -1,8 +1,8 @@
 //! The live page in a real browser.
 
 mod access;
-mod accessible;
-mod browser;
+pub(crate) mod accessible;
+pub(crate) mod browser;
 mod readable;
 mod viewpoints;
 

@@ -5,15 +5,15 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    geometry::{DVec2, Pose},
+use sonard_model::{
+    geometry::Pose,
     scene::{Material, RobotShape, Scene},
 };
 
-/// A point of the floor plan: x and y, metres.
-pub type Point = [f64; 2];
+/// A point of a floor plan: x and y, metres.
+pub type PlanPoint = [f64; 2];
 
-/// The scene in force: everything that a floor plan shows.
+/// A scene: everything that a drawn floor plan shows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FloorPlan {
     /// Its name.
@@ -36,9 +36,9 @@ pub struct WallLine {
     /// Its name.
     pub id: String,
     /// One end.
-    pub from: Point,
+    pub from: PlanPoint,
     /// The other.
-    pub to: Point,
+    pub to: PlanPoint,
     /// What it is made of.
     pub material: Material,
 }
@@ -49,7 +49,7 @@ pub struct Circle {
     /// Its name.
     pub id: String,
     /// Its axis.
-    pub center: Point,
+    pub center: PlanPoint,
     /// Its radius, metres.
     pub radius_m: f64,
     /// What it is made of.
@@ -62,9 +62,9 @@ pub struct Body {
     /// Its name.
     pub id: String,
     /// Corners of one with flat sides.
-    pub outline: Vec<Point>,
+    pub outline: Vec<PlanPoint>,
     /// Centre of a round one.
-    pub center: Option<Point>,
+    pub center: Option<PlanPoint>,
     /// Radius of a round one, metres.
     pub radius_m: Option<f64>,
 }
@@ -81,8 +81,8 @@ impl FloorPlan {
                 .iter()
                 .map(|wall| WallLine {
                     id: wall.id.to_string(),
-                    from: point(wall.a),
-                    to: point(wall.b),
+                    from: wall.a.to_array(),
+                    to: wall.b.to_array(),
                     material: wall.material,
                 })
                 .collect(),
@@ -91,7 +91,7 @@ impl FloorPlan {
                 .iter()
                 .map(|cylinder| Circle {
                     id: cylinder.id.to_string(),
-                    center: point(cylinder.center),
+                    center: cylinder.center.to_array(),
                     radius_m: cylinder.radius_m,
                     material: cylinder.material,
                 })
@@ -100,12 +100,12 @@ impl FloorPlan {
                 RobotShape::Circle { center, radius_m } => Body {
                     id: robot.id.to_string(),
                     outline: Vec::new(),
-                    center: Some(point(*center)),
+                    center: Some(center.to_array()),
                     radius_m: Some(*radius_m),
                 },
                 RobotShape::Outline(corners) => Body {
                     id: robot.id.to_string(),
-                    outline: corners.iter().copied().map(point).collect(),
+                    outline: corners.iter().copied().map(PlanPoint::from).collect(),
                     center: None,
                     radius_m: None,
                 },
@@ -113,10 +113,4 @@ impl FloorPlan {
             poses: scene.poses.clone(),
         }
     }
-}
-
-/// A point as the API has it.
-#[must_use]
-pub(crate) fn point(at: DVec2) -> Point {
-    at.to_array()
 }

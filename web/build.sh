@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# Builds the playground, a folder that any web server or none can serve: target/playground/index.html.
+#
+#   web/build.sh            type check, build, and hold its size
+#   TYPES=0 web/build.sh    without the type check
+set -euo pipefail
+cd "$(dirname "$0")/.."
+target=$PWD/${CARGO_TARGET_DIR:-target}
+case ${CARGO_TARGET_DIR:-} in /*) target=$CARGO_TARGET_DIR ;; esac
+page=$target/playground
+# All that the page loads, compressed, bytes.
+most=1000000
+
+if command -v rustup >/dev/null; then rustup target add --toolchain "$(rustup show active-toolchain | cut -d' ' -f1)" wasm32-unknown-unknown >/dev/null 2>&1; fi
+web/tools.sh
+tools=$target/tools/web/node_modules/.bin
+[ "${TYPES:-1}" = 0 ] || "$tools/tsc" --project web/jsconfig.json
+
+# A workspace of its own: what is built here is of no use to the other one.
+(cd web/wasm && CARGO_TARGET_DIR=$target/wasm cargo build --release --locked --quiet)
+wasm=$target/wasm/wasm32-unknown-unknown/release/sonard_playground.wasm
+
+rm -rf "$page"
+mkdir -p "$page"
+bundle() { "$tools/esbuild" "$1" --bundle --minify --format=iife --charset=utf8 --log-level=warning --outfile="$2"; }
+bundle web/playground/main.js "$page/playground.js"
+bundle web/playground/worker.js "$target/playground-worker.js"
+# From a folder a page can neither fetch a module nor start a worker's file: both come in a script.
+node web/pack.mjs "$wasm" "$target/playground-worker.js" >"$page/model-data.js"
+cp web/playground/{index.html,playground.css} src/server/page/{style.css,icon.svg} "$page"
+
+bytes=0
+for file in "$page"/*; do
+  size=$(gzip -9 -c "$file" | wc -c)
+  bytes=$((bytes + size))
+  printf '%8d  %s\n' "$size" "$(basename "$file")"
+done
+printf '%8d  all that the playground loads, compressed, bytes\n' "$bytes"
+[ "$bytes" -lt "$most" ] || { echo "web/build.sh: that is more than $most" >&2; exit 1; }
