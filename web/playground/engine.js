@@ -26,7 +26,8 @@
  * @typedef {{max_range_m?: number | null, threshold?: number | null}} Options
  * @typedef {{scene: string, sensor: string | Sensor, air: Air, options: Options}} Settings
  * @typedef {{time: string | null, pose: Pose | null, plan: ScanPlan | null, readings: number,
- *   provenance: string | null, sensor: Sensor | null, air: Air | null, scene: string | null}} LoggedScan
+ *   provenance: string | null, sensor: Sensor | null, air: Air | null, scene: string | null,
+ *   model: {engine: string, max_range_m?: number, threshold?: number} | null}} LoggedScan
  * @typedef {{message: string, help: string, line?: number}} Problem
  */
 

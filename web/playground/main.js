@@ -12,12 +12,14 @@ import { SideBySide } from "./compare.js";
 import { Controls } from "./controls.js";
 import { Editor } from "./editor.js";
 import { Files } from "./files.js";
+import { Logs } from "./logs.js";
 import { Model } from "./model.js";
 import { Ranger } from "./ranger.js";
 import { emptyRoom } from "./room.js";
+import { inShort, setLamp, tellTrouble } from "./say.js";
 import { pack, stateFromLink, unsqueeze } from "./share.js";
 import { planOf, settingsOf, usual } from "./state.js";
-import { STEPS } from "./steps.js";
+import { Tour } from "./tour.js";
 import { EchoTrace } from "./trace.js";
 
 /** @typedef {import("./state.js").State} State */
@@ -39,14 +41,11 @@ const sensors = new Map();
 let palette = colours();
 /** @type {State} */
 let state = { ...usual(), scene: emptyRoom(), pose: { x_m: 1, y_m: 0.8, heading_deg: 0 } };
-/** The scan of a log that is shown beside the model, and the air it was taken in. */
-let logged = /** @type {{scan: number, air: any} | null} */ (null);
 /** @type {Scan | null} */
 let scan = null;
 /** @type {import("./engine.js").Beam | null} */
 let beam = null;
 let half_beam_deg = 8;
-let step = 0;
 /** How long sweeps took from the question to the picture, milliseconds. @type {number[]} */
 const took = [];
 
@@ -60,7 +59,12 @@ const sides = new SideBySide(byId("figures"), select);
 const controls = new Controls(state, (changes) => change(changes));
 const ranger = new Ranger(byId("stage"), plan.view, (pose) => change({ pose }, true), settle);
 const editor = new Editor(byId("stage"), plan.view, (scene, kept) => change({ scene }, !kept), (pose) => change({ pose }));
-const files = new Files({ room: openRoom, log: openLog, refused: (problem) => tellTrouble(problem) });
+const files = new Files({ room: openOwnRoom, log: openLog, refused: (problem) => tellTrouble(problem) });
+const logs = new Logs(sensors, { onShow: showLogged, onSensors: fillSensors, onClose: () => change({ sensor: knownSensor() }) });
+const tour = new Tour(({ title, text, scene, range_m, ...shown }) => {
+  const room = structuredClone(/** @type {import("./room.js").SceneFile} */ (rooms.get(scene)));
+  openRoom(room, { ...usual(), reach_m: range_m, ...shown });
+});
 /** @type {Model} */
 let model;
 
@@ -97,11 +101,11 @@ function ask() {
   const engines = /** @type {import("./engine.js").EngineName[]} */ (["paths", "fan", "cone"]);
   const others = state.compare ? engines.filter((name) => name !== state.engine) : [];
   model.show({
-    settings: settingsOf(state, sensors, logged?.air ?? null),
+    settings: settingsOf(state, sensors, airOfLog()),
     pose: state.pose,
     plan: planOf(state),
     engines: [state.engine, ...others],
-    measured: logged?.scan ?? null,
+    measured: logs.scan,
     beam: state.beam,
   });
 }
@@ -157,7 +161,7 @@ function redraw() {
   place();
   if (state.arcs) drawArcs(plan.layers[3], plan, half_beam_deg);
   else plan.layers[3].clear();
-  const measured = logged !== null;
+  const measured = logs.scan !== null;
   byId("residuals").hidden = !measured;
   if (measured) {
     strip.scan = sweep;
@@ -187,18 +191,9 @@ function tell(selected) {
   }
   setText(byId("beam-now"), selected ? inWords(selected) : "none selected");
   clearTimeout(resting);
-  resting = setTimeout(() => setText(byId("summary"), inShort(sweep)), REST_MS);
+  resting = setTimeout(() => setText(byId("summary"), inShort(sweep, logs.scan !== null)), REST_MS);
 }
 let resting = 0;
-
-/** @param {any} sweep */
-function inShort(sweep) {
-  if (logged) return `${sweep.inWords()}.`;
-  const heard = [...sweep.beams.values()].filter((ping) => ping.range_m !== null).length;
-  const silent = sweep.beams.size - heard;
-  if (silent === 0) return `The ranger hears something in all ${count(heard, "direction")}.`;
-  return `The ranger hears something in ${count(heard, "direction")} and nothing in ${silent}.`;
-}
 
 /** @param {number} index */
 function select(index) {
@@ -257,19 +252,6 @@ function refuse(problem) {
   tellTrouble(problem);
 }
 
-/** @param {import("./engine.js").Problem | null} problem */
-function tellTrouble(problem) {
-  const place = byId("trouble");
-  place.hidden = problem === null;
-  setText(place, problem ? sentence(problem) : "");
-}
-
-/** @param {import("./engine.js").Problem} problem */
-function sentence({ message, help }) {
-  const first = message[0].toUpperCase() + message.slice(1);
-  return help ? `${first}. ${help[0].toUpperCase()}${help.slice(1)}.` : `${first}.`;
-}
-
 /** Handles to where their things are. */
 function place() {
   if (!plan.view.width || !plan.view.box) return;
@@ -297,99 +279,60 @@ function showScene() {
  */
 function openRoom(scene, further = {}) {
   const pose = Object.values(scene.poses ?? {})[0] ?? { x_m: 0, y_m: 0, heading_deg: 0 };
-  closeLog();
+  logs.close();
   plan.view.box = null;
   editor.toggle(false);
-  change({ scene, pose, beam: null, height_m: null, ...further });
-  panel.clear();
-  trace.show(null);
+  change({ scene, pose, beam: 0, height_m: null, sensor: knownSensor(), ...further });
   byId("pose").value = "";
 }
 
-/**
- * A log's scans: the first that is shown sets room, pose, sensor and air as it was taken in.
- * @param {string} text
- */
+/** @param {import("./room.js").SceneFile} scene */
+function openOwnRoom(scene) {
+  openRoom(scene);
+  tour.leave(String(scene.name), scene.source ?? "");
+}
+
+/** @param {string} text */
 async function openLog(text) {
   try {
     const { scans } = await model.ask({ kind: "log", text, pose: state.pose });
-    const list = byId("logged-scan");
-    list.replaceChildren(...scans.map((/** @type {any} */ one, /** @type {number} */ i) =>
-      new Option(`${i + 1} of ${scans.length}: ${count(one.readings, "reading")}`, String(i))));
-    list.onchange = () => showLogged(scans[Number(list.value)], Number(list.value));
-    byId("logged").hidden = false;
-    showLogged(scans[0], 0);
+    logs.open(scans);
+    const words =
+      "Marks are what was measured, rings what the model reads at the same place. Drag the ranger to where the two agree; " +
+      "change sensor, air and walls.";
+    tour.leave("Measured and predicted", words);
   } catch (problem) {
     tellTrouble(/** @type {any} */ (problem));
   }
 }
 
-/**
- * @param {import("./engine.js").LoggedScan} found
- * @param {number} number
- */
-function showLogged(found, number) {
-  const scene = found.scene ? JSON.parse(found.scene) : state.scene;
-  if (found.sensor) {
-    const name = "of the log";
-    sensors.set(name, found.sensor);
-    fillSensors();
-  }
-  const { temperature_c, humidity_percent, ...rest } = found.air ?? {};
-  logged = { scan: number, air: null };
+/** @param {Partial<State>} changes */
+function showLogged(changes) {
   plan.view.box = null;
-  change({
-    scene,
-    pose: found.pose ?? state.pose,
-    sensor: found.sensor ? "of the log" : state.sensor,
-    temperature_c: temperature_c ?? state.temperature_c,
-    humidity_percent: humidity_percent ?? state.humidity_percent,
-    engine: "paths",
-    threshold_db: 0,
-    gain: "own",
-    height_m: null,
-    beam: null,
-  });
+  editor.toggle(false);
+  change(changes);
 }
 
-function closeLog() {
-  logged = null;
-  byId("logged").hidden = true;
-  if (sensors.delete("of the log")) {
-    fillSensors();
-    if (state.sensor === "of the log") state.sensor = "senscomp-6500";
-  }
+/** What the log says of its air and the controls do not have; the speed of sound, where it was given by hand. */
+function airOfLog() {
+  const air = logs.air;
+  if (!air || air.temperature_c !== state.temperature_c || air.humidity_percent !== state.humidity_percent) return null;
+  return air;
 }
+
+/** The sensor in force, or the usual one when that was a log's that was closed. */
+const knownSensor = () => (sensors.has(state.sensor) ? state.sensor : usual().sensor);
 
 function fillSensors() {
   byId("sensor").replaceChildren(...[...sensors.keys()].map((name) => new Option(name, name)));
 }
 
-/** @param {number} to */
-function showStep(to) {
-  step = to;
-  const { title, text, scene, pose, beam: index, range_m, ...shown } = STEPS[step];
-  setText(byId("tour-title"), title);
-  setText(byId("tour-count"), `${step + 1} of ${STEPS.length}`);
-  setText(byId("tour-text"), text);
-  byId("tour-back").disabled = step === 0;
-  byId("tour-next").disabled = step === STEPS.length - 1;
-  const room = structuredClone(/** @type {import("./room.js").SceneFile} */ (rooms.get(scene)));
-  openRoom(room, { ...usual(), pose, beam: index, reach_m: range_m, ...shown });
-}
-
-/**
- * @param {"good" | "wait" | "bad"} lamp
- * @param {string} text
- */
-function setLamp(lamp, text) {
-  const link = byId("link");
-  if (link.dataset.lamp !== lamp) link.dataset.lamp = lamp;
-  setText(link, text);
-}
-
 function listen() {
-  byId("scene").addEventListener("change", () => openRoom(structuredClone(/** @type {any} */ (rooms.get(byId("scene").value)))));
+  byId("scene").addEventListener("change", () => {
+    const room = structuredClone(/** @type {import("./room.js").SceneFile} */ (rooms.get(byId("scene").value)));
+    openRoom(room);
+    tour.leave(room.name, room.source ?? "");
+  });
   byId("pose").addEventListener("change", () => {
     const pose = state.scene.poses?.[byId("pose").value];
     if (pose) change({ pose });
@@ -399,12 +342,6 @@ function listen() {
   byId("compare").addEventListener("change", () => change({ compare: byId("compare").checked }));
   byId("table").addEventListener("toggle", () => scan && redraw());
   byId("beam").addEventListener("input", () => select(Number(byId("beam").value)));
-  byId("tour-back").addEventListener("click", () => showStep(step - 1));
-  byId("tour-next").addEventListener("click", () => showStep(step + 1));
-  byId("close-log").addEventListener("click", () => {
-    closeLog();
-    change({});
-  });
   byId("save").addEventListener("click", () => files.save({ ...state.scene, poses: { ...state.scene.poses, here: state.pose } }));
   byId("share").addEventListener("click", share);
   byId("copy").addEventListener("click", async () => {
@@ -435,12 +372,7 @@ async function openLink() {
   const given = await stateFromLink(location.hash.slice(1));
   if (!given) return false;
   openRoom(given.scene, given);
-  setText(byId("tour-title"), "A view that was shared");
-  setText(byId("tour-count"), "");
-  setText(byId("tour-text"), "Drag the ranger, turn it, change what you like. The tour begins with “Next”.");
-  byId("tour-back").disabled = true;
-  byId("tour-next").disabled = false;
-  step = -1;
+  tour.leave("A view that was shared", "Drag the ranger, turn it, change what you like.");
   return true;
 }
 
@@ -456,7 +388,7 @@ async function start() {
   fillSensors();
   listen();
   if (await openLink()) return;
-  showStep(0);
+  tour.go(0);
   if (location.hash.length > 1) setText(byId("tour-text"), "The link holds no view of this page: it may have been cut off. Ask for it again.");
 }
 

@@ -20,6 +20,7 @@ addEventListener("message", ({ data }) => {
   else if (data.kind === "view") show(data.view);
   else if (data.kind === "log") answer(data.id, (model) => model.log(data.text, data.pose));
   else if (data.kind === "shipped") answer(data.id, (model) => model.shipped());
+  else if (data.kind === "memory") answer(data.id, (model) => ({ bytes: model.exports.memory.buffer.byteLength }));
   else if (data.kind === "ask") {
     // Whatever is asked may set the model otherwise than the page did.
     set = "";

@@ -1,20 +1,56 @@
-//! How long it takes from a move of the ranger to the picture.
+//! How long it takes from a move of the ranger to the picture, and what stays afterwards.
+
+use std::time::Duration;
+
+use serde_json::{Value, json};
 
 use super::{open, set, told};
-use crate::live_page::browser::DESK;
+use crate::live_page::browser::{Browser, DESK};
 
 /// Moves of the ranger that are timed.
 const MOVES: usize = 200;
 /// A tenth of a second is what people take for at once; the figure that is printed is better than that by far
 /// where nothing else wants the processors.
 const AT_ONCE_MS: f64 = 100.0;
+/// What the page may keep of as many sweeps, bytes: less than one reading each.
+const KEPT_BYTES: f64 = 1_000_000.0;
 
 #[test]
-fn a_sweep_of_400_beams_follows_the_ranger_at_once() {
+fn a_sweep_of_400_beams_follows_the_ranger_at_once_and_leaves_nothing_behind() {
     let browser = open(DESK);
     set(&browser, "scene", "simple-room");
+    move_about(&browser);
+    let before = memory(&browser);
+    let mut times = move_about(&browser);
+    let after = memory(&browser);
+    times.sort_by(f64::total_cmp);
+    let (median, p95) = (times[MOVES / 2], times[MOVES * 95 / 100]);
+    println!(
+        "400 beams in simple-room, from the move to the picture: median {median:.1} ms, 95th percentile {p95:.1} ms"
+    );
+    println!("heap of the page before and after {MOVES} sweeps, memory of the model: {before:?}, {after:?} bytes");
+    assert!(p95 < AT_ONCE_MS, "{p95} ms");
+    assert!(after[0] - before[0] < KEPT_BYTES, "{before:?} {after:?}");
+    assert!(after[1] <= before[1], "{before:?} {after:?}");
+    // A page that nobody touches does nothing.
+    let busy_s = |browser: &Browser| {
+        let metrics = browser.devtools("Performance.getMetrics", &json!({}));
+        let metrics = metrics["metrics"].as_array().expect("metrics").clone();
+        let task = metrics.iter().find(|metric| metric["name"] == "TaskDuration");
+        task.and_then(|metric| metric["value"].as_f64()).expect("a duration")
+    };
+    browser.devtools("Performance.enable", &json!({}));
+    let before_s = busy_s(&browser);
+    std::thread::sleep(Duration::from_secs(2));
+    let idle_s = busy_s(&browser) - before_s;
+    println!("busy for {:.1} % while idle", 50.0 * idle_s);
+    assert!(idle_s < 0.2, "{idle_s} s of 2 s");
+}
+
+/// How long each picture took, milliseconds.
+fn move_about(browser: &Browser) -> Vec<f64> {
     let times = told(
-        &browser,
+        browser,
         &format!(
             "(async () => {{ const {{took, change, idle}} = playground; \
              const frame = () => new Promise((done) => requestAnimationFrame(done)); \
@@ -25,13 +61,15 @@ fn a_sweep_of_400_beams_follows_the_ranger_at_once() {
              return took.slice(-{MOVES}); }})()"
         ),
     );
-    let mut times: Vec<f64> =
-        times.as_array().expect("times").iter().filter_map(serde_json::Value::as_f64).collect();
+    let times: Vec<f64> = times.as_array().expect("times").iter().filter_map(Value::as_f64).collect();
     assert_eq!(times.len(), MOVES);
-    times.sort_by(f64::total_cmp);
-    let (median, p95) = (times[MOVES / 2], times[MOVES * 95 / 100]);
-    println!(
-        "400 beams in simple-room, from the move to the picture: median {median:.1} ms, 95th percentile {p95:.1} ms"
-    );
-    assert!(p95 < AT_ONCE_MS, "{p95} ms");
+    times
+}
+
+/// Bytes that the page's scripts hold, and that the model has.
+fn memory(browser: &Browser) -> [f64; 2] {
+    browser.devtools("HeapProfiler.collectGarbage", &json!({}));
+    let heap = browser.devtools("Runtime.getHeapUsage", &json!({}));
+    let model = told(browser, "playground.ask({kind: 'memory'})");
+    [&heap["usedSize"], &model["bytes"]].map(|bytes| bytes.as_f64().expect("a number"))
 }

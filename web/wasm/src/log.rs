@@ -9,7 +9,7 @@ use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::Pose,
 };
-use sonard_records::{AirRecord, Provenance, Record, ScanPlan, ScanView, Session, decode_line};
+use sonard_records::{AirRecord, ModelRecord, Provenance, Record, ScanPlan, ScanView, Session, decode_line};
 
 use crate::Refusal;
 
@@ -24,6 +24,8 @@ pub(crate) struct Found<'a> {
     /// Its sensor's data.
     sensor: Option<&'a Sensor>,
     air: Option<AirRecord>,
+    /// Its model and settings.
+    model: Option<&'a ModelRecord>,
     /// Text of its scene's file.
     scene: Option<&'a str>,
 }
@@ -49,6 +51,7 @@ impl<'a> Found<'a> {
             provenance: session.map(|session| session.provenance),
             sensor: session.map(|session| &session.sensor),
             air,
+            model: session.and_then(|session| session.model.as_ref()),
             scene: session.and_then(|session| session.scene_text.as_deref()),
         }
     }
