@@ -17,7 +17,7 @@ import { Model } from "./model.js";
 import { Ranger } from "./ranger.js";
 import { emptyRoom } from "./room.js";
 import { inShort, setLamp, tellTrouble } from "./say.js";
-import { pack, stateFromLink, unsqueeze } from "./share.js";
+import { showLink, stateFromLink, unsqueeze } from "./share.js";
 import { planOf, settingsOf, usual } from "./state.js";
 import { Tour } from "./tour.js";
 import { EchoTrace } from "./trace.js";
@@ -343,12 +343,7 @@ function listen() {
   byId("table").addEventListener("toggle", () => scan && redraw());
   byId("beam").addEventListener("input", () => select(Number(byId("beam").value)));
   byId("save").addEventListener("click", () => files.save({ ...state.scene, poses: { ...state.scene.poses, here: state.pose } }));
-  byId("share").addEventListener("click", share);
-  byId("copy").addEventListener("click", async () => {
-    byId("address").select();
-    await navigator.clipboard?.writeText(byId("address").value).catch(() => document.execCommand("copy"));
-    setText(byId("copy"), "Copied");
-  });
+  byId("share").addEventListener("click", () => showLink(state));
   addEventListener("hashchange", () => openLink());
   new ResizeObserver(place).observe(byId("stage"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
@@ -357,13 +352,6 @@ function listen() {
     if (scan) redraw();
     ask();
   });
-}
-
-async function share() {
-  byId("address").value = `${location.href.split("#")[0]}#${await pack(state)}`;
-  setText(byId("copy"), "Copy");
-  byId("shared").showModal();
-  byId("address").select();
 }
 
 /** Whether the address had a view in it. */

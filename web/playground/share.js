@@ -5,8 +5,25 @@ import { stateFrom } from "./state.js";
 /** What a link may unpack to, bytes. */
 const MOST_BYTES = 4 << 20;
 
+/** Shows a link to a view, to be copied. @param {object} view */
+export async function showLink(view) {
+  const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("shared"));
+  const address = /** @type {HTMLInputElement} */ (document.getElementById("address"));
+  const copy = /** @type {HTMLButtonElement} */ (document.getElementById("copy"));
+  address.value = `${location.href.split("#")[0]}#${await pack(view)}`;
+  copy.textContent = "Copy";
+  copy.onclick = async () => {
+    address.select();
+    // Browsers that let no page write there copy what is selected.
+    await navigator.clipboard?.writeText(address.value).catch(() => document.execCommand("copy"));
+    copy.textContent = "Copied";
+  };
+  dialog.showModal();
+  address.select();
+}
+
 /** @param {object} view */
-export async function pack(view) {
+async function pack(view) {
   const text = new Blob([JSON.stringify(view)]).stream();
   const bytes = await gather(text.pipeThrough(new CompressionStream("deflate-raw")), MOST_BYTES);
   const letters = Array.from(bytes, (byte) => String.fromCharCode(byte)).join("");
@@ -14,7 +31,7 @@ export async function pack(view) {
 }
 
 /** @param {string} packed */
-export async function unpack(packed) {
+async function unpack(packed) {
   const letters = atob(packed.replaceAll("-", "+").replaceAll("_", "/"));
   const squeezed = Uint8Array.from(letters, (letter) => letter.charCodeAt(0));
   return JSON.parse(new TextDecoder().decode(await unsqueeze(squeezed, "deflate-raw", MOST_BYTES)));
