@@ -20,7 +20,9 @@ fn everything_has_a_name_and_fits_on_desk_and_phone_in_light_and_dark() {
         let wide = browser.eval("document.documentElement.scrollWidth");
         assert_eq!(wide, browser.eval("innerWidth"), "{}: it scrolls sideways", screen.name);
         assert_eq!(nameless(&browser), Vec::<String>::new(), "{}", screen.name);
+        // axe-core itself asks for the style sheets, which the policy refuses.
+        assert_clean(&browser);
         assert_eq!(axe(&browser), Vec::<String>::new(), "{}", screen.name);
+        browser.complaints();
     }
-    assert_clean(&browser);
 }

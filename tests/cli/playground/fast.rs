@@ -28,7 +28,9 @@ fn a_sweep_of_400_beams_follows_the_ranger_at_once_and_leaves_nothing_behind() {
     println!(
         "400 beams in simple-room, from the move to the picture: median {median:.1} ms, 95th percentile {p95:.1} ms"
     );
-    println!("heap of the page before and after {MOVES} sweeps, memory of the model: {before:?}, {after:?} bytes");
+    println!(
+        "heap of the page before and after {MOVES} sweeps, memory of the model: {before:?}, {after:?} bytes"
+    );
     assert!(p95 < AT_ONCE_MS, "{p95} ms");
     assert!(after[0] - before[0] < KEPT_BYTES, "{before:?} {after:?}");
     assert!(after[1] <= before[1], "{before:?} {after:?}");
@@ -61,7 +63,8 @@ fn move_about(browser: &Browser) -> Vec<f64> {
              return took.slice(-{MOVES}); }})()"
         ),
     );
-    let times: Vec<f64> = times.as_array().expect("times").iter().filter_map(Value::as_f64).collect();
+    let times: Vec<f64> =
+        times.as_array().expect("times").iter().filter_map(Value::as_f64).collect();
     assert_eq!(times.len(), MOVES);
     times
 }
