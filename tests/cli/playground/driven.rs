@@ -172,7 +172,7 @@ fn each_setting_changes_what_is_read() {
         ("engine", "cone"),
         ("in-space", "true"),
         ("ceiling", "0.6"),
-        ("height", "0.1"),
+        ("height", "0.25"),
     ] {
         // Each from where the page began, but for the heights, which build on each other.
         if !["ceiling", "height"].contains(&id) {
