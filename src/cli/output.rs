@@ -27,7 +27,7 @@ use clap::{
 
 use super::{Failure, Outcome};
 use crate::{
-    export::{CsvExport, McapExport},
+    export::{CsvExport, McapExport, ParquetExport},
     store::{FileKind, HEAD_BYTES, LogWriter, RecordWriter, StoreError, WholeFile},
 };
 pub(super) use stream::Stream;
@@ -72,6 +72,8 @@ pub(super) enum Product {
     List(&'static [&'static str]),
     /// A table of the readings of logs.
     Table,
+    /// The same with typed columns.
+    TypedTable,
     /// A recording of ROS 2 that this program made of logs.
     Recording,
     /// A log: never replaced unasked.
@@ -90,6 +92,7 @@ impl Product {
             Self::MapYaml => kind == FileKind::MapYaml,
             Self::List(members) => is_list(head, members),
             Self::Table => head.starts_with(CsvExport::<Vec<u8>>::head().as_bytes()),
+            Self::TypedTable => ParquetExport::<Vec<u8>>::begins(head),
             Self::Recording => McapExport::<Vec<u8>>::begins(head),
             Self::Log => false,
         }

@@ -45,6 +45,8 @@ pub enum FileKind {
     Compressed,
     /// MCAP recording.
     Mcap,
+    /// Parquet table.
+    Parquet,
     /// ROS 1 bag.
     RosBag,
     /// `SQLite` database, as of a ROS 2 bag.
@@ -58,7 +60,7 @@ pub enum FileKind {
 }
 
 /// How files begin that are not text.
-const SIGNATURES: [(&[u8], FileKind); 14] = [
+const SIGNATURES: [(&[u8], FileKind); 15] = [
     (b"\x89PNG\r\n\x1a\n", FileKind::Png),
     (b"\x1f\x8b", FileKind::Gzip),
     (b"\x28\xb5\x2f\xfd", FileKind::Compressed),
@@ -67,6 +69,7 @@ const SIGNATURES: [(&[u8], FileKind); 14] = [
     (b"PK\x03\x04", FileKind::Compressed),
     (b"\x04\x22\x4d\x18", FileKind::Compressed),
     (b"\x89MCAP0\r\n", FileKind::Mcap),
+    (b"PAR1", FileKind::Parquet),
     (b"#ROSBAG V", FileKind::RosBag),
     (b"SQLite format 3\0", FileKind::Sqlite),
     (b"%PDF-", FileKind::Pdf),
@@ -146,6 +149,7 @@ impl fmt::Display for FileKind {
             Self::Gzip => "compressed with gzip",
             Self::Compressed => "compressed",
             Self::Mcap => "an MCAP recording",
+            Self::Parquet => "a table in Parquet",
             Self::RosBag => "a ROS bag",
             Self::Sqlite => "an SQLite database (a ROS 2 bag?)",
             Self::Pdf => "a PDF",
@@ -256,6 +260,7 @@ mod tests {
         check("\x1f\u{8}".as_bytes(), FileKind::Binary);
         check(b"\x1f\x8b\x08\0\0", FileKind::Gzip);
         check(b"\x89MCAP0\r\n\x01\x2a", FileKind::Mcap);
+        check(b"PAR1\x15\x04\x15", FileKind::Parquet);
         check(b"#ROSBAG V2.0\nE\0\0\0", FileKind::RosBag);
         check(b"SQLite format 3\0\x10\0", FileKind::Sqlite);
         check("Dear log,\ntoday nothing.\n", FileKind::Text);

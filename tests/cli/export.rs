@@ -69,7 +69,7 @@ fn the_format_follows_from_the_ending_or_is_asked_for() {
     for arguments in [&["export", &log][..], &["export", &log, "-o", &path("a.txt")]] {
         let refused = run(arguments);
         assert_eq!(refused.status.code(), Some(2), "{arguments:?}");
-        assert!(said(&refused).contains("--to mcap or --to csv"), "{}", said(&refused));
+        assert!(said(&refused).contains("--to mcap, --to parquet or --to csv"), "{}", said(&refused));
     }
     assert!(!folder.path().join("a.txt").exists());
     assert!(run(&["export", &log, "-o", &path("a.csv")]).status.success());
@@ -78,6 +78,15 @@ fn the_format_follows_from_the_ending_or_is_asked_for() {
     fs::write(path("b.csv"), "azimuth_deg,range_m\n0,1\n").expect("writable");
     let refused = run(&["export", &log, "-o", &path("b.csv")]);
     assert!(said(&refused).contains("comma-separated"), "{}", said(&refused));
+    assert_eq!(refused.status.code(), Some(2));
+    for _ in 0..2 {
+        assert!(run(&["export", &log, "-o", &path("a.parquet")]).status.success());
+    }
+    let to_pipe = run(&["export", &log, "--to", "parquet"]);
+    assert_eq!(fs::read(path("a.parquet")).expect("written"), to_pipe.stdout);
+    fs::write(path("b.parquet"), b"PAR1\x15\x04\x15").expect("writable");
+    let refused = run(&["export", &log, "-o", &path("b.parquet")]);
+    assert!(said(&refused).contains("a table in Parquet"), "{}", said(&refused));
     assert_eq!(refused.status.code(), Some(2));
 }
 
@@ -110,6 +119,7 @@ fn a_recording_keeps_the_log_and_takes_only_its_own_place() {
         ("c.mcap", &["--profile", "laser"]),
         ("c.csv", &["--profile", "nav2"]),
         ("c.csv", &["--without-log"]),
+        ("c.parquet", &["--frame", "front"]),
     ] {
         let refused = record(out, wrong);
         assert_eq!(refused.status.code(), Some(2), "{wrong:?}: {}", said(&refused));

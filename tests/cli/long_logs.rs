@@ -63,7 +63,7 @@ fn verbs_read_a_long_log_in_little_memory() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
     let [log, picture, map, trusted] = ["long.jsonl", "all.svg", "map", "trusted.jsonl"].map(path);
-    let [table, recording] = ["all.csv", "all.mcap"].map(path);
+    let [table, typed, recording] = ["all.csv", "all.parquet", "all.mcap"].map(path);
     write_log(log.as_ref(), folder.path());
     let size_mb = fs::metadata(&log).expect("is there").len() >> 20;
     assert!(size_mb > MOST_MB, "{size_mb} MB tell nothing");
@@ -73,6 +73,7 @@ fn verbs_read_a_long_log_in_little_memory() {
         (&["log", "annotate", &log, "-o", &trusted], MOST_MB),
         (&["compare", &log], MOST_MB),
         (&["export", &log, "-o", &table], MOST_MB),
+        (&["export", &log, "-o", &typed], MOST_MB),
         (&["export", &log, "-o", &recording], MOST_MB),
         (&["compare", "--scene", "simple-room", &log], MOST_MB),
         (&["map", &log, "--out", &map], MOST_MB),

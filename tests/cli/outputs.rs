@@ -70,6 +70,7 @@ const CASES: [Case; 30] = [
     case("import --output", ("a", TABLE), "import IN -o IN --force"),
     case("export --output", ("a.csv", LOG), "export IN -o IN --force"),
     case("export --output", ("a.mcap", LOG), "export IN -o IN --force"),
+    case("export --output", ("a.parquet", LOG), "export IN -o IN --force"),
     case("export --output", ("log.csv", LOG), "export IN --to csv -o IN --force"),
     case("calibrate --out", ("sensor.json", LOG), "calibrate IN --out DIR --force"),
     case("calibrate --out", ("scene.json", SCENE), "calibrate LOG --scene IN --out DIR --force"),
@@ -337,6 +338,7 @@ fn a_full_disk_leaves_the_old_file_or_none_and_the_command_says_so() {
         (&course, vec!["simulate", "--scene", "simple-room", "--pose", "fig9", "-o", &course]),
         (&path("t.jsonl"), vec!["log", "annotate", &path("fig9.jsonl"), "-o", &path("t.jsonl")]),
         (&path("t.csv"), vec!["export", &path("fig9.jsonl"), "-o", &path("t.csv")]),
+        (&path("t.parquet"), vec!["export", &path("fig9.jsonl"), "-o", &path("t.parquet")]),
         (&path("t.mcap"), vec!["export", &path("fig9.jsonl"), "-o", &path("t.mcap")]),
         (&path("map/map.pgm"), vec!["map", &path("fig9.jsonl"), "--out", &path("map")]),
     ] {

@@ -23,6 +23,7 @@ fn others() -> Vec<(&'static str, Vec<u8>, &'static str)> {
         ("a.png", include_bytes!("../../docs/pictures/simple-room-fig9.png").to_vec(), "PNG"),
         ("a.svg", include_bytes!("../../docs/wiring/wiring.svg").to_vec(), "SVG"),
         ("a.mcap", b"\x89MCAP0\r\n\x01\0\0".to_vec(), "MCAP"),
+        ("a.parquet", b"PAR1\x15\x04\x15\x10".to_vec(), "Parquet"),
         ("a.bag", b"#ROSBAG V2.0\nE\0\0\0".to_vec(), "ROS bag"),
         ("a.db3", b"SQLite format 3\0\x10\0\x01".to_vec(), "SQLite"),
         ("poses.csv", b"x,y,deg\n1,2,3\n4,5,6\n".to_vec(), "comma"),

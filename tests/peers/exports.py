@@ -4,7 +4,8 @@
     tests/peers/exports.sh [PROGRAM]        makes logs and exports, and calls this
 
 A recording is read by mcap with mcap-ros2-support and by rosbags: both have to read every message alike,
-field by field, and what they read has to be what the log says. A table is read by duckdb and by pyarrow.
+field by field, and what they read has to be what the log says. A table is read by duckdb and by pyarrow: as text, and
+typed (Parquet), where both have to read every cell alike and as the log has it.
 """
 
 import csv
@@ -17,7 +18,9 @@ from datetime import datetime
 
 import duckdb
 import numpy as np
+import pyarrow as pa
 import pyarrow.csv
+import pyarrow.parquet
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -335,6 +338,102 @@ def check_table(path, log_path):
     print(f"{path}: {len(rows)} rows, read alike by three")
 
 
+SINGLE = {"range_m", "tof_us", "amplitude", "margin_db", "path_length_m"}
+SINGLE |= {f"sim_{name}" for name in SINGLE - {"tof_us"}} | {"residual_m", "confidence"}
+TEXT = {"log", "provenance", "scene", "sensor", "array", "scan", "ranger", "status", "path_kind", "path",
+        "sim_status", "sim_path_kind", "sim_path"}
+TIME = {"session_started", "scan_started", "time"}
+WHOLE = {"session", "collection_pose", "collection_repeat", "index", "step", "fired_ticks", "path_order", "sim_path_order"}
+
+
+def type_of(name):
+    if name in SINGLE:
+        return pa.float32()
+    if name in TEXT:
+        return pa.string()
+    if name in TIME:
+        return pa.timestamp("ns", tz="UTC")
+    if name in WHOLE:
+        return pa.int64()
+    return {"echo_ticks": pa.list_(pa.uint32()), "repaired": pa.bool_()}.get(name, pa.float64())
+
+
+def nanoseconds(time):
+    """Of a moment as a log has it; Python's own times end at microseconds."""
+    whole, _, rest = time.rstrip("Z").partition(".")
+    return int(datetime.fromisoformat(whole + "+00:00").timestamp()) * 10**9 + int(rest.ljust(9, "0") or 0)
+
+
+def cells_of_log(log, scan, ping):
+    """What a row has to say, by the names of the columns: all that is not of geometry."""
+    session, start, sim = log.session, scan["start"], ping.get("sim") or {}
+    pose = ping.get("pose") or start["pose"]
+    air = start.get("air") or session["air"]
+    cells = {name: None for name in TEXT | SINGLE | TIME | WHOLE}
+    cells |= {name: ping.get(name) for name in ping if name not in ("type", "sim", "path", "pose")}
+    cells |= {f"sim_{name}": value for name, value in sim.items() if name != "path"}
+    for prefix, path in [("", ping.get("path")), ("sim_", sim.get("path"))]:
+        if path:
+            cells |= {f"{prefix}path_{name}": path[name] for name in ("kind", "order")}
+            cells[f"{prefix}path_length_m"] = path["length_m"]
+    cells |= {name: pose[name] for name in ("x_m", "y_m", "heading_deg")}
+    cells |= {"session": 1, "session_started": session["started"], "scan": start["scan"], "scan_started": start["time"]}
+    cells |= {name: (session.get(name) or {}).get("name") for name in ("scene", "sensor", "array")}
+    cells |= {name: air[name] for name in ("temperature_c", "sound_speed_m_s")}
+    cells["provenance"] = ping.get("provenance") or session["provenance"]
+    cells.setdefault("repaired", False)
+    for name in TIME:
+        cells[name] = cells[name] and nanoseconds(cells[name])
+    for name in SINGLE:
+        cells[name] = None if cells[name] is None else float(np.float32(cells[name]))
+    return cells
+
+
+# What the log has in other words or not in one field: held against the table as text.
+DERIVED = {"log", "path", "sim_path", "transducer_x_m", "transducer_y_m", "transducer_z_m", "direction_deg", "tilt_deg"}
+
+
+def check_typed_table(path, log_path):
+    """Every cell of a table in Parquet by pyarrow and by duckdb, against the log and against the same table as text."""
+    log = Log(log_path)
+    file = pyarrow.parquet.ParquetFile(path)
+    table = file.read()
+    for field in table.schema:
+        assert field.type == type_of(field.name), field
+    moments = [name for name in table.column_names if name in TIME]
+    for name in moments:
+        table = table.set_column(table.column_names.index(name), name, table[name].cast(pa.int64()))
+    rows = table.to_pylist()
+    db = duckdb.connect()
+    columns = ", ".join(f"epoch_ns({name}::TIMESTAMP_NS) AS {name}" if name in TIME else name for name in table.column_names)
+    found = db.sql(f"SELECT {columns} FROM read_parquet('{path}')")
+    by_duckdb = [dict(zip(found.columns, row)) for row in found.fetchall()]
+    text = list(csv.DictReader(open(path.with_suffix(".csv"), encoding="utf-8", newline="")))
+    pings = [(scan, ping) for scan in log.scans for ping in scan["pings"]]
+    assert len(rows) == len(by_duckdb) == len(text) == len(pings)
+    assert list(text[0]) == table.column_names == file.schema_arrow.names
+    for row, other, line, (scan, ping) in zip(rows, by_duckdb, text, pings):
+        expected = cells_of_log(log, scan, ping)
+        for name, cell in row.items():
+            # duckdb has times with a zone to the microsecond.
+            agree = cell // 1000 == other[name] // 1000 if name in TIME and cell is not None else cell == other[name]
+            assert agree, (name, cell, other[name])
+            if name in DERIVED:
+                told = line[name]
+                assert (cell or "") == told if name in TEXT else cell == (float(told) if told else None), (name, cell, told)
+            else:
+                assert cell == expected.get(name), (name, cell, expected.get(name))
+    told = {key.decode(): value.decode() for key, value in file.metadata.metadata.items()}
+    by_duckdb = db.sql(f"SELECT key, value FROM parquet_kv_metadata('{path}')").fetchall()
+    assert {bytes(key).decode(): bytes(value).decode() for key, value in by_duckdb} == told
+    session = json.loads(told["sonard.session.1"])
+    scene = log.session.get("scene_text")
+    assert session == {key: value for key, value in log.session.items() if key not in ("type", "scene_text")}
+    assert scene is None or told[f"sonard.scene.{session['scene']['sha256']}"] == scene
+    size = path.stat().st_size / len(rows)
+    print(f"{path}: {len(rows)} rows, {size:.0f} bytes each, read alike by both")
+
+
 if __name__ == "__main__":
     folder = pathlib.Path(sys.argv[1])
     for recording in sorted(folder.glob("*.mcap")):
@@ -342,3 +441,5 @@ if __name__ == "__main__":
         check_recording(recording, folder / f"{name}.jsonl", profile)
     for table in sorted(folder.glob("*.csv")):
         check_table(table, folder / f"{table.stem}.jsonl")
+    for table in sorted(folder.glob("*.parquet")):
+        check_typed_table(table, folder / f"{table.stem}.jsonl")

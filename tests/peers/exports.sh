@@ -29,5 +29,6 @@ for log in "$work"/*.jsonl; do
   made export "$log" -o "${log%.jsonl}-rep117.mcap"
   made export "$log" --profile nav2 -o "${log%.jsonl}-nav2.mcap"
   made export "$log" -o "${log%.jsonl}.csv"
+  made export "$log" -o "${log%.jsonl}.parquet"
 done
 "$tools/bin/python" tests/peers/exports.py "$work"

@@ -120,6 +120,8 @@ pub struct Column {
     pub name: &'static str,
     /// What its cells hold.
     pub kind: Kind,
+    /// Of numbers, whether seven digits say all: formats that have such numbers take four bytes instead of eight.
+    pub is_single: bool,
     cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>,
 }
 
@@ -132,19 +134,24 @@ impl Column {
 }
 
 const fn text(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>) -> Column {
-    Column { name, kind: Kind::Text, cell }
+    Column { name, kind: Kind::Text, is_single: false, cell }
 }
 
 const fn integer(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>) -> Column {
-    Column { name, kind: Kind::Integer, cell }
+    Column { name, kind: Kind::Integer, is_single: false, cell }
 }
 
 const fn number(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>) -> Column {
-    Column { name, kind: Kind::Number, cell }
+    Column { name, kind: Kind::Number, is_single: false, cell }
+}
+
+/// A number of what was heard: a micrometre in ten metres is its seventh digit.
+const fn single(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>) -> Column {
+    Column { name, kind: Kind::Number, is_single: true, cell }
 }
 
 const fn time(name: &'static str, cell: for<'a> fn(&Row<'a>) -> Option<Value<'a>>) -> Column {
-    Column { name, kind: Kind::Time, cell }
+    Column { name, kind: Kind::Time, is_single: false, cell }
 }
 
 /// A word of the records, as a log has it.
@@ -197,31 +204,37 @@ pub const COLUMNS: &[Column] = &[
     number("temperature_c", |row| row.temperature_c().map(Value::Number)),
     number("sound_speed_m_s", |row| row.sound_speed_m_s().map(Value::Number)),
     text("status", |row| word(row.ping.status)),
-    number("range_m", |row| row.ping.range_m.map(Value::Number)),
-    number("tof_us", |row| row.ping.tof_us.map(Value::Number)),
+    single("range_m", |row| row.ping.range_m.map(Value::Number)),
+    single("tof_us", |row| row.ping.tof_us.map(Value::Number)),
     integer("fired_ticks", |row| {
         row.ping.fired_ticks.and_then(|ticks| i64::try_from(ticks).ok()).map(Value::Integer)
     }),
     Column {
         name: "echo_ticks",
         kind: Kind::Integers,
+        is_single: false,
         cell: |row| Some(Value::Integers(&row.ping.echo_ticks)),
     },
-    Column { name: "repaired", kind: Kind::Flag, cell: |row| Some(Value::Flag(row.ping.repaired)) },
-    number("amplitude", |row| row.ping.amplitude.map(Value::Number)),
-    number("margin_db", |row| row.ping.margin_db.map(Value::Number)),
+    Column {
+        name: "repaired",
+        kind: Kind::Flag,
+        is_single: false,
+        cell: |row| Some(Value::Flag(row.ping.repaired)),
+    },
+    single("amplitude", |row| row.ping.amplitude.map(Value::Number)),
+    single("margin_db", |row| row.ping.margin_db.map(Value::Number)),
     text("path_kind", |row| word(row.ping.path.as_ref()?.kind)),
     integer("path_order", |row| Some(Value::Integer(row.ping.path.as_ref()?.order.into()))),
-    number("path_length_m", |row| Some(Value::Number(row.ping.path.as_ref()?.length_m))),
+    single("path_length_m", |row| Some(Value::Number(row.ping.path.as_ref()?.length_m))),
     text("path", |row| row.ping.path.as_ref().map(words)),
     text("sim_status", |row| word(row.sim()?.status)),
-    number("sim_range_m", |row| row.sim()?.range_m.map(Value::Number)),
-    number("sim_amplitude", |row| row.sim()?.amplitude.map(Value::Number)),
-    number("sim_margin_db", |row| row.sim()?.margin_db.map(Value::Number)),
+    single("sim_range_m", |row| row.sim()?.range_m.map(Value::Number)),
+    single("sim_amplitude", |row| row.sim()?.amplitude.map(Value::Number)),
+    single("sim_margin_db", |row| row.sim()?.margin_db.map(Value::Number)),
     text("sim_path_kind", |row| word(row.sim_path()?.kind)),
     integer("sim_path_order", |row| Some(Value::Integer(row.sim_path()?.order.into()))),
-    number("sim_path_length_m", |row| Some(Value::Number(row.sim_path()?.length_m))),
+    single("sim_path_length_m", |row| Some(Value::Number(row.sim_path()?.length_m))),
     text("sim_path", |row| row.sim_path().map(words)),
-    number("residual_m", |row| row.ping.residual_m.map(Value::Number)),
-    number("confidence", |row| row.ping.confidence.map(Value::Number)),
+    single("residual_m", |row| row.ping.residual_m.map(Value::Number)),
+    single("confidence", |row| row.ping.confidence.map(Value::Number)),
 ];

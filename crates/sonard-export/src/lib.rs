@@ -1,5 +1,5 @@
-//! Scans in the formats of other tools: tables (CSV) of readings beside predictions, and recordings of ROS 2
-//! (MCAP).
+//! Scans in the formats of other tools: tables (CSV, Parquet) of readings beside predictions, and recordings of
+//! ROS 2 (MCAP).
 //!
 //! An [`Export`] takes scans one by one and writes to whatever takes bytes, so that what it has in memory
 //! does not grow with the number of scans.
@@ -8,6 +8,7 @@
 
 mod columns;
 mod error;
+mod parquet;
 mod recording;
 mod ros;
 mod sessions;
@@ -21,6 +22,7 @@ use sonard_records::ScanView;
 
 pub use columns::{COLUMNS, Column, Kind, Row, Value};
 pub use error::{ExportError, LeftOut};
+pub use parquet::ParquetExport;
 pub use recording::{McapExport, Profile, Settings};
 pub use table::CsvExport;
 

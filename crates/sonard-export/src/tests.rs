@@ -3,4 +3,5 @@
 mod cdr;
 mod csv;
 mod mcap;
+mod parquet;
 mod scans;

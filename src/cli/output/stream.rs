@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{self, BufWriter, StdoutLock, Write},
+    io::{self, BufWriter, Stdout, Write},
     mem,
 };
 
@@ -11,7 +11,7 @@ use crate::store::{Medium, WholeFile};
 /// What a verb writes to.
 #[derive(Debug)]
 pub(in crate::cli) enum Stream {
-    Standard(BufWriter<StdoutLock<'static>>),
+    Standard(BufWriter<Stdout>),
     File(BufWriter<WholeFile>),
     Device(File),
     /// Nothing more comes.
@@ -20,7 +20,7 @@ pub(in crate::cli) enum Stream {
 
 impl Stream {
     pub(in crate::cli) fn standard() -> Self {
-        Self::Standard(BufWriter::new(io::stdout().lock()))
+        Self::Standard(BufWriter::new(io::stdout()))
     }
 
     /// Puts the file in its place.

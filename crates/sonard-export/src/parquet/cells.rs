@@ -1,0 +1,213 @@
+//! The cells of a column before they are written.
+//!
+//! Parquet has nulls and lists as levels beside the values: a definition level says how much of a cell is
+//! there, a repetition level whether a value goes on with the list of the one before.
+
+use std::collections::HashMap;
+
+use ::parquet::{
+    basic::{LogicalType, Repetition, TimeUnit, Type as Physical},
+    data_type::{
+        BoolType, ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int32Type, Int64Type,
+    },
+    errors::ParquetError,
+    file::writer::SerializedColumnWriter,
+    schema::types::{ColumnPath, Type},
+};
+use std::sync::Arc;
+
+use crate::{Column, Kind, Value};
+
+/// The cells of a column that wait.
+#[derive(Debug)]
+pub(super) struct Cells {
+    values: Values,
+    /// Of a cell 1, or 0 for null; of lists see [`LIST`].
+    definitions: Vec<i16>,
+}
+
+/// What is there of a list: not even a list, an empty one, an element.
+const LIST: [i16; 3] = [0, 1, 2];
+
+#[derive(Debug)]
+enum Values {
+    Text(Texts),
+    Whole(Vec<i64>),
+    Double(Vec<f64>),
+    Single(Vec<f32>),
+    Flag(Vec<bool>),
+    List { numbers: Vec<i32>, repetitions: Vec<i16> },
+}
+
+/// Texts, each kept once.
+#[derive(Debug, Default)]
+struct Texts {
+    places: HashMap<Box<str>, u32>,
+    distinct: Vec<ByteArray>,
+    cells: Vec<u32>,
+}
+
+/// The type of a column; every cell may be null.
+pub(super) fn type_of(column: &Column) -> Result<Type, ParquetError> {
+    let (physical, logical) = match column.kind {
+        Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+        Kind::Integer => (Physical::INT64, None),
+        Kind::Number if column.is_single => (Physical::FLOAT, None),
+        Kind::Number => (Physical::DOUBLE, None),
+        Kind::Flag => (Physical::BOOLEAN, None),
+        Kind::Time => (Physical::INT64, Some(LogicalType::timestamp(true, TimeUnit::NANOS))),
+        Kind::Integers => return list_of_counts(column.name),
+    };
+    Type::primitive_type_builder(column.name, physical)
+        .with_repetition(Repetition::OPTIONAL)
+        .with_logical_type(logical)
+        .build()
+}
+
+/// A list as the format's own rules ask for it, in three levels.
+fn list_of_counts(name: &str) -> Result<Type, ParquetError> {
+    let element = Type::primitive_type_builder("element", Physical::INT32)
+        .with_repetition(Repetition::REQUIRED)
+        .with_logical_type(Some(LogicalType::integer(32, false)))
+        .build()?;
+    let list = Type::group_type_builder("list")
+        .with_repetition(Repetition::REPEATED)
+        .with_fields(vec![Arc::new(element)])
+        .build()?;
+    Type::group_type_builder(name)
+        .with_repetition(Repetition::OPTIONAL)
+        .with_logical_type(Some(LogicalType::List))
+        .with_fields(vec![Arc::new(list)])
+        .build()
+}
+
+/// Where a column's values are in the schema.
+pub(super) fn leaf(column: &Column) -> ColumnPath {
+    let below: &[&str] = if column.kind == Kind::Integers { &["list", "element"] } else { &[] };
+    ColumnPath::new([column.name].iter().chain(below).map(ToString::to_string).collect())
+}
+
+impl Cells {
+    /// No cells yet.
+    pub(super) fn of(column: &Column) -> Self {
+        let values = match column.kind {
+            Kind::Text => Values::Text(Texts::default()),
+            Kind::Integer | Kind::Time => Values::Whole(Vec::new()),
+            Kind::Number if column.is_single => Values::Single(Vec::new()),
+            Kind::Number => Values::Double(Vec::new()),
+            Kind::Flag => Values::Flag(Vec::new()),
+            Kind::Integers => Values::List { numbers: Vec::new(), repetitions: Vec::new() },
+        };
+        Self { values, definitions: Vec::new() }
+    }
+
+    /// Adds a cell; how many bytes more it takes than a number does.
+    pub(super) fn push(&mut self, value: Option<Value<'_>>) -> usize {
+        let (is_there, bytes) = match (&mut self.values, value) {
+            (Values::List { numbers, repetitions }, value) => {
+                let Some(Value::Integers(list)) = value else {
+                    repetitions.push(0);
+                    self.definitions.push(LIST[0]);
+                    return 0;
+                };
+                // Unsigned by its logical type: the bits are the same.
+                numbers.extend(list.iter().map(|number| number.cast_signed()));
+                repetitions.extend((0..list.len().max(1)).map(|place| i16::from(place > 0)));
+                let level = if list.is_empty() { LIST[1] } else { LIST[2] };
+                self.definitions.extend(std::iter::repeat_n(level, list.len().max(1)));
+                return 8 * list.len();
+            }
+            (Values::Text(texts), Some(Value::Text(text))) => (true, texts.push(&text)),
+            (Values::Whole(cells), Some(Value::Integer(number))) => {
+                cells.push(number);
+                (true, 0)
+            }
+            (Values::Whole(cells), Some(Value::Time(time))) => {
+                // Nobody measured before 1678 or after 2262.
+                let time_ns = i64::try_from(time.as_nanosecond()).ok();
+                cells.extend(time_ns);
+                (time_ns.is_some(), 0)
+            }
+            (Values::Double(cells), Some(Value::Number(number))) => {
+                cells.push(number);
+                (true, 0)
+            }
+            (Values::Single(cells), Some(Value::Number(number))) => {
+                cells.push(number as f32);
+                (true, 0)
+            }
+            (Values::Flag(cells), Some(Value::Flag(flag))) => {
+                cells.push(flag);
+                (true, 0)
+            }
+            // Of columns, each has cells of its kind.
+            (_, None | Some(_)) => (false, 0),
+        };
+        self.definitions.push(is_there.into());
+        bytes
+    }
+
+    /// Writes the cells and forgets them.
+    pub(super) fn write(
+        &mut self,
+        column: &mut SerializedColumnWriter<'_>,
+    ) -> Result<(), ParquetError> {
+        let levels = &self.definitions;
+        match &mut self.values {
+            Values::Text(texts) => texts.write(levels, column)?,
+            Values::Whole(cells) => write::<Int64Type>(cells, levels, None, column)?,
+            Values::Double(cells) => write::<DoubleType>(cells, levels, None, column)?,
+            Values::Single(cells) => write::<FloatType>(cells, levels, None, column)?,
+            Values::Flag(cells) => write::<BoolType>(cells, levels, None, column)?,
+            Values::List { numbers, repetitions } => {
+                write::<Int32Type>(numbers, levels, Some(repetitions), column)?;
+                repetitions.clear();
+            }
+        }
+        self.definitions.clear();
+        Ok(())
+    }
+}
+
+fn write<T: DataType>(
+    cells: &mut Vec<T::T>,
+    definitions: &[i16],
+    repetitions: Option<&[i16]>,
+    column: &mut SerializedColumnWriter<'_>,
+) -> Result<(), ParquetError> {
+    column.typed::<T>().write_batch(cells, Some(definitions), repetitions)?;
+    cells.clear();
+    Ok(())
+}
+
+impl Texts {
+    fn push(&mut self, text: &str) -> usize {
+        if let Some(place) = self.places.get(text) {
+            self.cells.push(*place);
+            return 0;
+        }
+        let place = self.distinct.len() as u32;
+        self.places.insert(text.into(), place);
+        self.distinct.push(text.as_bytes().to_vec().into());
+        self.cells.push(place);
+        2 * text.len()
+    }
+
+    /// Piece by piece, as each cell takes as much as a long text while it is written.
+    fn write(
+        &mut self,
+        definitions: &[i16],
+        column: &mut SerializedColumnWriter<'_>,
+    ) -> Result<(), ParquetError> {
+        const PIECE: usize = 4096;
+        let mut cells = self.cells.iter();
+        for levels in definitions.chunks(PIECE) {
+            let there = levels.iter().filter(|level| **level > 0).count();
+            let texts = cells.by_ref().take(there);
+            let texts: Vec<_> = texts.map(|place| self.distinct[*place as usize].clone()).collect();
+            column.typed::<ByteArrayType>().write_batch(&texts, Some(levels), None)?;
+        }
+        *self = Self::default();
+        Ok(())
+    }
+}
