@@ -13,6 +13,7 @@ mod doctor;
 mod explore;
 mod export;
 mod failure;
+mod findings;
 mod generate;
 mod groups;
 mod import;

@@ -11,9 +11,10 @@ use super::{
     Failure, Outcome,
     answer::answer,
     compare::RULED,
+    findings::{FindingsArgs, Seen},
     logs::first_of,
     numbers::{not_negative, positive, probability},
-    picture::{PictureArgs, scene_for},
+    picture::scene_for,
     sweeps::for_each_sweep,
 };
 use crate::{
@@ -33,7 +34,7 @@ pub(super) struct Args {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    picture: PictureArgs,
+    files: FindingsArgs,
     /// Scene file, or the name of a shipped scene (`sonard scene list`); only draws its walls, in
     /// place of those of the scene in the log
     #[arg(long, value_name = "SCENE")]
@@ -75,6 +76,7 @@ Examples:
   sonard simulate --scene plane-corner-edge --pose fig13 --sensor bozma-kuc-60khz -o one.jsonl
   sonard interpret one.jsonl -o one.png
   sonard interpret one.jsonl two.jsonl --json
+  sonard interpret one.jsonl two.jsonl -o features.geojson -o features.mcap
 
 A feature's bearing is counter-clockwise from the heading of the scan it was first seen in. Why \
 one is unresolved: second_position (plane or corner), translation (the places are too near to \
@@ -85,15 +87,15 @@ can be measured, or so near to that that a part may be).
 Exit codes: 0 done, also if nothing was found, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let targets = args.picture.targets()?;
+    let targets = args.files.targets()?;
     let (scans, features) = find(args)?;
     answer(args.json, &features, |out| print(out, &features))?;
-    if targets.is_empty() {
-        return Ok(());
-    }
-    let scene = scene_for(first_of(&args.logs), &scans, args.scene.as_deref())?;
-    let picture = draw_features(&scans, scene.as_ref(), &features);
-    targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
+    let mut seen = Seen::default();
+    scans.iter().for_each(|scan| seen.add(scan));
+    targets.write(&seen.place(None, &[], &features), || {
+        let scene = scene_for(first_of(&args.logs), &scans, args.scene.as_deref())?;
+        Ok(draw_features(&scans, scene.as_ref(), &features))
+    })
 }
 
 /// The scans that can be interpreted, and what is in them.

@@ -10,8 +10,9 @@ use std::{
 use super::{
     Failure, Outcome,
     answer::answer,
+    findings::{FindingsArgs, Seen},
     logs::{Drawn, first_of},
-    picture::{PictureArgs, scene_for},
+    picture::scene_for,
     sweeps::for_each_sweep,
 };
 use crate::{
@@ -38,7 +39,7 @@ pub(super) struct Args {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    picture: PictureArgs,
+    files: FindingsArgs,
     /// Scene file, or the name of a shipped scene (`sonard scene list`); only draws its walls, in
     /// place of those of the scene in the log
     #[arg(long, value_name = "SCENE")]
@@ -57,6 +58,7 @@ const HELP: &str = "\
 Examples:
   sonard lines run/*.jsonl -o lines.png
   sonard lines scan.jsonl --logical 2 --json
+  sonard lines run/*.jsonl -o lines.geojson -o lines.mcap
   sonard lines run/*.jsonl --laser laser.jsonl -o lines.png
 
 A line of a laser's file is what it saw from one place, counter-clockwise, null where nothing came \
@@ -73,26 +75,35 @@ pub(super) fn run(args: &Args) -> Outcome {
             "give a length in metres, greater than 0",
         ));
     }
-    let targets = args.picture.targets()?;
-    let (scans, map, left_out) = read(args)?;
+    let targets = args.files.targets()?;
+    let Read { scans, seen, map, left_out } = read(args)?;
     answer(args.json, map.lines().iter().map(record), |out| print(out, &map, left_out))?;
-    if targets.is_empty() {
-        return Ok(());
-    }
-    let scene = scene_for(first_of(&args.logs), &scans, args.scene.as_deref())?;
-    let picture = draw_lines(&scans, scene.as_ref(), map.lines());
-    targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
+    targets.write(&seen.place(None, map.lines(), &[]), || {
+        let scene = scene_for(first_of(&args.logs), &scans, args.scene.as_deref())?;
+        Ok(draw_lines(&scans, scene.as_ref(), map.lines()))
+    })
 }
 
-fn read(args: &Args) -> Result<(Vec<ScanView>, LineMap, usize), Failure> {
+/// The logs and what came of them.
+struct Read {
+    scans: Vec<ScanView>,
+    seen: Seen,
+    map: LineMap,
+    /// Readings.
+    left_out: usize,
+}
+
+fn read(args: &Args) -> Result<Read, Failure> {
     let settings = LineMapSettings { logical_m: args.logical, ..LineMapSettings::default() };
-    let (mut scans, mut map) = (Drawn::default(), LineMap::new(settings));
+    let (mut scans, mut seen, mut map) =
+        (Drawn::default(), Seen::default(), LineMap::new(settings));
     let (mut count, mut left_out) = (0_usize, 0);
     for_each_sweep(&args.logs, |scan, sweep| {
         left_out += map.add_sonar(&sweep);
         count += 1;
+        seen.add(&scan);
         // A picture shows all readings; without one they need not stay in memory.
-        if !args.picture.output.is_empty() {
+        if !args.files.output.is_empty() {
             scans.add(scan);
         }
     })?;
@@ -107,7 +118,7 @@ fn read(args: &Args) -> Result<(Vec<ScanView>, LineMap, usize), Failure> {
             "give logs as `sonard scan` or `sonard simulate` writes them",
         ));
     }
-    Ok((scans.finish(), map, left_out))
+    Ok(Read { scans: scans.finish(), seen, map, left_out })
 }
 
 pub(super) fn record(line: &MapLine) -> serde_json::Value {

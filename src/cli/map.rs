@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use super::{
     Failure, Outcome,
     answer::answer,
+    findings::{self, Seen},
     logs::first_of,
     map_file,
     output::{OutPath, Overwrite, Product, make_folder},
@@ -34,7 +35,7 @@ pub(super) struct Args {
     /// Logs whose scans have poses; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// Folder for what is written; map.pgm, map.yaml and map.png
+    /// Folder for what is written; map.pgm, map.yaml, map.mcap and map.png
     #[arg(long, value_name = "DIR")]
     out: OutPath,
     /// Whether readings that predicted features contradict count less
@@ -105,8 +106,8 @@ Make an occupancy grid of the scans of logs.
 Each scan is taken at its pose. Feature Prediction (O'Sullivan and others) predicts walls from \
 readings that are right and gives readings that such walls contradict less confidence, so that \
 mirror-like walls are not mapped as free space. Writes the pair map.pgm and map.yaml that ROS's \
-map_server reads (bright is free, dark occupied, in between is how likely), and map.png with the \
-way of the ranger.";
+map_server reads (bright is free, dark occupied, in between is how likely), the same as a recording \
+of ROS 2 (map.mcap, topic /map) and map.png with the way of the ranger.";
 
 const HELP: &str = "\
 Examples:
@@ -125,10 +126,11 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     map_file::check(&args.out, args.overwrite)?;
     args.overwrite.check_in(&args.out, "map.png", Product::Png)?;
+    args.overwrite.check_in(&args.out, "map.mcap", Product::Recording)?;
     if let Some(path) = &args.confidences {
         args.overwrite.check(path, CONFIDENCES)?;
     }
-    let Taken { session, provenance, sweeps: taken } = sweeps(args)?;
+    let Taken { session, provenance, seen, sweeps: taken } = sweeps(args)?;
     let refuse = |error: &dyn std::fmt::Display| {
         Failure::input(error.to_string(), "see `sonard map --help`")
     };
@@ -172,6 +174,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     .map_err(|error| refuse(&error))?;
     map_file::write(&args.out, &mapped.grid, args.overwrite)?;
     args.overwrite.save(&args.out.join("map.png"), Product::Png, &png)?;
+    let place = seen.place(Some(&mapped.grid), &[], &[]);
+    findings::write(&args.out.join("map.mcap"), Product::Recording, args.overwrite, &place)?;
     answer(args.json, [&summary], |out| summary.print(out))
 }
 
@@ -206,12 +210,15 @@ struct Taken {
     session: Session,
     /// Of the first that no ranger took, if any.
     provenance: Provenance,
+    seen: Seen,
     sweeps: Vec<(uuid::Uuid, Sweep)>,
 }
 
 fn sweeps(args: &Args) -> Result<Taken, Failure> {
     let (mut session, mut sweeps, mut made_up) = (None, Vec::new(), None);
+    let mut seen = Seen::default();
     for_each_sweep(&args.logs, |scan, sweep| {
+        seen.add(&scan);
         sweeps.push((scan.scan, sweep));
         let Some(of_scan) = scan.session.as_deref() else { return };
         if of_scan.provenance != Provenance::Hardware {
@@ -228,7 +235,7 @@ fn sweeps(args: &Args) -> Result<Taken, Failure> {
         )
     })?;
     let provenance = made_up.unwrap_or(session.provenance);
-    Ok(Taken { session, provenance, sweeps })
+    Ok(Taken { session, provenance, seen, sweeps })
 }
 
 /// A finished map and what was noticed on the way.

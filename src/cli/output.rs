@@ -27,7 +27,7 @@ use clap::{
 
 use super::{Failure, Outcome};
 use crate::{
-    export::{CsvExport, McapExport, ParquetExport},
+    export::{CsvExport, McapExport, ParquetExport, begins_geojson},
     store::{FileKind, HEAD_BYTES, LogWriter, RecordWriter, StoreError, WholeFile},
 };
 pub(super) use stream::Stream;
@@ -74,8 +74,10 @@ pub(super) enum Product {
     Table,
     /// The same with typed columns.
     TypedTable,
-    /// A recording of ROS 2 that this program made of logs.
+    /// A recording of ROS 2 that this program made.
     Recording,
+    /// Lines or features that this program found, as GeoJSON.
+    GeoJson,
     /// A log: never replaced unasked.
     Log,
 }
@@ -94,6 +96,7 @@ impl Product {
             Self::Table => head.starts_with(CsvExport::<Vec<u8>>::head().as_bytes()),
             Self::TypedTable => ParquetExport::<Vec<u8>>::begins(head),
             Self::Recording => McapExport::<Vec<u8>>::begins(head),
+            Self::GeoJson => begins_geojson(head),
             Self::Log => false,
         }
     }

@@ -55,6 +55,7 @@ const CASES: [Case; 30] = [
         "simulate --scene simple-room --poses IN --array ring-12 -o IN --force",
     ),
     case("map --out", ("map.pgm", LOG), "map IN --out DIR --force"),
+    case("map --out", ("map.mcap", LOG), "map IN --out DIR --force"),
     case("map --out", ("map.png", SCENE), "map LOG --scene IN --out DIR --force"),
     case("map --confidences", ("c.jsonl", LOG), "map IN --out DIR/map --confidences IN --force"),
     case(
@@ -257,7 +258,7 @@ fn map_and_explore_replace_their_own_files_only() {
         let output = run_case(map, &log, folder.path());
         assert!(output.status.success(), "{again} {}", stderr(&output));
     }
-    for name in ["map/map.yaml", "map/map.pgm", "map/map.png", "c.jsonl"] {
+    for name in ["map/map.yaml", "map/map.pgm", "map/map.mcap", "map/map.png", "c.jsonl"] {
         let path = folder.path().join(name);
         let was = fs::read(&path).expect("written");
         fs::write(&path, "{\"mine\": 1}\n").expect("writable");

@@ -21,6 +21,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
+import pyogrio
+import shapely
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -91,9 +93,10 @@ def check_types(summary):
 
 def check_qos(offered):
     for topic, [profile] in offered.items():
-        durable = "TRANSIENT_LOCAL" if topic == "/tf_static" else "VOLATILE"
+        kept = topic in ("/tf_static", "/map", "/sonar/lines", "/sonar/features")
+        durable = "TRANSIENT_LOCAL" if kept else "VOLATILE"
         assert (profile.durability.name, profile.reliability.name) == (durable, "RELIABLE"), topic
-        assert profile.depth == (1 if topic == "/tf_static" else 10), topic
+        assert profile.depth == (1 if kept else 10), topic
 
 
 class Log:
@@ -434,6 +437,69 @@ def check_typed_table(path, log_path):
     print(f"{path}: {len(rows)} rows, {size:.0f} bytes each, read alike by both")
 
 
+def only_message(path):
+    """The messages of a recording by topic, read alike by both, one each."""
+    messages, _, metadata, summary = by_mcap(path)
+    others, offered = by_rosbags(path)
+    assert sorted(map(str, messages)) == sorted(map(str, others))
+    check_types(summary)
+    check_qos(offered)
+    assert metadata["sonard"]["provenance"] == "simulated"
+    topics = {topic: message for topic, _, message in messages}
+    assert len(topics) == len(messages)
+    return topics
+
+
+def check_map(folder):
+    """The grid of a recording against the image that map_server reads."""
+    topics = only_message(folder / "map.mcap")
+    assert list(topics) == ["/map"]
+    grid, info = topics["/map"], topics["/map"]["info"]
+    header, _, pixels = (folder / "map.pgm").read_bytes().partition(b"255\n")
+    width, height = map(int, header.split()[1:3])
+    assert (info["width"], info["height"]) == (width, height) and grid["header"]["frame_id"] == "map"
+    assert len(grid["data"]) == len(pixels) == width * height
+    yaml = dict(line.split(": ", 1) for line in (folder / "map.yaml").read_text().splitlines())
+    assert near(info["resolution"], float(yaml["resolution"]))
+    at = info["origin"]["position"]
+    assert [at["x"], at["y"]] == json.loads(yaml["origin"])[:2] and info["origin"]["orientation"]["w"] == 1
+    for place, cell in enumerate(grid["data"]):
+        row, column = divmod(place, width)
+        pixel = pixels[(height - 1 - row) * width + column]
+        # The image has steps of 1 in 255, the grid of 1 in 100.
+        assert abs((50 if cell == -1 else cell) - 100 * (1 - pixel / 255)) <= 0.75, (place, cell, pixel)
+    print(f"{folder}: {width} x {height} cells, read alike by both")
+
+
+def check_found(folder, name, marker_type):
+    """Lines or features as markers and as GeoJSON, against what the command said."""
+    records = [json.loads(line) for line in open(folder / f"{name}.jsonl", encoding="utf-8")]
+    path = folder / f"{name}.geojson"
+    text = json.loads(path.read_text(encoding="utf-8"))
+    assert text["crs"] is None and text["sonard"]["units"] == "metres"
+    by_shapely = shapely.from_geojson(path.read_text(encoding="utf-8"))
+    meta, _, by_gdal, _ = pyogrio.raw.read(path)
+    assert meta["crs"] is None, "metres are no degrees"
+    drawn = {}
+    for record, read, one, other in zip(records, text["features"], by_shapely.geoms, by_gdal, strict=True):
+        if name == "lines":
+            expected = [record["from_m"], record["to_m"]]
+        else:
+            expected = [] if record["x_m"] is None else [[record["x_m"], record["y_m"]]]
+        for geometry in [one, shapely.from_wkb(other) if other else shapely.Point()]:
+            found = shapely.get_coordinates(geometry).tolist()
+            assert found == expected, (found, expected)
+        properties = {k: v for k, v in read["properties"].items() if k not in ("what", "seen_from_m")}
+        assert properties == {k: v for k, v in record.items() if k not in ("from_m", "to_m")}
+        drawn.setdefault(record["kind"], []).extend(expected)
+    markers = only_message(folder / f"{name}.mcap")[f"/sonar/{name}"]["markers"]
+    for marker in markers:
+        points = [[point["x"], point["y"]] for point in marker["points"]]
+        assert points == drawn.pop(marker["ns"], []) and marker["type"] == marker_type
+    assert not any(drawn.values()), drawn
+    print(f"{path}: {len(records)} {name}, read alike by both")
+
+
 if __name__ == "__main__":
     folder = pathlib.Path(sys.argv[1])
     for recording in sorted(folder.glob("*.mcap")):
@@ -443,3 +509,6 @@ if __name__ == "__main__":
         check_table(table, folder / f"{table.stem}.jsonl")
     for table in sorted(folder.glob("*.parquet")):
         check_typed_table(table, folder / f"{table.stem}.jsonl")
+    check_map(folder / "places" / "map")
+    check_found(folder / "places", "lines", 5)
+    check_found(folder / "places", "features", 7)

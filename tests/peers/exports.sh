@@ -5,7 +5,8 @@
 #   tests/peers/exports.sh [PROGRAM]    without a program, it is built
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-packages=(mcap==1.6.0 mcap-ros2-support==0.6.0 rosbags==0.11.9 duckdb==2.0.0 pyarrow==26.0.1 numpy==2.4.6)
+packages=(mcap==1.6.0 mcap-ros2-support==0.6.0 rosbags==0.11.9 duckdb==2.0.0 pyarrow==26.0.1 numpy==2.4.6
+  shapely==2.2.0 pyogrio==0.13.0)
 target=${CARGO_TARGET_DIR:-target}
 tools=$target/tools/exports
 tests/venv.sh "$tools" EXPORT_PEERS=0 "${packages[@]}"
@@ -31,4 +32,11 @@ for log in "$work"/*.jsonl; do
   made export "$log" -o "${log%.jsonl}.csv"
   made export "$log" -o "${log%.jsonl}.parquet"
 done
+# What was found of a place.
+mkdir "$work/places"
+"$program" lines "$work/simulated.jsonl" --json -o "$work/places/lines.geojson" -o "$work/places/lines.mcap" \
+  >"$work/places/lines.jsonl"
+"$program" interpret "$work/simulated.jsonl" --json -o "$work/places/features.geojson" -o "$work/places/features.mcap" \
+  >"$work/places/features.jsonl"
+made map "$work/simulated.jsonl" --out "$work/places/map"
 "$tools/bin/python" tests/peers/exports.py "$work"

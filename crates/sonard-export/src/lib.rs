@@ -1,5 +1,5 @@
 //! Scans in the formats of other tools: tables (CSV, Parquet) of readings beside predictions, and recordings of
-//! ROS 2 (MCAP).
+//! ROS 2 (MCAP); maps, lines and features as recordings and as GeoJSON.
 //!
 //! An [`Export`] takes scans one by one and writes to whatever takes bytes, so that what it has in memory
 //! does not grow with the number of scans.
@@ -9,6 +9,7 @@
 mod columns;
 mod error;
 mod parquet;
+mod place;
 mod recording;
 mod ros;
 mod sessions;
@@ -23,6 +24,7 @@ use sonard_records::ScanView;
 pub use columns::{COLUMNS, Column, Kind, Row, Value};
 pub use error::{ExportError, LeftOut};
 pub use parquet::ParquetExport;
+pub use place::{Place, begins_geojson, to_geojson, write_place};
 pub use recording::{McapExport, Profile, Settings};
 pub use table::CsvExport;
 

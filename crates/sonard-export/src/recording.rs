@@ -1,6 +1,7 @@
 //! Recordings of ROS 2: MCAP with messages in CDR.
 
 mod frames;
+mod messages;
 mod readings;
 mod times;
 
@@ -9,11 +10,7 @@ use std::{
     io::{self, Read, Write},
 };
 
-use mcap::{
-    Compression, McapError, WriteOptions, Writer,
-    records::{AttachmentHeader, MessageHeader, Metadata},
-    write::NoSeek,
-};
+use mcap::records::AttachmentHeader;
 
 use sonard_records::{Ping, ScanView};
 
@@ -21,15 +18,17 @@ use crate::{
     Export, ExportError, LeftOut, LogFile,
     columns::logged_word,
     ros::{
-        cdr::{Cdr, Encode},
-        interface::{Interface, LASER_SCAN, MARKERS, POINT_CLOUD, RANGE, TRANSFORMS},
+        interface::{LASER_SCAN, MARKERS, POINT_CLOUD, RANGE, TRANSFORMS},
         message::{Header, Markers, Range, Stamp, Transforms},
     },
     sessions::Sessions,
 };
-use frames::MAP;
+pub(crate) use frames::MAP;
+use messages::refused;
+pub(crate) use messages::Messages;
 use readings::{Figures, Heard, in_order, laser_scan, paths, points};
-use times::{Firings, Times, nanoseconds};
+pub(crate) use times::nanoseconds;
+use times::{Firings, Times};
 
 /// What a `Range` says of silence and of what is too near. REP 117 and the obstacle layer of nav2 contradict
 /// each other: that leaves out infinite ranges.
@@ -84,7 +83,7 @@ mod topic {
 /// A recording as ROS 2, Foxglove and others read it: each reading a `Range`, each scan a `LaserScan` where it has
 /// the form of one, a `PointCloud2` and the paths of its sound, with the frames of robot and rangers.
 pub struct McapExport<W: Write> {
-    out: Writer<NoSeek<W>>,
+    messages: Messages<W>,
     settings: Settings,
     sessions: Sessions,
     /// Of the session of the last scan.
@@ -93,21 +92,9 @@ pub struct McapExport<W: Write> {
     is_fixed_told: bool,
     times: Times,
     provenances: BTreeSet<String>,
-    channels: BTreeMap<String, Channel>,
     /// When the last scan ended.
     end: Stamp,
-    /// The bytes of a message, kept for the next.
-    buffer: Vec<u8>,
 }
-
-#[derive(Debug, Clone, Copy)]
-struct Channel {
-    id: u16,
-    sequence: u32,
-}
-
-/// Messages are compressed together, so many bytes of them: what waits in memory.
-const CHUNK_BYTES: u64 = 1 << 20;
 
 impl<W: Write> McapExport<W> {
     /// A recording that is written to `out`, from its beginning to its end.
@@ -115,34 +102,22 @@ impl<W: Write> McapExport<W> {
     /// # Errors
     /// When `out` refuses the beginning.
     pub fn new(out: W, settings: Settings) -> Result<Self, ExportError> {
-        let options = WriteOptions::new()
-            .profile("ros2")
-            .library(library())
-            .compression(Some(Compression::Lz4))
-            .chunk_size(Some(CHUNK_BYTES))
-            .disable_seeking(true);
         Ok(Self {
-            out: options.create(NoSeek::new(out)).map_err(refused)?,
+            messages: Messages::new(out)?,
             settings,
             sessions: Sessions::default(),
             figures: None,
             is_fixed_told: false,
             times: Times::default(),
             provenances: BTreeSet::new(),
-            channels: BTreeMap::new(),
             end: Stamp(0),
-            buffer: Vec::new(),
         })
     }
 
     /// Whether a file that begins so is such a recording.
     #[must_use]
     pub fn begins(head: &[u8]) -> bool {
-        const MAGIC: &[u8] = b"\x89MCAP0\r\n";
-        /// Behind it: kind and length of the header, length and name of the profile, length of the library.
-        const BEFORE_LIBRARY: usize = 8 + 9 + 4 + 4 + 4;
-        let library = head.get(BEFORE_LIBRARY..).unwrap_or_default();
-        head.starts_with(MAGIC) && library.starts_with(LIBRARY.as_bytes())
+        messages::begins(head)
     }
 
     fn write_scan(&mut self, scan: &ScanView, figures: &Figures) -> Result<(), ExportError> {
@@ -156,17 +131,17 @@ impl<W: Write> McapExport<W> {
         let both = (pings.as_slice(), &firings);
         self.end = self.write_readings(scan, both, figures)?;
         if let Some(laser) = laser_scan(scan, both, figures, first) {
-            self.write(topic::SCAN, LASER_SCAN, self.end, &laser)?;
+            self.messages.write(topic::SCAN, LASER_SCAN, self.end, &laser)?;
         }
         let header = Header { stamp: first, frame: MAP };
         let cloud = points(scan, both, header, |ping| Some(Heard::measured(ping)));
-        self.write(topic::POINTS, POINT_CLOUD, self.end, &cloud)?;
+        self.messages.write(topic::POINTS, POINT_CLOUD, self.end, &cloud)?;
         if pings.iter().any(|ping| ping.sim.is_some()) {
             let cloud = points(scan, both, header, Heard::predicted);
-            self.write(topic::PREDICTED_POINTS, POINT_CLOUD, self.end, &cloud)?;
+            self.messages.write(topic::PREDICTED_POINTS, POINT_CLOUD, self.end, &cloud)?;
         }
         if pings.iter().any(|ping| ping.sound_path().is_some()) {
-            self.write(topic::PATHS, MARKERS, self.end, &Markers(paths(scan, &pings, header)))?;
+            self.messages.write(topic::PATHS, MARKERS, self.end, &Markers(paths(scan, &pings, header)))?;
         }
         Ok(())
     }
@@ -191,7 +166,7 @@ impl<W: Write> McapExport<W> {
                 Stamp(at.0.saturating_add(firings.window_ns).min(next.saturating_sub(1)).max(at.0));
             for stamp in [*at, end] {
                 let moving = Transforms(figures.frames.moving(stamp, &robot, ping));
-                self.write(topic::TRANSFORMS, TRANSFORMS, stamp, &moving)?;
+                self.messages.write(topic::TRANSFORMS, TRANSFORMS, stamp, &moving)?;
             }
             self.write_range(*at, end, ping, figures)?;
         }
@@ -222,60 +197,26 @@ impl<W: Write> McapExport<W> {
                 Some(ranger) => format!("{above}/{ranger}/{}", topic::RANGE),
                 None => format!("{above}/{}", topic::RANGE),
             };
-            self.write(&name, RANGE, heard_at, &message)?;
+            self.messages.write(&name, RANGE, heard_at, &message)?;
         }
         Ok(())
     }
 
     fn write_fixed(&mut self, figures: &Figures, stamp: Stamp) -> Result<(), ExportError> {
         let fixed = Transforms(figures.frames.fixed(stamp));
-        self.write(topic::FIXED_TRANSFORMS, TRANSFORMS, stamp, &fixed)
-    }
-
-    fn write(
-        &mut self,
-        topic: &str,
-        interface: Interface,
-        at: Stamp,
-        message: &impl Encode,
-    ) -> Result<(), ExportError> {
-        if !self.channels.contains_key(topic) {
-            let id = self.add_channel(topic, interface)?;
-            self.channels.insert(topic.to_owned(), Channel { id, sequence: 0 });
-        }
-        let Some(channel) = self.channels.get_mut(topic) else { return Ok(()) };
-        channel.sequence = channel.sequence.wrapping_add(1);
-        let header = MessageHeader {
-            channel_id: channel.id,
-            sequence: channel.sequence,
-            log_time: at.0,
-            publish_time: at.0,
-        };
-        let bytes = Cdr::of(message, &mut self.buffer);
-        self.out.write_to_known_channel(&header, bytes).map_err(refused)
-    }
-
-    fn add_channel(&mut self, topic: &str, interface: Interface) -> Result<u16, ExportError> {
-        let definition = interface.definition();
-        let schema = self.out.add_schema(interface.name, "ros2msg", definition.as_bytes());
-        let metadata = BTreeMap::from([
-            ("offered_qos_profiles".to_owned(), quality_of_service(topic)),
-            ("topic_type_hash".to_owned(), interface.hash.to_owned()),
-        ]);
-        self.out.add_channel(schema.map_err(refused)?, topic, "cdr", &metadata).map_err(refused)
+        self.messages.write(topic::FIXED_TRANSFORMS, TRANSFORMS, stamp, &fixed)
     }
 
     /// What a reader of the recording must know and no message says.
-    fn write_remarks(&mut self) -> Result<(), ExportError> {
+    fn remarks(&self) -> BTreeMap<String, String> {
         let bases: Vec<_> = self.times.bases.iter().map(|base| base.in_words()).collect();
         let provenances: Vec<_> = self.provenances.iter().cloned().collect();
-        let metadata = BTreeMap::from([
+        BTreeMap::from([
             ("time_base".to_owned(), bases.join(", ")),
             ("provenance".to_owned(), provenances.join(", ")),
             ("profile".to_owned(), self.settings.profile.in_words().to_owned()),
             ("stamp".to_owned(), "firing".to_owned()),
-        ]);
-        self.out.write_metadata(&Metadata { name: "sonard".to_owned(), metadata }).map_err(refused)
+        ])
     }
 }
 
@@ -311,7 +252,7 @@ impl<W: Write> Export for McapExport<W> {
             name: log.name.to_owned(),
             media_type: "application/x-ndjson".to_owned(),
         };
-        self.out.start_attachment(log.bytes, header).map_err(refused)?;
+        self.messages.out.start_attachment(log.bytes, header).map_err(refused)?;
         let mut piece = vec![0; 1 << 16];
         let mut left = log.bytes;
         while left > 0 {
@@ -320,43 +261,14 @@ impl<W: Write> Export for McapExport<W> {
             if read == 0 {
                 return Err(cannot(io::ErrorKind::UnexpectedEof.into()));
             }
-            self.out.put_attachment_bytes(&piece[..read]).map_err(refused)?;
+            self.messages.out.put_attachment_bytes(&piece[..read]).map_err(refused)?;
             left -= read as u64;
         }
-        self.out.finish_attachment().map_err(refused)
+        self.messages.out.finish_attachment().map_err(refused)
     }
 
-    fn finish(mut self: Box<Self>) -> Result<(), ExportError> {
-        self.write_remarks()?;
-        self.out.finish().map_err(refused)?;
-        Ok(self.out.into_inner().into_inner().flush()?)
-    }
-}
-
-const LIBRARY: &str = "sonard ";
-
-fn library() -> String {
-    format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION"))
-}
-
-/// The profile that a topic was offered with, as rosbag2 has it in its text: what stands still is kept for those
-/// who come late.
-fn quality_of_service(topic: &str) -> String {
-    let (depth, durability) = match topic {
-        topic::FIXED_TRANSFORMS => (1, "transient_local"),
-        _ => (10, "volatile"),
-    };
-    let forever = "\n    sec: 9223372036\n    nsec: 854775807";
-    format!(
-        "- history: keep_last\n  depth: {depth}\n  reliability: reliable\n  durability: {durability}\n  \
-         deadline:{forever}\n  lifespan:{forever}\n  liveliness: automatic\n  \
-         liveliness_lease_duration:{forever}\n  avoid_ros_namespace_conventions: false\n"
-    )
-}
-
-fn refused(error: McapError) -> ExportError {
-    match error {
-        McapError::Io(error) => error.into(),
-        other => io::Error::other(other).into(),
+    fn finish(self: Box<Self>) -> Result<(), ExportError> {
+        let remarks = self.remarks();
+        self.messages.finish(remarks)
     }
 }

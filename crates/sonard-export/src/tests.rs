@@ -4,4 +4,5 @@ mod cdr;
 mod csv;
 mod mcap;
 mod parquet;
+mod place;
 mod scans;

@@ -11,7 +11,7 @@ use sonard_records::{Ping, Session};
 
 use crate::ros::message::{Header, Stamp, Transform};
 
-pub(super) const MAP: &str = "map";
+pub(crate) const MAP: &str = "map";
 const BASE: &str = "base_link";
 
 /// The frames of a session's rangers.

@@ -9,7 +9,7 @@ use sonard_records::{PathKind, Ping, PingStatus, Point, ScanView, Session};
 use super::{Profile, Settings, frames::Frames, times::Firings};
 use crate::{
     LeftOut,
-    ros::message::{Header, LaserScan, Lines, PointCloud, PointNumber, Stamp},
+    ros::message::{Header, LaserScan, Marker, PointCloud, PointNumber, Shape, Stamp},
 };
 
 /// What holds for all readings of a session.
@@ -206,16 +206,17 @@ const PATH_WIDTH_M: f64 = 0.004;
 const PATH_OPACITY: f32 = 0.5;
 
 /// The paths of the sound of all echoes, lines of one kind together.
-pub(super) fn paths<'a>(scan: &ScanView, pings: &[&Ping], header: Header<'a>) -> Vec<Lines<'a>> {
+pub(super) fn paths<'a>(scan: &ScanView, pings: &[&Ping], header: Header<'a>) -> Vec<Marker<'a>> {
     let lines = PATH_KINDS.map(|(kind, namespace, [red, green, blue])| {
         let mut points = Vec::new();
         for ping in pings {
             let corners = path_of(scan, ping, kind).unwrap_or_default();
             points.extend(corners.windows(2).flatten());
         }
-        Lines {
+        Marker {
             header,
             namespace,
+            shape: Shape::Lines,
             width_m: PATH_WIDTH_M,
             colour: [red, green, blue, PATH_OPACITY],
             points,

@@ -124,6 +124,6 @@ fn in_nanoseconds(ticks: u64, hz: u32) -> u64 {
 }
 
 /// Since 1970; of what was before, 0.
-pub(super) fn nanoseconds(time: Timestamp) -> u64 {
+pub(crate) fn nanoseconds(time: Timestamp) -> u64 {
     u64::try_from(time.as_nanosecond()).unwrap_or(0)
 }

@@ -94,6 +94,33 @@ uint32 count
     ],
 };
 
+pub(crate) const OCCUPANCY_GRID: Interface = Interface {
+    name: "nav_msgs/msg/OccupancyGrid",
+    hash: "RIHS01_8d348150c12913a31ee0ec170fbf25089e4745d17035792a1ba94d6f0bc0cfc7",
+    definition: "\
+std_msgs/Header header
+nav_msgs/MapMetaData info
+int8[] data
+",
+    parts: &[
+        HEADER,
+        TIME,
+        (
+            "nav_msgs/MapMetaData",
+            "\
+builtin_interfaces/Time map_load_time
+float32 resolution
+uint32 width
+uint32 height
+geometry_msgs/Pose origin
+",
+        ),
+        POSE,
+        POINT,
+        QUATERNION,
+    ],
+};
+
 pub(crate) const TRANSFORMS: Interface = Interface {
     name: "tf2_msgs/msg/TFMessage",
     hash: "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087",
@@ -126,11 +153,8 @@ pub(crate) const MARKERS: Interface = Interface {
         ("visualization_msgs/Marker", MARKER),
         HEADER,
         TIME,
-        (
-            "geometry_msgs/Pose",
-            "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
-        ),
-        ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n"),
+        POSE,
+        POINT,
         QUATERNION,
         VECTOR,
         ("std_msgs/ColorRGBA", "float32 r\nfloat32 g\nfloat32 b\nfloat32 a\n"),
@@ -144,6 +168,11 @@ pub(crate) const MARKERS: Interface = Interface {
 const HEADER: (&str, &str) =
     ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n");
 const TIME: (&str, &str) = ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
+const POSE: (&str, &str) = (
+    "geometry_msgs/Pose",
+    "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
+);
+const POINT: (&str, &str) = ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n");
 const VECTOR: (&str, &str) = ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n");
 const QUATERNION: (&str, &str) =
     ("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n");

@@ -1,5 +1,7 @@
 //! The messages, field by field as ROS 2's interfaces have them.
 
+use sonard_interpret::interpret::grid::Grid;
+
 use super::cdr::{Cdr, Encode};
 
 /// A moment, nanoseconds since 1970.
@@ -146,30 +148,44 @@ impl Encode for Transforms<'_> {
     }
 }
 
-/// `visualization_msgs/Marker` of the kind `LINE_LIST`: each two points are a line.
+/// What the points of a marker are drawn as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Shape {
+    /// `LINE_LIST`: each two are the ends of a line.
+    Lines = 5,
+    /// `SPHERE_LIST`.
+    Spheres = 7,
+}
+
+/// `visualization_msgs/Marker` of many points.
 #[derive(Debug)]
-pub(crate) struct Lines<'a> {
+pub(crate) struct Marker<'a> {
     pub(crate) header: Header<'a>,
     pub(crate) namespace: &'a str,
+    pub(crate) shape: Shape,
     pub(crate) width_m: f64,
     /// Red, green, blue, opacity.
     pub(crate) colour: [f32; 4],
     pub(crate) points: Vec<[f64; 3]>,
 }
 
-impl Encode for Lines<'_> {
+impl Encode for Marker<'_> {
     fn encode(&self, cdr: &mut Cdr) {
-        const LINE_LIST: i32 = 5;
         // What is not drawn any more has to be taken away.
         const ADD: i32 = 0;
         const DELETE: i32 = 2;
         self.header.encode(cdr);
         cdr.text(self.namespace);
         cdr.i32(0);
-        cdr.i32(LINE_LIST);
+        cdr.i32(self.shape as i32);
         cdr.i32(if self.points.is_empty() { DELETE } else { ADD });
-        // Pose: the origin. Scale: only the width counts.
-        for value in [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, self.width_m, 0.0, 0.0] {
+        // Pose: the origin.
+        for value in [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] {
+            cdr.f64(value);
+        }
+        // Of lines only the first counts.
+        let others_m = if self.shape == Shape::Lines { 0.0 } else { self.width_m };
+        for value in [self.width_m, others_m, others_m] {
             cdr.f64(value);
         }
         self.colour.iter().for_each(|value| cdr.f32(*value));
@@ -203,10 +219,42 @@ fn no_pictures(cdr: &mut Cdr) {
 
 /// `visualization_msgs/MarkerArray`.
 #[derive(Debug)]
-pub(crate) struct Markers<'a>(pub(crate) Vec<Lines<'a>>);
+pub(crate) struct Markers<'a>(pub(crate) Vec<Marker<'a>>);
 
 impl Encode for Markers<'_> {
     fn encode(&self, cdr: &mut Cdr) {
         cdr.list(&self.0);
     }
+}
+
+/// `nav_msgs/OccupancyGrid`.
+#[derive(Debug)]
+pub(crate) struct OccupancyGrid<'a> {
+    pub(crate) header: Header<'a>,
+    pub(crate) grid: &'a Grid,
+}
+
+impl Encode for OccupancyGrid<'_> {
+    fn encode(&self, cdr: &mut Cdr) {
+        let shape = self.grid.shape();
+        self.header.encode(cdr);
+        // When the map was loaded.
+        self.header.stamp.encode(cdr);
+        cdr.f32(shape.resolution_m as f32);
+        cdr.u32(shape.width as u32);
+        cdr.u32(shape.height as u32);
+        // Where the lower left corner is, and that it is not turned.
+        for value in [shape.origin.x, shape.origin.y, 0.0, 0.0, 0.0, 0.0, 1.0] {
+            cdr.f64(value);
+        }
+        let cells: Vec<u8> = self.grid.probabilities().map(percent).collect();
+        cdr.bytes(&cells);
+    }
+}
+
+/// How likely a cell is occupied, in hundredths, as a signed byte; -1 where nothing is known.
+fn percent(p: f64) -> u8 {
+    let known = p != 0.5;
+    let percent = if known { (100.0 * p).round() as i8 } else { -1 };
+    percent.cast_unsigned()
 }

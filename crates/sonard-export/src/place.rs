@@ -1,0 +1,114 @@
+//! What was found of a place: a map of it, its lines, its features.
+
+mod geojson;
+
+use std::io::Write;
+
+use jiff::Timestamp;
+use sonard_interpret::interpret::{Feature, FeatureKind, grid::Grid, lines::{LineKind, MapLine}};
+use sonard_records::Provenance;
+
+use crate::{
+    ExportError,
+    columns::logged_word,
+    recording::{MAP, Messages, nanoseconds},
+    ros::{
+        interface::{MARKERS, OCCUPANCY_GRID},
+        message::{Header, Marker, Markers, OccupancyGrid, Shape, Stamp},
+    },
+};
+pub use geojson::{begins_geojson, to_geojson};
+
+/// What was found of a place, in its own metres.
+#[derive(Debug, Clone, Copy)]
+pub struct Place<'a> {
+    /// When it was found so: the start of the last scan, if there is one.
+    pub time: Option<Timestamp>,
+    /// Where the readings come from.
+    pub provenance: Option<Provenance>,
+    /// Name of the scene, if it has one.
+    pub scene: Option<&'a str>,
+    /// How likely each cell is occupied.
+    pub grid: Option<&'a Grid>,
+    /// Line segments.
+    pub lines: &'a [MapLine],
+    /// Planes, corners and edges.
+    pub features: &'a [Feature],
+}
+
+/// Writes a recording of ROS 2 of a place: `/map` (`nav_msgs/OccupancyGrid`), `/sonar/lines` and `/sonar/features`
+/// (`visualization_msgs/MarkerArray`), as far as there are such.
+///
+/// # Errors
+/// What the output refuses.
+pub fn write_place(out: impl Write, place: &Place<'_>) -> Result<(), ExportError> {
+    let mut messages = Messages::new(out)?;
+    let stamp = Stamp(place.time.map_or(0, nanoseconds));
+    let header = Header { stamp, frame: MAP };
+    if let Some(grid) = place.grid {
+        messages.write("/map", OCCUPANCY_GRID, stamp, &OccupancyGrid { header, grid })?;
+    }
+    if !place.lines.is_empty() {
+        let lines = Markers(LINES.map(|drawn| lines(place.lines, header, drawn)).into());
+        messages.write("/sonar/lines", MARKERS, stamp, &lines)?;
+    }
+    if !place.features.is_empty() {
+        let points = Markers(FEATURES.map(|drawn| points(place.features, header, drawn)).into());
+        messages.write("/sonar/features", MARKERS, stamp, &points)?;
+    }
+    let provenance = place.provenance.and_then(logged_word);
+    let said = [("provenance", provenance), ("scene", place.scene.map(str::to_owned))];
+    let said = said.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
+    messages.finish(said.collect())
+}
+
+/// How lines of each kind are drawn: namespace, and red, green and blue.
+const LINES: [(LineKind, &str, [f32; 3]); 3] = [
+    (LineKind::Sonar, "sonar", [0.0, 0.45, 0.7]),
+    (LineKind::Laser, "laser", [0.0, 0.62, 0.45]),
+    (LineKind::Complex, "complex", [0.8, 0.47, 0.65]),
+];
+
+/// The same of features.
+const FEATURES: [(FeatureKind, &str, [f32; 3]); 4] = [
+    (FeatureKind::Plane, "plane", [0.0, 0.45, 0.7]),
+    (FeatureKind::Corner, "corner", [0.84, 0.37, 0.0]),
+    (FeatureKind::Edge, "edge", [0.0, 0.62, 0.45]),
+    (FeatureKind::Unresolved, "unresolved", [0.5, 0.5, 0.5]),
+];
+
+const LINE_WIDTH_M: f64 = 0.02;
+const POINT_WIDTH_M: f64 = 0.06;
+
+fn lines<'a>(
+    all: &[MapLine],
+    header: Header<'a>,
+    (kind, namespace, [red, green, blue]): (LineKind, &'a str, [f32; 3]),
+) -> Marker<'a> {
+    let of_kind = all.iter().filter(|line| line.kind == kind);
+    Marker {
+        header,
+        namespace,
+        shape: Shape::Lines,
+        width_m: LINE_WIDTH_M,
+        colour: [red, green, blue, 1.0],
+        points: of_kind.flat_map(|line| line.ends.map(|end| [end.x, end.y, 0.0])).collect(),
+    }
+}
+
+/// Those of which more than a direction is known.
+fn points<'a>(
+    all: &[Feature],
+    header: Header<'a>,
+    (kind, namespace, [red, green, blue]): (FeatureKind, &'a str, [f32; 3]),
+) -> Marker<'a> {
+    let of_kind = all.iter().filter(|feature| feature.kind == kind);
+    Marker {
+        header,
+        namespace,
+        shape: Shape::Spheres,
+        width_m: POINT_WIDTH_M,
+        colour: [red, green, blue, 1.0],
+        points: of_kind.filter_map(|feature| Some([feature.x_m?, feature.y_m?, 0.0])).collect(),
+    }
+}

@@ -1,0 +1,63 @@
+//! GeoJSON (RFC 7946) of a place in its own metres.
+
+use serde_json::{Value, json};
+use sonard_interpret::interpret::{Feature, lines::MapLine};
+
+use super::Place;
+use crate::columns::logged_word;
+
+/// How such a file begins; members are in the order of their names.
+const HEAD: &str = r#"{"crs":null,"sonard":"#;
+
+/// Whether a file that begins so is GeoJSON of this program.
+#[must_use]
+pub fn begins_geojson(head: &[u8]) -> bool {
+    head.starts_with(HEAD.as_bytes())
+}
+
+/// Lines and features as a `FeatureCollection`, a geometry a line of text.
+///
+/// RFC 7946 knows degrees of longitude and latitude only. A room has none: coordinates are metres in its own
+/// frame, which the member `sonard` says, and `crs` is null, which readers of the format before that
+/// RFC take for "unknown" (GDAL, QGIS).
+#[must_use]
+pub fn to_geojson(place: &Place<'_>) -> String {
+    let about = json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "units": "metres",
+        "frame": "local: x and y of the scene, x to the right, y up",
+        "time": place.time,
+        "provenance": place.provenance.and_then(logged_word),
+        "scene": place.scene,
+    });
+    let lines = place.lines.iter().map(line);
+    let all: Vec<_> = lines.chain(place.features.iter().map(feature)).collect();
+    let all: Vec<_> = all.iter().map(Value::to_string).collect();
+    format!(
+        "{HEAD}{about},\"type\":\"FeatureCollection\",\"features\":[\n{}\n]}}\n",
+        all.join(",\n")
+    )
+}
+
+fn line(line: &MapLine) -> Value {
+    let ends = line.ends.map(|end| end.to_array());
+    json!({
+        "type": "Feature",
+        "geometry": {"type": "LineString", "coordinates": ends},
+        "properties": {
+            "what": "line", "kind": line.kind, "length_m": line.length_m(), "confidence": line.confidence,
+            "terminal": line.terminal, "seen_from_m": line.seen_from.to_array(),
+        },
+    })
+}
+
+/// One of which only the direction is known has no geometry.
+fn feature(feature: &Feature) -> Value {
+    let at = feature.x_m.zip(feature.y_m);
+    let geometry = at.map(|(x_m, y_m)| json!({"type": "Point", "coordinates": [x_m, y_m]}));
+    let mut properties = serde_json::to_value(feature).unwrap_or_default();
+    if let Value::Object(properties) = &mut properties {
+        properties.insert("what".to_owned(), "feature".into());
+    }
+    json!({"type": "Feature", "geometry": geometry, "properties": properties})
+}

@@ -1,0 +1,149 @@
+use std::collections::BTreeMap;
+
+use byteorder::LittleEndian;
+use serde::Deserialize;
+use serde_json::Value;
+use sonard_interpret::interpret::{
+    Extents, Feature, Settings, Sweep,
+    grid::{Grid, GridShape},
+    interpret,
+    lines::{LineKind, MapLine},
+};
+use sonard_model::geometry::DVec2;
+use sonard_records::Provenance;
+
+use crate::{
+    Place, begins_geojson,
+    ros::interface::{MARKERS, OCCUPANCY_GRID},
+    to_geojson, write_place,
+};
+
+use super::scans::{Full, simulated};
+
+fn lines() -> Vec<MapLine> {
+    let line = |kind, ends: [[f64; 2]; 2]| MapLine {
+        ends: ends.map(DVec2::from),
+        terminal: [true, false],
+        kind,
+        confidence: 0.75,
+        seen_from: DVec2::new(0.5, 0.25),
+    };
+    vec![
+        line(LineKind::Sonar, [[0.0, 0.0], [2.0, 0.0]]),
+        line(LineKind::Laser, [[2.0, 0.0], [2.0, 1.5]]),
+    ]
+}
+
+/// Of a simulated scan.
+fn features() -> Vec<Feature> {
+    let scans = simulated();
+    let session = scans[0].session.as_deref().expect("it has one");
+    let extents = Extents::of_session(session).expect("good");
+    let sweeps: Vec<_> =
+        scans.iter().map(|scan| (scan.scan, Sweep::of(scan).expect("good"))).collect();
+    let features = interpret(&sweeps, &extents, &Settings::default());
+    assert!(!features.is_empty());
+    features
+}
+
+fn grid() -> Grid {
+    let shape = GridShape::covering(DVec2::new(-1.0, 2.0), DVec2::new(-0.8, 2.1), 0.05);
+    Grid::of_probabilities(shape.expect("good"), &[0.1, 0.9, 0.5, 0.26, 0.999])
+}
+
+const fn place<'a>(
+    grid: Option<&'a Grid>,
+    lines: &'a [MapLine],
+    features: &'a [Feature],
+) -> Place<'a> {
+    let (provenance, scene) = (Some(Provenance::Simulated), Some("simple-room"));
+    Place { time: None, provenance, scene, grid, lines, features }
+}
+
+#[derive(Debug, Deserialize)]
+struct OccupancyGrid {
+    _stamp: (i32, u32),
+    frame_id: String,
+    _map_load_time: (i32, u32),
+    resolution: f32,
+    width: u32,
+    height: u32,
+    origin: [f64; 7],
+    data: Vec<i8>,
+}
+
+#[test]
+fn a_grid_is_a_topic_that_those_who_come_late_get() {
+    let grid = grid();
+    let mut bytes = Vec::new();
+    write_place(&mut bytes, &place(Some(&grid), &[], &[])).expect("memory takes it");
+    let messages: Vec<_> = mcap::MessageStream::new(&bytes).expect("a recording").collect();
+    let [Ok(message)] = &messages[..] else { panic!("{messages:?}") };
+    assert_eq!(message.channel.topic, "/map");
+    let schema = message.channel.schema.as_ref().expect("a schema");
+    assert_eq!(&*schema.data, OCCUPANCY_GRID.definition().as_bytes());
+    assert!(message.channel.metadata["offered_qos_profiles"].contains("transient_local"));
+    let (read, length) =
+        cdr_encoding::from_bytes::<OccupancyGrid, LittleEndian>(&message.data[4..]).expect("CDR");
+    assert_eq!(length, message.data.len() - 4);
+    assert_eq!((read.frame_id.as_str(), read.resolution), ("map", 0.05));
+    assert_eq!((read.width, read.height), (4, 2));
+    assert_eq!(read.origin, [-1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    // Row by row from the lower left; of the rest, and of 0.5, nothing is known.
+    assert_eq!(read.data, [10, 90, -1, 26, 100, -1, -1, -1]);
+}
+
+#[test]
+fn lines_and_features_are_markers() {
+    let (lines, features) = (lines(), features());
+    let mut bytes = Vec::new();
+    write_place(&mut bytes, &place(None, &lines, &features)).expect("memory takes it");
+    let topics: BTreeMap<_, _> = mcap::MessageStream::new(&bytes)
+        .expect("a recording")
+        .map(|message| message.expect("a message").channel)
+        .map(|channel| (channel.topic.clone(), channel.schema.clone().expect("a schema")))
+        .collect();
+    assert_eq!(topics.keys().collect::<Vec<_>>(), ["/sonar/features", "/sonar/lines"]);
+    for schema in topics.values() {
+        assert_eq!(&*schema.data, MARKERS.definition().as_bytes());
+    }
+}
+
+#[test]
+fn geojson_has_each_line_and_feature_with_what_is_known_of_it() {
+    let (lines, mut features) = (lines(), features());
+    (features[0].x_m, features[0].y_m) = (None, None);
+    let text = to_geojson(&place(None, &lines, &features));
+    assert!(begins_geojson(text.as_bytes()) && !begins_geojson(b"{\"type\":\"FeatureCollection\"}"));
+    let read: Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!((&read["type"], &read["crs"]), (&"FeatureCollection".into(), &Value::Null));
+    assert_eq!(read["sonard"]["units"], "metres");
+    assert_eq!(read["sonard"]["provenance"], "simulated");
+    let found = read["features"].as_array().expect("a list");
+    assert_eq!(found.len(), lines.len() + features.len());
+    for (read, line) in found.iter().zip(&lines) {
+        assert_eq!(read["geometry"]["type"], "LineString");
+        let ends: [[f64; 2]; 2] =
+            serde_json::from_value(read["geometry"]["coordinates"].clone()).expect("places");
+        assert_eq!(ends, line.ends.map(|end| end.to_array()));
+        assert_eq!(read["properties"]["length_m"], line.length_m());
+        assert_eq!(read["properties"]["terminal"], serde_json::json!([true, false]));
+    }
+    for (read, feature) in found[lines.len()..].iter().zip(&features) {
+        match feature.x_m.zip(feature.y_m) {
+            Some((x_m, y_m)) => {
+                assert_eq!(read["geometry"]["coordinates"], serde_json::json!([x_m, y_m]));
+            }
+            None => assert_eq!(read["geometry"], Value::Null),
+        }
+        assert_eq!(read["properties"]["confidence"], feature.confidence);
+        assert_eq!(read["properties"]["what"], "feature");
+    }
+}
+
+#[test]
+fn a_full_disk_is_told() {
+    let grid = grid();
+    let written = write_place(Full(500), &place(Some(&grid), &[], &[]));
+    assert!(matches!(written, Err(crate::ExportError::Write(_))), "{written:?}");
+}

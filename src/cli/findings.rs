@@ -1,0 +1,148 @@
+//! What verbs write of what they found: pictures, and files that other tools show.
+
+use std::{
+    ffi::OsStr,
+    io::Write as _,
+    path::{Path, PathBuf},
+};
+
+use jiff::Timestamp;
+
+use super::{
+    Failure, Outcome,
+    output::{self, OutPath, Overwrite, Product},
+    picture,
+};
+use crate::{
+    export::{self, ExportError, Place},
+    interpret::{Feature, grid::Grid, lines::MapLine},
+    plot::{MAX_WIDTH_PX, Picture},
+    scan::{Provenance, ScanView},
+};
+
+/// Which files.
+#[derive(Debug, clap::Args)]
+pub(super) struct FindingsArgs {
+    /// File to write, by its name a picture (.svg, .png), GeoJSON in local metres (.geojson) or a recording
+    /// of ROS 2 with markers (.mcap), or - for SVG to standard output; several are possible
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: Vec<OutPath>,
+    /// Width of a PNG, pixels
+    #[arg(long, value_name = "PX", default_value_t = 1000,
+          value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_WIDTH_PX)))]
+    width: u32,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+/// Where what was found goes.
+enum Target {
+    Picture(picture::Target),
+    File(PathBuf, Product),
+}
+
+/// Places that were checked, for what will be found.
+pub(super) struct Targets<'a> {
+    args: &'a FindingsArgs,
+    all: Vec<Target>,
+}
+
+impl FindingsArgs {
+    /// Checked before anything is read, so that a wrong name costs no time.
+    pub(super) fn targets(&self) -> Result<Targets<'_>, Failure> {
+        let all = self.output.iter().map(|path| self.target(path));
+        Ok(Targets { args: self, all: all.collect::<Result<_, _>>()? })
+    }
+
+    fn target(&self, path: &Path) -> Result<Target, Failure> {
+        let ending = path.extension().map(OsStr::to_ascii_lowercase);
+        let product = match ending.as_deref().and_then(OsStr::to_str) {
+            Some("geojson") => Product::GeoJson,
+            Some("mcap") => Product::Recording,
+            _ if path == Path::new("-") => {
+                return picture::Target::of(path, self.overwrite).map(Target::Picture);
+            }
+            _ => {
+                output::picture(path).map_err(|_| {
+                    Failure::input(
+                        format!("{}: its ending says no format", path.display()),
+                        "let the name end in .svg, .png, .geojson or .mcap",
+                    )
+                })?;
+                return picture::Target::of(path, self.overwrite).map(Target::Picture);
+            }
+        };
+        self.overwrite.check(path, product)?;
+        Ok(Target::File(path.into(), product))
+    }
+}
+
+impl Targets<'_> {
+    /// Writes all; the picture is drawn if there is one among them.
+    pub(super) fn write(
+        &self,
+        place: &Place<'_>,
+        picture: impl FnOnce() -> Result<Picture, Failure>,
+    ) -> Outcome {
+        let has_picture = self.all.iter().any(|target| matches!(target, Target::Picture(_)));
+        let picture = if has_picture { Some(picture()?) } else { None };
+        for target in &self.all {
+            match (target, &picture) {
+                (Target::Picture(target), Some(picture)) => target.write(picture, self.args.width)?,
+                (Target::File(path, product), _) => {
+                    write(path, *product, self.args.overwrite, place)?;
+                }
+                (Target::Picture(_), None) => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Writes what was found as GeoJSON or as a recording.
+pub(super) fn write(path: &Path, product: Product, overwrite: Overwrite, place: &Place<'_>) -> Outcome {
+    let mut stream = overwrite.begin(path, product)?;
+    let written = match product {
+        Product::GeoJson => {
+            stream.write_all(export::to_geojson(place).as_bytes()).map_err(ExportError::from)
+        }
+        _ => export::write_place(&mut stream, place),
+    };
+    let finished = written.and_then(|()| Ok(stream.finish()?));
+    finished.or_else(|error| match error {
+        ExportError::Write(error) => Failure::from_write(&path.display().to_string(), &error),
+        error @ ExportError::Attach { .. } => Err(Failure::input(error, "nothing is attached")),
+    })
+}
+
+/// The scans that something was found in.
+#[derive(Debug, Default)]
+pub(super) struct Seen {
+    time: Option<Timestamp>,
+    provenance: Option<Provenance>,
+    scene: Option<String>,
+}
+
+impl Seen {
+    pub(super) fn add(&mut self, scan: &ScanView) {
+        self.time = self.time.max(scan.start.as_ref().map(|start| start.time));
+        let Some(session) = scan.session.as_deref() else { return };
+        // Where anything was made up, all that came of it is.
+        if self.provenance.is_none_or(|known| known == Provenance::Hardware) {
+            self.provenance = Some(session.provenance);
+        }
+        if self.scene.is_none() {
+            self.scene = session.scene.as_ref().map(|scene| scene.name.clone());
+        }
+    }
+
+    pub(super) fn place<'a>(
+        &'a self,
+        grid: Option<&'a Grid>,
+        lines: &'a [MapLine],
+        features: &'a [Feature],
+    ) -> Place<'a> {
+        let Self { time, provenance, scene } = self;
+        Place { time: *time, provenance: *provenance, scene: scene.as_deref(), grid, lines, features }
+    }
+}
