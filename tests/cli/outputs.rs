@@ -35,7 +35,7 @@ const fn case(
     Case { output, input, arguments }
 }
 
-const CASES: [Case; 30] = [
+const CASES: [Case; 32] = [
     case("plot --output", ("a.svg", LOG), "plot IN -o IN"),
     case("plot --output", ("a.png", LOG), "plot IN -o IN --force"),
     case("plot --output", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),

@@ -358,7 +358,8 @@ def type_of(name):
         return pa.timestamp("ns", tz="UTC")
     if name in WHOLE:
         return pa.int64()
-    return {"echo_ticks": pa.list_(pa.uint32()), "repaired": pa.bool_()}.get(name, pa.float64())
+    counts = pa.list_(pa.field("element", pa.uint32(), nullable=False))
+    return {"echo_ticks": counts, "repaired": pa.bool_()}.get(name, pa.float64())
 
 
 def nanoseconds(time):
@@ -408,7 +409,11 @@ def check_typed_table(path, log_path):
         table = table.set_column(table.column_names.index(name), name, table[name].cast(pa.int64()))
     rows = table.to_pylist()
     db = duckdb.connect()
-    columns = ", ".join(f"epoch_ns({name}::TIMESTAMP_NS) AS {name}" if name in TIME else name for name in table.column_names)
+    quoted = [f'"{name}"' for name in table.column_names]
+    columns = ", ".join(
+        f"epoch_ns({quoted}::TIMESTAMP_NS) AS {quoted}" if name in TIME else quoted
+        for name, quoted in zip(table.column_names, quoted)
+    )
     found = db.sql(f"SELECT {columns} FROM read_parquet('{path}')")
     by_duckdb = [dict(zip(found.columns, row)) for row in found.fetchall()]
     text = list(csv.DictReader(open(path.with_suffix(".csv"), encoding="utf-8", newline="")))
