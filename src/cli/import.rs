@@ -1,5 +1,7 @@
 //! `sonard import`.
 
+mod bag;
+
 use std::{
     fs::{self, File},
     io::{self, Read as _},
@@ -29,7 +31,7 @@ use crate::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(super) struct Args {
-    /// The file; - for standard input
+    /// The file, or the folder of a recording; - for standard input
     file: PathBuf,
     /// File to write; the log goes to it instead of to standard output
     #[arg(short, long, alias = "out", value_name = "FILE")]
@@ -70,10 +72,13 @@ struct ColumnArgs {
     /// How the file is written [default: as it looks]
     #[arg(long, value_enum)]
     format: Option<FormatName>,
-    /// File (TOML) with all of this: the keys format, columns, clockwise, zero_deg, none, none_from and
+    /// File (TOML) with all of this: the keys format, columns, topics, clockwise, zero_deg, none, none_from and
     /// sound_speed_m_s; options go over it
     #[arg(long, value_name = "FILE")]
     mapping: Option<PathBuf>,
+    /// Topic of a recording to read; several are possible [default: all Range but predictions, else LaserScan]
+    #[arg(long, value_name = "TOPIC")]
+    topic: Vec<String>,
     /// Azimuths and bearings count clockwise
     #[arg(long)]
     clockwise: bool,
@@ -102,17 +107,23 @@ enum FormatName {
     Carmen,
     /// The log of Player
     Player,
+    /// A recording of ROS 2 (MCAP), of sensor_msgs/Range or LaserScan
+    Mcap,
 }
 
 pub(super) const ABOUT: &str = "\
-Make a log of readings from elsewhere: tables, JSON, logs of CARMEN and Player.
+Make a log of readings from elsewhere: tables, JSON, logs of CARMEN and Player, recordings of ROS 2.
 
 The log is like any other, with provenance `imported`; its session says from which file, and what its \
 columns were taken to mean. Without --columns the header is asked, and what it was understood to say is \
 shown. Numbers that can't be what they are said to be (radians for degrees, centimetres for metres, a value \
 that stands for silence) are refused. A file makes the same log whenever it is imported.
 
-Scans are told apart by the field `scan`, else by where the robot stood, else by full turns.";
+Scans are told apart by the field `scan`, else by where the robot stood, else by full turns.
+
+Of a recording (MCAP, or a folder of rosbag2 with such) all sensor_msgs/Range are read, else LaserScan; /tf and \
+/tf_static say where the ranger was at each reading, and have to. One that turns on the robot makes scans, those that do \
+not are an array. Ranges at or below min_range are too near, from max_range on silent, NaN no readings.";
 
 const HELP: &str = "\
 Fields: azimuth_deg|rad|grad (from the heading) or bearing_deg|rad|grad (in the world); range_m|cm|mm|in|ft or \
@@ -125,6 +136,7 @@ Examples:
     --sensor hc-sr04 --pose 1.2,0.8,90 --scene my-room.json -o sweep.jsonl
   sonard import sweeps.json --columns scan=id,bearing_deg=bearings,range_m=ranges,x_m=at.0,y_m=at.1 \\
     -o sweeps.jsonl
+  sonard import rosbag2_2026_01_31 --topic /front_sonar -o run.jsonl
   sonard import robot.clf --none-from 5 --sensor pioneer -o robot.jsonl
 
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
@@ -137,12 +149,11 @@ pub(super) fn run(args: &Args) -> Outcome {
     let (sensor, air) = (args.sensor.sensor()?, args.air.air()?);
     let taken = taken(args, scene.as_ref(), &sensor, &air)?;
     let bytes = if args.file.as_os_str() == "-" { Some(standard_input()?) } else { None };
+    let files = if args.file.is_dir() { bag::files(&args.file)? } else { vec![args.file.clone()] };
     let open = || -> io::Result<Box<dyn io::Read>> {
         Ok(match &bytes {
             Some(bytes) => Box::new(io::Cursor::new(Arc::clone(bytes))),
-            None => {
-                Box::new(progress::reading(&args.file, io::BufReader::new(File::open(&args.file)?)))
-            }
+            None => one_after_the_other(&files)?,
         })
     };
     let found = Source { open: &open }.examine(mapping, taken).map_err(refuse)?;
@@ -161,6 +172,16 @@ pub(super) fn run(args: &Args) -> Outcome {
         }
         Err(Stop::Write(error)) => closed(Err(error)),
     }
+}
+
+/// The bytes of files that follow each other.
+fn one_after_the_other(files: &[PathBuf]) -> io::Result<Box<dyn io::Read>> {
+    let mut all: Box<dyn io::Read> = Box::new(io::empty());
+    for file in files {
+        let next = progress::reading(file, io::BufReader::new(File::open(file)?));
+        all = Box::new(all.chain(next));
+    }
+    Ok(all)
 }
 
 /// Why it ended before the last scan.
@@ -309,8 +330,12 @@ impl ColumnArgs {
             FormatName::Json => Format::Json,
             FormatName::Carmen => Format::Carmen,
             FormatName::Player => Format::Player,
+            FormatName::Mcap => Format::Mcap,
         });
         mapping.format = format.or(mapping.format);
+        if !self.topic.is_empty() {
+            mapping.topics.clone_from(&self.topic);
+        }
         mapping.clockwise |= self.clockwise;
         mapping.zero_deg = self.zero_deg.unwrap_or(mapping.zero_deg);
         if !self.none.is_empty() {

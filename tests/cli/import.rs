@@ -206,3 +206,86 @@ fn the_least_log_of_the_documents_is_one() {
     let schema: serde_json::Value = serde_json::from_str(&done(&["log", "schema"])).expect("JSON");
     assert!(schema["oneOf"].as_array().is_some_and(|kinds| kinds.len() == 5), "{schema}");
 }
+
+/// Status, azimuth and range of each reading, and by which ranger.
+fn heard(log: &str) -> Vec<(String, i64, Option<String>, Option<String>)> {
+    let told = |ping: &&serde_json::Value| {
+        let word = |name: &str| ping[name].as_str().map(str::to_owned);
+        let azimuth = (ping["azimuth_deg"].as_f64().expect("a direction") * 1e3).round() as i64;
+        let range_m = ping["range_m"].as_f64().map(|range_m| (range_m as f32).to_string());
+        let status = word("status").expect("a status");
+        let range_m = range_m.filter(|_| status == "echo");
+        (status, azimuth % 360_000, range_m, word("ranger"))
+    };
+    Log::parse(log).pings().iter().map(told).collect()
+}
+
+/// Where the robot stood at each reading, to a micrometre.
+fn places(log: &str) -> Vec<[i64; 3]> {
+    let (mut of_scan, mut places) = (serde_json::Value::Null, Vec::new());
+    for line in log.lines() {
+        let record: serde_json::Value = serde_json::from_str(line).expect("a record");
+        match record["type"].as_str() {
+            Some("scan_start") => of_scan = record["pose"].clone(),
+            Some("ping") => {
+                let pose = if record["pose"].is_null() { &of_scan } else { &record["pose"] };
+                let part = |name: &str| (pose[name].as_f64().expect("a number") * 1e6).round() as i64;
+                places.push(["x_m", "y_m", "heading_deg"].map(part));
+            }
+            _ => {}
+        }
+    }
+    places
+}
+
+/// What `sonard export` wrote comes back with the same readings in the same places.
+#[test]
+fn an_exported_recording_is_the_same_log_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
+    let course = path("course.csv");
+    fs::write(&course, "x_m,y_m,heading_deg\n2,1.5,0\n2.6,1.5,0\n3.2,1.6,30\n").expect("writes");
+    let (log, recording) = (path("log.jsonl"), path("log.mcap"));
+    for simulate in [
+        &["--scene", "simple-room", "--pose", "fig9"][..],
+        &["--scene", "mcgill-lab", "--poses", &course, "--max-range", "5"],
+        &["--array", "pioneer-8", "--scene", "mcgill-lab", "--poses", &course],
+    ] {
+        done(&[&["simulate", "-o", &log, "--force"], simulate].concat());
+        for profile in ["rep117", "nav2"] {
+            done(&["export", &log, "--profile", profile, "-o", &recording]);
+            let again = done(&["import", &recording]);
+            let was = fs::read_to_string(&log).expect("written");
+            assert_eq!(heard(&again), heard(&was), "{simulate:?} {profile}");
+            assert_eq!(places(&again), places(&was), "{simulate:?}");
+        }
+        // Of a scan that has the form of one, the laser's as well.
+        let laser = sonard(&["import", &recording, "--topic", "/sonar/scan"]).output();
+        let laser = laser.expect("starts");
+        if simulate.contains(&"--array") {
+            assert_eq!(laser.status.code(), Some(2), "{}", stderr(&laser));
+        } else {
+            let text = String::from_utf8(laser.stdout).expect("text");
+            assert_eq!(heard(&text), heard(&fs::read_to_string(&log).expect("written")));
+        }
+    }
+}
+
+#[test]
+fn the_folder_of_a_recording_is_read_and_one_with_sqlite_is_told_how_to_convert() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
+    let (log, bag) = (path("log.jsonl"), path("bag"));
+    done(&["simulate", "--scene", "simple-room", "--pose", "fig9", "-o", &log]);
+    fs::create_dir(&bag).expect("writable");
+    assert!(refused(&["import", &bag]).contains("no recording"));
+    fs::write(path("bag/bag_0.db3"), b"SQLite format 3\0").expect("writable");
+    assert!(refused(&["import", &bag]).contains("ros2 bag convert"));
+    assert!(refused(&["import", &path("bag/bag_0.db3")]).contains("ros2 bag convert"));
+    // The tenth file comes behind the second.
+    for name in ["bag/bag_10.mcap", "bag/bag_2.mcap"] {
+        done(&["export", &log, "-o", &path(name)]);
+    }
+    let again = done(&["import", &bag]);
+    assert_eq!(Log::parse(&again).pings().len(), 800);
+}

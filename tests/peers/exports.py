@@ -28,6 +28,8 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+import bag
+
 
 def plain(value):
     """A message, of either reader, as dicts, lists and numbers."""
@@ -505,6 +507,30 @@ def check_found(folder, name, marker_type):
     print(f"{path}: {len(records)} {name}, read alike by both")
 
 
+def check_imported(path):
+    """The log that was made of a bag of rosbags (bag.py): each reading, when and where."""
+    log = Log(path)
+    [front, left] = log.session["array"]["rangers"]
+    for ranger, (x, y, bearing) in zip([front, left], bag.RANGERS.values()):
+        assert near(ranger["x_m"], x) and near(ranger["y_m"], y) and near(ranger["bearing_deg"], bearing)
+    pings = [(ping, scan) for scan in log.scans for ping in scan["pings"]]
+    assert len(pings) == 80
+    for place, (ping, scan) in enumerate(pings):
+        number, name = place // 2, ping["ranger"]
+        assert name == list(bag.RANGERS)[place % 2]
+        said = bag.range_at(name, number)
+        status = {math.inf: "no_echo", -math.inf: "min_range"}.get(said, "echo")
+        assert ping["status"] == status, ping
+        assert ping["range_m"] == (None if math.isinf(said) else round(said, 6)), ping
+        time_s = 0.1 * number + (0.03 if name == "left" else 0)
+        assert abs(nanoseconds(ping["time"]) - round((bag.START_S + time_s) * 1e9)) < 1000, ping
+        pose = ping.get("pose") or scan["start"]["pose"]
+        expected = bag.pose_at(time_s)
+        for key, value in zip(("x_m", "y_m", "heading_deg"), expected):
+            assert abs(math.remainder(pose[key] - value, 360)) < 1e-6, (key, pose, expected)
+    print(f"{path}: {len(pings)} readings of another program's bag")
+
+
 if __name__ == "__main__":
     folder = pathlib.Path(sys.argv[1])
     for recording in sorted(folder.glob("*.mcap")):
@@ -517,3 +543,5 @@ if __name__ == "__main__":
     check_map(folder / "places" / "map")
     check_found(folder / "places", "lines", 5)
     check_found(folder / "places", "features", 7)
+    check_imported(folder / "places" / "bag.jsonl")
+    check_imported(folder / "places" / "bag-converted.jsonl")

@@ -19,6 +19,8 @@ pub enum Format {
     Carmen,
     /// The log of Player.
     Player,
+    /// A recording of ROS 2.
+    Mcap,
 }
 
 /// Which column of a table, or member of a JSON object, has a field.
@@ -50,6 +52,10 @@ pub struct Mapping {
     pub format: Option<Format>,
     /// Which column has which field; without any, what the header says.
     pub columns: BTreeMap<Field, Column>,
+    /// Topics of a recording that are read; without any, all of `sensor_msgs/Range` but predictions, else of
+    /// `sensor_msgs/LaserScan`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub topics: Vec<String>,
     /// Azimuths and bearings of the file count clockwise.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub clockwise: bool,

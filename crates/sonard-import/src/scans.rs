@@ -15,7 +15,7 @@ use crate::{Reading, Taken, rounds::Round};
 /// Motor steps a revolution that `step` counts in.
 const STEPS_PER_REVOLUTION: f64 = 400.0;
 /// A scan with more firings than a plan can have is cut.
-const MOST_FIRINGS: usize = 65_535;
+pub(crate) const MOST_FIRINGS: usize = 65_535;
 /// Stops this evenly apart are a plan's, degrees.
 const EVEN_DEG: f64 = 1e-3;
 
@@ -121,6 +121,32 @@ pub(crate) fn round(taken: &Taken, number: u64, round: &Round) -> Vec<Record> {
     });
     let pose = round.pose.unwrap_or(taken.pose);
     whole(taken, scan, pose, firings(round.ranges_m.len()), None, round.time.into_iter(), pings)
+}
+
+/// A firing of one of an array's rangers.
+#[derive(Debug)]
+pub(crate) struct Firing<'a> {
+    pub(crate) ranger: &'a str,
+    pub(crate) reading: Reading,
+}
+
+/// The records of a round of an array's rangers, each fired at a time and place of its own.
+pub(crate) fn firings_of_array(taken: &Taken, number: u64, fired: &[Firing<'_>]) -> Vec<Record> {
+    let scan = id(taken, number);
+    let pose = fired[0].reading.pose(&taken.pose);
+    let pings = (0..).zip(fired).map(|(index, Firing { ranger, reading })| {
+        let own = reading.pose(&taken.pose);
+        Ping {
+            ranger: Some((*ranger).to_owned()),
+            pose: Some(own).filter(|own| *own != pose),
+            time: reading.time,
+            tof_us: reading.tof_us,
+            range_m: reading.range_m,
+            ..Ping::new(scan, index, wrap_360(reading.direction_deg), reading.status)
+        }
+    });
+    let times = fired.iter().filter_map(|firing| firing.reading.time);
+    whole(taken, scan, pose, firings(fired.len()), None, times, pings)
 }
 
 fn whole(

@@ -13,6 +13,7 @@ use crate::{
     doubt::Doubts,
     json, player,
     reading::Reader,
+    recording::{Bag, MAGIC},
     rounds::{self, Message, Rounds},
     scans::{self, Cutter},
     table::{self, Header, Lines},
@@ -66,6 +67,8 @@ pub struct Imported {
     /// Whether it says where the robot stood.
     pub has_poses: bool,
     header: Option<Header>,
+    /// The frames and topics of a recording.
+    bag: Option<Bag>,
 }
 
 impl Source<'_> {
@@ -77,8 +80,10 @@ impl Source<'_> {
     pub fn examine(&self, mapping: Mapping, taken: Taken) -> Result<Imported, ImportError> {
         let mut head = Vec::new();
         (self.open)()?.take(HEAD_BYTES).read_to_end(&mut head)?;
-        let head = text(&head)?;
-        let format = mapping.format.unwrap_or_else(|| look(head));
+        let is_recording = head.starts_with(MAGIC);
+        let head = if is_recording { "" } else { text(&head)? };
+        let by_looks = || if is_recording { Format::Mcap } else { look(head) };
+        let format = mapping.format.unwrap_or_else(by_looks);
         let mut found = Imported {
             format,
             guessed: mapping.columns.is_empty(),
@@ -88,12 +93,42 @@ impl Source<'_> {
             echoes: 0,
             has_poses: false,
             header: None,
+            bag: None,
         };
         match format {
             Format::Csv | Format::Json => self.examine_rows(head, &mut found)?,
             Format::Carmen | Format::Player => self.examine_messages(&mut found)?,
+            Format::Mcap => self.examine_recording(&mut found)?,
         }
         Ok(found)
+    }
+
+    fn examine_recording(&self, found: &mut Imported) -> Result<(), ImportError> {
+        if found.taken.array.is_some() || !found.mapping.columns.is_empty() {
+            return Err(ImportError::mapping(
+                "a recording says itself where its rangers are and what its fields mean",
+                "leave the array and the columns out",
+            ));
+        }
+        let bag = Bag::look(self.open, &found.mapping)?;
+        found.guessed = false;
+        found.has_poses = bag.has_poses;
+        found.taken.array = bag.array(&found.taken.sensor);
+        if let Some(array) = &found.taken.array {
+            array.check().map_err(|error| {
+                ImportError::mapping(format!("its rangers: {error}"), "choose some: --topic TOPIC")
+            })?;
+        }
+        for scan in bag.scans((self.open)()?, &found.mapping, &found.taken) {
+            for record in scan? {
+                if let Record::Ping(ping) = record {
+                    found.readings += 1;
+                    found.echoes += u64::from(ping.range_m.is_some());
+                }
+            }
+        }
+        found.bag = Some(bag);
+        Ok(())
     }
 
     fn hash(&self) -> io::Result<String> {
@@ -217,6 +252,13 @@ fn text(head: &[u8]) -> Result<&str, ImportError> {
     if let Some(error) = error.filter(|error| error.error_len().is_none()) {
         return Ok(std::str::from_utf8(&head[..error.valid_up_to()]).unwrap_or_default());
     }
+    if head.starts_with(b"SQLite format 3\0") {
+        return Err(ImportError::mapping(
+            "it is an SQLite database, as older recordings of ROS 2 are",
+            "write it as MCAP: `ros2 bag convert`, or `rosbags-convert --src BAG --dst NEW --dst-storage mcap` \
+             without ROS",
+        ));
+    }
     Err(ImportError::mapping("it is no text", "is it compressed? Unpack it first: `gunzip FILE`"))
 }
 
@@ -292,6 +334,10 @@ impl Imported {
                 }))
             }
             Format::Carmen | Format::Player => Box::new(self.rounds(source)),
+            Format::Mcap => match &self.bag {
+                Some(bag) => Box::new(bag.scans(source, &self.mapping, &self.taken)),
+                None => Box::new(std::iter::empty()),
+            },
         })
     }
 

@@ -1,0 +1,231 @@
+//! The messages of MCAP files, in the order in which they stand there.
+
+use std::{
+    collections::{BTreeMap, VecDeque},
+    io::{self, Read},
+    sync::Arc,
+};
+
+use mcap::{
+    McapError,
+    read::{ChunkReader, parse_record},
+    records::{Record, op},
+};
+
+use crate::ImportError;
+
+/// How every such file begins and ends.
+pub(crate) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+
+/// The longest record that is taken into memory, and what a chunk may become, bytes.
+const MOST_BYTES: u64 = 1 << 28;
+
+/// A channel of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Channel {
+    pub(crate) topic: String,
+    /// Name of its type.
+    pub(crate) type_name: String,
+    /// How its messages are encoded.
+    pub(crate) encoding: String,
+}
+
+/// A message as it was recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Message {
+    pub(crate) channel: Arc<Channel>,
+    /// Nanoseconds since 1970.
+    pub(crate) recorded_ns: u64,
+    pub(crate) bytes: Vec<u8>,
+}
+
+/// The messages of such types in files that follow each other, in their order.
+pub(crate) struct Messages<'a, R> {
+    files: Files<R>,
+    types: &'a [&'a str],
+    topics: Option<Topics>,
+    /// The rest of a chunk.
+    waiting: VecDeque<Message>,
+}
+
+impl<'a, R: Read> Messages<'a, io::BufReader<R>> {
+    pub(crate) fn of(source: R, types: &'a [&'a str]) -> Self {
+        let files = Files { source: io::BufReader::new(source), at: 0 };
+        Self { files, types, topics: None, waiting: VecDeque::new() }
+    }
+}
+
+impl<R: Read> Messages<'_, R> {
+    /// Takes the next record in; whether there was one.
+    fn read_on(&mut self) -> Result<bool, ImportError> {
+        let Some(topics) = &mut self.topics else {
+            self.topics = self.files.begin()?.then(Topics::default);
+            return Ok(self.topics.is_some());
+        };
+        let Some((opcode, body)) = self.files.record()? else {
+            self.topics = None;
+            return Ok(true);
+        };
+        let files = &self.files;
+        let record = parse_record(opcode, &body).map_err(|error| files.damaged(&error))?;
+        let Record::Chunk { header, data } = record else {
+            self.waiting.extend(topics.take(record, self.types));
+            return Ok(true);
+        };
+        if header.uncompressed_size > MOST_BYTES {
+            return Err(files.damaged(&"a chunk of it is too long"));
+        }
+        for record in ChunkReader::new(header, &data).map_err(|error| files.unpacked(error))? {
+            let record = record.map_err(|error| files.unpacked(error))?;
+            self.waiting.extend(topics.take(record, self.types));
+        }
+        Ok(true)
+    }
+}
+
+impl<R: Read> Iterator for Messages<'_, R> {
+    type Item = Result<Message, ImportError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            if let Some(message) = self.waiting.pop_front() {
+                return Some(Ok(message));
+            }
+            match self.read_on() {
+                Ok(true) => {}
+                Ok(false) => return None,
+                Err(error) => return Some(Err(error)),
+            }
+        }
+    }
+}
+
+/// Files that follow each other.
+struct Files<R> {
+    source: R,
+    /// Bytes that were read.
+    at: u64,
+}
+
+impl<R: Read> Files<R> {
+    /// Whether another file begins.
+    fn begin(&mut self) -> Result<bool, ImportError> {
+        let mut first = [0];
+        if self.source.read(&mut first)? == 0 {
+            return Ok(false);
+        }
+        let mut magic = [0; MAGIC.len()];
+        (magic[0], self.at) = (first[0], self.at + 1);
+        self.fill(&mut magic[1..])?;
+        if magic != MAGIC {
+            return Err(ImportError::mapping(
+                "it is no MCAP recording",
+                "give a recording of ROS 2 in MCAP, or the folder of one",
+            ));
+        }
+        Ok(true)
+    }
+
+    /// The next record that can matter: its kind and bytes; `None` at the end of the file.
+    fn record(&mut self) -> Result<Option<(u8, Vec<u8>)>, ImportError> {
+        loop {
+            let mut head = [0; 9];
+            self.fill(&mut head)?;
+            let [opcode, length @ ..] = head;
+            let length = u64::from_le_bytes(length);
+            match opcode {
+                op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK if length > MOST_BYTES => {
+                    return Err(self.damaged(&format!("a record of {length} bytes is too long")));
+                }
+                op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK => {
+                    let mut body = Vec::new();
+                    self.source.by_ref().take(length).read_to_end(&mut body)?;
+                    self.at += body.len() as u64;
+                    if (body.len() as u64) < length {
+                        return Err(self.cut_off());
+                    }
+                    return Ok(Some((opcode, body)));
+                }
+                _ => self.skip(length)?,
+            }
+            if opcode == op::FOOTER {
+                self.fill(&mut [0; MAGIC.len()])?;
+                return Ok(None);
+            }
+        }
+    }
+
+    fn skip(&mut self, length: u64) -> Result<(), ImportError> {
+        let skipped = io::copy(&mut self.source.by_ref().take(length), &mut io::sink())?;
+        self.at += skipped;
+        if skipped < length { Err(self.cut_off()) } else { Ok(()) }
+    }
+
+    fn fill(&mut self, bytes: &mut [u8]) -> Result<(), ImportError> {
+        self.source.read_exact(bytes).map_err(|error| match error.kind() {
+            io::ErrorKind::UnexpectedEof => self.cut_off(),
+            _ => error.into(),
+        })?;
+        self.at += bytes.len() as u64;
+        Ok(())
+    }
+
+    fn cut_off(&self) -> ImportError {
+        ImportError::mapping(
+            format!("the recording ends within a record, behind byte {}", self.at),
+            "it was cut off: `mcap recover` saves what is whole",
+        )
+    }
+
+    fn damaged(&self, error: &dyn std::fmt::Display) -> ImportError {
+        ImportError::mapping(
+            format!("a record before byte {} is damaged: {error}", self.at),
+            "`mcap recover` saves what is whole",
+        )
+    }
+
+    fn unpacked(&self, error: McapError) -> ImportError {
+        match error {
+            McapError::UnsupportedCompression(how) => ImportError::mapping(
+                format!("its chunks are compressed by {how}"),
+                "`mcap compress --compression lz4` writes it as it can be read here",
+            ),
+            error => self.damaged(&error),
+        }
+    }
+}
+
+/// What the file said of its topics so far.
+#[derive(Default)]
+struct Topics {
+    types: BTreeMap<u16, String>,
+    channels: BTreeMap<u16, Arc<Channel>>,
+}
+
+impl Topics {
+    /// Takes a record in; the message that it is, if it is of such a type.
+    fn take(&mut self, record: Record<'_>, types: &[&str]) -> Option<Message> {
+        match record {
+            Record::Schema { header, .. } => {
+                self.types.insert(header.id, header.name);
+                None
+            }
+            Record::Channel(channel) => {
+                let type_name = self.types.get(&channel.schema_id).cloned().unwrap_or_default();
+                let told =
+                    Channel { topic: channel.topic, type_name, encoding: channel.message_encoding };
+                self.channels.insert(channel.id, Arc::new(told));
+                None
+            }
+            Record::Message { header, data } => {
+                let channel = self.channels.get(&header.channel_id)?;
+                let bytes = || data.into_owned();
+                let (channel, recorded_ns) = (Arc::clone(channel), header.log_time);
+                types
+                    .contains(&channel.type_name.as_str())
+                    .then(|| Message { channel, recorded_ns, bytes: bytes() })
+            }
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,342 @@
+//! Recordings as other programs write them: encoded by another's encoder, in both byte orders.
+
+use std::{
+    collections::BTreeMap,
+    io::{self, Cursor},
+};
+
+use byteorder::{BigEndian, LittleEndian};
+use proptest::prelude::*;
+use serde::Serialize;
+use sonard_model::{acoustics::Air, geometry::Pose, reading::PingStatus};
+use sonard_records::{Ping, Record, ScanStart};
+
+use super::{LASER_SCAN, RANGE, TRANSFORMS, read_message};
+use crate::{Format, ImportError, Imported, Mapping, Source, Taken};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Order {
+    Little,
+    Big,
+}
+
+/// A message behind the four bytes that say how it is encoded.
+fn cdr(message: &impl Serialize, order: Order) -> Vec<u8> {
+    let (head, bytes) = match order {
+        Order::Little => ([0, 1, 0, 0], cdr_encoding::to_vec::<_, LittleEndian>(message)),
+        Order::Big => ([0, 0, 0, 0], cdr_encoding::to_vec::<_, BigEndian>(message)),
+    };
+    [&head[..], &bytes.expect("memory takes it")].concat()
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Header(i32, u32, String);
+
+fn header(time_s: f64, frame: &str) -> Header {
+    Header(time_s.floor() as i32, (time_s.fract() * 1e9).round() as u32, frame.to_owned())
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Range(Header, u8, [f32; 4]);
+
+fn range(time_s: f64, frame: &str, range_m: f32) -> Range {
+    Range(header(time_s, frame), 0, [0.2, 0.3, 4.0, range_m])
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct LaserScan(Header, [f32; 7], Vec<f32>, Vec<f32>);
+
+#[derive(Debug, Clone, Serialize)]
+struct Transform(Header, String, [f64; 7]);
+
+fn transform(time_s: f64, parent: &str, child: &str, [x, y, yaw_deg]: [f64; 3]) -> Transform {
+    let (sin, cos) = (yaw_deg.to_radians() / 2.0).sin_cos();
+    Transform(header(time_s, parent), child.to_owned(), [x, y, 0.0, 0.0, 0.0, sin, cos])
+}
+
+/// A recording in the making.
+struct Bag {
+    out: mcap::Writer<Cursor<Vec<u8>>>,
+    channels: BTreeMap<String, u16>,
+    order: Order,
+}
+
+impl Bag {
+    fn new(order: Order) -> Self {
+        let options = mcap::WriteOptions::new().profile("ros2");
+        let out = options.create(Cursor::new(Vec::new())).expect("memory takes it");
+        Self { out, channels: BTreeMap::new(), order }
+    }
+
+    fn add(mut self, topic: &str, type_name: &str, time_s: f64, message: &impl Serialize) -> Self {
+        let channel = match self.channels.get(topic) {
+            Some(channel) => *channel,
+            None => {
+                let schema = self.out.add_schema(type_name, "ros2msg", b"").expect("new");
+                let channel = self.out.add_channel(schema, topic, "cdr", &BTreeMap::new());
+                let channel = channel.expect("new");
+                self.channels.insert(topic.to_owned(), channel);
+                channel
+            }
+        };
+        let time = (time_s * 1e9) as u64;
+        let header = mcap::records::MessageHeader {
+            channel_id: channel,
+            sequence: 0,
+            log_time: time,
+            publish_time: time,
+        };
+        let bytes = cdr(message, self.order);
+        self.out.write_to_known_channel(&header, &bytes).expect("memory takes it");
+        self
+    }
+
+    fn range(self, topic: &str, time_s: f64, frame: &str, range_m: f32) -> Self {
+        self.add(topic, RANGE, time_s, &range(time_s, frame, range_m))
+    }
+
+    fn moves(self, time_s: f64, place: [f64; 3]) -> Self {
+        let moved = vec![transform(time_s, "map", "base_link", place)];
+        self.add("/tf", TRANSFORMS, time_s, &moved)
+    }
+
+    fn mounts(self, parent: &str, child: &str, place: [f64; 3]) -> Self {
+        let mounted = vec![transform(0.0, parent, child, place)];
+        self.add("/tf_static", TRANSFORMS, 1.0, &mounted)
+    }
+
+    fn bytes(mut self) -> Vec<u8> {
+        self.out.finish().expect("memory takes it");
+        self.out.into_inner().into_inner()
+    }
+}
+
+fn taken() -> Taken {
+    Taken {
+        sha256: String::new(),
+        pose: Pose { x_m: 7.0, y_m: 8.0, heading_deg: 9.0 },
+        array: None,
+        sensor: "hc-sr04".to_owned(),
+        longest_m: 4.0,
+        air: Air::default(),
+        started: "2026-01-01T00:00:00Z".parse().expect("a time"),
+        as_said: false,
+    }
+}
+
+fn examine(bytes: &[u8], mapping: Mapping) -> Result<Imported, ImportError> {
+    let open = || -> io::Result<Box<dyn io::Read>> { Ok(Box::new(Cursor::new(bytes.to_vec()))) };
+    Source { open: &open }.examine(mapping, taken())
+}
+
+fn scans(bytes: &[u8], mapping: Mapping) -> Result<Vec<(ScanStart, Vec<Ping>)>, ImportError> {
+    let found = examine(bytes, mapping)?;
+    let mut scans: Vec<(ScanStart, Vec<Ping>)> = Vec::new();
+    for scan in found.scans(bytes)? {
+        for record in scan? {
+            match record {
+                Record::ScanStart(start) => scans.push((start, Vec::new())),
+                Record::Ping(ping) => scans.last_mut().expect("begun").1.push(*ping),
+                _ => {}
+            }
+        }
+    }
+    Ok(scans)
+}
+
+fn said<T: std::fmt::Debug>(result: Result<T, ImportError>) -> String {
+    let error = result.expect_err("this is wrong");
+    format!("{error}; {}", error.help())
+}
+
+/// A ranger that stands ahead of the middle of a robot that drives and turns.
+fn driving(order: Order) -> Bag {
+    Bag::new(order)
+        .mounts("base_link", "front", [0.2, 0.0, 0.0])
+        .moves(1.0, [0.0, 0.0, 0.0])
+        .range("/front/range", 1.5, "front", 1.25)
+        .moves(2.0, [1.0, 0.5, 90.0])
+        .range("/front/range", 2.0, "front", f32::INFINITY)
+        .range("/front/range", 2.0, "front", f32::NEG_INFINITY)
+}
+
+#[test]
+fn poses_are_interpolated_at_the_stamp_in_both_byte_orders() {
+    let [little, big] = [Order::Little, Order::Big].map(|order| {
+        scans(&driving(order).bytes(), Mapping::default()).expect("a recording")
+    });
+    assert_eq!(
+        little.iter().flat_map(|(_, pings)| pings).map(|ping| ping.range_m).collect::<Vec<_>>(),
+        big.iter().flat_map(|(_, pings)| pings).map(|ping| ping.range_m).collect::<Vec<_>>()
+    );
+    // One ranger that stands still is an array of one: each firing a round.
+    let [(first, one), (second, two), (_, three)] = &little[..] else { panic!("{little:?}") };
+    assert_eq!(first.pose, Pose { x_m: 0.5, y_m: 0.25, heading_deg: 45.0 });
+    assert_eq!(second.pose, Pose { x_m: 1.0, y_m: 0.5, heading_deg: 90.0 });
+    assert_eq!((one[0].range_m, one[0].status), (Some(1.25), PingStatus::Echo));
+    assert_eq!(one[0].ranger.as_deref(), Some("front"));
+    assert_eq!(one[0].time.map(|time| time.as_millisecond()), Some(1500));
+    assert_eq!((two[0].status, three[0].status), (PingStatus::NoEcho, PingStatus::MinRange));
+    let found = examine(&driving(Order::Big).bytes(), Mapping::default()).expect("a recording");
+    assert_eq!((found.format, found.readings, found.echoes), (Format::Mcap, 3, 1));
+    assert!(found.has_poses && found.mapping.columns.is_empty());
+    let array = found.taken.array.expect("an array");
+    assert_eq!((array.rangers[0].x_m, array.rangers[0].bearing_deg), (0.2, 0.0));
+}
+
+#[test]
+fn a_ranger_that_turns_makes_scans_that_end_where_they_began() {
+    let mut bag = Bag::new(Order::Little).mounts("base_link", "mount", [0.0, 0.1, 0.0]);
+    for turn in 0..7 {
+        let time_s = 10.0 + f64::from(turn);
+        let azimuth_deg = f64::from(turn % 3) * 90.0;
+        let moved = vec![
+            transform(time_s, "map", "base_link", [1.0, 2.0, 30.0]),
+            transform(time_s, "mount", "sonar", [0.0, 0.0, azimuth_deg]),
+        ];
+        bag = bag.add("/tf", TRANSFORMS, time_s, &moved);
+        bag = bag.range("/sonar/range", time_s, "sonar", 1.0 + turn as f32);
+    }
+    let scans = scans(&bag.bytes(), Mapping::default()).expect("a recording");
+    let told: Vec<Vec<_>> = scans
+        .iter()
+        .map(|(_, pings)| pings.iter().map(|ping| (ping.azimuth_deg, ping.range_m)).collect())
+        .collect();
+    // From 4 m on nothing was heard.
+    let turn = |ranges_m: [Option<f64>; 3]| [0.0, 90.0, 180.0].into_iter().zip(ranges_m);
+    assert_eq!(told[0], turn([Some(1.0), Some(2.0), Some(3.0)]).collect::<Vec<_>>());
+    assert_eq!(told[1], turn([None; 3]).collect::<Vec<_>>());
+    assert_eq!(told.len(), 3);
+    // On the axis, which stands beside the middle of the robot.
+    let pose = scans[0].0.pose;
+    let (sin, cos) = 30_f64.to_radians().sin_cos();
+    assert!((pose.x_m - (1.0 - 0.1 * sin)).abs() < 1e-8 && (pose.y_m - (2.0 + 0.1 * cos)).abs() < 1e-8);
+    assert!((pose.heading_deg - 30.0).abs() < 1e-8);
+}
+
+#[test]
+fn a_laser_scan_is_a_scan_whose_beams_have_times_and_places_of_their_own() {
+    let scan = LaserScan(
+        header(10.0, "laser"),
+        [0.0, 1.5, std::f32::consts::FRAC_PI_2, 0.5, 1.5, 0.3, 4.0],
+        vec![1.5, f32::NAN, 4.0, 0.3],
+        Vec::new(),
+    );
+    let bag = Bag::new(Order::Little)
+        .mounts("base_link", "laser", [0.0, 0.0, 90.0])
+        .moves(10.0, [0.0, 0.0, 0.0])
+        .add("/scan", LASER_SCAN, 10.0, &scan)
+        .moves(12.0, [2.0, 0.0, 0.0]);
+    let scans = scans(&bag.bytes(), Mapping::default()).expect("a recording");
+    let [(start, pings)] = &scans[..] else { panic!("{scans:?}") };
+    assert_eq!(start.pose, Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 });
+    let told: Vec<_> = pings.iter().map(|ping| (ping.azimuth_deg, ping.status)).collect();
+    let expected =
+        [(90.0, PingStatus::Echo), (270.0, PingStatus::NoEcho), (0.0, PingStatus::MinRange)];
+    assert_eq!(told, expected);
+    assert_eq!(pings[1].pose, Some(Pose { x_m: 1.0, y_m: 0.0, heading_deg: 0.0 }));
+    assert_eq!(pings[2].time.map(|time| time.as_millisecond()), Some(11_500));
+}
+
+#[test]
+fn where_transforms_lack_topic_frame_and_time_are_told() {
+    let late = driving(Order::Little).range("/front/range", 3.5, "front", 1.0).bytes();
+    let told = said(scans(&late, Mapping::default()));
+    for part in ["/front/range", "`base_link` in `map`", "1970-01-01T00:00:03.5Z", "00:00:02Z"] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+    let looped = driving(Order::Little).mounts("front", "map", [0.0; 3]).bytes();
+    assert!(said(scans(&looped, Mapping::default())).contains("its own parent"));
+    let twice = driving(Order::Little).mounts("odom", "front", [0.0; 3]).bytes();
+    assert!(said(scans(&twice, Mapping::default())).contains("`base_link` and in `odom`"));
+}
+
+#[test]
+fn without_poses_the_given_one_holds() {
+    let bag = Bag::new(Order::Big).range("/range", 1.0, "sonar", 1.5).bytes();
+    assert!(!examine(&bag, Mapping::default()).expect("a recording").has_poses);
+    let scans = scans(&bag, Mapping::default()).expect("a recording");
+    assert_eq!(scans[0].0.pose, taken().pose);
+}
+
+#[test]
+fn topics_are_chosen_and_predictions_left_alone() {
+    let bag = || {
+        driving(Order::Little)
+            .range("/sonar/predicted/range", 1.5, "front", 9.0)
+            .range("/rear/range", 1.5, "front", 2.0)
+    };
+    let found = examine(&bag().bytes(), Mapping::default()).expect("a recording");
+    assert_eq!(found.taken.array.expect("an array").rangers.len(), 2);
+    let one = |topic: &str| Mapping { topics: vec![topic.to_owned()], ..Mapping::default() };
+    let found = examine(&bag().bytes(), one("/rear/range")).expect("a recording");
+    assert_eq!((found.readings, found.echoes), (1, 1));
+    let told = said(examine(&bag().bytes(), one("/left")));
+    assert!(told.contains("/left") && told.contains("/rear/range"), "{told}");
+    let empty = Bag::new(Order::Little).moves(1.0, [0.0; 3]).bytes();
+    assert!(said(examine(&empty, Mapping::default())).contains("no message of sensor_msgs/Range"));
+}
+
+#[test]
+fn recordings_in_several_files_follow_each_other() {
+    let one = driving(Order::Little).bytes();
+    let other = Bag::new(Order::Big).range("/front/range", 1.75, "front", 2.0).bytes();
+    let both = [one, other].concat();
+    let found = examine(&both, Mapping::default()).expect("recordings");
+    assert_eq!((found.readings, found.echoes), (4, 2));
+}
+
+#[test]
+fn what_is_cut_off_or_no_recording_is_told() {
+    let whole = driving(Order::Little).bytes();
+    for end in 9..whole.len() {
+        let told = said(examine(&whole[..end], Mapping::default()));
+        assert!(told.contains("ends within a record") || told.contains("damaged"), "{end}: {told}");
+    }
+    let sqlite = said(examine(b"SQLite format 3\0\x10\0", Mapping::default()));
+    assert!(sqlite.contains("ros2 bag convert"), "{sqlite}");
+    let mapping = || Mapping {
+        columns: Mapping::columns_of("azimuth_deg=1,range_m=2").expect("columns"),
+        ..Mapping::default()
+    };
+    assert!(said(examine(&whole, mapping())).contains("says itself"));
+}
+
+#[test]
+fn messages_that_are_none_are_refused() {
+    let message = cdr(&range(1.0, "front", 1.0), Order::Little);
+    assert_eq!(read_message(RANGE, &message).expect("decodes"), 1);
+    for end in 0..message.len() {
+        let told = said(read_message(RANGE, &message[..end]));
+        // What the variance stands behind is whole before it.
+        assert!(told.contains("end too early"), "{end}: {told}");
+    }
+    for encoding in [[0, 2], [0, 3], [0, 6], [1, 1]] {
+        let other = [&encoding[..], &message[2..]].concat();
+        assert!(said(read_message(RANGE, &other)).contains("not plain CDR"), "{encoding:?}");
+    }
+    // A list that says that it is long.
+    let long = [&[0, 1, 0, 0], &u32::MAX.to_le_bytes()[..], &[0; 64]].concat();
+    assert!(said(read_message(TRANSFORMS, &long)).contains("end too early"));
+}
+
+proptest! {
+    #[test]
+    fn any_bytes_are_a_message_or_none(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+        for type_name in [RANGE, LASER_SCAN, TRANSFORMS] {
+            for head in [[0, 0, 0, 0], [0, 1, 0, 0]] {
+                let _ = read_message(type_name, &[&head[..], &bytes].concat());
+            }
+        }
+        let whole = [super::MAGIC, &bytes].concat();
+        let _ = examine(&whole, Mapping::default());
+    }
+
+    #[test]
+    fn a_damaged_recording_never_panics(at in 0_usize..1000, bits in 1_u8..) {
+        let mut bytes = driving(Order::Little).bytes();
+        let at = at % bytes.len();
+        bytes[at] ^= bits;
+        let _ = scans(&bytes, Mapping::default());
+    }
+}
