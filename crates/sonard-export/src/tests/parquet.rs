@@ -124,7 +124,7 @@ fn long_texts_end_a_group() {
     let id = scan.scan;
     let ping = |index: u32| {
         let mut ping = Ping::new(id, index, 0.0, PingStatus::NoEcho);
-        ping.ranger = Some(format!("{index:0>width$}", width = 1 << 20));
+        ping.ranger = Some("r".repeat(1 << 20) + &index.to_string());
         ping
     };
     scan.pings = (0..20).map(ping).collect();
