@@ -12,6 +12,7 @@
 #   SCHEMATHESIS=0 ./test.sh    leave the fuzzer of the API out, where there is no Python or PyPI
 #   PYTHON=0 ./test.sh          leave the package for Python out, where there is no Python or PyPI
 #   EXPORT_PEERS=0 ./test.sh    leave the other programs that read exports out, where there is no PyPI
+#   PROMTOOL=0 ./test.sh        leave promtool out, where Debian's prometheus can't be had
 #   FAKETIME=0 ./test.sh        leave the clock that is set out, where there is no libfaketime
 #   BOOT=0 ./test.sh            leave the units under a booted systemd out (systemd/boot-test.sh)
 #   PACKAGE=1 ./test.sh         build, install, upgrade and remove the Debian package, too; PACKAGE=all
@@ -225,6 +226,16 @@ check_exports() {
     fail "an export does not say what its log does, or the readers can't be had: EXPORT_PEERS=0 leaves them out"
 }
 
+check_monitoring() {
+  if [ "${PROMTOOL:-1}" = 0 ]; then
+    step "alerts as Prometheus reads them: LEFT OUT, because PROMTOOL=0"
+    return
+  fi
+  step "alerts as Prometheus reads them"
+  if ! command -v promtool >/dev/null; then get_packages ", or leave it out with PROMTOOL=0" prometheus; fi
+  tests/monitoring.sh
+}
+
 # run_tests [ARGUMENT...]: the closing lines are kept for the end.
 run_tests() {
   if [ "$runner" = nextest ]; then
@@ -286,6 +297,7 @@ quick)
   check_api
   check_python
   check_exports
+  check_monitoring
   test_page
   step "tests"
   run_tests || finish $?

@@ -18,7 +18,7 @@ mod status;
 
 pub use air::{AirOrder, AirStatus};
 pub use beam::{Beam, Echo};
-pub use health::{ClockReport, Health, LineTotals, ScanTotals};
+pub use health::{ClockReport, Health, LineTotals, ScanFit, ScanTotals};
 pub use link::{LinkReport, LinkState, Trouble};
 pub use logs::LogEntry;
 pub use orders::{Accepted, CancelRequest, ScanRequest, Scanning, Started};

@@ -13,6 +13,7 @@
 mod agenda;
 mod air;
 mod desk;
+mod fit;
 mod forecast;
 mod hub;
 mod journal;

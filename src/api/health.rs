@@ -1,7 +1,9 @@
 //! Whether all is well.
 
+use jiff::Timestamp;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use uuid::Uuid;
 
 /// Whether all is well, with the figures to judge by.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -16,6 +18,29 @@ pub struct Health {
     pub scans: ScanTotals,
     /// The device's clock in the last scan.
     pub clock: ClockReport,
+    /// How the last scan that ended agrees with the model.
+    pub fit: Option<ScanFit>,
+    /// How long after its firing the last reading came in, seconds, if it is known when that was.
+    pub reading_lateness_s: Option<f64>,
+}
+
+/// How a scan agrees with the model's prediction, by its last reading of each beam.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ScanFit {
+    /// The scan.
+    pub scan: Uuid,
+    /// When it ended.
+    pub ended: Timestamp,
+    /// Beams with an echo on both sides.
+    pub both_echo: u32,
+    /// Share of them whose ranges agree.
+    pub agree_fraction: Option<f64>,
+    /// Median distance between their ranges, metres.
+    pub median_abs_residual_m: Option<f64>,
+    /// Median of measured minus predicted range, metres.
+    pub median_residual_m: Option<f64>,
+    /// Beams that the scan lacked at its end.
+    pub missing: u32,
 }
 
 /// Figures of the serial line since the start.

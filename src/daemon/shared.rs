@@ -10,11 +10,11 @@ use jiff::Timestamp;
 use tokio::{sync::watch, time::Instant};
 use uuid::Uuid;
 
-use super::air::AirDesk;
+use super::{air::AirDesk, fit::Fit};
 use crate::{
     api::{
         ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, LinkState, LogStatus,
-        Pending, ScanProgress, ScanTotals, ScanningReport, Setup, SimulationReport, Status,
+        Pending, ScanFit, ScanProgress, ScanTotals, ScanningReport, Setup, SimulationReport, Status,
         SubscriberReport,
     },
     config::ScanningKeys,
@@ -144,6 +144,11 @@ struct Collector {
     /// How the last one ended, and the standard deviation of its last reading's time, microseconds.
     latest: Option<(ScanEnd, Option<f64>)>,
     sigma_us: Option<f64>,
+    /// How the scan under way agrees with the model, and how the last one did.
+    fit: Fit,
+    latest_fit: Option<ScanFit>,
+    /// How long after its firing the last reading came in, seconds.
+    lateness_s: Option<f64>,
 }
 
 impl Shared {
@@ -174,12 +179,18 @@ impl Shared {
             Record::ScanStart(start) => {
                 self.beams_done.store(0, Ordering::Relaxed);
                 (scans.current, scans.sigma_us) = (Some(start.scan), None);
+                scans.fit = Fit::default();
             }
             Record::Ping(ping) => {
                 self.beams_done.fetch_add(1, Ordering::Relaxed);
                 scans.sigma_us = ping.time_sigma_us;
+                scans.fit.add(ping);
+                let fired = ping.time.filter(|_| ping.time_sigma_us.is_some());
+                scans.lateness_s =
+                    fired.map(|fired| Timestamp::now().duration_since(fired).as_secs_f64());
             }
             Record::ScanEnd(end) => {
+                scans.latest_fit = Some(scans.fit.report(end));
                 let scan = scans.current.take()?;
                 scans.latest = Some((end.clone(), scans.sigma_us));
                 return Some(scan);
@@ -261,6 +272,8 @@ impl Shared {
             line: view.line.totals(),
             scans: view.scans,
             clock: view.clock,
+            fit: self.scans().latest_fit.clone(),
+            reading_lateness_s: self.scans().lateness_s,
         }
     }
 

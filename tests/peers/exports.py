@@ -478,6 +478,19 @@ def check_map(folder):
     print(f"{folder}: {width} x {height} cells, read alike by both")
 
 
+def flat(record):
+    """Members of members, and the two of a pair, by names of their own."""
+    told = {}
+    for name, value in record.items():
+        if isinstance(value, list):
+            value = dict(zip(("first", "last"), value))
+        if isinstance(value, dict):
+            told |= {f"{name}_{part}": one for part, one in flat(value).items()}
+        else:
+            told[name] = value
+    return told
+
+
 def check_found(folder, name, marker_type):
     """Lines or features as markers and as GeoJSON, against what the command said."""
     records = [json.loads(line) for line in open(folder / f"{name}.jsonl", encoding="utf-8")]
@@ -496,8 +509,8 @@ def check_found(folder, name, marker_type):
         for geometry in [one, shapely.from_wkb(other) if other else shapely.Point()]:
             found = shapely.get_coordinates(geometry).tolist()
             assert found == expected, (found, expected)
-        properties = {k: v for k, v in read["properties"].items() if k not in ("what", "seen_from_m")}
-        assert properties == {k: v for k, v in record.items() if k not in ("from_m", "to_m")}
+        properties = {k: v for k, v in read["properties"].items() if k != "what" and not k.startswith("seen_from")}
+        assert properties == flat({k: v for k, v in record.items() if k not in ("from_m", "to_m")})
         drawn.setdefault(record["kind"], []).extend(expected)
     markers = only_message(folder / f"{name}.mcap")[f"/sonar/{name}"]["markers"]
     for marker in markers:

@@ -5,6 +5,7 @@ use axum::{
     http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
+use jiff::Timestamp;
 use prometheus_client::{
     encoding::text::encode,
     metrics::{counter::ConstCounter, gauge::ConstGauge},
@@ -29,14 +30,19 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
 }
 
 async fn metrics(State(api): State<Api>) -> Result<Response, Failed> {
-    let mut text = String::new();
-    encode(&mut text, &registry(&api.daemon)).map_err(|error| {
+    // A disk may keep its answer back: that of the log is asked how much room it has.
+    let written = tokio::task::spawn_blocking(move || {
+        let mut text = String::new();
+        encode(&mut text, &registry(&api.daemon)).map(|()| text)
+    });
+    let fault = |error: &dyn std::fmt::Display| {
         Failed::new(
             StatusCode::INTERNAL_SERVER_ERROR,
             error.to_string(),
             "this is a fault of the program",
         )
-    })?;
+    };
+    let text = written.await.map_err(|error| fault(&error))?.map_err(|error| fault(&error))?;
     Ok(([(header::CONTENT_TYPE, MEDIA)], text).into_response())
 }
 
@@ -111,17 +117,67 @@ fn gauges(status: &Status, health: &Health) -> Vec<(&'static str, &'static str, 
             "Turns of a simulated array left out because the model was not ready",
             status.simulation.as_ref().map_or(0.0, |told| told.skipped as f64),
         ),
+        (
+            "log_failing",
+            "Whether records can't be written: no scan is taken until they can",
+            f64::from(u8::from(status.log.error.is_some())),
+        ),
         ("log_waiting_records", "Records that could not be written yet", status.log.waiting as f64),
         ("subscribers", "Live streams", status.subscribers.now as f64),
         ("air_temperature_celsius", "Air temperature", status.air.temperature_c),
         ("sound_speed_meters_per_second", "Speed of sound", status.air.sound_speed_m_s),
         ("uptime_seconds", "How long the daemon runs", status.uptime_s),
     ];
+    let fit = health.fit.as_ref();
+    let age_s = |ended: Timestamp| Timestamp::now().duration_since(ended).as_secs_f64();
     let known = [
+        ("log_free_bytes", "Room on the disk of the log", free_bytes(status)),
+        (
+            "last_scan_age_seconds",
+            "Since the last scan ended",
+            fit.map(|fit| age_s(fit.ended)),
+        ),
+        (
+            "last_scan_compared_beams",
+            "Beams of the last scan with an echo, measured and predicted",
+            fit.map(|fit| f64::from(fit.both_echo)),
+        ),
+        (
+            "last_scan_missing_beams",
+            "Beams that the last scan lacked at its end",
+            fit.map(|fit| f64::from(fit.missing)),
+        ),
+        (
+            "last_scan_agreement_ratio",
+            "Share of the compared beams whose ranges agree with the model",
+            fit.and_then(|fit| fit.agree_fraction),
+        ),
+        (
+            "last_scan_residual_median_meters",
+            "Median distance between measured and predicted range",
+            fit.and_then(|fit| fit.median_abs_residual_m),
+        ),
+        (
+            "last_scan_bias_meters",
+            "Median of measured minus predicted range",
+            fit.and_then(|fit| fit.median_residual_m),
+        ),
+        (
+            "reading_lateness_seconds",
+            "How long after its firing the last reading came in",
+            health.reading_lateness_s,
+        ),
         ("air_age_seconds", "Age of the air temperature", status.air.age_s),
         ("clock_drift_ppm", "Drift of the device's clock", health.clock.drift_ppm),
         ("clock_sigma_microseconds", "Standard deviation of times", health.clock.sigma_us),
     ];
     gauges.extend(known.iter().filter_map(|&(name, help, value)| Some((name, help, value?))));
     gauges
+}
+
+/// What may still be written to the disk of the log, if there is one.
+fn free_bytes(status: &Status) -> Option<f64> {
+    let folder = status.log.file.as_deref()?.parent()?;
+    let disk = rustix::fs::statvfs(folder).ok()?;
+    Some(disk.f_bavail as f64 * disk.f_frsize as f64)
 }

@@ -8,6 +8,7 @@ mod configuration;
 mod faults;
 mod kill;
 mod load;
+mod monitoring;
 mod requests;
 pub(crate) mod rig;
 mod schema;

@@ -1,6 +1,6 @@
 //! GeoJSON (RFC 7946) of a place in its own metres.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use sonard_interpret::interpret::{Feature, lines::MapLine};
 
 use super::Place;
@@ -46,7 +46,8 @@ fn line(line: &MapLine) -> Value {
         "geometry": {"type": "LineString", "coordinates": ends},
         "properties": {
             "what": "line", "kind": line.kind, "length_m": line.length_m(), "confidence": line.confidence,
-            "terminal": line.terminal, "seen_from_m": line.seen_from.to_array(),
+            "terminal_first": line.terminal[0], "terminal_last": line.terminal[1],
+            "seen_from_x_m": line.seen_from.x, "seen_from_y_m": line.seen_from.y,
         },
     })
 }
@@ -55,9 +56,28 @@ fn line(line: &MapLine) -> Value {
 fn feature(feature: &Feature) -> Value {
     let at = feature.x_m.zip(feature.y_m);
     let geometry = at.map(|(x_m, y_m)| json!({"type": "Point", "coordinates": [x_m, y_m]}));
-    let mut properties = serde_json::to_value(feature).unwrap_or_default();
-    if let Value::Object(properties) = &mut properties {
-        properties.insert("what".to_owned(), "feature".into());
-    }
+    let mut properties = Map::new();
+    properties.insert("what".to_owned(), "feature".into());
+    flatten(&mut properties, "", serde_json::to_value(feature).unwrap_or_default());
     json!({"type": "Feature", "geometry": geometry, "properties": properties})
+}
+
+/// Columns of a table, which is what properties are to a map on the screen: `probabilities_plane`, `beams_first`.
+fn flatten(properties: &mut Map<String, Value>, name: &str, value: Value) {
+    let within = |part: &str| if name.is_empty() { part.to_owned() } else { format!("{name}_{part}") };
+    match value {
+        Value::Object(parts) => {
+            for (part, value) in parts {
+                flatten(properties, &within(&part), value);
+            }
+        }
+        Value::Array(ends) => {
+            for (part, value) in ["first", "last"].into_iter().zip(ends) {
+                flatten(properties, &within(part), value);
+            }
+        }
+        value => {
+            properties.insert(name.to_owned(), value);
+        }
+    }
 }

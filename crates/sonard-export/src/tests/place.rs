@@ -127,7 +127,8 @@ fn geojson_has_each_line_and_feature_with_what_is_known_of_it() {
             serde_json::from_value(read["geometry"]["coordinates"].clone()).expect("places");
         assert_eq!(ends, line.ends.map(|end| end.to_array()));
         assert_eq!(read["properties"]["length_m"], line.length_m());
-        assert_eq!(read["properties"]["terminal"], serde_json::json!([true, false]));
+        assert_eq!(read["properties"]["terminal_first"], line.terminal[0]);
+        assert_eq!(read["properties"]["seen_from_y_m"], line.seen_from.y);
     }
     for (read, feature) in found[lines.len()..].iter().zip(&features) {
         match feature.x_m.zip(feature.y_m) {
@@ -138,6 +139,9 @@ fn geojson_has_each_line_and_feature_with_what_is_known_of_it() {
         }
         assert_eq!(read["properties"]["confidence"], feature.confidence);
         assert_eq!(read["properties"]["what"], "feature");
+        assert_eq!(read["properties"]["beams_last"], feature.beams[1]);
+        let properties = read["properties"].as_object().expect("an object");
+        assert!(properties.values().all(|value| !value.is_object() && !value.is_array()));
     }
 }
 

@@ -1,0 +1,56 @@
+//! The dashboard and the alerts that are shipped ask for what the daemon tells.
+
+use std::collections::BTreeSet;
+
+use super::Daemon;
+
+const FILES: [(&str, &str); 3] = [
+    ("grafana-sonard.json", include_str!("../../../config/monitoring/grafana-sonard.json")),
+    ("sonard-alerts.yml", include_str!("../../../config/monitoring/sonard-alerts.yml")),
+    ("sonard-alerts.test.yml", include_str!("../../../config/monitoring/sonard-alerts.test.yml")),
+];
+
+/// What begins like one of the daemon's figures.
+fn named(text: &str) -> BTreeSet<&str> {
+    let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let words = text.split(|c: char| !is_part(c));
+    words.filter(|word| word.starts_with("sonard_")).collect()
+}
+
+/// A figure's value in OpenMetrics text.
+fn value(figures: &str, name: &str) -> Option<f64> {
+    let line = figures.lines().find(|line| line.split(' ').next() == Some(name))?;
+    line.split(' ').nth(1)?.parse().ok()
+}
+
+#[test]
+fn every_figure_that_dashboard_and_alerts_ask_for_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(
+        folder.path(),
+        &["--set", "plan.to_deg=90", "--set", "model.max_range_m=3", "--set", "plan.step_deg=1.8"],
+    );
+    daemon.wait_for("ready");
+    assert_eq!(daemon.send("PUT", "/v1/air", r#"{"temperature_c":20}"#).status, 200);
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+    daemon.wait_for_scans(1);
+    let figures = String::from_utf8(daemon.get("/metrics").body).expect("text");
+    let told = named(&figures);
+    for (file, text) in FILES {
+        let asked = named(text);
+        assert!(asked.len() > 4, "{file}");
+        for name in asked {
+            assert!(told.contains(name), "{file} asks for {name}:\n{figures}");
+        }
+    }
+    // A mock plays what the model predicts, with noise of millimetres.
+    let of = |name: &str| value(&figures, name).unwrap_or_else(|| panic!("{name}:\n{figures}"));
+    assert!(of("sonard_last_scan_compared_beams") > 4.0, "{figures}");
+    assert!(of("sonard_last_scan_agreement_ratio") > 0.8, "{figures}");
+    assert!(of("sonard_last_scan_residual_median_meters") < 0.02, "{figures}");
+    assert!(of("sonard_last_scan_bias_meters").abs() < 0.02, "{figures}");
+    assert_eq!((of("sonard_last_scan_missing_beams"), of("sonard_log_failing")), (0.0, 0.0));
+    assert!(of("sonard_last_scan_age_seconds") < 60.0 && of("sonard_log_free_bytes") > 0.0);
+    let lateness_s = of("sonard_reading_lateness_seconds");
+    assert!((-1.0..30.0).contains(&lateness_s), "{lateness_s}");
+}
