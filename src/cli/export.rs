@@ -14,7 +14,9 @@ use super::{
     logs::{for_each_scan, logs_in},
     output::{OutPath, Overwrite, Product, Stream},
 };
-use crate::export::{CsvExport, Export, ExportError, LogFile, McapExport, ParquetExport, Profile, Settings};
+use crate::export::{
+    CsvExport, Export, ExportError, LogFile, McapExport, ParquetExport, Profile, Settings,
+};
 
 /// Options of `sonard export`.
 #[derive(Debug, clap::Args)]

@@ -88,7 +88,9 @@ impl Targets<'_> {
         let picture = if has_picture { Some(picture()?) } else { None };
         for target in &self.all {
             match (target, &picture) {
-                (Target::Picture(target), Some(picture)) => target.write(picture, self.args.width)?,
+                (Target::Picture(target), Some(picture)) => {
+                    target.write(picture, self.args.width)?
+                }
                 (Target::File(path, product), _) => {
                     write(path, *product, self.args.overwrite, place)?;
                 }
@@ -100,7 +102,12 @@ impl Targets<'_> {
 }
 
 /// Writes what was found as GeoJSON or as a recording.
-pub(super) fn write(path: &Path, product: Product, overwrite: Overwrite, place: &Place<'_>) -> Outcome {
+pub(super) fn write(
+    path: &Path,
+    product: Product,
+    overwrite: Overwrite,
+    place: &Place<'_>,
+) -> Outcome {
     let mut stream = overwrite.begin(path, product)?;
     let written = match product {
         Product::GeoJson => {
@@ -143,6 +150,13 @@ impl Seen {
         features: &'a [Feature],
     ) -> Place<'a> {
         let Self { time, provenance, scene } = self;
-        Place { time: *time, provenance: *provenance, scene: scene.as_deref(), grid, lines, features }
+        Place {
+            time: *time,
+            provenance: *provenance,
+            scene: scene.as_deref(),
+            grid,
+            lines,
+            features,
+        }
     }
 }

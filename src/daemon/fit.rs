@@ -78,6 +78,9 @@ mod tests {
         assert_eq!(report.agree_fraction, comparison.agree_fraction);
         assert_eq!(report.median_abs_residual_m, comparison.median_abs_residual_m);
         assert_eq!(report.median_residual_m, comparison.median_residual_m);
-        assert_eq!(Fit::default().report(scans[0].end.as_ref().expect("an end")).agree_fraction, None);
+        assert_eq!(
+            Fit::default().report(scans[0].end.as_ref().expect("an end")).agree_fraction,
+            None
+        );
     }
 }

@@ -14,8 +14,8 @@ use super::{air::AirDesk, fit::Fit};
 use crate::{
     api::{
         ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, LinkState, LogStatus,
-        Pending, ScanFit, ScanProgress, ScanTotals, ScanningReport, Setup, SimulationReport, Status,
-        SubscriberReport,
+        Pending, ScanFit, ScanProgress, ScanTotals, ScanningReport, Setup, SimulationReport,
+        Status, SubscriberReport,
     },
     config::ScanningKeys,
     geometry::Pose,

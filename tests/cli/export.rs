@@ -69,7 +69,11 @@ fn the_format_follows_from_the_ending_or_is_asked_for() {
     for arguments in [&["export", &log][..], &["export", &log, "-o", &path("a.txt")]] {
         let refused = run(arguments);
         assert_eq!(refused.status.code(), Some(2), "{arguments:?}");
-        assert!(said(&refused).contains("--to mcap, --to parquet or --to csv"), "{}", said(&refused));
+        assert!(
+            said(&refused).contains("--to mcap, --to parquet or --to csv"),
+            "{}",
+            said(&refused)
+        );
     }
     assert!(!folder.path().join("a.txt").exists());
     assert!(run(&["export", &log, "-o", &path("a.csv")]).status.success());

@@ -229,7 +229,8 @@ fn places(log: &str) -> Vec<[i64; 3]> {
             Some("scan_start") => of_scan = record["pose"].clone(),
             Some("ping") => {
                 let pose = if record["pose"].is_null() { &of_scan } else { &record["pose"] };
-                let part = |name: &str| (pose[name].as_f64().expect("a number") * 1e6).round() as i64;
+                let part =
+                    |name: &str| (pose[name].as_f64().expect("a number") * 1e6).round() as i64;
                 places.push(["x_m", "y_m", "heading_deg"].map(part));
             }
             _ => {}

@@ -5,7 +5,11 @@ mod geojson;
 use std::io::Write;
 
 use jiff::Timestamp;
-use sonard_interpret::interpret::{Feature, FeatureKind, grid::Grid, lines::{LineKind, MapLine}};
+use sonard_interpret::interpret::{
+    Feature, FeatureKind,
+    grid::Grid,
+    lines::{LineKind, MapLine},
+};
 use sonard_records::Provenance;
 
 use crate::{

@@ -24,8 +24,8 @@ use crate::{
     sessions::Sessions,
 };
 pub(crate) use frames::MAP;
-use messages::refused;
 pub(crate) use messages::Messages;
+use messages::refused;
 use readings::{Figures, Heard, in_order, laser_scan, paths, points};
 pub(crate) use times::nanoseconds;
 use times::{Firings, Times};
@@ -141,7 +141,12 @@ impl<W: Write> McapExport<W> {
             self.messages.write(topic::PREDICTED_POINTS, POINT_CLOUD, self.end, &cloud)?;
         }
         if pings.iter().any(|ping| ping.sound_path().is_some()) {
-            self.messages.write(topic::PATHS, MARKERS, self.end, &Markers(paths(scan, &pings, header)))?;
+            self.messages.write(
+                topic::PATHS,
+                MARKERS,
+                self.end,
+                &Markers(paths(scan, &pings, header)),
+            )?;
         }
         Ok(())
     }

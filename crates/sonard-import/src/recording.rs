@@ -273,7 +273,11 @@ impl Bag {
             true => self.transforms.place(&source.axis, &source.world, time_ns)?.at,
             false => robot.at,
         };
-        Ok(Pose { x_m: billionths(at.x), y_m: billionths(at.y), heading_deg: billionths(robot.yaw_deg()) })
+        Ok(Pose {
+            x_m: billionths(at.x),
+            y_m: billionths(at.y),
+            heading_deg: billionths(robot.yaw_deg()),
+        })
     }
 }
 
@@ -337,7 +341,10 @@ fn decode<T>(
     };
     if channel.encoding != "cdr" {
         let what = format!("{}: messages are encoded as `{}`", channel.topic, channel.encoding);
-        return Err(ImportError::mapping(what, "give a recording of ROS 2, whose messages are CDR"));
+        return Err(ImportError::mapping(
+            what,
+            "give a recording of ROS 2, whose messages are CDR",
+        ));
     }
     Cdr::new(&message.bytes).and_then(|mut cdr| read(&mut cdr)).map_err(refuse)
 }

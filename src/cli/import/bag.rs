@@ -9,12 +9,16 @@ use super::super::{Failure, output::note_input};
 
 /// The recordings of a folder, in the order in which they were written.
 pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let refuse = |what: String, help: &str| Failure::input(format!("{}: {what}", folder.display()), help);
+    let refuse =
+        |what: String, help: &str| Failure::input(format!("{}: {what}", folder.display()), help);
     let entries = fs::read_dir(folder)
         .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>, _>>())
-        .map_err(|error| refuse(format!("cannot be read: {error}"), "give the folder of a recording"))?;
+        .map_err(|error| {
+            refuse(format!("cannot be read: {error}"), "give the folder of a recording")
+        })?;
     let ends = |path: &&PathBuf, ending: &str| path.extension().is_some_and(|end| end == ending);
-    let mut files: Vec<PathBuf> = entries.iter().filter(|path| ends(path, "mcap")).cloned().collect();
+    let mut files: Vec<PathBuf> =
+        entries.iter().filter(|path| ends(path, "mcap")).cloned().collect();
     if files.is_empty() {
         return Err(match entries.iter().any(|path| ends(&path, "db3")) {
             true => refuse(
@@ -22,7 +26,9 @@ pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
                 "write it as MCAP: `ros2 bag convert`, or `rosbags-convert --src BAG --dst NEW --dst-storage \
                  mcap` without ROS",
             ),
-            false => refuse("there is no recording (.mcap) in it".to_owned(), "give a folder of rosbag2"),
+            false => {
+                refuse("there is no recording (.mcap) in it".to_owned(), "give a folder of rosbag2")
+            }
         });
     }
     files.sort_by_key(|path| (number(path), path.clone()));

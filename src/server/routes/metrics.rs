@@ -132,11 +132,7 @@ fn gauges(status: &Status, health: &Health) -> Vec<(&'static str, &'static str, 
     let age_s = |ended: Timestamp| Timestamp::now().duration_since(ended).as_secs_f64();
     let known = [
         ("log_free_bytes", "Room on the disk of the log", free_bytes(status)),
-        (
-            "last_scan_age_seconds",
-            "Since the last scan ended",
-            fit.map(|fit| age_s(fit.ended)),
-        ),
+        ("last_scan_age_seconds", "Since the last scan ended", fit.map(|fit| age_s(fit.ended))),
         (
             "last_scan_compared_beams",
             "Beams of the last scan with an echo, measured and predicted",

@@ -30,8 +30,7 @@ impl Remarks {
         // A record of a log is JSON.
         let Ok(record) = serde_json::to_string(&record) else { return };
         let hash = session.scene.as_ref().map(|scene| scene.sha256.as_str());
-        let scene =
-            text.zip(hash).filter(|(_, hash)| !self.scenes.contains(*hash));
+        let scene = text.zip(hash).filter(|(_, hash)| !self.scenes.contains(*hash));
         let more = record.len() + scene.as_ref().map_or(0, |(text, _)| text.len());
         if self.bytes + more > MOST_BYTES {
             self.left_out += 1;

@@ -64,7 +64,8 @@ fn feature(feature: &Feature) -> Value {
 
 /// Columns of a table, which is what properties are to a map on the screen: `probabilities_plane`, `beams_first`.
 fn flatten(properties: &mut Map<String, Value>, name: &str, value: Value) {
-    let within = |part: &str| if name.is_empty() { part.to_owned() } else { format!("{name}_{part}") };
+    let within =
+        |part: &str| if name.is_empty() { part.to_owned() } else { format!("{name}_{part}") };
     match value {
         Value::Object(parts) => {
             for (part, value) in parts {

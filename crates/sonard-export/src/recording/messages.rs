@@ -100,10 +100,7 @@ impl<W: Write> Messages<W> {
     }
 
     /// Says what a reader of the recording must know and no message says, and ends it.
-    pub(crate) fn finish(
-        mut self,
-        remarks: BTreeMap<String, String>,
-    ) -> Result<(), ExportError> {
+    pub(crate) fn finish(mut self, remarks: BTreeMap<String, String>) -> Result<(), ExportError> {
         let remarks = Metadata { name: "sonard".to_owned(), metadata: remarks };
         self.out.write_metadata(&remarks).map_err(refused)?;
         self.out.finish().map_err(refused)?;

@@ -168,10 +168,8 @@ pub(crate) const MARKERS: Interface = Interface {
 const HEADER: (&str, &str) =
     ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n");
 const TIME: (&str, &str) = ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
-const POSE: (&str, &str) = (
-    "geometry_msgs/Pose",
-    "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
-);
+const POSE: (&str, &str) =
+    ("geometry_msgs/Pose", "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n");
 const POINT: (&str, &str) = ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n");
 const VECTOR: (&str, &str) = ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n");
 const QUATERNION: (&str, &str) =

@@ -114,7 +114,9 @@ fn geojson_has_each_line_and_feature_with_what_is_known_of_it() {
     let (lines, mut features) = (lines(), features());
     (features[0].x_m, features[0].y_m) = (None, None);
     let text = to_geojson(&place(None, &lines, &features));
-    assert!(begins_geojson(text.as_bytes()) && !begins_geojson(b"{\"type\":\"FeatureCollection\"}"));
+    assert!(
+        begins_geojson(text.as_bytes()) && !begins_geojson(b"{\"type\":\"FeatureCollection\"}")
+    );
     let read: Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!((&read["type"], &read["crs"]), (&"FeatureCollection".into(), &Value::Null));
     assert_eq!(read["sonard"]["units"], "metres");

@@ -221,9 +221,11 @@ impl Topics {
                 let channel = self.channels.get(&header.channel_id)?;
                 let bytes = || data.into_owned();
                 let (channel, recorded_ns) = (Arc::clone(channel), header.log_time);
-                types
-                    .contains(&channel.type_name.as_str())
-                    .then(|| Message { channel, recorded_ns, bytes: bytes() })
+                types.contains(&channel.type_name.as_str()).then(|| Message {
+                    channel,
+                    recorded_ns,
+                    bytes: bytes(),
+                })
             }
             _ => None,
         }

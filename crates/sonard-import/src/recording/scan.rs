@@ -63,7 +63,8 @@ impl<'a> Gathered<'a> {
             let readings: Vec<_> = firings.map(|(_, reading)| reading).collect();
             return Some(scans::records(self.taken, self.scans, &readings));
         }
-        let firings = firings.map(|(ranger, reading)| Firing { ranger: &self.ids[ranger], reading });
+        let firings =
+            firings.map(|(ranger, reading)| Firing { ranger: &self.ids[ranger], reading });
         Some(scans::firings_of_array(self.taken, self.scans, &firings.collect::<Vec<_>>()))
     }
 

@@ -162,9 +162,8 @@ fn driving(order: Order) -> Bag {
 
 #[test]
 fn poses_are_interpolated_at_the_stamp_in_both_byte_orders() {
-    let [little, big] = [Order::Little, Order::Big].map(|order| {
-        scans(&driving(order).bytes(), Mapping::default()).expect("a recording")
-    });
+    let [little, big] = [Order::Little, Order::Big]
+        .map(|order| scans(&driving(order).bytes(), Mapping::default()).expect("a recording"));
     assert_eq!(
         little.iter().flat_map(|(_, pings)| pings).map(|ping| ping.range_m).collect::<Vec<_>>(),
         big.iter().flat_map(|(_, pings)| pings).map(|ping| ping.range_m).collect::<Vec<_>>()
@@ -210,7 +209,9 @@ fn a_ranger_that_turns_makes_scans_that_end_where_they_began() {
     // On the axis, which stands beside the middle of the robot.
     let pose = scans[0].0.pose;
     let (sin, cos) = 30_f64.to_radians().sin_cos();
-    assert!((pose.x_m - (1.0 - 0.1 * sin)).abs() < 1e-8 && (pose.y_m - (2.0 + 0.1 * cos)).abs() < 1e-8);
+    assert!(
+        (pose.x_m - (1.0 - 0.1 * sin)).abs() < 1e-8 && (pose.y_m - (2.0 + 0.1 * cos)).abs() < 1e-8
+    );
     assert!((pose.heading_deg - 30.0).abs() < 1e-8);
 }
 
@@ -262,9 +263,12 @@ fn without_poses_the_given_one_holds() {
 #[test]
 fn topics_are_chosen_and_predictions_left_alone() {
     let bag = || {
-        driving(Order::Little)
-            .range("/sonar/predicted/range", 1.5, "front", 9.0)
-            .range("/rear/range", 1.5, "front", 2.0)
+        driving(Order::Little).range("/sonar/predicted/range", 1.5, "front", 9.0).range(
+            "/rear/range",
+            1.5,
+            "front",
+            2.0,
+        )
     };
     let found = examine(&bag().bytes(), Mapping::default()).expect("a recording");
     assert_eq!(found.taken.array.expect("an array").rangers.len(), 2);

@@ -33,7 +33,9 @@ pub(crate) struct Placed {
 /// What is wrong with the frames of a recording.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub(crate) enum TransformError {
-    #[error("there is no transform of the frame `{child}` in `{parent}` at {time}: they go from {from} to {to}")]
+    #[error(
+        "there is no transform of the frame `{child}` in `{parent}` at {time}: they go from {from} to {to}"
+    )]
     Lacks { child: String, parent: String, time: String, from: String, to: String },
     #[error("the frame `{0}` is its own parent")]
     Loop(String),
@@ -71,7 +73,11 @@ impl Placed {
 
 impl Transforms {
     /// Takes a transform in.
-    pub(crate) fn add(&mut self, transform: Transform, is_fixed: bool) -> Result<(), TransformError> {
+    pub(crate) fn add(
+        &mut self,
+        transform: Transform,
+        is_fixed: bool,
+    ) -> Result<(), TransformError> {
         let Transform { header, child, translation_m, rotation } = transform;
         let (at, turn) = (DVec3::from(translation_m), DQuat::from_array(rotation));
         if !(at.is_finite() && turn.is_finite() && turn.length_squared() > 1e-6) {
