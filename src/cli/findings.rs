@@ -89,7 +89,7 @@ impl Targets<'_> {
         for target in &self.all {
             match (target, &picture) {
                 (Target::Picture(target), Some(picture)) => {
-                    target.write(picture, self.args.width)?
+                    target.write(picture, self.args.width)?;
                 }
                 (Target::File(path, product), _) => {
                     write(path, *product, self.args.overwrite, place)?;
