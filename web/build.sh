@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Builds the playground, a folder that any web server or none can serve: target/playground/index.html.
 #
-#   web/build.sh            type check, build, and hold its size
-#   TYPES=0 web/build.sh    without the type check
+#   web/build.sh            check types and lints, build, and hold its size
+#   CHECK=0 web/build.sh    build alone
 set -euo pipefail
 cd "$(dirname "$0")/.."
 target=$PWD/${CARGO_TARGET_DIR:-target}
@@ -14,10 +14,13 @@ most=1000000
 if command -v rustup >/dev/null; then rustup target add --toolchain "$(rustup show active-toolchain | cut -d' ' -f1)" wasm32-unknown-unknown >/dev/null 2>&1; fi
 web/tools.sh
 tools=$target/tools/web/node_modules/.bin
-[ "${TYPES:-1}" = 0 ] || "$tools/tsc" --project web/jsconfig.json
-
 # A workspace of its own: what is built here is of no use to the other one.
-(cd web/wasm && CARGO_TARGET_DIR=$target/wasm cargo build --release --locked --quiet)
+module() { (cd web/wasm && CARGO_TARGET_DIR=$target/wasm cargo "$1" --release --locked --quiet "${@:2}"); }
+if [ "${CHECK:-1}" != 0 ]; then
+  "$tools/tsc" --project web/jsconfig.json
+  module clippy -- -D warnings
+fi
+module build
 wasm=$target/wasm/wasm32-unknown-unknown/release/sonard_playground.wasm
 
 rm -rf "$page"

@@ -28,7 +28,7 @@ impl Desk {
     /// The answer to a request, both JSON.
     pub fn answer(&mut self, request: &[u8]) -> String {
         let told = serde_json::from_slice(request)
-            .map_err(|error| Refusal::new(format!("no request: {error}"), ""))
+            .map_err(|error| Refusal::new(&format!("no request: {error}"), ""))
             .and_then(|request| self.tell(request));
         told.unwrap_or_else(|refused| json!({ "refused": refused }).to_string())
     }
@@ -81,7 +81,7 @@ impl Desk {
 
     fn sweep(&mut self, engine: EngineKind) -> Result<&mut Sweep, Refusal> {
         let sweep = self.sweeps.get_mut(engine.name());
-        sweep.ok_or_else(|| Refusal::new(format!("{} has no sweep", engine.name()), ""))
+        sweep.ok_or_else(|| Refusal::new(&format!("{} has no sweep", engine.name()), ""))
     }
 }
 
@@ -97,7 +97,7 @@ fn unset() -> Refusal {
 }
 
 fn text(answer: &impl Serialize) -> Result<String, Refusal> {
-    serde_json::to_string(answer).map_err(|error| Refusal::new(error, ""))
+    serde_json::to_string(answer).map_err(|error| Refusal::new(&error, ""))
 }
 
 /// Scenes with their texts and sensors with their data.

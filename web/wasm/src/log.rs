@@ -9,7 +9,9 @@ use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::Pose,
 };
-use sonard_records::{AirRecord, ModelRecord, Provenance, Record, ScanPlan, ScanView, Session, decode_line};
+use sonard_records::{
+    AirRecord, ModelRecord, Provenance, Record, ScanPlan, ScanView, Session, decode_line,
+};
 
 use crate::Refusal;
 
@@ -80,7 +82,7 @@ fn own(text: &str) -> Result<Vec<Record>, Refusal> {
             Err(_) if !text.ends_with('\n') && text.ends_with(line) => break,
             Err(error) => {
                 let message = format!("line {}: {error}", number + 1);
-                return Err(Refusal::new(message, "`sonard log repair` keeps what is whole"));
+                return Err(Refusal::new(&message, "`sonard log repair` keeps what is whole"));
             }
         }
     }

@@ -22,7 +22,7 @@ pub struct Refusal {
 }
 
 impl Refusal {
-    pub(crate) fn new(message: impl ToString, help: impl Into<String>) -> Self {
+    pub(crate) fn new(message: &(impl ToString + ?Sized), help: impl Into<String>) -> Self {
         Self { message: message.to_string(), help: help.into(), line: None }
     }
 }
@@ -47,7 +47,7 @@ impl From<ImportError> for Refusal {
 
 impl From<TooCostly> for Refusal {
     fn from(error: TooCostly) -> Self {
-        Self::new(error, "listen less far, or take another engine")
+        Self::new(&error, "listen less far, or take another engine")
     }
 }
 
@@ -56,7 +56,7 @@ macro_rules! plain {
     ($($error:ty),*) => {
         $(impl From<$error> for Refusal {
             fn from(error: $error) -> Self {
-                Self::new(error, "")
+                Self::new(&error, "")
             }
         })*
     };

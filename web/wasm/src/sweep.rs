@@ -108,7 +108,7 @@ impl Sweep {
     /// Where a beam stands in the sweep.
     pub(crate) fn place_of(&self, index: u32) -> Result<usize, Refusal> {
         let place = self.view.pings.iter().position(|ping| ping.index == index);
-        place.ok_or_else(|| Refusal::new(format!("the sweep has no beam {index}"), ""))
+        place.ok_or_else(|| Refusal::new(&format!("the sweep has no beam {index}"), ""))
     }
 
     /// Looks from where a firing was taken along its axis; `None` if its log does not say where.
