@@ -32,6 +32,7 @@ fn readings_are_those_of_the_program_in_every_shipped_scene() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut compared = 0;
     let mut most_m: f64 = 0.0;
+    let mut apart: Vec<String> = Vec::new();
     for (name, text) in shipped::SCENES {
         let poses = poses(&Scene::from_json(text).expect("shipped"), count);
         let course = folder.path().join("course.csv");
@@ -52,15 +53,21 @@ fn readings_are_those_of_the_program_in_every_shipped_scene() {
                     assert_eq!(page_m.is_some(), own_m.is_some(), "{name} {pose:?}: {own}");
                     if let Some((page_m, own_m)) = page_m.zip(own_m) {
                         let off_m = (page_m - own_m).abs();
-                        assert!(off_m <= SAME_M, "{name} {engine} {pose:?}: {page_m} and {own_m}");
                         most_m = most_m.max(off_m);
+                        if off_m > SAME_M {
+                            apart.push(format!("{name} {engine} {pose:?}: {page_m} and {own_m}"));
+                        }
                     }
                     compared += 1;
                 }
             }
         }
     }
-    println!("{compared} readings of {count} poses a scene, the most apart by {most_m:e} m");
+    println!(
+        "{compared} readings of {count} poses a scene: {} apart by more than {SAME_M:e} m, the most by {most_m:e} m",
+        apart.len()
+    );
+    assert_eq!(apart, Vec::<String>::new());
     assert!(compared > 9 * count * BEAMS);
 }
 
