@@ -124,6 +124,7 @@ pub(crate) fn round(taken: &Taken, number: u64, round: &Round) -> Vec<Record> {
 }
 
 /// A firing of one of an array's rangers.
+#[cfg(feature = "recordings")]
 #[derive(Debug)]
 pub(crate) struct Firing<'a> {
     pub(crate) ranger: &'a str,
@@ -131,6 +132,7 @@ pub(crate) struct Firing<'a> {
 }
 
 /// The records of a round of an array's rangers, each fired at a time and place of its own.
+#[cfg(feature = "recordings")]
 pub(crate) fn firings_of_array(taken: &Taken, number: u64, fired: &[Firing<'_>]) -> Vec<Record> {
     let scan = id(taken, number);
     let pose = fired[0].reading.pose(&taken.pose);
