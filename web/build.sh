@@ -11,7 +11,12 @@ page=$target/playground
 # All that the page loads, compressed, bytes.
 most=1000000
 
-if command -v rustup >/dev/null; then rustup target add --toolchain "$(rustup show active-toolchain | cut -d' ' -f1)" wasm32-unknown-unknown >/dev/null 2>&1; fi
+if command -v rustup >/dev/null; then
+  rustup --quiet target add wasm32-unknown-unknown || {
+    echo "web/build.sh: the target wasm32-unknown-unknown can't be had; leave the playground out with PLAYGROUND=0" >&2
+    exit 1
+  }
+fi
 web/tools.sh
 tools=$target/tools/web/node_modules/.bin
 # A workspace of its own: what is built here is of no use to the other one.
