@@ -166,9 +166,9 @@ impl<W: Write> McapExport<W> {
         for (place, (at, ping)) in fired.iter().enumerate() {
             let Some(robot) = ping.pose.or_else(|| scan.pose()) else { continue };
             let next = fired.get(place + 1).map_or(u64::MAX, |(next, _)| next.0);
-            // Before the motor steps on.
-            end =
-                Stamp(at.0.saturating_add(firings.window_ns).min(next.saturating_sub(1)).max(at.0));
+            // Before the motor steps on, and before the next scan begins: no frame is at two places at one time.
+            let window_ns = firings.window_ns.saturating_sub(1);
+            end = Stamp(at.0.saturating_add(window_ns).min(next.saturating_sub(1)).max(at.0));
             for stamp in [*at, end] {
                 let moving = Transforms(figures.frames.moving(stamp, &robot, ping));
                 self.messages.write(topic::TRANSFORMS, TRANSFORMS, stamp, &moving)?;

@@ -6,8 +6,8 @@ use sonard_interpret::interpret::{Feature, lines::MapLine};
 use super::Place;
 use crate::columns::logged_word;
 
-/// How such a file begins; members are in the order of their names.
-const HEAD: &str = r#"{"crs":null,"sonard":"#;
+/// How such a file begins.
+const HEAD: &str = r#"{"sonard":"#;
 
 /// Whether a file that begins so is GeoJSON of this program.
 #[must_use]
@@ -18,8 +18,7 @@ pub fn begins_geojson(head: &[u8]) -> bool {
 /// Lines and features as a `FeatureCollection`, a geometry a line of text.
 ///
 /// RFC 7946 knows degrees of longitude and latitude only. A room has none: coordinates are metres in its own
-/// frame, which the member `sonard` says, and `crs` is null, which readers of the format before that
-/// RFC take for "unknown" (GDAL, QGIS).
+/// frame, which the member `sonard` says. Nothing that the format has would keep GDAL from taking them for degrees.
 #[must_use]
 pub fn to_geojson(place: &Place<'_>) -> String {
     let about = json!({

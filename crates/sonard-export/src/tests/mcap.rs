@@ -235,6 +235,10 @@ fn scans_without_times_follow_each_other_and_the_recording_says_that_they_are_ma
         .map(|range| range.header.nanoseconds())
         .collect();
     assert!(stamps.windows(2).all(|pair| pair[0] < pair[1]), "{stamps:?}");
+    // The window of the last reading ends before the next scan begins: no frame is told twice of one time.
+    let moving: Vec<Vec<Transform>> = decoded(&topics["/tf"]);
+    let told: Vec<_> = moving.iter().map(|message| message[0].header.nanoseconds()).collect();
+    assert!(told.windows(2).all(|pair| pair[0] < pair[1]), "{told:?}");
     let summary = mcap::Summary::read(&recording).expect("reads").expect("it has one");
     let remarks = mcap::read::metadata(&recording, &summary.metadata_indexes[0]).expect("reads");
     assert_eq!(remarks.name, "sonard");
