@@ -23,7 +23,7 @@ use crate::{
 /// Which files.
 #[derive(Debug, clap::Args)]
 pub(super) struct FindingsArgs {
-    /// File to write, by its name a picture (.svg, .png), GeoJSON in local metres (.geojson) or a recording
+    /// File to write; by its name a picture (.svg, .png), GeoJSON in local metres (.geojson) or a recording
     /// of ROS 2 with markers (.mcap), or - for SVG to standard output; several are possible
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Vec<OutPath>,
