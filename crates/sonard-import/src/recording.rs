@@ -246,6 +246,10 @@ impl Bag {
                 false => Some(self.pose(source, time_ns)?),
             };
             let direction_deg = billionths(in_robot.yaw_deg() + turned_deg);
+            // A beam of no angle is none.
+            if !direction_deg.is_finite() {
+                return Ok(None);
+            }
             Ok(Some(Heard { time_ns, pose, direction_deg, status, range_m }))
         };
         let misplaced = |error: TransformError| misplaced(&message.channel.topic, &error);

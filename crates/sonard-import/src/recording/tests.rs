@@ -253,6 +253,18 @@ fn where_transforms_lack_topic_frame_and_time_are_told() {
 }
 
 #[test]
+fn angles_and_places_that_are_none_are_no_readings() {
+    let angles = [0.0, 1.0, f32::INFINITY, 0.0, 0.0, 0.3, 4.0];
+    let scan = LaserScan(header(1.0, "laser"), angles, vec![1.5, 2.0], Vec::new());
+    let bag = Bag::new(Order::Little).add("/scan", LASER_SCAN, 1.0, &scan).bytes();
+    assert_eq!(examine(&bag, Mapping::default()).expect("a recording").readings, 0);
+    for far_m in [f64::NAN, f64::INFINITY, 1e300] {
+        let bag = driving(Order::Little).moves(3.0, [far_m, 0.0, 0.0]).bytes();
+        assert!(said(examine(&bag, Mapping::default())).contains("no finite place"), "{far_m}");
+    }
+}
+
+#[test]
 fn without_poses_the_given_one_holds() {
     let bag = Bag::new(Order::Big).range("/range", 1.0, "sonar", 1.5).bytes();
     assert!(!examine(&bag, Mapping::default()).expect("a recording").has_poses);

@@ -49,6 +49,8 @@ pub(crate) enum TransformError {
 
 /// As many as are kept: 64 MB.
 const MOST: usize = 1 << 20;
+/// No robot is so far from where its map begins, metres.
+const MOST_M: f64 = 1e9;
 /// No tree of a robot is this deep.
 const MOST_DEEP: usize = 64;
 
@@ -80,7 +82,7 @@ impl Transforms {
     ) -> Result<(), TransformError> {
         let Transform { header, child, translation_m, rotation } = transform;
         let (at, turn) = (DVec3::from(translation_m), DQuat::from_array(rotation));
-        if !(at.is_finite() && turn.is_finite() && turn.length_squared() > 1e-6) {
+        if !(at.abs().max_element() < MOST_M && turn.is_finite() && turn.length_squared() > 1e-6) {
             return Err(TransformError::Senseless(child));
         }
         let placed = Placed { at, turn: turn.normalize() };
