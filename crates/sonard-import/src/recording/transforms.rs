@@ -82,7 +82,11 @@ impl Transforms {
     ) -> Result<(), TransformError> {
         let Transform { header, child, translation_m, rotation } = transform;
         let (at, turn) = (DVec3::from(translation_m), DQuat::from_array(rotation));
-        if !(at.is_finite() && at.abs().max_element() < MOST_M && turn.is_finite() && turn.length_squared() > 1e-6) {
+        if !(at.is_finite()
+            && at.abs().max_element() < MOST_M
+            && turn.is_finite()
+            && turn.length_squared() > 1e-6)
+        {
             return Err(TransformError::Senseless(child));
         }
         let placed = Placed { at, turn: turn.normalize() };
