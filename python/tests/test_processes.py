@@ -104,7 +104,9 @@ def test_other_threads_run_meanwhile() -> None:
 
 def test_an_interrupt_ends_a_long_prediction() -> None:
     program = (
-        "import sonard, numpy, sys\n"
+        # In a script that runs in the background it would be ignored.
+        "import sonard, numpy, signal, sys\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "poses = numpy.tile([0.4, 0.3, 0.0], (200_000, 1))\n"
         "print('began', flush=True)\n"
         "try: sonard.Model('simple-room').predict(poses, threads=1)\n"

@@ -31,6 +31,12 @@ impl Motion {
         self.walls.iter().find(|moved| moved.0 == wall).map_or([DVec2::ZERO; 2], |moved| moved.1)
     }
 
+    /// Velocity and growth of a cylinder that moves.
+    fn of_cylinder(&self, cylinder: u32) -> Option<(DVec2, f64)> {
+        let moved = self.cylinders.iter().find(|moved| moved.0 == cylinder);
+        moved.map(|&(_, velocity, growth)| (velocity, growth))
+    }
+
     /// Velocity of the point of a wall that is nearest to `point`.
     fn on_wall(&self, scene: &Scene, wall: u32, point: DVec2) -> DVec2 {
         let [at_a, at_b] = self.of_wall(wall);
@@ -48,11 +54,16 @@ impl Motion {
             Mechanism::Diffraction(Bend::Upright(Edge { wall, at_b })) => {
                 self.of_wall(wall)[usize::from(at_b)]
             }
+            // The length that it is told with runs to its axis.
+            Mechanism::Diffraction(Bend::Post { cylinder }) => {
+                self.of_cylinder(cylinder).map_or(DVec2::ZERO, |(velocity, _)| velocity)
+            }
             Mechanism::Reflection(Reflector::Cylinder(cylinder)) => {
-                let moved = self.cylinders.iter().find(|moved| moved.0 == cylinder);
-                let Some((_, velocity, growth)) = moved else { return DVec3::ZERO };
+                let Some((velocity, growth)) = self.of_cylinder(cylinder) else {
+                    return DVec3::ZERO;
+                };
                 let center = scene.cylinders.get(cylinder as usize).map_or(point, |c| c.center);
-                *velocity + *growth * (point - center).normalize_or_zero()
+                velocity + growth * (point - center).normalize_or_zero()
             }
             Mechanism::Reflection(Reflector::Floor | Reflector::Ceiling) => DVec2::ZERO,
             Mechanism::Transducer => {

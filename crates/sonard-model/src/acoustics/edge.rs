@@ -11,6 +11,7 @@ use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 use num_complex::Complex64;
 
+pub use post::{MOST_KA, Post};
 pub use strip::{MOST_WAVELENGTHS, Strip};
 pub use view::EdgeView;
 
@@ -292,6 +293,7 @@ fn transition_fraction(x: f64, ix: Complex64) -> Complex64 {
     2.0 * ix / (2.0 * ix + 1.0 - rest)
 }
 
+pub(crate) mod post;
 mod strip;
 mod view;
 

@@ -10,7 +10,8 @@ use crate::{
 /// An echo at the transducer's face.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arrival {
-    /// Length of the path there and back, metres.
+    /// Length of the path there and back, metres; by a post that of its pulse, which comes by the surface, while
+    /// `path` runs to the axis.
     pub length_m: f64,
     /// Strength after gain compensation and the beam pattern on departure and arrival; a head-on, perfectly
     /// reflecting wall without absorption gives 1.

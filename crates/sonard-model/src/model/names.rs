@@ -43,7 +43,7 @@ impl Mechanism {
 
 impl Bend {
     /// Its name in a scene: `WALL.a` and `WALL.b` are the upright edges at the ends of a wall, `WALL.top`
-    /// and `WALL.bottom` the level ones.
+    /// and `WALL.bottom` the level ones; a thin cylinder has its id.
     ///
     /// # Panics
     /// If it is of another scene.
@@ -54,6 +54,7 @@ impl Bend {
             Self::Upright(Edge { wall, at_b: true }) => (wall, "b"),
             Self::Level { wall, is_upper: true } => (wall, "top"),
             Self::Level { wall, is_upper: false } => (wall, "bottom"),
+            Self::Post { cylinder } => return Reflector::Cylinder(cylinder).name(scene),
         };
         format!("{}.{end}", scene.walls[wall as usize].id)
     }

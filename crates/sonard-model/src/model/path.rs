@@ -52,7 +52,7 @@ pub enum Reflector {
     Ceiling,
 }
 
-/// An edge of a scene.
+/// An edge of a scene, or what diffracts as one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Bend {
     /// An upright one: where walls end or meet.
@@ -63,6 +63,11 @@ pub enum Bend {
         wall: u32,
         /// Whether it is the wall's upper one (else the lower).
         is_upper: bool,
+    },
+    /// A thin cylinder, which scatters as a whole.
+    Post {
+        /// Index into `scene.cylinders`.
+        cylinder: u32,
     },
 }
 
@@ -144,6 +149,7 @@ impl Mechanism {
             Self::Reflection(reflector) => Some(reflector),
             Self::Diffraction(Bend::Upright(Edge { wall, .. }) | Bend::Level { wall, .. })
             | Self::Scattering { wall } => Some(Reflector::Wall(wall)),
+            Self::Diffraction(Bend::Post { cylinder }) => Some(Reflector::Cylinder(cylinder)),
             Self::Transducer => None,
         }
     }

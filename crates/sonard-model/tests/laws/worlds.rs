@@ -153,8 +153,10 @@ impl World {
         let place = |random: &mut Pcg64| {
             DVec2::new(random.random_range(0.0..size.x), random.random_range(0.0..size.y))
         };
-        for _ in 0..kind.rounds {
-            let radius_m = random.random_range(0.015..0.2);
+        for number in 0..kind.rounds {
+            // Posts, as chair legs are, and bodies.
+            let radius_m =
+                random.random_range(if number % 3 == 2 { 0.004..0.016 } else { 0.018..0.2 });
             let found = (0..TRIES).map(|_| place(random)).find(|at| world.is_free(*at, radius_m));
             let reflectance = random.random_range(0.7..1.0);
             let round = |center| Round { center, radius_m, reflectance };

@@ -5,7 +5,10 @@
 //! own has. What the faces of an array send
 //! back to and fro is left out.
 
-use super::{engine::PathEngine, found::Found};
+use super::{
+    engine::PathEngine,
+    found::{Found, Heard},
+};
 use crate::{
     acoustics::{Incident, PulseArrival},
     geometry::{DVec2, wrap_pi},
@@ -35,7 +38,7 @@ impl PathEngine {
         max_path_m: f64,
         floor: f64,
     ) -> Result<AimedPaths<'_>, TooCostly> {
-        let mut paths = self.paths.within(max_path_m);
+        let mut paths = self.within(max_path_m);
         paths.plan.settings.floor = floor;
         let found = Found::between(paths, [transmitter.place, receiver.place], None)?;
         let axes_rad = [transmitter.direction_rad, receiver.direction_rad];
@@ -56,23 +59,20 @@ impl AimedPaths<'_> {
             let ends =
                 [self.engine.off_axis(out, rises_rad[0]), self.engine.off_axis(back, rises_rad[1])];
             let [leaving, arriving] = ends.map(|angle| self.engine.beam.one_way(angle));
-            let amplitude = echo.amplitude * leaving * arriving;
-            (self.engine.most(echo.amplitude, amplitude, &ends) >= floor).then_some(PulseArrival {
-                length_m: echo.length_m,
-                amplitude,
-                phase_rad: echo.phase_rad,
-                index,
-            })
+            let Heard { length_m, phase_rad, gain } = self.found.heard(index);
+            let amplitude = gain * echo.amplitude * leaving * arriving;
+            let most = self.engine.most(echo.amplitude, amplitude, &ends);
+            (most >= floor).then_some(PulseArrival { length_m, amplitude, phase_rad, index })
         })
     }
 
     /// The full account of one of them.
     pub(crate) fn arrival(&self, arrival: &PulseArrival) -> Arrival {
-        self.found.arrival(&self.found.echoes[arrival.index as usize], arrival.amplitude)
+        self.found.arrival(arrival.index, arrival.amplitude)
     }
 
     /// Its incidence on both faces.
     pub(crate) fn incident(&self, arrival: &PulseArrival) -> Incident {
-        self.found.incident(&self.found.echoes[arrival.index as usize], self.axes_rad)
+        self.found.incident(arrival.index, self.axes_rad)
     }
 }

@@ -54,6 +54,19 @@ impl Via {
     }
 }
 
+impl Via {
+    /// Whether one leads out as the other leads back, on two rays. Of a transmitter in line with an edge and the wall
+    /// behind it both leave and arrive alike.
+    fn is_reverse(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Edge { out, back, .. }, Self::Edge { out: other_out, back: other_back, .. }) => {
+                out != back && (out, back) == (other_back, other_out)
+            }
+            _ => false,
+        }
+    }
+}
+
 impl Echo {
     /// Whether two echoes are one that touches a corner and was found on both sides of it.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
@@ -64,6 +77,7 @@ impl Echo {
             // By two edges, and by level edges, there may be several paths of one length and the same
             // directions; their mechanisms list each once.
             && !matches!(self.via, Via::Edges { .. } | Via::LevelEdge { .. })
+            && !self.via.is_reverse(&other.via)
     }
 }
 

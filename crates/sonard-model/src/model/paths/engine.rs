@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use super::{
     direction_index::{DirectionIndex, Entry},
-    echo::Echo,
-    found::Found,
+    found::{Found, Heard},
     pattern::{PatternEnvelope, TwoWayBound},
+    plan::Plan,
     prepare::Paths,
     settings::Settings,
     transducer::{DirectedPath, FLOOR_ABOVE, FaceEchoes, MultipleEcho},
@@ -60,6 +60,12 @@ impl PathEngine {
         self.paths.heights.images.is_empty() && self.paths.plan.settings.tilt_rad == 0.0
     }
 
+    /// The paths whose pulses have run up to a length, metres.
+    pub(super) fn within(&self, length_m: f64) -> Paths {
+        let Plan { settings, corners, .. } = &self.paths.plan;
+        self.paths.within(settings.max_path_m.min(length_m + corners.most_lead_m))
+    }
+
     /// The weakest sound that is told.
     pub(crate) fn floor(&self) -> f64 {
         self.paths.plan.settings.floor
@@ -99,7 +105,7 @@ impl Engine for PathEngine {
         ends: [DVec2; 2],
         max_path_m: f64,
     ) -> Result<Option<Box<dyn Arrivals + 'a>>, TooCostly> {
-        Ok(Some(Box::new(PathArrivals::new(self, self.paths.within(max_path_m), ends)?)))
+        Ok(Some(Box::new(PathArrivals::new(self, self.within(max_path_m), ends)?)))
     }
 }
 
@@ -161,7 +167,7 @@ impl<'a> PathArrivals<'a> {
         multiple: &MultipleEcho,
         amplitude: f64,
     ) -> Arrival {
-        let Found { paths, traced, echoes } = &self.found;
+        let Found { paths, traced, echoes, .. } = &self.found;
         let run_through = |directed: &DirectedPath| {
             let echo = &echoes[directed.echo as usize];
             let path = paths.path(traced, echo).path;
@@ -212,7 +218,7 @@ impl<'a> PathArrivals<'a> {
 
     /// The image of the face over a multiple echo.
     fn multiple_image(&self, multiple: &MultipleEcho) -> Image {
-        let Found { paths, traced, echoes } = &self.found;
+        let Found { paths, traced, echoes, .. } = &self.found;
         let met = multiple.paths.iter().map(|path| &echoes[path.echo as usize]);
         let passages = multiple.paths.len() - 1;
         met.map(|echo| match echo.via.kind() {
@@ -239,9 +245,9 @@ impl Arrivals for PathArrivals<'_> {
                     ends = [0, 1].map(|end| self.engine.off_axis(ends[end], rise_rad[end]));
                 }
                 let [leaving, arriving] = ends.map(|angle| beam.one_way(angle));
-                let amplitude = entry.amplitude * leaving * arriving;
+                let Heard { length_m, phase_rad, gain } = self.found.heard(entry.echo);
+                let amplitude = gain * entry.amplitude * leaving * arriving;
                 if self.engine.most(entry.amplitude, amplitude, &ends) >= floor {
-                    let Echo { length_m, phase_rad, .. } = echoes[entry.echo as usize];
                     arrivals.push(PulseArrival {
                         length_m,
                         amplitude,
@@ -251,10 +257,10 @@ impl Arrivals for PathArrivals<'_> {
                 }
             });
         }
-        // Echoes are numbered by length; multiple echoes come after all of them.
+        // Echoes are numbered by the lengths of their paths; multiple echoes come after all of them.
         arrivals.sort_unstable_by_key(|arrival| arrival.index);
         let multiple = self.multiple_echoes(direction_rad);
-        if !multiple.is_empty() {
+        if !multiple.is_empty() || self.found.is_reordered() {
             let numbers = echoes.len() as u32..;
             arrivals.extend(multiple.iter().zip(numbers).map(|(echo, index)| echo.arrival(index)));
             arrivals.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
@@ -263,8 +269,8 @@ impl Arrivals for PathArrivals<'_> {
 
     fn incident(&self, direction_rad: f64, arrival: &PulseArrival) -> Incident {
         let (echoes, index) = (&self.found.echoes, arrival.index as usize);
-        if let Some(echo) = echoes.get(index) {
-            return self.found.incident(echo, [direction_rad; 2]);
+        if index < echoes.len() {
+            return self.found.incident(arrival.index, [direction_rad; 2]);
         }
         let multiple = &self.multiple_echoes(wrap_pi(direction_rad))[index - echoes.len()];
         let (strength, ends_rad) = self.multiple_ends(direction_rad, multiple, arrival.amplitude);
@@ -275,13 +281,10 @@ impl Arrivals for PathArrivals<'_> {
 
     fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival {
         let (echoes, index) = (&self.found.echoes, arrival.index as usize);
-        match echoes.get(index) {
-            Some(echo) => self.found.arrival(echo, arrival.amplitude),
-            None => {
-                let multiple = self.multiple_echoes(wrap_pi(direction_rad));
-                let multiple = &multiple[index - echoes.len()];
-                self.multiple_arrival(direction_rad, multiple, arrival.amplitude)
-            }
+        if index < echoes.len() {
+            return self.found.arrival(arrival.index, arrival.amplitude);
         }
+        let multiple = &self.multiple_echoes(wrap_pi(direction_rad))[index - echoes.len()];
+        self.multiple_arrival(direction_rad, multiple, arrival.amplitude)
     }
 }

@@ -16,6 +16,16 @@ pub(super) struct Found {
     pub(super) paths: Paths,
     pub(super) traced: Traced,
     pub(super) echoes: Vec<Echo>,
+    /// Of each echo; empty where all are 0. See [`Self::heard`].
+    leads_m: Vec<f64>,
+}
+
+/// An echo as its pulse arrives.
+pub(super) struct Heard {
+    pub(super) length_m: f64,
+    pub(super) phase_rad: f64,
+    /// Its amplitude beside that of its path.
+    pub(super) gain: f64,
 }
 
 impl Found {
@@ -26,17 +36,43 @@ impl Found {
         bound: Option<&TwoWayBound>,
     ) -> Result<Self, TooCostly> {
         let (traced, echoes) = paths.trace(transmitter, receiver, bound)?;
-        Ok(Self { paths, traced, echoes })
+        let lead_m = |echo| single::lead_m(&paths.plan, &traced.out, traced.back(), echo);
+        let leads_m = match paths.plan.corners.most_lead_m > 0.0 {
+            true => echoes.iter().map(lead_m).collect(),
+            false => Vec::new(),
+        };
+        Ok(Self { paths, traced, echoes, leads_m })
+    }
+
+    /// An echo as its pulse arrives: that of a post by its surface, while the path is told to its axis and the carrier
+    /// stays what it is. It has spread less.
+    pub(super) fn heard(&self, index: u32) -> Heard {
+        let Echo { length_m, phase_rad, .. } = self.echoes[index as usize];
+        match self.leads_m.get(index as usize) {
+            None | Some(0.0) => Heard { length_m, phase_rad, gain: 1.0 },
+            Some(lead_m) => {
+                let heard_m = length_m - lead_m;
+                let lead_rad = self.paths.plan.settings.wave_number_per_m * lead_m;
+                let phase_rad = wrap_pi(phase_rad - lead_rad);
+                Heard { length_m: heard_m, phase_rad, gain: heard_m / length_m }
+            }
+        }
+    }
+
+    /// Whether pulses may arrive in another order than their paths' lengths have.
+    pub(super) fn is_reordered(&self) -> bool {
+        !self.leads_m.is_empty()
     }
 
     /// The full account of an echo that arrives with an amplitude.
-    pub(super) fn arrival(&self, echo: &Echo, amplitude: f64) -> Arrival {
-        let path = self.paths.path(&self.traced, echo);
+    pub(super) fn arrival(&self, index: u32, amplitude: f64) -> Arrival {
+        let path = self.paths.path(&self.traced, &self.echoes[index as usize]);
+        let Heard { length_m, phase_rad, gain } = self.heard(index);
         Arrival {
-            length_m: path.length_m,
+            length_m,
             amplitude,
-            path_amplitude: path.amplitude,
-            phase_rad: path.phase_rad,
+            path_amplitude: gain * path.amplitude,
+            phase_rad,
             departure_rad: path.departure_rad,
             arrival_rad: path.arrival_rad,
             path: path.path,
@@ -44,8 +80,9 @@ impl Found {
     }
 
     /// The incidence of an echo, for a transmitter and a receiver that point in world directions, radians.
-    pub(super) fn incident(&self, echo: &Echo, axes_rad: [f64; 2]) -> Incident {
+    pub(super) fn incident(&self, index: u32, axes_rad: [f64; 2]) -> Incident {
         let (paths, traced) = (&self.paths, &self.traced);
+        let echo = &self.echoes[index as usize];
         let image = match echo.via.kind() {
             PathKind::Specular => mirrored(paths.mirrors_met(traced, echo)),
             PathKind::Diffracted => {
@@ -58,9 +95,9 @@ impl Found {
             wrap_pi(echo.departure.to_angle() - axes_rad[0]),
             wrap_pi(echo.arrival.to_angle() - axes_rad[1]),
         ];
-        let length_m = echo.length_m;
+        let Heard { length_m, gain, .. } = self.heard(index);
         Incident {
-            strength: echo.amplitude,
+            strength: gain * echo.amplitude,
             incidence: Incidence { leaving_rad, arriving_rad, length_m, image },
         }
     }

@@ -198,8 +198,8 @@ impl Paths {
     }
 
     fn upright_bend(&self, point: u32) -> Option<(DVec2, Mechanism)> {
-        let bend = Bend::Upright(self.plan.corners.edge(point)?);
-        Some((self.plan.corners.position(point)?, Mechanism::Diffraction(bend)))
+        let corners = &self.plan.corners;
+        Some((corners.position(point)?, Mechanism::Diffraction(corners.bend(point)?)))
     }
 
     fn by_two_edges(&self, traced: &Traced, path: &DoubleDiffraction) -> Contacts {

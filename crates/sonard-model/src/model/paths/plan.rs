@@ -5,6 +5,7 @@ mod climbs;
 mod corners;
 mod cylinders;
 mod mesh;
+mod posts;
 mod strips;
 mod walls;
 
@@ -14,6 +15,7 @@ pub(crate) use climbs::{ALL_SLOPES, Climbs, Spans, WallClimbs, united};
 pub(crate) use corners::{ALONG_RAD, Corner, Corners, Facing, Flank};
 pub(crate) use cylinders::{Circle, Cylinders, Span, SurfaceArc};
 pub(crate) use mesh::{Mesh, Side};
+pub(crate) use posts::take_posts;
 pub(crate) use strips::take_strips;
 pub(crate) use walls::{WallMirror, mirror_gain, scattered};
 

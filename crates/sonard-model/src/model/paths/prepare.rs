@@ -7,7 +7,8 @@ use super::{
     effort::{BOUND, Bound, Effort},
     height::Heights,
     plan::{
-        Circle, Corners, Cylinders, Mesh, Plan, WallMirror, mirror_gain, scattered, take_strips,
+        Circle, Corners, Cylinders, Mesh, Plan, WallMirror, mirror_gain, scattered, take_posts,
+        take_strips,
     },
     settings::{Settings, usual_z_m},
 };
@@ -67,21 +68,23 @@ fn plan(scene: &Scene, drawn: &FloorPlan, heights: &Heights, settings: Settings)
     let segments: &[(DVec2, DVec2)] = &drawn.walls;
     let gains: Vec<_> = scene.walls.iter().map(|wall| mirror_gain(&wall.material)).collect();
     let climbs = heights.climbs(&settings);
-    // Other laws know no aspect, and mirrors alone no edges.
-    let strips = match settings.edge_law {
-        Some(EdgeLaw::Utd) => {
-            let lets_pass = |wall| climbs.of_wall(wall).is_some();
-            take_strips(&mut arrangement, &gains, lets_pass, settings.wave_number_per_m)
-        }
-        _ => Vec::new(),
+    let circle = |c: &Cylinder| Circle {
+        center: c.center,
+        radius_m: if heights.is_there(c.z_m) { c.radius_m } else { 0.0 },
+        gain: mirror_gain(&c.material),
+        is_opaque: heights.is_opaque(c.z_m),
     };
-    let there = |cylinder: &&Cylinder| heights.is_there(cylinder.z_m);
-    let extra: Vec<_> = scene
-        .cylinders
-        .iter()
-        .filter(there)
-        .flat_map(|c| [c.center - c.radius_m, c.center + c.radius_m])
-        .collect();
+    let mut circles: Vec<Circle> = scene.cylinders.iter().map(circle).collect();
+    // Other laws know no aspect, and mirrors alone no edges.
+    let (mut strips, mut posts) = (Vec::new(), Vec::new());
+    if settings.edge_law == Some(EdgeLaw::Utd) {
+        let (lets_pass, k) = (|wall| climbs.of_wall(wall).is_some(), settings.wave_number_per_m);
+        strips = take_strips(&mut arrangement, &gains, lets_pass, k);
+        posts = take_posts(&mut arrangement, &mut circles, k);
+    }
+    let round = circles.iter().filter(|circle| circle.radius_m > 0.0);
+    let extra: Vec<_> =
+        round.flat_map(|c| [c.center - c.radius_m, c.center + c.radius_m]).collect();
     // From outside the box no echo is short enough.
     let margin_m = 0.5 * settings.max_path_m + 1.0;
     let mesh = Mesh::new(&arrangement, heights.stacked(&arrangement), &extra, margin_m);
@@ -97,15 +100,9 @@ fn plan(scene: &Scene, drawn: &FloorPlan, heights: &Heights, settings: Settings)
             z_m: scene.walls[number].z_m,
         }
     };
-    let circle = |c: &Cylinder| Circle {
-        center: c.center,
-        radius_m: if heights.is_there(c.z_m) { c.radius_m } else { 0.0 },
-        gain: mirror_gain(&c.material),
-        is_opaque: heights.is_opaque(c.z_m),
-    };
-    let circles = scene.cylinders.iter().map(circle).collect();
-    let corners =
-        settings.edge_law.map(|law| Corners::new(&arrangement, segments, &gains, law, strips));
+    let corners = settings
+        .edge_law
+        .map(|law| Corners::new(&arrangement, segments, &gains, law, strips, posts));
     Plan {
         walls: (0..segments.len()).map(wall).collect(),
         climbs: climbs.into(),

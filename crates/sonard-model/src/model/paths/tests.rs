@@ -11,6 +11,7 @@ mod level_edges;
 mod low_walls;
 mod pairs;
 mod peers;
+mod posts;
 mod rough;
 mod stacked;
 mod strips;

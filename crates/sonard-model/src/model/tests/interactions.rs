@@ -80,7 +80,7 @@ impl Room {
                 mirrored(out.normalize().extend(0.0))
             }
             Mechanism::Reflection(Reflector::Floor | Reflector::Ceiling) => mirrored(DVec3::Z),
-            Mechanism::Diffraction(Bend::Upright(_)) => diffracted(DVec3::Z),
+            Mechanism::Diffraction(Bend::Upright(_) | Bend::Post { .. }) => diffracted(DVec3::Z),
             Mechanism::Diffraction(Bend::Level { wall, .. }) => {
                 diffracted(self.mirror(wall).normal.perp().extend(0.0))
             }
@@ -106,6 +106,9 @@ impl Room {
         match mechanism {
             Mechanism::Reflection(Reflector::Wall(wall)) | Mechanism::Scattering { wall } => {
                 off_wall_m(wall)
+            }
+            Mechanism::Diffraction(Bend::Post { cylinder }) => {
+                point.distance(self.scene.cylinders[cylinder as usize].center)
             }
             Mechanism::Reflection(Reflector::Cylinder(index)) => {
                 let cylinder = &self.scene.cylinders[index as usize];

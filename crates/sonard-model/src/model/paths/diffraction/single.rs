@@ -37,11 +37,11 @@ pub(crate) fn echoes(plan: &Plan, law: EdgeLaw, out: &Rays, back: Option<&Rays>)
 }
 
 /// The aspect of the edge of an echo with one diffraction, from where the echo begins and ends; `None` of
-/// other echoes, by way of a cylinder or a narrow strip, and by laws that know no aspect.
+/// other echoes, by way of a cylinder, of a narrow strip or a post, and by laws that know no aspect.
 pub(crate) fn view(plan: &Plan, out: &Rays, back: &Rays, echo: &Echo) -> Option<EdgeView> {
     let Via::Edge { point, out: there, back: here } = echo.via else { return None };
     let is_utd = plan.settings.edge_law == Some(EdgeLaw::Utd);
-    let is_edge = |corner: &&Corner| is_utd && !corner.is_strip();
+    let is_edge = |corner: &&Corner| is_utd && !corner.is_whole();
     let corner = plan.corners.corner(point).filter(is_edge)?;
     let rays = [out.to_edge_by_walls(there)?, back.to_edge_by_walls(here)?];
     let [out, back] = rays.map(|ray| EdgeRay::by_walls(corner, ray, 0));
@@ -53,6 +53,19 @@ pub(crate) fn view(plan: &Plan, out: &Rays, back: &Rays, echo: &Echo) -> Option<
         legs_m: [out.length_m, back.length_m],
         swapped: rays.map(|ray| ray.order % 2 == 1),
     })
+}
+
+/// By how much the pulse of an echo comes earlier than along its path, metres: by the surface of a post, to whose axis
+/// paths are told. 0 of other echoes, and by way of cylinders.
+pub(crate) fn lead_m(plan: &Plan, out: &Rays, back: &Rays, echo: &Echo) -> f64 {
+    let Via::Edge { point, out: there, back: here } = echo.via else { return 0.0 };
+    let lead = || {
+        let corner = plan.corners.corner(point).filter(|corner| corner.is_whole())?;
+        let rays = [out.to_edge_by_walls(there)?, back.to_edge_by_walls(here)?];
+        let [out, back] = rays.map(|ray| EdgeRay::by_walls(corner, ray, 0));
+        Some(echo.rise_rad[0].cos() * corner.lead_m(&aspect(&out?, &back?)))
+    };
+    lead().unwrap_or(0.0)
 }
 
 /// Pairs of rays at one edge.
@@ -136,8 +149,8 @@ impl Search<'_> {
         let length_m = out.length_m + back.length_m;
         let strength = out.ray.gain * back.ray.gain * settings.air_gain(length_m);
         let floor = floor(settings, out, back, length_m);
-        // No law gives more than a wall's echo and the images that its edge replaces.
-        if 2.0 * strength < floor {
+        // No law gives more than a wall's echo and the images that its edge replaces; right before it a post may.
+        if !corner.is_whole() && 2.0 * strength < floor {
             return None;
         }
         let aspect = aspect(out, back);

@@ -1,15 +1,15 @@
-//! Upright edges: the wedges of air at the ends of walls, by point of the plan.
+//! Upright edges by point of the plan: the wedges of air at the ends of walls, and what diffracts as a whole.
 
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 use smallvec::SmallVec;
 
-use super::strips::PlanStrip;
+use super::{posts::PlanPost, strips::PlanStrip};
 use crate::{
-    acoustics::edge::{Aspect, EdgeLaw, Strip, Wedge},
+    acoustics::edge::{Aspect, EdgeLaw, Post, Strip, Wedge},
     geometry::{Arrangement, DVec2},
-    model::{Edge, paths::tolerance::TIE_M},
+    model::{Bend, Edge, paths::tolerance::TIE_M},
 };
 
 /// Rays along a wall's face belong to the wall's near end, radians.
@@ -23,17 +23,26 @@ pub(crate) const ALONG_RAD: f64 = 1e-6;
 #[derive(Debug, Default)]
 pub(crate) struct Corners {
     points: Vec<Option<Corner>>,
+    /// The most of [`Corner::lead_m`], metres.
+    pub(crate) most_lead_m: f64,
 }
 
 /// A point where at least one wall ends and at which sound is diffracted.
 #[derive(Debug)]
 pub(crate) struct Corner {
     point: DVec2,
-    edge: Edge,
+    bend: Bend,
     /// Counter-clockwise around the point.
     sectors: SmallVec<[Sector; 2]>,
-    /// The narrow strip whose middle this is.
-    strip: Option<Box<Strip>>,
+    /// What scatters as a whole and has its middle here, in place of an edge.
+    whole: Option<Box<Whole>>,
+}
+
+/// What is so narrow that it scatters as a whole.
+#[derive(Debug)]
+enum Whole {
+    Strip(Strip),
+    Post(Post),
 }
 
 /// The air between two walls at a point.
@@ -78,6 +87,7 @@ impl Corners {
         gains: &[f64],
         law: EdgeLaw,
         strips: Vec<PlanStrip>,
+        posts: Vec<PlanPost>,
     ) -> Self {
         let mut around: Vec<SmallVec<[(f64, u32); 4]>> = vec![SmallVec::new(); plan.points.len()];
         for piece in &plan.pieces {
@@ -97,14 +107,20 @@ impl Corners {
             let edge = ending.or_else(crossing)?;
             let sectors = sectors(&faces, gains, law);
             let answers = sectors.iter().any(|sector| sector.answers);
-            answers.then_some(Corner { point, edge, sectors, strip: None })
+            answers.then_some(Corner { point, bend: Bend::Upright(edge), sectors, whole: None })
         };
         let mut points: Vec<_> = (0..).zip(around).map(corner).collect();
         for strip in strips {
             let at = strip.point as usize;
             points[at] = Some(Corner::of_strip(plan.points[at], strip));
         }
-        Self { points }
+        let leads_m = posts.iter().map(|post| 2.0 * post.post.radius_m());
+        let most_lead_m = leads_m.fold(0.0, f64::max);
+        for post in posts {
+            let at = post.point as usize;
+            points[at] = Some(Corner::of_post(plan.points[at], post));
+        }
+        Self { points, most_lead_m }
     }
 
     /// Whether sound that comes to a point along `run` finds an edge there.
@@ -113,9 +129,9 @@ impl Corners {
         corner.is_some_and(|corner| corner.sectors.iter().any(|sector| sector.sees(-run)))
     }
 
-    /// The end of a wall that names the edge at a point.
-    pub(crate) fn edge(&self, point: u32) -> Option<Edge> {
-        Some(self.points.get(point as usize)?.as_ref()?.edge)
+    /// What diffracts at a point.
+    pub(crate) fn bend(&self, point: u32) -> Option<Bend> {
+        Some(self.points.get(point as usize)?.as_ref()?.bend)
     }
 
     /// The edge at a point, if there is one.
@@ -156,40 +172,64 @@ impl Corner {
         let sector = self.sectors.iter().rposition(|s| s.from_rad <= direction_rad).unwrap_or(last);
         let from_rad = (direction_rad - self.sectors[sector].from_rad).rem_euclid(TAU);
         let opening_rad = self.sectors[sector].wedge.opening_rad;
-        let in_air = from_rad > GRAZING_RAD && from_rad < opening_rad - GRAZING_RAD;
+        let in_air =
+            self.is_round() || from_rad > GRAZING_RAD && from_rad < opening_rad - GRAZING_RAD;
         (in_air && self.sectors[sector].answers).then_some((sector, from_rad))
     }
 
     /// A strip's middle: air all around it.
     fn of_strip(point: DVec2, PlanStrip { wall, along, strip, .. }: PlanStrip) -> Self {
+        let bend = Bend::Upright(Edge { wall, at_b: false });
+        Self::of_whole(point, along.normalize(), bend, Whole::Strip(strip))
+    }
+
+    fn of_post(point: DVec2, PlanPost { cylinder, post, .. }: PlanPost) -> Self {
+        Self::of_whole(point, DVec2::X, Bend::Post { cylinder }, Whole::Post(post))
+    }
+
+    fn of_whole(point: DVec2, along: DVec2, bend: Bend, whole: Whole) -> Self {
         let sector = Sector {
             from_rad: along.to_angle(),
-            faces: [along.normalize(); 2],
+            faces: [along; 2],
             wedge: Wedge { opening_rad: TAU, reflectance: [1.0; 2] },
             answers: true,
         };
         let sectors = SmallVec::from_buf_and_len([sector; 2], 1);
-        let edge = Edge { wall, at_b: false };
-        Self { point, edge, sectors, strip: Some(Box::new(strip)) }
+        Self { point, bend, sectors, whole: Some(Box::new(whole)) }
     }
 
-    /// Whether it is the middle of a narrow strip and no edge.
-    pub(crate) fn is_strip(&self) -> bool {
-        self.strip.is_some()
+    /// Whether something scatters as a whole and no edge does.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.whole.is_some()
+    }
+
+    /// Whether no direction from it runs along a wall.
+    fn is_round(&self) -> bool {
+        matches!(self.whole.as_deref(), Some(Whole::Post(_)))
     }
 
     /// Field of what is here relative to that of a head-on rigid wall: see [`EdgeLaw::echo`].
     pub(crate) fn echo(&self, law: EdgeLaw, sector: usize, aspect: &Aspect, k: f64) -> Complex64 {
-        match &self.strip {
-            Some(strip) => strip.echo(aspect),
+        match self.whole.as_deref() {
+            Some(Whole::Strip(strip)) => strip.echo(aspect),
+            Some(Whole::Post(post)) => post.echo(aspect),
             None => law.echo(&self.sectors[sector].wedge, aspect, k),
+        }
+    }
+
+    /// By how much a pulse comes earlier than by the point here, metres.
+    pub(crate) fn lead_m(&self, aspect: &Aspect) -> f64 {
+        match self.whole.as_deref() {
+            Some(Whole::Post(post)) => post.lead_m(aspect),
+            Some(Whole::Strip(_)) | None => 0.0,
         }
     }
 
     /// An upper bound of its magnitude.
     pub(crate) fn bound(&self, law: EdgeLaw, sector: usize, aspect: &Aspect, k: f64) -> f64 {
-        match &self.strip {
-            Some(strip) => strip.echo(aspect).norm(),
+        match self.whole.as_deref() {
+            Some(Whole::Strip(strip)) => strip.echo(aspect).norm(),
+            Some(Whole::Post(post)) => post.bound(aspect.distance_m),
             None => law.bound(&self.sectors[sector].wedge, aspect, k),
         }
     }
@@ -214,6 +254,10 @@ impl Corner {
             };
             let [first, second] = reflectance.map(Some);
             let mut found: SmallVec<[Facing; 2]> = SmallVec::new();
+            if self.is_round() {
+                found.push(at(from_rad, Flank::Open, None));
+                return found;
+            }
             if from_rad < ALONG_RAD {
                 found.push(at(0.0, Flank::Left, first));
             } else if from_rad < opening_rad - ALONG_RAD {

@@ -1,0 +1,59 @@
+//! Thin cylinders of the floor plan, which sound goes round: they scatter as a whole from their axes.
+
+use super::Circle;
+use crate::{
+    acoustics::edge::Post,
+    geometry::{Arrangement, DVec2},
+};
+
+/// A cylinder is a post if its surface is this many of its radii, or more, from every wall and every other cylinder:
+/// sound that runs to and fro between them is left out.
+const GAP_RADII: f64 = 4.0;
+
+/// A thin cylinder in the plan.
+#[derive(Debug)]
+pub(crate) struct PlanPost {
+    /// The point of its axis.
+    pub(crate) point: u32,
+    pub(crate) cylinder: u32,
+    pub(crate) post: Post,
+}
+
+/// Takes thin cylinders out of those that have a surface, which leaves them without size, and gives the plan a point
+/// at the axis of each.
+pub(crate) fn take_posts(
+    plan: &mut Arrangement,
+    circles: &mut [Circle],
+    wave_number_per_m: f64,
+) -> Vec<PlanPost> {
+    let ends = |end: u32| plan.points[end as usize];
+    let walls: Vec<[DVec2; 2]> = plan.pieces.iter().map(|piece| piece.ends.map(ends)).collect();
+    let thin = circles.iter().zip(0..).filter_map(|(circle, cylinder)| {
+        let post = Post::new(circle.radius_m, circle.gain, wave_number_per_m)?;
+        stands_free(circle, cylinder, circles, &walls).then_some((cylinder, post))
+    });
+    let thin: Vec<(u32, Post)> = thin.collect();
+    let add = |(cylinder, post): (u32, Post)| {
+        let circle = &mut circles[cylinder as usize];
+        circle.radius_m = 0.0;
+        plan.points.push(circle.center);
+        PlanPost { point: plan.points.len() as u32 - 1, cylinder, post }
+    };
+    thin.into_iter().map(add).collect()
+}
+
+fn stands_free(circle: &Circle, number: u32, circles: &[Circle], walls: &[[DVec2; 2]]) -> bool {
+    let gap_m = GAP_RADII * circle.radius_m;
+    let far_from_circles = circles.iter().zip(0..).all(|(other, index)| {
+        let apart_m = circle.center.distance(other.center);
+        index == number
+            || other.radius_m == 0.0
+            || apart_m - other.radius_m - circle.radius_m >= gap_m
+    });
+    let is_far = |&[a, b]: &[DVec2; 2]| {
+        let along = b - a;
+        let share = ((circle.center - a).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+        (a + share * along).distance(circle.center) - circle.radius_m >= gap_m
+    };
+    far_from_circles && walls.iter().all(is_far)
+}
