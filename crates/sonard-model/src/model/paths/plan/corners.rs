@@ -35,13 +35,13 @@ pub(crate) struct Corner {
     /// Counter-clockwise around the point.
     sectors: SmallVec<[Sector; 2]>,
     /// What scatters as a whole and has its middle here, in place of an edge.
-    whole: Option<Box<Whole>>,
+    whole: Option<Whole>,
 }
 
 /// What is so narrow that it scatters as a whole.
 #[derive(Debug)]
 enum Whole {
-    Strip(Strip),
+    Strip(Box<Strip>),
     Post(Post),
 }
 
@@ -180,7 +180,7 @@ impl Corner {
     /// A strip's middle: air all around it.
     fn of_strip(point: DVec2, PlanStrip { wall, along, strip, .. }: PlanStrip) -> Self {
         let bend = Bend::Upright(Edge { wall, at_b: false });
-        Self::of_whole(point, along.normalize(), bend, Whole::Strip(strip))
+        Self::of_whole(point, along.normalize(), bend, Whole::Strip(Box::new(strip)))
     }
 
     fn of_post(point: DVec2, PlanPost { cylinder, post, .. }: PlanPost) -> Self {
@@ -195,7 +195,7 @@ impl Corner {
             answers: true,
         };
         let sectors = SmallVec::from_buf_and_len([sector; 2], 1);
-        Self { point, bend, sectors, whole: Some(Box::new(whole)) }
+        Self { point, bend, sectors, whole: Some(whole) }
     }
 
     /// Whether something scatters as a whole and no edge does.
@@ -205,12 +205,12 @@ impl Corner {
 
     /// Whether no direction from it runs along a wall.
     fn is_round(&self) -> bool {
-        matches!(self.whole.as_deref(), Some(Whole::Post(_)))
+        matches!(self.whole, Some(Whole::Post(_)))
     }
 
     /// Field of what is here relative to that of a head-on rigid wall: see [`EdgeLaw::echo`].
     pub(crate) fn echo(&self, law: EdgeLaw, sector: usize, aspect: &Aspect, k: f64) -> Complex64 {
-        match self.whole.as_deref() {
+        match &self.whole {
             Some(Whole::Strip(strip)) => strip.echo(aspect),
             Some(Whole::Post(post)) => post.echo(aspect),
             None => law.echo(&self.sectors[sector].wedge, aspect, k),
@@ -219,7 +219,7 @@ impl Corner {
 
     /// By how much a pulse comes earlier than by the point here, metres.
     pub(crate) fn lead_m(&self, aspect: &Aspect) -> f64 {
-        match self.whole.as_deref() {
+        match &self.whole {
             Some(Whole::Post(post)) => post.lead_m(aspect),
             Some(Whole::Strip(_)) | None => 0.0,
         }
@@ -227,7 +227,7 @@ impl Corner {
 
     /// An upper bound of its magnitude.
     pub(crate) fn bound(&self, law: EdgeLaw, sector: usize, aspect: &Aspect, k: f64) -> f64 {
-        match self.whole.as_deref() {
+        match &self.whole {
             Some(Whole::Strip(strip)) => strip.echo(aspect).norm(),
             Some(Whole::Post(post)) => post.bound(aspect.distance_m),
             None => law.bound(&self.sectors[sector].wedge, aspect, k),
