@@ -266,14 +266,18 @@ impl Shared {
         if air.stale {
             reasons.push("the air temperature is stale".into());
         }
+        let (fit, reading_lateness_s) = {
+            let scans = self.scans();
+            (scans.latest_fit.clone(), scans.lateness_s)
+        };
         Health {
             healthy: reasons.is_empty(),
             reasons,
             line: view.line.totals(),
             scans: view.scans,
             clock: view.clock,
-            fit: self.scans().latest_fit.clone(),
-            reading_lateness_s: self.scans().lateness_s,
+            fit,
+            reading_lateness_s,
         }
     }
 
