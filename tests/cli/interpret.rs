@@ -71,7 +71,7 @@ fn wrong_input_is_refused_with_what_would_be_right() {
     for (arguments, words) in [
         (&["interpret", "nowhere.jsonl"][..], "nowhere.jsonl"),
         (&["interpret", log][..], "sonard scan"),
-        (&["interpret", log, "-o", "a.gif"][..], ".svg or .png"),
+        (&["interpret", log, "-o", "a.gif"][..], ".svg, .png, .geojson or .mcap"),
         (&["interpret", log, "--sigma-e", "0"][..], "greater than 0"),
         (&["interpret", log, "--min-confidence", "2"][..], "from 0 to 1"),
     ] {

@@ -347,7 +347,7 @@ def check_table(path, log_path):
 SINGLE = {"range_m", "tof_us", "amplitude", "margin_db", "path_length_m"}
 SINGLE |= {f"sim_{name}" for name in SINGLE - {"tof_us"}} | {"residual_m", "confidence"}
 TEXT = {"log", "provenance", "scene", "sensor", "array", "scan", "ranger", "status", "path_kind", "path",
-        "sim_status", "sim_path_kind", "sim_path"}
+        "crosstalk_ranger", "sim_status", "sim_path_kind", "sim_path", "sim_crosstalk_ranger"}
 TIME = {"session_started", "scan_started", "time"}
 WHOLE = {"session", "collection_pose", "collection_repeat", "index", "step", "fired_ticks", "path_order", "sim_path_order"}
 
@@ -377,8 +377,12 @@ def cells_of_log(log, scan, ping):
     pose = ping.get("pose") or start["pose"]
     air = start.get("air") or session["air"]
     cells = {name: None for name in TEXT | SINGLE | TIME | WHOLE}
-    cells |= {name: ping.get(name) for name in ping if name not in ("type", "sim", "path", "pose")}
-    cells |= {f"sim_{name}": value for name, value in sim.items() if name != "path"}
+    nested = ("type", "sim", "path", "pose", "crosstalk")
+    cells |= {name: ping.get(name) for name in ping if name not in nested}
+    cells |= {f"sim_{name}": value for name, value in sim.items() if name not in nested}
+    for prefix, of in [("", ping), ("sim_", sim)]:
+        for name in ("ranger", "before_us"):
+            cells[f"{prefix}crosstalk_{name}"] = (of.get("crosstalk") or {}).get(name)
     for prefix, path in [("", ping.get("path")), ("sim_", sim.get("path"))]:
         if path:
             cells |= {f"{prefix}path_{name}": path[name] for name in ("kind", "order")}

@@ -9,7 +9,7 @@ use jiff::Timestamp;
 use serde::Serialize;
 
 use sonard_model::{geometry::Pose, viewpoint::Viewpoint};
-use sonard_records::{PathRecord, Ping, ScanView, Session, SimRecord};
+use sonard_records::{CrosstalkRecord, PathRecord, Ping, ScanView, Session, SimRecord};
 
 /// A reading with what holds for its scan.
 #[derive(Debug, Clone, Copy)]
@@ -170,6 +170,10 @@ fn words(path: &PathRecord) -> Value<'_> {
     Value::Text(path.in_words().into())
 }
 
+fn sender(crosstalk: &CrosstalkRecord) -> Value<'_> {
+    Value::Text((&*crosstalk.ranger).into())
+}
+
 /// The columns, in their order.
 pub const COLUMNS: &[Column] = &[
     text("log", |row| Some(Value::Text(row.log.into()))),
@@ -227,6 +231,10 @@ pub const COLUMNS: &[Column] = &[
     integer("path_order", |row| Some(Value::Integer(row.ping.path.as_ref()?.order.into()))),
     single("path_length_m", |row| Some(Value::Number(row.ping.path.as_ref()?.length_m))),
     text("path", |row| row.ping.path.as_ref().map(words)),
+    text("crosstalk_ranger", |row| Some(sender(row.ping.crosstalk.as_ref()?))),
+    number("crosstalk_before_us", |row| {
+        Some(Value::Number(row.ping.crosstalk.as_ref()?.before_us))
+    }),
     text("sim_status", |row| word(row.sim()?.status)),
     single("sim_range_m", |row| row.sim()?.range_m.map(Value::Number)),
     single("sim_amplitude", |row| row.sim()?.amplitude.map(Value::Number)),
@@ -235,6 +243,10 @@ pub const COLUMNS: &[Column] = &[
     integer("sim_path_order", |row| Some(Value::Integer(row.sim_path()?.order.into()))),
     single("sim_path_length_m", |row| Some(Value::Number(row.sim_path()?.length_m))),
     text("sim_path", |row| row.sim_path().map(words)),
+    text("sim_crosstalk_ranger", |row| Some(sender(row.sim()?.crosstalk.as_ref()?))),
+    number("sim_crosstalk_before_us", |row| {
+        Some(Value::Number(row.sim()?.crosstalk.as_ref()?.before_us))
+    }),
     single("residual_m", |row| row.ping.residual_m.map(Value::Number)),
     single("confidence", |row| row.ping.confidence.map(Value::Number)),
 ];
