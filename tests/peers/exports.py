@@ -502,10 +502,14 @@ def check_found(folder, name, marker_type):
     path = folder / f"{name}.geojson"
     text = json.loads(path.read_text(encoding="utf-8"))
     assert text["sonard"]["units"] == "metres"
-    by_shapely = shapely.from_geojson(path.read_text(encoding="utf-8"))
+    # What has no place has no geometry (RFC 7946, 3.2); in a collection GEOS, alone of all, stumbles over that.
+    by_shapely = [
+        shapely.from_geojson(json.dumps(one["geometry"])) if one["geometry"] else shapely.Point()
+        for one in text["features"]
+    ]
     _, _, by_gdal, _ = pyogrio.raw.read(path)
     drawn = {}
-    for record, read, one, other in zip(records, text["features"], by_shapely.geoms, by_gdal, strict=True):
+    for record, read, one, other in zip(records, text["features"], by_shapely, by_gdal, strict=True):
         if name == "lines":
             expected = [record["from_m"], record["to_m"]]
         else:

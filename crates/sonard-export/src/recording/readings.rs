@@ -240,7 +240,7 @@ fn path_of(scan: &ScanView, ping: &Ping, kind: PathKind) -> Option<Vec<[f64; 3]>
         Point::Plan([x, y]) => [x, y, z_m],
         Point::Space(at) => at,
     };
-    let [transmitter, receiver] = from.ends().map(|end| [end.x, end.y, z_m]);
+    let [transmitter, receiver] = scan.ends(ping, path)?.map(|end| [end.x, end.y, z_m]);
     let met = path.interactions.iter().map(|met| met.point.map(corner));
     [Some(transmitter)].into_iter().chain(met).chain([Some(receiver)]).collect()
 }
