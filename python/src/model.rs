@@ -127,6 +127,8 @@ impl Model {
             double_diffraction,
             ray_spacing_deg,
             aperture_deg,
+            // A ranger alone has none.
+            without_crosstalk: false,
         };
         let options = keys
             .options()
