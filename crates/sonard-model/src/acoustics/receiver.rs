@@ -77,6 +77,9 @@ pub enum Combining {
     /// As pulses that rise and fall and, where they overlap, add up with their phases.
     #[default]
     Coherent,
+    /// As pulses whose phases nobody knows: where they overlap, their powers add up. So it is on average over places
+    /// that differ by a wavelength.
+    Incoherent,
     /// One at a time, each as strong at once as it will ever be, for as long as the pulse
     /// nominally lasts: the limit of a wide band, for models that know no phases. The range is half
     /// the path, exactly.
@@ -181,7 +184,7 @@ impl Receiver {
     /// Whether it needs an [`Incident`] for each arrival.
     #[must_use]
     pub const fn asks_incidents(&self) -> bool {
-        self.response.is_some() && matches!(self.combining, Combining::Coherent)
+        self.response.is_some() && !matches!(self.combining, Combining::Ideal)
     }
 
     /// Listens to the arrivals of one firing, which come in order of their length, and is made ready
@@ -193,7 +196,7 @@ impl Receiver {
     #[must_use]
     pub fn detect(&self, arrivals: &[PulseArrival]) -> Detection {
         let mut hearing = Hearing::new(self, arrivals, &|_| None);
-        self.told(self.detection(&mut hearing, Latch::Rearmed))
+        self.told(self.detection(&mut hearing, Latch::Rearmed, 0.0))
     }
 
     /// The same with the face's full response, if the sensor asks for it: `incident` tells how a
@@ -205,11 +208,11 @@ impl Receiver {
         incident: &dyn Fn(&PulseArrival) -> Option<Incident>,
         latch: Latch,
     ) -> Detection {
-        self.detect_within(f64::INFINITY, arrivals, incident, latch).0
+        self.detect_within(f64::INFINITY, arrivals, incident, latch, 0.0).0
     }
 
-    /// The same if only the arrivals up to a length there and back are known, in metres. If longer
-    /// ones can't change it, also the length, at most that one, beyond which they couldn't.
+    /// The same if only the arrivals up to a length there and back are known, in metres, and ECHO can't rise before
+    /// `ready_us`. If longer ones can't change it, also the length, at most that one, beyond which they couldn't.
     #[must_use]
     pub fn detect_within(
         &self,
@@ -217,10 +220,11 @@ impl Receiver {
         arrivals: &[PulseArrival],
         incident: &dyn Fn(&PulseArrival) -> Option<Incident>,
         latch: Latch,
+        ready_us: f64,
     ) -> (Detection, Option<f64>) {
         let mut hearing = Hearing::new(self, arrivals, incident);
         hearing.hear_within(length_m);
-        let detection = self.detection(&mut hearing, latch);
+        let detection = self.detection(&mut hearing, latch, ready_us);
         let needed_m = (!hearing.asked_beyond()).then(|| hearing.needed_m());
         (self.told(detection), needed_m)
     }
@@ -238,6 +242,7 @@ impl Receiver {
         let mut detection = self.detection(
             &mut Hearing::new(self, arrivals, incident).in_noise(&track),
             Latch::Rearmed,
+            0.0,
         );
         for (i, echo_us) in detection.echoes_us.iter_mut().enumerate() {
             let jitter_us = noise.jitter(rng);
@@ -276,9 +281,11 @@ impl Receiver {
         gain_db(&self.gain, t_us, self.range_m(t_us))
     }
 
-    fn detection(&self, hearing: &mut Hearing, latch: Latch) -> Detection {
+    fn detection(&self, hearing: &mut Hearing, latch: Latch, ready_us: f64) -> Detection {
         let mut echoes_us = SmallVec::new();
-        let Some(first_us) = hearing.next_rise(self.blanking_us) else {
+        // What has been above before, for less than it takes to rise, counts.
+        let from_us = (ready_us - 2.0 * self.integration_us).max(self.blanking_us);
+        let Some(first_us) = hearing.next_rise(from_us) else {
             return self.silence(hearing);
         };
         let already_there = first_us <= self.blanking_us + 1e-6;

@@ -1,5 +1,7 @@
 //! An observation point, from which firings are predicted.
 
+use std::cell::Cell;
+
 use rand::Rng;
 
 use super::{
@@ -43,17 +45,18 @@ impl<'a> ObservationPoint<'a> {
         self.listen(self.simulator.receiver(), direction_rad, Latch::First)
     }
 
-    /// The same as another receiver takes it: the simulator's own with another threshold, for what a firing is
-    /// that was a little more or less sensitive than usual.
+    /// Has a firing listened to by any receivers: the simulator's own with other thresholds, for what a firing is that
+    /// was more or less sensitive than usual. Its arrivals are found once; `listen` may be called again with more of
+    /// them, and its last result counts.
     ///
     /// # Errors
     /// As [`Self::ping`].
-    pub fn ping_with(
+    pub fn hear<T>(
         &self,
-        receiver: &Receiver,
         direction_rad: f64,
-    ) -> Result<Prediction, TooCostly> {
-        self.listen(receiver, direction_rad, Latch::First)
+        listen: impl FnMut(&Ear) -> T,
+    ) -> Result<T, TooCostly> {
+        self.heard(direction_rad, listen).map(|(heard, _)| heard)
     }
 
     /// The same with the receiver made ready again after each echo, up to eight times.
@@ -80,19 +83,31 @@ impl<'a> ObservationPoint<'a> {
         direction_rad: f64,
         latch: Latch,
     ) -> Result<(Prediction, f64), TooCostly> {
+        self.heard(direction_rad, |ear| ear.prediction(ear.detect(receiver, latch, 0.0)))
+    }
+
+    /// What `listen` tells once it has enough of the arrivals, and up to which length there and back they matter,
+    /// metres.
+    fn heard<T>(
+        &self,
+        direction_rad: f64,
+        mut listen: impl FnMut(&Ear) -> T,
+    ) -> Result<(T, f64), TooCostly> {
         let mut arrivals = Vec::with_capacity(USUAL_ARRIVALS);
         self.at(direction_rad, |all| {
-            let ((detection, needed_m), near) = all.nearest(|near, reach_m| {
+            let ((heard, needed_m), _) = all.nearest(|near, reach_m| {
                 near.listen(direction_rad, &mut arrivals);
-                let firing = Firing { from: near, direction_rad };
-                let incident = |arrival: &PulseArrival| Some(firing.incident(arrival));
-                let incident: &dyn Fn(&PulseArrival) -> Option<Incident> =
-                    if receiver.asks_incidents() { &incident } else { &|_| None };
-                let (detection, needed_m) =
-                    receiver.detect_within(reach_m, &arrivals, incident, latch);
-                ((detection, needed_m.unwrap_or(f64::INFINITY)), needed_m)
+                let ear = Ear {
+                    firing: Firing { from: near, direction_rad },
+                    arrivals: &arrivals,
+                    reach_m,
+                    needed_m: Cell::new(Some(0.0)),
+                };
+                let heard = listen(&ear);
+                let needed_m = ear.needed_m.get();
+                ((heard, needed_m.unwrap_or(f64::INFINITY)), needed_m)
             })?;
-            Ok((Firing { from: near, direction_rad }.prediction(detection), needed_m))
+            Ok((heard, needed_m))
         })
     }
 
@@ -126,7 +141,7 @@ impl<'a> ObservationPoint<'a> {
                 };
                 let known_m = reach_m.min(medley.known_m);
                 let (detection, needed_m) =
-                    receiver.detect_within(known_m, &sorted.arrivals, &incident, Latch::First);
+                    receiver.detect_within(known_m, &sorted.arrivals, &incident, Latch::First, 0.0);
                 ((detection, sorted, needed_m.unwrap_or(f64::INFINITY)), needed_m)
             })?;
             let firing = Firing { from: near, direction_rad };
@@ -244,6 +259,39 @@ impl<'a> ObservationPoint<'a> {
         }
         let mounting = &self.simulator.sensor().mounting;
         tell(&self.simulator.arrivals_between(mounting.places(self.position, direction_rad)))
+    }
+}
+
+/// A firing's arrivals, for receivers to listen to.
+pub struct Ear<'a> {
+    firing: Firing<'a>,
+    /// Shortest path first.
+    arrivals: &'a [PulseArrival],
+    /// Up to which length there and back they are known, metres.
+    reach_m: f64,
+    /// Up to which they matter to what was asked, if they are known so far.
+    needed_m: Cell<Option<f64>>,
+}
+
+impl Ear<'_> {
+    /// What a receiver detects that is ready from the end of blanking on, or from `ready_us` microseconds after firing
+    /// if that is later: for one that is known not to have been raised before, because a more sensitive one was not.
+    #[must_use]
+    pub fn detect(&self, receiver: &Receiver, latch: Latch, ready_us: f64) -> Detection {
+        let incident = |arrival: &PulseArrival| Some(self.firing.incident(arrival));
+        let incident: &dyn Fn(&PulseArrival) -> Option<Incident> =
+            if receiver.asks_incidents() { &incident } else { &|_| None };
+        let (detection, needed_m) =
+            receiver.detect_within(self.reach_m, self.arrivals, incident, latch, ready_us);
+        let both = self.needed_m.get().zip(needed_m);
+        self.needed_m.set(both.map(|(one_m, other_m)| one_m.max(other_m)));
+        detection
+    }
+
+    /// A detection as a reading, with the path of its arrival.
+    #[must_use]
+    pub fn prediction(&self, detection: Detection) -> Prediction {
+        self.firing.prediction(detection)
     }
 }
 

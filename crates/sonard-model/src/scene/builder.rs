@@ -19,6 +19,7 @@ use super::{Scene, SceneError};
 ///     .standing_from(0.0, 0.9)
 ///     .cylinder("leg", [2.5, 1.0], 0.02, "plaster")
 ///     .heights(0.0, 2.5)
+///     .floor_and_ceiling("plaster", "plaster")
 ///     .pose("door", 3.5, 0.4, 90.0)
 ///     .build()?;
 /// assert_eq!((room.walls.len(), room.cylinders.len()), (6, 1));
@@ -100,6 +101,14 @@ impl SceneBuilder {
     pub fn heights(mut self, floor_z_m: f64, ceiling_z_m: f64) -> Self {
         self.file.insert("floor_z_m".into(), json!(floor_z_m));
         self.file.insert("ceiling_z_m".into(), json!(ceiling_z_m));
+        self
+    }
+
+    /// What floor and ceiling are made of; without it both are rigid.
+    #[must_use]
+    pub fn floor_and_ceiling(mut self, floor_material: &str, ceiling_material: &str) -> Self {
+        self.file.insert("floor_material".into(), json!(floor_material));
+        self.file.insert("ceiling_material".into(), json!(ceiling_material));
         self
     }
 

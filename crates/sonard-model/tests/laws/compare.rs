@@ -1,5 +1,7 @@
 //! Listings of echoes, compared.
 
+use std::f64::consts::FRAC_PI_2;
+
 use sonard_model::{
     geometry::{DVec2, wrap_pi},
     model::{
@@ -14,10 +16,13 @@ pub(crate) struct Turned {
     /// Directions of the second listing are these, radians; `None`: they are not compared.
     pub(crate) direction: Option<fn(f64, f64) -> f64>,
     pub(crate) by_rad: f64,
+    /// Whether up is down in the second listing.
+    pub(crate) is_upside_down: bool,
 }
 
 /// Directions are as they are.
-pub(crate) const AS_IS: Turned = Turned { direction: Some(|direction, _| direction), by_rad: 0.0 };
+pub(crate) const AS_IS: Turned =
+    Turned { direction: Some(|direction, _| direction), by_rad: 0.0, is_upside_down: false };
 
 /// Whether two echoes are the same: length to 0.1 um, field to 1e-5, directions to a microradian.
 fn is_same(one: &EchoPath, other: &EchoPath, turned: Turned) -> bool {
@@ -25,10 +30,18 @@ fn is_same(one: &EchoPath, other: &EchoPath, turned: Turned) -> bool {
         let (sine, cosine) = echo.phase_rad.sin_cos();
         echo.amplitude * DVec2::new(cosine, sine)
     };
+    // Straight up and down there is no direction in the plan.
+    let is_upright = one.rise_rad.iter().all(|rise_rad| rise_rad.abs() > FRAC_PI_2 - 1e-6);
     let looks = |one: f64, other: f64| {
-        turned.direction.is_none_or(|to| wrap_pi(to(one, turned.by_rad) - other).abs() < 1e-6)
+        let is_along =
+            |to: fn(f64, f64) -> f64| wrap_pi(to(one, turned.by_rad) - other).abs() < 1e-6;
+        is_upright || turned.direction.is_none_or(is_along)
     };
+    let up = if turned.is_upside_down { -1.0 } else { 1.0 };
+    let climbs = |end: usize| (up * one.rise_rad[end] - other.rise_rad[end]).abs() < 1e-6;
     (one.length_m - other.length_m).abs() < 1e-7
+        && climbs(0)
+        && climbs(1)
         && field(one).distance(field(other)) < 1e-5 * one.amplitude
         && looks(one.departure_rad, other.departure_rad)
         && looks(one.arrival_rad, other.arrival_rad)

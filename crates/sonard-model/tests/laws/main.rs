@@ -5,6 +5,7 @@
 
 mod compare;
 mod energy;
+mod heights;
 mod listing;
 mod paths_are_real;
 mod rough;

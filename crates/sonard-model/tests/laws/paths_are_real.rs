@@ -98,14 +98,15 @@ fn paths_by_three_cylinders_run_clear_of_them() {
     let listed = Settings { floor: 1e-3, absorption_np_per_m: 0.0, max_path_m: 8.0, ..settings() };
     for case in 0..cases() {
         let mut random = generator("three", case);
-        let mut world = World { walls: Vec::new(), rounds: Vec::new(), ends: [DVec2::ZERO; 2] };
+        let mut world =
+            World { walls: Vec::new(), rounds: Vec::new(), ends: [DVec2::ZERO; 2], heights: None };
         while world.rounds.len() < 3 {
             let center = DVec2::new(random.random_range(-0.9..0.9), random.random_range(-0.9..0.9));
             let radius_m = random.random_range(0.03..0.2);
             let gap_m = |other: &Round| other.center.distance(center) - other.radius_m - radius_m;
             let is_free = center.length() > radius_m + 0.03;
             if is_free && world.rounds.iter().all(|other| gap_m(other) > 0.02) {
-                world.rounds.push(Round { center, radius_m, reflectance: 1.0 });
+                world.rounds.push(Round { center, radius_m, reflectance: 1.0, z_m: None });
             }
         }
         for echo in world.echoes(&listed) {

@@ -10,7 +10,9 @@ use crate::{
 
 #[test]
 fn moving_the_world_changes_nothing() {
-    for (kind, name) in [(FURNISHED, "move"), (WITH_LEGS_PAIR, "move legs")] {
+    for (kind, name) in
+        [(FURNISHED, "move"), (WITH_LEGS_PAIR, "move legs"), (WITH_HEIGHTS, "move heights")]
+    {
         on_random_worlds(name, kind, |world, random| {
             let shift =
                 DVec2::new(random.random_range(-50.0..50.0), random.random_range(-9.0..9.0));
@@ -23,12 +25,15 @@ fn moving_the_world_changes_nothing() {
 
 #[test]
 fn turning_the_world_turns_the_directions() {
-    for (kind, name) in [(FURNISHED_PAIR, "turn"), (WITH_LEGS, "turn legs")] {
+    for (kind, name) in
+        [(FURNISHED_PAIR, "turn"), (WITH_LEGS, "turn legs"), (WITH_HEIGHTS, "turn heights")]
+    {
         on_random_worlds(name, kind, |world, random| {
             let by_rad = any_angle(random);
             let there = world.clone().moved(|p| p.rotate(DVec2::from_angle(by_rad)));
             let lists = [world, &there].map(|world| world.echoes(&settings()));
-            let turned = Turned { direction: Some(|direction, by| direction + by), by_rad };
+            let turned =
+                Turned { direction: Some(|direction, by| direction + by), by_rad, ..AS_IS };
             assert_same(&lists[0], &lists[1], &settings(), turned);
         });
     }
@@ -36,11 +41,13 @@ fn turning_the_world_turns_the_directions() {
 
 #[test]
 fn a_mirrored_world_mirrors_the_directions() {
-    for (kind, name) in [(FURNISHED_PAIR, "mirror"), (WITH_LEGS, "mirror legs")] {
+    for (kind, name) in
+        [(FURNISHED_PAIR, "mirror"), (WITH_LEGS, "mirror legs"), (WITH_HEIGHTS, "mirror heights")]
+    {
         on_random_worlds(name, kind, |world, _| {
             let there = world.clone().moved(|p| DVec2::new(p.x, -p.y));
             let lists = [world, &there].map(|world| world.echoes(&settings()));
-            let turned = Turned { direction: Some(|direction, _| -direction), by_rad: 0.0 };
+            let turned = Turned { direction: Some(|direction, _| -direction), ..AS_IS };
             assert_same(&lists[0], &lists[1], &settings(), turned);
         });
     }
@@ -66,7 +73,9 @@ fn a_larger_world_with_a_longer_wavelength_is_the_same_world() {
 
 #[test]
 fn splitting_walls_changes_nothing() {
-    for (kind, name) in [(FURNISHED, "split"), (WITH_LEGS_PAIR, "split legs")] {
+    for (kind, name) in
+        [(FURNISHED, "split"), (WITH_LEGS_PAIR, "split legs"), (WITH_HEIGHTS, "split heights")]
+    {
         on_random_worlds(name, kind, |world, random| {
             let pieces = world.split(random);
             let lists = [world, &pieces].map(|world| world.echoes(&settings()));
@@ -77,7 +86,11 @@ fn splitting_walls_changes_nothing() {
 
 #[test]
 fn walls_in_another_order_and_from_their_other_ends_are_the_same_walls() {
-    for (kind, name) in [(FURNISHED_PAIR, "reorder"), (WITH_LEGS, "reorder legs")] {
+    for (kind, name) in [
+        (FURNISHED_PAIR, "reorder"),
+        (WITH_LEGS, "reorder legs"),
+        (WITH_HEIGHTS, "reorder heights"),
+    ] {
         on_random_worlds(name, kind, |world, random| {
             let other = world.reordered(random);
             let lists = [world, &other].map(|world| world.echoes(&settings()));
@@ -88,7 +101,9 @@ fn walls_in_another_order_and_from_their_other_ends_are_the_same_walls() {
 
 #[test]
 fn what_stands_behind_closed_walls_is_not_heard() {
-    for (kind, name) in [(FURNISHED, "hide"), (WITH_LEGS_PAIR, "hide legs")] {
+    for (kind, name) in
+        [(FURNISHED, "hide"), (WITH_LEGS_PAIR, "hide legs"), (WITH_HEIGHTS, "hide heights")]
+    {
         on_random_worlds(name, kind, |world, random| {
             let more = world.with_hidden(random);
             let lists = [world, &more].map(|world| world.echoes(&settings()));

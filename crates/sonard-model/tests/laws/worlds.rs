@@ -8,7 +8,7 @@ use sonard_model::{
     acoustics::edge::EdgeLaw,
     geometry::{DVec2, distance_to_segment},
     model::paths::{EchoPath, Paths, REPEATED_CONTACTS_ABOVE, Settings},
-    scene::Scene,
+    scene::{Scene, SceneBuilder},
 };
 
 /// A flat wall.
@@ -17,6 +17,8 @@ pub(crate) struct Wall {
     pub(crate) ends: [DVec2; 2],
     pub(crate) reflectance: f64,
     pub(crate) roughness: f64,
+    /// From one height to another; `None`: from floor to ceiling.
+    pub(crate) z_m: Option<[f64; 2]>,
 }
 
 /// An upright cylinder.
@@ -25,15 +27,29 @@ pub(crate) struct Round {
     pub(crate) center: DVec2,
     pub(crate) radius_m: f64,
     pub(crate) reflectance: f64,
+    /// From one height to another; `None`: from floor to ceiling.
+    pub(crate) z_m: Option<[f64; 2]>,
 }
 
-/// A scene in the plane with a transmitter and a receiver in it.
+/// What is below and above, and at which height the transducers are between.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Heights {
+    /// Of floor and ceiling.
+    pub(crate) limits_z_m: [f64; 2],
+    /// Of floor and ceiling.
+    pub(crate) reflectance: [f64; 2],
+    pub(crate) sensor_z_m: f64,
+}
+
+/// A scene with a transmitter and a receiver in it.
 #[derive(Debug, Clone)]
 pub(crate) struct World {
     pub(crate) walls: Vec<Wall>,
     pub(crate) rounds: Vec<Round>,
     /// Transmitter and receiver.
     pub(crate) ends: [DVec2; 2],
+    /// `None`: everything is in the plane.
+    pub(crate) heights: Option<Heights>,
 }
 
 /// What a world is made of.
@@ -48,17 +64,32 @@ pub(crate) struct Kind {
     pub(crate) roughness: f64,
     /// Whether transmitter and receiver stand apart.
     pub(crate) is_pair: bool,
+    /// Whether there are floor and ceiling, and things that end below or above.
+    pub(crate) has_heights: bool,
 }
 
 /// A furnished room.
-pub(crate) const FURNISHED: Kind =
-    Kind { partitions: 3, strips: 1, rounds: 0, roughness: 0.0, is_pair: false };
+pub(crate) const FURNISHED: Kind = Kind {
+    partitions: 3,
+    strips: 1,
+    rounds: 0,
+    roughness: 0.0,
+    is_pair: false,
+    has_heights: false,
+};
 /// The same with a transmitter and a receiver.
 pub(crate) const FURNISHED_PAIR: Kind = Kind { is_pair: true, ..FURNISHED };
 /// A room with walls and legs in it.
 pub(crate) const WITH_LEGS: Kind = Kind { partitions: 1, rounds: 3, ..FURNISHED };
 /// The same with a transmitter and a receiver.
 pub(crate) const WITH_LEGS_PAIR: Kind = Kind { is_pair: true, ..WITH_LEGS };
+
+/// A room with floor, ceiling, and low and hanging walls.
+pub(crate) const WITH_HEIGHTS: Kind =
+    Kind { partitions: 2, strips: 0, has_heights: true, ..FURNISHED };
+/// The same with a transmitter and a receiver, and cylinders.
+pub(crate) const WITH_HEIGHTS_AND_LEGS_PAIR: Kind =
+    Kind { partitions: 1, rounds: 2, is_pair: true, ..WITH_HEIGHTS };
 
 /// Nothing stands closer to anything else, metres: far above the ties of geometry, and a pose has to be off walls.
 const GAP_M: f64 = 0.04;
@@ -145,7 +176,9 @@ impl World {
                 break corners;
             }
         };
-        let mut world = Self { walls: Vec::new(), rounds: Vec::new(), ends: [DVec2::ZERO; 2] };
+        let heights = kind.has_heights.then(|| Heights::random(random));
+        let mut world =
+            Self { walls: Vec::new(), rounds: Vec::new(), ends: [DVec2::ZERO; 2], heights };
         for i in 0..4 {
             let wall = wall([corners[i], corners[(i + 1) % 4]], kind, random);
             world.walls.push(wall);
@@ -159,7 +192,8 @@ impl World {
                 random.random_range(if number % 3 == 2 { 0.004..0.016 } else { 0.018..0.2 });
             let found = (0..TRIES).map(|_| place(random)).find(|at| world.is_free(*at, radius_m));
             let reflectance = random.random_range(0.7..1.0);
-            let round = |center| Round { center, radius_m, reflectance };
+            let z_m = heights.and_then(|heights| heights.some_of_it(random));
+            let round = |center| Round { center, radius_m, reflectance, z_m };
             world.rounds.extend(found.map(round));
         }
         for number in 0..kind.partitions + kind.strips {
@@ -173,7 +207,8 @@ impl World {
                 .find(|ends| world.has_room_for(*ends));
             if let Some(ends) = found {
                 let partition = wall(ends, kind, random);
-                world.walls.push(partition);
+                let z_m = heights.and_then(|heights| heights.some_of_it(random));
+                world.walls.push(Wall { z_m, ..partition });
             }
         }
         world.place_ends(kind, size, random);
@@ -267,10 +302,32 @@ impl World {
                 at(random.random(), random.random_range(0.02..0.5)),
                 at(random.random(), random.random_range(0.5..0.8)),
             ];
-            world.walls.push(Wall { ends, reflectance: 1.0, roughness: 0.5 });
+            world.walls.push(Wall { ends, reflectance: 1.0, roughness: 0.5, z_m: None });
             let center = at(random.random_range(0.3..0.7), 1.1);
-            world.rounds.push(Round { center, radius_m: 0.1, reflectance: 1.0 });
+            world.rounds.push(Round { center, radius_m: 0.1, reflectance: 1.0, z_m: None });
         }
+        world
+    }
+
+    /// The same with every height moved.
+    pub(crate) fn with_heights(&self, to: impl Fn(f64) -> f64) -> Self {
+        let mut world = self.clone();
+        let moved = |z_m: [f64; 2]| {
+            let mut z_m = z_m.map(&to);
+            z_m.sort_by(f64::total_cmp);
+            z_m
+        };
+        world.walls.iter_mut().for_each(|wall| wall.z_m = wall.z_m.map(moved));
+        world.rounds.iter_mut().for_each(|round| round.z_m = round.z_m.map(moved));
+        world.heights = self.heights.map(|heights| {
+            let is_turned = to(0.0) > to(1.0);
+            let [floor, ceiling] = heights.reflectance;
+            Heights {
+                limits_z_m: moved(heights.limits_z_m),
+                reflectance: if is_turned { [ceiling, floor] } else { [floor, ceiling] },
+                sensor_z_m: to(heights.sensor_z_m),
+            }
+        });
         world
     }
 
@@ -296,6 +353,7 @@ impl World {
             builder = builder
                 .rough_material(&material, wall.reflectance, wall.roughness)
                 .walls(&id, &ends, &material);
+            builder = standing(builder, wall.z_m);
         }
         for (number, round) in self.rounds.iter().enumerate() {
             let material = format!("n{number}");
@@ -306,6 +364,16 @@ impl World {
                 round.radius_m,
                 &material,
             );
+            builder = standing(builder, round.z_m);
+        }
+        if let Some(heights) = self.heights {
+            let [floor_z_m, ceiling_z_m] = heights.limits_z_m;
+            let [floor, ceiling] = heights.reflectance;
+            builder = builder
+                .heights(floor_z_m, ceiling_z_m)
+                .material("floor", floor)
+                .material("ceiling", ceiling)
+                .floor_and_ceiling("floor", "ceiling");
         }
         builder.text()
     }
@@ -313,8 +381,40 @@ impl World {
     /// All its echoes.
     pub(crate) fn echoes(&self, settings: &Settings) -> Vec<EchoPath> {
         let [transmitter, receiver] = self.ends;
-        let paths = Paths::new(&self.scene(), settings.clone());
+        let sensor_z_m = self.heights.map(|heights| heights.sensor_z_m);
+        let paths = Paths::new(&self.scene(), Settings { sensor_z_m, ..settings.clone() });
         paths.enumerate_between(transmitter, receiver).expect("few paths")
+    }
+}
+
+impl Heights {
+    fn random(random: &mut Pcg64) -> Self {
+        let floor_z_m = random.random_range(-1.0..1.0);
+        let height_m = random.random_range(1.2..3.0);
+        Self {
+            limits_z_m: [floor_z_m, floor_z_m + height_m],
+            reflectance: [random.random_range(0.3..1.0), random.random_range(0.3..1.0)],
+            sensor_z_m: floor_z_m + random.random_range(0.1..0.9) * height_m,
+        }
+    }
+
+    /// From the floor, from the ceiling, between both, or all of it.
+    fn some_of_it(&self, random: &mut Pcg64) -> Option<[f64; 2]> {
+        let [floor_z_m, ceiling_z_m] = self.limits_z_m;
+        let at = |share: f64| floor_z_m + share * (ceiling_z_m - floor_z_m);
+        match random.random_range(0..4) {
+            0 => None,
+            1 => Some([floor_z_m, at(random.random_range(0.1..0.9))]),
+            2 => Some([at(random.random_range(0.1..0.9)), ceiling_z_m]),
+            _ => Some([at(random.random_range(0.1..0.45)), at(random.random_range(0.55..0.9))]),
+        }
+    }
+}
+
+fn standing(builder: SceneBuilder, z_m: Option<[f64; 2]>) -> SceneBuilder {
+    match z_m {
+        Some([bottom_z_m, top_z_m]) => builder.standing_from(bottom_z_m, top_z_m),
+        None => builder,
     }
 }
 
@@ -327,7 +427,8 @@ fn is_nearly_right(corners: &[DVec2; 4]) -> bool {
 }
 
 fn wall(ends: [DVec2; 2], kind: Kind, random: &mut Pcg64) -> Wall {
-    Wall { ends, reflectance: random.random_range(0.6..1.0), roughness: kind.roughness }
+    let reflectance = random.random_range(0.6..1.0);
+    Wall { ends, reflectance, roughness: kind.roughness, z_m: None }
 }
 
 /// A turn by an angle of the generator.

@@ -109,7 +109,7 @@ impl<'a> Hearing<'a> {
     pub(super) fn hear_within(&mut self, length_m: f64) {
         let arrives_us = self.receiver.arrives_us(length_m);
         self.horizon_us = match self.receiver.combining {
-            Combining::Coherent => arrives_us + self.span_us.0,
+            Combining::Coherent | Combining::Incoherent => arrives_us + self.span_us.0,
             Combining::Ideal => arrives_us,
         };
     }
@@ -124,7 +124,7 @@ impl<'a> Hearing<'a> {
     /// one.
     pub(super) fn needed_m(&self) -> f64 {
         let begins_us = match self.receiver.combining {
-            Combining::Coherent => self.span_us.0,
+            Combining::Coherent | Combining::Incoherent => self.span_us.0,
             Combining::Ideal => 0.0,
         };
         (self.asked_us - begins_us) * 1e-6 * self.receiver.sound_speed_m_s
@@ -140,7 +140,7 @@ impl<'a> Hearing<'a> {
     /// above the threshold then and stays there for the integration time.
     pub(super) fn next_rise(&mut self, ready_us: f64) -> Option<f64> {
         match self.receiver.combining {
-            Combining::Coherent => self.next_rise_of_sum(ready_us),
+            Combining::Coherent | Combining::Incoherent => self.next_rise_of_sum(ready_us),
             Combining::Ideal => self.next_rise_of_one(ready_us),
         }
     }
@@ -225,6 +225,11 @@ impl<'a> Hearing<'a> {
                     live.iter().map(|part| part.field * self.shape_at(part, t_us)).sum();
                 modulus(sum * gain + noise)
             }
+            Combining::Incoherent => {
+                let power = |part: &Part| (part.field * self.shape_at(part, t_us)).norm_sqr();
+                let power: f64 = live.iter().map(power).sum();
+                modulus(noise).hypot(power.sqrt() * gain)
+            }
             Combining::Ideal => live
                 .iter()
                 .map(|part| part.size * modulus(self.shape_at(part, t_us)) * gain)
@@ -259,7 +264,7 @@ impl<'a> Hearing<'a> {
     /// Lets arrivals enter and leave up to a time.
     fn advance(&mut self, t_us: f64) {
         self.enter(t_us, t_us);
-        if self.receiver.combining == Combining::Coherent {
+        if self.receiver.combining != Combining::Ideal {
             let is_over = |part: &Part| part.tof_us + self.span_us.1 < t_us;
             self.over += self.parts[self.over..].iter().take_while(|part| is_over(part)).count();
         }

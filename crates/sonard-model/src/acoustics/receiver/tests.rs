@@ -137,6 +137,61 @@ fn two_weak_sounds_in_phase_are_heard_and_out_of_phase_are_not() {
     assert_eq!(ideal.detect(&pair(0.0)).status, PingStatus::NoEcho);
 }
 
+/// Over all phases the mean power of a coherent pair is the power of an incoherent one.
+#[test]
+fn pairs_of_unknown_phase_have_their_mean_power() {
+    let incoherent = Receiver { combining: Combining::Incoherent, ..receiver() };
+    let pair = |phase_rad: f64| arrivals(&[(3000.0, 0.4, 0.0), (3001.0, 0.3, phase_rad)]);
+    let amplitude = |receiver: &Receiver, phase_rad: f64| {
+        receiver.detect(&pair(phase_rad)).amplitude.expect("an amplitude")
+    };
+    let phases = (0..64).map(|at| TAU * f64::from(at) / 64.0);
+    let mean =
+        phases.map(|phase_rad| amplitude(&receiver(), phase_rad).powi(2)).sum::<f64>() / 64.0;
+    for phase_rad in [0.0, 1.0, TAU / 2.0] {
+        let together = amplitude(&incoherent, phase_rad);
+        assert!((together - 0.5).abs() < 1e-3, "{phase_rad}: {together}");
+        assert!((together.powi(2) - mean).abs() < 2e-3, "{together} {mean}");
+    }
+    // Weak ones that cancel are heard on average, and one alone as ever.
+    let weak = arrivals(&[(3000.0, 0.015, 0.0), (3001.0, 0.015, TAU / 2.0)]);
+    assert_eq!(incoherent.detect(&weak).status, PingStatus::Echo);
+    let lone = arrivals(&[(2600.0, 0.4, 1.0), (3500.0, 0.05, 2.0)]);
+    assert_eq!(incoherent.detect(&lone), receiver().detect(&lone));
+}
+
+/// From the time on at which a more sensitive receiver was raised, a less sensitive one detects what it does from the end
+/// of blanking on.
+#[test]
+fn a_higher_threshold_is_passed_no_earlier() {
+    let mut rng = Pcg64::seed_from_u64(5);
+    for trial in 0..300 {
+        let mut of: Vec<(f64, f64, f64)> = (0..12)
+            .map(|_| {
+                let amplitude = 10f64.powf(rng.random_range(-2.2..0.0));
+                (rng.random_range(2400.0..6000.0), amplitude, rng.random_range(0.0..TAU))
+            })
+            .collect();
+        of.sort_by(|one, other| one.0.total_cmp(&other.0));
+        let all = arrivals(&of);
+        let (mut ready_us, mut threshold) = (0.0, 0.005);
+        while threshold < 1.5 {
+            let receiver = Receiver { threshold, ..receiver() };
+            let listen = |ready_us: f64| {
+                receiver.detect_within(f64::INFINITY, &all, &|_| None, Latch::First, ready_us).0
+            };
+            let (whole, late) = (listen(0.0), listen(ready_us));
+            assert_eq!((whole.status, whole.arrival), (late.status, late.arrival), "{trial}");
+            let [one_us, other_us] =
+                [&whole, &late].map(|detection| detection.echoes_us.first().copied());
+            let apart_us = one_us.zip(other_us).map_or(0.0, |(one, other)| (one - other).abs());
+            assert!(apart_us < 1.0 && one_us.is_some() == other_us.is_some(), "{whole:?} {late:?}");
+            ready_us = one_us.unwrap_or(ready_us);
+            threshold *= 1.12;
+        }
+    }
+}
+
 #[test]
 fn a_strong_pair_out_of_phase_is_heard_where_it_does_not_overlap() {
     let pair = arrivals(&[(3000.0, 0.5, 0.0), (3150.0, 0.5, TAU / 2.0)]);

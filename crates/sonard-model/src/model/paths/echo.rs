@@ -20,6 +20,9 @@ pub(crate) struct Echo {
     pub(crate) image: u16,
     /// How steeply a path of the plan can climb, by the numbers in the beams from transmitter and from receiver.
     pub(crate) slopes: [u32; 2],
+    /// Whether it touches cylinders more than once, or a cylinder and an upright edge: see
+    /// [`Settings::contact_floor`](super::settings::Settings::contact_floor).
+    pub(crate) is_repeated: bool,
     pub(crate) via: Via,
 }
 

@@ -133,6 +133,7 @@ impl Paths {
                 rise_rad: [0.0; 2],
                 image: 0,
                 slopes: [ray.slopes, ALL_SLOPES],
+                is_repeated: false,
                 via: Via::Walls { node: ray.node },
             })
             .filter(|echo| echo.amplitude >= settings.floor)
@@ -174,7 +175,10 @@ impl Paths {
         let mut number = 0;
         echoes.retain(|echo| {
             number += 1;
-            number > plan || traced.can_climb(echo, &VerticalImage::NONE)
+            let floor = || settings.contact_floor(echo.is_repeated, echo.length_m);
+            let is_listed =
+                || traced.can_climb(echo, &VerticalImage::NONE) && echo.amplitude >= floor();
+            number > plan || is_listed()
         });
     }
 

@@ -6,6 +6,7 @@ mod corners;
 mod cylinders;
 mod mesh;
 mod posts;
+mod raised;
 mod strips;
 mod walls;
 
@@ -16,6 +17,7 @@ pub(crate) use corners::{ALONG_RAD, Corner, Corners, Facing, Flank};
 pub(crate) use cylinders::{Circle, Cylinders, Span, SurfaceArc};
 pub(crate) use mesh::{Mesh, Side};
 pub(crate) use posts::take_posts;
+pub(crate) use raised::Raised;
 pub(crate) use strips::take_strips;
 pub(crate) use walls::{WallMirror, mirror_gain, scattered};
 
@@ -33,6 +35,7 @@ pub(crate) struct Plan {
     /// By wall of the scene.
     pub(crate) walls: Arc<[WallMirror]>,
     pub(crate) climbs: Arc<Climbs>,
+    pub(crate) raised: Arc<Raised>,
     pub(crate) corners: Arc<Corners>,
     pub(crate) cylinders: Arc<Cylinders>,
     /// `None` for a scene with nothing in it.

@@ -7,8 +7,8 @@ use super::{
     effort::{BOUND, Bound, Effort},
     height::Heights,
     plan::{
-        Circle, Corners, Cylinders, Mesh, Plan, WallMirror, mirror_gain, scattered, take_posts,
-        take_strips,
+        Circle, Corners, Cylinders, Mesh, Plan, Raised, WallMirror, mirror_gain, scattered,
+        take_posts, take_strips,
     },
     settings::{Settings, usual_z_m},
 };
@@ -103,9 +103,11 @@ fn plan(scene: &Scene, drawn: &FloorPlan, heights: &Heights, settings: Settings)
     let corners = settings
         .edge_law
         .map(|law| Corners::new(&arrangement, segments, &gains, law, strips, posts));
+    let images: Vec<_> = heights.images.iter().map(|image| [image.gain, image.rise_m]).collect();
     Plan {
         walls: (0..segments.len()).map(wall).collect(),
         climbs: climbs.into(),
+        raised: Raised::of(&images, &settings).into(),
         corners: corners.unwrap_or_default().into(),
         cylinders: Cylinders::new(circles, mesh.as_ref()).into(),
         mesh: mesh.map(Arc::new),

@@ -182,6 +182,7 @@ fn add(plan: &Plan, lit: &[LitPart], (echoes, patches): &mut (Vec<Echo>, Vec<Pat
             rise_rad: [0.0; 2],
             image: 0,
             slopes: [beam.slopes, ALL_SLOPES],
+            is_repeated: false,
             via: Via::Scatter { patch: number },
         });
     }

@@ -69,10 +69,10 @@ impl Settings {
         (-self.absorption_np_per_m * length_m).exp()
     }
 
-    /// The weakest echo that is asked for of those of at least this length whose middle contact with a
-    /// cylinder has `level` others before it. One by a cylinder and an edge counts as of level 1.
-    pub(crate) fn contact_floor(&self, level: u16, least_m: f64) -> f64 {
-        if level == 0 || least_m <= self.crowded_m {
+    /// The weakest echo that is asked for of those of at least this length: of those that touch cylinders more than
+    /// once, or a cylinder and an edge, only the stronger ones.
+    pub(crate) fn contact_floor(&self, is_repeated: bool, least_m: f64) -> f64 {
+        if !is_repeated || least_m <= self.crowded_m {
             self.floor
         } else {
             self.repeated_contacts_above * self.floor

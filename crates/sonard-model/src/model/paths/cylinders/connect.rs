@@ -124,7 +124,10 @@ impl<'a> Connector<'a> {
     ) {
         let half_path = &out.all[number as usize];
         let floor = |other_m: f64| {
-            self.plan.settings.contact_floor(half_path.level, half_path.least_m + other_m).powi(2)
+            self.plan
+                .settings
+                .contact_floor(half_path.level > 0, half_path.least_m + other_m)
+                .powi(2)
         };
         let tracer = HalfPathTracer::new(self.plan, out.views, half_path);
         for group in groups {
@@ -183,7 +186,7 @@ impl<'a> Connector<'a> {
         let departures = [out.departure(one.at_rad), back.departure(other.at_rad)];
         let heard =
             self.bound.map_or(1.0, |bound| bound.at(departures[0].angle_to(departures[1]).abs()));
-        let floor = settings.contact_floor(out.half_path.level, length_m);
+        let floor = settings.contact_floor(out.half_path.level > 0, length_m);
         let fits = length_m <= settings.max_path_m && amplitude * heard >= floor;
         fits.then_some(Pair {
             cylinder: out.half_path.cylinder,
@@ -206,6 +209,7 @@ impl<'a> Connector<'a> {
                 rise_rad: [0.0; 2],
                 image: 0,
                 slopes: [out.slopes(), back.slopes()],
+                is_repeated: out.half_path.level > 0,
                 via: Via::Cylinder { connection: 0 },
             },
         })

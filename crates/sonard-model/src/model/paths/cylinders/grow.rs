@@ -156,7 +156,7 @@ impl<'a> TubeGrower<'a> {
         let partner = partners.best(&half_path.departures);
         let order = half_path.order + 1;
         let circle = &self.plan.cylinders.circles[half_path.cylinder as usize];
-        let floor = self.plan.settings.contact_floor(1, half_path.least_m + self.back_m(circle));
+        let floor = self.plan.settings.contact_floor(true, half_path.least_m + self.back_m(circle));
         let is_heard = half_path.strength.with(&partner) >= floor.powi(2)
             && self.plan.settings.allows(order + 1);
         // An edge adds no order.
@@ -250,7 +250,7 @@ impl<'a> TubeGrower<'a> {
         let growth = tube.least(|front| front.growth);
         let spread = [length_m, width_m, growth];
         let strength = Strength::of(tube.gain, spread, self.radius_m, &self.plan.settings);
-        strength.with(&tube.partner) >= settings.contact_floor(1, least_m).powi(2)
+        strength.with(&tube.partner) >= settings.contact_floor(true, least_m).powi(2)
             || self.has_edges && self.is_worth_an_edge(tube.gain, spread, least_m)
     }
 
@@ -266,7 +266,7 @@ impl<'a> TubeGrower<'a> {
         let settings = &self.plan.settings;
         let loss = EDGE_MOST * gain * settings.air_gain(length_m);
         LOUDER * loss * loss * (length_m / width_m + 1.0 / growth)
-            >= settings.contact_floor(1, least_m).powi(2)
+            >= settings.contact_floor(true, least_m).powi(2)
     }
 
     /// Length of the shortest path back from a cylinder, metres.

@@ -123,7 +123,8 @@ impl TubeGrower<'_> {
         let spread = [least(|c| c.length_m), least(|c| c.width_m), least(|c| c.growth)];
         let strength = Strength::of(tube.gain, spread, self.radius_m, settings);
         let least_m = spread[0] + self.back_m(circle);
-        let is_worth = strength.with(&tube.partner) >= settings.contact_floor(1, least_m).powi(2)
+        let is_worth = strength.with(&tube.partner)
+            >= settings.contact_floor(true, least_m).powi(2)
             || self.has_edges && self.is_worth_an_edge(tube.gain, spread, least_m);
         if !is_worth || least_m > settings.max_path_m {
             return None;

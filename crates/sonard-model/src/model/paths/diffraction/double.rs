@@ -163,7 +163,8 @@ impl Search<'_> {
         let norm = |field: &Passed| field.iter().map(|part| part.norm()).sum::<f64>();
         let most = from_backs.iter().map(norm).fold(0.0, f64::max) * pair.ray.gain;
         for (out, from_out) in outs.iter().zip(&from_outs) {
-            if norm(from_out) * most < self.settings.floor {
+            let raised = self.plan.raised.by_edges(out.length_m + leg_m + back.length_m);
+            if norm(from_out) * most * raised < self.settings.floor {
                 continue;
             }
             for (back, from_back) in backs.iter().zip(&from_backs) {
@@ -193,7 +194,8 @@ impl Search<'_> {
         let gain = pair.ray.gain * settings.air_gain(length_m);
         let amplitude = gain * field.norm();
         let order = out.ray.order + pair.ray.order + back.ray.order;
-        if amplitude < floor(settings, out, back, length_m) || !settings.allows(order) {
+        let most = amplitude * self.plan.raised.by_edges(length_m);
+        if most < floor(settings, out, back, length_m) || !settings.allows(order) {
             return;
         }
         self.plan.effort.keep::<(Echo, Echo, DoubleDiffraction)>(1);
@@ -206,6 +208,7 @@ impl Search<'_> {
             rise_rad: [0.0; 2],
             image: 0,
             slopes: [out.slopes, back.slopes],
+            is_repeated: out.is_spread || back.is_spread,
             via: Via::Edges { double: self.paths.len() as u32 },
         });
         let EdgePair { points, leg, .. } = *pair;

@@ -100,6 +100,5 @@ pub(crate) fn is_same_departure(one: &Ray, other: &Ray) -> bool {
 /// The weakest echo that is asked for of those of a length, out on one ray to an edge and back on one to the same or
 /// another.
 pub(crate) fn floor(settings: &Settings, out: &EdgeRay, back: &EdgeRay, length_m: f64) -> f64 {
-    let is_spread = out.is_spread || back.is_spread;
-    if is_spread { settings.contact_floor(1, length_m) } else { settings.floor }
+    settings.contact_floor(out.is_spread || back.is_spread, length_m)
 }

@@ -349,6 +349,7 @@ impl Search<'_> {
             rise_rad: [rise_rad(out, &to), rise_rad(back, &from)],
             image: 0,
             slopes: [ALL_SLOPES; 2],
+            is_repeated: false,
             via: Via::LevelEdge { level: 0 },
         };
         let LevelEdge { wall, is_upper, .. } = self.edge;

@@ -20,7 +20,7 @@ use crate::{
 /// All echoes with one diffraction: out on one ray to an edge, back on another or the same. The rays are
 /// sorted by edge.
 pub(crate) fn echoes(plan: &Plan, law: EdgeLaw, out: &Rays, back: Option<&Rays>) -> Vec<Echo> {
-    let search = Search { law, settings: &plan.settings, effort: &plan.effort };
+    let search = Search { law, plan, settings: &plan.settings, effort: &plan.effort };
     let mut echoes = Vec::new();
     for point in out.edges() {
         let Some(corner) = plan.corners.corner(point) else { continue };
@@ -71,6 +71,7 @@ pub(crate) fn lead_m(plan: &Plan, out: &Rays, back: &Rays, echo: &Echo) -> f64 {
 /// Pairs of rays at one edge.
 struct Search<'a> {
     law: EdgeLaw,
+    plan: &'a Plan,
     settings: &'a Settings,
     effort: &'a Effort,
 }
@@ -133,11 +134,13 @@ impl Search<'_> {
             rise_rad: [0.0; 2],
             image: 0,
             slopes: [out.slopes, back.slopes],
+            is_repeated: out.is_spread || back.is_spread,
             via: Via::Edge { point, out: out.number, back: back.number },
         })
     }
 
-    /// Relative field of the echo out and back on two rays, `None` below the floor.
+    /// Relative field of the echo out and back on two rays, `None` if it is below the floor and by way of floor and
+    /// ceiling, too.
     ///
     /// Cheapest test first: what walls and air leave of a mirror's echo, then the law's bound at this aspect,
     /// then the law.
@@ -148,7 +151,7 @@ impl Search<'_> {
         }
         let length_m = out.length_m + back.length_m;
         let strength = out.ray.gain * back.ray.gain * settings.air_gain(length_m);
-        let floor = floor(settings, out, back, length_m);
+        let floor = floor(settings, out, back, length_m) / self.plan.raised.by_edge(length_m);
         // No law gives more than a wall's echo and the images that its edge replaces; right before it a post may.
         if !corner.is_whole() && 2.0 * strength < floor {
             return None;

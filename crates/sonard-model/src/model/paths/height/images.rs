@@ -112,7 +112,8 @@ impl VerticalImage {
         // After an even number of reflections it still runs as it left, and comes from the
         // other side.
         let comes_rad = if self.bounces.is_multiple_of(2) { -leaves_rad } else { leaves_rad };
-        let fits = length_m <= settings.max_path_m && amplitude >= settings.floor;
+        let floor = settings.contact_floor(plan.is_repeated, length_m);
+        let fits = length_m <= settings.max_path_m && amplitude >= floor;
         fits.then_some(Echo {
             length_m,
             amplitude,
@@ -139,6 +140,7 @@ impl VerticalImage {
             rise_rad: [0.0; 2],
             image: 0,
             slopes: [ALL_SLOPES; 2],
+            is_repeated: false,
             via: Via::Upright,
         };
         self.echo(&nowhere, index, settings)

@@ -47,6 +47,7 @@ fn before_a_wall(disc: Disc, path_m: f64, direction_rad: f64) -> Vec<MultipleEch
         rise_rad: [0.0; 2],
         image: 0,
         slopes: [0; 2],
+        is_repeated: false,
         via: Via::Walls { node: 0 },
     };
     let beam = BeamPattern::new(&Sensor::preset("senscomp-6500").expect("a preset"), 343.99);

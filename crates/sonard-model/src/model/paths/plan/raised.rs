@@ -1,0 +1,67 @@
+//! By how much floor and ceiling can raise the echoes of upright edges above what the plan says of them.
+
+use crate::model::paths::settings::Settings;
+
+/// The shortest length that is told apart, metres: below what a ranger has between its face and anything.
+const SHORTEST_M: f64 = 1e-3;
+
+/// One length over the next.
+const RATIO: f64 = 1.1;
+
+/// Bounds for the echoes that the images of an echo of the plan by upright edges can have, over that echo, by its
+/// length.
+///
+/// A steep path gains at an edge by its slant (see [`height`](crate::model::paths::height)), perhaps more than air, floor
+/// and ceiling take from it: then an image is listed of what is too weak itself.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Raised {
+    /// From [`SHORTEST_M`] on, each [`RATIO`] times longer: by one edge, and by two. None rises.
+    by_length: Vec<[f64; 2]>,
+}
+
+impl Raised {
+    /// Of images with these gains and heights above the ranger, metres.
+    pub(crate) fn of(images: &[[f64; 2]], settings: &Settings) -> Self {
+        let longest = (settings.max_path_m / SHORTEST_M).max(1.0);
+        let count = longest.log(RATIO) as i32 + 1;
+        let bounds = |number: i32| {
+            let from_m = SHORTEST_M * RATIO.powi(number);
+            let to_m = RATIO * from_m;
+            let raised = |&[gain, rise_m]: &[f64; 2]| {
+                let slant = from_m.hypot(rise_m) / from_m;
+                let gain = gain * settings.air_gain(to_m.hypot(rise_m) - to_m);
+                [gain * slant.sqrt(), gain * slant]
+            };
+            images.iter().map(raised).fold([1.0_f64; 2], most)
+        };
+        let mut by_length: Vec<[f64; 2]> = (0..count).map(bounds).collect();
+        for number in (1..by_length.len()).rev() {
+            by_length[number - 1] = most(by_length[number - 1], by_length[number]);
+        }
+        let is_needed = by_length.first() != Some(&[1.0; 2]);
+        Self { by_length: if is_needed { by_length } else { Vec::new() } }
+    }
+
+    /// For an echo of a length by one edge, at least 1.
+    pub(crate) fn by_edge(&self, length_m: f64) -> f64 {
+        self.at(length_m)[0]
+    }
+
+    /// The same by two edges.
+    pub(crate) fn by_edges(&self, length_m: f64) -> f64 {
+        self.at(length_m)[1]
+    }
+
+    fn at(&self, length_m: f64) -> [f64; 2] {
+        if self.by_length.is_empty() {
+            return [1.0; 2];
+        }
+        let number = (length_m / SHORTEST_M).max(1.0).log(RATIO) as usize;
+        let last = self.by_length.len().saturating_sub(1);
+        self.by_length.get(number.min(last)).copied().unwrap_or([1.0; 2])
+    }
+}
+
+fn most(one: [f64; 2], other: [f64; 2]) -> [f64; 2] {
+    [one[0].max(other[0]), one[1].max(other[1])]
+}
