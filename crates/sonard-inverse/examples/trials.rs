@@ -88,8 +88,13 @@ fn trial(seed: u64) -> Option<Trial> {
     let here = Sweep { pose: said, ..there.clone() };
     let priors =
         parameters.iter().map(|(of, _, sigma)| Prior { parameter: of.clone(), sigma: *sigma });
-    let what =
-        Fit { priors: priors.collect(), widest_m: 0.15, least_sigma_m: 2e-4, least_sigma_db: 0.5 };
+    let what = Fit {
+        priors: priors.collect(),
+        widest_m: 0.15,
+        widest_turn_deg: 12.0,
+        least_sigma_m: 2e-4,
+        least_sigma_db: 0.5,
+    };
     let errors = ErrorModel {
         sigma_m: NOISE_MM * 1e-3,
         tail_share: 0.1,

@@ -6,9 +6,11 @@ use sonard_model::geometry::{Pose, wrap_180};
 use thiserror::Error;
 
 use crate::{
+    candidates::Phases,
     likelihood::ErrorModel,
     linear::{Curve, Linear},
     parameter::Parameter,
+    rates::RateFinder,
     sweep::Sweep,
     world::{Models, World, WorldError},
 };
@@ -29,6 +31,8 @@ pub struct Fit {
     pub priors: Vec<Prior>,
     /// Spread of ranges to begin with, metres: as far off as predictions may be.
     pub widest_m: f64,
+    /// As far off as headings may be, degrees.
+    pub widest_turn_deg: f64,
     /// Least spread of ranges that is believed, metres.
     pub least_sigma_m: f64,
     /// Least spread of the threshold that is believed, decibels.
@@ -91,6 +95,24 @@ struct State<'a> {
     values: DVector<f64>,
     /// Of the world as it was last asked for, with the transducer on the axis.
     models: Models,
+    phases: Phases,
+}
+
+/// Where a fit is likeliest, by predictions with phases that are known or not.
+struct Settled {
+    /// Log-likelihood of all readings with the priors.
+    value: f64,
+    /// Changes since the start.
+    values: DVector<f64>,
+    errors: ErrorModel,
+    phases: Phases,
+}
+
+/// Where a single sweep was taken, roughly.
+pub(crate) struct Approached {
+    pub(crate) pose: Pose,
+    pub(crate) log_posterior: f64,
+    pub(crate) sigma_m: f64,
 }
 
 /// Spreads that a fit goes through, as shares of the widest, with the spread of the threshold, decibels: from so wide
@@ -101,7 +123,7 @@ const LAST_STAGES: usize = 5;
 /// Turns that are tried at each of them, degrees, and how many to both sides.
 const TURNS: [(f64, i32); STAGES.len()] = [(1.5, 8), (1.5, 8), (1.0, 10), (0.75, 12), (0.5, 10)];
 /// Decibels of the threshold that are tried for each degree of turn: what two-way beams fall by near the ends of arcs.
-const THRESHOLD_OF_TURN: f64 = 1.0;
+const THRESHOLD_OF_TURN: f64 = 1.5;
 /// Steps on one linearisation.
 const STEPS: usize = 12;
 /// Doubt of a threshold that is not fitted, decibels.
@@ -115,7 +137,8 @@ const SPREADS_DB: [f64; 7] = [0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0];
 ///
 /// Maximises the likelihood of all readings times the priors: Levenberg's and Marquardt's steps on a linearisation of
 /// all that each reading could have been, and new predictions after each set of them, with spreads that shrink from
-/// `widest_m` to what the readings have.
+/// `widest_m` to what the readings have. On the way arrivals add up by their powers, because a pose that is a tenth of
+/// a wavelength off has other phases; at the end with their phases, if readings are likelier so.
 ///
 /// # Errors
 /// When the world can't be predicted in, or the readings don't hold the parameters.
@@ -131,16 +154,31 @@ pub(crate) fn fit_with(
     fit: &Fit,
 ) -> Result<Fitted, FitError> {
     let mut state = State::new(models, world, sweeps, fit)?;
-    let reach_m = world.options.max_range_m.unwrap_or(world.sensor.max_range_m);
-    let mut errors = ErrorModel::rough(fit.widest_m, STAGES[0].1, reach_m);
+    let mut errors = state.rough_errors();
     let linear = state.approach(&mut errors)?;
-    state.settle(linear, &mut errors)?;
+    let errors = state.settle(linear, errors)?;
     if !world.sensor.mounting.is_on_axis() {
         let exact = state.linear(true)?;
         state.improve(&exact, &errors)?;
     }
     let linear = state.linear(true)?;
     state.finish(&linear, errors)
+}
+
+/// Goes near to where a fit would end, with a single sweep.
+pub(crate) fn approach(
+    models: Models,
+    world: &World,
+    sweep: &Sweep,
+    fit: &Fit,
+) -> Result<Approached, FitError> {
+    let sweeps = std::slice::from_ref(sweep);
+    let mut state = State::new(models, world, sweeps, fit)?;
+    let mut errors = state.rough_errors();
+    let linear = state.approach(&mut errors)?;
+    let errors = state.spread(&linear, &errors);
+    let log_posterior = state.value(&linear, &errors);
+    Ok(Approached { pose: state.poses()[0], log_posterior, sigma_m: errors.sigma_m })
 }
 
 /// Standard deviations that no unbiased estimate from such readings can fall below (Cramer and Rao), where `world` and
@@ -156,6 +194,7 @@ pub fn bound(
 ) -> Result<Vec<f64>, FitError> {
     let models = Models::of(&world.with_face_on_axis())?;
     let mut state = State::new(models, world, sweeps, fit)?;
+    state.phases = Phases::Known;
     let curve = state.linear(true)?.curve(&state.still(), errors);
     let covariance = state.covariance(curve.information).ok_or(FitError::Degenerate)?;
     Ok((0..fit.priors.len()).map(|at| covariance[(at, at)].sqrt()).collect())
@@ -173,7 +212,19 @@ impl<'a> State<'a> {
         }
         let parameters = fit.priors.iter().map(|prior| &prior.parameter).collect();
         let values = DVector::zeros(fit.priors.len());
-        Ok(Self { fit, start, sweeps, parameters, values, models })
+        let phases = Phases::Unknown;
+        Ok(Self { fit, start, sweeps, parameters, values, models, phases })
+    }
+
+    fn rough_errors(&self) -> ErrorModel {
+        let World { options, sensor, .. } = self.start;
+        let reach_m = options.max_range_m.unwrap_or(sensor.max_range_m);
+        ErrorModel::rough(self.fit.widest_m, STAGES[0].1, reach_m)
+    }
+
+    /// Least spread of ranges that is believed, metres: that of steps in which they are told is theirs at least.
+    fn least_sigma_m(&self) -> f64 {
+        self.fit.least_sigma_m.max(self.start.sensor.range_step_m / 12f64.sqrt())
     }
 
     fn covariance(&self, mut information: DMatrix<f64>) -> Option<DMatrix<f64>> {
@@ -216,8 +267,8 @@ impl<'a> State<'a> {
         let (world, poses) = (self.moved_world()?, self.poses());
         let exact = is_exact.then(|| self.models.changed_to(&world)).transpose()?;
         let models = exact.as_ref().unwrap_or(&self.models);
-        let (sweeps, parameters) = (self.sweeps, &self.parameters);
-        Ok(Linear::about(models, &world, sweeps, &poses, parameters, reference_m_s, is_exact)?)
+        let rates = RateFinder::new(&world, &self.parameters, reference_m_s, is_exact, self.phases);
+        Ok(Linear::about(models, &rates, self.sweeps, &poses)?)
     }
 
     /// The world where it stands, with its models.
@@ -236,7 +287,7 @@ impl<'a> State<'a> {
         let threshold = place(&Parameter::Threshold).filter(|_| self.sweeps.len() == 1);
         let step_db = THRESHOLD_OF_TURN * step_deg;
         let thresholds_db: Vec<f64> = match threshold {
-            Some(_) => (-steps..=steps).map(|step| f64::from(step) * step_db).collect(),
+            Some(_) => (-2..=2).map(|step| f64::from(step) * step_db).collect(),
             None => vec![0.0],
         };
         let mut changes: Vec<(usize, f64)> = Vec::new();
@@ -274,6 +325,7 @@ impl<'a> State<'a> {
     fn approach(&mut self, errors: &mut ErrorModel) -> Result<Linear, FitError> {
         let mut linear = self.linear(false)?;
         for ((share, sigma_db), (step_deg, steps)) in STAGES.into_iter().zip(TURNS) {
+            let steps = steps.min((self.fit.widest_turn_deg / step_deg) as i32);
             // Never narrower than what readings really spread by: else those few that happen to agree would be
             // believed and all others taken for clutter.
             let spread = self.spread(&linear, errors);
@@ -299,25 +351,37 @@ impl<'a> State<'a> {
         Ok(linear)
     }
 
+    /// Where it stands, as likely as that is.
+    fn value(&self, linear: &Linear, errors: &ErrorModel) -> f64 {
+        linear.log_likelihood(&self.still(), errors) + self.log_prior(&self.values)
+    }
+
+    /// Settles without phases, and with them; the likelier one counts.
+    fn settle(&mut self, linear: Linear, errors: ErrorModel) -> Result<ErrorModel, FitError> {
+        let without = self.settled(linear, errors)?;
+        (self.values, self.phases) = (without.values.clone(), Phases::Known);
+        let with = self.linear(false)?;
+        let with = self.settled(with, without.errors)?;
+        let Settled { values, errors, phases, .. } =
+            if with.value > without.value { with } else { without };
+        (self.values, self.phases) = (values, phases);
+        Ok(errors)
+    }
+
     /// Finds the spread and the values in turn, as long as both get likelier.
-    fn settle(&mut self, mut linear: Linear, errors: &mut ErrorModel) -> Result<(), FitError> {
-        let mut best: Option<(f64, DVector<f64>, ErrorModel)> = None;
-        for stage in 1..=LAST_STAGES {
-            *errors = self.spread(&linear, errors);
-            let value = linear.log_likelihood(&self.still(), errors) + self.log_prior(&self.values);
-            if best.as_ref().is_some_and(|best| value <= best.0 + 1e-3) {
+    fn settled(&mut self, mut linear: Linear, mut errors: ErrorModel) -> Result<Settled, FitError> {
+        let mut best: Option<Settled> = None;
+        for _ in 0..LAST_STAGES {
+            errors = self.spread(&linear, &errors);
+            let (value, values) = (self.value(&linear, &errors), self.values.clone());
+            if best.as_ref().is_some_and(|best| value <= best.value + 1e-3) {
                 break;
             }
-            best = Some((value, self.values.clone(), *errors));
-            if stage < LAST_STAGES {
-                self.improve(&linear, errors)?;
-                linear = self.linear(false)?;
-            }
+            best = Some(Settled { value, values, errors, phases: self.phases });
+            self.improve(&linear, &errors)?;
+            linear = self.linear(false)?;
         }
-        if let Some((_, values, spread)) = best {
-            (self.values, *errors) = (values, spread);
-        }
-        Ok(())
+        best.ok_or(FitError::Degenerate)
     }
 
     /// Goes where the linearisation is best, within what it holds for. Gives the largest step, as a share of that.
@@ -394,7 +458,7 @@ impl<'a> State<'a> {
             // The median of what is explained, which a tail moves little: 0.6745 of a normal one alone, and 0.72 with a
             // tail of a tenth, twice as long.
             let sigma_m = median_m / (0.6745 + 0.455 * tail_share);
-            let sigma_m = sigma_m.max(self.fit.least_sigma_m).min(self.fit.widest_m);
+            let sigma_m = sigma_m.min(self.fit.widest_m).max(self.least_sigma_m());
             ErrorModel { sigma_m, tail_share, ..spread }
         };
         let spread = likeliest(&mut TAILS.iter().map(of_tail), spread);

@@ -17,6 +17,8 @@ pub(crate) struct Possible {
     /// The threshold up to which it is, decibels above the nominal one.
     pub(crate) until_db: f64,
     pub(crate) until_rates: Rates,
+    /// Standard deviation of that beside the threshold's own, decibels.
+    pub(crate) spread_db: f64,
     /// What the range gains with the threshold, metres a decibel.
     pub(crate) walk_m_per_db: f64,
 }
@@ -76,12 +78,13 @@ impl Judged {
         let mut of: SmallVec<[Term; 3]> = SmallVec::new();
         for (at, (possible, &[own, slope])) in self.possible.iter().zip(&densities).enumerate() {
             let is_last = at + 1 == self.possible.len();
-            let until = after(possible.until_db, &possible.until_rates) / errors.sigma_db;
+            let sigma_db = errors.sigma_db.hypot(possible.spread_db);
+            let until = after(possible.until_db, &possible.until_rates) / sigma_db;
             let up_to = if is_last { 1.0 } else { normal_up_to(until).max(below) };
             let probability = up_to - below;
             below = up_to;
             let gain = if is_last { 0.0 } else { own - densities[at + 1][0] };
-            let by_until = explained * normal_density(until) / errors.sigma_db * gain;
+            let by_until = explained * normal_density(until) / sigma_db * gain;
             density += explained * probability * own;
             of.push(Term {
                 share: explained * probability * own,
@@ -91,7 +94,7 @@ impl Judged {
                     true => 0.0,
                     false => {
                         explained * expected_of_step(until) * self.distinct(at, errors.sigma_m)
-                            / errors.sigma_db.powi(2)
+                            / sigma_db.powi(2)
                     }
                 },
             });

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use sonard_model::geometry::Pose;
 
 use crate::{
+    candidates::Phases,
     judged::{Judged, Rates},
     likelihood::ErrorModel,
     parameter::Parameter,
@@ -35,21 +36,17 @@ pub(crate) struct Curve {
 }
 
 impl Linear {
-    /// Predicts all sweeps, each from its pose, by models of the world. Ranges are in metres at `reference_m_s`.
+    /// Predicts all sweeps, each from its pose, by models of the world that the rates are found in.
     ///
     /// A transducer beside its axis has paths of its own in each direction, some hundred times more work. If the models
     /// have it on the axis, the paths are found once, from there, and made longer to first order: a millimetre off for
     /// one that is 3 cm beside it and half a metre before a wall.
     pub(crate) fn about(
         models: &Models,
-        world: &World,
+        rates: &RateFinder,
         sweeps: &[Sweep],
         poses: &[Pose],
-        parameters: &[&Parameter],
-        reference_m_s: f64,
-        with_walk: bool,
     ) -> Result<Self, WorldError> {
-        let rates = RateFinder::new(world, parameters, reference_m_s, with_walk);
         let of = |(number, (sweep, pose)): (usize, (&Sweep, &Pose))| {
             models.at(pose, |simulator, point| {
                 Ok(rates.sweep(simulator, point, number, sweep, pose)?)
@@ -57,7 +54,7 @@ impl Linear {
         };
         let beams: Result<Vec<Vec<Judged>>, WorldError> =
             sweeps.par_iter().zip(poses).enumerate().map(of).collect();
-        Ok(Self { beams: beams?.into_iter().flatten().collect(), count: parameters.len() })
+        Ok(Self { beams: beams?.into_iter().flatten().collect(), count: rates.parameters() })
     }
 
     /// Log-likelihoods of one sweep from a pose turned by so many degrees each and at thresholds higher by so many
@@ -72,7 +69,13 @@ impl Linear {
         errors: &ErrorModel,
     ) -> Result<Vec<(f64, f64, f64)>, WorldError> {
         let parameters = [&Parameter::Threshold];
-        let rates = RateFinder::new(world, &parameters, world.air.sound_speed_m_s(), false);
+        let rates = RateFinder::new(
+            world,
+            &parameters,
+            world.air.sound_speed_m_s(),
+            false,
+            Phases::Unknown,
+        );
         let turned = models.at(pose, |simulator, point| {
             Ok(rates.turned(simulator, point, sweep, pose, turns_deg)?)
         })?;

@@ -6,10 +6,10 @@ use sonard_model::geometry::{Pose, wrap_180};
 
 use crate::{
     atlas::{Atlas, Match, is_apart},
-    fit::{Fit, FitError, Fitted, Prior, fit_with},
+    fit::{Approached, Fit, FitError, Fitted, Prior, approach, fit_with},
     parameter::Parameter,
     sweep::Sweep,
-    world::{Models, World},
+    world::World,
 };
 
 /// A pose that explains a sweep.
@@ -36,6 +36,10 @@ pub struct Mode {
 /// Matches of the atlas that are improved roughly, and of those how many with all beams.
 const ROUGH: usize = 8;
 const WHOLE: usize = 4;
+/// As far off as a match may be: metres, with places 0.1 m apart, and degrees, with directions 3 apart.
+const ROUGH_WIDEST: (f64, f64) = (0.08, 4.5);
+/// As far off as a rough fit's heading may be, degrees.
+const WHOLE_TURN_DEG: f64 = 2.0;
 /// What a pose is off by at least after a rough look, metres.
 const LEAST_WIDEST_M: f64 = 4e-3;
 /// Beams of a rough look.
@@ -54,40 +58,33 @@ const FAR_BELOW: f64 = 60.0;
 /// When there is nothing to predict with.
 pub fn locate(world: &World, atlas: &Atlas, sweep: &Sweep) -> Result<Vec<Mode>, FitError> {
     let models = atlas.models(world)?;
-    let improved = |sweep: &Sweep, pose: &Pose, widest_m: f64| {
-        improved(models.clone(), world, sweep, pose, widest_m)
-    };
     let few = thinned(sweep, FEW_BEAMS);
-    let mut rough: Vec<Fitted> = Vec::new();
+    let mut rough: Vec<Approached> = Vec::new();
     for Match { pose, .. } in atlas.matches(world, sweep, ROUGH) {
-        rough.extend(improved(&few, &pose, 0.08).ok());
+        let near = Sweep { pose, ..few.clone() };
+        rough.extend(approach(models.clone(), world, &near, &pose_alone(ROUGH_WIDEST)).ok());
     }
     rough.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
     let best = rough.first().map_or(0.0, |best| best.log_posterior);
     rough.retain(|found| found.log_posterior > best - FAR_BELOW);
     let mut whole: Vec<Fitted> = Vec::new();
-    for found in distinct(rough, 0.05).into_iter().take(WHOLE) {
+    for found in distinct(rough, 0.05, |found| &found.pose).into_iter().take(WHOLE) {
         // A rough fit is off by little more than its readings spread.
-        let widest_m = (3.0 * found.errors.sigma_m).clamp(LEAST_WIDEST_M, 0.03);
-        whole.extend(improved(sweep, &found.poses[0], widest_m).ok());
+        let widest_m = (3.0 * found.sigma_m).clamp(LEAST_WIDEST_M, 0.03);
+        let near = Sweep { pose: found.pose, ..sweep.clone() };
+        let what = pose_alone((widest_m, WHOLE_TURN_DEG));
+        whole.extend(fit_with(models.clone(), world, std::slice::from_ref(&near), &what).ok());
     }
     whole.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
-    Ok(modes(&distinct(whole, 0.05)))
+    Ok(modes(&distinct(whole, 0.05, |found| &found.poses[0])))
 }
 
-fn improved(
-    models: Models,
-    world: &World,
-    sweep: &Sweep,
-    pose: &Pose,
-    widest_m: f64,
-) -> Result<Fitted, FitError> {
+/// Fits a pose alone, that may be so many metres and degrees off.
+fn pose_alone((widest_m, widest_turn_deg): (f64, f64)) -> Fit {
     let of = |parameter, sigma| Prior { parameter, sigma };
     let priors =
         vec![of(Parameter::X(0), 0.5), of(Parameter::Y(0), 0.5), of(Parameter::Heading(0), 20.0)];
-    let from = Sweep { pose: *pose, ..sweep.clone() };
-    let what = Fit { priors, widest_m, least_sigma_m: 5e-4, least_sigma_db: 0.5 };
-    fit_with(models, world, std::slice::from_ref(&from), &what)
+    Fit { priors, widest_m, widest_turn_deg, least_sigma_m: 5e-4, least_sigma_db: 0.5 }
 }
 
 /// Every so many of a sweep's beams.
@@ -99,10 +96,10 @@ fn thinned(sweep: &Sweep, count: usize) -> Sweep {
 }
 
 /// Each pose once, of those that several fits found the best.
-fn distinct(sorted: Vec<Fitted>, within_m: f64) -> Vec<Fitted> {
-    let mut kept: Vec<Fitted> = Vec::new();
+fn distinct<T>(sorted: Vec<T>, within_m: f64, pose: impl Fn(&T) -> &Pose) -> Vec<T> {
+    let mut kept: Vec<T> = Vec::new();
     for found in sorted {
-        if kept.iter().all(|known| is_apart(&known.poses[0], &found.poses[0], within_m)) {
+        if kept.iter().all(|known| is_apart(pose(known), pose(&found), within_m)) {
             kept.push(found);
         }
     }

@@ -11,7 +11,7 @@ use sonard_model::{
 };
 
 use crate::{
-    candidates::{Candidate, Listener},
+    candidates::{Candidate, Listener, Phases},
     judged::{Judged, Possible, Rates},
     motion::{Motion, length_rate},
     parameter::Parameter,
@@ -33,6 +33,7 @@ pub(crate) struct RateFinder<'a> {
     reference_m_s: f64,
     /// Whether time walk is found out, too, which takes a firing or two for each candidate.
     with_walk: bool,
+    phases: Phases,
 }
 
 /// A firing.
@@ -54,11 +55,17 @@ impl<'a> RateFinder<'a> {
         parameters: &'a [&'a Parameter],
         reference_m_s: f64,
         with_walk: bool,
+        phases: Phases,
     ) -> Self {
         let steady = parameters.iter().map(|parameter| world.steady_motion(parameter)).collect();
         let changed = |parameter: &&Parameter| changed_beam(world, parameter);
         let changed_beams = parameters.iter().map(changed).collect();
-        Self { world, parameters, steady, changed_beams, reference_m_s, with_walk }
+        Self { world, parameters, steady, changed_beams, reference_m_s, with_walk, phases }
+    }
+
+    /// How many parameters there are.
+    pub(crate) const fn parameters(&self) -> usize {
+        self.parameters.len()
     }
 
     /// The firings of the sweep with this number.
@@ -70,7 +77,7 @@ impl<'a> RateFinder<'a> {
         sweep: &Sweep,
         pose: &Pose,
     ) -> Result<Vec<Judged>, TooCostly> {
-        let mut listener = Listener::new(simulator.receiver(), self.with_walk);
+        let mut listener = Listener::new(simulator.receiver(), self.phases, self.with_walk);
         let concerns = |parameter: &Parameter| parameter.sweep().is_none_or(|of| of == number);
         let all = self.parameters.iter().zip(0u32..);
         let concerning: Vec<u32> =
@@ -94,7 +101,7 @@ impl<'a> RateFinder<'a> {
         pose: &Pose,
         turns_deg: &[f64],
     ) -> Result<Vec<Vec<Judged>>, TooCostly> {
-        let mut listener = Listener::new(simulator.receiver(), self.with_walk);
+        let mut listener = Listener::new(simulator.receiver(), self.phases, self.with_walk);
         let all: Vec<u32> = (0..self.parameters.len() as u32).collect();
         let mut known: HashMap<i64, SmallVec<[Possible; 3]>> = HashMap::new();
         let mut judged = |beam: &Beam, by_deg: f64| {
@@ -155,6 +162,7 @@ impl<'a> RateFinder<'a> {
             range_rates,
             until_db: candidate.until_db,
             until_rates,
+            spread_db: candidate.spread_db,
             walk_m_per_db: stretch * candidate.walk_m_per_db,
         }
     }

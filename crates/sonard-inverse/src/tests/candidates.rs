@@ -1,7 +1,9 @@
 //! What a receiver could report against what it reports.
 
 use super::{first_pose, world};
-use crate::candidates::Listener;
+use sonard_model::acoustics::Latch;
+
+use crate::candidates::{Listener, Phases};
 
 #[test]
 fn at_each_threshold_the_candidate_is_what_a_receiver_with_it_reports() {
@@ -13,14 +15,16 @@ fn at_each_threshold_the_candidate_is_what_a_receiver_with_it_reports() {
         let pose = first_pose(&here.scene);
         let simulator = here.simulator(&pose).expect("a model");
         let point = simulator.at(pose.position());
-        let mut listener = Listener::new(simulator.receiver(), false);
+        let mut listener = Listener::new(simulator.receiver(), Phases::Known, false);
         let mut receiver = simulator.receiver().clone();
         for step in 0..200 {
             let direction_rad = here.direction_rad(&pose, 1.8 * f64::from(step));
             let found = listener.candidates(&point, direction_rad).expect("paths");
             for by_db in [-9.3, -4.1, -1.7, 0.0, 0.8, 2.9, 6.2, 10.4] {
                 receiver.threshold = simulator.receiver().threshold * 10f64.powf(by_db / 20.0);
-                let read = point.ping_with(&receiver, direction_rad).expect("paths");
+                let read = point
+                    .hear(direction_rad, |ear| ear.detect(&receiver, Latch::First, 0.0))
+                    .expect("paths");
                 let at = found.iter().position(|candidate| by_db < candidate.until_db);
                 let said = &found[at.unwrap_or(found.len() - 1)].prediction;
                 let off = match (said.range_m, read.range_m) {

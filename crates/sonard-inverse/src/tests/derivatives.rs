@@ -10,7 +10,10 @@ use sonard_model::{
 };
 
 use super::{first_pose, shipped, world};
-use crate::{Beam, Heard, Motion, Parameter, Sweep, World, length_rate, rates::RateFinder, walls};
+use crate::{
+    Beam, Heard, Motion, Parameter, Sweep, World, candidates::Phases, length_rate,
+    rates::RateFinder, walls,
+};
 
 /// Half of the step of a difference, metres.
 const BY_M: f64 = 1e-6;
@@ -102,7 +105,8 @@ fn margins_above_the_threshold() {
     ];
     let margins = |world: &World| {
         let asked: Vec<&Parameter> = parameters.iter().map(|(parameter, _)| parameter).collect();
-        let finder = RateFinder::new(world, &asked, world.air.sound_speed_m_s(), false);
+        let finder =
+            RateFinder::new(world, &asked, world.air.sound_speed_m_s(), false, Phases::Known);
         let simulator = world.simulator(&pose).expect("a model");
         let judged = finder.sweep(&simulator, &simulator.at(pose.position()), 0, &sweep, &pose);
         judged.expect("candidates").iter().map(|beam| beam.possible[0].clone()).collect::<Vec<_>>()

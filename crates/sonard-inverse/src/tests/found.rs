@@ -61,6 +61,7 @@ fn pose_air_and_threshold_come_back() {
             of(Parameter::Threshold, 6.0),
         ],
         widest_m: 0.1,
+        widest_turn_deg: 12.0,
         least_sigma_m: 2e-4,
         least_sigma_db: 0.5,
     };
@@ -71,6 +72,37 @@ fn pose_air_and_threshold_come_back() {
         assert!(off < 4.0 * estimate.sigma && estimate.identified, "{estimate:?} for {expected}");
     }
     assert!(fitted.estimates[0].sigma < 1e-3 && fitted.estimates[2].sigma < 0.3);
+}
+
+/// A ranger that tells whole centimetres is not believed to the millimetre where several readings happen to be alike.
+#[test]
+fn steps_of_the_range_are_part_of_its_spread() {
+    const STEP_M: f64 = 0.01;
+    let mut here = world("simple-room", "hc-sr04");
+    here.sensor.range_step_m = STEP_M;
+    let pose = first_pose(&here.scene);
+    let believed =
+        Pose { x_m: pose.x_m + 0.03, y_m: pose.y_m - 0.02, heading_deg: pose.heading_deg };
+    let sweep = sweep(&here, &pose, &believed, 120, TofNoise::NONE, 1);
+    let of = |parameter, sigma| Prior { parameter, sigma };
+    let what = Fit {
+        priors: vec![
+            of(Parameter::X(0), 0.1),
+            of(Parameter::Y(0), 0.1),
+            of(Parameter::Heading(0), 8.0),
+        ],
+        widest_m: 0.1,
+        widest_turn_deg: 12.0,
+        least_sigma_m: 2e-4,
+        least_sigma_db: 0.5,
+    };
+    let fitted = fit(&here, &[sweep], &what).expect("a fit");
+    let spread_m = STEP_M / 12f64.sqrt();
+    assert!((spread_m..1.6 * spread_m).contains(&fitted.errors.sigma_m), "{:?}", fitted.errors);
+    for (estimate, expected) in fitted.estimates.iter().zip([-0.03, 0.02]) {
+        let off_m = (estimate.change - expected).abs();
+        assert!(off_m < 3.0 * estimate.sigma && estimate.sigma < 2e-3, "{estimate:?}");
+    }
 }
 
 #[test]
