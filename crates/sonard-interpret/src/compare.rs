@@ -31,7 +31,7 @@ use sonard_model::geometry::Pose;
 use sonard_records::{PathKind, Ping, PingStatus, ScanView, SimRecord};
 
 pub use beside::{Beside, JudgedPing, Word};
-pub use explain::{Estimate, Explanation};
+pub use explain::{Estimate, Explanation, Quantity};
 pub use statistics::{keep_every_second, quantile};
 
 /// Least tolerance within which two ranges agree, metres.

@@ -104,6 +104,7 @@ const fn kind(kind: EventKind) -> &'static str {
         EventKind::Stopped => "stopped",
         EventKind::ClockStep => "clock step",
         EventKind::NoPrediction => "no prediction",
+        EventKind::Explanation => "explanation",
     }
 }
 

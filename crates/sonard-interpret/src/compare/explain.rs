@@ -31,7 +31,7 @@ use self::{
 };
 use super::{Judged, keep_every_second};
 
-pub use found::{Estimate, Explanation};
+pub use found::{Estimate, Explanation, Quantity};
 
 /// Changes with less gain in log-likelihood than this are noise.
 const LEAST_GAIN: f64 = 10.0;
@@ -153,18 +153,22 @@ impl Explainer {
             fit(self.pairs.iter().map(|pair| (pair.residual_m, gain(pair))))
         };
         let place = of(&|pair| pair.by_place.extend(0.0));
-        found.extend(self.explanation("pose", &[("x_m", 0), ("y_m", 1)], place));
+        found.extend(self.explanation("pose", &[(Quantity::XM, 0), (Quantity::YM, 1)], place));
         // What the measured range is to be multiplied by comes off the residual.
         let speed = of(&|pair| DVec3::new(0.0, 0.0, -pair.measured_m));
-        found.extend(self.explanation("sound_speed", &[("percent", 2)], speed));
+        found.extend(self.explanation("sound_speed", &[(Quantity::Percent, 2)], speed));
         let offset = of(&|_| DVec3::NEG_X);
-        found.extend(self.explanation("range_offset", &[("offset_m", 0)], offset));
+        found.extend(self.explanation("range_offset", &[(Quantity::OffsetM, 0)], offset));
         for (name, number) in self.walls.iter().zip(0..) {
             let wall = of(&|pair| {
                 let by_wall = pair.by_wall.iter().find(|(wall, _)| *wall == number);
                 DVec3::new(by_wall.map_or(0.0, |(_, gain)| *gain), 0.0, 0.0)
             });
-            found.extend(self.explanation(&format!("wall {name}"), &[("offset_m", 0)], wall));
+            found.extend(self.explanation(
+                &format!("wall {name}"),
+                &[(Quantity::OffsetM, 0)],
+                wall,
+            ));
         }
         let step_deg = self.turns.as_ref().map_or(0.0, |turns| turns.step_deg);
         found.extend(self.headings.explanation(step_deg));
@@ -193,7 +197,7 @@ impl Explainer {
     fn explanation(
         &self,
         change: &str,
-        values: &[(&'static str, usize)],
+        values: &[(Quantity, usize)],
         fit: Option<Fit>,
     ) -> Option<Explanation> {
         let fit = fit?;

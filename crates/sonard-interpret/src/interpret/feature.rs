@@ -1,6 +1,7 @@
 //! What an interpretation says, and by which settings.
 
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 /// How scans are interpreted.
@@ -52,7 +53,9 @@ pub struct Noise {
 }
 
 /// What an element of the floor plan is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum FeatureKind {
     /// A flat wall.
@@ -66,7 +69,9 @@ pub enum FeatureKind {
 }
 
 /// Why a feature is unresolved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
     /// A plane or a corner: a scan from another place decides.

@@ -10,14 +10,16 @@ mod ideal;
 mod image;
 mod polar;
 mod score;
+mod trace;
 
 #[cfg(test)]
 mod tests;
 
 pub use beam_model::{BeamModel, GaussianBeam, PhysicalBeam};
 pub use ideal::ideal;
-pub use image::{ImageError, MapYaml, from_pgm, to_pgm};
+pub use image::{ImageError, MapYaml, from_pgm, from_pixels, to_pgm};
 pub use score::{MapScore, PathSettings, ScoreError, score};
+pub use trace::{TraceSettings, WallLine, trace};
 
 use thiserror::Error;
 

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::{
-    found::Estimate,
+    found::{Estimate, Quantity},
     likelihood::{SIGMA_M, densities, is_near, log_likelihood},
 };
 
@@ -36,7 +36,7 @@ pub(super) struct Fit {
 
 impl Fit {
     /// One of its values; a share becomes percent.
-    pub(super) fn estimate(&self, name: &'static str, at: usize) -> Estimate {
+    pub(super) fn estimate(&self, name: Quantity, at: usize) -> Estimate {
         let scale = if at == 2 { 100.0 } else { 1.0 };
         Estimate { name, value: self.value[at] * scale, sigma: self.sigma[at] * scale }
     }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use sonard_records::{Ping, ScanPlan};
 
 use super::{
-    found::{Estimate, Explanation},
+    found::{Estimate, Explanation, Quantity},
     likelihood::{is_heard, is_near, log_likelihood},
 };
 use crate::compare::Judged;
@@ -29,7 +29,7 @@ impl Shifts {
     }
 
     /// The shift that explains most, if it is another than none, and none at an end. `step` is from one to the next.
-    fn explanation(&self, change: &str, name: &'static str, step: f64) -> Option<Explanation> {
+    fn explanation(&self, change: &str, name: Quantity, step: f64) -> Option<Explanation> {
         let (middle, likelihood) = (self.0.len() / 2, |at: usize| self.0[at].0);
         let best = (0..self.0.len())
             .max_by(|&one, &other| likelihood(one).total_cmp(&likelihood(other)))?;
@@ -100,7 +100,7 @@ impl Headings {
     }
 
     pub(super) fn explanation(&self, step_deg: f64) -> Option<Explanation> {
-        self.0.explanation("heading", "heading_deg", step_deg)
+        self.0.explanation("heading", Quantity::HeadingDeg, step_deg)
     }
 }
 
@@ -173,7 +173,7 @@ impl Thresholds {
         if self.heard.contains(&0) {
             return None;
         }
-        self.shifts.explanation("threshold", "threshold_db", STEP_DB)
+        self.shifts.explanation("threshold", Quantity::ThresholdDb, STEP_DB)
     }
 }
 

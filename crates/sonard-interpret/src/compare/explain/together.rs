@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::{
     fit::{Fit, Moved, fit},
-    found::{Estimate, Explanation, Pair},
+    found::{Estimate, Explanation, Pair, Quantity},
     likelihood::is_near,
     shift::{Turns, of_lapse, of_pair, parabola},
 };
@@ -112,11 +112,11 @@ impl Together {
         };
         let (now, explained_now) = self.likelihood(0, |(residual_m, _)| residual_m);
         let heading = Estimate {
-            name: "heading_deg",
+            name: Quantity::HeadingDeg,
             value: (best as f64 - most as f64 + peak) * step_deg,
             sigma: sigma * step_deg,
         };
-        let values = [("x_m", 0), ("y_m", 1), ("percent", 2)];
+        let values = [(Quantity::XM, 0), (Quantity::YM, 1), (Quantity::Percent, 2)];
         let mut estimates: Vec<_> =
             values.into_iter().map(|(name, at)| fit.estimate(name, at)).collect();
         estimates.insert(2, heading);

@@ -68,20 +68,34 @@ pub fn to_pgm(grid: &Grid) -> Vec<u8> {
 /// When the image is not a binary PGM of 8 bits, is cut off, or makes no grid.
 pub fn from_pgm(bytes: &[u8], yaml: &MapYaml) -> Result<Grid, ImageError> {
     let (width, height, start) = header(bytes)?;
+    from_pixels([width, height], bytes.get(start..).unwrap_or_default(), yaml)
+}
+
+/// A map from the pixels of its image, 8 bits each, row by row from the upper left one, and its description.
+///
+/// # Errors
+/// When they are too few for this width and height, or make no grid.
+pub fn from_pixels(
+    [width, height]: [usize; 2],
+    pixels: &[u8],
+    yaml: &MapYaml,
+) -> Result<Grid, ImageError> {
     let shape = GridShape::covering(
         DVec2::new(yaml.origin[0], yaml.origin[1]),
         DVec2::new(yaml.origin[0], yaml.origin[1])
             + yaml.resolution * DVec2::new(width as f64, height as f64),
         yaml.resolution,
     )?;
-    let pixels = bytes.get(start..start + shape.cells()).ok_or(ImageError::Image {
-        at: bytes.len(),
+    let pixels = pixels.get(..shape.cells()).ok_or(ImageError::Image {
+        at: pixels.len(),
         what: "the image ends before its last pixel",
     })?;
+    let is_of_map_saver = pixels.iter().all(|pixel| OF_MAP_SAVER.contains(pixel));
     let probability = |pixel: u8| {
         let dark = 1.0 - f64::from(pixel) / 255.0;
         // 127 and 128 are the two sides of unknown.
-        let p = if pixel == 127 || pixel == 128 { 0.5 } else { dark };
+        let is_unknown = matches!(pixel, 127 | 128) || (is_of_map_saver && pixel == UNKNOWN);
+        let p = if is_unknown { 0.5 } else { dark };
         if yaml.negate == 0 { p } else { 1.0 - p }
     };
     let rows = pixels.chunks(shape.width).rev();
@@ -89,6 +103,10 @@ pub fn from_pgm(bytes: &[u8], yaml: &MapYaml) -> Result<Grid, ImageError> {
         rows.flat_map(|row| row.iter().map(|pixel| probability(*pixel))).collect();
     Ok(Grid::of_probabilities(shape, &cells))
 }
+
+/// What map_saver of ROS writes: occupied, unknown and free. A map of probabilities has other shades.
+const OF_MAP_SAVER: [u8; 4] = [0, UNKNOWN, 254, 255];
+const UNKNOWN: u8 = 205;
 
 /// Width, height and where the pixels begin.
 fn header(bytes: &[u8]) -> Result<(usize, usize, usize), ImageError> {

@@ -113,6 +113,17 @@ fn the_pair_of_files_gives_the_map_back() {
 }
 
 #[test]
+fn what_map_saver_writes_for_unknown_is_unknown_unless_the_map_has_other_shades() {
+    let yaml = MapYaml::of(&shape(0.3, 0.1), "map.pgm");
+    let unknown = |pixels: &[u8; 9]| {
+        let pgm = [b"P5\n3 3\n255\n", &pixels[..]].concat();
+        from_pgm(&pgm, &yaml).expect("a map").probability(0)
+    };
+    assert_eq!(unknown(&[0, 254, 254, 254, 205, 205, 205, 0, 0]), 0.5);
+    assert!((unknown(&[0, 230, 254, 254, 205, 205, 205, 0, 0]) - 0.196).abs() < 1e-3);
+}
+
+#[test]
 fn damaged_files_are_named() {
     let grid = Grid::new(shape(1.0, 0.1));
     let (pgm, yaml) = (to_pgm(&grid), MapYaml::of(grid.shape(), "map.pgm"));
