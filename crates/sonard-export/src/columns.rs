@@ -79,6 +79,8 @@ pub enum Kind {
     Time,
     /// Whole numbers, perhaps none.
     Integers,
+    /// Finite numbers of seven digits, perhaps none.
+    Numbers,
 }
 
 /// What a cell holds.
@@ -96,6 +98,8 @@ pub enum Value<'a> {
     Time(Timestamp),
     /// Of [`Kind::Integers`].
     Integers(&'a [u32]),
+    /// Of [`Kind::Numbers`].
+    Numbers(&'a [f32]),
 }
 
 impl Value<'_> {
@@ -109,11 +113,23 @@ impl Value<'_> {
             Self::Flag(_) => Kind::Flag,
             Self::Time(_) => Kind::Time,
             Self::Integers(_) => Kind::Integers,
+            Self::Numbers(_) => Kind::Numbers,
         }
     }
 }
 
-/// A column of a table.
+/// What a column of a table is called and holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Field {
+    /// Its name, with the unit.
+    pub name: &'static str,
+    /// What its cells hold.
+    pub kind: Kind,
+    /// Of numbers, whether seven digits say all: formats that have such numbers take four bytes instead of eight.
+    pub is_single: bool,
+}
+
+/// A column of a table of logs.
 #[derive(Debug, Clone, Copy)]
 pub struct Column {
     /// Its name, with the unit.
@@ -126,6 +142,12 @@ pub struct Column {
 }
 
 impl Column {
+    /// What it is called and holds.
+    #[must_use]
+    pub const fn field(&self) -> Field {
+        Field { name: self.name, kind: self.kind, is_single: self.is_single }
+    }
+
     /// The cell of a reading; `None` where the log does not say it.
     #[must_use]
     pub fn cell<'a>(&self, row: &Row<'a>) -> Option<Value<'a>> {

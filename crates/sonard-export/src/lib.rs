@@ -21,9 +21,9 @@ use jiff::Timestamp;
 
 use sonard_records::ScanView;
 
-pub use columns::{COLUMNS, Column, Kind, Row, Value};
+pub use columns::{COLUMNS, Column, Field, Kind, Row, Value};
 pub use error::{ExportError, LeftOut};
-pub use parquet::ParquetExport;
+pub use parquet::{ParquetExport, TypedTable};
 pub use place::{Place, begins_geojson, to_geojson, write_place};
 pub use recording::{McapExport, Profile, Settings};
 pub use table::CsvExport;

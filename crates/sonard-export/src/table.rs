@@ -1,7 +1,7 @@
 //! Tables of comma-separated values.
 
 use std::{
-    fmt::Write as _,
+    fmt::{self, Display, Write as _},
     io::{self, Write},
 };
 
@@ -72,13 +72,16 @@ fn write_cell(cell: &mut String, value: &Value<'_>) {
         Value::Number(number) => write!(cell, "{number}"),
         Value::Flag(flag) => write!(cell, "{flag}"),
         Value::Time(time) => write!(cell, "{time}"),
-        Value::Integers(numbers) => {
-            for (place, number) in numbers.iter().enumerate() {
-                let _ = write!(cell, "{}{number}", if place == 0 { "" } else { " " });
-            }
-            Ok(())
-        }
+        Value::Integers(numbers) => write_list(cell, numbers),
+        Value::Numbers(numbers) => write_list(cell, numbers),
     };
+}
+
+fn write_list(cell: &mut String, numbers: &[impl Display]) -> fmt::Result {
+    for (place, number) in numbers.iter().enumerate() {
+        write!(cell, "{}{number}", if place == 0 { "" } else { " " })?;
+    }
+    Ok(())
 }
 
 fn refused(error: csv::Error) -> ExportError {

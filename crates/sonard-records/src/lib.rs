@@ -14,6 +14,7 @@ mod record;
 mod remaining;
 mod simulated;
 mod sink;
+mod trace;
 mod view;
 mod viewpoint;
 
@@ -32,4 +33,5 @@ pub use sonard_model::{
     plan::{PlanError, ScanPlan},
     reading::{PathKind, PingStatus},
 };
+pub use trace::TraceLine;
 pub use view::ScanView;

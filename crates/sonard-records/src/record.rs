@@ -448,4 +448,6 @@ pub enum EventKind {
     ClockStep,
     /// The model could not say what would be heard; the readings that follow have no predictions.
     NoPrediction,
+    /// Something else than what is believed would explain the readings of scans better, or no longer would.
+    Explanation,
 }

@@ -16,7 +16,7 @@ use ::parquet::{
 };
 use std::sync::Arc;
 
-use crate::{Column, Kind, Value};
+use crate::{Field, Kind, Value};
 
 /// The cells of a column that wait.
 #[derive(Debug)]
@@ -36,7 +36,14 @@ enum Values {
     Double(Vec<f64>),
     Single(Vec<f32>),
     Flag(Vec<bool>),
-    List { numbers: Vec<i32>, repetitions: Vec<i16> },
+    List(Elements, Vec<i16>),
+}
+
+/// The elements of lists, one behind the other.
+#[derive(Debug)]
+enum Elements {
+    Whole(Vec<i32>),
+    Single(Vec<f32>),
 }
 
 /// Texts, each kept once.
@@ -48,7 +55,7 @@ struct Texts {
 }
 
 /// The type of a column; every cell may be null.
-pub(super) fn type_of(column: &Column) -> Result<Type, ParquetError> {
+pub(super) fn type_of(column: &Field) -> Result<Type, ParquetError> {
     let (physical, logical) = match column.kind {
         Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
         Kind::Integer => (Physical::INT64, None),
@@ -56,7 +63,11 @@ pub(super) fn type_of(column: &Column) -> Result<Type, ParquetError> {
         Kind::Number => (Physical::DOUBLE, None),
         Kind::Flag => (Physical::BOOLEAN, None),
         Kind::Time => (Physical::INT64, Some(LogicalType::timestamp(true, TimeUnit::NANOS))),
-        Kind::Integers => return list_of_counts(column.name),
+        Kind::Integers => {
+            let count = Some(LogicalType::integer(32, false));
+            return list_of(column.name, Physical::INT32, count);
+        }
+        Kind::Numbers => return list_of(column.name, Physical::FLOAT, None),
     };
     Type::primitive_type_builder(column.name, physical)
         .with_repetition(Repetition::OPTIONAL)
@@ -65,10 +76,14 @@ pub(super) fn type_of(column: &Column) -> Result<Type, ParquetError> {
 }
 
 /// A list as the format's own rules ask for it, in three levels.
-fn list_of_counts(name: &str) -> Result<Type, ParquetError> {
-    let element = Type::primitive_type_builder("element", Physical::INT32)
+fn list_of(
+    name: &str,
+    physical: Physical,
+    logical: Option<LogicalType>,
+) -> Result<Type, ParquetError> {
+    let element = Type::primitive_type_builder("element", physical)
         .with_repetition(Repetition::REQUIRED)
-        .with_logical_type(Some(LogicalType::integer(32, false)))
+        .with_logical_type(logical)
         .build()?;
     let list = Type::group_type_builder("list")
         .with_repetition(Repetition::REPEATED)
@@ -82,21 +97,23 @@ fn list_of_counts(name: &str) -> Result<Type, ParquetError> {
 }
 
 /// Where a column's values are in the schema.
-pub(super) fn leaf(column: &Column) -> ColumnPath {
-    let below: &[&str] = if column.kind == Kind::Integers { &["list", "element"] } else { &[] };
+pub(super) fn leaf(column: &Field) -> ColumnPath {
+    let is_list = matches!(column.kind, Kind::Integers | Kind::Numbers);
+    let below: &[&str] = if is_list { &["list", "element"] } else { &[] };
     ColumnPath::new([column.name].iter().chain(below).map(ToString::to_string).collect())
 }
 
 impl Cells {
     /// No cells yet.
-    pub(super) fn of(column: &Column) -> Self {
+    pub(super) fn of(column: &Field) -> Self {
         let values = match column.kind {
             Kind::Text => Values::Text(Texts::default()),
             Kind::Integer | Kind::Time => Values::Whole(Vec::new()),
             Kind::Number if column.is_single => Values::Single(Vec::new()),
             Kind::Number => Values::Double(Vec::new()),
             Kind::Flag => Values::Flag(Vec::new()),
-            Kind::Integers => Values::List { numbers: Vec::new(), repetitions: Vec::new() },
+            Kind::Integers => Values::List(Elements::Whole(Vec::new()), Vec::new()),
+            Kind::Numbers => Values::List(Elements::Single(Vec::new()), Vec::new()),
         };
         Self { values, definitions: Vec::new() }
     }
@@ -104,18 +121,16 @@ impl Cells {
     /// Adds a cell; how many bytes more it takes than a number does.
     pub(super) fn push(&mut self, value: Option<Value<'_>>) -> usize {
         let (is_there, bytes) = match (&mut self.values, value) {
-            (Values::List { numbers, repetitions }, value) => {
-                let Some(Value::Integers(list)) = value else {
+            (Values::List(elements, repetitions), value) => {
+                let Some(length) = value.and_then(|list| elements.extend(&list)) else {
                     repetitions.push(0);
                     self.definitions.push(LIST[0]);
                     return 0;
                 };
-                // Unsigned by its logical type: the bits are the same.
-                numbers.extend(list.iter().map(|number| number.cast_signed()));
-                repetitions.extend((0..list.len().max(1)).map(|place| i16::from(place > 0)));
-                let level = if list.is_empty() { LIST[1] } else { LIST[2] };
-                self.definitions.extend(std::iter::repeat_n(level, list.len().max(1)));
-                return 8 * list.len();
+                repetitions.extend((0..length.max(1)).map(|place| i16::from(place > 0)));
+                let level = if length == 0 { LIST[1] } else { LIST[2] };
+                self.definitions.extend(std::iter::repeat_n(level, length.max(1)));
+                return 8 * length;
             }
             (Values::Text(texts), Some(Value::Text(text))) => (true, texts.push(&text)),
             (Values::Whole(cells), Some(Value::Integer(number))) => {
@@ -159,8 +174,15 @@ impl Cells {
             Values::Double(cells) => write::<DoubleType>(cells, levels, None, column)?,
             Values::Single(cells) => write::<FloatType>(cells, levels, None, column)?,
             Values::Flag(cells) => write::<BoolType>(cells, levels, None, column)?,
-            Values::List { numbers, repetitions } => {
-                write::<Int32Type>(numbers, levels, Some(repetitions), column)?;
+            Values::List(elements, repetitions) => {
+                match elements {
+                    Elements::Whole(cells) => {
+                        write::<Int32Type>(cells, levels, Some(repetitions), column)?;
+                    }
+                    Elements::Single(cells) => {
+                        write::<FloatType>(cells, levels, Some(repetitions), column)?;
+                    }
+                }
                 repetitions.clear();
             }
         }
@@ -178,6 +200,24 @@ fn write<T: DataType>(
     column.typed::<T>().write_batch(cells, Some(definitions), repetitions)?;
     cells.clear();
     Ok(())
+}
+
+impl Elements {
+    /// Adds those of a list and says how many they are; `None` if it is of others.
+    fn extend(&mut self, list: &Value<'_>) -> Option<usize> {
+        match (self, list) {
+            (Self::Whole(cells), Value::Integers(list)) => {
+                // Unsigned by its logical type: the bits are the same.
+                cells.extend(list.iter().map(|number| number.cast_signed()));
+                Some(list.len())
+            }
+            (Self::Single(cells), Value::Numbers(list)) => {
+                cells.extend_from_slice(list);
+                Some(list.len())
+            }
+            _ => None,
+        }
+    }
 }
 
 impl Texts {

@@ -44,7 +44,7 @@ fn cell(column: &Column, row: &Row<'_>) -> Field {
         Value::Number(number) => Field::Double(number),
         Value::Flag(flag) => Field::Bool(flag),
         Value::Time(time) => Field::Long(time.as_nanosecond() as i64),
-        Value::Integers(_) => panic!("checked by itself"),
+        Value::Integers(_) | Value::Numbers(_) => panic!("checked by itself"),
     }
 }
 
