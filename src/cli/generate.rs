@@ -1,97 +1,229 @@
-//! `sonard generate`: manual pages and completions, for packages.
+//! `sonard generate`.
 
-use std::{fs, io, path::Path};
+mod part;
 
-use clap::Command;
-use clap_complete::{Shell, generate_to};
-use clap_mangen::roff::{Roff, bold, italic, roman};
+use std::{
+    io::{self, Write as _},
+    path::{Path, PathBuf},
+};
 
-use super::{Failure, Outcome, command_line, output::OutPath};
-use crate::config::{Key, Section, sections};
+use rayon::prelude::*;
+
+use super::{
+    Failure, Outcome,
+    failure::is_wrong_place,
+    output::{OutPath, note_input},
+    progress,
+};
+use crate::{
+    dataset::{DataSet, DataSetError, PartOutcome},
+    generate::{Generator, Manifest, Part, Table},
+};
 
 /// Options of `sonard generate`.
 #[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+#[command(group(clap::ArgGroup::new("instead").args(["example", "check", "verify"])))]
 pub(super) struct Args {
-    /// Folder to write into; it gets man1, man5 and completions
-    dir: OutPath,
+    /// The specification, a TOML file, or spec.json of a data set
+    #[arg(value_name = "SPEC.toml", required_unless_present_any = ["example", "verify"])]
+    spec: Option<PathBuf>,
+    /// Folder for what is written; the data set, a folder for each shard in it
+    #[arg(long, value_name = "DIR", required_unless_present = "instead")]
+    out: Option<OutPath>,
+    /// The part of the set that this process makes: every N-th shard from the I-th on, I from 1
+    /// [default: as an array job's environment says, else all]
+    #[arg(long, value_name = "I/N", conflicts_with = "instead")]
+    shard: Option<Part>,
+    /// Print a file with every key explained, and end; a specification
+    #[arg(long)]
+    example: bool,
+    /// Check all that is named, and end
+    #[arg(long)]
+    check: bool,
+    /// Check files against their digests, and end; those of a data set's folder
+    #[arg(long, value_name = "DIR", conflicts_with = "spec")]
+    verify: Option<PathBuf>,
+    /// Also draw so many shards anew and hold them against those that are there
+    #[arg(long, value_name = "SHARDS", requires = "verify", default_value_t = 0)]
+    again: u32,
 }
+
+pub(super) const ABOUT: &str = "\
+Make a data set for learners: rooms, poses, sensors and air drawn at random, shard by shard.
+
+A specification says how large the set is, what scenes, furniture, materials, poses, sensors, air and noise are drawn \
+from, and what is kept: readings, their paths, every echo, traces, ideal ranges, features as labels, maps as they \
+should be. What does not fit is drawn again, and counted.
+
+A shard is a function of the specification and its number alone, so any engine can make a set: each process makes its \
+part (--shard I/N), in whatever order. Shards that are there are left out, so a set that was interrupted goes on \
+when the command is given again; one that was killed leaves nothing that looks whole. Who finds all shards there \
+writes manifest.json (counts, digests) and README.md (what the set is, what its columns mean).
+
+Without --shard the index of an array job is taken from its environment: SLURM_ARRAY_TASK_ID with its count, \
+JOB_COMPLETION_INDEX (Kubernetes) and AWS_BATCH_JOB_ARRAY_INDEX of as many as the set has shards. Which was taken is \
+said. --shard goes before them; --shard 1/1 makes all.";
+
+const EXAMPLES: &str = "\
+Examples:
+  sonard generate --example > rooms.toml        # every key, explained
+  sonard generate rooms.toml --check
+  sonard generate rooms.toml --out rooms        # all shards, on all cores
+  sonard generate rooms.toml --out rooms --shard 3/20
+  parallel sonard generate rooms.toml --out rooms --shard {#}/20 ::: $(seq 20)
+  sbatch --array=1-20 --wrap 'sonard generate rooms.toml --out /shared/rooms'
+  sonard generate --verify rooms --again 2      # digests, and two shards drawn anew
+
+Threads are as many as there are cores, or as RAYON_NUM_THREADS says. docs/generate.md says how to read a set.
+
+Exit codes: 0 done (also: was there), 1 --verify found a fault, 2 wrong usage, specification or folder, 3 the disk gave \
+up: the same command goes on.";
+
+const EXAMPLE: &str = include_str!("../../config/generate.toml");
 
 pub(super) fn run(args: &Args) -> Outcome {
-    write_all(&args.dir)
-        .map_err(|error| Failure::unwritable(&format!("into {}", args.dir.display()), &error))
+    if args.example {
+        return io::stdout()
+            .write_all(EXAMPLE.as_bytes())
+            .or_else(|error| Failure::from_write("to standard output", &error));
+    }
+    if let Some(folder) = &args.verify {
+        return verify(folder, args.again);
+    }
+    // Required without them.
+    let Some(spec) = &args.spec else { return Ok(()) };
+    let generator = read(spec)?;
+    let Some(out) = args.out.as_deref().filter(|_| !args.check) else {
+        anstream::println!("{}", size(&generator));
+        return Ok(());
+    };
+    let shards = generator.spec().set.shards;
+    let part = part::part(args.shard, &|name| std::env::var(name).ok(), shards)?;
+    make(&generator, out, part)
 }
 
-fn write_all(dir: &Path) -> io::Result<()> {
-    let [pages, files, completions] = ["man1", "man5", "completions"].map(|part| dir.join(part));
-    for folder in [&pages, &files, &completions] {
-        fs::create_dir_all(folder)?;
-    }
-    // Lines are filled by whoever shows the page.
-    let command = command_line().term_width(0);
-    clap_mangen::generate_to(command.clone(), &pages)?;
-    for shell in [Shell::Bash, Shell::Zsh, Shell::Fish] {
-        generate_to(shell, &mut command.clone(), "sonard", &completions)?;
-    }
-    fs::write(files.join("sonard.toml.5"), configuration_page(&command))
+fn read(path: &Path) -> Result<Generator, Failure> {
+    DataSet::read_specification(path, &note_input).map_err(|error| match error.of_disk() {
+        Some(_) => {
+            let help =
+                "give a specification that you may read: `sonard generate --example` prints one";
+            Failure::input(&error, help)
+        }
+        None => refused(&error),
+    })
 }
 
-/// `sonard.toml(5)`, made from the table of keys that the configuration is checked by.
-fn configuration_page(command: &Command) -> String {
-    let version = command.get_version().unwrap_or_default();
-    let mut page = Roff::new();
-    page.control("TH", ["sonard.toml", "5", "", &format!("sonard {version}"), ""]);
-    section(&mut page, "NAME");
-    page.text([roman("sonard.toml - configuration of the ultrasonic ranger's daemon")]);
-    section(&mut page, "SYNOPSIS");
-    page.text([italic("/etc/sonard/sonard.toml")]);
-    section(&mut page, "DESCRIPTION");
-    page.text([
-        roman("Read by "),
-        bold("sonard run"),
-        roman(
-            ". The file is TOML. Every key has a default or may be left out; a key that is not \
-             known is refused, with the nearest known one. Over the file go environment variables \
-             (SONARD_PLAN_STEP_DEG=1.8), over those the options of the command line (",
-        ),
-        bold("--set plan.step_deg=1.8"),
-        roman("). "),
-        bold("sonard run --check"),
-        roman(
-            " reads it all and says what is in force. A reload (SIGHUP) takes changes in; those of \
-             keys marked (restart) wait for the next start.",
-        ),
-    ]);
-    for of in sections() {
-        keys(&mut page, of);
-    }
-    section(&mut page, "SEE ALSO");
-    page.text([bold("sonard-run"), roman("(1), "), bold("sonard"), roman("(1)")]);
-    page.render()
-}
-
-fn keys(page: &mut Roff, of: &Section) {
-    section(page, &format!("[{}]", of.name));
-    page.text([roman(of.about.as_str())]);
-    for key in &of.keys {
-        page.control("TP", []);
-        page.text([bold(key.name.as_str())]);
-        page.text([roman(format!("{} {}", key.about, key.kind.wanted()))]);
-        page.control("br", []);
-        page.text([roman(fallback(key))]);
+fn refused(error: &DataSetError) -> Failure {
+    match error.of_disk() {
+        Some(disk) if !is_wrong_place(disk) => Failure::device(error, error.help()),
+        _ => Failure::input(error, error.help()),
     }
 }
 
-/// What is in force if the key is not given.
-fn fallback(key: &Key) -> String {
-    match (&key.default, &key.example) {
-        (Some(default), _) => format!("Default: {}.", key.kind.toml(default)),
-        (None, Some(example)) => format!("No default; for example {}.", key.kind.toml(example)),
-        (None, None) => "No default.".to_owned(),
-    }
+/// How much a set is, in a line.
+fn size(generator: &Generator) -> String {
+    let set = &generator.spec().set;
+    let readings = generator.readings() * u64::from(set.shards);
+    format!(
+        "{}: {} shards of {} scenes with {} poses each, {readings} readings; specification {}",
+        set.name,
+        set.shards,
+        set.scenes,
+        set.poses,
+        &generator.sha256()[..12]
+    )
 }
 
-fn section(page: &mut Roff, title: &str) {
-    page.control("SH", [title]);
+fn make(generator: &Generator, out: &Path, part: Part) -> Outcome {
+    let set = DataSet::open(out, generator).map_err(|error| refused(&error))?;
+    let shards = part.shards(generator.spec().set.shards).count() as u64;
+    let bar = progress::bar(generator.readings() * shards, "readings");
+    let made = set.make_part(part, &|readings| bar.inc(readings));
+    bar.finish_and_clear();
+    let PartOutcome { made, were_there } = made.map_err(|error| refused(&error))?;
+    anstream::eprintln!("{made} shards made, {were_there} were there");
+    match set.seal().map_err(|error| refused(&error))? {
+        Some(manifest) => anstream::eprintln!("{}: {}", out.display(), whole(&manifest)),
+        None => {
+            let missing = set.missing().map_err(|error| refused(&error))?;
+            let of = generator.spec().set.shards;
+            anstream::eprintln!(
+                "{}: {} of {of} shards are still missing",
+                out.display(),
+                missing.len()
+            );
+        }
+    }
+    Ok(())
+}
+
+/// What a whole set is, in a line.
+fn whole(manifest: &Manifest) -> String {
+    let totals = &manifest.totals;
+    let readings = totals.rows.get(&Table::Readings).copied().unwrap_or_default();
+    let again = &totals.redrawn;
+    format!(
+        "whole: {} shards, {readings} readings, {:.2} bytes a reading; drawn again: {} poses, {} pieces of furniture, {} \
+         scenes; SHA-256 {}",
+        manifest.shards,
+        totals.bytes as f64 / readings.max(1) as f64,
+        again.poses + again.costly,
+        again.furniture,
+        again.scenes,
+        manifest.sha256,
+    )
+}
+
+/// Problems that are named; the others are counted.
+const NAMED: usize = 20;
+
+fn verify(folder: &Path, again: u32) -> Outcome {
+    let generator = DataSet::specification(folder).map_err(|error| match error.of_disk() {
+        Some(_) => Failure::input(&error, "give the folder of a data set, with its spec.json"),
+        None => refused(&error),
+    })?;
+    let set = DataSet::at(folder, &generator);
+    let shards = generator.spec().set.shards;
+    let all: Vec<u32> = (1..=shards).collect();
+    let bar = progress::bar(shards.into(), "shards");
+    let of_shards: Vec<Vec<String>> = all
+        .par_iter()
+        .map(|shard| {
+            let problems = set.check_digests(*shard);
+            bar.inc(1);
+            problems
+        })
+        .collect();
+    bar.finish_and_clear();
+    let mut problems: Vec<String> = of_shards.into_iter().flatten().collect();
+    problems.extend(set.check_manifest().map_err(|error| refused(&error))?);
+    let sample = sample(shards, again);
+    if problems.is_empty() {
+        let bar = progress::bar(generator.readings() * sample.len() as u64, "readings");
+        let drawn: Result<Vec<_>, _> = sample
+            .par_iter()
+            .map(|shard| set.check_again(*shard, &|readings| bar.inc(readings)))
+            .collect();
+        bar.finish_and_clear();
+        problems.extend(drawn.map_err(|error| refused(&error))?.into_iter().flatten());
+    }
+    if problems.is_empty() {
+        anstream::println!("{}; as it should be, {} drawn anew", size(&generator), sample.len());
+        return Ok(());
+    }
+    for problem in problems.iter().take(NAMED) {
+        anstream::println!("{problem}");
+    }
+    let hint = "`sonard generate` makes what is missing; remove what is damaged first";
+    Err(Failure::Found(Some(format!("{}: {} problems; {hint}", folder.display(), problems.len()))))
+}
+
+/// So many shards, evenly over the set.
+fn sample(shards: u32, count: u32) -> Vec<u32> {
+    let count = count.min(shards);
+    let at = |number: u32| (u64::from(number) * u64::from(shards) / u64::from(count.max(1))) as u32;
+    (0..count).map(|number| 1 + at(number)).collect()
 }
 
 #[cfg(test)]
@@ -99,24 +231,32 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_verb_has_a_page_and_every_key_an_entry() {
-        let folder = tempfile::tempdir().expect("a folder");
-        write_all(folder.path()).expect("there is room");
-        let read = |name: &str| fs::read_to_string(folder.path().join(name)).expect("it is there");
-        for verb in command_line().get_subcommands().filter(|verb| !verb.is_hide_set()) {
-            let page = read(&format!("man1/sonard-{}.1", verb.get_name()));
-            assert!(page.contains(".SH OPTIONS"), "{}", verb.get_name());
-        }
-        // A hidden verb is for whoever makes packages.
-        assert!(!folder.path().join("man1/sonard-generate.1").exists());
-        let page = read("man5/sonard.toml.5");
-        for section in sections() {
-            for key in &section.keys {
-                assert!(page.contains(&format!("\\fB{}\\fR", key.name)), "{}", key.name);
+    fn the_example_is_right_and_has_every_key() {
+        let none = |name: &str| Err(io::Error::other(format!("no file {name}")));
+        let generator = Generator::from_toml("generate.toml", EXAMPLE, &none);
+        let generator = generator.unwrap_or_else(|error| panic!("{error}: {}", error.help));
+        let written: serde_json::Value =
+            serde_json::from_str(generator.text()).expect("it is JSON");
+        let specification = written["specification"].as_object().expect("an object");
+        for (section, keys) in specification {
+            assert!(EXAMPLE.contains(&format!("[{section}]")), "[{section}]");
+            let keys = match keys {
+                serde_json::Value::Array(kinds) => kinds[0].as_object(),
+                keys => keys.as_object(),
+            };
+            for key in keys.into_iter().flat_map(serde_json::Map::keys) {
+                let is_there = |line: &str| {
+                    line.trim_start_matches(['#', ' ']).starts_with(&format!("{key} = "))
+                };
+                assert!(EXAMPLE.lines().any(is_there), "[{section}] {key}");
             }
         }
-        for name in ["sonard.bash", "_sonard", "sonard.fish"] {
-            assert!(read(&format!("completions/{name}")).contains("benchmark"), "{name}");
-        }
+    }
+
+    #[test]
+    fn a_sample_is_spread_over_the_set() {
+        assert_eq!(sample(10, 0), [] as [u32; 0]);
+        assert_eq!(sample(10, 2), [1, 6]);
+        assert_eq!(sample(3, 9), [1, 2, 3]);
     }
 }

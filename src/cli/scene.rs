@@ -1,5 +1,11 @@
 //! `sonard scene`.
 
+mod from_dxf;
+mod from_grid;
+mod from_sdf;
+mod from_svg;
+mod made;
+
 use std::{
     fmt::Write as _,
     io::{self, Write as _},
@@ -24,13 +30,24 @@ const MOST_CHANGES: usize = 100;
 /// Verbs of `sonard scene`.
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum Verb {
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene;
-    /// checks that it can stand there
+    /// Check a scene file and say in a line what it holds
     #[command(long_about = CHECK_ABOUT, after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
     /// Draw a scene's floor plan as SVG or PNG
     #[command(long_about = DRAW_ABOUT, after_help = DRAW_EXAMPLES)]
     Draw(DrawArgs),
+    /// Make a scene of a drawing of a CAD program: the lines of a DXF file
+    #[command(long_about = from_dxf::ABOUT, after_help = from_dxf::EXAMPLES)]
+    FromDxf(from_dxf::FromDxfArgs),
+    /// Make a scene of a map of map_server: its walls, traced as lines
+    #[command(long_about = from_grid::ABOUT, after_help = from_grid::EXAMPLES)]
+    FromGrid(from_grid::FromGridArgs),
+    /// Make a scene of a world of Gazebo: the boxes and cylinders of an SDF file
+    #[command(long_about = from_sdf::ABOUT, after_help = from_sdf::EXAMPLES)]
+    FromSdf(from_sdf::FromSdfArgs),
+    /// Make a scene of a drawing: the lines of an SVG file
+    #[command(long_about = from_svg::ABOUT, after_help = from_svg::EXAMPLES)]
+    FromSvg(from_svg::FromSvgArgs),
     /// List the scenes that come with sonard, with their poses
     List,
     /// Print the file of a scene that comes with sonard: a start for one of your own
@@ -126,6 +143,10 @@ pub(super) fn run(verb: Verb) -> Outcome {
     match verb {
         Verb::Check(args) => check(&args),
         Verb::Draw(args) => draw(&args),
+        Verb::FromDxf(args) => from_dxf::run(&args),
+        Verb::FromGrid(args) => from_grid::run(&args),
+        Verb::FromSdf(args) => from_sdf::run(&args),
+        Verb::FromSvg(args) => from_svg::run(&args),
         Verb::List => list(),
         Verb::Show(name) => preset::scene(&name),
         Verb::Schema => schema(),

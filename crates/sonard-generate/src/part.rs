@@ -1,0 +1,97 @@
+//! The part of a set that one of several processes makes.
+
+use std::{fmt, str::FromStr};
+
+use thiserror::Error;
+
+/// One of so many parts of a set, counted from 1: `3/20`.
+///
+/// Part I of N are the shards I, I + N, I + 2 N, and so on, so that a set may have more shards than there are processes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    index: u32,
+    of: u32,
+}
+
+/// What is no part.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum PartError {
+    /// Not two numbers.
+    #[error("`{0}` is not I/N: give two whole numbers, as in 3/20")]
+    Form(String),
+    /// Beyond what there is.
+    #[error("there is no part {index} of {of}: parts count from 1/{of} to {of}/{of}")]
+    Range {
+        /// Which one was asked for.
+        index: u32,
+        /// Of how many.
+        of: u32,
+    },
+}
+
+impl Part {
+    /// The whole set.
+    pub const WHOLE: Self = Self { index: 1, of: 1 };
+
+    /// Part `index` of `of`, from 1.
+    ///
+    /// # Errors
+    /// When there is no such part.
+    pub const fn new(index: u32, of: u32) -> Result<Self, PartError> {
+        match index >= 1 && index <= of {
+            true => Ok(Self { index, of }),
+            false => Err(PartError::Range { index, of }),
+        }
+    }
+
+    /// Its shards in a set of so many, by their numbers, from 1.
+    pub fn shards(self, of_set: u32) -> impl Iterator<Item = u32> {
+        (self.index..=of_set).step_by(self.of as usize)
+    }
+}
+
+impl FromStr for Part {
+    type Err = PartError;
+
+    fn from_str(text: &str) -> Result<Self, PartError> {
+        let numbers = text
+            .split_once('/')
+            .and_then(|(index, of)| Some((index.trim().parse().ok()?, of.trim().parse().ok()?)));
+        let (index, of) = numbers.ok_or_else(|| PartError::Form(text.to_owned()))?;
+        Self::new(index, of)
+    }
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.of)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_together_are_the_set_and_no_shard_is_in_two() {
+        for shards in [1, 5, 12] {
+            for of in [1, 2, 5, 20] {
+                let parts = (1..=of).map(|index| Part::new(index, of).expect("a part"));
+                let mut all: Vec<u32> = parts.flat_map(|part| part.shards(shards)).collect();
+                all.sort_unstable();
+                assert_eq!(all, (1..=shards).collect::<Vec<_>>(), "{of} parts");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_part_is_told_what_would_be() {
+        assert_eq!("3/20".parse(), Part::new(3, 20));
+        for (text, part) in
+            [("3", "as in 3/20"), ("a/b", "as in 3/20"), ("0/4", "from 1/4"), ("5/4", "to 4/4")]
+        {
+            let error = text.parse::<Part>().expect_err(text).to_string();
+            assert!(error.contains(part), "{error}");
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! The readings at a pose.
+
+use sonard_model::{
+    acoustics::ReceiverNoise,
+    geometry::Pose,
+    model::{Arrival, Prediction, Simulator, TooCostly},
+    plan::ScanPlan,
+};
+
+use crate::{
+    seed::{Of, rng},
+    spec::Loaded,
+};
+
+/// What is heard at a pose.
+pub(super) struct AtPose {
+    /// Number of the scene in the set.
+    pub(super) scene: u64,
+    /// Number of the pose in the scene.
+    pub(super) number: u32,
+    pub(super) pose: Pose,
+    /// By firing.
+    pub(super) heard: Vec<Firing>,
+}
+
+/// One firing.
+pub(super) struct Firing {
+    pub(super) azimuth_deg: f64,
+    pub(super) direction_rad: f64,
+    pub(super) reading: Prediction,
+    /// Its echoes, where they are kept.
+    pub(super) echoes: Vec<Arrival>,
+    /// Its envelope, where that is kept.
+    pub(super) envelope: Vec<f32>,
+}
+
+impl AtPose {
+    /// All firings of a plan.
+    ///
+    /// # Errors
+    /// When there are too many paths.
+    pub(super) fn listen(
+        loaded: &Loaded,
+        (scene, number): (u64, u32),
+        noise: &ReceiverNoise,
+        simulator: &Simulator,
+        pose: Pose,
+        plan: &ScanPlan,
+    ) -> Result<Self, TooCostly> {
+        let point = simulator.at(pose.position());
+        let mut rng = rng(&loaded.sha256, Of::Pose(scene, number));
+        let keep = &loaded.spec.keep;
+        let mut heard = Vec::with_capacity(plan.beams() as usize);
+        for index in 0..plan.beams() {
+            let azimuth_deg = plan.azimuth_deg(index / plan.pings_per_stop);
+            let direction_rad = pose.direction_rad(azimuth_deg);
+            let reading = match *noise == ReceiverNoise::NONE {
+                true => point.ping(direction_rad)?,
+                false => point.ping_in_noise(direction_rad, noise, &mut rng)?,
+            };
+            let echoes = match keep.echoes_down_to > 0.0 {
+                true => {
+                    let mut echoes = point.arrivals(direction_rad)?;
+                    echoes.retain(|echo| echo.amplitude >= keep.echoes_down_to);
+                    echoes
+                }
+                false => Vec::new(),
+            };
+            let envelope = match keep.trace_to_m > 0.0 {
+                true => {
+                    let trace = point.trace(direction_rad, keep.trace_to_m, keep.trace_step_us)?;
+                    trace.points.iter().map(|sample| sample.envelope as f32).collect()
+                }
+                false => Vec::new(),
+            };
+            heard.push(Firing { azimuth_deg, direction_rad, reading, echoes, envelope });
+        }
+        Ok(Self { scene, number, pose, heard })
+    }
+}

@@ -1,0 +1,271 @@
+//! The tables of a shard while they are written.
+
+use std::{
+    collections::BTreeMap,
+    io::{self, Write},
+};
+
+use serde::Serialize;
+use smallvec::SmallVec;
+use sonard_export::{ExportError, Field, TypedTable, Value};
+use sonard_interpret::interpret::grid::{GridShape, ideal};
+use sonard_model::{
+    geometry::DVec2,
+    model::{Path, Simulator, raycast::Reflectors},
+};
+use sonard_records::PathRecord;
+
+use super::rows::{AtPose, Firing};
+use crate::{
+    draw::Drawn,
+    labels,
+    shard::ShardError,
+    spec::{KeepKeys, Spec},
+    table::Table,
+};
+
+type Row<'a> = SmallVec<[Option<Value<'a>>; 20]>;
+
+/// Tables, each with how many rows it has.
+pub(super) struct Tables {
+    keep: KeepKeys,
+    open: BTreeMap<Table, (TypedTable<Box<dyn Write + Send>>, u64)>,
+}
+
+impl Tables {
+    /// Begins all tables of a specification; `remark` stands in the metadata of each.
+    pub(super) fn create(
+        spec: &Spec,
+        remark: &str,
+        create: &mut dyn FnMut(Table) -> io::Result<Box<dyn Write + Send>>,
+    ) -> Result<Self, ShardError> {
+        let mut open = BTreeMap::new();
+        for table in Table::of(spec) {
+            let columns = table.columns(&spec.keep);
+            let fields: Vec<Field> = columns.iter().map(|column| column.field).collect();
+            let mut typed = TypedTable::new(create(table)?, table.row(), &fields)?;
+            typed.remark("sonard.shard", remark.to_owned());
+            open.insert(table, (typed, 0));
+        }
+        Ok(Self { keep: spec.keep.clone(), open })
+    }
+
+    /// Writes the ends of all tables; their rows.
+    pub(super) fn finish(self) -> Result<BTreeMap<Table, u64>, ShardError> {
+        let mut all = BTreeMap::new();
+        for (table, (typed, rows)) in self.open {
+            typed.finish()?;
+            all.insert(table, rows);
+        }
+        Ok(all)
+    }
+
+    fn row(&mut self, table: Table, row: Row<'_>) -> Result<(), ExportError> {
+        let Some((typed, rows)) = self.open.get_mut(&table) else { return Ok(()) };
+        *rows += 1;
+        typed.row(row)
+    }
+
+    /// What was drawn for a scene.
+    pub(super) fn scene(
+        &mut self,
+        drawn: &Drawn,
+        simulator: &Simulator,
+    ) -> Result<(), ExportError> {
+        let (air, noise) = (&drawn.air, &drawn.noise);
+        self.row(
+            Table::Scenes,
+            Row::from_iter([
+                integer(drawn.number),
+                integer(drawn.kind as u64 + 1),
+                text(&simulator.sensor().name),
+                simulator.sensor_z_m().map(Value::Number),
+                number(air.temperature_c()),
+                number(air.humidity_percent()),
+                number(air.pressure_kpa()),
+                number(simulator.sound_speed_m_s()),
+                number(noise.floor),
+                number(noise.jitter_us),
+                text(&drawn.scene.text),
+            ]),
+        )
+    }
+
+    /// The readings at a pose, and their echoes.
+    pub(super) fn pose(&mut self, simulator: &Simulator, at: &AtPose) -> Result<(), ShardError> {
+        let reflectors = self.keep.ideal_range.then(|| {
+            let scene = simulator.scene();
+            Reflectors::new(scene, &scene.floor_plan())
+        });
+        for (firing, index) in at.heard.iter().zip(0..) {
+            let ideal_m = reflectors.as_ref().map(|reflectors| {
+                let direction = DVec2::from_angle(firing.direction_rad);
+                reflectors.nearest(at.pose.position(), direction, None).map(|hit| hit.distance_m)
+            });
+            let words = self.keep.path.then(|| heard_path(simulator, firing)).flatten();
+            let row = self.reading(simulator, at, (firing, index), words.as_deref(), ideal_m);
+            self.row(Table::Readings, row)?;
+            for echo in &firing.echoes {
+                let path = in_words(simulator, &echo.path, echo.length_m);
+                let row = Row::from_iter([
+                    integer(at.scene),
+                    integer(at.number.into()),
+                    integer(index),
+                    word(echo.path.kind()),
+                    integer(echo.path.order() as u64),
+                    number(echo.length_m),
+                    number(echo.amplitude),
+                    text(&path),
+                ]);
+                self.row(Table::Echoes, row)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn reading<'a>(
+        &self,
+        simulator: &Simulator,
+        at: &AtPose,
+        (firing, index): (&'a Firing, u64),
+        path: Option<&'a str>,
+        ideal_m: Option<Option<f64>>,
+    ) -> Row<'a> {
+        let (keep, reading) = (&self.keep, &firing.reading);
+        let mut row = Row::from_iter([
+            integer(at.scene),
+            integer(at.number.into()),
+            integer(index),
+            number(at.pose.x_m),
+            number(at.pose.y_m),
+            number(at.pose.heading_deg),
+            number(firing.azimuth_deg),
+            word(reading.status),
+            reading.range_m.map(Value::Number),
+        ]);
+        // What was not heard is the candidate that came closest, not what a reading is of.
+        let heard = reading.arrival.as_ref().filter(|_| reading.status.has_range());
+        if keep.strength {
+            row.extend([
+                reading.echoes_us.first().copied().map(Value::Number),
+                reading.amplitude.map(Value::Number),
+                reading.margin_db.map(Value::Number),
+            ]);
+        }
+        if keep.path {
+            row.extend([
+                heard.and_then(|arrival| word(arrival.path.kind())),
+                heard.and_then(|arrival| integer(arrival.path.order() as u64)),
+                heard.map(|arrival| Value::Number(arrival.length_m)),
+                path.and_then(text),
+            ]);
+        }
+        row.extend(ideal_m.map(|range_m| range_m.map(Value::Number)));
+        if keep.features {
+            let feature = |path: &Path| labels::feature_of(path, simulator.scene());
+            row.push(heard.and_then(|arrival| text(feature(&arrival.path))));
+        }
+        if keep.trace_to_m > 0.0 {
+            row.push(Some(Value::Numbers(&firing.envelope)));
+        }
+        row
+    }
+
+    /// What is true of a scene, seen from where something stood.
+    pub(super) fn truth(&mut self, drawn: &Drawn, places: &[DVec2]) -> Result<(), ShardError> {
+        if self.keep.features {
+            for feature in labels::features(&drawn.scene) {
+                let row = Row::from_iter([
+                    integer(drawn.number),
+                    text(feature.kind),
+                    text(&feature.id),
+                    number(feature.at.x),
+                    number(feature.at.y),
+                    feature.to.map(|to| Value::Number(to.x)),
+                    feature.to.map(|to| Value::Number(to.y)),
+                    feature.radius_m.map(Value::Number),
+                    feature.opening_deg.map(Value::Number),
+                ]);
+                self.row(Table::Features, row)?;
+            }
+        }
+        if self.keep.occupancy_m > 0.0 {
+            self.map(drawn, places)?;
+        }
+        Ok(())
+    }
+
+    fn map(&mut self, drawn: &Drawn, places: &[DVec2]) -> Result<(), ShardError> {
+        let (low, high) = extent(drawn, places);
+        let shape = GridShape::covering(low, high, self.keep.occupancy_m).map_err(|error| {
+            let why = format!("{error} (keep.occupancy_m)");
+            ShardError::DoesNotFit { scene: drawn.number, why }
+        })?;
+        let grid = ideal(&drawn.scene, shape, places);
+        let cells: Vec<u32> = grid.probabilities().map(cell).collect();
+        let row = Row::from_iter([
+            integer(drawn.number),
+            number(shape.origin.x),
+            number(shape.origin.y),
+            number(shape.resolution_m),
+            integer(shape.width as u64),
+            integer(shape.height as u64),
+            Some(Value::Integers(&cells)),
+        ]);
+        Ok(self.row(Table::Occupancy, row)?)
+    }
+}
+
+/// Around everything that reflects and all places, with a margin, metres.
+fn extent(drawn: &Drawn, places: &[DVec2]) -> (DVec2, DVec2) {
+    const MARGIN_M: f64 = 0.2;
+    let walls = drawn.scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
+    let cylinders = drawn.scene.cylinders.iter().flat_map(|cylinder| {
+        let reach = DVec2::splat(cylinder.radius_m);
+        [cylinder.center - reach, cylinder.center + reach]
+    });
+    let all = walls.chain(cylinders).chain(places.iter().copied());
+    let (mut low, mut high) = (DVec2::splat(f64::INFINITY), DVec2::splat(f64::NEG_INFINITY));
+    for point in all {
+        (low, high) = (low.min(point), high.max(point));
+    }
+    (low - DVec2::splat(MARGIN_M), high + DVec2::splat(MARGIN_M))
+}
+
+/// Free, occupied, or out of reach.
+fn cell(probability: f64) -> u32 {
+    match probability {
+        p if p < 0.25 => 0,
+        p if p > 0.75 => 1,
+        _ => 2,
+    }
+}
+
+fn heard_path(simulator: &Simulator, firing: &Firing) -> Option<String> {
+    let arrival = firing.reading.arrival.as_ref().filter(|_| firing.reading.status.has_range())?;
+    Some(in_words(simulator, &arrival.path, arrival.length_m))
+}
+
+fn in_words(simulator: &Simulator, path: &Path, length_m: f64) -> String {
+    PathRecord::of(simulator.scene(), path, length_m).in_words()
+}
+
+fn integer<'a>(number: u64) -> Option<Value<'a>> {
+    i64::try_from(number).ok().map(Value::Integer)
+}
+
+const fn number<'a>(number: f64) -> Option<Value<'a>> {
+    Some(Value::Number(number))
+}
+
+fn text(text: &str) -> Option<Value<'_>> {
+    Some(Value::Text(text.into()))
+}
+
+/// A word of the records, as a log has it.
+fn word<'a>(value: impl Serialize) -> Option<Value<'a>> {
+    match serde_json::to_value(value) {
+        Ok(serde_json::Value::String(word)) => Some(Value::Text(word.into())),
+        _ => None,
+    }
+}

@@ -1,0 +1,255 @@
+//! Distributions of numbers, as a specification writes them.
+
+use std::fmt;
+
+use rand::{Rng, RngExt as _};
+use rand_distr::{Distribution as _, StandardNormal};
+use serde::{
+    Deserialize, Deserializer, Serialize, Serializer,
+    de::{Error, MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer},
+};
+
+/// Where a number comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Spread {
+    /// Always this one: `0.5`.
+    Fixed(f64),
+    /// Evenly from one number to another: `[0.3, 0.7]`.
+    Even([f64; 2]),
+    /// About a mean, and drawn again outside of bounds: `{ mean = 20, sigma = 3, least = 10, most = 30 }`.
+    Normal {
+        /// The middle.
+        mean: f64,
+        /// Standard deviation, before what is out of bounds is drawn again.
+        sigma: f64,
+        /// The least that is taken.
+        least: f64,
+        /// The most that is taken.
+        most: f64,
+    },
+    /// One of some, each as likely as any other: `{ any_of = [0.02, 0.05] }`.
+    AnyOf(Vec<f64>),
+}
+
+/// What a bounded normal distribution is drawn again at most; after that its bound counts.
+const MOST_DRAWS: usize = 1000;
+
+impl Spread {
+    /// The least number that can come.
+    #[must_use]
+    pub fn least(&self) -> f64 {
+        match self {
+            Self::Fixed(number) => *number,
+            Self::Even([least, _]) | Self::Normal { least, .. } => *least,
+            Self::AnyOf(numbers) => numbers.iter().copied().fold(f64::INFINITY, f64::min),
+        }
+    }
+
+    /// The greatest that can come.
+    #[must_use]
+    pub fn most(&self) -> f64 {
+        match self {
+            Self::Fixed(number) => *number,
+            Self::Even([_, most]) | Self::Normal { most, .. } => *most,
+            Self::AnyOf(numbers) => numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        }
+    }
+
+    /// Draws a number.
+    pub fn draw(&self, rng: &mut impl Rng) -> f64 {
+        match self {
+            Self::Fixed(number) => *number,
+            Self::Even([least, most]) if least < most => rng.random_range(*least..*most),
+            Self::Even([least, _]) => *least,
+            Self::Normal { mean, sigma, least, most } => {
+                let mut draw = || {
+                    let unit: f64 = StandardNormal.sample(rng);
+                    mean + sigma * unit
+                };
+                let fits = |number: &f64| (*least..=*most).contains(number);
+                (0..MOST_DRAWS).map(|_| draw()).find(fits).unwrap_or(mean.clamp(*least, *most))
+            }
+            Self::AnyOf(numbers) => numbers[rng.random_range(0..numbers.len())],
+        }
+    }
+
+    /// Draws a number of things: of `[2, 4]` 2, 3 or 4, of others the nearest whole number.
+    pub fn count(&self, rng: &mut impl Rng) -> usize {
+        match self {
+            Self::Even([least, most]) => rng.random_range(*least as usize..=*most as usize),
+            other => other.draw(rng).round() as usize,
+        }
+    }
+
+    /// What is wrong with it by itself.
+    fn check(self) -> Result<Self, &'static str> {
+        let (least, most) = (self.least(), self.most());
+        if !(least.is_finite() && most.is_finite()) {
+            return Err("a distribution needs finite numbers, and any_of at least one");
+        }
+        if least > most {
+            return Err("the least number comes first, the greatest after it");
+        }
+        match self {
+            Self::Normal { mean, sigma, .. } if !(mean.is_finite() && sigma >= 0.0) => {
+                Err("mean is a finite number, sigma one that is not negative")
+            }
+            sound => Ok(sound),
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    mean: Option<f64>,
+    sigma: Option<f64>,
+    least: Option<f64>,
+    most: Option<f64>,
+    any_of: Option<Vec<f64>>,
+}
+
+impl Written {
+    fn spread(self) -> Result<Spread, &'static str> {
+        match self {
+            Self { mean: None, sigma: None, least: None, most: None, any_of: Some(numbers) } => {
+                Ok(Spread::AnyOf(numbers))
+            }
+            Self { mean: Some(mean), sigma: Some(sigma), least, most, any_of: None } => {
+                // Farther out nothing comes: one of 10^9 is beyond six sigma.
+                let least = least.unwrap_or(mean - 6.0 * sigma);
+                Ok(Spread::Normal { mean, sigma, least, most: most.unwrap_or(mean + 6.0 * sigma) })
+            }
+            _ => Err("give mean and sigma (perhaps least and most), or any_of alone"),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Spread {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Form;
+        impl<'de> Visitor<'de> for Form {
+            type Value = Spread;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number, [least, most], { mean = , sigma = } or { any_of = [ , ] }")
+            }
+
+            fn visit_f64<E>(self, number: f64) -> Result<Spread, E> {
+                Ok(Spread::Fixed(number))
+            }
+
+            fn visit_i64<E>(self, number: i64) -> Result<Spread, E> {
+                Ok(Spread::Fixed(number as f64))
+            }
+
+            fn visit_u64<E>(self, number: u64) -> Result<Spread, E> {
+                Ok(Spread::Fixed(number as f64))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Spread, A::Error> {
+                let mut next = || list.next_element::<f64>();
+                match (next()?, next()?, next()?) {
+                    (Some(least), Some(most), None) => Ok(Spread::Even([least, most])),
+                    _ => Err(A::Error::custom("a list is [least, most]; for others write any_of")),
+                }
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Spread, A::Error> {
+                let written = Written::deserialize(MapAccessDeserializer::new(map))?;
+                written.spread().map_err(A::Error::custom)
+            }
+        }
+        deserializer.deserialize_any(Form)?.check().map_err(D::Error::custom)
+    }
+}
+
+impl Serialize for Spread {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Bounded {
+            mean: f64,
+            sigma: f64,
+            least: f64,
+            most: f64,
+        }
+        #[derive(Serialize)]
+        struct Chosen<'a> {
+            any_of: &'a [f64],
+        }
+        match self {
+            Self::Fixed(number) => number.serialize(serializer),
+            Self::Even(ends) => ends.serialize(serializer),
+            Self::Normal { mean, sigma, least, most } => {
+                let (mean, sigma, least, most) = (*mean, *sigma, *least, *most);
+                Bounded { mean, sigma, least, most }.serialize(serializer)
+            }
+            Self::AnyOf(any_of) => Chosen { any_of }.serialize(serializer),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng as _;
+    use rand_pcg::Pcg64;
+
+    use super::*;
+
+    fn read(text: &str) -> Result<Spread, String> {
+        serde_json::from_str(text).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn numbers_stay_within_what_is_said_of_them_and_reach_its_ends() {
+        let mut rng = Pcg64::seed_from_u64(1);
+        for text in [
+            "3",
+            "[-1, 2.5]",
+            "[2, 2]",
+            r#"{"mean": 1, "sigma": 3, "least": 0, "most": 2}"#,
+            r#"{"mean": 1, "sigma": 0}"#,
+            r#"{"any_of": [4, 1, 2.5]}"#,
+        ] {
+            let spread = read(text).expect(text);
+            let numbers: Vec<f64> = (0..2000).map(|_| spread.draw(&mut rng)).collect();
+            let (least, most) = (spread.least(), spread.most());
+            assert!(numbers.iter().all(|number| (least..=most).contains(number)), "{text}");
+            let near = 0.02 * (most - least);
+            assert!(numbers.iter().any(|number| *number <= least + near), "{text}");
+            assert!(numbers.iter().any(|number| *number >= most - near), "{text}");
+            let again = serde_json::to_string(&spread).expect("JSON");
+            assert_eq!(read(&again), Ok(spread), "{text}");
+        }
+    }
+
+    #[test]
+    fn counts_are_each_as_likely_with_both_ends() {
+        let mut rng = Pcg64::seed_from_u64(1);
+        let spread = Spread::Even([2.0, 4.0]);
+        let mut seen = [0; 6];
+        for _ in 0..3000 {
+            seen[spread.count(&mut rng)] += 1;
+        }
+        assert_eq!([seen[0], seen[1], seen[5]], [0, 0, 0]);
+        assert!(seen[2..5].iter().all(|times| (800..1200).contains(times)), "{seen:?}");
+    }
+
+    #[test]
+    fn what_is_no_distribution_is_refused() {
+        for (text, part) in [
+            ("\"wide\"", "expected a number, [least, most]"),
+            ("[1]", "[least, most]"),
+            ("[1, 2, 3]", "any_of"),
+            ("[2, 1]", "comes first"),
+            (r#"{"any_of": []}"#, "at least one"),
+            (r#"{"mean": 1}"#, "give mean and sigma"),
+            (r#"{"mean": 1, "sigma": -1}"#, "comes first"),
+            (r#"{"mean": 1, "sigma": 1, "least": 3, "most": 2}"#, "comes first"),
+            (r#"{"median": 1}"#, "unknown field `median`"),
+        ] {
+            let error = read(text).expect_err(text);
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,211 @@
+//! Scenes that are made of drawings, maps and worlds of others.
+
+use std::{collections::BTreeMap, f64::consts::PI, fs, path::Path};
+
+use super::super::{
+    Failure, Outcome,
+    numbers::probability,
+    output::{OutPath, Overwrite, Product, note_input},
+};
+use crate::{
+    geometry::DVec2,
+    interpret::grid::WallLine,
+    scene::{Scene, SceneBuilder},
+};
+
+/// What a scene that is made of something else is told besides.
+#[derive(Debug, clap::Args)]
+pub(in crate::cli) struct MadeArgs {
+    /// Amplitude that all surfaces mirror, 0 to 1
+    #[arg(long, value_name = "R", default_value_t = 0.97, value_parser = probability)]
+    reflectance: f64,
+    /// The scene's name [default: the file's]
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+    /// File to write; the scene goes to it instead of to standard output
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<OutPath>,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+/// A surface that was found.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Surface {
+    /// A row of walls.
+    Walls(WallLine),
+    /// An upright round body, metres.
+    Round { center: DVec2, radius_m: f64 },
+}
+
+/// What was found, by the names of what it was found in.
+#[derive(Debug, Default)]
+pub(super) struct Found {
+    surfaces: Vec<(String, Surface)>,
+    /// What makes no wall, with how often it was met.
+    left_out: BTreeMap<&'static str, usize>,
+}
+
+/// Points this near are one, metres: scenes are written to a tenth of a millimetre.
+const SAME_M: f64 = 2e-4;
+/// Walls in place of a curve are off it by this at most, metres.
+const OFF_CURVE_M: f64 = 1e-3;
+/// Walls of a full turn, at least and at most.
+const OF_A_TURN: (f64, f64) = (12.0, 360.0);
+/// The material of everything.
+const MATERIAL: &str = "wall";
+
+/// A file that a scene is made of, noted as one that is read.
+///
+/// # Errors
+/// When it can't be read; `help` says what would be right.
+pub(super) fn read(path: &Path, help: &str) -> Result<Vec<u8>, Failure> {
+    note_input(path);
+    fs::read(path).map_err(|error| refuse(path, &error, help))
+}
+
+/// What is wrong with a file.
+pub(super) fn refuse(path: &Path, what: &dyn std::fmt::Display, help: &str) -> Failure {
+    Failure::input(format!("{}: {what}", path.display()), help)
+}
+
+/// Corners along a circular arc that begins at `from` and turns so far about a centre, radians, counter-clockwise;
+/// `from` is not among them.
+pub(super) fn arc(center: DVec2, from: DVec2, turn_rad: f64) -> impl Iterator<Item = DVec2> {
+    let radius = from - center;
+    let (least, most) = OF_A_TURN;
+    let step_rad = 2.0 * (1.0 - OFF_CURVE_M / radius.length().max(OFF_CURVE_M)).acos();
+    let parts = turn_rad.abs() * (1.0 / step_rad).clamp(least / (2.0 * PI), most / (2.0 * PI));
+    let parts = parts.ceil().max(1.0) as usize;
+    (1..=parts).map(move |part| {
+        center + DVec2::from_angle(turn_rad * part as f64 / parts as f64).rotate(radius)
+    })
+}
+
+impl Found {
+    /// Keeps a row of walls, unless it has no length.
+    pub(super) fn walls(&mut self, name: &str, mut corners: Vec<DVec2>, is_closed: bool) {
+        corners.dedup_by(|a, b| a.distance(*b) < SAME_M);
+        let meets = |corners: &[DVec2]| match corners {
+            [first, .., last] => corners.len() > 2 && first.distance(*last) < SAME_M,
+            _ => false,
+        };
+        let is_closed = (is_closed || meets(&corners)) && corners.len() > 2;
+        if meets(&corners) {
+            corners.pop();
+        }
+        if corners.len() > 1 && corners.iter().all(|corner| corner.is_finite()) {
+            let is_closed = is_closed && corners.len() > 2;
+            let line = WallLine { corners, is_closed };
+            self.surfaces.push((name.to_owned(), Surface::Walls(line)));
+        }
+    }
+
+    /// Keeps an upright round body, unless it has no width.
+    pub(super) fn round(&mut self, name: &str, center: DVec2, radius_m: f64) {
+        if radius_m > SAME_M && radius_m.is_finite() && center.is_finite() {
+            self.surfaces.push((name.to_owned(), Surface::Round { center, radius_m }));
+        }
+    }
+
+    /// Counts what makes no wall.
+    pub(super) fn leave_out(&mut self, what: &'static str) {
+        *self.left_out.entry(what).or_default() += 1;
+    }
+}
+
+impl MadeArgs {
+    /// Writes the scene of what was found in a file, and says what was left out.
+    ///
+    /// # Errors
+    /// When nothing was found, with this help, and what the disk refuses.
+    pub(super) fn write(&self, from: &Path, found: &Found, help_if_none: &str) -> Outcome {
+        let shown = from.display();
+        for (what, count) in &found.left_out {
+            anstream::eprintln!("warning: {shown}: left out: {count} {what}");
+        }
+        if found.surfaces.is_empty() {
+            return Err(refuse(from, &"no wall is found in it", help_if_none));
+        }
+        let stem = from.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        let name = self.name.clone().or(stem).filter(|name| !name.is_empty());
+        let empty =
+            Scene::builder(name.as_deref().unwrap_or("scene")).material(MATERIAL, self.reflectance);
+        let scene = found.surfaces.iter().zip(1_usize..).fold(empty, with_surface);
+        let built = scene.build().map_err(|error| {
+            refuse(from, &error, "see that its lengths are in the units that were meant")
+        })?;
+        match self.output.as_deref() {
+            None => super::print(scene.text().trim_end()),
+            Some(path) => {
+                self.overwrite.save(path, Product::Log, scene.text().as_bytes())?;
+                anstream::eprintln!("{}", super::summary(&built));
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Rounded to a tenth of a millimetre: nobody draws finer.
+fn with_surface(
+    scene: SceneBuilder,
+    ((name, surface), number): (&(String, Surface), usize),
+) -> SceneBuilder {
+    let round = |metres: f64| (1e4 * metres).round() / 1e4 + 0.0;
+    let place = |point: &DVec2| [round(point.x), round(point.y)];
+    let id = format!("{name}-{number}");
+    match surface {
+        Surface::Walls(WallLine { corners, is_closed }) => {
+            let corners: Vec<[f64; 2]> = corners.iter().map(place).collect();
+            match is_closed {
+                true => scene.room(&id, &corners, MATERIAL),
+                false => scene.walls(&id, &corners, MATERIAL),
+            }
+        }
+        Surface::Round { center, radius_m } => {
+            scene.cylinder(&id, place(center), round(*radius_m), MATERIAL)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn walls_in_place_of_an_arc_are_near_it_and_end_where_it_ends() {
+        let center = DVec2::new(1.0, 2.0);
+        for (radius_m, turn_rad) in [(0.05, 6.0), (1.0, -1.5), (8.0, 0.01), (500.0, 3.0)] {
+            let from = center + DVec2::new(radius_m, 0.0);
+            let corners: Vec<DVec2> =
+                std::iter::once(from).chain(arc(center, from, turn_rad)).collect();
+            let end = center + radius_m * DVec2::from_angle(turn_rad);
+            assert!(corners[corners.len() - 1].distance(end) < 1e-9);
+            assert!((2..=362).contains(&corners.len()), "{radius_m}: {}", corners.len());
+            for ends in corners.windows(2) {
+                let sag_m = radius_m - center.distance(ends[0].midpoint(ends[1]));
+                // Of a wide one walls are no shorter than a degree.
+                let most_m = OFF_CURVE_M.max(radius_m * (1.0 - (PI / 360.0).cos()));
+                assert!(sag_m < 1.01 * most_m, "{radius_m}: {sag_m}");
+            }
+        }
+    }
+
+    #[test]
+    fn lines_without_length_are_none_and_a_ring_that_comes_back_is_closed() {
+        let mut found = Found::default();
+        let corner = |x: f64, y: f64| DVec2::new(x, y);
+        found.walls("dot", vec![corner(1.0, 1.0), corner(1.0, 1.0 + 1e-5)], false);
+        found.walls("far", vec![corner(0.0, 0.0), corner(f64::NAN, 1.0)], false);
+        found.round("dot", corner(0.0, 0.0), 0.0);
+        assert!(found.surfaces.is_empty());
+        let ring = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0)].map(|(x, y)| corner(x, y));
+        found.walls("ring", ring.to_vec(), false);
+        found.walls("there and back", vec![ring[0], ring[1], ring[0]], true);
+        let [(_, Surface::Walls(ring)), (_, Surface::Walls(line))] = &found.surfaces[..] else {
+            panic!("{found:?}")
+        };
+        assert!(ring.is_closed && ring.corners.len() == 3);
+        assert!(!line.is_closed && line.corners.len() == 2);
+    }
+}

@@ -1,0 +1,81 @@
+//! A shard that has not its place yet.
+
+use std::{
+    fs::{self, File, Permissions},
+    io,
+    os::unix::fs::PermissionsExt as _,
+    path::Path,
+};
+
+use rustix::fs::{FlockOperation, flock};
+use tempfile::{Builder, TempDir};
+
+use super::DataSetError;
+
+/// A new folder is for whom the umask leaves it.
+const MODE: u32 = 0o777;
+/// What its name ends in.
+const ENDING: &str = ".draft";
+
+/// A hidden folder beside a shard's place. It is locked as long as somebody writes into it, so that what a killed
+/// process left can be told from what another one is still at.
+#[derive(Debug)]
+pub(super) struct Draft {
+    folder: TempDir,
+    lock: File,
+}
+
+impl Draft {
+    /// Begins one for the shard of this name.
+    pub(super) fn begin(root: &Path, shard: &str) -> Result<Self, DataSetError> {
+        let fail = |error| DataSetError::io("make a folder in", root, error);
+        let folder = Builder::new()
+            .prefix(&format!(".{shard}."))
+            .suffix(ENDING)
+            .permissions(Permissions::from_mode(MODE))
+            .tempdir_in(root)
+            .map_err(fail)?;
+        let lock = File::open(folder.path()).map_err(fail)?;
+        // A file system without locks: then nobody clears away what others left.
+        let _ = flock(&lock, FlockOperation::NonBlockingLockExclusive);
+        Ok(Self { folder, lock })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Brings the folder to the disk and renames it to its place, where nothing may be.
+    pub(super) fn take_place(self, place: &Path) -> Result<(), DataSetError> {
+        let fail = |error| DataSetError::io("write", place, error);
+        self.lock.sync_all().map_err(fail)?;
+        fs::rename(self.path(), place).map_err(fail)?;
+        // It has another name now: there is nothing to be removed.
+        drop(self.folder.keep());
+        let root = place.parent().unwrap_or(Path::new("."));
+        File::open(root).and_then(|root| root.sync_all()).map_err(fail)
+    }
+
+    /// Removes what killed processes left of a shard that is there now. What can't be removed stays: it is hidden,
+    /// and nobody takes it for a shard.
+    pub(super) fn clear(root: &Path, shard: &str) {
+        let Ok(entries) = fs::read_dir(root) else { return };
+        let prefix = format!(".{shard}.");
+        for entry in entries.filter_map(Result::ok) {
+            let name = entry.file_name();
+            let is_draft = name
+                .to_str()
+                .is_some_and(|name| name.starts_with(&prefix) && name.ends_with(ENDING));
+            if is_draft {
+                let _ = remove(&entry.path());
+            }
+        }
+    }
+}
+
+/// Removes a folder that nobody writes into.
+fn remove(path: &Path) -> io::Result<()> {
+    let lock = File::open(path)?;
+    flock(&lock, FlockOperation::NonBlockingLockExclusive)?;
+    fs::remove_dir_all(path)
+}

@@ -1,0 +1,180 @@
+use std::{
+    fs, io,
+    os::unix::fs::PermissionsExt as _,
+    path::Path,
+    sync::atomic::{AtomicU64, Ordering},
+};
+
+use sonard_generate::Generator;
+
+use super::*;
+
+const SPEC: &str = "[set]\nname = \"small\"\nshards = 3\nscenes = 2\nposes = 3\n[[scene]]\nshape = \"l\"\n\
+                    width_m = [3, 5]\ndepth_m = 4\n[furniture]\nboxes = 1\n[plan]\nstep_deg = 18\n[keep]\nfeatures = true\n";
+
+fn generator(text: &str) -> Generator {
+    let none = |name: &str| Err(io::Error::other(format!("no file {name}")));
+    Generator::from_toml("small.toml", text, &none).expect("a specification")
+}
+
+fn make_all(set: &DataSet<'_>) -> Vec<Outcome> {
+    (1..=3).map(|shard| set.make(shard, &|_| {}).expect("it can be made")).collect()
+}
+
+fn names(root: &Path) -> Vec<String> {
+    let entries = fs::read_dir(root).expect("a folder");
+    let name = |entry: io::Result<fs::DirEntry>| entry.expect("an entry").file_name();
+    let mut names: Vec<String> =
+        entries.map(|entry| name(entry).to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_set_is_made_once_and_sealed_when_it_is_whole() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let root = folder.path().join("set");
+    let generator = generator(SPEC);
+    let set = DataSet::open(&root, &generator).expect("a new folder");
+    let readings = AtomicU64::new(0);
+    let count = |more: u64| {
+        readings.fetch_add(more, Ordering::Relaxed);
+    };
+    assert_eq!(set.make(2, &count).expect("made"), Outcome::Made);
+    assert_eq!((readings.into_inner(), generator.readings()), (120, 120));
+    assert_eq!(set.missing().expect("readable"), [1, 3]);
+    assert_eq!(set.seal().expect("readable"), None);
+    assert_eq!(names(&root), ["shard-00002", "spec.json"]);
+    assert_eq!(make_all(&set), [Outcome::Made, Outcome::WasThere, Outcome::Made]);
+    let manifest = set.seal().expect("writable").expect("whole");
+    assert_eq!(manifest.shards, 3);
+    assert_eq!(
+        names(&root),
+        ["README.md", "manifest.json", "shard-00001", "shard-00002", "shard-00003", "spec.json"]
+    );
+    // As readable as what else is written there.
+    let mode = |path: &str| fs::metadata(root.join(path)).expect("there").permissions().mode();
+    assert_eq!(mode("shard-00001") & 0o444, mode("spec.json") & 0o444);
+    // By another process in another order it is the same set.
+    let other_root = folder.path().join("other");
+    let specification = DataSet::specification(&root).expect("as it was written");
+    let other = DataSet::open(&other_root, &specification).expect("a new folder");
+    for shard in [3, 1, 2] {
+        other.make(shard, &|_| {}).expect("made");
+    }
+    assert_eq!(other.seal().expect("writable"), Some(manifest));
+    let text = |root: &Path| fs::read_to_string(root.join(MANIFEST)).expect("there");
+    assert_eq!(text(&root), text(&other_root));
+    // A card that somebody wrote on stays.
+    fs::write(root.join(CARD), "mine").expect("writable");
+    set.seal().expect("writable");
+    assert_eq!(fs::read_to_string(root.join(CARD)).expect("there"), "mine");
+}
+
+#[test]
+fn what_a_killed_process_left_is_no_shard_and_goes_when_the_shard_is_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let generator = generator(SPEC);
+    let set = DataSet::open(folder.path(), &generator).expect("an empty folder");
+    // Cut off in the middle of a table, and just before the rename.
+    let whole = set.draft(1, &|_| {}).expect("made");
+    let (cut, last) =
+        (folder.path().join(".shard-00001.a.draft"), folder.path().join(".shard-00001.b.draft"));
+    fs::create_dir(&cut).expect("writable");
+    fs::write(cut.join("readings.parquet"), b"PAR1sonard").expect("writable");
+    fs::create_dir(&last).expect("writable");
+    for name in names(whole.path()) {
+        fs::copy(whole.path().join(&name), last.join(&name)).expect("writable");
+    }
+    assert_eq!(set.missing().expect("readable"), [1, 2, 3]);
+    // Another process that is still at it keeps its own; who comes second does not mind.
+    assert_eq!(set.make(1, &|_| {}).expect("made"), Outcome::Made);
+    assert!(!cut.exists() && !last.exists());
+    assert!(whole.path().exists());
+    let late = whole.take_place(&folder.path().join("shard-00001"));
+    assert!(late.is_err(), "a shard's place is taken once");
+    assert_eq!(set.check_digests(1), [] as [&str; 0]);
+}
+
+#[test]
+fn another_sets_folder_and_shards_are_refused_in_words() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (own, other) = (generator(SPEC), generator(&SPEC.replace("poses = 3", "poses = 2")));
+    let set = DataSet::open(folder.path(), &own).expect("an empty folder");
+    set.make(1, &|_| {}).expect("made");
+    let error = DataSet::open(folder.path(), &other).expect_err("another set's");
+    assert!(error.to_string().contains("of another specification"), "{error}");
+    assert!(error.help().contains("new folder"));
+    // A shard that was copied from elsewhere.
+    let elsewhere = tempfile::tempdir().expect("a folder");
+    DataSet::open(elsewhere.path(), &other).expect("empty").make(2, &|_| {}).expect("made");
+    fs::rename(elsewhere.path().join("shard-00002"), folder.path().join("shard-00002"))
+        .expect("one disk");
+    let error = set.make(2, &|_| {}).expect_err("foreign").to_string();
+    assert!(error.contains("shard-00002: it is of another specification"), "{error}");
+    fs::rename(folder.path().join("shard-00001"), folder.path().join("shard-00003"))
+        .expect("one disk");
+    let error = set.make(3, &|_| {}).expect_err("renamed").to_string();
+    assert!(error.contains("it is shard 1, not 3"), "{error}");
+    let facts = folder.path().join("shard-00003").join(FACTS);
+    let text = fs::read_to_string(&facts).expect("there");
+    fs::write(&facts, text.replace("\"drawing\": ", "\"drawing\": 9")).expect("writable");
+    let error = set.make(3, &|_| {}).expect_err("older").to_string();
+    assert!(error.contains("their readings may differ"), "{error}");
+    // A folder of something else.
+    let error =
+        DataSet::open(folder.path().join("shard-00003").as_path(), &own).expect_err("strange");
+    assert!(matches!(error, DataSetError::Strange { .. }), "{error}");
+}
+
+#[test]
+fn what_was_damaged_or_is_missing_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let generator = generator(SPEC);
+    let set = DataSet::open(folder.path(), &generator).expect("an empty folder");
+    make_all(&set);
+    assert_eq!(set.check_manifest().expect("readable"), ["manifest.json is missing"]);
+    set.seal().expect("writable");
+    assert_eq!(set.check_manifest().expect("readable"), [] as [&str; 0]);
+    assert_eq!(set.check_again(2, &|_| {}).expect("drawn"), [] as [&str; 0]);
+    let readings = folder.path().join("shard-00002/readings.parquet");
+    let whole = fs::read(&readings).expect("there");
+    // A bit in the middle, by which the file has the size that it had.
+    let mut flipped = whole.clone();
+    flipped[whole.len() / 2] ^= 1;
+    fs::write(&readings, &flipped).expect("writable");
+    let problems = set.check_digests(2);
+    assert_eq!(problems.len(), 1);
+    assert!(problems[0].starts_with("shard-00002/readings.parquet: its SHA-256"), "{problems:?}");
+    fs::write(&readings, &whole[..whole.len() - 9]).expect("writable");
+    assert!(
+        set.check_digests(2)[0].contains("lacks readings.parquet of"),
+        "{:?}",
+        set.check_digests(2)
+    );
+    assert!(matches!(set.make(2, &|_| {}), Err(DataSetError::NotWhole { .. })));
+    fs::remove_dir_all(folder.path().join("shard-00002")).expect("writable");
+    assert_eq!(set.check_digests(2), ["shard-00002 is missing"]);
+    set.make(2, &|_| {}).expect("made anew");
+    // Digests that were made to fit what somebody changed.
+    let facts = folder.path().join("shard-00001").join(FACTS);
+    let scenes = folder.path().join("shard-00001/scenes.parquet");
+    let other = fs::read(folder.path().join("shard-00003/scenes.parquet")).expect("there");
+    fs::write(&scenes, &other).expect("writable");
+    let (bytes, sha256) = digest(&scenes).expect("there");
+    let mut told: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(&facts).expect("there")).expect("JSON");
+    told["files"]["scenes.parquet"]["bytes"] = bytes.into();
+    told["files"]["scenes.parquet"]["sha256"] = sha256.into();
+    fs::write(&facts, told.to_string()).expect("writable");
+    assert_eq!(set.check_digests(1), [] as [&str; 0]);
+    assert_eq!(
+        set.check_manifest().expect("readable"),
+        ["manifest.json: it does not say what the shards say"]
+    );
+    let problems = set.check_again(1, &|_| {}).expect("drawn");
+    assert_eq!(problems, ["shard-00001/scenes.parquet: drawn anew it is another one"]);
+    fs::write(folder.path().join("notes.txt"), "mine").expect("writable");
+    let problems = set.check_manifest().expect("readable");
+    assert!(problems.contains(&"notes.txt: it is no part of the set".to_owned()), "{problems:?}");
+}
