@@ -5,6 +5,7 @@
 mod air;
 mod arrays;
 mod error;
+mod generate;
 mod json;
 mod log;
 mod model;
@@ -27,6 +28,7 @@ mod _sonard {
             AirError, LogError, OptionError, PoseError, SceneError, SensorError, SonardError,
             TooManyPathsError,
         },
+        generate::generate,
         log::{Log, Scan, read_log},
         model::{Model, predict::seconds_of_predict_many},
         scene::Scene,

@@ -20,17 +20,17 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
+PROGRAM = os.environ.get("SONARD", str(Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target")) / "debug/sonard"))
+
 Command = Callable[..., list[dict[str, Any]]]
 
 
 @pytest.fixture(scope="session")
 def command() -> Command:
     """Runs the command `sonard` and gives what it printed, line by line."""
-    target = Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target"))
-    program = os.environ.get("SONARD", str(target / "debug/sonard"))
 
     def run(*arguments: object) -> list[dict[str, Any]]:
-        done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, check=False)
+        done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         return [json.loads(line) for line in done.stdout.splitlines()]
 

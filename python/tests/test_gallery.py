@@ -12,14 +12,24 @@ import pytest
 
 import sonard
 
-from .conftest import REPOSITORY
+from .conftest import PROGRAM, REPOSITORY
 
 GALLERY = REPOSITORY / "python/gallery"
 SCRIPTS = sorted(GALLERY.glob("*.py"))
 
 
+def options(script: Path, folder: Path) -> list[str]:
+    """A data set of as many rooms as it takes to see that the script runs; GALLERY=full makes that which is told of."""
+    spec = script.with_suffix(".toml")
+    if os.environ.get("GALLERY") == "full" or not spec.exists():
+        return []
+    small = re.sub("^scenes = .*$", "scenes = 2", spec.read_text(), flags=re.MULTILINE)
+    (folder / "small.toml").write_text(re.sub("^poses = .*$", "poses = 5", small, flags=re.MULTILINE))
+    return ["small.toml"]
+
+
 def run(program: list[str], folder: Path) -> str:
-    environment = {**os.environ, "MPLCONFIGDIR": str(folder / ".matplotlib")}
+    environment = {**os.environ, "MPLCONFIGDIR": str(folder / ".matplotlib"), "SONARD": PROGRAM}
     done = subprocess.run(
         [sys.executable, "-W", "error", *program], cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
@@ -33,7 +43,7 @@ def test_the_gallery_runs(script: Path, tmp_path: Path) -> None:
     lacking = [name for name in needs if find_spec(name) is None]
     if lacking:
         pytest.skip(f"{lacking} is not installed here")
-    said = run([str(script)], tmp_path)
+    said = run([str(script), *options(script, tmp_path)], tmp_path)
     assert said.strip()
     print(said)
     if "savefig" in script.read_text() and find_spec("matplotlib"):

@@ -32,6 +32,7 @@ from ._sonard import (
     TooManyPathsError,
     __version__,
     compare,
+    generate,
     interpret,
     read_log,
 )
@@ -66,6 +67,7 @@ __all__ = [
     "Trace",
     "__version__",
     "compare",
+    "generate",
     "interpret",
     "read_log",
 ]

@@ -29,6 +29,7 @@ __all__ = [
     "__version__",
     "_seconds_of_predict_many",
     "compare",
+    "generate",
     "interpret",
     "map",
     "read_log",
@@ -280,6 +281,13 @@ class Locator:
     def __getnewargs__(self) -> tuple[Model, float]: ...
 
 def read_log(path: str | PathLike[str]) -> Log: ...
+def generate(
+    spec: str | PathLike[str],
+    out: str | PathLike[str],
+    *,
+    part: tuple[int, int] | None = None,
+    threads: int | None = None,
+) -> dict[str, Any]: ...
 def compare(scans: Log | Scan | Iterable[Log | Scan]) -> dict[str, Any]: ...
 def interpret(
     scans: Log | Scan | Iterable[Log | Scan],
