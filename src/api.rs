@@ -6,24 +6,30 @@
 
 mod air;
 mod beam;
+mod findings;
 mod health;
 mod link;
 mod logs;
 mod orders;
+mod preview;
 mod problem;
 mod scans;
+mod sensor;
 mod setup;
 mod simulation;
 mod status;
 
 pub use air::{AirOrder, AirStatus};
 pub use beam::{Beam, Echo};
+pub use findings::{Findings, FoundFeature, FoundLine, MapCells};
 pub use health::{ClockReport, Health, LineTotals, ScanFit, ScanTotals};
 pub use link::{LinkReport, LinkState, Trouble};
 pub use logs::LogEntry;
 pub use orders::{Accepted, CancelRequest, ScanRequest, Scanning, Started};
+pub use preview::PreviewRequest;
 pub use problem::Problem;
 pub use scans::{ListedScan, ScanReport, WholeScan};
+pub use sensor::{SensorFigures, SensorOrder};
 pub use setup::Setup;
 pub use simulation::{RangerReading, SimulationReport};
 pub use status::{
@@ -34,5 +40,5 @@ pub use status::{
 // Those that the pure part makes.
 pub use crate::{
     compare::{Beside, JudgedPing, Word},
-    scan::{Body, Circle, FloorPlan, HumpLine, PlanPoint, WallLine},
+    scan::{Body, Circle, FloorPlan, HumpLine, PlanPoint, TraceLine, WallLine},
 };

@@ -29,6 +29,7 @@ mod mock_world;
 mod numbers;
 mod options;
 mod output;
+mod package_files;
 mod paths;
 mod picture;
 mod place;
@@ -103,6 +104,9 @@ enum Verb {
     /// Show the echo trace of one firing, each hump with its path
     #[command(long_about = trace::ABOUT)]
     Trace(trace::Args),
+    /// Make a data set for learners: rooms, poses, sensors and air drawn at random, shard by shard
+    #[command(long_about = generate::ABOUT)]
+    Generate(generate::Args),
     /// Make a log of readings from elsewhere: tables, JSON, logs of CARMEN and Player
     #[command(long_about = import::ABOUT)]
     Import(Box<import::Args>),
@@ -143,8 +147,8 @@ enum Verb {
     Benchmark(benchmark::Verb),
     /// Write manual pages and shell completions, for packages
     #[command(hide = true)]
-    Generate(generate::Args),
-    /// Check or draw a scene file, list or print those that come with sonard, or print their schema
+    PackageFiles(package_files::Args),
+    /// Check, draw or make a scene file (of a map or drawing), list or print those that come with sonard
     #[command(subcommand)]
     Scene(scene::Verb),
     /// List or print the sensors that come with sonard
@@ -218,6 +222,7 @@ pub fn main() -> ExitCode {
         Verb::Log(verb) => log::run(verb),
         Verb::Benchmark(verb) => benchmark::run(verb),
         Verb::Generate(args) => generate::run(&args),
+        Verb::PackageFiles(args) => package_files::run(&args),
         Verb::Scene(verb) => scene::run(verb),
         Verb::Sensor(verb) => preset::sensor(&verb),
         Verb::Array(verb) => preset::array(&verb),

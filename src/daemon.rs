@@ -24,13 +24,17 @@ mod operator;
 mod outlet;
 mod player;
 mod refusal;
+mod sensor;
 mod settings;
 mod shared;
 
 use std::sync::Arc;
 
 use jiff::Timestamp;
-use tokio::sync::{mpsc, oneshot};
+use tokio::{
+    sync::{mpsc, oneshot},
+    time::Instant,
+};
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
@@ -42,7 +46,9 @@ pub use judged::judged_line;
 pub use machine::{BackOff, Input, LinkMachine, Step, Transition};
 pub use operator::OpenPort;
 pub use refusal::{Refusal, RefusalKind};
+pub use sensor::ordered_sensor;
 pub use settings::{Mismatch, Settings, Simulated};
+pub use shared::NextScan;
 
 use crate::{
     api::{
@@ -126,7 +132,7 @@ fn wire(
     let shared = Arc::new(Shared::new(first_view(&settings)));
     let gate = (shutdown.clone(), Arc::clone(&shared));
     let desk = Desk::new(settings, board, requests, gate, journal.clone());
-    let outlet = Outlet { journal: journal.clone(), hub: hub.clone(), shared: Arc::clone(&shared) };
+    let outlet = Outlet::new(journal.clone(), hub.clone(), Arc::clone(&shared));
     let worker = employ(desk, outlet);
     let handle = Handle { orders, shared: Arc::clone(&shared), hub: hub.clone(), journal };
     (Daemon { worker, shared, hub, shutdown }, handle)
@@ -200,6 +206,12 @@ impl Handle {
         InForce { now, pending: self.status().pending.setup }
     }
 
+    /// What the next scan is taken by.
+    #[must_use]
+    pub fn next_scan(&self) -> NextScan {
+        self.shared.view.borrow().next_scan(Instant::now())
+    }
+
     /// The session in force in the log, once there was a scan.
     #[must_use]
     pub fn session(&self) -> Option<Arc<Session>> {
@@ -227,6 +239,7 @@ fn first_view(settings: &Settings) -> View {
         pose: settings.pose,
         scene: settings.scene.clone(),
         setup: Arc::new(settings.setup()),
+        array: settings.simulated.as_ref().map(|simulated| Arc::clone(&simulated.array)),
         air: AirDesk::new(settings.keys.air.clone()),
     };
     View {

@@ -40,6 +40,7 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub use sonard_export as export;
+pub use sonard_generate as generate;
 pub use sonard_import as import;
 pub use sonard_interpret::{compare, explore, interpret};
 pub use sonard_inverse as inverse;
@@ -62,6 +63,8 @@ pub mod collect;
 pub mod config;
 #[cfg(feature = "daemon")]
 pub mod daemon;
+#[cfg(feature = "store")]
+pub mod dataset;
 #[cfg(feature = "daemon")]
 pub mod interrupts;
 #[cfg(feature = "daemon")]

@@ -20,5 +20,5 @@ pub use introduction::{device_record, provenance, serial_text};
 pub use job::ScanJob;
 pub use prepared::{PrepareError, PreparedScan, ScanInputs};
 pub use scanner::{Ranger, ScanError, ScanSummary, Unasked};
-pub use settings::{DeafWindow, Listening, Motion, hold_s};
+pub use settings::{BlankingError, DeafWindow, Listening, Motion, check_blanking, hold_s};
 pub use timing::limit_s;

@@ -18,7 +18,7 @@ mod routes;
 mod token;
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError},
     time::Duration,
 };
@@ -63,6 +63,8 @@ pub(crate) struct Api {
     document: Bytes,
     access: Arc<Access>,
     history: Arc<Mutex<History>>,
+    /// Folder of the playground, if it is served.
+    playground: Option<Arc<Path>>,
     /// Who asks the model about a beam.
     looking: Arc<Semaphore>,
     /// Who reads a scan's next piece.
@@ -92,6 +94,7 @@ impl Server {
         let api = Api {
             daemon: daemon.clone(),
             history: Arc::new(Mutex::new(History::new(log_folder.clone()))),
+            playground: keys.playground.as_deref().map(|folder| Path::new(folder).into()),
             looking: Arc::new(Semaphore::new(1)),
             reading: Arc::new(Semaphore::new(1)),
             scene: Shelved::default(),

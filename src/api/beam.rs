@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     compare::JudgedPing,
-    scan::{HumpLine, PlanPoint},
+    scan::{HumpLine, PlanPoint, TraceLine},
 };
 
 /// A beam with all that is known about it.
@@ -21,6 +21,9 @@ pub struct Beam {
     /// What the model hears, in order of time, faint sounds included; `null` if it could not be
     /// asked.
     pub humps: Option<Vec<HumpLine>>,
+    /// The echo trace that the model predicts, up to half a metre beyond what was heard or predicted;
+    /// `null` if it could not be asked.
+    pub trace: Option<TraceLine>,
     /// Why the model could not be asked, in words.
     pub lacks: Option<String>,
 }

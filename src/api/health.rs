@@ -5,6 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
+use crate::compare::Explanation;
+
 /// Whether all is well, with the figures to judge by.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Health {
@@ -41,6 +43,10 @@ pub struct ScanFit {
     pub median_residual_m: Option<f64>,
     /// Beams that the scan lacked at its end.
     pub missing: u32,
+    /// What would explain its readings better than what is believed, most gain first; told some milliseconds after
+    /// the scan's end, and of scans of at most 4,096 readings.
+    #[serde(default)]
+    pub explanations: Vec<Explanation>,
 }
 
 /// Figures of the serial line since the start.

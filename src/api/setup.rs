@@ -1,4 +1,4 @@
-//! What no request can change.
+//! What the configuration decides about every scan.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use crate::{
     config::{ModelKeys, MotionKeys},
 };
 
-/// What the configuration decides about every scan, and no request can change.
+/// What the configuration decides about every scan; of it requests change the sensor alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Setup {
     /// The sensor's data.

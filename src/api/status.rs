@@ -6,7 +6,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-use super::{air::AirStatus, link::LinkReport, setup::Setup, simulation::SimulationReport};
+use super::{
+    air::AirStatus, link::LinkReport, sensor::SensorFigures, setup::Setup,
+    simulation::SimulationReport,
+};
 use crate::{
     config::Mode,
     geometry::Pose,
@@ -38,6 +41,8 @@ pub struct Status {
     pub scene: Option<SceneRef>,
     /// The air, likewise.
     pub air: AirStatus,
+    /// The sensor that readings are predicted for, likewise.
+    pub sensor: SensorFigures,
     /// What was changed since the scan under way began: it counts from the next one on.
     pub pending: Pending,
     /// The log.
@@ -61,6 +66,8 @@ pub struct Pending {
     pub scene: Option<SceneRef>,
     /// Other air.
     pub air: Option<AirStatus>,
+    /// Another sensor, or other figures of it.
+    pub sensor: Option<SensorFigures>,
     /// Another sensor, model or motion.
     pub setup: Option<Setup>,
 }

@@ -24,6 +24,9 @@ use crate::inverse::{Fit, Fitted, Sweep, World, fit};
 use report::{Line, lines, write_folder};
 use what::{Group, PriorSigma, parameters};
 
+/// How far off headings may be, degrees: one and a half times what is assumed of them.
+const WIDEST_TURN_DEG: f64 = 12.0;
+
 /// Options of `sonard calibrate`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
@@ -111,6 +114,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let what = Fit {
         priors: parameters(&args.fit, &args.prior, &world, sweeps.len())?,
         widest_m: args.widest_m,
+        widest_turn_deg: WIDEST_TURN_DEG,
         least_sigma_m: 2e-4,
         least_sigma_db: 0.5,
     };

@@ -50,7 +50,7 @@ pub(super) struct Args {
     /// Set a key over the file; may be given several times
     #[arg(long, value_name = "SECTION.KEY=VALUE")]
     set: Vec<String>,
-    /// Print a plan with every key, its range and its default, and end
+    /// Print a file with every key explained, and end; a plan, with ranges and defaults
     #[arg(long)]
     example: bool,
     /// Check all that is named, and end
@@ -63,7 +63,7 @@ pub(super) struct Args {
     /// JSON instead of text; one object, with --plan-only
     #[arg(long, requires = "plan_only")]
     json: bool,
-    /// Check a collection's files against its manifest, and end
+    /// Check files against their digests, and end; those of a collection's folder
     #[arg(long, value_name = "DIR", conflicts_with = "plan")]
     verify: Option<PathBuf>,
     /// Write a collection's report and manifest anew, and end

@@ -10,7 +10,7 @@ use super::{
     daemon::{DaemonArgs, refuse},
     runtime,
 };
-use crate::api::{Health, LinkReport, Pending, SimulationReport, Status};
+use crate::api::{Health, LinkReport, Pending, ScanFit, SimulationReport, Status};
 
 /// Options of `sonard status`.
 #[derive(Debug, clap::Args)]
@@ -71,6 +71,9 @@ fn screen(status: &Status, health: &Health) -> String {
     if let Some(scan) = &status.scan {
         lines.push(format!("  scan     {} of {} beams", scan.done, scan.beams));
     }
+    lines.extend(health.fit.as_ref().and_then(agreement));
+    let better = health.fit.as_ref().and_then(|fit| fit.explanations.first());
+    lines.extend(better.map(|better| format!("  better   explained: {better}")));
     let (air, log, clients) = (&status.air, &status.log, &status.subscribers);
     let source = word(&air.source);
     let file = log.file.as_ref().map_or_else(|| "-".into(), |file| file.display().to_string());
@@ -94,6 +97,17 @@ fn screen(status: &Status, health: &Health) -> String {
         lines.push(format!("  the last change of the configuration was refused: {error}"));
     }
     lines.join("\n")
+}
+
+/// How the last scan agrees with the model.
+fn agreement(fit: &ScanFit) -> Option<String> {
+    let (share, off_m) = (fit.agree_fraction?, fit.median_abs_residual_m?);
+    Some(format!(
+        "  model    {:.0} % of {} echoes of the last scan agree, half of them within {:.0} mm",
+        100.0 * share,
+        fit.both_echo,
+        1e3 * off_m,
+    ))
 }
 
 /// What counts from the next scan on.

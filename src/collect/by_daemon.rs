@@ -282,7 +282,7 @@ impl ByDaemon {
         if setup != self.setup {
             return Err(Halt::wrong(
                 "the daemon's sensor, model or motion is not what it was when this began",
-                "put its configuration back, or start the collection again: it says what changed",
+                "put its configuration back (a sensor that a program changed: DELETE /v1/sensor), or start the collection again: it says what changed",
             ));
         }
         Ok(self.client.get_json("/v1/status").await?)

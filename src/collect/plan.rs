@@ -85,15 +85,7 @@ impl Plan {
     /// How the motor turns and the ranger listens.
     #[must_use]
     pub fn motion(&self) -> Motion {
-        let keys = &self.keys.motion;
-        Motion {
-            window_ms: keys.window_ms,
-            settle_ms: keys.settle_ms,
-            min_interval_ms: keys.min_interval_ms,
-            max_echoes: keys.max_echoes,
-            speed: keys.speed,
-            acceleration: keys.acceleration,
-        }
+        self.keys.motion.motion()
     }
 
     /// Poses that will be there, as far as that is known.

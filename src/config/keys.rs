@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::air::AirKeys;
-use crate::model::OptionKeys;
+use crate::{model::OptionKeys, ranger::Motion};
 
 /// Configuration of `sonard run`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
@@ -237,6 +237,9 @@ pub struct ServerKeys {
     pub token_file: Option<String>,
     /// Host names, besides those of loopback, under which a browser may ask (restart).
     pub hosts: Vec<String>,
+    /// Folder of the playground, as `web/build.sh` makes it, to be served at /playground/ (restart).
+    #[schemars(example = "/usr/share/sonard/playground")]
+    pub playground: Option<String>,
     /// Connections at a time (restart): so many by the socket, by TCP from this computer, and by TCP
     /// from others, each by itself.
     #[schemars(range(min = 1, max = 10_000))]
@@ -292,6 +295,21 @@ impl Default for PlanKeys {
 impl Default for ScanningKeys {
     fn default() -> Self {
         Self { mode: Mode::OnRequest, every_s: 60.0 }
+    }
+}
+
+impl MotionKeys {
+    /// As the ranger takes them.
+    #[must_use]
+    pub const fn motion(&self) -> Motion {
+        Motion {
+            window_ms: self.window_ms,
+            settle_ms: self.settle_ms,
+            min_interval_ms: self.min_interval_ms,
+            max_echoes: self.max_echoes,
+            speed: self.speed,
+            acceleration: self.acceleration,
+        }
     }
 }
 
@@ -364,6 +382,7 @@ impl Default for ServerKeys {
             listen: None,
             token_file: None,
             hosts: Vec::new(),
+            playground: None,
             max_clients: 128,
             max_requests_per_s: 200.0,
             max_body_kb: 64,

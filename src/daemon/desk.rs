@@ -15,11 +15,13 @@ use super::{
     air::{AirDesk, Reading, watch_thermometer},
     journal::Journal,
     refusal::{Refusal, RefusalKind},
+    sensor::{check_device, ordered_sensor},
     settings::Settings,
     shared::{Shared, Terms},
 };
 use crate::{
-    api::{AirOrder, ConfigurationReport, Setup},
+    acoustics::Sensor,
+    api::{AirOrder, ConfigurationReport, SensorOrder, Setup},
     board::Board,
     config::{Mode, ScanningKeys},
     geometry::Pose,
@@ -48,6 +50,10 @@ pub enum Order {
     Air(AirOrder),
     /// The air is again what the configuration and the thermometer say.
     OwnAir,
+    /// The sensor is like this from the next scan on.
+    Sensor(Box<SensorOrder>),
+    /// The sensor is again what the configuration says.
+    OwnSensor,
     /// The configuration was read again.
     Reload(Result<Box<Settings>, String>),
 }
@@ -83,7 +89,9 @@ pub(super) enum Interrupt {
 /// What is in force, and the ends of everything that may change it.
 pub(super) struct Desk {
     pub(super) settings: Settings,
-    /// What of them no request can change.
+    /// The configuration's sensor, in whose place `settings` has one that a program wants.
+    own_sensor: Sensor,
+    /// What of them the configuration decides.
     pub(super) setup: Arc<Setup>,
     pub(super) plan: ScanPlan,
     pub(super) pose: Pose,
@@ -116,6 +124,7 @@ impl Desk {
         journal: Journal,
     ) -> Self {
         Self {
+            own_sensor: settings.sensor.clone(),
             setup: Arc::new(settings.setup()),
             plan: settings.plan(),
             pose: settings.pose,
@@ -151,6 +160,7 @@ impl Desk {
             pose: self.pose,
             scene: self.settings.scene.clone(),
             setup: Arc::clone(&self.setup),
+            array: simulated.map(|simulated| Arc::clone(&simulated.array)),
             air: self.air.clone(),
         }
     }
@@ -226,6 +236,11 @@ impl Desk {
             }
             Order::OwnAir => {
                 self.take_own_air();
+                (Ok(()), Some(Interrupt::Agenda))
+            }
+            Order::Sensor(order) => (self.set_sensor(&order), Some(Interrupt::Agenda)),
+            Order::OwnSensor => {
+                self.use_sensor(self.own_sensor.clone());
                 (Ok(()), Some(Interrupt::Agenda))
             }
             Order::Reload(Ok(settings)) => (Ok(()), Some(self.reload(*settings))),
@@ -328,6 +343,25 @@ impl Desk {
         check_pose(&self.settings, pose)
     }
 
+    fn set_sensor(&mut self, order: &SensorOrder) -> Result<(), Refusal> {
+        let sound_speed_m_s = self.air.status(Instant::now()).sound_speed_m_s;
+        let of_array = self.settings.simulated.is_some();
+        let sensor = ordered_sensor(order, &self.setup, of_array, sound_speed_m_s)?;
+        if let Some(identity) = &self.identity {
+            check_device(&sensor, &self.settings.sensor, identity)?;
+        }
+        self.use_sensor(sensor);
+        Ok(())
+    }
+
+    fn use_sensor(&mut self, sensor: Sensor) {
+        if sensor != self.settings.sensor {
+            self.settings.sensor = sensor;
+            self.setup = Arc::new(self.settings.setup());
+            self.stale = true;
+        }
+    }
+
     /// Forgets what programs said about the air.
     fn take_own_air(&mut self) {
         self.air = AirDesk::new(self.settings.keys.air.clone());
@@ -335,7 +369,11 @@ impl Desk {
     }
 
     /// Takes a new configuration in: what changed in it goes before what programs said.
-    fn reload(&mut self, settings: Settings) -> Interrupt {
+    fn reload(&mut self, mut settings: Settings) -> Interrupt {
+        let own_sensor = std::mem::replace(&mut self.own_sensor, settings.sensor.clone());
+        if own_sensor == settings.sensor && settings.goes_with(&self.settings.sensor) {
+            settings.sensor = self.settings.sensor.clone();
+        }
         let before = std::mem::replace(&mut self.settings, settings);
         let now = self.now();
         let (keys, then) = (&self.settings.keys, &before.keys);

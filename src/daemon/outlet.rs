@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use jiff::Timestamp;
+use tokio::sync::Semaphore;
 
-use super::{hub::Hub, journal::Journal, shared::Shared};
+use super::{fit::explanations, hub::Hub, journal::Journal, shared::Shared};
 use crate::{
-    scan::{Event, EventKind, Record, Session, Sink, SinkError},
+    scan::{Event, EventKind, Record, ScanView, Session, Sink, SinkError},
     store::MAX_LOGGED_SCENE_BYTES,
 };
 
@@ -16,9 +17,15 @@ pub(super) struct Outlet {
     pub(super) journal: Journal,
     pub(super) hub: Hub,
     pub(super) shared: Arc<Shared>,
+    /// One scan at a time is looked at for what would explain it better.
+    explaining: Arc<Semaphore>,
 }
 
 impl Outlet {
+    pub(super) fn new(journal: Journal, hub: Hub, shared: Arc<Shared>) -> Self {
+        Self { journal, hub, shared, explaining: Arc::new(Semaphore::new(1)) }
+    }
+
     /// An event, now.
     pub(super) fn event(&self, kind: EventKind, detail: String) {
         self.put(&Record::Event(Event { time: Timestamp::now(), kind, detail }));
@@ -32,9 +39,24 @@ impl Outlet {
             Record::Session(session) => self.begin(session),
             _ => self.hub.publish(record),
         }
-        if let Some(scan) = over {
+        if let Some((scan, readings)) = over {
             self.hub.publish_scan(scan);
+            readings.into_iter().for_each(|readings| self.explain(readings));
         }
+    }
+
+    /// Looks for what would explain a scan better, beside all else: the ranger does not wait for it. A scan that ends
+    /// while another is looked at is passed over.
+    fn explain(&self, scan: ScanView) {
+        let Ok(turn) = Arc::clone(&self.explaining).try_acquire_owned() else { return };
+        let outlet = self.clone();
+        tokio::task::spawn_blocking(move || {
+            let id = scan.scan;
+            if let Some(news) = outlet.shared.explained(id, &explanations(scan)) {
+                outlet.event(EventKind::Explanation, format!("scan {id}: {news}"));
+            }
+            drop(turn);
+        });
     }
 
     /// Live streams go without the scene's text, and the API has it as far as a log's line has: what a

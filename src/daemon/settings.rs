@@ -69,18 +69,10 @@ impl Settings {
     /// How the motor turns and the ranger listens.
     #[must_use]
     pub const fn motion(&self) -> Motion {
-        let motion = &self.keys.motion;
-        Motion {
-            window_ms: motion.window_ms,
-            settle_ms: motion.settle_ms,
-            min_interval_ms: motion.min_interval_ms,
-            max_echoes: motion.max_echoes,
-            speed: motion.speed,
-            acceleration: motion.acceleration,
-        }
+        self.keys.motion.motion()
     }
 
-    /// What no request can change.
+    /// What the configuration decides about every scan.
     #[must_use]
     pub fn setup(&self) -> Setup {
         Setup {
@@ -180,6 +172,12 @@ impl Settings {
             });
         }
         Ok(())
+    }
+
+    /// Whether a sensor in place of this one goes together with the rest.
+    #[must_use]
+    pub fn goes_with(&self, sensor: &Sensor) -> bool {
+        Self { sensor: sensor.clone(), ..self.clone() }.check().is_ok()
     }
 
     fn check_server(&self) -> Result<(), Mismatch> {

@@ -10,16 +10,21 @@ use jiff::Timestamp;
 use tokio::{sync::watch, time::Instant};
 use uuid::Uuid;
 
-use super::{air::AirDesk, fit::Fit};
+use super::{
+    air::AirDesk,
+    fit::{Fit, news},
+};
 use crate::{
     api::{
-        ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, LinkState, LogStatus,
-        Pending, ScanFit, ScanProgress, ScanTotals, ScanningReport, Setup, SimulationReport,
-        Status, SubscriberReport,
+        AirStatus, ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, LinkState,
+        LogStatus, Pending, ScanFit, ScanProgress, ScanTotals, ScanningReport, SensorFigures,
+        Setup, SimulationReport, Status, SubscriberReport,
     },
+    array::RangerArray,
+    compare::Explanation,
     config::ScanningKeys,
     geometry::Pose,
-    scan::{Device, Provenance, Record, ScanEnd, ScanPlan, SceneRef, Session},
+    scan::{Device, Provenance, Record, ScanEnd, ScanPlan, ScanView, SceneRef, Session},
     scene::Scene,
 };
 
@@ -51,6 +56,23 @@ pub(super) struct View {
     pub(super) simulation: Option<SimulationReport>,
 }
 
+/// What the next scan is taken by.
+#[derive(Debug, Clone)]
+pub struct NextScan {
+    /// Azimuths.
+    pub plan: ScanPlan,
+    /// Where the ranger stands.
+    pub pose: Pose,
+    /// The scene, if there is one.
+    pub scene: Option<Arc<Scene>>,
+    /// Sensor and model.
+    pub setup: Arc<Setup>,
+    /// The air.
+    pub air: AirStatus,
+    /// The array that is played in place of a ranger that turns, if one is.
+    pub array: Option<Arc<RangerArray>>,
+}
+
 /// What scans are taken by.
 #[derive(Debug, Clone)]
 pub(super) struct Terms {
@@ -58,6 +80,8 @@ pub(super) struct Terms {
     pub(super) pose: Pose,
     pub(super) scene: Option<Arc<Scene>>,
     pub(super) setup: Arc<Setup>,
+    /// The array that is played, where nothing is measured.
+    pub(super) array: Option<Arc<RangerArray>>,
     pub(super) air: AirDesk,
 }
 
@@ -76,6 +100,11 @@ impl View {
         if self.scan.is_some() { &self.now } else { &self.next }
     }
 
+    pub(super) fn next_scan(&self, at: Instant) -> NextScan {
+        let Terms { plan, pose, scene, setup, array, air } = self.next.clone();
+        NextScan { plan, pose, scene, setup, array, air: air.status(at) }
+    }
+
     /// What differs from it in the next scan.
     fn pending(&self, at: Instant) -> Pending {
         let (now, next) = (self.in_force(), &self.next);
@@ -86,6 +115,9 @@ impl View {
             pose: Some(next.pose).filter(|pose| *pose != now.pose),
             scene: scene.map(SceneRef::of),
             air: next.air.differs(&now.air).then(|| next.air.status(at)),
+            sensor: Some(&next.setup.sensor)
+                .filter(|sensor| **sensor != now.setup.sensor)
+                .map(SensorFigures::of),
             setup: Some(&next.setup).filter(|setup| **setup != now.setup).map(|s| (**s).clone()),
         }
     }
@@ -147,6 +179,8 @@ struct Collector {
     /// How the scan under way agrees with the model, and how the last one did.
     fit: Fit,
     latest_fit: Option<ScanFit>,
+    /// The best explanation that an event told.
+    told: Option<Explanation>,
     /// How long after its firing the last reading came in, seconds.
     lateness_s: Option<f64>,
 }
@@ -171,15 +205,16 @@ impl Shared {
         self.beats.load(Ordering::Relaxed)
     }
 
-    /// Takes in a record of a scan; gives back the scan if this was its end.
-    pub(super) fn collect(&self, record: &Record) -> Option<Uuid> {
+    /// Takes in a record of a scan; gives back the scan if this was its end, with its readings if they were few enough.
+    pub(super) fn collect(&self, record: &Record) -> Option<(Uuid, Option<ScanView>)> {
         self.beat();
+        let session = self.view.borrow().session.clone();
         let mut scans = self.scans();
         match record {
             Record::ScanStart(start) => {
                 self.beams_done.store(0, Ordering::Relaxed);
                 (scans.current, scans.sigma_us) = (Some(start.scan), None);
-                scans.fit = Fit::default();
+                scans.fit = Fit::of(start, session);
             }
             Record::Ping(ping) => {
                 self.beams_done.fetch_add(1, Ordering::Relaxed);
@@ -190,14 +225,27 @@ impl Shared {
                     fired.map(|fired| Timestamp::now().duration_since(fired).as_secs_f64());
             }
             Record::ScanEnd(end) => {
-                scans.latest_fit = Some(scans.fit.report(end));
+                let fit = std::mem::take(&mut scans.fit);
+                scans.latest_fit = Some(fit.report(end));
                 let scan = scans.current.take()?;
                 scans.latest = Some((end.clone(), scans.sigma_us));
-                return Some(scan);
+                return Some((scan, fit.into_scan()));
             }
             Record::Session(_) | Record::Event(_) => {}
         }
         None
+    }
+
+    /// Takes in what would explain a scan better; gives back what there is to say of it.
+    pub(super) fn explained(&self, scan: Uuid, found: &[Explanation]) -> Option<String> {
+        let mut scans = self.scans();
+        let news = news(scans.told.as_ref(), found.first());
+        if news.is_some() {
+            scans.told = found.first().cloned();
+        }
+        let latest = scans.latest_fit.as_mut().filter(|fit| fit.scan == scan);
+        latest.into_iter().for_each(|fit| fit.explanations = found.to_vec());
+        news
     }
 
     /// The last scan that is over.
@@ -245,6 +293,7 @@ impl Shared {
             pose: in_force.pose,
             scene: in_force.scene.as_deref().map(SceneRef::of),
             air: in_force.air.status(now),
+            sensor: SensorFigures::of(&in_force.setup.sensor),
             pending,
             log,
             subscribers,

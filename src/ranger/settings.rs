@@ -64,6 +64,39 @@ impl DeafWindow {
     }
 }
 
+/// A blanking that a device can't keep.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+pub enum BlankingError {
+    /// The module's own can't be shortened there.
+    #[error(
+        "the device can't shorten the module's blanking: it listens from {INTERNAL_BLANKING_US} us on"
+    )]
+    Fixed,
+    /// It can't be so short.
+    #[error("the device's shortest blanking is {least_us} us")]
+    TooShort {
+        /// The least, microseconds.
+        least_us: f64,
+    },
+}
+
+/// Checks that a device of this identity can keep a blanking, microseconds.
+///
+/// # Errors
+/// When it can't.
+pub fn check_blanking(blanking_us: f64, identity: &Identity) -> Result<(), BlankingError> {
+    let least_us = f64::from(SHORT_BLANKING_TICKS_MIN) * 1e6 / f64::from(TICK_HZ);
+    if blanking_us >= INTERNAL_BLANKING_US {
+        Ok(())
+    } else if !identity.capabilities.has(Capabilities::SHORT_BLANKING) {
+        Err(BlankingError::Fixed)
+    } else if blanking_us < least_us {
+        Err(BlankingError::TooShort { least_us })
+    } else {
+        Ok(())
+    }
+}
+
 impl Motion {
     /// Checks that something can be heard at all.
     ///

@@ -2,11 +2,14 @@
 
 mod beam;
 mod control;
+mod findings;
 mod live;
 mod logs;
 mod metrics;
 mod page;
 mod pieces;
+mod playground;
+mod preview;
 mod report;
 mod scans;
 mod scene;
@@ -25,9 +28,12 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
     endpoints.extend(scene::endpoints());
     endpoints.extend(live::endpoints());
     endpoints.extend(scans::endpoints());
+    endpoints.extend(findings::endpoints());
+    endpoints.extend(preview::endpoints());
     endpoints.extend(logs::endpoints());
     endpoints.extend(metrics::endpoints());
     endpoints.extend(page::endpoints());
+    endpoints.extend(playground::endpoints());
     endpoints.push(
         Endpoint::get("/v1/openapi.json", openapi, "This description")
             .answers::<Value>(200, "An OpenAPI 3.1 document"),

@@ -98,20 +98,36 @@ impl History {
     /// # Errors
     /// When the folder or a log in it can't be read.
     pub fn newest(&mut self, most: usize) -> io::Result<Vec<PastScan>> {
-        let mut newest = Vec::new();
+        Ok(self.list(None, most)?.unwrap_or_default())
+    }
+
+    /// The scans that stand before one, newest first, at most so many; `None` if the newest logs have no
+    /// such scan.
+    ///
+    /// # Errors
+    /// When the folder or a log in it can't be read.
+    pub fn before(&mut self, scan: Uuid, most: usize) -> io::Result<Option<Vec<PastScan>>> {
+        self.list(Some(scan), most)
+    }
+
+    fn list(&mut self, mut before: Option<Uuid>, most: usize) -> io::Result<Option<Vec<PastScan>>> {
+        let mut listed = Vec::new();
         for log in self.recent()? {
-            let index = self.read_on(&log)?;
-            let wanted = most - newest.len();
-            let places: Vec<Place> = index.scans.iter().rev().take(wanted).cloned().collect();
+            let mut places = self.read_on(&log)?.scans.iter().rev();
+            if before.is_some_and(|scan| !places.any(|place| place.scan == scan)) {
+                continue;
+            }
+            before = None;
+            let places: Vec<Place> = places.take(most - listed.len()).cloned().collect();
             let mut file = BufReader::new(File::open(self.folder.join(&log))?);
             for place in places {
-                newest.extend(place.summary(&log, &mut file)?);
+                listed.extend(place.summary(&log, &mut file)?);
             }
-            if newest.len() == most {
+            if listed.len() == most {
                 break;
             }
         }
-        Ok(newest)
+        Ok(Some(listed).filter(|_| before.is_none()))
     }
 
     /// Where a scan stands; `None` if the newest logs have no such scan.

@@ -35,7 +35,7 @@ const fn case(
     Case { output, input, arguments }
 }
 
-const CASES: [Case; 32] = [
+const CASES: [Case; 37] = [
     case("plot --output", ("a.svg", LOG), "plot IN -o IN"),
     case("plot --output", ("a.png", LOG), "plot IN -o IN --force"),
     case("plot --output", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),
@@ -43,6 +43,22 @@ const CASES: [Case; 32] = [
     case("interpret --output", ("a.svg", LOG), "interpret IN -o IN"),
     case("lines --output", ("a.svg", LOG), "lines IN -o IN"),
     case("scene draw --output", ("a.svg", SCENE), "scene draw IN -o IN"),
+    case(
+        "scene from-dxf --output",
+        ("a.json", CAD_DRAWING),
+        "scene from-dxf IN --unit-m 1 -o IN --force",
+    ),
+    case("scene from-sdf --output", ("a.json", WORLD), "scene from-sdf IN -o IN --force"),
+    case(
+        "scene from-grid --output",
+        ("map.yaml", MAP),
+        "scene from-grid IN --least-m 0 -o IN --force",
+    ),
+    case(
+        "scene from-svg --output",
+        ("a.json", DRAWING),
+        "scene from-svg IN --width-m 3 -o IN --force",
+    ),
     case("simulate --output", ("a.json", SCENE), "simulate --scene IN --pose fig9 -o IN --force"),
     case(
         "simulate --output",
@@ -73,6 +89,7 @@ const CASES: [Case; 32] = [
     case("export --output", ("a.mcap", LOG), "export IN -o IN --force"),
     case("export --output", ("a.parquet", LOG), "export IN -o IN --force"),
     case("export --output", ("log.csv", LOG), "export IN --to csv -o IN --force"),
+    case("generate --out", ("README.md", DATA_SET), "generate IN --out DIR"),
     case("calibrate --out", ("sensor.json", LOG), "calibrate IN --out DIR --force"),
     case("calibrate --out", ("scene.json", SCENE), "calibrate LOG --scene IN --out DIR --force"),
     case("predict --output", ("a.jsonl", LOG), "predict IN -o IN --force"),
@@ -103,13 +120,20 @@ const WITHOUT_INPUT: [&str; 4] = [
     "benchmark map --out",
     "benchmark explore --out",
     "benchmark interpret --output",
-    "generate DIR",
+    "package-files DIR",
 ];
 
 const POSES: &str = "{\"x_m\":0.774,\"y_m\":0.085,\"heading_deg\":0.0}\n";
 const TABLE: &str = "azimuth_deg,range_m\n0,1\n";
+const DRAWING: &str = "<svg xmlns='http://www.w3.org/2000/svg' width='9' height='9'><path d='M0 0h9v9z' stroke='red'/></svg>";
+const CAD_DRAWING: &str =
+    "0\nSECTION\n2\nENTITIES\n0\nLINE\n8\n0\n10\n0\n20\n0\n11\n1\n21\n0\n0\nENDSEC\n0\nEOF\n";
+const WORLD: &str = "<sdf><model name='m'><link><collision><geometry><box><size>1 1 1</size></box>\
+                     </geometry></collision></link></model></sdf>";
 const MAP: &str = "image: map.pgm\nresolution: 0.5\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n\
                    occupied_thresh: 0.65\nfree_thresh: 0.196\n";
+const DATA_SET: &str = "[set]\nname = \"a\"\nshards = 1\nscenes = 1\nposes = 1\n[[scene]]\nshape = \"file\"\n\
+                        file = \"simple-room\"\n";
 const PLAN: &str = "[collection]\nfolder = \"out\"\n[place]\nscene = \"simple-room\"\n\
                     poses = [\"fig9\"]\n";
 

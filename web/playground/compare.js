@@ -24,7 +24,7 @@ export class SideBySide {
   constructor(place, onPick) {
     this.figures = [...place.querySelectorAll("figure")].map((figure) => ({
       name: /** @type {import("./engine.js").EngineName} */ (figure.dataset.engine),
-      plan: new Plan(figure.querySelector(".stage"), onPick),
+      plan: new Plan(figure.querySelector(".stage"), onPick, `What the engine ${figure.dataset.engine} reads`),
       words: /** @type {HTMLElement} */ (figure.querySelector(".misses")),
     }));
     /** @type {Map<string, Scan>} */

@@ -1,8 +1,8 @@
 // Drawing a room: corners and pillars as handles on the plan, walls by clicks.
 
-import { Handle } from "./handles.js";
+import { Handle } from "../../src/server/page/handles.js";
 import { addPillar, addWall, cornersOf, emptyRoom, moveCorner, removeCorner } from "./room.js";
-import { rounded } from "./ranger.js";
+import { rounded } from "../../src/server/page/ranger.js";
 
 /** @param {string} id */
 const byId = (id) => /** @type {HTMLButtonElement} */ (document.getElementById(id));
@@ -44,7 +44,7 @@ export class Editor {
       this.remember();
       onPose(room.poses?.start ?? { x_m: 1, y_m: 1, heading_deg: 0 });
       this.onScene(room, true);
-      this.view.box = null;
+      this.view.show(this.view.what);
     });
     byId("undo").addEventListener("click", () => this.undo());
     stage.addEventListener("click", (event) => this.click(event), { capture: true });

@@ -2,9 +2,12 @@
 
 import { BeamPanel, inWords } from "../../src/server/page/beam.js";
 import { Plan } from "../../src/server/page/plan.js";
+import { Ranger } from "../../src/server/page/ranger.js";
 import { Scan } from "../../src/server/page/scan.js";
 import { Strip } from "../../src/server/page/strip.js";
 import { BeamTable } from "../../src/server/page/table.js";
+import { addTools } from "../../src/server/page/tools.js";
+import { EchoTrace } from "../../src/server/page/trace.js";
 import { colours, legend } from "../../src/server/page/verdicts.js";
 import { count, setText } from "../../src/server/page/words.js";
 import { drawArcs } from "./arcs.js";
@@ -14,13 +17,11 @@ import { Editor } from "./editor.js";
 import { Files } from "./files.js";
 import { Logs } from "./logs.js";
 import { Model } from "./model.js";
-import { Ranger } from "./ranger.js";
 import { emptyRoom } from "./room.js";
 import { inShort, setLamp, tellTrouble } from "./say.js";
 import { showLink, stateFromLink, unsqueeze } from "./share.js";
 import { planOf, settingsOf, usual } from "./state.js";
 import { Tour } from "./tour.js";
-import { EchoTrace } from "./trace.js";
 
 /** @typedef {import("./state.js").State} State */
 
@@ -49,9 +50,11 @@ let half_beam_deg = 8;
 /** How long sweeps took from the question to the picture, milliseconds. @type {number[]} */
 const took = [];
 
-const plan = /** @type {any} */ (new Plan(byId("stage"), select));
+const words = "Floor plan with what the ranger would read; the table of beams has the same in words";
+const plan = /** @type {any} */ (new Plan(byId("stage"), select, words));
+const fans = plan.addLayer("fans");
 plan.view.what = "room";
-const strip = /** @type {any} */ (new Strip(byId("strip"), select));
+const strip = /** @type {any} */ (new Strip(byId("residuals"), select));
 const table = /** @type {any} */ (new BeamTable(byId("table")));
 const trace = new EchoTrace(byId("trace"), choosePath);
 const panel = /** @type {any} */ (new BeamPanel(byId("beam-panel"), showPath));
@@ -67,6 +70,10 @@ const tour = new Tour(({ title, text, scene, range_m, ...shown }) => {
 });
 /** @type {Model} */
 let model;
+addTools(plan, () => {
+  place();
+  if (scan) tellLegend();
+});
 
 /**
  * Changes what is shown. While somebody drags, the view of the plan stays.
@@ -81,7 +88,7 @@ function change(changes, dragging = false) {
   controls.show(state);
   place();
   if (plan.view.what !== state.fit) {
-    [plan.view.what, plan.view.box] = [state.fit, null];
+    plan.view.show(state.fit);
     byId("fit").value = state.fit;
     if (scan) redraw();
   }
@@ -158,9 +165,6 @@ function redraw() {
   for (const view of [plan, table]) view.scan = sweep;
   plan.selected = selected;
   plan.redraw(palette);
-  place();
-  if (state.arcs) drawArcs(plan.layers[3], plan, half_beam_deg);
-  else plan.layers[3].clear();
   const measured = logs.scan !== null;
   byId("residuals").hidden = !measured;
   if (measured) {
@@ -175,9 +179,6 @@ function redraw() {
 /** The texts around the plan. @param {any} selected */
 function tell(selected) {
   const sweep = /** @type {any} */ (scan);
-  legend(byId("legend"), sweep.counts, plan.pens(), palette);
-  const { beyond } = plan.notShown();
-  setText(byId("beyond"), beyond ? `${count(beyond, "reading")} beyond the view: arrows on its border` : "");
   const progress = byId("progress");
   progress.hidden = !sweep.underWay || took.length === 0;
   progress.max = sweep.planned;
@@ -194,6 +195,13 @@ function tell(selected) {
   resting = setTimeout(() => setText(byId("summary"), inShort(sweep, logs.scan !== null)), REST_MS);
 }
 let resting = 0;
+
+/** What is drawn, which depends on the view. */
+function tellLegend() {
+  legend(byId("legend"), scan?.counts ?? new Map(), plan.pens(), palette);
+  const { beyond } = plan.notShown();
+  setText(byId("beyond"), beyond ? `${count(beyond, "reading")} beyond the view: arrows on its border` : "");
+}
 
 /** @param {number} index */
 function select(index) {
@@ -252,8 +260,9 @@ function refuse(problem) {
   tellTrouble(problem);
 }
 
-/** Handles to where their things are. */
+/** What lies on the plan, to where its things are in the view. */
 function place() {
+  if (scan && plan.palette) drawArcs(fans, plan, state.arcs ? half_beam_deg : null);
   if (!plan.view.width || !plan.view.box) return;
   ranger.place(state.pose);
   editor.show(state.scene);
@@ -280,7 +289,7 @@ function showScene() {
 function openRoom(scene, further = {}) {
   const pose = Object.values(scene.poses ?? {})[0] ?? { x_m: 0, y_m: 0, heading_deg: 0 };
   logs.close();
-  plan.view.box = null;
+  plan.view.show(plan.view.what);
   editor.toggle(false);
   change({ scene, pose, beam: 0, height_m: null, sensor: knownSensor(), ...further });
   byId("pose").value = "";
@@ -308,7 +317,7 @@ async function openLog(text) {
 
 /** @param {Partial<State>} changes */
 function showLogged(changes) {
-  plan.view.box = null;
+  plan.view.show(plan.view.what);
   editor.toggle(false);
   change(changes);
 }
@@ -345,7 +354,6 @@ function listen() {
   byId("save").addEventListener("click", () => files.save({ ...state.scene, poses: { ...state.scene.poses, here: state.pose } }));
   byId("share").addEventListener("click", () => showLink(state));
   addEventListener("hashchange", () => openLink());
-  new ResizeObserver(place).observe(byId("stage"));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     palette = colours();
     trace.redraw(palette);

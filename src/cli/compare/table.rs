@@ -104,7 +104,7 @@ fn explanations(found: &[Explanation]) -> Table {
     let mut table = Table::new();
     table.load_style(RULED).set_header(["change", "by", "explains", "gain"]);
     for Explanation { change, estimates, gain, explains } in found.iter().take(MOST_EXPLANATIONS) {
-        let by: Vec<String> = estimates.iter().map(estimate).collect();
+        let by: Vec<String> = estimates.iter().map(Estimate::to_string).collect();
         let explains = format!("{explains} readings");
         table.add_row([change.replace('_', " "), by.join(", "), explains, format!("{gain:.0}")]);
     }
@@ -117,18 +117,6 @@ const FEW_AGREE: f64 = 0.25;
 
 /// So many of them are shown.
 const MOST_EXPLANATIONS: usize = 6;
-
-fn estimate(Estimate { name, value, sigma }: &Estimate) -> String {
-    match *name {
-        "x_m" => format!("x {:+.0} mm +- {:.1}", 1e3 * value, 1e3 * sigma),
-        "y_m" => format!("y {:+.0} mm +- {:.1}", 1e3 * value, 1e3 * sigma),
-        "offset_m" => format!("{:+.0} mm +- {:.1}", 1e3 * value, 1e3 * sigma),
-        "heading_deg" => format!("{value:+.2} degrees +- {sigma:.2}"),
-        "threshold_db" => format!("{value:+.1} dB +- {sigma:.1}"),
-        // The speed of sound grows with the root of the absolute temperature.
-        _ => format!("{value:+.2} % +- {sigma:.2} (air {:+.1} C)", 2.0 * value / 100.0 * 293.0),
-    }
-}
 
 fn beam_table(beams: &[&Beam]) -> Table {
     let mut table = Table::new();

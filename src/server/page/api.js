@@ -19,11 +19,19 @@ let wake = () => {};
 let asking = null;
 let declined = false;
 
-/** The JSON of an answer; asks for the token where one is wanted. */
-export async function ask(path, { method = "GET", body, signal } = {}) {
+/** @typedef {{method?: string, body?: object, signal?: AbortSignal}} Request */
+
+/** The JSON of an answer; asks for the token where one is wanted. @param {string} path @param {Request} [request] */
+export const ask = async (path, request = {}) => (await answerTo(path, request)).json();
+
+/** An answer as a file. @param {string} path @returns {Promise<Blob>} */
+export const askFile = async (path) => (await answerTo(path, {})).blob();
+
+/** @param {string} path @param {Request} request */
+async function answerTo(path, { method = "GET", body, signal } = {}) {
   for (;;) {
     const response = await send(path, { method, body, signal });
-    if (response.ok || (path === "/v1/health" && response.status === 503)) return response.json();
+    if (response.ok || (path === "/v1/health" && response.status === 503)) return response;
     const refused = await refusal(response);
     const wants = refused.status === 401 && (method !== "GET" || !declined);
     if (!wants || !(await askToken(refused))) throw refused;
@@ -41,11 +49,11 @@ export async function follow(path, onLine, onState) {
       wait = FIRST_WAIT_MS;
       onState(true);
       await readEvents(response.body, onLine, stop);
-    } catch (error) {
+    } catch (/** @type {any} */ error) {
       if (error instanceof Refused && error.status === 401 && !declined) await askToken(error);
     }
     onState(false);
-    await new Promise((done) => {
+    await new Promise((/** @type {(value?: any) => void} */ done) => {
       wake = done;
       setTimeout(done, wait);
     });
@@ -56,7 +64,9 @@ export async function follow(path, onLine, onState) {
 /** Tries the stream again at once: the daemon is known to be back. */
 export const hurry = () => wake();
 
+/** @param {string} path @param {Request} request */
 function send(path, { method = "GET", body, signal } = {}) {
+  /** @type {Record<string, string>} */
   const headers = {};
   const token = sessionStorage.getItem(TOKEN);
   if (token) headers.Authorization = `Bearer ${token}`;
@@ -90,8 +100,7 @@ function askToken(refused) {
 }
 
 function showDialog(refused) {
-  const dialog = document.getElementById("token");
-  const input = document.getElementById("token-text");
+  const [dialog, input] = ["token", "token-text"].map((id) => /** @type {any} */ (document.getElementById(id)));
   document.getElementById("token-why").textContent = `The daemon says: ${refused.message}.`;
   input.value = "";
   dialog.returnValue = "";

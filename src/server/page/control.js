@@ -8,7 +8,7 @@ export function control(form, stop, say) {
     try {
       await ask(path, { method: "POST", body });
       say(done);
-    } catch (error) {
+    } catch (/** @type {any} */ error) {
       say(error.status ? `Refused: ${error.message}. ${error.help}` : "The daemon does not answer.");
     }
   };

@@ -36,7 +36,7 @@ export function drawScaleBar({ c }, view, palette) {
   const length = step * view.scale;
   const [x, y] = [12, view.height - 12];
   c.font = `12px ${FONT}`;
-  const text = step < 1 ? `${Math.round(100 * step)} cm` : `${step} m`;
+  const text = step < 0.01 ? `${Math.round(1000 * step)} mm` : step < 1 ? `${Math.round(100 * step)} cm` : `${step} m`;
   c.setLineDash([]);
   c.fillStyle = palette["--panel"];
   c.fillRect(x - 6, y - 14, length + 20 + c.measureText(text).width, 22);

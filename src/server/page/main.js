@@ -3,17 +3,24 @@
 import { ask, follow, hurry } from "./api.js";
 import { BeamPanel, inWords } from "./beam.js";
 import { control } from "./control.js";
+import { downloads } from "./download.js";
+import { Explanations } from "./explanations.js";
 import { History } from "./history.js";
+import { Next } from "./next.js";
+import { Overlays } from "./overlays.js";
 import { Plan } from "./plan.js";
 import { Scan } from "./scan.js";
 import { watch } from "./status.js";
 import { Strip } from "./strip.js";
 import { Summary } from "./summary.js";
 import { BeamTable } from "./table.js";
+import { addTools } from "./tools.js";
+import { EchoTrace } from "./trace.js";
 import { colours, legend } from "./verdicts.js";
+import { Waterfall } from "./waterfall.js";
 import { clock, count, setText } from "./words.js";
 
-const byId = (id) => document.getElementById(id);
+const byId = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
 const slider = byId("beam");
 
 let palette = colours();
@@ -29,36 +36,57 @@ let unheard = null;
 let catching = null;
 let again = false;
 
-export const plan = new Plan(byId("stage"), select);
-const strip = new Strip(byId("strip"), select);
+const words = "Floor plan with the readings of the scan; the table of beams has the same in words";
+export const plan = new Plan(byId("stage"), select, words);
+addTools(plan, () => (changed = true));
+const strip = new Strip(byId("residuals"), select);
 const table = new BeamTable(byId("table"));
-const panel = new BeamPanel(
-  byId("beam-panel"),
-  (path) => {
-    plan.select(selected, path);
-    changed = true;
-  },
-  ({ scan, index }, signal) => ask(`/v1/scans/${scan}/beams/${index}`, { signal }),
-);
+/** What the daemon told last of the selected beam. */
+let beam = null;
+const panel = new BeamPanel(byId("beam-panel"), showPath, async ({ scan, index }, signal) => {
+  beam = await ask(`/v1/scans/${scan}/beams/${index}`, { signal });
+  return beam;
+});
+// A sound that is chosen in the trace is chosen in the list, too.
+const trace = new EchoTrace(byId("trace"), (hump) => byId("beam-panel").querySelectorAll(".humps button")[beam.humps.indexOf(hump)]?.click());
 const summary = new Summary(byId("summary"));
 const history = new History(
-  { list: byId("scans-list"), live: byId("live"), replay: byId("replay"), speed: byId("speed") },
+  { list: byId("scans-list"), line: byId("scan-line"), live: byId("live"), replay: byId("replay"), speed: byId("speed") },
   (scan, trouble) => {
     show(scan ?? live);
     if (trouble) summary.say(trouble);
     else if (shown) summary.shows(shown);
   },
 );
-control(byId("control"), byId("stop"), (text) => summary.say(text));
+const waterfall = new Waterfall(byId("over-time"), {
+  get: (id) => history.get(id),
+  known: () => history.scans,
+  onPick: async (id, index) => {
+    await history.show(id);
+    select(index);
+  },
+});
+const say = (text) => summary.say(text);
+control(byId("control"), byId("stop"), say);
+const overlays = new Overlays(byId("overlays"), plan, strip, say);
+const next = new Next(byId("next"), plan, say);
+const explanations = new Explanations(byId("better"), plan, {
+  show: (id) => history.show(id),
+  propose: (change) => next.propose(change),
+});
+downloads(byId("downloads"), plan, { scan: () => shown, log: (id) => history.logOf(id), say });
 
 /** Shows a scan, or the same one anew. */
 function show(scan) {
   const another = scan?.id !== shown?.id;
   shown = scan;
   for (const view of [plan, strip, table]) view.scan = scan;
+  if (scan && !scan.replayed) waterfall.add(scan, [...scan.beams.values()]);
   if (scan) scan.added = [];
   plan.latest = null;
   if (another) keepSelection();
+  overlays.tell();
+  explanations.mark();
   redraw();
   loadScene();
 }
@@ -75,6 +103,9 @@ function keepSelection() {
 function redraw() {
   plan.redraw(palette);
   strip.redraw(palette);
+  trace.redraw(palette);
+  history.line.redraw(palette);
+  waterfall.redrawSoon(palette);
   table.redraw();
   tell();
 }
@@ -84,6 +115,7 @@ function frame() {
   if (shown?.added.length) {
     const added = shown.added.splice(0);
     for (const view of [plan, strip, table]) view.addReadings(added);
+    waterfall.add(shown, added);
     const anew = selected && added.findLast((ping) => ping.index === selected.index);
     if (anew && anew !== selected) choose(anew);
     changed = true;
@@ -129,7 +161,17 @@ function choose(ping) {
   plan.select(ping, path);
   strip.select(ping);
   table.select(ping);
+  waterfall.select(ping);
   panel.show(ping);
+  changed = true;
+}
+
+/** Draws the path of a sound, and its place in the echo trace. */
+function showPath(path) {
+  byId("trace").hidden = !beam?.trace;
+  plan.select(selected, path);
+  const same = JSON.stringify(path);
+  trace.show(beam?.trace ? beam : null, beam?.humps?.find(({ polyline }) => JSON.stringify(polyline) === same) ?? null);
   changed = true;
 }
 
@@ -146,6 +188,9 @@ function deselect() {
   setText(byId("beam-now"), "none selected");
   plan.select(null);
   strip.selected = null;
+  waterfall.select(null);
+  trace.show(null);
+  byId("trace").hidden = true;
   panel.clear();
   changed = true;
 }
@@ -159,7 +204,8 @@ function begin(start) {
   return scan;
 }
 
-function take(record) {
+/** Takes in a record of the stream. */
+export function take(record) {
   switch (record.type) {
     case "session":
       session = record;
@@ -185,7 +231,7 @@ function take(record) {
       changed = true;
       if (shown === live) {
         // A view that was kept wide for readings that did not come again shrinks now.
-        plan.redraw();
+        overlays.redraw();
         summary.ended(live);
       }
       history.refreshSoon();
@@ -212,7 +258,7 @@ function catchUp() {
 /** All of the newest scan so far. */
 async function readNewest() {
   await Promise.all([loadScene(), history.refresh()]);
-  const newest = byId("scans-list").querySelector("button")?.dataset.scan;
+  const newest = history.scans[0]?.scan;
   if (!newest) return;
   const asked = Promise.all([ask(`/v1/scans/${newest}`), ask("/v1/status")]);
   const [whole, status] = await asked.catch(() => []);
@@ -266,7 +312,7 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
 tell();
 let answered = true;
 let version = null;
-watch((status) => {
+watch((status, health) => {
   // Another version of the daemon brings its own page.
   if (version && status && status.sonard !== version) location.reload();
   version ??= status?.sonard;
@@ -276,6 +322,8 @@ watch((status) => {
     catchUp();
   }
   answered = status !== null;
+  if (status) next.tell(status);
+  if (health) explanations.tell(health);
 });
 follow("/v1/live/records?format=sse&verdicts=true", take, (there) => {
   if (there) return catchUp();

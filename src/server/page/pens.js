@@ -13,6 +13,18 @@ const PENS = {
   direction: { words: "direction of the selected beam", colour: "--ray", width: 1.2, dash: [6, 4] },
   selected: { words: "selected reading", colour: "--ray", width: 2, sign: "ring" },
   path: { words: "path of its sound", colour: "--path", width: 1.8, sign: "leg" },
+  fan: { words: "arc of a reading: within the beam, so far away", colour: "--quiet", width: 1.2, sign: "arc" },
+  before: { words: "reading of the sweep before", colour: "--silent", width: 1, sign: "dot" },
+  measure: { words: "measured length", colour: "--good", width: 1.6, sign: "length" },
+  second: { words: "reading of the pinned scan", colour: "--wait", width: 1.2, sign: "dot" },
+  average: { words: "average of both scans", colour: "--good", width: 1.2, sign: "dot" },
+  difference: { words: "from the pinned scan to this one", colour: "--bad", width: 1.6 },
+  occupied: { words: "map: occupied", colour: "--ink", width: 1, sign: "cell" },
+  free: { words: "map: free", colour: "--direct", width: 1, sign: "cell" },
+  found: { words: "fitted line", colour: "--good", width: 3 },
+  feature: { words: "plane (P), corner (C), edge (E), unresolved (?)", colour: "--min-range", width: 1.5, sign: "ring" },
+  preview: { words: "what the model expects of the next scan", colour: "--good", width: 1.3, sign: "square" },
+  better: { words: "where it would be by the chosen explanation", colour: "--bad", width: 2, dash: [7, 3] },
   beyond: { words: "reading beyond the view", colour: "--ink", width: 1, sign: "arrow" },
 };
 
@@ -20,11 +32,12 @@ const PENS = {
 export const PEN_NAMES = Object.keys(PENS);
 export const penWords = (name) => PENS[name].words;
 
-/** A canvas, and what has been drawn on it since it was cleared. */
+/** A canvas, or a picture in the making, and what has been drawn on it since it was cleared. */
 export class Layer {
-  constructor(canvas) {
+  /** @param {HTMLCanvasElement | null} canvas @param {any} c */
+  constructor(canvas, c = canvas.getContext("2d")) {
     this.canvas = canvas;
-    this.c = canvas.getContext("2d");
+    this.c = c;
     this.used = new Set();
     this.width = 0;
     this.height = 0;
@@ -38,9 +51,19 @@ export class Layer {
     this.c.setTransform(scale, 0, 0, scale, 0, 0);
   }
 
-  clear() {
+  /** What is drawn from now on is drawn in this view. @param {any} view */
+  clear(view) {
     this.used.clear();
     this.c.clearRect(0, 0, this.width, this.height);
+    this.drawnIn = { scale: view.scale, x0: view.x0, y0: view.y0 };
+    if (this.canvas?.style.transform) this.canvas.style.transform = "";
+  }
+
+  /** Moves what is drawn to where it is in the view now, until it is drawn anew. @param {any} view */
+  shift({ scale, x0, y0 }) {
+    const by = scale / this.drawnIn.scale;
+    const [dx, dy] = [x0 - by * this.drawnIn.x0, y0 - by * this.drawnIn.y0];
+    this.canvas.style.transform = `matrix(${by}, 0, 0, ${by}, ${dx}, ${dy})`;
   }
 
   /** The context, set to draw with a pen. */
@@ -65,11 +88,38 @@ export function line(c, points) {
   c.stroke();
 }
 
+/** An upright line of a plot. @param {CanvasRenderingContext2D} c @param {number} x @param {number[]} between @param {string} colour */
+export function upright(c, x, [top, bottom], colour) {
+  c.setLineDash([]);
+  c.lineWidth = 1.4;
+  c.strokeStyle = colour;
+  line(c, [[x, top], [x, bottom]]);
+}
+
 /** @param {CanvasRenderingContext2D} c @param {number[]} at @param {number} radius */
 export function circle(c, [x, y], radius) {
   c.beginPath();
   c.arc(x, y, radius, 0, 2 * Math.PI);
   c.stroke();
+}
+
+/** @param {CanvasRenderingContext2D} c @param {number[]} at @param {number} half */
+export function square(c, [x, y], half) {
+  line(c, [[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half], [x - half, y - half]]);
+}
+
+/** @param {CanvasRenderingContext2D} c @param {number[]} at @param {number} radius */
+export function disc(c, [x, y], radius) {
+  c.beginPath();
+  c.arc(x, y, radius, 0, 2 * Math.PI);
+  c.fill();
+}
+
+/** A line with a stroke across each end. @param {CanvasRenderingContext2D} c @param {number[]} from @param {number[]} to */
+export function drawLength(c, from, to) {
+  const turn = Math.atan2(to[1] - from[1], to[0] - from[0]);
+  line(c, [from, to]);
+  for (const end of [from, to]) drawFace(c, end, turn, 5);
 }
 
 /**
@@ -125,6 +175,17 @@ export function drawSample(c, name, palette) {
       return arrow(c, [12, 8], 0, [6, 4, 4]);
     case "arrow":
       return arrow(c, [12, 8], 0, [4, 5, 3]);
+    case "dot":
+      return disc(c, [12, 8], 3);
+    case "cell":
+      c.globalAlpha = 0.5;
+      c.fillRect(6, 2, 12, 12);
+      c.globalAlpha = 1;
+      return;
+    case "square":
+      return square(c, [12, 8], 4);
+    case "length":
+      return drawLength(c, [3, 8], [21, 8]);
     default:
       return line(c, [[1, 8], [23, 8]]);
   }

@@ -1,29 +1,36 @@
-// The floor plan on three layers: ground (grid, walls), marks (readings, drawn as they come), and above
-// them what changes with every beam (robot, sweep, selection, path of the sound). Every reading is drawn
-// from its own viewpoint.
+// The floor plan on four layers: ground (grid, walls), under (the sweep before), marks (readings, drawn as they
+// come), and above them what changes with every beam (robot, sweep, selection, path of the sound, lengths).
 
+import { make } from "./dom.js";
+import { Gestures } from "./gestures.js";
 import { drawGrid, drawScaleBar, drawScene } from "./ground.js";
-import { arrow, circle, drawFace, drawPose, Layer, line, PEN_NAMES } from "./pens.js";
-import { MARKS, draw } from "./verdicts.js";
+import { arrow, circle, drawPose, Layer, line, PEN_NAMES } from "./pens.js";
+import { place, Sketch } from "./sketch.js";
 import { View } from "./view.js";
-import { inWorld, offDirection, pointAt } from "./viewpoint.js";
+import { inWorld, offDirection } from "./viewpoint.js";
 
-const MARK_PX = 3;
 const HIT_PX = 24;
 const TURN = Math.PI / 180;
-/** Half the angle of an arc that stands for the nearest range of a ranger that does not turn, degrees. */
-const ARC_DEG = 8;
-/** Half the width of a transducer's face as it is drawn, metres. */
-const FACE_M = 0.02;
+/** More readings than this are not drawn anew with every frame of a gesture, but moved, and drawn when it rests. */
+const MANY = 4000;
+const REST_MS = 120;
+const LAYERS = ["ground", "under", "marks", "over"];
 
 export class Plan {
-  /** Calls `onPick(index)` when somebody clicks at a beam. */
-  constructor(stage, onPick) {
+  /** Calls `onPick(index)` when somebody clicks at a beam. `words` says what the plan is of. */
+  constructor(stage, onPick, words) {
     this.stage = stage;
-    this.layers = [...stage.querySelectorAll("canvas")].map((canvas) => new Layer(canvas));
+    this.words = words;
+    /** @type {Layer[]} */
+    this.layers = [];
+    for (const name of LAYERS) this.addLayer(name);
     this.ground = this.layers[0];
-    this.marks = this.layers[1];
-    this.over = this.layers[2];
+    this.under = this.layers[1];
+    this.marks = this.layers[2];
+    this.over = this.layers[3];
+    /** The next frame that draws a moved view, and the rest after which all is drawn. @type {number | null} */
+    this.moving = null;
+    this.resting = 0;
     this.view = new View();
     /** While somebody drags something the view stays. */
     this.held = false;
@@ -36,8 +43,29 @@ export class Plan {
     /** Scene and pose that the view was fitted to. */
     this.fitted = "";
     this.onPick = onPick;
+    /** The measuring tool, where there is one. */
+    this.measure = null;
+    /** What else is drawn, under the readings and over them. @type {{drawUnder?: Function, drawOver?: Function}[]} */
+    this.overlays = [];
+    this.onView = () => {};
     new ResizeObserver(() => this.resize()).observe(stage);
-    this.over.canvas.addEventListener("click", (event) => this.pick([event.offsetX, event.offsetY]));
+    const tool = () => (this.measure?.on ? this.measure : null);
+    this.gestures = new Gestures(stage, this.over.canvas, this.view, {
+      onMove: () => this.moveView(),
+      onClick: (px) => (tool() ?? { click: (at) => this.pick(at) }).click(px),
+      onHover: (px) => tool()?.hover(px),
+      onKey: (event) => tool()?.key(event) || this.key(event),
+    });
+  }
+
+  /** The layer above all others; of the page's main plan they bear their names. */
+  addLayer(name) {
+    const picture = name === "over";
+    const canvas = make("canvas", { className: name, ...(picture ? { role: "img", ariaLabel: this.words } : { ariaHidden: "true" }) });
+    if (this.stage.id) canvas.id = name;
+    this.stage.append(canvas);
+    this.layers.push(new Layer(canvas));
+    return this.layers.at(-1);
   }
 
   /** Everything anew: another scene, scan, size or style. */
@@ -45,13 +73,25 @@ export class Plan {
     this.palette = palette;
     if (!this.view.width) return;
     if (!this.held || !this.view.box) this.fit();
-    this.ground.clear();
-    drawGrid(this.ground, this.view, palette);
-    if (this.sceneFits()) drawScene(this.ground, this.view, palette, this.scene);
-    drawScaleBar(this.ground, this.view, palette);
-    this.marks.clear();
+    this.drawGround();
+    this.drawUnder();
+    this.marks.clear(this.view);
     this.drawReadings(this.readings());
     this.drawOver();
+    this.onView();
+  }
+
+  /** Somebody moved the view: once a frame it is drawn. */
+  moveView() {
+    this.moving ??= requestAnimationFrame(() => {
+      this.moving = null;
+      if (this.readings().length + this.beforeReadings().length <= MANY) return this.redraw();
+      this.drawGround();
+      for (const layer of [this.under, this.marks]) layer.shift(this.view);
+      this.drawOver();
+      clearTimeout(this.resting);
+      this.resting = setTimeout(() => this.redraw(), REST_MS);
+    });
   }
 
   /** Readings that came since the last frame. */
@@ -72,30 +112,42 @@ export class Plan {
 
   resize() {
     const { clientWidth, clientHeight } = this.stage;
-    [this.view.width, this.view.height] = [clientWidth, clientHeight];
+    this.view.resize(clientWidth, clientHeight);
     for (const layer of this.layers) layer.resize(clientWidth, clientHeight);
     if (this.palette) this.redraw();
   }
 
   /** Shows the room alone, the readings around it as well, or all. */
   show(what) {
-    [this.view.what, this.view.box] = [what, null];
+    this.view.show(what);
     this.redraw();
+  }
+
+  /** Whether a key was for the plan. @param {KeyboardEvent} event */
+  key({ key }) {
+    if (key === "0" || key === "Home") this.show(this.view.what);
+    else if (key.toLowerCase() === "m" && this.measure) this.measure.toggle();
+    else return false;
+    return true;
   }
 
   readings() {
     return this.scan ? [...this.scan.beams.values()] : [];
   }
 
+  /** Of the sweep before, while the next one is under way. */
+  beforeReadings() {
+    return this.scan?.before ? [...this.scan.before.beams.values()] : [];
+  }
+
   fit() {
-    const room = [];
-    for (const { from, to } of this.scene?.walls ?? []) room.push(from, to);
+    const room = this.corners();
     for (const { center: [x, y], radius_m: r } of this.scene?.cylinders ?? []) room.push([x - r, y - r], [x + r, y + r]);
     const pose = this.scan?.start.pose;
     if (pose) room.push([pose.x_m, pose.y_m]);
     const readings = this.readings();
     for (const { viewpoint } of readings) if (viewpoint) room.push([viewpoint.x_m, viewpoint.y_m]);
-    const ends = readings.map((ping) => this.place(ping)).filter((end) => end !== null);
+    const ends = readings.map((ping) => place(ping)).filter((end) => end !== null);
     // While readings come in, the view only widens, from one scan of a place to the next as well.
     const where = `${this.scene?.sha256} ${JSON.stringify(pose)}`;
     const grow = this.scan?.underWay && where === this.fitted;
@@ -104,21 +156,36 @@ export class Plan {
     this.view.fit(room, ends, grow);
   }
 
-  /** Where a range along a beam ends, metres; by itself its reading's. `null` if it is not known. */
-  place({ viewpoint, range_m }, m = range_m) {
-    return viewpoint && m !== null ? pointAt(viewpoint, m) : null;
+  /** Ends of the scene's walls, metres. */
+  corners() {
+    return (this.scene?.walls ?? []).flatMap(({ from, to }) => [from, to]);
+  }
+
+  /** The end of a wall that is nearest to a pixel, at most so far from it; else the reading; else the point there. */
+  snap(px, most_px) {
+    const nearestOf = (points) => {
+      let [best, nearest] = [null, most_px];
+      for (const point of points) {
+        const [x, y] = this.view.px(point);
+        const off = Math.hypot(x - px[0], y - px[1]);
+        if (off < nearest) [best, nearest] = [point, off];
+      }
+      return best;
+    };
+    const ends = () => this.readings().map((ping) => place(ping)).filter((end) => end !== null);
+    return nearestOf(this.corners()) ?? nearestOf(ends()) ?? this.view.world(px);
   }
 
   /** Whether a reading is out of the view that the view would widen for. */
   widens(ping) {
-    const at = this.place(ping);
+    const at = place(ping);
     return at !== null && this.view.wouldGrow(at);
   }
 
   /** How many readings lie beyond the view, and how many are from a place that is not known. */
   notShown() {
     const readings = this.view.width ? this.readings() : [];
-    const ends = readings.map((ping) => this.place(ping)).filter((end) => end !== null);
+    const ends = readings.map((ping) => place(ping)).filter((end) => end !== null);
     const beyond = ends.filter((end) => this.view.isBeyond(this.view.px(end))).length;
     return { beyond, unplaced: readings.filter((ping) => !ping.viewpoint).length };
   }
@@ -134,98 +201,86 @@ export class Plan {
     return this.scene && (!taken || taken === this.scene.sha256);
   }
 
-  /** What was read stands above what the model says. */
+  /** All layers on another canvas, for a picture. */
+  drawOn(c) {
+    const own = [this.ground, this.under, this.marks, this.over];
+    const all = new Layer(null, c);
+    // They lie on one another.
+    all.clear = () => {};
+    this.ground = this.under = this.marks = this.over = all;
+    this.drawGround();
+    this.drawUnder();
+    this.drawReadings(this.readings());
+    this.drawOver();
+    [this.ground, this.under, this.marks, this.over] = own;
+  }
+
+  sketch(layer, scan = this.scan) {
+    return new Sketch(layer, this.view, this.palette, scan);
+  }
+
+  drawGround() {
+    const { ground, view, palette } = this;
+    ground.clear(view);
+    drawGrid(ground, view, palette);
+    if (this.sceneFits()) drawScene(ground, view, palette, this.scene);
+    drawScaleBar(ground, view, palette);
+  }
+
+  /** The sweep before fades behind the one that comes in. */
+  drawUnder() {
+    this.under.clear(this.view);
+    const before = this.scan?.before;
+    if (before) {
+      this.under.c.globalAlpha = 0.45;
+      this.sketch(this.under, before).dots(this.beforeReadings(), "before");
+      this.under.c.globalAlpha = 1;
+    }
+    for (const overlay of this.overlays) overlay.drawUnder?.(this.under, this);
+  }
+
   drawReadings(pings) {
-    const placed = pings.filter((ping) => ping.viewpoint);
-    for (const ping of placed) {
-      this.drawNearest(ping);
-      if (ping.ranger) this.drawTransducer(this.marks, ping);
-      if (ping.sim?.range_m != null) this.drawAt("model", ping, ping.sim.range_m);
-    }
-    for (const ping of placed) {
-      if (MARKS[ping.mark].shape === "tick") this.drawSilence(ping);
-      else this.drawAt(ping.mark, ping, ping.range_m);
-    }
-  }
-
-  drawAt(mark, ping, range_m) {
-    const at = this.view.px(this.place(ping, range_m));
-    if (!this.view.isBeyond(at)) return draw(this.marks.c, mark, ...at, MARK_PX, this.palette[MARKS[mark].colour]);
-    if (mark === "model") return;
-    // Beyond the view: an arrow on its border says that there is something, in the colour of its mark.
-    const c = this.marks.pen("beyond", this.palette);
-    c.fillStyle = this.palette[MARKS[mark].colour];
-    const { end, turn } = this.ray(ping);
-    arrow(c, end, turn, [3, 5, 2.4]);
-  }
-
-  /** On the border of the view, in the beam's direction. */
-  drawSilence(ping) {
-    const { end, turn } = this.ray(ping);
-    draw(this.marks.c, ping.mark, ...end, MARK_PX, this.palette[MARKS[ping.mark].colour], turn);
-  }
-
-  /** Nothing nearer is heard: a piece of arc round the transducer, as wide as one step of the plan. */
-  drawNearest(ping) {
-    const { session, start } = this.scan;
-    if (!session) return;
-    const near_m = (session.sensor.blanking_us * 1e-6 * session.air.sound_speed_m_s) / 2;
-    const half_deg = ping.ranger ? ARC_DEG : Math.min(ARC_DEG, start.plan.step_deg / 2);
-    const c = this.marks.pen("blanking", this.palette);
-    const { turn } = this.ray(ping);
-    c.beginPath();
-    c.arc(...this.from(ping), near_m * this.view.scale, turn - half_deg * TURN, turn + half_deg * TURN);
-    c.stroke();
-  }
-
-  drawTransducer(layer, ping) {
-    const c = layer.pen("face", this.palette);
-    drawFace(c, this.from(ping), this.ray(ping).turn, Math.max(3, FACE_M * this.view.scale));
-  }
-
-  /** Where a reading was taken, pixels. */
-  from({ viewpoint: { x_m, y_m } }) {
-    return this.view.px([x_m, y_m]);
-  }
-
-  /** Where a beam leaves the view, pixels, and its direction there, radians clockwise from the right. */
-  ray(ping) {
-    const turn = -ping.viewpoint.direction_deg * TURN;
-    return { end: this.view.border(this.from(ping), turn), turn };
+    if (this.scan) this.sketch(this.marks).readings(pings);
   }
 
   drawOver() {
-    this.over.clear();
-    if (!this.scan || !this.palette) return;
+    if (!this.palette) return;
+    this.over.clear(this.view);
+    if (this.scan) this.drawScan();
+    for (const overlay of this.overlays) overlay.drawOver?.(this.over, this);
+    this.measure?.draw(this.over, this.palette);
+  }
+
+  drawScan() {
     this.drawRobot((this.latest ?? this.readings().at(-1))?.pose ?? this.scan.start.pose);
     if (this.scan.underWay && this.latest?.viewpoint) this.drawRay("newest", this.latest);
     if (!this.selected?.viewpoint) return;
     this.drawRay("direction", this.selected);
     if (this.path) this.drawPath();
-    const at = this.place(this.selected);
+    const at = place(this.selected);
     if (at) circle(this.over.pen("selected", this.palette), this.view.px(at), 8);
   }
 
   /** The robot's body, which the array has, or else the scene. */
-  drawRobot(pose) {
+  drawRobot(pose, robot = "robot", heading = "pose") {
     const own = this.scan.session?.array?.body?.shape;
     const scenes = this.sceneFits() ? this.scene.robot : null;
     const body = own ? (own.circle ?? { outline: own.outline }) : scenes;
     const world = (point) => this.view.px(inWorld(pose, point));
     if (body) {
-      const c = this.over.pen("robot", this.palette);
+      const c = this.over.pen(robot, this.palette);
       if (body.center) circle(c, world(body.center), body.radius_m * this.view.scale);
       else line(c, [...body.outline, body.outline[0]].map(world));
     }
-    drawPose(this.over.pen("pose", this.palette), world([0, 0]), -pose.heading_deg * TURN);
+    drawPose(this.over.pen(heading, this.palette), world([0, 0]), -pose.heading_deg * TURN);
   }
 
   drawRay(pen, ping) {
-    const from = this.from(ping);
-    line(this.over.pen(pen, this.palette), [from, this.ray(ping).end]);
+    const sketch = this.sketch(this.over);
+    line(this.over.pen(pen, this.palette), [sketch.from(ping), sketch.ray(ping).end]);
     const { x_m, y_m } = ping.pose ?? this.scan.start.pose;
     const off_m = Math.hypot(ping.viewpoint.x_m - x_m, ping.viewpoint.y_m - y_m);
-    if (off_m > 1e-3) this.drawTransducer(this.over, ping);
+    if (off_m > 1e-3) sketch.transducer(ping);
   }
 
   /** The path of the sound, with an arrow on each of its legs. */
@@ -245,7 +300,7 @@ export class Plan {
   pick([x, y]) {
     let [best, nearest] = [null, HIT_PX];
     for (const ping of this.readings()) {
-      const at = this.place(ping);
+      const at = place(ping);
       if (!at) continue;
       const [u, v] = this.view.px(at);
       const distance = Math.hypot(u - x, v - y);

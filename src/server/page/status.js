@@ -6,9 +6,9 @@ import * as words from "./words.js";
 const EVERY_MS = 1000;
 /** When it answered last. */
 let answered = null;
-const byId = (id) => document.getElementById(id);
+const byId = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
 
-/** Asks for ever; `onStatus` gets each answer, or `null` when there is none. */
+/** Asks for ever; `onStatus` gets status and health each time, or `null` when there is no answer. */
 export async function watch(onStatus) {
   for (;;) {
     if (!document.hidden) await look(onStatus);
@@ -22,8 +22,8 @@ async function look(onStatus) {
     const [status, health] = await Promise.all([ask("/v1/status", { signal }), ask("/v1/health", { signal })]);
     answered = new Date();
     show(status, health);
-    onStatus(status);
-  } catch (error) {
+    onStatus(status, health);
+  } catch (/** @type {any} */ error) {
     showLost(error);
     onStatus(null);
   }
@@ -41,6 +41,7 @@ function show(status, health) {
     ["Pose", `${pose.x_m.toFixed(3)}, ${pose.y_m.toFixed(3)} m, ${pose.heading_deg}°`],
     ["Scans", mode(status.scanning)],
     ...pending(status.pending),
+    ...restart(status.configuration),
   ]);
   showTrouble(trouble(status));
   showHealth(status, health);
@@ -64,6 +65,9 @@ function pending({ plan, pose, scene, air, setup }) {
   if (setup) parts.push("sensor, model or motion");
   return parts.length > 0 ? [["From the next scan on", parts.join("; ")]] : [];
 }
+
+/** Keys of a changed configuration that wait. */
+const restart = ({ needs_restart }) => (needs_restart.length ? [["After a restart", needs_restart.join(", ")]] : []);
 
 function mode({ mode, paused, requested, next_in_s }) {
   const parts = [mode.replaceAll("_", " ").replaceAll("-", " ")];

@@ -1,14 +1,21 @@
 // The residuals of a scan against azimuth, measured minus model.
 
+import { make } from "./dom.js";
+import { upright } from "./pens.js";
 import { MARKS, draw } from "./verdicts.js";
 
 const LEFT = 46, RIGHT = 10, TOP = 8, BOTTOM = 20;
 const SCALES_MM = [5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
 const AGREE_MM = 10;
+const WORDS = "measured minus model in mm, against azimuth; shaded where 10 mm or less; the upright line is the selected beam";
 
 export class Strip {
   /** Calls `onPick(index)` when somebody clicks at a beam. */
-  constructor(canvas, onPick) {
+  constructor(section, onPick) {
+    const canvas = make("canvas", { id: "strip", role: "img", ariaLabel: `Residual: ${WORDS}` });
+    this.title = make("h2", { textContent: "Residual" });
+    this.words = make("p", { textContent: WORDS });
+    section.append(make("div", { className: "head" }, this.title, this.words), canvas);
     this.c = canvas.getContext("2d");
     this.width = 0;
     this.height = 0;
@@ -18,6 +25,8 @@ export class Strip {
     this.scan = null;
     this.selected = null;
     this.onPick = onPick;
+    /** Metres to be drawn of a reading, or `null`. @param {any} ping */
+    this.valueOf = (ping) => ping.residual_m;
     new ResizeObserver(() => this.resize()).observe(canvas);
     canvas.addEventListener("click", (event) => this.pick(event.offsetX));
   }
@@ -38,16 +47,28 @@ export class Strip {
     this.setScale();
     this.c.clearRect(0, 0, this.width, this.height);
     this.drawAxes();
-    for (const ping of this.scan?.residuals() ?? []) this.drawResidual(ping);
-    if (this.selected) this.drawSelected();
+    for (const ping of this.drawn()) this.drawResidual(ping);
+    if (this.selected) upright(this.c, this.x(this.selected.azimuth_deg), [TOP, this.height - BOTTOM], this.palette["--ray"]);
   }
 
   /** Readings that came since the last frame. */
   addReadings(pings) {
     if (!this.width) return;
-    const wider = pings.some((ping) => ping.residual_m !== null && Math.abs(1e3 * ping.residual_m) > this.most);
-    if (wider) return this.redraw();
-    for (const ping of pings) if (ping.residual_m !== null) this.drawResidual(ping);
+    const fresh = pings.filter((ping) => this.valueOf(ping) !== null);
+    if (fresh.some((ping) => Math.abs(1e3 * this.valueOf(ping)) > this.most)) return this.redraw();
+    for (const ping of fresh) this.drawResidual(ping);
+  }
+
+  /** Readings that have something to be drawn. */
+  drawn() {
+    return [...(this.scan?.beams.values() ?? [])].filter((ping) => this.valueOf(ping) !== null);
+  }
+
+  /** From the next time on it is drawn, shows something else of readings, with a title and words; the residual without. */
+  show(valueOf = (ping) => ping.residual_m, title = "Residual", words = WORDS) {
+    this.valueOf = valueOf;
+    [this.title.textContent, this.words.textContent] = [title, words];
+    this.c.canvas.ariaLabel = `${title}: ${words}`;
   }
 
   select(ping) {
@@ -57,7 +78,7 @@ export class Strip {
 
   /** The scale that nineteen of twenty residuals fit in; the others are drawn at its end. */
   setScale() {
-    const sizes = (this.scan?.residuals() ?? []).map((ping) => Math.abs(1e3 * ping.residual_m)).sort((a, b) => a - b);
+    const sizes = this.drawn().map((ping) => Math.abs(1e3 * this.valueOf(ping))).sort((a, b) => a - b);
     const wanted = sizes.length ? sizes[Math.floor(0.95 * (sizes.length - 1))] : 0;
     this.most = SCALES_MM.find((scale) => scale >= wanted) ?? SCALES_MM.at(-1);
   }
@@ -109,20 +130,9 @@ export class Strip {
   }
 
   drawResidual(ping) {
-    const mm = 1e3 * ping.residual_m;
+    const mm = 1e3 * this.valueOf(ping);
     const mark = MARKS[ping.mark].shape === "tick" ? "unexplained" : ping.mark;
     draw(this.c, mark, this.x(ping.azimuth_deg), this.y(mm), 2.2, this.palette[MARKS[mark].colour]);
-  }
-
-  drawSelected() {
-    const c = this.c;
-    const x = this.x(this.selected.azimuth_deg);
-    c.strokeStyle = this.palette["--ray"];
-    c.lineWidth = 1.4;
-    c.beginPath();
-    c.moveTo(x, TOP);
-    c.lineTo(x, this.height - BOTTOM);
-    c.stroke();
   }
 
   pick(x) {

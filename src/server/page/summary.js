@@ -32,6 +32,9 @@ export class Summary {
   }
 
   event({ kind, detail }) {
-    this.say(`${kind.replaceAll("_", " ")}: ${detail}`);
+    // An explanation is of the last scan, which nobody knows by its id.
+    const of = /^scan [0-9a-f-]{36}: /;
+    if (kind === "explanation") this.say(`The last scan is ${detail.replace(of, "")}.`);
+    else this.say(`${kind.replaceAll("_", " ")}: ${detail}`);
   }
 }

@@ -1,13 +1,24 @@
 // The readings as a table, made only while somebody looks at it.
 
+import { make } from "./dom.js";
 import { MARKS } from "./verdicts.js";
+import { setText } from "./words.js";
 
+const WORDS = "Table of beams";
+const COLUMNS = ["Beam", "Azimuth °", "Range m", "Model m", "Residual mm", "Verdict"];
+/** More rows than this nobody reads, and no browser likes. */
+const MOST_ROWS = 4000;
 const cell = (figure, digits) => (figure === null || figure === undefined ? "–" : figure.toFixed(digits));
 
 export class BeamTable {
   constructor(details) {
     this.details = details;
-    this.body = details.querySelector("tbody");
+    this.body = make("tbody");
+    const head = make("tr", {}, ...COLUMNS.map((textContent) => make("th", { scope: "col", textContent })));
+    const scroll = make("div", { className: "scroll", role: "region", ariaLabel: WORDS, tabIndex: 0 });
+    scroll.append(make("table", {}, make("thead", {}, head), this.body));
+    this.more = make("p", { className: "hint" });
+    details.append(make("summary", { textContent: WORDS }), scroll, this.more);
     this.rows = new Map();
     this.scan = null;
     details.addEventListener("toggle", () => this.redraw());
@@ -23,6 +34,7 @@ export class BeamTable {
     if (!this.details.open) return;
     const fresh = document.createDocumentFragment();
     for (const ping of pings) {
+      if (this.rows.size >= MOST_ROWS && !this.rows.has(ping.index)) continue;
       const row = makeRow(ping);
       const before = this.rows.get(ping.index);
       if (before) before.replaceWith(row);
@@ -30,6 +42,8 @@ export class BeamTable {
       this.rows.set(ping.index, row);
     }
     this.body.append(fresh);
+    const left = this.scan.beams.size - this.rows.size;
+    setText(this.more, left > 0 ? `${left} more are in the scan's file.` : "");
   }
 
   select(ping) {

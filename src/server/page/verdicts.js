@@ -75,9 +75,17 @@ export function colours() {
   });
 }
 
+/** Names of the marks that occur, in the order of the legend. @param {Map<string, number>} counts */
+export const marksIn = (counts) => Object.keys(MARKS).filter((name) => counts.get(name));
+
+/** A mark as the legend shows it, in a field of 24 by 16 pixels. */
+export function drawMark(c, name, palette) {
+  draw(c, name, 12, MARKS[name].shape === "tick" ? 2 : 8, 4, palette[MARKS[name].colour]);
+}
+
 /** Fills the legend with the marks that occur and their numbers, and with the pens that are drawn with. */
 export function legend(list, counts, pens, palette) {
-  const marks = Object.keys(MARKS).filter((name) => counts.get(name));
+  const marks = marksIn(counts);
   const names = [...marks, ...pens];
   const same = names.length === list.children.length && names.every((name, i) => list.children[i].dataset.sign === name);
   if (!same || list.palette !== palette) {
@@ -92,21 +100,19 @@ export function legend(list, counts, pens, palette) {
 }
 
 function markEntry(name, palette) {
-  const tick = MARKS[name].shape === "tick";
-  const sign = (c) => draw(c, name, 8, tick ? 2 : 8, 4, palette[MARKS[name].colour]);
-  return entry(name, 16, sign, "");
+  return entry(name, (c) => drawMark(c, name, palette), "");
 }
 
 function penEntry(name, palette) {
-  return entry(name, 24, (c) => drawSample(c, name, palette), penWords(name));
+  return entry(name, (c) => drawSample(c, name, palette), penWords(name));
 }
 
-function entry(name, width, sign, text) {
+function entry(name, sign, text) {
   const item = document.createElement("li");
   item.dataset.sign = name;
   const sample = item.appendChild(document.createElement("canvas"));
   sample.ariaHidden = "true";
-  sample.width = width * devicePixelRatio;
+  sample.width = 24 * devicePixelRatio;
   sample.height = 16 * devicePixelRatio;
   const c = sample.getContext("2d");
   c.scale(devicePixelRatio, devicePixelRatio);

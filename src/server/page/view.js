@@ -5,6 +5,8 @@ const MARGIN_PX = 26;
 const FOOT_PX = 40;
 /** In the usual view the room takes up at least a quarter of the plan. */
 const NEAR = 1.5;
+/** Pixels a metre that can be zoomed to: from a square kilometre to a millimetre. */
+const [LEAST_SCALE, MOST_SCALE] = [0.5, 40000];
 
 export class View {
   constructor() {
@@ -12,6 +14,8 @@ export class View {
     this.what = "near";
     /** Left, low, right, high, metres. @type {number[] | null} */
     this.box = null;
+    /** Whether somebody zoomed or moved it: then it stays until it is fitted again. */
+    this.moved = false;
     this.width = 0;
     this.height = 0;
     this.scale = 1;
@@ -26,6 +30,8 @@ export class View {
    * @param {boolean} grow
    */
   fit(room, readings, grow) {
+    if (this.moved && this.box) return;
+    this.moved = false;
     const inner = boxOf(room.length ? room : readings) ?? boxOf([[-1, -1], [1, 1]]);
     const around = { room: 0.06, near: NEAR, all: Infinity }[this.what] * Math.max(...sizes(inner));
     const most = [inner[0] - around, inner[1] - around, inner[2] + around, inner[3] + around];
@@ -36,6 +42,34 @@ export class View {
     this.scale = Math.min((this.width - 2 * MARGIN_PX) / across, (this.height - MARGIN_PX - FOOT_PX) / up);
     this.x0 = this.width / 2 - (this.scale * (left + right)) / 2;
     this.y0 = (this.height + MARGIN_PX - FOOT_PX) / 2 + (this.scale * (low + high)) / 2;
+  }
+
+  /** Fits room and readings ("near"), the room or all, from now on. @param {string} what */
+  show(what) {
+    [this.what, this.box, this.moved] = [what, null, false];
+  }
+
+  /** What is in the middle stays there if somebody moved it there. @param {number} width @param {number} height */
+  resize(width, height) {
+    if (this.moved) this.pan((width - this.width) / 2, (height - this.height) / 2);
+    [this.width, this.height] = [width, height];
+  }
+
+  /** The point at a pixel stays there. @param {number} factor @param {number[]} px */
+  zoom(factor, [x, y]) {
+    const scale = Math.max(LEAST_SCALE, Math.min(MOST_SCALE, this.scale * factor));
+    const by = scale / this.scale;
+    this.scale = scale;
+    this.x0 = x + by * (this.x0 - x);
+    this.y0 = y + by * (this.y0 - y);
+    this.moved = true;
+  }
+
+  /** @param {number} dx pixels to the right @param {number} dy pixels down */
+  pan(dx, dy) {
+    this.x0 += dx;
+    this.y0 += dy;
+    this.moved = true;
   }
 
   /** Where a point is, pixels. @param {number[]} point @returns {[number, number]} */
@@ -55,7 +89,7 @@ export class View {
 
   /** Whether a reading there would widen the view. */
   wouldGrow(point) {
-    if (this.what === "room" || !this.box) return false;
+    if (this.what === "room" || this.moved || !this.box) return false;
     /** @type {(point: number[], box: number[]) => boolean} */
     const inside = ([x, y], [left, low, right, high]) => x >= left && y >= low && x <= right && y <= high;
     return this.isBeyond(this.px(point)) && !inside(point, this.box);

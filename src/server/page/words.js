@@ -60,6 +60,26 @@ const PROVENANCES = {
 /** What a reader must know about readings that no ranger made; nothing for hardware. */
 export const provenance = (name) => PROVENANCES[name];
 
+/** A value that a change would have, with its standard deviation and the words of `sonard status`. */
+export function estimate({ name, value, sigma }) {
+  const by = (figure, unit, digits, along = "") =>
+    `${along}${figure < 0 ? "−" : "+"}${Math.abs(figure).toFixed(digits)} ${unit} ± `;
+  switch (name) {
+    case "x_m":
+    case "y_m":
+    case "offset_m":
+      return `${by(1e3 * value, "mm", 0, name === "offset_m" ? "" : `${name[0]} `)}${(1e3 * sigma).toFixed(1)}`;
+    case "heading_deg":
+      return `${by(value, "degrees", 2)}${sigma.toFixed(2)}`;
+    case "threshold_db":
+      return `${by(value, "dB", 1)}${sigma.toFixed(1)}`;
+    default: {
+      const warmer_c = 5.86 * value;
+      return `${by(value, "%", 2)}${sigma.toFixed(2)} (air ${warmer_c < 0 ? "−" : "+"}${Math.abs(warmer_c).toFixed(1)} °C)`;
+    }
+  }
+}
+
 /** The facts of a list, each a name and a text; only what changed is touched. */
 export function facts(list, entries) {
   const rows = list.children;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     acoustics::Air,
-    api::{Beam, Echo, HumpLine, JudgedPing, PlanPoint},
+    api::{Beam, Echo, HumpLine, JudgedPing, PlanPoint, TraceLine},
     geometry::Pose,
     model::{Options, Simulator, TooCostly},
     scan::{Ping, ScanView, Session},
@@ -21,9 +21,9 @@ const STEP_US: f64 = 20.0;
 pub(super) fn look(view: &ScanView, ping: Ping, scene: Option<&Scene>) -> Beam {
     let session = view.session.as_deref();
     let echoes = echoes(view, session, &ping);
-    let (humps, lacks) = match ask_model(view, session, &ping, scene) {
-        Ok(humps) => (Some(humps), None),
-        Err(lacks) => (None, Some(lacks)),
+    let (humps, trace, lacks) = match ask_model(view, session, &ping, scene) {
+        Ok((humps, trace)) => (Some(humps), Some(trace), None),
+        Err(lacks) => (None, None, Some(lacks)),
     };
     // A log of format 1 does not say where the sound went; the model does, in the scan's own scene.
     let polyline = ping.sound_path().and_then(|path| match scene {
@@ -31,7 +31,7 @@ pub(super) fn look(view: &ScanView, ping: Ping, scene: Option<&Scene>) -> Beam {
         _ => path.polyline(view.ends(&ping, path)?),
     });
     let polyline = polyline.map(|points| points.into_iter().map(PlanPoint::from).collect());
-    Beam { reading: JudgedPing::of(ping, view), echoes, polyline, humps, lacks }
+    Beam { reading: JudgedPing::of(ping, view), echoes, polyline, humps, trace, lacks }
 }
 
 fn echoes(view: &ScanView, session: Option<&Session>, ping: &Ping) -> Vec<Echo> {
@@ -53,7 +53,7 @@ fn ask_model(
     session: Option<&Session>,
     ping: &Ping,
     scene: Option<&Scene>,
-) -> Result<Vec<HumpLine>, String> {
+) -> Result<(Vec<HumpLine>, TraceLine), String> {
     let (session, pose) = session.zip(view.pose()).ok_or("the log lacks the scan's session")?;
     let scene = scene.ok_or("there is no scene in force")?;
     let taken_in = session.scene.as_ref().ok_or("the scan was taken without a scene")?;
@@ -73,7 +73,7 @@ fn ask_model(
     let options = Options { max_range_m: Some(until_m), ..options };
     let simulator = Simulator::new(Arc::clone(&scene), sensor, air, options)
         .map_err(|error| error.to_string())?;
-    humps(&simulator, &axis, until_m).map_err(|error| error.to_string())
+    listen(&simulator, &axis, until_m).map_err(|error| error.to_string())
 }
 
 /// The session's air, at the temperature that was known when the scan began.
@@ -86,8 +86,13 @@ fn air(view: &ScanView, session: &Session) -> Result<Air, crate::acoustics::AirE
     }
 }
 
-fn humps(simulator: &Simulator, axis: &Pose, until_m: f64) -> Result<Vec<HumpLine>, TooCostly> {
+fn listen(
+    simulator: &Simulator,
+    axis: &Pose,
+    until_m: f64,
+) -> Result<(Vec<HumpLine>, TraceLine), TooCostly> {
     let station = simulator.at(axis.position());
     let trace = station.trace(axis.direction_rad(0.0), until_m, STEP_US)?;
-    HumpLine::of_trace(simulator, &station, axis, &trace)
+    let humps = HumpLine::of_trace(simulator, &station, axis, &trace)?;
+    Ok((humps, TraceLine::of(simulator, &trace, STEP_US)))
 }

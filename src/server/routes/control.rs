@@ -4,7 +4,7 @@ use axum::{Json, extract::State, http::StatusCode};
 use uuid::Uuid;
 
 use crate::{
-    api::{Accepted, AirOrder, CancelRequest, ScanRequest, Scanning, Started},
+    api::{Accepted, AirOrder, CancelRequest, ScanRequest, Scanning, SensorOrder, Started},
     daemon::{Asked, Order},
     geometry::Pose,
     scan::ScanPlan,
@@ -50,6 +50,19 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
             "/v1/air",
             own_air,
             "The air is again what the configuration and the thermometer say",
+        )
+        .answers::<Accepted>(202, taken),
+        Endpoint::put(
+            "/v1/sensor",
+            sensor,
+            "The sensor is like this: what readings are predicted for, and when the receiver listens",
+        )
+        .takes::<SensorOrder>()
+        .answers::<Accepted>(202, taken),
+        Endpoint::delete(
+            "/v1/sensor",
+            own_sensor,
+            "The sensor is again what the configuration says",
         )
         .answers::<Accepted>(202, taken),
     ]
@@ -100,6 +113,14 @@ async fn air(State(api): State<Api>, Body(order): Body<AirOrder>) -> Answer {
 
 async fn own_air(State(api): State<Api>) -> Answer {
     carry_out(&api, Order::OwnAir).await
+}
+
+async fn sensor(State(api): State<Api>, Body(order): Body<SensorOrder>) -> Answer {
+    carry_out(&api, Order::Sensor(Box::new(order))).await
+}
+
+async fn own_sensor(State(api): State<Api>) -> Answer {
+    carry_out(&api, Order::OwnSensor).await
 }
 
 async fn carry_out(api: &Api, order: Order) -> Answer {

@@ -1,21 +1,24 @@
 //! The live page: files without secrets, which ask the API like any other client.
 
 use axum::{
+    extract::State,
     http::{HeaderMap, HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use serde_json::json;
 use sha2::{Digest as _, Sha256};
 
+use super::playground::is_playground;
 use crate::server::{
+    Api,
     answer::{Failed, Path},
     openapi::Endpoint,
 };
 
-const HTML: &str = "text/html; charset=utf-8";
-const CSS: &str = "text/css; charset=utf-8";
-const SCRIPT: &str = "text/javascript; charset=utf-8";
-const SVG: &str = "image/svg+xml";
+pub(super) const HTML: &str = "text/html; charset=utf-8";
+pub(super) const CSS: &str = "text/css; charset=utf-8";
+pub(super) const SCRIPT: &str = "text/javascript; charset=utf-8";
+pub(super) const SVG: &str = "image/svg+xml";
 
 /// Nothing from elsewhere, no script or style within the page, no frame around it.
 const POLICY: HeaderValue = HeaderValue::from_static(
@@ -23,7 +26,7 @@ const POLICY: HeaderValue = HeaderValue::from_static(
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
 );
 /// A browser asks whether its copy is good, each time: after an update it must not be.
-const CACHED: HeaderValue = HeaderValue::from_static("no-cache");
+pub(super) const CACHED: HeaderValue = HeaderValue::from_static("no-cache");
 
 struct Asset {
     name: &'static str,
@@ -50,25 +53,42 @@ static ASSETS: &[Asset] = &assets![
     "api.js" SCRIPT,
     "beam.js" SCRIPT,
     "control.js" SCRIPT,
+    "dom.js" SCRIPT,
+    "download.js" SCRIPT,
+    "explanations.js" SCRIPT,
+    "findings.js" SCRIPT,
+    "gestures.js" SCRIPT,
     "ground.js" SCRIPT,
+    "handles.js" SCRIPT,
     "history.js" SCRIPT,
+    "measure.js" SCRIPT,
+    "next.js" SCRIPT,
+    "overlays.js" SCRIPT,
     "pens.js" SCRIPT,
+    "picture.js" SCRIPT,
     "plan.js" SCRIPT,
+    "ranger.js" SCRIPT,
     "scan.js" SCRIPT,
+    "sketch.js" SCRIPT,
     "status.js" SCRIPT,
     "strip.js" SCRIPT,
     "summary.js" SCRIPT,
+    "svg.js" SCRIPT,
     "table.js" SCRIPT,
+    "timeline.js" SCRIPT,
+    "tools.js" SCRIPT,
+    "trace.js" SCRIPT,
     "verdicts.js" SCRIPT,
     "view.js" SCRIPT,
     "viewpoint.js" SCRIPT,
+    "waterfall.js" SCRIPT,
     "words.js" SCRIPT,
 ];
 
 /// Whether a path is one of the page's files, which anybody who reaches the server may see: they
 /// hold no data and no secret.
 pub(in crate::server) fn is_public(path: &str) -> bool {
-    path == "/" || path.starts_with("/page/")
+    path == "/" || path.starts_with("/page/") || is_playground(path)
 }
 
 pub(super) fn endpoints() -> Vec<Endpoint> {
@@ -83,20 +103,24 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
     ]
 }
 
-async fn index(headers: HeaderMap) -> Response {
-    answer(&ASSETS[0], &headers)
+async fn index(State(api): State<Api>, headers: HeaderMap) -> Response {
+    let Asset { media, text, .. } = &ASSETS[0];
+    // The way to the playground is shown where there is one.
+    let link = if api.playground.is_some() { "" } else { " hidden" };
+    answer(media, text.replace(" data-playground", link), &headers)
 }
 
 async fn file(Path(name): Path<String>, headers: HeaderMap) -> Result<Response, Failed> {
     let asset = ASSETS.iter().skip(1).find(|asset| asset.name == name);
     let missing =
         || Failed::new(StatusCode::NOT_FOUND, "the page has no such file", "the page is at GET /");
-    Ok(answer(asset.ok_or_else(missing)?, &headers))
+    let asset = asset.ok_or_else(missing)?;
+    Ok(answer(asset.media, asset.text.to_owned(), &headers))
 }
 
 /// The file, or that the browser's copy is good.
-fn answer(asset: &Asset, headers: &HeaderMap) -> Response {
-    let tag = tag(asset.text);
+fn answer(media: &'static str, text: String, headers: &HeaderMap) -> Response {
+    let tag = tag(&text);
     let known = headers.get(header::IF_NONE_MATCH).and_then(|known| known.to_str().ok());
     let good = known.is_some_and(|known| known.split(',').any(|one| one.trim() == tag));
     let common = [
@@ -108,7 +132,7 @@ fn answer(asset: &Asset, headers: &HeaderMap) -> Response {
     if good {
         return (StatusCode::NOT_MODIFIED, common, tag).into_response();
     }
-    (common, tag, [(header::CONTENT_TYPE, asset.media)], asset.text).into_response()
+    (common, tag, [(header::CONTENT_TYPE, media)], text).into_response()
 }
 
 /// Names a text by what is in it.
@@ -134,7 +158,7 @@ mod tests {
         served.sort_unstable();
         assert_eq!(names, served);
         let bytes: usize = ASSETS.iter().map(|asset| asset.text.len()).sum();
-        assert!(bytes < 100_000, "the page is {bytes} bytes");
+        assert!(bytes < 200_000, "the page is {bytes} bytes");
     }
 
     #[test]
@@ -154,7 +178,8 @@ mod tests {
     #[test]
     fn a_copy_that_is_good_is_not_sent_again() {
         let mut headers = HeaderMap::new();
-        let first = answer(&ASSETS[0], &headers);
+        let page = |headers: &HeaderMap| answer(HTML, ASSETS[0].text.to_owned(), headers);
+        let first = page(&headers);
         assert_eq!(first.status(), StatusCode::OK);
         let tag = first.headers().get(header::ETAG).expect("a tag").clone();
         for (known, status) in [
@@ -163,7 +188,7 @@ mod tests {
             ("\"other\"".to_owned(), StatusCode::OK),
         ] {
             headers.insert(header::IF_NONE_MATCH, known.parse().expect("a value"));
-            assert_eq!(answer(&ASSETS[0], &headers).status(), status, "{known}");
+            assert_eq!(page(&headers).status(), status, "{known}");
         }
     }
 }

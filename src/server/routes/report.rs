@@ -7,7 +7,8 @@ use super::{
     scans::{answer, written},
 };
 use crate::{
-    api::{AirStatus, Health, InForce, ScanReport, Setup, Status},
+    acoustics::Sensor,
+    api::{AirStatus, Health, InForce, ScanReport, SensorFigures, Setup, Status},
     daemon::Moved,
     geometry::Pose,
     scan::{ScanPlan, Session},
@@ -37,6 +38,10 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
             .answers::<InForce<Pose>>(200, "The pose, and one that is pending"),
         Endpoint::get("/v1/air", air, "The air in force, with its age")
             .answers::<InForce<AirStatus>>(200, "The air, and what is pending"),
+        Endpoint::get("/v1/sensor", sensor, "Those figures of the sensor that requests change")
+            .answers::<InForce<SensorFigures>>(200, "The sensor, and what is pending"),
+        Endpoint::get("/v1/sensors", sensors, "The sensors that come with the program")
+            .answers::<Vec<Sensor>>(200, "All that is known of each, with sources"),
     ]
 }
 
@@ -87,4 +92,14 @@ async fn pose(State(api): State<Api>) -> Json<InForce<Pose>> {
 async fn air(State(api): State<Api>) -> Json<InForce<AirStatus>> {
     let Status { air, pending, .. } = api.daemon.status();
     Json(InForce { now: air, pending: pending.air })
+}
+
+async fn sensor(State(api): State<Api>) -> Json<InForce<SensorFigures>> {
+    let Status { sensor, pending, .. } = api.daemon.status();
+    Json(InForce { now: sensor, pending: pending.sensor })
+}
+
+async fn sensors() -> Json<Vec<Sensor>> {
+    // A preset that can't be read is a fault that a test finds.
+    Json(Sensor::preset_names().filter_map(|name| Sensor::preset(name).ok()).collect())
 }

@@ -42,9 +42,11 @@ const WRITING: Duration = Duration::from_secs(5);
 
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Limit {
+struct Listing {
     #[serde(default)]
     limit: Option<u16>,
+    #[serde(default)]
+    before: Option<Uuid>,
 }
 
 pub(super) fn endpoints() -> Vec<Endpoint> {
@@ -57,6 +59,7 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
                 json!({"type": "integer", "minimum": 1, "maximum": MOST}),
                 "At most so many; without it, 50. Only the eight newest logs are looked at",
             )
+            .parameter("query", "before", uuid(), "Only scans that were taken before this one")
             .answers::<Vec<ListedScan>>(200, "The scans"),
         Endpoint::get("/v1/scans/{scan}", whole, "A scan of the logs with its readings")
             .parameter("path", "scan", uuid(), "A scan from GET /v1/scans, or the one under way")
@@ -86,14 +89,19 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
 
 async fn list(
     State(api): State<Api>,
-    Query(Limit { limit }): Query<Limit>,
+    Query(Listing { limit, before }): Query<Listing>,
 ) -> Result<Json<Vec<ListedScan>>, Failed> {
     let limit = limit.unwrap_or(USUAL);
     if !(1..=MOST).contains(&limit) {
         let (status, help) = (StatusCode::UNPROCESSABLE_ENTITY, "from 1 to 500");
         return Err(Failed::new(status, format!("limit is {limit}"), help));
     }
-    let scans = in_history(&api, move |history| history.newest(limit.into())).await?;
+    let most = limit.into();
+    let scans = in_history(&api, move |history| match before {
+        None => history.newest(most).map(Some),
+        Some(scan) => history.before(scan, most),
+    });
+    let scans = scans.await?.ok_or_else(no_such_scan)?;
     Ok(Json(scans.into_iter().map(listed).collect()))
 }
 
@@ -167,13 +175,14 @@ async fn scene_of(api: &Api, passage: &Passage) -> Result<Option<Arc<Scene>>, Fa
     Ok(logged.map(Arc::new).or(in_force))
 }
 
-async fn find(api: &Api, scan: &str) -> Result<Passage, Failed> {
-    let missing = || {
-        let help = "GET /v1/scans names the newest; older ones are in GET /v1/logs";
-        Failed::new(StatusCode::NOT_FOUND, "there is no such scan", help)
-    };
-    let id = Uuid::parse_str(scan).map_err(|_| missing())?;
-    in_history(api, move |history| history.passage(id)).await?.ok_or_else(missing)
+pub(super) async fn find(api: &Api, scan: &str) -> Result<Passage, Failed> {
+    let id = Uuid::parse_str(scan).map_err(|_| no_such_scan())?;
+    in_history(api, move |history| history.passage(id)).await?.ok_or_else(no_such_scan)
+}
+
+fn no_such_scan() -> Failed {
+    let help = "GET /v1/scans names the newest; older ones are in GET /v1/logs";
+    Failed::new(StatusCode::NOT_FOUND, "there is no such scan", help)
 }
 
 /// A scan that has just ended, as soon as all of it is in the log; `None` if that does not come to be.
@@ -206,13 +215,13 @@ async fn in_history<T: Send + 'static>(
     answer.map_err(|error| unreadable(&error))
 }
 
-fn unreadable(error: &io::Error) -> Failed {
+pub(super) fn unreadable(error: &io::Error) -> Failed {
     let help = "check the log folder and its permissions";
     let error = format!("cannot read the logs: {error}");
     Failed::new(StatusCode::INTERNAL_SERVER_ERROR, error, help)
 }
 
-fn broken(error: &tokio::task::JoinError) -> Failed {
+pub(super) fn broken(error: &tokio::task::JoinError) -> Failed {
     let help = "this is a fault of the program";
     Failed::new(StatusCode::INTERNAL_SERVER_ERROR, error.to_string(), help)
 }

@@ -42,6 +42,14 @@ fn the_newest_scans_come_first_from_several_logs_while_they_grow() {
     append(folder, "notes.jsonl", &scan(9));
     assert_eq!(ids(&history.newest(5).expect("readable")), [3, 2, 1]);
     assert_eq!(ids(&history.newest(2).expect("readable")), [3, 2]);
+    let mut before = |scan, most| {
+        let listed = history.before(Uuid::from_u128(scan), most).expect("readable");
+        listed.map(|scans| ids(&scans))
+    };
+    assert_eq!(before(3, 5), Some(vec![2, 1]));
+    assert_eq!(before(3, 1), Some(vec![2]));
+    assert_eq!(before(1, 5), Some(vec![]));
+    assert_eq!(before(9, 5), None);
     // A scan under way is there with what it has, a line that is still being written is not.
     let begun = begun(4);
     let (whole, torn) = begun.split_at(begun.len() - 10);

@@ -1,6 +1,7 @@
 //! What the API says and does.
 
 use std::{
+    fs,
     io::{BufRead as _, BufReader, Write as _},
     time::Duration,
 };
@@ -8,9 +9,10 @@ use std::{
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Value, json};
 use sonard::{
+    acoustics::Sensor,
     api::{
         AirStatus, Beam, FloorPlan, Health, InForce, ListedScan, LogEntry, ScanReport, Scanning,
-        Setup, Started, Status, WholeScan,
+        SensorFigures, Setup, Started, Status, WholeScan,
     },
     geometry::Pose,
     scan::{ScanPlan, Session},
@@ -26,7 +28,11 @@ const SHORT: [&str; 6] =
 #[test]
 fn the_server_does_what_its_document_says() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    for name in ["index.html", "playground.js"] {
+        fs::write(folder.path().join(name), "a page").expect("there is room");
+    }
+    let playground = format!("server.playground={}", folder.path().display());
+    let daemon = Daemon::start_mock(folder.path(), &[&SHORT[..], &["--set", &playground]].concat());
     let document = daemon.get("/v1/openapi.json").json();
     assert_eq!(document["openapi"], "3.1.0");
     daemon.wait_for("ready");
@@ -44,6 +50,8 @@ fn the_server_does_what_its_document_says() {
         ("/v1/plan", json!({"from_deg": 0.0, "to_deg": 9.0, "step_deg": 0.9, "pings_per_stop": 1})),
         ("/v1/pose", json!({"x_m": 0.5, "y_m": 0.3, "heading_deg": 0.0})),
         ("/v1/air", json!({"temperature_c": 22.5})),
+        ("/v1/preview", json!({"sensor": {"preset": "polaroid-chirp"}})),
+        ("/v1/sensor", json!({"threshold": 0.03, "gain": {"kind": "compensating"}})),
     ];
     let mut operations = 0;
     for (path, methods) in document["paths"].as_object().expect("paths") {
@@ -62,6 +70,7 @@ fn the_server_does_what_its_document_says() {
             }
             let path = path
                 .replace("{name}", &log)
+                .replace("playground/{file}", "playground/playground.js")
                 .replace("{file}", "main.js")
                 .replace("{scan}", &scan)
                 .replace("{index}", "7");
@@ -91,7 +100,7 @@ fn the_server_does_what_its_document_says() {
     assert!(operations >= 25, "{operations} operations");
     // What only looks like a log is none, and breaks no list.
     let folder_like_a_log = folder.path().join("log/sonard-20260101T000000Z.jsonl");
-    std::fs::create_dir(folder_like_a_log).expect("it is new");
+    fs::create_dir(folder_like_a_log).expect("it is new");
     let names = daemon.get("/v1/logs").json();
     assert_eq!(names.as_array().map(Vec::len), Some(1), "{names}");
     assert_eq!(daemon.get("/v1/scans").status, 200);
@@ -119,6 +128,9 @@ fn the_server_does_what_its_document_says() {
         ("POST", "/v1/start", "[null,null]", 422),
         ("POST", "/v1/start", r#"{"plan":[0,9,0.9,1]}"#, 422),
         ("PUT", "/v1/air", r#"{"temperature_c":70}"#, 422),
+        ("PUT", "/v1/sensor", r#"{"preset":"ear"}"#, 422),
+        ("PUT", "/v1/sensor", r#"{"threshold":[0.1]}"#, 422),
+        ("PUT", "/v1/sensor", r#"["senscomp-6500"]"#, 422),
         ("POST", "/v1/start", r#"{"scnas":1}"#, 422),
         ("GET", "/v1/live/records?moved_m=-1", "", 422),
         ("GET", "/v1/live/records?mvoed_m=1", "", 400),
@@ -145,7 +157,9 @@ fn every_answer_is_read_by_the_type_it_is_written_by() {
     fn same<T: Serialize + DeserializeOwned>(path: &str, answer: &Value) {
         let read: T = serde_json::from_value(answer.clone())
             .unwrap_or_else(|error| panic!("{path}: {error}"));
-        assert_eq!(serde_json::to_value(read).expect("JSON"), *answer, "{path}");
+        // As text, where a number of single precision has no more digits than it needs.
+        let written = serde_json::to_string(&read).expect("JSON");
+        assert_eq!(serde_json::from_str::<Value>(&written).expect("JSON"), *answer, "{path}");
     }
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &SHORT);
@@ -166,6 +180,8 @@ fn every_answer_is_read_by_the_type_it_is_written_by() {
     check("/v1/plan", same::<InForce<ScanPlan>>);
     check("/v1/pose", same::<InForce<Pose>>);
     check("/v1/air", same::<InForce<AirStatus>>);
+    check("/v1/sensor", same::<InForce<SensorFigures>>);
+    check("/v1/sensors", same::<Vec<Sensor>>);
     check("/v1/scanning", same::<Scanning>);
     check("/v1/scene", same::<FloorPlan>);
     check("/v1/scans", same::<Vec<ListedScan>>);
@@ -393,7 +409,7 @@ fn watch_goes_on_with_the_next_daemon_if_told_to() {
 fn a_change_during_a_scan_is_shown_at_once_beside_what_is_in_force() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("s.toml");
-    std::fs::write(&file, "[plan]\nto_deg = 360\n").expect("a file");
+    fs::write(&file, "[plan]\nto_deg = 360\n").expect("a file");
     let config = ["--config", file.to_str().expect("plain path"), "--set", "motion.settle_ms=50"];
     let daemon = Daemon::start_mock(folder.path(), &config);
     daemon.wait_for("ready");
@@ -428,10 +444,10 @@ fn a_change_during_a_scan_is_shown_at_once_beside_what_is_in_force() {
     assert!(shown.contains("pending  from the next scan on: plan 0.0 to 180.0"), "{shown}");
 
     // The configuration that is read again, and what is wrong with it, likewise.
-    std::fs::write(&file, "[plan]\nto_dge = 90\n").expect("a file");
+    fs::write(&file, "[plan]\nto_dge = 90\n").expect("a file");
     daemon.signal(rustix::process::Signal::HUP);
     wait_until("the refusal", || daemon.status()["configuration"]["error"].is_string());
-    std::fs::write(&file, "[plan]\nto_deg = 90\n[motion]\nsettle_ms = 60\n").expect("a file");
+    fs::write(&file, "[plan]\nto_deg = 90\n[motion]\nsettle_ms = 60\n").expect("a file");
     daemon.signal(rustix::process::Signal::HUP);
     wait_until("the new plan", || daemon.status()["pending"]["plan"]["to_deg"] == 90.0);
     let status = daemon.status();

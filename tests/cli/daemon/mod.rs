@@ -5,13 +5,16 @@ mod api;
 mod board;
 mod clock;
 mod configuration;
+mod explained;
 mod faults;
 mod kill;
 mod load;
+pub(crate) mod model;
 mod monitoring;
 mod requests;
 pub(crate) mod rig;
 mod schema;
+mod sensor;
 mod simulate;
 mod soak;
 mod strangers;
@@ -259,7 +262,18 @@ fn dechunked(mut rest: &[u8]) -> Vec<u8> {
 
 /// Resident memory of a process, kilobytes.
 pub(crate) fn resident_kb(process: u32) -> u64 {
+    memory_kb(process, "VmRSS:")
+}
+
+/// Resident memory that a process has beside the pages of its program's file, kilobytes: what it costs however
+/// large its program is built.
+pub(crate) fn own_kb(process: u32) -> u64 {
+    memory_kb(process, "RssAnon:")
+}
+
+/// A figure of a process's memory by its name in `/proc/PID/status`, kilobytes.
+pub(crate) fn memory_kb(process: u32, figure: &str) -> u64 {
     let status = fs::read_to_string(format!("/proc/{process}/status")).expect("it runs");
-    let line = status.lines().find(|line| line.starts_with("VmRSS:")).expect("a figure");
+    let line = status.lines().find(|line| line.starts_with(figure)).expect("a figure");
     line.split_whitespace().nth(1).and_then(|kb| kb.parse().ok()).expect("a number")
 }

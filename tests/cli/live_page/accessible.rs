@@ -9,6 +9,9 @@ use super::{
     browser::{Browser, DESK, DESK_DARK, PHONE, PHONE_DARK},
     daemon, scan_once,
 };
+use crate::daemon::write_token;
+
+const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 
 /// Roles that somebody operates, or that stand for something to see.
 const NAMED: [&str; 9] = [
@@ -36,11 +39,40 @@ fn everything_has_a_name_and_contrast_on_desk_and_phone_in_light_and_dark() {
     );
     browser.until("document.querySelectorAll('.humps button').length > 0");
     assert_clean(&browser);
+    look_at(&browser, "");
+}
+
+#[test]
+fn so_has_the_workbench_with_all_of_it_open() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = write_token(folder.path(), TOKEN);
+    let setting = format!("server.token_file={}", file.display());
+    let (daemon, address) = daemon(folder.path(), "127.0.0.1:0", &["--set", &setting]);
+    let browser = Browser::open(&address, DESK);
+    scan_once(&daemon);
+    browser.until(OVER);
+    browser.eval(&format!("sessionStorage.setItem('sonard-token', '{TOKEN}')"));
+    for id in ["show-map", "show-lines", "show-features", "pin", "change"] {
+        browser.click(&format!("#{id}"));
+    }
+    for id in ["over-time", "table"] {
+        browser.eval(&format!("document.getElementById('{id}').open = true"));
+    }
+    browser.until("document.getElementById('next-now').textContent.includes('expects')");
+    browser.click(".tools [aria-label=\"Measure a length\"]");
+    browser.click_at("#over", 0.3, 0.6);
+    browser.click_at("#over", 0.6, 0.7);
+    assert_clean(&browser);
+    look_at(&browser, "workbench-");
+}
+
+/// On every screen, in light and dark.
+fn look_at(browser: &Browser, what: &str) {
     for screen in [DESK, DESK_DARK, PHONE, PHONE_DARK] {
         browser.look_through(screen);
         browser.eval("scrollTo(0, 0)");
         browser.until("new Promise((done) => setTimeout(() => done(true), 300))");
-        browser.picture(screen.name);
+        browser.picture(&format!("{what}{}", screen.name));
         let [wide, window] = ["document.documentElement.scrollWidth", "innerWidth"];
         assert_eq!(
             browser.eval(wide),
@@ -48,11 +80,11 @@ fn everything_has_a_name_and_contrast_on_desk_and_phone_in_light_and_dark() {
             "{}: it scrolls sideways",
             screen.name
         );
-        assert_eq!(nameless(&browser), Vec::<String>::new(), "{}", screen.name);
-        for (mark, contrast) in contrasts(&browser) {
+        assert_eq!(nameless(browser), Vec::<String>::new(), "{}", screen.name);
+        for (mark, contrast) in contrasts(browser) {
             assert!(contrast >= 3.0, "{}: {mark} has a contrast of {contrast:.2}", screen.name);
         }
-        assert_eq!(axe(&browser), Vec::<String>::new(), "{}", screen.name);
+        assert_eq!(axe(browser), Vec::<String>::new(), "{}", screen.name);
     }
 }
 

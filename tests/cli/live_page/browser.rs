@@ -161,6 +161,11 @@ impl Browser {
         file
     }
 
+    /// An element as it is to be seen, PNG.
+    pub(crate) fn picture_of(&self, selector: &str) -> Vec<u8> {
+        self.wait_for(self.find(selector).screenshot())
+    }
+
     /// Everything that the console shows as a warning or an error since the last look.
     pub(crate) fn complaints(&self) -> Vec<String> {
         let entries = self.log("browser");

@@ -3,8 +3,14 @@
 mod access;
 pub(crate) mod accessible;
 pub(crate) mod browser;
+mod explained;
+mod fast;
+mod pictures;
+pub(crate) mod pointer;
 mod readable;
+pub(crate) mod view;
 mod viewpoints;
+mod workbench;
 
 use std::path::Path;
 

@@ -8,7 +8,10 @@ use serde_json::json;
 use super::{assert_clean, legend, open, open_with, set, settled, told};
 use crate::{
     common::{run, stderr},
-    live_page::browser::{Browser, DESK, PHONE},
+    live_page::{
+        browser::{Browser, DESK, PHONE},
+        view::check_view,
+    },
 };
 
 /// The number after some words of the legend, 0 without them.
@@ -151,6 +154,27 @@ fn middle(browser: &Browser, selector: &str) -> [f64; 2] {
         ),
     );
     [0, 1].map(|i| at[i].as_f64().expect("a number"))
+}
+
+#[test]
+fn the_plan_is_moved_zoomed_and_measured_as_on_the_daemons_page() {
+    let browser = open(DESK);
+    check_view(&browser, "Promise.resolve(playground.plan)");
+    // The handles go along, and stay of use.
+    let before = middle(&browser, ".ranger");
+    browser.click(".tools [aria-label=\"Zoom in\"]");
+    browser.eval("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))");
+    let [x, y] = middle(&browser, ".ranger");
+    assert!((x - before[0]).hypot(y - before[1]) > 5.0, "{before:?} {x} {y}");
+    let stood = pose(&browser);
+    for (kind, dx) in [("mousePressed", 0.0), ("mouseMoved", 30.0), ("mouseReleased", 30.0)] {
+        mouse(&browser, kind, x + dx, y);
+    }
+    settled(&browser);
+    assert!(pose(&browser)[0] > stood[0], "{stood:?} {:?}", pose(&browser));
+    set(&browser, "arcs", "true");
+    assert!(legend(&browser).contains("arc of a reading"), "{}", legend(&browser));
+    assert_clean(&browser);
 }
 
 #[test]

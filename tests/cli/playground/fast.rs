@@ -19,7 +19,11 @@ const KEPT_BYTES: f64 = 1_000_000.0;
 fn a_sweep_of_400_beams_follows_the_ranger_at_once_and_leaves_nothing_behind() {
     let browser = open(DESK);
     set(&browser, "scene", "simple-room");
-    move_about(&browser);
+    // Which sweeps are given up for a newer one differs each time, and what the most of them takes with it: what
+    // leaks goes on growing.
+    for _ in 0..3 {
+        move_about(&browser);
+    }
     let before = memory(&browser);
     let mut times = move_about(&browser);
     let after = memory(&browser);

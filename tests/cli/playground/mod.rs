@@ -1,10 +1,12 @@
 //! The playground, opened from its folder in a real browser. `web/build.sh` builds it.
 
 mod accessible;
+mod animated;
 mod driven;
 mod equal;
 mod fast;
 mod pictures;
+mod served;
 
 use std::path::Path;
 

@@ -3,11 +3,10 @@
 use serde::Serialize;
 use sonard_interpret::compare::JudgedPing;
 use sonard_model::{
-    acoustics::EchoTrace,
     geometry::Pose,
     model::{ObservationPoint, Simulator, TooCostly},
 };
-use sonard_records::{HumpLine, PlanPoint};
+use sonard_records::{HumpLine, PlanPoint, TraceLine};
 
 use crate::{Refusal, sweep::Sweep};
 
@@ -25,22 +24,7 @@ pub(crate) struct Beam {
     polyline: Option<Vec<PlanPoint>>,
     /// What the model hears, in order of time, faint sounds included.
     humps: Vec<HumpLine>,
-    trace: Trace,
-}
-
-/// The signal as an oscilloscope would show it.
-#[derive(Debug, Default, Serialize)]
-struct Trace {
-    /// Between its points, microseconds; the first is the firing.
-    step_us: f64,
-    /// Half the speed of sound, metres a microsecond: time times this is range.
-    m_per_us: f64,
-    /// Envelope of all arrivals together.
-    envelope: Vec<f32>,
-    /// Least envelope that is noticed then.
-    threshold: Vec<f32>,
-    /// Until when the receiver is deaf, microseconds.
-    blanking_us: f64,
+    trace: TraceLine,
 }
 
 impl Beam {
@@ -56,7 +40,7 @@ impl Beam {
             let until_m = if heard_m > 0.0 { most_m.min(heard_m + BEYOND_M) } else { most_m };
             let trace = point.trace(axis.direction_rad(0.0), until_m, STEP_US)?;
             let humps = HumpLine::of_trace(simulator, point, axis, &trace)?;
-            Ok::<_, TooCostly>((humps, Trace::of(simulator, &trace)))
+            Ok::<_, TooCostly>((humps, TraceLine::of(simulator, &trace, STEP_US)))
         };
         let (humps, trace) = sweep.look(ping, listen)?.transpose()?.unwrap_or_default();
         let viewpoint = reading.beside.viewpoint;
@@ -64,17 +48,5 @@ impl Beam {
         let line = line.and_then(|(path, viewpoint)| path.polyline(viewpoint.ends()));
         let polyline = line.map(|points| points.into_iter().map(PlanPoint::from).collect());
         Ok(Self { reading, polyline, humps, trace })
-    }
-}
-
-impl Trace {
-    fn of(simulator: &Simulator, trace: &EchoTrace) -> Self {
-        Self {
-            step_us: STEP_US,
-            m_per_us: simulator.sound_speed_m_s() * 0.5e-6,
-            envelope: trace.points.iter().map(|point| point.envelope as f32).collect(),
-            threshold: trace.points.iter().map(|point| point.threshold as f32).collect(),
-            blanking_us: simulator.sensor().blanking_us,
-        }
     }
 }

@@ -1,5 +1,7 @@
 // The echo trace of a beam, as an oscilloscope would show it: envelope and threshold against range, in decibels.
 
+import { arrow, upright } from "./pens.js";
+
 const LEFT = 44, RIGHT = 10, TOP = 18, BOTTOM = 24;
 const TOP_DB = 6, LEAST_DB = -60;
 const STEPS_M = [0.05, 0.1, 0.2, 0.5, 1, 2, 5];
@@ -9,16 +11,16 @@ const FONT = "11px system-ui, sans-serif";
 export class EchoTrace {
   /**
    * @param {HTMLCanvasElement} canvas
-   * @param {(hump: import("./engine.js").Hump) => void} onPick
+   * @param {(hump: import("../../../web/playground/engine.js").Hump) => void} onPick
    */
   constructor(canvas, onPick) {
     this.canvas = canvas;
     this.c = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     this.width = 0;
     this.height = 0;
-    /** @type {import("./engine.js").Beam | null} */
+    /** @type {import("../../../web/playground/engine.js").Beam | null} */
     this.beam = null;
-    /** @type {import("./engine.js").Hump | null} */
+    /** @type {import("../../../web/playground/engine.js").Hump | null} */
     this.chosen = null;
     /** @type {Record<string, string> | null} */
     this.palette = null;
@@ -28,8 +30,8 @@ export class EchoTrace {
   }
 
   /**
-   * @param {import("./engine.js").Beam | null} beam
-   * @param {import("./engine.js").Hump | null} chosen
+   * @param {import("../../../web/playground/engine.js").Beam | null} beam
+   * @param {import("../../../web/playground/engine.js").Hump | null} chosen
    */
   show(beam, chosen = null) {
     [this.beam, this.chosen] = [beam, chosen];
@@ -56,8 +58,8 @@ export class EchoTrace {
     this.drawLine(trace.threshold, palette["--min-range"], [5, 4]);
     this.drawLine(trace.envelope, palette["--direct"], []);
     for (const hump of humps) this.drawHump(palette, hump);
-    const heard = reading.sim ?? reading;
-    if (heard.range_m !== null) this.drawReading(palette, heard.range_m);
+    for (const echo of this.beam.echoes ?? []) this.drawEcho(palette, echo);
+    if (reading.range_m !== null) this.drawRange(reading.range_m, palette["--wall"]);
     this.drawWords(palette);
   }
 
@@ -108,7 +110,7 @@ export class EchoTrace {
 
   /**
    * @param {Record<string, string>} palette
-   * @param {import("./engine.js").Trace} trace
+   * @param {import("../../../web/playground/engine.js").Trace} trace
    */
   drawBlanking(palette, trace) {
     const { c } = this;
@@ -140,7 +142,7 @@ export class EchoTrace {
 
   /**
    * @param {Record<string, string>} palette
-   * @param {import("./engine.js").Hump} hump
+   * @param {import("../../../web/playground/engine.js").Hump} hump
    */
   drawHump(palette, hump) {
     const { c } = this;
@@ -156,19 +158,18 @@ export class EchoTrace {
     c.fill();
   }
 
-  /**
-   * @param {Record<string, string>} palette
-   * @param {number} range_m
-   */
-  drawReading(palette, range_m) {
-    const { c } = this;
+  /** @param {number} range_m @param {string} colour */
+  drawRange(range_m, colour) {
     const x = this.x(range_m);
-    c.strokeStyle = palette["--wall"];
-    c.lineWidth = 1.4;
-    c.beginPath();
-    c.moveTo(x, TOP);
-    c.lineTo(x, this.height - BOTTOM);
-    c.stroke();
+    if (x <= this.width - RIGHT) upright(this.c, x, [TOP, this.height - BOTTOM], colour);
+  }
+
+  /** What the ranger's comparator told, above the trace. @param {Record<string, string>} palette @param {{range_m: number | null}} echo */
+  drawEcho(palette, { range_m }) {
+    const x = range_m === null ? Infinity : this.x(range_m);
+    if (x > this.width - RIGHT) return;
+    this.c.fillStyle = palette["--ray"];
+    arrow(this.c, [x, TOP + 4], Math.PI / 2, [5, 4, 4]);
   }
 
   /** What each line is. @param {Record<string, string>} palette */
@@ -179,6 +180,7 @@ export class EchoTrace {
       ["threshold", "--min-range"],
       ["reading", "--wall"],
     ];
+    if (this.beam?.echoes?.length) words.push(["echoes", "--ray"]);
     c.textAlign = "left";
     let x = LEFT;
     for (const [text, colour] of words) {
@@ -192,10 +194,10 @@ export class EchoTrace {
 
   /** @param {number} x */
   pick(x) {
-    const off = (/** @type {import("./engine.js").Hump} */ hump) => Math.abs(this.x(hump.range_m) - x);
+    const off = (/** @type {import("../../../web/playground/engine.js").Hump} */ hump) => Math.abs(this.x(hump.range_m) - x);
     const nearest = (this.beam?.humps ?? []).reduce(
       (one, other) => (one && off(one) <= off(other) ? one : other),
-      /** @type {import("./engine.js").Hump | null} */ (null),
+      /** @type {import("../../../web/playground/engine.js").Hump | null} */ (null),
     );
     if (nearest && off(nearest) <= HIT_PX) this.onPick(nearest);
   }

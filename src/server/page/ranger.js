@@ -11,7 +11,7 @@ export class Ranger {
   /**
    * @param {HTMLElement} stage
    * @param {any} view
-   * @param {(pose: import("./engine.js").Pose) => void} onPose
+   * @param {(pose: import("../../../web/playground/engine.js").Pose) => void} onPose
    * @param {() => void} onDone
    */
   constructor(stage, view, onPose, onDone) {
@@ -53,7 +53,7 @@ export class Ranger {
     }, view);
   }
 
-  /** @param {import("./engine.js").Pose} pose */
+  /** @param {import("../../../web/playground/engine.js").Pose} pose */
   place(pose) {
     this.pose = pose;
     const { x_m, y_m, heading_deg } = pose;

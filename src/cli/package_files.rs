@@ -1,0 +1,122 @@
+//! `sonard package-files`: manual pages and completions, for packages.
+
+use std::{fs, io, path::Path};
+
+use clap::Command;
+use clap_complete::{Shell, generate_to};
+use clap_mangen::roff::{Roff, bold, italic, roman};
+
+use super::{Failure, Outcome, command_line, output::OutPath};
+use crate::config::{Key, Section, sections};
+
+/// Options of `sonard package-files`.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// Folder to write into; it gets man1, man5 and completions
+    dir: OutPath,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    write_all(&args.dir)
+        .map_err(|error| Failure::unwritable(&format!("into {}", args.dir.display()), &error))
+}
+
+fn write_all(dir: &Path) -> io::Result<()> {
+    let [pages, files, completions] = ["man1", "man5", "completions"].map(|part| dir.join(part));
+    for folder in [&pages, &files, &completions] {
+        fs::create_dir_all(folder)?;
+    }
+    // Lines are filled by whoever shows the page.
+    let command = command_line().term_width(0);
+    clap_mangen::generate_to(command.clone(), &pages)?;
+    for shell in [Shell::Bash, Shell::Zsh, Shell::Fish] {
+        generate_to(shell, &mut command.clone(), "sonard", &completions)?;
+    }
+    fs::write(files.join("sonard.toml.5"), configuration_page(&command))
+}
+
+/// `sonard.toml(5)`, made from the table of keys that the configuration is checked by.
+fn configuration_page(command: &Command) -> String {
+    let version = command.get_version().unwrap_or_default();
+    let mut page = Roff::new();
+    page.control("TH", ["sonard.toml", "5", "", &format!("sonard {version}"), ""]);
+    section(&mut page, "NAME");
+    page.text([roman("sonard.toml - configuration of the ultrasonic ranger's daemon")]);
+    section(&mut page, "SYNOPSIS");
+    page.text([italic("/etc/sonard/sonard.toml")]);
+    section(&mut page, "DESCRIPTION");
+    page.text([
+        roman("Read by "),
+        bold("sonard run"),
+        roman(
+            ". The file is TOML. Every key has a default or may be left out; a key that is not \
+             known is refused, with the nearest known one. Over the file go environment variables \
+             (SONARD_PLAN_STEP_DEG=1.8), over those the options of the command line (",
+        ),
+        bold("--set plan.step_deg=1.8"),
+        roman("). "),
+        bold("sonard run --check"),
+        roman(
+            " reads it all and says what is in force. A reload (SIGHUP) takes changes in; those of \
+             keys marked (restart) wait for the next start.",
+        ),
+    ]);
+    for of in sections() {
+        keys(&mut page, of);
+    }
+    section(&mut page, "SEE ALSO");
+    page.text([bold("sonard-run"), roman("(1), "), bold("sonard"), roman("(1)")]);
+    page.render()
+}
+
+fn keys(page: &mut Roff, of: &Section) {
+    section(page, &format!("[{}]", of.name));
+    page.text([roman(of.about.as_str())]);
+    for key in &of.keys {
+        page.control("TP", []);
+        page.text([bold(key.name.as_str())]);
+        page.text([roman(format!("{} {}", key.about, key.kind.wanted()))]);
+        page.control("br", []);
+        page.text([roman(fallback(key))]);
+    }
+}
+
+/// What is in force if the key is not given.
+fn fallback(key: &Key) -> String {
+    match (&key.default, &key.example) {
+        (Some(default), _) => format!("Default: {}.", key.kind.toml(default)),
+        (None, Some(example)) => format!("No default; for example {}.", key.kind.toml(example)),
+        (None, None) => "No default.".to_owned(),
+    }
+}
+
+fn section(page: &mut Roff, title: &str) {
+    page.control("SH", [title]);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_verb_has_a_page_and_every_key_an_entry() {
+        let folder = tempfile::tempdir().expect("a folder");
+        write_all(folder.path()).expect("there is room");
+        let read = |name: &str| fs::read_to_string(folder.path().join(name)).expect("it is there");
+        for verb in command_line().get_subcommands().filter(|verb| !verb.is_hide_set()) {
+            let page = read(&format!("man1/sonard-{}.1", verb.get_name()));
+            assert!(page.contains(".SH OPTIONS"), "{}", verb.get_name());
+        }
+        // A hidden verb is for whoever makes packages.
+        assert!(!folder.path().join("man1/sonard-package-files.1").exists());
+        let page = read("man5/sonard.toml.5");
+        for section in sections() {
+            for key in &section.keys {
+                assert!(page.contains(&format!("\\fB{}\\fR", key.name)), "{}", key.name);
+            }
+        }
+        for name in ["sonard.bash", "_sonard", "sonard.fish"] {
+            assert!(read(&format!("completions/{name}")).contains("benchmark"), "{name}");
+        }
+    }
+}

@@ -1,0 +1,130 @@
+// A canvas context that writes SVG: as much of one as the plan is drawn with.
+
+const RIGHT = { left: "start", center: "middle", right: "end" };
+const BASE = { middle: "central", alphabetic: "alphabetic" };
+
+/** Coordinates to a fiftieth of a pixel. @param {number} value */
+const n = (value) => String(Math.round(50 * value) / 50);
+/** @param {string} text */
+const escaped = (text) => text.replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
+
+export class SvgContext {
+  /** @param {number} width @param {number} height */
+  constructor(width, height) {
+    this.width = width;
+    this.height = height;
+    /** @type {string[]} */
+    this.parts = [];
+    this.path = "";
+    /** @type {object[]} */
+    this.saved = [];
+    this.measure = new OffscreenCanvas(1, 1).getContext("2d");
+    this.fillStyle = this.strokeStyle = "#000000";
+    this.lineWidth = 1;
+    this.globalAlpha = 1;
+    this.lineCap = "butt";
+    this.lineJoin = "miter";
+    this.font = "12px sans-serif";
+    this.textAlign = "left";
+    this.textBaseline = "alphabetic";
+    /** @type {number[]} */
+    this.dash = [];
+    this.transform = "";
+  }
+
+  /** The picture's file. @param {string} title */
+  file(title) {
+    const { width, height } = this;
+    const head = `<svg xmlns="http://www.w3.org/2000/svg" width="${n(width)}" height="${n(height)}" viewBox="0 0 ${n(width)} ${n(height)}">`;
+    return `${head}<title>${escaped(title)}</title>\n${this.parts.join("\n")}\n</svg>\n`;
+  }
+
+  /** What is drawn within is cut off at a box's border. @param {number[]} box @param {() => void} draw */
+  within([x, y, width, height], draw) {
+    this.parts.push(`<svg x="${n(x)}" y="${n(y)}" width="${n(width)}" height="${n(height)}">`);
+    draw();
+    this.parts.push("</svg>");
+  }
+
+  save() {
+    const { fillStyle, strokeStyle, lineWidth, globalAlpha, font, textAlign, textBaseline, dash, transform } = this;
+    this.saved.push({ fillStyle, strokeStyle, lineWidth, globalAlpha, font, textAlign, textBaseline, dash, transform });
+  }
+
+  restore() {
+    Object.assign(this, this.saved.pop());
+  }
+
+  /** @param {number} x @param {number} y */
+  translate(x, y) {
+    this.transform += `translate(${n(x)} ${n(y)})`;
+  }
+
+  /** @param {number} turn radians */
+  rotate(turn) {
+    this.transform += `rotate(${n((turn * 180) / Math.PI)})`;
+  }
+
+  /** @param {number[]} dash */
+  setLineDash(dash) {
+    this.dash = dash;
+  }
+
+  beginPath() {
+    this.path = "";
+  }
+
+  moveTo(x, y) {
+    this.path += `M${n(x)} ${n(y)}`;
+  }
+
+  lineTo(x, y) {
+    this.path += `${this.path ? "L" : "M"}${n(x)} ${n(y)}`;
+  }
+
+  /** Clockwise from one direction to another, as on a canvas. */
+  arc(x, y, r, from, to) {
+    const end = (turn) => `${n(x + r * Math.cos(turn))} ${n(y + r * Math.sin(turn))}`;
+    const whole = to - from >= 2 * Math.PI - 1e-9;
+    this.path += `${this.path ? "L" : "M"}${end(from)}`;
+    // An arc that ends where it begins would be none.
+    if (whole) this.path += `A${n(r)} ${n(r)} 0 0 1 ${end(from + Math.PI)}`;
+    this.path += `A${n(r)} ${n(r)} 0 ${!whole && to - from > Math.PI ? 1 : 0} 1 ${end(to)}`;
+  }
+
+  stroke() {
+    const dash = this.dash.length ? ` stroke-dasharray="${this.dash.join(" ")}"` : "";
+    const join = this.lineJoin === "miter" ? "" : ` stroke-linejoin="${this.lineJoin}"`;
+    this.put(`path d="${this.path}" fill="none" stroke="${this.strokeStyle}" stroke-width="${this.lineWidth}"${dash}${join}`);
+  }
+
+  fill() {
+    this.put(`path d="${this.path}" fill="${this.fillStyle}"`);
+  }
+
+  fillRect(x, y, width, height) {
+    this.put(`rect x="${n(x)}" y="${n(y)}" width="${n(width)}" height="${n(height)}" fill="${this.fillStyle}"`);
+  }
+
+  clearRect() {}
+
+  fillText(text, x, y) {
+    const size = /(\d+)px (.*)/.exec(this.font);
+    const bold = /^[5-9]00|^bold/.test(this.font) ? ' font-weight="600"' : "";
+    const font = `font-family="${escaped(size[2])}" font-size="${size[1]}"${bold}`;
+    const place = `x="${n(x)}" y="${n(y)}" text-anchor="${RIGHT[this.textAlign] ?? "start"}" dominant-baseline="${BASE[this.textBaseline] ?? "alphabetic"}"`;
+    this.put(`text ${place} ${font} fill="${this.fillStyle}"`, escaped(String(text)));
+  }
+
+  measureText(text) {
+    this.measure.font = this.font;
+    return this.measure.measureText(text);
+  }
+
+  /** @param {string} open @param {string} [content] */
+  put(open, content) {
+    const alpha = this.globalAlpha < 1 ? ` opacity="${this.globalAlpha}"` : "";
+    const turn = this.transform ? ` transform="${this.transform}"` : "";
+    this.parts.push(`<${open}${alpha}${turn}${content === undefined ? "/>" : `>${content}</text>`}`);
+  }
+}

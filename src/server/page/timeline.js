@@ -1,0 +1,100 @@
+// The scans of the logs as a time line: one upright line each, and a slider that goes through them.
+
+import { clock, count, setText } from "./words.js";
+import { make } from "./dom.js";
+
+/** As far as a slider's thumb stays from its ends, pixels. */
+const INSET = 8;
+const HEIGHT = 40, FOOT = 14;
+const LABEL_PX = 74;
+const FONT = "11px system-ui, sans-serif";
+
+export class TimeLine {
+  /**
+   * @param {HTMLElement} place
+   * @param {(scan: any) => void} onScrub
+   * @param {() => void} onOlder
+   */
+  constructor(place, onScrub, onOlder) {
+    this.canvas = make("canvas", { id: "time-line", ariaHidden: "true" });
+    this.slider = make("input", { type: "range", id: "scrub", min: "0", max: "0", step: "1", ariaLabel: "Scan, from the oldest to the newest", disabled: true });
+    this.told = make("output", { id: "scrub-now", textContent: "no scan yet" });
+    this.older = make("button", { type: "button", id: "older", textContent: "Older", disabled: true });
+    place.append(this.canvas, this.slider, make("p", {}, this.told, this.older));
+    /** Oldest first. @type {any[]} */
+    this.scans = [];
+    this.shown = null;
+    this.palette = null;
+    this.slider.addEventListener("input", () => {
+      const scan = this.scans[this.slider.value];
+      this.tell(scan);
+      if (scan) onScrub(scan);
+    });
+    this.older.addEventListener("click", onOlder);
+    new ResizeObserver(() => this.redraw()).observe(this.canvas);
+  }
+
+  /** @param {any[]} scans newest first @param {string | null} shown its id; `null` for what is live @param {boolean} more whether there may be older ones */
+  show(scans, shown, more) {
+    this.scans = scans.toReversed();
+    this.shown = shown;
+    this.slider.max = Math.max(0, scans.length - 1);
+    this.slider.disabled = scans.length === 0;
+    this.older.disabled = !more;
+    const at = shown === null ? scans.length - 1 : this.scans.findIndex(({ scan }) => scan === shown);
+    this.slider.value = at < 0 ? 0 : at;
+    this.tell(this.scans[at]);
+    this.redraw();
+  }
+
+  tell(scan) {
+    if (!scan) return setText(this.told, this.scans.length ? "a scan that is not in the list" : "no scan yet");
+    const at = this.scans.indexOf(scan) + 1;
+    const text = `scan ${at} of ${this.scans.length}, ${clock(scan.time)}, ${scan.end ? count(scan.end.beams, "beam") : "not ended"}`;
+    setText(this.told, text);
+    this.slider.setAttribute("aria-valuetext", text);
+  }
+
+  redraw(palette = this.palette) {
+    this.palette = palette;
+    const { canvas, scans } = this;
+    const width = canvas.clientWidth;
+    if (!palette || !width) return;
+    [canvas.width, canvas.height] = [Math.round(width * devicePixelRatio), Math.round(HEIGHT * devicePixelRatio)];
+    const c = canvas.getContext("2d");
+    c.scale(devicePixelRatio, devicePixelRatio);
+    const along = Math.max(1, scans.length - 1);
+    const x = (i) => INSET + (i / along) * (width - 2 * INSET);
+    const thick = Math.max(1, Math.min(6, (width - 2 * INSET) / along - 1));
+    this.drawTimes(c, x, width);
+    let last = -1;
+    scans.forEach((scan, i) => {
+      // Of scans that share a pixel the first one is drawn.
+      if (Math.round(x(i)) === last && scan.scan !== this.shown) return;
+      last = Math.round(x(i));
+      const whole = scan.end && scan.end.missing === 0;
+      const share = scan.end ? scan.end.beams / Math.max(1, scan.end.beams + scan.end.missing) : 0.5;
+      const high = Math.max(0.15, share) * (HEIGHT - FOOT - 4);
+      c.fillStyle = palette[scan.scan === this.shown ? "--path" : whole ? "--direct" : scan.end ? "--unexplained" : "--wait"];
+      c.fillRect(x(i) - thick / 2, HEIGHT - FOOT - high, thick, high);
+    });
+  }
+
+  /** The hour, or the day, where there is room to say it. */
+  drawTimes(c, x, width) {
+    c.fillStyle = this.palette["--quiet"];
+    [c.font, c.textBaseline] = [FONT, "alphabetic"];
+    let [free, day] = [0, ""];
+    this.scans.forEach(({ time }, i) => {
+      const at = x(i);
+      if (at < free || at > width - LABEL_PX / 2) return;
+      const when = new Date(time);
+      const date = when.toLocaleDateString(undefined, { month: "short", day: "numeric" });
+      const hour = when.toLocaleTimeString(undefined, { hour: "2-digit", minute: "2-digit", second: "2-digit", hour12: false });
+      c.textAlign = at < LABEL_PX / 2 ? "left" : "center";
+      c.fillText(date === day ? hour : `${date}, ${hour}`, at, HEIGHT - 2);
+      free = at + (date === day ? LABEL_PX : 2 * LABEL_PX);
+      day = date;
+    });
+  }
+}

@@ -1,0 +1,73 @@
+//! What would explain a scan's readings better than what the daemon believes.
+
+use serde_json::{Value, json};
+use sonard::mock::Pace;
+
+use super::{Daemon, clean_log, logs, rig::Rig};
+use crate::common::{run, wait_until};
+
+/// Takes a scan from where the daemon is told to be.
+fn scan(daemon: &Daemon, pose: [f64; 3], number: u64) {
+    let [x_m, y_m, heading_deg] = pose;
+    let pose = json!({ "x_m": x_m, "y_m": y_m, "heading_deg": heading_deg });
+    assert_eq!(daemon.send("PUT", "/v1/pose", &pose.to_string()).status, 202);
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+    daemon.wait_for_scans(number);
+}
+
+/// What is said of the last scan, once something is.
+fn explanations(daemon: &Daemon) -> Vec<Value> {
+    let told = || daemon.health()["fit"]["explanations"].as_array().cloned().unwrap_or_default();
+    wait_until("an explanation", || !told().is_empty());
+    told()
+}
+
+fn events(folder: &std::path::Path) -> Vec<String> {
+    let log = clean_log(folder);
+    let kind = |event: &&Value| event["kind"] == "explanation";
+    let detail = |event: &Value| event["detail"].as_str().unwrap_or_default().to_owned();
+    log.of_type("event").filter(kind).map(detail).collect()
+}
+
+#[test]
+fn a_pose_that_is_wrong_is_told_once_and_moved_by_nobody() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut rig = Rig::new(folder.path(), Pace::Virtual);
+    rig.plug("", 1);
+    let options = rig.options();
+    let options: Vec<&str> = options.iter().map(String::as_str).collect();
+    let daemon = Daemon::start(folder.path(), &options);
+    daemon.wait_for("ready");
+    let truth = daemon.get("/v1/pose").json();
+    let [x_m, y_m, heading_deg] =
+        ["x_m", "y_m", "heading_deg"].map(|key| truth[key].as_f64().expect("a number"));
+    // Two centimetres beside where it is, and then where it is.
+    let beside = [x_m + 0.02, y_m + 0.02, heading_deg];
+    scan(&daemon, beside, 1);
+    let found = explanations(&daemon);
+    assert!(["pose", "together"].iter().any(|change| found[0]["change"] == *change), "{found:?}");
+    for name in ["x_m", "y_m"] {
+        let all = found[0]["estimates"].as_array().expect("estimates");
+        let of = all.iter().find(|estimate| estimate["name"] == name).expect("it is there");
+        let value = of["value"].as_f64().expect("a number");
+        assert!((value + 0.02).abs() < 0.004, "{name}: {found:?}");
+    }
+    let socket = folder.path().join("s").display().to_string();
+    let said = String::from_utf8(run(&["status", "--socket", &socket]).stdout).expect("text");
+    assert!(said.contains("better   explained: "), "{said}");
+    assert_eq!(daemon.get("/v1/pose").json()["x_m"].as_f64(), Some(x_m + 0.02));
+    scan(&daemon, [x_m, y_m, heading_deg], 2);
+    let log = logs(folder.path()).remove(0);
+    let is_told = || std::fs::read_to_string(&log).is_ok_and(|log| log.contains("no longer"));
+    wait_until("news", is_told);
+    assert_eq!(daemon.health()["fit"]["explanations"], json!([]));
+    for number in [3, 4] {
+        scan(&daemon, beside, number);
+        explanations(&daemon);
+    }
+    assert_eq!(daemon.stop(), Some(0));
+    let events = events(folder.path());
+    assert_eq!(events.len(), 3, "{events:?}");
+    assert!(events[0].contains("better explained: ") && events[2].contains("better explained: "));
+    assert!(events[1].contains("no longer better explained"), "{events:?}");
+}

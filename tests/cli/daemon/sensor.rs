@@ -1,0 +1,151 @@
+//! Another sensor, while the daemon runs.
+
+use std::fs;
+
+use rustix::process::Signal;
+use serde_json::{Value, json};
+
+use super::{Daemon, clean_log, viewpoint::start_array};
+use crate::common::wait_until;
+
+const TURN: [&str; 4] = ["--set", "plan.step_deg=3.6", "--set", "model.max_range_m=3"];
+
+fn scan(daemon: &Daemon, number: u64) {
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+    daemon.wait_for_scans(number);
+}
+
+fn echoes(pings: &Value) -> usize {
+    pings.as_array().expect("readings").iter().filter(|ping| ping["status"] == "echo").count()
+}
+
+#[test]
+fn a_sensor_is_previewed_pending_in_force_and_given_back() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &TURN);
+    daemon.wait_for("ready");
+    let own = daemon.get("/v1/sensor").json();
+    assert_eq!((&own["name"], &own["pending"]), (&json!("senscomp-6500"), &Value::Null));
+    let presets = daemon.get("/v1/sensors").json();
+    let names: Vec<&Value> =
+        presets.as_array().expect("presets").iter().map(|one| &one["name"]).collect();
+    assert!(names.len() >= 7 && names.contains(&&json!("hc-sr04")), "{names:?}");
+
+    // A deaf one hears less, before anything is changed.
+    let deaf = json!({"threshold": 0.9});
+    let preview = |sensor: &Value| {
+        let reply = daemon.send("POST", "/v1/preview", &json!({"sensor": sensor}).to_string());
+        assert_eq!(reply.status, 200, "{}", reply.json());
+        reply.json()["pings"].clone()
+    };
+    let (now, then) = (echoes(&preview(&json!({}))), echoes(&preview(&deaf)));
+    assert!(then < now, "{then} of {now}");
+    assert_eq!(daemon.get("/v1/sensor").json(), own);
+
+    // While a scan is under way it waits for the next one.
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+    wait_until("a scan", || daemon.status()["scan"]["done"].as_u64() > Some(2));
+    assert_eq!(daemon.send("PUT", "/v1/sensor", &deaf.to_string()).status, 202);
+    let status = daemon.status();
+    assert_eq!(status["sensor"]["threshold"], own["threshold"]);
+    assert_eq!(status["pending"]["sensor"]["threshold"], 0.9);
+    assert_eq!(daemon.get("/v1/setup").json()["pending"]["sensor"]["threshold"], 0.9);
+    daemon.wait_for_scans(1);
+    assert_eq!(daemon.status()["sensor"]["threshold"], 0.9);
+    scan(&daemon, 2);
+    assert_eq!(daemon.send("DELETE", "/v1/sensor", "").status, 202);
+    scan(&daemon, 3);
+    assert_eq!(daemon.get("/v1/sensor").json(), own);
+    let log = clean_log(folder.path());
+    let thresholds: Vec<f64> = log
+        .of_type("session")
+        .map(|session| session["sensor"]["threshold"].as_f64().expect("a threshold"))
+        .collect();
+    let own = own["threshold"].as_f64().expect("a threshold");
+    assert_eq!(thresholds, [own, 0.9, own], "each begins a session");
+    // What the scans were predicted by is what was previewed.
+    let scans: Vec<&Value> = log.of_type("scan_start").collect();
+    let predicted = log
+        .of_type("ping")
+        .filter(|ping| ping["scan"] == scans[1]["scan"] && ping["sim"]["status"] == "echo");
+    assert_eq!(predicted.count(), then);
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn a_sensor_is_refused_where_device_or_configuration_says_otherwise() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("s.toml");
+    fs::write(&file, "[model]\nthreshold = 0.03\n").expect("there is room");
+    let with_file = ["--config", file.to_str().expect("plain path")];
+    let daemon = Daemon::start_mock(folder.path(), &[&TURN[..], &with_file].concat());
+    daemon.wait_for("ready");
+    for (body, status, words) in [
+        (r#"{"preset":"ear"}"#, 422, "no sensor preset"),
+        (r#"{"threshold":0}"#, 422, "threshold is 0"),
+        (r#"{"treshold":0.1}"#, 422, "treshold"),
+        (r#"{"threshold":0.1}"#, 409, "model.threshold"),
+        (r#"{"blanking_us":20000}"#, 409, "listening window"),
+        (r#"{"blanking_us":100}"#, 409, "shortest blanking is 500 us"),
+    ] {
+        let reply = daemon.send("PUT", "/v1/sensor", body);
+        assert_eq!(reply.status, status, "{body}: {}", reply.json());
+        let said = reply.json()["error"].as_str().expect("words").to_owned();
+        assert!(said.contains(words), "{body}: {said}");
+    }
+    assert_eq!(daemon.status()["pending"]["sensor"], Value::Null);
+    assert_eq!(daemon.send("PUT", "/v1/sensor", r#"{"blanking_us":900}"#).status, 202);
+    // A configuration that is read again leaves it, unless it says something else of the sensor.
+    let blanking = || daemon.get("/v1/sensor").json()["blanking_us"].clone();
+    for (text, blanking_us) in
+        [("[model]\nthreshold = 0.04\n", 900.0), ("[model]\nsensor = \"polaroid-chirp\"\n", 1600.0)]
+    {
+        fs::write(&file, text).expect("there is room");
+        daemon.signal(Signal::HUP);
+        wait_until(text, || {
+            let model = daemon.get("/v1/setup").json()["model"].clone();
+            text.contains("sensor") == (model["sensor"] == "polaroid-chirp")
+                && (text.contains("sensor") || model["threshold"] == 0.04)
+        });
+        assert_eq!(blanking(), blanking_us, "{text}");
+    }
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn an_array_is_previewed_and_its_rangers_are_another_sensor_from_the_next_round_on() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = start_array(folder.path(), &[]);
+    let pose = daemon.get("/v1/pose").json();
+    let ahead = json!({"x_m": pose["x_m"], "y_m": pose["y_m"],
+                       "heading_deg": pose["heading_deg"].as_f64().map(|deg| deg + 30.0)});
+    let asked = json!({"pose": ahead, "sensor": {"threshold": 0.5}}).to_string();
+    let reply = daemon.send("POST", "/v1/preview", &asked);
+    assert_eq!(reply.status, 200, "{}", reply.json());
+    let previewed = reply.json();
+    assert_eq!(previewed["pings"].as_array().map(Vec::len), Some(8));
+    assert_eq!(daemon.send("PUT", "/v1/pose", &ahead.to_string()).status, 202);
+    assert_eq!(daemon.send("PUT", "/v1/sensor", r#"{"threshold":0.5}"#).status, 202);
+    // What a round then reads is what was previewed.
+    let newest = || daemon.get("/v1/scan/latest").json();
+    let session = || daemon.get("/v1/session").json();
+    wait_until("a round by it", || session()["sensor"]["threshold"] == 0.5);
+    let before = newest()["start"]["scan"].clone();
+    wait_until("another round", || newest()["start"]["scan"] != before);
+    let scan = newest();
+    let id = scan["start"]["scan"].as_str().expect("an id");
+    let whole = daemon.get(&format!("/v1/scans/{id}")).json();
+    for (said, read) in previewed["pings"]
+        .as_array()
+        .expect("them")
+        .iter()
+        .zip(whole["pings"].as_array().expect("them"))
+    {
+        for key in ["ranger", "status", "range_m", "viewpoint"] {
+            assert_eq!(said[key], read[key], "{key}: {read}");
+        }
+    }
+    let plan = r#"{"plan":{"from_deg":0,"to_deg":9,"step_deg":0.9,"pings_per_stop":1}}"#;
+    assert_eq!(daemon.send("POST", "/v1/preview", plan).status, 409);
+    assert_eq!(daemon.stop(), Some(0));
+}
