@@ -31,10 +31,10 @@ trap 'rm -rf "$work"' EXIT
 
 fail() { printf 'test.sh: %s\n' "$*" >&2; exit 1; }
 
-# Seconds of processor time of all that has run so far.
-cpu_s() {
+# Seconds of processor time of all that has run so far, into `cpu_s`: a subshell would count its own.
+count_cpu() {
   times >"$work/times"
-  tail -n 1 "$work/times" | tr 'ms' '  ' | awk '{printf "%.0f", 60 * ($1 + $3) + $2 + $4}'
+  cpu_s=$(tail -n 1 "$work/times" | tr 'ms' '  ' | awk '{printf "%.0f", 60 * ($1 + $3) + $2 + $4}')
 }
 
 step_name=
@@ -42,35 +42,28 @@ step() {
   end_step
   step_name=$*
   step_began=$SECONDS
-  step_cpu=$(cpu_s)
+  count_cpu
+  step_cpu=$cpu_s
   printf '\n== %s\n' "$*"
 }
 end_step() {
-  [ -z "$step_name" ] || printf '%6d %6d  %s\n' $((SECONDS - step_began)) $(($(cpu_s) - step_cpu)) "$step_name" >>"$work/took"
+  if [ -z "$step_name" ]; then return; fi
+  count_cpu
+  printf '%6d %6d  %s\n' $((SECONDS - step_began)) $((cpu_s - step_cpu)) "$step_name" >>"$work/took"
 }
 print_times() {
   end_step
   printf '\n== time\n  wall    cpu  step (seconds)\n'
   cat "$work/took"
-  printf '%6d %6d  all\n\n' "$SECONDS" "$(cpu_s)"
-}
-
-# get_packages WHAT-TO-DO-WITHOUT PACKAGE...: installs them where it may.
-get_packages() {
-  local without=$1
-  shift
-  if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
-    apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@" >/dev/null
-  else
-    fail "missing here: sudo apt-get install $*$without"
-  fi
+  count_cpu
+  printf '%6d %6d  all\n\n' "$SECONDS" "$cpu_s"
 }
 
 check_tools() {
   step "tools"
   command -v cargo >/dev/null || fail "cargo is missing: install Rust 1.90 or newer from https://rustup.rs"
   if ! command -v cc >/dev/null || { [ "$fuzz_seconds" != 0 ] && ! command -v c++ >/dev/null; }; then
-    get_packages "" gcc g++ libc6-dev
+    tests/install.sh "" gcc g++ libc6-dev
   fi
   for component in rustfmt clippy; do
     cargo "${component/rustfmt/fmt}" --version >/dev/null 2>&1 || rustup component add "$component" ||
@@ -125,7 +118,7 @@ build_firmware() {
 build_tests() {
   step "build of the tests"
   if [ "${FAKETIME:-1}" != 0 ] && ! ls /usr/lib/*/faketime/libfaketime.so.1 >/dev/null 2>&1; then
-    get_packages ", or leave the clock that is set out with FAKETIME=0" libfaketime
+    tests/install.sh "leave the clock that is set out with FAKETIME=0" libfaketime
   fi
   if [ "$runner" = nextest ]; then
     cargo nextest run --workspace "${features[@]}" --no-run --cargo-quiet
@@ -141,7 +134,7 @@ prepare_browser() {
   fi
   step "a browser for the live page"
   if ! command -v chromium >/dev/null || ! command -v chromedriver >/dev/null; then
-    get_packages ", or leave the page out with PAGE=0" chromium chromium-driver
+    tests/install.sh "leave the page out with PAGE=0" chromium chromium-driver
   fi
   if [ "${AXE:-1}" = 0 ]; then printf 'axe-core: LEFT OUT, because AXE=0\n'; else tests/axe.sh; fi
   chromium --version
@@ -156,7 +149,7 @@ build_playground() {
     return
   fi
   step "the playground"
-  if ! command -v node >/dev/null; then get_packages ", or leave the playground out with PLAYGROUND=0" nodejs npm; fi
+  if ! command -v node >/dev/null; then tests/install.sh "leave the playground out with PLAYGROUND=0" nodejs npm; fi
   web/build.sh || fail "the playground: see above. Where it can't be built, PLAYGROUND=0 leaves it out"
 }
 
@@ -232,7 +225,7 @@ check_monitoring() {
     return
   fi
   step "alerts as Prometheus reads them"
-  if ! command -v promtool >/dev/null; then get_packages ", or leave it out with PROMTOOL=0" prometheus; fi
+  if ! command -v promtool >/dev/null; then tests/install.sh "leave it out with PROMTOOL=0" prometheus; fi
   tests/monitoring.sh
 }
 

@@ -30,11 +30,8 @@ get_tools() {
       missing+=("$package")
   done
   if [ ${#missing[@]} != 0 ]; then
-    [ "$(id -u)" = 0 ] ||
-      fail "packages are missing: sudo apt-get install --no-install-recommends ${missing[*]}"
-    printf 'installing %s\n' "${missing[*]}"
-    apt-get update -qq && apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null ||
-      fail "could not install: ${missing[*]}"
+    printf 'missing: %s\n' "${missing[*]}"
+    tests/install.sh "leave firmware and emulator out with FIRMWARE=0" "${missing[@]}" || fail "could not install: ${missing[*]}"
   fi
   command -v cargo >/dev/null || fail "cargo is missing: install Rust 1.90 or newer from https://rustup.rs"
 }

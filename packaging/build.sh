@@ -30,7 +30,7 @@ install rustc-web cargo-web libstd-rust-web-dev:arm64 gcc-aarch64-linux-gnu libc
 # Pages and completions are the same everywhere, and are written by the program itself.
 cargo build --release --quiet --bin sonard
 rm -rf "$target/package"
-"$target/release/sonard" generate "$target/package"
+"$target/release/sonard" package-files "$target/package"
 
 case ${1:-} in
 "")

@@ -47,7 +47,7 @@ test_arm64() {
   deb=$(packaging/build.sh arm64 | tail -n 1)
   look_into "$deb" arm64
   readelf -h "$work/tree/usr/bin/sonard" | grep -q 'Machine: *AArch64' || fail "the program is not for AArch64"
-  need qemu-aarch64 qemu-user
+  command -v qemu-aarch64 >/dev/null || tests/install.sh "" qemu-user
   step "run for arm64"
   # Programs that start a thread hang in some of these emulators: only what needs none is run.
   local run=(timeout 60 qemu-aarch64 -L /usr/aarch64-linux-gnu "$work/tree/usr/bin/sonard")
@@ -65,7 +65,7 @@ test_here() {
   look_into "$deb" "$architecture"
 
   step "lintian"
-  need lintian lintian
+  command -v lintian >/dev/null || tests/install.sh "" lintian
   # A package outside of Debian's archive closes no bug there, and who gives it to others puts an
   # address into it.
   lintian --fail-on error,warning --allow-root "$deb" \
@@ -73,7 +73,7 @@ test_here() {
     fail "lintian finds fault with it"
 
   step "manual pages"
-  need man man-db
+  command -v man >/dev/null || tests/install.sh "" man-db
   local page said
   for page in "$work"/tree/usr/share/man/man?/*.gz; do
     said=$(LC_ALL=C.UTF-8 MANROFFSEQ='' MANWIDTH=80 man --warnings -E UTF-8 -l -Tutf8 -Z "$page" 2>&1 >/dev/null)

@@ -135,7 +135,7 @@ report() {
 }
 
 check_place
-need systemd-nspawn systemd-container
+command -v systemd-nspawn >/dev/null || tests/install.sh "" systemd-container
 root=$work/root
 new_debian "$root"
 case $subject in

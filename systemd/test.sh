@@ -5,13 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 fail() { printf 'systemd/test.sh: %s\n' "$*" >&2; exit 1; }
 
-if ! command -v systemd-analyze >/dev/null; then
-  if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
-    apt-get update -qq && apt-get install -y -qq --no-install-recommends systemd >/dev/null
-  else
-    fail "systemd-analyze is missing: sudo apt-get install systemd"
-  fi
-fi
+command -v systemd-analyze >/dev/null || ../tests/install.sh "" systemd
 
 # Verifying wants the program where the unit says it is.
 root=$(mktemp -d)

@@ -6,14 +6,7 @@ cd "$(dirname "$0")/.."
 version=4.14.1
 tools=${CARGO_TARGET_DIR:-target}/tools
 if [ ! -f "$tools/axe-core/axe.min.js" ]; then
-  if ! command -v npm >/dev/null; then
-    if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
-      apt-get update -qq && apt-get install -y -qq --no-install-recommends npm >/dev/null
-    else
-      echo "tests/axe.sh: npm is missing: sudo apt-get install npm, or leave axe-core out with AXE=0" >&2
-      exit 1
-    fi
-  fi
+  command -v npm >/dev/null || tests/install.sh "leave axe-core out with AXE=0" npm
   work=$(mktemp -d)
   trap 'rm -rf "$work"' EXIT
   (cd "$work" && npm pack --silent "axe-core@$version" >/dev/null && tar xzf "axe-core-$version.tgz")

@@ -2,7 +2,7 @@
 # Invariant 1: the crates of the pure part depend on nothing that does I/O or keeps time.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-pure=(sonard-model sonard-records sonard-export sonard-import sonard-interpret sonard-inverse sonard-plot)
+pure=(sonard-model sonard-records sonard-export sonard-generate sonard-import sonard-interpret sonard-inverse sonard-plot)
 for crate in "${pure[@]}"; do
   tree=$(cargo tree --package "$crate" --edges normal --prefix none --format '{p}' | cut -d' ' -f1 | sort -u)
   for banned in tokio tokio-serial serialport axum rppal mio rustix clap sonard; do

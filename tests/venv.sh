@@ -10,10 +10,10 @@ shift 2
 interpreter=${INTERPRETER:-python3}
 if [ "$(cat "$folder/packages" 2>/dev/null)" = "$*" ]; then exit; fi
 if ! "$interpreter" -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 10))' 2>/dev/null; then
-  if [ "$interpreter" = python3 ] && command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
-    apt-get update -qq && apt-get install -y -qq --no-install-recommends python3 python3-venv >/dev/null
+  if [ "$interpreter" = python3 ]; then
+    "$(dirname "$0")/install.sh" "leave this out with $switch" python3 python3-venv
   else
-    echo "$0: $interpreter 3.10 or newer with venv is missing: sudo apt-get install python3-venv, or leave this out with $switch" >&2
+    echo "$0: $interpreter 3.10 or newer with venv is missing: install it, or leave this out with $switch" >&2
     exit 1
   fi
 fi
