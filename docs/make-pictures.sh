@@ -56,11 +56,14 @@ cp "$work/rooms/room-2/maps.png" "$pictures/explored.png"
 # The live page, as its test sees it in Chromium.
 tests/axe.sh
 cargo test --quiet --test cli live_page::accessible
+cargo test --quiet --test cli live_page::pictures
 cp target/page/desk.png "$pictures/page-desk.png"
 cp target/page/phone-dark.png "$pictures/page-phone.png"
+cp target/page/page-{overlays,preview}.png "$pictures/"
 
 # The playground, likewise.
 web/build.sh
 cargo test --quiet --test cli playground::pictures
 for picture in desk phone engines; do cp "target/page/playground-$picture.png" "$pictures/"; done
+cp target/page/playground.png "$pictures/playground.png"
 ls -l "$pictures"
