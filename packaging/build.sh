@@ -9,7 +9,8 @@ target=${CARGO_TARGET_DIR:-target}
 tools=$PWD/$target/tools
 
 if [ ! -x "$tools/bin/cargo-deb" ]; then
-  cargo install --quiet --locked --root "$tools" cargo-deb@3.8.0 >&2
+  # A program that packs files once: building it takes longer than it runs.
+  cargo install --quiet --debug --locked --root "$tools" cargo-deb@3.8.0 >&2
 fi
 
 # Debian's own cargo has the standard library of other architectures; rustup's may lack it.

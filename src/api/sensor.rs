@@ -11,6 +11,7 @@ use crate::acoustics::{Gain, Sensor, SensorError};
 pub struct SensorOrder {
     /// Name of a sensor that comes with the program: GET /v1/sensors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("enum" = preset_choices()))]
     pub preset: Option<String>,
     /// Least amplitude detected; a head-on, perfect wall gives 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -70,6 +71,11 @@ impl SensorFigures {
             gain: sensor.gain.clone(),
         }
     }
+}
+
+/// What `preset` may be: null is as if it were left out.
+fn preset_choices() -> Vec<Option<&'static str>> {
+    Sensor::preset_names().map(Some).chain([None]).collect()
 }
 
 impl SensorOrder {

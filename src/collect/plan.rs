@@ -85,7 +85,7 @@ impl Plan {
     /// How the motor turns and the ranger listens.
     #[must_use]
     pub fn motion(&self) -> Motion {
-        self.keys.motion.motion()
+        Motion::from(&self.keys.motion)
     }
 
     /// Poses that will be there, as far as that is known.

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::air::AirKeys;
-use crate::{model::OptionKeys, ranger::Motion};
+use crate::model::OptionKeys;
 
 /// Configuration of `sonard run`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
@@ -295,21 +295,6 @@ impl Default for PlanKeys {
 impl Default for ScanningKeys {
     fn default() -> Self {
         Self { mode: Mode::OnRequest, every_s: 60.0 }
-    }
-}
-
-impl MotionKeys {
-    /// As the ranger takes them.
-    #[must_use]
-    pub const fn motion(&self) -> Motion {
-        Motion {
-            window_ms: self.window_ms,
-            settle_ms: self.settle_ms,
-            min_interval_ms: self.min_interval_ms,
-            max_echoes: self.max_echoes,
-            speed: self.speed,
-            acceleration: self.acceleration,
-        }
     }
 }
 

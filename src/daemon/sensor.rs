@@ -6,7 +6,7 @@ use super::refusal::{Refusal, RefusalKind};
 use crate::{
     acoustics::Sensor,
     api::{SensorOrder, Setup},
-    ranger::{Listening, check_blanking},
+    ranger::{Listening, Motion, check_blanking},
 };
 
 /// The sensor of an order beside what the configuration decides.
@@ -34,7 +34,7 @@ pub fn ordered_sensor(
     if !of_array {
         let max_range_m = setup.model.options.max_range_m.unwrap_or(sensor.max_range_m);
         let listening = Listening { max_range_m, sound_speed_m_s, blanking_us: sensor.blanking_us };
-        let heard = setup.motion.motion().check_window(&listening);
+        let heard = Motion::from(&setup.motion).check_window(&listening);
         heard.map_err(|deaf| conflict(deaf.to_string(), &deaf.help()))?;
     }
     Ok(sensor)

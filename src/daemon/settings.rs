@@ -69,7 +69,7 @@ impl Settings {
     /// How the motor turns and the ranger listens.
     #[must_use]
     pub const fn motion(&self) -> Motion {
-        self.keys.motion.motion()
+        Motion::from(&self.keys.motion)
     }
 
     /// What the configuration decides about every scan.

@@ -6,6 +6,8 @@ use firmware_protocol::messages::{
 };
 use thiserror::Error;
 
+use crate::config::MotionKeys;
+
 /// Blanking of the module when nothing shortens it, microseconds.
 const INTERNAL_BLANKING_US: f64 = 2380.0;
 
@@ -24,6 +26,19 @@ pub struct Motion {
     pub speed: u16,
     /// Motor acceleration, steps a second squared.
     pub acceleration: u32,
+}
+
+impl From<&MotionKeys> for Motion {
+    fn from(keys: &MotionKeys) -> Self {
+        Self {
+            window_ms: keys.window_ms,
+            settle_ms: keys.settle_ms,
+            min_interval_ms: keys.min_interval_ms,
+            max_echoes: keys.max_echoes,
+            speed: keys.speed,
+            acceleration: keys.acceleration,
+        }
+    }
 }
 
 /// What listening has to reach and where it begins.
