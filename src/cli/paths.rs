@@ -14,7 +14,7 @@ use super::{
     place::PlaceArgs,
 };
 use crate::{
-    geometry::wrap_360,
+    geometry::{Pose, wrap_360},
     model::{
         EdgeLawKind, Options, PathOptions, Simulator,
         paths::{EchoPath, Paths},
@@ -28,6 +28,10 @@ use crate::{
 pub(super) struct Args {
     #[command(flatten)]
     place: PlaceArgs,
+    /// Azimuth, degrees counter-clockwise from the heading; the paths are those between transmitter and receiver where
+    /// they are when the ranger looks there. Without it both are on its axis
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    azimuth_deg: Option<f64>,
     /// Listen and predict up to this range, metres, instead of the sensor's
     #[arg(long, value_name = "M")]
     max_range: Option<f64>,
@@ -71,6 +75,7 @@ Examples:
   sonard paths --scene simple-room --pose fig9 --max-range 1
   sonard paths --scene mcgill-lab --pose 1,1,0 --max-order 2 --json | jq -c '.interactions[].point'
   sonard paths --scene my-room.json --pose 1.2,0.8,90 --lossless --weakest 0.05
+  sonard paths --scene simple-room --pose fig9 --sensor hc-sr04 --azimuth-deg 45   # its two capsules apart
 
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
@@ -114,8 +119,14 @@ pub(super) fn run(args: &Args) -> Outcome {
     let settings =
         crate::model::paths::Settings { floor: args.weakest, ..simulator.path_settings() };
     let paths = Paths::new(simulator.scene(), settings);
-    let at = pose.position();
-    let told = paths.each_between(at, at, |paths| {
+    let [transmitter, receiver] = match args.azimuth_deg {
+        None => [pose.position(); 2],
+        Some(azimuth_deg) => {
+            let axis = Pose { heading_deg: pose.heading_deg + azimuth_deg, ..pose };
+            simulator.sensor().mounting.viewpoint(&axis).ends()
+        }
+    };
+    let told = paths.each_between(transmitter, receiver, |paths| {
         let count = paths.len();
         let lines = paths.map(|path| line(&simulator, &path));
         if args.json { write_json(lines) } else { write_table(lines, count) }

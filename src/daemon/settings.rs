@@ -68,7 +68,7 @@ impl Settings {
 
     /// How the motor turns and the ranger listens.
     #[must_use]
-    pub const fn motion(&self) -> Motion {
+    pub fn motion(&self) -> Motion {
         Motion::from(&self.keys.motion)
     }
 

@@ -44,6 +44,29 @@ fn the_table_names_paths_and_max_order_limits_them() {
 }
 
 #[test]
+fn an_azimuth_puts_transmitter_and_receiver_where_they_are_when_the_ranger_looks_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = folder.path().join("wall.json");
+    let text = r#"{"name":"wall","materials":{"brick":{"reflectance":1}},
+        "walls":[{"id":"wall","from":[-9,2],"to":[9,2],"material":"brick"}]}"#;
+    std::fs::write(&scene, text).expect("a file");
+    let scene = scene.to_str().expect("UTF-8");
+    // An hc-sr04's capsules are 26 mm apart: along the wall they face, and across it a quarter turn on.
+    let shortest = |azimuth_deg: &str| {
+        let here = ["--scene", scene, "--pose", "0,0,90", "--max-range", "3", "--max-order", "1"];
+        let aimed = ["--sensor", "hc-sr04", "--azimuth-deg", azimuth_deg, "--json"];
+        let lines = lines(&[&here[..], &aimed].concat());
+        lines[0]["length_m"].as_f64().expect("a number")
+    };
+    for (azimuth_deg, length_m) in
+        [("0", f64::hypot(4.0, 0.026)), ("180", f64::hypot(4.0, 0.026)), ("-90", 4.0)]
+    {
+        let off_m = shortest(azimuth_deg) - length_m;
+        assert!(off_m.abs() < 1e-12, "{azimuth_deg}: {off_m}");
+    }
+}
+
+#[test]
 fn wrong_input_is_refused_with_what_would_be_right() {
     paths(&["--scene", "simple-room", "--pose", "fig9", "--weakest", "0"])
         .code(2)

@@ -49,6 +49,16 @@ impl Pose {
     }
 }
 
+/// The angle from one direction to another, radians in [-pi, pi], counter-clockwise positive; the vectors' lengths
+/// do not matter.
+///
+/// By the arc tangent, which is right to rounding: the arc cosine of a scalar product loses half of the digits where
+/// the directions are nearly the same.
+#[must_use]
+pub fn turn_rad(from: DVec2, to: DVec2) -> f64 {
+    from.perp_dot(to).atan2(from.dot(to))
+}
+
 /// Distance of a point from the segment `a`-`b`, metres.
 #[must_use]
 pub fn distance_to_segment(point: DVec2, a: DVec2, b: DVec2) -> f64 {

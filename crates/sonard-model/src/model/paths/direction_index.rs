@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::{echo::Echo, pattern::PatternEnvelope};
-use crate::geometry::wrap_pi;
+use crate::geometry::{turn_rad, wrap_pi};
 
 /// Directions are sorted into this many bins.
 const BINS: usize = 360;
@@ -45,7 +45,7 @@ impl Entry {
         envelope: &PatternEnvelope,
         floor: f64,
     ) -> Option<Self> {
-        let half_rad = 0.5 * echo.departure.angle_to(echo.arrival);
+        let half_rad = 0.5 * turn_rad(echo.departure, echo.arrival);
         let level = floor / echo.amplitude;
         let wide = envelope.reach_rad(level) - half_rad.abs();
         if wide < 0.0 {

@@ -9,7 +9,7 @@ use super::{
     lit::View,
 };
 use crate::{
-    geometry::DVec2,
+    geometry::{DVec2, turn_rad},
     model::paths::plan::{Circle, Cylinders, Span, SurfaceArc},
 };
 
@@ -86,7 +86,7 @@ fn lit_by(circle: &Circle, beam: &Beam) -> Option<Span> {
         return None;
     }
     let tangent_rad = sine.asin();
-    let off_axis = |border: DVec2| (-to_image).angle_to(border);
+    let off_axis = |border: DVec2| turn_rad(-to_image, border);
     let (mut right, mut left) = (off_axis(beam.right), off_axis(beam.left));
     if right > left {
         // The beam holds the direction away from the circle, and one side of it at most.

@@ -16,13 +16,16 @@ use super::{
     stationary::{SLACK, stationary_contact},
     strength::Strength,
 };
-use crate::model::{
-    SearchPart,
-    paths::{
-        beams::{Leg, View},
-        echo::{Echo, Via},
-        pattern::TwoWayBound,
-        plan::{Circle, Plan},
+use crate::{
+    geometry::turn_rad,
+    model::{
+        SearchPart,
+        paths::{
+            beams::{Leg, View},
+            echo::{Echo, Via},
+            pattern::TwoWayBound,
+            plan::{Circle, Plan},
+        },
     },
 };
 
@@ -185,7 +188,7 @@ impl<'a> Connector<'a> {
         let amplitude = self.amplitude(&contacts, circle, gain);
         let departures = [out.departure(one.at_rad), back.departure(other.at_rad)];
         let heard =
-            self.bound.map_or(1.0, |bound| bound.at(departures[0].angle_to(departures[1]).abs()));
+            self.bound.map_or(1.0, |bound| bound.at(turn_rad(departures[0], departures[1]).abs()));
         let floor = settings.contact_floor(out.half_path.level > 0, length_m);
         let fits = length_m <= settings.max_path_m && amplitude * heard >= floor;
         fits.then_some(Pair {

@@ -1,6 +1,6 @@
 //! Directions of departure.
 
-use crate::geometry::{DVec2, wrap_pi};
+use crate::geometry::{DVec2, turn_rad, wrap_pi};
 
 /// The directions in which the rays of a half-path leave.
 #[derive(Debug, Clone, Copy)]
@@ -11,7 +11,7 @@ pub(crate) struct Departures {
 
 impl Departures {
     pub(crate) fn between(one: DVec2, other: DVec2) -> Self {
-        let half_rad = 0.5 * one.angle_to(other);
+        let half_rad = 0.5 * turn_rad(one, other);
         Self { middle_rad: wrap_pi(one.to_angle() + half_rad), half_rad: half_rad.abs() }
     }
 

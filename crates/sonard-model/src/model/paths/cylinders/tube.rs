@@ -5,7 +5,7 @@ use super::{
     strength::Strength, tracer::Tracer,
 };
 use crate::{
-    geometry::DVec2,
+    geometry::{DVec2, turn_rad},
     model::paths::{
         plan::{Circle, Span},
         tolerance::TIE_M,
@@ -77,8 +77,8 @@ pub(crate) fn split(
 ) {
     let [from, to] = tube.borders;
     let middle = |front: &Front| front.origin - circle.center;
-    let turn = middle(&from).angle_to(middle(&to)).abs();
-    let opens = from.along.angle_to(to.along).abs();
+    let turn = turn_rad(middle(&from), middle(&to)).abs();
+    let opens = turn_rad(from.along, to.along).abs();
     let Span { from_rad, to_rad } = tube.span;
     if halvings < MOST_HALVINGS && (turn > MOST_TURN_RAD || opens > 2.0 * MOST_TURN_RAD) {
         let half = 0.5 * (from_rad + to_rad);

@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 
 use crate::{
     acoustics::edge::{MOST_WAVELENGTHS, Strip},
-    geometry::{Arrangement, DVec2},
+    geometry::{Arrangement, DVec2, turn_rad},
 };
 
 /// Pieces of a wall that go on straight to within this are one, radians.
@@ -96,7 +96,7 @@ impl<'a> Chains<'a> {
             };
             let far = self.other_end(next, at);
             let so_far = self.position(at) - self.position(point);
-            let bend_rad = so_far.angle_to(self.position(far) - self.position(at));
+            let bend_rad = turn_rad(so_far, self.position(far) - self.position(at));
             if bend_rad.abs() > STRAIGHT_RAD {
                 return None;
             }
