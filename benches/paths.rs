@@ -270,9 +270,9 @@ fn building_plans() {
         report("paths: scan of 400 azimuths", scan, None);
         report("paths: a ping's share of it", scan.each_of(400), None);
         report("parry: 15 ray casts", cast, Some(scan.each_of(400)));
-        let station = model.at(poses[0]);
+        let point = model.at(poses[0]);
         let heard: usize = (0..400)
-            .map(|i| station.arrivals(f64::from(i) * TAU / 400.0).map_or(0, |all| all.len()))
+            .map(|i| point.arrivals(f64::from(i) * TAU / 400.0).map_or(0, |all| all.len()))
             .sum();
         println!("  {:.1} sounds a ping", heard as f64 / 400.0);
     }

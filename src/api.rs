@@ -40,5 +40,5 @@ pub use status::{
 // Those that the pure part makes.
 pub use crate::{
     compare::{Beside, JudgedPing, Word},
-    scan::{Body, Circle, FloorPlan, HumpLine, PlanPoint, TraceLine, WallLine},
+    scan::{Body, Circle, FloorPlan, PeakLine, PlanPoint, TraceLine, WallLine},
 };

@@ -101,7 +101,7 @@ enum Verb {
     /// List the propagation paths of echoes at a place
     #[command(long_about = paths::ABOUT)]
     Paths(paths::Args),
-    /// Show the echo trace of one firing, each hump with its path
+    /// Show the echo trace of one firing, each peak with its path
     #[command(long_about = trace::ABOUT)]
     Trace(trace::Args),
     /// Make a data set for learners: rooms, poses, sensors and air drawn at random, shard by shard

@@ -43,9 +43,9 @@ def test_a_trace_is_that_of_the_command(command: Command) -> None:
     for field in ["t_us", "envelope", "threshold", "gain_db"]:
         np.testing.assert_array_equal(getattr(trace, field), line[field])
     np.testing.assert_array_equal(trace.echoes_us, line["detection"]["tof_us"])
-    for peak, hump in zip(trace.peaks, line["humps"], strict=True):
-        assert (peak.tof_us, peak.peak_us, peak.peak) == (hump["tof_us"], hump["peak_us"], hump["peak"])
-        assert peak.path.length_m == hump["path"]["length_m"]
+    for peak, told in zip(trace.peaks, line["peaks"], strict=True):
+        assert (peak.tof_us, peak.peak_us, peak.peak) == (told["tof_us"], told["peak_us"], told["peak"])
+        assert peak.path.length_m == told["path"]["length_m"]
 
 
 def test_a_reading_says_its_path() -> None:

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     compare::JudgedPing,
-    scan::{HumpLine, PlanPoint, TraceLine},
+    scan::{PeakLine, PlanPoint, TraceLine},
 };
 
 /// A beam with all that is known about it.
@@ -20,7 +20,7 @@ pub struct Beam {
     pub polyline: Option<Vec<PlanPoint>>,
     /// What the model hears, in order of time, faint sounds included; `null` if it could not be
     /// asked.
-    pub humps: Option<Vec<HumpLine>>,
+    pub peaks: Option<Vec<PeakLine>>,
     /// The echo trace that the model predicts, up to half a metre beyond what was heard or predicted;
     /// `null` if it could not be asked.
     pub trace: Option<TraceLine>,

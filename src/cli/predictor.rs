@@ -121,11 +121,11 @@ fn predict_stepper(
         let robot = pings[0].pose.unwrap_or(*pose);
         scene.check_pose(&robot).map_err(|error| Failure::input(&error, error.help()))?;
         let simulator = simulator(log, scene.with_robot_at(&robot), session)?;
-        let station = simulator.at(robot.position());
+        let point = simulator.at(robot.position());
         for ping in pings {
             let Some(axis) = ping.axis(Some(session), pose) else { continue };
             let prediction =
-                station.ping(axis.direction_rad(0.0)).map_err(|error| too_costly(log, &error))?;
+                point.ping(axis.direction_rad(0.0)).map_err(|error| too_costly(log, &error))?;
             set_beside(ping, SimRecord::of(&simulator, &prediction));
         }
     }

@@ -141,9 +141,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     let noise = args.noise.noise()?;
     let mut out = records_to(args.output.as_deref(), args.overwrite)?;
     let mut rng = Pcg64::seed_from_u64(args.noise.seed);
-    let mut ping = |station: &ObservationPoint, direction_rad| match &noise {
-        Some(noise) => station.ping_in_noise(direction_rad, noise, &mut rng),
-        None => station.ping(direction_rad),
+    let mut ping = |point: &ObservationPoint, direction_rad| match &noise {
+        Some(noise) => point.ping_in_noise(direction_rad, noise, &mut rng),
+        None => point.ping(direction_rad),
     };
     let bar = progress::bar(u64::from(plan.stops()) * poses.len() as u64, "beams");
     let mut written: Result<(), Stop> = Ok(());
@@ -270,10 +270,10 @@ fn write(
     let scan = Uuid::new_v4();
     let start = ScanStart::new(scan, Timestamp::now(), *pose, *plan);
     out.write(&Record::ScanStart(start))?;
-    let station = simulator.at(pose.position());
+    let point = simulator.at(pose.position());
     for index in 0..plan.stops() {
         let azimuth_deg = plan.azimuth_deg(index);
-        let prediction = predict(&station, pose.direction_rad(azimuth_deg))?;
+        let prediction = predict(&point, pose.direction_rad(azimuth_deg))?;
         let ping = Ping::simulated(simulator, scan, index, azimuth_deg, &prediction);
         out.write(&Record::Ping(Box::new(ping)))?;
         bar.inc(1);

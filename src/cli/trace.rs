@@ -51,8 +51,8 @@ pub(super) const ABOUT: &str = "\
 Show what an oscilloscope would show of one firing.
 
 The envelope of all echoes together against time, with the gain, the threshold in force, the \
-blanking and the moments at which ECHO rises; each hump with the path it came by. Without -o and \
---json, a table of the humps. Times are counted as a calibrated ranger counts them: a head-on, \
+blanking and the moments at which ECHO rises; each peak with the path it came by. Without -o and \
+--json, a table of the peaks. Times are counted as a calibrated ranger counts them: a head-on, \
 perfectly reflecting wall rises at its path's length over the speed of sound.";
 
 const HELP: &str = "\
@@ -78,12 +78,12 @@ struct TraceObject<'a> {
     threshold: Vec<f64>,
     gain_db: Vec<f64>,
     transmission: &'a [(f64, f64)],
-    humps: Vec<HumpObject>,
+    peaks: Vec<PeakObject>,
     detection: DetectionObject,
 }
 
 #[derive(Debug, Serialize)]
-struct HumpObject {
+struct PeakObject {
     tof_us: f64,
     peak_us: f64,
     peak: f64,
@@ -130,7 +130,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     firing.draw(&targets, args.picture.width)
 }
 
-/// One firing, with names for its humps.
+/// One firing, with names for its peaks.
 struct Firing<'a> {
     simulator: &'a Simulator,
     pose: Pose,
@@ -144,20 +144,20 @@ struct Firing<'a> {
 impl<'a> Firing<'a> {
     fn new(args: &'a Args, simulator: &'a Simulator, pose: Pose) -> Result<Self, TooCostly> {
         let direction_rad = pose.direction_rad(args.azimuth_deg);
-        let station = simulator.at(pose.position());
+        let point = simulator.at(pose.position());
         let whole = || {
             let longest_m = simulator.receiver().max_range_m;
-            let trace = station.trace(direction_rad, longest_m, args.step_us)?;
+            let trace = point.trace(direction_rad, longest_m, args.step_us)?;
             Ok(interesting_m(simulator, &trace))
         };
         let until_m = args.until.map_or_else(whole, Ok)?;
-        let trace = station.trace(direction_rad, until_m, args.step_us)?;
+        let trace = point.trace(direction_rad, until_m, args.step_us)?;
         let record = |sound| {
-            let arrival = ObservationPoint::arrival(&station, direction_rad, sound)?;
+            let arrival = ObservationPoint::arrival(&point, direction_rad, sound)?;
             Ok(PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m))
         };
         let paths =
-            trace.peaks.iter().map(|hump| record(&hump.arrival)).collect::<Result<_, _>>()?;
+            trace.peaks.iter().map(|peak| record(&peak.arrival)).collect::<Result<_, _>>()?;
         let path = trace.detection.arrival.as_ref().map(record).transpose()?;
         Ok(Self {
             simulator,
@@ -170,7 +170,7 @@ impl<'a> Firing<'a> {
         })
     }
 
-    fn humps(&self) -> impl Iterator<Item = (&EnvelopePeak, &PathRecord)> {
+    fn peaks(&self) -> impl Iterator<Item = (&EnvelopePeak, &PathRecord)> {
         self.trace.peaks.iter().zip(&self.paths)
     }
 
@@ -189,12 +189,12 @@ impl<'a> Firing<'a> {
             threshold: points.iter().map(|point| point.threshold).collect(),
             gain_db: points.iter().map(|point| point.gain_db).collect(),
             transmission: &self.trace.transmission,
-            humps: self
-                .humps()
-                .map(|(hump, path)| HumpObject {
-                    tof_us: hump.tof_us,
-                    peak_us: hump.peak.1,
-                    peak: hump.peak.0,
+            peaks: self
+                .peaks()
+                .map(|(peak, path)| PeakObject {
+                    tof_us: peak.tof_us,
+                    peak_us: peak.peak.1,
+                    peak: peak.peak.0,
                     path: path.clone(),
                 })
                 .collect(),
@@ -217,12 +217,12 @@ impl<'a> Firing<'a> {
                 column.set_cell_alignment(CellAlignment::Right);
             }
         }
-        for (hump, path) in self.humps() {
+        for (peak, path) in self.peaks() {
             table.add_row([
-                format!("{:.1}", hump.tof_us),
+                format!("{:.1}", peak.tof_us),
                 format!("{:.4}", path.length_m / 2.0),
-                format!("{:.4}", hump.peak.0),
-                format!("{:.1}", 20.0 * hump.peak.0.log10()),
+                format!("{:.4}", peak.peak.0),
+                format!("{:.1}", 20.0 * peak.peak.0.log10()),
                 path.in_words(),
             ]);
         }
@@ -280,11 +280,11 @@ impl<'a> Firing<'a> {
     }
 }
 
-/// Half a metre beyond the last hump that comes within 10 dB of the threshold, and of the blanking.
+/// Half a metre beyond the last peak that comes within 10 dB of the threshold, and of the blanking.
 fn interesting_m(simulator: &Simulator, trace: &EchoTrace) -> f64 {
     let receiver = simulator.receiver();
-    let near = |hump: &&EnvelopePeak| hump.peak.0 > 0.3 * receiver.threshold_at(hump.tof_us);
+    let near = |peak: &&EnvelopePeak| peak.peak.0 > 0.3 * receiver.threshold_at(peak.tof_us);
     let last = trace.peaks.iter().rev().find(near);
-    let last_m = last.map_or(1.0, |hump| hump.arrival.length_m / 2.0);
+    let last_m = last.map_or(1.0, |peak| peak.arrival.length_m / 2.0);
     (last_m.max(receiver.min_range_m()) + 0.5).min(receiver.max_range_m)
 }

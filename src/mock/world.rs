@@ -43,8 +43,8 @@ impl Soundings {
         let mounted = Pose { heading_deg: pose.heading_deg + mounting_offset_deg, ..*pose };
         let turn =
             ScanPlan { step_deg: 360.0 / f64::from(steps_per_revolution), ..ScanPlan::default() };
-        let station = simulator.at(mounted.position());
-        let ping = |stop| station.ping_rearmed(mounted.direction_rad(turn.azimuth_deg(stop)));
+        let point = simulator.at(mounted.position());
+        let ping = |stop| point.ping_rearmed(mounted.direction_rad(turn.azimuth_deg(stop)));
         let predictions = (0..turn.stops()).map(ping).collect::<Result<Vec<_>, _>>()?;
         Ok(Self::from_predictions(&predictions))
     }

@@ -11,7 +11,7 @@ fn sonard(args: &[&str]) -> assert_cmd::assert::Assert {
 }
 
 #[test]
-fn json_has_the_signal_the_humps_and_what_was_made_of_them() {
+fn json_has_the_signal_the_peaks_and_what_was_made_of_them() {
     let assert =
         sonard(&["trace", "--scene", "echo-traces", "--pose", "d", "--until", "2.5", "--json"]);
     let trace: Value =
@@ -51,7 +51,7 @@ fn the_table_says_what_a_silence_lacks_and_what_blanking_hides() {
 }
 
 #[test]
-fn a_faint_hump_that_stands_alone_has_a_number_too() {
+fn a_faint_peak_that_stands_alone_has_a_number_too() {
     let folder = tempfile::tempdir().expect("a folder");
     let svg = folder.path().join("trace.svg");
     let svg = svg.to_str().expect("plain");

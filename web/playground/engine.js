@@ -12,10 +12,10 @@
  * @typedef {{kind: string, order: number, interactions: {kind: string, id: string, point?: number[]}[],
  *   length_m: number}} Path
  * @typedef {{tof_us: number, range_m: number, peak: number, margin_db: number, path: Path,
- *   polyline: [number, number][]}} Hump
+ *   polyline: [number, number][]}} Peak
  * @typedef {{step_us: number, m_per_us: number, envelope: number[], threshold: number[], blanking_us: number}} Trace
  * @typedef {{range_m: number | null}} Echo
- * @typedef {{reading: Reading, echoes?: Echo[], polyline: [number, number][] | null, humps: Hump[], trace: Trace}} Beam
+ * @typedef {{reading: Reading, echoes?: Echo[], polyline: [number, number][] | null, peaks: Peak[], trace: Trace}} Beam
  * @typedef {"cone" | "fan" | "paths"} EngineName
  * @typedef {{reflectance: number, roughness: number}} Material
  * @typedef {{name: string, sha256: string, robot: object | null, poses: Record<string, Pose>,

@@ -219,7 +219,7 @@ function showBeam(told) {
   told.reading.mark = ping?.mark ?? "silent";
   panel.show(told.reading);
   panel.showDetails(told);
-  const list = byId("beam-panel").querySelector(".humps");
+  const list = byId("beam-panel").querySelector(".peaks");
   const drawn = list?.querySelector("[aria-pressed=true]");
   if (drawn) list.scrollTop = drawn.offsetTop - list.clientHeight / 2;
   trace.redraw(palette);
@@ -228,21 +228,21 @@ function showBeam(told) {
 }
 
 /** @param {import("./engine.js").Beam} told */
-function chosenOf({ humps, polyline }) {
-  return humps.find((hump) => JSON.stringify(hump.polyline) === JSON.stringify(polyline)) ?? null;
+function chosenOf({ peaks, polyline }) {
+  return peaks.find((peak) => JSON.stringify(peak.polyline) === JSON.stringify(polyline)) ?? null;
 }
 
-/** Another sound of the beam. @param {import("./engine.js").Hump} hump */
-function choosePath(hump) {
-  const at = beam?.humps.indexOf(hump) ?? -1;
-  byId("beam-panel").querySelectorAll(".humps button")[at]?.click();
+/** Another sound of the beam. @param {import("./engine.js").Peak} peak */
+function choosePath(peak) {
+  const at = beam?.peaks.indexOf(peak) ?? -1;
+  byId("beam-panel").querySelectorAll(".peaks button")[at]?.click();
 }
 
 /** @param {[number, number][]} polyline */
 function showPath(polyline) {
   plan.select(plan.selected, polyline);
-  const hump = beam?.humps.find((one) => one.polyline === polyline);
-  trace.show(beam, hump ?? null);
+  const peak = beam?.peaks.find((one) => one.polyline === polyline);
+  trace.show(beam, peak ?? null);
 }
 
 /** @param {import("./engine.js").Problem} problem */

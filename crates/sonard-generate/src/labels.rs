@@ -2,7 +2,7 @@
 
 use sonard_model::{
     geometry::{DVec2, distance_to_segment},
-    model::{Bend, Mechanism, Path, Reflector},
+    model::{Diffractor, Mechanism, Path, Reflector},
     scene::{Scene, Wall},
 };
 
@@ -19,7 +19,7 @@ pub(crate) fn feature_of(path: &Path, scene: &Scene) -> &'static str {
     match (met.next(), met.next(), met.next()) {
         (Some(Mechanism::Reflection(Reflector::Wall(_))), None, _) => "plane",
         (Some(Mechanism::Reflection(Reflector::Cylinder(_))), None, _)
-        | (Some(Mechanism::Diffraction(Bend::Post { .. })), None, _) => "cylinder",
+        | (Some(Mechanism::Diffraction(Diffractor::Post { .. })), None, _) => "cylinder",
         (Some(Mechanism::Diffraction(_)), None, _) => "edge",
         (Some(Mechanism::Scattering { .. }), None, _) => "rough",
         (Some(Mechanism::Reflection(Reflector::Floor | Reflector::Ceiling)), None, _) => "level",

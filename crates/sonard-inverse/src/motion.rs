@@ -3,7 +3,7 @@
 use glam::DVec3;
 use sonard_model::{
     geometry::DVec2,
-    model::{Arrival, Bend, Edge, Mechanism, Reflector},
+    model::{Arrival, Diffractor, Edge, Mechanism, Reflector},
     scene::Scene,
 };
 
@@ -50,12 +50,14 @@ impl Motion {
         let in_plane = match mechanism {
             Mechanism::Reflection(Reflector::Wall(wall))
             | Mechanism::Scattering { wall }
-            | Mechanism::Diffraction(Bend::Level { wall, .. }) => self.on_wall(scene, wall, point),
-            Mechanism::Diffraction(Bend::Upright(Edge { wall, at_b })) => {
+            | Mechanism::Diffraction(Diffractor::Level { wall, .. }) => {
+                self.on_wall(scene, wall, point)
+            }
+            Mechanism::Diffraction(Diffractor::Upright(Edge { wall, at_b })) => {
                 self.of_wall(wall)[usize::from(at_b)]
             }
             // The length that it is told with runs to its axis.
-            Mechanism::Diffraction(Bend::Post { cylinder }) => {
+            Mechanism::Diffraction(Diffractor::Post { cylinder }) => {
                 self.of_cylinder(cylinder).map_or(DVec2::ZERO, |(velocity, _)| velocity)
             }
             Mechanism::Reflection(Reflector::Cylinder(cylinder)) => {

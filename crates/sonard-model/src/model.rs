@@ -33,7 +33,7 @@ pub use options::{
     ConeOptions, EngineKind, EngineOptions, FanOptions, ForeignOption, OptionKeys, Options,
     PathOptions,
 };
-pub use path::{Bend, Edge, Interaction, Mechanism, Path, Reflector};
+pub use path::{Diffractor, Edge, Interaction, Mechanism, Path, Reflector};
 pub use prediction::Prediction;
 pub use simulator::{ModelError, Simulator, sensor_z_m};
 

@@ -7,9 +7,9 @@ mod array;
 mod codec;
 mod drawn;
 mod floor_plan;
-mod hump;
 mod modelled;
 mod path;
+mod peak;
 mod record;
 mod remaining;
 mod simulated;
@@ -20,8 +20,8 @@ mod viewpoint;
 
 pub use codec::{EncodeError, FaultKind, MAX_LINE_BYTES, RecordError, decode_line, encode_line};
 pub use floor_plan::{Body, Circle, FloorPlan, PlanPoint, WallLine};
-pub use hump::HumpLine;
 pub use path::{InteractionKind, InteractionRecord, PathRecord, Point};
+pub use peak::PeakLine;
 pub use record::{
     AirRecord, AirSource, CollectionRef, CrosstalkRecord, Device, Event, EventKind, ImportRef,
     LOG_FORMAT, ModelRecord, Ping, Provenance, Record, STOPPED_ON_REQUEST, ScanAir, ScanEnd,

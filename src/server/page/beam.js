@@ -70,31 +70,31 @@ export class BeamPanel {
   /** Echoes and paths; of readings of the model alone, which have no echoes, paths. */
   showDetails(beam) {
     const heard = beam.echoes ? echoes(beam) : [];
-    this.details.replaceChildren(...heard, ...this.humps(beam));
+    this.details.replaceChildren(...heard, ...this.peaks(beam));
   }
 
   /** What the model hears; each sound draws its path. */
-  humps(beam) {
+  peaks(beam) {
     if (beam.lacks) return [note(`No paths: ${beam.lacks}.`)];
     const list = document.createElement("ul");
-    list.className = "humps";
-    const humps = beam.humps ?? [];
-    const drawn = drawnOf(humps, beam);
-    for (const hump of humps) list.append(this.hump(hump, hump === drawn, list));
+    list.className = "peaks";
+    const peaks = beam.peaks ?? [];
+    const drawn = drawnOf(peaks, beam);
+    for (const peak of peaks) list.append(this.peak(peak, peak === drawn, list));
     if (!list.children.length) return [heading("What the model hears"), note("nothing that comes near the threshold")];
     return [heading("What the model hears: range, over the threshold, path"), list];
   }
 
-  hump(hump, drawn, list) {
+  peak(peak, drawn, list) {
     const item = document.createElement("li");
     const button = item.appendChild(document.createElement("button"));
     button.type = "button";
     button.ariaPressed = String(drawn);
-    const texts = [words.metres(hump.range_m), words.decibels(hump.margin_db), words.path(hump.path)];
+    const texts = [words.metres(peak.range_m), words.decibels(peak.margin_db), words.path(peak.path)];
     for (const text of texts) button.appendChild(document.createElement("span")).textContent = text;
     button.addEventListener("click", () => {
       for (const other of list.querySelectorAll("button")) other.ariaPressed = String(other === button);
-      this.onPath(hump.polyline);
+      this.onPath(peak.polyline);
     });
     return item;
   }
@@ -102,11 +102,11 @@ export class BeamPanel {
 
 /** Which of the model's sounds the path of a beam's reading is: as many points, each within a millimetre;
  * of several, the one that meets the same in the same order. */
-function drawnOf(humps, { polyline, reading }) {
+function drawnOf(peaks, { polyline, reading }) {
   const near = (points) => points.every(([x, y], i) => Math.hypot(x - polyline[i][0], y - polyline[i][1]) < 1e-3);
-  const same = humps.filter((hump) => hump.polyline.length === polyline?.length && near(hump.polyline));
+  const same = peaks.filter((peak) => peak.polyline.length === polyline?.length && near(peak.polyline));
   const named = words.path(reading.path ?? reading.sim?.path);
-  return same.find((hump) => words.path(hump.path) === named) ?? same[0];
+  return same.find((peak) => words.path(peak.path) === named) ?? same[0];
 }
 
 /** A reading in one line, as the slider says it. */

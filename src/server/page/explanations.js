@@ -24,7 +24,7 @@ export class Explanations {
     this.told = { scan: "", explanations: [] };
     /** Which change is drawn. @type {string | null} */
     this.chosen = null;
-    this.list = make("ul", { id: "better-list", className: "humps" });
+    this.list = make("ul", { id: "better-list", className: "peaks" });
     this.hint = make("p", { className: "hint", textContent: "± is one standard deviation, gain the logarithm of how much likelier all readings become." });
     this.preview = make("button", { type: "button", id: "better-preview", textContent: "Preview", hidden: true });
     this.preview.addEventListener("click", () => this.propose());

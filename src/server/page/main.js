@@ -48,7 +48,7 @@ const panel = new BeamPanel(byId("beam-panel"), showPath, async ({ scan, index }
   return beam;
 });
 // A sound that is chosen in the trace is chosen in the list, too.
-const trace = new EchoTrace(byId("trace"), (hump) => byId("beam-panel").querySelectorAll(".humps button")[beam.humps.indexOf(hump)]?.click());
+const trace = new EchoTrace(byId("trace"), (peak) => byId("beam-panel").querySelectorAll(".peaks button")[beam.peaks.indexOf(peak)]?.click());
 const summary = new Summary(byId("summary"));
 const history = new History(
   { list: byId("scans-list"), line: byId("scan-line"), live: byId("live"), replay: byId("replay"), speed: byId("speed") },
@@ -171,7 +171,7 @@ function showPath(path) {
   byId("trace").hidden = !beam?.trace;
   plan.select(selected, path);
   const same = JSON.stringify(path);
-  trace.show(beam?.trace ? beam : null, beam?.humps?.find(({ polyline }) => JSON.stringify(polyline) === same) ?? null);
+  trace.show(beam?.trace ? beam : null, beam?.peaks?.find(({ polyline }) => JSON.stringify(polyline) === same) ?? null);
   changed = true;
 }
 

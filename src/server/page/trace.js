@@ -11,7 +11,7 @@ const FONT = "11px system-ui, sans-serif";
 export class EchoTrace {
   /**
    * @param {HTMLCanvasElement} canvas
-   * @param {(hump: import("../../../web/playground/engine.js").Hump) => void} onPick
+   * @param {(peak: import("../../../web/playground/engine.js").Peak) => void} onPick
    */
   constructor(canvas, onPick) {
     this.canvas = canvas;
@@ -20,7 +20,7 @@ export class EchoTrace {
     this.height = 0;
     /** @type {import("../../../web/playground/engine.js").Beam | null} */
     this.beam = null;
-    /** @type {import("../../../web/playground/engine.js").Hump | null} */
+    /** @type {import("../../../web/playground/engine.js").Peak | null} */
     this.chosen = null;
     /** @type {Record<string, string> | null} */
     this.palette = null;
@@ -31,7 +31,7 @@ export class EchoTrace {
 
   /**
    * @param {import("../../../web/playground/engine.js").Beam | null} beam
-   * @param {import("../../../web/playground/engine.js").Hump | null} chosen
+   * @param {import("../../../web/playground/engine.js").Peak | null} chosen
    */
   show(beam, chosen = null) {
     [this.beam, this.chosen] = [beam, chosen];
@@ -53,11 +53,11 @@ export class EchoTrace {
     this.c.clearRect(0, 0, this.width, this.height);
     this.drawAxes(palette);
     if (!this.beam) return;
-    const { trace, humps, reading } = this.beam;
+    const { trace, peaks, reading } = this.beam;
     this.drawBlanking(palette, trace);
     this.drawLine(trace.threshold, palette["--min-range"], [5, 4]);
     this.drawLine(trace.envelope, palette["--direct"], []);
-    for (const hump of humps) this.drawHump(palette, hump);
+    for (const peak of peaks) this.drawPeak(palette, peak);
     for (const echo of this.beam.echoes ?? []) this.drawEcho(palette, echo);
     if (reading.range_m !== null) this.drawRange(reading.range_m, palette["--wall"]);
     this.drawWords(palette);
@@ -142,13 +142,13 @@ export class EchoTrace {
 
   /**
    * @param {Record<string, string>} palette
-   * @param {import("../../../web/playground/engine.js").Hump} hump
+   * @param {import("../../../web/playground/engine.js").Peak} peak
    */
-  drawHump(palette, hump) {
+  drawPeak(palette, peak) {
     const { c } = this;
-    const x = this.x(hump.range_m);
+    const x = this.x(peak.range_m);
     if (x > this.width - RIGHT) return;
-    const chosen = hump === this.chosen;
+    const chosen = peak === this.chosen;
     c.fillStyle = palette[chosen ? "--path" : "--quiet"];
     const half = chosen ? 5 : 3;
     c.beginPath();
@@ -194,10 +194,10 @@ export class EchoTrace {
 
   /** @param {number} x */
   pick(x) {
-    const off = (/** @type {import("../../../web/playground/engine.js").Hump} */ hump) => Math.abs(this.x(hump.range_m) - x);
-    const nearest = (this.beam?.humps ?? []).reduce(
+    const off = (/** @type {import("../../../web/playground/engine.js").Peak} */ peak) => Math.abs(this.x(peak.range_m) - x);
+    const nearest = (this.beam?.peaks ?? []).reduce(
       (one, other) => (one && off(one) <= off(other) ? one : other),
-      /** @type {import("../../../web/playground/engine.js").Hump | null} */ (null),
+      /** @type {import("../../../web/playground/engine.js").Peak | null} */ (null),
     );
     if (nearest && off(nearest) <= HIT_PX) this.onPick(nearest);
   }

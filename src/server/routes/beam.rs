@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     acoustics::Air,
-    api::{Beam, Echo, HumpLine, JudgedPing, PlanPoint, TraceLine},
+    api::{Beam, Echo, JudgedPing, PeakLine, PlanPoint, TraceLine},
     geometry::Pose,
     model::{Options, Simulator, TooCostly},
     scan::{Ping, ScanView, Session},
@@ -13,7 +13,7 @@ use crate::{
 
 /// The model is asked so far beyond what was heard or predicted, metres.
 const BEYOND_M: f64 = 0.5;
-/// Spacing of the samples that find a hump's peak, microseconds.
+/// Spacing of the samples that find an envelope peak, microseconds.
 const STEP_US: f64 = 20.0;
 
 /// Everything about a reading of a scan. The model is asked if `scene` is the one that the scan
@@ -21,8 +21,8 @@ const STEP_US: f64 = 20.0;
 pub(super) fn look(view: &ScanView, ping: Ping, scene: Option<&Scene>) -> Beam {
     let session = view.session.as_deref();
     let echoes = echoes(view, session, &ping);
-    let (humps, trace, lacks) = match ask_model(view, session, &ping, scene) {
-        Ok((humps, trace)) => (Some(humps), Some(trace), None),
+    let (peaks, trace, lacks) = match ask_model(view, session, &ping, scene) {
+        Ok((peaks, trace)) => (Some(peaks), Some(trace), None),
         Err(lacks) => (None, None, Some(lacks)),
     };
     // A log of format 1 does not say where the sound went; the model does, in the scan's own scene.
@@ -31,7 +31,7 @@ pub(super) fn look(view: &ScanView, ping: Ping, scene: Option<&Scene>) -> Beam {
         _ => path.polyline(view.ends(&ping, path)?),
     });
     let polyline = polyline.map(|points| points.into_iter().map(PlanPoint::from).collect());
-    Beam { reading: JudgedPing::of(ping, view), echoes, polyline, humps, trace, lacks }
+    Beam { reading: JudgedPing::of(ping, view), echoes, polyline, peaks, trace, lacks }
 }
 
 fn echoes(view: &ScanView, session: Option<&Session>, ping: &Ping) -> Vec<Echo> {
@@ -53,7 +53,7 @@ fn ask_model(
     session: Option<&Session>,
     ping: &Ping,
     scene: Option<&Scene>,
-) -> Result<(Vec<HumpLine>, TraceLine), String> {
+) -> Result<(Vec<PeakLine>, TraceLine), String> {
     let (session, pose) = session.zip(view.pose()).ok_or("the log lacks the scan's session")?;
     let scene = scene.ok_or("there is no scene in force")?;
     let taken_in = session.scene.as_ref().ok_or("the scan was taken without a scene")?;
@@ -90,9 +90,9 @@ fn listen(
     simulator: &Simulator,
     axis: &Pose,
     until_m: f64,
-) -> Result<(Vec<HumpLine>, TraceLine), TooCostly> {
-    let station = simulator.at(axis.position());
-    let trace = station.trace(axis.direction_rad(0.0), until_m, STEP_US)?;
-    let humps = HumpLine::of_trace(simulator, &station, axis, &trace)?;
-    Ok((humps, TraceLine::of(simulator, &trace, STEP_US)))
+) -> Result<(Vec<PeakLine>, TraceLine), TooCostly> {
+    let point = simulator.at(axis.position());
+    let trace = point.trace(axis.direction_rad(0.0), until_m, STEP_US)?;
+    let peaks = PeakLine::of_trace(simulator, &point, axis, &trace)?;
+    Ok((peaks, TraceLine::of(simulator, &trace, STEP_US)))
 }

@@ -259,11 +259,11 @@ fn past_scans_and_their_beams_are_read_from_the_logs() {
     let length_m: f64 = path.windows(2).map(|leg| distance(&leg[0], &leg[1])).sum();
     let stated_m = whole["pings"][5]["sim"]["path"]["length_m"].as_f64().expect("a length");
     assert!((length_m - stated_m).abs() < 1e-6, "{length_m} and {stated_m}");
-    let drawn = |hump: &Value| hump["path"] == whole["pings"][5]["sim"]["path"];
-    let humps = beam["humps"].as_array().expect("humps");
+    let drawn = |peak: &Value| peak["path"] == whole["pings"][5]["sim"]["path"];
+    let peaks = beam["peaks"].as_array().expect("peaks");
     assert!(
-        humps.iter().any(|hump| drawn(hump) && hump["polyline"] == beam["polyline"]),
-        "{humps:?}"
+        peaks.iter().any(|peak| drawn(peak) && peak["polyline"] == beam["polyline"]),
+        "{peaks:?}"
     );
     let echo = &beam["echoes"][0];
     let off_m = echo["range_m"].as_f64().zip(whole["pings"][5]["range_m"].as_f64());

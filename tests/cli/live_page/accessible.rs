@@ -37,7 +37,7 @@ fn everything_has_a_name_and_contrast_on_desk_and_phone_in_light_and_dark() {
         "(() => { const s = document.getElementById('beam'); s.value = 300; \
          s.dispatchEvent(new Event('input')); })()",
     );
-    browser.until("document.querySelectorAll('.humps button').length > 0");
+    browser.until("document.querySelectorAll('.peaks button').length > 0");
     assert_clean(&browser);
     look_at(&browser, "");
 }

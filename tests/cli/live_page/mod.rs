@@ -144,13 +144,13 @@ fn a_beam_is_chosen_by_click_or_key_and_its_path_is_drawn() {
     let spoken = browser.eval("document.getElementById('beam').getAttribute('aria-valuetext')");
     assert_eq!(spoken, json!(now()));
     // The daemon tells the beam's echoes and paths; the predicted one is drawn.
-    browser.until("document.querySelectorAll('.humps button').length > 0");
-    browser.until("document.querySelectorAll('.humps [aria-pressed=true]').length === 1");
+    browser.until("document.querySelectorAll('.peaks button').length > 0");
+    browser.until("document.querySelectorAll('.peaks [aria-pressed=true]').length === 1");
     assert!(browser.eval("document.querySelectorAll('.echoes li').length").as_u64() >= Some(1));
     let with_path = path_points(&browser);
     assert!(with_path > 50, "{with_path} points of the path's colour");
     // Another sound by key: tab to it, press it, and its own path is drawn.
-    browser.eval("document.querySelector('.humps [aria-pressed=false]:not(:disabled)').focus()");
+    browser.eval("document.querySelector('.peaks [aria-pressed=false]:not(:disabled)').focus()");
     browser.press(Key::Enter.into());
     browser.until("document.activeElement.ariaPressed === 'true'");
     assert_ne!(path_points(&browser), with_path);

@@ -35,7 +35,7 @@ fn pictures_of_overlays_and_preview_are_made() {
         "(() => { const s = document.getElementById('beam'); s.value = 100; \
          s.dispatchEvent(new Event('input')); })()",
     );
-    browser.until("document.querySelectorAll('.humps [aria-pressed=true]').length === 1");
+    browser.until("document.querySelectorAll('.peaks [aria-pressed=true]').length === 1");
     for kind in ["map", "lines", "features"] {
         browser.click(&format!("#show-{kind}"));
     }

@@ -184,7 +184,7 @@ fn everything_that_is_drawn_is_in_the_legend() {
     browser.until(OVER);
     assert!(!legend_has(&browser, "direction of the newest reading"));
     choose(&browser, 75);
-    browser.until("document.querySelectorAll('.humps [aria-pressed=true]').length === 1");
+    browser.until("document.querySelectorAll('.peaks [aria-pressed=true]').length === 1");
     let drawn = [
         "wall",
         "pose and heading",
@@ -246,7 +246,7 @@ fn a_selected_beam_stays_selected_in_the_next_scan() {
     browser.click("#scans-list li:nth-child(2) button");
     browser.until("document.querySelector('#live').ariaPressed === 'false'");
     assert!(now().starts_with("beam 75, "), "{}", now());
-    browser.until("document.querySelectorAll('.humps [aria-pressed=true]').length === 1");
+    browser.until("document.querySelectorAll('.peaks [aria-pressed=true]').length === 1");
     assert_clean(&browser);
 }
 

@@ -105,7 +105,7 @@ fn check_path(browser: &Browser, reading: &Value) {
          s.dispatchEvent(new Event('input')); }})()",
         reading["index"]
     ));
-    browser.until("document.querySelectorAll('.humps [aria-pressed=true]').length === 1");
+    browser.until("document.querySelectorAll('.peaks [aria-pressed=true]').length === 1");
     let path: Vec<Point> =
         of_plan(browser, "plan.path").as_array().expect("a path").iter().map(point).collect();
     for side in [path[0], path[path.len() - 1]] {

@@ -35,7 +35,7 @@ fn choose(browser: &Browser, index: u32) {
         "(() => {{ const s = document.getElementById('beam'); s.value = {index}; \
          s.dispatchEvent(new Event('input')); }})()"
     ));
-    browser.until("document.querySelectorAll('.humps [aria-pressed=true]').length === 1");
+    browser.until("document.querySelectorAll('.peaks [aria-pressed=true]').length === 1");
 }
 
 fn has(browser: &Browser, selector: &str, words: &str) {
@@ -129,11 +129,11 @@ fn the_selected_beam_has_its_echo_trace_and_its_ranges_over_time() {
     let drawn = drawn_points(&browser, "trace");
     assert!(drawn > 600, "{drawn} points");
     // A sound is chosen by its place in the trace, too.
-    let chosen = || browser.text(".humps [aria-pressed=true]");
+    let chosen = || browser.text(".peaks [aria-pressed=true]");
     let before = chosen();
     browser.click_at("#trace", 0.22, 0.85);
     browser.until(&format!(
-        "document.querySelector('.humps [aria-pressed=true]').textContent !== {before:?}"
+        "document.querySelector('.peaks [aria-pressed=true]').textContent !== {before:?}"
     ));
     browser.click("#over-time summary");
     has(&browser, "#series-now", "Beam 75 in 2 scans: mean 0.82");

@@ -6,7 +6,7 @@ use sonard_model::{
     geometry::Pose,
     model::{ObservationPoint, Simulator, TooCostly},
 };
-use sonard_records::{HumpLine, PlanPoint, TraceLine};
+use sonard_records::{PeakLine, PlanPoint, TraceLine};
 
 use crate::{Refusal, sweep::Sweep};
 
@@ -23,7 +23,7 @@ pub(crate) struct Beam {
     /// The path of its sound in the plan: the transmitter, each interaction, the receiver.
     polyline: Option<Vec<PlanPoint>>,
     /// What the model hears, in order of time, faint sounds included.
-    humps: Vec<HumpLine>,
+    peaks: Vec<PeakLine>,
     trace: TraceLine,
 }
 
@@ -39,14 +39,14 @@ impl Beam {
             let most_m = simulator.receiver().max_range_m;
             let until_m = if heard_m > 0.0 { most_m.min(heard_m + BEYOND_M) } else { most_m };
             let trace = point.trace(axis.direction_rad(0.0), until_m, STEP_US)?;
-            let humps = HumpLine::of_trace(simulator, point, axis, &trace)?;
-            Ok::<_, TooCostly>((humps, TraceLine::of(simulator, &trace, STEP_US)))
+            let peaks = PeakLine::of_trace(simulator, point, axis, &trace)?;
+            Ok::<_, TooCostly>((peaks, TraceLine::of(simulator, &trace, STEP_US)))
         };
-        let (humps, trace) = sweep.look(ping, listen)?.transpose()?.unwrap_or_default();
+        let (peaks, trace) = sweep.look(ping, listen)?.transpose()?.unwrap_or_default();
         let viewpoint = reading.beside.viewpoint;
         let line = reading.ping.sound_path().zip(viewpoint);
         let line = line.and_then(|(path, viewpoint)| path.polyline(viewpoint.ends()));
         let polyline = line.map(|points| points.into_iter().map(PlanPoint::from).collect());
-        Ok(Self { reading, polyline, humps, trace })
+        Ok(Self { reading, polyline, peaks, trace })
     }
 }

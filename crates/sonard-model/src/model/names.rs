@@ -1,6 +1,6 @@
 //! Names of what a path meets: ids of the scene, and words for what has no id.
 
-use super::{Bend, Edge, Mechanism, Reflector};
+use super::{Diffractor, Edge, Mechanism, Reflector};
 use crate::scene::Scene;
 
 /// The name of the transducer's own face on a path.
@@ -26,7 +26,7 @@ impl Reflector {
 }
 
 impl Mechanism {
-    /// What it is done by, in a scene: a [`Reflector`]'s name, a [`Bend`]'s, or [`FACE_NAME`].
+    /// What it is done by, in a scene: a [`Reflector`]'s name, a [`Diffractor`]'s, or [`FACE_NAME`].
     ///
     /// # Panics
     /// If it is of another scene.
@@ -34,14 +34,14 @@ impl Mechanism {
     pub fn name(self, scene: &Scene) -> String {
         match self {
             Self::Reflection(reflector) => reflector.name(scene),
-            Self::Diffraction(bend) => bend.name(scene),
+            Self::Diffraction(diffractor) => diffractor.name(scene),
             Self::Scattering { wall } => Reflector::Wall(wall).name(scene),
             Self::Transducer => FACE_NAME.to_owned(),
         }
     }
 }
 
-impl Bend {
+impl Diffractor {
     /// Its name in a scene: `WALL.a` and `WALL.b` are the upright edges at the ends of a wall, `WALL.top`
     /// and `WALL.bottom` the level ones; a thin cylinder has its id.
     ///

@@ -29,7 +29,7 @@ pub enum Mechanism {
     /// Mirror reflection (by engine [`Cone`](super::Cone), which knows no mirrors: the nearest hit).
     Reflection(Reflector),
     /// Diffraction at an edge.
-    Diffraction(Bend),
+    Diffraction(Diffractor),
     /// Diffuse scattering by the roughness of a wall.
     Scattering {
         /// Index into `scene.walls`.
@@ -54,7 +54,7 @@ pub enum Reflector {
 
 /// An edge of a scene, or what diffracts as one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Bend {
+pub enum Diffractor {
     /// An upright one: where walls end or meet.
     Upright(Edge),
     /// A level one of a wall that ends below the ceiling or above the floor.
@@ -109,9 +109,9 @@ impl Path {
     }
 
     /// The edges that diffract it, in order.
-    pub fn bends(&self) -> impl DoubleEndedIterator<Item = Bend> {
+    pub fn diffractors(&self) -> impl DoubleEndedIterator<Item = Diffractor> {
         self.mechanisms().filter_map(|mechanism| match mechanism {
-            Mechanism::Diffraction(bend) => Some(bend),
+            Mechanism::Diffraction(diffractor) => Some(diffractor),
             _ => None,
         })
     }
@@ -147,9 +147,11 @@ impl Mechanism {
     pub const fn surface(self) -> Option<Reflector> {
         match self {
             Self::Reflection(reflector) => Some(reflector),
-            Self::Diffraction(Bend::Upright(Edge { wall, .. }) | Bend::Level { wall, .. })
+            Self::Diffraction(
+                Diffractor::Upright(Edge { wall, .. }) | Diffractor::Level { wall, .. },
+            )
             | Self::Scattering { wall } => Some(Reflector::Wall(wall)),
-            Self::Diffraction(Bend::Post { cylinder }) => Some(Reflector::Cylinder(cylinder)),
+            Self::Diffraction(Diffractor::Post { cylinder }) => Some(Reflector::Cylinder(cylinder)),
             Self::Transducer => None,
         }
     }

@@ -15,8 +15,8 @@ pub(in crate::model) mod reference;
 use std::sync::Arc;
 
 use super::{
-    Arrival, Bend, ConeOptions, EngineKind, EngineOptions, FanOptions, Options, Path, PathOptions,
-    Reflector, Simulator,
+    Arrival, ConeOptions, Diffractor, EngineKind, EngineOptions, FanOptions, Options, Path,
+    PathOptions, Reflector, Simulator,
 };
 use crate::{
     acoustics::{Air, Sensor},
@@ -73,8 +73,8 @@ pub(in crate::model) fn reflectors(path: &Path) -> Vec<Reflector> {
 }
 
 /// The edges that diffract it, in order.
-pub(in crate::model) fn bends(path: &Path) -> Vec<Bend> {
-    path.bends().collect()
+pub(in crate::model) fn diffractors(path: &Path) -> Vec<Diffractor> {
+    path.diffractors().collect()
 }
 
 fn pose(scene: &Scene, name: &str) -> Pose {

@@ -87,8 +87,8 @@ pub(crate) fn floor_of(echo: &EchoPath, settings: &Settings) -> f64 {
     let is_round = |m: &Mechanism| matches!(m, Mechanism::Reflection(Reflector::Cylinder(_)));
     let is_bend = |m: &Mechanism| matches!(m, Mechanism::Diffraction(_));
     let contacts = echo.path.mechanisms().filter(is_round).count();
-    let bends = echo.path.mechanisms().filter(is_bend).count();
-    let is_kept = contacts < 2 && (contacts == 0 || bends == 0);
+    let diffractors = echo.path.mechanisms().filter(is_bend).count();
+    let is_kept = contacts < 2 && (contacts == 0 || diffractors == 0);
     if is_kept { settings.floor } else { settings.repeated_contacts_above * settings.floor }
 }
 

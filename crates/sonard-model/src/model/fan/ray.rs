@@ -7,7 +7,7 @@ use crate::{
     acoustics::BeamPattern,
     geometry::{DVec2, wrap_pi},
     model::{
-        Arrival, Bend, Edge, Interaction, Mechanism, Path, Reflector,
+        Arrival, Diffractor, Edge, Interaction, Mechanism, Path, Reflector,
         raycast::{Hit, Reflectors},
     },
 };
@@ -272,8 +272,8 @@ impl Candidate {
     /// back misses the cylinder (13 of a thousand in the shipped scenes), the last ray that met it is drawn, and the
     /// last leg does not obey the law of mirrors.
     fn path(&self, reflectors: &Reflectors, position: DVec2) -> Path {
-        let bend = self.met.edge.map(|edge| (edge, reflectors.edge_point(edge)));
-        let end = bend.map_or(position, |(_, point)| point);
+        let diffractor = self.met.edge.map(|edge| (edge, reflectors.edge_point(edge)));
+        let end = diffractor.map_or(position, |(_, point)| point);
         let over = |leaves_rad| Ray::over(position, leaves_rad, &self.met.reflectors, reflectors);
         let mut leaves_rad = self.ray_departure_rad;
         let mut points = Vec::new();
@@ -293,9 +293,10 @@ impl Candidate {
         }
         let reflections =
             self.met.reflectors.iter().copied().map(Mechanism::Reflection).zip(points);
-        let bend = bend.map(|(edge, point)| (Mechanism::Diffraction(Bend::Upright(edge)), point));
+        let diffractor = diffractor
+            .map(|(edge, point)| (Mechanism::Diffraction(Diffractor::Upright(edge)), point));
         let interaction = |(mechanism, point)| Interaction { mechanism, point, z_m: None };
-        Path { interactions: reflections.chain(bend).map(interaction).collect() }
+        Path { interactions: reflections.chain(diffractor).map(interaction).collect() }
     }
 
     pub(super) fn weighing(&self) -> Weighing {

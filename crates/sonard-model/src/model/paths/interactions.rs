@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     geometry::DVec2,
-    model::{Bend, Interaction, Mechanism, Path, Reflector, SearchPart},
+    model::{Diffractor, Interaction, Mechanism, Path, Reflector, SearchPart},
 };
 
 /// An echo path, before the beam pattern.
@@ -150,9 +150,13 @@ impl Paths {
         };
         let (point, mut interactions) = half(0, &traced.out);
         let (_, back) = half(1, traced.back());
-        let bend = Bend::Level { wall, is_upper: level.is_upper };
+        let diffractor = Diffractor::Level { wall, is_upper: level.is_upper };
         let z_m = self.heights.z_at(rise_m);
-        interactions.push(Interaction { mechanism: Mechanism::Diffraction(bend), point, z_m });
+        interactions.push(Interaction {
+            mechanism: Mechanism::Diffraction(diffractor),
+            point,
+            z_m,
+        });
         interactions.extend(back.into_iter().rev());
         interactions
     }
@@ -182,7 +186,7 @@ impl Paths {
             }
             Via::Edges { double } => self.by_two_edges(traced, &traced.double[double as usize]),
             Via::Edge { point, out, back } => {
-                let Some(middle) = self.upright_bend(point) else { return Contacts::new() };
+                let Some(middle) = self.upright_diffractor(point) else { return Contacts::new() };
                 let rays = [(there, there.to_edge(out)), (here, here.to_edge(back))];
                 self.out_and_back(rays, middle)
             }
@@ -197,15 +201,15 @@ impl Paths {
         out
     }
 
-    fn upright_bend(&self, point: u32) -> Option<(DVec2, Mechanism)> {
+    fn upright_diffractor(&self, point: u32) -> Option<(DVec2, Mechanism)> {
         let corners = &self.plan.corners;
-        Some((corners.position(point)?, Mechanism::Diffraction(corners.bend(point)?)))
+        Some((corners.position(point)?, Mechanism::Diffraction(corners.diffractor(point)?)))
     }
 
     fn by_two_edges(&self, traced: &Traced, path: &DoubleDiffraction) -> Contacts {
         let DoubleDiffraction { points: [first, second], leg, out, back } = *path;
-        let bends = [first, second].map(|point| self.upright_bend(point));
-        let [Some(one), Some(other)] = bends else { return Contacts::new() };
+        let diffractors = [first, second].map(|point| self.upright_diffractor(point));
+        let [Some(one), Some(other)] = diffractors else { return Contacts::new() };
         let (there, here) = (&traced.out, traced.back());
         let between = &self.edge_to_edge.at(&self.plan, first).beams;
         let leg = Leg::from(&between.to_edges[leg as usize].1);

@@ -28,8 +28,8 @@ use crate::{
     acoustics::edge::EdgeLaw,
     geometry::DVec2,
     model::{
-        Bend, Edge,
-        tests::{bends, reflectors},
+        Diffractor, Edge,
+        tests::{diffractors, reflectors},
     },
     reading::PathKind,
     scene::{DEFAULT_SNAP_M, Material, Scene, Wall},

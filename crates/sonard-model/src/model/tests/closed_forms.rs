@@ -90,7 +90,8 @@ fn a_free_end_returns_kuc_and_siegels_share_of_a_plane() {
         let all = arrivals(scene(vec![tilted]), BARE, DVec2::ZERO, 0.0);
         let found = of_kind(&all, PathKind::Diffracted)
             .find(|arrival| {
-                bends(&arrival.path)[..] == [Bend::Upright(Edge { wall: 0, at_b: false })]
+                diffractors(&arrival.path)[..]
+                    == [Diffractor::Upright(Edge { wall: 0, at_b: false })]
             })
             .expect("the end is heard");
         let wavelength_m = Air::default().sound_speed_m_s() / 49.4e3;
@@ -107,7 +108,8 @@ fn an_end_out_of_sight_is_silent() {
         wall("screen", (0.5, -0.4), (0.5, 0.4), 1.0),
     ];
     let all = arrivals(scene(walls), BARE, DVec2::ZERO, 0.0);
-    let of_second = |a: &Arrival| matches!(bends(&a.path)[..], [Bend::Upright(e)] if e.wall == 1);
+    let of_second =
+        |a: &Arrival| matches!(diffractors(&a.path)[..], [Diffractor::Upright(e)] if e.wall == 1);
     assert!(of_kind(&all, PathKind::Diffracted).all(of_second));
 }
 

@@ -21,7 +21,7 @@ struct Run {
 fn names(simulator: &Simulator, arrival: &Arrival) -> String {
     let scene = simulator.scene();
     let name = |met: Mechanism| match met {
-        Mechanism::Diffraction(bend) => format!("edge {}", bend.name(scene)),
+        Mechanism::Diffraction(diffractor) => format!("edge {}", diffractor.name(scene)),
         _ => met.name(scene),
     };
     arrival.path.mechanisms().map(name).collect::<Vec<_>>().join(", ")

@@ -80,8 +80,10 @@ impl Room {
                 mirrored(out.normalize().extend(0.0))
             }
             Mechanism::Reflection(Reflector::Floor | Reflector::Ceiling) => mirrored(DVec3::Z),
-            Mechanism::Diffraction(Bend::Upright(_) | Bend::Post { .. }) => diffracted(DVec3::Z),
-            Mechanism::Diffraction(Bend::Level { wall, .. }) => {
+            Mechanism::Diffraction(Diffractor::Upright(_) | Diffractor::Post { .. }) => {
+                diffracted(DVec3::Z)
+            }
+            Mechanism::Diffraction(Diffractor::Level { wall, .. }) => {
                 diffracted(self.mirror(wall).normal.perp().extend(0.0))
             }
             Mechanism::Scattering { .. } | Mechanism::Transducer => 0.0,
@@ -107,7 +109,7 @@ impl Room {
             Mechanism::Reflection(Reflector::Wall(wall)) | Mechanism::Scattering { wall } => {
                 off_wall_m(wall)
             }
-            Mechanism::Diffraction(Bend::Post { cylinder }) => {
+            Mechanism::Diffraction(Diffractor::Post { cylinder }) => {
                 point.distance(self.scene.cylinders[cylinder as usize].center)
             }
             Mechanism::Reflection(Reflector::Cylinder(index)) => {
@@ -116,14 +118,14 @@ impl Room {
             }
             Mechanism::Reflection(Reflector::Floor) => off_z_m(self.scene.floor_z_m),
             Mechanism::Reflection(Reflector::Ceiling) => off_z_m(self.scene.ceiling_z_m),
-            Mechanism::Diffraction(Bend::Upright(Edge { wall, at_b })) => {
+            Mechanism::Diffraction(Diffractor::Upright(Edge { wall, at_b })) => {
                 let wall = &self.scene.walls[wall as usize];
                 // Where walls cross, the edge is called by the nearer end of one.
                 let (near, far) = if at_b { (wall.b, wall.a) } else { (wall.a, wall.b) };
                 assert!(point.distance(near) <= point.distance(far), "{interaction:?}");
                 distance_to_segment(point, wall.a, wall.b)
             }
-            Mechanism::Diffraction(Bend::Level { wall, is_upper }) => {
+            Mechanism::Diffraction(Diffractor::Level { wall, is_upper }) => {
                 let limits = self.scene.walls[wall as usize].z_m.expect("a wall with limits");
                 off_wall_m(wall).max(off_z_m(Some(limits[usize::from(is_upper)])))
             }
@@ -253,17 +255,18 @@ impl Counts {
     fn add(&mut self, path: &Path) {
         let of_floor = |met| matches!(met, Reflector::Floor | Reflector::Ceiling);
         let floor = path.reflectors().any(of_floor);
-        let bends = bends(path);
-        let level = bends.iter().any(|bend| matches!(bend, Bend::Level { .. }));
+        let diffractors = diffractors(path);
+        let level =
+            diffractors.iter().any(|diffractor| matches!(diffractor, Diffractor::Level { .. }));
         let mirrors = path.interactions.len() == path.order() && !floor && !is_round(path);
         self.mirrored += usize::from(mirrors);
         self.round += usize::from(is_round(path));
         self.floor += usize::from(floor);
         self.scattered += usize::from(path.kind() == PathKind::Scattered);
-        self.upright += usize::from(!bends.is_empty() && !level);
+        self.upright += usize::from(!diffractors.is_empty() && !level);
         self.level += usize::from(level);
         self.level_by_floor += usize::from(level && floor);
-        self.twice += usize::from(bends.len() == 2);
+        self.twice += usize::from(diffractors.len() == 2);
     }
 
     fn assert_at_least(&self, count: usize) {
@@ -364,7 +367,7 @@ fn the_order_of_a_path_counts_mirror_reflections_only() {
             .collect(),
     };
     let wall = Mechanism::Reflection(Reflector::Wall(0));
-    let level = Mechanism::Diffraction(Bend::Level { wall: 1, is_upper: true });
+    let level = Mechanism::Diffraction(Diffractor::Level { wall: 1, is_upper: true });
     let rough = Mechanism::Scattering { wall: 2 };
     let floor = Mechanism::Reflection(Reflector::Floor);
     for (path, kind, order) in [

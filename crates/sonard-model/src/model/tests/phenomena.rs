@@ -271,8 +271,8 @@ fn a_weak_post_explains_a_silence() {
     let silence = simulator.at(DVec2::ZERO).ping(0.0).expect("few paths");
     assert_eq!(silence.status, PingStatus::NoEcho);
     let candidate = silence.arrival.expect("a candidate");
-    let bends: Vec<Bend> = candidate.path.bends().collect();
-    assert_eq!(bends, [Bend::Post { cylinder: 0 }]);
+    let diffractors: Vec<Diffractor> = candidate.path.diffractors().collect();
+    assert_eq!(diffractors, [Diffractor::Post { cylinder: 0 }]);
     let lacks_db = silence.margin_db.expect("what it lacked");
     // sqrt(r / (r + d)) of a wall's echo, 10 m of air at 1.641 dB/m, and a threshold of -35.1 dB.
     let expected_db = 10.0 * (0.01_f64 / 5.0).log10() - 9.98 * 1.641 + 35.1;

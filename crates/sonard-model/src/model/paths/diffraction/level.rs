@@ -41,7 +41,7 @@ use crate::{
     acoustics::edge::{Aspect, EdgeLaw, Wedge},
     geometry::{DVec2, Mirror},
     model::{
-        Bend, Mechanism, SearchPart,
+        Diffractor, Mechanism, SearchPart,
         paths::{
             beams::{Beams, Leg, LitSpan, Ray},
             echo::{Echo, Via, drop_repeats},
@@ -387,7 +387,7 @@ impl Search<'_> {
         let Surroundings { plan, heights, .. } = self.scene;
         let mut contacts = wall_contacts(from.beams, plan, leg, point);
         let LevelEdge { wall, is_upper, .. } = self.edge;
-        contacts.push((point, Mechanism::Diffraction(Bend::Level { wall, is_upper })));
+        contacts.push((point, Mechanism::Diffraction(Diffractor::Level { wall, is_upper })));
         let ends = Ends { start: from.start, end: None, rise_m: beam.climb_m };
         heights.is_path_clear(&plan.cylinders, &contacts, &ends)
     }

@@ -9,7 +9,7 @@ use super::{posts::PlanPost, strips::PlanStrip};
 use crate::{
     acoustics::edge::{Aspect, EdgeLaw, Post, Strip, Wedge},
     geometry::{Arrangement, DVec2},
-    model::{Bend, Edge, paths::tolerance::TIE_M},
+    model::{Diffractor, Edge, paths::tolerance::TIE_M},
 };
 
 /// Rays along a wall's face belong to the wall's near end, radians.
@@ -31,7 +31,7 @@ pub(crate) struct Corners {
 #[derive(Debug)]
 pub(crate) struct Corner {
     point: DVec2,
-    bend: Bend,
+    diffractor: Diffractor,
     /// Counter-clockwise around the point.
     sectors: SmallVec<[Sector; 2]>,
     /// What scatters as a whole and has its middle here, in place of an edge.
@@ -107,7 +107,12 @@ impl Corners {
             let edge = ending.or_else(crossing)?;
             let sectors = sectors(&faces, gains, law);
             let answers = sectors.iter().any(|sector| sector.answers);
-            answers.then_some(Corner { point, bend: Bend::Upright(edge), sectors, whole: None })
+            answers.then_some(Corner {
+                point,
+                diffractor: Diffractor::Upright(edge),
+                sectors,
+                whole: None,
+            })
         };
         let mut points: Vec<_> = (0..).zip(around).map(corner).collect();
         for strip in strips {
@@ -130,8 +135,8 @@ impl Corners {
     }
 
     /// What diffracts at a point.
-    pub(crate) fn bend(&self, point: u32) -> Option<Bend> {
-        Some(self.points.get(point as usize)?.as_ref()?.bend)
+    pub(crate) fn diffractor(&self, point: u32) -> Option<Diffractor> {
+        Some(self.points.get(point as usize)?.as_ref()?.diffractor)
     }
 
     /// The edge at a point, if there is one.
@@ -179,15 +184,15 @@ impl Corner {
 
     /// A strip's middle: air all around it.
     fn of_strip(point: DVec2, PlanStrip { wall, along, strip, .. }: PlanStrip) -> Self {
-        let bend = Bend::Upright(Edge { wall, at_b: false });
-        Self::of_whole(point, along.normalize(), bend, Whole::Strip(Box::new(strip)))
+        let diffractor = Diffractor::Upright(Edge { wall, at_b: false });
+        Self::of_whole(point, along.normalize(), diffractor, Whole::Strip(Box::new(strip)))
     }
 
     fn of_post(point: DVec2, PlanPost { cylinder, post, .. }: PlanPost) -> Self {
-        Self::of_whole(point, DVec2::X, Bend::Post { cylinder }, Whole::Post(post))
+        Self::of_whole(point, DVec2::X, Diffractor::Post { cylinder }, Whole::Post(post))
     }
 
-    fn of_whole(point: DVec2, along: DVec2, bend: Bend, whole: Whole) -> Self {
+    fn of_whole(point: DVec2, along: DVec2, diffractor: Diffractor, whole: Whole) -> Self {
         let sector = Sector {
             from_rad: along.to_angle(),
             faces: [along; 2],
@@ -195,7 +200,7 @@ impl Corner {
             answers: true,
         };
         let sectors = SmallVec::from_buf_and_len([sector; 2], 1);
-        Self { point, bend, sectors, whole: Some(whole) }
+        Self { point, diffractor, sectors, whole: Some(whole) }
     }
 
     /// Whether something scatters as a whole and no edge does.

@@ -110,7 +110,7 @@ fn an_edge_seen_along_its_wall_answers() {
     let settings = Settings { edge_law: Some(EdgeLaw::KucSiegel), ..LOSSLESS };
     let echoes = Paths::new(&wall, settings).enumerate(DVec2::new(-0.5, 0.0)).expect("few paths");
     assert_eq!(echoes.len(), 1);
-    let end = Bend::Upright(Edge { wall: 0, at_b: false });
-    assert_eq!(bends(&echoes[0].path)[..], [end]);
+    let end = Diffractor::Upright(Edge { wall: 0, at_b: false });
+    assert_eq!(diffractors(&echoes[0].path)[..], [end]);
     assert!((echoes[0].length_m - 1.0).abs() < 1e-12);
 }

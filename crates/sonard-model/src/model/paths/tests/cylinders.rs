@@ -208,7 +208,7 @@ fn a_huge_cylinder_is_a_wall() {
         let is_same = |one: &&EchoPath| {
             (one.length_m - other.length_m).abs() < 1e-3
                 && (one.amplitude - other.amplitude).abs() < 1e-2 * other.amplitude
-                && bends(&one.path) == bends(&other.path)
+                && diffractors(&one.path) == diffractors(&other.path)
                 && reflectors(&one.path).len() == reflectors(&other.path).len()
         };
         assert!(round.iter().any(|one| is_same(&one)), "{other:?}");
@@ -234,7 +234,9 @@ fn edges_answer_by_way_of_cylinders() {
         .fold(f64::INFINITY, f64::min);
     let bent: Vec<_> = echoes
         .iter()
-        .filter(|echo| matches!(bends(&echo.path)[..], [Bend::Upright(edge)] if !edge.at_b))
+        .filter(
+            |echo| matches!(diffractors(&echo.path)[..], [Diffractor::Upright(edge)] if !edge.at_b),
+        )
         .map(|echo| (echo.length_m, reflectors(&echo.path).len()))
         .collect();
     for (expected, count) in [(2.4, 1), (1.2 + by, 2), (2.0 * by, 1)] {

@@ -15,7 +15,7 @@ pub(super) fn at_height(z_m: f64) -> Settings {
 }
 
 pub(super) fn is_by_level_edge(echo: &EchoPath) -> bool {
-    matches!(bends(&echo.path)[..], [Bend::Level { .. }])
+    matches!(diffractors(&echo.path)[..], [Diffractor::Level { .. }])
 }
 
 /// Pressure of an echo beside a source's at 1 m.
@@ -33,7 +33,7 @@ fn low_wall() -> Scene {
 
 /// The upper edge of a wall, as what bends a path.
 fn top_of(wall: u32) -> Mechanism {
-    Mechanism::Diffraction(Bend::Level { wall, is_upper: true })
+    Mechanism::Diffraction(Diffractor::Level { wall, is_upper: true })
 }
 
 fn by_level_edges(plan: &Scene, at: DVec2, z_m: f64) -> Vec<EchoPath> {
@@ -310,7 +310,7 @@ fn a_level_edge_in_pieces_is_one() {
         ..cut.walls[0].clone()
     });
     let mut pieces = by_level_edges(&cut, DVec2::new(0.25, 0.0), 0.9);
-    pieces.retain(|e| matches!(bends(&e.path)[..], [Bend::Level { wall: 0, .. }]));
+    pieces.retain(|e| matches!(diffractors(&e.path)[..], [Diffractor::Level { wall: 0, .. }]));
     assert_eq!(pieces.len(), whole.len(), "{pieces:#?}");
 }
 
@@ -333,7 +333,7 @@ fn jumps(plan: &Scene, heights_m: [f64; 2], [from, to]: [DVec2; 2]) -> Vec<(f64,
     let mirrored = |echoes: &[EchoPath]| {
         let mut paths: Vec<_> = echoes
             .iter()
-            .filter(|e| bends(&e.path).is_empty() && e.length_m < 6.0)
+            .filter(|e| diffractors(&e.path).is_empty() && e.length_m < 6.0)
             .map(|e| reflectors(&e.path).to_vec())
             .collect();
         paths.sort();
@@ -357,7 +357,7 @@ fn jumps(plan: &Scene, heights_m: [f64; 2], [from, to]: [DVec2; 2]) -> Vec<(f64,
         let [before, after] = [low, high].map(echoes);
         let mirrors = |echoes: &[EchoPath]| {
             let mut echoes = echoes.to_vec();
-            echoes.retain(|echo| bends(&echo.path).is_empty());
+            echoes.retain(|echo| diffractors(&echo.path).is_empty());
             sum(&echoes)
         };
         let alone = (mirrors(&before) - mirrors(&after)).norm();

@@ -53,7 +53,8 @@ fn lengths_are_those_of_both_halves() {
         let found: Vec<_> = echoes
             .iter()
             .filter(|echo| {
-                reflectors(&echo.path)[..] == walls[..] && bends(&echo.path).is_empty() != bent
+                reflectors(&echo.path)[..] == walls[..]
+                    && diffractors(&echo.path).is_empty() != bent
             })
             .filter(|echo| (echo.length_m - expected).abs() < 1e-9)
             .collect();
@@ -78,7 +79,7 @@ fn the_same_way_back_from_receiver_to_transmitter() {
         walls.reverse();
         let found = back.iter().any(|other| {
             reflectors(&other.path) == walls
-                && bends(&other.path) == bends(&echo.path)
+                && diffractors(&other.path) == diffractors(&echo.path)
                 && (other.length_m - echo.length_m).abs() < 1e-9
                 && (other.amplitude - echo.amplitude).abs() < 1e-6 * echo.amplitude
                 && crate::geometry::wrap_pi(other.departure_rad - echo.arrival_rad).abs() < 1e-7

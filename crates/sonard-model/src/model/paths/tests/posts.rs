@@ -92,8 +92,9 @@ fn a_cylinder_beside_a_wall_or_a_thick_one_is_no_post() {
         let mut scene = scene(&[[2.0, -3.0, 2.0, 3.0]]);
         scene.cylinders = vec![post(center.into(), radius_m)];
         let echoes = Paths::new(&scene, settings()).enumerate(DVec2::ZERO).expect("few paths");
-        let bends =
-            |echo: &EchoPath| echo.path.bends().any(|bend| matches!(bend, Bend::Post { .. }));
-        assert_eq!(echoes.iter().any(bends), is_post, "{center:?} {radius_m}");
+        let diffractors = |echo: &EchoPath| {
+            echo.path.diffractors().any(|diffractor| matches!(diffractor, Diffractor::Post { .. }))
+        };
+        assert_eq!(echoes.iter().any(diffractors), is_post, "{center:?} {radius_m}");
     }
 }

@@ -56,7 +56,9 @@ fn which_is_named_first_does_not_matter() {
             let mut all: Vec<[f64; 2]> = echoes(room, z_m, law)
                 .iter()
                 .filter(|echo| {
-                    !bends(&echo.path).iter().any(|bend| matches!(bend, Bend::Upright(_)))
+                    !diffractors(&echo.path)
+                        .iter()
+                        .any(|diffractor| matches!(diffractor, Diffractor::Upright(_)))
                 })
                 .map(|echo| [echo.length_m, echo.amplitude])
                 .collect();

@@ -139,7 +139,7 @@ fn double() -> Settings {
 }
 
 fn bent_twice(echoes: Vec<EchoPath>) -> Vec<EchoPath> {
-    echoes.into_iter().filter(|echo| bends(&echo.path).len() == 2).collect()
+    echoes.into_iter().filter(|echo| diffractors(&echo.path).len() == 2).collect()
 }
 
 /// Two parallel screens with their free ends side by side, and the product written out.
@@ -160,7 +160,7 @@ fn between_two_free_ends_it_is_the_product_of_their_coefficients() {
         .collect();
     assert_eq!(straight.len(), 1);
     let names = [Edge { wall: 0, at_b: false }, Edge { wall: 1, at_b: false }];
-    assert_eq!(bends(&straight[0].path)[..], names.map(Bend::Upright));
+    assert_eq!(diffractors(&straight[0].path)[..], names.map(Diffractor::Upright));
     assert!((straight[0].length_m - (out + across + back)).abs() < 1e-12);
 
     // Keller's coefficient of a half plane, angles from its face, far from both boundaries.

@@ -213,9 +213,11 @@ fn corners_of_low_walls_answer_as_those_of_high_ones() {
         let level = |plan: &Scene, at: DVec2| -> Vec<f64> {
             let mut echoes =
                 Paths::new(plan, settings.clone()).enumerate(frame.rotate(at)).expect("few paths");
-            let is_by_level_edge = |bend: &Bend| matches!(bend, Bend::Level { .. });
-            echoes
-                .retain(|e| e.rise_rad == [0.0; 2] && !bends(&e.path).iter().any(is_by_level_edge));
+            let is_by_level_edge =
+                |diffractor: &Diffractor| matches!(diffractor, Diffractor::Level { .. });
+            echoes.retain(|e| {
+                e.rise_rad == [0.0; 2] && !diffractors(&e.path).iter().any(is_by_level_edge)
+            });
             echoes.iter().map(|echo| echo.length_m).collect()
         };
         for at in [DVec2::new(-0.4, 0.3), DVec2::new(0.4, -0.3)] {

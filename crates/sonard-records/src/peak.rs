@@ -1,4 +1,4 @@
-//! What the model hears of a firing, hump by hump.
+//! What the model hears of a firing, peak by peak.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,14 +10,14 @@ use sonard_model::{
 
 use crate::{PathRecord, PlanPoint};
 
-/// Humps this far below the threshold are left out, as a factor of amplitude.
+/// Peaks this far below the threshold are left out, as a factor of amplitude.
 const FAINT: f64 = 0.1;
-/// The strongest so many humps are told.
-const MOST_HUMPS: usize = 24;
+/// The strongest so many peaks are told.
+const MOST_PEAKS: usize = 24;
 
-/// A hump of the echo trace that the model predicts.
+/// An envelope peak of the echo trace that the model predicts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct HumpLine {
+pub struct PeakLine {
     /// When it begins to rise, microseconds after firing.
     pub tof_us: f64,
     /// Half its path's length, metres.
@@ -32,36 +32,36 @@ pub struct HumpLine {
     pub polyline: Vec<PlanPoint>,
 }
 
-impl HumpLine {
-    /// The humps of a trace in order of time, without the faintest; the trace is of a firing from `station`
+impl PeakLine {
+    /// The peaks of a trace in order of time, without the faintest; the trace is of a firing from `point`
     /// along the transducer's `axis`.
     ///
     /// # Errors
     /// When there are more paths than the model can find.
     pub fn of_trace(
         simulator: &Simulator,
-        station: &ObservationPoint<'_>,
+        point: &ObservationPoint<'_>,
         axis: &Pose,
         trace: &EchoTrace,
     ) -> Result<Vec<Self>, TooCostly> {
         let direction_rad = axis.direction_rad(0.0);
         let ends = simulator.sensor().mounting.viewpoint(axis).ends();
         let receiver = simulator.receiver();
-        let over = |hump: &EnvelopePeak| hump.peak.0 / receiver.threshold_at(hump.tof_us);
+        let over = |peak: &EnvelopePeak| peak.peak.0 / receiver.threshold_at(peak.tof_us);
         let mut loudest: Vec<&EnvelopePeak> =
-            trace.peaks.iter().filter(|hump| over(hump) > FAINT).collect();
+            trace.peaks.iter().filter(|peak| over(peak) > FAINT).collect();
         loudest.sort_by(|one, other| over(other).total_cmp(&over(one)));
-        loudest.truncate(MOST_HUMPS);
+        loudest.truncate(MOST_PEAKS);
         loudest.sort_by(|one, other| one.tof_us.total_cmp(&other.tof_us));
-        let line = |hump: &EnvelopePeak| {
-            let arrival = station.arrival(direction_rad, &hump.arrival)?;
+        let line = |peak: &EnvelopePeak| {
+            let arrival = point.arrival(direction_rad, &peak.arrival)?;
             let path = PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m);
             let polyline = path.polyline(ends).into_iter().flatten().map(PlanPoint::from);
             Ok(Self {
-                tof_us: hump.tof_us,
+                tof_us: peak.tof_us,
                 range_m: arrival.length_m / 2.0,
-                peak: hump.peak.0,
-                margin_db: 20.0 * over(hump).log10(),
+                peak: peak.peak.0,
+                margin_db: 20.0 * over(peak).log10(),
                 polyline: polyline.collect(),
                 path,
             })
