@@ -1,5 +1,8 @@
 //! The most likely values of parameters, and how sure they are.
 
+mod spread;
+mod step;
+
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::Serialize;
 use sonard_model::geometry::{Pose, wrap_180};
@@ -8,7 +11,7 @@ use thiserror::Error;
 use crate::{
     candidates::Phases,
     likelihood::ErrorModel,
-    linear::{Curve, Linear},
+    linear::Linear,
     parameter::Parameter,
     rates::RateFinder,
     sweep::Sweep,
@@ -122,16 +125,8 @@ const STAGES: [(f64, f64); 5] = [(1.0, 6.0), (0.5, 5.0), (0.25, 4.0), (0.12, 3.0
 const LAST_STAGES: usize = 5;
 /// Turns that are tried at each of them, degrees, and how many to both sides.
 const TURNS: [(f64, i32); STAGES.len()] = [(1.5, 8), (1.5, 8), (1.0, 10), (0.75, 12), (0.5, 10)];
-/// Decibels of the threshold that are tried for each degree of turn: what two-way beams fall by near the ends of arcs.
-const THRESHOLD_OF_TURN: f64 = 1.5;
-/// Steps on one linearisation.
-const STEPS: usize = 12;
 /// Doubt of a threshold that is not fitted, decibels.
 const NOT_FITTED_DB: f64 = 0.5;
-/// Shares of readings in the far tail that are tried.
-const TAILS: [f64; 5] = [0.0, 0.03, 0.06, 0.1, 0.2];
-/// Spreads of the threshold that are tried, decibels.
-const SPREADS_DB: [f64; 7] = [0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0];
 
 /// Fits parameters to sweeps, from a world that is believed.
 ///
@@ -278,40 +273,6 @@ impl<'a> State<'a> {
         Ok(world)
     }
 
-    /// Turns each sweep whose heading is in doubt to where it fits best as a whole, in so many steps to both sides:
-    /// headings move no path of a transducer on the axis, only the ends of arcs, which say little from afar. Of a
-    /// single sweep the threshold, which moves all ends of arcs too, is tried with it.
-    fn turn(&mut self, errors: &ErrorModel, step_deg: f64, steps: i32) -> Result<bool, FitError> {
-        let (world, poses) = (self.moved_world()?, self.poses());
-        let place = |wanted: &Parameter| self.parameters.iter().position(|of| **of == *wanted);
-        let threshold = place(&Parameter::Threshold).filter(|_| self.sweeps.len() == 1);
-        let step_db = THRESHOLD_OF_TURN * step_deg;
-        let thresholds_db: Vec<f64> = match threshold {
-            Some(_) => (-2..=2).map(|step| f64::from(step) * step_db).collect(),
-            None => vec![0.0],
-        };
-        let mut changes: Vec<(usize, f64)> = Vec::new();
-        for at in 0..self.parameters.len() {
-            let Parameter::Heading(sweep) = *self.parameters[at] else { continue };
-            let turns: Vec<f64> = (-steps..=steps).map(|step| f64::from(step) * step_deg).collect();
-            let (sweep, pose) = (&self.sweeps[sweep], &poses[sweep]);
-            let tried =
-                Linear::turned(&self.models, &world, sweep, pose, &turns, &thresholds_db, errors)?;
-            let cost =
-                |at: usize, by: f64| 0.5 * self.precision(at) * (self.values[at] + by).powi(2);
-            let value = |&(by, db, likely): &(f64, f64, f64)| {
-                likely - cost(at, by) - threshold.map_or(0.0, |threshold| cost(threshold, db))
-            };
-            let best = tried.iter().max_by(|one, other| value(one).total_cmp(&value(other)));
-            if let Some(&(by, db, _)) = best {
-                changes.push((at, by));
-                changes.extend(threshold.map(|threshold| (threshold, db)));
-            }
-        }
-        changes.iter().for_each(|&(at, by)| self.values[at] += by);
-        Ok(changes.iter().any(|(_, by)| *by != 0.0))
-    }
-
     fn precision(&self, at: usize) -> f64 {
         self.fit.priors[at].sigma.powi(-2)
     }
@@ -382,89 +343,6 @@ impl<'a> State<'a> {
             linear = self.linear(false)?;
         }
         best.ok_or(FitError::Degenerate)
-    }
-
-    /// Goes where the linearisation is best, within what it holds for. Gives the largest step, as a share of that.
-    fn improve(&mut self, linear: &Linear, errors: &ErrorModel) -> Result<f64, FitError> {
-        let mut change = self.still();
-        let mut damping = 1e-3;
-        let mut curve = linear.curve(&change, errors);
-        let mut value = curve.value + self.log_prior(&self.values);
-        for _ in 0..STEPS {
-            let step = self.step(&curve, &change, damping).ok_or(FitError::Degenerate)?;
-            let next = self.bounded(&(&change + step));
-            let next_value =
-                linear.log_likelihood(&next, errors) + self.log_prior(&(&self.values + &next));
-            if next_value > value {
-                let is_done = next_value - value < 1e-4;
-                (change, value) = (next, next_value);
-                if is_done {
-                    break;
-                }
-                curve = linear.curve(&change, errors);
-                damping = (damping * 0.3).max(1e-6);
-            } else {
-                damping *= 8.0;
-                if damping > 1e6 {
-                    break;
-                }
-            }
-        }
-        let shares = change.iter().zip(&self.parameters).map(|(by, of)| by.abs() / of.step());
-        let largest = shares.fold(0.0, f64::max);
-        self.values += change;
-        Ok(largest)
-    }
-
-    fn step(&self, curve: &Curve, change: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
-        let mut normal = curve.information.clone();
-        let mut right = curve.gradient.clone();
-        for at in 0..right.len() {
-            normal[(at, at)] *= 1.0 + damping;
-            normal[(at, at)] += self.precision(at) * (1.0 + damping);
-            right[at] -= self.precision(at) * (self.values[at] + change[at]);
-        }
-        Some(Cholesky::new(normal)?.solve(&right))
-    }
-
-    fn bounded(&self, change: &DVector<f64>) -> DVector<f64> {
-        let bounds = self.parameters.iter().map(|parameter| parameter.step());
-        DVector::from_iterator(
-            change.len(),
-            change.iter().zip(bounds).map(|(by, most)| by.clamp(-most, most)),
-        )
-    }
-
-    /// The spread of readings about the present predictions: one step of expectation-maximisation.
-    fn spread(&self, linear: &Linear, errors: &ErrorModel) -> ErrorModel {
-        let (residuals, unexplained) = linear.residuals(errors);
-        let mut spread = *errors;
-        spread.clutter = unexplained.clamp(0.002, 0.5);
-        let mut sizes: Vec<f64> = residuals
-            .iter()
-            .filter(|(_, share)| *share > 0.5)
-            .map(|(residual_m, _)| residual_m.abs())
-            .collect();
-        sizes.sort_by(f64::total_cmp);
-        let median_m = sizes.get(sizes.len() / 2).copied().unwrap_or(errors.sigma_m);
-        let still = self.still();
-        let likeliest = |tried: &mut dyn Iterator<Item = ErrorModel>, otherwise: ErrorModel| {
-            let likely = |spread: ErrorModel| (linear.log_likelihood(&still, &spread), spread);
-            let best = tried.map(likely).max_by(|one, other| one.0.total_cmp(&other.0));
-            best.map_or(otherwise, |(_, spread)| spread)
-        };
-        // A tail that is not there would make all readings seem late, and one that is not believed the same.
-        let of_tail = |&tail_share: &f64| {
-            // The median of what is explained, which a tail moves little: 0.6745 of a normal one alone, and 0.72 with a
-            // tail of a tenth, twice as long.
-            let sigma_m = median_m / (0.6745 + 0.455 * tail_share);
-            let sigma_m = sigma_m.min(self.fit.widest_m).max(self.least_sigma_m());
-            ErrorModel { sigma_m, tail_share, ..spread }
-        };
-        let spread = likeliest(&mut TAILS.iter().map(of_tail), spread);
-        let of_threshold = |&sigma_db: &f64| ErrorModel { sigma_db, ..spread };
-        let believed = SPREADS_DB.iter().filter(|sigma_db| **sigma_db >= self.fit.least_sigma_db);
-        likeliest(&mut believed.map(of_threshold), spread)
     }
 
     fn finish(self, linear: &Linear, errors: ErrorModel) -> Result<Fitted, FitError> {

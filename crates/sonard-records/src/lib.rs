@@ -12,6 +12,7 @@ mod path;
 mod peak;
 mod record;
 mod remaining;
+mod session;
 mod simulated;
 mod sink;
 mod trace;
@@ -23,11 +24,14 @@ pub use floor_plan::{Body, Circle, FloorPlan, PlanPoint, WallLine};
 pub use path::{InteractionKind, InteractionRecord, PathRecord, Point};
 pub use peak::PeakLine;
 pub use record::{
-    AirRecord, AirSource, CollectionRef, CrosstalkRecord, Device, Event, EventKind, ImportRef,
-    LOG_FORMAT, ModelRecord, Ping, Provenance, Record, STOPPED_ON_REQUEST, ScanAir, ScanEnd,
-    ScanStart, SceneRef, Session, SimRecord,
+    AirSource, CrosstalkRecord, Event, EventKind, Ping, Record, STOPPED_ON_REQUEST, ScanAir,
+    ScanEnd, ScanStart, SimRecord,
 };
 pub use remaining::Segment;
+pub use session::{
+    AirRecord, CollectionRef, Device, ImportRef, LOG_FORMAT, ModelRecord, Provenance, SceneRef,
+    Session,
+};
 pub use sink::{Sink, SinkError};
 pub use sonard_model::{
     plan::{PlanError, ScanPlan},

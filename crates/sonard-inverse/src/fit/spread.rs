@@ -1,0 +1,43 @@
+//! How readings spread about predictions.
+
+use super::State;
+use crate::{likelihood::ErrorModel, linear::Linear};
+
+/// Shares of readings in the far tail that are tried.
+const TAILS: [f64; 5] = [0.0, 0.03, 0.06, 0.1, 0.2];
+/// Spreads of the threshold that are tried, decibels.
+const SPREADS_DB: [f64; 7] = [0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0];
+
+impl State<'_> {
+    /// The spread of readings about the present predictions: one step of expectation-maximisation.
+    pub(super) fn spread(&self, linear: &Linear, errors: &ErrorModel) -> ErrorModel {
+        let (residuals, unexplained) = linear.residuals(errors);
+        let mut spread = *errors;
+        spread.clutter = unexplained.clamp(0.002, 0.5);
+        let mut sizes: Vec<f64> = residuals
+            .iter()
+            .filter(|(_, share)| *share > 0.5)
+            .map(|(residual_m, _)| residual_m.abs())
+            .collect();
+        sizes.sort_by(f64::total_cmp);
+        let median_m = sizes.get(sizes.len() / 2).copied().unwrap_or(errors.sigma_m);
+        let still = self.still();
+        let likeliest = |tried: &mut dyn Iterator<Item = ErrorModel>, otherwise: ErrorModel| {
+            let likely = |spread: ErrorModel| (linear.log_likelihood(&still, &spread), spread);
+            let best = tried.map(likely).max_by(|one, other| one.0.total_cmp(&other.0));
+            best.map_or(otherwise, |(_, spread)| spread)
+        };
+        // A tail that is not there would make all readings seem late, and one that is not believed the same.
+        let of_tail = |&tail_share: &f64| {
+            // The median of what is explained, which a tail moves little: 0.6745 of a normal one alone, and 0.72 with a
+            // tail of a tenth, twice as long.
+            let sigma_m = median_m / (0.6745 + 0.455 * tail_share);
+            let sigma_m = sigma_m.min(self.fit.widest_m).max(self.least_sigma_m());
+            ErrorModel { sigma_m, tail_share, ..spread }
+        };
+        let spread = likeliest(&mut TAILS.iter().map(of_tail), spread);
+        let of_threshold = |&sigma_db: &f64| ErrorModel { sigma_db, ..spread };
+        let believed = SPREADS_DB.iter().filter(|sigma_db| **sigma_db >= self.fit.least_sigma_db);
+        likeliest(&mut believed.map(of_threshold), spread)
+    }
+}

@@ -1,0 +1,239 @@
+//! The settings of all engines side by side, as flags, configuration and records give them.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::{ConeOptions, EngineKind, EngineOptions, FanOptions, Options, PathOptions};
+use crate::acoustics::{EdgeLawKind, Response};
+
+/// The settings as flags, keys of a file and records give them: side by side, of whatever engine.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(feature = "clap", command(next_help_heading = "Model"))]
+#[serde(default)]
+pub struct OptionKeys {
+    /// How echoes are found.
+    #[cfg_attr(feature = "clap", arg(long, value_enum, default_value_t))]
+    pub engine: EngineKind,
+    /// Listen and predict up to this range, metres, instead of the sensor's.
+    #[cfg_attr(feature = "clap", arg(long = "max-range", value_name = "M"))]
+    #[schemars(range(min = 0.1, max = 100), example = 4)]
+    pub max_range_m: Option<f64>,
+    /// Least amplitude detected, instead of the sensor's; a head-on, perfect wall gives 1.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "T"))]
+    #[schemars(range(min = 0.000_001, max = 1), example = 0.04)]
+    pub threshold: Option<f64>,
+    /// How the face answers to a pulse, instead of the sensor's way; with paths.
+    #[cfg_attr(feature = "clap", arg(long, value_enum))]
+    #[schemars(example = &"full")]
+    pub response: Option<Response>,
+    /// Detect one sound at a time and time it by its path alone; with paths, the others always do.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub ideal_receiver: bool,
+    /// Leave out the absorption of the air; with paths and fan.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub lossless: bool,
+    /// Most mirror reflections on a path, instead of as many as can matter; with paths and fan.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
+    #[schemars(range(min = 0, max = 65_535), example = 3)]
+    pub max_order: Option<u32>,
+    /// How edges diffract, instead of the sensor's law, or else utd; with paths.
+    #[cfg_attr(feature = "clap", arg(long, value_enum, value_name = "LAW"))]
+    #[schemars(example = &"kuc-siegel")]
+    pub edge_law: Option<EdgeLawKind>,
+    /// Also follow sound that bends at two edges; with paths.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub double_diffraction: bool,
+    /// Leave out what a ranger of an array receives of other firings than its own; with paths, the others know no
+    /// crosstalk.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub without_crosstalk: bool,
+    /// Angle between the rays, degrees, instead of 0.05; with fan.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
+    #[schemars(range(min = 0.0001, max = 5), example = 0.1)]
+    pub ray_spacing_deg: Option<f64>,
+    /// Full aperture, degrees, instead of the sensor's two-way -6 dB width; with cone.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG"))]
+    #[schemars(range(min = 0, max = 180), example = 15)]
+    pub aperture_deg: Option<f64>,
+}
+
+/// A setting of another engine than the one that is named.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("{option} is nothing that the engine {} knows", engine.name())]
+pub struct ForeignOption {
+    /// The setting, as in [`OptionKeys`].
+    pub option: &'static str,
+    /// The engine that is named.
+    pub engine: EngineKind,
+    /// Those that know it.
+    pub of: &'static [EngineKind],
+}
+
+impl ForeignOption {
+    /// What would be right.
+    #[must_use]
+    pub fn help(&self) -> String {
+        let of: Vec<_> = self.of.iter().map(|engine| engine.name()).collect();
+        format!("leave it out, or choose the engine {}", of.join(" or "))
+    }
+}
+
+impl From<&Options> for OptionKeys {
+    fn from(options: &Options) -> Self {
+        let keys = Self {
+            engine: options.engine.kind(),
+            max_range_m: options.max_range_m,
+            threshold: options.threshold,
+            ..Self::default()
+        };
+        match options.engine {
+            EngineOptions::Paths(paths) => Self {
+                response: paths.response,
+                ideal_receiver: paths.ideal_receiver,
+                lossless: paths.lossless,
+                max_order: paths.max_order,
+                edge_law: paths.edge_law,
+                double_diffraction: paths.double_diffraction,
+                without_crosstalk: paths.without_crosstalk,
+                ..keys
+            },
+            EngineOptions::Fan(fan) => Self {
+                lossless: fan.lossless,
+                max_order: fan.max_order,
+                ray_spacing_deg: Some(fan.ray_spacing_deg),
+                ..keys
+            },
+            EngineOptions::Cone(cone) => Self { aperture_deg: cone.aperture_deg, ..keys },
+        }
+    }
+}
+
+impl OptionKeys {
+    /// The options that are named.
+    ///
+    /// # Errors
+    /// The first one that the engine does not know.
+    pub fn options(&self) -> Result<Options, ForeignOption> {
+        let known = self.options_of_engine();
+        let foreign =
+            OPTIONS.iter().find(|(option, of)| !of.contains(&self.engine) && self.gives(option));
+        match foreign {
+            None => Ok(known),
+            Some(&(option, of)) => Err(ForeignOption { option, engine: self.engine, of }),
+        }
+    }
+
+    /// The options that the engine knows; others are left out. Early logs have those of every engine.
+    #[must_use]
+    pub fn options_of_engine(&self) -> Options {
+        let engine = match self.engine {
+            EngineKind::Paths => EngineOptions::Paths(PathOptions {
+                response: self.response,
+                ideal_receiver: self.ideal_receiver,
+                lossless: self.lossless,
+                max_order: self.max_order,
+                edge_law: self.edge_law,
+                double_diffraction: self.double_diffraction,
+                without_crosstalk: self.without_crosstalk,
+            }),
+            EngineKind::Fan => EngineOptions::Fan(FanOptions {
+                lossless: self.lossless,
+                max_order: self.max_order,
+                ray_spacing_deg: self
+                    .ray_spacing_deg
+                    .unwrap_or_else(|| FanOptions::default().ray_spacing_deg),
+            }),
+            EngineKind::Cone => {
+                EngineOptions::Cone(ConeOptions { aperture_deg: self.aperture_deg })
+            }
+        };
+        Options { engine, max_range_m: self.max_range_m, threshold: self.threshold }
+    }
+
+    /// Whether an option of [`OPTIONS`] is given.
+    fn gives(&self, option: &str) -> bool {
+        match option {
+            "response" => self.response.is_some(),
+            "ideal_receiver" => self.ideal_receiver,
+            "lossless" => self.lossless,
+            "max_order" => self.max_order.is_some(),
+            "edge_law" => self.edge_law.is_some(),
+            "double_diffraction" => self.double_diffraction,
+            "without_crosstalk" => self.without_crosstalk,
+            "ray_spacing_deg" => self.ray_spacing_deg.is_some(),
+            _ => self.aperture_deg.is_some(),
+        }
+    }
+}
+
+/// The options that not every engine knows, and who does.
+const OPTIONS: [(&str, &[EngineKind]); 9] = [
+    ("response", &[EngineKind::Paths]),
+    ("ideal_receiver", &[EngineKind::Paths]),
+    ("lossless", &[EngineKind::Paths, EngineKind::Fan]),
+    ("max_order", &[EngineKind::Paths, EngineKind::Fan]),
+    ("edge_law", &[EngineKind::Paths]),
+    ("double_diffraction", &[EngineKind::Paths]),
+    ("without_crosstalk", &[EngineKind::Paths]),
+    ("ray_spacing_deg", &[EngineKind::Fan]),
+    ("aperture_deg", &[EngineKind::Cone]),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every option given, for an engine.
+    fn everything(engine: EngineKind) -> OptionKeys {
+        OptionKeys {
+            engine,
+            max_range_m: Some(4.0),
+            threshold: Some(0.05),
+            response: Some(Response::Full),
+            ideal_receiver: true,
+            lossless: true,
+            max_order: Some(2),
+            edge_law: Some(EdgeLawKind::Utd),
+            double_diffraction: true,
+            without_crosstalk: true,
+            ray_spacing_deg: Some(0.2),
+            aperture_deg: Some(20.0),
+        }
+    }
+
+    #[test]
+    fn what_an_engine_knows_survives_and_what_it_does_not_is_refused_by_name() {
+        let engines = [EngineKind::Paths, EngineKind::Fan, EngineKind::Cone];
+        for engine in engines {
+            let own = OptionKeys::from(&everything(engine).options_of_engine());
+            assert_eq!(OptionKeys::from(&own.options().expect("its own")), own);
+            assert_eq!(
+                (own.engine, own.max_range_m, own.threshold),
+                (engine, Some(4.0), Some(0.05))
+            );
+            // Each option alone is either kept or refused.
+            for (option, of) in OPTIONS {
+                let text = serde_json::to_value(everything(engine)).expect("JSON");
+                let one = serde_json::json!({ "engine": engine, option: text[option] });
+                let one: OptionKeys = serde_json::from_value(one).expect("keys");
+                assert!(one.gives(option), "{option}");
+                match one.options() {
+                    Ok(options) => {
+                        assert!(of.contains(&engine), "{option}");
+                        let kept = serde_json::to_value(OptionKeys::from(&options)).expect("JSON");
+                        assert_eq!(kept[option], text[option], "{option}");
+                    }
+                    Err(error) => {
+                        assert!(!of.contains(&engine), "{option}");
+                        assert_eq!((error.option, error.engine), (option, engine));
+                    }
+                }
+            }
+        }
+        let error = everything(EngineKind::Cone).options().expect_err("others' options");
+        assert_eq!(error.to_string(), "response is nothing that the engine cone knows");
+        assert_eq!(error.help(), "leave it out, or choose the engine paths");
+    }
+}
