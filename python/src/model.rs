@@ -1,8 +1,7 @@
 //! The model.
 
+mod parts;
 pub(crate) mod predict;
-
-use std::sync::Arc;
 
 use pyo3::{
     exceptions::PyValueError,
@@ -10,17 +9,10 @@ use pyo3::{
     types::{PyDict, PyTuple},
 };
 use serde::de::DeserializeOwned;
-use sonard::inverse::World;
-use sonard_model::{
-    acoustics,
-    geometry::Pose,
-    model::{OptionKeys, Options, Simulator, paths},
-    scene as model_scene,
-};
+use sonard_model::model::{OptionKeys, Options, Simulator, paths};
 
 use crate::{
     air::Air,
-    arrays,
     error::{self, OptionError, refuse},
     json,
     path::{PathResult, reading},
@@ -72,26 +64,6 @@ pub(crate) struct Model {
     simulator: OfProcess<Simulator>,
 }
 
-/// What a simulator is made of.
-struct Parts<'a> {
-    scene: &'a Arc<model_scene::Scene>,
-    sensor: &'a acoustics::Sensor,
-    air: acoustics::Air,
-    options: Options,
-}
-
-impl Parts<'_> {
-    fn simulator(&self) -> Result<Simulator, sonard_model::model::ModelError> {
-        Simulator::new(self.scene.clone(), self.sensor.clone(), self.air, self.options)
-    }
-
-    /// With the robot's body at a pose.
-    fn simulator_at(&self, pose: &Pose) -> Result<Simulator, sonard_model::model::ModelError> {
-        let scene = Arc::new(self.scene.with_robot_at(pose));
-        Simulator::new(scene, self.sensor.clone(), self.air, self.options)
-    }
-}
-
 #[pymethods]
 impl Model {
     #[new]
@@ -138,7 +110,8 @@ impl Model {
             Some(sensor) => sensor::meant(sensor)?,
             None => sensor::default(py)?,
         };
-        let air = air.map_or_else(|| acoustics::Air::default().into(), |air| *air.get());
+        let air =
+            air.map_or_else(|| sonard_model::acoustics::Air::default().into(), |air| *air.get());
         let (of, kind) = (&scene.get().scene, &sensor.get().sensor);
         let parts = Parts { scene: of, sensor: kind, air: air.air, options };
         let simulator =
@@ -360,60 +333,6 @@ impl Model {
     ) -> PyResult<(Bound<'py, PyTuple>, Bound<'py, PyDict>)> {
         let made_of = (self.scene(py), self.sensor(py), self.air, self.engine());
         Ok((made_of.into_pyobject(py)?, self.options(py)?))
-    }
-}
-
-impl Model {
-    pub(crate) fn of(
-        py: Python<'_>,
-        scene: Py<Scene>,
-        sensor: Py<Sensor>,
-        air: Air,
-        options: Options,
-    ) -> PyResult<Self> {
-        let (of, kind) = (&scene.get().scene, &sensor.get().sensor);
-        let parts = Parts { scene: of, sensor: kind, air: air.air, options };
-        let simulator =
-            py.detach(|| parts.simulator()).map_err(|error| error::model(py, &error))?;
-        Ok(Self { scene, sensor, air, options, simulator: OfProcess::new(simulator) })
-    }
-
-    /// What readings are explained by.
-    pub(crate) fn world(&self) -> World {
-        let Parts { scene, sensor, air, options } = self.parts();
-        World::new(scene.clone(), sensor.clone(), air, options)
-    }
-
-    fn parts(&self) -> Parts<'_> {
-        Parts {
-            scene: &self.scene.get().scene,
-            sensor: &self.sensor.get().sensor,
-            air: self.air.air,
-            options: self.options,
-        }
-    }
-
-    /// The simulator of the scene without a robot's body.
-    fn simulator(&self, py: Python<'_>) -> PyResult<Arc<Simulator>> {
-        let made = self.simulator.get(py, || self.parts().simulator());
-        made.map_err(|error| error::model(py, &error))
-    }
-
-    /// The simulator for a pose.
-    fn simulator_at(&self, py: Python<'_>, pose: &Pose) -> PyResult<Arc<Simulator>> {
-        if self.parts().scene.robot.is_none() {
-            return self.simulator(py);
-        }
-        let made = py.detach(|| self.parts().simulator_at(pose));
-        made.map(Arc::new).map_err(|error| error::model(py, &error))
-    }
-
-    /// The one pose that is given, if a ranger can stand there.
-    fn checked(&self, given: &Bound<'_, PyAny>) -> PyResult<Pose> {
-        let pose = arrays::one_pose(given)?;
-        let checked = self.parts().scene.check_pose(&pose);
-        checked.map_err(|error| error::pose(given.py(), &[], &error))?;
-        Ok(pose)
     }
 }
 
