@@ -100,7 +100,13 @@ fn counters(status: &Status, health: &Health) -> [(&'static str, &'static str, u
 
 /// What goes up and down, as far as it is known.
 fn gauges(status: &Status, health: &Health) -> Vec<(&'static str, &'static str, f64)> {
-    let mut gauges = vec![
+    let known = gauges_if_known(status, health);
+    let known = known.iter().filter_map(|&(name, help, value)| Some((name, help, value?)));
+    state_gauges(status, health).into_iter().chain(known).collect()
+}
+
+fn state_gauges(status: &Status, health: &Health) -> [(&'static str, &'static str, f64); 10] {
+    [
         ("healthy", "Whether all is well", f64::from(u8::from(health.healthy))),
         (
             "link_up",
@@ -127,10 +133,17 @@ fn gauges(status: &Status, health: &Health) -> Vec<(&'static str, &'static str, 
         ("air_temperature_celsius", "Air temperature", status.air.temperature_c),
         ("sound_speed_meters_per_second", "Speed of sound", status.air.sound_speed_m_s),
         ("uptime_seconds", "How long the daemon runs", status.uptime_s),
-    ];
+    ]
+}
+
+/// Those of what need not have been told or taken yet.
+fn gauges_if_known(
+    status: &Status,
+    health: &Health,
+) -> [(&'static str, &'static str, Option<f64>); 11] {
     let fit = health.fit.as_ref();
     let age_s = |ended: Timestamp| Timestamp::now().duration_since(ended).as_secs_f64();
-    let known = [
+    [
         ("log_free_bytes", "Room on the disk of the log", free_bytes(status)),
         ("last_scan_age_seconds", "Since the last scan ended", fit.map(|fit| age_s(fit.ended))),
         (
@@ -166,9 +179,7 @@ fn gauges(status: &Status, health: &Health) -> Vec<(&'static str, &'static str, 
         ("air_age_seconds", "Age of the air temperature", status.air.age_s),
         ("clock_drift_ppm", "Drift of the device's clock", health.clock.drift_ppm),
         ("clock_sigma_microseconds", "Standard deviation of times", health.clock.sigma_us),
-    ];
-    gauges.extend(known.iter().filter_map(|&(name, help, value)| Some((name, help, value?))));
-    gauges
+    ]
 }
 
 /// What may still be written to the disk of the log, if there is one.

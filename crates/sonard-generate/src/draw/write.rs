@@ -69,26 +69,7 @@ pub(super) fn scene(
     pieces: &[Piece],
     rng: &mut impl Rng,
 ) -> Result<Scene, Unfit> {
-    let materials = spec.materials.iter().map(|(name, material)| {
-        let reflectance = material.reflectance.draw(rng);
-        (name.as_str(), Material { reflectance, roughness: material.roughness.draw(rng) })
-    });
-    let mut file = File {
-        name: &spec.set.name,
-        floor_z_m: None,
-        floor_material: None,
-        ceiling_z_m: None,
-        ceiling_material: None,
-        materials: materials.collect(),
-        walls: Vec::new(),
-        cylinders: Vec::new(),
-    };
-    if let Some(heights) = &spec.heights {
-        file.floor_z_m = Some(0.0);
-        file.floor_material = Some(one_of(&heights.floor, spec, rng));
-        file.ceiling_z_m = Some(heights.ceiling_m.draw(rng));
-        file.ceiling_material = Some(one_of(&heights.ceiling, spec, rng));
-    }
+    let mut file = empty(spec, rng);
     for (number, ends) in outline.walls().enumerate() {
         let material = one_of(&keys.walls, spec, rng);
         file.walls.push(Wall::single(format!("room.{number}"), ends, material));
@@ -130,6 +111,31 @@ pub(super) fn scene(
     }
     let text = serde_json::to_string(&file).map_err(|_| Unfit::Scene)?;
     Scene::from_json(&text).map_err(|_| Unfit::Scene)
+}
+
+/// The room without walls: its materials, its floor and its ceiling.
+fn empty<'a>(spec: &'a Spec, rng: &mut impl Rng) -> File<'a> {
+    let materials = spec.materials.iter().map(|(name, material)| {
+        let reflectance = material.reflectance.draw(rng);
+        (name.as_str(), Material { reflectance, roughness: material.roughness.draw(rng) })
+    });
+    let mut file = File {
+        name: &spec.set.name,
+        floor_z_m: None,
+        floor_material: None,
+        ceiling_z_m: None,
+        ceiling_material: None,
+        materials: materials.collect(),
+        walls: Vec::new(),
+        cylinders: Vec::new(),
+    };
+    if let Some(heights) = &spec.heights {
+        file.floor_z_m = Some(0.0);
+        file.floor_material = Some(one_of(&heights.floor, spec, rng));
+        file.ceiling_z_m = Some(heights.ceiling_m.draw(rng));
+        file.ceiling_material = Some(one_of(&heights.ceiling, spec, rng));
+    }
+    file
 }
 
 impl<'a> Wall<'a> {
