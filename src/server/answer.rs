@@ -161,11 +161,17 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Body<T> {
     }
 }
 
-/// No body has a list in it, but fields in a list without their names would be read as an object.
+/// The fields of bodies that are lists, of objects.
+const LISTS: [&str; 1] = ["steps"];
+
+/// Whether there is a list elsewhere: its values, without names, would be read as the fields of an object.
 fn has_list(value: &Value) -> bool {
     match value {
         Value::Array(_) => true,
-        Value::Object(fields) => fields.values().any(has_list),
+        Value::Object(fields) => fields.iter().any(|(name, value)| match value {
+            Value::Array(values) if LISTS.contains(&name.as_str()) => values.iter().any(has_list),
+            _ => has_list(value),
+        }),
         _ => false,
     }
 }

@@ -42,6 +42,15 @@ fn a_sensor_is_previewed_pending_in_force_and_given_back() {
     assert!(then < now, "{then} of {now}");
     assert_eq!(daemon.get("/v1/sensor").json(), own);
 
+    // A list is one where the document says so, and nowhere else.
+    let steps = json!([{"until_us": 9000, "gain_db": -3}, {"until_us": null, "gain_db": 0}]);
+    preview(&json!({"gain": {"kind": "steps", "steps": steps}}));
+    for wrong in
+        [json!([0.9]), json!({"gain": {"kind": "steps", "steps": [[9000, -3], [null, 0]]}})]
+    {
+        let reply = daemon.send("PUT", "/v1/sensor", &wrong.to_string());
+        assert_eq!(reply.status, 422, "{wrong}: {}", reply.json());
+    }
     // While a scan is under way it waits for the next one.
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
     wait_until("a scan", || daemon.status()["scan"]["done"].as_u64() > Some(2));
