@@ -9,7 +9,7 @@ use super::{
     beam::{Beam, Ray, reaches, reaches_well},
     lit::View,
     shade::shade,
-    tree::{Beams, Node, ROOT},
+    tree::{Beams, ROOT},
 };
 use crate::{
     geometry::DVec2,
