@@ -95,7 +95,12 @@ impl Grower<'_> {
     }
 
     /// From and to where along a wall's line a beam meets it, metres.
-    pub(super) fn lit_span_m(&self, beam: &Beam, wall_mirror: &WallMirror, side: usize) -> [f64; 2] {
+    pub(super) fn lit_span_m(
+        &self,
+        beam: &Beam,
+        wall_mirror: &WallMirror,
+        side: usize,
+    ) -> [f64; 2] {
         let mirror = &wall_mirror.mirror;
         let along = mirror.normal.perp();
         let ends =
