@@ -73,7 +73,10 @@ impl<'a> LazyArrivals<'a> {
         for (near, reach) in self.near.iter().zip(REACHES).skip(begin) {
             let reach_m = reach * self.max_path_m;
             let arrivals = near.get_or_init(|| self.engine.arrivals_within(self.at, reach_m));
-            let Some(arrivals) = arrivals.as_ref().map_err(TooCostly::clone)? else { break };
+            // Whoever asks knows nothing of steps: what is too far is the range that was asked for.
+            let asked =
+                |error: &TooCostly| TooCostly { max_path_m: self.max_path_m, ..error.clone() };
+            let Some(arrivals) = arrivals.as_ref().map_err(asked)? else { break };
             let (heard, needed_m) = listen(arrivals.as_ref(), reach_m);
             if let Some(needed_m) = needed_m {
                 settled(needed_m);

@@ -17,7 +17,7 @@ pub(crate) struct Bound {
 }
 
 /// Two seconds or so.
-pub(crate) const BOUND: Bound = Bound { steps: 30_000_000, bytes: 300_000_000 };
+pub(crate) const BOUND: Bound = Bound { steps: 50_000_000, bytes: 300_000_000 };
 
 /// The effort of a search so far.
 #[derive(Debug)]

@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// Effort of finding where two half-paths meet, in steps of a beam.
-const STEPS_A_PAIR: usize = 20;
+const STEPS_A_PAIR: usize = 32;
 
 /// The contact in the middle of an echo path.
 #[derive(Debug, Clone, Copy)]

@@ -37,7 +37,7 @@ use crate::{
 };
 
 /// Effort of a tube in a triangle, in steps of a beam.
-const STEPS_A_TUBE: usize = 10;
+const STEPS_A_TUBE: usize = 16;
 
 /// An edge sends back as much as a mirror at most: half of each of two images whose boundaries lie together.
 const EDGE_MOST: f64 = 1.0;
@@ -254,9 +254,9 @@ impl<'a> TubeGrower<'a> {
             || self.has_edges && self.is_worth_an_edge(tube.gain, spread, least_m)
     }
 
-    /// Whether an edge could send back enough of rays that have spread so, in echoes of at least a length. With
-    /// any partner the power is at most `L / w + 1 / g` of a mirror's, by the same reasoning as for half-paths
-    /// ([`strength`](super::strength)).
+    /// Whether an edge could send back enough of rays that have spread so, in echoes of at least a length there and
+    /// back, all of which the air takes its part of. With any partner the power is at most `L / w + 1 / g` of a
+    /// mirror's, by the same reasoning as for half-paths ([`strength`](super::strength)).
     pub(crate) fn is_worth_an_edge(
         &self,
         gain: f64,
@@ -264,7 +264,7 @@ impl<'a> TubeGrower<'a> {
         least_m: f64,
     ) -> bool {
         let settings = &self.plan.settings;
-        let loss = EDGE_MOST * gain * settings.air_gain(length_m);
+        let loss = EDGE_MOST * gain * settings.air_gain(least_m);
         LOUDER * loss * loss * (length_m / width_m + 1.0 / growth)
             >= settings.contact_floor(true, least_m).powi(2)
     }

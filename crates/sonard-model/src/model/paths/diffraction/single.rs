@@ -152,12 +152,12 @@ impl Search<'_> {
         let length_m = out.length_m + back.length_m;
         let strength = out.ray.gain * back.ray.gain * settings.air_gain(length_m);
         let floor = floor(settings, out, back, length_m) / self.plan.raised.by_edge(length_m);
+        let aspect = aspect(out, back);
+        let strength = strength * spreading(out, back, &aspect);
         // No law gives more than a wall's echo and the images that its edge replaces; right before it a post may.
         if !corner.is_whole() && 2.0 * strength < floor {
             return None;
         }
-        let aspect = aspect(out, back);
-        let strength = strength * spreading(out, back, &aspect);
         let k = settings.wave_number_per_m;
         if strength * corner.bound(*law, out.sector, &aspect, k) < floor {
             return None;
