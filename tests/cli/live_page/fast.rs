@@ -128,3 +128,62 @@ fn the_page_stays_usable_with_65535_beams_and_with_10000_scans() {
     assert_eq!(browser.eval("document.getElementById('scrub').max"), "9999");
     assert_clean(&browser);
 }
+
+/// Seconds for which the page's work is added up.
+const WATCHED_S: f64 = 5.0;
+
+#[test]
+fn the_page_rests_between_scans_and_takes_200_readings_a_second_as_they_come() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_scans(&folder.path().join("log"), 1, 400);
+    let (_daemon, address) = daemon(folder.path(), "127.0.0.1:0", &[]);
+    let browser = Browser::open(&address, DESK);
+    browser.until("document.getElementById('which').textContent.includes('400 of 400')");
+    browser.devtools("Performance.enable", &json!({}));
+    let idle = share_of_a_core(&browser, "setTimeout(done, wait_ms)");
+    // As many as an ordinary ranger brings, and as many as a fast one to a metre.
+    let [usual, fast] = [25, 200].map(|rate| {
+        let feed = format!(
+            "import('/page/main.js').then(({{plan, take}}) => {{ \
+               const {{start, beams}} = plan.scan; const pings = [...beams.values()]; \
+               const scan = crypto.randomUUID(); let told = 0; const began = performance.now(); \
+               take({{...start, type: 'scan_start', scan, time: new Date().toISOString()}}); \
+               const tell = () => {{ \
+                 const passed_ms = performance.now() - began; \
+                 while (told < {rate} * passed_ms / 1000) \
+                   take({{...pings[told++ % pings.length], type: 'ping', scan}}); \
+                 if (passed_ms < wait_ms) setTimeout(tell, 5); else done(told); }}; \
+               tell(); }})"
+        );
+        share_of_a_core(&browser, &feed)
+    });
+    println!(
+        "the page takes {:.1} % of a core at rest, {:.0} % at 25 readings a second, {:.0} % at 200",
+        100.0 * idle,
+        100.0 * usual,
+        100.0 * fast
+    );
+    assert!(idle < 0.1 && fast < 0.9, "{idle} {fast}");
+    assert_clean(&browser);
+}
+
+/// The page's work while a script runs that ends `wait_ms` later by `done`: tasks of its main thread over the time that
+/// passed.
+fn share_of_a_core(browser: &Browser, script: &str) -> f64 {
+    let before = metrics(browser);
+    let wait_ms = 1e3 * WATCHED_S;
+    browser.eval(&format!("new Promise((done) => {{ const wait_ms = {wait_ms}; {script}; }})"));
+    let after = metrics(browser);
+    (after[0] - before[0]) / (after[1] - before[1])
+}
+
+/// Seconds of work, and of the clock.
+fn metrics(browser: &Browser) -> [f64; 2] {
+    let told = browser.devtools("Performance.getMetrics", &json!({}));
+    let of = |name: &str| {
+        let metrics = told["metrics"].as_array().expect("metrics");
+        let found = metrics.iter().find(|metric| metric["name"] == name);
+        found.and_then(|metric| metric["value"].as_f64()).expect("a number")
+    };
+    ["TaskDuration", "Timestamp"].map(of)
+}
