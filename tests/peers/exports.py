@@ -95,7 +95,7 @@ def check_types(summary):
 
 def check_qos(offered):
     for topic, [profile] in offered.items():
-        kept = topic in ("/tf_static", "/map", "/sonar/lines", "/sonar/features")
+        kept = topic in ("/tf_static", "/map", "/sonar/scene", "/sonar/lines", "/sonar/features")
         durable = "TRANSIENT_LOCAL" if kept else "VOLATILE"
         assert (profile.durability.name, profile.reliability.name) == (durable, "RELIABLE"), topic
         assert profile.depth == (1 if kept else 10), topic
@@ -281,6 +281,31 @@ def check_paths(topics, log):
             assert abs(drawn - lengths.get(marker["ns"], 0)) < 1e-5 * max(1, len(points)), marker["ns"]
 
 
+def check_residuals(topics, log):
+    expected = {}
+    for ping in (ping for scan in log.scans for ping in scan["pings"] if ping.get("residual_m") is not None):
+        topic = f"/sonar/{ping['ranger']}/residual" if ping.get("ranger") else "/sonar/residual"
+        expected.setdefault(topic, []).append({"data": ping["residual_m"]})
+    told = {topic: [m for _, m in of] for topic, of in topics.items() if topic.endswith("/residual")}
+    assert told == expected
+
+
+def check_scene(topics, log):
+    text = log.session.get("scene_text")
+    assert ("/sonar/scene" in topics) == bool(text)
+    if not text:
+        return
+    walls, cylinders = topics["/sonar/scene"][0][1]["markers"]
+    assert (walls["ns"], walls["type"], walls["header"]["frame_id"]) == ("walls", 5, "map")
+    scene = json.loads(text)
+    drawn = shapely.MultiPoint([(p["x"], p["y"]) for p in walls["points"]])
+    corners = [at for wall in scene["walls"] for at in wall.get("polyline") or (wall["from"], wall["to"])]
+    assert all(drawn.distance(shapely.Point(corner)) < 1e-9 for corner in corners)
+    for circle in scene.get("cylinders", []):
+        centre = circle["center"]
+        assert any(near(math.dist(centre, (p["x"], p["y"])), circle["radius_m"], 1e-9) for p in cylinders["points"])
+
+
 def check_times(messages, log):
     """Where the log has times, they are the stamps; in any case time goes on."""
     stamps = sorted(
@@ -311,6 +336,8 @@ def check_recording(path, log_path, profile):
     check_points(topics, log)
     check_transforms(topics, log)
     check_paths(topics, log)
+    check_residuals(topics, log)
+    check_scene(topics, log)
     check_times(messages, log)
     assert attachments == {pathlib.Path(log_path).name: pathlib.Path(log_path).read_bytes()}
     assert metadata["sonard"]["profile"] == profile and metadata["sonard"]["time_base"]

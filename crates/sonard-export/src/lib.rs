@@ -1,13 +1,19 @@
 //! Scans in the formats of other tools: tables (CSV, Parquet) of readings beside predictions, and recordings of
 //! ROS 2 (MCAP); maps, lines and features as recordings and as GeoJSON.
 //!
+//! [`Live`] makes the messages of a recording of records as they come, and [`foxglove`] speaks the protocol that
+//! viewers ask for them by.
+//!
 //! An [`Export`] takes scans one by one and writes to whatever takes bytes, so that what it has in memory
 //! does not grow with the number of scans.
 
 #![warn(clippy::mod_module_files)]
 
 mod columns;
+mod conversion;
 mod error;
+pub mod foxglove;
+mod live;
 mod parquet;
 mod place;
 mod recording;
@@ -22,10 +28,12 @@ use jiff::Timestamp;
 use sonard_records::ScanView;
 
 pub use columns::{COLUMNS, Column, Field, Kind, Row, Value};
+pub use conversion::{Profile, Settings, Topic};
 pub use error::{ExportError, LeftOut};
+pub use live::{Live, LiveMessage};
 pub use parquet::{ParquetExport, TypedTable};
 pub use place::{Place, begins_geojson, to_geojson, write_place};
-pub use recording::{McapExport, Profile, Settings};
+pub use recording::McapExport;
 pub use table::CsvExport;
 
 /// Takes scans, in the order in which they were taken, and writes them in its format.

@@ -15,7 +15,8 @@ use sonard_records::Provenance;
 use crate::{
     ExportError,
     columns::logged_word,
-    recording::{MAP, Messages, nanoseconds},
+    conversion::MAP,
+    recording::{Messages, nanoseconds},
     ros::{
         interface::{MARKERS, OCCUPANCY_GRID},
         message::{Header, Marker, Markers, OccupancyGrid, Shape, Stamp},

@@ -2,6 +2,8 @@
 
 mod cdr;
 mod csv;
+mod foxglove;
+mod live;
 mod mcap;
 mod parquet;
 mod place;

@@ -13,6 +13,7 @@ use mcap::{
 
 use crate::{
     ExportError,
+    conversion::{FIXED_TRANSFORMS, Outlet, SCENE},
     ros::{
         cdr::{Cdr, Encode},
         interface::Interface,
@@ -35,7 +36,7 @@ struct Channel {
 }
 
 /// Topics of what stands still: kept for those who come late.
-const KEPT: [&str; 4] = ["/tf_static", "/map", "/sonar/lines", "/sonar/features"];
+const KEPT: [&str; 5] = [FIXED_TRANSFORMS, SCENE, "/map", "/sonar/lines", "/sonar/features"];
 
 /// Messages are compressed together, so many bytes of them: what waits in memory.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -105,6 +106,20 @@ impl<W: Write> Messages<W> {
         self.out.write_metadata(&remarks).map_err(refused)?;
         self.out.finish().map_err(refused)?;
         Ok(self.out.into_inner().into_inner().flush()?)
+    }
+}
+
+impl<W: Write> Outlet for Messages<W> {
+    type Error = ExportError;
+
+    fn message(
+        &mut self,
+        topic: &str,
+        interface: Interface,
+        at: Stamp,
+        message: &impl Encode,
+    ) -> Result<(), ExportError> {
+        self.write(topic, interface, at, message)
     }
 }
 

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use sonard_records::{Ping, ScanView};
 
-use crate::ros::message::Stamp;
+use crate::{conversion::Firings, ros::message::Stamp};
 
 /// Where the times of a scan come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -27,15 +27,6 @@ impl TimeBase {
             Self::MadeUp => "made up: evenly from the scan's start",
         }
     }
-}
-
-/// The times of a scan's firings.
-#[derive(Debug)]
-pub(super) struct Firings {
-    /// Of each reading; of one that never was, none.
-    pub(super) fired: Vec<Option<Stamp>>,
-    /// How long each listened, nanoseconds.
-    pub(super) window_ns: u64,
 }
 
 /// Gives scans their times. Scans that were made faster than they would have taken are laid one after the

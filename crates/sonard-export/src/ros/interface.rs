@@ -39,6 +39,13 @@ float32 variance
     parts: &[HEADER, TIME],
 };
 
+pub(crate) const FLOAT: Interface = Interface {
+    name: "std_msgs/msg/Float64",
+    hash: "RIHS01_705ba9c3d1a09df43737eb67095534de36fd426c0587779bda2bc51fe790182a",
+    definition: "float64 data\n",
+    parts: &[],
+};
+
 pub(crate) const LASER_SCAN: Interface = Interface {
     name: "sensor_msgs/msg/LaserScan",
     hash: "RIHS01_64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828",

@@ -78,6 +78,16 @@ impl Encode for LaserScan<'_> {
     }
 }
 
+/// `std_msgs/Float64`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Float(pub(crate) f64);
+
+impl Encode for Float {
+    fn encode(&self, cdr: &mut Cdr) {
+        cdr.f64(self.0);
+    }
+}
+
 /// What the fields of a point are made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PointNumber {

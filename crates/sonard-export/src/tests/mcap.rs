@@ -9,7 +9,7 @@ use serde::{Deserialize, de::DeserializeOwned};
 
 use crate::{
     Export as _, ExportError, LeftOut, LogFile, McapExport, Profile, Settings,
-    ros::interface::{Interface, LASER_SCAN, MARKERS, POINT_CLOUD, RANGE, TRANSFORMS},
+    ros::interface::{FLOAT, Interface, LASER_SCAN, MARKERS, POINT_CLOUD, RANGE, TRANSFORMS},
 };
 use sonard_records::{PingStatus, ScanView};
 
@@ -168,6 +168,16 @@ fn a_laser_scan_has_each_beam_in_its_place() {
 }
 
 #[test]
+fn residuals_and_the_scene_are_told_as_the_log_has_them() {
+    let scans = measured();
+    let topics = by_topic(&recorded(&scans));
+    let residuals: Vec<f64> = decoded(&topics["/sonar/residual"]);
+    let expected: Vec<f64> = scans[0].pings.iter().filter_map(|ping| ping.residual_m).collect();
+    assert!(!expected.is_empty());
+    assert_eq!(residuals, expected);
+}
+
+#[test]
 fn transforms_lead_from_the_map_to_where_the_transducer_was() {
     let scans = simulated();
     let topics = by_topic(&recorded(&scans));
@@ -286,7 +296,7 @@ fn a_scan_without_session_or_pose_is_left_out() {
 }
 
 /// The types that are exported.
-const INTERFACES: [Interface; 5] = [RANGE, LASER_SCAN, POINT_CLOUD, TRANSFORMS, MARKERS];
+const INTERFACES: [Interface; 6] = [RANGE, FLOAT, LASER_SCAN, POINT_CLOUD, TRANSFORMS, MARKERS];
 
 #[test]
 fn topics_declare_their_types_and_how_they_were_offered() {
@@ -306,7 +316,7 @@ fn topics_declare_their_types_and_how_they_were_offered() {
         );
         assert_eq!(channel.metadata["topic_type_hash"], interface.hash);
         let offered = &channel.metadata["offered_qos_profiles"];
-        let is_fixed = channel.topic == "/tf_static";
+        let is_fixed = ["/tf_static", "/sonar/scene"].contains(&channel.topic.as_str());
         assert_eq!(offered.contains("durability: transient_local"), is_fixed, "{}", channel.topic);
         assert!(offered.contains("reliability: reliable"));
         used.insert(schema.name.clone());

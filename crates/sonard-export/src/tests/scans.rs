@@ -25,6 +25,11 @@ pub(super) fn measured() -> Vec<ScanView> {
     ScanView::from_records(records(SMALL))
 }
 
+/// Its records.
+pub(super) fn records_of_measured() -> Vec<Record> {
+    records(SMALL).collect()
+}
+
 /// The same without sessions, and without the start of the scan.
 pub(super) fn bare() -> Vec<ScanView> {
     let kept = |record: &Record| !matches!(record, Record::Session(_) | Record::ScanStart(_));

@@ -1,4 +1,4 @@
-//! What a recording says of the readings of a scan.
+//! What messages say of the readings of a scan.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,10 @@ use sonard_interpret::interpret::Extents;
 use sonard_model::{acoustics::BeamPattern, viewpoint::Viewpoint};
 use sonard_records::{PathKind, Ping, PingStatus, Point, ScanView, Session};
 
-use super::{Profile, Settings, frames::Frames, times::Firings};
+use super::{
+    frames::Frames,
+    settings::{Profile, Settings},
+};
 use crate::{
     LeftOut,
     ros::message::{Header, LaserScan, Marker, PointCloud, PointNumber, Shape, Stamp},
@@ -58,6 +61,15 @@ impl Figures {
     }
 }
 
+/// When the readings of a scan were fired.
+#[derive(Debug)]
+pub(crate) struct Firings {
+    /// Of each reading; of one that never was, none.
+    pub(crate) fired: Vec<Option<Stamp>>,
+    /// How long each listened, nanoseconds.
+    pub(crate) window_ns: u64,
+}
+
 /// What was heard, or is predicted to be.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Heard {
@@ -86,7 +98,7 @@ impl Heard {
 }
 
 /// The readings of a scan in the order of the plan. Of one that was measured again the last counts.
-pub(super) fn in_order(scan: &ScanView) -> Vec<&Ping> {
+pub(crate) fn in_order(scan: &ScanView) -> Vec<&Ping> {
     let by_index: BTreeMap<u32, &Ping> = scan.pings.iter().map(|ping| (ping.index, ping)).collect();
     by_index.into_values().collect()
 }

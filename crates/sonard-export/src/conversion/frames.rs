@@ -26,6 +26,20 @@ pub(super) struct Frames {
     rangers: BTreeMap<String, Ranger>,
 }
 
+/// How a robot and its ranger stand at a reading.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stance {
+    robot: Pose,
+    /// Where a stepper has turned its ranger; of an array's, which do not turn, `None`.
+    turned_deg: Option<f64>,
+}
+
+impl Stance {
+    pub(super) fn of(robot: Pose, ping: &Ping) -> Self {
+        Self { robot, turned_deg: ping.ranger.is_none().then_some(ping.azimuth_deg) }
+    }
+}
+
 /// A ranger of an array.
 #[derive(Debug)]
 struct Ranger {
@@ -68,6 +82,11 @@ impl Frames {
         }
     }
 
+    /// The names of an array's rangers; none of a ranger that turns.
+    pub(super) fn rangers(&self) -> Vec<&str> {
+        self.rangers.values().map(|ranger| &*ranger.name).collect()
+    }
+
     /// What does not move.
     pub(super) fn fixed(&self, stamp: Stamp) -> Vec<Transform<'_>> {
         if self.rangers.is_empty() {
@@ -90,19 +109,23 @@ impl Frames {
     }
 
     /// Where the robot is, and where a stepper has turned its ranger.
-    pub(super) fn moving(&self, stamp: Stamp, robot: &Pose, ping: &Ping) -> Vec<Transform<'_>> {
+    pub(super) fn moving(
+        &self,
+        stamp: Stamp,
+        Stance { robot, turned_deg }: Stance,
+    ) -> Vec<Transform<'_>> {
         let mut transforms = vec![Transform {
             header: Header { stamp, frame: MAP },
             child: BASE,
             translation: [robot.x_m, robot.y_m, 0.0],
             rotation: turned(robot.heading_deg, 0.0),
         }];
-        if ping.ranger.is_none() {
+        if let Some(azimuth_deg) = turned_deg {
             transforms.push(Transform {
                 header: Header { stamp, frame: &self.mount },
                 child: &self.sonar,
-                translation: face(&self.mounting, ping.azimuth_deg),
-                rotation: turned(ping.azimuth_deg, self.mounting.tilt_deg),
+                translation: face(&self.mounting, azimuth_deg),
+                rotation: turned(azimuth_deg, self.mounting.tilt_deg),
             });
         }
         transforms

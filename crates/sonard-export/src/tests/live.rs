@@ -1,0 +1,95 @@
+use std::collections::BTreeMap;
+
+use sonard_records::{PingStatus, Record};
+
+use crate::{Export as _, Live, McapExport, Settings};
+
+use super::scans::{measured, of_array, records_of_measured};
+
+type Messages = BTreeMap<String, Vec<(u64, Vec<u8>)>>;
+
+fn told(records: impl IntoIterator<Item = Record>) -> (Live, Messages) {
+    let (mut live, mut messages) = (Live::new(Settings::default()), Messages::new());
+    for record in records {
+        live.take(record, |message| {
+            let told = (message.at_ns, message.bytes.to_vec());
+            messages.entry(message.topic.to_owned()).or_default().push(told);
+        })
+        .expect("a whole session");
+    }
+    (live, messages)
+}
+
+/// What a recording holds of the same scans.
+fn recorded() -> Messages {
+    let mut bytes = Vec::new();
+    let mut export = Box::new(McapExport::new(&mut bytes, Settings::default()).expect("memory"));
+    for scan in measured() {
+        export.scan("small.jsonl", &scan).expect("memory");
+    }
+    export.finish().expect("memory");
+    let mut messages = Messages::new();
+    for message in mcap::MessageStream::new(&bytes).expect("a recording") {
+        let message = message.expect("a message");
+        let read = (message.log_time, message.data.into_owned());
+        messages.entry(message.channel.topic.clone()).or_default().push(read);
+    }
+    messages
+}
+
+#[test]
+fn what_is_told_live_is_what_a_recording_of_the_log_holds() {
+    let (live, told) = told(records_of_measured());
+    let recorded = recorded();
+    assert!(told.len() > 6, "{:?}", told.keys());
+    assert_eq!(told.keys().collect::<Vec<_>>(), recorded.keys().collect::<Vec<_>>());
+    for (topic, messages) in &told {
+        assert!(messages == &recorded[topic], "{topic}");
+    }
+    let topics: Vec<_> = live.topics().iter().map(|topic| topic.name.as_str()).collect();
+    assert!(told.keys().all(|topic| topics.contains(&topic.as_str())), "{topics:?}");
+}
+
+#[test]
+fn topics_are_those_of_the_session_in_force() {
+    let scan = of_array().remove(0);
+    let session = scan.session.as_deref().expect("it has one").clone();
+    let (live, _) = told([Record::Session(Box::new(session))]);
+    let names: Vec<_> = live.topics().iter().map(|topic| topic.name.as_str()).collect();
+    assert!(names.contains(&"/sonar/s0/range") && !names.contains(&"/sonar/scan"), "{names:?}");
+    assert!(live.topics().iter().all(|topic| topic.is_kept != topic.name.ends_with("/range")));
+    assert_eq!(Live::new(Settings::default()).topics(), []);
+}
+
+#[test]
+fn a_session_that_says_too_little_has_no_topics() {
+    let scan = measured().remove(0);
+    let mut session = scan.session.as_deref().expect("it has one").clone();
+    session.sensor.frequency_hz = -1.0;
+    let mut live = Live::new(Settings::default());
+    let told = |_: crate::LiveMessage<'_>| panic!("nothing to be told");
+    assert!(live.take(Record::Session(Box::new(session)), told).is_err());
+    assert_eq!(live.topics(), []);
+    for record in records_of_measured().into_iter().skip(1) {
+        live.take(record, told).expect("passed over");
+    }
+}
+
+#[test]
+fn a_scan_of_very_many_readings_is_told_reading_by_reading_alone() {
+    let records = records_of_measured();
+    let at = records
+        .iter()
+        .position(|record| matches!(record, Record::Ping(ping) if ping.status == PingStatus::Echo));
+    let at = at.expect("a reading");
+    let Record::Ping(ping) = &records[at] else { panic!("a reading") };
+    let more = (0..10_000_u32).map(|index| {
+        let mut ping = ping.clone();
+        ping.index = index;
+        Record::Ping(ping)
+    });
+    let before = records[..at].iter().cloned();
+    let (_, messages) = told(before.chain(more).chain(records[at..].iter().cloned()));
+    assert!(messages["/sonar/range"].len() > 10_000);
+    assert!(!messages.contains_key("/sonar/points") && !messages.contains_key("/sonar/scan"));
+}

@@ -1,0 +1,28 @@
+//! Any texts of a viewer, line by line: nothing panics, nothing is subscribed to that is not there, and no answer is longer
+//! than what it answers asks for.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use sonard::export::foxglove::{Session, Step};
+
+fuzz_target!(|bytes: &[u8]| {
+    let is_there = |channel: u32| (1..=4).contains(&channel);
+    let mut session = Session::default();
+    for text in bytes.split(|byte| *byte == b'\n') {
+        let steps = match std::str::from_utf8(text) {
+            Ok(text) => session.take_text(text, is_there),
+            Err(_) => session.take_binary(),
+        };
+        assert!(steps.len() <= 10, "{steps:?}");
+        for step in &steps {
+            if let Step::Say(said) = step {
+                assert!(said.len() < 2000, "{said}");
+            }
+        }
+        let channels: Vec<u32> = session.channels().collect();
+        assert!(channels.iter().all(|channel| is_there(*channel)));
+        for channel in channels {
+            assert_eq!(session.frame(channel, 1, b"body").map(|frame| frame.len()), Some(17));
+        }
+    }
+});
