@@ -14,8 +14,8 @@ pub use air::AirKeys;
 pub(crate) use air::air_section;
 pub use document::document;
 pub use keys::{
-    DeviceKeys, GpioKeys, Keys, LinkKeys, LogKeys, Mode, ModelKeys, MotionKeys, PlaceKeys,
-    PlanKeys, ScanningKeys, ServerKeys, SimulateKeys,
+    DeviceKeys, FoxgloveKeys, GpioKeys, Keys, LinkKeys, LogKeys, Mode, ModelKeys, MotionKeys,
+    PlaceKeys, PlanKeys, ScanningKeys, ServerKeys, SimulateKeys,
 };
 pub use layers::{ConfigError, Layers, Origin};
 pub use schema::{Form, Key, Kind, Section, read_sections, sections};

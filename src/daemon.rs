@@ -40,7 +40,8 @@ use uuid::Uuid;
 
 pub use agenda::{Agenda, Asked, Due};
 pub use desk::{Order, Request};
-pub use hub::{Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
+pub(crate) use hub::Shelf;
+pub use hub::{Attendance, Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
 pub use journal::{Journal, JournalThread};
 pub use judged::judged_line;
 pub use machine::{BackOff, Input, LinkMachine, Step, Transition};

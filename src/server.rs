@@ -9,6 +9,7 @@
 mod access;
 mod answer;
 mod connection;
+mod foxglove;
 mod listen;
 mod openapi;
 mod places;
@@ -19,7 +20,10 @@ mod token;
 
 use std::{
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Duration,
 };
 
@@ -27,7 +31,7 @@ use axum::{
     Router,
     body::Bytes,
     extract::{DefaultBodyLimit, Request, State},
-    http::{HeaderName, HeaderValue, StatusCode, header},
+    http::{HeaderName, HeaderValue, StatusCode, Uri, header},
     middleware::{self, Next},
     response::{IntoResponse, Response},
 };
@@ -41,8 +45,9 @@ pub use access::{Access, Peer, Refused, Standing};
 pub use listen::{ListenError, Listeners};
 pub use token::{TokenError, read_token};
 
-use crate::{config::ServerKeys, daemon::Handle, scan::Session, scene::Scene, store::History};
+use crate::{config::Keys, daemon::Handle, scan::Session, scene::Scene, store::History};
 use answer::{Failed, Shelved};
+use foxglove::Stage;
 use places::Places;
 use rate::Buckets;
 
@@ -63,6 +68,10 @@ pub(crate) struct Api {
     document: Bytes,
     access: Arc<Access>,
     history: Arc<Mutex<History>>,
+    /// Where viewers come together, if there are any.
+    foxglove: Option<Arc<Stage>>,
+    /// Said once that a viewer's page may not ask: browsers hide why from whom they refuse.
+    has_told_origin: Arc<AtomicBool>,
     /// Folder of the playground, if it is served.
     playground: Option<Arc<Path>>,
     /// Who asks the model about a beam.
@@ -80,20 +89,27 @@ pub(crate) struct Api {
 pub struct Server {
     router: Router,
     daemon: Handle,
+    foxglove: Option<Arc<Stage>>,
     places: Arc<Places>,
     doorstep: Arc<Semaphore>,
     stall: Duration,
 }
 
 impl Server {
-    /// A server of `daemon`, whose logs are in `log_folder`.
+    /// A server of `daemon`, whose logs are in `log_folder`. Must be called within a tokio runtime, before the daemon
+    /// runs.
     #[must_use]
-    pub fn new(daemon: Handle, log_folder: PathBuf, access: Access, keys: &ServerKeys) -> Self {
+    pub fn new(daemon: Handle, log_folder: PathBuf, access: Access, keys: &Keys) -> Self {
         let endpoints = routes::endpoints();
+        let viewers = &keys.foxglove;
+        let foxglove = viewers.enabled.then(|| Stage::open(&daemon, viewers));
+        let keys = &keys.server;
         let places = Arc::new(Places::new(keys.max_clients as usize));
         let api = Api {
             daemon: daemon.clone(),
             history: Arc::new(Mutex::new(History::new(log_folder.clone()))),
+            foxglove: foxglove.clone(),
+            has_told_origin: Arc::default(),
             playground: keys.playground.as_deref().map(|folder| Path::new(folder).into()),
             looking: Arc::new(Semaphore::new(1)),
             reading: Arc::new(Semaphore::new(1)),
@@ -123,9 +139,23 @@ impl Server {
         Self {
             router,
             daemon,
+            foxglove,
             places,
             doorstep: Arc::new(Semaphore::new(DOORSTEP)),
             stall: Duration::from_secs_f64(keys.stall_s),
+        }
+    }
+}
+
+impl Api {
+    /// Says why a viewer was refused whose page is from elsewhere, once.
+    fn tell_of_refused_viewer(&self, uri: &Uri, refused: &Refused) {
+        let is_viewer = self.foxglove.is_some() && uri.path() == routes::FOXGLOVE;
+        if is_viewer
+            && refused.status == StatusCode::FORBIDDEN
+            && !self.has_told_origin.swap(true, Ordering::Relaxed)
+        {
+            tracing::warn!("foxglove: {}: {}", refused.message, refused.help);
         }
     }
 }
@@ -139,6 +169,7 @@ async fn guard(State(api): State<Api>, mut request: Request, next: Next) -> Resp
     {
         Ok(standing) => standing,
         Err(refused) => {
+            api.tell_of_refused_viewer(request.uri(), &refused);
             return ([(header::CONNECTION, "close")], Failed::from(refused)).into_response();
         }
     };

@@ -160,7 +160,7 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     for address in listeners.addresses().into_iter().flatten() {
         tracing::info!("listening on http://{address}");
     }
-    let server_keys = keys.server.clone();
+    let keys = keys.clone();
     let access = access(&settings, &listeners)?;
     let (daemon, handle) = match board {
         Some(board) => {
@@ -169,7 +169,7 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
         }
         None => daemon::prepare_simulated(journal, settings),
     };
-    let server = Server::new(handle.clone(), log_folder, access, &server_keys);
+    let server = Server::new(handle.clone(), log_folder, access, &keys);
     let reloading = tokio::spawn(reload_on_hangup(loader, handle, hangups));
     let ended = CancellationToken::new();
     let serving = tokio::spawn(server.run(listeners, ended.clone().cancelled_owned()));
@@ -196,6 +196,9 @@ fn access(settings: &Settings, listeners: &Listeners) -> Result<Access, Failure>
         None => None,
     };
     let mut access = Access::new(&keys.hosts, token.as_deref());
+    if settings.keys.foxglove.enabled {
+        access = access.with_viewers(&settings.keys.foxglove.origins);
+    }
     for address in listeners.addresses().into_iter().flatten() {
         if !address.ip().is_loopback() && token.is_none() {
             return Err(Failure::input(

@@ -22,7 +22,7 @@ use crate::{
     scan::{PingStatus, Record, ScanStart, ScanView, Session, encode_line},
 };
 pub use moved::Moved;
-use shelf::Shelf;
+pub(crate) use shelf::Shelf;
 
 /// Most readings that wait, bytes.
 const READING_BYTES: usize = 4 << 20;
@@ -127,8 +127,17 @@ impl Hub {
     #[must_use]
     pub fn subscribe(&self, wanted: Wanted) -> Subscription {
         let verdicts = usize::from(wanted.verdicts);
-        self.inner.of_verdicts.fetch_add(verdicts, Ordering::Relaxed);
-        self.inner.of_records.fetch_add(1, Ordering::Relaxed);
+        self.listen(wanted, Counts { subscribers: 1, of_records: 1, of_verdicts: verdicts })
+    }
+
+    /// Begins to listen for all records as a part of the daemon, which is no subscriber.
+    #[must_use]
+    pub fn follow(&self) -> Subscription {
+        self.listen(Wanted::default(), Counts { of_records: 1, ..Counts::default() })
+    }
+
+    fn listen(&self, wanted: Wanted, counts: Counts) -> Subscription {
+        let counted = Counted::new(self, counts);
         let changed = self.inner.records.subscribe();
         let waiting = held(&self.inner.waiting);
         Subscription {
@@ -137,16 +146,24 @@ impl Hub {
             wanted,
             moved: Moved::new(wanted.moved_m),
             changed,
-            counted: Counted::new(self, true, wanted.verdicts),
+            counted,
         }
+    }
+
+    /// Counts somebody as a subscriber whom a follower tells, until what is returned is dropped.
+    #[must_use]
+    pub fn attend(&self) -> Attendance {
+        let counts = Counts { subscribers: 1, ..Counts::default() };
+        Attendance { _counted: Counted::new(self, counts) }
     }
 
     /// Begins to listen for scans that are over.
     #[must_use]
     pub fn subscribe_scans(&self) -> ScanSubscription {
+        let counts = Counts { subscribers: 1, ..Counts::default() };
         let changed = self.inner.scans.subscribe();
         let scan = held(&self.inner.waiting).scans.end();
-        ScanSubscription { scan, changed, counted: Counted::new(self, false, false) }
+        ScanSubscription { scan, changed, counted: Counted::new(self, counts) }
     }
 
     /// Hands a record to everybody who wants records.
@@ -193,6 +210,12 @@ impl Hub {
         held(&self.inner.waiting).closed = true;
         self.inner.records.send_replace(());
         self.inner.scans.send_replace(());
+    }
+
+    /// Whether every stream ends after what is waiting for it.
+    #[must_use]
+    pub fn is_closed(&self) -> bool {
+        held(&self.inner.waiting).closed
     }
 
     /// Streams at the moment.
@@ -347,28 +370,43 @@ impl ScanSubscription {
     }
 }
 
-/// Counts a subscriber as long as it is there.
+/// A subscriber who listens elsewhere; dropping it says that it left.
+#[derive(Debug)]
+pub struct Attendance {
+    _counted: Counted,
+}
+
+/// What somebody who listens counts as.
+#[derive(Debug, Clone, Copy, Default)]
+struct Counts {
+    subscribers: usize,
+    of_records: usize,
+    of_verdicts: usize,
+}
+
+/// Counts somebody as long as it is there.
 #[derive(Debug)]
 struct Counted {
     hub: Hub,
-    of_records: bool,
-    of_verdicts: bool,
+    counts: Counts,
 }
 
 impl Counted {
-    fn new(hub: &Hub, of_records: bool, of_verdicts: bool) -> Self {
-        hub.inner.subscribers.fetch_add(1, Ordering::Relaxed);
-        Self { hub: hub.clone(), of_records, of_verdicts }
+    fn new(hub: &Hub, counts: Counts) -> Self {
+        hub.inner.subscribers.fetch_add(counts.subscribers, Ordering::Relaxed);
+        hub.inner.of_records.fetch_add(counts.of_records, Ordering::Relaxed);
+        hub.inner.of_verdicts.fetch_add(counts.of_verdicts, Ordering::Relaxed);
+        Self { hub: hub.clone(), counts }
     }
 }
 
 impl Drop for Counted {
     fn drop(&mut self) {
-        let inner = &self.hub.inner;
-        inner.subscribers.fetch_sub(1, Ordering::Relaxed);
-        inner.of_verdicts.fetch_sub(usize::from(self.of_verdicts), Ordering::Relaxed);
-        let last = inner.of_records.fetch_sub(usize::from(self.of_records), Ordering::Relaxed) == 1;
-        if self.of_records && last {
+        let (inner, counts) = (&self.hub.inner, self.counts);
+        inner.subscribers.fetch_sub(counts.subscribers, Ordering::Relaxed);
+        inner.of_verdicts.fetch_sub(counts.of_verdicts, Ordering::Relaxed);
+        let last = inner.of_records.fetch_sub(counts.of_records, Ordering::Relaxed) == 1;
+        if counts.of_records > 0 && last {
             // Nobody is left who wants them. Who comes at this moment misses nothing but these.
             let mut waiting = held(&inner.waiting);
             waiting.readings.clear();

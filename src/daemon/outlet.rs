@@ -65,9 +65,11 @@ impl Outlet {
         let fits = |text: &Arc<str>| text.len() <= MAX_LOGGED_SCENE_BYTES;
         let mut session = session.clone();
         let scene_text = session.scene_text.take().filter(fits);
-        self.hub.publish(&Record::Session(Box::new(session.clone())));
+        let record = Record::Session(Box::new(session.clone()));
         let session = Arc::new(Session { scene_text, ..session });
+        // Who follows the records finds the text there.
         self.shared.view.send_modify(|view| view.session = Some(session));
+        self.hub.publish(&record);
     }
 }
 

@@ -6,13 +6,17 @@
 
 use std::net::IpAddr;
 
-use axum::http::{
-    HeaderMap, Method, StatusCode, Uri,
-    header::{AUTHORIZATION, HOST, ORIGIN},
+use axum::{
+    extract::Query,
+    http::{
+        HeaderMap, Method, StatusCode, Uri,
+        header::{AUTHORIZATION, HOST, ORIGIN},
+    },
 };
+use serde::Deserialize;
 use sha2::{Digest as _, Sha256};
 
-use super::routes::is_public;
+use super::routes::{FOXGLOVE, is_public};
 
 /// How a client came in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +56,8 @@ pub struct Refused {
 #[derive(Debug, Clone, Default)]
 pub struct Access {
     hosts: Vec<String>,
+    /// Origins of pages that may ask for live messages for viewers.
+    viewers: Vec<String>,
     token: Option<[u8; 32]>,
 }
 
@@ -61,6 +67,7 @@ impl Access {
     pub fn new(hosts: &[String], token: Option<&str>) -> Self {
         Self {
             hosts: hosts.iter().map(|host| host.to_ascii_lowercase()).collect(),
+            viewers: Vec::new(),
             token: token.map(|token| digest(token.trim())),
         }
     }
@@ -74,6 +81,13 @@ impl Access {
                 IpAddr::V6(address) => format!("[{address}]"),
             });
         }
+        self
+    }
+
+    /// Lets pages of these origins, as browsers name them, ask for live messages, which need a page from elsewhere.
+    #[must_use]
+    pub fn with_viewers(mut self, origins: &[String]) -> Self {
+        self.viewers.extend(origins.iter().map(|origin| origin.to_ascii_lowercase()));
         self
     }
 
@@ -93,7 +107,7 @@ impl Access {
             return Ok(Standing::Socket);
         }
         self.check_host(uri, headers)?;
-        if self.shows_token(headers) {
+        if self.shows_token(uri, headers) {
             return Ok(Standing::Token);
         }
         let reads = matches!(*method, Method::GET | Method::HEAD | Method::OPTIONS);
@@ -113,10 +127,17 @@ impl Access {
         if host.is_some_and(|host| self.knows(host)) {
             return Ok(());
         }
+        let is_for_viewers = uri.path() == FOXGLOVE;
+        if is_for_viewers && self.viewers.iter().any(|viewer| origin == viewer.as_str()) {
+            return Ok(());
+        }
         Err(Refused {
             status: StatusCode::FORBIDDEN,
             message: format!("pages of {origin:?} may not ask here"),
-            help: "open the page from this server itself, or name its host in server.hosts",
+            help: match is_for_viewers {
+                true => "name the origin in foxglove.origins",
+                false => "open the page from this server itself, or name its host in server.hosts",
+            },
         })
     }
 
@@ -135,14 +156,16 @@ impl Access {
         })
     }
 
-    fn shows_token(&self, headers: &HeaderMap) -> bool {
-        let shown = headers
+    fn shows_token(&self, uri: &Uri, headers: &HeaderMap) -> bool {
+        let in_header = headers
             .get(AUTHORIZATION)
             .and_then(|value| value.to_str().ok())
             .and_then(|value| value.split_once(' '))
-            .filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"));
+            .filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"))
+            .map(|(_, shown)| shown.to_owned());
+        let shown = in_header.or_else(|| token_in_query(uri));
         // Digests are compared, so that the time says nothing about the token.
-        shown.is_some_and(|(_, shown)| self.token == Some(digest(shown.trim())))
+        shown.is_some_and(|shown| self.token == Some(digest(shown.trim())))
     }
 
     fn lacks_token(&self) -> Refused {
@@ -170,6 +193,16 @@ impl Access {
         let name = name.to_ascii_lowercase();
         ["localhost", "127.0.0.1", "[::1]"].contains(&name.as_str()) || self.hosts.contains(&name)
     }
+}
+
+/// A browser can't send a header with the request for a WebSocket: for those the token may stand in the query.
+fn token_in_query(uri: &Uri) -> Option<String> {
+    #[derive(Deserialize)]
+    struct Shown {
+        token: String,
+    }
+    let shown = (uri.path() == FOXGLOVE).then(|| Query::<Shown>::try_from_uri(uri))?;
+    shown.ok().map(|Query(shown)| shown.token)
 }
 
 /// Images and scripts of a page are asked for without `Origin`, but browsers say that they belong to
@@ -304,6 +337,42 @@ mod tests {
             assert_eq!(answer, expected, "{path}");
         }
         assert_eq!(ask_for("/", &access, Peer::Network, &Method::POST, &[host]), Err(401));
+    }
+
+    #[test]
+    fn viewers_may_come_from_elsewhere_and_show_the_token_in_the_query_but_on_their_route_alone() {
+        let viewer = "https://app.foxglove.dev";
+        let access = Access::new(&[], Some("se+cret"))
+            .with_viewers(&[viewer.to_owned()])
+            .with_address("192.168.1.5".parse().expect("an address"));
+        let host = ("host", "192.168.1.5:8765");
+        let (from, elsewhere) = (("origin", viewer), ("origin", "https://evil.example"));
+        let site = ("sec-fetch-site", "cross-site");
+        for (path, headers, expected) in [
+            ("/foxglove/?token=se%2Bcret", &[host][..], Ok(())),
+            ("/foxglove/?token=se%2Bcret", &[host, from, site], Ok(())),
+            ("/foxglove/?a=b&token=se%2Bcret", &[host], Ok(())),
+            ("/foxglove/?token=se%2Bcret", &[host, elsewhere], Err(403)),
+            ("/foxglove/?token=wrong", &[host], Err(401)),
+            ("/foxglove/?token=wrong&token=se%2Bcret", &[host], Err(401)),
+            ("/foxglove/?token=", &[host, from], Err(401)),
+            ("/foxglove/", &[host, from], Err(401)),
+            ("/foxglove?token=se%2Bcret", &[host], Err(401)),
+            ("/v1/status?token=se%2Bcret", &[host], Err(401)),
+            ("/v1/status?token=se%2Bcret", &[host, from], Err(403)),
+        ] {
+            let answer = ask_for(path, &access, Peer::Network, &Method::GET, headers);
+            assert_eq!(answer, expected, "{path} {headers:?}");
+        }
+        let unset = Access::default();
+        let refused = ask_for(
+            "/foxglove/",
+            &unset,
+            Peer::Loopback,
+            &Method::GET,
+            &[("host", "localhost"), from],
+        );
+        assert_eq!(refused, Err(403));
     }
 
     #[test]

@@ -30,6 +30,7 @@ impl Server {
     /// Serves until `stop` is ready, then lets requests under way end.
     pub async fn run(self, mut listeners: Listeners, stop: impl Future<Output = ()>) {
         let shutdown = CancellationToken::new();
+        let foxglove = self.foxglove.clone();
         let server = Arc::new(self);
         let mut accepting = JoinSet::new();
         for listener in std::mem::take(&mut listeners.unix) {
@@ -50,6 +51,9 @@ impl Server {
         stop.await;
         shutdown.cancel();
         while accepting.join_next().await.is_some() {}
+        if let Some(stage) = foxglove {
+            drop(timeout(LAST_CALL, stage.is_empty()).await);
+        }
         listeners.remove_made();
     }
 
@@ -86,13 +90,16 @@ impl Server {
         self: Arc<Self>,
         peer: Peer,
         stream: S,
-        _place: Place,
+        place: Place,
         shutdown: CancellationToken,
     ) {
+        // What is made of the connection later keeps its place.
+        let place = Arc::new(place);
         let mut stream = TimeoutStream::new(stream);
         stream.set_write_timeout(Some(self.stall));
         let service = service_fn(|mut request: Request<Incoming>| {
             request.extensions_mut().insert(peer);
+            request.extensions_mut().insert(Arc::clone(&place));
             let router = self.router.clone();
             router.oneshot(request)
         });
@@ -100,7 +107,8 @@ impl Server {
             .timer(TokioTimer::new())
             .header_read_timeout(HEAD_TIME)
             .max_buf_size(BUFFER)
-            .serve_connection(TokioIo::new(Worded::new(Box::pin(stream))), service);
+            .serve_connection(TokioIo::new(Worded::new(Box::pin(stream))), service)
+            .with_upgrades();
         let mut connection = pin!(connection);
         let ended = tokio::select! {
             ended = &mut connection => ended,

@@ -3,6 +3,7 @@
 mod beam;
 mod control;
 mod findings;
+mod foxglove;
 mod live;
 mod logs;
 mod metrics;
@@ -17,6 +18,7 @@ mod scene;
 use axum::{extract::State, http::header, response::IntoResponse};
 use serde_json::Value;
 
+pub(super) use foxglove::FOXGLOVE;
 pub(super) use page::is_public;
 
 use super::{Api, openapi::Endpoint};
@@ -27,6 +29,7 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
     endpoints.extend(control::endpoints());
     endpoints.extend(scene::endpoints());
     endpoints.extend(live::endpoints());
+    endpoints.extend(foxglove::endpoints());
     endpoints.extend(scans::endpoints());
     endpoints.extend(findings::endpoints());
     endpoints.extend(preview::endpoints());

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 /// The newest items that were put on it, numbered from 0, up to a number and a sum of bytes.
 #[derive(Debug)]
-pub(super) struct Shelf<T> {
+pub(crate) struct Shelf<T> {
     items: VecDeque<(usize, T)>,
     /// Number of the oldest one that is there, or of the next one.
     first: u64,
@@ -14,35 +14,40 @@ pub(super) struct Shelf<T> {
 }
 
 impl<T> Shelf<T> {
-    pub(super) const fn new(most: usize, most_bytes: usize) -> Self {
+    pub(crate) const fn new(most: usize, most_bytes: usize) -> Self {
         Self { items: VecDeque::new(), first: 0, bytes: 0, most, most_bytes }
     }
 
-    /// Puts one on it that costs so many bytes. The newest stays whatever it costs.
-    pub(super) fn put(&mut self, bytes: usize, item: T) {
+    /// Puts one on it that costs so many bytes, and gives back those that fall off. The newest stays whatever it costs.
+    pub(crate) fn put(&mut self, bytes: usize, item: T) -> Vec<T> {
+        let mut fallen = Vec::new();
         let bytes = bytes + size_of::<(usize, T)>();
         self.bytes += bytes;
         self.items.push_back((bytes, item));
         while self.items.len() > 1 && (self.items.len() > self.most || self.bytes > self.most_bytes)
         {
-            self.bytes -= self.items.pop_front().map_or(0, |(bytes, _)| bytes);
+            if let Some((bytes, item)) = self.items.pop_front() {
+                self.bytes -= bytes;
+                fallen.push(item);
+            }
             self.first += 1;
         }
+        fallen
     }
 
     /// One by its number, if it is there.
-    pub(super) fn get(&self, number: u64) -> Option<&T> {
+    pub(crate) fn get(&self, number: u64) -> Option<&T> {
         let at = usize::try_from(number.checked_sub(self.first)?).ok()?;
         self.items.get(at).map(|(_, item)| item)
     }
 
     /// Number of the oldest one.
-    pub(super) const fn first(&self) -> u64 {
+    pub(crate) const fn first(&self) -> u64 {
         self.first
     }
 
     /// Number of the next one that will be put on it.
-    pub(super) fn end(&self) -> u64 {
+    pub(crate) fn end(&self) -> u64 {
         self.first + self.items.len() as u64
     }
 
@@ -61,10 +66,11 @@ mod tests {
     fn only_the_newest_stay_by_number_and_by_bytes() {
         let cost = |bytes: usize| bytes - size_of::<(usize, u8)>();
         let mut shelf = Shelf::new(3, 1000);
-        (0..5_u8).for_each(|item| shelf.put(cost(100), item));
+        let fallen: Vec<u8> = (0..5_u8).flat_map(|item| shelf.put(cost(100), item)).collect();
+        assert_eq!(fallen, [0, 1]);
         assert_eq!((shelf.first(), shelf.end()), (2, 5));
         assert_eq!((shelf.get(1), shelf.get(2), shelf.get(5)), (None, Some(&2), None));
-        shelf.put(cost(850), 5);
+        assert_eq!(shelf.put(cost(850), 5), [2, 3]);
         assert_eq!((shelf.first(), shelf.bytes), (4, 950));
         shelf.put(5000, 6);
         assert_eq!((shelf.first(), shelf.get(6)), (6, Some(&6)), "the newest is there in any case");

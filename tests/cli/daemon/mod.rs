@@ -7,6 +7,7 @@ mod clock;
 mod configuration;
 mod explained;
 mod faults;
+mod foxglove;
 mod kill;
 mod load;
 pub(crate) mod model;

@@ -1,0 +1,268 @@
+//! Live messages for viewers that speak Foxglove's protocol: one follower makes them of the daemon's records, and each
+//! viewer takes them from the board at its own pace.
+
+mod board;
+
+use std::{
+    error::Error as _,
+    io,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Duration,
+};
+
+use axum::extract::ws::{CloseFrame, Message, WebSocket, close_code};
+use tokio::{
+    sync::{OwnedSemaphorePermit, Semaphore, watch},
+    time::{Instant, sleep_until, timeout},
+};
+use uuid::Uuid;
+
+use super::Standing;
+use crate::{
+    config::FoxgloveKeys,
+    daemon::{Handle, Line},
+    export::{
+        Live, LiveMessage, Settings,
+        foxglove::{MOST_TEXT_BYTES, server_info},
+    },
+    scan::{Record, Session, decode_line},
+};
+use board::{Board, Found, MOST_MESSAGE_BYTES, Outgoing, Viewer};
+
+/// Least time from one thing that a viewer sends to the next that is read.
+const BETWEEN_READS: Duration = Duration::from_millis(10);
+/// How often a viewer is asked whether it is there.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(15);
+/// One that shows no sign of life for so long is gone.
+const GIVEN_UP: Duration = Duration::from_secs(60);
+/// How long a viewer may take to say goodbye.
+const GOODBYE: Duration = Duration::from_secs(1);
+
+/// The longest that a viewer may send at once, bytes: what is longer than a text may be is refused in words up to here.
+pub(super) const MOST_RECEIVED_BYTES: usize = 8 * MOST_TEXT_BYTES;
+/// What is kept of a viewer's connection beside its messages, bytes.
+pub(super) const READ_BYTES: usize = 4096;
+/// The longest that waits to be taken by a viewer's connection: a message, and what answers its pings.
+pub(super) const WRITE_BYTES: usize = MOST_MESSAGE_BYTES + (1 << 16);
+
+/// Where viewers come together.
+#[derive(Debug)]
+pub(super) struct Stage {
+    daemon: Handle,
+    board: Mutex<Board>,
+    /// Changes with whatever viewers have to look at.
+    changed: watch::Sender<()>,
+    /// Places of guests, and of all others: nobody takes them from those.
+    places: [Arc<Semaphore>; 2],
+    most_viewers: u32,
+    /// Another one after a restart, so that viewers know.
+    session: String,
+}
+
+impl Stage {
+    /// Begins to follow the daemon, until that ends. Must be called within a runtime.
+    pub(super) fn open(daemon: &Handle, keys: &FoxgloveKeys) -> Arc<Self> {
+        let stage = Arc::new(Self {
+            daemon: daemon.clone(),
+            board: Mutex::new(Board::new(keys.queue_kb as usize * 1000)),
+            changed: watch::Sender::new(()),
+            places: [(); 2].map(|()| Arc::new(Semaphore::new(keys.max_clients as usize))),
+            most_viewers: keys.max_clients,
+            session: Uuid::new_v4().to_string(),
+        });
+        let mut follower =
+            Follower { stage: Arc::clone(&stage), live: Live::new(Settings::default()) };
+        // What is in force already was told to nobody.
+        if let Some(session) = daemon.session() {
+            follower.take(Record::Session(Box::new((*session).clone())));
+        }
+        tokio::spawn(follower.run());
+        stage
+    }
+
+    /// A place for a viewer, if one is free.
+    pub(super) fn take_place(&self, standing: Standing) -> Option<OwnedSemaphorePermit> {
+        let [guests, others] = &self.places;
+        let places = if standing == Standing::Guest { guests } else { others };
+        Arc::clone(places).try_acquire_owned().ok()
+    }
+
+    /// Waits until every viewer has left.
+    pub(super) async fn is_empty(&self) {
+        for places in &self.places {
+            drop(places.acquire_many(self.most_viewers).await);
+        }
+    }
+
+    /// Tells a viewer, until it leaves or is shown out.
+    pub(super) async fn attend(self: Arc<Self>, mut socket: WebSocket) {
+        let _attendance = self.daemon.hub().attend();
+        match self.tell(&mut socket).await {
+            Ok(goodbye) => say_goodbye(&mut socket, goodbye).await,
+            Err(error) if took_nothing(&error) => self.daemon.hub().count_cut_off(),
+            // It is gone.
+            Err(_) => {}
+        }
+    }
+
+    /// Tells a viewer what it asks for; why that ended in order.
+    async fn tell(&self, socket: &mut WebSocket) -> Result<CloseFrame, axum::Error> {
+        let mut changed = self.changed.subscribe();
+        let mut viewer = Viewer::new(&self.board(), server_info(&self.session));
+        let mut heard = Instant::now();
+        let (mut may_read, mut next_ping) = (heard, heard + SIGN_OF_LIFE);
+        loop {
+            // What comes after this look makes it ready again.
+            changed.mark_unchanged();
+            let found = viewer.look(&self.board());
+            let is_idle = found == Found::Nothing;
+            match found {
+                Found::Something(Outgoing::Text(text)) => socket.send(text.into()).await?,
+                Found::Something(Outgoing::Binary(frame)) => socket.send(frame.into()).await?,
+                Found::Over => return Ok(goodbye(close_code::AWAY, "nothing more is told here")),
+                Found::ShownOut => {
+                    return Ok(goodbye(close_code::POLICY, "too much makes no sense"));
+                }
+                Found::Nothing => {}
+            }
+            let now = Instant::now();
+            if now > heard + GIVEN_UP {
+                return Ok(goodbye(close_code::AWAY, "there is no sign of life"));
+            }
+            if now > next_ping {
+                next_ping = now + SIGN_OF_LIFE;
+                socket.send(Message::Ping(Vec::new().into())).await?;
+            }
+            tokio::select! {
+                biased;
+                came = socket.recv(), if now >= may_read => {
+                    let Some(came) = came else { return Ok(goodbye(close_code::NORMAL, "")) };
+                    heard = Instant::now();
+                    may_read = heard + BETWEEN_READS;
+                    match came {
+                        Ok(Message::Text(text)) => viewer.take_text(&text, &self.board()),
+                        Ok(Message::Binary(_)) => viewer.take_binary(&self.board()),
+                        Ok(Message::Ping(_) | Message::Pong(_)) => {}
+                        Ok(Message::Close(_)) => return Ok(goodbye(close_code::NORMAL, "")),
+                        Err(error) => return refused(error),
+                    }
+                }
+                () = std::future::ready(()), if !is_idle => {}
+                _ = changed.changed() => {}
+                () = sleep_until(may_read), if now < may_read => {}
+                () = sleep_until(next_ping) => {}
+            }
+        }
+    }
+
+    /// Nothing under this lock can panic, so a poisoned one holds what it should.
+    fn board(&self) -> MutexGuard<'_, Board> {
+        self.board.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// What makes messages of the daemon's records.
+struct Follower {
+    stage: Arc<Stage>,
+    live: Live,
+}
+
+impl Follower {
+    async fn run(mut self) {
+        let hub = self.stage.daemon.hub().clone();
+        while !hub.is_closed() {
+            let mut records = hub.follow();
+            while let Some(line) = records.next().await {
+                self.take_line(&line);
+            }
+            if !hub.is_closed() {
+                let words = "records came faster than they could be told: a scan is not whole";
+                self.stage.board().announce(words.into());
+            }
+        }
+        self.stage.board().close();
+        self.stage.changed.send_replace(());
+    }
+
+    fn take_line(&mut self, line: &Line) {
+        match decode_line(line.trim_ascii_end()) {
+            Ok(Record::Session(mut session)) => {
+                session.scene_text = self.scene_text(&session);
+                self.take(Record::Session(session));
+            }
+            // A whole scan takes its time.
+            Ok(record @ Record::ScanEnd(_)) => tokio::task::block_in_place(|| self.take(record)),
+            Ok(record) => self.take(record),
+            Err(_missed) => {
+                let words = "readings came faster than they could be told: some are left out";
+                self.stage.board().announce(words.into());
+            }
+        }
+        self.stage.changed.send_replace(());
+    }
+
+    /// The text of a session's scene, which live records go without.
+    fn scene_text(&self, session: &Session) -> Option<Arc<str>> {
+        let in_force = self.stage.daemon.session()?;
+        in_force.scene_text.clone().filter(|_| in_force.scene == session.scene)
+    }
+
+    fn take(&mut self, record: Record) {
+        let is_session = matches!(record, Record::Session(_));
+        let put = |message: LiveMessage<'_>| self.stage.board().put(&message);
+        if let Err(why) = self.live.take(record, put) {
+            let words = format!("nothing can be told of these scans: {why}");
+            tracing::warn!("foxglove: {words}");
+            self.stage.board().announce(words);
+        }
+        if is_session {
+            self.stage.board().set_topics(self.live.topics());
+        }
+    }
+}
+
+/// Why a viewer is shown out whose connection brought what can't be read.
+fn refused(error: axum::Error) -> Result<CloseFrame, axum::Error> {
+    if is_of_connection(&error) {
+        return Err(error);
+    }
+    let why = format!("{error}; texts have at most {MOST_TEXT_BYTES} bytes");
+    // A reason has at most 123 bytes.
+    let why: String = why.chars().filter(char::is_ascii).take(120).collect();
+    Ok(goodbye(close_code::POLICY, &why))
+}
+
+fn goodbye(code: u16, reason: &str) -> CloseFrame {
+    CloseFrame { code, reason: reason.into() }
+}
+
+/// Closes a connection in order, if the other end does its part.
+async fn say_goodbye(socket: &mut WebSocket, goodbye: CloseFrame) {
+    let closing = async {
+        if socket.send(Message::Close(Some(goodbye))).await.is_ok() {
+            while let Some(Ok(_)) = socket.recv().await {}
+        }
+    };
+    drop(timeout(GOODBYE, closing).await);
+}
+
+/// Whether a connection ended because the viewer did not read.
+fn took_nothing(error: &axum::Error) -> bool {
+    cause(error).is_some_and(|error| error.kind() == io::ErrorKind::TimedOut)
+}
+
+fn is_of_connection(error: &axum::Error) -> bool {
+    cause(error).is_some()
+}
+
+/// The fault of the connection that is behind an error, if one is.
+fn cause(error: &axum::Error) -> Option<&io::Error> {
+    let mut source = error.source();
+    while let Some(error) = source {
+        if let Some(io) = error.downcast_ref::<io::Error>() {
+            return Some(io);
+        }
+        source = error.source();
+    }
+    None
+}

@@ -1,0 +1,107 @@
+//! What viewers cost, and what those that sleep do to others.
+
+use std::time::{Duration, Instant};
+
+use super::{
+    super::{Daemon, own_kb},
+    start,
+    viewer::Viewer,
+};
+use crate::common::{cpu_s, wait_until};
+
+/// A daemon that scans without a rest, far faster than in real time.
+fn busy(folder: &std::path::Path, further: &[&str]) -> Daemon {
+    let scanning = ["--virtual-time", "--set", "scanning.mode=continuous"];
+    start(folder, &[&scanning, further].concat())
+}
+
+fn viewer(daemon: &Daemon) -> Viewer<std::os::unix::net::UnixStream> {
+    let mut viewer = Viewer::new(daemon.connect().expect("it listens"), "foxglove.sdk.v1");
+    viewer.wait_for_channels();
+    viewer.subscribe_to_all();
+    viewer
+}
+
+#[test]
+fn a_viewer_that_slept_is_told_how_much_it_missed_and_goes_on() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon =
+        busy(folder.path(), &["--set", "foxglove.queue_kb=16", "--set", "server.stall_s=60"]);
+    let mut slow = viewer(&daemon);
+    let before = daemon.health()["scans"]["completed"].as_u64().expect("a count");
+    // More than sockets take in between.
+    daemon.wait_for_scans(before + 40);
+    let told = slow.for_a_while(Duration::from_secs(3));
+    let left_out = |words: &String| words.ends_with(" messages left out");
+    assert!(told.words.iter().any(left_out), "{:?}", told.words);
+    assert!(told.of("/sonar/range").count() > 0);
+    drop(slow.until("/sonar/points"));
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn viewers_that_never_wake_cost_little_and_are_cut_off_while_others_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = busy(folder.path(), &["--set", "server.stall_s=3"]);
+    let mut awake = viewer(&daemon);
+    // Until as much waits as may.
+    drop(awake.for_a_while(Duration::from_secs(8)));
+    let before_kb = own_kb(daemon.id());
+    let asleep: Vec<_> = (0..7).map(|_| viewer(&daemon)).collect();
+    let cut_off = || daemon.status()["subscribers"]["cut_off"].as_u64();
+    let mut most_kb = 0;
+    let until = Instant::now() + Duration::from_secs(40);
+    while cut_off() != Some(7) && Instant::now() < until {
+        assert!(awake.for_a_while(Duration::from_millis(300)).of("/tf").count() > 0);
+        most_kb = most_kb.max(own_kb(daemon.id()));
+    }
+    assert_eq!(cut_off(), Some(7));
+    println!("{before_kb} kB with one viewer, at most {most_kb} kB with seven asleep beside it");
+    // Each one's message on its way, and its connection.
+    assert!(most_kb < before_kb + 7000, "{before_kb} kB before, {most_kb} kB at most");
+    assert_eq!(daemon.health()["scans"]["stopped"], 0);
+    drop(asleep);
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+/// Prints what one viewer of all topics costs a daemon that scans in real time: `--run-ignored all`.
+#[test]
+#[ignore = "takes two minutes, and prints figures"]
+fn figures_of_one_viewer() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let settings = [
+        "--set",
+        "scanning.mode=continuous",
+        "--set",
+        "model.max_range_m=4",
+        "--set",
+        "foxglove.enabled=true",
+    ];
+    let daemon = Daemon::start_mock(folder.path(), &settings);
+    daemon.wait_for_scans(1);
+    let share = |daemon: &Daemon| {
+        let (before, since) = (cpu_s(daemon.id()), Instant::now());
+        std::thread::sleep(Duration::from_secs(40));
+        100.0 * (cpu_s(daemon.id()) - before) / since.elapsed().as_secs_f64()
+    };
+    let (alone, alone_kb) = (share(&daemon), own_kb(daemon.id()));
+    let mut viewer = viewer(&daemon);
+    let watching = std::thread::spawn(move || {
+        let told = viewer.for_a_while(Duration::from_secs(45));
+        let topics: Vec<String> =
+            told.topics().map(|topic| format!("{topic} {}", told.of(topic).count())).collect();
+        let bytes: usize = told
+            .topics()
+            .flat_map(|topic| told.of(topic).map(|(_, bytes)| bytes.len()).collect::<Vec<_>>())
+            .sum();
+        (topics, bytes, told.words)
+    });
+    wait_until("the viewer", || daemon.status()["subscribers"]["now"] == 1);
+    let (watched, watched_kb) = (share(&daemon), own_kb(daemon.id()));
+    let (topics, bytes, words) = watching.join().expect("no panic");
+    println!(
+        "{alone:.2} % of a core and {alone_kb} kB without a viewer, {watched:.2} % and {watched_kb} kB with one of all \
+         topics; {bytes} bytes in 45 s: {topics:?}; {words:?}"
+    );
+    assert_eq!(daemon.stop(), Some(0));
+}
