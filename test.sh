@@ -12,6 +12,7 @@
 #   SCHEMATHESIS=0 ./test.sh    leave the fuzzer of the API out, where there is no Python or PyPI
 #   PYTHON=0 ./test.sh          leave the package for Python out, where there is no Python or PyPI
 #   EXPORT_PEERS=0 ./test.sh    leave the other programs that read exports out, where there is no PyPI
+#   FOXGLOVE_PEER=0 ./test.sh   leave Foxglove's client library out, where there is no npm or node
 #   PROMTOOL=0 ./test.sh        leave promtool out, where Debian's prometheus can't be had
 #   FAKETIME=0 ./test.sh        leave the clock that is set out, where there is no libfaketime
 #   BOOT=0 ./test.sh            leave the units under a booted systemd out (systemd/boot-test.sh)
@@ -219,6 +220,16 @@ check_exports() {
     fail "an export does not say what its log does, or the readers can't be had: EXPORT_PEERS=0 leaves them out"
 }
 
+check_viewers() {
+  if [ "${FOXGLOVE_PEER:-1}" = 0 ]; then
+    step "live messages as Foxglove's library reads them: LEFT OUT, because FOXGLOVE_PEER=0"
+    return
+  fi
+  step "live messages as Foxglove's library reads them"
+  tests/peers/foxglove.sh "${CARGO_TARGET_DIR:-target}/debug/sonard" ||
+    fail "viewers are not told what the log says, or the library can't be had: FOXGLOVE_PEER=0 leaves it out"
+}
+
 check_monitoring() {
   if [ "${PROMTOOL:-1}" = 0 ]; then
     step "alerts as Prometheus reads them: LEFT OUT, because PROMTOOL=0"
@@ -290,6 +301,7 @@ quick)
   check_api
   check_python
   check_exports
+  check_viewers
   check_monitoring
   test_page
   step "tests"
