@@ -6,6 +6,7 @@
 
 mod air;
 mod document;
+mod foxglove;
 mod keys;
 mod layers;
 mod schema;
@@ -13,9 +14,10 @@ mod schema;
 pub use air::AirKeys;
 pub(crate) use air::air_section;
 pub use document::document;
+pub use foxglove::FoxgloveKeys;
 pub use keys::{
-    DeviceKeys, FoxgloveKeys, GpioKeys, Keys, LinkKeys, LogKeys, Mode, ModelKeys, MotionKeys,
-    PlaceKeys, PlanKeys, ScanningKeys, ServerKeys, SimulateKeys,
+    DeviceKeys, GpioKeys, Keys, LinkKeys, LogKeys, Mode, ModelKeys, MotionKeys, PlaceKeys,
+    PlanKeys, ScanningKeys, ServerKeys, SimulateKeys,
 };
 pub use layers::{ConfigError, Layers, Origin};
 pub use schema::{Form, Key, Kind, Section, read_sections, sections};

@@ -5,6 +5,7 @@
 //! readings a subscriber missed by that is told in their place. Scan starts, scan ends and events are
 //! told without a gap: a subscriber that missed one is cut off.
 
+mod counted;
 mod moved;
 mod shelf;
 
@@ -21,6 +22,8 @@ use crate::{
     api::Beside,
     scan::{PingStatus, Record, ScanStart, ScanView, Session, encode_line},
 };
+pub use counted::Attendance;
+use counted::{Counted, Counts};
 pub use moved::Moved;
 pub(crate) use shelf::Shelf;
 
@@ -153,8 +156,7 @@ impl Hub {
     /// Counts somebody as a subscriber whom a follower tells, until what is returned is dropped.
     #[must_use]
     pub fn attend(&self) -> Attendance {
-        let counts = Counts { subscribers: 1, ..Counts::default() };
-        Attendance { _counted: Counted::new(self, counts) }
+        Attendance::new(self)
     }
 
     /// Begins to listen for scans that are over.
@@ -279,7 +281,7 @@ impl Subscription {
     }
 
     fn look(&mut self) -> Found {
-        let inner = Arc::clone(&self.counted.hub.inner);
+        let inner = Arc::clone(&self.counted.hub().inner);
         let waiting = held(&inner.waiting);
         if self.control < waiting.controls.first() {
             drop(waiting);
@@ -352,9 +354,9 @@ impl ScanSubscription {
         loop {
             self.changed.mark_unchanged();
             {
-                let waiting = held(&self.counted.hub.inner.waiting);
+                let waiting = held(&self.counted.hub().inner.waiting);
                 if self.scan < waiting.scans.first() {
-                    self.counted.hub.count_cut_off();
+                    self.counted.hub().count_cut_off();
                     return None;
                 }
                 if let Some(scan) = waiting.scans.get(self.scan) {
@@ -366,51 +368,6 @@ impl ScanSubscription {
                 }
             }
             self.changed.changed().await.ok()?;
-        }
-    }
-}
-
-/// A subscriber who listens elsewhere; dropping it says that it left.
-#[derive(Debug)]
-pub struct Attendance {
-    _counted: Counted,
-}
-
-/// What somebody who listens counts as.
-#[derive(Debug, Clone, Copy, Default)]
-struct Counts {
-    subscribers: usize,
-    of_records: usize,
-    of_verdicts: usize,
-}
-
-/// Counts somebody as long as it is there.
-#[derive(Debug)]
-struct Counted {
-    hub: Hub,
-    counts: Counts,
-}
-
-impl Counted {
-    fn new(hub: &Hub, counts: Counts) -> Self {
-        hub.inner.subscribers.fetch_add(counts.subscribers, Ordering::Relaxed);
-        hub.inner.of_records.fetch_add(counts.of_records, Ordering::Relaxed);
-        hub.inner.of_verdicts.fetch_add(counts.of_verdicts, Ordering::Relaxed);
-        Self { hub: hub.clone(), counts }
-    }
-}
-
-impl Drop for Counted {
-    fn drop(&mut self) {
-        let (inner, counts) = (&self.hub.inner, self.counts);
-        inner.subscribers.fetch_sub(counts.subscribers, Ordering::Relaxed);
-        inner.of_verdicts.fetch_sub(counts.of_verdicts, Ordering::Relaxed);
-        let last = inner.of_records.fetch_sub(counts.of_records, Ordering::Relaxed) == 1;
-        if counts.of_records > 0 && last {
-            // Nobody is left who wants them. Who comes at this moment misses nothing but these.
-            let mut waiting = held(&inner.waiting);
-            waiting.readings.clear();
-            waiting.controls.clear();
         }
     }
 }
