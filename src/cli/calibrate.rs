@@ -1,7 +1,7 @@
 //! `sonard calibrate`.
 
+mod prior;
 mod report;
-mod what;
 
 use std::{
     io::{self, Write},
@@ -20,12 +20,9 @@ use super::{
     what_if::WhatIfArgs,
     worlds::SweepArgs,
 };
-use crate::inverse::{Fit, Fitted, Sweep, World, fit};
-use report::{Line, lines, write_folder};
-use what::{Group, PriorSigma, parameters};
-
-/// How far off headings may be, degrees: one and a half times what is assumed of them.
-const WIDEST_TURN_DEG: f64 = 12.0;
+use crate::inverse::{Fit, Fitted, Group, GroupError, Prior, Sweep, Told, World, fit, priors};
+use prior::PriorSigma;
+use report::write_folder;
 
 /// Options of `sonard calibrate`.
 #[derive(Debug, clap::Args)]
@@ -111,27 +108,33 @@ pub(super) fn run(args: &Args) -> Outcome {
             "give logs of a ranger on a stepper",
         ));
     };
-    let what = Fit {
-        priors: parameters(&args.fit, &args.prior, &world, sweeps.len())?,
-        widest_m: args.widest_m,
-        widest_turn_deg: WIDEST_TURN_DEG,
-        least_sigma_m: 2e-4,
-        least_sigma_db: 0.5,
-    };
+    let what = Fit::usual(wanted(args, &world, sweeps.len())?, args.widest_m);
     let bar = progress::spinner("scans fitted to");
     bar.set_position(sweeps.len() as u64);
     let fitted = fit(&world, &sweeps, &what).map_err(|error| {
         Failure::input(error, "see that poses are in the scene, and fit fewer parameters")
     })?;
     bar.finish_and_clear();
-    let lines = lines(&world, &sweeps, &what, &fitted);
+    let lines = fitted.told(&world, &sweeps, &what);
     if let Some(out) = &args.out {
         write_folder(out, args.overwrite, &world, &sweeps, &fitted, &lines)?;
     }
     answer(args.json, &lines, |out| print(out, &lines, &fitted))
 }
 
-fn print(out: &mut impl Write, lines: &[Line], fitted: &Fitted) -> io::Result<()> {
+/// What is to be fitted, with its priors.
+fn wanted(args: &Args, world: &World, sweeps: usize) -> Result<Vec<Prior>, Failure> {
+    let given: Vec<(String, f64)> = args.prior.iter().map(|PriorSigma(one)| one.clone()).collect();
+    priors(&args.fit, &given, world, sweeps).map_err(|error| {
+        let option = match error {
+            GroupError::NoHeight | GroupError::NoSkirts { .. } => "--fit ",
+            GroupError::NotFitted { .. } | GroupError::Sigma { .. } => "--prior: ",
+        };
+        Failure::input(format!("{option}{error}"), error.help())
+    })
+}
+
+fn print(out: &mut impl Write, lines: &[Told], fitted: &Fitted) -> io::Result<()> {
     let mut table = Table::new();
     table.load_style(RULED);
     table.set_header(["parameter", "was", "is", "\u{b1}", "95 %", ""]);

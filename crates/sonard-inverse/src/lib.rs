@@ -13,6 +13,7 @@ mod atlas;
 mod candidates;
 mod doubt;
 mod fit;
+mod groups;
 mod judged;
 mod likelihood;
 mod linear;
@@ -23,15 +24,18 @@ mod rates;
 mod sweep;
 #[cfg(test)]
 mod tests;
+mod told;
 mod walls;
 mod world;
 
 pub use atlas::{Atlas, AtlasError};
 pub use doubt::{Doubt, doubts};
 pub use fit::{Estimate, Fit, FitError, Fitted, Prior, bound, fit};
+pub use groups::{Group, GroupError, name, priors};
 pub use likelihood::ErrorModel;
 pub use locate::{Mode, locate};
 pub use motion::{Motion, length_rate};
 pub use parameter::Parameter;
 pub use sweep::{Beam, Heard, Sweep, SweepError};
+pub use told::Told;
 pub use world::{World, WorldError};

@@ -191,6 +191,16 @@ impl RangerArray {
         ScanPlan { step_deg: 360.0 / beams, ..ScanPlan::default() }
     }
 
+    /// Where a robot stands in each of so many rounds from a pose on: it turns in place by equal parts of the angle
+    /// between two rangers of an even ring, so that directions are spread evenly.
+    #[must_use]
+    pub fn turned(&self, pose: &Pose, rounds: u32) -> Vec<Pose> {
+        let step_deg = self.plan(rounds).step_deg;
+        let heading_deg = |round| wrap_360(pose.heading_deg + f64::from(round) * step_deg);
+        let turned = (1..rounds).map(|round| Pose { heading_deg: heading_deg(round), ..*pose });
+        std::iter::once(*pose).chain(turned).collect()
+    }
+
     /// A scene with this robot's body as its robot.
     #[must_use]
     pub fn in_scene(&self, scene: &Scene) -> Scene {
@@ -204,12 +214,26 @@ impl RangerArray {
     /// # Errors
     /// Which ranger can't be there, and why.
     pub fn check_pose(&self, scene: &Scene, robot: &Pose) -> Result<(), ArrayPoseError> {
-        let scene = self.in_scene(scene);
-        let places: Vec<DVec2> =
-            self.rangers.iter().map(|ranger| ranger.pose_on(robot).position()).collect();
-        scene.check_places(robot, &places).map_err(|(at, error)| ArrayPoseError {
-            ranger: at.map(|at| self.rangers[at].id.clone()),
-            error,
+        self.check_poses(scene, std::slice::from_ref(robot)).map_err(|(_, error)| error)
+    }
+
+    /// The same for many poses.
+    ///
+    /// # Errors
+    /// The first pose that fails, by its index, and why.
+    pub fn check_poses(
+        &self,
+        scene: &Scene,
+        poses: &[Pose],
+    ) -> Result<(), (usize, ArrayPoseError)> {
+        let faces = |robot: &Pose| {
+            let faces = self.rangers.iter().map(|ranger| ranger.pose_on(robot).position());
+            (*robot, faces.collect())
+        };
+        let checked = self.in_scene(scene).check_many_places(poses.iter().map(faces));
+        checked.map_err(|(at, (ranger, error))| {
+            let ranger = ranger.map(|ranger| self.rangers[ranger].id.clone());
+            (at, ArrayPoseError { ranger, error })
         })
     }
 }

@@ -18,6 +18,7 @@ mod rewrite;
 mod robot;
 mod schema;
 pub mod shipped;
+mod surfaces;
 #[cfg(test)]
 mod tests;
 
@@ -27,6 +28,7 @@ pub use floor_plan::{Change, DEFAULT_SNAP_M, FloorPlan};
 pub use pose::{PoseError, parse_pose};
 pub use robot::{Robot, RobotShape};
 pub use schema::json_schema;
+pub use surfaces::Surfaces;
 
 use std::{collections::BTreeMap, sync::Arc};
 

@@ -10,9 +10,9 @@ use dxf::{
 
 use super::{
     super::{Failure, Outcome, numbers::positive},
-    made::{Found, MadeArgs, arc, read, refuse},
+    made::{MadeArgs, arc, read, refuse},
 };
-use crate::geometry::DVec2;
+use crate::{geometry::DVec2, scene::Surfaces};
 
 /// Options of `sonard scene from-dxf`.
 #[derive(Debug, clap::Args)]
@@ -61,7 +61,7 @@ pub(super) fn run(args: &FromDxfArgs) -> Outcome {
         let common = &entity.common;
         common.is_visible && !common.is_in_paper_space && layers.contains(&common.layer)
     });
-    let mut found = Plan { unit_m, found: Found::default() };
+    let mut found = Plan { unit_m, found: Surfaces::default() };
     for entity in shown {
         found.add(entity);
     }
@@ -102,7 +102,7 @@ fn layers(args: &FromDxfArgs, drawing: &Drawing) -> Result<BTreeSet<String>, Fai
 struct Plan {
     /// Metres a unit.
     unit_m: f64,
-    found: Found,
+    found: Surfaces,
 }
 
 impl Plan {

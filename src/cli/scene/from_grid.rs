@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use super::{
     super::{Outcome, map_file, numbers::not_negative},
-    made::{Found, MadeArgs},
+    made::MadeArgs,
 };
-use crate::interpret::grid::{TraceSettings, trace};
+use crate::interpret::grid::{TraceSettings, surfaces};
 
 /// Options of `sonard scene from-grid`.
 #[derive(Debug, clap::Args)]
@@ -44,11 +44,7 @@ pub(super) fn run(args: &FromGridArgs) -> Outcome {
         least_m: args.least_m.unwrap_or(by_default.least_m),
         ..by_default
     };
-    let mut found = Found::default();
-    for line in trace(&grid, &settings) {
-        found.walls("wall", line.corners, line.is_closed);
-    }
     let help =
         "give a map with occupied cells (above 0.65) beside free ones, or a smaller --least-m";
-    args.made.write(&args.map, &found, help)
+    args.made.write(&args.map, &surfaces(&grid, &settings), help)
 }

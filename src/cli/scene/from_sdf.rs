@@ -7,8 +7,9 @@ use roxmltree::{Document, Node};
 
 use super::{
     super::{Failure, Outcome, numbers::within},
-    made::{Found, MadeArgs, read, refuse},
+    made::{MadeArgs, read, refuse},
 };
+use crate::scene::Surfaces;
 
 /// Options of `sonard scene from-sdf`.
 #[derive(Debug, clap::Args)]
@@ -47,7 +48,7 @@ pub(super) fn run(args: &FromSdfArgs) -> Outcome {
         let what = format!("the outermost element is {}, not sdf", root.tag_name().name());
         return Err(refuse(&args.world, &what, help));
     }
-    let mut world = World { args, found: Found::default() };
+    let mut world = World { args, found: Surfaces::default() };
     world.add(root, "body", &DAffine3::IDENTITY)?;
     let help = "give a world with boxes, cylinders or outlines that the height of --cut-z-m meets";
     args.made.write(&args.world, &world.found, help)
@@ -56,7 +57,7 @@ pub(super) fn run(args: &FromSdfArgs) -> Outcome {
 /// What was found so far.
 struct World<'a> {
     args: &'a FromSdfArgs,
-    found: Found,
+    found: Surfaces,
 }
 
 impl World<'_> {

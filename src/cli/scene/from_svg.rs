@@ -9,9 +9,9 @@ use usvg::{
 
 use super::{
     super::{Outcome, numbers::positive},
-    made::{Found, MadeArgs, read, refuse},
+    made::{MadeArgs, read, refuse},
 };
-use crate::geometry::DVec2;
+use crate::{geometry::DVec2, scene::Surfaces};
 
 /// Options of `sonard scene from-svg`.
 #[derive(Debug, clap::Args)]
@@ -51,7 +51,7 @@ pub(super) fn run(args: &FromSvgArgs) -> Outcome {
         .map_err(|error| refuse(&args.drawing, &error, help))?;
     let (width, height) = (f64::from(tree.size().width()), f64::from(tree.size().height()));
     let scale = args.width_m / width;
-    let mut drawing = Drawing { scale, width, height, found: Found::default() };
+    let mut drawing = Drawing { scale, width, height, found: Surfaces::default() };
     drawing.group(tree.root());
     args.made.write(&args.drawing, &drawing.found, "draw walls as lines; texts and images are none")
 }
@@ -63,7 +63,7 @@ struct Drawing {
     /// Of the drawing, in its units.
     width: f64,
     height: f64,
-    found: Found,
+    found: Surfaces,
 }
 
 impl Drawing {

@@ -1,17 +1,13 @@
 //! Scenes that are made of drawings, maps and worlds of others.
 
-use std::{collections::BTreeMap, f64::consts::PI, fs, path::Path};
+use std::{f64::consts::PI, fs, path::Path};
 
 use super::super::{
     Failure, Outcome,
     numbers::probability,
     output::{OutPath, Overwrite, Product, note_input},
 };
-use crate::{
-    geometry::DVec2,
-    interpret::grid::WallLine,
-    scene::{Scene, SceneBuilder},
-};
+use crate::{geometry::DVec2, scene::Surfaces};
 
 /// What a scene that is made of something else is told besides.
 #[derive(Debug, clap::Args)]
@@ -29,31 +25,10 @@ pub(in crate::cli) struct MadeArgs {
     overwrite: Overwrite,
 }
 
-/// A surface that was found.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Surface {
-    /// A row of walls.
-    Walls(WallLine),
-    /// An upright round body, metres.
-    Round { center: DVec2, radius_m: f64 },
-}
-
-/// What was found, by the names of what it was found in.
-#[derive(Debug, Default)]
-pub(super) struct Found {
-    surfaces: Vec<(String, Surface)>,
-    /// What makes no wall, with how often it was met.
-    left_out: BTreeMap<&'static str, usize>,
-}
-
-/// Points this near are one, metres: scenes are written to a tenth of a millimetre.
-const SAME_M: f64 = 2e-4;
 /// Walls in place of a curve are off it by this at most, metres.
 const OFF_CURVE_M: f64 = 1e-3;
 /// Walls of a full turn, at least and at most.
 const OF_A_TURN: (f64, f64) = (12.0, 360.0);
-/// The material of everything.
-const MATERIAL: &str = "wall";
 
 /// A file that a scene is made of, noted as one that is read.
 ///
@@ -82,56 +57,22 @@ pub(super) fn arc(center: DVec2, from: DVec2, turn_rad: f64) -> impl Iterator<It
     })
 }
 
-impl Found {
-    /// Keeps a row of walls, unless it has no length.
-    pub(super) fn walls(&mut self, name: &str, mut corners: Vec<DVec2>, is_closed: bool) {
-        corners.dedup_by(|a, b| a.distance(*b) < SAME_M);
-        let meets = |corners: &[DVec2]| match corners {
-            [first, .., last] => corners.len() > 2 && first.distance(*last) < SAME_M,
-            _ => false,
-        };
-        let is_closed = (is_closed || meets(&corners)) && corners.len() > 2;
-        if meets(&corners) {
-            corners.pop();
-        }
-        if corners.len() > 1 && corners.iter().all(|corner| corner.is_finite()) {
-            let is_closed = is_closed && corners.len() > 2;
-            let line = WallLine { corners, is_closed };
-            self.surfaces.push((name.to_owned(), Surface::Walls(line)));
-        }
-    }
-
-    /// Keeps an upright round body, unless it has no width.
-    pub(super) fn round(&mut self, name: &str, center: DVec2, radius_m: f64) {
-        if radius_m > SAME_M && radius_m.is_finite() && center.is_finite() {
-            self.surfaces.push((name.to_owned(), Surface::Round { center, radius_m }));
-        }
-    }
-
-    /// Counts what makes no wall.
-    pub(super) fn leave_out(&mut self, what: &'static str) {
-        *self.left_out.entry(what).or_default() += 1;
-    }
-}
-
 impl MadeArgs {
     /// Writes the scene of what was found in a file, and says what was left out.
     ///
     /// # Errors
     /// When nothing was found, with this help, and what the disk refuses.
-    pub(super) fn write(&self, from: &Path, found: &Found, help_if_none: &str) -> Outcome {
+    pub(super) fn write(&self, from: &Path, found: &Surfaces, help_if_none: &str) -> Outcome {
         let shown = from.display();
-        for (what, count) in &found.left_out {
+        for (what, count) in found.left_out() {
             anstream::eprintln!("warning: {shown}: left out: {count} {what}");
         }
-        if found.surfaces.is_empty() {
+        if found.is_empty() {
             return Err(refuse(from, &"no wall is found in it", help_if_none));
         }
         let stem = from.file_stem().map(|stem| stem.to_string_lossy().into_owned());
         let name = self.name.clone().or(stem).filter(|name| !name.is_empty());
-        let empty =
-            Scene::builder(name.as_deref().unwrap_or("scene")).material(MATERIAL, self.reflectance);
-        let scene = found.surfaces.iter().zip(1_usize..).fold(empty, with_surface);
+        let scene = found.scene(name.as_deref().unwrap_or("scene"), self.reflectance);
         let built = scene.build().map_err(|error| {
             refuse(from, &error, "see that its lengths are in the units that were meant")
         })?;
@@ -142,28 +83,6 @@ impl MadeArgs {
                 anstream::eprintln!("{}", super::summary(&built));
                 Ok(())
             }
-        }
-    }
-}
-
-/// Rounded to a tenth of a millimetre: nobody draws finer.
-fn with_surface(
-    scene: SceneBuilder,
-    ((name, surface), number): (&(String, Surface), usize),
-) -> SceneBuilder {
-    let round = |metres: f64| (1e4 * metres).round() / 1e4 + 0.0;
-    let place = |point: &DVec2| [round(point.x), round(point.y)];
-    let id = format!("{name}-{number}");
-    match surface {
-        Surface::Walls(WallLine { corners, is_closed }) => {
-            let corners: Vec<[f64; 2]> = corners.iter().map(place).collect();
-            match is_closed {
-                true => scene.room(&id, &corners, MATERIAL),
-                false => scene.walls(&id, &corners, MATERIAL),
-            }
-        }
-        Surface::Round { center, radius_m } => {
-            scene.cylinder(&id, place(center), round(*radius_m), MATERIAL)
         }
     }
 }
@@ -189,23 +108,5 @@ mod tests {
                 assert!(sag_m < 1.01 * most_m, "{radius_m}: {sag_m}");
             }
         }
-    }
-
-    #[test]
-    fn lines_without_length_are_none_and_a_ring_that_comes_back_is_closed() {
-        let mut found = Found::default();
-        let corner = |x: f64, y: f64| DVec2::new(x, y);
-        found.walls("dot", vec![corner(1.0, 1.0), corner(1.0, 1.0 + 1e-5)], false);
-        found.walls("far", vec![corner(0.0, 0.0), corner(f64::NAN, 1.0)], false);
-        found.round("dot", corner(0.0, 0.0), 0.0);
-        assert!(found.surfaces.is_empty());
-        let ring = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0)].map(|(x, y)| corner(x, y));
-        found.walls("ring", ring.to_vec(), false);
-        found.walls("there and back", vec![ring[0], ring[1], ring[0]], true);
-        let [(_, Surface::Walls(ring)), (_, Surface::Walls(line))] = &found.surfaces[..] else {
-            panic!("{found:?}")
-        };
-        assert!(ring.is_closed && ring.corners.len() == 3);
-        assert!(!line.is_closed && line.corners.len() == 2);
     }
 }

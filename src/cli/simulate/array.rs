@@ -17,7 +17,7 @@ use crate::{
         output::{closed, records_to},
         progress, scene_file,
     },
-    geometry::{Pose, wrap_360},
+    geometry::Pose,
     model::{ArrayAtPose, ArrayModel, ModelError, Prediction, TooCostly},
     scan::{Ping, Record, ScanEnd, ScanStart, Session},
     store::RecordWriter,
@@ -42,12 +42,11 @@ pub(super) fn run(args: &Args, name: &str) -> Outcome {
     let array = load_array(name)?;
     let scene = scene_file::load(&args.scene)?;
     let Places { poses, left_out } = places(args, &scene, |pose| {
-        let mut rounds = turned(args, *pose, &array).into_iter();
-        rounds.try_for_each(|pose| {
-            array.check_pose(&scene, &pose).map_err(|error| (error.to_string(), error.help()))
-        })
+        let checked = array.check_poses(&scene, &array.turned(pose, args.array.rounds));
+        checked.map_err(|(_, error)| (error.to_string(), error.help()))
     })?;
-    let rounds: Vec<Vec<Pose>> = poses.iter().map(|pose| turned(args, *pose, &array)).collect();
+    let rounds: Vec<Vec<Pose>> =
+        poses.iter().map(|pose| array.turned(pose, args.array.rounds)).collect();
     let (sensor, air) = (args.sensor.sensor_or(&array.sensor)?, args.air.air()?);
     let model =
         ArrayModel::new(Arc::new(array), &scene, &sensor, air, engine_options(&args.engine)?)
@@ -63,16 +62,6 @@ pub(super) fn run(args: &Args, name: &str) -> Outcome {
         Err(Stop::Model(error)) => Err(refuse(&error)),
         Err(Stop::Write(error)) => closed(Err(error)),
     }
-}
-
-/// The robot's pose in each round: turned by equal parts of the angle between two rangers of an
-/// even ring.
-fn turned(args: &Args, pose: Pose, array: &crate::array::RangerArray) -> Vec<Pose> {
-    let step_deg = array.plan(args.array.rounds).step_deg;
-    let heading_deg = |round| wrap_360(pose.heading_deg + f64::from(round) * step_deg);
-    let turned =
-        (1..args.array.rounds).map(|round| Pose { heading_deg: heading_deg(round), ..pose });
-    std::iter::once(pose).chain(turned).collect()
 }
 
 fn refuse(error: &ModelError) -> Failure {

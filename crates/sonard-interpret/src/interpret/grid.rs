@@ -19,7 +19,7 @@ pub use beam_model::{BeamModel, GaussianBeam, PhysicalBeam};
 pub use ideal::ideal;
 pub use image::{ImageError, MapYaml, from_pgm, from_pixels, to_pgm};
 pub use score::{MapScore, PathSettings, ScoreError, score};
-pub use trace::{TraceSettings, WallLine, trace};
+pub use trace::{TraceSettings, WallLine, surfaces, trace};
 
 use thiserror::Error;
 

@@ -67,17 +67,41 @@ impl Course {
         Ok(course)
     }
 
+    /// A course of poses, with the seconds at which the robot is at each of them or with none.
+    ///
+    /// # Errors
+    /// Names the first pose that is wrong, counted from 1 as a line.
+    pub fn new(poses: &[Pose], times_s: Option<&[f64]>) -> Result<Self, CourseError> {
+        let refuse = |at: usize, message: String| CourseError { line: at + 1, message };
+        if poses.is_empty() {
+            return Err(refuse(0, "there is no pose: give one".to_owned()));
+        }
+        if let Some(times_s) = times_s.filter(|times_s| times_s.len() != poses.len()) {
+            let (count, times) = (poses.len(), times_s.len());
+            let message = format!("{count} poses, but {times} times: give one for each");
+            return Err(refuse(count.min(times), message));
+        }
+        let mut course = Self { poses: Vec::new(), times_s: Vec::new() };
+        for (at, &Pose { x_m, y_m, heading_deg }) in poses.iter().enumerate() {
+            let waypoint =
+                Waypoint { time_s: times_s.map(|times_s| times_s[at]), x_m, y_m, heading_deg };
+            course.push(&waypoint).map_err(|message| refuse(at, message))?;
+        }
+        Ok(course)
+    }
+
     fn push(&mut self, waypoint: &Waypoint) -> Result<(), String> {
         let Waypoint { time_s, x_m, y_m, heading_deg } = *waypoint;
+        if ![time_s.unwrap_or_default(), x_m, y_m, heading_deg].iter().all(|one| one.is_finite()) {
+            return Err("its numbers must be finite".into());
+        }
         if !self.poses.is_empty() && time_s.is_some() == self.times_s.is_empty() {
             return Err("either every line has a time_s, or none".into());
         }
         if let Some(time_s) = time_s {
             match self.times_s.last() {
                 Some(before_s) if time_s <= *before_s => {
-                    return Err(format!(
-                        "time_s {time_s} is not after {before_s}, the line before"
-                    ));
+                    return Err(format!("time_s {time_s} is not after {before_s}, the one before"));
                 }
                 _ => {}
             }
@@ -91,6 +115,12 @@ impl Course {
     #[must_use]
     pub fn poses(&self) -> &[Pose] {
         &self.poses
+    }
+
+    /// When the robot is at each of them, seconds; empty where the course has no times.
+    #[must_use]
+    pub fn times_s(&self) -> &[f64] {
+        &self.times_s
     }
 
     /// With times for a robot that drives at this speed, metres a second; a course that has times

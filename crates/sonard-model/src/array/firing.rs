@@ -74,6 +74,22 @@ impl RangerArray {
         (whole * turns.len() + begun.count()) as f64 * self.interval_ms * 1e-3
     }
 
+    /// When each firing of so many rounds begins, seconds after the first.
+    #[must_use]
+    pub fn firing_times_s(&self, rounds: u32) -> Vec<f64> {
+        let turns = self.turns();
+        let begins_s = |turn: usize| turn as f64 * self.interval_ms * 1e-3;
+        let of_round = |round: u32| {
+            let first = round as usize * turns.len();
+            let times = turns
+                .iter()
+                .zip(first..)
+                .flat_map(|(turn, number)| std::iter::repeat_n(begins_s(number), turn.len()));
+            times.collect::<Vec<_>>()
+        };
+        (0..rounds).flat_map(of_round).collect()
+    }
+
     /// The firings whose sound can be on its way when one of a round listens, counted from 0: those of its own
     /// turn and of so many turns before, latest first. The array is taken to poll on and on, round after round.
     #[must_use]

@@ -169,3 +169,56 @@ fn wrong_courses_are_named_by_their_line() {
         assert!(error.message.contains(part), "{error} lacks {part}");
     }
 }
+
+#[test]
+fn a_course_of_poses_is_that_of_its_lines() {
+    let at = |x_m, heading_deg| Pose { x_m, y_m: 0.0, heading_deg };
+    let poses = [at(0.0, 0.0), at(1.0, 350.0)];
+    let text = "{\"time_s\":5,\"x_m\":0,\"y_m\":0}\n{\"time_s\":9,\"x_m\":1,\"y_m\":0,\"heading_deg\":350}";
+    let course = Course::new(&poses, Some(&[5.0, 9.0])).expect("two poses");
+    assert_eq!(course, Course::from_json_lines(text).expect("two lines"));
+    assert_eq!(course.timed(1.0).times_s(), [0.0, 4.0]);
+    assert_eq!(Course::new(&poses, None).expect("two poses").timed(0.5).times_s(), [0.0, 2.0]);
+    for (poses, times_s, line, part) in [
+        (&poses[..0], None, 1, "no pose"),
+        (&poses[..], Some(&[1.0][..]), 2, "2 poses, but 1 times"),
+        (&poses[..], Some(&[1.0, 1.0][..]), 2, "not after 1"),
+        (&poses[..], Some(&[1.0, f64::NAN][..]), 2, "finite"),
+        (&[at(f64::INFINITY, 0.0)][..], None, 1, "finite"),
+    ] {
+        let error = Course::new(poses, times_s).expect_err(part);
+        assert!(error.line == line && error.message.contains(part), "{error} lacks {part}");
+    }
+}
+
+#[test]
+fn rounds_begin_one_after_the_other_and_turn_by_parts_of_the_ring() {
+    let mut array = preset("ring-12");
+    array.interval_ms = 50.0;
+    array.firing_order =
+        vec![Turn::Together(vec!["s0".into(), "s6".into()]), Turn::from("s3"), Turn::from("s0")];
+    assert_eq!(array.firing_times_s(0), [0.0; 0]);
+    let expected = [0.0, 0.0, 0.05, 0.1, 0.15, 0.15, 0.2, 0.25];
+    let times_s = array.firing_times_s(2);
+    assert_eq!(times_s.len(), expected.len());
+    for (found_s, expected_s) in times_s.iter().zip(expected) {
+        assert!((found_s - expected_s).abs() < 1e-12, "{times_s:?}");
+    }
+    let ring = preset("ring-12");
+    let from = Pose { x_m: 1.0, y_m: 2.0, heading_deg: -350.0 };
+    let turned = ring.turned(&from, 3);
+    assert_eq!(turned[0], from);
+    let headings: Vec<f64> = turned.iter().map(|pose| pose.heading_deg.round()).collect();
+    assert_eq!(headings, [-350.0, 20.0, 30.0]);
+}
+
+#[test]
+fn of_many_poses_the_first_that_fails_is_named() {
+    let room = scene("simple-room");
+    let at = |x_m, y_m| Pose { x_m, y_m, heading_deg: 0.0 };
+    let (array, good) = (preset("pioneer-8"), at(0.4, 0.37));
+    assert_eq!(array.check_poses(&room, &[good; 3]), Ok(()));
+    let bad = at(0.8, 0.37);
+    let (index, error) = array.check_poses(&room, &[good, bad]).expect_err("beyond the wall");
+    assert_eq!((index, Err(error)), (1, array.check_pose(&room, &bad)));
+}

@@ -225,10 +225,32 @@ impl Scene {
         pose: &Pose,
         places: &[DVec2],
     ) -> Result<(), (Option<usize>, PoseError)> {
+        self.check_places_among(&Outlines::of(self), pose, places)
+    }
+
+    /// The same for many poses, each with the places of its faces, with the outlines found once.
+    ///
+    /// # Errors
+    /// The first pose that fails, by its index, with what [`Self::check_places`] says of it.
+    pub fn check_many_places(
+        &self,
+        stands: impl IntoIterator<Item = (Pose, Vec<DVec2>)>,
+    ) -> Result<(), (usize, (Option<usize>, PoseError))> {
         let outlines = Outlines::of(self);
-        self.check_pose_among(&outlines, pose).map_err(|error| (None, error))?;
+        stands.into_iter().enumerate().try_for_each(|(at, (pose, places))| {
+            self.check_places_among(&outlines, &pose, &places).map_err(|error| (at, error))
+        })
+    }
+
+    fn check_places_among(
+        &self,
+        outlines: &Outlines,
+        pose: &Pose,
+        places: &[DVec2],
+    ) -> Result<(), (Option<usize>, PoseError)> {
+        self.check_pose_among(outlines, pose).map_err(|error| (None, error))?;
         let check = |place: DVec2| {
-            self.check_place(&outlines, place)?;
+            self.check_place(outlines, place)?;
             self.check_off_robot(pose, place, outlines.room)
         };
         for (at, &place) in places.iter().enumerate() {

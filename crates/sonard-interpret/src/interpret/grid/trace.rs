@@ -3,7 +3,10 @@
 use std::collections::HashMap;
 
 use super::Grid;
-use sonard_model::geometry::{DVec2, distance_to_segment, enclosed_area};
+use sonard_model::{
+    geometry::{DVec2, distance_to_segment, enclosed_area},
+    scene::Surfaces,
+};
 
 /// A line along walls, free space on its left.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +50,16 @@ impl TraceSettings {
 
 /// A corner of cells: column and row of the cell that it is the lower left corner of.
 type Node = (i64, i64);
+
+/// The walls of a map as surfaces of a scene.
+#[must_use]
+pub fn surfaces(grid: &Grid, settings: &TraceSettings) -> Surfaces {
+    let mut found = Surfaces::default();
+    for WallLine { corners, is_closed } in trace(grid, settings) {
+        found.walls("wall", corners, is_closed);
+    }
+    found
+}
 
 /// The walls of a map.
 ///
