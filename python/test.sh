@@ -13,7 +13,7 @@ root=$(cd .. && pwd)
 export SONARD=${SONARD:-${CARGO_TARGET_DIR:-$root/target}/debug/sonard}
 # What is built here is of no use to the workspace, and the other way round.
 export CARGO_TARGET_DIR=$PWD/target
-needed=(maturin mypy numpy pytest hypothesis matplotlib pyroomacoustics pyarrow scikit-learn mujoco)
+needed=(maturin mypy numpy pytest hypothesis matplotlib pyroomacoustics pyarrow scikit-learn mujoco shapely)
 
 [ -x "$SONARD" ] || (cd .. && unset CARGO_TARGET_DIR && cargo build --workspace --quiet)
 ../tests/venv.sh target/venv PYTHON=0 "${needed[@]}"

@@ -20,29 +20,65 @@ pub(crate) type Numbers<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
 /// Words of eight bytes that a reading takes: its status with seven bytes of filling, and four numbers.
 pub(crate) const READING_WORDS: usize = 5;
 
-const FIELDS: [&str; READING_WORDS] = ["status", "range_m", "amplitude", "margin_db", "tof_us"];
+/// Fields of a reading: name, format and offset.
+const FIELDS: [(&str, &str, usize); READING_WORDS] = [
+    ("status", "u1", 0),
+    ("range_m", "f8", 8),
+    ("amplitude", "f8", 16),
+    ("margin_db", "f8", 24),
+    ("tof_us", "f8", 32),
+];
+
+/// What the readings of arrays have besides, in the filling.
+const CROSSTALK: (&str, &str, usize) = ("crosstalk", "i2", 2);
 
 /// The type of a reading in an array.
 pub(crate) fn reading_dtype(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+    dtype(py, &FIELDS, 8 * READING_WORDS)
+}
+
+/// The type of a reading of an array of rangers.
+pub(crate) fn array_reading_dtype(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+    let mut fields = FIELDS.to_vec();
+    fields.insert(1, CROSSTALK);
+    dtype(py, &fields, 8 * READING_WORDS)
+}
+
+/// The type of a structure of these fields: name, format and offset.
+pub(crate) fn dtype<'py>(
+    py: Python<'py>,
+    fields: &[(&str, &str, usize)],
+    itemsize: usize,
+) -> PyResult<Bound<'py, PyAny>> {
     let layout = PyDict::new(py);
-    layout.set_item("names", FIELDS)?;
-    layout.set_item("formats", ["u1", "f8", "f8", "f8", "f8"])?;
-    layout.set_item("offsets", [0, 8, 16, 24, 32])?;
-    layout.set_item("itemsize", 8 * READING_WORDS)?;
+    layout.set_item("names", fields.iter().map(|field| field.0).collect::<Vec<_>>())?;
+    layout.set_item("formats", fields.iter().map(|field| field.1).collect::<Vec<_>>())?;
+    layout.set_item("offsets", fields.iter().map(|field| field.2).collect::<Vec<_>>())?;
+    layout.set_item("itemsize", itemsize)?;
     py.import("numpy")?.call_method1("dtype", (layout,))
 }
 
 /// A reading as the words of its array. Of a silence range and time of flight are infinite; what there is none
 /// of is not a number.
 pub(crate) fn words_of(prediction: &Prediction) -> [f64; READING_WORDS] {
+    words(prediction, 0)
+}
+
+/// The same of an array's ranger, with the ranger whose sound it was if not its own, else -1.
+pub(crate) fn words_of_array(prediction: &Prediction) -> [f64; READING_WORDS] {
+    words(prediction, prediction.crosstalk.map_or(-1, |other| other.ranger as i16))
+}
+
+fn words(prediction: &Prediction, crosstalk: i16) -> [f64; READING_WORDS] {
     let none = match prediction.status {
         PingStatus::NoEcho => f64::INFINITY,
         _ => f64::NAN,
     };
-    let mut status = [0; 8];
-    status[0] = status::code(prediction.status);
+    let mut head = [0; 8];
+    head[0] = status::code(prediction.status);
+    head[2..4].copy_from_slice(&crosstalk.to_ne_bytes());
     [
-        f64::from_bits(u64::from_ne_bytes(status)),
+        f64::from_bits(u64::from_ne_bytes(head)),
         prediction.range_m.unwrap_or(none),
         prediction.amplitude.unwrap_or(f64::NAN),
         prediction.margin_db.unwrap_or(f64::NAN),
@@ -119,6 +155,17 @@ pub(crate) fn rows(
     }
     shape.pop();
     Ok((array.as_array().iter().copied().collect(), shape))
+}
+
+/// The numbers of an array, one after the other, and its shape.
+pub(crate) fn any(given: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
+    let array: Numbers = given.extract()?;
+    Ok((array.as_array().iter().copied().collect(), array.shape().to_vec()))
+}
+
+/// Poses as rows of x, y and heading.
+pub(crate) fn numbers_of(poses: &[Pose]) -> Vec<f64> {
+    poses.iter().flat_map(|pose| [pose.x_m, pose.y_m, pose.heading_deg]).collect()
 }
 
 /// The numbers of an array of one axis.

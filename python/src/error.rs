@@ -9,7 +9,7 @@ use pyo3::{
     type_object::PyTypeInfo,
 };
 use sonard_model::{
-    acoustics, model,
+    acoustics, array, model,
     scene::{self, shown},
 };
 
@@ -33,6 +33,12 @@ create_exception!(
     "A pose at which no ranger can stand. `index` is its place among those given, a tuple."
 );
 create_exception!(sonard, SensorError, SonardError, "A sensor's data that make no sense.");
+create_exception!(
+    sonard,
+    ArrayError,
+    SonardError,
+    "An array's or a course's data that make no sense."
+);
 create_exception!(sonard, AirError, SonardError, "Air that the formulas do not cover.");
 create_exception!(
     sonard,
@@ -89,13 +95,27 @@ pub(crate) fn scene(py: Python<'_>, error: &scene::SceneError, text_is_given: bo
 
 /// A pose that is refused, by its place among those given.
 pub(crate) fn pose(py: Python<'_>, index: &[usize], error: &scene::PoseError) -> PyErr {
+    pose_in_words(py, index, &error.to_string(), &error.help())
+}
+
+/// A pose of an array's robot that is refused, likewise.
+pub(crate) fn array_pose(py: Python<'_>, index: &[usize], error: &array::ArrayPoseError) -> PyErr {
+    pose_in_words(py, index, &error.to_string(), &error.help())
+}
+
+fn pose_in_words(py: Python<'_>, index: &[usize], words: &str, help: &str) -> PyErr {
     let place = match index {
         [] => String::new(),
         _ => format!("poses{index:?}: "),
     };
-    let exception = refuse::<PoseError>(py, &format!("{place}{error}"), &error.help());
+    let exception = refuse::<PoseError>(py, &format!("{place}{words}"), help);
     tell(py, &exception, "index", pyo3::types::PyTuple::new(py, index).ok());
     exception
+}
+
+/// Data of an array that are refused.
+pub(crate) fn array(py: Python<'_>, error: &array::ArrayError) -> PyErr {
+    refuse::<ArrayError>(py, &error.to_string(), &error.help())
 }
 
 /// Data of a sensor that are refused.

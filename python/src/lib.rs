@@ -3,12 +3,18 @@
 //! What a user sees is described in `package/sonard/__init__.pyi`; `stubtest` holds the two together.
 
 mod air;
+mod array;
 mod arrays;
+mod calibrate;
 mod error;
+mod firing;
 mod generate;
 mod json;
+mod locate;
 mod log;
+mod map;
 mod model;
+mod options;
 mod path;
 mod pool;
 mod readings;
@@ -24,15 +30,19 @@ mod _sonard {
     #[pymodule_export]
     use crate::{
         air::Air,
+        array::{ArrayModel, Course, RangerArray},
+        calibrate::calibrate,
         error::{
-            AirError, LogError, OptionError, PoseError, SceneError, SensorError, SonardError,
-            TooManyPathsError,
+            AirError, ArrayError, LogError, OptionError, PoseError, SceneError, SensorError,
+            SonardError, TooManyPathsError,
         },
         generate::generate,
+        locate::Locator,
         log::{Log, Scan, read_log},
+        map::make_map,
         model::{Model, predict::seconds_of_predict_many},
         scene::Scene,
-        sense::{Locator, compare, find_features, make_map},
+        sense::{compare, find_features},
         sensor::Sensor,
     };
 
@@ -41,6 +51,8 @@ mod _sonard {
         use pyo3::types::PyModuleMethods as _;
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         module.add("READING", crate::arrays::reading_dtype(module.py())?)?;
+        let array_reading = crate::arrays::array_reading_dtype(module.py())?;
+        module.add("ARRAY_READING", array_reading)?;
         module.add("LOGGED", crate::log::logged_dtype(module.py())?)
     }
 }

@@ -22,6 +22,7 @@ pub(crate) use table::{logged_dtype, shaped_readings};
 
 use crate::{
     air::Air,
+    array::{ArrayModel, RangerArray},
     error::{self, LogError, refuse},
     json,
     model::Model,
@@ -244,23 +245,43 @@ impl Scan {
     /// scene : Scene or str, optional
     ///     A scene in place of the log's.
     #[pyo3(signature = (scene = None))]
-    fn model(&self, py: Python<'_>, scene: Option<&Bound<'_, PyAny>>) -> PyResult<Model> {
-        let scene = match scene {
-            Some(given) => crate::scene::meant(given)?,
-            None => {
-                let help = "give one of your own: scan.model(scene)";
-                let none = || refuse::<LogError>(py, "the log holds no scene", help);
-                Py::new(py, self.scene(py)?.ok_or_else(none)?)?
-            }
+    pub(crate) fn model(
+        &self,
+        py: Python<'_>,
+        scene: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Model> {
+        let scene = self.scene_meant(py, scene)?;
+        let sensor = Py::new(py, self.sensor(py)?)?;
+        Model::of(py, scene, sensor, self.air(py)?, self.options(py)?)
+    }
+
+    /// The array of its session; ``None`` of a ranger on a stepper.
+    #[getter]
+    fn array(&self, py: Python<'_>) -> PyResult<Option<RangerArray>> {
+        let array = self.session_of(py)?.array.as_ref();
+        array.map(|array| RangerArray::checked(py, array.clone())).transpose()
+    }
+
+    /// The model of its session's array: its scene, sensor, air and options.
+    ///
+    /// Parameters
+    /// ----------
+    /// scene : Scene or str, optional
+    ///     A scene in place of the log's.
+    #[pyo3(signature = (scene = None))]
+    fn array_model(
+        &self,
+        py: Python<'_>,
+        scene: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<ArrayModel> {
+        let none = || {
+            let help = "of a ranger on a stepper: scan.model()";
+            refuse::<LogError>(py, "the scan is of no array", help)
         };
-        let options = match &self.session_of(py)?.model {
-            None => Options::default(),
-            Some(model) => model.options().ok_or_else(|| {
-                let message = format!("the log's model ({}) can't be set up again", model.engine);
-                refuse::<LogError>(py, &message, "make a Model of your own")
-            })?,
-        };
-        Model::of(py, scene, Py::new(py, self.sensor(py)?)?, self.air(py)?, options)
+        let array = Py::new(py, self.array(py)?.ok_or_else(none)?)?;
+        let scene = self.scene_meant(py, scene)?;
+        let sensor = Py::new(py, self.sensor(py)?)?;
+        ArrayModel::of(py, scene, array, sensor, self.air(py)?, self.options(py)?)
     }
 
     fn __repr__(&self) -> String {
@@ -281,6 +302,24 @@ impl Scan {
 impl Scan {
     pub(crate) fn view(&self) -> &ScanView {
         &self.log.get().data.scans[self.at]
+    }
+
+    /// The scene given, else the log's.
+    fn scene_meant(&self, py: Python<'_>, given: Option<&Bound<'_, PyAny>>) -> PyResult<Py<Scene>> {
+        if let Some(given) = given {
+            return crate::scene::meant(given);
+        }
+        let help = "give one of your own: scan.model(scene)";
+        let none = || refuse::<LogError>(py, "the log holds no scene", help);
+        Py::new(py, self.scene(py)?.ok_or_else(none)?)
+    }
+
+    fn options(&self, py: Python<'_>) -> PyResult<Options> {
+        let Some(model) = &self.session_of(py)?.model else { return Ok(Options::default()) };
+        model.options().ok_or_else(|| {
+            let message = format!("the log's model ({}) can't be set up again", model.engine);
+            refuse::<LogError>(py, &message, "make a Model of your own")
+        })
     }
 
     pub(crate) fn session_of(&self, py: Python<'_>) -> PyResult<&Session> {

@@ -2,25 +2,26 @@
 
 mod parts;
 pub(crate) mod predict;
+mod single;
 
 use pyo3::{
-    exceptions::PyValueError,
     prelude::*,
     types::{PyDict, PyTuple},
 };
-use serde::de::DeserializeOwned;
-use sonard_model::model::{OptionKeys, Options, Simulator, paths};
+use sonard_model::{
+    acoustics,
+    model::{OptionKeys, Options, Simulator},
+};
 
 use crate::{
     air::Air,
-    error::{self, OptionError, refuse},
-    json,
-    path::{PathResult, reading},
+    error,
+    options::{self, Words},
     pool::OfProcess,
     scene::{self, Scene},
     sensor::{self, Sensor},
-    trace::TraceResult,
 };
+use parts::Parts;
 
 /// Predicts what a ranger reads in a scene.
 ///
@@ -87,31 +88,25 @@ impl Model {
         ray_spacing_deg: Option<f64>,
         aperture_deg: Option<f64>,
     ) -> PyResult<Self> {
+        let words = Words { engine, response, edge_law };
         let keys = OptionKeys {
-            engine: word(py, "engine", engine)?,
             max_range_m,
             threshold,
-            response: response.map(|name| word(py, "response", name)).transpose()?,
             ideal_receiver,
             lossless,
             max_order,
-            edge_law: edge_law.map(|name| word(py, "edge_law", name)).transpose()?,
             double_diffraction,
             ray_spacing_deg,
             aperture_deg,
-            // A ranger alone has none.
-            without_crosstalk: false,
+            ..OptionKeys::default()
         };
-        let options = keys
-            .options()
-            .map_err(|error| refuse::<OptionError>(py, &error.to_string(), &error.help()))?;
+        let options = options::options(py, &words, keys)?;
         let scene = scene::meant(scene)?;
         let sensor = match sensor {
             Some(sensor) => sensor::meant(sensor)?,
             None => sensor::default(py)?,
         };
-        let air =
-            air.map_or_else(|| sonard_model::acoustics::Air::default().into(), |air| *air.get());
+        let air = air.map_or_else(|| acoustics::Air::default().into(), |air| *air.get());
         let (of, kind) = (&scene.get().scene, &sensor.get().sensor);
         let parts = Parts { scene: of, sensor: kind, air: air.air, options };
         let simulator =
@@ -146,15 +141,7 @@ impl Model {
     /// The options that are given, by name.
     #[getter]
     fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let keys = json::to_python(py, &OptionKeys::from(&self.options))?;
-        let given = PyDict::new(py);
-        for (name, value) in keys.cast::<PyDict>()? {
-            let is_given = !value.is_none() && !value.is(pyo3::types::PyBool::new(py, false));
-            if is_given && name.extract::<String>()? != "engine" {
-                given.set_item(name, value)?;
-            }
-        }
-        Ok(given)
+        options::given(py, &self.options)
     }
 
     /// Speed of sound, metres a second.
@@ -214,6 +201,32 @@ impl Model {
         predict::predict(self, py, poses, azimuths_deg, threads)
     }
 
+    /// Predicted readings of a ranger that moves: one firing at each pose.
+    ///
+    /// Parameters
+    /// ----------
+    /// poses : array_like, shape (..., 3)
+    ///     Where the ranger's rotation axis stands at each firing, as of ``predict``.
+    /// azimuths_deg : array_like, shape (...)
+    ///     Where it fires there, degrees counter-clockwise from the heading; what can be broadcast is.
+    /// threads : int, optional
+    ///     As of ``predict``.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of dtype READING, shape (...)
+    ///     As of ``predict``. Each firing costs what a pose costs there.
+    #[pyo3(signature = (poses, azimuths_deg, threads = None))]
+    fn fire<'py>(
+        &self,
+        py: Python<'py>,
+        poses: &Bound<'py, PyAny>,
+        azimuths_deg: &Bound<'py, PyAny>,
+        threads: Option<usize>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        predict::fire(self, py, poses, azimuths_deg, threads)
+    }
+
     /// One predicted reading with the path of its sound.
     ///
     /// Parameters
@@ -225,17 +238,10 @@ impl Model {
     #[pyo3(signature = (pose, azimuth_deg = 0.0))]
     fn reading<'py>(
         &self,
-        py: Python<'py>,
         pose: &Bound<'py, PyAny>,
         azimuth_deg: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let pose = self.checked(pose)?;
-        let direction_rad = predict::direction_rad(&pose, azimuth_deg)?;
-        let simulator = self.simulator_at(py, &pose)?;
-        let predicted = py
-            .detach(|| simulator.at(pose.position()).ping(direction_rad))
-            .map_err(|error| error::too_costly(py, &error))?;
-        reading(py, simulator.scene(), &predicted)
+        single::reading(self, pose, azimuth_deg)
     }
 
     /// Every propagation path of echoes at a place, shortest first.
@@ -256,26 +262,10 @@ impl Model {
     #[pyo3(signature = (pose, weakest = 0.001))]
     fn paths<'py>(
         &self,
-        py: Python<'py>,
         pose: &Bound<'py, PyAny>,
         weakest: f64,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
-        if !(1e-6..=1.0).contains(&weakest) {
-            return Err(PyValueError::new_err(format!(
-                "weakest is {weakest}: it must be from 0.000001 to 1"
-            )));
-        }
-        let pose = self.checked(pose)?;
-        let simulator = self.simulator_at(py, &pose)?;
-        let found = py.detach(|| {
-            let settings = paths::Settings { floor: weakest, ..simulator.path_settings() };
-            let paths = paths::Paths::new(simulator.scene(), settings);
-            paths.each_between(pose.position(), pose.position(), |echoes| {
-                echoes.map(|echo| PathResult::of_echo(simulator.scene(), &echo)).collect::<Vec<_>>()
-            })
-        });
-        let found = found.map_err(|error| error::too_costly(py, &error))?;
-        found.into_iter().map(|path| path.into_python(py)).collect()
+        single::paths(self, pose, weakest)
     }
 
     /// What an oscilloscope would show of one firing.
@@ -293,38 +283,17 @@ impl Model {
     #[pyo3(signature = (pose, azimuth_deg = 0.0, until_m = None, step_us = 5.0))]
     fn trace<'py>(
         &self,
-        py: Python<'py>,
         pose: &Bound<'py, PyAny>,
         azimuth_deg: f64,
         until_m: Option<f64>,
         step_us: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let pose = self.checked(pose)?;
-        let direction_rad = predict::direction_rad(&pose, azimuth_deg)?;
-        let simulator = self.simulator_at(py, &pose)?;
-        let until_m = until_m.unwrap_or(simulator.receiver().max_range_m);
-        for (name, value, [least, most]) in
-            [("until_m", until_m, [0.05, 100.0]), ("step_us", step_us, [1.0, 1000.0])]
-        {
-            if !(least..=most).contains(&value) {
-                let message = format!("{name} is {value}: it must be from {least} to {most}");
-                return Err(PyValueError::new_err(message));
-            }
-        }
-        let trace = py.detach(|| {
-            let point = simulator.at(pose.position());
-            TraceResult::at(simulator.scene(), &point, direction_rad, until_m, step_us)
-        });
-        trace.map_err(|error| error::too_costly(py, &error))?.into_python(py)
+        single::trace(self, pose, azimuth_deg, until_m, step_us)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let (scene, sensor) = (&self.scene.get().scene.name, &self.sensor.get().sensor.name);
-        let given = self.options(py)?.iter().map(|(name, value)| {
-            Ok(format!(", {}={}", name.extract::<String>()?, value.repr()?.extract::<String>()?))
-        });
-        let given: String = given.collect::<PyResult<_>>()?;
-        Ok(format!("<Model of '{sensor}' in '{scene}', engine '{}'{given}>", self.engine()))
+        Ok(format!("<Model of '{sensor}' in '{scene}', {}>", options::shown(py, &self.options)?))
     }
 
     fn __getnewargs_ex__<'py>(
@@ -334,10 +303,4 @@ impl Model {
         let made_of = (self.scene(py), self.sensor(py), self.air, self.engine());
         Ok((made_of.into_pyobject(py)?, self.options(py)?))
     }
-}
-
-/// A setting that has names for values.
-fn word<T: DeserializeOwned>(py: Python<'_>, option: &str, name: &str) -> PyResult<T> {
-    serde_json::from_value(name.into())
-        .map_err(|error| refuse::<OptionError>(py, &format!("{option} is `{name}`: {error}"), ""))
 }

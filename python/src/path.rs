@@ -116,11 +116,12 @@ fn degrees(angle_rad: f64) -> f64 {
     wrap_360(angle_rad.to_degrees()) + 0.0
 }
 
-/// A prediction as a `Reading`.
+/// A prediction as a `Reading`, of a ranger's own sound or of another's.
 pub(crate) fn reading<'py>(
     py: Python<'py>,
     scene: &Scene,
     predicted: &Prediction,
+    crosstalk: Option<&str>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let arrival = predicted.arrival.as_ref();
     let path = arrival.map(|arrival| PathResult::of_arrival(scene, arrival).into_python(py));
@@ -131,6 +132,7 @@ pub(crate) fn reading<'py>(
         predicted.margin_db,
         predicted.echoes_us.first().copied(),
         path.transpose()?,
+        crosstalk,
     );
     result(py, "Reading", fields)
 }

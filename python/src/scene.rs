@@ -1,5 +1,9 @@
 //! Scenes.
 
+mod grid;
+mod points;
+mod shapes;
+
 use std::{
     collections::BTreeMap,
     fs,
@@ -15,22 +19,20 @@ use pyo3::{
     types::{PyTuple, PyType},
 };
 use sonard_model::{
-    geometry::{DVec2, Pose},
-    scene::{self, SceneBuilder, shipped, suggest},
+    geometry::Pose,
+    scene::{self, shipped, suggest},
 };
 
 use crate::{
     arrays,
     error::{self, SceneError, refuse},
 };
-
-/// The material of scenes made from points.
-const MATERIAL: &str = "wall";
+use points::{MATERIAL, Rest};
 
 /// Walls and cylinders of some material, with named poses.
 ///
-/// ``Scene.shipped("simple-room")``, ``Scene.from_points(corners)``, ``Scene.from_json(text)`` and
-/// ``Scene.load(path)`` make one. Lengths are metres.
+/// ``Scene.shipped("simple-room")``, ``Scene.from_points(corners)``, ``Scene.from_shapes(polygons)``,
+/// ``Scene.from_grid(map)``, ``Scene.from_json(text)`` and ``Scene.load(path)`` make one. Lengths are metres.
 #[pyclass(frozen, module = "sonard")]
 pub(crate) struct Scene {
     pub(crate) scene: Arc<scene::Scene>,
@@ -77,40 +79,73 @@ impl Scene {
         ceiling_z_m: Option<f64>,
         name: &str,
     ) -> PyResult<Self> {
-        let mut builder =
-            scene::Scene::builder(name).rough_material(MATERIAL, reflectance, roughness);
-        builder = with_outline(builder, "wall", points, "points", closed)?;
-        for (number, outline) in
-            obstacles.map(|given| given.try_iter()).transpose()?.into_iter().flatten().enumerate()
-        {
-            let id = format!("obstacle-{number}");
-            builder = with_outline(builder, &id, &outline?, &format!("obstacles[{number}]"), true)?;
-        }
-        if let Some(cylinders) = cylinders {
-            let (numbers, _) = arrays::rows(cylinders, "cylinders", 3, "x_m, y_m, radius_m")?;
-            for (number, row) in numbers.chunks_exact(3).enumerate() {
-                let id = format!("cylinder-{number}");
-                builder = builder.cylinder(&id, [row[0], row[1]], row[2], MATERIAL);
-            }
-        }
-        match (floor_z_m, ceiling_z_m) {
-            (Some(floor_z_m), Some(ceiling_z_m)) => {
-                builder = builder.heights(floor_z_m, ceiling_z_m);
-            }
-            (None, None) => {}
-            _ => {
-                return Err(PyValueError::new_err(
-                    "give floor_z_m and ceiling_z_m, or none of them",
-                ));
-            }
-        }
-        let scene = builder.build().map_err(|error| error::scene(py, &error, false))?;
+        let empty = scene::Scene::builder(name).rough_material(MATERIAL, reflectance, roughness);
+        let builder = points::with_outlines(empty, points, closed, obstacles)?;
+        let rest = Rest { cylinders, heights_m: [floor_z_m, ceiling_z_m] };
+        Ok(Self { scene: Arc::new(rest.built(py, builder)?) })
+    }
+
+    /// A scene from shapes as shapely, geopandas, fiona or GeoJSON have them: walls along lines and around polygons and
+    /// their holes. A polygon is a room, or what stands in one; which follows from where it lies.
+    ///
+    /// Parameters
+    /// ----------
+    /// shapes : object, or sequence of them
+    ///     What has ``__geo_interface__`` or ``coords``, or a mapping as in GeoJSON: LineString, LinearRing, Polygon,
+    ///     MultiLineString, MultiPolygon, GeometryCollection, Feature or FeatureCollection; x and y in metres. Heights of
+    ///     points are left out.
+    /// cylinders, reflectance, roughness, floor_z_m, ceiling_z_m, name
+    ///     As of ``from_points``.
+    #[staticmethod]
+    #[pyo3(signature = (shapes, *, cylinders = None, reflectance = 0.97, roughness = 0.0, floor_z_m = None, ceiling_z_m = None, name = "scene"))]
+    #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
+    fn from_shapes(
+        py: Python<'_>,
+        shapes: &Bound<'_, PyAny>,
+        cylinders: Option<&Bound<'_, PyAny>>,
+        reflectance: f64,
+        roughness: f64,
+        floor_z_m: Option<f64>,
+        ceiling_z_m: Option<f64>,
+        name: &str,
+    ) -> PyResult<Self> {
+        let empty = scene::Scene::builder(name).rough_material(MATERIAL, reflectance, roughness);
+        let builder = shapes::with_shapes(empty, shapes)?;
+        let rest = Rest { cylinders, heights_m: [floor_z_m, ceiling_z_m] };
+        Ok(Self { scene: Arc::new(rest.built(py, builder)?) })
+    }
+
+    /// The walls that a map of ROS's map_server shows, traced as lines: what ``sonard scene from-grid`` makes of it.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or path-like
+    ///     Its description (YAML), or the folder of map.yaml; beside it the image, PGM or PNG.
+    /// tolerance_m : float, optional
+    ///     How far a wall may be off the sides of the cells that it stands for, metres; one and a half cells without it.
+    /// least_m : float, optional
+    ///     What is less around is left out, metres; four cells without it.
+    /// reflectance : float
+    ///     Amplitude of the mirror reflection relative to the incident wave, 0 to 1, of everything.
+    /// name : str, optional
+    ///     The scene's name; the file's without it.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, tolerance_m = None, least_m = None, reflectance = 0.97, name = None))]
+    fn from_grid(
+        py: Python<'_>,
+        path: PathBuf,
+        tolerance_m: Option<f64>,
+        least_m: Option<f64>,
+        reflectance: f64,
+        name: Option<&str>,
+    ) -> PyResult<Self> {
+        let scene = grid::traced(py, &path, tolerance_m, least_m, reflectance, name)?;
         Ok(Self { scene: Arc::new(scene) })
     }
 
     /// A scene from the text of a scene file (``sonard scene schema`` describes it).
     #[staticmethod]
-    fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
+    pub(crate) fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
         let scene =
             scene::Scene::from_json(text).map_err(|error| error::scene(py, &error, true))?;
         Ok(Self { scene: Arc::new(scene) })
@@ -282,26 +317,13 @@ pub(crate) const fn tuple_of(pose: &Pose) -> PoseTuple {
     (pose.x_m, pose.y_m, pose.heading_deg)
 }
 
-/// Walls along an outline that was given as an array.
-fn with_outline(
-    builder: SceneBuilder,
-    id: &str,
-    given: &Bound<'_, PyAny>,
-    name: &str,
-    closed: bool,
-) -> PyResult<SceneBuilder> {
-    let (mut corners, _) = arrays::points(given, name)?;
-    let corners: Vec<[f64; 2]> = {
-        if closed && corners.len() > 1 && corners.first() == corners.last() {
-            corners.pop();
-        }
-        corners.into_iter().map(DVec2::into).collect()
-    };
-    Ok(if closed {
-        builder.room(id, &corners, MATERIAL)
-    } else {
-        builder.walls(id, &corners, MATERIAL)
-    })
+/// Whether a number is in a range.
+fn between(name: &str, value: f64, [least, most]: [f64; 2]) -> PyResult<()> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    let message = format!("{name} is {value}: it must be from {least} to {most}");
+    Err(PyValueError::new_err(message))
 }
 
 /// The scene meant by a `Scene` or by a shipped one's name.

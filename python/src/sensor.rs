@@ -32,7 +32,7 @@ pub(crate) struct Sensor {
 impl Sensor {
     /// A sensor that comes with the package, by its name.
     #[staticmethod]
-    fn preset(py: Python<'_>, name: &str) -> PyResult<Self> {
+    pub(crate) fn preset(py: Python<'_>, name: &str) -> PyResult<Self> {
         named(py, name).map(|sensor| Self { sensor })
     }
 
@@ -52,7 +52,7 @@ impl Sensor {
 
     /// A sensor from a data file.
     #[staticmethod]
-    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+    pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let text =
             fs::read_to_string(&path).map_err(|error| error::unreadable(py, path, &error))?;
         Self::from_json(py, &text)

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 import warnings
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -24,24 +25,28 @@ POSES = places_in(SCENE, 20)
 PATIENCE_S = 60
 
 
-def in_a_fork(queue: "multiprocessing.Queue[bytes]") -> None:
-    queue.put(MODEL.predict(POSES).tobytes())
-
-
-def fork_and_predict() -> bytes:
-    """What a forked child predicts."""
+def in_a_fork_of(ask: Callable[[], bytes]) -> bytes:
+    """What a forked child answers."""
     context = multiprocessing.get_context("fork")
     queue = context.Queue()
+
+    def answer(queue: "multiprocessing.Queue[bytes]") -> None:
+        queue.put(ask())
+
     with warnings.catch_warnings():
         # Python says that forks of threaded programs may hang: this one must not.
         warnings.simplefilter("ignore", DeprecationWarning)
-        child = context.Process(target=in_a_fork, args=(queue,))
+        child = context.Process(target=answer, args=(queue,))
         child.start()
     try:
         return bytes(queue.get(timeout=PATIENCE_S))
     finally:
         child.kill()
         child.join()
+
+
+def fork_and_predict() -> bytes:
+    return in_a_fork_of(lambda: MODEL.predict(POSES).tobytes())
 
 
 def test_a_fork_after_use_does_not_hang() -> None:

@@ -13,16 +13,21 @@ All lengths are metres, angles degrees counter-clockwise, times microseconds, as
 """
 
 from ._sonard import (
+    ARRAY_READING,
     LOGGED,
     READING,
     Air,
     AirError,
+    ArrayError,
+    ArrayModel,
+    Course,
     Locator,
     Log,
     LogError,
     Model,
     OptionError,
     PoseError,
+    RangerArray,
     Scan,
     Scene,
     SceneError,
@@ -31,21 +36,28 @@ from ._sonard import (
     SonardError,
     TooManyPathsError,
     __version__,
+    calibrate,
     compare,
     generate,
     interpret,
     read_log,
 )
 from ._sonard import map as map
-from ._results import Map, Path, Peak, Reading, Trace
+from ._results import Calibration, Estimate, Map, Path, Peak, Reading, Trace
 from ._status import Status
 
 # Not `map`, which a star import would put in place of Python's.
 __all__ = [
+    "ARRAY_READING",
     "LOGGED",
     "READING",
     "Air",
     "AirError",
+    "ArrayError",
+    "ArrayModel",
+    "Calibration",
+    "Course",
+    "Estimate",
     "Locator",
     "Log",
     "LogError",
@@ -55,6 +67,7 @@ __all__ = [
     "Path",
     "Peak",
     "PoseError",
+    "RangerArray",
     "Reading",
     "Scan",
     "Scene",
@@ -66,6 +79,7 @@ __all__ = [
     "TooManyPathsError",
     "Trace",
     "__version__",
+    "calibrate",
     "compare",
     "generate",
     "interpret",

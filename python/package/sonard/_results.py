@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ._sonard import Air, Model, Scene, Sensor
 from ._status import Status
 
 
@@ -62,12 +63,15 @@ class Reading:
     """When ECHO rises, microseconds after firing; ``None`` of a silence."""
     path: Path | None
     """The path of the echo; of a silence that of the candidate that came closest, if there was any."""
+    crosstalk: str | None = None
+    """The ranger of an array whose sound it was, if not its own; the path begins at that one."""
 
     def __repr__(self) -> str:
         at = "" if self.range_m is None else f" at {self.range_m:.4f} m"
         margin = "" if self.margin_db is None else f", margin {self.margin_db:.1f} dB"
         by = "" if self.path is None else f", by {self.path}"
-        return f"<Reading {self.status.name}{at}{margin}{by}>"
+        of = "" if self.crosstalk is None else f", sound of {self.crosstalk}"
+        return f"<Reading {self.status.name}{at}{margin}{by}{of}>"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -129,3 +133,97 @@ class Map:
     def __repr__(self) -> str:
         rows, columns = self.occupancy.shape
         return f"<Map of {columns} x {rows} cells of {self.resolution_m} m at {self.origin_m}>"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Estimate:
+    """A figure that was fitted."""
+
+    name: str
+    """What it is: ``"x_m"``, ``"sound_speed"``, ``"reflectance brick"``, ``"wall north"``, ..."""
+    scan: str | None
+    """The scan that it is of alone, if it is of one."""
+    value: float
+    """The value found, in the unit that the name says; of ``"sound_speed"`` metres a second, of a wall metres along its
+    normal, of ``"aperture"`` metres, of a reflectance the share of the amplitude."""
+    change: float
+    """Less what it was."""
+    sigma: float
+    """Standard deviation."""
+    low: float
+    """95 percent lie from here ..."""
+    high: float
+    """... to here."""
+    prior: float
+    """What it was."""
+    prior_sigma: float
+    """Standard deviation of what was believed."""
+    identified: bool
+    """Whether the readings say more about it than was believed."""
+
+    def __repr__(self) -> str:
+        of = "" if self.scan is None else f" of {self.scan[:8]}"
+        left = "" if self.identified else ", left at its prior"
+        return f"<Estimate {self.name}{of}: {self.value:.5g} \u00b1 {self.sigma:.2g}{left}>"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Calibration:
+    """What ``calibrate`` found."""
+
+    estimates: tuple[Estimate, ...]
+    """Each figure that was fitted."""
+    covariance: NDArray[np.float64]
+    """Covariance of their values, to first order, in the products of their units: shape (estimates, estimates)."""
+    model: Model
+    """Scene, sensor, air and options as they were found; delay and stepper, which a model does not know, are below."""
+    poses: NDArray[np.float64]
+    """Where the scans were taken, x and y in metres, heading in degrees: shape (scans, 3)."""
+    scans: tuple[str, ...]
+    """The scans that were used."""
+    delay_m: float
+    """What is added to every range, metres."""
+    heading_zero_deg: float
+    """What is added to every azimuth, degrees."""
+    gear: float
+    """What every azimuth is multiplied with before."""
+    readings: int
+    """How many readings were used."""
+    explained: float
+    """The share of them that is explained."""
+    sigma_m: float
+    """Standard deviation of the ranges about the model's, metres."""
+    sigma_db: float
+    """Standard deviation of the strengths, decibels."""
+    log_likelihood: float
+    """Natural logarithm of the likelihood of all readings."""
+    log_posterior: float
+    """The same with the priors."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene as it was found."""
+        return self.model.scene
+
+    @property
+    def sensor(self) -> Sensor:
+        """The sensor as it was found, ``NAME-calibrated`` where it differs."""
+        return self.model.sensor
+
+    @property
+    def air(self) -> Air:
+        """The air as it was found."""
+        return self.model.air
+
+    def __getitem__(self, name: str) -> Estimate:
+        """The estimate of that name; of several, one for each scan, the first."""
+        for estimate in self.estimates:
+            if estimate.name == name:
+                return estimate
+        raise KeyError(f"{name!r} was not fitted: there are {', '.join(sorted({one.name for one in self.estimates}))}")
+
+    def __repr__(self) -> str:
+        return (
+            f"<Calibration of {len(self.estimates)} figures by {self.readings} readings, "
+            f"{self.explained:.0%} explained, within {1e3 * self.sigma_m:.1f} mm>"
+        )

@@ -1,24 +1,29 @@
 import pathlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from os import PathLike
-from typing import Any, Literal, final
+from typing import Any, ClassVar, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._results import Map, Path, Reading, Trace
+from ._results import Calibration, Map, Path, Reading, Trace
 
 __all__ = [
+    "ARRAY_READING",
     "LOGGED",
     "READING",
     "Air",
     "AirError",
+    "ArrayError",
+    "ArrayModel",
+    "Course",
     "Locator",
     "Log",
     "LogError",
     "Model",
     "OptionError",
     "PoseError",
+    "RangerArray",
     "Scan",
     "Scene",
     "SceneError",
@@ -28,6 +33,7 @@ __all__ = [
     "TooManyPathsError",
     "__version__",
     "_seconds_of_predict_many",
+    "calibrate",
     "compare",
     "generate",
     "interpret",
@@ -37,6 +43,7 @@ __all__ = [
 
 __version__: str
 READING: np.dtype[np.void]
+ARRAY_READING: np.dtype[np.void]
 LOGGED: np.dtype[np.void]
 
 class SonardError(ValueError):
@@ -51,6 +58,7 @@ class PoseError(SonardError):
     index: tuple[int, ...]
 
 class SensorError(SonardError): ...
+class ArrayError(SonardError): ...
 class AirError(SonardError): ...
 class OptionError(SonardError): ...
 class LogError(SonardError): ...
@@ -147,6 +155,26 @@ class Scene:
         name: str = "scene",
     ) -> Scene: ...
     @staticmethod
+    def from_shapes(
+        shapes: Any,
+        *,
+        cylinders: ArrayLike | None = None,
+        reflectance: float = 0.97,
+        roughness: float = 0.0,
+        floor_z_m: float | None = None,
+        ceiling_z_m: float | None = None,
+        name: str = "scene",
+    ) -> Scene: ...
+    @staticmethod
+    def from_grid(
+        path: str | PathLike[str],
+        *,
+        tolerance_m: float | None = None,
+        least_m: float | None = None,
+        reflectance: float = 0.97,
+        name: str | None = None,
+    ) -> Scene: ...
+    @staticmethod
     def from_json(text: str) -> Scene: ...
     @staticmethod
     def load(path: str | PathLike[str]) -> Scene: ...
@@ -223,6 +251,12 @@ class Model:
         azimuths_deg: ArrayLike | None = None,
         threads: int | None = None,
     ) -> NDArray[np.void]: ...
+    def fire(
+        self,
+        poses: ArrayLike,
+        azimuths_deg: ArrayLike,
+        threads: int | None = None,
+    ) -> NDArray[np.void]: ...
     def reading(self, pose: ArrayLike, azimuth_deg: float = 0.0) -> Reading: ...
     def paths(self, pose: ArrayLike, weakest: float = 0.001) -> list[Path]: ...
     def trace(
@@ -233,6 +267,102 @@ class Model:
         step_us: float = 5.0,
     ) -> Trace: ...
     def __getnewargs_ex__(self) -> tuple[tuple[Scene, Sensor, Air, str], dict[str, Any]]: ...
+
+@final
+class RangerArray:
+    @staticmethod
+    def preset(name: str) -> RangerArray: ...
+    @staticmethod
+    def preset_names() -> list[str]: ...
+    @staticmethod
+    def from_json(text: str) -> RangerArray: ...
+    @staticmethod
+    def load(path: str | PathLike[str]) -> RangerArray: ...
+    def to_json(self) -> str: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def description(self) -> str: ...
+    @property
+    def sensor(self) -> str: ...
+    @property
+    def interval_ms(self) -> float: ...
+    @property
+    def ids(self) -> list[str]: ...
+    @property
+    def mounts(self) -> NDArray[np.float64]: ...
+    @property
+    def turns(self) -> list[list[str]]: ...
+    @property
+    def round(self) -> list[str]: ...
+    @property
+    def body(self) -> dict[str, Any] | None: ...
+    @property
+    def sources(self) -> dict[str, str]: ...
+    def firing_times_s(self, rounds: int = 1) -> NDArray[np.float64]: ...
+    def poses_on(self, poses: ArrayLike) -> NDArray[np.float64]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class Course:
+    def __new__(cls, poses: ArrayLike, times_s: ArrayLike | None = None, speed_m_s: float = 0.3) -> Course: ...
+    @staticmethod
+    def load(path: str | PathLike[str], speed_m_s: float = 0.3) -> Course: ...
+    @property
+    def poses(self) -> NDArray[np.float64]: ...
+    @property
+    def times_s(self) -> NDArray[np.float64]: ...
+    @property
+    def duration_s(self) -> float: ...
+    def poses_at(self, times_s: ArrayLike) -> NDArray[np.float64]: ...
+    def __len__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+    def __getnewargs__(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+
+@final
+class ArrayModel:
+    def __new__(
+        cls,
+        scene: Scene | str,
+        array: RangerArray | str,
+        sensor: Sensor | str | None = None,
+        air: Air | None = None,
+        engine: Literal["paths", "fan", "cone"] = "paths",
+        *,
+        max_range_m: float | None = None,
+        threshold: float | None = None,
+        response: Literal["stationary", "full"] | None = None,
+        ideal_receiver: bool = False,
+        lossless: bool = False,
+        max_order: int | None = None,
+        edge_law: Literal["utd", "kuc-siegel", "bozma-kuc"] | None = None,
+        double_diffraction: bool = False,
+        without_crosstalk: bool = False,
+        ray_spacing_deg: float | None = None,
+        aperture_deg: float | None = None,
+    ) -> ArrayModel: ...
+    @property
+    def scene(self) -> Scene: ...
+    @property
+    def array(self) -> RangerArray: ...
+    @property
+    def sensor(self) -> Sensor: ...
+    @property
+    def air(self) -> Air: ...
+    @property
+    def engine(self) -> str: ...
+    @property
+    def options(self) -> dict[str, Any]: ...
+    @property
+    def sound_speed_m_s(self) -> float: ...
+    @property
+    def max_range_m(self) -> float: ...
+    def predict(self, poses: ArrayLike, rounds: int = 1, threads: int | None = None) -> NDArray[np.void]: ...
+    def fire(self, poses: ArrayLike, threads: int | None = None) -> NDArray[np.void]: ...
+    def reading(self, pose: ArrayLike, firing: int = 0) -> Reading: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[Scene, RangerArray, Sensor, Air, str], dict[str, Any]]: ...
 
 def _seconds_of_predict_many(model: Model, poses: ArrayLike, threads: int | None = None) -> float: ...
 
@@ -273,6 +403,9 @@ class Scan:
     @property
     def scene(self) -> Scene | None: ...
     def model(self, scene: Scene | str | None = None) -> Model: ...
+    @property
+    def array(self) -> RangerArray | None: ...
+    def array_model(self, scene: Scene | str | None = None) -> ArrayModel: ...
 
 @final
 class Locator:
@@ -288,6 +421,15 @@ def generate(
     part: tuple[int, int] | None = None,
     threads: int | None = None,
 ) -> dict[str, Any]: ...
+def calibrate(
+    scans: Log | Scan | Iterable[Log | Scan],
+    model: Model | None = None,
+    *,
+    fit: Sequence[str] = ("pose", "air", "threshold"),
+    priors: dict[str, float] | None = None,
+    poses: ArrayLike | None = None,
+    widest_m: float = 0.1,
+) -> Calibration: ...
 def compare(scans: Log | Scan | Iterable[Log | Scan]) -> dict[str, Any]: ...
 def interpret(
     scans: Log | Scan | Iterable[Log | Scan],

@@ -1,10 +1,10 @@
 //! The readings of logs as an array.
 
 use numpy::PyArray1;
-use pyo3::{prelude::*, types::PyDict};
+use pyo3::prelude::*;
 use sonard::scan::{Ping, PingStatus, ScanView};
 
-use crate::status;
+use crate::{arrays, status};
 
 /// Numbers of a logged reading, behind its scan, index and statuses.
 const NUMBERS: [&str; 14] = [
@@ -37,12 +37,7 @@ pub(crate) fn logged_dtype(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
     let format = |name| if name == "time" { "M8[ns]" } else { "f8" };
     let numbers = NUMBERS.iter().enumerate().map(|(at, name)| (*name, format(*name), 8 * (at + 2)));
     let all: Vec<(&str, &str, usize)> = heads.into_iter().chain(numbers).collect();
-    let layout = PyDict::new(py);
-    layout.set_item("names", all.iter().map(|field| field.0).collect::<Vec<_>>())?;
-    layout.set_item("formats", all.iter().map(|field| field.1).collect::<Vec<_>>())?;
-    layout.set_item("offsets", all.iter().map(|field| field.2).collect::<Vec<_>>())?;
-    layout.set_item("itemsize", 8 * WORDS)?;
-    py.import("numpy")?.call_method1("dtype", (layout,))
+    arrays::dtype(py, &all, 8 * WORDS)
 }
 
 /// The readings of some scans, each with its place in the log.

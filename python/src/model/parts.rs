@@ -7,7 +7,7 @@ use sonard::inverse::World;
 use sonard_model::{
     acoustics,
     geometry::Pose,
-    model::{ModelError, Options, Simulator},
+    model::{EngineOptions, ModelError, Options, Simulator},
     scene as model_scene,
 };
 
@@ -40,8 +40,12 @@ impl Model {
         scene: Py<Scene>,
         sensor: Py<Sensor>,
         air: Air,
-        options: Options,
+        mut options: Options,
     ) -> PyResult<Self> {
+        if let EngineOptions::Paths(paths) = &mut options.engine {
+            // A ranger alone has none.
+            paths.without_crosstalk = false;
+        }
         let (of, kind) = (&scene.get().scene, &sensor.get().sensor);
         let parts = Parts { scene: of, sensor: kind, air: air.air, options };
         let simulator =

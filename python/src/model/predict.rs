@@ -1,29 +1,20 @@
 //! Readings of many poses.
 
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
-use numpy::PyArray1;
-use pyo3::{
-    exceptions::{PyMemoryError, PyValueError},
-    prelude::*,
-    types::PyTuple,
-};
-use rayon::prelude::*;
+use pyo3::{exceptions::PyValueError, prelude::*, types::PyTuple};
 use sonard_model::{
     geometry::Pose,
     model::{ModelError, Simulator},
     plan::ScanPlan,
 };
 
-use super::Model;
+use super::{Model, parts::Parts};
 use crate::{
     arrays::{self, Poses, READING_WORDS},
-    error,
+    error, firing,
     pool::pool,
 };
-
-/// Poses that a thread predicts before signals are looked at.
-const POSES_AT_ONCE: usize = 64;
 
 /// Largest magnitude of an azimuth, degrees.
 const MOST_AZIMUTH_DEG: f64 = 1e6;
@@ -37,36 +28,55 @@ pub(super) fn predict<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let poses = Poses::of(poses)?;
     let azimuths_deg = azimuths_deg.map_or_else(|| Ok(full_turn()), checked_azimuths)?;
-    let parts = model.parts();
-    let pool = pool(py, threads)?;
-    let checked = py.detach(|| parts.scene.check_poses(&poses.list));
-    checked.map_err(|(at, error)| error::pose(py, &poses.index(at), &error))?;
-
-    let words = READING_WORDS * azimuths_deg.len();
-    let mut table = empty_table(words, poses.list.len())?;
-    let shared = model.simulator(py)?;
-    let fire = |pose: &Pose, row: &mut [f64]| -> Result<(), ModelError> {
-        match parts.scene.robot {
-            None => fire_all(&shared, pose, &azimuths_deg, row),
-            Some(_) => fire_all(&parts.simulator_at(pose)?, pose, &azimuths_deg, row),
-        }
-    };
-    let at_once = POSES_AT_ONCE * pool.current_num_threads();
-    if words > 0 {
-        for (poses, rows) in poses.list.chunks(at_once).zip(table.chunks_mut(at_once * words)) {
-            let done = py.detach(|| {
-                let pairs = poses.par_iter().zip(rows.par_chunks_mut(words));
-                pool.install(|| pairs.try_for_each(|(pose, row)| fire(pose, row)))
-            });
-            done.map_err(|error| error::model(py, &error))?;
-            py.check_signals()?;
-        }
-    }
+    let stands = Stands::checked(model, py, &poses)?;
+    let fire = |pose: &Pose, row: &mut [f64]| stands.fire(pose, &azimuths_deg, row);
+    let table = firing::table(py, &poses.list, azimuths_deg.len(), threads, fire)?;
     let mut shape = poses.shape;
     shape.push(azimuths_deg.len());
-    let readings = PyArray1::from_vec(py, table);
-    let readings = readings.call_method1("view", (arrays::reading_dtype(py)?,))?;
-    readings.call_method1("reshape", (PyTuple::new(py, shape)?,))
+    firing::shaped(py, table, arrays::reading_dtype(py)?, shape)
+}
+
+/// One reading a pose.
+pub(super) fn fire<'py>(
+    model: &Model,
+    py: Python<'py>,
+    poses: &Bound<'py, PyAny>,
+    azimuths_deg: &Bound<'py, PyAny>,
+    threads: Option<usize>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let poses = Poses::of(poses)?;
+    let shape = PyTuple::new(py, &poses.shape)?;
+    let spread = py.import("numpy")?.call_method1("broadcast_to", (azimuths_deg, shape))?;
+    let azimuths_deg = checked_azimuths(&spread.call_method1("reshape", (-1,))?)?;
+    let stands = Stands::checked(model, py, &poses)?;
+    let firings: Vec<(Pose, f64)> = poses.list.iter().copied().zip(azimuths_deg).collect();
+    let fire = |(pose, azimuth_deg): &(Pose, f64), row: &mut [f64]| {
+        stands.fire(pose, &[*azimuth_deg], row)
+    };
+    let table = firing::table(py, &firings, 1, threads, fire)?;
+    firing::shaped(py, table, arrays::reading_dtype(py)?, poses.shape)
+}
+
+/// The models of poses at which the ranger can stand.
+struct Stands<'a> {
+    parts: Parts<'a>,
+    shared: Arc<Simulator>,
+}
+
+impl<'a> Stands<'a> {
+    fn checked(model: &'a Model, py: Python<'_>, poses: &Poses) -> PyResult<Self> {
+        let parts = model.parts();
+        let checked = py.detach(|| parts.scene.check_poses(&poses.list));
+        checked.map_err(|(at, error)| error::pose(py, &poses.index(at), &error))?;
+        Ok(Self { parts, shared: model.simulator(py)? })
+    }
+
+    fn fire(&self, pose: &Pose, azimuths_deg: &[f64], row: &mut [f64]) -> Result<(), ModelError> {
+        match self.parts.scene.robot {
+            None => fire_all(&self.shared, pose, azimuths_deg, row),
+            Some(_) => fire_all(&self.parts.simulator_at(pose)?, pose, azimuths_deg, row),
+        }
+    }
 }
 
 /// The azimuths of a scan that was asked nothing else.
@@ -97,21 +107,6 @@ pub(super) fn direction_rad(pose: &Pose, azimuth_deg: f64) -> PyResult<f64> {
 
 fn is_azimuth(azimuth_deg: f64) -> bool {
     azimuth_deg.abs() <= MOST_AZIMUTH_DEG
-}
-
-fn empty_table(words: usize, poses: usize) -> PyResult<Vec<f64>> {
-    let mut table = Vec::new();
-    let reserved = words.checked_mul(poses).map(|length| (length, table.try_reserve_exact(length)));
-    match reserved {
-        Some((length, Ok(()))) => {
-            table.resize(length, 0.0);
-            Ok(table)
-        }
-        _ => Err(PyMemoryError::new_err(format!(
-            "no memory for {poses} poses of {} readings: give fewer poses at once",
-            words / READING_WORDS
-        ))),
-    }
 }
 
 fn fire_all(

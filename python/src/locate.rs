@@ -1,0 +1,139 @@
+//! Where scans were taken.
+
+use pyo3::{exceptions::PyValueError, prelude::*};
+use sonard::inverse;
+use sonard_model::{geometry::Pose, reading::PingStatus};
+use uuid::Uuid;
+
+use crate::{
+    error::{LogError, SonardError, refuse},
+    json,
+    log::Scan,
+    model::Model,
+    pool::pool,
+    readings::Heard,
+    sense::warn,
+};
+
+/// Finds where a sweep was taken, without a guess.
+///
+/// Predicts what would be read on a grid of places when it is made; ``locate`` then looks up and improves what fits.
+///
+/// Parameters
+/// ----------
+/// model : Model
+///     With the scene to locate in.
+/// spacing_m : float
+///     Spacing of the grid, metres, 0.01 to 2.
+#[pyclass(frozen, module = "sonard")]
+pub(crate) struct Locator {
+    model: Py<Model>,
+    world: inverse::World,
+    atlas: inverse::Atlas,
+    spacing_m: f64,
+}
+
+#[pymethods]
+impl Locator {
+    #[new]
+    #[pyo3(signature = (model, spacing_m = 0.1))]
+    fn new(py: Python<'_>, model: Py<Model>, spacing_m: f64) -> PyResult<Self> {
+        if !(0.01..=2.0).contains(&spacing_m) {
+            let message = format!("spacing_m is {spacing_m}: it must be from 0.01 to 2");
+            return Err(PyValueError::new_err(message));
+        }
+        let world = model.get().world();
+        let pool = pool(py, None)?;
+        let atlas = py.detach(|| pool.install(|| inverse::Atlas::new(&world, spacing_m)));
+        let atlas = atlas.map_err(|error| refuse::<SonardError>(py, &error.to_string(), ""))?;
+        Ok(Self { model, world, atlas, spacing_m })
+    }
+
+    /// The poses that explain a sweep, most probable first.
+    ///
+    /// Parameters
+    /// ----------
+    /// readings : Scan or array_like, shape (beams,)
+    ///     Of one place: a scan of a log, readings as ``Model.predict`` gives them, or ranges in metres, ``inf`` for a
+    ///     silence and ``nan`` for what was not measured.
+    /// azimuths_deg : array_like, shape (beams,), optional
+    ///     Where they were fired, degrees; without it 400 azimuths from 0 to 359.1. A scan has its own.
+    ///
+    /// Returns
+    /// -------
+    /// list of dict
+    ///     ``x_m``, ``y_m``, ``heading_deg``, ``probability``, ``sigma_x_m``, ``sigma_y_m``, ``sigma_heading_deg``
+    ///     and ``explained``, the share of the readings that the pose explains.
+    #[pyo3(signature = (readings, azimuths_deg = None))]
+    fn locate<'py>(
+        &self,
+        py: Python<'py>,
+        readings: &Bound<'py, PyAny>,
+        azimuths_deg: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let sweep = self.sweep(py, readings, azimuths_deg)?;
+        let pool = pool(py, None)?;
+        let found = py.detach(|| {
+            pool.install(|| {
+                let modes = inverse::locate(&self.world, &self.atlas, &sweep)?;
+                let doubts = inverse::doubts(&self.world, &self.atlas, &sweep, &modes);
+                Ok::<_, inverse::FitError>((modes, doubts))
+            })
+        });
+        let (modes, doubts) =
+            found.map_err(|error| refuse::<SonardError>(py, &error.to_string(), ""))?;
+        doubts.iter().try_for_each(|doubt| warn(py, &doubt.to_string()))?;
+        json::to_python(py, &modes)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let model: String = self.model.bind(py).repr()?.extract()?;
+        Ok(format!("<Locator, {} m apart, by {model}>", self.spacing_m))
+    }
+
+    fn __getnewargs__(&self, py: Python<'_>) -> (Py<Model>, f64) {
+        (self.model.clone_ref(py), self.spacing_m)
+    }
+}
+
+impl Locator {
+    fn sweep(
+        &self,
+        py: Python<'_>,
+        readings: &Bound<'_, PyAny>,
+        azimuths_deg: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<inverse::Sweep> {
+        if let Ok(scan) = readings.cast::<Scan>() {
+            if azimuths_deg.is_some() {
+                return Err(PyValueError::new_err("azimuths_deg: a scan has its own"));
+            }
+            return inverse::Sweep::of(scan.get().view())
+                .map_err(|error| refuse::<LogError>(py, &error.to_string(), ""));
+        }
+        let heard = Heard::of(readings, azimuths_deg)?;
+        let us_per_m = 2e6 / self.world.air.sound_speed_m_s();
+        let beams: Vec<inverse::Beam> = heard
+            .beams
+            .into_iter()
+            .filter_map(|(azimuth_deg, status, range_m)| {
+                let heard = match status {
+                    PingStatus::Echo => inverse::Heard::Echo { tof_us: range_m * us_per_m },
+                    PingStatus::NoEcho => inverse::Heard::Silence,
+                    _ => return None,
+                };
+                Some(inverse::Beam { azimuth_deg, heard })
+            })
+            .collect();
+        if beams.len() < LEAST_BEAMS {
+            return Err(PyValueError::new_err(format!(
+                "{} of the readings say something: at least {LEAST_BEAMS} are needed",
+                beams.len()
+            )));
+        }
+        let pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
+        Ok(inverse::Sweep { scan: Uuid::nil(), pose, beams })
+    }
+}
+
+/// Fewer say too little about three values of a pose.
+const LEAST_BEAMS: usize = 8;

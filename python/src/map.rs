@@ -1,0 +1,123 @@
+//! Occupancy grids of scans.
+
+use pyo3::{exceptions::PyValueError, prelude::*};
+use sonard::{
+    interpret::{
+        Extents, Sweep,
+        grid::Grid,
+        mapping::{Mapper, Mapping},
+    },
+    scan::Session,
+};
+use sonard_model::geometry::DVec2;
+
+use crate::{
+    arrays,
+    error::{LogError, SonardError, refuse},
+    log::{Scan, scans_of},
+    path::result,
+    sense::warn,
+};
+
+/// Makes an occupancy grid of scans, each taken at its pose.
+///
+/// Parameters
+/// ----------
+/// scans : Log, Scan or sequence of them
+///     Of one sensor; scans that can't be used are left out with a warning.
+/// resolution_m : float
+///     Side of a cell, metres.
+/// region : tuple of float, optional
+///     What to map, x0, y0, x1, y1 in metres; without it around what was seen.
+/// silent_beyond_m : float, optional
+///     Ranges beyond this are taken for silence, metres; without it the sensor's, at most 5.
+/// feature_prediction : bool
+///     Whether readings that predicted walls contradict count less.
+/// extend_m : float
+///     How far walls are taken to go on beyond what was seen of them, metres.
+/// least_confidence : float
+///     Readings of less confidence are left out; 0.5 is full confidence.
+///
+/// Returns
+/// -------
+/// Map
+///     What ``sonard map`` makes of the same scans.
+#[pyfunction]
+#[pyo3(name = "map", signature = (scans, *, resolution_m = 0.05, region = None, silent_beyond_m = None, feature_prediction = true, extend_m = 2.0, least_confidence = 0.48))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
+pub(crate) fn make_map<'py>(
+    py: Python<'py>,
+    scans: &Bound<'py, PyAny>,
+    resolution_m: f64,
+    region: Option<[f64; 4]>,
+    silent_beyond_m: Option<f64>,
+    feature_prediction: bool,
+    extend_m: f64,
+    least_confidence: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let lengths_m = [Some(resolution_m), silent_beyond_m, Some(extend_m), Some(least_confidence)];
+    checked(lengths_m)?;
+    let mapping = Mapping {
+        resolution_m,
+        region: region.map(|[x0, y0, x1, y1]| [DVec2::new(x0, y0), DVec2::new(x1, y1)]),
+        silent_beyond_m,
+        extend_m,
+        least_confidence,
+        predicts_features: feature_prediction,
+        ..Mapping::default()
+    };
+    let scans = scans_of(scans)?;
+    let (sweeps, session) = sweeps(py, &scans)?;
+    let extents = Extents::of_session(session)
+        .map_err(|error| refuse::<LogError>(py, &format!("session: {error}"), ""))?;
+    let shape = mapping
+        .shape(&sweeps, mapping.max_range_m(&extents))
+        .map_err(|error| refuse::<SonardError>(py, &error.to_string(), ""))?;
+    let of_array = session.array.is_some();
+    let grid = py.detach(|| {
+        let mut mapper = Mapper::new(&mapping, Grid::new(shape), extents, of_array, sweeps.len());
+        sweeps.iter().for_each(|sweep| drop(mapper.add(sweep)));
+        mapper.finish()
+    });
+    let occupancy =
+        arrays::shaped(py, grid.probabilities().collect(), &[shape.height, shape.width])?;
+    let origin_m = (shape.origin.x, shape.origin.y);
+    result(py, "Map", (occupancy, origin_m, shape.resolution_m))
+}
+
+/// Refuses what is no length or confidence; some may be 0.
+fn checked(values: [Option<f64>; 4]) -> PyResult<()> {
+    let above_0 = f64::MIN_POSITIVE;
+    let names = [
+        ("resolution_m", above_0),
+        ("silent_beyond_m", above_0),
+        ("extend_m", 0.0),
+        ("least_confidence", 0.0),
+    ];
+    for ((name, least), value) in names.into_iter().zip(values) {
+        if let Some(value) = value.filter(|value| !(least..=1e6).contains(value)) {
+            return Err(PyValueError::new_err(format!(
+                "{name} is {value}: it must be greater than 0"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// The sweeps of scans that can be mapped, and the session of the first.
+fn sweeps<'a>(py: Python<'_>, scans: &'a [Py<Scan>]) -> PyResult<(Vec<Sweep>, &'a Session)> {
+    let (mut sweeps, mut first): (Vec<Sweep>, Option<&Scan>) = (Vec::new(), None);
+    for scan in scans {
+        let view = scan.get().view();
+        match Sweep::of(view) {
+            Ok(sweep) => sweeps.push(sweep),
+            Err(error) => {
+                warn(py, &format!("scan {} is left out: {error}", view.scan))?;
+                continue;
+            }
+        }
+        first.get_or_insert(scan.get());
+    }
+    let none = || refuse::<LogError>(py, "there is no scan with its session and pose to map", "");
+    Ok((sweeps, first.ok_or_else(none)?.session_of(py)?))
+}

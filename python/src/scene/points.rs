@@ -1,0 +1,83 @@
+//! Scenes from arrays of points, and what scenes from code have in common.
+
+use pyo3::{exceptions::PyValueError, prelude::*};
+use sonard_model::{
+    geometry::DVec2,
+    scene::{self, SceneBuilder},
+};
+
+use crate::{arrays, error};
+
+/// The material of scenes that are made.
+pub(super) const MATERIAL: &str = "wall";
+
+/// What a scene has beside its outlines.
+pub(super) struct Rest<'a, 'py> {
+    pub(super) cylinders: Option<&'a Bound<'py, PyAny>>,
+    pub(super) heights_m: [Option<f64>; 2],
+}
+
+impl Rest<'_, '_> {
+    /// Puts it into a scene and makes that.
+    pub(super) fn built(
+        &self,
+        py: Python<'_>,
+        mut builder: SceneBuilder,
+    ) -> PyResult<scene::Scene> {
+        if let Some(cylinders) = self.cylinders {
+            let (numbers, _) = arrays::rows(cylinders, "cylinders", 3, "x_m, y_m, radius_m")?;
+            for (number, row) in numbers.chunks_exact(3).enumerate() {
+                let id = format!("cylinder-{number}");
+                builder = builder.cylinder(&id, [row[0], row[1]], row[2], MATERIAL);
+            }
+        }
+        match self.heights_m {
+            [Some(floor_z_m), Some(ceiling_z_m)] => {
+                builder = builder.heights(floor_z_m, ceiling_z_m);
+            }
+            [None, None] => {}
+            _ => {
+                return Err(PyValueError::new_err(
+                    "give floor_z_m and ceiling_z_m, or none of them",
+                ));
+            }
+        }
+        builder.build().map_err(|error| error::scene(py, &error, false))
+    }
+}
+
+/// Walls along the outlines of a room and of what stands in it.
+pub(super) fn with_outlines(
+    mut builder: SceneBuilder,
+    points: &Bound<'_, PyAny>,
+    closed: bool,
+    obstacles: Option<&Bound<'_, PyAny>>,
+) -> PyResult<SceneBuilder> {
+    builder = with_outline(builder, "wall", points, "points", closed)?;
+    let obstacles = obstacles.map(|given| given.try_iter()).transpose()?;
+    for (number, outline) in obstacles.into_iter().flatten().enumerate() {
+        let (id, name) = (format!("obstacle-{number}"), format!("obstacles[{number}]"));
+        builder = with_outline(builder, &id, &outline?, &name, true)?;
+    }
+    Ok(builder)
+}
+
+/// Walls along an outline that was given as an array.
+fn with_outline(
+    builder: SceneBuilder,
+    id: &str,
+    given: &Bound<'_, PyAny>,
+    name: &str,
+    closed: bool,
+) -> PyResult<SceneBuilder> {
+    let (mut corners, _) = arrays::points(given, name)?;
+    if closed && corners.len() > 1 && corners.first() == corners.last() {
+        corners.pop();
+    }
+    let corners: Vec<[f64; 2]> = corners.into_iter().map(DVec2::into).collect();
+    Ok(if closed {
+        builder.room(id, &corners, MATERIAL)
+    } else {
+        builder.walls(id, &corners, MATERIAL)
+    })
+}
