@@ -79,10 +79,9 @@ pub(crate) fn calibrate<'py>(
         let message = format!("widest_m is {widest_m}: it must be from 0.005 to 1");
         return Err(PyValueError::new_err(message));
     }
-    let groups = match &fit {
-        Some(names) => names.iter().map(|name| word(py, "fit", name)).collect::<PyResult<_>>()?,
-        None => USUAL.iter().map(|name| word(py, "fit", name)).collect::<PyResult<Vec<Group>>>()?,
-    };
+    let names = fit.unwrap_or_else(|| USUAL.map(str::to_owned).to_vec());
+    let groups =
+        names.iter().map(|name| word(py, "fit", name)).collect::<PyResult<Vec<Group>>>()?;
     let scans = scans_of(scans)?;
     let sweeps = sweeps(py, &scans, poses)?;
     let believed = match model {

@@ -133,13 +133,14 @@ impl Scene {
     #[pyo3(signature = (path, *, tolerance_m = None, least_m = None, reflectance = 0.97, name = None))]
     fn from_grid(
         py: Python<'_>,
-        path: PathBuf,
+        path: &Bound<'_, PyAny>,
         tolerance_m: Option<f64>,
         least_m: Option<f64>,
         reflectance: f64,
         name: Option<&str>,
     ) -> PyResult<Self> {
-        let scene = grid::traced(py, &path, tolerance_m, least_m, reflectance, name)?;
+        let scene =
+            grid::traced(py, &path.extract::<PathBuf>()?, tolerance_m, least_m, reflectance, name)?;
         Ok(Self { scene: Arc::new(scene) })
     }
 

@@ -57,10 +57,11 @@ impl Course {
     #[staticmethod]
     #[pyo3(signature = (path, speed_m_s = 0.3))]
     fn load(py: Python<'_>, path: PathBuf, speed_m_s: f64) -> PyResult<Self> {
-        let text = fs::read_to_string(&path)
-            .map_err(|error| error::unreadable(py, path.clone(), &error))?;
+        let name = path.display().to_string();
+        let text =
+            fs::read_to_string(&path).map_err(|error| error::unreadable(py, path, &error))?;
         let course = array::Course::from_json_lines(&text).map_err(|error| {
-            let message = format!("{}:{}: {}", path.display(), error.line, error.message);
+            let message = format!("{name}:{}: {}", error.line, error.message);
             refuse::<ArrayError>(py, &message, "")
         })?;
         Ok(Self { course: course.timed(checked_speed(speed_m_s)?) })

@@ -33,7 +33,7 @@ pub(super) fn traced(
         };
         Ok::<_, GridFileError>(surfaces(&grid, &settings))
     });
-    let found = found.map_err(|error| unusable(py, error))?;
+    let found = found.map_err(|error| unusable(py, &error))?;
     if found.is_empty() {
         let help =
             "give a map with occupied cells (above 0.65) beside free ones, or a smaller least_m";
@@ -46,7 +46,7 @@ pub(super) fn traced(
     built.map_err(|error| error::scene(py, &error, false))
 }
 
-fn unusable(py: Python<'_>, error: GridFileError) -> PyErr {
+fn unusable(py: Python<'_>, error: &GridFileError) -> PyErr {
     match &error.fault {
         GridFileFault::Disk(source) => error::unreadable(py, error.path.clone(), source),
         GridFileFault::Map(_) | GridFileFault::Png(_) => {
