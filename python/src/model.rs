@@ -15,13 +15,11 @@ use sonard_model::{
 
 use crate::{
     air::Air,
-    error,
     options::{self, Words},
     pool::OfProcess,
     scene::{self, Scene},
     sensor::{self, Sensor},
 };
-use parts::Parts;
 
 /// Predicts what a ranger reads in a scene.
 ///
@@ -107,11 +105,7 @@ impl Model {
             None => sensor::default(py)?,
         };
         let air = air.map_or_else(|| acoustics::Air::default().into(), |air| *air.get());
-        let (of, kind) = (&scene.get().scene, &sensor.get().sensor);
-        let parts = Parts { scene: of, sensor: kind, air: air.air, options };
-        let simulator =
-            py.detach(|| parts.simulator()).map_err(|error| error::model(py, &error))?;
-        Ok(Self { scene, sensor, air, options, simulator: OfProcess::new(simulator) })
+        Self::of(py, scene, sensor, air, options)
     }
 
     /// The scene.
