@@ -8,8 +8,9 @@ use std::{
 
 use mcap::{
     McapError,
-    read::{ChunkReader, parse_record},
+    read::parse_record,
     records::{Record, op},
+    sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
 };
 
 use crate::ImportError;
@@ -68,17 +69,16 @@ impl<R: Read> Messages<'_, R> {
         };
         let files = &self.files;
         let record = parse_record(opcode, &body).map_err(|error| files.damaged(&error))?;
-        let Record::Chunk { header, data } = record else {
+        let Record::Chunk { header, .. } = record else {
             self.waiting.extend(topics.take(record, self.types));
             return Ok(true);
         };
         if header.uncompressed_size > MOST_BYTES {
             return Err(files.damaged(&"a chunk of it is too long"));
         }
-        for record in ChunkReader::new(header, &data).map_err(|error| files.unpacked(error))? {
-            let record = record.map_err(|error| files.unpacked(error))?;
-            self.waiting.extend(topics.take(record, self.types));
-        }
+        let mut take = |record: Record<'_>| self.waiting.extend(topics.take(record, self.types));
+        each_of_chunk(&body, header.uncompressed_size as usize, &mut take)
+            .map_err(|error| files.unpacked(error))?;
         Ok(true)
     }
 }
@@ -98,6 +98,35 @@ impl<R: Read> Iterator for Messages<'_, R> {
             }
         }
     }
+}
+
+/// Gives each record of a chunk of this body, which unpacks to so many bytes by its own account.
+///
+/// The library's own reader of chunks knows no limit, and takes a record for as long as it says it is; of a file's
+/// records it knows one. So it is given the chunk as a file of nothing else.
+fn each_of_chunk(
+    body: &[u8],
+    unpacked: usize,
+    take: &mut impl FnMut(Record<'_>),
+) -> Result<(), McapError> {
+    let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true)
+        .with_validate_chunk_crcs(true)
+        .with_record_length_limit(unpacked.max(body.len()));
+    let mut reader = LinearReader::new_with_options(options);
+    let length = (body.len() as u64).to_le_bytes();
+    let mut source = (&[op::CHUNK][..]).chain(&length[..]).chain(body);
+    while let Some(event) = reader.next_event() {
+        match event? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let read = source.read(reader.insert(wanted))?;
+                reader.notify_read(read);
+            }
+            LinearReadEvent::Record { data, opcode } => take(parse_record(opcode, data)?),
+        }
+    }
+    Ok(())
 }
 
 /// Files that follow each other.

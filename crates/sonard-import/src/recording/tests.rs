@@ -319,6 +319,21 @@ fn what_is_cut_off_or_no_recording_is_told() {
 }
 
 #[test]
+fn a_record_of_a_chunk_that_says_it_is_longer_than_the_chunk_is_refused() {
+    for length in [u64::MAX, u64::MAX - 8, 1 << 40, 22] {
+        let message = [&[0x05], &length.to_le_bytes()[..], &[0; 21]].concat();
+        let size = (message.len() as u64).to_le_bytes();
+        let times = [0; 16];
+        let crc_and_compression = [0; 8];
+        let body = [&times, &size[..], &crc_and_compression, &size, &message].concat();
+        let chunk = [&[0x06], &(body.len() as u64).to_le_bytes()[..], &body].concat();
+        let recording = [&super::mcap::MAGIC[..], &chunk].concat();
+        let words = said(examine(&recording, Mapping::default()));
+        assert!(words.contains("damaged"), "{length}: {words}");
+    }
+}
+
+#[test]
 fn messages_that_are_none_are_refused() {
     let message = cdr(&range(1.0, "front", 1.0), Order::Little);
     assert_eq!(read_message(RANGE, &message).expect("decodes"), 1);
