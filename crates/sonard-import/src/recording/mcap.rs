@@ -21,6 +21,10 @@ pub(crate) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 /// The longest record that is taken into memory, and what a chunk may become, bytes.
 const MOST_BYTES: u64 = 1 << 28;
 
+/// What stands before the records of a chunk, without the name of its compression: three times eight bytes, a check
+/// sum and the lengths of name and records.
+const CHUNK_HEAD: usize = 3 * 8 + 4 + 4 + 8;
+
 /// A channel of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Channel {
@@ -76,8 +80,11 @@ impl<R: Read> Messages<'_, R> {
         if header.uncompressed_size > MOST_BYTES {
             return Err(files.damaged(&"a chunk of it is too long"));
         }
+        // What is told of it, and its records; more may stand behind them.
+        let end = CHUNK_HEAD + header.compression.len() + header.compressed_size as usize;
+        let chunk = body.get(..end).unwrap_or(&body);
         let mut take = |record: Record<'_>| self.waiting.extend(topics.take(record, self.types));
-        each_of_chunk(&body, header.uncompressed_size as usize, &mut take)
+        each_of_chunk(chunk, header.uncompressed_size as usize, &mut take)
             .map_err(|error| files.unpacked(error))?;
         Ok(true)
     }
@@ -123,10 +130,19 @@ fn each_of_chunk(
                 let read = source.read(reader.insert(wanted))?;
                 reader.notify_read(read);
             }
-            LinearReadEvent::Record { data, opcode } => take(parse_record(opcode, data)?),
+            LinearReadEvent::Record { data, opcode } if is_of_messages(opcode) => {
+                take(parse_record(opcode, data)?);
+            }
+            // Of others the library believes lengths that may be lies.
+            LinearReadEvent::Record { .. } => {}
         }
     }
     Ok(())
+}
+
+/// Whether a record in a chunk matters.
+const fn is_of_messages(opcode: u8) -> bool {
+    matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE)
 }
 
 /// Files that follow each other.

@@ -327,9 +327,14 @@ fn a_record_of_a_chunk_that_says_it_is_longer_than_the_chunk_is_refused() {
         let crc_and_compression = [0; 8];
         let body = [&times, &size[..], &crc_and_compression, &size, &message].concat();
         let chunk = [&[0x06], &(body.len() as u64).to_le_bytes()[..], &body].concat();
-        let recording = [super::mcap::MAGIC, &chunk[..]].concat();
-        let words = said(examine(&recording, Mapping::default()));
-        assert!(words.contains("damaged"), "{length}: {words}");
+        // Behind it, in a chunk that is longer than its records, there would be enough.
+        let behind = [&chunk[..], &[0; 40]].concat();
+        let longer = [&[0x06], &(body.len() as u64 + 40).to_le_bytes()[..], &behind[9..]].concat();
+        for chunk in [chunk, longer] {
+            let recording = [super::mcap::MAGIC, &chunk[..]].concat();
+            let words = said(examine(&recording, Mapping::default()));
+            assert!(words.contains("damaged"), "{length}: {words}");
+        }
     }
 }
 
