@@ -93,8 +93,16 @@ impl Browser {
         self.wait_for(self.client().execute(&format!("return {expression}"), Vec::new()))
     }
 
-    /// The text of the first element of a selector.
+    /// Waits until what was changed before is drawn: texts and canvases follow with the next frame.
+    pub(crate) fn until_drawn(&self) {
+        self.eval(
+            "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))",
+        );
+    }
+
+    /// The text of the first element of a selector, as it is drawn.
     pub(crate) fn text(&self, selector: &str) -> String {
+        self.until_drawn();
         let text = self.eval(&format!("document.querySelector('{selector}').textContent"));
         text.as_str().expect("a text").to_owned()
     }

@@ -68,6 +68,7 @@ fn drawn_points(browser: &Browser, layer: &str) -> u64 {
 /// How many points of a layer fulfil a condition on its bytes `d` at `i`. A copy is looked into:
 /// a layer that is read becomes slow to draw on, and the browser says so.
 fn count_points(browser: &Browser, layer: &str, condition: &str) -> u64 {
+    browser.until_drawn();
     let count = browser.eval(&format!(
         "(() => {{ const c = document.getElementById('{layer}'); \
          const copy = new OffscreenCanvas(c.width, c.height); \

@@ -49,8 +49,7 @@ fn choose_view(browser: &Browser, view: &str) {
         "(() => {{ const s = document.getElementById('fit'); s.value = '{view}'; \
          s.dispatchEvent(new Event('change')); }})()"
     ));
-    // The texts follow with the next frame.
-    browser.eval("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))");
+    browser.until_drawn();
 }
 
 /// A scan with readings of every kind, two of them silent where the model hears something.
@@ -159,7 +158,7 @@ fn colours(browser: &Browser) -> [Vec<String>; 2] {
 }
 
 fn check_legend(browser: &Browser, words: &[&str]) {
-    browser.eval("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))");
+    browser.until_drawn();
     for words in words {
         assert!(legend_has(browser, words), "{words:?} is not in: {}", browser.text("#legend"));
     }

@@ -47,15 +47,10 @@ fn faint_points(browser: &Browser) -> u64 {
 
 /// Scale, origin, and whether somebody moved it.
 fn view(browser: &Browser, plan: &str) -> ([f64; 3], bool) {
-    until_drawn(browser);
+    browser.until_drawn();
     let view =
         browser.eval(&format!("({plan}).then(({{view: v}}) => [v.scale, v.x0, v.y0, v.moved])"));
     ([0, 1, 2].map(|i| view[i].as_f64().expect("a number")), view[3] == true)
-}
-
-/// What is changed is drawn with the next frame.
-fn until_drawn(browser: &Browser) {
-    browser.eval("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))");
 }
 
 /// Everything that can be done to the view of a page whose plan is what an expression promises.
@@ -141,7 +136,6 @@ fn check_lengths(browser: &Browser, plan: &str) {
     ));
     let length_m = length_m.as_f64().expect("metres");
     assert!(told().starts_with(&format!("{length_m:.4} m")), "{} and not {length_m}", told());
-    until_drawn(browser);
     assert!(browser.text("#legend").contains("measured length"));
     assert_eq!(browser.text("#beam-now"), selected, "no beam is selected meanwhile");
     browser.eval("document.getElementById('stage').focus()");
@@ -158,7 +152,6 @@ fn check_lengths(browser: &Browser, plan: &str) {
     assert!((by_keys * scale - 200.0).abs() < 20.0, "{}: {by_keys} m", told());
     browser.press(Key::Escape.into());
     assert_eq!(browser.eval("document.querySelector('.measured').hidden"), true);
-    until_drawn(browser);
     assert!(!browser.text("#legend").contains("measured length"));
 }
 

@@ -163,7 +163,7 @@ fn the_plan_is_moved_zoomed_and_measured_as_on_the_daemons_page() {
     // The handles go along, and stay of use.
     let before = middle(&browser, ".ranger");
     browser.click(".tools [aria-label=\"Zoom in\"]");
-    browser.eval("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))");
+    browser.until_drawn();
     let [x, y] = middle(&browser, ".ranger");
     assert!((x - before[0]).hypot(y - before[1]) > 5.0, "{before:?} {x} {y}");
     let stood = pose(&browser);

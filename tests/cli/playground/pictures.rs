@@ -53,9 +53,7 @@ fn an_animated_picture_of_the_false_wall_is_made() {
             // What is said once it rests.
             browser.until("new Promise((done) => setTimeout(() => done(true), 600))");
         }
-        browser.eval(
-            "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))",
-        );
+        browser.until_drawn();
         let stands_ms = if frame == 0 || frame == FRAMES { 1800 } else { FRAME_MS };
         frames.push((browser.picture_of(".floor"), stands_ms));
     }
