@@ -200,6 +200,7 @@ impl Found {
                 *prior,
                 *prior_sigma,
                 told.identified,
+                told.at_limit,
             );
             result(py, "Estimate", fields)
         });

@@ -81,7 +81,7 @@ Examples:
   sonard calibrate room.jsonl --pose 0.774,0.085,90
   sonard calibrate *.jsonl --scene arena.json --fit pose,delay,threshold,beam --prior x_m=0.05 --out fitted
 
-Of --json: name, scan (of a pose), value, change, sigma, low, high (95 %), prior, prior_sigma, identified; values that \
+Of --json: name, scan (of a pose), value, change, sigma, low, high (95 %), prior, prior_sigma, identified, at_limit; values that \
 are logarithms or shares are told as what they make of the file's figure.
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
@@ -145,7 +145,7 @@ fn print(out: &mut impl Write, lines: &[Told], fitted: &Fitted) -> io::Result<()
             format!("{:.5}", line.value),
             format!("{:.5}", line.sigma),
             format!("{:.5} to {:.5}", line.low, line.high),
-            if line.identified { String::new() } else { "left at its prior".to_owned() },
+            line.remark().to_owned(),
         ]);
     }
     for column in table.column_iter_mut().skip(1).take(4) {

@@ -37,9 +37,21 @@ pub struct Told {
     pub prior_sigma: f64,
     /// Whether the readings say more than was believed.
     pub identified: bool,
+    /// Whether it would go on if it could: the value is the least or the largest there is.
+    pub at_limit: bool,
 }
 
 impl Told {
+    /// What besides its figures has to be said of it.
+    #[must_use]
+    pub const fn remark(&self) -> &'static str {
+        match (self.at_limit, self.identified) {
+            (true, _) => "at its limit",
+            (false, true) => "",
+            (false, false) => "left at its prior",
+        }
+    }
+
     /// Its name, with the beginning of the scan's.
     #[must_use]
     pub fn title(&self) -> String {
@@ -68,6 +80,8 @@ impl Fit {
 const WIDEST_TURN_DEG: f64 = 12.0;
 /// Standard deviations to both sides that hold 95 %.
 const HALF_WIDTH: f64 = 1.959_964;
+/// What sums of changes are off by, beside a limit.
+const ROUNDING: f64 = 1e-9;
 
 impl Fitted {
     /// The estimates as figures, in the order of the priors; `world` is the one that was started from.
@@ -76,6 +90,8 @@ impl Fitted {
         let of = |(prior, estimate): (&Prior, &Estimate)| {
             let parameter = &prior.parameter;
             let value = |by: f64| value(world, sweeps, parameter, by);
+            let (least, most) = world.limits(parameter);
+            let possible = |by: f64| value(by.clamp(least, most));
             let half_width = HALF_WIDTH * estimate.sigma;
             let per_unit = |sigma: f64| {
                 0.5 * (value(estimate.change + sigma) - value(estimate.change - sigma)).abs()
@@ -86,11 +102,12 @@ impl Fitted {
                 value: value(estimate.change),
                 change: value(estimate.change) - value(0.0),
                 sigma: per_unit(estimate.sigma),
-                low: value(estimate.change - half_width),
-                high: value(estimate.change + half_width),
+                low: possible(estimate.change - half_width),
+                high: possible(estimate.change + half_width),
                 prior: value(0.0),
                 prior_sigma: per_unit(prior.sigma),
                 identified: estimate.identified,
+                at_limit: estimate.change < least + ROUNDING || estimate.change > most - ROUNDING,
             }
         };
         fit.priors.iter().zip(&self.estimates).map(of).collect()
@@ -160,9 +177,9 @@ fn value(world: &World, sweeps: &[Sweep], parameter: &Parameter, by: f64) -> f64
         Parameter::SoundSpeed => world.air.sound_speed_m_s() * (1.0 + by),
         Parameter::Delay => world.delay_m + by,
         Parameter::Threshold => 20.0 * world.sensor.threshold.log10() + by,
-        Parameter::ThresholdRise => (world.sensor.threshold_rise_db_per_m + by).max(0.0),
+        Parameter::ThresholdRise => world.sensor.threshold_rise_db_per_m + by,
         Parameter::Skirts => match world.sensor.aperture {
-            Aperture::Piston { skirts_db: Some(db), .. } => (db + by).min(0.0),
+            Aperture::Piston { skirts_db: Some(db), .. } => db + by,
             _ => by,
         },
         Parameter::Aperture => world.sensor.half_width_m() * by.exp(),

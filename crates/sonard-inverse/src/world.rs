@@ -103,6 +103,8 @@ impl World {
         let mut offsets_m = Vec::new();
         let mut reflectances = Vec::new();
         for &(parameter, by) in changes {
+            let (least, most) = self.limits(parameter);
+            let by = by.clamp(least, most);
             match parameter {
                 Parameter::X(_) | Parameter::Y(_) | Parameter::Heading(_) => {}
                 Parameter::HeadingZero => world.heading_zero_deg += by,
@@ -118,14 +120,11 @@ impl World {
                 }
                 Parameter::Delay => world.delay_m += by,
                 Parameter::Threshold => world.sensor.threshold *= 10f64.powf(by / 20.0),
-                Parameter::ThresholdRise => {
-                    let rise_db_per_m = &mut world.sensor.threshold_rise_db_per_m;
-                    *rise_db_per_m = (*rise_db_per_m + by).max(0.0);
-                }
+                Parameter::ThresholdRise => world.sensor.threshold_rise_db_per_m += by,
                 Parameter::Skirts => {
                     if let Aperture::Piston { skirts_db: Some(db), .. } = &mut world.sensor.aperture
                     {
-                        *db = (*db + by).min(0.0);
+                        *db += by;
                     }
                 }
                 Parameter::Aperture => scale_aperture(&mut world.sensor.aperture, by.exp()),
@@ -137,6 +136,25 @@ impl World {
             world.scene = Arc::new(changed_scene(&self.scene, &offsets_m, &reflectances));
         }
         Ok(world)
+    }
+
+    /// The least and the largest change of a parameter that there can be: no threshold falls with the range, no skirts
+    /// are louder than the axis, and no material gives back more than it gets.
+    #[must_use]
+    pub fn limits(&self, parameter: &Parameter) -> (f64, f64) {
+        let (least, most) = (f64::NEG_INFINITY, f64::INFINITY);
+        match parameter {
+            Parameter::ThresholdRise => (-self.sensor.threshold_rise_db_per_m, most),
+            Parameter::Skirts => match self.sensor.aperture {
+                Aperture::Piston { skirts_db: Some(db), .. } => (least, -db),
+                _ => (least, most),
+            },
+            Parameter::Reflectance(name) => {
+                let known = self.scene.materials.get(name);
+                (least, known.map_or(most, |material| -material.reflectance.ln()))
+            }
+            _ => (least, most),
+        }
     }
 
     /// The height of the transducer, metres; `None` in a scene without floor and ceiling.
@@ -273,7 +291,8 @@ fn changed_scene(scene: &Scene, offsets_m: &[(usize, f64)], reflectances: &[(&st
     for &(name, by) in reflectances {
         let Some(material) = scene.materials.get(name) else { continue };
         let new = sonard_model::scene::Material {
-            reflectance: (material.reflectance * by.exp()).clamp(0.0, 1.0),
+            // Rounding may go past its limit.
+            reflectance: (material.reflectance * by.exp()).min(1.0),
             ..*material
         };
         let of = changed.walls.iter_mut().map(|wall| &mut wall.material);

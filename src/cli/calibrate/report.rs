@@ -102,7 +102,10 @@ fn report(lines: &[Told], fitted: &Fitted) -> String {
     );
     text.push_str("| --- | --- | --- | --- | --- | --- |\n");
     for line in lines {
-        let told = if line.identified { "yes" } else { "no: left at its prior" };
+        let told = match line.remark() {
+            "" => "yes".to_owned(),
+            remark => format!("no: {remark}"),
+        };
         let _ = writeln!(
             text,
             "| {} | {:.5} | {:.5} | {:.5} | {:.5} | {told} |",

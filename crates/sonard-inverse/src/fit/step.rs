@@ -90,6 +90,7 @@ impl State<'_> {
         Ok(largest)
     }
 
+    /// Solves the damped normal equations; what stands at its limit and would go past it is held.
     fn step(&self, curve: &Curve, change: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
         let mut normal = curve.information.clone();
         let mut right = curve.gradient.clone();
@@ -98,14 +99,31 @@ impl State<'_> {
             normal[(at, at)] += self.precision(at) * (1.0 + damping);
             right[at] -= self.precision(at) * (self.values[at] + change[at]);
         }
+        for at in 0..right.len() {
+            let (least, most) = self.limits_of_change(at);
+            let is_held =
+                (change[at] <= least && right[at] < 0.0) || (change[at] >= most && right[at] > 0.0);
+            if is_held {
+                normal.row_mut(at).fill(0.0);
+                normal.column_mut(at).fill(0.0);
+                (normal[(at, at)], right[at]) = (1.0, 0.0);
+            }
+        }
         Some(Cholesky::new(normal)?.solve(&right))
     }
 
+    /// No further than linearisation and limits allow.
     fn bounded(&self, change: &DVector<f64>) -> DVector<f64> {
-        let bounds = self.parameters.iter().map(|parameter| parameter.step());
-        DVector::from_iterator(
-            change.len(),
-            change.iter().zip(bounds).map(|(by, most)| by.clamp(-most, most)),
-        )
+        let bounded = change.iter().enumerate().map(|(at, by)| {
+            let (step, (least, most)) = (self.parameters[at].step(), self.limits_of_change(at));
+            by.clamp(least.max(-step), most.min(step))
+        });
+        DVector::from_iterator(change.len(), bounded)
+    }
+
+    /// How far a parameter can go from where it stands.
+    fn limits_of_change(&self, at: usize) -> (f64, f64) {
+        let (least, most) = self.start.limits(self.parameters[at]);
+        (least - self.values[at], most - self.values[at])
     }
 }

@@ -74,6 +74,30 @@ fn pose_air_and_threshold_come_back() {
     assert!(fitted.estimates[0].sigma < 1e-3 && fitted.estimates[2].sigma < 0.3);
 }
 
+/// Held to a threshold that is 9 dB too high, a fit would have it fall with the range, which no receiver's does: it
+/// stops where there is no rise, with an interval that begins there, and says so.
+#[test]
+fn what_would_go_past_its_limit_is_held_there_and_told() {
+    let mut here = world("simple-room", "senscomp-6500");
+    let pose = first_pose(&here.scene);
+    let sweeps = [sweep(&here, &pose, &pose, 400, TofNoise::NONE, 1)];
+    here.sensor.threshold *= 10f64.powf(9.0 / 20.0);
+    here.sensor.threshold_rise_db_per_m = 0.5;
+    let of = |parameter, sigma| Prior { parameter, sigma };
+    let what = Fit {
+        priors: vec![of(Parameter::ThresholdRise, 5.0), of(Parameter::Threshold, 0.01)],
+        widest_m: 0.02,
+        widest_turn_deg: 0.0,
+        least_sigma_m: 2e-4,
+        least_sigma_db: 0.5,
+    };
+    let fitted = fit(&here, &sweeps, &what).expect("a fit");
+    assert_eq!(fitted.world.sensor.threshold_rise_db_per_m, 0.0);
+    let told = &fitted.told(&here, &sweeps, &what)[0];
+    assert!(told.at_limit && told.value == 0.0 && told.low == 0.0, "{told:?}");
+    assert!(told.sigma > 0.0 && told.high > 0.0 && told.remark() == "at its limit", "{told:?}");
+}
+
 /// A ranger that tells whole centimetres is not believed to the millimetre where several readings happen to be alike.
 #[test]
 fn steps_of_the_range_are_part_of_its_spread() {

@@ -1,0 +1,181 @@
+"""LEGO NXT rangers that turn in an arena: fitted to the runs of one robot, predicted for all others."""
+
+import collections
+import json
+from concurrent.futures import ThreadPoolExecutor
+
+from work import share, table
+
+FITTED = ("roberto-a", "roberto-b", "roberto-c", "roberto-d")
+FIT = "pose,mounting,threshold,rise,beam,skirts"
+PRIORS = ("x_m=0.03", "y_m=0.03", "heading_deg=4")
+NEAR_M = 0.03
+# 255 stands for no echo.
+REACH_M = "2.55"
+# The first robot sees itself from here on.
+BODY_M = 0.27
+RANGES_M = (0, 0.4, 0.6, 0.9, 1.3, 1.7, 2.1, 2.6)
+
+
+def main(work):
+    with open(work.given("arena-sweeps.json")) as file:
+        sweeps = json.load(file)
+    start = work.keep("start.json", start_sensor(work))
+    groups = {
+        "fitted": [sweep for sweep in sweeps if sweep["group"] in FITTED],
+        "blind": [sweep for sweep in sweeps if sweep["group"] not in FITTED],
+    }
+    for name, of in groups.items():
+        imported(work, name, of, start)
+    calibrate(work, start)
+    sensor = work.path("calibrated", "sensor.json")
+    placed = {name: located(work, name, sensor) for name in groups}
+    by_run(work, groups["blind"], placed["blind"], sensor)
+    found = located_by(groups["blind"], placed["blind"])
+    by_model(work, groups["blind"], found, sensor)
+    by_range(work, found, sensor)
+    count = located_rightly(groups["fitted"], placed["fitted"])
+    print("of the fitted sweeps %d of %d located first, %d in a later answer\n" % (
+        count["first"], len(placed["fitted"]), count["later"]))
+
+
+def start_sensor(work):
+    """hc-sr04 with a plain amplifier, two cans 3 cm apart, and skirts."""
+    sensor = json.loads(work.run("sensor", "show", "hc-sr04"))
+    sensor.update(
+        name="nxt", aperture={"shape": "piston", "radius_m": 0.0055, "skirts_db": -10.0}, threshold=0.15,
+        threshold_rise_db_per_m=1.0, gain={"kind": "steps", "steps": [{"until_us": None, "gain_db": 0.0}]},
+        mounting={"separation_m": 0.03, "ahead_m": 0.03}, max_range_m=float(REACH_M))
+    sensor["sources"] = {key: "where the fit begins" for key in sensor if key not in ("name", "description", "sources")}
+    return sensor
+
+
+def imported(work, name, sweeps, sensor):
+    columns = "scan=id,bearing_deg=bearing_deg,range_m=range_m,x_m=fit_m.0,y_m=fit_m.1"
+    work.run("import", work.keep(name + ".json", sweeps), "--columns", columns, "--scene", work.given("arena.json"),
+             "--sensor", sensor, "--force", "-o", work.path(name + ".jsonl"))
+
+
+def calibrate(work, sensor):
+    priors = [arg for prior in PRIORS for arg in ("--prior", prior)]
+    lines = work.lines("calibrate", work.path("fitted.jsonl"), "--sensor", sensor, "--fit", FIT, *priors, "--out",
+                       work.path("calibrated"), "--force", "--json")
+    rows = [[line["name"], "%.5g" % line["prior"], "%.5g" % line["value"], "%.2g" % line["sigma"]]
+            for line in lines if "scan" not in line]
+    table(["", "was", "is", "standard deviation"], rows)
+    with open(work.path("calibrated", "report.md")) as file:
+        print("\n".join(line for line in file.read().splitlines() if "explained" in line or "told apart" in line) + "\n")
+
+
+def located(work, name, sensor):
+    """The modes of each sweep, most probable first; scans are in the order of the sweeps."""
+    modes = collections.defaultdict(list)
+    for line in work.lines("locate", work.path(name + ".jsonl"), "--sensor", sensor, "--json"):
+        if "x_m" in line:
+            modes[line["scan"]].append(line)
+    with open(work.path(name + ".jsonl")) as file:
+        scans = [line["scan"] for line in map(json.loads, file) if line["type"] == "scan_start"]
+    return [modes[scan] for scan in scans]
+
+
+def located_by(sweeps, placed):
+    """Each sweep with the first pose that was found; bearings in the file are the world's, so headings are near 0."""
+    return [(sweep, modes[0]) for sweep, modes in zip(sweeps, placed) if modes]
+
+
+def by_hand_of(sweep):
+    """A sweep with ranges from the axis, and the pose that was found by hand."""
+    ranges = [range_m and range_m + sweep["radial_offset_m"] for range_m in sweep["range_m"]]
+    x_m, y_m = sweep["fit_m"]
+    return dict(sweep, range_m=ranges), {"x_m": x_m, "y_m": y_m, "heading_deg": 0.0}
+
+
+def located_rightly(sweeps, placed):
+    """How many sweeps were found within 10 cm and 10 degrees, by the first answer or a later one."""
+    count = collections.Counter()
+    for sweep, modes in zip(sweeps, placed):
+        is_right = [is_near(mode, sweep["fit_m"]) for mode in modes]
+        count["first"] += is_right[:1] == [True]
+        count["later"] += any(is_right[1:]) and not is_right[0]
+    return count
+
+
+def is_near(mode, place):
+    off_m = ((mode["x_m"] - place[0]) ** 2 + (mode["y_m"] - place[1]) ** 2) ** 0.5
+    return off_m < 0.1 and abs((mode["heading_deg"] + 180) % 360 - 180) < 10
+
+
+def by_run(work, sweeps, placed, sensor):
+    counts = scores(work, located_by(sweeps, placed), sensor)
+    rows = []
+    for run, count in counts.items():
+        pairs = [(sweep, modes) for sweep, modes in zip(sweeps, placed) if run in ("all", sweep["group"])]
+        right = located_rightly(*zip(*pairs))
+        rows.append([run, "%d of %d" % (right["first"], len(pairs)), right["later"],
+                     "%s of %d" % (share(count["near"], count["echo"]), count["echo"]),
+                     share(count["unheard"], count["echo"]),
+                     "%s of %d" % (share(count["agreed"], count["silent"]), count["silent"]), count["body"]])
+    table(["run", "located within 10 cm and 10 degrees", "right pose only in a later answer", "echoes within 3 cm",
+           "not heard", "silences predicted", "of the body"], rows)
+
+
+def by_model(work, sweeps, found, sensor):
+    by_hand = [by_hand_of(sweep) for sweep in sweeps]
+    nearest = ("--engine", "cone")
+    rows = []
+    for title, poses, of, options in (
+        ("fitted sensor, poses by `locate`", found, sensor, ()),
+        ("nearest hit, the same poses", found, sensor, nearest),
+        ("`lego-nxt`, poses and offsets by hand", by_hand, "lego-nxt", ()),
+        ("`hc-sr04` as shipped, poses and offsets by hand", by_hand, "hc-sr04", ()),
+        ("nearest hit, poses and offsets by hand", by_hand, "hc-sr04", nearest),
+    ):
+        count = scores(work, poses, of, options)["all"]
+        rows.append([title, share(count["near"], count["echo"]), share(count["agreed"], count["silent"])])
+    table(["", "echoes within 3 cm", "silences predicted"], rows)
+
+
+def by_range(work, found, sensor):
+    counts = collections.Counter()
+    for _, measured, model in readings(work, found, sensor):
+        if measured is not None:
+            least_m = max(edge for edge in RANGES_M if edge <= measured)
+            counts[least_m, "echo"] += 1
+            counts[least_m, "near"] += is_echo_of(model, measured)
+    table(["from", "echoes within 3 cm"], [
+        ["%.1f m" % edge, "%d of %d" % (counts[edge, "near"], counts[edge, "echo"])] for edge in RANGES_M[:-1]])
+
+
+def scores(work, found, sensor, options=()):
+    """Counts of what agrees, by run and in all."""
+    counts = collections.defaultdict(collections.Counter)
+    for run, measured, model in readings(work, found, sensor, options):
+        for count in (counts[run], counts["all"]):
+            if measured is None:
+                count["silent"] += 1
+                count["agreed"] += model is None
+            elif measured < BODY_M and run.startswith("roberto") and not is_echo_of(model, measured):
+                count["body"] += 1
+            else:
+                count["echo"] += 1
+                count["near"] += is_echo_of(model, measured)
+                count["unheard"] += model is None
+    counts["all"] = counts.pop("all")
+    return counts
+
+
+def is_echo_of(model, measured):
+    return model is not None and abs(model - measured) < NEAR_M
+
+
+def readings(work, found, sensor, options=()):
+    """Run, measured and predicted range of each reading."""
+    def one(pair):
+        sweep, mode = pair
+        pings = work.pings(work.given("arena.json"), (mode["x_m"], mode["y_m"], 0.0), sensor, "--step-deg", "1",
+                           "--max-range", REACH_M, *options)
+        predicted = {round(ping["azimuth_deg"]) % 360: ping.get("range_m") for ping in pings}
+        return [(sweep["group"], measured, predicted[round(bearing + mode["heading_deg"]) % 360])
+                for bearing, measured in zip(sweep["bearing_deg"], sweep["range_m"])]
+    with ThreadPoolExecutor(2) as pool:
+        return [reading for sweep in pool.map(one, found) for reading in sweep]

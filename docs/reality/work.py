@@ -1,0 +1,52 @@
+"""The program with folders for data and results, and what its answers are read into."""
+
+import json
+import os
+import subprocess
+import sys
+
+
+class Work:
+    """Runs the built program; `data` has the measurements, `out` takes what is made."""
+
+    def __init__(self, sonard, data, out):
+        self.sonard, self.data, self.out = os.path.abspath(sonard), data, out
+        os.makedirs(out, exist_ok=True)
+
+    def given(self, *names):
+        return os.path.join(self.data, *names)
+
+    def path(self, *names):
+        return os.path.join(self.out, *names)
+
+    def keep(self, name, value):
+        """Writes a JSON file into `out` and returns its path."""
+        with open(self.path(name), "w") as file:
+            json.dump(value, file)
+        return self.path(name)
+
+    def run(self, *args):
+        done = subprocess.run([self.sonard, *args], capture_output=True, text=True)
+        if done.returncode:
+            sys.exit("%s\n%s" % (" ".join(args), done.stderr))
+        return done.stdout
+
+    def lines(self, *args):
+        """The JSON lines that a command prints."""
+        return [json.loads(line) for line in self.run(*args).splitlines()]
+
+    def pings(self, scene, pose, sensor, *options):
+        """The readings that the model predicts from a pose (x, y, heading)."""
+        said = self.lines("simulate", "--scene", scene, "--pose=%f,%f,%f" % pose, "--sensor", sensor, *options)
+        return [line for line in said if line["type"] == "ping"]
+
+
+def table(head, rows):
+    """Prints a table in Markdown."""
+    for row in (head, ["---"] * len(head), *rows):
+        print("| " + " | ".join(str(cell) for cell in row) + " |")
+    print()
+
+
+def share(part, whole):
+    return "%.1f %%" % (100 * part / whole) if whole else "none"
