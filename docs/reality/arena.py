@@ -14,6 +14,8 @@ NEAR_M = 0.03
 REACH_M = "2.55"
 # The first robot sees itself from here on.
 BODY_M = 0.27
+# The sweep that is drawn.
+DRAWN = "roberto-f-2"
 RANGES_M = (0, 0.4, 0.6, 0.9, 1.3, 1.7, 2.1, 2.6)
 
 
@@ -34,6 +36,7 @@ def main(work):
     found = located_by(groups["blind"], placed["blind"])
     by_model(work, groups["blind"], found, sensor)
     by_range(work, found, sensor)
+    picture(work, *next(pair for pair in found if pair[0]["id"] == DRAWN), sensor)
     count = located_rightly(groups["fitted"], placed["fitted"])
     print("of the fitted sweeps %d of %d located first, %d in a later answer\n" % (
         count["first"], len(placed["fitted"]), count["later"]))
@@ -144,6 +147,14 @@ def by_range(work, found, sensor):
             counts[least_m, "near"] += is_echo_of(model, measured)
     table(["from", "echoes within 3 cm"], [
         ["%.1f m" % edge, "%d of %d" % (counts[edge, "near"], counts[edge, "echo"])] for edge in RANGES_M[:-1]])
+
+
+def picture(work, sweep, mode, sensor):
+    """One blind sweep on the floor plan, beside what the fitted sensor reads at the pose that was located."""
+    imported(work, "drawn", [sweep], sensor)
+    pose = "--pose=%f,%f,%f" % (mode["x_m"], mode["y_m"], mode["heading_deg"])
+    work.run("predict", work.path("drawn.jsonl"), pose, "--sensor", sensor, "--force", "-o", work.path("predicted.jsonl"))
+    work.run("plot", work.path("predicted.jsonl"), "--force", "-o", work.path("reality-arena.png"), "--width", "1200")
 
 
 def scores(work, found, sensor, options=()):

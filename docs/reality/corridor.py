@@ -13,8 +13,7 @@ TRIED = (
     ("nearest hit", "hc-sr04", 0.0, "cone"),
     ("smooth walls, `hc-sr04`", "hc-sr04", 0.0, "paths"),
     ("smooth walls, `senscomp-6500`", "senscomp-6500", 0.0, "paths"),
-    ("rough walls (0.3), `hc-sr04`", "hc-sr04", 0.3, "paths"),
-    ("rough walls (0.3), `senscomp-6500`", "senscomp-6500", 0.3, "paths"),
+    ("rough walls (0.6), `senscomp-6500`", "senscomp-6500", 0.6, "paths"),
 )
 
 

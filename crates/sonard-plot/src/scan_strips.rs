@@ -44,7 +44,7 @@ pub(super) fn residual(
         Scale::Linear { .. } => "measured \u{2212} model, mm",
         Scale::SymLog { .. } => {
             layer.add(strip.band(-RESIDUAL_LINEAR_MM, RESIDUAL_LINEAR_MM));
-            "measured \u{2212} model, mm (linear within \u{b1}10 mm, shaded; logarithmic beyond)"
+            "measured \u{2212} model, mm (logarithmic beyond \u{b1}10)"
         }
     };
     layer.add(strip.frame(title, last));

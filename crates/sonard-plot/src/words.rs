@@ -114,7 +114,8 @@ fn named<'a>(pose: &Pose, scene: Option<&'a Scene>) -> Option<&'a str> {
 }
 
 fn pose(pose: &Pose) -> String {
-    format!("({:.3}, {:.3}) m, heading {}\u{b0}", pose.x_m, pose.y_m, pose.heading_deg)
+    let heading_deg = (100.0 * pose.heading_deg).round() / 100.0;
+    format!("({:.3}, {:.3}) m, heading {heading_deg}\u{b0}", pose.x_m, pose.y_m)
 }
 
 fn sensor(session: &Session) -> String {

@@ -160,10 +160,12 @@ class Estimate:
     """Standard deviation of what was believed."""
     identified: bool
     """Whether the readings say more about it than was believed."""
+    at_limit: bool
+    """Whether it would go on if it could: the value is the least or the largest there is."""
 
     def __repr__(self) -> str:
         of = "" if self.scan is None else f" of {self.scan[:8]}"
-        left = "" if self.identified else ", left at its prior"
+        left = ", at its limit" if self.at_limit else "" if self.identified else ", left at its prior"
         return f"<Estimate {self.name}{of}: {self.value:.5g} \u00b1 {self.sigma:.2g}{left}>"
 
 
