@@ -13,7 +13,10 @@ use super::{
     Failure, Outcome, answer::answer, compare::RULED, numbers::within, progress,
     what_if::InsteadArgs, worlds::SweepArgs,
 };
-use crate::inverse::{Atlas, Doubt, Mode, World, doubts, locate};
+use crate::{
+    inverse::{Atlas, Course, Doubt, FitError, Mode, Odometry, Sweep, World, doubts, locate},
+    scene::Scene,
+};
 
 /// Options of `sonard locate`.
 #[derive(Debug, clap::Args)]
@@ -21,14 +24,37 @@ use crate::inverse::{Atlas, Doubt, Mode, World, doubts, locate};
 pub(super) struct Args {
     #[command(flatten)]
     sweeps: SweepArgs,
-    #[command(flatten)]
-    instead: InsteadArgs,
     /// Distance of the places that are tried first, metres
     #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = within(0.01..=2.0))]
     spacing_m: f64,
     /// JSON instead of text; one object a pose, most probable first
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    instead: InsteadArgs,
+    #[command(flatten)]
+    course: CourseArgs,
+}
+
+/// Options of scans that a robot took on its way.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Course")]
+struct CourseArgs {
+    /// The scans follow each other, and the poses in the log are odometry's, in any frame
+    #[arg(long)]
+    course: bool,
+    /// What odometry is off by for each metre driven (standard deviation), metres
+    #[arg(long, value_name = "M", requires = "course", default_value_t = 0.05,
+          value_parser = within(0.0..=1.0))]
+    drift_m_per_m: f64,
+    /// What its heading is off by for each metre driven (standard deviation), degrees
+    #[arg(long, value_name = "DEG", requires = "course", default_value_t = 5.0,
+          value_parser = within(0.0..=180.0))]
+    drift_deg_per_m: f64,
+    /// Probability that the robot was carried elsewhere between two scans
+    #[arg(long, value_name = "P", requires = "course", default_value_t = 0.02,
+          value_parser = within(0.0..=1.0))]
+    carried: f64,
 }
 
 pub(super) const ABOUT: &str = "\
@@ -37,7 +63,12 @@ Find where sweeps were taken, without any guess.
 Each scan's readings alone say where in the scene the ranger stood and where it looked: every pose that explains them \
 is listed with its probability, because rooms with a symmetry have several. First the model predicts what would be \
 read on a grid of places all over the scene; the best matches are then improved until all readings - echoes by any \
-path, silences, the ends of arcs - are as likely as they can be. The pose in the log is not used.
+path, silences, the ends of arcs - are as likely as they can be. The pose in the log is not used, or as odometry alone.
+
+With --course what the scans before say counts too: from each pose that explained the last one odometry leads to one \
+where this one should have been taken, and the poses that agree with it gain. So rooms that look alike are told \
+apart once the robot was where they do not, and one that was carried elsewhere is found again. Each scan is answered \
+as soon as it is read: a log may come through a pipe while it is taken.
 
 A scan that nothing in the scene explains gets its best pose all the same, with the share of readings that it explains \
 and, where the readings can tell, what may be wrong with them: azimuths counted clockwise, another unit.";
@@ -47,6 +78,7 @@ Examples:
   sonard simulate --scene mcgill-lab --pose center -o scan.jsonl
   sonard locate scan.jsonl
   sonard locate sweep.jsonl --scene my-room.json --sensor hc-sr04 --json
+  sonard locate way.jsonl --scene my-room.json --course --drift-m-per-m 0.1
 
 Of --json: log, scan, x_m, y_m, heading_deg, probability, sigma_x_m, sigma_y_m, sigma_heading_deg, explained (share of \
 the readings), doubts.
@@ -66,13 +98,14 @@ struct Answer<'a> {
 pub(super) fn run(args: &Args) -> Outcome {
     let what_if = args.instead.load()?;
     let mut known: Option<(Arc<World>, Atlas)> = None;
+    let mut way = Way::new(&args.course);
     let mut any = false;
     args.sweeps.for_each(&what_if, |log, sweep, world| {
         if known.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, world)) {
             known = Some((Arc::clone(world), atlas(world, args.spacing_m)?));
         }
         let Some((_, atlas)) = &known else { return Ok(()) };
-        let modes = locate(world, atlas, &sweep).map_err(|error| refuse(&error))?;
+        let modes = way.locate(world, atlas, &sweep).map_err(|error| refuse(&error))?;
         let doubts = doubts(world, atlas, &sweep, &modes);
         any = true;
         let log = log.display().to_string();
@@ -83,6 +116,35 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Ok(());
     }
     Err(Failure::input("there is no sweep to locate", "give a log of a ranger on a stepper"))
+}
+
+/// Sweeps for themselves, or along a course.
+struct Way {
+    odometry: Option<Odometry>,
+    /// In which scene the course goes on.
+    course: Option<(Arc<Scene>, Course)>,
+}
+
+impl Way {
+    fn new(args: &CourseArgs) -> Self {
+        let &CourseArgs { course, drift_m_per_m, drift_deg_per_m, carried } = args;
+        let odometry = Odometry { drift_m_per_m, drift_deg_per_m, carried };
+        Self { odometry: course.then_some(odometry), course: None }
+    }
+
+    fn locate(
+        &mut self,
+        world: &World,
+        atlas: &Atlas,
+        sweep: &Sweep,
+    ) -> Result<Vec<Mode>, FitError> {
+        let Some(odometry) = self.odometry else { return locate(world, atlas, sweep) };
+        // In another scene nothing is known of where the robot is.
+        self.course = self.course.take().filter(|(scene, _)| **scene == *world.scene);
+        let (_, course) =
+            self.course.get_or_insert_with(|| (Arc::clone(&world.scene), Course::new(odometry)));
+        course.next(world, atlas, sweep)
+    }
 }
 
 fn atlas(world: &World, spacing_m: f64) -> Result<Atlas, Failure> {

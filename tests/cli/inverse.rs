@@ -1,10 +1,15 @@
 //! From readings back to poses and parameters, through the whole program.
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    io::{BufRead as _, BufReader, Write as _},
+    path::Path,
+    process::Stdio,
+};
 
 use serde_json::Value;
 
-use crate::common::{run, stderr};
+use crate::common::{run, sonard, stderr};
 
 /// Runs a verb that should succeed; the objects that it prints.
 fn lines(arguments: &[&str]) -> Vec<Value> {
@@ -85,6 +90,52 @@ fn a_symmetric_room_has_its_poses_listed_and_another_room_is_doubted() {
     assert!(elsewhere[0]["doubts"][0]["kind"].is_string(), "{}", elsewhere[0]);
 }
 
+/// A robot drives from one end of a room, whose ends look alike, past a short wall to the other; its log comes through
+/// a pipe, and each scan is answered before the next is there.
+#[test]
+fn a_course_is_followed_while_its_log_is_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let room = r#"{"name": "long room", "materials": {"plaster": {"reflectance": 0.95}}, "walls": [
+        {"id": "w", "polyline": [[0, 0], [5, 0], [5, 1], [0, 1]], "closed": true, "material": "plaster"},
+        {"id": "stub", "from": [2.9, 1], "to": [2.9, 0.6], "material": "plaster"}]}"#;
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).expect("a file");
+        path.to_str().expect("a plain path").to_owned()
+    };
+    let scene = file("room.json", room);
+    let way = file("way.csv", "x_m,y_m,heading_deg\n2.2,0.4,5\n3.4,0.35,30\n4.4,0.6,80\n");
+    let simulate = ["simulate", "--scene", &scene, "--poses", &way, "--step-deg", "4"];
+    let log = run(&[&simulate[..], &["--max-range", "1.5"]].concat());
+    assert_eq!(log.status.code(), Some(0), "{}", stderr(&log));
+    let log = String::from_utf8(log.stdout).expect("text");
+    let mut child = sonard(&["locate", "-", "--course", "--json"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("it starts");
+    let mut to = child.stdin.take().expect("its input");
+    let mut from = BufReader::new(child.stdout.take().expect("its output")).lines();
+    let is_end = |line: &str| line.starts_with(r#"{"type":"scan_end""#);
+    let first = 1 + log.lines().position(is_end).expect("a first scan");
+    let lines_of = |text: Vec<&str>| text.join("\n") + "\n";
+    to.write_all(lines_of(log.lines().take(first).collect()).as_bytes()).expect("it reads");
+    let answer = from.next().expect("an answer").expect("text");
+    let answer: Value = serde_json::from_str(&answer).expect("JSON");
+    assert!((number(&answer, "x_m") - 2.2).abs() < 0.02, "{answer}");
+    to.write_all(lines_of(log.lines().skip(first).collect()).as_bytes()).expect("it reads");
+    drop(to);
+    let rest: Vec<Value> =
+        from.map(|line| serde_json::from_str(&line.expect("text")).expect("JSON")).collect();
+    assert!(child.wait().expect("it ends").success());
+    let end = rest.last().expect("an answer to the last scan");
+    assert!((number(end, "x_m") - 4.4).abs() < 0.02, "{end}");
+    assert!(number(end, "probability") > 0.99, "{end}");
+    let alone = lines(&["locate", &file("way.jsonl", &log), "--json"]);
+    let of_end = alone.iter().filter(|mode| mode["scan"] == end["scan"]);
+    assert_eq!(of_end.count(), 2, "{alone:?}");
+}
+
 #[test]
 fn what_can_not_be_fitted_is_said() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -97,6 +148,8 @@ fn what_can_not_be_fitted_is_said() {
         (vec!["calibrate", "nowhere.jsonl"], "nowhere.jsonl"),
         (vec!["locate", &log, "--scene", "nowhere"], "nowhere"),
         (vec!["locate", &log, "--spacing-m", "0"], "0.01 to 2"),
+        (vec!["locate", &log, "--carried", "0.1"], "--course"),
+        (vec!["locate", &log, "--course", "--carried", "1.1"], "0 to 1"),
     ] {
         let output = run(&arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");

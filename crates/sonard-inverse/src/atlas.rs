@@ -100,6 +100,12 @@ impl Atlas {
         self.places.len()
     }
 
+    /// Where a ranger may stand, square metres.
+    #[must_use]
+    pub fn area_m2(&self) -> f64 {
+        self.places.len() as f64 * self.spacing_m.powi(2)
+    }
+
     /// Models of a world that may be the one predicted with.
     pub(crate) fn models(&self, world: &World) -> Result<Models, WorldError> {
         self.models.changed_to(&world.with_face_on_axis())

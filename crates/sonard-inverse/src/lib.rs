@@ -2,7 +2,8 @@
 //! what was measured.
 //!
 //! [`fit`] improves the [`Parameter`]s of a [`World`] until the readings of some [`Sweep`]s are as likely as they
-//! can be, and says how sure that is. [`Atlas`] finds where a sweep was taken without any guess.
+//! can be, and says how sure that is. [`locate`] finds with an [`Atlas`] where a sweep was taken without any guess,
+//! and a [`Course`] follows a robot from sweep to sweep.
 //!
 //! A reading is taken for what a receiver says whose threshold differs a little from firing to firing: from the
 //! lowest to the highest it would have reported one arrival after the other and in the end nothing
@@ -11,6 +12,7 @@
 
 mod atlas;
 mod candidates;
+mod course;
 mod doubt;
 mod fit;
 mod groups;
@@ -29,6 +31,7 @@ mod walls;
 mod world;
 
 pub use atlas::{Atlas, AtlasError};
+pub use course::{Course, Odometry};
 pub use doubt::{Doubt, doubts};
 pub use fit::{Estimate, Fit, FitError, Fitted, Prior, bound, fit};
 pub use groups::{Group, GroupError, name, priors};

@@ -33,6 +33,28 @@ pub struct Mode {
     pub explained: f64,
 }
 
+impl Mode {
+    /// Where a sweep was fitted, for certain as long as there is no other.
+    fn of(fitted: &Fitted) -> Self {
+        let (pose, of) = (&fitted.poses[0], &fitted.estimates);
+        Self {
+            x_m: pose.x_m,
+            y_m: pose.y_m,
+            heading_deg: wrap_180(pose.heading_deg),
+            probability: 1.0,
+            sigma_x_m: of[0].sigma,
+            sigma_y_m: of[1].sigma,
+            sigma_heading_deg: of[2].sigma,
+            explained: 1.0 - fitted.errors.clutter,
+        }
+    }
+
+    /// Standard deviation of its place, metres: root mean square of both axes.
+    pub(crate) fn sigma_m(&self) -> f64 {
+        (0.5 * (self.sigma_x_m.powi(2) + self.sigma_y_m.powi(2))).sqrt()
+    }
+}
+
 /// Matches of the atlas that are improved roughly, and of those how many with all beams.
 const ROUGH: usize = 8;
 const WHOLE: usize = 4;
@@ -57,18 +79,30 @@ const FAR_BELOW: f64 = 60.0;
 /// # Errors
 /// When there is nothing to predict with.
 pub fn locate(world: &World, atlas: &Atlas, sweep: &Sweep) -> Result<Vec<Mode>, FitError> {
+    Ok(modes(&explaining(world, atlas, sweep, &[])?, |_| 0.0))
+}
+
+/// Fits the poses of the atlas that a sweep goes with best, and those where it is expected; the likeliest ones, each once.
+pub(crate) fn explaining(
+    world: &World,
+    atlas: &Atlas,
+    sweep: &Sweep,
+    expected: &[Pose],
+) -> Result<Vec<Fitted>, FitError> {
     let models = atlas.models(world)?;
     let few = thinned(sweep, FEW_BEAMS);
     let mut rough: Vec<Approached> = Vec::new();
-    for Match { pose, .. } in atlas.matches(world, sweep, ROUGH) {
-        let near = Sweep { pose, ..few.clone() };
+    let matches = atlas.matches(world, sweep, ROUGH);
+    for pose in matches.iter().map(|Match { pose, .. }| pose).chain(expected) {
+        let near = Sweep { pose: *pose, ..few.clone() };
         rough.extend(approach(models.clone(), world, &near, &pose_alone(ROUGH_WIDEST)).ok());
     }
     rough.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
     let best = rough.first().map_or(0.0, |best| best.log_posterior);
     rough.retain(|found| found.log_posterior > best - FAR_BELOW);
     let mut whole: Vec<Fitted> = Vec::new();
-    for found in distinct(rough, 0.05, |found| &found.pose).into_iter().take(WHOLE) {
+    let most = WHOLE + expected.len();
+    for found in distinct(rough, 0.05, |found| &found.pose).into_iter().take(most) {
         // A rough fit is off by little more than its readings spread.
         let widest_m = (3.0 * found.sigma_m).clamp(LEAST_WIDEST_M, 0.03);
         let near = Sweep { pose: found.pose, ..sweep.clone() };
@@ -76,7 +110,7 @@ pub fn locate(world: &World, atlas: &Atlas, sweep: &Sweep) -> Result<Vec<Mode>, 
         whole.extend(fit_with(models.clone(), world, std::slice::from_ref(&near), &what).ok());
     }
     whole.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
-    Ok(modes(&distinct(whole, 0.05, |found| &found.poses[0])))
+    Ok(distinct(whole, 0.05, |found| &found.poses[0]))
 }
 
 /// Fits a pose alone, that may be so many metres and degrees off.
@@ -106,32 +140,21 @@ fn distinct<T>(sorted: Vec<T>, within_m: f64, pose: impl Fn(&T) -> &Pose) -> Vec
     kept
 }
 
-/// Modes with their probabilities, by Laplace's approximation of each one's evidence.
-fn modes(found: &[Fitted]) -> Vec<Mode> {
+/// Modes with their probabilities: each one's evidence by Laplace's approximation, times how probable it was beforehand,
+/// whose logarithm `log_prior` gives.
+pub(crate) fn modes(found: &[Fitted], log_prior: impl Fn(&Mode) -> f64) -> Vec<Mode> {
+    let mut modes: Vec<Mode> = found.iter().map(Mode::of).collect();
     let evidence = |fitted: &Fitted| {
         (fitted.log_posterior + 0.5 * log_volume(&fitted.covariance)) / READINGS_OF_ARC
     };
-    let all: Vec<f64> = found.iter().map(evidence).collect();
+    let all: Vec<f64> =
+        found.iter().zip(&modes).map(|(fitted, mode)| evidence(fitted) + log_prior(mode)).collect();
     let most = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let sum: f64 = all.iter().map(|evidence| (evidence - most).exp()).sum();
-    let mut modes: Vec<Mode> = found
-        .iter()
-        .zip(&all)
-        .map(|(fitted, evidence)| {
-            let (pose, of) = (&fitted.poses[0], &fitted.estimates);
-            Mode {
-                x_m: pose.x_m,
-                y_m: pose.y_m,
-                heading_deg: wrap_180(pose.heading_deg),
-                probability: (evidence - most).exp() / sum,
-                sigma_x_m: of[0].sigma,
-                sigma_y_m: of[1].sigma,
-                sigma_heading_deg: of[2].sigma,
-                explained: 1.0 - fitted.errors.clutter,
-            }
-        })
-        .filter(|mode| mode.probability >= LEAST_PROBABILITY)
-        .collect();
+    let sum: f64 = all.iter().map(|log| (log - most).exp()).sum();
+    for (mode, log) in modes.iter_mut().zip(&all) {
+        mode.probability = (log - most).exp() / sum;
+    }
+    modes.retain(|mode| mode.probability >= LEAST_PROBABILITY);
     modes.sort_by(|one, other| other.probability.total_cmp(&one.probability));
     modes
 }

@@ -13,7 +13,7 @@ use super::{first_pose, world};
 use crate::{Atlas, Beam, Fit, Heard, Parameter, Prior, Sweep, World, fit, locate};
 
 /// A sweep as a world has it, with noise, said to be from another pose.
-fn sweep(
+pub(super) fn sweep(
     world: &World,
     pose: &Pose,
     believed: &Pose,
