@@ -32,14 +32,15 @@ def main(work):
     calibrate(work, start)
     sensor = work.path("calibrated", "sensor.json")
     placed = {name: located(work, name, sensor) for name in groups}
-    by_run(work, groups["blind"], placed["blind"], sensor)
+    courses = {name: along_course(work, of, sensor) for name, of in groups.items()}
+    by_run(work, groups["blind"], placed["blind"], courses["blind"], sensor)
     found = located_by(groups["blind"], placed["blind"])
-    by_model(work, groups["blind"], found, sensor)
+    by_model(work, groups["blind"], found, located_by(groups["blind"], courses["blind"]), sensor)
     by_range(work, found, sensor)
     picture(work, *next(pair for pair in found if pair[0]["id"] == DRAWN), sensor)
-    count = located_rightly(groups["fitted"], placed["fitted"])
-    print("of the fitted sweeps %d of %d located first, %d in a later answer\n" % (
-        count["first"], len(placed["fitted"]), count["later"]))
+    count, course = (located_rightly(groups["fitted"], of["fitted"]) for of in (placed, courses))
+    print("of the %d fitted sweeps %d located first, %d in a later answer, %d along their courses\n" % (
+        len(groups["fitted"]), count["first"], count["later"], course["first"]))
 
 
 def start_sensor(work):
@@ -53,8 +54,8 @@ def start_sensor(work):
     return sensor
 
 
-def imported(work, name, sweeps, sensor):
-    columns = "scan=id,bearing_deg=bearing_deg,range_m=range_m,x_m=fit_m.0,y_m=fit_m.1"
+def imported(work, name, sweeps, sensor, place="fit_m"):
+    columns = "scan=id,bearing_deg=bearing_deg,range_m=range_m,x_m=%s.0,y_m=%s.1" % (place, place)
     work.run("import", work.keep(name + ".json", sweeps), "--columns", columns, "--scene", work.given("arena.json"),
              "--sensor", sensor, "--force", "-o", work.path(name + ".jsonl"))
 
@@ -70,15 +71,25 @@ def calibrate(work, sensor):
         print("\n".join(line for line in file.read().splitlines() if "explained" in line or "told apart" in line) + "\n")
 
 
-def located(work, name, sensor):
+def located(work, name, sensor, *options):
     """The modes of each sweep, most probable first; scans are in the order of the sweeps."""
     modes = collections.defaultdict(list)
-    for line in work.lines("locate", work.path(name + ".jsonl"), "--sensor", sensor, "--json"):
+    for line in work.lines("locate", work.path(name + ".jsonl"), "--sensor", sensor, "--json", *options):
         if "x_m" in line:
             modes[line["scan"]].append(line)
     with open(work.path(name + ".jsonl")) as file:
         scans = [line["scan"] for line in map(json.loads, file) if line["type"] == "scan_start"]
     return [modes[scan] for scan in scans]
+
+
+def along_course(work, sweeps, sensor):
+    """The modes of each sweep with those before it in its run. Odometry are the waypoints that the robots were sent to;
+    headings, which are of the fits by hand, are not used."""
+    placed = []
+    for run in dict.fromkeys(sweep["group"] for sweep in sweeps):
+        imported(work, run, [sweep for sweep in sweeps if sweep["group"] == run], sensor, "waypoint_m")
+        placed += located(work, run, sensor, "--course", "--drift-deg-per-m", "180")
+    return placed
 
 
 def located_by(sweeps, placed):
@@ -108,27 +119,29 @@ def is_near(mode, place):
     return off_m < 0.1 and abs((mode["heading_deg"] + 180) % 360 - 180) < 10
 
 
-def by_run(work, sweeps, placed, sensor):
+def by_run(work, sweeps, placed, courses, sensor):
     counts = scores(work, located_by(sweeps, placed), sensor)
     rows = []
     for run, count in counts.items():
-        pairs = [(sweep, modes) for sweep, modes in zip(sweeps, placed) if run in ("all", sweep["group"])]
-        right = located_rightly(*zip(*pairs))
-        rows.append([run, "%d of %d" % (right["first"], len(pairs)), right["later"],
+        of = [at for at, sweep in enumerate(sweeps) if run in ("all", sweep["group"])]
+        right, course = (located_rightly([sweeps[at] for at in of], [modes[at] for at in of])
+                         for modes in (placed, courses))
+        rows.append([run, "%d of %d" % (right["first"], len(of)), right["later"], "%d of %d" % (course["first"], len(of)),
                      "%s of %d" % (share(count["near"], count["echo"]), count["echo"]),
                      share(count["unheard"], count["echo"]),
                      "%s of %d" % (share(count["agreed"], count["silent"]), count["silent"]), count["body"]])
-    table(["run", "located within 10 cm and 10 degrees", "right pose only in a later answer", "echoes within 3 cm",
-           "not heard", "silences predicted", "of the body"], rows)
+    table(["run", "located within 10 cm and 10 degrees", "right pose only in a later answer", "located along the course",
+           "echoes within 3 cm", "not heard", "silences predicted", "of the body"], rows)
 
 
-def by_model(work, sweeps, found, sensor):
+def by_model(work, sweeps, found, along, sensor):
     by_hand = [by_hand_of(sweep) for sweep in sweeps]
     nearest = ("--engine", "cone")
     rows = []
     for title, poses, of, options in (
         ("fitted sensor, poses by `locate`", found, sensor, ()),
         ("nearest hit, the same poses", found, sensor, nearest),
+        ("fitted sensor, poses along the courses", along, sensor, ()),
         ("`lego-nxt`, poses and offsets by hand", by_hand, "lego-nxt", ()),
         ("`hc-sr04` as shipped, poses and offsets by hand", by_hand, "hc-sr04", ()),
         ("nearest hit, poses and offsets by hand", by_hand, "hc-sr04", nearest),
