@@ -3,13 +3,16 @@
 //! `cargo run --release -p sonard-inverse --example courses -- COUNT [SEED] [BEAMS] [SCENE...]` drives COUNT courses of
 //! eight sweeps in each scene (all shipped ones, if none is named), up to half a metre from one to the next, with odometry
 //! that is off by 5 % and 5 degrees a metre; before the fifth sweep the robot is carried elsewhere. Right is the first
-//! answer within 2 cm and 1 degree of the truth (10 cm and 5 degrees with fewer than 100 beams). Prints the shares of sweeps
+//! answer within 2 cm and 1 degree of the truth (10 cm and 5 degrees with fewer than 100 beams); where a scene is the same
+//! turned by half, either pose is. Prints the shares of sweeps
 //! that are right, and of courses that are right again within so many sweeps after the robot was carried.
 
+mod images;
 mod rooms;
 
 use std::sync::Arc;
 
+use images::images;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
@@ -99,8 +102,11 @@ fn drive(world: &World, atlas: &Atlas, beams: usize, rng: &mut Pcg64, tally: &mu
             pose: told,
             beams: all.into_iter().step_by(every).collect(),
         };
-        let is_right =
-            |modes: &[Mode]| modes.first().is_some_and(|mode| is_there(mode, &pose, beams));
+        let right = images(world, &pose);
+        let is_right = |modes: &[Mode]| {
+            let found = modes.first();
+            found.is_some_and(|mode| right.iter().any(|pose| is_there(mode, pose, beams)))
+        };
         let by_course = is_right(&course.next(world, atlas, &sweep).unwrap_or_default());
         tally.sweeps += 1;
         tally.alone += u32::from(is_right(&locate(world, atlas, &sweep).unwrap_or_default()));
