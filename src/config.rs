@@ -6,6 +6,7 @@
 
 mod air;
 mod document;
+mod fleet;
 mod foxglove;
 mod keys;
 mod layers;
@@ -14,6 +15,7 @@ mod schema;
 pub use air::AirKeys;
 pub(crate) use air::air_section;
 pub use document::document;
+pub use fleet::{FleetKeys, MAX_ROBOT_NAME, is_robot_name, robot_name_of_host};
 pub use foxglove::FoxgloveKeys;
 pub use keys::{
     DeviceKeys, GpioKeys, Keys, LinkKeys, LogKeys, Mode, ModelKeys, MotionKeys, PlaceKeys,

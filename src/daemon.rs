@@ -130,7 +130,7 @@ fn wire(
     let (orders, requests) = mpsc::channel(ORDERS);
     let shutdown = CancellationToken::new();
     let hub = Hub::new(settings.keys.server.queue as usize);
-    let shared = Arc::new(Shared::new(first_view(&settings)));
+    let shared = Arc::new(Shared::new(first_view(&settings), settings.keys.fleet.robot.clone()));
     let gate = (shutdown.clone(), Arc::clone(&shared));
     let desk = Desk::new(settings, board, requests, gate, journal.clone());
     let outlet = Outlet::new(journal.clone(), hub.clone(), Arc::clone(&shared));

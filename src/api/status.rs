@@ -19,6 +19,8 @@ use crate::{
 /// What the daemon is doing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Status {
+    /// The robot's name (`fleet.robot`).
+    pub robot: String,
     /// Version of the program.
     pub sonard: String,
     /// How long it runs, seconds.

@@ -88,7 +88,10 @@ mod tests {
                 assert_eq!(read.origin(&section.name, &key.name), None, "{}", key.name);
             }
         }
-        assert_eq!(yielding, ["scanning.mode", "model.sensor", "log.folder", "server.socket"]);
+        assert_eq!(
+            yielding,
+            ["scanning.mode", "model.sensor", "log.folder", "server.socket", "fleet.robot"]
+        );
     }
 
     #[test]

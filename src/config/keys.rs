@@ -6,7 +6,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{air::AirKeys, foxglove::FoxgloveKeys};
+use super::{air::AirKeys, fleet::FleetKeys, foxglove::FoxgloveKeys};
 use crate::model::OptionKeys;
 
 /// Configuration of `sonard run`.
@@ -39,6 +39,8 @@ pub struct Keys {
     pub server: ServerKeys,
     /// Live messages for Foxglove and Lichtblick, at /foxglove/ of the server's address.
     pub foxglove: FoxgloveKeys,
+    /// This robot among others.
+    pub fleet: FleetKeys,
     /// Pins of a Raspberry Pi (BCM numbers); only in a build with the feature pi.
     pub gpio: GpioKeys,
 }

@@ -31,6 +31,11 @@ impl Outlet {
         self.put(&Record::Event(Event { time: Timestamp::now(), kind, detail }));
     }
 
+    /// A session with the robot's name in it.
+    pub(super) fn named(&self, session: Session) -> Session {
+        Session { robot: Some(self.shared.robot.clone()), ..session }
+    }
+
     /// A record for everybody.
     pub(super) fn put(&self, record: &Record) {
         let over = self.shared.collect(record);

@@ -220,7 +220,7 @@ impl Player {
             self.stage = Some(Stage::set(&self.desk.settings, air).await?);
         }
         let Some(stage) = &self.stage else { return Ok(()) };
-        let session = Session::of_array(&stage.model(), Timestamp::now());
+        let session = self.out.named(Session::of_array(&stage.model(), Timestamp::now()));
         let same = self.session.as_ref().is_some_and(|before| {
             *before == Session { started: before.started, ..session.clone() }
         });

@@ -7,7 +7,7 @@ use crate::{
     acoustics::{Air, Sensor},
     api::Setup,
     array::{Course, RangerArray},
-    config::Keys,
+    config::{Keys, MAX_ROBOT_NAME, is_robot_name},
     geometry::Pose,
     model::Options,
     ranger::Motion,
@@ -163,6 +163,7 @@ impl Settings {
             help: foreign.help(),
         })?;
         self.check_server()?;
+        self.check_robot()?;
         if self.keys.link.retry_max_s < self.keys.link.retry_min_s {
             return Err(Mismatch {
                 section: "link",
@@ -202,6 +203,19 @@ impl Settings {
         Ok(())
     }
 
+    fn check_robot(&self) -> Result<(), Mismatch> {
+        let robot = &self.keys.fleet.robot;
+        if is_robot_name(robot) {
+            return Ok(());
+        }
+        Err(Mismatch {
+            section: "fleet",
+            key: "robot",
+            message: format!("fleet.robot is {robot:?}"),
+            help: format!("letters, digits, `-`, `_` and `.`, at most {MAX_ROBOT_NAME}: kiwi-7"),
+        })
+    }
+
     /// Keys marked `(restart)` that differ from those of `before`, as `section.key`.
     #[must_use]
     pub fn needs_restart(&self, before: &Self) -> Vec<String> {
@@ -212,6 +226,9 @@ impl Settings {
         }
         if now.server != then.server {
             keys.push("server".to_owned());
+        }
+        if now.fleet != then.fleet {
+            keys.push("fleet".to_owned());
         }
         if now.gpio != then.gpio {
             keys.push("gpio".to_owned());

@@ -162,6 +162,8 @@ fn with(mut totals: LineTotals, stats: &LinkStats) -> LineTotals {
 #[derive(Debug)]
 pub(super) struct Shared {
     pub(super) started: Instant,
+    /// The robot's name, as of the start.
+    pub(super) robot: String,
     pub(super) view: watch::Sender<View>,
     /// Counts whatever shows that the operator gets on; the watchdog looks at it.
     beats: AtomicU64,
@@ -186,9 +188,10 @@ struct Collector {
 }
 
 impl Shared {
-    pub(super) fn new(view: View) -> Self {
+    pub(super) fn new(view: View, robot: String) -> Self {
         Self {
             started: Instant::now(),
+            robot,
             view: watch::Sender::new(view),
             beats: AtomicU64::new(0),
             beams_done: AtomicU32::new(0),
@@ -265,6 +268,7 @@ impl Shared {
         let view = self.view.borrow().clone();
         let (in_force, pending) = (view.in_force().clone(), view.pending(now));
         Status {
+            robot: self.robot.clone(),
             sonard: env!("CARGO_PKG_VERSION").into(),
             uptime_s: now.duration_since(self.started).as_secs_f64(),
             link: LinkReport {

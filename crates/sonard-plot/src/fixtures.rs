@@ -133,6 +133,7 @@ pub(super) fn session() -> Session {
         started: jiff::Timestamp::UNIX_EPOCH,
         sonard: "0.1.0".into(),
         provenance: Provenance::Mock,
+        robot: None,
         device: None,
         sensor: Sensor::preset("senscomp-6500").expect("a preset"),
         array: None,

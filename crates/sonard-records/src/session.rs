@@ -46,6 +46,9 @@ pub struct Session {
     pub sonard: String,
     /// Where the readings come from.
     pub provenance: Provenance,
+    /// The robot it is of, where a daemon wrote it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot: Option<String>,
     /// The ranger that answered; `null` for simulated scans.
     pub device: Option<Device>,
     /// The sensor's data in force.
@@ -81,6 +84,7 @@ impl Session {
             started,
             sonard: env!("CARGO_PKG_VERSION").to_owned(),
             provenance,
+            robot: None,
             device: None,
             sensor,
             array: None,

@@ -16,7 +16,7 @@ use crate::{
         options::load_sensor,
         scene_file,
     },
-    config::{ConfigError, Keys, Layers, Mode},
+    config::{ConfigError, Keys, Layers, Mode, robot_name_of_host},
     daemon::{Mismatch, Settings, Simulated},
     scene::{PoseError, parse_pose},
 };
@@ -126,7 +126,7 @@ impl Loader {
         Ok(layers)
     }
 
-    /// What systemd provides goes before defaults, and the mock's port before everything.
+    /// What system and systemd provide goes before defaults, and the mock's port before everything.
     fn fill_in(&self, layers: &Layers, keys: &mut Keys) {
         // Of several folders, systemd separates by colons, the first is meant.
         let first = |variable| {
@@ -142,6 +142,12 @@ impl Loader {
             && let Some(folder) = first("RUNTIME_DIRECTORY")
         {
             keys.server.socket = format!("{folder}/sonard.sock");
+        }
+        let host = rustix::system::uname();
+        if layers.origin("fleet", "robot").is_none()
+            && let Some(name) = host.nodename().to_str().ok().and_then(robot_name_of_host)
+        {
+            keys.fleet.robot = name;
         }
         // A simulated array is polled all the time, as on the robot.
         if self.args.simulate && layers.origin("scanning", "mode").is_none() {

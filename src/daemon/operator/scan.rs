@@ -110,6 +110,7 @@ impl Operator {
 
     /// Writes a session's record if the one in force says something else.
     fn put_session(&mut self, session: Session) {
+        let session = self.out.named(session);
         let same = self.session.as_ref().is_some_and(|before| {
             *before == Session { started: before.started, ..session.clone() }
         });

@@ -8,7 +8,7 @@ use axum::{
 use jiff::Timestamp;
 use prometheus_client::{
     encoding::text::encode,
-    metrics::{counter::ConstCounter, gauge::ConstGauge},
+    metrics::{counter::ConstCounter, gauge::ConstGauge, info::Info},
     registry::Registry,
 };
 
@@ -55,6 +55,8 @@ fn is_made_up(status: &Status) -> bool {
 fn registry(daemon: &Handle) -> Registry {
     let (status, health) = (daemon.status(), daemon.health());
     let mut registry = Registry::with_prefix("sonard");
+    let robot = Info::new([("robot", status.robot.clone()), ("version", status.sonard.clone())]);
+    registry.register("robot", "Which robot it is, and of which version", robot);
     for (name, help, value) in counters(&status, &health) {
         registry.register(name, help, ConstCounter::new(value));
     }

@@ -4,7 +4,7 @@ use std::{fs, net::TcpListener, os::unix::fs::PermissionsExt as _};
 
 use rustix::process::Signal;
 
-use super::{Daemon, write_token};
+use super::{Daemon, clean_log, write_token};
 use crate::common::{run, sonard, stderr, wait_until};
 
 #[test]
@@ -73,6 +73,8 @@ fn wrong_configurations_end_with_the_place_and_a_way_out() {
         ("", &["--mock"][..], &["needs a scene"]),
         ("[server]\nsocket_mode = \"9999\"\n", &port[..], &["s.toml:2:15", "three octal digits"]),
         ("[server]\nsocket_mode = \"00660\"\n", &port[..], &["three octal digits"]),
+        ("[fleet]\nrobot = \"a/b\"\n", &port[..], &["s.toml:2:9", "letters, digits"]),
+        ("[fleet]\nrobot = \"\"\n", &port[..], &["s.toml:2:9", "letters, digits"]),
         ("[server]\nlisten = \"localhost\"\n", &port[..], &["s.toml:2:10", "127.0.0.1:8765"]),
         ("", &["--port", "x", "--set", "link.retry_max_s=0.1"][..], &["--set", "retry_min_s"]),
     ] {
@@ -92,6 +94,37 @@ fn wrong_configurations_end_with_the_place_and_a_way_out() {
     let output =
         sonard(&["run", "--check", "--port", "x"]).env("SONARD_PLAN_STEP_DEG", "fast").output();
     assert!(stderr(&output.expect("starts")).contains("SONARD_PLAN_STEP_DEG"));
+}
+
+#[test]
+fn a_robot_is_called_as_its_host_unless_it_has_a_name_and_says_so_everywhere() {
+    let host = rustix::system::uname();
+    let host = host.nodename().to_str().expect("plain");
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &["--set", "plan.to_deg=9"]);
+    assert_eq!(daemon.status()["robot"], host);
+    assert_eq!(daemon.stop(), Some(0));
+
+    let named = ["--set", "plan.to_deg=9", "--set", "fleet.robot=kiwi-7"];
+    let daemon = Daemon::start_mock(folder.path(), &named);
+    assert_eq!(daemon.status()["robot"], "kiwi-7");
+    let figures = String::from_utf8(daemon.get("/metrics").body).expect("text");
+    let info = format!(
+        "\nsonard_robot_info{{robot=\"kiwi-7\",version=\"{}\"}} 1\n",
+        env!("CARGO_PKG_VERSION")
+    );
+    assert!(figures.contains(&info), "{figures}");
+    daemon.wait_for("ready");
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+    daemon.wait_for_scans(1);
+    assert_eq!(daemon.get("/v1/session").json()["robot"], "kiwi-7");
+    assert_eq!(daemon.stop(), Some(0));
+    let log = clean_log(folder.path());
+    let session = log.of_type("session").next().expect("a session");
+    assert_eq!(session["robot"], "kiwi-7");
+    let shown = run(&["log", "show", folder.path().join("log").to_str().expect("plain path")]);
+    let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
+    assert!(shown.contains("robot   kiwi-7"), "{shown}");
 }
 
 #[test]

@@ -78,6 +78,9 @@ fn print_session(out: &mut impl Write, session: &Session) -> io::Result<()> {
         session;
     let provenance = format!("{provenance:?}").to_lowercase();
     writeln!(out, "session   {}  {provenance}, sonard {sonard}", seconds(*started))?;
+    if let Some(robot) = &session.robot {
+        writeln!(out, "  robot   {robot}")?;
+    }
     if let Some(device) = device {
         let (serial, firmware, boot) = (&device.serial, &device.firmware, &device.boot);
         let steps = device.steps_per_revolution;
