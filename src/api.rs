@@ -7,6 +7,7 @@
 mod air;
 mod beam;
 mod findings;
+mod fleet;
 mod health;
 mod link;
 mod logs;
@@ -22,6 +23,7 @@ mod status;
 pub use air::{AirOrder, AirStatus};
 pub use beam::{Beam, Echo};
 pub use findings::{Findings, FoundFeature, FoundLine, MapCells};
+pub use fleet::{Fleet, FleetPicture, FleetReport, FleetRobot, FleetScan, FleetState};
 pub use health::{ClockReport, Health, LineTotals, ScanFit, ScanTotals};
 pub use link::{LinkReport, LinkState, Trouble};
 pub use logs::LogEntry;

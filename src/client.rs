@@ -27,6 +27,9 @@ use crate::api::{Accepted, Problem};
 /// How long a daemon may take for its answer to begin.
 const PATIENCE: Duration = Duration::from_secs(10);
 
+/// Longest refusal that is read, bytes.
+const MOST_REFUSAL_BYTES: usize = 64 * 1024;
+
 /// Where a daemon is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
@@ -63,6 +66,9 @@ pub enum ClientError {
     /// It answers something else than it should.
     #[error("the daemon's answer can't be read: {0}")]
     Strange(#[from] serde_json::Error),
+    /// It answers more than was asked for.
+    #[error("the daemon's answer is longer than {0} bytes")]
+    TooLong(usize),
     /// It refused.
     #[error("the daemon refused ({status}): {error}")]
     Refused {
@@ -91,7 +97,7 @@ impl ClientError {
                  --socket or --address say where it is; the socket's group may use it"
                 .into(),
             Self::TooSlow => "look at its messages (`journalctl -u sonard`)".into(),
-            Self::Http(_) | Self::Strange(_) => {
+            Self::Http(_) | Self::Strange(_) | Self::TooLong(_) => {
                 "make sure that it is a sonard of this version".into()
             }
             Self::Refused { help, .. } => help.clone(),
@@ -122,6 +128,19 @@ impl Client {
     pub async fn get_json<T: DeserializeOwned>(&self, path: &str) -> Result<T, ClientError> {
         let body = self.get(path).await?.into_body().collect().await?.to_bytes();
         Ok(serde_json::from_slice(&body)?)
+    }
+
+    /// The same of an answer that may have so many bytes; no more of one are taken.
+    ///
+    /// # Errors
+    /// As [`Self::get_json`], or when it is longer.
+    pub async fn get_json_within<T: DeserializeOwned>(
+        &self,
+        path: &str,
+        most_bytes: usize,
+    ) -> Result<T, ClientError> {
+        let body = self.get(path).await?.into_body();
+        Ok(serde_json::from_slice(&within(body, most_bytes).await?)?)
     }
 
     /// Gives an order with a JSON body, and returns the whole answer.
@@ -174,13 +193,26 @@ impl Client {
         if status.is_success() || status == StatusCode::SERVICE_UNAVAILABLE {
             return Ok(response);
         }
-        let body = response.into_body().collect().await?.to_bytes();
+        let body = within(response.into_body(), MOST_REFUSAL_BYTES).await?;
         let Problem { error, help } = serde_json::from_slice(&body).unwrap_or_else(|_| Problem {
             error: String::from_utf8_lossy(&body).into_owned(),
             help: "make sure that it is a sonard of this version".into(),
         });
         Err(ClientError::Refused { status, error, help })
     }
+}
+
+/// A body's bytes, at most so many.
+async fn within(mut body: Incoming, most_bytes: usize) -> Result<Vec<u8>, ClientError> {
+    let mut bytes = Vec::new();
+    while let Some(frame) = body.frame().await {
+        let frame = frame?;
+        bytes.extend_from_slice(frame.data_ref().map_or(&[][..], |data| data));
+        if bytes.len() > most_bytes {
+            return Err(ClientError::TooLong(most_bytes));
+        }
+    }
+    Ok(bytes)
 }
 
 async fn begin(

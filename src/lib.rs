@@ -65,6 +65,8 @@ pub mod config;
 pub mod daemon;
 #[cfg(feature = "store")]
 pub mod dataset;
+#[cfg(feature = "daemon")]
+pub mod fleet;
 #[cfg(feature = "store")]
 pub mod grid_file;
 #[cfg(feature = "daemon")]

@@ -36,7 +36,7 @@ use axum::{
     response::{IntoResponse, Response},
 };
 use tokio::{
-    sync::Semaphore,
+    sync::{Semaphore, watch},
     time::{Instant, timeout},
 };
 use tower_http::{catch_panic::CatchPanicLayer, set_header::SetResponseHeaderLayer};
@@ -45,7 +45,9 @@ pub use access::{Access, Peer, Refused, Standing};
 pub use listen::{ListenError, Listeners};
 pub use token::{TokenError, read_token};
 
-use crate::{config::Keys, daemon::Handle, scan::Session, scene::Scene, store::History};
+use crate::{
+    config::Keys, daemon::Handle, fleet::Asked, scan::Session, scene::Scene, store::History,
+};
 use answer::{Failed, Shelved};
 use foxglove::Stage;
 use places::Places;
@@ -72,6 +74,8 @@ pub(crate) struct Api {
     foxglove: Option<Arc<Stage>>,
     /// Said once that a viewer's page may not ask: browsers hide why from whom they refuse.
     has_told_origin: Arc<AtomicBool>,
+    /// What is known of other robots, if they are asked.
+    fleet: Option<watch::Receiver<Bytes>>,
     /// Folder of the playground, if it is served.
     playground: Option<Arc<Path>>,
     /// Who asks the model about a beam.
@@ -96,10 +100,16 @@ pub struct Server {
 }
 
 impl Server {
-    /// A server of `daemon`, whose logs are in `log_folder`. Must be called within a tokio runtime, before the daemon
+    /// A server of `daemon`, whose logs are in `log_folder`, and which asks the daemons of `fleet`. Must be called within a tokio runtime, before the daemon
     /// runs.
     #[must_use]
-    pub fn new(daemon: Handle, log_folder: PathBuf, access: Access, keys: &Keys) -> Self {
+    pub fn new(
+        daemon: Handle,
+        log_folder: PathBuf,
+        access: Access,
+        keys: &Keys,
+        fleet: Vec<Asked>,
+    ) -> Self {
         let endpoints = routes::endpoints();
         let viewers = &keys.foxglove;
         let foxglove = viewers.enabled.then(|| Stage::open(&daemon, viewers));
@@ -110,6 +120,7 @@ impl Server {
             history: Arc::new(Mutex::new(History::new(log_folder.clone()))),
             foxglove: foxglove.clone(),
             has_told_origin: Arc::default(),
+            fleet: (!fleet.is_empty()).then(|| crate::fleet::watch(fleet)),
             playground: keys.playground.as_deref().map(|folder| Path::new(folder).into()),
             looking: Arc::new(Semaphore::new(1)),
             reading: Arc::new(Semaphore::new(1)),

@@ -33,6 +33,8 @@ pub struct Status {
     pub provenance: Option<Provenance>,
     /// When scans are taken.
     pub scanning: ScanningReport,
+    /// How long ago the last reading came in, seconds.
+    pub last_reading_age_s: Option<f64>,
     /// The scan under way.
     pub scan: Option<ScanProgress>,
     /// Azimuths in force: of the daemon's own scan that is under way, else of the next.

@@ -1,10 +1,11 @@
 //! Which daemon a verb asks.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{Failure, Outcome};
 use crate::{
     client::{Client, ClientError, Place, ScansError},
+    fleet::{Asked, Member, MemberError, check_all, read_members},
     scan::SceneRef,
     scene::Scene,
     server::{TokenError, read_token},
@@ -43,20 +44,86 @@ impl DaemonArgs {
                  others listen in",
             ));
         }
-        let token = self.token_file.as_ref().map(|file| {
-            read_token(file).map_err(|error| {
-                let help = match error {
-                    TokenError::Open(_) => error.help(file),
-                    _ => "give --token-file a copy of the daemon's server.token_file".into(),
-                };
-                Failure::input(
-                    format!("cannot read the token in {}: {error}", file.display()),
-                    help,
-                )
-            })
-        });
-        Ok(Client::new(Place::Address(host.to_owned()), token.transpose()?))
+        let token = self.token_file.as_deref().map(token).transpose()?;
+        Ok(Client::new(Place::Address(host.to_owned()), token))
     }
+}
+
+/// Which daemons a verb asks that may ask several.
+#[derive(Debug, Clone, clap::Args)]
+pub(super) struct DaemonsArgs {
+    /// Unix socket of the daemon; of each, if given several times
+    #[arg(
+        long,
+        value_name = "PATH",
+        env = "SONARD_SERVER_SOCKET",
+        default_value = "/run/sonard/sonard.sock"
+    )]
+    socket: Vec<PathBuf>,
+    /// TCP address of the daemon, HOST:PORT, instead of its socket; of each, if given several times
+    #[arg(long, value_name = "ADDRESS")]
+    address: Vec<String>,
+    /// File with the daemon's token: over TCP it wants it for orders, from another computer for
+    /// everything
+    #[arg(long, value_name = "FILE", env = "SONARD_SERVER_TOKEN_FILE")]
+    token_file: Option<PathBuf>,
+    /// File that lists daemons, a [[daemon]] for each, or a configuration with [fleet]: all of them
+    /// are asked
+    #[arg(long, value_name = "FILE", conflicts_with = "address")]
+    fleet: Option<PathBuf>,
+}
+
+/// One daemon, or several.
+pub(super) enum Daemons {
+    One(Client),
+    Several(Vec<Asked>),
+}
+
+impl DaemonsArgs {
+    pub(super) fn daemons(&self) -> Result<Daemons, Failure> {
+        let wrong = |error: MemberError| Failure::input(&error, &error.help);
+        if let Some(file) = &self.fleet {
+            return asked(read_members(file).map_err(wrong)?).map(Daemons::Several);
+        }
+        let (socket, address) = (self.socket.as_slice(), self.address.as_slice());
+        if let ([socket], [] | [_]) = (socket, address) {
+            let one = DaemonArgs {
+                socket: socket.clone(),
+                address: address.first().cloned(),
+                token_file: self.token_file.clone(),
+            };
+            return one.client().map(Daemons::One);
+        }
+        // One may be the default, which addresses stand in place of.
+        let sockets = if socket.len() > 1 { socket } else { &[] };
+        let sockets = sockets.iter().map(|path| Ok(Member::at_socket(path.clone())));
+        let members = sockets.chain(address.iter().map(|address| Member::parse(address)));
+        let members: Result<Vec<_>, _> = members.collect();
+        let with_token = |member: Member| Member { token_file: self.token_file.clone(), ..member };
+        let members = members.map_err(wrong)?.into_iter().map(with_token).collect();
+        asked(check_all(members).map_err(wrong)?).map(Daemons::Several)
+    }
+}
+
+/// Daemons with the way to ask them: their tokens are read.
+pub(super) fn asked(members: Vec<Member>) -> Result<Vec<Asked>, Failure> {
+    let asked = members.into_iter().map(|member| {
+        let by_tcp = matches!(member.place, Place::Address(_));
+        let file = member.token_file.as_deref().filter(|_| by_tcp);
+        let client = Client::new(member.place.clone(), file.map(token).transpose()?);
+        Ok(Asked { member, client })
+    });
+    asked.collect()
+}
+
+fn token(file: &Path) -> Result<String, Failure> {
+    read_token(file).map_err(|error| {
+        let help = match error {
+            TokenError::Open(_) => error.help(file),
+            _ => "give a copy of the daemon's server.token_file".into(),
+        };
+        Failure::input(format!("cannot read the token in {}: {error}", file.display()), help)
+    })
 }
 
 pub(super) fn refuse(error: &ClientError) -> Failure {

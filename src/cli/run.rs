@@ -162,6 +162,7 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     }
     let keys = keys.clone();
     let access = access(&settings, &listeners)?;
+    let fleet = load::fleet(&keys.fleet)?;
     let (daemon, handle) = match board {
         Some(board) => {
             let resources = Resources { open_port: Box::new(link::open), board, journal };
@@ -169,7 +170,7 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
         }
         None => daemon::prepare_simulated(journal, settings),
     };
-    let server = Server::new(handle.clone(), log_folder, access, &keys);
+    let server = Server::new(handle.clone(), log_folder, access, &keys, fleet);
     let reloading = tokio::spawn(reload_on_hangup(loader, handle, hangups));
     let ended = CancellationToken::new();
     let serving = tokio::spawn(server.run(listeners, ended.clone().cancelled_owned()));

@@ -5,9 +5,11 @@ use std::io::Write as _;
 use jiff::Timestamp;
 use serde::Serialize;
 
+mod fleet;
+
 use super::{
     Failure, Outcome,
-    daemon::{DaemonArgs, refuse},
+    daemon::{Daemons, DaemonsArgs, refuse},
     runtime,
 };
 use crate::api::{Health, LinkReport, Pending, ScanFit, SimulationReport, Status};
@@ -17,8 +19,8 @@ use crate::api::{Health, LinkReport, Pending, ScanFit, SimulationReport, Status}
 #[command(after_help = HELP)]
 pub(super) struct Args {
     #[command(flatten)]
-    daemon: DaemonArgs,
-    /// JSON instead of text; one object: status and health as the API gives them
+    daemon: DaemonsArgs,
+    /// JSON instead of text; one object a daemon: status and health as the API gives them
     #[arg(long)]
     json: bool,
 }
@@ -27,8 +29,11 @@ const HELP: &str = "\
 Examples:
   sonard status
   sonard status --socket /tmp/sonard.sock --json
+  sonard status --address kiwi=10.0.0.7:8765 --address 10.0.0.8:8765 --token-file fleet-token
+  sonard status --fleet fleet.toml
 
-Exit codes: 0 all is well, 1 something is not, 3 no daemon answers.";
+Of several daemons each has its line, also one that is silent, refuses, or is not the robot that was named before the `=`.
+Exit codes: 0 all is well, 1 something is not, 3 no daemon answers (of several: not each of them).";
 
 /// What is told with `--json`.
 #[derive(Serialize)]
@@ -38,7 +43,10 @@ struct Told<'a> {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let client = args.daemon.client()?;
+    let client = match args.daemon.daemons()? {
+        Daemons::One(client) => client,
+        Daemons::Several(daemons) => return fleet::run(&daemons, args.json),
+    };
     let (status, health): (Status, Health) = runtime::new()?
         .block_on(async {
             Ok((client.get_json("/v1/status").await?, client.get_json("/v1/health").await?))

@@ -1,5 +1,7 @@
 //! `sonard watch`.
 
+mod fleet;
+
 use std::{
     io::{self, Write as _},
     time::Duration,
@@ -11,7 +13,7 @@ use tokio::time::sleep;
 
 use super::{
     Failure, Outcome,
-    daemon::{DaemonArgs, refuse},
+    daemon::{Daemons, DaemonsArgs, refuse},
     runtime::{self, Interrupts},
 };
 use crate::{
@@ -28,18 +30,19 @@ const RECONNECT_MAX: Duration = Duration::from_secs(5);
 #[command(after_help = HELP)]
 pub(super) struct Args {
     #[command(flatten)]
-    daemon: DaemonArgs,
+    daemon: DaemonsArgs,
     /// Only readings that moved by more than this, metres, or whose status changed
     #[arg(long, value_name = "M", conflicts_with = "scans")]
     moved: Option<f64>,
     /// Whole scans when they are over, as JSON
     #[arg(long)]
     scans: bool,
-    /// JSON instead of text; the records themselves, one a line
+    /// JSON instead of text; the records themselves, one a line, of several daemons each as `record`
+    /// beside its `robot`
     #[arg(long)]
     json: bool,
     /// Wait for a daemon that goes away, and go on when it is back; what it measures meanwhile is not
-    /// shown
+    /// shown; of several, each is waited for anyway
     #[arg(long)]
     reconnect: bool,
 }
@@ -49,6 +52,7 @@ Examples:
   sonard watch
   sonard watch --moved 0.05
   sonard watch --reconnect >>readings.txt
+  sonard watch --fleet fleet.toml
   sonard watch --json | jq 'select(.type == \"ping\") | .range_m'
 
 Exit codes: 0 interrupted, or nobody reads its output any more; 2 wrong usage; 3 no daemon answers, or
@@ -63,10 +67,18 @@ pub(super) fn run(args: &Args) -> Outcome {
     runtime::new()?.block_on(async {
         let interrupts = Interrupts::listen();
         tokio::select! {
-            watched = watch(args, &path) => watched,
+            watched = watched(args, &path) => watched,
             () = interrupts.wait() => Ok(()),
         }
     })
+}
+
+/// One daemon, or several at a time.
+async fn watched(args: &Args, path: &str) -> Outcome {
+    match args.daemon.daemons()? {
+        Daemons::One(client) => watch(args, client, path).await,
+        Daemons::Several(daemons) => fleet::watch(daemons, path, args.json || args.scans).await,
+    }
 }
 
 /// Why a stream is over.
@@ -77,8 +89,7 @@ enum Over {
     Daemon(String),
 }
 
-async fn watch(args: &Args, path: &str) -> Outcome {
-    let client = args.daemon.client()?;
+async fn watch(args: &Args, client: Client, path: &str) -> Outcome {
     let mut body = client.get(path).await.map_err(|error| refuse(&error))?.into_body();
     loop {
         let why = match follow(args, body).await {

@@ -14,11 +14,22 @@ pub struct FleetKeys {
     /// `-`, `_` and `.`, at most 64. The host's name goes before the default.
     #[schemars(extend("x-default-yields" = true))]
     pub robot: String,
+    /// Other daemons, at most 32, to be asked every 2 s and shown at /fleet and GET /v1/fleet (restart):
+    /// [NAME=]HOST:PORT, or [NAME=] and the path of a socket. One that says another name than NAME is
+    /// another robot. None asks nobody.
+    pub daemons: Vec<String>,
+    /// File with the token that is shown to those by TCP (restart), readable by its owner alone.
+    #[schemars(example = "/etc/sonard/fleet-token")]
+    pub token_file: Option<String>,
+    /// File that lists daemons, each with a token file of its own, to be asked as well (restart); as of
+    /// `sonard status --fleet`.
+    #[schemars(example = "/etc/sonard/fleet.toml")]
+    pub file: Option<String>,
 }
 
 impl Default for FleetKeys {
     fn default() -> Self {
-        Self { robot: "robot".into() }
+        Self { robot: "robot".into(), daemons: Vec::new(), token_file: None, file: None }
     }
 }
 

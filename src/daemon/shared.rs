@@ -185,6 +185,8 @@ struct Collector {
     told: Option<Explanation>,
     /// How long after its firing the last reading came in, seconds.
     lateness_s: Option<f64>,
+    /// When it came in.
+    read: Option<Instant>,
 }
 
 impl Shared {
@@ -222,6 +224,7 @@ impl Shared {
             Record::Ping(ping) => {
                 self.beams_done.fetch_add(1, Ordering::Relaxed);
                 scans.sigma_us = ping.time_sigma_us;
+                scans.read = Some(Instant::now());
                 scans.fit.add(ping);
                 let fired = ping.time.filter(|_| ping.time_sigma_us.is_some());
                 scans.lateness_s =
@@ -288,6 +291,10 @@ impl Shared {
                 requested: view.requested,
                 next_in_s: until(view.next_at),
             },
+            last_reading_age_s: self
+                .scans()
+                .read
+                .map(|read| now.duration_since(read).as_secs_f64()),
             scan: view.scan.map(|(scan, beams)| ScanProgress {
                 scan,
                 beams,

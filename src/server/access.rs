@@ -329,6 +329,9 @@ mod tests {
         for (path, headers, expected) in [
             ("/", &[host][..], Ok(())),
             ("/page/main.js", &[host], Ok(())),
+            ("/fleet", &[host], Ok(())),
+            ("/fleet", &[("host", "evil.example")], Err(403)),
+            ("/v1/fleet", &[host], Err(401)),
             ("/", &[("host", "evil.example")], Err(403)),
             ("/pages", &[host], Err(401)),
             ("/v1/scans", &[host], Err(401)),

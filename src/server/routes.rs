@@ -3,6 +3,7 @@
 mod beam;
 mod control;
 mod findings;
+mod fleet;
 mod foxglove;
 mod live;
 mod logs;
@@ -28,6 +29,7 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
     let mut endpoints = report::endpoints();
     endpoints.extend(control::endpoints());
     endpoints.extend(scene::endpoints());
+    endpoints.extend(fleet::endpoints());
     endpoints.extend(live::endpoints());
     endpoints.extend(foxglove::endpoints());
     endpoints.extend(scans::endpoints());

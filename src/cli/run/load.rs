@@ -13,11 +13,13 @@ use crate::{
     cli::{
         Failure,
         array::{load_array, load_course},
+        daemon::asked,
         options::load_sensor,
         scene_file,
     },
-    config::{ConfigError, Keys, Layers, Mode, robot_name_of_host},
+    config::{ConfigError, FleetKeys, Keys, Layers, Mode, robot_name_of_host},
     daemon::{Mismatch, Settings, Simulated},
+    fleet::{Asked, members_of},
     scene::{PoseError, parse_pose},
 };
 
@@ -54,6 +56,8 @@ impl Loader {
                 .map_or_else(|| format!("{section}.{key}"), ToString::to_string);
             Failure::input(format!("{origin}: {}", mismatch.message), &mismatch.help)
         })?;
+        // Who can't be asked is told now, not at the start.
+        fleet(&settings.keys.fleet)?;
         if settings.keys.device.port.is_none() && !self.args.mock && !self.args.simulate {
             return Err(Failure::input(
                 "no device: device.port is not set",
@@ -208,6 +212,13 @@ fn simulated(mut keys: Keys, sensor_chosen: bool) -> Result<Settings, Failure> {
     let sensor = load_sensor(&keys.model.sensor)?;
     let simulated = Simulated { array: Arc::new(array), course: course.map(Arc::new) };
     Ok(Settings { keys, scene: Some(Arc::new(scene)), sensor, pose, simulated: Some(simulated) })
+}
+
+/// The other daemons that are asked, with their tokens.
+pub(super) fn fleet(keys: &FleetKeys) -> Result<Vec<Asked>, Failure> {
+    let members = members_of(keys)
+        .map_err(|error| Failure::input(format!("[fleet]: {error}"), &error.help))?;
+    asked(members)
 }
 
 /// What is in force, as a file that would say the same.

@@ -8,7 +8,7 @@ use axum::{
 use serde_json::json;
 use sha2::{Digest as _, Sha256};
 
-use super::playground::is_playground;
+use super::{fleet::PAGE as FLEET, playground::is_playground};
 use crate::server::{
     Api,
     answer::{Failed, Path},
@@ -44,9 +44,10 @@ macro_rules! assets {
     };
 }
 
-/// Every file of the page; the first is the page itself.
+/// Every file of the pages; the first two are the pages themselves.
 static ASSETS: &[Asset] = &assets![
     "index.html" HTML,
+    "fleet.html" HTML,
     "style.css" CSS,
     "icon.svg" SVG,
     "main.js" SCRIPT,
@@ -57,6 +58,8 @@ static ASSETS: &[Asset] = &assets![
     "download.js" SCRIPT,
     "explanations.js" SCRIPT,
     "findings.js" SCRIPT,
+    "fleet.css" CSS,
+    "fleet.js" SCRIPT,
     "gestures.js" SCRIPT,
     "ground.js" SCRIPT,
     "handles.js" SCRIPT,
@@ -88,7 +91,7 @@ static ASSETS: &[Asset] = &assets![
 /// Whether a path is one of the page's files, which anybody who reaches the server may see: they
 /// hold no data and no secret.
 pub(in crate::server) fn is_public(path: &str) -> bool {
-    path == "/" || path.starts_with("/page/") || is_playground(path)
+    path == "/" || path == FLEET || path.starts_with("/page/") || is_playground(path)
 }
 
 pub(super) fn endpoints() -> Vec<Endpoint> {
@@ -107,11 +110,19 @@ async fn index(State(api): State<Api>, headers: HeaderMap) -> Response {
     let Asset { media, text, .. } = &ASSETS[0];
     // The way to the playground is shown where there is one.
     let link = if api.playground.is_some() { "" } else { " hidden" };
-    answer(media, text.replace(" data-playground", link), &headers)
+    let fleet = if api.fleet.is_some() { "" } else { " hidden" };
+    let text = text.replace(" data-playground", link).replace(" data-fleet", fleet);
+    answer(media, text, &headers)
+}
+
+/// The page of all robots.
+pub(super) fn fleet(headers: &HeaderMap) -> Response {
+    let Asset { media, text, .. } = &ASSETS[1];
+    answer(media, (*text).to_owned(), headers)
 }
 
 async fn file(Path(name): Path<String>, headers: HeaderMap) -> Result<Response, Failed> {
-    let asset = ASSETS.iter().skip(1).find(|asset| asset.name == name);
+    let asset = ASSETS.iter().skip(2).find(|asset| asset.name == name);
     let missing =
         || Failed::new(StatusCode::NOT_FOUND, "the page has no such file", "the page is at GET /");
     let asset = asset.ok_or_else(missing)?;

@@ -4,7 +4,7 @@ use std::{fs, net::TcpListener, os::unix::fs::PermissionsExt as _};
 
 use rustix::process::Signal;
 
-use super::{Daemon, clean_log, write_token};
+use super::{Daemon, clean_log, logs, write_token};
 use crate::common::{run, sonard, stderr, wait_until};
 
 #[test]
@@ -122,7 +122,7 @@ fn a_robot_is_called_as_its_host_unless_it_has_a_name_and_says_so_everywhere() {
     let log = clean_log(folder.path());
     let session = log.of_type("session").next().expect("a session");
     assert_eq!(session["robot"], "kiwi-7");
-    let shown = run(&["log", "show", folder.path().join("log").to_str().expect("plain path")]);
+    let shown = run(&["log", "show", logs(folder.path())[0].to_str().expect("plain path")]);
     let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
     assert!(shown.contains("robot   kiwi-7"), "{shown}");
 }

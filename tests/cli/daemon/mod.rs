@@ -7,6 +7,7 @@ mod clock;
 mod configuration;
 mod explained;
 mod faults;
+pub(crate) mod fleet;
 mod foxglove;
 mod kill;
 mod load;

@@ -5,6 +5,7 @@ pub(crate) mod accessible;
 pub(crate) mod browser;
 mod explained;
 mod fast;
+mod fleet;
 mod pictures;
 pub(crate) mod pointer;
 mod readable;

@@ -1,0 +1,297 @@
+//! Which daemons there are, from options, configuration and files.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use thiserror::Error;
+
+use crate::{
+    client::{Client, Place},
+    config::{FleetKeys, Keys, Layers, is_robot_name},
+};
+
+/// Most daemons that are looked at together.
+pub const MOST_MEMBERS: usize = 32;
+
+/// A daemon among others.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Member {
+    /// The robot that it is to be of, if that was said.
+    pub robot: Option<String>,
+    /// Where it is.
+    pub place: Place,
+    /// File with its token.
+    pub token_file: Option<PathBuf>,
+}
+
+/// A daemon and the way to ask it.
+#[derive(Clone)]
+pub struct Asked {
+    /// Which one.
+    pub member: Member,
+    /// Asks it.
+    pub client: Client,
+}
+
+/// Why daemons can't be named so.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{message}")]
+pub struct MemberError {
+    /// What is wrong.
+    pub message: String,
+    /// What would be right.
+    pub help: String,
+}
+
+impl Member {
+    /// Reads `[NAME=]PLACE`, where the place is `HOST:PORT`, `http://HOST:PORT`, or a socket's path.
+    ///
+    /// # Errors
+    /// When it is none.
+    pub fn parse(text: &str) -> Result<Self, MemberError> {
+        let (robot, place) = match text.split_once('=') {
+            Some((robot, place)) => (Some(robot), place),
+            None => (None, text),
+        };
+        if let Some(robot) = robot.filter(|robot| !is_robot_name(robot)) {
+            return Err(MemberError {
+                message: format!("{robot:?} is no robot's name"),
+                help: "letters, digits, `-`, `_` and `.`: kiwi=10.0.0.7:8765".into(),
+            });
+        }
+        let place = read_place(place).ok_or_else(|| MemberError {
+            message: format!("{place:?} is no place of a daemon"),
+            help: "HOST:PORT, or the path of a socket, which begins with /; a daemon speaks plain \
+                   HTTP, so ask through a tunnel where others listen in"
+                .into(),
+        })?;
+        Ok(Self { robot: robot.map(str::to_owned), place, token_file: None })
+    }
+
+    /// One at a socket.
+    #[must_use]
+    pub const fn at_socket(path: PathBuf) -> Self {
+        Self { robot: None, place: Place::Socket(path), token_file: None }
+    }
+
+    /// Where it is asked, for people.
+    #[must_use]
+    pub fn address(&self) -> String {
+        match &self.place {
+            Place::Socket(path) => path.display().to_string(),
+            Place::Address(address) => address.clone(),
+        }
+    }
+
+    /// Where its page is, if that can be opened from elsewhere.
+    #[must_use]
+    pub fn page(&self) -> Option<String> {
+        match &self.place {
+            Place::Socket(_) => None,
+            Place::Address(address) => Some(format!("http://{address}/")),
+        }
+    }
+}
+
+fn read_place(text: &str) -> Option<Place> {
+    if text.starts_with('/') {
+        return Some(Place::Socket(text.into()));
+    }
+    let address = text.strip_prefix("http://").unwrap_or(text);
+    let address = address.strip_suffix('/').unwrap_or(address);
+    let (host, port) = address.rsplit_once(':')?;
+    let is_host = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.:[]".contains(&byte);
+    let is_good = !host.is_empty() && host.bytes().all(is_host) && port.parse::<u16>().is_ok();
+    is_good.then(|| Place::Address(address.to_owned()))
+}
+
+/// The daemons that a configuration names, its file's among them.
+///
+/// # Errors
+/// One that is none, a file that can't be read, or too many.
+pub fn members_of(keys: &FleetKeys) -> Result<Vec<Member>, MemberError> {
+    let mut members = Vec::new();
+    for text in &keys.daemons {
+        let member = Member::parse(text)?;
+        let token_file = match member.place {
+            Place::Address(_) => keys.token_file.as_ref().map(PathBuf::from),
+            Place::Socket(_) => None,
+        };
+        members.push(Member { token_file, ..member });
+    }
+    if let Some(file) = &keys.file {
+        members.extend(read_members(Path::new(file))?);
+    }
+    check_all(members)
+}
+
+/// The file's form.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    daemon: Vec<Entry>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    #[serde(default)]
+    robot: Option<String>,
+    #[serde(default)]
+    address: Option<String>,
+    #[serde(default)]
+    socket: Option<String>,
+    #[serde(default)]
+    token_file: Option<PathBuf>,
+}
+
+/// The daemons of a file: a list of `[[daemon]]`, or a configuration whose `[fleet]` names some.
+///
+/// # Errors
+/// When it can't be read, is something else, or names none or too many.
+pub fn read_members(path: &Path) -> Result<Vec<Member>, MemberError> {
+    let name = path.display();
+    let wrong = |message: String| {
+        MemberError {
+        message: format!("{name}: {message}"),
+        help: "a [[daemon]] for each, with address = \"HOST:PORT\" or socket = \"PATH\", and as wanted \
+               robot and token_file; or a configuration with [fleet]"
+            .into(),
+    }
+    };
+    let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
+    let table: toml::Table =
+        toml::from_str(&text).map_err(|error| wrong(at_line(&text, &error)))?;
+    if table.contains_key("fleet") && !table.contains_key("daemon") {
+        let layers = Layers::<Keys>::new().file(&name.to_string(), &text);
+        let keys = layers.and_then(Layers::keys).map_err(|error| wrong(error.to_string()))?;
+        // A file that names itself would be read for ever.
+        let members = members_of(&FleetKeys { file: None, ..keys.fleet })?;
+        return if members.is_empty() {
+            Err(wrong("its fleet.daemons names none".into()))
+        } else {
+            Ok(members)
+        };
+    }
+    let file: File = toml::from_str(&text).map_err(|error| wrong(at_line(&text, &error)))?;
+    let members = file.daemon.into_iter().map(|entry| member(entry, path));
+    let members: Vec<_> = members.collect::<Result<_, _>>().map_err(|error: MemberError| {
+        MemberError { message: format!("{name}: {}", error.message), ..error }
+    })?;
+    if members.is_empty() {
+        return Err(wrong("it names no daemon".into()));
+    }
+    check_all(members)
+}
+
+/// A token file stands beside the list, unless its path says otherwise.
+fn member(entry: Entry, list: &Path) -> Result<Member, MemberError> {
+    let place = match (entry.address, entry.socket) {
+        (Some(address), None) if !address.starts_with('/') => address,
+        (None, Some(socket)) if socket.starts_with('/') => socket,
+        _ => {
+            return Err(MemberError {
+                message: "a [[daemon]] is at one place".into(),
+                help: "address = \"HOST:PORT\", or socket = \"/PATH\"".into(),
+            });
+        }
+    };
+    let name = entry.robot.map(|robot| format!("{robot}=")).unwrap_or_default();
+    let token_file = entry.token_file.map(|file| list.with_file_name(file));
+    Ok(Member { token_file, ..Member::parse(&format!("{name}{place}"))? })
+}
+
+fn at_line(text: &str, error: &toml::de::Error) -> String {
+    let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+    format!("line {}: {}", before.matches('\n').count() + 1, error.message())
+}
+
+/// Daemons that can be looked at together.
+///
+/// # Errors
+/// Too many, or two that are one.
+pub fn check_all(members: Vec<Member>) -> Result<Vec<Member>, MemberError> {
+    if members.len() > MOST_MEMBERS {
+        return Err(MemberError {
+            message: format!("{} daemons", members.len()),
+            help: format!("at most {MOST_MEMBERS} are looked at together"),
+        });
+    }
+    for (i, member) in members.iter().enumerate() {
+        if members[..i].iter().any(|before| before.place == member.place) {
+            return Err(MemberError {
+                message: format!("{} is named twice", member.address()),
+                help: "name each daemon once".into(),
+            });
+        }
+        let is_taken = |before: &Member| before.robot.is_some() && before.robot == member.robot;
+        if members[..i].iter().any(is_taken) {
+            return Err(MemberError {
+                message: format!("two daemons are of {}", member.robot.as_deref().unwrap_or("")),
+                help: "give each robot a name of its own (fleet.robot)".into(),
+            });
+        }
+    }
+    Ok(members)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn a_place_may_have_a_name_before_it() {
+        let parsed = |text: &str| Member::parse(text).expect(text);
+        let kiwi = parsed("kiwi=http://10.0.0.7:8765/");
+        assert_eq!(kiwi.robot.as_deref(), Some("kiwi"));
+        assert_eq!(kiwi.place, Place::Address("10.0.0.7:8765".into()));
+        assert_eq!(kiwi.page().as_deref(), Some("http://10.0.0.7:8765/"));
+        assert_eq!(parsed("[::1]:80").place, Place::Address("[::1]:80".into()));
+        let socket = parsed("/run/a=b.sock");
+        assert!(socket.robot.is_none() || socket.robot.is_some_and(|robot| robot.is_empty()));
+        for bad in ["", "kiwi", "kiwi=", "a b=h:1", "h:port", "h:99999", "https://h:1", "h:1/x"] {
+            assert!(Member::parse(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_file_lists_daemons_or_is_a_configuration_and_is_refused_with_its_place() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("fleet.toml");
+        let read = |text: &str| {
+            fs::write(&file, text).expect("there is room");
+            read_members(&file)
+        };
+        let members = read(
+            "[[daemon]]\nrobot = \"kiwi\"\naddress = \"h:1\"\ntoken_file = \"kiwi.token\"\n\
+             [[daemon]]\nsocket = \"/run/s\"\n",
+        );
+        let members = members.expect("it is right");
+        assert_eq!(members[0].token_file.as_deref(), Some(&*folder.path().join("kiwi.token")));
+        assert_eq!(members[1].place, Place::Socket("/run/s".into()));
+        let members = read("[fleet]\ndaemons = [\"a=h:1\", \"/s\"]\ntoken_file = \"/t\"\n");
+        let members = members.expect("it is right");
+        assert_eq!(members[0].token_file.as_deref(), Some(Path::new("/t")));
+        assert_eq!(members[1].token_file, None, "a socket needs none");
+        for (text, part) in [
+            ("[[daemon]]\naddress = 3\n", "line 2"),
+            ("[[daemon]]\nport = \"h:1\"\n", "line 2"),
+            ("[[daemon]]\nrobot = \"a\"\n", "at one place"),
+            ("daemon = []\n", "no daemon"),
+            ("[fleet]\n", "names none"),
+            ("[[daemon]]\naddress = \"h:1\"\n[[daemon]]\naddress = \"h:1\"\n", "twice"),
+            (
+                "[[daemon]]\nrobot = \"a\"\naddress = \"h:1\"\n\
+                 [[daemon]]\nrobot = \"a\"\naddress = \"h:2\"\n",
+                "two daemons are of a",
+            ),
+            ("{", "line 1"),
+        ] {
+            let error = read(text).expect_err(text);
+            assert!(error.message.contains(part), "{text}: {error}");
+        }
+        let many: String = (0..33).map(|i| format!("[[daemon]]\naddress = \"h:{i}\"\n")).collect();
+        assert!(read(&many).expect_err("too many").help.contains("32"));
+    }
+}

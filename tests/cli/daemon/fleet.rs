@@ -1,0 +1,366 @@
+//! Many daemons at a time: status, watch, and one daemon that asks the others.
+
+use std::{
+    fs,
+    io::{BufRead as _, BufReader, Read as _, Write as _},
+    net::{TcpListener, TcpStream},
+    path::Path,
+    process::{Output, Stdio},
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use serde_json::Value;
+use sonard::mock::Pace;
+
+use super::{Daemon, ask, rig::Rig, write_token};
+use crate::common::{run, sonard, stderr, wait_until};
+
+/// A full turn of a hundred beams each few seconds.
+const SCANNING: [&str; 6] = [
+    "--set",
+    "scanning.mode=continuous",
+    "--set",
+    "plan.step_deg=3.6",
+    "--set",
+    "model.max_range_m=3",
+];
+/// How soon a change has to be told.
+const SOON: Duration = Duration::from_secs(5);
+
+/// Three robots, one of them on a ranger that can be pulled out, and a daemon that asks them.
+pub(crate) struct Fleet {
+    pub(crate) rig: Rig,
+    /// The one on the rig, and two on mocks.
+    pub(crate) robots: Vec<Option<Daemon>>,
+    pub(crate) asking: Daemon,
+    pub(crate) list: String,
+}
+
+impl Fleet {
+    pub(crate) fn start(folder: &Path) -> Self {
+        let own = |name: &str| {
+            let folder = folder.join(name);
+            fs::create_dir(&folder).expect("it is new");
+            folder
+        };
+        let mut rig = Rig::new(folder, Pace::RealTime);
+        rig.plug("", 1);
+        let options = rig.options();
+        let options: Vec<&str> = options.iter().map(String::as_str).collect();
+        let tcp = ["--set", "server.listen=127.0.0.1:0"];
+        let named = |name: &str| format!("fleet.robot={name}");
+        let kiwi = named("kiwi");
+        let options = [&options[..], &SCANNING, &tcp, &["--set", &kiwi]].concat();
+        let mut robots = vec![Daemon::start(&own("kiwi"), &options)];
+        for name in ["mango", "lime"] {
+            let named = named(name);
+            let options = [&SCANNING[..], &tcp, &["--set", &named]].concat();
+            robots.push(Daemon::start_mock(&own(name), &options));
+        }
+        let places = robots.iter().zip(["kiwi", "mango", "lime"]);
+        let places: Vec<_> =
+            places.map(|(robot, name)| format!("{name}={}", robot.address())).collect();
+        let daemons = format!("fleet.daemons={}", places.join(","));
+        let asking = Daemon::start_mock(&own("asking"), &[&tcp[..], &["--set", &daemons]].concat());
+        let quoted: Vec<_> = places.iter().map(|place| format!("{place:?}")).collect();
+        let list = folder.join("fleet.toml");
+        fs::write(&list, format!("[fleet]\ndaemons = [{}]\n", quoted.join(", "))).expect("room");
+        Self {
+            rig,
+            robots: robots.into_iter().map(Some).collect(),
+            asking,
+            list: list.to_str().expect("plain path").to_owned(),
+        }
+    }
+
+    pub(crate) fn told(&self) -> Vec<Value> {
+        let fleet = self.asking.get("/v1/fleet").json();
+        fleet["robots"].as_array().expect("robots").clone()
+    }
+
+    pub(crate) fn states(&self) -> Vec<String> {
+        let state = |robot: &Value| robot["state"].as_str().expect("a state").to_owned();
+        self.told().iter().map(state).collect()
+    }
+
+    fn status(&self) -> Output {
+        run(&["status", "--fleet", &self.list])
+    }
+}
+
+/// How long it takes until something is so, seconds; it must be soon.
+pub(crate) fn soon(what: &str, condition: impl FnMut() -> bool) -> f64 {
+    let since = Instant::now();
+    wait_until(what, condition);
+    let took = since.elapsed();
+    assert!(took < SOON, "{what} took {took:?}");
+    took.as_secs_f64()
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn of_three_robots_one_is_unplugged_and_one_killed_and_it_is_told_within_five_seconds() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut fleet = Fleet::start(folder.path());
+    wait_until("three that are well", || fleet.states() == ["well", "well", "well"]);
+    wait_until("pictures", || {
+        let has = |one: &Value| one["report"]["last_scan"]["picture"]["points_m"].is_array();
+        fleet.told().iter().all(has)
+    });
+    let picture = &fleet.told()[1]["report"]["last_scan"]["picture"];
+    assert!(picture["points_m"].as_array().expect("points").len() > 50, "{picture}");
+    assert!(picture["walls_m"].as_array().expect("walls").len() >= 4, "{picture}");
+    let output = fleet.status();
+    assert_eq!(output.status.code(), Some(0), "{}{}", said(&output), stderr(&output));
+
+    fleet.rig.unplug();
+    let unplugged_s = soon("the unplugged one", || fleet.states() == ["not_well", "well", "well"]);
+    let output = fleet.status();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(fleet.told()[0]["wrong"][0].as_str().expect("why").contains("the link is"));
+
+    fleet.robots[1].take().expect("it runs").kill();
+    let killed_s = soon("the killed one", || fleet.states() == ["not_well", "silent", "well"]);
+    let since = Instant::now();
+    let output = fleet.status();
+    let status_s = since.elapsed().as_secs_f64();
+    assert_eq!(output.status.code(), Some(3), "{}", said(&output));
+    let table = said(&output);
+    let row =
+        |name: &str| table.lines().find(|line| line.contains(name)).expect("a row").to_owned();
+    assert!(row("mango").contains("SILENT") && row("lime").contains('%'), "{table}");
+    assert!(row("kiwi").contains("the link is"), "{table}");
+    // What it was last is still there, and since when it is silent.
+    let mango = &fleet.told()[1];
+    assert!(mango["heard"].is_string() && mango["report"]["last_scan"].is_object(), "{mango}");
+
+    fleet.rig.plug("", 2);
+    let back_s = soon("the one that is back", || fleet.states() == ["well", "silent", "well"]);
+    println!(
+        "unplugged: told after {unplugged_s:.1} s; killed: {killed_s:.1} s; plugged in again: \
+         {back_s:.1} s; `sonard status` of all took {status_s:.2} s"
+    );
+}
+
+#[test]
+fn a_daemon_that_names_no_other_asks_none_and_shows_none() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &[]);
+    assert_eq!(daemon.get("/v1/fleet").status, 404);
+    assert_eq!(daemon.get("/fleet").status, 404);
+    let page = String::from_utf8(daemon.get("/").body).expect("text");
+    assert!(page.contains("href=\"/fleet\" hidden"), "{page}");
+    for (setting, part) in [
+        ("fleet.daemons=kiwi", "no place of a daemon"),
+        ("fleet.daemons=a=h:1,a=h:2", "two daemons are of a"),
+        ("fleet.file=/no/such.toml", "/no/such.toml"),
+    ] {
+        let output = run(&["run", "--check", "--port", "x", "--set", setting]);
+        assert_eq!(output.status.code(), Some(2), "{setting}");
+        assert!(stderr(&output).contains(part), "{setting}: {}", stderr(&output));
+    }
+}
+
+/// Answers each request as somebody who is no proper daemon; how many bytes of its answers were taken.
+fn serve(
+    answer: impl Fn(TcpStream, &AtomicU64) + Send + Sync + 'static,
+) -> (String, Arc<AtomicU64>) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("its address").to_string();
+    let taken = Arc::new(AtomicU64::new(0));
+    let (counted, answer) = (Arc::clone(&taken), Arc::new(answer));
+    thread::spawn(move || {
+        for mut stream in listener.incoming().flatten() {
+            let (counted, answer) = (Arc::clone(&counted), Arc::clone(&answer));
+            thread::spawn(move || {
+                drop(stream.set_read_timeout(Some(Duration::from_secs(10))));
+                let mut request = [0; 4096];
+                let _ = stream.read(&mut request);
+                answer(stream, &counted);
+            });
+        }
+    });
+    (address, taken)
+}
+
+fn answer_with(mut stream: &TcpStream, media: &str, body: &str) {
+    let length = body.len();
+    let head =
+        format!("HTTP/1.1 200 OK\r\ncontent-type: {media}\r\ncontent-length: {length}\r\n\r\n");
+    drop(stream.write_all((head + body).as_bytes()));
+}
+
+/// Writes for ever, as fast as it is taken.
+fn pour(mut stream: TcpStream, taken: &AtomicU64) {
+    let head = b"HTTP/1.1 200 OK\r\ncontent-type: application/json\r\n\r\n[";
+    if stream.write_all(head).is_err() {
+        return;
+    }
+    let piece = [b'1'; 16 * 1024];
+    while let Ok(bytes) = stream.write(&piece) {
+        taken.fetch_add(bytes as u64, Ordering::Relaxed);
+    }
+}
+
+#[test]
+fn who_is_silent_or_says_something_else_has_a_row_with_the_reason_and_delays_nobody() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let name = ["--set", "fleet.robot=kiwi", "--set", "server.listen=127.0.0.1:0"];
+    let robot = Daemon::start_mock(folder.path(), &name);
+    let mut lie = robot.status();
+    lie["robot"] = "\u{1b}[2Jowned".into();
+    let lie = lie.to_string();
+    let (silent, _) = serve(|stream, _| {
+        thread::sleep(Duration::from_secs(60));
+        drop(stream);
+    });
+    let (page, _) = serve(|stream, _| answer_with(&stream, "text/html", "<html>\u{1b}[2J</html>"));
+    let (endless, taken) = serve(pour);
+    let (liar, _) = serve(move |stream, _| answer_with(&stream, "application/json", &lie));
+    let (babble, _) = serve(|mut stream, _| drop(stream.write_all(b"SSH-2.0-x\r\n")));
+    let nobody = {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        listener.local_addr().expect("its address").to_string()
+    };
+    let kiwi = robot.address();
+    let others = [&silent, &page, &endless, &liar, &babble, &nobody];
+    let daemons: Vec<String> = others.iter().map(|one| (*one).clone()).collect();
+    let daemons = [vec![format!("mango={kiwi}")], daemons].concat();
+    let mut arguments = vec!["status"];
+    for daemon in &daemons {
+        arguments.extend(["--address", daemon]);
+    }
+    let since = Instant::now();
+    let output = run(&[&arguments[..], &["--json"]].concat());
+    let took = since.elapsed();
+    assert!(took < Duration::from_secs(4), "{took:?}");
+    assert_eq!(output.status.code(), Some(3));
+    let said = said(&output);
+    assert!(!said.contains('\u{1b}'), "{said:?}");
+    let rows: Vec<Value> =
+        said.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let states: Vec<&str> = rows.iter().map(|row| row["state"].as_str().expect("text")).collect();
+    assert_eq!(
+        states,
+        ["other_robot", "silent", "strange", "strange", "strange", "strange", "silent"],
+        "{said}"
+    );
+    assert_eq!(rows[0]["wrong"][0], "kiwi answers in place of mango");
+    assert!(rows[3]["wrong"][0].as_str().expect("why").contains("longer than"), "{said}");
+    // What the system's buffers hold, and no more, was taken of what has no end: two questions.
+    let taken = taken.load(Ordering::Relaxed);
+    assert!(taken < 24 << 20, "{taken} bytes");
+    println!("seven daemons, six of them none: {:.2} s, {taken} bytes taken", took.as_secs_f64());
+
+    let list = format!("fleet.daemons={}", [vec![kiwi], daemons[1..].to_vec()].concat().join(","));
+    let folder = tempfile::tempdir().expect("a folder");
+    let asking = Daemon::start_mock(folder.path(), &["--set", &list]);
+    let states = || {
+        let fleet = asking.get("/v1/fleet").json();
+        let robots = fleet["robots"].as_array().expect("robots").clone();
+        robots.iter().map(|one| one["state"].as_str().expect("text").to_owned()).collect::<Vec<_>>()
+    };
+    let wanted = ["well", "silent", "strange", "strange", "strange", "strange", "silent"];
+    let took_s = soon("each as it is", || states() == wanted);
+    println!("a daemon that asks the same: {took_s:.1} s");
+    assert!(!asking.get("/v1/fleet").body.contains(&0x1b));
+}
+
+#[test]
+fn a_fleet_is_told_to_whoever_may_read_and_tokens_to_nobody() {
+    const TOKEN: &str = "0123456789abcdef0123456789abcdef";
+    let (seen, tokens) = std::sync::mpsc::channel();
+    let seen = std::sync::Mutex::new(seen);
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("its address").to_string();
+    thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            let mut lines = BufReader::new(&stream).lines().map_while(Result::ok);
+            let shown = lines.find(|line| line.to_lowercase().starts_with("authorization"));
+            drop(seen.lock().expect("no panic").send(shown.unwrap_or_default()));
+            let mut stream = &stream;
+            drop(stream.write_all(b"HTTP/1.1 401 Unauthorized\r\ncontent-length: 0\r\n\r\n"));
+        }
+    });
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = write_token(folder.path(), TOKEN);
+    let list = folder.path().join("fleet.toml");
+    let entry = "[[daemon]]\nrobot = \"kiwi\"\ntoken_file = \"token\"\n";
+    fs::write(&list, format!("{entry}address = {address:?}\n")).expect("room");
+    let settings = [
+        format!("fleet.file={}", list.display()),
+        format!("server.token_file={}", file.display()),
+        "server.listen=127.0.0.1:0".to_owned(),
+    ];
+    let settings: Vec<&str> = settings.iter().flat_map(|one| ["--set", one.as_str()]).collect();
+    let asking = Daemon::start_mock(folder.path(), &settings);
+    let shown = tokens.recv_timeout(Duration::from_secs(10)).expect("it asks");
+    assert!(shown.ends_with(TOKEN), "{shown}");
+    wait_until("the refusal", || {
+        asking.get("/v1/fleet").json()["robots"][0]["state"] == "refusing"
+    });
+    let told = String::from_utf8(asking.get("/v1/fleet").body).expect("text");
+    assert!(!told.contains(TOKEN) && !told.contains("token_file"), "{told}");
+    assert!(!asking.said().contains(TOKEN), "{}", asking.said());
+    for (host, origin, status) in [
+        ("localhost", None, 200),
+        ("evil.example", None, 403),
+        ("localhost", Some("http://evil.example"), 403),
+    ] {
+        for path in ["/v1/fleet", "/fleet"] {
+            let headers: Vec<_> =
+                [("Host", host)].into_iter().chain(origin.map(|one| ("Origin", one))).collect();
+            let reply = ask(asking.connect_tcp(), "GET", path, &headers, "");
+            assert_eq!(reply.status, status, "{path} {host} {origin:?}");
+        }
+    }
+}
+
+#[test]
+fn watch_shows_the_readings_of_all_each_with_its_robot_also_after_a_restart() {
+    let folders = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
+    let start = |number: usize, name: &str| {
+        let named = format!("fleet.robot={name}");
+        let options = [&SCANNING[..], &["--set", &named]].concat();
+        Daemon::start_mock(folders[number].path(), &options)
+    };
+    let kiwi = start(0, "kiwi");
+    let mango = start(1, "mango");
+    let sockets: Vec<String> =
+        folders.iter().map(|folder| folder.path().join("s").display().to_string()).collect();
+    let mut watching =
+        sonard(&["watch", "--socket", &sockets[0], "--socket", &sockets[1], "--json"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+    let mut lines = BufReader::new(watching.stdout.take().expect("piped")).lines();
+    let mut until_both = || {
+        let mut heard = [false; 2];
+        while heard != [true; 2] {
+            let line = lines.next().expect("it goes on").expect("text");
+            let line: Value = serde_json::from_str(&line).expect("JSON");
+            let is_reading = line["record"]["type"] == "ping";
+            let number = ["kiwi", "mango"].iter().position(|name| line["robot"] == *name);
+            heard[number.expect("a robot")] |= is_reading;
+        }
+    };
+    until_both();
+    kiwi.kill();
+    let kiwi = start(0, "kiwi");
+    // Of what it sent before it was killed some may wait still.
+    for _ in 0..100 {
+        until_both();
+    }
+    drop(watching.kill());
+    drop(watching.wait());
+    assert_eq!((kiwi.stop(), mango.stop()), (Some(0), Some(0)));
+}
