@@ -57,8 +57,10 @@ cp "$work/rooms/room-2/maps.png" "$pictures/explored.png"
 tests/axe.sh
 cargo test --quiet --test cli live_page::accessible
 cargo test --quiet --test cli live_page::pictures
+cargo test --quiet --test cli live_page::fleet
 cp target/page/desk.png "$pictures/page-desk.png"
 cp target/page/phone-dark.png "$pictures/page-phone.png"
+cp target/page/fleet-desk.png "$pictures/fleet.png"
 cp target/page/page-{overlays,preview}.png "$pictures/"
 
 # The playground, likewise.

@@ -4,8 +4,8 @@ use super::Told;
 use crate::{api::FleetState, config::is_robot_name};
 
 /// Most reasons that are told of a robot, and most characters of each: they are another's words.
-const MOST_REASONS: usize = 4;
-const MOST_CHARACTERS: usize = 200;
+const MOST_REASONS: usize = 3;
+const MOST_CHARACTERS: usize = 120;
 
 /// Why a daemon did not say how it is, in words.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -112,6 +112,54 @@ fn report(told: &Told, before: Option<FleetScan>, now: Timestamp) -> FleetReport
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        acoustics::Sensor,
+        api::{
+            ClockReport, ConfigurationReport, LineTotals, LogStatus, Pending, ScanTotals,
+            SensorFigures, SubscriberReport,
+        },
+        geometry::Pose,
+    };
+    use serde_json::json;
+
+    /// What a robot that is well says, with a last scan.
+    fn told(robot: &str, scan: Uuid) -> Told {
+        let zero = Timestamp::UNIX_EPOCH;
+        let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+        let status = json!({
+            "robot": robot, "sonard": "0.1.0", "uptime_s": 1.0,
+            "link": {"state": "ready", "since": zero, "port": "", "trouble": null, "failures": 0,
+                     "retry_in_s": null},
+            "device": null, "provenance": "mock", "last_reading_age_s": 2.0, "scan": null,
+            "scanning": {"mode": "on-request", "every_s": 1.0, "paused": false, "requested": 0,
+                         "next_in_s": null},
+            "plan": {"from_deg": 0.0, "to_deg": 9.0, "step_deg": 0.9, "pings_per_stop": 1},
+            "pose": {"x_m": 0.0, "y_m": 0.0, "heading_deg": 0.0}, "scene": null,
+            "air": {"temperature_c": 20.0, "humidity_percent": 50.0, "pressure_kpa": 101.3,
+                    "sound_speed_m_s": 343.0, "source": "configuration", "age_s": null,
+                    "stale": false, "error": null},
+            "sensor": SensorFigures::of(&sensor), "pending": Pending::default(),
+            "log": LogStatus::default(), "subscribers": SubscriberReport::default(),
+            "configuration": ConfigurationReport::default(), "simulation": null,
+        });
+        let fit = json!({"scan": scan, "ended": zero, "both_echo": 3, "agree_fraction": 1.0,
+                         "median_abs_residual_m": 0.001, "median_residual_m": 0.0, "missing": 2});
+        let health = json!({
+            "healthy": true, "reasons": [], "line": LineTotals::default(),
+            "scans": ScanTotals::default(), "clock": ClockReport::default(), "fit": fit,
+            "reading_lateness_s": null,
+        });
+        Told {
+            status: serde_json::from_value(status).expect("a status"),
+            health: serde_json::from_value(health).expect("a health"),
+        }
+    }
+
+    const PICTURE: FleetPicture = FleetPicture {
+        pose: Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 },
+        points_m: Vec::new(),
+        walls_m: Vec::new(),
+    };
 
     fn roll() -> Roll {
         let members = ["kiwi=/a", "/b"].map(|text| Member::parse(text).expect("a place"));
@@ -138,15 +186,67 @@ mod tests {
         roll.take(0, Err(Unheard::Refusing("no".into())), at(6));
         assert_eq!(state(&roll, 0), (FleetState::Refusing, at(6)));
         roll.take(7, gone(), at(8));
-        roll.show(
-            7,
-            Uuid::nil(),
-            FleetPicture {
-                pose: crate::geometry::Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 },
-                points_m: Vec::new(),
-                walls_m: Vec::new(),
-            },
-        );
+        roll.show(7, Uuid::nil(), PICTURE);
         assert_eq!(roll.fleet().robots.len(), 2);
+    }
+
+    #[test]
+    fn who_answered_first_is_who_is_expected_and_what_it_said_stays_while_another_answers() {
+        let (mut roll, scan) = (roll(), Uuid::from_u128(1));
+        roll.take(1, Ok(told("mango", scan)), at(10));
+        let mango = roll.fleet().robots[1].clone();
+        assert_eq!((mango.state, mango.robot.as_deref()), (FleetState::Well, Some("mango")));
+        let report = mango.report.expect("it was heard");
+        assert_eq!(report.last_reading, Some(at(8)));
+        assert_eq!(mango.wrong, ["2 beams of the last scan are missing"]);
+        roll.take(1, Ok(told("papaya", scan)), at(12));
+        let mango = roll.fleet().robots[1].clone();
+        assert_eq!((mango.state, mango.since), (FleetState::OtherRobot, at(12)));
+        assert_eq!((mango.robot.as_deref(), mango.heard), (Some("mango"), Some(at(10))));
+        assert_eq!(mango.report, Some(report));
+        roll.take(1, Ok(told("a/b", scan)), at(14));
+        assert_eq!(state(&roll, 1), (FleetState::Strange, at(14)));
+    }
+
+    #[test]
+    fn a_picture_is_of_its_scan_and_goes_with_it() {
+        let (mut roll, scan, next) = (roll(), Uuid::from_u128(1), Uuid::from_u128(2));
+        roll.take(0, Ok(told("kiwi", scan)), at(1));
+        assert_eq!(roll.lacks_picture(0), Some(scan));
+        roll.show(0, next, PICTURE);
+        assert_eq!(roll.lacks_picture(0), Some(scan), "that was another scan");
+        roll.show(0, scan, PICTURE);
+        roll.take(0, Ok(told("kiwi", scan)), at(3));
+        assert_eq!(roll.lacks_picture(0), None);
+        roll.take(0, Ok(told("kiwi", next)), at(5));
+        assert_eq!(roll.lacks_picture(0), Some(next));
+    }
+
+    #[test]
+    fn namesakes_are_told_once_and_no_longer_when_one_has_another_name() {
+        let (mut roll, scan) = (roll(), Uuid::from_u128(1));
+        roll.take(1, Ok(told("kiwi", scan)), at(1));
+        roll.take(0, Ok(told("kiwi", scan)), at(1));
+        roll.take(0, Ok(told("kiwi", scan)), at(3));
+        let wrong: Vec<_> = roll.fleet().robots.iter().map(|one| one.wrong.len()).collect();
+        assert_eq!(wrong, [1, 2]);
+        assert_eq!(roll.fleet().robots[1].wrong[1], "2 robots are called kiwi: set fleet.robot");
+    }
+
+    #[test]
+    fn the_largest_fleet_with_all_that_can_be_wrong_is_within_its_bytes() {
+        let members: Vec<_> = (0..crate::fleet::MOST_MEMBERS)
+            .map(|i| Member::parse(&format!("{i:0>64}={}:1", "h".repeat(60))).expect("a place"))
+            .collect();
+        let mut roll = Roll::new(&members, at(0));
+        for (number, member) in members.iter().enumerate() {
+            let mut told = told(member.robot.as_deref().expect("a name"), Uuid::nil());
+            told.status.sonard = "\u{1F916}".repeat(10_000);
+            told.health.reasons = vec!["\u{1F916}\"\\".repeat(10_000); 100];
+            told.health.healthy = false;
+            roll.take(number, Ok(told), at(1));
+        }
+        let bytes = serde_json::to_vec(&roll.fleet()).expect("JSON").len();
+        assert!(bytes < 100_000, "{bytes} bytes without pictures");
     }
 }

@@ -17,12 +17,22 @@ use crate::{api::FleetPicture, client::Client};
 /// From question to question.
 const EVERY: Duration = Duration::from_secs(2);
 /// All pictures together, bytes of JSON: as many clients as there may be stay within the server's bound.
-const MOST_PICTURE_BYTES: usize = 96 * 1024;
+const MOST_PICTURE_BYTES: usize = 64 * 1024;
+/// How often a scan is asked for that can't be had.
+const MOST_TRIES: u8 = 3;
 
 /// What comes of asking.
 enum News {
     Answer(Box<Result<Told, Unheard>>),
-    Picture(Uuid, FleetPicture),
+    Picture(Uuid, Option<FleetPicture>),
+}
+
+/// A scan whose picture is wanted.
+#[derive(Debug, Clone, Copy, Default)]
+struct Wish {
+    scan: Option<Uuid>,
+    tries: u8,
+    is_pending: bool,
 }
 
 /// Asks daemons every 2 s, for as long as somebody holds what is told: a [`Fleet`](crate::api::Fleet) as
@@ -37,9 +47,6 @@ pub fn watch(fleet: Vec<Asked>) -> watch::Receiver<Bytes> {
 
 /// Owns the roll until nobody looks at it any more.
 async fn keep(mut roll: Roll, fleet: Vec<Asked>, tell: watch::Sender<Bytes>) {
-    let picture_bytes = MOST_PICTURE_BYTES / fleet.len().max(1);
-    // Scans are large: one is read at a time.
-    let drawing = Arc::new(Semaphore::new(1));
     let (send, mut news) = mpsc::channel(fleet.len().max(1));
     // Those that ask end with this task.
     let mut asking = JoinSet::new();
@@ -47,30 +54,29 @@ async fn keep(mut roll: Roll, fleet: Vec<Asked>, tell: watch::Sender<Bytes>) {
     for (number, client) in clients.iter().enumerate() {
         asking.spawn(keep_asking(number, client.clone(), send.clone()));
     }
-    let mut wanted = vec![None; clients.len()];
+    // Scans are large: one is read at a time.
+    let drawing = Arc::new(Semaphore::new(1));
+    let most_bytes = MOST_PICTURE_BYTES / clients.len().max(1);
+    let mut wishes = vec![Wish::default(); clients.len()];
     loop {
         let (number, news) = tokio::select! {
-            news = news.recv() => match news {
-                Some(news) => news,
-                None => return,
-            },
+            Some(news) = news.recv() => news,
             () = tell.closed() => return,
         };
         match news {
             News::Answer(answer) => roll.take(number, *answer, Timestamp::now()),
-            News::Picture(scan, picture) => roll.show(number, scan, picture),
+            News::Picture(scan, picture) => {
+                wishes[number].is_pending = false;
+                picture.into_iter().for_each(|picture| roll.show(number, scan, picture));
+            }
         }
-        let lacking = roll.lacks_picture(number);
-        // A scan that can't be had is not asked for again.
-        if let Some(scan) = lacking.filter(|scan| wanted[number] != Some(*scan)) {
-            wanted[number] = Some(scan);
-            let (client, send, turn) =
-                (clients[number].clone(), send.clone(), Arc::clone(&drawing));
+        if let Some(scan) = wishes[number].next(roll.lacks_picture(number)) {
+            let (client, send) = (clients[number].clone(), send.clone());
+            let turn = Arc::clone(&drawing);
             asking.spawn(async move {
                 let Ok(_turn) = turn.acquire().await else { return };
-                if let Some(picture) = picture::fetch(&client, scan, picture_bytes).await {
-                    drop(send.send((number, News::Picture(scan, picture))).await);
-                }
+                let picture = picture::fetch(&client, scan, most_bytes).await;
+                drop(send.send((number, News::Picture(scan, picture))).await);
             });
         }
         while asking.try_join_next().is_some() {}
@@ -80,6 +86,22 @@ async fn keep(mut roll: Roll, fleet: Vec<Asked>, tell: watch::Sender<Bytes>) {
             *before = now;
             is_news
         });
+    }
+}
+
+impl Wish {
+    /// The scan to ask for now, if one is lacking that may be had.
+    fn next(&mut self, lacking: Option<Uuid>) -> Option<Uuid> {
+        let scan = lacking.filter(|_| !self.is_pending)?;
+        if self.scan != Some(scan) {
+            *self = Self { scan: Some(scan), ..Self::default() };
+        }
+        if self.tries == MOST_TRIES {
+            return None;
+        }
+        self.tries += 1;
+        self.is_pending = true;
+        Some(scan)
     }
 }
 
@@ -97,4 +119,23 @@ async fn keep_asking(number: usize, client: Client, send: mpsc::Sender<(usize, N
 
 fn written(roll: &Roll) -> Bytes {
     serde_json::to_vec(&roll.fleet()).unwrap_or_default().into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scan_is_asked_for_once_at_a_time_and_not_for_ever() {
+        let (scan, next) = (Uuid::from_u128(1), Uuid::from_u128(2));
+        let mut wish = Wish::default();
+        assert_eq!(wish.next(None), None);
+        for _ in 0..MOST_TRIES {
+            assert_eq!(wish.next(Some(scan)), Some(scan));
+            assert_eq!(wish.next(Some(next)), None, "one is on its way");
+            wish.is_pending = false;
+        }
+        assert_eq!(wish.next(Some(scan)), None);
+        assert_eq!(wish.next(Some(next)), Some(next));
+    }
 }

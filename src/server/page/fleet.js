@@ -52,10 +52,10 @@ class Card {
       this.title.replaceChildren(robot.page ? make("a", { href: robot.page, rel: "noreferrer" }, name) : name);
     }
     this.item.dataset.lamp = lamp;
-    words.setText(this.state, `${state}, ${since(robot.since)}`);
+    words.setText(this.state, robot.state === "well" ? state : `${state}, ${since(robot.since)}`);
     words.setText(this.wrong, robot.wrong.join("; "));
     this.wrong.hidden = robot.wrong.length === 0;
-    this.item.classList.toggle("old", robot.state !== "well" && robot.state !== "not_well");
+    this.item.classList.toggle("old", !isHeard(robot));
     words.facts(this.facts, facts(robot));
     this.draw(robot.report?.last_scan?.picture ?? null, name);
   }
@@ -92,6 +92,9 @@ class Card {
   }
 }
 
+/** Whether it says itself how it is. */
+const isHeard = ({ state }) => state === "well" || state === "not_well";
+
 /** What the robot says of its ranger, if it was heard just now. */
 function stateOf({ state, report }) {
   if (STATES[state]) return STATES[state];
@@ -99,14 +102,15 @@ function stateOf({ state, report }) {
   return state === "not_well" ? ["bad", text] : [lamp, text];
 }
 
-function facts({ report, address, heard }) {
+function facts(robot) {
+  const { report, address, heard } = robot;
   if (!report) return [["Asked at", address]];
   const { scan, last_reading, last_scan, provenance } = report;
   const share = last_scan?.agree_fraction ?? null;
   const off_m = last_scan?.median_abs_residual_m ?? null;
   return [
     ["Readings", words.provenance(provenance) ?? (provenance ? "hardware" : "–")],
-    ["Scan", scan ? `${scan.done} of ${words.count(scan.beams, "beam")}` : "none under way"],
+    ["Scan", !isHeard(robot) ? "–" : scan ? `${scan.done} of ${words.count(scan.beams, "beam")}` : "none under way"],
     ["Last reading", last_reading ? `${ago(last_reading)} ago` : "–"],
     ["Last scan", last_scan ? words.clock(last_scan.ended) : "–"],
     ["Agreement", share === null ? "–" : `${(100 * share).toFixed(0)} %, half within ${(1e3 * off_m).toFixed(0)} mm`],

@@ -32,7 +32,9 @@ fn the_server_does_what_its_document_says() {
         fs::write(folder.path().join(name), "a page").expect("there is room");
     }
     let playground = format!("server.playground={}", folder.path().display());
-    let daemon = Daemon::start_mock(folder.path(), &[&SHORT[..], &["--set", &playground]].concat());
+    let others = ["--set", "fleet.daemons=/nobody/is/there"];
+    let further = [&SHORT[..], &["--set", &playground], &others].concat();
+    let daemon = Daemon::start_mock(folder.path(), &further);
     let document = daemon.get("/v1/openapi.json").json();
     assert_eq!(document["openapi"], "3.1.0");
     daemon.wait_for("ready");

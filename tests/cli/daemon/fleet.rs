@@ -141,12 +141,23 @@ fn of_three_robots_one_is_unplugged_and_one_killed_and_it_is_told_within_five_se
     // What it was last is still there, and since when it is silent.
     let mango = &fleet.told()[1];
     assert!(mango["heard"].is_string() && mango["report"]["last_scan"].is_object(), "{mango}");
+    // Another robot at its place is not taken for it.
+    let listen = format!("server.listen={}", mango["address"].as_str().expect("an address"));
+    let elsewhere = folder.path().join("papaya");
+    fs::create_dir(&elsewhere).expect("it is new");
+    let named = ["--set", &listen, "--set", "fleet.robot=papaya"];
+    let papaya = Daemon::start_mock(&elsewhere, &named);
+    let other_s = soon("another", || fleet.states() == ["not_well", "other_robot", "well"]);
+    assert_eq!(fleet.told()[1]["wrong"][0], "papaya answers in place of mango");
+    assert_eq!(fleet.status().status.code(), Some(3));
+    papaya.kill();
+    wait_until("silence", || fleet.states() == ["not_well", "silent", "well"]);
 
     fleet.rig.plug("", 2);
     let back_s = soon("the one that is back", || fleet.states() == ["well", "silent", "well"]);
     println!(
-        "unplugged: told after {unplugged_s:.1} s; killed: {killed_s:.1} s; plugged in again: \
-         {back_s:.1} s; `sonard status` of all took {status_s:.2} s"
+        "unplugged: told after {unplugged_s:.1} s; killed: {killed_s:.1} s; another in its place: \
+         {other_s:.1} s; plugged in again: {back_s:.1} s; `sonard status` of all took {status_s:.2} s"
     );
 }
 

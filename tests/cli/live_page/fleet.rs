@@ -15,9 +15,7 @@ fn each_robot_has_its_card_and_a_change_is_seen_within_five_seconds() {
     let browser = Browser::open(&address, DESK);
     browser.until("document.getElementById('link').textContent === 'ready'");
     assert_eq!(browser.eval("document.getElementById('fleet').hidden"), false);
-    drop(browser);
-
-    let browser = Browser::open_at(&format!("http://{address}/fleet"), DESK);
+    browser.click("#fleet");
     browser.until("document.getElementById('summary').textContent === '3 of 3 robots well'");
     browser.until("document.querySelectorAll('#robots canvas:not([hidden])').length === 3");
     let names = "[...document.querySelectorAll('#robots h2')].map((one) => one.textContent).join()";
