@@ -50,8 +50,9 @@ impl Member {
     /// When it is none.
     pub fn parse(text: &str) -> Result<Self, MemberError> {
         let (robot, place) = match text.split_once('=') {
-            Some((robot, place)) => (Some(robot), place),
-            None => (None, text),
+            // A path may have one in it.
+            Some((robot, place)) if !text.starts_with('/') => (Some(robot), place),
+            _ => (None, text),
         };
         if let Some(robot) = robot.filter(|robot| !is_robot_name(robot)) {
             return Err(MemberError {
@@ -248,8 +249,7 @@ mod tests {
         assert_eq!(kiwi.place, Place::Address("10.0.0.7:8765".into()));
         assert_eq!(kiwi.page().as_deref(), Some("http://10.0.0.7:8765/"));
         assert_eq!(parsed("[::1]:80").place, Place::Address("[::1]:80".into()));
-        let socket = parsed("/run/a=b.sock");
-        assert!(socket.robot.is_none() || socket.robot.is_some_and(|robot| robot.is_empty()));
+        assert_eq!(parsed("/run/a=b.sock"), Member::at_socket("/run/a=b.sock".into()));
         for bad in ["", "kiwi", "kiwi=", "a b=h:1", "h:port", "h:99999", "https://h:1", "h:1/x"] {
             assert!(Member::parse(bad).is_err(), "{bad}");
         }

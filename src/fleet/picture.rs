@@ -117,6 +117,6 @@ mod tests {
         scan.pings[0].range_m = Some(f64::INFINITY);
         scan.pings[1].range_m = None;
         let picture = draw(&scan, None, 1000);
-        assert_eq!(picture.points_m, [[0.999, 0.035]]);
+        assert_eq!(picture.points_m, [[1.0, 0.035]]);
     }
 }

@@ -78,9 +78,11 @@ fn every_plain_path_of_the_command_line_is_read() {
         "scene from-svg drawing",
         "simulate poses",
         "simulate scene",
+        "status fleet",
         "status socket",
         "status token_file",
         "trace scene",
+        "watch fleet",
         "watch socket",
         "watch token_file",
         // The daemon's own, by rules of the store and the server.

@@ -62,11 +62,15 @@ impl Fleet {
             let options = [&SCANNING[..], &tcp, &["--set", &named]].concat();
             robots.push(Daemon::start_mock(&own(name), &options));
         }
+        for robot in &robots {
+            until_it_listens(robot);
+        }
         let places = robots.iter().zip(["kiwi", "mango", "lime"]);
         let places: Vec<_> =
             places.map(|(robot, name)| format!("{name}={}", robot.address())).collect();
         let daemons = format!("fleet.daemons={}", places.join(","));
         let asking = Daemon::start_mock(&own("asking"), &[&tcp[..], &["--set", &daemons]].concat());
+        until_it_listens(&asking);
         let quoted: Vec<_> = places.iter().map(|place| format!("{place:?}")).collect();
         let list = folder.join("fleet.toml");
         fs::write(&list, format!("[fleet]\ndaemons = [{}]\n", quoted.join(", "))).expect("room");
@@ -91,6 +95,11 @@ impl Fleet {
     fn status(&self) -> Output {
         run(&["status", "--fleet", &self.list])
     }
+}
+
+/// Waits until it said where it listens by TCP: the socket may answer before that is read.
+fn until_it_listens(daemon: &Daemon) {
+    wait_until("its address", || daemon.said().contains("http://"));
 }
 
 /// How long it takes until something is so, seconds; it must be soon.
@@ -226,6 +235,7 @@ fn who_is_silent_or_says_something_else_has_a_row_with_the_reason_and_delays_nob
     let folder = tempfile::tempdir().expect("a folder");
     let name = ["--set", "fleet.robot=kiwi", "--set", "server.listen=127.0.0.1:0"];
     let robot = Daemon::start_mock(folder.path(), &name);
+    until_it_listens(&robot);
     let mut lie = robot.status();
     lie["robot"] = "\u{1b}[2Jowned".into();
     let lie = lie.to_string();
@@ -315,6 +325,7 @@ fn a_fleet_is_told_to_whoever_may_read_and_tokens_to_nobody() {
     let asking = Daemon::start_mock(folder.path(), &settings);
     let shown = tokens.recv_timeout(Duration::from_secs(10)).expect("it asks");
     assert!(shown.ends_with(TOKEN), "{shown}");
+    until_it_listens(&asking);
     wait_until("the refusal", || {
         asking.get("/v1/fleet").json()["robots"][0]["state"] == "refusing"
     });
