@@ -10,10 +10,14 @@ use sonard_model::{
 pub(crate) const SPAN_DB: f64 = 12.0;
 /// Least step from one to the next, decibels.
 const STEP_DB: f64 = 0.25;
-/// Step by which time walk is found out, decibels.
+/// Margins between which time walk is found out, decibels to both sides.
 const WALK_DB: f64 = 0.5;
 /// Just above where an echo is lost.
 const ABOVE_DB: f64 = 0.02;
+/// Margin below which time walk is not followed, decibels.
+const LEAST_MARGIN_DB: f64 = 0.1;
+/// Later than time walk explains by this much is another rise of the envelope, metres.
+const JUMP_M: f64 = 0.003;
 /// More than this many changes of the first echo are not followed.
 const MOST: usize = 12;
 
@@ -36,7 +40,7 @@ pub(crate) struct Candidate {
     /// By how much that may be off, because it is not known with which phase its arrival meets others: a standard
     /// deviation, decibels.
     pub(crate) spread_db: f64,
-    /// What its range gains with the threshold, metres a decibel (time walk); 0 unless it is asked for.
+    /// What its range gains with the threshold, metres a decibel (time walk).
     pub(crate) walk_m_per_db: f64,
 }
 
@@ -47,26 +51,26 @@ pub(crate) type Candidates = SmallVec<[Candidate; 3]>;
 pub(crate) struct Listener {
     receiver: Receiver,
     threshold: f64,
-    /// Whether time walk is asked for: a firing or two more for each candidate.
-    with_walk: bool,
 }
 
 /// What a receiver with some threshold detects.
 struct Detected {
     detection: Detection,
+    /// The threshold, decibels above the nominal one.
+    by_db: f64,
     /// The threshold up to which its envelope reaches, decibels above the nominal one; infinite of silence.
     reaches_db: f64,
 }
 
 impl Listener {
-    pub(crate) fn new(receiver: &Receiver, phases: Phases, with_walk: bool) -> Self {
+    pub(crate) fn new(receiver: &Receiver, phases: Phases) -> Self {
         // Steps in which ranges are told would hide how they move.
         let mut receiver = receiver.clone();
         receiver.range_step_m = 0.0;
         if phases == Phases::Unknown && receiver.combining == Combining::Coherent {
             receiver.combining = Combining::Incoherent;
         }
-        Self { threshold: receiver.threshold, receiver, with_walk }
+        Self { threshold: receiver.threshold, receiver }
     }
 
     /// All that a firing could come to.
@@ -81,7 +85,7 @@ impl Listener {
     /// From the lowest threshold up. A higher one is passed no earlier, so that time runs forward, too.
     fn rising(&mut self, ear: &Ear) -> Candidates {
         let mut found = Candidates::new();
-        let mut last: Option<Detection> = None;
+        let mut last: Option<Detected> = None;
         let (mut by_db, mut ready_us) = (-SPAN_DB, 0.0);
         while by_db < SPAN_DB && found.len() < MOST {
             let mut next = self.detect(ear, by_db, ready_us);
@@ -90,20 +94,20 @@ impl Listener {
             if by_db < 0.0 && until_db > 0.0 {
                 // What is reported at the usual threshold is told as it is there.
                 let usual = self.detect(ear, 0.0, ready_us);
-                if is_same(&usual.detection, &next.detection) {
+                if self.is_same(&next, &usual) {
                     (next, by_db) = (usual, 0.0);
                 }
             }
             match found.last_mut() {
-                Some(known) if last.as_ref().is_some_and(|last| is_same(last, &next.detection)) => {
+                Some(known) if last.as_ref().is_some_and(|last| self.is_same(last, &next)) => {
                     known.until_db = known.until_db.max(until_db);
                 }
                 _ => {
                     let spread_db = self.spread_db(&next.detection);
-                    let walk_m_per_db = self.walk(ear, by_db, &next.detection);
+                    let walk_m_per_db = self.walk_m_per_db(until_db - by_db);
                     let prediction = ear.prediction(next.detection.clone());
                     found.push(Candidate { prediction, until_db, spread_db, walk_m_per_db });
-                    last = Some(next.detection);
+                    last = Some(next);
                 }
             }
             by_db = until_db.max(by_db + STEP_DB) + ABOVE_DB;
@@ -118,7 +122,7 @@ impl Listener {
         let margin_db = detection.margin_db.unwrap_or(0.0).max(0.0);
         let reaches_db =
             if detection.status.has_range() { by_db + margin_db } else { f64::INFINITY };
-        Detected { detection, reaches_db }
+        Detected { detection, by_db, reaches_db }
     }
 
     /// By how much the strength of an arrival may be off that meets others with unknown phases. Of two sounds whose
@@ -134,19 +138,11 @@ impl Listener {
         DB_OF_RATIO * beside.clamp(0.0, 1.0).sqrt()
     }
 
-    /// How the range of an arrival that is reported at `by_db` moves with the threshold.
-    fn walk(&mut self, ear: &Ear, by_db: f64, reported: &Detection) -> f64 {
-        if !self.with_walk {
-            return 0.0;
-        }
-        for step_db in [WALK_DB, -WALK_DB] {
-            let beside = self.detect(ear, by_db + step_db, 0.0).detection;
-            let ranges = beside.range_m.zip(reported.range_m);
-            if let (true, Some((other_m, range_m))) = (is_same(&beside, reported), ranges) {
-                return (other_m - range_m) / step_db;
-            }
-        }
-        0.0
+    /// What the range of an arrival that reaches so far above the threshold gains with the threshold.
+    fn walk_m_per_db(&self, margin_db: f64) -> f64 {
+        let (low_db, high_db) = ((margin_db - WALK_DB).max(0.0), margin_db.max(0.0) + WALK_DB);
+        let [late_m, early_m] = [low_db, high_db].map(|db| self.receiver.time_walk_m(db));
+        (late_m - early_m) / (high_db - low_db)
     }
 
     /// The threshold at which an arrival is no longer reported that is at `from_db`. The peak of its envelope says
@@ -157,8 +153,10 @@ impl Listener {
         if said_db.is_infinite() || beyond <= from_db {
             return said_db.min(SPAN_DB.max(from_db));
         }
-        let mut is_reported =
-            |by_db: f64| is_same(&self.detect(ear, by_db, ready_us).detection, &reported.detection);
+        let mut is_reported = |by_db: f64| {
+            let detected = self.detect(ear, by_db, ready_us);
+            self.is_same(reported, &detected)
+        };
         if is_reported(beyond) {
             return said_db;
         }
@@ -169,19 +167,26 @@ impl Listener {
         }
         0.5 * (low + high)
     }
-}
 
-/// Whether two detections are of the same arrival. Their ranges may part: at a higher threshold an echo is later by the
-/// time that its pulse takes to rise.
-fn is_same(one: &Detection, other: &Detection) -> bool {
-    let length_m = |detection: &Detection| match detection.status.has_range() {
-        true => detection.arrival.map(|arrival| arrival.length_m),
-        false => None,
-    };
-    one.status == other.status
-        && match (length_m(one), length_m(other)) {
+    /// Whether two detections are of the same rise of the envelope, one at a higher threshold: of the same arrival, and
+    /// no later than that arrival takes to rise further. Where arrivals overlap the first may fade before the next one
+    /// drives the envelope on, and a little more of threshold makes the echo centimetres later.
+    fn is_same(&self, one: &Detected, higher: &Detected) -> bool {
+        let length_m = |detection: &Detection| match detection.status.has_range() {
+            true => detection.arrival.map(|arrival| arrival.length_m),
+            false => None,
+        };
+        let [first, second] = [&one.detection, &higher.detection];
+        let is_same_arrival = match (length_m(first), length_m(second)) {
             (Some(one_m), Some(other_m)) => (one_m - other_m).abs() < 1e-6,
             (None, None) => true,
             _ => false,
-        }
+        };
+        let later_m = first.range_m.zip(second.range_m).map_or(0.0, |(one, other)| other - one);
+        // At the very top, where a pulse is flat, its rise takes any time.
+        let margin_db = |of: &Detected| (one.reaches_db - of.by_db).max(LEAST_MARGIN_DB);
+        let walk_m = |of: &Detected| self.receiver.time_walk_m(margin_db(of));
+        let jump_m = later_m - (walk_m(higher) - walk_m(one));
+        first.status == second.status && is_same_arrival && jump_m < JUMP_M
+    }
 }

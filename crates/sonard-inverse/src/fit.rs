@@ -1,5 +1,6 @@
 //! The most likely values of parameters, and how sure they are.
 
+mod restart;
 mod spread;
 mod step;
 
@@ -138,7 +139,10 @@ const NOT_FITTED_DB: f64 = 0.5;
 /// # Errors
 /// When the world can't be predicted in, or the readings don't hold the parameters.
 pub fn fit(world: &World, sweeps: &[Sweep], fit: &Fit) -> Result<Fitted, FitError> {
-    fit_with(Models::of(&world.with_face_on_axis())?, world, sweeps, fit)
+    let models = Models::of(&world.with_face_on_axis())?;
+    let mut state = State::new(models, world, sweeps, fit)?;
+    let (best, beside) = state.likeliest()?;
+    state.end(best, Some(beside))
 }
 
 /// The same with models of the world with the transducer on its axis, which it may have in common with other fits.
@@ -149,15 +153,8 @@ pub(crate) fn fit_with(
     fit: &Fit,
 ) -> Result<Fitted, FitError> {
     let mut state = State::new(models, world, sweeps, fit)?;
-    let mut errors = state.rough_errors();
-    let linear = state.approach(&mut errors)?;
-    let errors = state.settle(linear, errors)?;
-    if !world.sensor.mounting.is_on_axis() {
-        let exact = state.linear(true)?;
-        state.improve(&exact, &errors)?;
-    }
-    let linear = state.linear(true)?;
-    state.finish(&linear, errors)
+    let end = state.attempt(state.still(), 0)?;
+    state.end(end, None)
 }
 
 /// Goes near to where a fit would end, with a single sweep.
@@ -170,7 +167,7 @@ pub(crate) fn approach(
     let sweeps = std::slice::from_ref(sweep);
     let mut state = State::new(models, world, sweeps, fit)?;
     let mut errors = state.rough_errors();
-    let linear = state.approach(&mut errors)?;
+    let linear = state.approach(&mut errors, 0)?;
     let errors = state.spread(&linear, &errors);
     let log_posterior = state.value(&linear, &errors);
     Ok(Approached { pose: state.poses()[0], log_posterior, sigma_m: errors.sigma_m })
@@ -262,7 +259,7 @@ impl<'a> State<'a> {
         let (world, poses) = (self.moved_world()?, self.poses());
         let exact = is_exact.then(|| self.models.changed_to(&world)).transpose()?;
         let models = exact.as_ref().unwrap_or(&self.models);
-        let rates = RateFinder::new(&world, &self.parameters, reference_m_s, is_exact, self.phases);
+        let rates = RateFinder::new(&world, &self.parameters, reference_m_s, self.phases);
         Ok(Linear::about(models, &rates, self.sweeps, &poses)?)
     }
 
@@ -283,9 +280,9 @@ impl<'a> State<'a> {
     }
 
     /// Goes from spread to spread, and gives the predictions where that ends.
-    fn approach(&mut self, errors: &mut ErrorModel) -> Result<Linear, FitError> {
+    fn approach(&mut self, errors: &mut ErrorModel, stage: usize) -> Result<Linear, FitError> {
         let mut linear = self.linear(false)?;
-        for ((share, sigma_db), (step_deg, steps)) in STAGES.into_iter().zip(TURNS) {
+        for ((share, sigma_db), (step_deg, steps)) in STAGES.into_iter().zip(TURNS).skip(stage) {
             let steps = steps.min((self.fit.widest_turn_deg / step_deg) as i32);
             // Never narrower than what readings really spread by: else those few that happen to agree would be
             // believed and all others taken for clutter.
@@ -318,15 +315,12 @@ impl<'a> State<'a> {
     }
 
     /// Settles without phases, and with them; the likelier one counts.
-    fn settle(&mut self, linear: Linear, errors: ErrorModel) -> Result<ErrorModel, FitError> {
+    fn settle(&mut self, linear: Linear, errors: ErrorModel) -> Result<Settled, FitError> {
         let without = self.settled(linear, errors)?;
         (self.values, self.phases) = (without.values.clone(), Phases::Known);
         let with = self.linear(false)?;
         let with = self.settled(with, without.errors)?;
-        let Settled { values, errors, phases, .. } =
-            if with.value > without.value { with } else { without };
-        (self.values, self.phases) = (values, phases);
-        Ok(errors)
+        Ok(if with.value > without.value { with } else { without })
     }
 
     /// Finds the spread and the values in turn, as long as both get likelier.
@@ -345,7 +339,15 @@ impl<'a> State<'a> {
         best.ok_or(FitError::Degenerate)
     }
 
-    fn finish(self, linear: &Linear, errors: ErrorModel) -> Result<Fitted, FitError> {
+    /// What came of it, where it settled.
+    fn end(mut self, best: Settled, beside: Option<DMatrix<f64>>) -> Result<Fitted, FitError> {
+        (self.values, self.phases) = (best.values, best.phases);
+        let errors = best.errors;
+        if !self.start.sensor.mounting.is_on_axis() {
+            let exact = self.linear(true)?;
+            self.improve(&exact, &errors)?;
+        }
+        let linear = self.linear(true)?;
         let curve = linear.curve(&self.still(), &errors);
         let mut covariance =
             self.covariance(curve.information.clone()).ok_or(FitError::Degenerate)?;
@@ -354,6 +356,9 @@ impl<'a> State<'a> {
         let sigma_db = threshold.map_or(NOT_FITTED_DB, |at| covariance[(at, at)].sqrt());
         let moved = &covariance * &curve.walk * sigma_db;
         covariance += &moved * moved.transpose();
+        if let Some(beside) = beside {
+            covariance += beside;
+        }
         let estimates = self.values.iter().enumerate().map(|(at, &change)| {
             let sigma = covariance[(at, at)].max(0.0).sqrt();
             Estimate { change, sigma, identified: sigma < 0.5 * self.fit.priors[at].sigma }

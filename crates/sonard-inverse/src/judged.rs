@@ -51,6 +51,19 @@ pub(crate) struct Term {
     pub(crate) expected_of_until: f64,
 }
 
+impl Possible {
+    /// How its range spreads: a threshold in doubt makes that of a weak echo doubtful, too, by its time walk.
+    pub(crate) fn errors(&self, errors: &ErrorModel) -> ErrorModel {
+        let sigma_db = errors.sigma_db.hypot(self.spread_db);
+        errors.with_range_spread(errors.sigma_m.hypot(self.walk_m_per_db * sigma_db))
+    }
+
+    /// What its range says beside that of a strong echo, 0 to 1.
+    pub(crate) fn certainty(&self, errors: &ErrorModel) -> f64 {
+        (errors.sigma_m / self.errors(errors).sigma_m).powi(2)
+    }
+}
+
 impl Judged {
     /// How likely the reading is after a change of the parameters.
     pub(crate) fn terms(&self, change: &DVector<f64>, errors: &ErrorModel) -> Terms {
@@ -65,8 +78,9 @@ impl Judged {
             .iter()
             .map(|possible| match (self.heard_m, possible.range_m) {
                 (Some(heard_m), Some(range_m)) => {
-                    let [density, slope] =
-                        errors.range(heard_m - after(range_m, &possible.range_rates));
+                    let [density, slope] = possible
+                        .errors(errors)
+                        .range(heard_m - after(range_m, &possible.range_rates));
                     [density, -slope]
                 }
                 (None, None) => [1.0, 0.0],

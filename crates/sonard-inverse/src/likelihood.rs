@@ -37,6 +37,11 @@ impl ErrorModel {
         }
     }
 
+    /// The same with another standard deviation of ranges; the far tail keeps its length.
+    pub(crate) fn with_range_spread(self, sigma_m: f64) -> Self {
+        Self { sigma_m, tail_ratio: self.tail_ratio * self.sigma_m / sigma_m, ..self }
+    }
+
     /// Density of the error of a range (measured less predicted, metres), and its derivative: normal, or later by an
     /// exponentially distributed excess (`TofNoise`), whose density is the convolution of both.
     pub(crate) fn range(&self, error_m: f64) -> [f64; 2] {

@@ -69,13 +69,8 @@ impl Linear {
         errors: &ErrorModel,
     ) -> Result<Vec<(f64, f64, f64)>, WorldError> {
         let parameters = [&Parameter::Threshold];
-        let rates = RateFinder::new(
-            world,
-            &parameters,
-            world.air.sound_speed_m_s(),
-            false,
-            Phases::Unknown,
-        );
+        let rates =
+            RateFinder::new(world, &parameters, world.air.sound_speed_m_s(), Phases::Unknown);
         let turned = models.at(pose, |simulator, point| {
             Ok(rates.turned(simulator, point, sweep, pose, turns_deg)?)
         })?;
@@ -105,6 +100,7 @@ impl Linear {
             let terms = beam.terms(change, errors);
             curve.value += terms.density.ln();
             for (possible, term) in beam.possible.iter().zip(&terms.of) {
+                let of_range = of_range * possible.certainty(errors);
                 let weight = term.share * of_range;
                 for &(at, rate) in &possible.range_rates {
                     curve.gradient[at as usize] += term.by_range * rate;

@@ -31,8 +31,6 @@ pub(crate) struct RateFinder<'a> {
     /// By parameter, the beam pattern slightly changed by it, if it is about the beam, and by how much.
     changed_beams: Vec<Option<(BeamPattern, f64)>>,
     reference_m_s: f64,
-    /// Whether time walk is found out, too, which takes a firing or two for each candidate.
-    with_walk: bool,
     phases: Phases,
 }
 
@@ -54,13 +52,12 @@ impl<'a> RateFinder<'a> {
         world: &'a World,
         parameters: &'a [&'a Parameter],
         reference_m_s: f64,
-        with_walk: bool,
         phases: Phases,
     ) -> Self {
         let steady = parameters.iter().map(|parameter| world.steady_motion(parameter)).collect();
         let changed = |parameter: &&Parameter| changed_beam(world, parameter);
         let changed_beams = parameters.iter().map(changed).collect();
-        Self { world, parameters, steady, changed_beams, reference_m_s, with_walk, phases }
+        Self { world, parameters, steady, changed_beams, reference_m_s, phases }
     }
 
     /// How many parameters there are.
@@ -77,7 +74,7 @@ impl<'a> RateFinder<'a> {
         sweep: &Sweep,
         pose: &Pose,
     ) -> Result<Vec<Judged>, TooCostly> {
-        let mut listener = Listener::new(simulator.receiver(), self.phases, self.with_walk);
+        let mut listener = Listener::new(simulator.receiver(), self.phases);
         let concerns = |parameter: &Parameter| parameter.sweep().is_none_or(|of| of == number);
         let all = self.parameters.iter().zip(0u32..);
         let concerning: Vec<u32> =
@@ -101,7 +98,7 @@ impl<'a> RateFinder<'a> {
         pose: &Pose,
         turns_deg: &[f64],
     ) -> Result<Vec<Vec<Judged>>, TooCostly> {
-        let mut listener = Listener::new(simulator.receiver(), self.phases, self.with_walk);
+        let mut listener = Listener::new(simulator.receiver(), self.phases);
         let all: Vec<u32> = (0..self.parameters.len() as u32).collect();
         let mut known: HashMap<i64, SmallVec<[Possible; 3]>> = HashMap::new();
         let mut judged = |beam: &Beam, by_deg: f64| {

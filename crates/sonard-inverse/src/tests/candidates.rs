@@ -1,9 +1,54 @@
 //! What a receiver could report against what it reports.
 
 use super::{first_pose, world};
-use sonard_model::acoustics::Latch;
+use sonard_model::{acoustics::Latch, geometry::Pose};
 
-use crate::candidates::{Listener, Phases};
+use crate::{
+    World,
+    candidates::{Listener, Phases},
+};
+
+/// Where arrivals overlap, the first may fade before the next one drives the envelope on, and a little more of threshold
+/// makes an echo centimetres later without another arrival. That is another reading.
+#[test]
+fn an_echo_that_rises_in_two_steps_is_two_candidates() {
+    let mut here = world("right-angle-corner", "senscomp-6500");
+    here.sensor.threshold *= 0.5;
+    let places = (-3..=3).map(|at| 0.1 * f64::from(at));
+    let jumps: u32 = places.map(|x_m| jumps_from(&here, x_m)).sum();
+    assert!(jumps > 10, "{jumps}");
+}
+
+/// Holds every jump of the range on the way from threshold to threshold to an end of a candidate; how many there are.
+fn jumps_from(here: &World, x_m: f64) -> u32 {
+    let pose = Pose { x_m, y_m: -0.3, heading_deg: 0.0 };
+    let simulator = here.simulator(&pose).expect("a model");
+    let point = simulator.at(pose.position());
+    let mut listener = Listener::new(simulator.receiver(), Phases::Known);
+    let mut receiver = simulator.receiver().clone();
+    let mut jumps = 0;
+    for step in 0..400 {
+        let direction_rad = (0.9 * f64::from(step)).to_radians();
+        let found = listener.candidates(&point, direction_rad).expect("paths");
+        let mut read_m = |by_db: f64| {
+            receiver.threshold = simulator.receiver().threshold * 10f64.powf(by_db / 20.0);
+            let read = point.hear(direction_rad, |ear| ear.detect(&receiver, Latch::First, 0.0));
+            read.expect("paths").range_m
+        };
+        for at in -40..40 {
+            let by_db = 0.25 * f64::from(at);
+            let Some((low_m, high_m)) = read_m(by_db).zip(read_m(by_db + 0.25)) else { continue };
+            // No lone pulse rises so slowly within a quarter of a decibel, but at its very top.
+            if high_m - low_m > 0.015 {
+                jumps += 1;
+                let ends = found.iter().map(|candidate| candidate.until_db);
+                let nearest = ends.map(|end_db| (end_db - by_db).abs()).fold(f64::MAX, f64::min);
+                assert!(nearest < 0.8, "{step}: from {low_m} to {high_m} at {by_db}: {found:?}");
+            }
+        }
+    }
+    jumps
+}
 
 #[test]
 fn at_each_threshold_the_candidate_is_what_a_receiver_with_it_reports() {
@@ -15,7 +60,7 @@ fn at_each_threshold_the_candidate_is_what_a_receiver_with_it_reports() {
         let pose = first_pose(&here.scene);
         let simulator = here.simulator(&pose).expect("a model");
         let point = simulator.at(pose.position());
-        let mut listener = Listener::new(simulator.receiver(), Phases::Known, false);
+        let mut listener = Listener::new(simulator.receiver(), Phases::Known);
         let mut receiver = simulator.receiver().clone();
         for step in 0..200 {
             let direction_rad = here.direction_rad(&pose, 1.8 * f64::from(step));

@@ -105,8 +105,7 @@ fn margins_above_the_threshold() {
     ];
     let margins = |world: &World| {
         let asked: Vec<&Parameter> = parameters.iter().map(|(parameter, _)| parameter).collect();
-        let finder =
-            RateFinder::new(world, &asked, world.air.sound_speed_m_s(), false, Phases::Known);
+        let finder = RateFinder::new(world, &asked, world.air.sound_speed_m_s(), Phases::Known);
         let simulator = world.simulator(&pose).expect("a model");
         let judged = finder.sweep(&simulator, &simulator.at(pose.position()), 0, &sweep, &pose);
         judged.expect("candidates").iter().map(|beam| beam.possible[0].clone()).collect::<Vec<_>>()

@@ -74,6 +74,78 @@ fn pose_air_and_threshold_come_back() {
     assert!(fitted.estimates[0].sigma < 1e-3 && fitted.estimates[2].sigma < 0.3);
 }
 
+/// Two walls that meet hardly hold the speed of sound: only weak echoes of their ends do, which other arrivals explain as
+/// well a few centimetres on. A fit may end in any of these explanations, but its intervals must say so. (Four trials of
+/// the example `trials` in which they once did not.)
+#[test]
+fn what_several_places_explain_is_not_told_for_sure() {
+    let doubtful = [
+        (
+            "right-angle-corner",
+            0,
+            [-0.220_48, -0.348_91, 131.243],
+            [0.0969, 0.0589, 0.1, -0.0022, -5.82, 0.0340],
+        ),
+        (
+            "right-angle-corner",
+            0,
+            [0.218_05, 0.039_22, 73.519],
+            [0.0635, -0.0598, -1.2, 0.0146, -3.73, -0.0321],
+        ),
+        (
+            "right-angle-corner",
+            0,
+            [-0.342_73, 0.039_31, -27.024],
+            [0.0697, -0.0074, 1.3, -0.0118, -0.84, -0.0198],
+        ),
+        (
+            "oblique-corner",
+            1,
+            [0.022_79, -0.598_08, 90.152],
+            [0.0330, -0.0839, -0.1, -0.0083, -5.91, -0.0469],
+        ),
+    ];
+    let (mut fits, mut wrong) = (0, 0);
+    for (scene, wall, [x_m, y_m, heading_deg], changes) in doubtful {
+        let mut here = world(scene, "senscomp-6500");
+        here.options.max_range_m = Some(4.0);
+        let parameters = [
+            (Parameter::X(0), 0.058),
+            (Parameter::Y(0), 0.058),
+            (Parameter::Heading(0), 4.6),
+            (Parameter::SoundSpeed, 0.008),
+            (Parameter::Threshold, 3.5),
+            (Parameter::Wall(wall), 0.029),
+        ];
+        let expected: Vec<_> = parameters.iter().map(|(of, _)| of).zip(changes).collect();
+        let truth = here.changed(&expected).expect("a world");
+        let pose = Pose { x_m, y_m, heading_deg };
+        let believed = Pose {
+            x_m: x_m - changes[0],
+            y_m: y_m - changes[1],
+            heading_deg: heading_deg - changes[2],
+        };
+        let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
+        let priors =
+            parameters.iter().map(|(of, sigma)| Prior { parameter: of.clone(), sigma: *sigma });
+        let what = Fit::usual(priors.collect(), 0.15);
+        for seed in 1..=3 {
+            let sweep = sweep(&truth, &pose, &believed, 400, noise, seed);
+            let fitted = fit(&here, &[sweep], &what).expect("a fit");
+            let mut off = fitted
+                .estimates
+                .iter()
+                .zip(&expected)
+                .map(|(found, (_, by))| (found.change - by).abs() / found.sigma);
+            fits += 1;
+            wrong += u32::from(off.any(|sigmas| sigmas > 6.0));
+        }
+    }
+    // Ten of them are where nothing is searched beside the place where a fit ends; three of the four that are left are from
+    // one place, where the next best explanation is five standard deviations of the air's temperature away.
+    assert!(wrong <= 4, "{wrong} of {fits}");
+}
+
 /// Held to a threshold that is 9 dB too high, a fit would have it fall with the range, which no receiver's does: it
 /// stops where there is no rise, with an interval that begins there, and says so.
 #[test]

@@ -281,6 +281,17 @@ impl Receiver {
         gain_db(&self.gain, t_us, self.range_m(t_us))
     }
 
+    /// By how much later an echo is told that reaches so many decibels above the threshold in force than one that is
+    /// timed without bias, metres of range (time walk); of a lone echo.
+    #[must_use]
+    pub fn time_walk_m(&self, margin_db: f64) -> f64 {
+        if self.combining == Combining::Ideal {
+            return 0.0;
+        }
+        let level = 10f64.powf(-margin_db.max(0.0) / 20.0);
+        self.range_m(self.shape.rise_us(level).map_or(0.0, |rise_us| rise_us - self.lead_us))
+    }
+
     fn detection(&self, hearing: &mut Hearing, latch: Latch, ready_us: f64) -> Detection {
         let mut echoes_us = SmallVec::new();
         // What has been above before, for less than it takes to rise, counts.

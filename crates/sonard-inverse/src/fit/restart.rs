@@ -1,0 +1,198 @@
+//! Other places to begin from: a fit ends in the next best explanation, which need not be the best.
+//!
+//! Where readings hold something little, a fit may go past the answer and settle where other arrivals explain the same
+//! readings about as well: a weak echo that is told late for one of a path that is shorter, a wall for the next. So the
+//! directions that are held least are searched beside where it ended. What is likelier there is followed, and what
+//! is nearly as likely widens the intervals.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use super::{FitError, STAGES, Settled, State};
+use crate::{candidates::Phases, likelihood::ErrorModel};
+
+/// Directions that are searched.
+const DIRECTIONS: usize = 2;
+/// Places on each side, and how far apart, in standard deviations of what a rough look leaves in doubt.
+const PLACES: (i32, f64) = (6, 0.5);
+/// Of a robot with a body, whose paths have to be found anew for each: a prediction costs some hundred times as much.
+const PLACES_OF_BODY: (i32, f64) = (2, 1.5);
+/// A rough look: spread of ranges, metres, of the threshold, decibels, and the share of clutter.
+const ROUGH: (f64, f64, f64) = (0.03, 3.0, 0.05);
+/// A close one, by which places are told apart.
+const CLOSE: (f64, f64, f64) = (0.005, 1.5, 0.03);
+/// Directions of less doubt than this share of what was believed are held well enough.
+const LEAST_SHARE: f64 = 0.1;
+/// Places that are followed to their ends.
+const FOLLOWED: usize = 2;
+/// The stage that these start with.
+const STAGE: usize = STAGES.len() - 1;
+/// A fit has gone astray that explains less than all readings but this share, or contradicts what was believed by
+/// this many standard deviations.
+const ASTRAY: (f64, f64) = (0.03, 3.5);
+/// Beginnings anew of such a one, in standard deviations of what a first look leaves in doubt.
+const ANEW: f64 = 1.5;
+/// Readings of an arc share what the model misses: so many count as one where places are weighed.
+const READINGS_OF_ONE: f64 = 8.0;
+
+/// Somewhere beside the end of a fit.
+pub(super) struct Place {
+    values: DVector<f64>,
+    /// Log-posterior with spreads by which places are told apart.
+    value: f64,
+}
+
+impl State<'_> {
+    /// The likeliest end of all beginnings, and what the other places add to its covariance.
+    pub(super) fn likeliest(&mut self) -> Result<(Settled, DMatrix<f64>), FitError> {
+        let mut best = self.attempt(self.still(), 0)?;
+        if self.is_astray(&best) && self.start.scene.robot.is_none() {
+            for start in self.beginnings()? {
+                let end = self.attempt(start, 0)?;
+                keep_likelier(&mut best, end);
+            }
+        }
+        let places = self.places(&best)?;
+        for place in places.iter().take(FOLLOWED) {
+            let end = self.attempt(place.values.clone(), STAGE)?;
+            keep_likelier(&mut best, end);
+        }
+        let beside = self.beside(&best, &places)?;
+        Ok((best, beside))
+    }
+
+    /// Where a fit ends that begins there, with the spreads from this stage on.
+    pub(super) fn attempt(
+        &mut self,
+        start: DVector<f64>,
+        stage: usize,
+    ) -> Result<Settled, FitError> {
+        (self.values, self.phases) = (start, Phases::Unknown);
+        let mut errors = self.rough_errors();
+        errors.sigma_m *= STAGES[stage].0;
+        let linear = self.approach(&mut errors, stage)?;
+        self.settle(linear, errors)
+    }
+
+    fn is_astray(&self, end: &Settled) -> bool {
+        let (unexplained, sigmas) = ASTRAY;
+        let contradicts = end.values.component_div(&self.prior_sigmas()).amax() > sigmas;
+        contradicts || end.errors.clutter > unexplained
+    }
+
+    /// Other beginnings than what was believed.
+    fn beginnings(&mut self) -> Result<Vec<DVector<f64>>, FitError> {
+        let doubtful = self.doubtful(&self.still(), &self.rough_errors())?;
+        let sides = doubtful
+            .into_iter()
+            .flat_map(|(direction, sigma)| [-ANEW, ANEW].map(|side| side * sigma * &direction));
+        Ok(sides.map(|start| self.limited(start)).collect())
+    }
+
+    /// Places along the directions that are held least beside where a fit ended, each improved; the likeliest first, and
+    /// one of those that are the same.
+    fn places(&mut self, end: &Settled) -> Result<Vec<Place>, FitError> {
+        let close = widened(&end.errors, CLOSE);
+        let has_body = self.start.scene.robot.is_some();
+        let (places, apart) = if has_body { PLACES_OF_BODY } else { PLACES };
+        let mut tried: Vec<Place> = Vec::new();
+        for (direction, sigma) in self.doubtful(&end.values, &widened(&end.errors, ROUGH))? {
+            for place in (-places..=places).filter(|place| *place != 0) {
+                let by = f64::from(place) * apart * sigma;
+                self.values = self.limited(&end.values + by * &direction);
+                tried.push(self.improved(&close)?);
+            }
+        }
+        tried.sort_by(|one, other| other.value.total_cmp(&one.value));
+        let mut places: Vec<Place> = Vec::new();
+        for place in tried {
+            let known = places.iter().map(|other| &other.values).chain([&end.values]);
+            if known.into_iter().all(|other| self.is_apart(&place.values, other)) {
+                places.push(place);
+            }
+        }
+        Ok(places)
+    }
+
+    fn improved(&mut self, errors: &ErrorModel) -> Result<Place, FitError> {
+        let mut linear = self.linear(false)?;
+        for _ in 0..2 {
+            self.improve(&linear, errors)?;
+            linear = self.linear(false)?;
+        }
+        Ok(Place { values: self.values.clone(), value: self.value(&linear, errors) })
+    }
+
+    /// What the covariance gains because the values may be those of other places, which explain the readings nearly as
+    /// well.
+    fn beside(&mut self, best: &Settled, places: &[Place]) -> Result<DMatrix<f64>, FitError> {
+        (self.values, self.phases) = (best.values.clone(), Phases::Unknown);
+        let close = widened(&best.errors, CLOSE);
+        let linear = self.linear(false)?;
+        let of_best = self.value(&linear, &close);
+        let odds = |place: &Place| ((place.value - of_best) / READINGS_OF_ONE).min(0.0).exp();
+        let all: f64 = 1.0 + places.iter().map(odds).sum::<f64>();
+        let mut beside = DMatrix::zeros(best.values.len(), best.values.len());
+        for place in places {
+            let away = &place.values - &best.values;
+            beside += &away * away.transpose() * (odds(place) / all);
+        }
+        Ok(beside)
+    }
+
+    /// The directions, in the parameters' units, in which readings that spread so much leave the most in doubt beside
+    /// what was believed, with the standard deviation in each.
+    fn doubtful(
+        &mut self,
+        about: &DVector<f64>,
+        errors: &ErrorModel,
+    ) -> Result<Vec<(DVector<f64>, f64)>, FitError> {
+        (self.values, self.phases) = (about.clone(), Phases::Unknown);
+        let curve = self.linear(false)?.curve(&self.still(), errors);
+        let covariance = self.covariance(curve.information).ok_or(FitError::Degenerate)?;
+        let sigmas = self.prior_sigmas();
+        let believed = DMatrix::from_diagonal(&sigmas.map(f64::recip));
+        let of = SymmetricEigen::new(&believed * covariance * &believed);
+        let mut order: Vec<usize> = (0..sigmas.len()).collect();
+        order.sort_by(|one, other| of.eigenvalues[*other].total_cmp(&of.eigenvalues[*one]));
+        order.retain(|&at| of.eigenvalues[at] > LEAST_SHARE * LEAST_SHARE);
+        let direction = |at: usize| {
+            (of.eigenvectors.column(at).component_mul(&sigmas), of.eigenvalues[at].sqrt())
+        };
+        Ok(order.into_iter().take(DIRECTIONS).map(direction).collect())
+    }
+
+    fn prior_sigmas(&self) -> DVector<f64> {
+        DVector::from_iterator(
+            self.fit.priors.len(),
+            self.fit.priors.iter().map(|prior| prior.sigma),
+        )
+    }
+
+    fn limited(&self, mut values: DVector<f64>) -> DVector<f64> {
+        for (value, parameter) in values.iter_mut().zip(&self.parameters) {
+            let (least, most) = self.start.limits(parameter);
+            *value = value.clamp(least, most);
+        }
+        values
+    }
+
+    /// Whether a fit from one of two places would hardly end as from the other.
+    fn is_apart(&self, one: &DVector<f64>, other: &DVector<f64>) -> bool {
+        (one - other).component_div(&self.prior_sigmas()).amax() > 0.5 * LEAST_SHARE
+    }
+}
+
+fn widened(errors: &ErrorModel, (sigma_m, sigma_db, clutter): (f64, f64, f64)) -> ErrorModel {
+    ErrorModel {
+        sigma_m: errors.sigma_m.max(sigma_m),
+        sigma_db: errors.sigma_db.max(sigma_db),
+        clutter: errors.clutter.max(clutter),
+        ..*errors
+    }
+}
+
+fn keep_likelier(best: &mut Settled, end: Settled) {
+    if end.value > best.value {
+        *best = end;
+    }
+}
