@@ -20,7 +20,9 @@ use super::{
     what_if::WhatIfArgs,
     worlds::SweepArgs,
 };
-use crate::inverse::{Fit, Fitted, Group, GroupError, Prior, Sweep, Told, World, fit, priors};
+use crate::inverse::{
+    Fit, Fitted, Group, GroupError, Prior, Progress, Sweep, Told, World, fit_watched, priors,
+};
 use prior::PriorSigma;
 use report::write_folder;
 
@@ -111,7 +113,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let what = Fit::usual(wanted(args, &world, sweeps.len())?, args.widest_m);
     let bar = progress::spinner("scans fitted to");
     bar.set_position(sweeps.len() as u64);
-    let fitted = fit(&world, &sweeps, &what).map_err(|error| {
+    let watch = |progress: Progress| bar.set_message(progress.to_string());
+    let fitted = fit_watched(&world, &sweeps, &what, &watch).map_err(|error| {
         Failure::input(error, "see that poses are in the scene, and fit fewer parameters")
     })?;
     bar.finish_and_clear();

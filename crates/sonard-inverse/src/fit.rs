@@ -1,8 +1,11 @@
 //! The most likely values of parameters, and how sure they are.
 
 mod restart;
+mod settle;
 mod spread;
 mod step;
+
+use std::fmt;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::Serialize;
@@ -89,9 +92,38 @@ pub enum FitError {
     Degenerate,
 }
 
+/// How far a fit has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Progress {
+    /// Goes from wide spreads of readings to the ones that they have: which of so many it is at, from 1.
+    Approaching {
+        /// Which.
+        spread: usize,
+        /// Of so many.
+        of: usize,
+    },
+    /// Searches beside where it ended: which of so many places it is at, from 1.
+    Searching {
+        /// Which.
+        place: usize,
+        /// Of so many.
+        of: usize,
+    },
+}
+
+impl fmt::Display for Progress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Approaching { spread, of } => write!(f, "spread {spread} of {of}"),
+            Self::Searching { place, of } => write!(f, "place {place} of {of} beside the fit"),
+        }
+    }
+}
+
 /// Where a fit stands.
 struct State<'a> {
     fit: &'a Fit,
+    watch: &'a dyn Fn(Progress),
     start: &'a World,
     sweeps: &'a [Sweep],
     parameters: Vec<&'a Parameter>,
@@ -119,13 +151,6 @@ pub(crate) struct Approached {
     pub(crate) sigma_m: f64,
 }
 
-/// Spreads that a fit goes through, as shares of the widest, with the spread of the threshold, decibels: from so wide
-/// that it finds its way to what readings really spread by.
-const STAGES: [(f64, f64); 5] = [(1.0, 6.0), (0.5, 5.0), (0.25, 4.0), (0.12, 3.0), (0.06, 2.5)];
-/// Improvements of the spread itself at the end.
-const LAST_STAGES: usize = 5;
-/// Turns that are tried at each of them, degrees, and how many to both sides.
-const TURNS: [(f64, i32); STAGES.len()] = [(1.5, 8), (1.5, 8), (1.0, 10), (0.75, 12), (0.5, 10)];
 /// Doubt of a threshold that is not fitted, decibels.
 const NOT_FITTED_DB: f64 = 0.5;
 
@@ -139,8 +164,22 @@ const NOT_FITTED_DB: f64 = 0.5;
 /// # Errors
 /// When the world can't be predicted in, or the readings don't hold the parameters.
 pub fn fit(world: &World, sweeps: &[Sweep], fit: &Fit) -> Result<Fitted, FitError> {
+    fit_watched(world, sweeps, fit, &|_| ())
+}
+
+/// The same, and tells on the way how far it has come.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_watched(
+    world: &World,
+    sweeps: &[Sweep],
+    fit: &Fit,
+    watch: &dyn Fn(Progress),
+) -> Result<Fitted, FitError> {
     let models = Models::of(&world.with_face_on_axis())?;
     let mut state = State::new(models, world, sweeps, fit)?;
+    state.watch = watch;
     let (best, beside) = state.likeliest()?;
     state.end(best, Some(beside))
 }
@@ -205,13 +244,13 @@ impl<'a> State<'a> {
         let parameters = fit.priors.iter().map(|prior| &prior.parameter).collect();
         let values = DVector::zeros(fit.priors.len());
         let phases = Phases::Unknown;
-        Ok(Self { fit, start, sweeps, parameters, values, models, phases })
+        Ok(Self { fit, watch: &|_| (), start, sweeps, parameters, values, models, phases })
     }
 
     fn rough_errors(&self) -> ErrorModel {
         let World { options, sensor, .. } = self.start;
         let reach_m = options.max_range_m.unwrap_or(sensor.max_range_m);
-        ErrorModel::rough(self.fit.widest_m, STAGES[0].1, reach_m)
+        ErrorModel::rough(self.fit.widest_m, settle::STAGES[0].1, reach_m)
     }
 
     /// Least spread of ranges that is believed, metres: that of steps in which they are told is theirs at least.
@@ -277,66 +316,6 @@ impl<'a> State<'a> {
     fn log_prior(&self, values: &DVector<f64>) -> f64 {
         let of = |(at, value): (usize, &f64)| -0.5 * self.precision(at) * value * value;
         values.iter().enumerate().map(of).sum()
-    }
-
-    /// Goes from spread to spread, and gives the predictions where that ends.
-    fn approach(&mut self, errors: &mut ErrorModel, stage: usize) -> Result<Linear, FitError> {
-        let mut linear = self.linear(false)?;
-        for ((share, sigma_db), (step_deg, steps)) in STAGES.into_iter().zip(TURNS).skip(stage) {
-            let steps = steps.min((self.fit.widest_turn_deg / step_deg) as i32);
-            // Never narrower than what readings really spread by: else those few that happen to agree would be
-            // believed and all others taken for clutter.
-            let spread = self.spread(&linear, errors);
-            errors.sigma_m = (self.fit.widest_m * share).max(spread.sigma_m.min(errors.sigma_m));
-            errors.sigma_db = sigma_db.max(self.fit.least_sigma_db);
-            let is_turned = self.turn(errors, step_deg, steps)?;
-            if is_turned {
-                linear = self.linear(false)?;
-            }
-            let mut moved = f64::INFINITY;
-            for _ in 0..3 {
-                moved = self.improve(&linear, errors)?;
-                linear = self.linear(false)?;
-                if moved < 0.2 {
-                    break;
-                }
-            }
-            // What the readings spread by is reached, and nothing moves: narrower it does not get.
-            if !is_turned && moved < 0.02 && errors.sigma_m > self.fit.widest_m * share {
-                break;
-            }
-        }
-        Ok(linear)
-    }
-
-    /// Where it stands, as likely as that is.
-    fn value(&self, linear: &Linear, errors: &ErrorModel) -> f64 {
-        linear.log_likelihood(&self.still(), errors) + self.log_prior(&self.values)
-    }
-
-    /// Settles without phases, and with them; the likelier one counts.
-    fn settle(&mut self, linear: Linear, errors: ErrorModel) -> Result<Settled, FitError> {
-        let without = self.settled(linear, errors)?;
-        (self.values, self.phases) = (without.values.clone(), Phases::Known);
-        let with = self.linear(false)?;
-        let with = self.settled(with, without.errors)?;
-        Ok(if with.value > without.value { with } else { without })
-    }
-
-    /// Finds the spread and the values in turn, as long as both get likelier.
-    fn settled(&mut self, mut linear: Linear, mut errors: ErrorModel) -> Result<Settled, FitError> {
-        let mut best: Option<Settled> = None;
-        for _ in 0..LAST_STAGES {
-            errors = self.spread(&linear, &errors);
-            let (value, values) = (self.value(&linear, &errors), self.values.clone());
-            if best.as_ref().is_some_and(|best| value <= best.value + 1e-3) {
-                break;
-            }
-            best = Some(Settled { value, values, errors, phases: self.phases });
-            self.improve(&linear, &errors)?;
-            linear = self.linear(false)?;
-        }
-        best.ok_or(FitError::Degenerate)
     }
 
     /// What came of it, where it settled.

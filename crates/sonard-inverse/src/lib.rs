@@ -33,7 +33,7 @@ mod world;
 pub use atlas::{Atlas, AtlasError};
 pub use course::{Course, Odometry};
 pub use doubt::{Doubt, doubts};
-pub use fit::{Estimate, Fit, FitError, Fitted, Prior, bound, fit};
+pub use fit::{Estimate, Fit, FitError, Fitted, Prior, Progress, bound, fit, fit_watched};
 pub use groups::{Group, GroupError, name, priors};
 pub use likelihood::ErrorModel;
 pub use locate::{Mode, locate};

@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::{FitError, STAGES, Settled, State};
+use super::{FitError, Progress, Settled, State, settle::STAGES};
 use crate::{candidates::Phases, likelihood::ErrorModel};
 
 /// Directions that are searched.
@@ -95,8 +95,11 @@ impl State<'_> {
         let has_body = self.start.scene.robot.is_some();
         let (places, apart) = if has_body { PLACES_OF_BODY } else { PLACES };
         let mut tried: Vec<Place> = Vec::new();
-        for (direction, sigma) in self.doubtful(&end.values, &widened(&end.errors, ROUGH))? {
+        let doubtful = self.doubtful(&end.values, &widened(&end.errors, ROUGH))?;
+        let of = doubtful.len() * 2 * places as usize;
+        for (direction, sigma) in doubtful {
             for place in (-places..=places).filter(|place| *place != 0) {
+                (self.watch)(Progress::Searching { place: tried.len() + 1, of });
                 let by = f64::from(place) * apart * sigma;
                 self.values = self.limited(&end.values + by * &direction);
                 tried.push(self.improved(&close)?);
