@@ -7,6 +7,7 @@ mod budget;
 mod gaps;
 mod networks;
 mod node;
+mod services;
 
 use std::{
     io,
@@ -29,6 +30,7 @@ use crate::{
     export::Topic,
 };
 use node::Node;
+use services::Services;
 
 /// From one try to open the ports of DDS to the next.
 const BETWEEN_TRIES: Duration = Duration::from_secs(5);
@@ -120,20 +122,32 @@ impl Teller {
         let opened = Node::open(&self.keys, &self.daemon, self.report.clone());
         let mut node = opened.map_err(|error| error.to_string())?;
         tracing::info!("ros: domain {} on {}", self.keys.domain, self.keys.networks.join(", "));
+        let services = match self.keys.commands {
+            true => Services::offer(&mut node).map_err(|error| error.to_string())?,
+            false => Services::none(),
+        };
         node.set_topics(&self.expected());
         let mut follower = Follower::begin(&self.daemon, self.keys.messages(), &mut node);
-        let ended = self.tell(&mut follower, &mut node).await;
+        let ended = self.tell(&mut follower, &mut node, &services).await;
         self.report = node.leave();
         ended
     }
 
-    async fn tell(&self, follower: &mut Follower, node: &mut Node) -> Result<(), String> {
-        let mut looks = interval(LOOK);
+    async fn tell(
+        &self,
+        follower: &mut Follower,
+        node: &mut Node,
+        services: &Services,
+    ) -> Result<(), String> {
+        let mut looks = interval(if services.are_offered() { services::LOOK } else { LOOK });
         looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
             tokio::select! {
                 more = follower.next(node) => if !more { return node.look_after() },
-                _ = looks.tick() => node.look_after()?,
+                _ = looks.tick() => {
+                    node.look_after()?;
+                    services.answer(&self.daemon, node).await;
+                }
             }
         }
     }

@@ -154,7 +154,7 @@ fn is_network(text: &str) -> bool {
     if is_digits_and_dots {
         return text.parse::<Ipv4Addr>().is_ok_and(|address| !address.is_unspecified());
     }
-    let fits = |c: char| c.is_ascii_graphic() && !matches!(c, '/' | ':' | '*');
+    let fits = |c: char| c.is_ascii_alphanumeric() || "-_.@".contains(c);
     (1..=MOST).contains(&text.len()) && text.chars().all(fits)
 }
 
