@@ -119,7 +119,7 @@ impl Teller {
 
     /// A node's life: ends well with the daemon, and else with what is wrong.
     async fn live(&mut self) -> Result<(), String> {
-        let opened = Node::open(&self.keys, &self.daemon, self.report.clone());
+        let opened = Node::open(&self.keys, &self.daemon, &self.report);
         let mut node = opened.map_err(|error| error.to_string())?;
         tracing::info!("ros: domain {} on {}", self.keys.domain, self.keys.networks.join(", "));
         let services = match self.keys.commands {

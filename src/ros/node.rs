@@ -106,7 +106,7 @@ impl Node {
     pub(super) fn open(
         keys: &RosKeys,
         daemon: &Handle,
-        report: RosReport,
+        report: &RosReport,
     ) -> Result<Self, Box<dyn std::error::Error>> {
         let networks = addresses(&keys.networks, &interfaces())?;
         let participant = DomainParticipantBuilder::new(keys.domain)
@@ -131,7 +131,7 @@ impl Node {
             distribution: keys.messages().distribution,
             namespace: keys.namespace.clone(),
             queue_bytes: keys.queue_kb as usize * 1000,
-            report: RosReport { networks, up, since, trouble: None, ..report },
+            report: RosReport { networks, up, since, trouble: None, ..report.clone() },
             gaps: Gaps::default(),
             fault: None,
         })
@@ -199,13 +199,14 @@ impl Node {
         self.fault.take().map_or(Ok(()), Err)
     }
 
-    /// Counts a service that was called.
-    pub(super) const fn count_command(&mut self, was_taken: bool) {
+    /// Counts a service that was called, before that is answered.
+    pub(super) fn count_command(&mut self, was_taken: bool) {
         if was_taken {
             self.report.commands += 1;
         } else {
             self.report.refused += 1;
         }
+        self.daemon.report_ros(self.report.clone());
     }
 
     /// Waits until the last messages are acknowledged, if that does not take long, and leaves.
