@@ -33,6 +33,5 @@ impl Ros {
         Ok(Self {})
     }
 
-    #[expect(clippy::unused_async, clippy::unused_self, reason = "with the feature it waits")]
     pub(super) async fn stop(self) {}
 }
