@@ -14,6 +14,7 @@ mod agenda;
 mod air;
 mod desk;
 mod fit;
+mod follower;
 mod forecast;
 mod hub;
 mod journal;
@@ -40,6 +41,7 @@ use uuid::Uuid;
 
 pub use agenda::{Agenda, Asked, Due};
 pub use desk::{Order, Request};
+pub(crate) use follower::{Audience, Follower};
 pub(crate) use hub::Shelf;
 pub use hub::{Attendance, Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
 pub use journal::{Journal, JournalThread};
@@ -53,11 +55,11 @@ pub use shared::NextScan;
 
 use crate::{
     api::{
-        ClockReport, ConfigurationReport, Health, InForce, LinkState, ScanTotals, Setup,
-        SimulationReport, Status, SubscriberReport,
+        ClockReport, ConfigurationReport, Health, InForce, LinkState, RosReport, ScanRequest,
+        ScanTotals, Setup, SimulationReport, Started, Status, SubscriberReport,
     },
     board::{Board, NoBoard},
-    scan::Session,
+    scan::{Event, EventKind, Record, Session},
     scene::Scene,
 };
 use air::AirDesk;
@@ -174,6 +176,36 @@ impl Handle {
         let (reply, answer) = oneshot::channel();
         self.orders.send(Request { order, reply }).await.map_err(|_| gone())?;
         answer.await.map_err(|_| gone())?
+    }
+
+    /// Takes in a request for scans, as programs make it.
+    ///
+    /// # Errors
+    /// As [`order`](Self::order), and for a request of no scans.
+    pub async fn start(&self, asked: ScanRequest) -> Result<Started, Refusal> {
+        let ScanRequest { scans, plan, pose } = asked;
+        if scans == Some(0) {
+            return Err(Refusal {
+                kind: RefusalKind::Wrong,
+                message: "scans is 0".into(),
+                help: "give 1 or more, or leave it out".into(),
+            });
+        }
+        let request = Uuid::new_v4();
+        self.order(Order::Start(Asked { request, scans, plan, pose })).await?;
+        Ok(Started { accepted: true, request })
+    }
+
+    /// An event of now for log and live streams.
+    pub fn event(&self, kind: EventKind, detail: String) {
+        let record = Record::Event(Event { time: Timestamp::now(), kind, detail });
+        self.journal.record(&record);
+        self.hub.publish(&record);
+    }
+
+    /// Says how it goes with ROS 2.
+    pub fn report_ros(&self, report: RosReport) {
+        self.shared.report_ros(report);
     }
 
     /// What the daemon is doing.

@@ -79,6 +79,8 @@ pub mod mock;
 pub mod pi;
 #[cfg(feature = "daemon")]
 pub mod ranger;
+#[cfg(feature = "ros")]
+pub mod ros;
 #[cfg(feature = "daemon")]
 pub mod server;
 #[cfg(feature = "store")]

@@ -174,6 +174,7 @@ impl RecordingArgs {
             },
             field_of_view_deg: self.field_of_view_deg,
             frame: self.frame.clone().unwrap_or(by_default.frame),
+            ..Settings::default()
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod load;
 mod mock;
+mod ros;
 
 use std::{
     io::{self, IsTerminal as _},
@@ -26,6 +27,7 @@ use crate::{
 };
 use load::Loader;
 use mock::Mock;
+use ros::Ros;
 
 /// Options of `sonard run`.
 #[derive(Debug, Clone, clap::Args)]
@@ -170,6 +172,7 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
         }
         None => daemon::prepare_simulated(journal, settings),
     };
+    let ros = Ros::start(&keys.ros, &handle)?;
     let server = Server::new(handle.clone(), log_folder, access, &keys, fleet);
     let reloading = tokio::spawn(reload_on_hangup(loader, handle, hangups));
     let ended = CancellationToken::new();
@@ -179,6 +182,7 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     reloading.abort();
     // It ends by itself; a panic in it is printed already.
     drop(serving.await);
+    ros.stop().await;
     let last = tokio::task::spawn_blocking(|| thread.close()).await.unwrap_or_default();
     match last.error {
         Some(error) => Err(Failure::device(format!("the log was not closed well: {error}"), "")),
@@ -232,9 +236,13 @@ fn print(text: &str) -> Outcome {
     written.or_else(|error| Failure::from_write("to standard output", &error))
 }
 
+/// What is said unless `SONARD_LOG` asks for something else: libraries say much.
+const BY_DEFAULT: &str = "info,rustdds=off";
+
 /// What the daemon says goes to standard error; under systemd the journal knows the time.
 fn say_on_stderr() {
-    let filter = EnvFilter::try_from_env("SONARD_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
+    let filter =
+        EnvFilter::try_from_env("SONARD_LOG").unwrap_or_else(|_| EnvFilter::new(BY_DEFAULT));
     let subscriber = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)

@@ -12,7 +12,7 @@ use super::{
     daemon::{Daemons, DaemonsArgs, refuse},
     runtime,
 };
-use crate::api::{Health, LinkReport, Pending, ScanFit, SimulationReport, Status};
+use crate::api::{Health, LinkReport, Pending, RosReport, ScanFit, SimulationReport, Status};
 
 /// Options of `sonard status`.
 #[derive(Debug, clap::Args)]
@@ -96,6 +96,7 @@ fn screen(status: &Status, health: &Health) -> String {
             clients.now, clients.dropped_readings, clients.cut_off,
         ),
     ]);
+    lines.extend(status.ros.as_ref().map(ros));
     lines.extend(pending(&status.pending));
     lines.extend(health.reasons.iter().map(|reason| format!("  not well: {reason}")));
     if let Some(error) = &air.error {
@@ -105,6 +106,18 @@ fn screen(status: &Status, health: &Health) -> String {
         lines.push(format!("  the last change of the configuration was refused: {error}"));
     }
     lines.join("\n")
+}
+
+/// How it goes with ROS 2.
+fn ros(report: &RosReport) -> String {
+    let RosReport { domain, messages, left_out, subscriptions, .. } = report;
+    let networks = report.networks.join(", ");
+    if let Some(why) = &report.trouble {
+        return format!("  ros      domain {domain} is not told: {why}");
+    }
+    format!(
+        "  ros      domain {domain} on {networks}; {subscriptions} subscriptions, {messages} messages, {left_out} left out"
+    )
 }
 
 /// How the last scan agrees with the model.

@@ -6,7 +6,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{air::AirKeys, fleet::FleetKeys, foxglove::FoxgloveKeys};
+use super::{air::AirKeys, fleet::FleetKeys, foxglove::FoxgloveKeys, ros::RosKeys};
 use crate::model::OptionKeys;
 
 /// Configuration of `sonard run`.
@@ -41,6 +41,8 @@ pub struct Keys {
     pub foxglove: FoxgloveKeys,
     /// This robot among others.
     pub fleet: FleetKeys,
+    /// Messages and services for ROS 2, by DDS; only in a build with the feature ros.
+    pub ros: RosKeys,
     /// Pins of a Raspberry Pi (BCM numbers); only in a build with the feature pi.
     pub gpio: GpioKeys,
 }

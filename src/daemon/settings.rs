@@ -164,6 +164,13 @@ impl Settings {
         })?;
         self.check_server()?;
         self.check_robot()?;
+        let built_in = cfg!(feature = "ros");
+        self.keys.ros.check(built_in).map_err(|(key, message, help)| Mismatch {
+            section: "ros",
+            key,
+            message,
+            help,
+        })?;
         if self.keys.link.retry_max_s < self.keys.link.retry_min_s {
             return Err(Mismatch {
                 section: "link",
@@ -229,6 +236,12 @@ impl Settings {
         }
         if now.fleet != then.fleet {
             keys.push("fleet".to_owned());
+        }
+        if now.foxglove != then.foxglove {
+            keys.push("foxglove".to_owned());
+        }
+        if now.ros != then.ros {
+            keys.push("ros".to_owned());
         }
         if now.gpio != then.gpio {
             keys.push("gpio".to_owned());

@@ -17,8 +17,8 @@ use super::{
 use crate::{
     api::{
         AirStatus, ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, LinkState,
-        LogStatus, Pending, ScanFit, ScanProgress, ScanTotals, ScanningReport, SensorFigures,
-        Setup, SimulationReport, Status, SubscriberReport,
+        LogStatus, Pending, RosReport, ScanFit, ScanProgress, ScanTotals, ScanningReport,
+        SensorFigures, Setup, SimulationReport, Status, SubscriberReport,
     },
     array::RangerArray,
     compare::Explanation,
@@ -169,6 +169,7 @@ pub(super) struct Shared {
     beats: AtomicU64,
     beams_done: AtomicU32,
     scans: Mutex<Collector>,
+    ros: Mutex<Option<RosReport>>,
 }
 
 /// What is remembered of scans. Their readings are in the log.
@@ -198,6 +199,7 @@ impl Shared {
             beats: AtomicU64::new(0),
             beams_done: AtomicU32::new(0),
             scans: Mutex::default(),
+            ros: Mutex::default(),
         }
     }
 
@@ -308,6 +310,7 @@ impl Shared {
             pending,
             log,
             subscribers,
+            ros: held(&self.ros).clone(),
             configuration: view.configuration,
             simulation: view.simulation,
         }
@@ -341,8 +344,17 @@ impl Shared {
         }
     }
 
-    fn scans(&self) -> MutexGuard<'_, Collector> {
-        // Nothing under this lock can panic, so a poisoned one holds what it should.
-        self.scans.lock().unwrap_or_else(PoisonError::into_inner)
+    /// How it goes with ROS 2.
+    pub(super) fn report_ros(&self, report: RosReport) {
+        *held(&self.ros) = Some(report);
     }
+
+    fn scans(&self) -> MutexGuard<'_, Collector> {
+        held(&self.scans)
+    }
+}
+
+/// Nothing under these locks can panic, so a poisoned one holds what it should.
+fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

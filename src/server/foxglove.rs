@@ -20,12 +20,11 @@ use uuid::Uuid;
 use super::Standing;
 use crate::{
     config::FoxgloveKeys,
-    daemon::{Handle, Line},
+    daemon::{Audience, Follower, Handle},
     export::{
-        Live, LiveMessage, Settings,
+        LiveMessage, Settings, Topic,
         foxglove::{MOST_TEXT_BYTES, server_info},
     },
-    scan::{Record, Session, decode_line},
 };
 use board::{Board, Found, MOST_MESSAGE_BYTES, Outgoing, Viewer};
 
@@ -70,13 +69,9 @@ impl Stage {
             most_viewers: keys.max_clients,
             session: Uuid::new_v4().to_string(),
         });
-        let mut follower =
-            Follower { stage: Arc::clone(&stage), live: Live::new(Settings::default()) };
-        // What is in force already was told to nobody.
-        if let Some(session) = daemon.session() {
-            follower.take(Record::Session(Box::new((*session).clone())));
-        }
-        tokio::spawn(follower.run());
+        let mut told = Told(Arc::clone(&stage));
+        let follower = Follower::begin(daemon, Settings::default(), &mut told);
+        tokio::spawn(follow(follower, told));
         stage
     }
 
@@ -161,64 +156,31 @@ impl Stage {
     }
 }
 
-/// What makes messages of the daemon's records.
-struct Follower {
-    stage: Arc<Stage>,
-    live: Live,
+/// The stage as the follower tells it.
+struct Told(Arc<Stage>);
+
+impl Audience for Told {
+    fn set_topics(&mut self, topics: &[Topic]) {
+        self.0.board().set_topics(topics);
+    }
+
+    fn tell(&mut self, message: &LiveMessage<'_>) {
+        self.0.board().put(message);
+    }
+
+    fn announce(&mut self, words: String) {
+        self.0.board().announce(words);
+    }
+
+    fn told(&mut self) {
+        self.0.changed.send_replace(());
+    }
 }
 
-impl Follower {
-    async fn run(mut self) {
-        let hub = self.stage.daemon.hub().clone();
-        while !hub.is_closed() {
-            let mut records = hub.follow();
-            while let Some(line) = records.next().await {
-                self.take_line(&line);
-            }
-            if !hub.is_closed() {
-                let words = "records came faster than they could be told: a scan is not whole";
-                self.stage.board().announce(words.into());
-            }
-        }
-        self.stage.board().close();
-        self.stage.changed.send_replace(());
-    }
-
-    fn take_line(&mut self, line: &Line) {
-        match decode_line(line.trim_ascii_end()) {
-            Ok(Record::Session(mut session)) => {
-                session.scene_text = self.scene_text(&session);
-                self.take(Record::Session(session));
-            }
-            // A whole scan takes its time.
-            Ok(record @ Record::ScanEnd(_)) => tokio::task::block_in_place(|| self.take(record)),
-            Ok(record) => self.take(record),
-            Err(_missed) => {
-                let words = "readings came faster than they could be told: some are left out";
-                self.stage.board().announce(words.into());
-            }
-        }
-        self.stage.changed.send_replace(());
-    }
-
-    /// The text of a session's scene, which live records go without.
-    fn scene_text(&self, session: &Session) -> Option<Arc<str>> {
-        let in_force = self.stage.daemon.session()?;
-        in_force.scene_text.clone().filter(|_| in_force.scene == session.scene)
-    }
-
-    fn take(&mut self, record: Record) {
-        let is_session = matches!(record, Record::Session(_));
-        let put = |message: LiveMessage<'_>| self.stage.board().put(&message);
-        if let Err(why) = self.live.take(record, put) {
-            let words = format!("nothing can be told of these scans: {why}");
-            tracing::warn!("foxglove: {words}");
-            self.stage.board().announce(words);
-        }
-        if is_session {
-            self.stage.board().set_topics(self.live.topics());
-        }
-    }
+async fn follow(mut follower: Follower, mut told: Told) {
+    while follower.next(&mut told).await {}
+    told.0.board().close();
+    told.0.changed.send_replace(());
 }
 
 /// Why a viewer is shown out whose connection brought what can't be read.

@@ -15,7 +15,7 @@ use crate::{
     LeftOut,
     ros::{
         cdr::Encode,
-        interface::{FLOAT, Interface, LASER_SCAN, MARKERS, POINT_CLOUD, RANGE, TRANSFORMS},
+        interface::{Interface, LASER_SCAN, MARKERS, POINT_CLOUD, TRANSFORMS},
         message::{Float, Header, Markers, Range, Stamp, Transforms},
     },
 };
@@ -24,10 +24,11 @@ use frames::Stance;
 use readings::{Figures, Heard, laser_scan, paths, points};
 pub(crate) use readings::{Firings, in_order};
 use scene::outlines;
-pub use settings::{Profile, Settings};
+pub use settings::{Distribution, Profile, Settings};
 use topics::OfReading;
 pub use topics::Topic;
-pub(crate) use topics::{FIXED_TRANSFORMS, SCENE};
+pub(crate) use topics::stands_still;
+use topics::{FIXED_TRANSFORMS, SCENE};
 
 /// Where messages go.
 pub(crate) trait Outlet {
@@ -82,7 +83,8 @@ impl Converter {
         (self.figures, self.topics, self.untold) = (None, Vec::new(), None);
         let figures = Figures::of(session, &self.settings)?;
         let scene = outlines(session);
-        self.topics = topics::of_session(session, &figures.frames, !scene.is_empty());
+        let distribution = self.settings.distribution;
+        self.topics = topics::of_session(session, &figures.frames, !scene.is_empty(), distribution);
         self.untold = Some(Untold { scene });
         self.figures = Some(figures);
         Ok(())
@@ -123,9 +125,9 @@ impl Converter {
             untold.tell(figures, fired, out)?;
         }
         let stance = Stance::of(robot, ping);
-        out.message(topics::TRANSFORMS_TOPIC, TRANSFORMS, fired, &figures.placed(fired, stance))?;
+        self.settings.place(figures, fired, stance, out)?;
         self.listening = Some(Listening { fired, stance });
-        figures.tell(self.settings.profile, ping, fired, out)
+        figures.tell(&self.settings, ping, fired, out)
     }
 
     /// Tells a scan whose readings are told, in the order of its plan.
@@ -168,7 +170,27 @@ impl Converter {
         if end == last.fired {
             return Ok(());
         }
-        out.message(topics::TRANSFORMS_TOPIC, TRANSFORMS, end, &figures.placed(end, last.stance))
+        self.settings.place(figures, end, last.stance, out)
+    }
+}
+
+impl Settings {
+    /// Tells where what moves is at a time.
+    fn place<O: Outlet>(
+        &self,
+        figures: &Figures,
+        at: Stamp,
+        stance: Stance,
+        out: &mut O,
+    ) -> Result<(), O::Error> {
+        let mut placed = figures.frames.moving(at, stance);
+        if !self.places_robot {
+            placed.retain(|transform| transform.header.frame != MAP);
+        }
+        match placed.is_empty() {
+            true => Ok(()),
+            false => out.message(topics::TRANSFORMS_TOPIC, TRANSFORMS, at, &Transforms(placed)),
+        }
     }
 }
 
@@ -190,14 +212,10 @@ impl Figures {
         Stamp(fired.0.saturating_add(self.window_ns.saturating_sub(1)))
     }
 
-    fn placed(&self, at: Stamp, stance: Stance) -> Transforms<'_> {
-        Transforms(self.frames.moving(at, stance))
-    }
-
     /// Tells what was heard, what was predicted, and by how much they differ, when both are known.
     fn tell<O: Outlet>(
         &self,
-        profile: Profile,
+        settings: &Settings,
         ping: &Ping,
         fired: Stamp,
         out: &mut O,
@@ -209,7 +227,7 @@ impl Figures {
             (OfReading::Predicted, Heard::predicted(ping)),
         ];
         for (told, heard) in readings {
-            let range = heard.and_then(|heard| self.range(profile, heard));
+            let range = heard.and_then(|heard| self.range(settings.profile, heard));
             let Some(range) = range else { continue };
             let message = Range {
                 header: Header { stamp: fired, frame },
@@ -217,13 +235,16 @@ impl Figures {
                 min_range: self.min_range_m as f32,
                 max_range: self.max_range_m as f32,
                 range,
+                has_variance: settings.distribution != Distribution::Humble,
             };
-            out.message(&told.topic(ranger), RANGE, heard_at, &message)?;
+            let interface = told.interface(settings.distribution);
+            out.message(&told.topic(ranger), interface, heard_at, &message)?;
         }
         match ping.residual_m {
             Some(residual_m) => {
-                let topic = OfReading::Residual.topic(ranger);
-                out.message(&topic, FLOAT, heard_at, &Float(residual_m))
+                let told = OfReading::Residual;
+                let interface = told.interface(settings.distribution);
+                out.message(&told.topic(ranger), interface, heard_at, &Float(residual_m))
             }
             None => Ok(()),
         }

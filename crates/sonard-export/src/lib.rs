@@ -2,7 +2,7 @@
 //! ROS 2 (MCAP); maps, lines and features as recordings and as GeoJSON.
 //!
 //! [`Live`] makes the messages of a recording of records as they come, and [`foxglove`] speaks the protocol that
-//! viewers ask for them by.
+//! viewers ask for them by; [`dds`] says how ROS 2 itself passes them on.
 //!
 //! An [`Export`] takes scans one by one and writes to whatever takes bytes, so that what it has in memory
 //! does not grow with the number of scans.
@@ -11,6 +11,7 @@
 
 mod columns;
 mod conversion;
+pub mod dds;
 mod error;
 pub mod foxglove;
 mod live;
@@ -28,7 +29,7 @@ use jiff::Timestamp;
 use sonard_records::ScanView;
 
 pub use columns::{COLUMNS, Column, Field, Kind, Row, Value};
-pub use conversion::{Profile, Settings, Topic};
+pub use conversion::{Distribution, Profile, Settings, Topic};
 pub use error::{ExportError, LeftOut};
 pub use live::{Live, LiveMessage};
 pub use parquet::{ParquetExport, TypedTable};

@@ -13,7 +13,7 @@ use prometheus_client::{
 };
 
 use crate::{
-    api::{Health, Status},
+    api::{Health, RosReport, Status},
     daemon::Handle,
     scan::Provenance,
     server::{Api, answer::Failed, openapi::Endpoint},
@@ -63,7 +63,26 @@ fn registry(daemon: &Handle) -> Registry {
     for (name, help, value) in gauges(&status, &health) {
         registry.register(name, help, ConstGauge::new(value));
     }
+    if let Some(report) = &status.ros {
+        register_ros(&mut registry, report);
+    }
     registry
+}
+
+/// How it goes with ROS 2, where that is told.
+fn register_ros(registry: &mut Registry, report: &RosReport) {
+    for (name, help, value) in [
+        ("ros_messages", "Messages to ROS 2", report.messages),
+        ("ros_left_out_messages", "Messages to ROS 2 that were left out", report.left_out),
+        ("ros_commands", "Services of ROS 2 that did what was asked", report.commands),
+        ("ros_refused_commands", "Services of ROS 2 that refused", report.refused),
+    ] {
+        registry.register(name, help, ConstCounter::new(value));
+    }
+    let up = f64::from(u8::from(report.up));
+    registry.register("ros_up", "Whether ROS 2 is told", ConstGauge::new(up));
+    let subscriptions = ConstGauge::new(report.subscriptions as f64);
+    registry.register("ros_subscriptions", "Subscriptions of ROS 2 to topics", subscriptions);
 }
 
 /// What only ever grows: name, meaning, value.

@@ -75,6 +75,9 @@ fn wrong_configurations_end_with_the_place_and_a_way_out() {
         ("[server]\nsocket_mode = \"00660\"\n", &port[..], &["three octal digits"]),
         ("[fleet]\nrobot = \"a/b\"\n", &port[..], &["s.toml:2:9", "letters, digits"]),
         ("[fleet]\nrobot = \"\"\n", &port[..], &["s.toml:2:9", "letters, digits"]),
+        ("[ros]\nenabled = true\nnamespace = \"kiwi\"\n", &port[..], &["s.toml:3:13", "/kiwi"]),
+        ("[ros]\nenabled = true\nnetworks = [\"*\"]\n", &port[..], &["s.toml:3:12", "wlan0"]),
+        ("[ros]\ndomain = 233\n", &port[..], &["s.toml:2:10", "232"]),
         ("[server]\nlisten = \"localhost\"\n", &port[..], &["s.toml:2:10", "127.0.0.1:8765"]),
         ("", &["--port", "x", "--set", "link.retry_max_s=0.1"][..], &["--set", "retry_min_s"]),
     ] {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use sonard_model::{
     acoustics::Mounting,
+    array::RangerArray,
     geometry::{DVec2, Pose},
 };
 use sonard_records::{Ping, Session};
@@ -55,11 +56,10 @@ impl Frames {
     pub(super) fn of(session: &Session, sonar: &str) -> Self {
         let mounting = session.sensor.mounting;
         let mut rangers: BTreeMap<String, Ranger> = BTreeMap::new();
-        for ranger in session.array.iter().flat_map(|array| &array.rangers) {
-            let mut name = plain(&ranger.id);
-            while rangers.values().any(|other| other.name == name) {
-                name.push('_');
-            }
+        let array = session.array.as_ref();
+        for (ranger, name) in
+            array.into_iter().flat_map(|array| array.rangers.iter().zip(names(array)))
+        {
             let (bearing_deg, z_m) = (ranger.bearing_deg, ranger.z_m.or(mounting.z_m));
             let [x, y, _] = face(&mounting, bearing_deg);
             let placed = Ranger {
@@ -130,6 +130,19 @@ impl Frames {
         }
         transforms
     }
+}
+
+/// The ids of an array's rangers as parts of the names of topics and frames.
+pub(super) fn names(array: &RangerArray) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for ranger in &array.rangers {
+        let mut name = plain(&ranger.id);
+        while names.contains(&name) {
+            name.push('_');
+        }
+        names.push(name);
+    }
+    names
 }
 
 /// The middle of a face from the axis that it is mounted on, turned by an azimuth.

@@ -21,11 +21,25 @@ impl Profile {
     }
 }
 
+/// Whose definitions messages follow: `sensor_msgs/Range` is not the same everywhere.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Distribution {
+    /// Up to Humble: a range has no variance.
+    Humble,
+    /// Iron, Jazzy and later.
+    #[default]
+    Jazzy,
+}
+
 /// How messages are made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// What a `Range` says of silence.
     pub profile: Profile,
+    /// Whose definitions messages follow.
+    pub distribution: Distribution,
+    /// Whether it is told where the robot is, `base_link` in `map`. Where others tell that, two would contradict each other.
+    pub places_robot: bool,
     /// Full angle of what a reading is valid for, degrees; without it, as far as the beam is 6 dB down, there and
     /// back.
     pub field_of_view_deg: Option<f64>,
@@ -35,6 +49,12 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { profile: Profile::default(), field_of_view_deg: None, frame: "sonar".to_owned() }
+        Self {
+            profile: Profile::default(),
+            distribution: Distribution::default(),
+            places_robot: true,
+            field_of_view_deg: None,
+            frame: "sonar".to_owned(),
+        }
     }
 }

@@ -1,10 +1,14 @@
 //! The topics, by name.
 
+use sonard_model::array::RangerArray;
 use sonard_records::{Provenance, Session};
 
-use super::frames::Frames;
+use super::{
+    frames::{Frames, names},
+    settings::Distribution,
+};
 use crate::ros::interface::{
-    FLOAT, Interface, LASER_SCAN, MARKERS, POINT_CLOUD, RANGE, TRANSFORMS,
+    FLOAT, Interface, LASER_SCAN, MARKERS, POINT_CLOUD, RANGE, RANGE_OF_HUMBLE, TRANSFORMS,
 };
 
 pub(crate) const TRANSFORMS_TOPIC: &str = "/tf";
@@ -39,10 +43,11 @@ impl OfReading {
         }
     }
 
-    const fn interface(self) -> Interface {
-        match self {
-            Self::Range | Self::Predicted => RANGE,
-            Self::Residual => FLOAT,
+    pub(super) const fn interface(self, distribution: Distribution) -> Interface {
+        match (self, distribution) {
+            (Self::Range | Self::Predicted, Distribution::Jazzy) => RANGE,
+            (Self::Range | Self::Predicted, Distribution::Humble) => RANGE_OF_HUMBLE,
+            (Self::Residual, _) => FLOAT,
         }
     }
 }
@@ -59,6 +64,27 @@ pub struct Topic {
 }
 
 impl Topic {
+    /// What there will be messages of, as far as can be told before the first session says: of a ranger that turns, or of
+    /// an array's; with predictions, and with a scene, if there are any.
+    #[must_use]
+    pub fn expected(
+        array: Option<&RangerArray>,
+        predicts: bool,
+        draws_scene: bool,
+        distribution: Distribution,
+    ) -> Vec<Self> {
+        let rangers = array.map(names).unwrap_or_default();
+        let rangers: Vec<&str> = rangers.iter().map(String::as_str).collect();
+        of_rangers(&rangers, predicts, draws_scene, distribution)
+    }
+
+    /// Whether it tells once what stands still, so that each subscriber must get it whenever it comes: transient local,
+    /// in words of ROS 2.
+    #[must_use]
+    pub fn stands_still(&self) -> bool {
+        stands_still(&self.name)
+    }
+
     /// The type of its messages, as `package/msg/Type`.
     #[must_use]
     pub const fn type_name(&self) -> &'static str {
@@ -72,32 +98,52 @@ impl Topic {
     }
 }
 
+/// Whether the messages of a topic tell what stands still.
+pub(crate) fn stands_still(topic: &str) -> bool {
+    const STILL: [&str; 5] = [FIXED_TRANSFORMS, SCENE, "/map", "/sonar/lines", "/sonar/features"];
+    STILL.contains(&topic)
+}
+
 /// The topics of a session, those of an array's rangers by their names.
-pub(super) fn of_session(session: &Session, frames: &Frames, draws_scene: bool) -> Vec<Topic> {
+pub(super) fn of_session(
+    session: &Session,
+    frames: &Frames,
+    draws_scene: bool,
+    distribution: Distribution,
+) -> Vec<Topic> {
+    // Of what the model made itself there is nothing beside it.
+    let predicts = session.model.is_some() && session.provenance != Provenance::Simulated;
+    of_rangers(&frames.rangers(), predicts, draws_scene, distribution)
+}
+
+/// The topics of a ranger that turns, or of an array's by their names.
+fn of_rangers(
+    rangers: &[&str],
+    predicts: bool,
+    draws_scene: bool,
+    distribution: Distribution,
+) -> Vec<Topic> {
     let kept = |name: &str, interface| Topic { name: name.to_owned(), is_kept: true, interface };
     let mut topics = vec![kept(FIXED_TRANSFORMS, TRANSFORMS), kept(TRANSFORMS_TOPIC, TRANSFORMS)];
     if draws_scene {
         topics.push(kept(SCENE, MARKERS));
     }
-    let rangers = frames.rangers();
     if rangers.is_empty() {
         topics.push(kept(SCAN, LASER_SCAN));
     }
     topics.extend([kept(POINTS, POINT_CLOUD), kept(PATHS, MARKERS)]);
-    // Of what the model made itself there is nothing beside it.
-    let predicts = session.model.is_some() && session.provenance != Provenance::Simulated;
     if predicts {
         topics.push(kept(PREDICTED_POINTS, POINT_CLOUD));
     }
     let rangers: Vec<Option<&str>> =
-        if rangers.is_empty() { vec![None] } else { rangers.into_iter().map(Some).collect() };
+        if rangers.is_empty() { vec![None] } else { rangers.iter().copied().map(Some).collect() };
     for ranger in rangers {
         let told = OfReading::ALL.into_iter();
         let told = told.filter(|one| predicts || *one == OfReading::Range);
         topics.extend(told.map(|one| Topic {
             name: one.topic(ranger),
             is_kept: false,
-            interface: one.interface(),
+            interface: one.interface(distribution),
         }));
     }
     topics

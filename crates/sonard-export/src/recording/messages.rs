@@ -13,7 +13,7 @@ use mcap::{
 
 use crate::{
     ExportError,
-    conversion::{FIXED_TRANSFORMS, Outlet, SCENE},
+    conversion::{Outlet, stands_still},
     ros::{
         cdr::{Cdr, Encode},
         interface::Interface,
@@ -34,9 +34,6 @@ struct Channel {
     id: u16,
     sequence: u32,
 }
-
-/// Topics of what stands still: kept for those who come late.
-const KEPT: [&str; 5] = [FIXED_TRANSFORMS, SCENE, "/map", "/sonar/lines", "/sonar/features"];
 
 /// Messages are compressed together, so many bytes of them: what waits in memory.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -125,7 +122,7 @@ impl<W: Write> Outlet for Messages<W> {
 
 /// The profile that a topic was offered with, as rosbag2 has it in its text.
 fn quality_of_service(topic: &str) -> String {
-    let (depth, durability) = match KEPT.contains(&topic) {
+    let (depth, durability) = match stands_still(topic) {
         true => (1, "transient_local"),
         false => (10, "volatile"),
     };

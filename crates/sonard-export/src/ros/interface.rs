@@ -39,6 +39,23 @@ float32 variance
     parts: &[HEADER, TIME],
 };
 
+/// `sensor_msgs/Range` as it was up to Humble.
+pub(crate) const RANGE_OF_HUMBLE: Interface = Interface {
+    name: "sensor_msgs/msg/Range",
+    hash: "RIHS01_9430b1915b94d4268ff903679e8ecd09b6a67d331bd028738ec1eeb592891ebd",
+    definition: "\
+uint8 ULTRASOUND=0
+uint8 INFRARED=1
+std_msgs/Header header
+uint8 radiation_type
+float32 field_of_view
+float32 min_range
+float32 max_range
+float32 range
+",
+    parts: &[HEADER, TIME],
+};
+
 pub(crate) const FLOAT: Interface = Interface {
     name: "std_msgs/msg/Float64",
     hash: "RIHS01_705ba9c3d1a09df43737eb67095534de36fd426c0587779bda2bc51fe790182a",

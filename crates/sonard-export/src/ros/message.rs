@@ -31,7 +31,7 @@ impl Encode for Header<'_> {
     }
 }
 
-/// `sensor_msgs/Range` of an ultrasonic ranger, as it is since Iron.
+/// `sensor_msgs/Range` of an ultrasonic ranger.
 #[derive(Debug)]
 pub(crate) struct Range<'a> {
     pub(crate) header: Header<'a>,
@@ -40,6 +40,8 @@ pub(crate) struct Range<'a> {
     pub(crate) min_range: f32,
     pub(crate) max_range: f32,
     pub(crate) range: f32,
+    /// Whether there is a variance, as there is since Iron.
+    pub(crate) has_variance: bool,
 }
 
 impl Encode for Range<'_> {
@@ -49,8 +51,11 @@ impl Encode for Range<'_> {
         const UNKNOWN: f32 = 0.0;
         self.header.encode(cdr);
         cdr.u8(ULTRASOUND);
-        for value in [self.field_of_view, self.min_range, self.max_range, self.range, UNKNOWN] {
+        for value in [self.field_of_view, self.min_range, self.max_range, self.range] {
             cdr.f32(value);
+        }
+        if self.has_variance {
+            cdr.f32(UNKNOWN);
         }
     }
 }

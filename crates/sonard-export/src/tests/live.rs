@@ -2,14 +2,18 @@ use std::collections::BTreeMap;
 
 use sonard_records::{PingStatus, Record};
 
-use crate::{Export as _, Live, McapExport, Settings};
+use crate::{Distribution, Export as _, Live, McapExport, Settings, Topic};
 
 use super::scans::{measured, of_array, records_of_measured};
 
 type Messages = BTreeMap<String, Vec<(u64, Vec<u8>)>>;
 
 fn told(records: impl IntoIterator<Item = Record>) -> (Live, Messages) {
-    let (mut live, mut messages) = (Live::new(Settings::default()), Messages::new());
+    told_with(Settings::default(), records)
+}
+
+fn told_with(settings: Settings, records: impl IntoIterator<Item = Record>) -> (Live, Messages) {
+    let (mut live, mut messages) = (Live::new(settings), Messages::new());
     for record in records {
         live.take(record, |message| {
             let told = (message.at_ns, message.bytes.to_vec());
@@ -59,6 +63,48 @@ fn topics_are_those_of_the_session_in_force() {
     assert!(names.contains(&"/sonar/s0/range") && !names.contains(&"/sonar/scan"), "{names:?}");
     assert!(live.topics().iter().all(|topic| topic.is_kept != topic.name.ends_with("/range")));
     assert_eq!(Live::new(Settings::default()).topics(), []);
+}
+
+#[test]
+fn what_is_expected_is_what_the_session_then_says() {
+    let jazzy = Distribution::Jazzy;
+    let (live, _) = told(records_of_measured());
+    let draws = |live: &Live| live.topics().iter().any(|topic| topic.name == "/sonar/scene");
+    let predicts = |live: &Live| live.topics().iter().any(|topic| topic.name == "/sonar/residual");
+    assert!(predicts(&live));
+    assert_eq!(Topic::expected(None, true, draws(&live), jazzy), live.topics());
+
+    let session = of_array().remove(0).session.expect("it has one");
+    let mut live = Live::new(Settings::default());
+    live.take(Record::Session(Box::new((*session).clone())), |_| {}).expect("a whole session");
+    let expected = Topic::expected(session.array.as_ref(), predicts(&live), draws(&live), jazzy);
+    assert_eq!(expected, live.topics());
+}
+
+#[test]
+fn a_range_of_humble_is_that_of_jazzy_without_its_variance() {
+    let humble = Settings { distribution: Distribution::Humble, ..Settings::default() };
+    let (live, of_humble) = told_with(humble, records_of_measured());
+    let (_, of_jazzy) = told(records_of_measured());
+    for (topic, messages) in &of_jazzy {
+        let less = if topic.ends_with("/range") { 4 } else { 0 };
+        let cut = messages.iter().map(|(at, bytes)| (*at, bytes[..bytes.len() - less].to_vec()));
+        assert!(of_humble[topic] == cut.collect::<Vec<_>>(), "{topic}");
+    }
+    let range = live.topics().iter().find(|topic| topic.name == "/sonar/range").expect("there");
+    assert!(!range.definition().contains("variance"));
+}
+
+#[test]
+fn where_others_place_the_robot_only_the_ranger_is_placed() {
+    let elsewhere = Settings { places_robot: false, ..Settings::default() };
+    let (_, placed) = told_with(elsewhere, records_of_measured());
+    let (_, all) = told(records_of_measured());
+    let has = |bytes: &[u8], name: &[u8]| bytes.windows(name.len()).any(|part| part == name);
+    assert_eq!(placed["/tf"].len(), all["/tf"].len());
+    assert!(all["/tf"].iter().all(|(_, bytes)| has(bytes, b"map\0") && has(bytes, b"base_link\0")));
+    assert!(placed["/tf"].iter().all(|(_, bytes)| !has(bytes, b"map\0") && has(bytes, b"sonar\0")));
+    assert_eq!(placed["/tf_static"], all["/tf_static"]);
 }
 
 #[test]
