@@ -13,6 +13,7 @@
 #   PYTHON=0 ./test.sh          leave the package for Python out, where there is no Python or PyPI
 #   EXPORT_PEERS=0 ./test.sh    leave the other programs that read exports out, where there is no PyPI
 #   FOXGLOVE_PEER=0 ./test.sh   leave Foxglove's client library out, where there is no npm or node
+#   MQTT_PEER=0 ./test.sh       leave mosquitto out, where Debian's packages can't be had
 #   PROMTOOL=0 ./test.sh        leave promtool out, where Debian's prometheus can't be had
 #   FAKETIME=0 ./test.sh        leave the clock that is set out, where there is no libfaketime
 #   BOOT=0 ./test.sh            leave the units under a booted systemd out (systemd/boot-test.sh)
@@ -230,6 +231,16 @@ check_viewers() {
     fail "viewers are not told what the log says, or the library can't be had: FOXGLOVE_PEER=0 leaves it out"
 }
 
+check_broker() {
+  if [ "${MQTT_PEER:-1}" = 0 ]; then
+    step "records as mosquitto gets them: LEFT OUT, because MQTT_PEER=0"
+    return
+  fi
+  step "records as mosquitto gets them"
+  tests/peers/mqtt.sh "${CARGO_TARGET_DIR:-target}/debug/sonard" ||
+    fail "a broker does not get what the log says, or mosquitto can't be had: MQTT_PEER=0 leaves it out"
+}
+
 check_monitoring() {
   if [ "${PROMTOOL:-1}" = 0 ]; then
     step "alerts as Prometheus reads them: LEFT OUT, because PROMTOOL=0"
@@ -302,6 +313,7 @@ quick)
   check_python
   check_exports
   check_viewers
+  check_broker
   check_monitoring
   test_page
   step "tests"

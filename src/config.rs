@@ -10,6 +10,7 @@ mod fleet;
 mod foxglove;
 mod keys;
 mod layers;
+mod mqtt;
 mod schema;
 
 pub use air::AirKeys;
@@ -22,4 +23,5 @@ pub use keys::{
     PlanKeys, ScanningKeys, ServerKeys, SimulateKeys,
 };
 pub use layers::{ConfigError, Layers, Origin};
+pub use mqtt::{Broker, MqttKeys};
 pub use schema::{Form, Key, Kind, Section, read_sections, sections};

@@ -53,11 +53,11 @@ pub use shared::NextScan;
 
 use crate::{
     api::{
-        ClockReport, ConfigurationReport, Health, InForce, LinkState, ScanTotals, Setup,
-        SimulationReport, Status, SubscriberReport,
+        ClockReport, ConfigurationReport, Health, InForce, LinkState, MqttReport, ScanRequest,
+        ScanTotals, Setup, SimulationReport, Started, Status, SubscriberReport,
     },
     board::{Board, NoBoard},
-    scan::Session,
+    scan::{Event, EventKind, Record, Session},
     scene::Scene,
 };
 use air::AirDesk;
@@ -176,10 +176,46 @@ impl Handle {
         answer.await.map_err(|_| gone())?
     }
 
+    /// Takes in a request for scans, as programs make it.
+    ///
+    /// # Errors
+    /// As [`order`](Self::order), and for a request of no scans.
+    pub async fn start(&self, asked: ScanRequest) -> Result<Started, Refusal> {
+        let ScanRequest { scans, plan, pose } = asked;
+        if scans == Some(0) {
+            return Err(Refusal {
+                kind: RefusalKind::Wrong,
+                message: "scans is 0".into(),
+                help: "give 1 or more, or leave it out".into(),
+            });
+        }
+        let request = Uuid::new_v4();
+        self.order(Order::Start(Asked { request, scans, plan, pose })).await?;
+        Ok(Started { accepted: true, request })
+    }
+
+    /// An event of now for log and live streams.
+    pub fn event(&self, kind: EventKind, detail: String) {
+        let record = Record::Event(Event { time: Timestamp::now(), kind, detail });
+        self.journal.record(&record);
+        self.hub.publish(&record);
+    }
+
+    /// Says how it goes with the MQTT broker.
+    pub fn report_mqtt(&self, report: MqttReport) {
+        self.shared.report_mqtt(report);
+    }
+
     /// What the daemon is doing.
     #[must_use]
     pub fn status(&self) -> Status {
         self.shared.status(self.journal.status(), self.subscribers())
+    }
+
+    /// Records that are in the log since the start.
+    #[must_use]
+    pub fn records_written(&self) -> u64 {
+        self.journal.written()
     }
 
     /// Whether all is well.

@@ -75,10 +75,14 @@ pub mod interrupts;
 pub mod link;
 #[cfg(feature = "daemon")]
 pub mod mock;
+#[cfg(feature = "mqtt")]
+pub mod mqtt;
 #[cfg(feature = "pi")]
 pub mod pi;
 #[cfg(feature = "daemon")]
 pub mod ranger;
+#[cfg(feature = "daemon")]
+pub mod secret;
 #[cfg(feature = "daemon")]
 pub mod server;
 #[cfg(feature = "store")]

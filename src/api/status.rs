@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 use super::{
-    air::AirStatus, link::LinkReport, sensor::SensorFigures, setup::Setup,
+    air::AirStatus, link::LinkReport, mqtt::MqttReport, sensor::SensorFigures, setup::Setup,
     simulation::SimulationReport,
 };
 use crate::{
@@ -53,6 +53,9 @@ pub struct Status {
     pub log: LogStatus,
     /// Clients of live streams.
     pub subscribers: SubscriberReport,
+    /// What goes to an MQTT broker, if one is named.
+    #[serde(default)]
+    pub mqtt: Option<MqttReport>,
     /// What became of the last change of the configuration.
     pub configuration: ConfigurationReport,
     /// The array that the model plays, where nothing is measured.

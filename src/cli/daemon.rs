@@ -8,7 +8,7 @@ use crate::{
     fleet::{Asked, Member, MemberError, check_all, read_members},
     scan::SceneRef,
     scene::Scene,
-    server::{TokenError, read_token},
+    server::read_token,
 };
 
 /// Where the daemon is.
@@ -118,10 +118,8 @@ pub(super) fn asked(members: Vec<Member>) -> Result<Vec<Asked>, Failure> {
 
 fn token(file: &Path) -> Result<String, Failure> {
     read_token(file).map_err(|error| {
-        let help = match error {
-            TokenError::Open(_) => error.help(file),
-            _ => "give a copy of the daemon's server.token_file".into(),
-        };
+        let copy = || "give a copy of the daemon's server.token_file".into();
+        let help = error.help(file).unwrap_or_else(copy);
         Failure::input(format!("cannot read the token in {}: {error}", file.display()), help)
     })
 }

@@ -12,7 +12,7 @@ use super::{
     daemon::{Daemons, DaemonsArgs, refuse},
     runtime,
 };
-use crate::api::{Health, LinkReport, Pending, ScanFit, SimulationReport, Status};
+use crate::api::{Health, LinkReport, MqttReport, Pending, ScanFit, SimulationReport, Status};
 
 /// Options of `sonard status`.
 #[derive(Debug, clap::Args)]
@@ -96,6 +96,7 @@ fn screen(status: &Status, health: &Health) -> String {
             clients.now, clients.dropped_readings, clients.cut_off,
         ),
     ]);
+    lines.extend(status.mqtt.as_ref().map(broker));
     lines.extend(pending(&status.pending));
     lines.extend(health.reasons.iter().map(|reason| format!("  not well: {reason}")));
     if let Some(error) = &air.error {
@@ -105,6 +106,17 @@ fn screen(status: &Status, health: &Health) -> String {
         lines.push(format!("  the last change of the configuration was refused: {error}"));
     }
     lines.join("\n")
+}
+
+/// How it goes with the MQTT broker.
+fn broker(report: &MqttReport) -> String {
+    let MqttReport { broker, acknowledged, behind_bytes, .. } = report;
+    let is_there = if report.connected { "is there" } else { "is not there" };
+    let why = report.trouble.as_ref().map(|why| format!(" ({why})")).unwrap_or_default();
+    let behind_kb = *behind_bytes as f64 / 1e3;
+    format!(
+        "  mqtt     {broker} {is_there}{why}; {acknowledged} records acknowledged, {behind_kb:.0} kB behind"
+    )
 }
 
 /// How the last scan agrees with the model.

@@ -6,7 +6,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{air::AirKeys, fleet::FleetKeys, foxglove::FoxgloveKeys};
+use super::{air::AirKeys, fleet::FleetKeys, foxglove::FoxgloveKeys, mqtt::MqttKeys};
 use crate::model::OptionKeys;
 
 /// Configuration of `sonard run`.
@@ -41,6 +41,8 @@ pub struct Keys {
     pub foxglove: FoxgloveKeys,
     /// This robot among others.
     pub fleet: FleetKeys,
+    /// Records to an MQTT broker, from the log; only in a build with the feature mqtt.
+    pub mqtt: MqttKeys,
     /// Pins of a Raspberry Pi (BCM numbers); only in a build with the feature pi.
     pub gpio: GpioKeys,
 }

@@ -164,6 +164,13 @@ impl Settings {
         })?;
         self.check_server()?;
         self.check_robot()?;
+        let built_in = cfg!(feature = "mqtt");
+        self.keys.mqtt.check(built_in).map_err(|(key, message, help)| Mismatch {
+            section: "mqtt",
+            key,
+            message,
+            help,
+        })?;
         if self.keys.link.retry_max_s < self.keys.link.retry_min_s {
             return Err(Mismatch {
                 section: "link",
@@ -229,6 +236,12 @@ impl Settings {
         }
         if now.fleet != then.fleet {
             keys.push("fleet".to_owned());
+        }
+        if now.foxglove != then.foxglove {
+            keys.push("foxglove".to_owned());
+        }
+        if now.mqtt != then.mqtt {
+            keys.push("mqtt".to_owned());
         }
         if now.gpio != then.gpio {
             keys.push("gpio".to_owned());

@@ -17,8 +17,8 @@ use super::{
 use crate::{
     api::{
         AirStatus, ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, LinkState,
-        LogStatus, Pending, ScanFit, ScanProgress, ScanTotals, ScanningReport, SensorFigures,
-        Setup, SimulationReport, Status, SubscriberReport,
+        LogStatus, MqttReport, Pending, ScanFit, ScanProgress, ScanTotals, ScanningReport,
+        SensorFigures, Setup, SimulationReport, Status, SubscriberReport,
     },
     array::RangerArray,
     compare::Explanation,
@@ -169,6 +169,7 @@ pub(super) struct Shared {
     beats: AtomicU64,
     beams_done: AtomicU32,
     scans: Mutex<Collector>,
+    mqtt: Mutex<Option<MqttReport>>,
 }
 
 /// What is remembered of scans. Their readings are in the log.
@@ -198,6 +199,7 @@ impl Shared {
             beats: AtomicU64::new(0),
             beams_done: AtomicU32::new(0),
             scans: Mutex::default(),
+            mqtt: Mutex::default(),
         }
     }
 
@@ -308,6 +310,7 @@ impl Shared {
             pending,
             log,
             subscribers,
+            mqtt: held(&self.mqtt).clone(),
             configuration: view.configuration,
             simulation: view.simulation,
         }
@@ -341,8 +344,17 @@ impl Shared {
         }
     }
 
-    fn scans(&self) -> MutexGuard<'_, Collector> {
-        // Nothing under this lock can panic, so a poisoned one holds what it should.
-        self.scans.lock().unwrap_or_else(PoisonError::into_inner)
+    /// How it goes with the broker.
+    pub(super) fn report_mqtt(&self, report: MqttReport) {
+        *held(&self.mqtt) = Some(report);
     }
+
+    fn scans(&self) -> MutexGuard<'_, Collector> {
+        held(&self.scans)
+    }
+}
+
+/// Nothing under these locks can panic, so a poisoned one holds what it should.
+fn held<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

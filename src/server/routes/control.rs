@@ -1,11 +1,10 @@
 //! Orders.
 
 use axum::{Json, extract::State, http::StatusCode};
-use uuid::Uuid;
 
 use crate::{
     api::{Accepted, AirOrder, CancelRequest, ScanRequest, Scanning, SensorOrder, Started},
-    daemon::{Asked, Order},
+    daemon::Order,
     geometry::Pose,
     scan::ScanPlan,
     server::{
@@ -72,14 +71,7 @@ async fn start(
     State(api): State<Api>,
     Body(start): Body<ScanRequest>,
 ) -> Result<(StatusCode, Json<Started>), Failed> {
-    if start.scans == Some(0) {
-        let help = "give 1 or more, or leave it out";
-        return Err(Failed::new(StatusCode::UNPROCESSABLE_ENTITY, "scans is 0", help));
-    }
-    let ScanRequest { scans, plan, pose } = start;
-    let request = Uuid::new_v4();
-    api.daemon.order(Order::Start(Asked { request, scans, plan, pose })).await?;
-    Ok((StatusCode::ACCEPTED, Json(Started { accepted: true, request })))
+    Ok((StatusCode::ACCEPTED, Json(api.daemon.start(start).await?)))
 }
 
 async fn cancel(State(api): State<Api>, Body(cancel): Body<CancelRequest>) -> Answer {

@@ -13,6 +13,7 @@ mod kill;
 mod load;
 pub(crate) mod model;
 mod monitoring;
+mod mqtt;
 mod requests;
 pub(crate) mod rig;
 mod schema;
