@@ -5,8 +5,8 @@ use std::{future::Future, io, pin::Pin, time::Duration};
 use bytes::Bytes;
 use futures_util::{StreamExt as _, stream::FuturesUnordered};
 use rumqttc::{
-    AsyncClient, ConnectReturnCode, ConnectionError, Event, EventLoop, Incoming, Publish,
-    PublishOptions, QoS, StateError,
+    AsyncClient, ClientError, ConnectReturnCode, ConnectionError, Event, EventLoop, Incoming,
+    Publish, PublishOptions, QoS, StateError,
 };
 use tokio::{
     sync::mpsc,
@@ -78,8 +78,12 @@ impl Connection {
         sent: Sent,
     ) -> Result<(), String> {
         let options = PublishOptions::new(QoS::AtLeastOnce).retain(kind.is_retained());
-        let notice = self.client.try_publish_tracked(topic, payload, options);
-        let notice = notice.map_err(|error| error.to_string())?;
+        let notice = match self.client.try_publish_tracked(topic, payload, options) {
+            Ok(notice) => notice,
+            // Why it is over is among the news.
+            Err(ClientError::RequestChannelDisconnected(_)) => return Ok(()),
+            Err(error) => return Err(error.to_string()),
+        };
         // Without an acknowledgement there is news of the connection's end.
         self.under_way.push(Box::pin(async move { notice.wait_async().await.ok().map(|_| sent) }));
         Ok(())

@@ -22,7 +22,7 @@ READINGS = 10_000
 ROBOT = "kiwi"
 COMMON = ["--mock", "--scene", "simple-room", "--pose", "fig9", "--virtual-time"]
 SMALL = ["model.max_range_m=3", f"fleet.robot={ROBOT}"]
-CONTINUOUS = "scanning.mode=continuous"
+SCANS = READINGS // 400 + 1
 
 
 def spawn(command, **pipes):
@@ -104,6 +104,11 @@ class Subscriber:
         lines = self.file.read_bytes().split(b"\n")[:-1]
         fields = (line.decode().split(" ", 2) for line in lines)
         return [(topic.removeprefix(f"sonard/{ROBOT}/"), text) for topic, _retained, text in fields]
+
+    def pings(self):
+        """Readings that came, each counted once."""
+        lines = self.file.read_bytes().split(b"\n")[:-1]
+        return len({line for line in lines if line.startswith(f"sonard/{ROBOT}/ping ".encode())})
 
     def stop(self):
         self.process.terminate()
@@ -197,7 +202,29 @@ def online(messages):
 
 
 def pings(folder):
-    return sum(record["type"] == "ping" for record in log(folder))
+    return sum(file.read_bytes().count(b'{"type":"ping",') for file in (folder / "log").glob("sonard-*.jsonl"))
+
+
+def is_ready(daemon):
+    return daemon.ask("GET", "/v1/status")["link"]["state"] in ("ready", "scanning")
+
+
+def is_idle(daemon):
+    status = daemon.ask("GET", "/v1/status")
+    return status["scan"] is None and status["scanning"]["requested"] == 0
+
+
+def take_scans(daemon, scans):
+    until("the ranger", lambda: is_ready(daemon))
+    daemon.ask("POST", "/v1/start", {"scans": scans})
+
+
+def wait_for_rest(daemon):
+    """Until no scan is taken any more, and the broker has all."""
+    until("the scans", lambda: is_idle(daemon))
+    # Longer than it takes to tell how far behind the broker is.
+    time.sleep(2.5)
+    until("all of it", lambda: daemon.mqtt()["connected"] and daemon.mqtt()["behind_bytes"] == 0)
 
 
 def kills(work):
@@ -207,23 +234,27 @@ def kills(work):
     broker = Broker(work / "kills-broker")
     subscriber = Subscriber(folder, broker)
     broker.remember()
-    settings = [f"mqtt.broker=mqtt://127.0.0.1:{broker.port}", CONTINUOUS, "log.rotate_mb=1"]
+    settings = [f"mqtt.broker=mqtt://127.0.0.1:{broker.port}", "log.rotate_mb=1"]
     daemon = Daemon(folder, settings)
-    for share in (1, 2, 3, 4):
-        until("readings", lambda: pings(folder) > READINGS * share // 5, 200)
-        if share % 2:
+    kills = 0
+    while pings(folder) < READINGS:
+        # What a broker has for a subscriber that is not back yet goes with the broker, and is no daemon's loss.
+        until("the subscriber", lambda: subscriber.pings() == pings(folder))
+        before = pings(folder)
+        take_scans(daemon, 5)
+        # In the middle of the scans, and of what is under way.
+        until("readings", lambda: pings(folder) > before + 200)
+        kills += 1
+        if kills % 2:
             broker.kill()
-            time.sleep(1)
             broker.start()
+            until("the scans", lambda: is_idle(daemon))
         else:
             daemon.kill()
             daemon = Daemon(folder, settings)
-    until("readings", lambda: pings(folder) > READINGS, 200)
-    # No more scans, and what is left of the log.
-    daemon.ask("PUT", "/v1/scanning", {"mode": "on-request"})
-    daemon.ask("POST", "/v1/stop")
-    until("the scan's end", lambda: daemon.ask("GET", "/v1/status")["scan"] is None)
-    until("all of it", lambda: daemon.mqtt()["connected"] and daemon.mqtt()["behind_bytes"] == 0)
+    assert kills >= 4
+    take_scans(daemon, 1)
+    wait_for_rest(daemon)
     daemon.stop()
     logged = log(folder)
     until("the last one", lambda: subscriber.messages() and online(subscriber.messages())[-1] == "false")
@@ -234,7 +265,7 @@ def kills(work):
     assert "false" in online(messages)[:-1], "no last will was heard"
     broker.kill()
     count = sum(record["type"] == "ping" for record in logged)
-    print(f"{count} readings, {len(logged)} records: none lost, {twice} came twice")
+    print(f"{count} readings, {len(logged)} records, {kills} kills: none lost, {twice} came twice")
 
 
 def catch_up(work):
@@ -242,8 +273,9 @@ def catch_up(work):
     folder = work / "catch-up"
     folder.mkdir()
     port = free_port()
-    daemon = Daemon(folder, [f"mqtt.broker=mqtt://127.0.0.1:{port}", CONTINUOUS])
-    until("readings", lambda: pings(folder) > READINGS, 200)
+    daemon = Daemon(folder, [f"mqtt.broker=mqtt://127.0.0.1:{port}"])
+    take_scans(daemon, SCANS)
+    until("readings", lambda: daemon.ask("GET", "/v1/health")["scans"]["completed"] == SCANS)
     daemon.stop()
     assert "nobody listens there" in (folder / "said").read_text()
     broker = Broker(work / "catch-up-broker")
@@ -308,8 +340,7 @@ def secrets(work):
     for host in ("localhost", "127.0.0.1"):
         daemon = Daemon(folder, settings("right", "ca", host))
         until("a connection", lambda: daemon.mqtt()["connected"])
-        until("the ranger", lambda: daemon.ask("GET", "/v1/status")["link"]["state"] == "ready")
-        daemon.ask("POST", "/v1/start", {"scans": 2})
+        take_scans(daemon, 2)
         until("scans", lambda: daemon.ask("GET", "/v1/health")["scans"]["completed"] == 2)
         daemon.stop()
     until("the last one", lambda: online(subscriber.messages())[-2:] == ["true", "false"])
@@ -333,7 +364,7 @@ def commands(work):
     # One that waited is not carried out.
     publish("start", "{}", "-r")
     daemon = Daemon(folder, [f"mqtt.broker=mqtt://127.0.0.1:{broker.port}", "mqtt.commands=true", "plan.to_deg=36"])
-    until("the ranger", lambda: daemon.ask("GET", "/v1/status")["link"]["state"] == "ready")
+    until("the ranger", lambda: is_ready(daemon))
     answers = lambda: [json.loads(text) for topic, text in subscriber.messages() if topic == "answer"]
     until("a refusal", lambda: len(answers()) == 1)
     assert "retained" in answers()[0]["error"], answers()
