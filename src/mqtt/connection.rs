@@ -171,13 +171,9 @@ fn words(error: &ConnectionError) -> String {
             ConnectReturnCode::BadUserNamePassword | ConnectReturnCode::NotAuthorized,
         ) => "it refuses user or password: see mqtt.user and mqtt.password_file".into(),
         ConnectionError::ConnectionRefused(code) => format!("it refuses the connection: {code:?}"),
-        ConnectionError::Io(error) if error.kind() == io::ErrorKind::ConnectionRefused => {
-            "nobody listens there".into()
+        ConnectionError::Io(error) | ConnectionError::MqttState(StateError::Io(error)) => {
+            words_of_io(error)
         }
-        ConnectionError::Io(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
-            "it closed the connection".into()
-        }
-        ConnectionError::Io(error) => error.to_string(),
         ConnectionError::NetworkTimeout => "it does not answer".into(),
         ConnectionError::FlushTimeout => "it takes nothing".into(),
         ConnectionError::MqttState(StateError::ConnectionAborted) => {
@@ -187,5 +183,17 @@ fn words(error: &ConnectionError) -> String {
         ConnectionError::MqttState(error) => format!("what it sends makes no sense: {error}"),
         ConnectionError::Tls(error) => format!("TLS: {error}"),
         other => other.to_string(),
+    }
+}
+
+fn words_of_io(error: &io::Error) -> String {
+    use io::ErrorKind as Kind;
+    match error.kind() {
+        Kind::ConnectionRefused => "nobody listens there".into(),
+        Kind::UnexpectedEof
+        | Kind::ConnectionReset
+        | Kind::ConnectionAborted
+        | Kind::BrokenPipe => "it closed the connection".into(),
+        _ => error.to_string(),
     }
 }
