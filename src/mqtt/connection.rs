@@ -171,9 +171,10 @@ fn words(error: &ConnectionError) -> String {
             ConnectReturnCode::BadUserNamePassword | ConnectReturnCode::NotAuthorized,
         ) => "it refuses user or password: see mqtt.user and mqtt.password_file".into(),
         ConnectionError::ConnectionRefused(code) => format!("it refuses the connection: {code:?}"),
-        ConnectionError::Io(error) | ConnectionError::MqttState(StateError::Io(error)) => {
-            words_of_io(error)
-        }
+        ConnectionError::Io(error)
+        | ConnectionError::MqttState(
+            StateError::Io(error) | StateError::Deserialization(rumqttc::Error::Io(error)),
+        ) => words_of_io(error),
         ConnectionError::NetworkTimeout => "it does not answer".into(),
         ConnectionError::FlushTimeout => "it takes nothing".into(),
         ConnectionError::MqttState(StateError::ConnectionAborted) => {

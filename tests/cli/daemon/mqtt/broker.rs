@@ -150,7 +150,7 @@ fn serve(mut stream: TcpStream, manner: Manner, heard: &Mutex<Heard>) -> io::Res
                     is_retained: kind & 1 == 1,
                 });
                 if left == 0 {
-                    return Ok(());
+                    return stream.shutdown(Shutdown::Both);
                 }
                 left -= 1;
                 if manner != Manner::Deaf {
