@@ -12,12 +12,15 @@ use super::{Daemon, clean_log, write_token};
 use crate::common::{Log, run, stderr, wait_until};
 use broker::{Broker, Manner};
 
+/// A small plan, taken faster than in real time.
+const PLAN: [&str; 5] =
+    ["--virtual-time", "--set", "model.max_range_m=3", "--set", "plan.to_deg=36"];
+
 /// A daemon that sends to `broker`, of a small plan and faster than in real time.
 fn start(folder: &Path, broker: &Broker, further: &[&str]) -> Daemon {
     let settings = broker.settings();
     let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
-    let plan = ["--virtual-time", "--set", "model.max_range_m=3", "--set", "plan.to_deg=36"];
-    Daemon::start_mock(folder, &[&settings[..], &plan, further].concat())
+    Daemon::start_mock(folder, &[&settings[..], &PLAN, further].concat())
 }
 
 fn take_scans(daemon: &Daemon, scans: u64) {
