@@ -117,9 +117,22 @@ impl<M: Medium> LogWriter<M> {
             .map_err(|source| StoreError::Record { path: self.path.clone(), source })?;
         self.write_line()?;
         self.scenes.written(record);
-        self.appended += 1;
-        self.waiting_since.get_or_insert(now);
-        if matches!(record, Record::ScanEnd(_)) { self.sync() } else { self.sync_if_due(now) }
+        self.appended_one(record, now)
+    }
+
+    /// Appends a record by its line as it stands in another log, without the newline: with all that a later version may
+    /// have put there.
+    ///
+    /// # Errors
+    /// As for [`append`](Self::append).
+    pub fn append_line(&mut self, line: &[u8], record: &Record) -> Result<(), StoreError> {
+        self.check_usable()?;
+        self.line.clear();
+        self.line.extend_from_slice(line);
+        self.line.push(b'\n');
+        self.write_line()?;
+        self.scenes.written(record);
+        self.appended_one(record, Instant::now())
     }
 
     /// Syncs if a record has waited for longer than the interval. For callers whose records may
@@ -189,6 +202,12 @@ impl<M: Medium> LogWriter<M> {
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    fn appended_one(&mut self, record: &Record, now: Instant) -> Result<(), StoreError> {
+        self.appended += 1;
+        self.waiting_since.get_or_insert(now);
+        if matches!(record, Record::ScanEnd(_)) { self.sync() } else { self.sync_if_due(now) }
     }
 
     fn check_usable(&self) -> Result<(), StoreError> {

@@ -9,6 +9,7 @@ mod explained;
 mod faults;
 pub(crate) mod fleet;
 mod foxglove;
+mod gather;
 mod kill;
 mod load;
 pub(crate) mod model;
