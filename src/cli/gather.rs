@@ -27,6 +27,8 @@ use crate::{
 
 /// From round to round.
 const EVERY: Duration = Duration::from_secs(2);
+/// How long a daemon may keep the others waiting for the next round.
+const TURN: Duration = Duration::from_secs(20);
 /// Refused records of a log that are named; of more only the number is told.
 const SHOWN: u64 = 5;
 
@@ -79,7 +81,8 @@ others are gathered.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let daemons = args.daemon.each()?;
-    let choices = Choices { root: args.out.to_path_buf(), since: args.since };
+    let turn = args.follow.then_some(TURN);
+    let choices = Choices { root: args.out.to_path_buf(), since: args.since, turn };
     let mut crew =
         Crew::new(choices, daemons).map_err(|error| Failure::input(&error, &error.help))?;
     runtime::new()?.block_on(async {

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use tokio::{task::JoinSet, time::Instant};
 
 use super::{
-    pull::{PullError, Tally, Watcher, pull},
+    pull::{Order, PullError, Tally, Watcher, pull},
     settle::{Claim, settle},
     shelf::{Shelf, ShelfError},
 };
@@ -26,6 +26,8 @@ pub struct Choices {
     pub root: PathBuf,
     /// Logs that ended before are left out.
     pub since: Option<Timestamp>,
+    /// How long a round may take from one daemon, so that the others come in turn; the rest is left for the next.
+    pub turn: Option<Duration>,
 }
 
 /// The daemons, each with its robot's folder once it said which robot it is of.
@@ -87,10 +89,12 @@ impl Crew {
             let mate = &mut self.mates[*number];
             let Some(mut shelf) = mate.shelf.take() else { continue };
             let (client, watcher) = (mate.asked.client.clone(), Arc::clone(watcher));
-            let (number, since) = (*number, self.choices.since);
+            let number = *number;
+            let until = self.choices.turn.map(|turn| Instant::now() + turn);
+            let order = Order { since: self.choices.since, until };
             pulling.spawn(async move {
                 let mut tally = Tally::default();
-                let pulled = pull(&client, &mut shelf, since, &*watcher, &mut tally).await;
+                let pulled = pull(&client, &mut shelf, order, &*watcher, &mut tally).await;
                 (number, shelf, tally, pulled)
             });
         }

@@ -9,7 +9,10 @@ use hyper::{
 };
 use jiff::{Timestamp, civil::DateTime, tz::TimeZone};
 use thiserror::Error;
-use tokio::{task::block_in_place, time::timeout};
+use tokio::{
+    task::block_in_place,
+    time::{Instant, timeout},
+};
 
 use super::{
     ledger::{LOOKED_AT, Mark, Taken},
@@ -26,6 +29,9 @@ use crate::{
 const MOST_LIST_BYTES: usize = 4 << 20;
 /// How long a daemon may take for the next bytes of a log.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// What a daemon has to send on the average, from its first half minute on, bytes a second.
+const LEAST_RATE: f64 = 1000.0;
+const GRACE: Duration = Duration::from_secs(30);
 /// What of a log may be refused before it is given up, bytes.
 const MOST_REFUSED_BYTES: u64 = 16 << 20;
 /// After so many bytes it is remembered how far a log was taken.
@@ -97,14 +103,29 @@ impl PullError {
     }
 }
 
-/// Takes all that is new; adds it to `tally`. With `since`, logs are left out that ended before that.
+/// What is to be taken.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Order {
+    /// Logs that ended before are left out.
+    pub(super) since: Option<Timestamp>,
+    /// Then it is enough for this time.
+    pub(super) until: Option<Instant>,
+}
+
+impl Order {
+    fn is_enough(&self) -> bool {
+        self.until.is_some_and(|until| Instant::now() >= until)
+    }
+}
+
+/// Takes all that is new; adds it to `tally`.
 ///
 /// # Errors
 /// The first log that can't be taken whole; what came is kept, and the others are tried.
 pub(super) async fn pull(
     client: &Client,
     shelf: &mut Shelf,
-    since: Option<Timestamp>,
+    order: Order,
     watcher: &dyn Watcher,
     tally: &mut Tally,
 ) -> Result<(), PullError> {
@@ -113,7 +134,7 @@ pub(super) async fn pull(
     let newest = shelf.ledger().logs.last_key_value();
     let newest = newest.map(|(name, taken)| (name.clone(), taken.clone()));
     same_robot(client, newest, &listed).await?;
-    let lacking: Vec<_> = wanted(&listed, since)
+    let lacking: Vec<_> = wanted(&listed, order.since)
         .iter()
         .filter(|log| log.bytes > shelf.taken(&log.name).bytes)
         .collect();
@@ -121,12 +142,12 @@ pub(super) async fn pull(
     watcher.expect(bytes.fold(0, u64::saturating_add));
     let mut outcome = Ok(());
     for log in lacking {
-        let one = Pull { client, shelf, log, watcher, tally }.run().await;
+        let one = Pull { client, shelf, log, order, watcher, tally }.run().await;
         let is_over = matches!(one, Err(PullError::Client(_) | PullError::Shelf(_)));
         if outcome.is_ok() {
             outcome = one;
         }
-        if is_over {
+        if is_over || order.is_enough() {
             break;
         }
     }
@@ -186,6 +207,7 @@ struct Pull<'a> {
     client: &'a Client,
     shelf: &'a mut Shelf,
     log: &'a LogEntry,
+    order: Order,
     watcher: &'a dyn Watcher,
     tally: &'a mut Tally,
 }
@@ -214,6 +236,9 @@ impl Pull<'_> {
             self.watcher.came(count);
             waiting += count;
             block_in_place(|| self.sift(&bytes))?;
+            if self.order.is_enough() {
+                return Ok(());
+            }
             if waiting >= REMEMBER_BYTES {
                 block_in_place(|| self.shelf.keep())?;
                 waiting = 0;
@@ -257,6 +282,8 @@ struct Body {
     left: u64,
     /// What was read too far.
     rest: Bytes,
+    began: Instant,
+    came: u64,
 }
 
 impl Body {
@@ -270,7 +297,14 @@ impl Body {
             StatusCode::OK => from,
             status => return Err(PullError::Strange(format!("{name}: it answers {status}"))),
         };
-        Ok(Self { body: answer.into_body(), skip, left: end - from, rest: Bytes::new() })
+        Ok(Self {
+            body: answer.into_body(),
+            skip,
+            left: end - from,
+            rest: Bytes::new(),
+            began: Instant::now(),
+            came: 0,
+        })
     }
 
     /// The next bytes; `None` at the end.
@@ -283,6 +317,11 @@ impl Body {
             let frame = within(self.body.frame()).await.ok_or_else(broken)?;
             let frame = frame.ok_or_else(broken)?.map_err(|_| broken())?;
             let Ok(mut bytes) = frame.into_data() else { continue };
+            self.came += bytes.len() as u64;
+            let took = self.began.elapsed();
+            if took > GRACE && (self.came as f64) < LEAST_RATE * took.as_secs_f64() {
+                return Err(broken());
+            }
             let skipped = self.skip.min(bytes.len() as u64);
             self.skip -= skipped;
             drop(bytes.split_to(skipped as usize));

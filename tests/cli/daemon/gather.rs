@@ -23,7 +23,7 @@ const PLAN: [&str; 5] =
 fn start(folder: &Path, robot: &str, further: &[&str]) -> Daemon {
     drop(fs::create_dir(folder));
     let robot = format!("fleet.robot={robot}");
-    Daemon::start_mock(folder, &[&PLAN, &["--set", &robot], further].concat())
+    Daemon::start_mock(folder, &[&PLAN[..], &["--set", &robot], further].concat())
 }
 
 fn take_scans(daemon: &Daemon, scans: u64) {
