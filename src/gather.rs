@@ -3,6 +3,7 @@
 //! A [`Ledger`] says how far each log was taken. It is written once the records before it are on the disk, and what
 //! stands behind it is cut off: gathering that was killed goes on where it stood. [`Sieve`] and [`settle`] are pure.
 
+mod body;
 mod crew;
 mod ledger;
 mod pull;

@@ -44,7 +44,7 @@ pub(super) struct Args {
     /// Leave out logs that ended before: a time (2026-03-01T08:00Z), a day (UTC), or how long ago (36h)
     #[arg(long, value_name = "TIME", value_parser = since)]
     since: Option<Timestamp>,
-    /// Go on until interrupted, with what is logged meanwhile; daemons that are away are waited for
+    /// Go on as records are added; until interrupted, and with daemons that come back
     #[arg(long)]
     follow: bool,
     /// JSON instead of text; one object a daemon

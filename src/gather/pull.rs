@@ -1,21 +1,12 @@
 //! Takes what a daemon has in its logs and the robot's folder lacks.
 
-use std::{future::Future, time::Duration};
-
-use http_body_util::BodyExt as _;
-use hyper::{
-    StatusCode,
-    body::{Bytes, Incoming},
-};
 use jiff::{Timestamp, civil::DateTime, tz::TimeZone};
 use thiserror::Error;
-use tokio::{
-    task::block_in_place,
-    time::{Instant, timeout},
-};
+use tokio::{task::block_in_place, time::Instant};
 
 use super::{
-    ledger::{LOOKED_AT, Mark, Taken},
+    body::Body,
+    ledger::Taken,
     shelf::{Shelf, ShelfError},
     sieve::{Refusal, Sifted},
 };
@@ -27,15 +18,10 @@ use crate::{
 
 /// Longest list of logs that is read, bytes.
 const MOST_LIST_BYTES: usize = 4 << 20;
-/// How long a daemon may take for the next bytes of a log.
-const PATIENCE: Duration = Duration::from_secs(10);
-/// What a daemon has to send on the average, from its first half minute on, bytes a second.
-const LEAST_RATE: f64 = 1000.0;
-const GRACE: Duration = Duration::from_secs(30);
 /// What of a log may be refused before it is given up, bytes.
 const MOST_REFUSED_BYTES: u64 = 16 << 20;
 /// After so many bytes it is remembered how far a log was taken.
-const REMEMBER_BYTES: u64 = 1 << 20;
+const REMEMBER_BYTES: u64 = 1 << 18;
 
 /// Hears how it goes.
 pub trait Watcher: Send + Sync {
@@ -134,6 +120,7 @@ pub(super) async fn pull(
     let newest = shelf.ledger().logs.last_key_value();
     let newest = newest.map(|(name, taken)| (name.clone(), taken.clone()));
     same_robot(client, newest, &listed).await?;
+    block_in_place(|| shelf.confirm())?;
     let lacking: Vec<_> = wanted(&listed, order.since)
         .iter()
         .filter(|log| log.bytes > shelf.taken(&log.name).bytes)
@@ -261,7 +248,7 @@ impl Pull<'_> {
                 }
                 Sifted::Refused(refusal) => {
                     self.tally.refused += 1;
-                    self.watcher.refused(&self.shelf.ledger().robot, name, &refusal);
+                    self.watcher.refused(self.shelf.robot(), name, &refusal);
                 }
             }
         }
@@ -272,88 +259,6 @@ impl Pull<'_> {
         }
         Ok(())
     }
-}
-
-/// The bytes of a log from a place on, up to where it was said to end.
-struct Body {
-    body: Incoming,
-    /// What is passed over before, and what is wanted behind that.
-    skip: u64,
-    left: u64,
-    /// What was read too far.
-    rest: Bytes,
-    began: Instant,
-    came: u64,
-}
-
-impl Body {
-    /// From the last bytes on that were taken.
-    async fn of(client: &Client, name: &str, taken: u64, end: u64) -> Result<Self, PullError> {
-        let from = taken - taken.min(LOOKED_AT);
-        let answer = client.get_from(&format!("/v1/logs/{name}"), from).await?;
-        let skip = match answer.status() {
-            StatusCode::PARTIAL_CONTENT => 0,
-            // One that knows no ranges.
-            StatusCode::OK => from,
-            status => return Err(PullError::Strange(format!("{name}: it answers {status}"))),
-        };
-        Ok(Self {
-            body: answer.into_body(),
-            skip,
-            left: end - from,
-            rest: Bytes::new(),
-            began: Instant::now(),
-            came: 0,
-        })
-    }
-
-    /// The next bytes; `None` at the end.
-    async fn next(&mut self, name: &str) -> Result<Option<Bytes>, PullError> {
-        if !self.rest.is_empty() {
-            return Ok(Some(std::mem::take(&mut self.rest)));
-        }
-        let broken = || PullError::BrokenOff(name.to_owned());
-        while self.left > 0 {
-            let frame = within(self.body.frame()).await.ok_or_else(broken)?;
-            let frame = frame.ok_or_else(broken)?.map_err(|_| broken())?;
-            let Ok(mut bytes) = frame.into_data() else { continue };
-            self.came += bytes.len() as u64;
-            let took = self.began.elapsed();
-            if took > GRACE && (self.came as f64) < LEAST_RATE * took.as_secs_f64() {
-                return Err(broken());
-            }
-            let skipped = self.skip.min(bytes.len() as u64);
-            self.skip -= skipped;
-            drop(bytes.split_to(skipped as usize));
-            bytes.truncate(usize::try_from(self.left).unwrap_or(usize::MAX));
-            self.left -= bytes.len() as u64;
-            if !bytes.is_empty() {
-                return Ok(Some(bytes));
-            }
-        }
-        Ok(None)
-    }
-
-    /// The last bytes that were taken, if they are still the same.
-    async fn before(&mut self, name: &str, taken: u64, sha256: &str) -> Result<Vec<u8>, PullError> {
-        let (wanted, mut last) = (taken.min(LOOKED_AT) as usize, Vec::new());
-        while last.len() < wanted {
-            let mut bytes =
-                self.next(name).await?.ok_or_else(|| PullError::BrokenOff(name.into()))?;
-            last.extend_from_slice(&bytes.split_to(bytes.len().min(wanted - last.len())));
-            self.rest = bytes;
-        }
-        let mut mark = Mark::default();
-        mark.push(&last);
-        match taken == 0 || mark.sha256() == sha256 {
-            true => Ok(last),
-            false => Err(PullError::OtherLog { log: name.into(), why: "it was changed" }),
-        }
-    }
-}
-
-async fn within<T>(wait: impl Future<Output = T>) -> Option<T> {
-    timeout(PATIENCE, wait).await.ok()
 }
 
 #[cfg(test)]

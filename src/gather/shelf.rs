@@ -22,6 +22,8 @@ use crate::{
 #[derive(Debug)]
 pub struct Shelf {
     folder: PathBuf,
+    robot: String,
+    address: String,
     ledger: Ledger,
     open: Option<OpenLog>,
     _lock: File,
@@ -111,16 +113,36 @@ impl Shelf {
             let message = format!("{} holds logs that were not gathered", folder.display());
             return Err(ShelfError::new(message, "give another folder with --out"));
         }
-        let mut ledger = Ledger::read(&folder).map_err(fail)?.unwrap_or_default();
-        (ledger.robot, ledger.address) = (robot.into(), address.into());
-        ledger.write(&folder).map_err(fail)?;
-        Ok(Self { folder, ledger, open: None, _lock: lock })
+        let ledger = Ledger::read(&folder).map_err(fail)?.unwrap_or_default();
+        let (robot, address) = (robot.into(), address.into());
+        Ok(Self { folder, robot, address, ledger, open: None, _lock: lock })
     }
 
     /// What was taken so far.
     #[must_use]
     pub const fn ledger(&self) -> &Ledger {
         &self.ledger
+    }
+
+    /// The robot it is of.
+    #[must_use]
+    pub fn robot(&self) -> &str {
+        &self.robot
+    }
+
+    /// Writes down that the robot's daemon, which has what was taken before, is there; and forgets logs whose copies
+    /// somebody cut or removed, so that they are taken anew.
+    pub(super) fn confirm(&mut self) -> Result<(), ShelfError> {
+        let before = self.ledger.clone();
+        (self.ledger.robot, self.ledger.address) = (self.robot.clone(), self.address.clone());
+        let folder = &self.folder;
+        let length = |name: &str| fs::metadata(folder.join(name)).map_or(0, |file| file.len());
+        self.ledger.logs.retain(|name, taken| length(name) >= taken.kept_bytes);
+        if self.ledger == before && super::is_of_robot(&self.folder) {
+            return Ok(());
+        }
+        self.open = None;
+        self.ledger.write(&self.folder).map_err(|error| ShelfError::of(&self.folder, &error))
     }
 
     /// How far a log was taken.
@@ -136,14 +158,9 @@ impl Shelf {
         self.open = None;
         let path = self.folder.join(name);
         let fail = |error: io::Error| ShelfError::of(&path, &error);
-        let mut kept_bytes = self.taken(name).kept_bytes;
+        let kept_bytes = self.taken(name).kept_bytes;
         let file = open_own(OpenOptions::new().read(true).write(true).create(true), &path);
         let file = file.map_err(fail)?;
-        if file.metadata().map_err(fail)?.len() < kept_bytes {
-            // Somebody cut it: it is taken anew.
-            self.ledger.logs.remove(name);
-            kept_bytes = 0;
-        }
         file.set_len(kept_bytes).map_err(fail)?;
         let mut sieve = Sieve::default();
         for line in read_log(BufReader::new(file)) {
@@ -235,14 +252,21 @@ mod tests {
     fn a_place_of_another_robot_wants_the_new_one_to_be_named() {
         let root = tempfile::tempdir().expect("a folder");
         let root = root.path();
-        let kiwi = Shelf::open(root, "kiwi", "h:1", false).expect("the first");
-        let error = Shelf::open(root, "kiwi", "h:1", false).expect_err("it is written to");
+        let open = |robot: &str, address: &str, was_named| {
+            let mut shelf = Shelf::open(root, robot, address, was_named)?;
+            shelf.confirm()?;
+            Ok::<_, ShelfError>(shelf)
+        };
+        let kiwi = open("kiwi", "h:1", false).expect("the first");
+        let error = open("kiwi", "h:1", false).expect_err("it is written to");
         assert!(error.message.contains("another process"), "{error}");
         drop(kiwi);
-        Shelf::open(root, "kiwi", "h:2", false).expect("it moved");
-        Shelf::open(root, "lime", "h:1", false).expect("nobody is there any more");
-        let error = Shelf::open(root, "plum", "h:2", false).expect_err("kiwi was there");
+        drop(Shelf::open(root, "kiwi", "h:9", false).expect("somebody who says so"));
+        open("kiwi", "h:2", false).expect("it moved");
+        open("lime", "h:1", false).expect("nobody is there any more");
+        open("mango", "h:9", false).expect("who only said so was never there");
+        let error = open("plum", "h:2", false).expect_err("kiwi was there");
         assert!(error.message.contains("where kiwi was") && error.help.contains("plum=h:2"));
-        Shelf::open(root, "plum", "h:2", true).expect("it was named");
+        open("plum", "h:2", true).expect("it was named");
     }
 }
