@@ -1,5 +1,7 @@
 //! Takes what a daemon has in its logs and the robot's folder lacks.
 
+use std::time::Duration;
+
 use jiff::{Timestamp, civil::DateTime, tz::TimeZone};
 use thiserror::Error;
 use tokio::{task::block_in_place, time::Instant};
@@ -22,6 +24,8 @@ const MOST_LIST_BYTES: usize = 4 << 20;
 const MOST_REFUSED_BYTES: u64 = 16 << 20;
 /// After so many bytes it is remembered how far a log was taken.
 const REMEMBER_BYTES: u64 = 1 << 18;
+/// But no sooner than that, since it waits for the disk.
+const REMEMBER_EVERY: Duration = Duration::from_millis(200);
 
 /// Hears how it goes.
 pub trait Watcher: Send + Sync {
@@ -216,7 +220,7 @@ impl Pull<'_> {
     }
 
     async fn take(&mut self, mut body: Body) -> Result<(), PullError> {
-        let mut waiting = 0;
+        let (mut waiting, mut kept) = (0, Instant::now());
         while let Some(bytes) = body.next(&self.log.name).await? {
             let count = bytes.len() as u64;
             self.tally.bytes += count;
@@ -226,9 +230,9 @@ impl Pull<'_> {
             if self.order.is_enough() {
                 return Ok(());
             }
-            if waiting >= REMEMBER_BYTES {
+            if waiting >= REMEMBER_BYTES && kept.elapsed() >= REMEMBER_EVERY {
                 block_in_place(|| self.shelf.keep())?;
-                waiting = 0;
+                (waiting, kept) = (0, Instant::now());
             }
         }
         Ok(())

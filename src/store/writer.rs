@@ -117,11 +117,13 @@ impl<M: Medium> LogWriter<M> {
             .map_err(|source| StoreError::Record { path: self.path.clone(), source })?;
         self.write_line()?;
         self.scenes.written(record);
-        self.appended_one(record, now)
+        self.appended += 1;
+        self.waiting_since.get_or_insert(now);
+        if matches!(record, Record::ScanEnd(_)) { self.sync() } else { self.sync_if_due(now) }
     }
 
     /// Appends a record by its line as it stands in another log, without the newline: with all that a later version may
-    /// have put there.
+    /// have put there. It is on the disk for good after the next [`sync`](Self::sync), which is the caller's to ask for.
     ///
     /// # Errors
     /// As for [`append`](Self::append).
@@ -132,7 +134,8 @@ impl<M: Medium> LogWriter<M> {
         self.line.push(b'\n');
         self.write_line()?;
         self.scenes.written(record);
-        self.appended_one(record, Instant::now())
+        self.appended += 1;
+        Ok(())
     }
 
     /// Syncs if a record has waited for longer than the interval. For callers whose records may
@@ -202,12 +205,6 @@ impl<M: Medium> LogWriter<M> {
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
-    }
-
-    fn appended_one(&mut self, record: &Record, now: Instant) -> Result<(), StoreError> {
-        self.appended += 1;
-        self.waiting_since.get_or_insert(now);
-        if matches!(record, Record::ScanEnd(_)) { self.sync() } else { self.sync_if_due(now) }
     }
 
     fn check_usable(&self) -> Result<(), StoreError> {

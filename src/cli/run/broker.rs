@@ -79,6 +79,6 @@ impl Broker {
         Ok(())
     }
 
-    #[expect(clippy::unused_async, clippy::unused_self, reason = "with the feature it waits")]
+    #[expect(clippy::unused_self, reason = "with the feature it waits")]
     pub(super) async fn stop(self) {}
 }
