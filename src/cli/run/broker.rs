@@ -79,6 +79,5 @@ impl Broker {
         Ok(())
     }
 
-    #[expect(clippy::unused_self, reason = "with the feature it waits")]
     pub(super) async fn stop(self) {}
 }
