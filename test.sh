@@ -14,6 +14,7 @@
 #   EXPORT_PEERS=0 ./test.sh    leave the other programs that read exports out, where there is no PyPI
 #   FOXGLOVE_PEER=0 ./test.sh   leave Foxglove's client library out, where there is no npm or node
 #   ROS_PEER=0 ./test.sh        leave Cyclone DDS out, where there is no PyPI, or no network of its own can be opened
+#   MQTT_PEER=0 ./test.sh       leave mosquitto out, where Debian's packages can't be had
 #   PROMTOOL=0 ./test.sh        leave promtool out, where Debian's prometheus can't be had
 #   FAKETIME=0 ./test.sh        leave the clock that is set out, where there is no libfaketime
 #   BOOT=0 ./test.sh            leave the units under a booted systemd out (systemd/boot-test.sh)
@@ -85,6 +86,8 @@ check_text() {
   cargo fmt --manifest-path web/wasm/Cargo.toml -- --check
   step "clippy, warnings denied"
   cargo clippy --workspace --all-targets "${features[@]}" --quiet -- -D warnings
+  # As it is built by default: the workspace asks for the feature mqtt, too.
+  cargo clippy --package sonard --quiet -- -D warnings
 }
 
 check_pure_part() {
@@ -241,6 +244,16 @@ check_ros() {
     fail "ROS 2 is not told what the log says, or Cyclone DDS can't be had: ROS_PEER=0 leaves it out"
 }
 
+check_broker() {
+  if [ "${MQTT_PEER:-1}" = 0 ]; then
+    step "records as mosquitto gets them: LEFT OUT, because MQTT_PEER=0"
+    return
+  fi
+  step "records as mosquitto gets them"
+  tests/peers/mqtt.sh "${CARGO_TARGET_DIR:-target}/debug/sonard" ||
+    fail "a broker does not get what the log says, or mosquitto can't be had: MQTT_PEER=0 leaves it out"
+}
+
 check_monitoring() {
   if [ "${PROMTOOL:-1}" = 0 ]; then
     step "alerts as Prometheus reads them: LEFT OUT, because PROMTOOL=0"
@@ -314,6 +327,7 @@ quick)
   check_exports
   check_viewers
   check_ros
+  check_broker
   check_monitoring
   test_page
   step "tests"

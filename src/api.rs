@@ -6,11 +6,13 @@
 
 mod air;
 mod beam;
+mod body;
 mod findings;
 mod fleet;
 mod health;
 mod link;
 mod logs;
+mod mqtt;
 mod orders;
 mod preview;
 mod problem;
@@ -23,11 +25,13 @@ mod status;
 
 pub use air::{AirOrder, AirStatus};
 pub use beam::{Beam, Echo};
+pub(crate) use body::{Strict, has_list};
 pub use findings::{Findings, FoundFeature, FoundLine, MapCells};
 pub use fleet::{Fleet, FleetPicture, FleetReport, FleetRobot, FleetScan, FleetState};
 pub use health::{ClockReport, Health, LineTotals, ScanFit, ScanTotals};
 pub use link::{LinkReport, LinkState, Trouble};
 pub use logs::LogEntry;
+pub use mqtt::MqttReport;
 pub use orders::{Accepted, CancelRequest, ScanRequest, Scanning, Started};
 pub use preview::PreviewRequest;
 pub use problem::Problem;

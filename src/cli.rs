@@ -14,6 +14,7 @@ mod explore;
 mod export;
 mod failure;
 mod findings;
+mod gather;
 mod generate;
 mod groups;
 mod import;
@@ -85,6 +86,9 @@ enum Verb {
     Status(status::Args),
     /// Show the records of a running daemon as they are made
     Watch(watch::Args),
+    /// Bring the logs of many daemons into one folder
+    #[command(long_about = gather::ABOUT)]
+    Gather(gather::Args),
     /// Play a ranger on a pty, with sound from the model
     #[command(long_about = mock::ABOUT)]
     Mock(mock::Args),
@@ -201,6 +205,7 @@ pub fn main() -> ExitCode {
         Verb::Run(args) => run::run(*args),
         Verb::Status(args) => status::run(&args),
         Verb::Watch(args) => watch::run(&args),
+        Verb::Gather(args) => gather::run(&args),
         Verb::Mock(args) => mock::run(&args),
         #[cfg(feature = "pi")]
         Verb::Board(args) => board::run(&args),

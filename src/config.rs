@@ -10,6 +10,7 @@ mod fleet;
 mod foxglove;
 mod keys;
 mod layers;
+mod mqtt;
 mod ros;
 mod schema;
 
@@ -23,5 +24,6 @@ pub use keys::{
     PlanKeys, ScanningKeys, ServerKeys, SimulateKeys,
 };
 pub use layers::{ConfigError, Layers, Origin};
+pub use mqtt::{Broker, MqttKeys};
 pub use ros::{RosDistribution, RosKeys, RosProfile};
 pub use schema::{Form, Key, Kind, Section, read_sections, sections};

@@ -55,8 +55,8 @@ pub use shared::NextScan;
 
 use crate::{
     api::{
-        ClockReport, ConfigurationReport, Health, InForce, LinkState, RosReport, ScanRequest,
-        ScanTotals, Setup, SimulationReport, Started, Status, SubscriberReport,
+        ClockReport, ConfigurationReport, Health, InForce, LinkState, MqttReport, RosReport,
+        ScanRequest, ScanTotals, Setup, SimulationReport, Started, Status, SubscriberReport,
     },
     board::{Board, NoBoard},
     scan::{Event, EventKind, Record, Session},
@@ -208,10 +208,21 @@ impl Handle {
         self.shared.report_ros(report);
     }
 
+    /// Says how it goes with the MQTT broker.
+    pub fn report_mqtt(&self, report: MqttReport) {
+        self.shared.report_mqtt(report);
+    }
+
     /// What the daemon is doing.
     #[must_use]
     pub fn status(&self) -> Status {
         self.shared.status(self.journal.status(), self.subscribers())
+    }
+
+    /// Records that are in the log since the start.
+    #[must_use]
+    pub fn records_written(&self) -> u64 {
+        self.journal.written()
     }
 
     /// Whether all is well.

@@ -67,6 +67,8 @@ pub mod daemon;
 pub mod dataset;
 #[cfg(feature = "daemon")]
 pub mod fleet;
+#[cfg(feature = "daemon")]
+pub mod gather;
 #[cfg(feature = "store")]
 pub mod grid_file;
 #[cfg(feature = "daemon")]
@@ -75,12 +77,16 @@ pub mod interrupts;
 pub mod link;
 #[cfg(feature = "daemon")]
 pub mod mock;
+#[cfg(feature = "mqtt")]
+pub mod mqtt;
 #[cfg(feature = "pi")]
 pub mod pi;
 #[cfg(feature = "daemon")]
 pub mod ranger;
 #[cfg(feature = "ros")]
 pub mod ros;
+#[cfg(feature = "daemon")]
+pub mod secret;
 #[cfg(feature = "daemon")]
 pub mod server;
 #[cfg(feature = "store")]

@@ -43,7 +43,7 @@ use tower_http::{catch_panic::CatchPanicLayer, set_header::SetResponseHeaderLaye
 
 pub use access::{Access, Peer, Refused, Standing};
 pub use listen::{ListenError, Listeners};
-pub use token::{TokenError, read_token};
+pub use token::{read_token, token_help};
 
 use crate::{
     config::Keys, daemon::Handle, fleet::Asked, scan::Session, scene::Scene, store::History,

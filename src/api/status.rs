@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 use super::{
-    air::AirStatus, link::LinkReport, ros::RosReport, sensor::SensorFigures, setup::Setup,
-    simulation::SimulationReport,
+    air::AirStatus, link::LinkReport, mqtt::MqttReport, ros::RosReport, sensor::SensorFigures,
+    setup::Setup, simulation::SimulationReport,
 };
 use crate::{
     config::Mode,
@@ -56,6 +56,9 @@ pub struct Status {
     /// What is told to ROS 2, if anything is.
     #[serde(default)]
     pub ros: Option<RosReport>,
+    /// What goes to an MQTT broker, if one is named.
+    #[serde(default)]
+    pub mqtt: Option<MqttReport>,
     /// What became of the last change of the configuration.
     pub configuration: ConfigurationReport,
     /// The array that the model plays, where nothing is measured.

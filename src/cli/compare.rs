@@ -12,7 +12,11 @@ use std::{
 use serde::Serialize;
 
 use super::{
-    Failure, Outcome, logs::for_each_scan, predictor::Predictor, scene_file, what_if::WhatIfArgs,
+    Failure, Outcome,
+    logs::{for_each_scan, logs_in},
+    predictor::Predictor,
+    scene_file,
+    what_if::WhatIfArgs,
 };
 use crate::{
     compare::{Comparer, Comparison},
@@ -26,7 +30,7 @@ pub(super) use table::{RULED, path_text};
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(super) struct Args {
-    /// Logs to compare; - for standard input
+    /// Logs to compare, or folders of them; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it again, with
@@ -64,11 +68,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     let scene = args.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
     let mut all = Comparer::default();
     let what_if = args.what_if.load()?;
-    for log in &args.logs {
+    let several = logs_in(&args.logs)?;
+    for log in &several {
         let predictor = Predictor::new(log, scene.as_ref(), &what_if);
-        compare_log(args, log, predictor, &mut all)?;
+        compare_log(args, log, predictor, (several.len() > 1).then_some(&mut all))?;
     }
-    let (logs, all) = (args.logs.len(), all.finish());
+    let (logs, all) = (several.len(), all.finish());
     if logs < 2 {
         return Ok(());
     }
@@ -86,14 +91,14 @@ fn compare_log(
     args: &Args,
     log: &Path,
     mut predictor: Predictor<'_>,
-    all: &mut Comparer,
+    mut all: Option<&mut Comparer>,
 ) -> Outcome {
     let (mut comparer, mut worst) = (Comparer::default(), Worst::new(args.worst));
     let mut all_simulated = true;
     for_each_scan(log, |mut scan| {
         predictor.predict(&mut scan)?;
         worst.add(&comparer.add(&scan));
-        if args.logs.len() > 1 {
+        if let Some(all) = &mut all {
             all.add(&scan);
         }
         all_simulated &= is_simulated(&scan);

@@ -8,7 +8,7 @@ use crate::{
     fleet::{Asked, Member, MemberError, check_all, read_members},
     scan::SceneRef,
     scene::Scene,
-    server::{TokenError, read_token},
+    server::read_token,
 };
 
 /// Where the daemon is.
@@ -81,12 +81,8 @@ pub(super) enum Daemons {
 
 impl DaemonsArgs {
     pub(super) fn daemons(&self) -> Result<Daemons, Failure> {
-        let wrong = |error: MemberError| Failure::input(&error, &error.help);
-        if let Some(file) = &self.fleet {
-            return asked(read_members(file).map_err(wrong)?).map(Daemons::Several);
-        }
         let (socket, address) = (self.socket.as_slice(), self.address.as_slice());
-        if let ([socket], [] | [_]) = (socket, address) {
+        if let (None, [socket], [] | [_]) = (&self.fleet, socket, address) {
             let one = DaemonArgs {
                 socket: socket.clone(),
                 address: address.first().cloned(),
@@ -94,14 +90,24 @@ impl DaemonsArgs {
             };
             return one.client().map(Daemons::One);
         }
+        self.each().map(Daemons::Several)
+    }
+
+    /// All of them, each with what is known of it, also if it is one.
+    pub(super) fn each(&self) -> Result<Vec<Asked>, Failure> {
+        let wrong = |error: MemberError| Failure::input(&error, &error.help);
+        if let Some(file) = &self.fleet {
+            return asked(read_members(file).map_err(wrong)?);
+        }
+        let (socket, address) = (self.socket.as_slice(), self.address.as_slice());
         // One may be the default, which addresses stand in place of.
-        let sockets = if socket.len() > 1 { socket } else { &[] };
+        let sockets = if socket.len() > 1 || address.is_empty() { socket } else { &[] };
         let sockets = sockets.iter().map(|path| Ok(Member::at_socket(path.clone())));
         let members = sockets.chain(address.iter().map(|address| Member::parse(address)));
         let members: Result<Vec<_>, _> = members.collect();
         let with_token = |member: Member| Member { token_file: self.token_file.clone(), ..member };
         let members = members.map_err(wrong)?.into_iter().map(with_token).collect();
-        asked(check_all(members).map_err(wrong)?).map(Daemons::Several)
+        asked(check_all(members).map_err(wrong)?)
     }
 }
 
@@ -118,10 +124,8 @@ pub(super) fn asked(members: Vec<Member>) -> Result<Vec<Asked>, Failure> {
 
 fn token(file: &Path) -> Result<String, Failure> {
     read_token(file).map_err(|error| {
-        let help = match error {
-            TokenError::Open(_) => error.help(file),
-            _ => "give a copy of the daemon's server.token_file".into(),
-        };
+        let copy = || "give a copy of the daemon's server.token_file".into();
+        let help = error.help(file).unwrap_or_else(copy);
         Failure::input(format!("cannot read the token in {}: {error}", file.display()), help)
     })
 }

@@ -14,15 +14,18 @@ use super::{
     logs::{for_each_scan, logs_in},
     output::{OutPath, Overwrite, Product, Stream},
 };
-use crate::export::{
-    CsvExport, Export, ExportError, LogFile, McapExport, ParquetExport, Profile, Settings,
+use crate::{
+    export::{
+        CsvExport, Export, ExportError, LogFile, McapExport, ParquetExport, Profile, Settings,
+    },
+    gather::is_of_robot,
 };
 
 /// Options of `sonard export`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(super) struct Args {
-    /// Logs, folders of a daemon's logs, folders of collections; - for standard input
+    /// Logs, folders of a daemon's logs, of `sonard gather`, of collections; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// Format to write [default: as the ending of the output says]
@@ -78,7 +81,7 @@ pub(super) const ABOUT: &str = "\
 Write logs for other tools: recordings of ROS 2 (MCAP), tables (Parquet, CSV).
 
 All logs go into one output, scan by scan in their order. Of a folder the logs in it are taken, of a \
-collection's those in its folder `scans`, in the order of their names.";
+collection's those in its folder `scans`, of gathered ones those of each robot, in the order of their names.";
 
 const HELP: &str = "\
 Examples:
@@ -291,7 +294,9 @@ fn attach(export: &mut dyn Export, log: &Path, name: &str) -> Result<(), Stop> {
     Ok(export.attach(&LogFile { name, bytes, written }, &mut file)?)
 }
 
-/// What a log is called in its export.
+/// What a log is called in its export: with its robot, where logs of several were gathered.
 fn name_of(log: &Path) -> String {
-    log.file_name().unwrap_or(log.as_os_str()).to_string_lossy().into_owned()
+    let name = log.file_name().unwrap_or(log.as_os_str()).to_string_lossy();
+    let robot = log.parent().filter(|folder| is_of_robot(folder)).and_then(Path::file_name);
+    robot.map_or_else(|| name.to_string(), |robot| format!("{}/{name}", robot.to_string_lossy()))
 }

@@ -27,7 +27,7 @@ use crate::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(super) struct Args {
-    /// Logs of scans by one ranger, from one place or more; - for standard input
+    /// Logs of scans by one ranger, from one place or more, or folders of such; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// JSON instead of text; one object a feature
@@ -93,7 +93,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut seen = Seen::default();
     scans.iter().for_each(|scan| seen.add(scan));
     targets.write(&seen.place(None, &[], &features), || {
-        let scene = scene_for(first_of(&args.logs), &scans, args.scene.as_deref())?;
+        let scene = scene_for(&first_of(&args.logs), &scans, args.scene.as_deref())?;
         Ok(draw_features(&scans, scene.as_ref(), &features))
     })
 }

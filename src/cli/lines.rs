@@ -25,7 +25,7 @@ use crate::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(super) struct Args {
-    /// Logs whose scans have poses; - for standard input
+    /// Logs whose scans have poses, or folders of such; - for standard input
     #[arg(required_unless_present = "laser", value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// What a laser saw in the same place, after the sonar's scans: one JSON object a line; - for
@@ -79,7 +79,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let Read { scans, seen, map, left_out } = read(args)?;
     answer(args.json, map.lines().iter().map(record), |out| print(out, &map, left_out))?;
     targets.write(&seen.place(None, map.lines(), &[]), || {
-        let scene = scene_for(first_of(&args.logs), &scans, args.scene.as_deref())?;
+        let scene = scene_for(&first_of(&args.logs), &scans, args.scene.as_deref())?;
         Ok(draw_lines(&scans, scene.as_ref(), map.lines()))
     })
 }

@@ -10,6 +10,7 @@ use std::{
 use super::{Failure, output::note_input, progress};
 use crate::{
     compare::keep_every_second,
+    gather::is_of_robot,
     scan::{Record, ScanView},
     store::{FileKind, LineError, StoreError, open_for_reading, read_log},
 };
@@ -43,8 +44,8 @@ impl Damage {
     }
 }
 
-/// The logs that are meant: a folder stands for those in it, one of a collection for its scans, in the order of
-/// their names. They are noted as read.
+/// The logs that are meant: a folder stands for those in it, one of a collection for its scans, one of `sonard gather`
+/// for those of all robots, in the order of their names. They are noted as read.
 ///
 /// # Errors
 /// A folder can't be read, or has no log in it.
@@ -57,7 +58,11 @@ pub(super) fn logs_in(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         }
         let scans = path.join("scans");
         let folder = if scans.is_dir() { &scans } else { path };
-        let found = logs_of(folder).map_err(|error| {
+        let found = logs_of(folder).and_then(|found| match found.is_empty() {
+            true => logs_of_robots(folder),
+            false => Ok(found),
+        });
+        let found = found.map_err(|error| {
             Failure::input(
                 format!("cannot read the folder {}: {error}", folder.display()),
                 "give a folder that you may read, or logs",
@@ -82,6 +87,16 @@ fn logs_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut logs: Vec<_> = paths.into_iter().filter(is_log).collect();
     logs.sort();
     Ok(logs)
+}
+
+/// The logs of the robots that were gathered into a folder, robot by robot.
+fn logs_of_robots(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let entries = fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.path()));
+    let mut robots: Vec<_> = entries.collect::<io::Result<_>>()?;
+    robots.retain(|robot| is_of_robot(robot));
+    robots.sort();
+    let logs: Vec<_> = robots.iter().map(|robot| logs_of(robot)).collect::<io::Result<_>>()?;
+    Ok(logs.concat())
 }
 
 fn kind_of(reader: &mut impl std::io::BufRead) -> FileKind {
@@ -203,6 +218,7 @@ impl Drawn {
 }
 
 /// Logs of one robot stand together, and their scenes with them.
-pub(super) fn first_of(logs: &[PathBuf]) -> &Path {
-    logs.first().map_or(Path::new("-"), PathBuf::as_path)
+pub(super) fn first_of(logs: &[PathBuf]) -> PathBuf {
+    let first = logs_in(logs).ok().and_then(|logs| logs.into_iter().next());
+    first.unwrap_or_else(|| "-".into())
 }

@@ -32,7 +32,7 @@ use crate::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(super) struct Args {
-    /// Logs whose scans have poses; - for standard input
+    /// Logs whose scans have poses, or folders of such; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// Folder for what is written; map.pgm, map.yaml, map.mcap and map.png
@@ -156,7 +156,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let scene = match &args.scene {
         Some(given) => Some(scene_file::load(given)?),
         // Walls under the map are a help: a log that lacks them is mapped as well.
-        None => logged_scene(&session, first_of(&args.logs)).ok().flatten(),
+        None => logged_scene(&session, &first_of(&args.logs)).ok().flatten(),
     };
     make_folder(&args.out)?;
 

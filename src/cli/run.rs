@@ -1,5 +1,6 @@
 //! `sonard run`.
 
+mod broker;
 mod load;
 mod mock;
 mod ros;
@@ -23,8 +24,9 @@ use crate::{
     board,
     daemon::{self, Handle, Journal, Order, Resources, Settings},
     link,
-    server::{Access, Listeners, Server, read_token},
+    server::{Access, Listeners, Server, read_token, token_help},
 };
+use broker::Broker;
 use load::Loader;
 use mock::Mock;
 use ros::Ros;
@@ -155,6 +157,7 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
             Some(board::open(&keys.gpio).map_err(|error| Failure::input(&error, error.help()))?)
         }
     };
+    let mut broker = Broker::open(&settings)?;
     let log_folder = PathBuf::from(&keys.log.folder);
     let (journal, thread) = Journal::open(&log_folder, settings.rotation())?;
     let listeners =
@@ -168,11 +171,12 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     let (daemon, handle) = match board {
         Some(board) => {
             let resources = Resources { open_port: Box::new(link::open), board, journal };
-            daemon::prepare(resources, settings)
+            daemon::prepare(resources, settings.clone())
         }
-        None => daemon::prepare_simulated(journal, settings),
+        None => daemon::prepare_simulated(journal, settings.clone()),
     };
     let ros = Ros::start(&keys.ros, &handle)?;
+    broker.start(&settings, &handle, &log_folder)?;
     let server = Server::new(handle.clone(), log_folder, access, &keys, fleet);
     let reloading = tokio::spawn(reload_on_hangup(loader, handle, hangups));
     let ended = CancellationToken::new();
@@ -184,6 +188,7 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     drop(serving.await);
     ros.stop().await;
     let last = tokio::task::spawn_blocking(|| thread.close()).await.unwrap_or_default();
+    broker.stop().await;
     match last.error {
         Some(error) => Err(Failure::device(format!("the log was not closed well: {error}"), "")),
         None => Ok(()),
@@ -195,7 +200,7 @@ fn access(settings: &Settings, listeners: &Listeners) -> Result<Access, Failure>
     let keys = &settings.keys.server;
     let token = match &keys.token_file {
         Some(file) => Some(read_token(Path::new(file)).map_err(|error| {
-            let help = error.help(Path::new(file));
+            let help = token_help(&error, Path::new(file));
             Failure::input(format!("server.token_file {file}: {error}"), help)
         })?),
         None => None,

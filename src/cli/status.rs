@@ -12,7 +12,9 @@ use super::{
     daemon::{Daemons, DaemonsArgs, refuse},
     runtime,
 };
-use crate::api::{Health, LinkReport, Pending, RosReport, ScanFit, SimulationReport, Status};
+use crate::api::{
+    Health, LinkReport, MqttReport, Pending, RosReport, ScanFit, SimulationReport, Status,
+};
 
 /// Options of `sonard status`.
 #[derive(Debug, clap::Args)]
@@ -97,6 +99,7 @@ fn screen(status: &Status, health: &Health) -> String {
         ),
     ]);
     lines.extend(status.ros.as_ref().map(ros));
+    lines.extend(status.mqtt.as_ref().map(broker));
     lines.extend(pending(&status.pending));
     lines.extend(health.reasons.iter().map(|reason| format!("  not well: {reason}")));
     if let Some(error) = &air.error {
@@ -117,6 +120,17 @@ fn ros(report: &RosReport) -> String {
     }
     format!(
         "  ros      domain {domain} on {networks}; {subscriptions} subscriptions, {messages} messages, {left_out} left out"
+    )
+}
+
+/// How it goes with the MQTT broker.
+fn broker(report: &MqttReport) -> String {
+    let MqttReport { broker, acknowledged, behind_bytes, .. } = report;
+    let is_there = if report.connected { "is there" } else { "is not there" };
+    let why = report.trouble.as_ref().map(|why| format!(" ({why})")).unwrap_or_default();
+    let behind_kb = *behind_bytes as f64 / 1e3;
+    format!(
+        "  mqtt     {broker} {is_there}{why}; {acknowledged} records acknowledged, {behind_kb:.0} kB behind"
     )
 }
 

@@ -2,7 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::{Failure, logs::for_each_scan};
+use super::{
+    Failure,
+    logs::{for_each_scan, logs_in},
+};
 use crate::{interpret::Sweep, scan::ScanView};
 
 /// Hands over each scan of the logs that can be interpreted, one by one as it is read, since a
@@ -11,7 +14,7 @@ pub(super) fn for_each_sweep(
     logs: &[PathBuf],
     mut take: impl FnMut(ScanView, Sweep),
 ) -> Result<(), Failure> {
-    for log in logs {
+    for log in &logs_in(logs)? {
         for_each_scan(log, |scan| {
             match Sweep::of(&scan) {
                 Ok(sweep) => take(scan, sweep),

@@ -6,7 +6,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{air::AirKeys, fleet::FleetKeys, foxglove::FoxgloveKeys, ros::RosKeys};
+use super::{air::AirKeys, fleet::FleetKeys, foxglove::FoxgloveKeys, mqtt::MqttKeys, ros::RosKeys};
 use crate::model::OptionKeys;
 
 /// Configuration of `sonard run`.
@@ -43,6 +43,8 @@ pub struct Keys {
     pub fleet: FleetKeys,
     /// Messages and services for ROS 2, by DDS; only in a build with the feature ros.
     pub ros: RosKeys,
+    /// Records to an MQTT broker, from the log; only in a build with the feature mqtt.
+    pub mqtt: MqttKeys,
     /// Pins of a Raspberry Pi (BCM numbers); only in a build with the feature pi.
     pub gpio: GpioKeys,
 }

@@ -110,6 +110,12 @@ impl Journal {
         self.status.borrow().clone()
     }
 
+    /// Records that are in the log since it was opened.
+    #[must_use]
+    pub fn written(&self) -> u64 {
+        self.status.borrow().written
+    }
+
     /// Whether records can be written.
     #[must_use]
     pub fn is_well(&self) -> bool {

@@ -171,6 +171,13 @@ impl Settings {
             message,
             help,
         })?;
+        let built_in = cfg!(feature = "mqtt");
+        self.keys.mqtt.check(built_in).map_err(|(key, message, help)| Mismatch {
+            section: "mqtt",
+            key,
+            message,
+            help,
+        })?;
         if self.keys.link.retry_max_s < self.keys.link.retry_min_s {
             return Err(Mismatch {
                 section: "link",
@@ -242,6 +249,9 @@ impl Settings {
         }
         if now.ros != then.ros {
             keys.push("ros".to_owned());
+        }
+        if now.mqtt != then.mqtt {
+            keys.push("mqtt".to_owned());
         }
         if now.gpio != then.gpio {
             keys.push("gpio".to_owned());

@@ -17,8 +17,8 @@ use super::{
 use crate::{
     api::{
         AirStatus, ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, LinkState,
-        LogStatus, Pending, RosReport, ScanFit, ScanProgress, ScanTotals, ScanningReport,
-        SensorFigures, Setup, SimulationReport, Status, SubscriberReport,
+        LogStatus, MqttReport, Pending, RosReport, ScanFit, ScanProgress, ScanTotals,
+        ScanningReport, SensorFigures, Setup, SimulationReport, Status, SubscriberReport,
     },
     array::RangerArray,
     compare::Explanation,
@@ -170,6 +170,7 @@ pub(super) struct Shared {
     beams_done: AtomicU32,
     scans: Mutex<Collector>,
     ros: Mutex<Option<RosReport>>,
+    mqtt: Mutex<Option<MqttReport>>,
 }
 
 /// What is remembered of scans. Their readings are in the log.
@@ -200,6 +201,7 @@ impl Shared {
             beams_done: AtomicU32::new(0),
             scans: Mutex::default(),
             ros: Mutex::default(),
+            mqtt: Mutex::default(),
         }
     }
 
@@ -311,6 +313,7 @@ impl Shared {
             log,
             subscribers,
             ros: held(&self.ros).clone(),
+            mqtt: held(&self.mqtt).clone(),
             configuration: view.configuration,
             simulation: view.simulation,
         }
@@ -347,6 +350,11 @@ impl Shared {
     /// How it goes with ROS 2.
     pub(super) fn report_ros(&self, report: RosReport) {
         *held(&self.ros) = Some(report);
+    }
+
+    /// How it goes with the broker.
+    pub(super) fn report_mqtt(&self, report: MqttReport) {
+        *held(&self.mqtt) = Some(report);
     }
 
     fn scans(&self) -> MutexGuard<'_, Collector> {

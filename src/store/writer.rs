@@ -122,6 +122,22 @@ impl<M: Medium> LogWriter<M> {
         if matches!(record, Record::ScanEnd(_)) { self.sync() } else { self.sync_if_due(now) }
     }
 
+    /// Appends a record by its line as it stands in another log, without the newline: with all that a later version may
+    /// have put there. It is on the disk for good after the next [`sync`](Self::sync), which is the caller's to ask for.
+    ///
+    /// # Errors
+    /// As for [`append`](Self::append).
+    pub fn append_line(&mut self, line: &[u8], record: &Record) -> Result<(), StoreError> {
+        self.check_usable()?;
+        self.line.clear();
+        self.line.extend_from_slice(line);
+        self.line.push(b'\n');
+        self.write_line()?;
+        self.scenes.written(record);
+        self.appended += 1;
+        Ok(())
+    }
+
     /// Syncs if a record has waited for longer than the interval. For callers whose records may
     /// stop coming.
     ///

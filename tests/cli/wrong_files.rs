@@ -75,7 +75,7 @@ fn a_file_of_another_kind_is_named_in_few_lines() {
         assert_eq!(output.status.code(), Some(2), "{name}: {}", stderr(&output));
         assert!(said(&output).contains(says), "{name}: {}", stderr(&output));
     }
-    let output = run(&["compare", folder.path().to_str().expect("plain path")]);
+    let output = run(&["plot", folder.path().to_str().expect("plain path")]);
     assert!(said(&output).contains("directory"), "{}", stderr(&output));
 }
 

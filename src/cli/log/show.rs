@@ -25,7 +25,7 @@ pub(in crate::cli) struct Args {
     /// List every reading too
     #[arg(long)]
     readings: bool,
-    /// Print what is in the log line by line, and go on as records are added
+    /// Go on as records are added; what is in the log comes first, line by line
     #[arg(long, conflicts_with = "json")]
     follow: bool,
     /// JSON instead of text; one object for each session, scan, event and damaged line

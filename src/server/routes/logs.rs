@@ -4,11 +4,14 @@ use axum::{
     Json,
     body::Body,
     extract::State,
-    http::{StatusCode, header},
+    http::{HeaderMap, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use serde_json::json;
-use tokio::{fs::File, io::AsyncReadExt as _};
+use tokio::{
+    fs::File,
+    io::{AsyncReadExt as _, AsyncSeekExt as _, SeekFrom},
+};
 use tokio_util::io::ReaderStream;
 
 use crate::{
@@ -27,7 +30,18 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
             .answers::<Vec<LogEntry>>(200, "The logs"),
         Endpoint::get("/v1/logs/{name}", download, "A log, as far as it is written")
             .parameter("path", "name", json!({"type": "string"}), "A name from GET /v1/logs")
-            .answers_text(200, "application/x-ndjson", "One record a line"),
+            .parameter(
+                "header",
+                "Range",
+                json!({"type": "string"}),
+                "bytes=N-: from byte N on. Any other range is answered with the whole",
+            )
+            .answers_text(200, "application/x-ndjson", "One record a line")
+            .answers_text(
+                206,
+                "application/x-ndjson",
+                "The log from the byte on that was asked for",
+            ),
     ]
 }
 
@@ -42,22 +56,46 @@ async fn list(State(api): State<Api>) -> Result<Json<Vec<LogEntry>>, Failed> {
     Ok(Json(entries.collect()))
 }
 
-async fn download(State(api): State<Api>, Path(name): Path<String>) -> Result<Response, Failed> {
+async fn download(
+    State(api): State<Api>,
+    Path(name): Path<String>,
+    asked: HeaderMap,
+) -> Result<Response, Failed> {
     // Only what the list shows: a name can't lead out of the folder.
     let known = files(&api)?.into_iter().any(|file| file.name == name);
     if !known {
         let help = "GET /v1/logs names them";
         return Err(Failed::new(StatusCode::NOT_FOUND, format!("there is no log {name}"), help));
     }
-    let file = File::open(api.log_folder.join(&name)).await.map_err(|error| unreadable(&error))?;
+    let mut file =
+        File::open(api.log_folder.join(&name)).await.map_err(|error| unreadable(&error))?;
     let bytes = file.metadata().await.map_err(|error| unreadable(&error))?.len();
+    let from = first_byte(&asked);
+    let begin = from.unwrap_or(0);
+    if from.is_some() && begin >= bytes {
+        let status = StatusCode::RANGE_NOT_SATISFIABLE;
+        return Err(Failed::new(status, format!("{name} has {bytes} bytes"), "ask for fewer"));
+    }
+    file.seek(SeekFrom::Start(begin)).await.map_err(|error| unreadable(&error))?;
     let headers = [
         (header::CONTENT_TYPE, "application/x-ndjson".to_owned()),
-        (header::CONTENT_LENGTH, bytes.to_string()),
+        (header::CONTENT_LENGTH, (bytes - begin).to_string()),
+        (header::ACCEPT_RANGES, "bytes".to_owned()),
         (header::CONTENT_DISPOSITION, format!("attachment; filename=\"{name}\"")),
     ];
     // The log grows: what was announced is what is sent.
-    Ok((headers, Body::from_stream(ReaderStream::new(file.take(bytes)))).into_response())
+    let body = Body::from_stream(ReaderStream::new(file.take(bytes - begin)));
+    let range = [(header::CONTENT_RANGE, format!("bytes {begin}-{}/{bytes}", bytes.max(1) - 1))];
+    match from {
+        Some(_) => Ok((StatusCode::PARTIAL_CONTENT, headers, range, body).into_response()),
+        None => Ok((headers, body).into_response()),
+    }
+}
+
+/// The byte from which on a part is asked for. Other ranges may be answered with the whole (RFC 9110, 14.2).
+fn first_byte(asked: &HeaderMap) -> Option<u64> {
+    let range = asked.get(header::RANGE)?.to_str().ok()?;
+    range.strip_prefix("bytes=")?.strip_suffix('-')?.parse().ok()
 }
 
 fn files(api: &Api) -> Result<Vec<crate::store::LogFile>, Failed> {

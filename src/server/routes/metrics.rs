@@ -13,7 +13,7 @@ use prometheus_client::{
 };
 
 use crate::{
-    api::{Health, RosReport, Status},
+    api::{Health, MqttReport, RosReport, Status},
     daemon::Handle,
     scan::Provenance,
     server::{Api, answer::Failed, openapi::Endpoint},
@@ -66,6 +66,9 @@ fn registry(daemon: &Handle) -> Registry {
     if let Some(report) = &status.ros {
         register_ros(&mut registry, report);
     }
+    if let Some(report) = &status.mqtt {
+        register_mqtt(&mut registry, report);
+    }
     registry
 }
 
@@ -83,6 +86,37 @@ fn register_ros(registry: &mut Registry, report: &RosReport) {
     registry.register("ros_up", "Whether ROS 2 is told", ConstGauge::new(up));
     let subscriptions = ConstGauge::new(report.subscriptions as f64);
     registry.register("ros_subscriptions", "Subscriptions of ROS 2 to topics", subscriptions);
+}
+
+/// How it goes with an MQTT broker, where one is named.
+fn register_mqtt(registry: &mut Registry, report: &MqttReport) {
+    for (name, help, value) in [
+        ("mqtt_connections", "Connections with the MQTT broker", report.connections),
+        ("mqtt_acknowledged_records", "Records that the MQTT broker has", report.acknowledged),
+        ("mqtt_commands", "Commands taken through the MQTT broker", report.commands),
+        ("mqtt_refused_commands", "Commands refused", report.refused),
+    ] {
+        registry.register(name, help, ConstCounter::new(value));
+    }
+    for (name, help, value) in [
+        (
+            "mqtt_connected",
+            "Whether the MQTT broker is there",
+            f64::from(u8::from(report.connected)),
+        ),
+        (
+            "mqtt_waiting_records",
+            "Records under way that the MQTT broker did not acknowledge",
+            report.waiting as f64,
+        ),
+        (
+            "mqtt_behind_bytes",
+            "What of the log the MQTT broker does not have",
+            report.behind_bytes as f64,
+        ),
+    ] {
+        registry.register(name, help, ConstGauge::new(value));
+    }
 }
 
 /// What only ever grows: name, meaning, value.
