@@ -42,19 +42,18 @@ pub(super) struct Place {
 }
 
 impl State<'_> {
-    /// The likeliest end of all beginnings, and what the other places add to its covariance.
+    /// The likeliest end of all beginnings, and what the other places add to its covariance. Where there is nothing to
+    /// predict, as within a wall, there is no other beginning.
     pub(super) fn likeliest(&mut self) -> Result<(Settled, DMatrix<f64>), FitError> {
         let mut best = self.attempt(self.still(), 0)?;
         if self.is_astray(&best) && self.start.scene.robot.is_none() {
             for start in self.beginnings()? {
-                let end = self.attempt(start, 0)?;
-                keep_likelier(&mut best, end);
+                keep_likelier(&mut best, self.attempt(start, 0));
             }
         }
         let places = self.places(&best)?;
         for place in places.iter().take(FOLLOWED) {
-            let end = self.attempt(place.values.clone(), STAGE)?;
-            keep_likelier(&mut best, end);
+            keep_likelier(&mut best, self.attempt(place.values.clone(), STAGE));
         }
         let beside = self.beside(&best, &places)?;
         Ok((best, beside))
@@ -96,13 +95,14 @@ impl State<'_> {
         let (places, apart) = if has_body { PLACES_OF_BODY } else { PLACES };
         let mut tried: Vec<Place> = Vec::new();
         let doubtful = self.doubtful(&end.values, &widened(&end.errors, ROUGH))?;
-        let of = doubtful.len() * 2 * places as usize;
+        let (mut number, of) = (0, doubtful.len() * 2 * places as usize);
         for (direction, sigma) in doubtful {
             for place in (-places..=places).filter(|place| *place != 0) {
-                (self.watch)(Progress::Searching { place: tried.len() + 1, of });
+                number += 1;
+                (self.watch)(Progress::Searching { place: number, of });
                 let by = f64::from(place) * apart * sigma;
                 self.values = self.limited(&end.values + by * &direction);
-                tried.push(self.improved(&close)?);
+                tried.extend(self.improved(&close).ok());
             }
         }
         tried.sort_by(|one, other| other.value.total_cmp(&one.value));
@@ -194,8 +194,10 @@ fn widened(errors: &ErrorModel, (sigma_m, sigma_db, clutter): (f64, f64, f64)) -
     }
 }
 
-fn keep_likelier(best: &mut Settled, end: Settled) {
-    if end.value > best.value {
+fn keep_likelier(best: &mut Settled, end: Result<Settled, FitError>) {
+    if let Ok(end) = end
+        && end.value > best.value
+    {
         *best = end;
     }
 }
