@@ -46,7 +46,7 @@ pub struct Read {
     pub after: Place,
 }
 
-/// The records between the log and the broker; see the [module](self).
+/// The records between the log and the broker, as the head of this file describes them.
 #[derive(Debug)]
 pub struct Window {
     most_bytes: usize,
