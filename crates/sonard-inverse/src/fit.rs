@@ -51,7 +51,7 @@ pub struct Fit {
 pub struct Estimate {
     /// What the parameter is to be changed by, in its unit.
     pub change: f64,
-    /// Standard deviation of it.
+    /// Standard deviation of it, with other values that explain the readings nearly as well.
     pub sigma: f64,
     /// Whether the readings say more about it than was believed beforehand.
     pub identified: bool,
@@ -62,7 +62,7 @@ pub struct Estimate {
 pub struct Fitted {
     /// In the order of the parameters.
     pub estimates: Vec<Estimate>,
-    /// Covariance of the changes, in their order.
+    /// Covariance of the changes, in their order, about this explanation of the readings alone.
     pub covariance: DMatrix<f64>,
     /// The world with all changes made.
     pub world: World,
@@ -335,11 +335,9 @@ impl<'a> State<'a> {
         let sigma_db = threshold.map_or(NOT_FITTED_DB, |at| covariance[(at, at)].sqrt());
         let moved = &covariance * &curve.walk * sigma_db;
         covariance += &moved * moved.transpose();
-        if let Some(beside) = beside {
-            covariance += beside;
-        }
+        let beside = beside.unwrap_or_else(|| DMatrix::zeros(self.values.len(), self.values.len()));
         let estimates = self.values.iter().enumerate().map(|(at, &change)| {
-            let sigma = covariance[(at, at)].max(0.0).sqrt();
+            let sigma = (covariance[(at, at)] + beside[(at, at)]).max(0.0).sqrt();
             Estimate { change, sigma, identified: sigma < 0.5 * self.fit.priors[at].sigma }
         });
         Ok(Fitted {
