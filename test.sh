@@ -214,44 +214,25 @@ check_python() {
   python/test.sh || fail "the package for Python: see above. Where it can't be built, PYTHON=0 leaves it out"
 }
 
-check_exports() {
-  if [ "${EXPORT_PEERS:-1}" = 0 ]; then
-    step "exports as other programs read them: LEFT OUT, because EXPORT_PEERS=0"
+# NAME SCRIPT WHAT FAILURE: what other programs read of sonard; NAME=0 leaves it out.
+check_peer() {
+  if [ "${!1:-1}" = 0 ]; then
+    step "$3: LEFT OUT, because $1=0"
     return
   fi
-  step "exports as other programs read them"
-  tests/peers/exports.sh "${CARGO_TARGET_DIR:-target}/debug/sonard" ||
-    fail "an export does not say what its log does, or the readers can't be had: EXPORT_PEERS=0 leaves them out"
+  step "$3"
+  "tests/peers/$2" "${CARGO_TARGET_DIR:-target}/debug/sonard" || fail "$4: $1=0 leaves it out"
 }
 
-check_viewers() {
-  if [ "${FOXGLOVE_PEER:-1}" = 0 ]; then
-    step "live messages as Foxglove's library reads them: LEFT OUT, because FOXGLOVE_PEER=0"
-    return
-  fi
-  step "live messages as Foxglove's library reads them"
-  tests/peers/foxglove.sh "${CARGO_TARGET_DIR:-target}/debug/sonard" ||
-    fail "viewers are not told what the log says, or the library can't be had: FOXGLOVE_PEER=0 leaves it out"
-}
-
-check_ros() {
-  if [ "${ROS_PEER:-1}" = 0 ]; then
-    step "messages as ROS 2 gets them: LEFT OUT, because ROS_PEER=0"
-    return
-  fi
-  step "messages as ROS 2 gets them"
-  tests/peers/ros.sh "${CARGO_TARGET_DIR:-target}/debug/sonard" ||
-    fail "ROS 2 is not told what the log says, or Cyclone DDS can't be had: ROS_PEER=0 leaves it out"
-}
-
-check_broker() {
-  if [ "${MQTT_PEER:-1}" = 0 ]; then
-    step "records as mosquitto gets them: LEFT OUT, because MQTT_PEER=0"
-    return
-  fi
-  step "records as mosquitto gets them"
-  tests/peers/mqtt.sh "${CARGO_TARGET_DIR:-target}/debug/sonard" ||
-    fail "a broker does not get what the log says, or mosquitto can't be had: MQTT_PEER=0 leaves it out"
+check_peers() {
+  check_peer EXPORT_PEERS exports.sh "exports as other programs read them" \
+    "an export does not say what its log does, or the readers can't be had"
+  check_peer FOXGLOVE_PEER foxglove.sh "live messages as Foxglove's library reads them" \
+    "viewers are not told what the log says, or the library can't be had"
+  check_peer ROS_PEER ros.sh "messages as ROS 2 gets them" \
+    "ROS 2 is not told what the log says, or Cyclone DDS can't be had"
+  check_peer MQTT_PEER mqtt.sh "records as mosquitto gets them" \
+    "a broker does not get what the log says, or mosquitto can't be had"
 }
 
 check_monitoring() {
@@ -324,10 +305,7 @@ quick)
   check_examples
   check_api
   check_python
-  check_exports
-  check_viewers
-  check_ros
-  check_broker
+  check_peers
   check_monitoring
   test_page
   step "tests"

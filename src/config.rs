@@ -27,3 +27,6 @@ pub use layers::{ConfigError, Layers, Origin};
 pub use mqtt::{Broker, MqttKeys};
 pub use ros::{RosDistribution, RosKeys, RosProfile};
 pub use schema::{Form, Key, Kind, Section, read_sections, sections};
+
+/// A key of a section with what is wrong with it, and what would be right.
+pub(crate) type Fault = (&'static str, String, String);

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use sha2::{Digest as _, Sha256};
 use sonard_generate::{Generator, Manifest, Part, ShardFacts, Table};
 
-use crate::store::WholeFile;
+use crate::store::{WholeFile, hexadecimal};
 use draft::Draft;
 pub use error::DataSetError;
 
@@ -298,10 +298,6 @@ fn digest(path: &Path) -> io::Result<(u64, String)> {
         bytes += read as u64;
         hash.update(&piece[..read]);
     }
-}
-
-fn hexadecimal(digest: &[u8]) -> String {
-    digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ use std::{
 use sha2::{Digest as _, Sha256};
 
 use super::order::Slot;
-use crate::store::WholeFile;
+use crate::store::{WholeFile, hexadecimal};
 pub use error::FolderError;
 
 /// Scans under way: empty unless the program is running or was killed.
@@ -272,10 +272,6 @@ fn digest(path: &Path) -> io::Result<(u64, String)> {
         bytes += read as u64;
         reader.consume(read);
     }
-}
-
-fn hexadecimal(digest: &[u8]) -> String {
-    digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// The name of a scan's file without its ending; names sort as the scans do up to 999 poses.

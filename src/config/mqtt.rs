@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::Fault;
+
 /// The port of MQTT, and that of MQTT by TLS.
 const PORTS: [u16; 2] = [1883, 8883];
 /// Longest prefix of topics and name of a robot, bytes: a topic has at most 65,535.
@@ -77,9 +79,6 @@ pub struct Broker {
     /// Whether it is spoken to by TLS.
     pub tls: bool,
 }
-
-/// A key of the section with what is wrong with it, and what would be right.
-type Fault = (&'static str, String, String);
 
 impl Broker {
     /// Reads `mqtt://HOST:PORT` or `mqtts://HOST:PORT`; the port may be left out.

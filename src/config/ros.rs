@@ -5,6 +5,7 @@ use std::net::Ipv4Addr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::Fault;
 use crate::export::{
     Settings,
     dds::{is_name, is_namespace},
@@ -83,9 +84,6 @@ impl Default for RosKeys {
         }
     }
 }
-
-/// A key of the section with what is wrong with it, and what would be right.
-type Fault = (&'static str, String, String);
 
 impl RosKeys {
     /// How messages are made.

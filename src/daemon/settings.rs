@@ -164,20 +164,12 @@ impl Settings {
         })?;
         self.check_server()?;
         self.check_robot()?;
-        let built_in = cfg!(feature = "ros");
-        self.keys.ros.check(built_in).map_err(|(key, message, help)| Mismatch {
-            section: "ros",
-            key,
-            message,
-            help,
-        })?;
-        let built_in = cfg!(feature = "mqtt");
-        self.keys.mqtt.check(built_in).map_err(|(key, message, help)| Mismatch {
-            section: "mqtt",
-            key,
-            message,
-            help,
-        })?;
+        for (section, checked) in [
+            ("ros", self.keys.ros.check(cfg!(feature = "ros"))),
+            ("mqtt", self.keys.mqtt.check(cfg!(feature = "mqtt"))),
+        ] {
+            checked.map_err(|(key, message, help)| Mismatch { section, key, message, help })?;
+        }
         if self.keys.link.retry_max_s < self.keys.link.retry_min_s {
             return Err(Mismatch {
                 section: "link",

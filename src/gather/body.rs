@@ -9,11 +9,11 @@ use hyper::{
 };
 use tokio::time::{Instant, timeout};
 
-use super::{
-    ledger::{LOOKED_AT, Mark},
-    pull::PullError,
+use super::pull::PullError;
+use crate::{
+    client::Client,
+    store::{MARK_BYTES, Mark},
 };
-use crate::client::Client;
 
 /// How long a daemon may take for the next bytes of a log.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -41,7 +41,7 @@ impl Body {
         taken: u64,
         end: u64,
     ) -> Result<Self, PullError> {
-        let from = taken - taken.min(LOOKED_AT);
+        let from = taken - taken.min(MARK_BYTES);
         let answer = client.get_from(&format!("/v1/logs/{name}"), from).await?;
         let skip = match answer.status() {
             StatusCode::PARTIAL_CONTENT => 0,
@@ -93,7 +93,7 @@ impl Body {
         taken: u64,
         sha256: &str,
     ) -> Result<Vec<u8>, PullError> {
-        let (wanted, mut last) = (taken.min(LOOKED_AT) as usize, Vec::new());
+        let (wanted, mut last) = (taken.min(MARK_BYTES) as usize, Vec::new());
         while last.len() < wanted {
             let mut bytes =
                 self.next(name).await?.ok_or_else(|| PullError::BrokenOff(name.into()))?;

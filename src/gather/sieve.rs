@@ -4,8 +4,10 @@ use std::collections::HashSet;
 
 use uuid::Uuid;
 
-use super::ledger::Mark;
-use crate::scan::{MAX_LINE_BYTES, Record, ScanStart, decode_line};
+use crate::{
+    scan::{MAX_LINE_BYTES, Record, ScanStart, decode_line},
+    store::Mark,
+};
 
 /// Scans of a log that are remembered, so that none begins twice.
 const MOST_SCANS: usize = 100_000;

@@ -1,7 +1,7 @@
 //! The place in the log that everything before is acknowledged of, in a file beside the logs.
 
 use std::{
-    fs::{self, File},
+    fs::File,
     io,
     os::unix::fs::FileExt as _,
     path::{Path, PathBuf},
@@ -11,14 +11,12 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use super::window::Place;
-use crate::store::WholeFile;
+use crate::store::{MARK_BYTES, WholeFile, hexadecimal, read_small};
 
 /// The file's name in the folder of the logs.
 const NAME: &str = "mqtt-place.json";
 /// Largest file that is read, bytes.
 const MOST_BYTES: u64 = 4096;
-/// So many bytes before a place tell whether a log is the one it was.
-const LOOKED_AT: u64 = 256;
 
 /// A place, and what stood before it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,7 +26,7 @@ pub(super) struct Bookmark {
     file: String,
     /// So many bytes of it are behind.
     bytes: u64,
-    /// SHA-256 of the last of these, at most [`LOOKED_AT`].
+    /// SHA-256 of the last of these, at most [`MARK_BYTES`].
     sha256: String,
 }
 
@@ -48,14 +46,7 @@ impl Bookmark {
     /// # Errors
     /// When there is one that can't be read.
     pub(super) fn read(folder: &Path) -> io::Result<Option<Self>> {
-        let path = path_in(folder);
-        match fs::metadata(&path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            Ok(metadata) if metadata.is_file() && metadata.len() <= MOST_BYTES => {}
-            Ok(_) => return Err(io::ErrorKind::InvalidData.into()),
-            Err(error) => return Err(error),
-        }
-        Ok(Some(serde_json::from_slice(&fs::read(&path)?)?))
+        read_small(&path_in(folder), MOST_BYTES)
     }
 
     /// Brings a place to the disk: after a crash either it is remembered, or the one before it.
@@ -79,16 +70,18 @@ fn path_in(folder: &Path) -> PathBuf {
 
 /// SHA-256 of what stands before a place.
 fn before(folder: &Path, place: &Place) -> io::Result<String> {
-    let from = place.bytes.saturating_sub(LOOKED_AT);
+    let from = place.bytes.saturating_sub(MARK_BYTES);
     let mut bytes = vec![0; usize::try_from(place.bytes - from).unwrap_or_default()];
     // What a damaged file names must not lead out of the folder.
     let name = Path::new(&*place.file).file_name().ok_or(io::ErrorKind::NotFound)?;
     File::open(folder.join(name))?.read_exact_at(&mut bytes, from)?;
-    Ok(Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(hexadecimal(&Sha256::digest(&bytes)))
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -29,38 +29,14 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import bag
-
-
-def plain(value):
-    """A message, of either reader, as dicts, lists and numbers."""
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, (bytes, bytearray, memoryview)):
-        return list(value)
-    if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
-    if isinstance(value, (str, bool, int)):
-        return value
-    if isinstance(value, float):
-        return "nan" if math.isnan(value) else value
-    names = getattr(value, "__dataclass_fields__", None) or value.__slots__
-    return {name: plain(getattr(value, name)) for name in names if not name.startswith("_")}
-
-
-def without_constants(message):
-    """Constants of a type, which one reader gives with each message, are upper case."""
-    if isinstance(message, dict):
-        return {k: without_constants(v) for k, v in message.items() if not k.isupper()}
-    if isinstance(message, list):
-        return [without_constants(one) for one in message]
-    return message
+from plain import plain
 
 
 def by_mcap(path):
     with open(path, "rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
         messages = [
-            (channel.topic, message.log_time, without_constants(plain(decoded)))
+            (channel.topic, message.log_time, plain(decoded))
             for _, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False)
         ]
         attachments = {one.name: one.data for one in reader.iter_attachments()}
@@ -73,7 +49,7 @@ def by_rosbags(path):
     with AnyReader([pathlib.Path(path)]) as reader:
         offered = {one.topic: one.ext.offered_qos_profiles for one in reader.connections}
         messages = [
-            (connection.topic, at, without_constants(plain(reader.deserialize(raw, connection.msgtype))))
+            (connection.topic, at, plain(reader.deserialize(raw, connection.msgtype)))
             for connection, at, raw in reader.messages()
         ]
         return messages, offered

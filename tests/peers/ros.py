@@ -29,6 +29,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 import ros_types as ros
+from plain import plain
 
 PROGRAM, WORK = sys.argv[1], pathlib.Path(sys.argv[2])
 # Where there are echoes, silence, and walls that are too near.
@@ -129,21 +130,6 @@ class Subscriber:
             time.sleep(0.1)
         time.sleep(0.3)
         assert have() == numbers, have()
-
-
-def plain(value):
-    """A message, of either reader, as dicts, lists and numbers."""
-    if isinstance(value, (bytes, bytearray, memoryview)):
-        return list(value)
-    if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
-    if isinstance(value, (str, bool, int)):
-        return value
-    if isinstance(value, float):
-        return "nan" if math.isnan(value) else value
-    names = getattr(value, "__dataclass_fields__", None) or value.__slots__
-    # Constants of a type, which one reader gives with each message, are upper case.
-    return {name: plain(getattr(value, name)) for name in names if not name.startswith("_") and not name.isupper()}
 
 
 def recorded(log, *options):

@@ -181,7 +181,7 @@ pub fn fit_watched(
     let mut state = State::new(models, world, sweeps, fit)?;
     state.watch = watch;
     let (best, beside) = state.likeliest()?;
-    state.end(best, Some(beside))
+    state.end(best, &beside)
 }
 
 /// The same with models of the world with the transducer on its axis, which it may have in common with other fits.
@@ -193,7 +193,8 @@ pub(crate) fn fit_with(
 ) -> Result<Fitted, FitError> {
     let mut state = State::new(models, world, sweeps, fit)?;
     let end = state.attempt(state.still(), 0)?;
-    state.end(end, None)
+    let beside = state.still();
+    state.end(end, &beside)
 }
 
 /// Goes near to where a fit would end, with a single sweep.
@@ -292,7 +293,7 @@ impl<'a> State<'a> {
         self.start.changed(&self.changes(&self.values))
     }
 
-    /// Predictions where it stands; exact ones with the transducer where it is, and with time walk.
+    /// Predictions where it stands; exact ones with the transducer where it is.
     fn linear(&mut self, is_exact: bool) -> Result<Linear, FitError> {
         let reference_m_s = self.start.air.sound_speed_m_s();
         let (world, poses) = (self.moved_world()?, self.poses());
@@ -318,8 +319,8 @@ impl<'a> State<'a> {
         values.iter().enumerate().map(of).sum()
     }
 
-    /// What came of it, where it settled.
-    fn end(mut self, best: Settled, beside: Option<DMatrix<f64>>) -> Result<Fitted, FitError> {
+    /// What came of it, where it settled; other places add so much to the variances.
+    fn end(mut self, best: Settled, beside: &DVector<f64>) -> Result<Fitted, FitError> {
         (self.values, self.phases) = (best.values, best.phases);
         let errors = best.errors;
         if !self.start.sensor.mounting.is_on_axis() {
@@ -335,9 +336,8 @@ impl<'a> State<'a> {
         let sigma_db = threshold.map_or(NOT_FITTED_DB, |at| covariance[(at, at)].sqrt());
         let moved = &covariance * &curve.walk * sigma_db;
         covariance += &moved * moved.transpose();
-        let beside = beside.unwrap_or_else(|| DMatrix::zeros(self.values.len(), self.values.len()));
         let estimates = self.values.iter().enumerate().map(|(at, &change)| {
-            let sigma = (covariance[(at, at)] + beside[(at, at)]).max(0.0).sqrt();
+            let sigma = (covariance[(at, at)] + beside[at]).max(0.0).sqrt();
             Estimate { change, sigma, identified: sigma < 0.5 * self.fit.priors[at].sigma }
         });
         Ok(Fitted {

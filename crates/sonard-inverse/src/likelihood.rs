@@ -2,6 +2,10 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
+/// Readings that share what the model misses of an arc, and so count as one where explanations are weighed against each
+/// other: taken for independent they would make sure of what they can't tell.
+pub(crate) const READINGS_OF_ARC: f64 = 8.0;
+
 /// The spread of readings about what is predicted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorModel {

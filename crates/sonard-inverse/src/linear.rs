@@ -30,8 +30,7 @@ pub(crate) struct Curve {
     /// Fisher's information: of ranges as Gauss and Newton have it, of thresholds what a reading is expected to say. What
     /// single surprising readings seem to say would make far too sure.
     pub(crate) information: DMatrix<f64>,
-    /// What the gradient would gain by each decibel that the threshold is wrong, because of time walk, if that is in
-    /// the linearisation.
+    /// What the gradient would gain by each decibel that the threshold is wrong, because of time walk.
     pub(crate) walk: DVector<f64>,
 }
 

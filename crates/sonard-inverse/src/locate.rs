@@ -7,6 +7,7 @@ use sonard_model::geometry::{Pose, wrap_180};
 use crate::{
     atlas::{Atlas, Match, is_apart},
     fit::{Approached, Fit, FitError, Fitted, Prior, approach, fit_with},
+    likelihood::READINGS_OF_ARC,
     parameter::Parameter,
     sweep::Sweep,
     world::World,
@@ -66,9 +67,6 @@ const WHOLE_TURN_DEG: f64 = 2.0;
 const LEAST_WIDEST_M: f64 = 4e-3;
 /// Beams of a rough look.
 const FEW_BEAMS: usize = 60;
-/// Readings that share what the model misses of an arc, and so count as one where poses are weighed against each
-/// other: taken for independent they would make sure of what they can't tell.
-const READINGS_OF_ARC: f64 = 8.0;
 /// Modes this much less likely than the best are not listed.
 const LEAST_PROBABILITY: f64 = 1e-3;
 /// Logarithm of how much less likely a rough fit may be and still be improved.

@@ -8,7 +8,10 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::{FitError, Progress, Settled, State, settle::STAGES};
-use crate::{candidates::Phases, likelihood::ErrorModel};
+use crate::{
+    candidates::Phases,
+    likelihood::{ErrorModel, READINGS_OF_ARC},
+};
 
 /// Directions that are searched.
 const DIRECTIONS: usize = 2;
@@ -31,20 +34,18 @@ const STAGE: usize = STAGES.len() - 1;
 const ASTRAY: (f64, f64) = (0.03, 3.5);
 /// Beginnings anew of such a one, in standard deviations of what a first look leaves in doubt.
 const ANEW: f64 = 1.5;
-/// Readings of an arc share what the model misses: so many count as one where places are weighed.
-const READINGS_OF_ONE: f64 = 8.0;
 
 /// Somewhere beside the end of a fit.
-pub(super) struct Place {
+struct Place {
     values: DVector<f64>,
     /// Log-posterior with spreads by which places are told apart.
     value: f64,
 }
 
 impl State<'_> {
-    /// The likeliest end of all beginnings, and what the other places add to its covariance. Where there is nothing to
-    /// predict, as within a wall, there is no other beginning.
-    pub(super) fn likeliest(&mut self) -> Result<(Settled, DMatrix<f64>), FitError> {
+    /// The likeliest end of all beginnings, and what the other places add to the variances of its values. Where there
+    /// is nothing to predict, as within a wall, there is no other beginning.
+    pub(super) fn likeliest(&mut self) -> Result<(Settled, DVector<f64>), FitError> {
         let mut best = self.attempt(self.still(), 0)?;
         if self.is_astray(&best) && self.start.scene.robot.is_none() {
             for start in self.beginnings()? {
@@ -125,19 +126,19 @@ impl State<'_> {
         Ok(Place { values: self.values.clone(), value: self.value(&linear, errors) })
     }
 
-    /// What the covariance gains because the values may be those of other places, which explain the readings nearly as
+    /// What variances gain because the values may be those of other places, which explain the readings nearly as
     /// well.
-    fn beside(&mut self, best: &Settled, places: &[Place]) -> Result<DMatrix<f64>, FitError> {
+    fn beside(&mut self, best: &Settled, places: &[Place]) -> Result<DVector<f64>, FitError> {
         (self.values, self.phases) = (best.values.clone(), Phases::Unknown);
         let close = widened(&best.errors, CLOSE);
         let linear = self.linear(false)?;
         let of_best = self.value(&linear, &close);
-        let odds = |place: &Place| ((place.value - of_best) / READINGS_OF_ONE).min(0.0).exp();
+        let odds = |place: &Place| ((place.value - of_best) / READINGS_OF_ARC).min(0.0).exp();
         let all: f64 = 1.0 + places.iter().map(odds).sum::<f64>();
-        let mut beside = DMatrix::zeros(best.values.len(), best.values.len());
+        let mut beside = self.still();
         for place in places {
             let away = &place.values - &best.values;
-            beside += &away * away.transpose() * (odds(place) / all);
+            beside += away.component_mul(&away) * (odds(place) / all);
         }
         Ok(beside)
     }
