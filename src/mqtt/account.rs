@@ -15,8 +15,9 @@ use crate::{
     secret::{Secret, SecretError, read_secret},
 };
 
-/// The largest message from the broker that is read, bytes; commands are far smaller.
-const MOST_RECEIVED_BYTES: usize = 1 << 17;
+/// The largest message from the broker that is read, bytes; commands are far smaller. Some dozens of them wait within the
+/// client when a broker sends faster than they are read.
+const MOST_RECEIVED_BYTES: usize = 1 << 15;
 /// What a message has beside its payload, bytes: its head, its topic.
 const BESIDE_BYTES: usize = 1024;
 /// Messages that the client takes over at a time: those of the window, the status, answers.

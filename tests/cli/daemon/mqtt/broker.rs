@@ -133,7 +133,7 @@ fn serve(mut stream: TcpStream, manner: Manner, heard: &Mutex<Heard>) -> io::Res
             stream.write_all(&[0xd0, 0].repeat(1 << 12))?;
         },
         Manner::Pushy => loop {
-            send(&mut stream, 0x30, &[&string("a")[..], &[b'x'; 1 << 16]].concat())?;
+            send(&mut stream, 0x30, &[&string("a")[..], &[b'x'; 32_000]].concat())?;
         },
         _ => {}
     }
