@@ -12,15 +12,14 @@ mod verify;
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs::{self, File},
-    io::{self, BufWriter, Read as _, Write},
+    io::{self, BufWriter, Write},
     path::{Path, PathBuf},
 };
 
 use rayon::prelude::*;
-use sha2::{Digest as _, Sha256};
 use sonard_generate::{Generator, Manifest, Part, ShardFacts, Table};
 
-use crate::store::{WholeFile, hexadecimal};
+use crate::store::{WholeFile, digest_of};
 use draft::Draft;
 pub use error::DataSetError;
 
@@ -289,15 +288,7 @@ fn write(path: &Path, text: &str) -> Result<(), DataSetError> {
 fn digest(path: &Path) -> io::Result<(u64, String)> {
     let mut file = File::open(path)?;
     file.sync_all()?;
-    let (mut hash, mut bytes, mut piece) = (Sha256::new(), 0, vec![0; 1 << 16]);
-    loop {
-        let read = file.read(&mut piece)?;
-        if read == 0 {
-            return Ok((bytes, hexadecimal(&hash.finalize())));
-        }
-        bytes += read as u64;
-        hash.update(&piece[..read]);
-    }
+    digest_of(&mut file)
 }
 
 #[cfg(test)]

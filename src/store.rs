@@ -26,7 +26,7 @@ pub use folder::{LogFile, LogFolder, Rotation, log_files};
 pub use format::RecordWriter;
 pub use history::{History, Passage, PassageLines, PastScan};
 pub use kind::{FileKind, HEAD_BYTES};
-pub use mark::{MARK_BYTES, Mark, hexadecimal, read_small};
+pub use mark::{MARK_BYTES, Mark, digest_of, hexadecimal, read_small};
 pub use medium::{FileMedium, Medium, Pipe};
 pub use open::{Recovered, is_being_written, open_own};
 pub(crate) use reader::open_for_reading;

@@ -9,14 +9,14 @@ mod error;
 
 use std::{
     fs::{self, File},
-    io::{self, BufRead as _, BufReader},
+    io,
     path::{Path, PathBuf},
 };
 
 use sha2::{Digest as _, Sha256};
 
 use super::order::Slot;
-use crate::store::{WholeFile, hexadecimal};
+use crate::store::{WholeFile, digest_of, hexadecimal};
 pub use error::FolderError;
 
 /// Scans under way: empty unless the program is running or was killed.
@@ -192,8 +192,9 @@ impl Folder {
     /// When it can't be read.
     pub fn look(&self, file: String) -> Result<Sealed, FolderError> {
         let path = self.root.join(&file);
-        let (bytes, sha256) =
-            digest(&path).map_err(|source| FolderError::io("read", &path, source))?;
+        let (bytes, sha256) = File::open(&path)
+            .and_then(|mut file| digest_of(&mut file))
+            .map_err(|source| FolderError::io("read", &path, source))?;
         Ok(Sealed { file, bytes, sha256 })
     }
 
@@ -256,22 +257,6 @@ impl Folder {
 #[must_use]
 pub fn sha256(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
-}
-
-/// Size and SHA-256 of a file, read piece by piece.
-fn digest(path: &Path) -> io::Result<(u64, String)> {
-    let mut reader = BufReader::with_capacity(1 << 16, File::open(path)?);
-    let (mut digest, mut bytes) = (Sha256::new(), 0);
-    loop {
-        let piece = reader.fill_buf()?;
-        if piece.is_empty() {
-            return Ok((bytes, hexadecimal(&digest.finalize())));
-        }
-        digest.update(piece);
-        let read = piece.len();
-        bytes += read as u64;
-        reader.consume(read);
-    }
 }
 
 /// The name of a scan's file without its ending; names sort as the scans do up to 999 poses.

@@ -10,9 +10,8 @@ use std::{
 use sha2::{Digest as _, Sha256};
 use sonard_generate::{ShardFacts, Table};
 
-use super::{
-    CARD, DataSet, DataSetError, MANIFEST, SPECIFICATION, digest, hexadecimal, name, visible,
-};
+use super::{CARD, DataSet, DataSetError, MANIFEST, SPECIFICATION, digest, name, visible};
+use crate::store::hexadecimal;
 
 impl DataSet<'_> {
     /// Holds a shard that is there against the digests that it names; what is wrong, in words.

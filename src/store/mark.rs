@@ -1,6 +1,10 @@
 //! Places in logs, remembered in a file beside them.
 
-use std::{fs, io, path::Path};
+use std::{
+    fs::{self, File},
+    io::{self, Read as _},
+    path::Path,
+};
 
 use serde::de::DeserializeOwned;
 use sha2::{Digest as _, Sha256};
@@ -33,6 +37,22 @@ pub fn hexadecimal(digest: &[u8]) -> String {
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// Size and SHA-256 of a file, read piece by piece.
+///
+/// # Errors
+/// When it can't be read.
+pub fn digest_of(file: &mut File) -> io::Result<(u64, String)> {
+    let (mut hash, mut bytes, mut piece) = (Sha256::new(), 0, vec![0; 1 << 16]);
+    loop {
+        let read = file.read(&mut piece)?;
+        if read == 0 {
+            return Ok((bytes, hexadecimal(&hash.finalize())));
+        }
+        bytes += read as u64;
+        hash.update(&piece[..read]);
+    }
+}
+
 /// What a small file of JSON says; `None` where there is no file.
 ///
 /// # Errors
@@ -59,5 +79,15 @@ mod tests {
         bytes.chunks(7).for_each(|piece| pieces.push(piece));
         assert_eq!((whole.sha256(), whole.0.len()), (pieces.sha256(), 256));
         assert_eq!(whole.0, bytes[744..]);
+    }
+
+    #[test]
+    fn a_file_longer_than_a_piece_has_the_digest_of_its_bytes() {
+        let bytes: Vec<u8> = (0..=250).cycle().take(200_001).collect();
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("file");
+        fs::write(&path, &bytes).expect("written");
+        let digest = digest_of(&mut File::open(path).expect("a file")).expect("read");
+        assert_eq!(digest, (200_001, hexadecimal(&Sha256::digest(&bytes))));
     }
 }

@@ -9,10 +9,13 @@ use serde_json::json;
 use sha2::{Digest as _, Sha256};
 
 use super::{fleet::PAGE as FLEET, playground::is_playground};
-use crate::server::{
-    Api,
-    answer::{Failed, Path},
-    openapi::Endpoint,
+use crate::{
+    server::{
+        Api,
+        answer::{Failed, Path},
+        openapi::Endpoint,
+    },
+    store::hexadecimal,
 };
 
 pub(super) const HTML: &str = "text/html; charset=utf-8";
@@ -148,9 +151,7 @@ fn answer(media: &'static str, text: String, headers: &HeaderMap) -> Response {
 
 /// Names a text by what is in it.
 fn tag(text: &str) -> String {
-    let digest = Sha256::digest(text.as_bytes());
-    let hex: String = digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
-    format!("\"{hex}\"")
+    format!("\"{}\"", hexadecimal(&Sha256::digest(text.as_bytes())[..8]))
 }
 
 #[cfg(test)]

@@ -25,6 +25,8 @@ pub(super) enum Manner {
     Noisy,
     /// Sends messages that nobody asked for without an end.
     Pushy,
+    /// The same, larger than any command.
+    Bulky,
     /// Refuses user and password.
     Refusing,
 }
@@ -134,6 +136,9 @@ fn serve(mut stream: TcpStream, manner: Manner, heard: &Mutex<Heard>) -> io::Res
         },
         Manner::Pushy => loop {
             send(&mut stream, 0x30, &[&string("a")[..], &[b'x'; 32_000]].concat())?;
+        },
+        Manner::Bulky => loop {
+            send(&mut stream, 0x30, &[&string("a")[..], &[b'x'; 64_000]].concat())?;
         },
         _ => {}
     }

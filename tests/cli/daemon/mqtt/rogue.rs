@@ -54,6 +54,7 @@ fn none_costs_memory_or_holds_up_a_scan() {
         (Manner::Garbled, "makes no sense"),
         (Manner::Noisy, "messages a second"),
         (Manner::Pushy, "messages a second"),
+        (Manner::Bulky, "makes no sense"),
     ] {
         let (taken, kb) = beside(Some((manner, trouble)));
         assert!(taken * 4 > alone, "{manner:?}: {taken} scans, {alone} without a broker");
@@ -64,7 +65,9 @@ fn none_costs_memory_or_holds_up_a_scan() {
 
 #[test]
 fn none_keeps_an_idle_daemon_busy() {
-    for manner in [Manner::Deaf, Manner::Curt, Manner::Garbled, Manner::Noisy, Manner::Pushy] {
+    for manner in
+        [Manner::Deaf, Manner::Curt, Manner::Garbled, Manner::Noisy, Manner::Pushy, Manner::Bulky]
+    {
         let folder = tempfile::tempdir().expect("a folder");
         let broker = Broker::start(manner);
         let daemon = start(folder.path(), &broker, &[]);

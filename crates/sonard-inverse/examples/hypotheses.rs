@@ -1,0 +1,101 @@
+//! What one hypothesis of a sweep's pose costs, with derivatives by x, y and heading.
+//!
+//! `cargo run --release -p sonard-inverse --example hypotheses` predicts 400 beams from many places of each scene, one
+//! place after the other on one core, and prints the median of the readings alone and of what a hypothesis takes. Names
+//! of scenes as arguments choose among them.
+
+mod rooms;
+
+use std::{hint::black_box, sync::Arc, time::Instant};
+
+use rand::SeedableRng as _;
+use rand_pcg::Pcg64;
+use rooms::{place, readings};
+use sonard_inverse::{ErrorModel, Hypotheses, Parameter, Sweep, World};
+use sonard_model::{
+    acoustics::{Air, Sensor},
+    geometry::Pose,
+    model::Options,
+    scene::{Scene, shipped},
+};
+use uuid::Uuid;
+
+/// Scenes, and how far they are looked at, metres.
+const TO_M: [(&str, f64); 4] =
+    [("simple-room", 4.0), ("simple-room", 10.7), ("simple-room-robot", 4.0), ("mcgill-lab", 10.7)];
+/// Places in each.
+const PLACES: usize = 41;
+/// At each of them.
+const RUNS: u32 = 9;
+
+fn main() {
+    println!("{:20} {:>8} {:>10} {:>12}", "scene", "to", "readings", "hypothesis");
+    let only: Vec<String> = std::env::args().skip(1).collect();
+    for (name, to_m) in TO_M {
+        if !only.is_empty() && !only.iter().any(|wanted| wanted == name) {
+            continue;
+        }
+        let Some((readings_ms, hypothesis_ms)) = times(name, to_m) else {
+            eprintln!("{name}: can't be predicted");
+            std::process::exit(1);
+        };
+        println!("{name:20} {to_m:6.1} m {readings_ms:7.3} ms {hypothesis_ms:9.3} ms");
+    }
+}
+
+/// Median milliseconds of a sweep's readings alone and of its likelihood with derivatives.
+fn times(name: &str, to_m: f64) -> Option<(f64, f64)> {
+    let scene = Arc::new(Scene::from_json(shipped::text(name)?).ok()?);
+    let sensor = Sensor::preset("senscomp-6500").ok()?;
+    let mut world = World::new(scene, sensor, Air::default(), Options::default());
+    world.options.max_range_m = Some(to_m);
+    let mut rng = Pcg64::seed_from_u64(1);
+    let parameters = vec![Parameter::X(0), Parameter::Y(0), Parameter::Heading(0)];
+    let hypotheses = Hypotheses::new(world.clone(), parameters).ok()?;
+    let errors = ErrorModel {
+        sigma_m: 1e-3,
+        tail_share: 0.1,
+        tail_ratio: 2.0,
+        sigma_db: 0.5,
+        clutter: 0.002,
+        clutter_silent: 0.3,
+        clutter_m: 4.0,
+    };
+    let (mut alone, mut whole) = (Vec::new(), Vec::new());
+    for _ in 0..PLACES {
+        let pose = place(&world.scene, &mut rng)?;
+        let sweep = Sweep { scan: Uuid::nil(), pose, beams: readings(&world, &pose, &mut rng)? };
+        let off = Pose { x_m: pose.x_m + 0.02, ..pose };
+        let simulator = world.simulator(&off).ok()?;
+        alone.push(best_ms(|| {
+            // As a hypothesis is: with a body moved along, and nothing known of the place.
+            let simulator = simulator.in_scene(Arc::clone(simulator.scene())).ok()?;
+            let point = simulator.at(off.position());
+            for beam in &sweep.beams {
+                black_box(point.ping(world.direction_rad(&off, beam.azimuth_deg)).ok()?);
+            }
+            Some(())
+        })?);
+        whole.push(best_ms(|| {
+            black_box(hypotheses.log_likelihood(&sweep, &off, &errors).ok()?);
+            Some(())
+        })?);
+    }
+    Some((median(alone), median(whole)))
+}
+
+/// The best of several runs, milliseconds: what others on the computer take is left out.
+fn best_ms(mut run: impl FnMut() -> Option<()>) -> Option<f64> {
+    let mut best = f64::INFINITY;
+    for _ in 0..RUNS {
+        let began = Instant::now();
+        run()?;
+        best = best.min(began.elapsed().as_secs_f64() * 1e3);
+    }
+    Some(best)
+}
+
+fn median(mut of: Vec<f64>) -> f64 {
+    of.sort_by(f64::total_cmp);
+    of[of.len() / 2]
+}
