@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use serde_json::Value;
+use serde_json::{Value, json};
 use sonard::api::Location;
 
 use super::Daemon;
@@ -18,11 +18,19 @@ const ROOM: &str = r#"{"name": "long room", "materials": {"plaster": {"reflectan
     {"id": "stub", "from": [2.9, 1], "to": [2.9, 0.6], "material": "plaster"}]}"#;
 const WAY: &str = "2.2,0.4,5\n3.4,0.35,30\n4.4,0.6,80\n";
 
-/// One so large that it takes minutes to look it over.
-const HALL: &str = r#"{"name": "hall", "materials": {"plaster": {"reflectance": 0.95}}, "walls": [
-    {"id": "w", "polyline": [[0, 0], [19, 0], [19, 18], [7, 21], [0, 20]], "closed": true, "material": "plaster"},
-    {"id": "a", "from": [3, 3], "to": [9, 4], "material": "plaster"},
-    {"id": "b", "from": [12, 9], "to": [13, 15], "material": "plaster"}]}"#;
+/// One so large and full of pillars that it takes minutes to look it over.
+fn hall() -> String {
+    let pillar = |at: u32| {
+        let [x_m, y_m] = [at % 8, at / 8].map(|place| 1.5 + 2.2 * f64::from(place));
+        json!({"id": format!("p{at}"), "center": [x_m, y_m], "radius_m": 0.15, "material": "plaster"})
+    };
+    let corners = [[0, 0], [19, 0], [19, 18], [7, 21], [0, 20]];
+    let walls = json!([{"id": "w", "polyline": corners, "closed": true, "material": "plaster"}]);
+    let (pillars, plaster) =
+        ((0..56).map(pillar).collect::<Vec<_>>(), json!({"reflectance": 0.95}));
+    json!({"name": "hall", "materials": {"plaster": plaster}, "walls": walls, "cylinders": pillars})
+        .to_string()
+}
 
 /// A log of a day in a daemon's folder, with a scan from each pose.
 fn simulated(folder: &Path, day: u32, scene: &str, way: &str, further: &[&str]) -> PathBuf {
@@ -133,8 +141,7 @@ fn what_can_not_be_located_is_said_with_the_reason() {
 #[test]
 fn one_client_at_a_time_is_answered_and_none_that_has_left() {
     let folder = tempfile::tempdir().expect("a folder");
-    let few = ["--step-deg", "9", "--max-range", "8"];
-    simulated(folder.path(), 1, HALL, "5,9,0\n", &few);
+    simulated(folder.path(), 1, &hall(), "4.8,9.3,0\n", &["--step-deg", "9"]);
     simulated(folder.path(), 2, ROOM, "2.2,0.4,5\n", &["--step-deg", "9", "--max-range", "1.5"]);
     let daemon = Daemon::start_mock(folder.path(), &["--set", "scanning.mode=on-request"]);
     let scans = scans(&daemon);

@@ -20,9 +20,9 @@ impl Case {
         let folder = tempfile::tempdir().expect("a folder");
         let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
         let (way, log) = (path("way.csv"), path("room.jsonl"));
-        fs::write(&way, "x_m,y_m,heading_deg\n0.8,0.05,92\n0.4,0.3,10\n0.2,-0.2,200\n")
+        fs::write(&way, "x_m,y_m,heading_deg\n0.8,0.05,92\n0.4,0.3,10\n0.2,0.3,200\n")
             .expect("room on the disk");
-        let simulate = ["simulate", "--scene", "simple-room", "--poses", &way, "--step-deg", "1.8"];
+        let simulate = ["simulate", "--scene", "simple-room", "--poses", &way];
         let noise = ["--jitter-us", "6", "--temperature-c", "15", "-o", &log];
         let output = run(&[&simulate[..], &noise].concat());
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
