@@ -83,6 +83,7 @@ What to fit (--fit), with the doubt that is assumed:
   beam        aperture: size of the radiating face, as a logarithm (0.3)
   skirts      skirts_db, what the face hears far off its axis, if the sensor's file has some (6 dB)
   materials   reflectance of each material, as a logarithm (0.1)
+  roughness   roughness of each material (0.1)
   walls       each wall along its normal (0.05 m)
 
 Examples:

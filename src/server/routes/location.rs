@@ -179,10 +179,13 @@ fn scans_between(
     let mut scans: Vec<Uuid> = to.into_iter().collect();
     let most = MOST_SCANS - scans.len();
     let before = match to {
-        None => Some(history.newest(most)?),
-        Some(to) => history.before(to, most)?,
+        None => history.newest(most)?,
+        Some(to) => match history.before(to, most)? {
+            None => return Ok(None),
+            Some(before) => before,
+        },
     };
-    scans.extend(before.unwrap_or_default().iter().map(|past| past.start.scan));
+    scans.extend(before.iter().map(|past| past.start.scan));
     let first = scans.iter().position(|scan| *scan == from);
     Ok(first.map(|first| {
         scans.truncate(first + 1);

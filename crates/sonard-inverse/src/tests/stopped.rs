@@ -5,12 +5,13 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
+use rayon::prelude::*;
 use sonard_model::{acoustics::TofNoise, geometry::Pose};
 
 use super::{first_pose, found::sweep, world};
 use crate::{
-    Atlas, AtlasError, Fit, FitError, Fitted, Found, Group, Parameter, Sweep, Unwatched, Watch,
-    World, fit_watched, locate_watched, priors,
+    Atlas, AtlasError, ErrorModel, Fit, FitError, Fitted, Found, Heard, Parameter, Prior, Sweep,
+    Unwatched, Watch, World, fit_watched, locate_watched,
 };
 
 /// Keeps what is found, and stops when there is so much.
@@ -39,26 +40,29 @@ impl Watch for Keeper {
     }
 }
 
-/// Few readings of a corner, so that a fit is short, and begins anew from elsewhere because most of them are clutter.
-fn short() -> (World, Vec<Sweep>, Fit) {
+/// Few readings of a corner, so that a fit is short, of which one in four is of somebody who walks about, so that it begins
+/// anew from elsewhere.
+fn short(parameters: &[(Parameter, f64)]) -> (World, Vec<Sweep>, Fit) {
     let mut here = world("right-angle-corner", "senscomp-6500");
     here.options.max_range_m = Some(2.0);
     let pose = first_pose(&here.scene);
     let believed = Pose { x_m: pose.x_m + 0.05, ..pose };
-    let changes = [(&Parameter::Threshold, 2.0)];
-    let truth = here.changed(&changes).expect("a world");
+    let truth = here.changed(&[(&Parameter::Threshold, 2.0)]).expect("a world");
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
-    let mut sweep = sweep(&truth, &pose, &believed, 48, noise, 2);
-    // One in four is of somebody who walks about.
-    for (beam, late_us) in
-        sweep.beams.iter_mut().step_by(4).zip([700.0, 2900.0, 1300.0].iter().cycle())
-    {
-        beam.heard = crate::Heard::Echo { tof_us: 3000.0 + late_us };
+    let mut sweep = sweep(&truth, &pose, &believed, 24, noise, 2);
+    let late_us = [700.0, 2900.0, 1300.0].into_iter().cycle();
+    for (beam, late_us) in sweep.beams.iter_mut().step_by(4).zip(late_us) {
+        beam.heard = Heard::Echo { tof_us: 3000.0 + late_us };
     }
-    let groups = [Group::Pose, Group::Threshold];
-    let priors = priors(&groups, &[], &here, 1).expect("they are fitted");
-    (here, vec![sweep], Fit::usual(priors, 0.1))
+    let of = |(parameter, sigma): &(Parameter, f64)| Prior {
+        parameter: parameter.clone(),
+        sigma: *sigma,
+    };
+    (here, vec![sweep], Fit::usual(parameters.iter().map(of).collect(), 0.1))
 }
+
+const PLACE: [(Parameter, f64); 3] =
+    [(Parameter::X(0), 0.1), (Parameter::Y(0), 0.1), (Parameter::Threshold, 6.0)];
 
 /// All figures of an answer, as the bits that they are.
 fn bits(fitted: &Fitted) -> Vec<u64> {
@@ -70,38 +74,49 @@ fn bits(fitted: &Fitted) -> Vec<u64> {
     of.chain(further).chain(poses).chain(covariance).map(f64::to_bits).collect()
 }
 
-#[test]
-fn a_fit_that_was_stopped_anywhere_goes_on_to_the_same_answer() {
-    let (here, sweeps, what) = short();
+/// Stops a fit at every so many searches, and goes on from each.
+fn stop_and_go_on(parameters: &[(Parameter, f64)], every: usize) {
+    let (here, sweeps, what) = short(parameters);
     let keeper = Keeper::until(usize::MAX);
     let whole = fit_watched(&here, &sweeps, &what, &[], &keeper).expect("a fit");
     let all = keeper.found();
-    let of = |kind: fn(&Found) -> bool| all.iter().filter(|found| kind(found)).count();
-    // It begins anew four times, looks at 24 places along two directions, and follows two.
-    assert!(of(|found| matches!(found, Found::End { .. })) >= 6, "{all:?}");
-    assert!(of(|found| matches!(found, Found::Place { .. } | Found::Nothing)) >= 12, "{all:?}");
-    for cut in 0..all.len() {
+    let count = |kind: fn(&Found) -> bool| all.iter().filter(|found| kind(found)).count();
+    // It begins anew, looks at places along two directions, and follows the best.
+    assert!(count(|found| matches!(found, Found::End { .. })) >= 6, "{all:?}");
+    assert!(count(|found| matches!(found, Found::Place { .. } | Found::Nothing)) >= 12, "{all:?}");
+    (0..all.len()).into_par_iter().step_by(every).for_each(|cut| {
         let keeper = Keeper::until(cut);
         let stopped = fit_watched(&here, &sweeps, &what, &[], &keeper);
         assert_eq!(stopped.err(), Some(FitError::Stopped), "{cut}");
-        assert_eq!(keeper.found(), all[..cut], "{cut}");
-    }
-    for cut in 0..=all.len() {
+        let known = keeper.found();
+        assert_eq!(known, all[..cut], "{cut}");
         let keeper = Keeper::until(usize::MAX);
-        let again = fit_watched(&here, &sweeps, &what, &all[..cut], &keeper).expect("a fit");
+        let again = fit_watched(&here, &sweeps, &what, &known, &keeper).expect("a fit");
         assert_eq!(bits(&again), bits(&whole), "{cut}");
-        let nothing = |found: &&Found| **found != Found::Nothing;
-        let further: Vec<Found> = keeper.found();
-        assert!(further.iter().filter(nothing).eq(all[cut..].iter().filter(nothing)), "{cut}");
-    }
+        assert_eq!(keeper.found(), all[cut..], "{cut}");
+    });
+    let nothing_left = Keeper::until(usize::MAX);
+    let again = fit_watched(&here, &sweeps, &what, &all, &nothing_left).expect("a fit");
+    assert_eq!(bits(&again), bits(&whole));
+    assert_eq!(nothing_left.found(), []);
+}
+
+#[test]
+fn a_fit_that_was_stopped_at_any_search_goes_on_to_the_same_answer() {
+    stop_and_go_on(&PLACE, 1);
+}
+
+#[test]
+fn so_does_one_that_turns_its_sweep() {
+    stop_and_go_on(&[&PLACE[..], &[(Parameter::Heading(0), 8.0)]].concat(), 13);
 }
 
 #[test]
 fn what_another_fit_found_is_refused() {
-    let (here, sweeps, what) = short();
-    let errors = crate::ErrorModel::rough(0.1, 6.0, 5.0);
-    let place = Found::Place { values: vec![0.0; 4], log_posterior: 0.0 };
-    let short = Found::Spread { values: vec![0.0; 3], errors, is_last: false };
+    let (here, sweeps, what) = short(&PLACE);
+    let errors = ErrorModel::rough(0.1, 6.0, 5.0);
+    let place = Found::Place { values: vec![0.0; 3], log_posterior: 0.0 };
+    let short = Found::Spread { values: vec![0.0; 2], errors, is_last: false };
     for known in [place, short] {
         let fitted = fit_watched(&here, &sweeps, &what, &[known], &Unwatched);
         assert_eq!(fitted.err(), Some(FitError::OtherFit));
@@ -122,7 +137,7 @@ impl Watch for Impatient {
 
 #[test]
 fn a_search_for_poses_ends_when_nobody_waits_for_it() {
-    let (here, sweeps, _) = short();
+    let (here, sweeps, _) = short(&PLACE);
     let atlas = Atlas::new(&here, 0.3).expect("an atlas");
     for most in [0, 3, 20] {
         let watch = || Impatient { asked: AtomicUsize::new(0), most };
