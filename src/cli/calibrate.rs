@@ -198,7 +198,9 @@ fn refuse(error: &FitError, unfinished: Option<&Unfinished>) -> Failure {
         }
         _ => {
             // There will be no results, however often it is tried.
-            unfinished.map(|unfinished| drop(unfinished.remove()));
+            if let Some(unfinished) = unfinished {
+                drop(unfinished.remove());
+            }
             Failure::input(error, "see that poses are in the scene, and fit fewer parameters")
         }
     }
