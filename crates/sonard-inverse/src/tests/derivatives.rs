@@ -162,8 +162,8 @@ fn strengths_with_materials() {
             const BY: f64 = 1e-3;
             let [before, after] =
                 [-BY, BY].map(|by| here.changed(&[(&parameter, by)]).expect("a world"));
-            for step in 0..12 {
-                let direction_rad = 30f64.to_radians() * f64::from(step);
+            for step in 0..24 {
+                let direction_rad = 15f64.to_radians() * f64::from(step);
                 let [before, after] =
                     [&before, &after].map(|world| strengths(world, direction_rad));
                 for (key, arrival) in strengths(&here, direction_rad) {
@@ -185,7 +185,7 @@ fn strengths_with_materials() {
             }
         }
     }
-    assert!(compared.iter().all(|count| *count > 100), "{compared:?}");
+    assert!(compared.iter().all(|count| *count > 50), "{compared:?}");
 }
 
 #[test]
