@@ -11,6 +11,7 @@ mod findings;
 mod fleet;
 mod health;
 mod link;
+mod location;
 mod logs;
 mod mqtt;
 mod orders;
@@ -30,6 +31,7 @@ pub use findings::{Findings, FoundFeature, FoundLine, MapCells};
 pub use fleet::{Fleet, FleetPicture, FleetReport, FleetRobot, FleetScan, FleetState};
 pub use health::{ClockReport, Health, LineTotals, ScanFit, ScanTotals};
 pub use link::{LinkReport, LinkState, Trouble};
+pub use location::Location;
 pub use logs::LogEntry;
 pub use mqtt::MqttReport;
 pub use orders::{Accepted, CancelRequest, ScanRequest, Scanning, Started};
@@ -48,5 +50,6 @@ pub use status::{
 // Those that the pure part makes.
 pub use crate::{
     compare::{Beside, JudgedPing, Word},
+    inverse::{Doubt, Mode},
     scan::{Body, Circle, FloorPlan, PeakLine, PlanPoint, TraceLine, WallLine},
 };

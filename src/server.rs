@@ -80,6 +80,8 @@ pub(crate) struct Api {
     playground: Option<Arc<Path>>,
     /// Who asks the model about a beam.
     looking: Arc<Semaphore>,
+    /// Who asks where scans were taken.
+    locating: Arc<Semaphore>,
     /// Who reads a scan's next piece.
     reading: Arc<Semaphore>,
     scene: Shelved<Scene>,
@@ -123,6 +125,7 @@ impl Server {
             fleet: (!fleet.is_empty()).then(|| crate::fleet::watch(fleet)),
             playground: keys.playground.as_deref().map(|folder| Path::new(folder).into()),
             looking: Arc::new(Semaphore::new(1)),
+            locating: Arc::new(Semaphore::new(1)),
             reading: Arc::new(Semaphore::new(1)),
             scene: Shelved::default(),
             session: Shelved::default(),

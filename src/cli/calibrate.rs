@@ -2,6 +2,7 @@
 
 mod prior;
 mod report;
+mod unfinished;
 
 use std::{
     io::{self, Write},
@@ -9,6 +10,7 @@ use std::{
 };
 
 use comfy_table::{CellAlignment, Table};
+use indicatif::ProgressBar;
 
 use super::{
     Failure, Outcome,
@@ -17,14 +19,17 @@ use super::{
     numbers::within,
     output::{OutPath, Overwrite},
     progress,
-    what_if::WhatIfArgs,
+    runtime::{self, Interrupts},
+    what_if::{WhatIf, WhatIfArgs},
     worlds::SweepArgs,
 };
 use crate::inverse::{
-    Fit, Fitted, Group, GroupError, Prior, Progress, Sweep, Told, World, fit_watched, priors,
+    Fit, FitError, Fitted, Found, Group, GroupError, Prior, Progress, Sweep, Told, Watch, World,
+    fit_watched, priors,
 };
 use prior::PriorSigma;
 use report::write_folder;
+use unfinished::{Head, Unfinished};
 
 /// Options of `sonard calibrate`.
 #[derive(Debug, clap::Args)]
@@ -60,7 +65,9 @@ Starts from what the logs and files say, with the stated doubt about each parame
 the model explains the readings best: the ranges of echoes by any path that the receiver may have reported, silences, \
 and where arcs begin and end. Each value comes with its standard deviation, and with a word whether the readings say \
 more about it than was believed before: what they can't tell stays where it was. The share of readings that nothing \
-explains is part of the answer.";
+explains is part of the answer.
+
+With --out, what was found so far is kept in DIR/unfinished.jsonl until the results are there: whenever a calibration was stopped or killed, the same command goes on from there and comes to the same answer. Another one is refused there.";
 
 const HELP: &str = "\
 What to fit (--fit), with the doubt that is assumed:
@@ -76,6 +83,7 @@ What to fit (--fit), with the doubt that is assumed:
   beam        aperture: size of the radiating face, as a logarithm (0.3)
   skirts      skirts_db, what the face hears far off its axis, if the sensor's file has some (6 dB)
   materials   reflectance of each material, as a logarithm (0.1)
+  roughness   roughness of each material (0.1)
   walls       each wall along its normal (0.05 m)
 
 Examples:
@@ -85,15 +93,35 @@ Examples:
 
 Of --json: name, scan (of a pose), value, change, sigma, low, high (95 %), prior, prior_sigma, identified, at_limit; values that \
 are logarithms or shares are told as what they make of the file's figure.
-Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
+Exit codes: 0 done, 1 stopped on request, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let what_if = args.what_if.load()?;
     if let Some(out) = &args.out {
-        report::check(out, args.overwrite)?;
+        unfinished::check(out, args.overwrite)?;
+        if !unfinished::has_results(out) {
+            report::check(out, args.overwrite)?;
+        }
     }
+    let (sweeps, world) = read(args, &what_if)?;
+    let what = Fit::usual(wanted(args, &world, sweeps.len())?, args.widest_m);
+    let head = Head::of(&world, &sweeps, &what);
+    let open = |out: &OutPath| Unfinished::open(out, args.overwrite, &head);
+    let unfinished = args.out.as_ref().map(open).transpose()?;
+    let fitted = find(&world, &sweeps, &what, unfinished.as_ref())?;
+    let lines = fitted.told(&world, &sweeps, &what);
+    if let (Some(out), Some(unfinished)) = (&args.out, unfinished) {
+        let overwrite = args.overwrite.or_forced(unfinished.begin_results());
+        write_folder(out, overwrite, &world, &sweeps, &fitted, &lines)?;
+        unfinished.remove()?;
+    }
+    answer(args.json, &lines, |out| print(out, &lines, &fitted))
+}
+
+/// The sweeps, and the world that they have in common.
+fn read(args: &Args, what_if: &WhatIf) -> Result<(Vec<Sweep>, Arc<World>), Failure> {
     let (mut sweeps, mut world): (Vec<Sweep>, Option<Arc<World>>) = (Vec::new(), None);
-    args.sweeps.for_each(&what_if, |log, sweep, of| {
+    args.sweeps.for_each(what_if, |log, sweep, of| {
         let known = world.get_or_insert_with(|| Arc::clone(of));
         if known.sensor != of.sensor || known.scene.sha256 != of.scene.sha256 {
             return Err(Failure::input(
@@ -104,25 +132,78 @@ pub(super) fn run(args: &Args) -> Outcome {
         sweeps.push(sweep);
         Ok(())
     })?;
-    let Some(world) = world else {
-        return Err(Failure::input(
-            "there is no sweep to fit to",
-            "give logs of a ranger on a stepper",
-        ));
+    let world = world.ok_or_else(|| {
+        Failure::input("there is no sweep to fit to", "give logs of a ranger on a stepper")
+    })?;
+    Ok((sweeps, world))
+}
+
+/// Fits, from what was found before, and until somebody interrupts.
+fn find(
+    world: &World,
+    sweeps: &[Sweep],
+    what: &Fit,
+    unfinished: Option<&Unfinished>,
+) -> Result<Fitted, Failure> {
+    let runtime = runtime::new()?;
+    let interrupts = {
+        let _within = runtime.enter();
+        Interrupts::listen()
     };
-    let what = Fit::usual(wanted(args, &world, sweeps.len())?, args.widest_m);
+    let known = unfinished.map_or(&[][..], Unfinished::known);
+    if let Some(unfinished) = unfinished.filter(|_| !known.is_empty()) {
+        let (path, searches) = (unfinished.path().display(), known.len());
+        anstream::eprintln!("{path}: goes on after {searches} searches");
+    }
     let bar = progress::spinner("scans fitted to");
     bar.set_position(sweeps.len() as u64);
-    let watch = |progress: Progress| bar.set_message(progress.to_string());
-    let fitted = fit_watched(&world, &sweeps, &what, &watch).map_err(|error| {
-        Failure::input(error, "see that poses are in the scene, and fit fewer parameters")
-    })?;
+    let watcher = Watcher { bar: bar.clone(), interrupts, unfinished };
+    let fitted = fit_watched(world, sweeps, what, known, &watcher);
     bar.finish_and_clear();
-    let lines = fitted.told(&world, &sweeps, &what);
-    if let Some(out) = &args.out {
-        write_folder(out, args.overwrite, &world, &sweeps, &fitted, &lines)?;
+    fitted.map_err(|error| refuse(&error, unfinished))
+}
+
+/// Shows how it goes, and keeps it.
+struct Watcher<'a> {
+    bar: ProgressBar,
+    interrupts: Interrupts,
+    unfinished: Option<&'a Unfinished>,
+}
+
+impl Watch for Watcher<'_> {
+    fn progress(&self, progress: Progress) {
+        self.bar.set_message(progress.to_string());
     }
-    answer(args.json, &lines, |out| print(out, &lines, &fitted))
+
+    fn found(&self, found: &Found) {
+        if let Some(unfinished) = self.unfinished {
+            self.bar.suspend(|| unfinished.keep(found));
+        }
+    }
+
+    fn stops(&self) -> bool {
+        self.interrupts.happened()
+    }
+}
+
+fn refuse(error: &FitError, unfinished: Option<&Unfinished>) -> Failure {
+    let kept = unfinished.map(|unfinished| unfinished.path().display());
+    match (error, kept) {
+        (FitError::Stopped, Some(path)) => Failure::Found(Some(format!(
+            "{error}: {path} has what was found; the same command goes on from there"
+        ))),
+        (FitError::Stopped, None) => Failure::Found(Some(error.to_string())),
+        (FitError::OtherFit, Some(path)) => {
+            Failure::input(format!("{path}: {error}"), unfinished::HELP)
+        }
+        _ => {
+            // There will be no results, however often it is tried.
+            if let Some(unfinished) = unfinished {
+                drop(unfinished.remove());
+            }
+            Failure::input(error, "see that poses are in the scene, and fit fewer parameters")
+        }
+    }
 }
 
 /// What is to be fitted, with its priors.

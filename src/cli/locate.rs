@@ -13,10 +13,7 @@ use super::{
     Failure, Outcome, answer::answer, compare::RULED, numbers::within, progress,
     what_if::InsteadArgs, worlds::SweepArgs,
 };
-use crate::{
-    inverse::{Atlas, Course, Doubt, FitError, Mode, Odometry, Sweep, World, doubts, locate},
-    scene::Scene,
-};
+use crate::inverse::{Atlas, Course, Doubt, Mode, Odometry, World, doubts, locate};
 
 /// Options of `sonard locate`.
 #[derive(Debug, clap::Args)]
@@ -55,6 +52,14 @@ struct CourseArgs {
     #[arg(long, value_name = "P", requires = "course", default_value_t = 0.02,
           value_parser = within(0.0..=1.0))]
     carried: f64,
+}
+
+impl CourseArgs {
+    /// Of scans that follow each other.
+    fn odometry(&self) -> Option<Odometry> {
+        let &Self { course, drift_m_per_m, drift_deg_per_m, carried } = self;
+        course.then_some(Odometry { drift_m_per_m, drift_deg_per_m, carried })
+    }
 }
 
 pub(super) const ABOUT: &str = "\
@@ -98,14 +103,18 @@ struct Answer<'a> {
 pub(super) fn run(args: &Args) -> Outcome {
     let what_if = args.instead.load()?;
     let mut known: Option<(Arc<World>, Atlas)> = None;
-    let mut way = Way::new(&args.course);
+    let mut course = args.course.odometry().map(Course::new);
     let mut any = false;
     args.sweeps.for_each(&what_if, |log, sweep, world| {
         if known.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, world)) {
             known = Some((Arc::clone(world), atlas(world, args.spacing_m)?));
         }
         let Some((_, atlas)) = &known else { return Ok(()) };
-        let modes = way.locate(world, atlas, &sweep).map_err(|error| refuse(&error))?;
+        let modes = match &mut course {
+            Some(course) => course.next(world, atlas, &sweep),
+            None => locate(world, atlas, &sweep),
+        };
+        let modes = modes.map_err(|error| refuse(&error))?;
         let doubts = doubts(world, atlas, &sweep, &modes);
         any = true;
         let log = log.display().to_string();
@@ -116,35 +125,6 @@ pub(super) fn run(args: &Args) -> Outcome {
         return Ok(());
     }
     Err(Failure::input("there is no sweep to locate", "give a log of a ranger on a stepper"))
-}
-
-/// Sweeps for themselves, or along a course.
-struct Way {
-    odometry: Option<Odometry>,
-    /// In which scene the course goes on.
-    course: Option<(Arc<Scene>, Course)>,
-}
-
-impl Way {
-    fn new(args: &CourseArgs) -> Self {
-        let &CourseArgs { course, drift_m_per_m, drift_deg_per_m, carried } = args;
-        let odometry = Odometry { drift_m_per_m, drift_deg_per_m, carried };
-        Self { odometry: course.then_some(odometry), course: None }
-    }
-
-    fn locate(
-        &mut self,
-        world: &World,
-        atlas: &Atlas,
-        sweep: &Sweep,
-    ) -> Result<Vec<Mode>, FitError> {
-        let Some(odometry) = self.odometry else { return locate(world, atlas, sweep) };
-        // In another scene nothing is known of where the robot is.
-        self.course = self.course.take().filter(|(scene, _)| **scene == *world.scene);
-        let (_, course) =
-            self.course.get_or_insert_with(|| (Arc::clone(&world.scene), Course::new(odometry)));
-        course.next(world, atlas, sweep)
-    }
 }
 
 fn atlas(world: &World, spacing_m: f64) -> Result<Atlas, Failure> {

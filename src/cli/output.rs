@@ -244,6 +244,16 @@ impl Place {
 }
 
 impl Overwrite {
+    /// Whether it was asked for.
+    pub(super) const fn is_forced(self) -> bool {
+        self.force
+    }
+
+    /// The same, or as if it was asked for.
+    pub(super) const fn or_forced(self, force: bool) -> Self {
+        Self { force: self.force || force }
+    }
+
     /// Checks that a file may be written there. Before any work, so that a refusal costs none.
     pub(super) fn check(self, path: &Path, product: Product) -> Outcome {
         self.place(path, product).map(drop)

@@ -6,6 +6,7 @@ mod findings;
 mod fleet;
 mod foxglove;
 mod live;
+mod location;
 mod logs;
 mod metrics;
 mod page;
@@ -34,6 +35,7 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
     endpoints.extend(foxglove::endpoints());
     endpoints.extend(scans::endpoints());
     endpoints.extend(findings::endpoints());
+    endpoints.extend(location::endpoints());
     endpoints.extend(preview::endpoints());
     endpoints.extend(logs::endpoints());
     endpoints.extend(metrics::endpoints());

@@ -1,5 +1,7 @@
 //! From readings back to poses and parameters, through the whole program.
 
+mod stopped;
+
 use std::{
     fs,
     io::{BufRead as _, BufReader, Write as _},

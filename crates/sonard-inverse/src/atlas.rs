@@ -9,6 +9,7 @@ use thiserror::Error;
 
 use crate::{
     sweep::Sweep,
+    watch::{Unwatched, Watch},
     world::{Models, World, WorldError},
 };
 
@@ -45,6 +46,9 @@ pub enum AtlasError {
     /// No place to stand.
     #[error("there is no place in the scene where a ranger could stand")]
     NoPlace,
+    /// Whoever watches it wants it no longer.
+    #[error("stopped on request")]
+    Stopped,
 }
 
 /// A pose that a sweep may have been taken from.
@@ -62,6 +66,14 @@ impl Atlas {
     /// # Errors
     /// When the world can't be predicted in, or has no room.
     pub fn new(world: &World, spacing_m: f64) -> Result<Self, AtlasError> {
+        Self::watched(world, spacing_m, &Unwatched)
+    }
+
+    /// The same, until `watch` stops it.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and [`AtlasError::Stopped`].
+    pub fn watched(world: &World, spacing_m: f64, watch: &dyn Watch) -> Result<Self, AtlasError> {
         let (places, spacing_m) = standing_places(&world.scene, spacing_m);
         if places.is_empty() {
             return Err(AtlasError::NoPlace);
@@ -73,19 +85,24 @@ impl Atlas {
         let models = Models::of(&alone)?;
         let shown =
             |range_m: Option<f64>| range_m.map_or(SILENCE_M, |far_m| (far_m + shift_m) as f32);
-        let readings = |place: &DVec2| {
+        let mut ranges_m = vec![SILENCE_M; DIRECTIONS * places.len()];
+        let predict = |(ranges_m, place): (&mut [f32], &DVec2)| {
+            if watch.stops() {
+                return Err(AtlasError::Stopped);
+            }
             let pose = Pose { x_m: place.x, y_m: place.y, heading_deg: 0.0 };
             models.at(&pose, |_, point| {
-                let range_m = |direction: usize| {
+                for (direction, known_m) in ranges_m.iter_mut().enumerate() {
                     let direction_rad =
                         std::f64::consts::TAU * direction as f64 / DIRECTIONS as f64;
-                    Ok(shown(point.ping(direction_rad)?.range_m))
-                };
-                (0..DIRECTIONS).map(range_m).collect::<Result<Vec<f32>, WorldError>>()
-            })
+                    *known_m = shown(point.ping(direction_rad)?.range_m);
+                }
+                Ok(())
+            })?;
+            Ok(())
         };
-        let ranges_m: Result<Vec<Vec<f32>>, WorldError> = places.par_iter().map(readings).collect();
-        Ok(Self { spacing_m, places, ranges_m: ranges_m?.concat(), models })
+        ranges_m.par_chunks_exact_mut(DIRECTIONS).zip(&places).try_for_each(predict)?;
+        Ok(Self { spacing_m, places, ranges_m, models })
     }
 
     /// Distance of neighbouring places, metres.

@@ -1,14 +1,18 @@
 //! Where a robot is along its way: what each sweep says, weighed by what odometry says between them.
 
-use std::f64::consts::TAU;
+use std::{f64::consts::TAU, sync::Arc};
 
-use sonard_model::geometry::{DVec2, Pose, wrap_180};
+use sonard_model::{
+    geometry::{DVec2, Pose, wrap_180},
+    scene::Scene,
+};
 
 use crate::{
     atlas::Atlas,
     fit::FitError,
     locate::{Mode, explaining, modes},
     sweep::Sweep,
+    watch::{Unwatched, Watch},
     world::World,
 };
 
@@ -37,12 +41,22 @@ const DRIFT_OF_TURN: f64 = 0.03;
 ///
 /// A filter over the poses that explain each sweep (a hidden Markov model whose states are [`Mode`]s): a pose is as
 /// probable as it explains the sweep, times how well it goes with a pose of the sweep before and the way between them. Where
-/// the robot may have been carried, all poses are as good as any other before they are asked.
+/// the robot may have been carried, all poses are as good as any other before they are asked. In another scene than that of
+/// the sweep before nothing is known, as at the beginning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
     odometry: Odometry,
-    /// Odometry's pose at the last sweep, and where that was taken.
-    last: Option<(Pose, Vec<Mode>)>,
+    last: Option<Last>,
+}
+
+/// The last sweep.
+#[derive(Debug, Clone, PartialEq)]
+struct Last {
+    scene: Arc<Scene>,
+    /// Odometry's pose.
+    told: Pose,
+    /// Where it was taken.
+    modes: Vec<Mode>,
 }
 
 /// Where a sweep should have been taken, by a pose of the one before and odometry.
@@ -71,20 +85,38 @@ impl Course {
         atlas: &Atlas,
         sweep: &Sweep,
     ) -> Result<Vec<Mode>, FitError> {
-        let expected = self.expected(&sweep.pose);
+        self.next_watched(world, atlas, sweep, &Unwatched)
+    }
+
+    /// The same, until `watch` stops it.
+    ///
+    /// # Errors
+    /// As [`next`](Self::next), and [`FitError::Stopped`].
+    pub fn next_watched(
+        &mut self,
+        world: &World,
+        atlas: &Atlas,
+        sweep: &Sweep,
+        watch: &dyn Watch,
+    ) -> Result<Vec<Mode>, FitError> {
+        let expected = self.expected(&world.scene, &sweep.pose);
         let poses: Vec<Pose> = expected.iter().map(|expected| expected.pose).collect();
-        let found = explaining(world, atlas, sweep, &poses)?;
+        let found = explaining(world, atlas, sweep, &poses, watch)?;
         let volume = atlas.area_m2() * 360.0;
         let modes = modes(&found, |mode| self.log_prior(mode, &expected, volume));
         if !modes.is_empty() {
-            self.last = Some((sweep.pose, modes.clone()));
+            let (scene, modes) = (Arc::clone(&world.scene), modes.clone());
+            self.last = Some(Last { scene, told: sweep.pose, modes });
         }
         Ok(modes)
     }
 
     /// Where the modes of the last sweep have come by what odometry says now.
-    fn expected(&self, now: &Pose) -> Vec<Expected> {
-        let Some((then, modes)) = &self.last else { return Vec::new() };
+    fn expected(&self, scene: &Arc<Scene>, now: &Pose) -> Vec<Expected> {
+        let is_same = |last: &&Last| Arc::ptr_eq(&last.scene, scene) || last.scene == *scene;
+        let Some(Last { told: then, modes, .. }) = self.last.as_ref().filter(is_same) else {
+            return Vec::new();
+        };
         let driven = DVec2::from_angle(-then.heading_deg.to_radians())
             .rotate(now.position() - then.position());
         let turned_deg = wrap_180(now.heading_deg - then.heading_deg);

@@ -1,11 +1,12 @@
 //! The most likely values of parameters, and how sure they are.
 
+mod journal;
 mod restart;
 mod settle;
 mod spread;
 mod step;
 
-use std::fmt;
+use std::{rc::Rc, slice};
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::Serialize;
@@ -19,8 +20,10 @@ use crate::{
     parameter::Parameter,
     rates::RateFinder,
     sweep::Sweep,
+    watch::{Unwatched, Watch},
     world::{Models, World, WorldError},
 };
+pub use journal::Found;
 
 /// A parameter to fit, and what is known of it beforehand.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,40 +93,39 @@ pub enum FitError {
     /// The numbers don't hold.
     #[error("the readings don't hold the parameters: their information can't be inverted")]
     Degenerate,
+    /// Whoever watches it wants it no longer.
+    #[error("stopped on request")]
+    Stopped,
+    /// What was given as known is of another fit.
+    #[error("what is known of this fit was found by another one")]
+    OtherFit,
 }
 
-/// How far a fit has come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Progress {
-    /// Goes from wide spreads of readings to the ones that they have: which of so many it is at, from 1.
-    Approaching {
-        /// Which.
-        spread: usize,
-        /// Of so many.
-        of: usize,
-    },
-    /// Searches beside where it ended: which of so many places it is at, from 1.
-    Searching {
-        /// Which.
-        place: usize,
-        /// Of so many.
-        of: usize,
-    },
+impl FitError {
+    /// Whether it is about all that is searched, and not only about one beginning among others.
+    pub(crate) const fn ends_all(&self) -> bool {
+        matches!(self, Self::Stopped | Self::OtherFit)
+    }
 }
 
-impl fmt::Display for Progress {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Approaching { spread, of } => write!(f, "spread {spread} of {of}"),
-            Self::Searching { place, of } => write!(f, "place {place} of {of} beside the fit"),
-        }
+/// What came of one beginning among others, which may have come to nothing.
+///
+/// # Errors
+/// What is about all of them.
+pub(crate) fn one_of_many<T>(result: Result<T, FitError>) -> Result<Option<T>, FitError> {
+    match result {
+        Ok(found) => Ok(Some(found)),
+        Err(error) if error.ends_all() => Err(error),
+        Err(_) => Ok(None),
     }
 }
 
 /// Where a fit stands.
 struct State<'a> {
     fit: &'a Fit,
-    watch: &'a dyn Fn(Progress),
+    watch: &'a dyn Watch,
+    /// What the next searches came to, if it goes on from there.
+    known: slice::Iter<'a, Found>,
     start: &'a World,
     sweeps: &'a [Sweep],
     parameters: Vec<&'a Parameter>,
@@ -132,6 +134,8 @@ struct State<'a> {
     /// Of the world as it was last asked for, with the transducer on the axis.
     models: Models,
     phases: Phases,
+    /// The predictions that were made last, and where.
+    last: Option<(DVector<f64>, Phases, Rc<Linear>)>,
 }
 
 /// Where a fit is likeliest, by predictions with phases that are known or not.
@@ -164,22 +168,24 @@ const NOT_FITTED_DB: f64 = 0.5;
 /// # Errors
 /// When the world can't be predicted in, or the readings don't hold the parameters.
 pub fn fit(world: &World, sweeps: &[Sweep], fit: &Fit) -> Result<Fitted, FitError> {
-    fit_watched(world, sweeps, fit, &|_| ())
+    fit_watched(world, sweeps, fit, &[], &Unwatched)
 }
 
-/// The same, and tells on the way how far it has come.
+/// The same, and tells `watch` how far it has come and what it found. Goes on from what is `known`: what the same fit
+/// found when it was stopped, in that order.
 ///
 /// # Errors
-/// As [`fit`].
+/// As [`fit`]; [`FitError::Stopped`] if `watch` wants it, [`FitError::OtherFit`] if what is known does not go with it.
 pub fn fit_watched(
     world: &World,
     sweeps: &[Sweep],
     fit: &Fit,
-    watch: &dyn Fn(Progress),
+    known: &[Found],
+    watch: &dyn Watch,
 ) -> Result<Fitted, FitError> {
     let models = Models::of(&world.with_face_on_axis())?;
-    let mut state = State::new(models, world, sweeps, fit)?;
-    state.watch = watch;
+    let mut state = State::new(models, world, sweeps, fit, watch)?;
+    state.known = known.iter();
     let (best, beside) = state.likeliest()?;
     state.end(best, &beside)
 }
@@ -190,8 +196,9 @@ pub(crate) fn fit_with(
     world: &World,
     sweeps: &[Sweep],
     fit: &Fit,
+    watch: &dyn Watch,
 ) -> Result<Fitted, FitError> {
-    let mut state = State::new(models, world, sweeps, fit)?;
+    let mut state = State::new(models, world, sweeps, fit, watch)?;
     let end = state.attempt(state.still(), 0)?;
     let beside = state.still();
     state.end(end, &beside)
@@ -203,11 +210,13 @@ pub(crate) fn approach(
     world: &World,
     sweep: &Sweep,
     fit: &Fit,
+    watch: &dyn Watch,
 ) -> Result<Approached, FitError> {
-    let sweeps = std::slice::from_ref(sweep);
-    let mut state = State::new(models, world, sweeps, fit)?;
+    let sweeps = slice::from_ref(sweep);
+    let mut state = State::new(models, world, sweeps, fit, watch)?;
     let mut errors = state.rough_errors();
-    let linear = state.approach(&mut errors, 0)?;
+    state.approach(&mut errors, 0)?;
+    let linear = state.linear()?;
     let errors = state.spread(&linear, &errors);
     let log_posterior = state.value(&linear, &errors);
     Ok(Approached { pose: state.poses()[0], log_posterior, sigma_m: errors.sigma_m })
@@ -225,9 +234,9 @@ pub fn bound(
     errors: &ErrorModel,
 ) -> Result<Vec<f64>, FitError> {
     let models = Models::of(&world.with_face_on_axis())?;
-    let mut state = State::new(models, world, sweeps, fit)?;
+    let mut state = State::new(models, world, sweeps, fit, &Unwatched)?;
     state.phases = Phases::Known;
-    let curve = state.linear(true)?.curve(&state.still(), errors);
+    let curve = state.exact()?.curve(&state.still(), errors);
     let covariance = state.covariance(curve.information).ok_or(FitError::Degenerate)?;
     Ok((0..fit.priors.len()).map(|at| covariance[(at, at)].sqrt()).collect())
 }
@@ -238,14 +247,25 @@ impl<'a> State<'a> {
         start: &'a World,
         sweeps: &'a [Sweep],
         fit: &'a Fit,
+        watch: &'a dyn Watch,
     ) -> Result<Self, FitError> {
         if fit.priors.is_empty() || sweeps.is_empty() {
             return Err(FitError::Nothing);
         }
         let parameters = fit.priors.iter().map(|prior| &prior.parameter).collect();
         let values = DVector::zeros(fit.priors.len());
-        let phases = Phases::Unknown;
-        Ok(Self { fit, watch: &|_| (), start, sweeps, parameters, values, models, phases })
+        Ok(Self {
+            fit,
+            watch,
+            known: [].iter(),
+            start,
+            sweeps,
+            parameters,
+            values,
+            models,
+            phases: Phases::Unknown,
+            last: None,
+        })
     }
 
     fn rough_errors(&self) -> ErrorModel {
@@ -293,18 +313,36 @@ impl<'a> State<'a> {
         self.start.changed(&self.changes(&self.values))
     }
 
-    /// Predictions where it stands; exact ones with the transducer where it is.
-    fn linear(&mut self, is_exact: bool) -> Result<Linear, FitError> {
-        let reference_m_s = self.start.air.sound_speed_m_s();
-        let (world, poses) = (self.moved_world()?, self.poses());
-        let exact = is_exact.then(|| self.models.changed_to(&world)).transpose()?;
-        let models = exact.as_ref().unwrap_or(&self.models);
-        let rates = RateFinder::new(&world, &self.parameters, reference_m_s, self.phases);
-        Ok(Linear::about(models, &rates, self.sweeps, &poses)?)
+    /// Predictions where it stands, with the transducer on the axis.
+    fn linear(&mut self) -> Result<Rc<Linear>, FitError> {
+        if let Some((values, phases, linear)) = &self.last
+            && (values, *phases) == (&self.values, self.phases)
+        {
+            return Ok(Rc::clone(linear));
+        }
+        let world = self.moved_world()?;
+        let linear = Rc::new(self.about(&self.models, &world)?);
+        self.last = Some((self.values.clone(), self.phases, Rc::clone(&linear)));
+        Ok(linear)
     }
 
-    /// The world where it stands, with its models.
-    fn moved_world(&mut self) -> Result<World, WorldError> {
+    /// Exact ones, with the transducer where it is.
+    fn exact(&mut self) -> Result<Linear, FitError> {
+        let world = self.moved_world()?;
+        self.about(&self.models.changed_to(&world)?, &world)
+    }
+
+    fn about(&self, models: &Models, world: &World) -> Result<Linear, FitError> {
+        let reference_m_s = self.start.air.sound_speed_m_s();
+        let rates = RateFinder::new(world, &self.parameters, reference_m_s, self.phases);
+        Ok(Linear::about(models, &rates, self.sweeps, &self.poses())?)
+    }
+
+    /// The world where it stands, with its models; before each prediction.
+    fn moved_world(&mut self) -> Result<World, FitError> {
+        if self.watch.stops() {
+            return Err(FitError::Stopped);
+        }
         let world = self.world()?;
         self.models = self.models.changed_to(&world.with_face_on_axis())?;
         Ok(world)
@@ -324,10 +362,10 @@ impl<'a> State<'a> {
         (self.values, self.phases) = (best.values, best.phases);
         let errors = best.errors;
         if !self.start.sensor.mounting.is_on_axis() {
-            let exact = self.linear(true)?;
+            let exact = self.exact()?;
             self.improve(&exact, &errors)?;
         }
-        let linear = self.linear(true)?;
+        let linear = self.exact()?;
         let curve = linear.curve(&self.still(), &errors);
         let mut covariance =
             self.covariance(curve.information.clone()).ok_or(FitError::Degenerate)?;

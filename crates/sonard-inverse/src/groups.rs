@@ -35,6 +35,8 @@ pub enum Group {
     Skirts,
     /// Reflectances.
     Materials,
+    /// Roughnesses.
+    Roughness,
     /// Places of walls.
     Walls,
 }
@@ -99,7 +101,7 @@ const fn usual_sigma(parameter: &Parameter) -> f64 {
         Parameter::Threshold | Parameter::Skirts => 6.0,
         Parameter::ThresholdRise => 5.0,
         Parameter::Aperture => 0.3,
-        Parameter::Reflectance(_) => 0.1,
+        Parameter::Reflectance(_) | Parameter::Roughness(_) => 0.1,
         Parameter::Wall(_) => 0.05,
     }
 }
@@ -173,6 +175,9 @@ fn of_group(group: Group, world: &World, sweeps: usize) -> Result<Vec<Parameter>
         },
         Group::Materials => {
             world.scene.materials.keys().cloned().map(Parameter::Reflectance).collect()
+        }
+        Group::Roughness => {
+            world.scene.materials.keys().cloned().map(Parameter::Roughness).collect()
         }
         Group::Walls => (0..world.scene.walls.len()).map(Parameter::Wall).collect(),
     })

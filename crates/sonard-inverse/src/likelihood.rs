@@ -2,12 +2,15 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
+use serde::{Deserialize, Serialize};
+
 /// Readings that share what the model misses of an arc, and so count as one where explanations are weighed against each
 /// other: taken for independent they would make sure of what they can't tell.
 pub(crate) const READINGS_OF_ARC: f64 = 8.0;
 
 /// The spread of readings about what is predicted.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ErrorModel {
     /// Standard deviation of the range of an echo, metres.
     pub sigma_m: f64,

@@ -1,20 +1,22 @@
 //! Where a sweep was taken.
 
 use nalgebra::DMatrix;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use sonard_model::geometry::{Pose, wrap_180};
 
 use crate::{
     atlas::{Atlas, Match, is_apart},
-    fit::{Approached, Fit, FitError, Fitted, Prior, approach, fit_with},
+    fit::{Approached, Fit, FitError, Fitted, Prior, approach, fit_with, one_of_many},
     likelihood::READINGS_OF_ARC,
     parameter::Parameter,
     sweep::Sweep,
+    watch::{Unwatched, Watch},
     world::World,
 };
 
 /// A pose that explains a sweep.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Mode {
     /// Metres.
     pub x_m: f64,
@@ -77,7 +79,20 @@ const FAR_BELOW: f64 = 60.0;
 /// # Errors
 /// When there is nothing to predict with.
 pub fn locate(world: &World, atlas: &Atlas, sweep: &Sweep) -> Result<Vec<Mode>, FitError> {
-    Ok(modes(&explaining(world, atlas, sweep, &[])?, |_| 0.0))
+    locate_watched(world, atlas, sweep, &Unwatched)
+}
+
+/// The same, until `watch` stops it.
+///
+/// # Errors
+/// As [`locate`], and [`FitError::Stopped`].
+pub fn locate_watched(
+    world: &World,
+    atlas: &Atlas,
+    sweep: &Sweep,
+    watch: &dyn Watch,
+) -> Result<Vec<Mode>, FitError> {
+    Ok(modes(&explaining(world, atlas, sweep, &[], watch)?, |_| 0.0))
 }
 
 /// Fits the poses of the atlas that a sweep goes with best, and those where it is expected; the likeliest ones, each once.
@@ -86,6 +101,7 @@ pub(crate) fn explaining(
     atlas: &Atlas,
     sweep: &Sweep,
     expected: &[Pose],
+    watch: &dyn Watch,
 ) -> Result<Vec<Fitted>, FitError> {
     let models = atlas.models(world)?;
     let few = thinned(sweep, FEW_BEAMS);
@@ -93,7 +109,8 @@ pub(crate) fn explaining(
     let matches = atlas.matches(world, sweep, ROUGH);
     for pose in matches.iter().map(|Match { pose, .. }| pose).chain(expected) {
         let near = Sweep { pose: *pose, ..few.clone() };
-        rough.extend(approach(models.clone(), world, &near, &pose_alone(ROUGH_WIDEST)).ok());
+        let found = approach(models.clone(), world, &near, &pose_alone(ROUGH_WIDEST), watch);
+        rough.extend(one_of_many(found)?);
     }
     rough.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
     let best = rough.first().map_or(0.0, |best| best.log_posterior);
@@ -105,7 +122,8 @@ pub(crate) fn explaining(
         let widest_m = (3.0 * found.sigma_m).clamp(LEAST_WIDEST_M, 0.03);
         let near = Sweep { pose: found.pose, ..sweep.clone() };
         let what = pose_alone((widest_m, WHOLE_TURN_DEG));
-        whole.extend(fit_with(models.clone(), world, std::slice::from_ref(&near), &what).ok());
+        let found = fit_with(models.clone(), world, std::slice::from_ref(&near), &what, watch);
+        whole.extend(one_of_many(found)?);
     }
     whole.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
     Ok(distinct(whole, 0.05, |found| &found.poses[0]))

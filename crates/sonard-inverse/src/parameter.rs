@@ -35,6 +35,8 @@ pub enum Parameter {
     Skirts,
     /// Natural logarithm of how much more a material reflects.
     Reflectance(String),
+    /// Larger share of what a material gives back that it scatters.
+    Roughness(String),
     /// A wall farther along its normal, which is left of the way from its first to its second end, by its index in
     /// the scene; metres.
     Wall(usize),
@@ -63,6 +65,7 @@ impl Parameter {
             Self::Threshold | Self::Skirts => 3.0,
             Self::ThresholdRise => 2.0,
             Self::Aperture | Self::Reflectance(_) => 0.15,
+            Self::Roughness(_) => 0.05,
         }
     }
 }
@@ -85,6 +88,7 @@ impl fmt::Display for Parameter {
             Self::Aperture => f.write_str("aperture"),
             Self::Skirts => f.write_str("skirts_db"),
             Self::Reflectance(material) => write!(f, "reflectance {material}"),
+            Self::Roughness(material) => write!(f, "roughness {material}"),
             Self::Wall(wall) => write!(f, "wall {wall}"),
         }
     }

@@ -7,7 +7,7 @@ use sonard_model::{
     acoustics::BeamPattern,
     geometry::{DVec2, Pose, wrap_360, wrap_pi},
     model::{Arrival, Mechanism, ObservationPoint, Reflector, Simulator, TooCostly},
-    scene::{Material, Scene},
+    scene::Scene,
 };
 
 use crate::{
@@ -218,13 +218,7 @@ impl<'a> RateFinder<'a> {
                     (level_db(pattern, 0.0) - level_db(firing.simulator.beam(), 0.0)) / by
                 })
             }
-            Parameter::Reflectance(name) => {
-                let scene = firing.simulator.scene();
-                let times =
-                    scene.materials.get(name).map_or(0, |of| reflections(scene, arrival, of));
-                20.0 * std::f64::consts::LOG10_E * times as f64
-            }
-            _ => 0.0,
+            parameter => material_rate_db(parameter, firing.simulator.scene(), arrival),
         }
     }
 }
@@ -258,18 +252,33 @@ fn decibels(amplitude: f64) -> f64 {
     20.0 * amplitude.max(1e-6).log10()
 }
 
-/// How often an arrival was reflected by a material.
-fn reflections(scene: &Scene, arrival: &Arrival, material: &Material) -> usize {
-    let is_of = |mechanism: Mechanism| match mechanism {
-        Mechanism::Reflection(Reflector::Wall(wall)) => {
-            scene.walls.get(wall as usize).is_some_and(|wall| wall.material == *material)
+/// What the strength of an arrival gains with a parameter of a material, decibels for each unit; 0 for others.
+pub(crate) fn material_rate_db(parameter: &Parameter, scene: &Scene, arrival: &Arrival) -> f64 {
+    /// Where a material hardly mirrors or scatters, a little more is many decibels, which no step would hold.
+    const LEAST_SHARE: f64 = 0.02;
+    let (Parameter::Reflectance(name) | Parameter::Roughness(name)) = parameter else { return 0.0 };
+    let Some(material) = scene.materials.get(name) else { return 0.0 };
+    let [by_mirror, by_scattering] = match parameter {
+        // Both have shares of the same energy, which are roots in the amplitude.
+        Parameter::Roughness(_) => {
+            let scattered = material.roughness;
+            [-0.5 / (1.0 - scattered).max(LEAST_SHARE), 0.5 / scattered.max(LEAST_SHARE)]
         }
-        Mechanism::Reflection(Reflector::Cylinder(cylinder)) => {
-            scene.cylinders.get(cylinder as usize).is_some_and(|of| of.material == *material)
-        }
-        Mechanism::Reflection(Reflector::Floor) => scene.floor_material == *material,
-        Mechanism::Reflection(Reflector::Ceiling) => scene.ceiling_material == *material,
-        _ => false,
+        _ => [1.0, 1.0],
     };
-    arrival.path.mechanisms().filter(|&mechanism| is_of(mechanism)).count()
+    let of_wall = |wall: u32| scene.walls.get(wall as usize).map(|wall| wall.material);
+    let rate = |mechanism: Mechanism| {
+        let (of, rate) = match mechanism {
+            Mechanism::Reflection(Reflector::Wall(wall)) => (of_wall(wall), by_mirror),
+            Mechanism::Reflection(Reflector::Cylinder(cylinder)) => {
+                (scene.cylinders.get(cylinder as usize).map(|of| of.material), by_mirror)
+            }
+            Mechanism::Reflection(Reflector::Floor) => (Some(scene.floor_material), by_mirror),
+            Mechanism::Reflection(Reflector::Ceiling) => (Some(scene.ceiling_material), by_mirror),
+            Mechanism::Scattering { wall } => (of_wall(wall), by_scattering),
+            Mechanism::Diffraction(_) | Mechanism::Transducer => (None, 0.0),
+        };
+        if of == Some(*material) { rate } else { 0.0 }
+    };
+    20.0 * std::f64::consts::LOG10_E * arrival.path.mechanisms().map(rate).sum::<f64>()
 }

@@ -186,6 +186,9 @@ fn value(world: &World, sweeps: &[Sweep], parameter: &Parameter, by: f64) -> f64
         Parameter::Reflectance(name) => {
             world.scene.materials.get(name).map_or(1.0, |material| material.reflectance) * by.exp()
         }
+        Parameter::Roughness(name) => {
+            world.scene.materials.get(name).map_or(by, |material| material.roughness + by)
+        }
         Parameter::Wall(_) => by,
     }
 }

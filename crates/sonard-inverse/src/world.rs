@@ -1,13 +1,13 @@
 //! Everything that predictions depend on, and what becomes of it when parameters change.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use glam::DVec2;
 use sonard_model::{
     acoustics::{Air, Aperture, Sensor},
     geometry::Pose,
     model::{ModelError, ObservationPoint, Options, Simulator, TooCostly},
-    scene::{PoseError, Scene},
+    scene::{Material, PoseError, Scene},
 };
 use thiserror::Error;
 
@@ -101,7 +101,7 @@ impl World {
     pub fn changed(&self, changes: &[(&Parameter, f64)]) -> Result<Self, WorldError> {
         let mut world = self.clone();
         let mut offsets_m = Vec::new();
-        let mut reflectances = Vec::new();
+        let mut materials: BTreeMap<&str, Material> = BTreeMap::new();
         for &(parameter, by) in changes {
             let (least, most) = self.limits(parameter);
             let by = by.clamp(least, most);
@@ -128,18 +128,29 @@ impl World {
                     }
                 }
                 Parameter::Aperture => scale_aperture(&mut world.sensor.aperture, by.exp()),
-                Parameter::Reflectance(material) => reflectances.push((material.as_str(), by)),
+                Parameter::Reflectance(name) | Parameter::Roughness(name) => {
+                    if let Some(material) = self.scene.materials.get(name) {
+                        let new = materials.entry(name).or_insert(*material);
+                        // Rounding may go past a limit.
+                        match parameter {
+                            Parameter::Roughness(_) => {
+                                new.roughness = (material.roughness + by).clamp(0.0, 1.0);
+                            }
+                            _ => new.reflectance = (material.reflectance * by.exp()).min(1.0),
+                        }
+                    }
+                }
                 Parameter::Wall(wall) => offsets_m.push((*wall, by)),
             }
         }
-        if !offsets_m.is_empty() || !reflectances.is_empty() {
-            world.scene = Arc::new(changed_scene(&self.scene, &offsets_m, &reflectances));
+        if !offsets_m.is_empty() || !materials.is_empty() {
+            world.scene = Arc::new(changed_scene(&self.scene, &offsets_m, &materials));
         }
         Ok(world)
     }
 
     /// The least and the largest change of a parameter that there can be: no threshold falls with the range, no skirts
-    /// are louder than the axis, and no material gives back more than it gets.
+    /// are louder than the axis, and no material gives back more than it gets, or scatters more than that.
     #[must_use]
     pub fn limits(&self, parameter: &Parameter) -> (f64, f64) {
         let (least, most) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -152,6 +163,12 @@ impl World {
             Parameter::Reflectance(name) => {
                 let known = self.scene.materials.get(name);
                 (least, known.map_or(most, |material| -material.reflectance.ln()))
+            }
+            Parameter::Roughness(name) => {
+                let known = self.scene.materials.get(name);
+                known.map_or((least, most), |material| {
+                    (-material.roughness, 1.0 - material.roughness)
+                })
             }
             _ => (least, most),
         }
@@ -281,20 +298,19 @@ fn scale_aperture(aperture: &mut Aperture, by: f64) {
     }
 }
 
-fn changed_scene(scene: &Scene, offsets_m: &[(usize, f64)], reflectances: &[(&str, f64)]) -> Scene {
+fn changed_scene(
+    scene: &Scene,
+    offsets_m: &[(usize, f64)],
+    materials: &BTreeMap<&str, Material>,
+) -> Scene {
     let mut changed = scene.clone();
     if !offsets_m.is_empty() {
         for (wall, [a, b]) in changed.walls.iter_mut().zip(moved_ends(scene, offsets_m)) {
             (wall.a, wall.b) = (a, b);
         }
     }
-    for &(name, by) in reflectances {
+    for (&name, &new) in materials {
         let Some(material) = scene.materials.get(name) else { continue };
-        let new = sonard_model::scene::Material {
-            // Rounding may go past its limit.
-            reflectance: (material.reflectance * by.exp()).min(1.0),
-            ..*material
-        };
         let of = changed.walls.iter_mut().map(|wall| &mut wall.material);
         let of = of.chain(changed.cylinders.iter_mut().map(|cylinder| &mut cylinder.material));
         let of = of.chain([&mut changed.floor_material, &mut changed.ceiling_material]);

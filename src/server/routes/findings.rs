@@ -6,7 +6,7 @@ use axum::{Json, extract::State, http::StatusCode};
 use serde_json::json;
 use tokio::sync::OwnedSemaphorePermit;
 
-use super::scans::{broken, find, unreadable, written};
+use super::scans::{broken, find_written, unreadable};
 use crate::{
     api::{Findings, FoundFeature, FoundLine, MapCells},
     interpret::{
@@ -49,11 +49,7 @@ async fn findings(
     State(api): State<Api>,
     Path(scan): Path<String>,
 ) -> Result<Json<Findings>, Failed> {
-    let mut passage = find(&api, &scan).await?;
-    // All of a scan that has just ended may not be in the log yet.
-    if passage.view.end.is_none() && api.daemon.latest_scan() == Some(passage.view.scan) {
-        passage = written(&api, passage.view.scan).await?.unwrap_or(passage);
-    }
+    let passage = find_written(&api, &scan).await?;
     // One after the other, also when clients leave meanwhile.
     let turn = Arc::clone(&api.looking).acquire_owned().await.ok();
     let finding = tokio::task::spawn_blocking(move || find_in(&passage, turn));
@@ -85,7 +81,7 @@ fn find_in(passage: &Passage, _turn: Option<OwnedSemaphorePermit>) -> Result<Fin
 }
 
 /// The scan with its readings; of a beam that was measured twice the last one.
-fn read(passage: &Passage) -> Result<ScanView, Failed> {
+pub(super) fn read(passage: &Passage) -> Result<ScanView, Failed> {
     let mut view = passage.view.clone();
     let mut count = 0;
     for line in passage.lines(true).map_err(|error| unreadable(&error))? {

@@ -160,19 +160,21 @@ async fn scene(
 /// The scene that a scan was taken in: the one in force, or the one in its log. The one in force
 /// also where the log says nothing.
 async fn scene_of(api: &Api, passage: &Passage) -> Result<Option<Arc<Scene>>, Failed> {
-    let in_force = api.daemon.scene();
-    let session = passage.view.session.clone();
-    let taken_in = session.as_deref().and_then(|session| session.scene.as_ref());
+    let (in_force, passage) = (api.daemon.scene(), passage.clone());
+    let finding = tokio::task::spawn_blocking(move || taken_in(in_force, &passage));
+    finding.await.map_err(|error| broken(&error))
+}
+
+/// The same; it may read the disk.
+pub(super) fn taken_in(in_force: Option<Arc<Scene>>, passage: &Passage) -> Option<Arc<Scene>> {
+    let session = passage.view.session.as_deref();
+    let taken_in = session.and_then(|session| session.scene.as_ref());
     let fits = |scene: &Scene| taken_in.is_none_or(|taken_in| taken_in.sha256 == scene.sha256);
     if in_force.as_deref().is_some_and(fits) {
-        return Ok(in_force);
+        return in_force;
     }
-    let log = passage.path.clone();
-    let reading = tokio::task::spawn_blocking(move || {
-        session.and_then(|session| logged_scene(&session, &log).ok().flatten())
-    });
-    let logged = reading.await.map_err(|error| broken(&error))?;
-    Ok(logged.map(Arc::new).or(in_force))
+    let logged = session.and_then(|session| logged_scene(session, &passage.path).ok().flatten());
+    logged.map(Arc::new).or(in_force)
 }
 
 pub(super) async fn find(api: &Api, scan: &str) -> Result<Passage, Failed> {
@@ -180,7 +182,16 @@ pub(super) async fn find(api: &Api, scan: &str) -> Result<Passage, Failed> {
     in_history(api, move |history| history.passage(id)).await?.ok_or_else(no_such_scan)
 }
 
-fn no_such_scan() -> Failed {
+/// The same, with all of it if it has just ended: that may not be in the log yet.
+pub(super) async fn find_written(api: &Api, scan: &str) -> Result<Passage, Failed> {
+    let passage = find(api, scan).await?;
+    if passage.view.end.is_none() && api.daemon.latest_scan() == Some(passage.view.scan) {
+        return Ok(written(api, passage.view.scan).await?.unwrap_or(passage));
+    }
+    Ok(passage)
+}
+
+pub(super) fn no_such_scan() -> Failed {
     let help = "GET /v1/scans names the newest; older ones are in GET /v1/logs";
     Failed::new(StatusCode::NOT_FOUND, "there is no such scan", help)
 }
@@ -203,7 +214,7 @@ pub(super) async fn written(api: &Api, scan: Uuid) -> Result<Option<Passage>, Fa
 }
 
 /// Looks into the logs, beside everything else: disks block.
-async fn in_history<T: Send + 'static>(
+pub(super) async fn in_history<T: Send + 'static>(
     api: &Api,
     ask: impl FnOnce(&mut History) -> io::Result<T> + Send + 'static,
 ) -> Result<T, Failed> {

@@ -12,6 +12,7 @@ mod foxglove;
 mod gather;
 mod kill;
 mod load;
+mod location;
 pub(crate) mod model;
 mod monitoring;
 mod mqtt;

@@ -7,10 +7,16 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::{FitError, Progress, Settled, State, settle::STAGES};
+use super::{
+    FitError, Settled, State,
+    journal::{Found, listed},
+    one_of_many,
+    settle::STAGES,
+};
 use crate::{
     candidates::Phases,
     likelihood::{ErrorModel, READINGS_OF_ARC},
+    watch::Progress,
 };
 
 /// Directions that are searched.
@@ -49,12 +55,12 @@ impl State<'_> {
         let mut best = self.attempt(self.still(), 0)?;
         if self.is_astray(&best) && self.start.scene.robot.is_none() {
             for start in self.beginnings()? {
-                keep_likelier(&mut best, self.attempt(start, 0));
+                keep_likelier(&mut best, self.attempt(start, 0))?;
             }
         }
         let places = self.places(&best)?;
         for place in places.iter().take(FOLLOWED) {
-            keep_likelier(&mut best, self.attempt(place.values.clone(), STAGE));
+            keep_likelier(&mut best, self.attempt(place.values.clone(), STAGE))?;
         }
         let beside = self.beside(&best, &places)?;
         Ok((best, beside))
@@ -69,8 +75,8 @@ impl State<'_> {
         (self.values, self.phases) = (start, Phases::Unknown);
         let mut errors = self.rough_errors();
         errors.sigma_m *= STAGES[stage].0;
-        let linear = self.approach(&mut errors, stage)?;
-        self.settle(linear, errors)
+        self.approach(&mut errors, stage)?;
+        self.settle(errors)
     }
 
     fn is_astray(&self, end: &Settled) -> bool {
@@ -100,10 +106,17 @@ impl State<'_> {
         for (direction, sigma) in doubtful {
             for place in (-places..=places).filter(|place| *place != 0) {
                 number += 1;
-                (self.watch)(Progress::Searching { place: number, of });
                 let by = f64::from(place) * apart * sigma;
-                self.values = self.limited(&end.values + by * &direction);
-                tried.extend(self.improved(&close).ok());
+                let start = self.limited(&end.values + by * &direction);
+                let found = self.found(|state| {
+                    state.watch.progress(Progress::Searching { place: number, of });
+                    state.improved(start, &close)
+                });
+                let Some(found) = one_of_many(found)? else { continue };
+                let Found::Place { values, log_posterior } = found else {
+                    return Err(FitError::OtherFit);
+                };
+                tried.push(Place { values: DVector::from_vec(values), value: log_posterior });
             }
         }
         tried.sort_by(|one, other| other.value.total_cmp(&one.value));
@@ -117,13 +130,16 @@ impl State<'_> {
         Ok(places)
     }
 
-    fn improved(&mut self, errors: &ErrorModel) -> Result<Place, FitError> {
-        let mut linear = self.linear(false)?;
+    /// Where it is likelier near a place.
+    fn improved(&mut self, start: DVector<f64>, errors: &ErrorModel) -> Result<Found, FitError> {
+        self.values = start;
         for _ in 0..2 {
+            let linear = self.linear()?;
             self.improve(&linear, errors)?;
-            linear = self.linear(false)?;
         }
-        Ok(Place { values: self.values.clone(), value: self.value(&linear, errors) })
+        let linear = self.linear()?;
+        let log_posterior = self.value(&linear, errors);
+        Ok(Found::Place { values: listed(&self.values), log_posterior })
     }
 
     /// What variances gain because the values may be those of other places, which explain the readings nearly as
@@ -131,7 +147,7 @@ impl State<'_> {
     fn beside(&mut self, best: &Settled, places: &[Place]) -> Result<DVector<f64>, FitError> {
         (self.values, self.phases) = (best.values.clone(), Phases::Unknown);
         let close = widened(&best.errors, CLOSE);
-        let linear = self.linear(false)?;
+        let linear = self.linear()?;
         let of_best = self.value(&linear, &close);
         let odds = |place: &Place| ((place.value - of_best) / READINGS_OF_ARC).min(0.0).exp();
         let all: f64 = 1.0 + places.iter().map(odds).sum::<f64>();
@@ -151,7 +167,7 @@ impl State<'_> {
         errors: &ErrorModel,
     ) -> Result<Vec<(DVector<f64>, f64)>, FitError> {
         (self.values, self.phases) = (about.clone(), Phases::Unknown);
-        let curve = self.linear(false)?.curve(&self.still(), errors);
+        let curve = self.linear()?.curve(&self.still(), errors);
         let covariance = self.covariance(curve.information).ok_or(FitError::Degenerate)?;
         let sigmas = self.prior_sigmas();
         let believed = DMatrix::from_diagonal(&sigmas.map(f64::recip));
@@ -195,10 +211,11 @@ fn widened(errors: &ErrorModel, (sigma_m, sigma_db, clutter): (f64, f64, f64)) -
     }
 }
 
-fn keep_likelier(best: &mut Settled, end: Result<Settled, FitError>) {
-    if let Ok(end) = end
+fn keep_likelier(best: &mut Settled, end: Result<Settled, FitError>) -> Result<(), FitError> {
+    if let Some(end) = one_of_many(end)?
         && end.value > best.value
     {
         *best = end;
     }
+    Ok(())
 }

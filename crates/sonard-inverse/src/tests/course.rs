@@ -109,3 +109,18 @@ fn odometry_has_a_frame_of_its_own_and_counts_for_nothing_where_all_are_carried(
         );
     }
 }
+
+#[test]
+fn in_another_scene_a_course_begins_anew() {
+    let (world, atlas) = long_room();
+    let other = Arc::new(Scene { name: "another".to_owned(), ..Scene::clone(&world.scene) });
+    let elsewhere = World { scene: other, ..world.clone() };
+    let mut course = Course::new(Odometry::default());
+    for true_pose in &WAY.map(pose)[..3] {
+        course.next(&world, &atlas, &swept(&world, true_pose, 0.0, 0.0)).expect("a model");
+    }
+    let sweep = swept(&world, &pose(WAY[4]), 0.0, 0.0);
+    let alone = locate(&world, &atlas, &sweep).expect("a model");
+    assert_eq!(course.clone().next(&elsewhere, &atlas, &sweep), Ok(alone));
+    assert!(course.next(&world, &atlas, &sweep).expect("a model")[0].probability > 0.99);
+}

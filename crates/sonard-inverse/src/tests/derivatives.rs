@@ -11,8 +11,11 @@ use sonard_model::{
 
 use super::{first_pose, shipped, world};
 use crate::{
-    Beam, Heard, Motion, Parameter, Sweep, World, candidates::Phases, length_rate,
-    rates::RateFinder, walls,
+    Beam, Heard, Motion, Parameter, Sweep, World,
+    candidates::Phases,
+    length_rate,
+    rates::{RateFinder, material_rate_db},
+    walls,
 };
 
 /// Half of the step of a difference, metres.
@@ -128,6 +131,61 @@ fn margins_above_the_threshold() {
         }
         assert!(compared >= 6, "{parameter}: {compared}");
     }
+}
+
+/// How strong each arrival is, and what that gains with the figures of its materials: mirrored and scattered sound, and
+/// such as met both.
+#[test]
+fn strengths_with_materials() {
+    let text = r#"{"name": "yard", "materials": {"brick": {"reflectance": 0.8, "roughness": 0.3},
+        "glass": {"reflectance": 0.9}}, "walls": [
+        {"id": "w", "polyline": [[0, 0], [3, 0], [3, 2]], "material": "brick"},
+        {"id": "v", "polyline": [[3, 2], [0, 2], [0, 0]], "material": "glass"}]}"#;
+    let mut here = world("simple-room", "senscomp-6500");
+    here.scene = Scene::from_json(text).expect("a scene").into();
+    here.options.max_range_m = Some(3.5);
+    let pose = Pose { x_m: 1.1, y_m: 0.7, heading_deg: 0.0 };
+    let strengths = |world: &World, direction_rad: f64| {
+        let simulator = world.simulator(&pose).expect("a model");
+        let arrivals = simulator.at(pose.position()).arrivals(direction_rad).expect("paths");
+        let key = |arrival: &Arrival| {
+            (arrival.path.mechanisms().collect::<Key>(), arrival.length_m.to_bits())
+        };
+        arrivals.into_iter().map(|of| (key(&of), of)).collect::<BTreeMap<_, _>>()
+    };
+    // Of mirrored arrivals and of those that were scattered.
+    let mut compared = [0; 2];
+    for name in ["brick", "glass"] {
+        let of = |kind: fn(String) -> Parameter| kind(name.to_owned());
+        let roughness = (name == "brick").then(|| of(Parameter::Roughness));
+        for parameter in [of(Parameter::Reflectance)].into_iter().chain(roughness) {
+            const BY: f64 = 1e-3;
+            let [before, after] =
+                [-BY, BY].map(|by| here.changed(&[(&parameter, by)]).expect("a world"));
+            for step in 0..24 {
+                let direction_rad = 15f64.to_radians() * f64::from(step);
+                let [before, after] =
+                    [&before, &after].map(|world| strengths(world, direction_rad));
+                for (key, arrival) in strengths(&here, direction_rad) {
+                    let (Some(before), Some(after)) = (before.get(&key), after.get(&key)) else {
+                        continue;
+                    };
+                    let expected =
+                        20.0 * (after.path_amplitude / before.path_amplitude).log10() / (2.0 * BY);
+                    let any = |kind: fn(&Mechanism) -> bool| key.0.iter().any(kind);
+                    if any(|met| matches!(met, Mechanism::Diffraction(_))) {
+                        continue;
+                    }
+                    let rate = material_rate_db(&parameter, &here.scene, &arrival);
+                    let error = (rate - expected).abs();
+                    assert!(error < 1e-3, "{parameter}: {rate} for {expected} of {key:?}");
+                    let at = usize::from(any(|met| matches!(met, Mechanism::Scattering { .. })));
+                    compared[at] += u32::from(rate != 0.0);
+                }
+            }
+        }
+    }
+    assert!(compared.iter().all(|count| *count > 50), "{compared:?}");
 }
 
 #[test]

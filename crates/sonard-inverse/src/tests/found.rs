@@ -6,11 +6,12 @@ use sonard_model::{
     acoustics::TofNoise,
     geometry::{Pose, wrap_180},
     reading::PingStatus,
+    scene::Scene,
 };
 use uuid::Uuid;
 
 use super::{first_pose, world};
-use crate::{Atlas, Beam, Fit, Heard, Parameter, Prior, Sweep, World, fit, locate};
+use crate::{Atlas, Beam, Fit, Group, Heard, Parameter, Prior, Sweep, World, fit, locate, priors};
 
 /// A sweep as a world has it, with noise, said to be from another pose.
 pub(super) fn sweep(
@@ -72,6 +73,29 @@ fn pose_air_and_threshold_come_back() {
         assert!(off < 4.0 * estimate.sigma && estimate.identified, "{estimate:?} for {expected}");
     }
     assert!(fitted.estimates[0].sigma < 1e-3 && fitted.estimates[2].sigma < 0.3);
+}
+
+#[test]
+fn the_roughness_of_a_wall_comes_back() {
+    let text = r#"{"name": "yard", "materials": {"brick": {"reflectance": 0.9, "roughness": 0.2}},
+        "walls": [{"id": "w", "polyline": [[0, 0], [3, 0], [3, 2], [0, 2]], "closed": true, "material": "brick"}]}"#;
+    let mut here = world("simple-room", "senscomp-6500");
+    here.scene = Scene::from_json(text).expect("a scene").into();
+    here.options.max_range_m = Some(2.0);
+    let pose = Pose { x_m: 1.1, y_m: 0.8, heading_deg: 20.0 };
+    let roughness = Parameter::Roughness("brick".to_owned());
+    let truth = here.changed(&[(&roughness, 0.15)]).expect("a world");
+    assert_eq!(truth.scene.walls[0].material, truth.scene.materials["brick"]);
+    let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
+    let sweeps = [sweep(&truth, &pose, &pose, 240, noise, 3)];
+    let given = [("roughness brick".to_owned(), 0.3)];
+    let priors = priors(&[Group::Roughness], &given, &here, 1).expect("it is fitted");
+    let what = Fit::usual(priors, 0.02);
+    let fitted = fit(&here, &sweeps, &what).expect("a fit");
+    let told = &fitted.told(&here, &sweeps, &what)[0];
+    assert!((told.value - 0.35).abs() < 2.0 * told.sigma && told.identified, "{told:?}");
+    let scene = &fitted.world.scene;
+    assert!((scene.walls[0].material.roughness - told.value).abs() < 1e-12, "{:?}", scene.walls[0]);
 }
 
 /// Two walls that meet hardly hold the speed of sound: only weak echoes of their ends do, which other arrivals explain as
