@@ -23,8 +23,8 @@ use crate::{
 /// ----------
 /// model : Model
 ///     With the scene to locate in.
-/// spacing_m : float
-///     Spacing of the grid, metres, 0.01 to 2.
+/// spacing_m : float, optional
+///     Spacing of the grid, metres, 0.01 to 2; without it 0.05 in small scenes to 0.1.
 #[pyclass(frozen, module = "sonard")]
 pub(crate) struct Locator {
     model: Py<Model>,
@@ -36,13 +36,15 @@ pub(crate) struct Locator {
 #[pymethods]
 impl Locator {
     #[new]
-    #[pyo3(signature = (model, spacing_m = 0.1))]
-    fn new(py: Python<'_>, model: Py<Model>, spacing_m: f64) -> PyResult<Self> {
+    #[pyo3(signature = (model, spacing_m = None))]
+    fn new(py: Python<'_>, model: Py<Model>, spacing_m: Option<f64>) -> PyResult<Self> {
+        let world = model.get().world();
+        let spacing_m =
+            spacing_m.unwrap_or_else(|| inverse::Atlas::usual_spacing_m(&world.scene));
         if !(0.01..=2.0).contains(&spacing_m) {
             let message = format!("spacing_m is {spacing_m}: it must be from 0.01 to 2");
             return Err(PyValueError::new_err(message));
         }
-        let world = model.get().world();
         let pool = pool(py, None)?;
         let atlas = py.detach(|| pool.install(|| inverse::Atlas::new(&world, spacing_m)));
         let atlas = atlas.map_err(|error| refuse::<SonardError>(py, &error.to_string(), ""))?;

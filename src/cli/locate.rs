@@ -21,9 +21,9 @@ use crate::inverse::{Atlas, Course, Doubt, Mode, Odometry, World, doubts, locate
 pub(super) struct Args {
     #[command(flatten)]
     sweeps: SweepArgs,
-    /// Distance of the places that are tried first, metres
-    #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = within(0.01..=2.0))]
-    spacing_m: f64,
+    /// Distance of the places that are tried first, metres [default: 0.05 in small scenes to 0.1]
+    #[arg(long, value_name = "M", value_parser = within(0.01..=2.0))]
+    spacing_m: Option<f64>,
     /// JSON instead of text; one object a pose, most probable first
     #[arg(long)]
     json: bool,
@@ -127,7 +127,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     Err(Failure::input("there is no sweep to locate", "give a log of a ranger on a stepper"))
 }
 
-fn atlas(world: &World, spacing_m: f64) -> Result<Atlas, Failure> {
+fn atlas(world: &World, spacing_m: Option<f64>) -> Result<Atlas, Failure> {
+    let spacing_m = spacing_m.unwrap_or_else(|| Atlas::usual_spacing_m(&world.scene));
     let bar = progress::spinner("scenes looked over");
     let atlas = Atlas::new(world, spacing_m).map_err(|error| refuse(&error))?;
     bar.finish_and_clear();

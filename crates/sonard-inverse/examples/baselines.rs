@@ -73,7 +73,7 @@ struct Tally {
 
 fn compared_in(name: &str, count: u64, seed: u64) {
     let world = world_of(name, EngineKind::Paths);
-    let atlas = match Atlas::new(&world, 0.1) {
+    let atlas = match Atlas::new(&world, Atlas::usual_spacing_m(&world.scene)) {
         Ok(atlas) => atlas,
         Err(error) => return println!("{name:24} {error}"),
     };

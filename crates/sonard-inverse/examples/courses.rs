@@ -63,7 +63,7 @@ fn driven_in(name: &str, count: u64, seed: u64, beams: usize) {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     let mut world = World::new(scene, sensor, Air::default(), Options::default());
     world.options.max_range_m = Some(4.0);
-    let atlas = match Atlas::new(&world, 0.1) {
+    let atlas = match Atlas::new(&world, Atlas::usual_spacing_m(&world.scene)) {
         Ok(atlas) => atlas,
         Err(error) => return println!("{name:24} {error}"),
     };

@@ -49,7 +49,7 @@ fn located_in(name: &str, count: u64, seed: u64) {
     let mut world = World::new(scene, sensor, Air::default(), Options::default());
     world.options.max_range_m = Some(4.0);
     let began = Instant::now();
-    let atlas = match Atlas::new(&world, 0.1) {
+    let atlas = match Atlas::new(&world, Atlas::usual_spacing_m(&world.scene)) {
         Ok(atlas) => atlas,
         Err(error) => return println!("{name:24} {error}"),
     };

@@ -1,5 +1,7 @@
 //! What a ranger would read at every place of a scene, for finding a sweep's pose without a guess.
 
+use std::sync::OnceLock;
+
 use rayon::prelude::*;
 use sonard_model::{
     geometry::{DVec2, Pose},
@@ -23,6 +25,13 @@ const SPREAD: f32 = 0.5;
 const MOST_SPREADS: f32 = 3.0;
 /// More places than this are not predicted at: the grid is made coarser.
 const MOST_PLACES: f64 = 40_000.0;
+/// As many places are cheap enough for a finer grid than usual.
+const FEW_PLACES: f64 = 4_000.0;
+/// The usual spacing of places, metres: of small scenes and of others. Near a wall, where its echo falls into the
+/// blanking, what is read is another thing some centimetres on.
+const USUAL_SPACING_M: (f64, f64) = (0.05, 0.1);
+/// Matches are no nearer to each other, metres.
+const APART_M: f64 = 0.2;
 /// Room beside the outermost wall of a scene without a closed room, metres.
 const BESIDE_M: f64 = 1.0;
 
@@ -30,11 +39,23 @@ const BESIDE_M: f64 = 1.0;
 #[derive(Clone)]
 pub struct Atlas {
     spacing_m: f64,
+    /// Where a robot is usually: with something in most directions, or wherever it can stand.
+    usual: Region,
+    /// Where a ranger can stand besides, and what it would read there, once it is wanted.
+    beside: Vec<DVec2>,
+    beside_m: OnceLock<Vec<f32>>,
+    /// By which they are predicted, with the transducer on the axis.
+    models: Models,
+    /// What ranges there lack, metres.
+    shift_m: f64,
+}
+
+/// Places, and what would be read there.
+#[derive(Clone)]
+struct Region {
     places: Vec<DVec2>,
     /// [`DIRECTIONS`] ranges a place, counter-clockwise from +x, metres.
     ranges_m: Vec<f32>,
-    /// By which they were predicted, with the transducer on the axis.
-    models: Models,
 }
 
 /// Why there is no atlas of a world.
@@ -78,31 +99,29 @@ impl Atlas {
         if places.is_empty() {
             return Err(AtlasError::NoPlace);
         }
+        let is_usual = |place: &DVec2| is_surrounded(&world.scene, *place);
+        let (mut usual, mut beside): (Vec<_>, Vec<_>) = places.into_iter().partition(is_usual);
+        if usual.is_empty() {
+            std::mem::swap(&mut usual, &mut beside);
+        }
         let alone = World { scene: without_robot(&world.scene), ..world.with_face_on_axis() };
         // What is met ahead is nearer to a face before the axis.
         let nearer_m = world.sensor.mounting.ahead_m;
         let shift_m = world.delay_m - nearer_m;
         let models = Models::of(&alone)?;
-        let shown =
-            |range_m: Option<f64>| range_m.map_or(SILENCE_M, |far_m| (far_m + shift_m) as f32);
-        let mut ranges_m = vec![SILENCE_M; DIRECTIONS * places.len()];
-        let predict = |(ranges_m, place): (&mut [f32], &DVec2)| {
-            if watch.stops() {
-                return Err(AtlasError::Stopped);
-            }
-            let pose = Pose { x_m: place.x, y_m: place.y, heading_deg: 0.0 };
-            models.at(&pose, |_, point| {
-                for (direction, known_m) in ranges_m.iter_mut().enumerate() {
-                    let direction_rad =
-                        std::f64::consts::TAU * direction as f64 / DIRECTIONS as f64;
-                    *known_m = shown(point.ping(direction_rad)?.range_m);
-                }
-                Ok(())
-            })?;
-            Ok(())
-        };
-        ranges_m.par_chunks_exact_mut(DIRECTIONS).zip(&places).try_for_each(predict)?;
-        Ok(Self { spacing_m, places, ranges_m, models })
+        let ranges_m = readings(&models, shift_m, &usual, watch)?;
+        let usual = Region { places: usual, ranges_m };
+        Ok(Self { spacing_m, usual, beside, beside_m: OnceLock::new(), models, shift_m })
+    }
+
+    /// The spacing that suits a scene, metres: the finer, the smaller it is.
+    #[must_use]
+    pub fn usual_spacing_m(scene: &Scene) -> f64 {
+        let (least_m, most_m) = USUAL_SPACING_M;
+        extent(scene).map_or(most_m, |(low, high)| {
+            let size = high - low;
+            (size.x * size.y / FEW_PLACES).sqrt().clamp(least_m, most_m)
+        })
     }
 
     /// Distance of neighbouring places, metres.
@@ -111,16 +130,16 @@ impl Atlas {
         self.spacing_m
     }
 
-    /// How many places there are.
+    /// How many places there are where a robot usually is.
     #[must_use]
     pub const fn places(&self) -> usize {
-        self.places.len()
+        self.usual.places.len()
     }
 
-    /// Where a ranger may stand, square metres.
+    /// Where a robot usually is, square metres.
     #[must_use]
     pub fn area_m2(&self) -> f64 {
-        self.places.len() as f64 * self.spacing_m.powi(2)
+        self.places() as f64 * self.spacing_m.powi(2)
     }
 
     /// Models of a world that may be the one predicted with.
@@ -128,16 +147,44 @@ impl Atlas {
         self.models.changed_to(&world.with_face_on_axis())
     }
 
-    /// The poses that a sweep fits best, best first; none within twice the grid's spacing and 9 degrees of a better
-    /// one.
+    /// The poses that a sweep fits best, best first, none near a better one: where a robot usually is.
     pub(crate) fn matches(&self, world: &World, sweep: &Sweep, count: usize) -> Vec<Match> {
+        let Region { places, ranges_m } = &self.usual;
+        self.matches_of(places, ranges_m, world, sweep, count)
+    }
+
+    /// The same for all other places. What would be read there is predicted the first time.
+    pub(crate) fn matches_beside(
+        &self,
+        world: &World,
+        sweep: &Sweep,
+        count: usize,
+        watch: &dyn Watch,
+    ) -> Result<Vec<Match>, AtlasError> {
+        let ranges_m = match self.beside_m.get() {
+            Some(known) => known,
+            None => {
+                let found = readings(&self.models, self.shift_m, &self.beside, watch)?;
+                self.beside_m.get_or_init(|| found)
+            }
+        };
+        Ok(self.matches_of(&self.beside, ranges_m, world, sweep, count))
+    }
+
+    fn matches_of(
+        &self,
+        places: &[DVec2],
+        ranges_m: &[f32],
+        world: &World,
+        sweep: &Sweep,
+        count: usize,
+    ) -> Vec<Match> {
         let heard = resampled(world, sweep);
         if heard.is_empty() {
             return Vec::new();
         }
         let spread_m = SPREAD * self.spacing_m as f32;
-        let mut all: Vec<(f32, usize, usize)> = self
-            .ranges_m
+        let mut all: Vec<(f32, usize, usize)> = ranges_m
             .par_chunks_exact(DIRECTIONS)
             .enumerate()
             .flat_map_iter(|(place, ranges_m)| {
@@ -148,9 +195,10 @@ impl Atlas {
         let mut found: Vec<Match> = Vec::new();
         for (cost, place, turn) in all {
             let heading_deg = 360.0 * turn as f64 / DIRECTIONS as f64;
-            let [x_m, y_m] = self.places[place].to_array();
+            let [x_m, y_m] = places[place].to_array();
             let pose = Pose { x_m, y_m, heading_deg };
-            if found.iter().all(|known| is_apart(&known.pose, &pose, 2.0 * self.spacing_m)) {
+            let apart_m = APART_M.max(2.0 * self.spacing_m);
+            if found.iter().all(|known| is_apart(&known.pose, &pose, apart_m)) {
                 found.push(Match { pose, cost });
             }
             if found.len() == count {
@@ -159,6 +207,33 @@ impl Atlas {
         }
         found
     }
+}
+
+/// What would be read at each of some places.
+fn readings(
+    models: &Models,
+    shift_m: f64,
+    places: &[DVec2],
+    watch: &dyn Watch,
+) -> Result<Vec<f32>, AtlasError> {
+    let shown = |range_m: Option<f64>| range_m.map_or(SILENCE_M, |far_m| (far_m + shift_m) as f32);
+    let mut ranges_m = vec![SILENCE_M; DIRECTIONS * places.len()];
+    let predict = |(ranges_m, place): (&mut [f32], &DVec2)| {
+        if watch.stops() {
+            return Err(AtlasError::Stopped);
+        }
+        let pose = Pose { x_m: place.x, y_m: place.y, heading_deg: 0.0 };
+        models.at(&pose, |_, point| {
+            for (direction, known_m) in ranges_m.iter_mut().enumerate() {
+                let direction_rad = std::f64::consts::TAU * direction as f64 / DIRECTIONS as f64;
+                *known_m = shown(point.ping(direction_rad)?.range_m);
+            }
+            Ok(())
+        })?;
+        Ok(())
+    };
+    ranges_m.par_chunks_exact_mut(DIRECTIONS).zip(places).try_for_each(predict)?;
+    Ok(ranges_m)
 }
 
 /// Whether two poses are farther apart than that, or look elsewhere.
@@ -227,8 +302,8 @@ fn best_turns(
     least.into_iter()
 }
 
-/// A grid of places where a ranger can stand, and its spacing.
-fn standing_places(scene: &Scene, spacing_m: f64) -> (Vec<DVec2>, f64) {
+/// The rectangle about what is in a scene, with room beside it.
+fn extent(scene: &Scene) -> Option<(DVec2, DVec2)> {
     let ends = scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
     let round = scene.cylinders.iter().map(|cylinder| cylinder.center);
     let named = scene.poses.values().map(Pose::position);
@@ -236,10 +311,12 @@ fn standing_places(scene: &Scene, spacing_m: f64) -> (Vec<DVec2>, f64) {
     for point in ends.chain(round).chain(named) {
         (low, high) = (low.min(point), high.max(point));
     }
-    if !low.is_finite() {
-        return (Vec::new(), spacing_m);
-    }
-    (low, high) = (low - BESIDE_M, high + BESIDE_M);
+    low.is_finite().then_some((low - BESIDE_M, high + BESIDE_M))
+}
+
+/// A grid of places where a ranger can stand, and its spacing.
+fn standing_places(scene: &Scene, spacing_m: f64) -> (Vec<DVec2>, f64) {
+    let Some((low, high)) = extent(scene) else { return (Vec::new(), spacing_m) };
     let size = high - low;
     let spacing_m = spacing_m.max((size.x * size.y / MOST_PLACES).sqrt());
     let [columns, rows] = (size / spacing_m).to_array().map(|count| count.ceil() as u32 + 1);
@@ -249,11 +326,7 @@ fn standing_places(scene: &Scene, spacing_m: f64) -> (Vec<DVec2>, f64) {
         .collect();
     let stands = scene.can_stand(&all);
     let places = all.into_iter().zip(stands).filter(|(_, stands)| *stands);
-    let places: Vec<DVec2> = places.map(|(place, _)| place).collect();
-    // Behind the walls of a room lies its mirror image, which fits nearly as well.
-    let within: Vec<DVec2> =
-        places.iter().copied().filter(|place| is_surrounded(scene, *place)).collect();
-    (if within.is_empty() { places } else { within }, spacing_m)
+    (places.map(|(place, _)| place).collect(), spacing_m)
 }
 
 /// Whether there is something in most directions.
@@ -295,6 +368,8 @@ mod tests {
             assert_eq!(is_surrounded(&room, place.into()), expected, "{place:?}");
         }
         let (places, spacing_m) = standing_places(&room, 0.1);
+        let places: Vec<DVec2> =
+            places.into_iter().filter(|place| is_surrounded(&room, *place)).collect();
         assert!(places.iter().all(|place| place.cmpge(DVec2::ZERO).all()), "some are outside");
         assert!(
             (places.len() as f64 * spacing_m * spacing_m - 6.0).abs() < 0.6,

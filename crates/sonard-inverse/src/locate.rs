@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 use sonard_model::geometry::{Pose, wrap_180};
 
 use crate::{
-    atlas::{Atlas, Match, is_apart},
+    atlas::{Atlas, AtlasError, Match, is_apart},
     fit::{Approached, Fit, FitError, Fitted, Prior, approach, fit_with, one_of_many},
     likelihood::READINGS_OF_ARC,
     parameter::Parameter,
-    sweep::Sweep,
+    sweep::{Beam, Heard, Sweep},
     watch::{Unwatched, Watch},
-    world::World,
+    world::{Models, World},
 };
 
 /// A pose that explains a sweep.
@@ -96,6 +96,10 @@ pub fn locate_watched(
 }
 
 /// Fits the poses of the atlas that a sweep goes with best, and those where it is expected; the likeliest ones, each once.
+///
+/// Behind the walls of a room lies its mirror image, which fits nearly as well. So places with nothing in most directions
+/// count only for a sweep that none of the others explains: one whose readings, on the average, are less likely than if
+/// they were known to a metre.
 pub(crate) fn explaining(
     world: &World,
     atlas: &Atlas,
@@ -103,30 +107,60 @@ pub(crate) fn explaining(
     expected: &[Pose],
     watch: &dyn Watch,
 ) -> Result<Vec<Fitted>, FitError> {
-    let models = atlas.models(world)?;
-    let few = thinned(sweep, FEW_BEAMS);
-    let mut rough: Vec<Approached> = Vec::new();
+    let search = Search { models: atlas.models(world)?, world, sweep, watch };
     let matches = atlas.matches(world, sweep, ROUGH);
-    for pose in matches.iter().map(|Match { pose, .. }| pose).chain(expected) {
-        let near = Sweep { pose: *pose, ..few.clone() };
-        let found = approach(models.clone(), world, &near, &pose_alone(ROUGH_WIDEST), watch);
-        rough.extend(one_of_many(found)?);
+    let starts = matches.iter().map(|Match { pose, .. }| pose).chain(expected);
+    let mut found = search.improved(starts, WHOLE + expected.len())?;
+    if found.first().is_none_or(|best| best.log_likelihood < 0.0) {
+        match atlas.matches_beside(world, sweep, ROUGH, watch) {
+            Ok(matches) => found.extend(search.improved(matches.iter().map(|of| &of.pose), WHOLE)?),
+            Err(AtlasError::Stopped) => return Err(FitError::Stopped),
+            Err(AtlasError::World(error)) => return Err(error.into()),
+            Err(AtlasError::NoPlace) => {}
+        }
     }
-    rough.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
-    let best = rough.first().map_or(0.0, |best| best.log_posterior);
-    rough.retain(|found| found.log_posterior > best - FAR_BELOW);
-    let mut whole: Vec<Fitted> = Vec::new();
-    let most = WHOLE + expected.len();
-    for found in distinct(rough, 0.05, |found| &found.pose).into_iter().take(most) {
-        // A rough fit is off by little more than its readings spread.
-        let widest_m = (3.0 * found.sigma_m).clamp(LEAST_WIDEST_M, 0.03);
-        let near = Sweep { pose: found.pose, ..sweep.clone() };
-        let what = pose_alone((widest_m, WHOLE_TURN_DEG));
-        let found = fit_with(models.clone(), world, std::slice::from_ref(&near), &what, watch);
-        whole.extend(one_of_many(found)?);
+    found.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
+    Ok(distinct(found, 0.05, |found| &found.poses[0]))
+}
+
+/// What is looked for where.
+struct Search<'a> {
+    models: Models,
+    world: &'a World,
+    sweep: &'a Sweep,
+    watch: &'a dyn Watch,
+}
+
+impl Search<'_> {
+    /// Fits from each of some poses, roughly and by few beams, and the `most` best of them by all.
+    fn improved<'p>(
+        &self,
+        starts: impl Iterator<Item = &'p Pose>,
+        most: usize,
+    ) -> Result<Vec<Fitted>, FitError> {
+        let &Self { ref models, world, sweep, watch } = self;
+        let few = thinned(sweep, FEW_BEAMS);
+        let mut rough: Vec<Approached> = Vec::new();
+        for pose in starts {
+            let near = Sweep { pose: *pose, ..few.clone() };
+            let found = approach(models.clone(), world, &near, &pose_alone(ROUGH_WIDEST), watch);
+            rough.extend(one_of_many(found)?);
+        }
+        rough.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
+        let best = rough.first().map_or(0.0, |best| best.log_posterior);
+        rough.retain(|found| found.log_posterior > best - FAR_BELOW);
+        let mut whole: Vec<Fitted> = Vec::new();
+        for found in distinct(rough, 0.05, |found| &found.pose).into_iter().take(most) {
+            // A rough fit is off by little more than its readings spread.
+            let widest_m = (3.0 * found.sigma_m).clamp(LEAST_WIDEST_M, 0.03);
+            let near = Sweep { pose: found.pose, ..sweep.clone() };
+            let what = pose_alone((widest_m, WHOLE_TURN_DEG));
+            let found = fit_with(models.clone(), world, std::slice::from_ref(&near), &what, watch);
+            whole.extend(one_of_many(found)?);
+        }
+        whole.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
+        Ok(whole)
     }
-    whole.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
-    Ok(distinct(whole, 0.05, |found| &found.poses[0]))
 }
 
 /// Fits a pose alone, that may be so many metres and degrees off.
@@ -137,12 +171,19 @@ fn pose_alone((widest_m, widest_turn_deg): (f64, f64)) -> Fit {
     Fit { priors, widest_m, widest_turn_deg, least_sigma_m: 5e-4, least_sigma_db: 0.5 }
 }
 
-/// Every so many of a sweep's beams.
+/// So many of a sweep's beams, evenly spread: two of three that heard something, where there are as many, because what
+/// a place is known by are its echoes, and of a sweep before two walls hardly any other beam has one.
 fn thinned(sweep: &Sweep, count: usize) -> Sweep {
-    let beams = &sweep.beams;
-    let count = count.min(beams.len());
-    let beams = (0..count).map(|at| beams[at * beams.len() / count]).collect();
+    let is_echo = |beam: &&Beam| matches!(beam.heard, Heard::Echo { .. });
+    let (echoes, silent): (Vec<&Beam>, Vec<&Beam>) = sweep.beams.iter().partition(is_echo);
+    let of_silent = silent.len().min(count - echoes.len().min(2 * count / 3));
+    let of_echoes = echoes.len().min(count - of_silent);
+    let beams = evenly(&echoes, of_echoes).chain(evenly(&silent, of_silent)).copied().collect();
     Sweep { beams, ..sweep.clone() }
+}
+
+fn evenly<'a>(of: &'a [&'a Beam], count: usize) -> impl Iterator<Item = &'a Beam> {
+    (0..count).map(move |at| of[at * of.len() / count])
 }
 
 /// Each pose once, of those that several fits found the best.

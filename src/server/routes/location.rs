@@ -44,8 +44,6 @@ use crate::{
 
 /// Most scans of a course.
 const MOST_SCANS: usize = 500;
-/// Distance of the places that are tried first, metres.
-const SPACING_M: f64 = 0.1;
 /// How long to wait until others have been answered.
 const TURN: Duration = Duration::from_secs(5);
 
@@ -323,7 +321,8 @@ impl Locator {
         let known = match known {
             Some(known) => known,
             None => {
-                let atlas = Atlas::watched(&world, SPACING_M, watch);
+                let spacing_m = Atlas::usual_spacing_m(&world.scene);
+                let atlas = Atlas::watched(&world, spacing_m, watch);
                 let atlas = atlas.map_err(|error| error.to_string())?;
                 Known { session, world: Arc::clone(&world), atlas }
             }

@@ -11,7 +11,9 @@ use sonard_model::{
 use uuid::Uuid;
 
 use super::{first_pose, world};
-use crate::{Atlas, Beam, Fit, Group, Heard, Parameter, Prior, Sweep, World, fit, locate, priors};
+use crate::{
+    Atlas, Beam, Fit, Group, Heard, Mode, Parameter, Prior, Sweep, World, fit, locate, priors,
+};
 
 /// A sweep as a world has it, with noise, said to be from another pose.
 pub(super) fn sweep(
@@ -247,11 +249,36 @@ fn a_sweep_is_found_without_a_guess() {
         };
         let swept =
             sweep(&here, &pose, &Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 }, 400, noise, trial);
-        let modes = locate(&here, &atlas, &swept).expect("modes");
-        let is_right = modes.iter().any(|mode| {
-            let off_m = (mode.x_m - pose.x_m).hypot(mode.y_m - pose.y_m);
-            off_m < 0.02 && wrap_180(mode.heading_deg - pose.heading_deg).abs() < 1.0
-        });
-        assert!(is_right, "{pose:?}: {modes:?}");
+        assert_found(&locate(&here, &atlas, &swept).expect("modes"), &pose);
     }
+}
+
+/// Behind the furniture of `plane-corner-edge`, where most directions are empty while other places have something on all
+/// sides; before two walls, so near to one of them that its echo falls into the blanking, and where 33 of 400 beams hear
+/// anything.
+#[test]
+fn a_sweep_is_found_where_a_robot_hardly_ever_is() {
+    for (scene, x_m, y_m, heading_deg) in [
+        ("plane-corner-edge", 0.506, -1.266, -139.0),
+        ("plane-corner-edge", -1.030, -0.253, -50.7),
+        ("oblique-corner", -0.266, 0.302, -26.1),
+        ("oblique-corner", -0.283, -0.255, -94.7),
+    ] {
+        let mut here = world(scene, "senscomp-6500");
+        here.options.max_range_m = Some(4.0);
+        let pose = Pose { x_m, y_m, heading_deg };
+        let noise = TofNoise::of_range_mm(1.0, here.air.sound_speed_m_s());
+        let unknown = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
+        let swept = sweep(&here, &pose, &unknown, 400, noise, 1);
+        let atlas = Atlas::new(&here, Atlas::usual_spacing_m(&here.scene)).expect("an atlas");
+        assert_found(&locate(&here, &atlas, &swept).expect("modes"), &pose);
+    }
+}
+
+fn assert_found(modes: &[Mode], pose: &Pose) {
+    let is_right = modes.iter().any(|mode| {
+        let off_m = (mode.x_m - pose.x_m).hypot(mode.y_m - pose.y_m);
+        off_m < 0.02 && wrap_180(mode.heading_deg - pose.heading_deg).abs() < 1.0
+    });
+    assert!(is_right, "{pose:?}: {modes:?}");
 }
