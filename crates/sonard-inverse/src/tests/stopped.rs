@@ -6,7 +6,11 @@ use std::sync::{
 };
 
 use rayon::prelude::*;
-use sonard_model::{acoustics::TofNoise, geometry::Pose};
+use sonard_model::{
+    acoustics::TofNoise,
+    geometry::Pose,
+    model::{ConeOptions, EngineOptions, Options},
+};
 
 use super::{first_pose, found::sweep, world};
 use crate::{
@@ -40,11 +44,15 @@ impl Watch for Keeper {
     }
 }
 
-/// Few readings of a corner, so that a fit is short, of which one in four is of somebody who walks about, so that it begins
+/// Few readings of a corner by the engine that is quickest, so that a fit is short, of which one in four is of somebody who walks about, so that it begins
 /// anew from elsewhere.
 fn short(parameters: &[(Parameter, f64)]) -> (World, Vec<Sweep>, Fit) {
     let mut here = world("right-angle-corner", "senscomp-6500");
-    here.options.max_range_m = Some(2.0);
+    here.options = Options {
+        engine: EngineOptions::Cone(ConeOptions::default()),
+        max_range_m: Some(3.0),
+        ..Options::default()
+    };
     let pose = first_pose(&here.scene);
     let believed = Pose { x_m: pose.x_m + 0.05, ..pose };
     let truth = here.changed(&[(&Parameter::Threshold, 2.0)]).expect("a world");
