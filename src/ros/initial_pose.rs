@@ -1,8 +1,8 @@
 //! The robot's pose as somebody on the network tells it: `/initialpose`, which RViz's "2D Pose Estimate" publishes.
 
 use rustdds::{
-    Subscriber, TopicKind, dds::CreateResult, no_key::SimpleDataReader,
-    policy::Durability, serialization::CDRDeserializerAdapter,
+    Subscriber, TopicKind, dds::CreateResult, no_key::SimpleDataReader, policy::Durability,
+    serialization::CDRDeserializerAdapter,
 };
 use serde::Deserialize;
 

@@ -53,7 +53,7 @@ fn the_map_that_is_told_is_the_one_that_is_made_of_the_log() {
 fn a_map_that_gets_too_large_is_told_no_more_and_scanning_goes_on() {
     let folder = tempfile::tempdir().expect("a folder");
     let walls = r#"{"name": "plain", "materials": {"brick": {"reflectance": 0.9}},
-        "walls": [{"id": "wall", "from": [-10000, 2], "to": [10000, 2], "material": "brick"}]}"#;
+        "walls": [{"id": "wall", "from": [-400, 2], "to": [400, 2], "material": "brick"}]}"#;
     let scene = folder.path().join("plain.json");
     fs::write(&scene, walls).expect("there is room");
     let scene = scene.to_str().expect("plain path");
@@ -70,16 +70,17 @@ fn a_map_that_gets_too_large_is_told_no_more_and_scanning_goes_on() {
         assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
         daemon.wait_for_scans(scan);
     };
-    take(1, 0.0);
+    take(1, -390.0);
     viewer.wait_for_channels();
     viewer.subscribe_to_all();
     drop(viewer.until(MAP));
-    take(2, 9000.0);
+    take(2, 390.0);
     let told = viewer.for_a_while(Duration::from_secs(2));
-    let said = |words: &String| words.contains("no more map is told") && words.contains("sonard map");
+    let said =
+        |words: &String| words.contains("no more map is told") && words.contains("sonard map");
     assert!(told.words.iter().any(said), "{:?}", told.words);
     assert_eq!((told.of(MAP).count(), told.of("/sonar/points").count()), (0, 1));
-    take(3, 0.0);
+    take(3, -390.0);
     let told = viewer.for_a_while(Duration::from_secs(2));
     assert!(!told.words.iter().any(said), "it is said once: {:?}", told.words);
     assert_eq!((told.of(MAP).count(), told.of("/sonar/points").count()), (0, 1));
