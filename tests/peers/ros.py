@@ -250,7 +250,7 @@ def compare(name, options, rangers=(), namespace="", **keys):
 
 def newest(subscriber, topic):
     """The last message. The library lets go of one that another took the place of within some seconds: who comes before gets
-    both, in their order, as each depth but 1 would have it."""
+    both, in their order."""
     messages = subscriber.take()[topic]
     return plain(messages[-1]) if messages else None
 
@@ -350,7 +350,7 @@ def initial_pose(daemon, me, namespace):
         (("map", here, (half, 0, 0, half)), "it leans by 90 degrees"),
         (("map", (math.nan, 0, 0), (0, 0, 0, 1)), "not finite"),
         (("map", here, (0, 0, 0, 0)), "length 0"),
-        (("map", (-7, 0, 0), (0, 0, 0, 1)), "scene"),
+        (("map", (-7, 0, 0), (0, 0, 0, 1)), "outside the room"),
     ):
         tell(*wrong)
         refused += 1
