@@ -43,6 +43,7 @@ if tells mqtt; then
   printf '%s\n' 'listener 1883 127.0.0.1' 'allow_anonymous true' 'user root' >"$work/broker.conf"
   mosquitto -c "$work/broker.conf" 2>/dev/null &
   others+=" $!"
+  until (exec 3<>/dev/tcp/127.0.0.1/1883) 2>/dev/null; do sleep 0.05; done
   mosquitto_sub -h 127.0.0.1 -t 'sonard/#' -q 1 >"$work/by-mqtt" &
   others+=" $!"
   options+=(--set mqtt.broker=mqtt://127.0.0.1:1883)
