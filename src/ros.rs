@@ -5,6 +5,7 @@
 
 mod budget;
 mod gaps;
+mod initial_pose;
 mod networks;
 mod node;
 mod services;
@@ -27,7 +28,7 @@ use crate::{
     api::RosReport,
     config::RosKeys,
     daemon::{Audience as _, Follower, Handle},
-    export::Topic,
+    export::{Live, Topic},
 };
 use node::Node;
 use services::Services;
@@ -64,6 +65,7 @@ impl Ros {
             left_out: 0,
             commands: 0,
             refused: 0,
+            refusal: None,
         };
         daemon.report_ros(report.clone());
         let teller = Teller { keys: keys.clone(), daemon, stop: stop.clone(), report };
@@ -127,7 +129,8 @@ impl Teller {
             false => Services::none(),
         };
         node.set_topics(&self.expected());
-        let mut follower = Follower::begin(&self.daemon, self.keys.messages(), &mut node);
+        let live = Live::new(self.keys.messages()).with_map(self.keys.map);
+        let mut follower = Follower::begin(&self.daemon, live, &mut node);
         let ended = self.tell(&mut follower, &mut node, &services).await;
         self.report = node.leave();
         ended
@@ -158,6 +161,9 @@ impl Teller {
         let (is_simulated, has_scene) = (next.array.is_some(), next.scene.is_some());
         let distribution = self.keys.messages().distribution;
         let predicts = has_scene && !is_simulated;
-        Topic::expected(next.array.as_deref(), predicts, has_scene, distribution)
+        let mut expected =
+            Topic::expected(next.array.as_deref(), predicts, has_scene, distribution);
+        expected.extend(self.keys.map.then(Topic::map));
+        expected
     }
 }

@@ -25,8 +25,10 @@ pub struct RosReport {
     pub messages: u64,
     /// Messages that were left out because what waits for subscribers was too much, or they were too long.
     pub left_out: u64,
-    /// Services that were called and did what was asked.
+    /// Services that were called and did what was asked, and poses that were followed.
     pub commands: u64,
-    /// Services that were called and refused.
+    /// Services that were called and refused, and poses that were.
     pub refused: u64,
+    /// Why the last of them was refused.
+    pub refusal: Option<String>,
 }

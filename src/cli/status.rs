@@ -118,8 +118,11 @@ fn ros(report: &RosReport) -> String {
     if let Some(why) = &report.trouble {
         return format!("  ros      domain {domain} is not told: {why}");
     }
+    let refusal = report.refusal.as_ref().map(|why| format!("; last refused: {why}"));
     format!(
-        "  ros      domain {domain} on {networks}; {subscriptions} subscriptions, {messages} messages, {left_out} left out"
+        "  ros      domain {domain} on {networks}; {subscriptions} subscriptions, {messages} messages, {left_out} left \
+         out{}",
+        refusal.unwrap_or_default()
     )
 }
 

@@ -16,6 +16,8 @@ pub struct FoxgloveKeys {
     /// count (restart).
     #[schemars(range(min = 16, max = 32_768))]
     pub queue_kb: u32,
+    /// Whether a map of all scans since the start is told after each scan (restart), as `sonard map` makes it.
+    pub map: bool,
     /// Origins of viewers from elsewhere that may ask in a browser, besides this server's own names
     /// (restart).
     pub origins: Vec<String>,
@@ -27,6 +29,7 @@ impl Default for FoxgloveKeys {
             enabled: false,
             max_clients: 8,
             queue_kb: 1024,
+            map: false,
             origins: vec!["https://app.foxglove.dev".into()],
         }
     }

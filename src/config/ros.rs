@@ -37,7 +37,11 @@ pub struct RosKeys {
     /// Whether /tf says where base_link is in map (restart). A robot whose own software says so must not be
     /// told twice.
     pub places_robot: bool,
-    /// Whether scans may be started and stopped by services (restart), by whoever is on these networks.
+    /// Whether a map of all scans since the start is told after each scan (restart), as `sonard map` makes it. Where others tell
+    /// /map, two would contradict each other.
+    pub map: bool,
+    /// Whether scans may be started and stopped by services and the pose set by /initialpose (restart), by whoever is on
+    /// these networks.
     pub commands: bool,
     /// Messages of a topic that subscribers have not acknowledged, all together, kilobytes (restart); what comes
     /// when so much waits is left out, with a count.
@@ -79,6 +83,7 @@ impl Default for RosKeys {
             frame: "sonar".into(),
             field_of_view_deg: None,
             places_robot: true,
+            map: false,
             commands: false,
             queue_kb: 512,
         }

@@ -7,7 +7,7 @@ use super::{
     hub::{Line, Subscription},
 };
 use crate::{
-    export::{Live, LiveMessage, Settings, Topic},
+    export::{LeftOut, Live, LiveMessage, Topic},
     scan::{Record, Session, decode_line},
 };
 
@@ -32,9 +32,9 @@ pub(crate) struct Follower {
 
 impl Follower {
     /// Begins to follow; what is in force already is told to nobody.
-    pub(crate) fn begin(daemon: &Handle, settings: Settings, audience: &mut impl Audience) -> Self {
+    pub(crate) fn begin(daemon: &Handle, live: Live, audience: &mut impl Audience) -> Self {
         let records = daemon.hub().follow();
-        let mut follower = Self { daemon: daemon.clone(), records, live: Live::new(settings) };
+        let mut follower = Self { daemon: daemon.clone(), records, live };
         if let Some(session) = daemon.session() {
             follower.take(Record::Session(Box::new((*session).clone())), audience);
         }
@@ -61,8 +61,8 @@ impl Follower {
                 session.scene_text = self.scene_text(&session);
                 self.take(Record::Session(session), audience);
             }
-            // A whole scan takes its time.
-            Ok(record @ Record::ScanEnd(_)) => {
+            // A whole scan takes its time, and may end with the next one's start.
+            Ok(record @ (Record::ScanStart(_) | Record::ScanEnd(_))) => {
                 tokio::task::block_in_place(|| self.take(record, audience));
             }
             Ok(record) => self.take(record, audience),
@@ -84,8 +84,12 @@ impl Follower {
         let is_session = matches!(record, Record::Session(_));
         let taken = self.live.take(record, |message| audience.tell(&message));
         if let Err(why) = taken {
-            tracing::warn!("live messages: nothing can be told of these scans: {why}");
-            audience.announce(format!("nothing can be told of these scans: {why}"));
+            let words = match why {
+                LeftOut::Map(_) => why.to_string(),
+                why => format!("nothing can be told of these scans: {why}"),
+            };
+            tracing::warn!("live messages: {words}");
+            audience.announce(words);
         }
         if is_session {
             audience.set_topics(self.live.topics());

@@ -39,6 +39,8 @@ const NAME: &str = "sonard";
 const DEPTHS: [i32; 2] = [10, 1];
 /// What the kernel may keep for a socket, bytes: nobody sends much.
 const SOCKET_BYTES: usize = 1 << 18;
+/// Least time from one refusal that is told to the next.
+const BETWEEN_REFUSALS: Duration = Duration::from_secs(5);
 /// How long the last messages may take to be acknowledged.
 const LAST: Duration = Duration::from_secs(1);
 
@@ -82,13 +84,15 @@ pub(super) struct Node {
     /// Goes last: what is made by it leaves with a word to others.
     pub(super) participant: DomainParticipant,
     daemon: Handle,
-    /// Readers and writers of services.
+    /// Readers and writers of services, and what listens for poses.
     pub(super) services: [Vec<Guid>; 2],
     distribution: Distribution,
     pub(super) namespace: String,
     queue_bytes: usize,
     report: RosReport,
     gaps: Gaps,
+    /// When a refusal was told last.
+    refused: Option<Instant>,
     /// Why it can't go on.
     fault: Option<String>,
 }
@@ -133,6 +137,7 @@ impl Node {
             queue_bytes: keys.queue_kb as usize * 1000,
             report: RosReport { networks, up, since, trouble: None, ..report.clone() },
             gaps: Gaps::default(),
+            refused: None,
             fault: None,
         })
     }
@@ -199,12 +204,19 @@ impl Node {
         self.fault.take().map_or(Ok(()), Err)
     }
 
-    /// Counts a service that was called, before that is answered.
-    pub(super) fn count_command(&mut self, was_taken: bool) {
-        if was_taken {
-            self.report.commands += 1;
-        } else {
-            self.report.refused += 1;
+    /// Counts what was asked for, before that is answered; why it was refused is told, but not as often as somebody can ask.
+    pub(super) fn count_command<T>(&mut self, done: &Result<T, String>) {
+        match done {
+            Ok(_) => self.report.commands += 1,
+            Err(why) => {
+                self.report.refused += 1;
+                self.report.refusal = Some(why.clone());
+                let is_early = self.refused.is_some_and(|last| last.elapsed() < BETWEEN_REFUSALS);
+                if !is_early {
+                    self.refused = Some(Instant::now());
+                    tracing::warn!("ros: {why}");
+                }
+            }
         }
         self.daemon.report_ros(self.report.clone());
     }

@@ -1,4 +1,5 @@
-//! Services by which whoever is on the network starts and stops scans: `std_srvs/srv/Trigger`, with the rules of the API.
+//! What whoever is on the network can have done, with the rules of the API: services start and stop scans
+//! (`std_srvs/srv/Trigger`), a topic says where the robot is.
 
 use std::{convert::Infallible, time::Duration};
 
@@ -14,17 +15,20 @@ use rustdds::{
 };
 use tokio::time::timeout;
 
-use super::node::{AsItIs, Node, Writer, now, reliable, without_encoding};
+use super::{
+    initial_pose::InitialPose,
+    node::{AsItIs, Node, Writer, now, reliable, without_encoding},
+};
 use crate::{
     api::ScanRequest,
-    daemon::{Handle, Order},
+    daemon::{Handle, Order, Refusal},
     export::dds::{Asker, TRIGGER, service_on_wire},
 };
 
 /// How often it is looked whether a service was called.
 pub(super) const LOOK: Duration = Duration::from_millis(100);
 /// Requests that wait, and that are answered at a look: who sends more gets no answer to some.
-const MOST_REQUESTS: i32 = 4;
+pub(super) const MOST_REQUESTS: i32 = 4;
 /// How long the daemon may take to answer.
 const PATIENCE: Duration = Duration::from_secs(2);
 
@@ -40,7 +44,7 @@ impl Command {
 
     /// Has it done; what there is to say of it, or why not.
     async fn carry_out(self, daemon: &Handle) -> Result<String, String> {
-        let done = async {
+        in_time(async {
             match self {
                 Self::Start => {
                     let begun = daemon.start(ScanRequest::default()).await?;
@@ -48,14 +52,24 @@ impl Command {
                 }
                 Self::Stop => daemon.order(Order::Stop).await.map(|()| "stopped".to_owned()),
             }
-        };
-        let answer = timeout(PATIENCE, done).await.map_err(|_| "the daemon is busy".to_owned())?;
-        answer.map_err(|refusal| format!("{}; {}", refusal.message, refusal.help))
+        })
+        .await
     }
 }
 
-/// The services that are offered.
-pub(super) struct Services(Vec<Service>);
+/// What came of something that the daemon does, or why not.
+pub(super) async fn in_time<T>(
+    done: impl Future<Output = Result<T, Refusal>>,
+) -> Result<T, String> {
+    let answer = timeout(PATIENCE, done).await.map_err(|_| "the daemon is busy".to_owned())?;
+    answer.map_err(|refusal| format!("{}; {}", refusal.message, refusal.help))
+}
+
+/// What is offered and listened for.
+pub(super) struct Services {
+    services: Vec<Service>,
+    initial_pose: Option<InitialPose>,
+}
 
 struct Service {
     command: Command,
@@ -66,7 +80,7 @@ struct Service {
 impl Services {
     /// None of them.
     pub(super) const fn none() -> Self {
-        Self(Vec::new())
+        Self { services: Vec::new(), initial_pose: None }
     }
 
     /// All of them, as the node's.
@@ -82,22 +96,26 @@ impl Services {
             node.services[1].push(replies.guid().to_bytes());
             services.push(Service { command, requests, replies });
         }
-        Ok(Self(services))
+        let initial_pose = Some(InitialPose::listen(node, &subscriber)?);
+        Ok(Self { services, initial_pose })
     }
 
     pub(super) const fn are_offered(&self) -> bool {
-        !self.0.is_empty()
+        !self.services.is_empty()
     }
 
     /// Does what was asked for since the last time.
     pub(super) async fn answer(&self, daemon: &Handle, node: &mut Node) {
-        for service in &self.0 {
+        if let Some(initial_pose) = &self.initial_pose {
+            initial_pose.obey(daemon, node).await;
+        }
+        for service in &self.services {
             service.requests.drain_read_notifications();
             for _ in 0..MOST_REQUESTS {
                 // What can't be read asks for nothing.
                 let Ok(Some(request)) = service.requests.try_take_one() else { break };
                 let done = service.command.carry_out(daemon).await;
-                node.count_command(done.is_ok());
+                node.count_command(&done);
                 service.reply(&request, done);
             }
         }

@@ -22,7 +22,7 @@ use crate::{
     config::FoxgloveKeys,
     daemon::{Audience, Follower, Handle},
     export::{
-        LiveMessage, Settings, Topic,
+        Live, LiveMessage, Settings, Topic,
         foxglove::{MOST_TEXT_BYTES, server_info},
     },
 };
@@ -70,7 +70,8 @@ impl Stage {
             session: Uuid::new_v4().to_string(),
         });
         let mut told = Told(Arc::clone(&stage));
-        let follower = Follower::begin(daemon, Settings::default(), &mut told);
+        let live = Live::new(Settings::default()).with_map(keys.map);
+        let follower = Follower::begin(daemon, live, &mut told);
         tokio::spawn(follow(follower, told));
         stage
     }

@@ -1,10 +1,12 @@
 // Holds what a viewer is told live against the daemon's log of the same scans.
 //
 //   tests/peers/foxglove.sh [PROGRAM]        starts daemons, and calls this
+//   foxglove.mjs watch ADDRESS TOKEN_FILE    is told everything, until it is ended
 //
 // Foxglove's client library subscribes to every topic and its decoders read the messages; the log is read without sonard.
 
 import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
 import fs from "node:fs";
 import path from "node:path";
 import { createRequire } from "node:module";
@@ -17,7 +19,7 @@ const { WebSocket } = require("ws");
 
 /** Scans that are compared; one before them says what topics there are. */
 const SCANS = 2;
-const [name, address, tokenFile, folder] = process.argv.slice(2);
+const [name, address, tokenFile, folder, program] = process.argv.slice(2);
 const token = fs.readFileSync(tokenFile, "utf8");
 const radians = (degrees) => (degrees * Math.PI) / 180;
 
@@ -273,6 +275,34 @@ function compareMarkers(messages, log) {
   assert.deepEqual(drawn, segments.flat());
 }
 
+/** The last map beside the image and description that `sonard map` makes of the log. */
+function compareMap(messages) {
+  const made = `${folder}-map`;
+  execFileSync(program, ["map", folder, "--out", made], { stdio: "ignore" });
+  const words = fs.readFileSync(path.join(made, "map.yaml"), "utf8");
+  const [x, y] = words.match(/origin: \[(.*)\]/)[1].split(",").map(Number);
+  const image = fs.readFileSync(path.join(made, "map.pgm"));
+  const [head, width, height] = image.toString("latin1").match(/^P5\n(\d+) (\d+)\n255\n/).map((part, place) => (place ? Number(part) : part));
+  const { header, info, data } = messages.get("/map").at(-1).message;
+  assert.deepEqual([info.width, info.height, header.frame_id], [width, height, "map"]);
+  assert.deepEqual([info.origin.position.x, info.origin.position.y, info.resolution], [x, y, single(0.05)]);
+  assert.equal(data.length, width * height);
+  let known = 0;
+  data.forEach((percent, place) => {
+    const pixel = image[head.length + (height - 1 - Math.floor(place / width)) * width + (place % width)];
+    // In the image what is not known is in the middle; both round, to a 255th and to a hundredth.
+    if (percent === -1) assert.equal(pixel, 128, `cell ${place}`);
+    else near(percent / 100, 1 - pixel / 255, 0.5 / 100 + 0.5 / 255 + 1e-9, `cell ${place}`);
+    known += percent === -1 ? 0 : 1;
+  });
+  assert(known > 50, `${known} cells are known`);
+  return data.length;
+}
+
+if (name === "watch") {
+  connect("foxglove.sdk.v1");
+  await new Promise(() => {});
+}
 const viewers = ["foxglove.sdk.v1", "foxglove.websocket.v1"].map(connect);
 await until("the greeting", () => viewers.every((viewer) => viewer.info));
 for (let scan = 0; scan <= SCANS; scan += 1) {
@@ -297,7 +327,8 @@ for (const viewer of viewers) {
   comparePoints(messages, log);
   compareTransforms(messages, log);
   compareMarkers(messages, log);
+  const cells = compareMap(messages);
   const count = [...messages.values()].reduce((sum, of) => sum + of.length, 0);
-  console.log(`${name}: ${count} messages of ${new Set(viewer.topics.values()).size} types, ${ranges} readings, as the log`);
+  console.log(`${name}: ${count} messages of ${new Set(viewer.topics.values()).size} types, ${ranges} readings and a map of ${cells} cells, as the log`);
   viewer.client.close();
 }

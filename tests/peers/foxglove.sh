@@ -1,28 +1,18 @@
 #!/usr/bin/env bash
-# Has Foxglove's own client library (from npm, under target/tools; no part of this repository) take what the daemon tells
-# viewers live, and holds every field against the daemon's log of the same scans (foxglove.mjs).
+# Has Foxglove's own client library take what the daemon tells viewers live, and holds every field against the daemon's log
+# of the same scans (foxglove.mjs).
 #
 #   tests/peers/foxglove.sh [PROGRAM]    without a program, it is built
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-packages=(@foxglove/ws-protocol@0.8.0 @foxglove/rosmsg@5.0.5 @foxglove/rosmsg2-serialization@3.1.0 ws@8.18.3)
-target=${CARGO_TARGET_DIR:-target}
-tools=$target/tools/foxglove
-if [ "$(cat "$tools/packages" 2>/dev/null)" != "${packages[*]}" ]; then
-  command -v npm >/dev/null || tests/install.sh "leave viewers out with FOXGLOVE_PEER=0" nodejs npm
-  mkdir -p "$tools"
-  npm install --silent --no-fund --no-audit --no-save --prefix "$tools" "${packages[@]}"
-  echo "${packages[*]}" >"$tools/packages"
-fi
-program=$(realpath "${1:-$target/debug/sonard}")
+. tests/peers/foxglove-tools.sh
+program=$(realpath "${1:-${CARGO_TARGET_DIR:-target}/debug/sonard}")
 if [ $# = 0 ]; then cargo build --workspace --quiet; fi
 
 work=$(mktemp -d)
 daemon=
 trap '[ -z "$daemon" ] || kill "$daemon" 2>/dev/null || true; rm -rf "$work"' EXIT
 (umask 077 && head -c 16 /dev/urandom | od -An -tx1 | tr -d ' \n' >"$work/token")
-# Beside the tools, where node finds them.
-cp tests/peers/foxglove.mjs "$tools/"
 
 # watch NAME OPTION...: a daemon that a viewer watches for two scans.
 watch() {
@@ -30,7 +20,7 @@ watch() {
   shift
   : >"$work/said"
   "$program" run "$@" --log "$work/$name" --socket "$work/socket" --set server.listen=127.0.0.1:0 \
-    --set server.token_file="$work/token" --set foxglove.enabled=true 2>"$work/said" >/dev/null &
+    --set server.token_file="$work/token" --set foxglove.enabled=true --set foxglove.map=true 2>"$work/said" >/dev/null &
   daemon=$!
   for _ in $(seq 100); do
     if grep -q 'http://' "$work/said"; then break; fi
@@ -38,7 +28,7 @@ watch() {
   done
   local address
   address=$(sed -n 's|.*http://\([0-9.:]*\).*|\1|p' "$work/said" | head -n 1)
-  timeout 120 node "$tools/foxglove.mjs" "$name" "$address" "$work/token" "$work/$name" || { cat "$work/said" >&2; exit 1; }
+  timeout 120 node "$foxglove_tools/foxglove.mjs" "$name" "$address" "$work/token" "$work/$name" "$program" || { cat "$work/said" >&2; exit 1; }
   kill "$daemon"
   wait "$daemon" || true
   daemon=

@@ -2,6 +2,7 @@
 """Holds what a daemon tells ROS 2 by DDS, as Cyclone DDS receives it, against its log and against a recording of it.
 
     tests/peers/ros.sh [PROGRAM]        opens a network of its own without a way out, and calls this
+    ros.py PROGRAM FOLDER subscribe     subscribes to everything, until it is ended
 
 Each message has to be what `sonard export` makes of the same log, field by field, as mcap-ros2-support reads that, and
 readings have to be what the log says.
@@ -39,7 +40,11 @@ ARRAY = ["--simulate", "--array", "pioneer-8", "--scene", "mcgill-lab", "--pose"
 OF_SCANS = {"/sonar/scan": ros.LaserScan, "/sonar/points": ros.PointCloud2, "/sonar/paths": ros.MarkerArray,
             "/sonar/predicted/points": ros.PointCloud2, "/tf": ros.TFMessage, "/tf_static": ros.TFMessage,
             "/sonar/scene": ros.MarkerArray}
-STILL = ("/tf_static", "/sonar/scene")
+STILL = ("/tf_static", "/sonar/scene", "/map")
+# Its map has more bytes than a packet of UDP.
+HALL = {"name": "hall", "materials": {"plaster": {"reflectance": 0.9}},
+        "walls": [{"id": "around", "polyline": [[0, 0], [30, 0], [30, 12], [0, 12]], "closed": True,
+                   "material": "plaster"}]}
 
 
 class Daemon:
@@ -137,6 +142,23 @@ def recorded(log, *options):
     path = WORK / "recorded.mcap"
     path.unlink(missing_ok=True)
     subprocess.run([PROGRAM, "export", log, "-o", path, *options], check=True, capture_output=True)
+    return messages_of(path)
+
+
+def maps(log):
+    """The maps that `sonard map` makes of the log up to the end of each of its scans."""
+    lines = [line for file in sorted(log.glob("*.jsonl")) for line in file.read_text().splitlines(keepends=True)]
+    ends = [place for place, line in enumerate(lines, 1) if json.loads(line)["type"] == "scan_end"]
+    part, folder = WORK / "part.jsonl", WORK / "map"
+    made = []
+    for end in ends:
+        part.write_text("".join(lines[:end]))
+        subprocess.run([PROGRAM, "map", part, "--out", folder], check=True, capture_output=True)
+        made += messages_of(folder / "map.mcap")["/map"]
+    return made
+
+
+def messages_of(path):
     messages = collections.defaultdict(list)
     with open(path, "rb") as file:
         for _, channel, _, message in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
@@ -184,6 +206,8 @@ def compare(name, options, rangers=(), namespace="", **keys):
     profile, is_humble = keys.get("profile", "rep117"), keys.get("distribution") == "humble"
     range_type = ros.RangeOfHumble if is_humble else ros.Range
     types = dict(OF_SCANS)
+    if keys.get("map"):
+        types["/map"] = ros.OccupancyGrid
     for ranger in rangers or ("",):
         of = f"/{ranger}" if ranger else ""
         types |= {f"/sonar{of}/range": range_type, f"/sonar/predicted{of}/range": range_type,
@@ -196,6 +220,9 @@ def compare(name, options, rangers=(), namespace="", **keys):
     until(lambda: daemon.status()["ros"]["subscriptions"] == offered, "subscriptions")
     daemon.scan(2)
     expected = recorded(daemon.log, "--profile", profile)
+    if keys.get("map"):
+        expected["/map"] = maps(daemon.log)
+        assert len(expected["/map"]) == 2 and expected["/map"][0] != expected["/map"][1]
     subscriber.wait_for({topic: len(messages) for topic, messages in expected.items()})
     compared = 0
     for topic, messages in subscriber.messages.items():
@@ -221,9 +248,18 @@ def compare(name, options, rangers=(), namespace="", **keys):
           f"{len(readings)} readings those of the log ({dict(silent)})")
 
 
+def newest(subscriber, topic):
+    """The last message. The library lets go of one that another took the place of within some seconds: who comes before gets
+    both, in their order."""
+    messages = subscriber.take()[topic]
+    return plain(messages[-1]) if messages else None
+
+
 def late(daemon, subscriber, types, namespace, expected):
     """Who comes late gets what stands still, and of the rest what comes from then on."""
     comer = Subscriber(types, namespace)
+    until(lambda: newest(comer, "/map") == expected.get("/map", [None])[-1], "the last map")
+    comer.messages["/map"] = comer.messages["/map"][-1:]
     comer.wait_for({topic: 1 for topic in STILL if topic in expected})
     for topic in STILL:
         for mine, other in zip(comer.messages[topic], subscriber.messages[topic][-1:]):
@@ -269,6 +305,69 @@ def call(participant, namespace, service, number):
 TYPES = {"Request": ros.TriggerRequest, "Reply": ros.TriggerResponse}
 
 
+def large_map():
+    """A map of many packets comes whole, also to who comes late."""
+    scene = WORK / "hall.json"
+    scene.write_text(json.dumps(HALL))
+    options = ["--mock", "--scene", scene, "--pose", "2,2,0", "--set", "plan.step_deg=7.2", "--set", "model.max_range_m=3"]
+    daemon = Daemon("hall", options, {"enabled": "true", "map": "true"})
+    until(lambda: daemon.status()["ros"]["up"], "a node")
+    subscriber = Subscriber({"/map": ros.OccupancyGrid})
+    until(lambda: daemon.status()["ros"]["subscriptions"] == 1, "a subscription")
+    daemon.scan(1)
+    daemon.ask("PUT", "/v1/pose", {"x_m": 28, "y_m": 10, "heading_deg": 45})
+    daemon.scan(1)
+    expected = maps(daemon.log)
+    comer = Subscriber({"/map": ros.OccupancyGrid})
+    until(lambda: newest(comer, "/map") == expected[-1], "the last map", 30)
+    subscriber.wait_for({"/map": 2})
+    assert [plain(message) for message in subscriber.messages["/map"]] == expected
+    cells = len(expected[-1]["data"])
+    assert cells > 100_000, cells
+    daemon.stop()
+    print(f"ros: a map of {cells} cells is that of the log, also for who comes late")
+
+
+def initial_pose(daemon, me, namespace):
+    """A pose in the map is followed by the next scan; others are not, and it is said why."""
+    named = Topic(me, f"rt{namespace}/initialpose", ros.PoseWithCovarianceStamped)
+    poses = DataWriter(me, named, qos=policies(False))
+    until(poses.get_matched_subscriptions, "a node that listens")
+    time.sleep(0.5)
+
+    def tell(frame, position, orientation):
+        pose = ros.Pose(position=ros.Point(*position), orientation=ros.Quaternion(*orientation))
+        header = ros.Header(stamp=ros.Time(sec=0, nanosec=0), frame_id=frame)
+        whole = ros.PoseWithCovariance(pose=pose, covariance=[0.25] * 36)
+        poses.write(ros.PoseWithCovarianceStamped(header=header, pose=whole))
+
+    wanted = lambda: json.loads(daemon.ask("GET", "/v1/pose"))
+    before, status = wanted(), lambda: daemon.status()["ros"]
+    refused = status()["refused"]
+    here, half = (0.5, 0.3, 0.0), math.sqrt(0.5)
+    for wrong, why in (
+        (("odom", here, (0, 0, 0, 1)), 'its frame is "odom"'),
+        (("map", here, (half, 0, 0, half)), "it leans by 90 degrees"),
+        (("map", (math.nan, 0, 0), (0, 0, 0, 1)), "not finite"),
+        (("map", here, (0, 0, 0, 0)), "length 0"),
+        (("map", (-7, 0, 0), (0, 0, 0, 1)), "outside the room"),
+    ):
+        tell(*wrong)
+        refused += 1
+        until(lambda: status()["refused"] == refused, f"a refusal: {why}")
+        assert "/initialpose is not followed" in status()["refusal"] and why in status()["refusal"], status()
+    assert wanted() == before, wanted()
+    tell("map", here, (0, 0, half, half))
+    until(lambda: wanted() != before, "a pose that is followed")
+    daemon.scan(1)
+    starts = [json.loads(line) for file in daemon.log.glob("*.jsonl") for line in file.read_text().splitlines()
+              if '"scan_start"' in line]
+    pose = max(starts, key=lambda start: start["time"])["pose"]
+    assert (pose["x_m"], pose["y_m"]) == here[:2] and abs(pose["heading_deg"] - 90) < 1e-9, pose
+    assert "is not followed" in daemon.said.read_text()
+    return refused
+
+
 def commands():
     """Services start and stop scans where that is configured, by the API's rules, and are not there else."""
     daemon = Daemon("commands", ROOM, {"enabled": "true", "commands": "true", "namespace": "/kiwi"})
@@ -283,17 +382,23 @@ def commands():
     until(lambda: scans()["stopped"] == 1 and scans()["completed"] == 0, f"a scan that was stopped")
     status = daemon.status()["ros"]
     assert (status["commands"], status["refused"]) == (2, 0), status
+    refused = initial_pose(daemon, me, "/kiwi")
+    status = daemon.status()["ros"]
+    assert (status["commands"], status["refused"]) == (3, refused), status
     daemon.stop()
     daemon = Daemon("no-commands", ROOM, {"enabled": "true"})
     until(lambda: daemon.status()["ros"]["up"], "a node")
     named = Topic(me, "rq/sonar/startRequest", ros.TriggerRequest)
     requests = DataWriter(me, named, qos=policies(False))
+    named = Topic(me, "rt/initialpose", ros.PoseWithCovarianceStamped)
+    poses = DataWriter(me, named, qos=policies(False))
     subscriber = Subscriber({"/sonar/range": ros.Range})
     until(lambda: subscriber.readers["/sonar/range"].get_matched_publications(), "a topic")
     time.sleep(1)
     assert not requests.get_matched_subscriptions(), "there is no service"
+    assert not poses.get_matched_subscriptions(), "nobody listens for poses"
     daemon.stop()
-    print("ros: services start and stop scans where that is configured, and only there")
+    print("ros: services start and stop scans and poses are followed where that is configured, and only there")
 
 
 def stuck():
@@ -331,7 +436,8 @@ def stuck():
 
 def subscribe():
     """Subscribes to everything and reads it until it is ended."""
-    subscriber = Subscriber(OF_SCANS | {"/sonar/range": ros.Range, "/sonar/predicted/range": ros.Range})
+    subscriber = Subscriber(OF_SCANS | {"/sonar/range": ros.Range, "/sonar/predicted/range": ros.Range,
+                                        "/sonar/residual": ros.Float64, "/map": ros.OccupancyGrid})
     while True:
         subscriber.take()
         time.sleep(0.05)
@@ -376,12 +482,13 @@ def main():
         subscribe()
     off()
     confined()
-    compare("stepper", ROOM)
+    compare("stepper", ROOM, map="true")
     compare("stepper-nav2", ROOM, profile="nav2", namespace="/kiwi")
     compare("stepper-humble", ROOM, distribution="humble")
     rangers = [f"s{number}" for number in range(8)]
-    compare("array", ARRAY, rangers=rangers)
+    compare("array", ARRAY, rangers=rangers, map="true")
     compare("array-nav2", ARRAY, rangers=rangers, profile="nav2", distribution="humble")
+    large_map()
     commands()
     stuck()
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.annotations import final
-from cyclonedds.idl.types import array, float32, float64, int32, int64, sequence, uint8, uint32, uint64
+from cyclonedds.idl.types import array, float32, float64, int8, int32, int64, sequence, uint8, uint32, uint64
 
 
 def name(text):
@@ -131,6 +131,38 @@ class Quaternion(IdlStruct, typename=name("geometry_msgs/msg/Quaternion")):
 class Pose(IdlStruct, typename=name("geometry_msgs/msg/Pose")):
     position: Point
     orientation: Quaternion
+
+
+@dataclass
+@final
+class PoseWithCovariance(IdlStruct, typename=name("geometry_msgs/msg/PoseWithCovariance")):
+    pose: Pose
+    covariance: array[float64, 36]
+
+
+@dataclass
+@final
+class PoseWithCovarianceStamped(IdlStruct, typename=name("geometry_msgs/msg/PoseWithCovarianceStamped")):
+    header: Header
+    pose: PoseWithCovariance
+
+
+@dataclass
+@final
+class MapMetaData(IdlStruct, typename=name("nav_msgs/msg/MapMetaData")):
+    map_load_time: Time
+    resolution: float32
+    width: uint32
+    height: uint32
+    origin: Pose
+
+
+@dataclass
+@final
+class OccupancyGrid(IdlStruct, typename=name("nav_msgs/msg/OccupancyGrid")):
+    header: Header
+    info: MapMetaData
+    data: sequence[int8]
 
 
 @dataclass

@@ -27,8 +27,8 @@ use scene::outlines;
 pub use settings::{Distribution, Profile, Settings};
 use topics::OfReading;
 pub use topics::Topic;
-pub(crate) use topics::stands_still;
 use topics::{FIXED_TRANSFORMS, SCENE};
+pub(crate) use topics::{MAP_TOPIC, stands_still};
 
 /// Where messages go.
 pub(crate) trait Outlet {

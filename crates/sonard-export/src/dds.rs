@@ -6,12 +6,16 @@
 
 use crate::{
     Distribution,
+    conversion::MAP,
     ros::cdr::{Cdr, Encode},
 };
 
 /// The topic by which nodes make themselves known, and the type of its messages.
 pub const NODES: (&str, &str) =
     ("ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_");
+
+/// The frame of the world, in which poses are.
+pub const MAP_FRAME: &str = MAP;
 
 /// Most characters of a namespace, so that topics stay within the 255 that DDS has.
 pub const MOST_NAMESPACE: usize = 100;

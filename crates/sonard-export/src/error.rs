@@ -32,4 +32,10 @@ pub enum LeftOut {
     /// Figures of sensor or air make no sense.
     #[error("its session: {0}")]
     Session(String),
+    /// With this scan the live map ends.
+    #[error(
+        "no more map is told: {0}; `sonard map` makes one of the log, with larger cells (--resolution) or of a part \
+         (--region)"
+    )]
+    Map(String),
 }

@@ -1,5 +1,7 @@
 //! The messages of a recording, made of records as they come.
 
+mod map;
+
 use std::{convert::Infallible, sync::Arc};
 
 use sonard_records::{Ping, Record, ScanStart, ScanView, Session};
@@ -7,6 +9,7 @@ use sonard_records::{Ping, Record, ScanStart, ScanView, Session};
 use crate::{
     LeftOut, Settings, Topic,
     conversion::{Converter, Firings, Outlet, in_order},
+    live::map::LiveMap,
     recording::nanoseconds,
     ros::{
         cdr::{Cdr, Encode},
@@ -31,10 +34,12 @@ pub struct LiveMessage<'a> {
 }
 
 /// Makes messages of records in the order of a log, whose readings have times. What it holds does not grow with what it
-/// is given: at most the readings of a scan of 4096.
+/// is given: at most the readings of a scan of 4096 and, where it makes a map, that.
 #[derive(Debug)]
 pub struct Live {
     converter: Converter,
+    topics: Vec<Topic>,
+    map: Option<LiveMap>,
     session: Option<Arc<Session>>,
     /// The scan under way, with its readings as long as they are not too many.
     scan: Option<UnderWay>,
@@ -53,19 +58,31 @@ impl Live {
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         let converter = Converter::new(settings);
-        Self { converter, session: None, scan: None, buffer: Vec::new() }
+        let topics = Vec::new();
+        Self { converter, topics, map: None, session: None, scan: None, buffer: Vec::new() }
+    }
+
+    /// Whether it also tells a map after each scan ([`Topic::map`]): cell for cell the one that `sonard map` makes of
+    /// all scans so far. Scans of more than 4096 readings are not on it. It has at most 500,000 cells, and takes at most 12
+    /// megabytes; a place that is larger ends it.
+    #[must_use]
+    pub fn with_map(mut self, is_wanted: bool) -> Self {
+        self.map = is_wanted.then(LiveMap::new);
+        self.topics.retain(|topic| *topic != Topic::map());
+        self.topics.extend(is_wanted.then(Topic::map));
+        self
     }
 
     /// What there may be messages of in the session in force.
     #[must_use]
     pub fn topics(&self) -> &[Topic] {
-        self.converter.topics()
+        &self.topics
     }
 
     /// Takes the next record and hands what there is to be told of it to `tell`.
     ///
     /// # Errors
-    /// Of a session that says too little for messages: nothing is told of its scans.
+    /// Of a session that says too little for messages: nothing is told of its scans. Of a scan with which the map ends.
     pub fn take(
         &mut self,
         record: Record,
@@ -73,21 +90,25 @@ impl Live {
     ) -> Result<(), LeftOut> {
         let mut teller = Teller { tell, buffer: std::mem::take(&mut self.buffer) };
         let taken = match record {
-            Record::Session(session) => self.begin_session(session.into()),
+            Record::Session(session) => {
+                let mapped = self.end_without_word(&mut teller);
+                self.begin_session(session.into()).and(mapped)
+            }
             Record::ScanStart(start) => {
+                let mapped = self.end_without_word(&mut teller);
                 self.scan = Some(UnderWay::of(start, self.session.clone()));
-                Ok(())
+                mapped
             }
             Record::Ping(ping) => {
                 self.take_reading(*ping, &mut teller);
                 Ok(())
             }
             Record::ScanEnd(end) => {
-                if let Some(mut scan) = self.scan.take_if(|scan| scan.view.scan == end.scan) {
+                let scan = self.scan.take_if(|scan| scan.view.scan == end.scan);
+                scan.map_or(Ok(()), |mut scan| {
                     scan.view.end = Some(end);
-                    self.end_scan(&scan, &mut teller);
-                }
-                Ok(())
+                    self.end_scan(&scan, &mut teller)
+                })
             }
             Record::Event(_) => Ok(()),
         };
@@ -97,8 +118,30 @@ impl Live {
 
     fn begin_session(&mut self, session: Arc<Session>) -> Result<(), LeftOut> {
         let begun = self.converter.begin_session(&session);
+        self.topics = self.converter.topics().to_vec();
+        self.topics.extend(self.map.is_some().then(Topic::map));
         (self.session, self.scan) = (Some(session), None);
         begun
+    }
+
+    /// A scan whose end never came is on the map as well.
+    fn end_without_word(
+        &mut self,
+        out: &mut impl Outlet<Error = Infallible>,
+    ) -> Result<(), LeftOut> {
+        let scan = self.scan.take();
+        scan.map_or(Ok(()), |scan| self.map(&scan, out))
+    }
+
+    fn map(
+        &mut self,
+        scan: &UnderWay,
+        out: &mut impl Outlet<Error = Infallible>,
+    ) -> Result<(), LeftOut> {
+        match &mut self.map {
+            Some(map) if !scan.is_too_long => map.add(&scan.view, self.converter.end(), out),
+            _ => Ok(()),
+        }
     }
 
     fn take_reading(&mut self, ping: Ping, out: &mut impl Outlet<Error = Infallible>) {
@@ -112,14 +155,19 @@ impl Live {
         scan.add(ping);
     }
 
-    fn end_scan(&mut self, scan: &UnderWay, out: &mut impl Outlet<Error = Infallible>) {
+    fn end_scan(
+        &mut self,
+        scan: &UnderWay,
+        out: &mut impl Outlet<Error = Infallible>,
+    ) -> Result<(), LeftOut> {
         if scan.is_too_long {
-            return;
+            return Ok(());
         }
         let pings = in_order(&scan.view);
         let fired = pings.iter().map(|ping| fired(ping)).collect();
         let firings = Firings { fired, window_ns: self.converter.window_ns() };
         let Ok(()) = self.converter.scan(&scan.view, (&pings, &firings), out);
+        self.map(scan, out)
     }
 }
 

@@ -15,7 +15,7 @@ use sonard_records::Provenance;
 use crate::{
     ExportError,
     columns::logged_word,
-    conversion::MAP,
+    conversion::{MAP, MAP_TOPIC},
     recording::{Messages, nanoseconds},
     ros::{
         interface::{MARKERS, OCCUPANCY_GRID},
@@ -51,7 +51,7 @@ pub fn write_place(out: impl Write, place: &Place<'_>) -> Result<(), ExportError
     let stamp = Stamp(place.time.map_or(0, nanoseconds));
     let header = Header { stamp, frame: MAP };
     if let Some(grid) = place.grid {
-        messages.write("/map", OCCUPANCY_GRID, stamp, &OccupancyGrid { header, grid })?;
+        messages.write(MAP_TOPIC, OCCUPANCY_GRID, stamp, &OccupancyGrid { header, grid })?;
     }
     if !place.lines.is_empty() {
         let lines = Markers(LINES.map(|drawn| lines(place.lines, header, drawn)).into());

@@ -4,6 +4,7 @@ mod cdr;
 mod csv;
 mod foxglove;
 mod live;
+mod live_map;
 mod mcap;
 mod parquet;
 mod place;

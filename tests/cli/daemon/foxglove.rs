@@ -3,6 +3,7 @@
 mod access;
 mod cost;
 mod layout;
+mod map;
 mod viewer;
 
 use std::time::Duration;

@@ -8,7 +8,8 @@ use super::{
     settings::Distribution,
 };
 use crate::ros::interface::{
-    FLOAT, Interface, LASER_SCAN, MARKERS, POINT_CLOUD, RANGE, RANGE_OF_HUMBLE, TRANSFORMS,
+    FLOAT, Interface, LASER_SCAN, MARKERS, OCCUPANCY_GRID, POINT_CLOUD, RANGE, RANGE_OF_HUMBLE,
+    TRANSFORMS,
 };
 
 pub(crate) const TRANSFORMS_TOPIC: &str = "/tf";
@@ -18,6 +19,7 @@ pub(crate) const SCAN: &str = "/sonar/scan";
 pub(crate) const POINTS: &str = "/sonar/points";
 pub(crate) const PATHS: &str = "/sonar/paths";
 pub(crate) const PREDICTED_POINTS: &str = "/sonar/predicted/points";
+pub(crate) const MAP_TOPIC: &str = "/map";
 
 /// What is told of each reading; of those of an array by `/sonar/RANGER/range` and the like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,7 +80,13 @@ impl Topic {
         of_rangers(&rangers, predicts, draws_scene, distribution)
     }
 
-    /// Whether it tells once what stands still, so that each subscriber must get it whenever it comes: transient local,
+    /// A map of what was seen so far.
+    #[must_use]
+    pub fn map() -> Self {
+        Self { name: MAP_TOPIC.to_owned(), is_kept: true, interface: OCCUPANCY_GRID }
+    }
+
+    /// Whether it tells what stands still, so that each subscriber must get it whenever it comes: transient local,
     /// in words of ROS 2.
     #[must_use]
     pub fn stands_still(&self) -> bool {
@@ -100,7 +108,8 @@ impl Topic {
 
 /// Whether the messages of a topic tell what stands still.
 pub(crate) fn stands_still(topic: &str) -> bool {
-    const STILL: [&str; 5] = [FIXED_TRANSFORMS, SCENE, "/map", "/sonar/lines", "/sonar/features"];
+    const STILL: [&str; 5] =
+        [FIXED_TRANSFORMS, SCENE, MAP_TOPIC, "/sonar/lines", "/sonar/features"];
     STILL.contains(&topic)
 }
 

@@ -10,6 +10,7 @@ mod ideal;
 mod image;
 mod polar;
 mod score;
+mod tiles;
 mod trace;
 
 #[cfg(test)]
@@ -19,6 +20,7 @@ pub use beam_model::{BeamModel, GaussianBeam, PhysicalBeam};
 pub use ideal::ideal;
 pub use image::{ImageError, MapYaml, from_pgm, from_pixels, to_pgm};
 pub use score::{MapScore, PathSettings, ScoreError, score};
+pub(super) use tiles::Tiles;
 pub use trace::{TraceSettings, WallLine, surfaces, trace};
 
 use thiserror::Error;
@@ -110,6 +112,16 @@ impl GridShape {
         self.origin + self.resolution_m * DVec2::new(column as f64 + 0.5, row as f64 + 0.5)
     }
 
+    /// The lower left corner in cells from the world's origin: whole ones, and what is left of one.
+    fn corner_in_cells(&self) -> (DVec2, DVec2) {
+        /// What rounding leaves.
+        const NOTHING: f64 = 1e-6;
+        let corner = self.origin / self.resolution_m;
+        let whole = corner.round();
+        let rest = corner - whole;
+        (whole, DVec2::select(rest.abs().cmplt(DVec2::splat(NOTHING)), DVec2::ZERO, rest))
+    }
+
     /// Index of the cell that holds a point.
     #[must_use]
     pub fn index_at(&self, point: DVec2) -> Option<usize> {
@@ -141,6 +153,35 @@ pub struct Trust {
 impl Default for Trust {
     fn default() -> Self {
         Self { least_confidence: 0.0, keep_clear: true }
+    }
+}
+
+/// A set of readings, and how far they are believed.
+#[derive(Clone, Copy)]
+pub(super) struct Told<'a> {
+    pub(super) sweep: &'a Sweep,
+    /// Of its beams; without them all are believed.
+    pub(super) assessments: Option<&'a [Assessment]>,
+    pub(super) model: &'a BeamModel,
+    pub(super) trust: &'a Trust,
+}
+
+impl<'a> Told<'a> {
+    /// What the readings say around each place that they were taken at, one after the other. Rangers of an array hear
+    /// from where they are: a table for each place.
+    fn tables(self, cell_m: f64) -> impl Iterator<Item = (DVec2, polar::Table)> + 'a {
+        let mut mounts: Vec<DVec2> = Vec::new();
+        for beam in &self.sweep.beams {
+            if !mounts.contains(&beam.mount) {
+                mounts.push(beam.mount);
+            }
+        }
+        let pose = self.sweep.pose;
+        let turn = DVec2::from_angle(pose.direction_rad(0.0));
+        mounts.into_iter().map(move |mount| {
+            let from = pose.position() + turn.rotate(mount);
+            (from, polar::Table::of(self, mount, cell_m))
+        })
     }
 }
 
@@ -192,22 +233,11 @@ impl Grid {
         model: &BeamModel,
         trust: &Trust,
     ) -> usize {
-        let cell_m = self.shape.resolution_m;
-        // Rangers of an array hear from where they are: a table for each place.
-        let mut places: Vec<DVec2> = Vec::new();
-        for beam in &sweep.beams {
-            if !places.contains(&beam.mount) {
-                places.push(beam.mount);
-            }
-        }
-        let mut left_out = 0;
-        for mount in places {
-            let table = polar::Table::of(sweep, mount, assessments, model, trust, cell_m);
-            let turn = DVec2::from_angle(sweep.pose.direction_rad(0.0));
-            let from = sweep.pose.position() + turn.rotate(mount);
+        let told = Told { sweep, assessments, model, trust };
+        let tables = told.tables(self.shape.resolution_m);
+        tables.fold(0, |left_out, (from, table)| {
             table.add_to(&self.shape, from, &mut self.log_odds);
-            left_out += table.left_out;
-        }
-        left_out
+            left_out + table.left_out
+        })
     }
 }

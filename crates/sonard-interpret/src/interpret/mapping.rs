@@ -1,5 +1,9 @@
 //! An occupancy grid of scans: which cells, what a reading says of them, and how often it counts.
 
+mod growing;
+
+pub use growing::{GrowError, GrowingMap};
+
 use super::{
     Extents, Heard, Sweep,
     grid::{BeamModel, GaussianBeam, Grid, GridError, GridShape, PhysicalBeam, Trust},
@@ -76,21 +80,18 @@ impl Mapping {
         max_range_m: f64,
     ) -> Result<GridShape, GridError> {
         let [low, high] = self.region.unwrap_or_else(|| {
-            let points = sweeps.into_iter().flat_map(|sweep| {
-                let echoes = sweep.beams.iter().filter_map(move |beam| match beam.heard {
-                    Heard::Echo(m) if m <= max_range_m => Some(sweep.point(beam, m)),
-                    _ => None,
-                });
-                echoes.chain([sweep.pose.position()])
-            });
-            let corners = points.map(|p| (p, p)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-            let (low, high) = corners.unwrap_or((DVec2::ZERO, DVec2::ONE));
-            // Corners on whole cells, so that maps of one place lie on each other.
-            let cell = self.resolution_m;
-            let low = ((low - MARGIN_M) / cell).floor() * cell;
-            [low, ((high + MARGIN_M) / cell).ceil() * cell]
+            let seen = sweeps.into_iter().map(|sweep| seen(sweep, max_range_m)).reduce(both);
+            self.around(seen.unwrap_or([DVec2::ZERO, DVec2::ONE]))
         });
         GridShape::covering(low, high, self.resolution_m)
+    }
+
+    /// The region around what was seen, from corner to corner.
+    fn around(&self, [low, high]: [DVec2; 2]) -> [DVec2; 2] {
+        // Corners on whole cells, so that maps of one place lie on each other.
+        let cell = self.resolution_m;
+        let low = ((low - MARGIN_M) / cell).floor() * cell;
+        [low, ((high + MARGIN_M) / cell).ceil() * cell]
     }
 
     /// How often each of so many scans counts. A reading's odds are set for maps of many scans: one
@@ -125,14 +126,35 @@ impl Mapping {
     }
 }
 
+/// Lower left and upper right corner of where a scan's ranger stood and where it heard something within range.
+fn seen(sweep: &Sweep, max_range_m: f64) -> [DVec2; 2] {
+    let echoes = sweep.beams.iter().filter_map(|beam| match beam.heard {
+        Heard::Echo(m) if m <= max_range_m => Some(sweep.point(beam, m)),
+        _ => None,
+    });
+    let stood = sweep.pose.position();
+    echoes.map(|place| [place; 2]).fold([stood; 2], both)
+}
+
+/// The corners of two regions together.
+fn both([low, high]: [DVec2; 2], other: [DVec2; 2]) -> [DVec2; 2] {
+    [low.min(other[0]), high.max(other[1])]
+}
+
 /// A map in the making.
 #[derive(Debug)]
 pub struct Mapper {
     grid: Grid,
+    appraiser: Appraiser,
+    evidence: u8,
+}
+
+/// What readings of a sensor say, and how far each is believed.
+#[derive(Debug)]
+struct Appraiser {
     model: BeamModel,
     predictor: Option<FeaturePrediction>,
     trust: Trust,
-    evidence: u8,
 }
 
 /// What came of a scan on a map.
@@ -154,23 +176,17 @@ impl Mapper {
         of_array: bool,
         scans: usize,
     ) -> Self {
-        let max_range_m = mapping.max_range_m(&extents);
-        let (model, prediction) = mapping.beam(extents, max_range_m, of_array);
-        Self {
-            grid,
-            model,
-            predictor: mapping.predicts_features.then(|| FeaturePrediction::new(prediction)),
-            trust: Trust { least_confidence: mapping.least_confidence, keep_clear: true },
-            evidence: mapping.evidence(scans),
-        }
+        let appraiser = Appraiser::new(mapping, extents, of_array);
+        Self { grid, appraiser, evidence: mapping.evidence(scans) }
     }
 
     /// Adds a scan.
     pub fn add(&mut self, sweep: &Sweep) -> Added {
-        let assessments = self.predictor.as_mut().map(|predictor| predictor.assess(sweep));
+        let assessments = self.appraiser.assess(sweep);
+        let Appraiser { model, trust, .. } = &self.appraiser;
         let mut left_out = 0;
         for _ in 0..self.evidence {
-            left_out = self.grid.add(sweep, assessments.as_deref(), &self.model, &self.trust);
+            left_out = self.grid.add(sweep, assessments.as_deref(), model, trust);
         }
         Added { assessments, left_out }
     }
@@ -179,5 +195,20 @@ impl Mapper {
     #[must_use]
     pub fn finish(self) -> Grid {
         self.grid
+    }
+}
+
+impl Appraiser {
+    fn new(mapping: &Mapping, extents: Extents, of_array: bool) -> Self {
+        let max_range_m = mapping.max_range_m(&extents);
+        let (model, prediction) = mapping.beam(extents, max_range_m, of_array);
+        let predictor = mapping.predicts_features.then(|| FeaturePrediction::new(prediction));
+        let trust = Trust { least_confidence: mapping.least_confidence, keep_clear: true };
+        Self { model, predictor, trust }
+    }
+
+    /// How far the readings of the next scan are believed.
+    fn assess(&mut self, sweep: &Sweep) -> Option<Vec<Assessment>> {
+        self.predictor.as_mut().map(|predictor| predictor.assess(sweep))
     }
 }

@@ -61,7 +61,7 @@ fn named<'a>(value: &'a Value, found: &mut Vec<&'a str>) {
 fn every_topic_and_field_of_the_layout_is_there() {
     let layout: Value = serde_json::from_str(LAYOUT).expect("JSON");
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = start(folder.path(), &["--virtual-time"]);
+    let daemon = start(folder.path(), &["--virtual-time", "--set", "foxglove.map=true"]);
     daemon.wait_for("ready");
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
     let mut viewer = Viewer::new(daemon.connect().expect("it listens"), "foxglove.sdk.v1");

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::{BeamModel, GridShape, MOST_LOG_ODDS, Trust};
-use crate::interpret::{Beam, Heard, Sweep, prediction::Assessment};
+use super::{BeamModel, GridShape, MOST_LOG_ODDS, Told, Trust};
+use crate::interpret::{Beam, Heard, prediction::Assessment};
 use sonard_model::geometry::DVec2;
 
 /// Directions of the table: 0.75 degrees each, finer than the motor's steps.
@@ -26,14 +26,8 @@ pub(super) struct Table {
 
 impl Table {
     /// Of the readings of a set that were taken at one place on the robot.
-    pub(super) fn of(
-        sweep: &Sweep,
-        mount: DVec2,
-        assessments: Option<&[Assessment]>,
-        model: &BeamModel,
-        trust: &Trust,
-        cell_m: f64,
-    ) -> Self {
+    pub(super) fn of(told: Told<'_>, mount: DVec2, cell_m: f64) -> Self {
+        let Told { sweep, assessments, model, trust } = told;
         let longest_m = model.max_range_m() + 0.2;
         let distances = (longest_m / cell_m).ceil() as usize + 1;
         let mut table = Self {
@@ -105,23 +99,30 @@ impl Table {
     }
 
     /// Adds each entry to the cells it is about, around `from`.
+    ///
+    /// Cells are counted from the one of the world in which that is, so that each gets exactly the same whatever grid it
+    /// is part of.
     pub(super) fn add_to(&self, shape: &GridShape, from: DVec2, cells: &mut [f32]) {
-        let place = (from - shape.origin) / shape.resolution_m;
+        let place = from / shape.resolution_m;
         if !place.is_finite() {
             return;
         }
-        let [low, high] = self.box_in_cells(shape).map(|corner| place + corner);
+        let (home, (corner, rest)) = (place.floor(), shape.corner_in_cells());
+        let (to_corner, within) = (corner - home, rest - (place - home));
+        let [low, high] =
+            self.box_in_cells(shape.resolution_m).map(|side| side - to_corner - within);
         let range = |low: f64, high: f64, count: usize| {
             let within = |cell: f64| cell.clamp(0.0, count as f64) as usize;
             within(low.floor())..within(high.ceil())
         };
         let columns = range(low.x, high.x, shape.width);
         let per_radian = DIRECTIONS as f32 / TAU as f32;
+        let middle = within + 0.5;
         for row in range(low.y, high.y, shape.height) {
-            let dy = (row as f64 + 0.5 - place.y) as f32;
+            let dy = (row as f64 + to_corner.y + middle.y) as f32;
             let line = &mut cells[row * shape.width..][..shape.width];
             for column in columns.clone() {
-                let dx = (column as f64 + 0.5 - place.x) as f32;
+                let dx = (column as f64 + to_corner.x + middle.x) as f32;
                 let distance = (dx * dx + dy * dy).sqrt() as usize;
                 if distance >= self.distances {
                     continue;
@@ -134,16 +135,14 @@ impl Table {
             }
         }
     }
-}
 
-impl Table {
     /// Lower left and upper right corner of what something is said of, from the place of the
     /// ranger, cells.
-    fn box_in_cells(&self, shape: &GridShape) -> [DVec2; 2] {
+    pub(super) fn box_in_cells(&self, resolution_m: f64) -> [DVec2; 2] {
         let bin_rad = TAU / DIRECTIONS as f64;
         let told = self.reach.iter().enumerate().filter(|(_, reach)| **reach > 0);
         let sides = told.flat_map(|(direction, reach)| {
-            let reach = *reach as f64 * self.cell_m / shape.resolution_m;
+            let reach = *reach as f64 * self.cell_m / resolution_m;
             // A direction's entry is for half a direction to each side of it.
             [-0.5, 0.5].map(|off| reach * DVec2::from_angle((direction as f64 + off) * bin_rad))
         });
