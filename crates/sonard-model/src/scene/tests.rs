@@ -1,4 +1,5 @@
 mod errors;
+mod plans;
 mod standing;
 
 use super::*;

@@ -45,6 +45,18 @@ fn syntax_errors_point_at_the_place() {
     assert_eq!((empty.line, empty.column), (1, 1));
 }
 
+/// A text that was cut off names its open bracket, whatever stands in its strings.
+#[test]
+fn quotes_and_brackets_in_strings_are_no_syntax() {
+    for name in [r#"a\"b"#, r#"a\"]b"#, r#"\\"#, "[[", r#"\"{\""#] {
+        let text = format!("{{\"name\": \"{name}\", \"walls\": [{{\"id\": \"]\"}}, ");
+        let error = Scene::from_json(&text).expect_err("cut off");
+        assert_eq!(&text[error.span.clone()], "[", "{name}: {error}");
+        assert!(error.to_string().contains("this `[` is never closed"), "{name}: {error}");
+        assert_eq!(error.span.start, text.find("[{\"id").expect("there"), "{name}");
+    }
+}
+
 #[test]
 #[rustfmt::skip]
 fn shapes_that_do_not_fit_are_named() {

@@ -59,7 +59,7 @@ fn walls_that_do_not_close_enclose_nothing() {
 }
 
 /// A scene of walls and what `more` says.
-fn plan_of(walls: &[&str], more: &str) -> Scene {
+pub(super) fn plan_of(walls: &[&str], more: &str) -> Scene {
     let text = format!(
         r#"{{"name": "plan", "materials": {{"m": {{"reflectance": 0.9}}}}, "walls": [{}] {more}}}"#,
         walls.join(",")
@@ -74,7 +74,7 @@ fn ring(id: &str, [x, y]: [f64; 2], [width, depth]: [f64; 2]) -> String {
     )
 }
 
-fn single(id: &str, from: [f64; 2], to: [f64; 2]) -> String {
+pub(super) fn single(id: &str, from: [f64; 2], to: [f64; 2]) -> String {
     format!(r#"{{"id": "{id}", "from": {from:?}, "to": {to:?}, "material": "m"}}"#)
 }
 
@@ -114,6 +114,11 @@ fn where_a_ranger_can_stand_follows_from_the_plan_alone() {
             "a pillar outside",
             vec![room(), ring("P", [6.0, 1.0], [0.3, 0.3])],
             &[([1.0, 1.0], ""), ([6.1, 1.1], "inside `P`"), ([5.0, 1.0], "")],
+        ),
+        (
+            "a hut with a screen in it",
+            vec![room(), ring("H", [6.0, 1.0], [0.3, 0.3]), single("p", [6.1, 1.2], [6.2, 1.2])],
+            &[([1.0, 1.0], ""), ([6.1, 1.1], ""), ([5.0, 1.0], "outside")],
         ),
         (
             "a box poking out",
