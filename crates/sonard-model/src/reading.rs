@@ -43,3 +43,15 @@ pub enum PathKind {
     /// Sent back by the roughness of the last wall.
     Scattered,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn echoes_and_the_least_range_have_ranges() {
+        use PingStatus::{Echo, LinkLost, MinRange, ModuleFault, NoEcho, StepDoubtful};
+        let all = [Echo, NoEcho, MinRange, LinkLost, StepDoubtful, ModuleFault];
+        assert_eq!(all.map(PingStatus::has_range), [true, false, true, false, false, false]);
+    }
+}

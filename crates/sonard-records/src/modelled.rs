@@ -140,8 +140,15 @@ impl From<Mechanism> for InteractionKind {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use sonard_model::model::{ConeOptions, EngineKind, EngineOptions, FanOptions, PathOptions};
+    use sonard_model::{
+        acoustics::Sensor,
+        geometry::DVec2,
+        model::{ConeOptions, EngineKind, EngineOptions, FanOptions, PathOptions},
+        scene::shipped,
+    };
 
     #[test]
     fn air_survives_its_record() {
@@ -174,6 +181,31 @@ mod tests {
         let mut unknown = record;
         unknown.settings.insert("bounces".into(), 3.into());
         assert_eq!(unknown.options(), None);
+    }
+
+    /// Each path is found among the arrivals by its kind and length, to a millimetre.
+    #[test]
+    fn a_path_is_found_again_by_kind_and_length() {
+        let text = shipped::text("two-surface-room").expect("shipped");
+        let scene = Arc::new(Scene::from_json(text).expect("a scene"));
+        let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+        let options = Options::default();
+        let simulator = Simulator::new(scene.clone(), sensor, Air::default(), options);
+        let simulator = simulator.expect("a model");
+        let point = simulator.at(DVec2::new(1.2, 0.9));
+        let arrivals = point.arrivals(0.3).expect("few paths");
+        assert!(arrivals.len() > 5, "{}", arrivals.len());
+        for arrival in &arrivals {
+            let path = PathRecord::of(&scene, &arrival.path, arrival.length_m);
+            let off_m = |found: Option<Arrival>| {
+                found.map(|found| (found.length_m - arrival.length_m).abs())
+            };
+            assert_eq!(off_m(path.arrival(&point, 0.3)), Some(0.0));
+            let rounded = PathRecord { length_m: arrival.length_m + 4e-7, ..path.clone() };
+            assert!(off_m(rounded.arrival(&point, 0.3)).is_some_and(|m| m < 1e-6));
+            let odd = PathRecord { length_m: 1e-3 + arrivals[arrivals.len() - 1].length_m, ..path };
+            assert_eq!(odd.arrival(&point, 0.3), None);
+        }
     }
 
     #[test]

@@ -97,3 +97,31 @@ impl ScanEnd {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use sonard_model::{
+        acoustics::{Air, Sensor},
+        model::Options,
+        scene::{Scene, shipped},
+    };
+
+    use super::*;
+
+    /// Sound goes to the largest range and back once a beam.
+    #[test]
+    fn a_simulated_scan_lasts_as_long_as_its_listening_windows() {
+        let scene = Scene::from_json(shipped::text("simple-room").expect("shipped"));
+        let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+        let options = Options { max_range_m: Some(3.4), ..Options::default() };
+        let scene = Arc::new(scene.expect("a scene"));
+        let simulator = Simulator::new(scene, sensor, Air::default(), options).expect("a model");
+        let end = ScanEnd::simulated(&simulator, Uuid::nil(), 400, Timestamp::UNIX_EPOCH);
+        let expected_s = 400.0 * 2.0 * 3.4 / simulator.sound_speed_m_s();
+        assert!((end.duration_s - expected_s).abs() < 1e-9, "{end:?}");
+        assert!((7.9..8.0).contains(&end.acoustic_limit_s), "{end:?}");
+        assert_eq!((end.beams, end.missing, end.repaired), (400, 0, 0));
+    }
+}

@@ -311,3 +311,26 @@ fn open_reason(
         Some(_) => Some(Reason::Ambiguous),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reason(said: [f64; 4], hidden_by: usize) -> Option<Reason> {
+        let [plane, corner, edge, other] = said;
+        let probabilities = Probabilities { plane, corner, edge, other };
+        open_reason(&probabilities, hidden_by, None, None, &Settings::default())
+    }
+
+    #[test]
+    fn what_stays_open_says_why() {
+        // What lies behind a nearer wall came by way of it; else its extent is odd.
+        assert_eq!(reason([0.2, 0.1, 0.0, 0.7], 0), Some(Reason::Extent));
+        assert_eq!(reason([0.2, 0.1, 0.0, 0.7], 1), Some(Reason::Reflections));
+        assert_eq!(reason([0.2, 0.1, 0.0, 0.7], 3), Some(Reason::Reflections));
+        assert_eq!(reason([0.0, 0.0, 0.99, 0.01], 1), None);
+        // Between an edge and the others its extent has to decide, and between these another place.
+        assert_eq!(reason([0.3, 0.2, 0.5, 0.0], 2), Some(Reason::Extent));
+        assert_eq!(reason([0.6, 0.39, 0.0, 0.01], 0), Some(Reason::SecondPosition));
+    }
+}

@@ -3,7 +3,11 @@
 mod calibration;
 mod degenerate;
 mod densities;
+mod mapping;
 mod paper;
+mod probabilities;
+mod rooms;
+mod sweep;
 mod worlds;
 
 use std::sync::Arc;

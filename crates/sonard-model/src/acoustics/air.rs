@@ -180,4 +180,13 @@ mod tests {
             assert_eq!(air.map_err(|error| error.field), Err(field));
         }
     }
+
+    #[test]
+    fn air_says_what_it_was_made_of() {
+        let air = Air::new(-7.5, 35.0, 98.2).expect("in range");
+        let told = [air.temperature_c(), air.humidity_percent(), air.pressure_kpa()];
+        assert_eq!(told, [-7.5, 35.0, 98.2]);
+        let slower = air.with_sound_speed(300.0).expect("in range");
+        assert_eq!((slower.sound_speed_m_s(), slower.pressure_kpa()), (300.0, 98.2));
+    }
 }

@@ -135,4 +135,20 @@ mod tests {
             assert_eq!(encloses(&outlines[1], DVec2::new(x, y)), is_inside, "({x}, {y})");
         }
     }
+
+    /// However small a room is, and however it is divided: the outside is the face that encloses less than nothing.
+    #[test]
+    fn small_rooms_have_outlines_too() {
+        let at = |x: f64, y: f64| DVec2::new(3.0 + 0.1 * x, -2.0 + 0.1 * y);
+        let corners = [at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)];
+        let mut segments: Vec<_> = (0..4).map(|i| (corners[i], corners[(i + 1) % 4])).collect();
+        segments.push((corners[0], corners[2]));
+        let made = Arrangement::of(&segments);
+        let outlines = made.outlines();
+        assert_eq!(outlines.len(), 1);
+        let outline: Vec<DVec2> =
+            outlines[0].iter().map(|&point| made.points[point as usize]).collect();
+        assert_eq!(outline.len(), 4, "{outline:?}");
+        assert!((enclosed_area(&outline) - 0.01).abs() < 1e-12);
+    }
 }

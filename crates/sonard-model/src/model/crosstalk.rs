@@ -173,3 +173,35 @@ impl Medley<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::acoustics::{Gain, Sensor};
+
+    /// Of `n` turns back, of `t` of path each, most is heard of a sound that seems `h` long where
+    /// `1 / h - 1 / (h + n t)` is the absorption.
+    #[test]
+    fn so_many_turns_are_heard_as_the_air_lets_through() {
+        let sensor = Sensor {
+            gain: Gain::default(),
+            threshold: 0.02,
+            max_range_m: 3.4,
+            ..Sensor::preset("senscomp-6500").expect("a preset")
+        };
+        let receiver = Receiver::new(&sensor, 340.0);
+        for (absorption, turn_m, expected) in [(0.6, 1.0, 3), (0.6, 2.0, 1), (0.3, 1.0, 6)] {
+            let most = |turns: f64| {
+                let ahead_m: f64 = turns * turn_m;
+                let seems_m = (ahead_m * ahead_m + 4.0 * ahead_m / absorption).sqrt() - ahead_m;
+                let seems_m = (0.5 * seems_m).clamp(0.82, 6.8);
+                seems_m / (seems_m + ahead_m) * (-absorption * (seems_m + ahead_m)).exp()
+            };
+            let count = (1..).take_while(|turns| most(f64::from(*turns)) >= 0.02).count();
+            assert_eq!(count, expected, "{absorption} {turn_m}");
+            assert_eq!(turns_heard(&receiver, absorption, turn_m), expected);
+        }
+        assert_eq!(turns_heard(&receiver, 5.0, 1.0), 0);
+        assert_eq!(turns_heard(&receiver, 0.0, 1e-3), MOST_TURNS);
+    }
+}

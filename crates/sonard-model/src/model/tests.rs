@@ -8,6 +8,8 @@ mod floor_plans;
 mod full_wave;
 mod interactions;
 mod laws;
+mod multiples;
+mod options;
 mod phenomena;
 mod reach;
 pub(in crate::model) mod reference;

@@ -136,4 +136,22 @@ mod tests {
         ["texts", "arcs", "texts"].into_iter().for_each(|what| found.leave_out(what));
         assert_eq!(found.left_out().collect::<Vec<_>>(), [("arcs", 1), ("texts", 2)]);
     }
+
+    #[test]
+    fn what_was_found_is_a_scene() {
+        let mut found = Surfaces::default();
+        found.round("column", DVec2::new(3.000_04, 1.0), 0.2);
+        let ring = [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0]].map(DVec2::from);
+        found.walls("wall", ring.to_vec(), true);
+        found.walls("screen", ring[..2].to_vec(), false);
+        let scene = found.scene("hall", 0.97).build().expect("a scene");
+        let ids: Vec<&str> = scene.walls.iter().map(|wall| &*wall.id).collect();
+        assert_eq!(ids, ["wall-2.0", "wall-2.1", "wall-2.2", "screen-3"]);
+        let [column] = &scene.cylinders[..] else { panic!("{:?}", scene.cylinders) };
+        assert_eq!(
+            (&*column.id, column.center, column.radius_m),
+            ("column-1", DVec2::new(3.0, 1.0), 0.2)
+        );
+        assert_eq!(scene.walls[0].material.reflectance, 0.97);
+    }
 }

@@ -1,8 +1,10 @@
 //! Random scenes.
 
+mod changed;
+
 use std::f64::consts::{PI, TAU};
 
-use rand::{RngExt, SeedableRng, seq::SliceRandom};
+use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use sonard_model::{
     acoustics::edge::EdgeLaw,
@@ -248,95 +250,6 @@ impl World {
     fn has_room_for(&self, [a, b]: [DVec2; 2]) -> bool {
         let steps = (a.distance(b) / (0.5 * GAP_M)).ceil();
         (0..=steps as u32).all(|step| self.is_free(a.lerp(b, f64::from(step) / steps), 0.0))
-    }
-
-    /// The same with every point moved by a motion that keeps lengths.
-    pub(crate) fn moved(mut self, to: impl Fn(DVec2) -> DVec2) -> Self {
-        for wall in &mut self.walls {
-            wall.ends = wall.ends.map(&to);
-        }
-        for round in &mut self.rounds {
-            round.center = to(round.center);
-        }
-        Self { ends: self.ends.map(to), ..self }
-    }
-
-    /// The same with every wall in two or three pieces.
-    pub(crate) fn split(&self, random: &mut Pcg64) -> Self {
-        let mut walls = Vec::new();
-        for wall in &self.walls {
-            let [a, b] = wall.ends;
-            let mut cuts = vec![0.0, random.random_range(0.1..0.5), 1.0];
-            if random.random() {
-                cuts.insert(2, random.random_range(0.6..0.9));
-            }
-            let pieces = cuts.windows(2).map(|cut| [a.lerp(b, cut[0]), a.lerp(b, cut[1])]);
-            walls.extend(pieces.map(|ends| Wall { ends, ..*wall }));
-        }
-        Self { walls, ..self.clone() }
-    }
-
-    /// The same in another order, and walls from their other ends.
-    pub(crate) fn reordered(&self, random: &mut Pcg64) -> Self {
-        let mut world = self.clone();
-        world.walls.shuffle(random);
-        world.rounds.shuffle(random);
-        for wall in &mut world.walls {
-            if random.random() {
-                wall.ends.reverse();
-            }
-        }
-        world
-    }
-
-    /// The same with walls and cylinders behind its own outer walls.
-    pub(crate) fn with_hidden(&self, random: &mut Pcg64) -> Self {
-        let mut world = self.clone();
-        let middle = self.walls[..4].iter().map(|wall| 0.25 * wall.ends[0]).sum::<DVec2>();
-        for wall in &self.walls[..4] {
-            let [a, b] = wall.ends;
-            let out = (a - b).perp().normalize();
-            let out = if out.dot(a - middle) > 0.0 { out } else { -out };
-            let at = |along: f64, off_m: f64| a.lerp(b, along) + off_m * out;
-            let ends = [
-                at(random.random(), random.random_range(0.02..0.5)),
-                at(random.random(), random.random_range(0.5..0.8)),
-            ];
-            world.walls.push(Wall { ends, reflectance: 1.0, roughness: 0.5, z_m: None });
-            let center = at(random.random_range(0.3..0.7), 1.1);
-            world.rounds.push(Round { center, radius_m: 0.1, reflectance: 1.0, z_m: None });
-        }
-        world
-    }
-
-    /// The same with every height moved.
-    pub(crate) fn with_heights(&self, to: impl Fn(f64) -> f64) -> Self {
-        let mut world = self.clone();
-        let moved = |z_m: [f64; 2]| {
-            let mut z_m = z_m.map(&to);
-            z_m.sort_by(f64::total_cmp);
-            z_m
-        };
-        world.walls.iter_mut().for_each(|wall| wall.z_m = wall.z_m.map(moved));
-        world.rounds.iter_mut().for_each(|round| round.z_m = round.z_m.map(moved));
-        world.heights = self.heights.map(|heights| {
-            let is_turned = to(0.0) > to(1.0);
-            let [floor, ceiling] = heights.reflectance;
-            Heights {
-                limits_z_m: moved(heights.limits_z_m),
-                reflectance: if is_turned { [ceiling, floor] } else { [floor, ceiling] },
-                sensor_z_m: to(heights.sensor_z_m),
-            }
-        });
-        world
-    }
-
-    /// The same with every surface's reflectance changed.
-    pub(crate) fn with_reflectance(&self, of: impl Fn(f64) -> f64) -> Self {
-        let mut world = self.clone();
-        world.walls.iter_mut().for_each(|wall| wall.reflectance = of(wall.reflectance));
-        world.rounds.iter_mut().for_each(|round| round.reflectance = of(round.reflectance));
-        world
     }
 
     /// As a scene.

@@ -1,5 +1,7 @@
 //! Readings by a world that differs in one thing from the one they are predicted in.
 
+mod closed_forms;
+
 use std::sync::Arc;
 
 use jiff::Timestamp;

@@ -96,6 +96,49 @@ fn impossible_grids_are_refused() {
 }
 
 #[test]
+fn a_grid_holds_its_lower_and_left_border_and_not_the_others() {
+    let shape = GridShape::covering(DVec2::new(-1.0, 2.0), DVec2::new(1.0, 3.0), 0.5);
+    let shape = shape.expect("a grid");
+    let index = |x: f64, y: f64| shape.index_at(DVec2::new(x, y));
+    assert_eq!([index(-1.0, 2.0), index(0.9, 2.0), index(-1.0, 2.9)], [Some(0), Some(3), Some(4)]);
+    assert_eq!([index(1.0, 2.5), index(0.0, 3.0), index(-1.1, 2.5), index(0.0, 1.9)], [None; 4]);
+    for row in 0..2 {
+        for column in 0..4 {
+            assert_eq!(shape.index_at(shape.center(column, row)), Some(4 * row + column));
+        }
+    }
+    assert_eq!(shape.center(3, 1), DVec2::new(0.75, 2.75));
+}
+
+/// At a metre in cells of 5 cm: a wall through a nearer cell is heard in twice the half extent of half a turn, if it
+/// reaches there; at the reading one of the arc's cells is the wall.
+#[test]
+fn a_physical_reading_says_what_its_figures_do() {
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    let extents = Extents::new(&sensor, &Air::default(), false).expect("figures");
+    let extent_deg = extents.plane_corner_deg(1.0, 1.0);
+    let beam = PhysicalBeam::new(extents.clone(), 5.0);
+    let model = BeamModel::Physical(Box::new(beam));
+    let said = model.say(1.0, 0.05);
+    assert!((said.half_rad - (extent_deg / 2.0).to_radians()).abs() < 1e-12);
+    assert!((said.free.exp() - (1.0 - 0.8 * extent_deg / 180.0)).abs() < 1e-12, "{said:?}");
+    // Over half the arc the cells share the wall that is there for sure, beside the tenth that is wall anyway.
+    let cells = (extent_deg / 2.0).to_radians() / 0.05;
+    let here = 0.1 + 0.9 / cells;
+    let odds = here / (1.0 - here) / (0.1 / 0.9);
+    assert!((said.occupied.exp() - odds).abs() < 1e-9, "{said:?} {odds}");
+    // In cells of a centimetre the ring is four thick.
+    let fine = 0.1 + 0.9 / (cells * 5.0 * 4.0);
+    let odds = fine / (1.0 - fine) / (0.1 / 0.9);
+    assert!((model.say(1.0, 0.01).occupied.exp() - odds).abs() < 1e-9);
+    let widest_deg = extents.plane_corner_deg(extents.min_range_m, 1.0);
+    assert!((model.width_deg() - widest_deg).abs() < 1e-9);
+    // Two standard deviations at its edge.
+    let [free, occupied] = gaussian().off_axis(0.1, 0.1);
+    assert_eq!((free, occupied), ((-2.0_f64).exp(), (-2.0_f64).exp()));
+}
+
+#[test]
 fn the_pair_of_files_gives_the_map_back() {
     let mut grid = Grid::new(shape(3.0, 0.05));
     grid.add(&beam(Heard::Echo(1.0)), None, &gaussian(), &Trust::default());
@@ -160,6 +203,31 @@ fn ideal_maps_are_closed() {
     let free_m2 = ideal.probabilities().filter(|p| *p < 0.5).count() as f64 * 0.05 * 0.05;
     // 3.6 x 1.6 + 2.2 x 1.4 m, less at most a cell along all 13.2 m of wall.
     assert!((8.84 - 13.2 * 0.05..8.84).contains(&free_m2), "{free_m2}");
+}
+
+#[test]
+fn cylinders_are_drawn_where_they_stand() {
+    let (center, radius_m) = (DVec2::new(1.02, 0.7), 0.4);
+    let text = r#"{"name": "c", "materials": {"m": {"reflectance": 1}},
+        "cylinders": [{"id": "c", "center": [1.02, 0.7], "radius_m": 0.4, "material": "m"},
+                      {"id": "post", "center": [0.375, 1.725], "radius_m": 0.002, "material": "m"}]}"#;
+    let scene = Scene::from_json(text).expect("a scene");
+    let shape = GridShape::covering(DVec2::ZERO, DVec2::new(3.0, 2.0), 0.05).expect("a grid");
+    let map = ideal(&scene, shape, &[DVec2::new(2.5, 1.5)]);
+    let mut walls = 0;
+    for row in 0..shape.height {
+        for column in 0..shape.width {
+            let middle = shape.center(column, row);
+            let is_post = middle.distance(DVec2::new(0.375, 1.725)) < 1e-9;
+            let is_wall = map.probability(row * shape.width + column) > 0.5;
+            walls += usize::from(is_wall);
+            assert_eq!(is_wall, is_post || middle.distance(center) <= radius_m, "{middle}");
+        }
+    }
+    let disc_m2 = std::f64::consts::PI * radius_m * radius_m;
+    assert!((walls as f64 * 0.0025 - disc_m2).abs() < 0.03 * disc_m2, "{walls}");
+    // All around can be reached.
+    assert!(map.probabilities().all(|p| p != 0.5));
 }
 
 #[test]

@@ -117,6 +117,19 @@ fn slopes_blend_by_equation_1() {
     assert!((merged.length_m() - 3.1).abs() < 0.01);
 }
 
+/// l1 = 2, f1 = 0.5; l2 = 1.5, f2 = 0.6: g = max(2 / 3.5 0.5, 1.5 / 3.5 0.6).
+#[test]
+fn the_weight_of_equation_1_is_a_share_of_both_lengths() {
+    let main = line([0.0, 0.0], [2.0, 0.0], LineKind::Sonar, 0.5);
+    let end = DVec2::new(2.0, 0.0) + 1.5 * DVec2::new(1.0, 0.04).normalize();
+    let minor = line([2.0, 0.0], end.to_array(), LineKind::Sonar, 0.6);
+    let merged = merge(&main, &minor, &MergeSettings::default()).expect("one wall");
+    let along = merged.ends[1] - merged.ends[0];
+    let slope = (1.0 - 2.0 / 3.5 * 0.5) * 0.04;
+    assert!((along.y / along.x - slope).abs() < 1e-9, "{merged:?}");
+    assert!((merged.confidence - 1.9 / 3.5).abs() < 1e-12, "{merged:?}");
+}
+
 #[test]
 fn crossing_lines_blend_through_their_crossing() {
     let one = line([0.0, 0.0], [2.0, 0.0], LineKind::Laser, 1.0);
@@ -286,6 +299,22 @@ fn the_laser_cuts_what_sonar_only_thought() {
     map.add_laser(&shot(DVec2::ZERO, [-30.0, 30.0], &[[at(1.5, -2.0), at(1.5, 2.0)]]));
     let [wall] = map.lines() else { panic!("{:?}", map.lines()) };
     assert_eq!(wall.kind, LineKind::Laser);
+}
+
+/// Of a line that nothing is heard of from close by, what is farther off stays.
+#[test]
+fn a_line_is_cut_where_the_robot_stands_and_hears_nothing() {
+    let at = DVec2::new;
+    let mut map = LineMap::new(LineMapSettings::default());
+    let seen: Vec<DVec2> = along(at(-0.5, 1.0), at(2.0, 1.0), 100).collect();
+    map.add_sonar(&sweep(DVec2::ZERO, &seen));
+    assert_eq!(map.lines().len(), 1);
+    map.add_sonar(&sweep(at(0.0, 0.8), &[at(0.0, -1.0)]));
+    let [rest] = map.lines() else { panic!("{:?}", map.lines()) };
+    let (low, high) = (rest.ends[0].x.min(rest.ends[1].x), rest.ends[0].x.max(rest.ends[1].x));
+    // Half a metre from the robot is 0.46 m along it; lines are cut to 2 cm.
+    let known_m = (0.5_f64.powi(2) - 0.2_f64.powi(2)).sqrt();
+    assert!((0.0..0.021).contains(&(low - known_m)) && (high - 2.0).abs() < 1e-9, "{rest:?}");
 }
 
 #[test]

@@ -130,3 +130,40 @@ fn what_covers_an_arc_is_noticed() {
     let plane = features.iter().find(|f| f.range_m.is_some_and(|m| (m - 0.7).abs() < 1e-3));
     assert_eq!(plane.and_then(|plane| plane.reason), Some(Reason::Interference));
 }
+
+/// What a second place sees only in part decides nothing, and that is why.
+#[test]
+fn what_is_covered_from_the_second_place_says_so() {
+    let text = shipped::text("plane-corner-edge").expect("shipped");
+    let scene = std::sync::Arc::new(Scene::from_json(text).expect("a scene"));
+    let simulator = simulator(scene.clone());
+    let places = ["fig13", "second-plane"].map(|name| scene.pose(name).expect("a pose"));
+    let [one, two] =
+        [(1, places[0]), (2, places[1])].map(|(number, at)| scan(&simulator, number, &at));
+    let planes = |scans: &[ScanView]| -> Vec<_> {
+        let all = features(scans, &Settings::default()).into_iter();
+        all.filter(|feature| feature.kind == FeatureKind::Plane).collect()
+    };
+    let seen = planes(&[one.clone(), two.clone()]);
+    assert!(!seen.is_empty());
+    let mut interfered = 0;
+    for (plane, side) in seen.iter().flat_map(|plane| [(plane, 1.0), (plane, -1.0)]) {
+        // Something near stands before one end of it, as the second place sees it.
+        let mut covered = two.clone();
+        let range_m = plane.range_m.expect("a range");
+        let is_before = |ping: &sonard_records::Ping| {
+            let off_deg = wrap_360(ping.azimuth_deg - plane.bearing_deg + 180.0) - 180.0;
+            (8.0..16.0).contains(&(side * off_deg))
+        };
+        for ping in covered.pings.iter_mut().filter(|ping| is_before(ping)) {
+            (ping.status, ping.range_m) = (PingStatus::Echo, Some(0.5 * range_m));
+        }
+        let all = features(&[one.clone(), covered], &Settings::default());
+        let again =
+            all.iter().find(|feature| (feature.scan, feature.beams) == (plane.scan, plane.beams));
+        let again = again.expect("the first scan is as it was");
+        assert_ne!(again.kind, FeatureKind::Corner, "{again:?}");
+        interfered += usize::from(again.reason == Some(Reason::Interference));
+    }
+    assert!(interfered > 0, "{} planes", seen.len());
+}

@@ -1,5 +1,8 @@
 //! Arrivals at given times against what the module's description says of them.
 
+mod noise;
+mod threshold;
+
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 
@@ -221,29 +224,6 @@ fn the_ideal_receiver_is_the_limit_of_sounds_that_do_not_overlap() {
     }
 }
 
-/// The threshold in force drifts up with the range within a step and falls at its end.
-#[test]
-fn gain_steps_move_the_threshold() {
-    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-    let receiver = Receiver::new(&sensor, 343.99);
-    let [before, after] = [5119.0, 5121.0].map(|t_us| receiver.threshold_at(t_us));
-    assert!((20.0 * (before / after).log10() - 5.2).abs() < 0.01, "{before} {after}");
-    // It is the sensor's own within each step, and at the rated range.
-    assert!((receiver.threshold_at(3491.0) / sensor.threshold - 1.0).abs() < 0.01);
-    assert!((receiver.threshold_at(62_210.0) / sensor.threshold - 1.0).abs() < 0.01);
-    // An echo too weak at the end of step 1 is heard once the gain has risen.
-    let tof_us = 5000.0;
-    let weak = PulseArrival {
-        length_m: tof_us * 343.99e-6,
-        amplitude: 0.8 * before,
-        phase_rad: 0.0,
-        index: 0,
-    };
-    let detection = receiver.detect(&[weak]);
-    assert_eq!(detection.status, PingStatus::Echo);
-    assert!((detection.echoes_us[0] - 5120.0).abs() < 0.1, "{detection:?}");
-}
-
 /// Sounds at random, of which a receiver hears some: times in microseconds, amplitudes, phases.
 fn random_sounds(rng: &mut Pcg64) -> Vec<(f64, f64, f64)> {
     let count = rng.random_range(1..6);
@@ -256,62 +236,6 @@ fn random_sounds(rng: &mut Pcg64) -> Vec<(f64, f64, f64)> {
         .collect();
     sounds.sort_by(|one, other| one.0.total_cmp(&other.0));
     sounds
-}
-
-#[test]
-fn a_threshold_that_rises_is_continuous_and_never_hears_more_or_earlier() {
-    let flat = receiver();
-    let mut rng = Pcg64::seed_from_u64(1);
-    for _ in 0..300 {
-        let sounds = arrivals(&random_sounds(&mut rng));
-        let mut last_us = 0.0;
-        for rise_db in [0.0, 0.5, 2.0, 6.0, 15.0] {
-            let found = rising(rise_db).detect(&sounds);
-            let first_us = found.echoes_us.first().copied().unwrap_or(f64::INFINITY);
-            assert!(first_us >= last_us - 0.02, "{rise_db}: {first_us} after {last_us}");
-            last_us = first_us;
-            if rise_db == 0.0 {
-                assert_eq!(found, flat.detect(&sounds));
-            }
-        }
-    }
-    let rising = rising(4.0);
-    // 6000 us are 1.02 m.
-    assert!((rising.threshold_at(6000.0) / 0.02 - 10f64.powf(4.08 / 20.0)).abs() < 1e-9);
-    let steps = (0..20_000).map(|t_us| rising.threshold_at(f64::from(t_us)));
-    let steps: Vec<f64> = steps.collect();
-    for pair in steps.windows(2) {
-        assert!((1.0..1.0001).contains(&(pair[1] / pair[0])), "{pair:?}");
-    }
-}
-
-/// Whether the receiver hears worse or the sounds are weaker is the same.
-#[test]
-fn a_threshold_that_rises_is_sound_that_falls() {
-    let mut rng = Pcg64::seed_from_u64(2);
-    let (mut same, mut heard) = (0, 0);
-    for _ in 0..400 {
-        let sounds = random_sounds(&mut rng);
-        // At the middle of the pulse, which lasts 324 us.
-        let weaker = |&(tof_us, amplitude, phase): &(f64, f64, f64)| {
-            let range_m = 0.5e-6 * SPEED_M_S * (tof_us + 100.0);
-            (tof_us, amplitude * 10f64.powf(-5.0 * range_m / 20.0), phase)
-        };
-        let weaker: Vec<_> = sounds.iter().map(weaker).collect();
-        let [one, other] =
-            [rising(5.0).detect(&arrivals(&sounds)), receiver().detect(&arrivals(&weaker))];
-        let firsts = [&one, &other].map(|found| found.echoes_us.first().copied());
-        match firsts {
-            [Some(one_us), Some(other_us)] if (one_us - other_us).abs() < 4.0 => {
-                heard += 1;
-                same += 1;
-            }
-            [None, None] => same += 1,
-            _ => {}
-        }
-    }
-    // Some stand within a few tenths of a decibel of the threshold.
-    assert!(same >= 385 && heard > 150, "{same} of 400, {heard} heard");
 }
 
 #[test]
@@ -352,51 +276,4 @@ fn measured_times_at_the_end_of_blanking_are_minimum_range() {
     ] {
         assert_eq!(classify_tof(tof_us, 2380.0), status, "{tof_us:?}");
     }
-}
-
-#[test]
-fn noise_is_off_by_default_repeats_with_its_seed_and_shakes_weak_echoes_most() {
-    let one = |strength, noise: &ReceiverNoise, seed| {
-        let mut rng = Pcg64::seed_from_u64(seed);
-        receiver().detect_in_noise(
-            &arrivals(&[(4000.0, strength, 0.0)]),
-            &|_| None,
-            noise,
-            &mut rng,
-        )
-    };
-    let quiet = one(0.1, &ReceiverNoise::NONE, 1);
-    let plain = receiver().detect(&arrivals(&[(4000.0, 0.1, 0.0)]));
-    assert!((quiet.echoes_us[0] - plain.echoes_us[0]).abs() < 0.01);
-    let noise = ReceiverNoise { floor: 0.002, jitter_us: 0.0 };
-    assert_eq!(one(0.1, &noise, 7), one(0.1, &noise, 7));
-    assert_ne!(one(0.1, &noise, 7), one(0.1, &noise, 8));
-    let spread_us = |strength| {
-        let times: Vec<f64> = (0..60)
-            .filter_map(|seed| one(strength, &noise, seed).echoes_us.first().copied())
-            .collect();
-        let mean = times.iter().sum::<f64>() / times.len() as f64;
-        (times.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / times.len() as f64).sqrt()
-    };
-    let (weak, strong) = (spread_us(0.05), spread_us(1.0));
-    assert!(weak > 1.0 && weak > 1.5 * strong, "{weak} {strong}");
-    // Noise alone raises ECHO when its envelope is of the threshold's size.
-    let loud = ReceiverNoise { floor: 0.05, jitter_us: 0.0 };
-    let mut rng = Pcg64::seed_from_u64(3);
-    let alarm = receiver().detect_in_noise(&[], &|_| None, &loud, &mut rng);
-    assert_eq!((alarm.status, alarm.arrival), (PingStatus::Echo, None));
-}
-
-/// The envelope of the noise has the size asked for.
-#[test]
-fn noise_has_its_floor() {
-    let noise = ReceiverNoise { floor: 0.01, jitter_us: 0.0 };
-    let receiver = receiver();
-    let track = noise.track(&receiver, &mut Pcg64::seed_from_u64(5));
-    let squares = (1..2000).map(|i| {
-        let t_us = 10.0 * f64::from(i);
-        (track.at(t_us).norm() / receiver.range_m(t_us)).powi(2)
-    });
-    let rms = (squares.sum::<f64>() / 1999.0).sqrt();
-    assert!((rms / 0.01 - 1.0).abs() < 0.1, "{rms}");
 }

@@ -197,3 +197,15 @@ fn nothing_leaves_backwards_and_nothing_beats_the_axis() {
         }
     }
 }
+
+/// The fourth power of `exp(-2 t^2 / h^2)` has the integral `h sqrt(pi / 8)`.
+#[test]
+fn a_gaussian_beams_power_is_its_integral() {
+    for half_angle_deg in [5.0, 12.0] {
+        let aperture = Aperture::Gaussian { half_angle_deg, radius_m: 0.019 };
+        let sensor = Sensor { aperture, ..Sensor::preset("senscomp-6500").expect("a preset") };
+        let power_rad = BeamPattern::new(&sensor, 343.0).two_way_power_rad();
+        let expected_rad = half_angle_deg.to_radians() * (PI / 8.0).sqrt();
+        assert!((power_rad / expected_rad - 1.0).abs() < 1e-6, "{power_rad} {expected_rad}");
+    }
+}

@@ -121,3 +121,75 @@ pub(crate) fn wrap_once(angle_rad: f64) -> f64 {
         angle_rad
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        acoustics::{BeamPattern, Sensor},
+        geometry::DVec2,
+        model::paths::echo::Via,
+    };
+
+    #[test]
+    fn angles_are_brought_back_by_one_turn() {
+        let quarter = PI / 2.0;
+        for (angle_rad, expected_rad) in
+            [(3.0 * quarter, -quarter), (-3.0 * quarter, quarter), (1.0, 1.0), (-3.0, -3.0)]
+        {
+            assert!((wrap_once(angle_rad) - expected_rad).abs() < 1e-15, "{angle_rad}");
+        }
+        assert_eq!((wrap_once(PI), wrap_once(-PI)), (PI, -PI));
+    }
+
+    /// Whatever leaves and arrives where: each direction in which the pattern leaves it above the floor is
+    /// within the reach, and the index tells it there.
+    #[test]
+    fn nothing_that_is_heard_is_out_of_reach() {
+        let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+        let beam = BeamPattern::new(&sensor, 343.0);
+        let envelope = PatternEnvelope::of(&beam);
+        let floor = 0.001;
+        let mut heard = 0;
+        for (apart_deg, amplitude) in
+            [(0.0, 0.9), (10.0, 0.9), (25.0, 0.5), (-40.0, 0.9), (70.0, 1.0), (5.0, 0.0011)]
+        {
+            for middle_deg in [0.0_f64, 100.0, 179.0, -178.0] {
+                let [departure_rad, arrival_rad] =
+                    [-0.5, 0.5].map(|half| (middle_deg + half * apart_deg).to_radians());
+                let echo = Echo {
+                    length_m: 2.0,
+                    amplitude,
+                    phase_rad: 0.0,
+                    departure: DVec2::from_angle(departure_rad),
+                    arrival: DVec2::from_angle(arrival_rad),
+                    rise_rad: [0.0; 2],
+                    image: 0,
+                    slopes: [0; 2],
+                    is_repeated: false,
+                    via: Via::Walls { node: 0 },
+                };
+                let entry = Entry::of(&echo, 7, &envelope, floor);
+                let index = DirectionIndex::new(entry.as_slice());
+                for at in -1800..1800 {
+                    let direction_rad = (f64::from(at) * 0.1).to_radians();
+                    let one_way = |end: f64| beam.one_way(wrap_pi(end - direction_rad));
+                    if amplitude * one_way(departure_rad) * one_way(arrival_rad) >= floor {
+                        heard += 1;
+                        let mut told = 0;
+                        index.near(direction_rad, |entry, off_rad| {
+                            told += 1;
+                            let off = wrap_pi(direction_rad - middle_deg.to_radians());
+                            assert!(entry.echo == 7 && (off_rad - off).abs() < 1e-9);
+                        });
+                        assert_eq!(told, 1, "{apart_deg} {amplitude} {middle_deg} at {at}");
+                    }
+                }
+            }
+        }
+        assert!(heard > 5000, "{heard}");
+        // And it is a bound that bounds: far off the axis nothing is told.
+        let narrow = DirectionIndex::new(&[]);
+        narrow.near(0.0, |_, _| panic!("nothing is there"));
+    }
+}

@@ -79,3 +79,47 @@ impl Settings {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ranger_stands_half_a_metre_up_or_half_way_to_a_low_ceiling() {
+        for (floor_z_m, ceiling_z_m, expected_m) in [
+            (Some(0.0), Some(2.5), 0.5),
+            (Some(-2.0), Some(0.5), -1.5),
+            (Some(0.2), Some(1.0), 0.6),
+            (Some(0.3), None, 0.8),
+            (None, Some(2.0), 1.5),
+            (None, None, 0.5),
+        ] {
+            let found_m = usual_z_m(floor_z_m, ceiling_z_m);
+            assert!(
+                (found_m - expected_m).abs() < 1e-12,
+                "{floor_z_m:?} {ceiling_z_m:?}: {found_m}"
+            );
+        }
+    }
+
+    #[test]
+    fn floors_follow_from_length_and_contacts() {
+        let settings = Settings {
+            floor: 0.002,
+            repeated_contacts_above: 10.0,
+            crowded_m: 0.8,
+            absorption_np_per_m: 0.2,
+            max_order: Some(3),
+            ..crate::model::paths::tests::LOSSLESS
+        };
+        let floors = [(false, 5.0), (true, 0.7), (true, 0.8), (true, 0.9)]
+            .map(|(is_repeated, length_m)| settings.contact_floor(is_repeated, length_m));
+        assert_eq!(floors, [0.002, 0.002, 0.002, 0.02]);
+        assert_eq!([3, 4].map(|order| settings.allows(order)), [true, false]);
+        // exp(-0.2 l) is 0.002 after 31 m.
+        assert!((settings.air_gain(settings.audible_m()) - 0.002).abs() < 1e-12);
+        assert!((settings.same_loss_m(0.5) - 0.5_f64.ln() / -0.2).abs() < 1e-12);
+        let lossless = Settings { absorption_np_per_m: 0.0, ..settings };
+        assert_eq!((lossless.same_loss_m(0.5), lossless.audible_m()), (0.0, 20.0));
+    }
+}

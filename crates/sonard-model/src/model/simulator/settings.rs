@@ -96,3 +96,20 @@ pub(super) fn fan_settings(
         max_order: options.max_order.unwrap_or(u32::MAX),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 2380 us of blanking and an integration of 60 us are 0.83 m of path; of a long blanking a metre counts.
+    #[test]
+    fn sound_is_crowded_until_the_receiver_can_notice_it() {
+        let preset = Sensor::preset("senscomp-6500").expect("a preset");
+        let of = |blanking_us: f64| {
+            let sensor = Sensor { blanking_us, integration_us: 60.0, ..preset.clone() };
+            crowded_m(&Receiver::new(&sensor, 340.0))
+        };
+        assert!((of(2380.0) - 0.8296).abs() < 1e-9, "{}", of(2380.0));
+        assert_eq!(of(5000.0), 1.0);
+    }
+}

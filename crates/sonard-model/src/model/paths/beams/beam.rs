@@ -143,3 +143,76 @@ pub(crate) fn reaches(border: DVec2, v: DVec2) -> bool {
 pub(crate) fn reaches_well(border: DVec2, v: DVec2) -> bool {
     !reaches(v, border)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn beam(right: f64, left: f64) -> Beam {
+        let turn = |deg: f64| 2.0 * DVec2::from_angle(deg.to_radians());
+        Beam {
+            image: DVec2::new(1.0, 2.0),
+            right: turn(right),
+            left: turn(left),
+            turn: DVec2::X,
+            gain: 0.8,
+            audible_m: 10.0,
+            node: 0,
+            triangle: 3,
+            side: 1,
+            mirrored: false,
+            is_level: true,
+            order: 1,
+            slopes: 0,
+        }
+    }
+
+    #[test]
+    fn beams_side_by_side_are_one() {
+        let mut first = beam(10.0, 30.0);
+        assert!(first.merge(&beam(30.0, 45.0)));
+        assert_eq!((first.right, first.left), (beam(10.0, 45.0).right, beam(10.0, 45.0).left));
+        // Seen in a mirror the next one counter-clockwise lies clockwise.
+        let mirrored = |right, left| Beam { mirrored: true, ..beam(right, left) };
+        let mut first = mirrored(30.0, 45.0);
+        assert!(first.merge(&mirrored(10.0, 30.0)));
+        assert_eq!((first.right, first.left), (beam(10.0, 45.0).right, beam(10.0, 45.0).left));
+    }
+
+    #[test]
+    fn beams_that_differ_stay_two() {
+        let next = beam(30.0, 45.0);
+        for other in [
+            beam(31.0, 45.0),
+            beam(210.0, 225.0),
+            Beam { gain: 0.81, ..next },
+            Beam { gain: 0.4, ..next },
+            Beam { triangle: 4, ..next },
+            Beam { side: 2, ..next },
+            Beam { is_level: false, ..next },
+            Beam { image: DVec2::new(1.0, 2.001), ..next },
+        ] {
+            let mut first = beam(10.0, 30.0);
+            assert!(!first.merge(&other), "{other:?}");
+            assert_eq!(first.left, beam(10.0, 30.0).left);
+        }
+    }
+
+    #[test]
+    fn a_mirror_turns_a_beam_and_remembers_where_it_left() {
+        let mirror = Mirror { normal: DVec2::X, offset_m: 4.0 };
+        // Reflected at x = 4, a ray's angle is taken from half a turn.
+        let rotor = DVec2::from_angle(std::f64::consts::PI);
+        let behind = beam(10.0, 30.0).reflected(&mirror, rotor);
+        assert_eq!((behind.image, behind.order, behind.mirrored), (DVec2::new(7.0, 2.0), 2, true));
+        let off = |one: DVec2, deg: f64| one.distance(2.0 * DVec2::from_angle(deg.to_radians()));
+        assert!(off(behind.right, 150.0) < 1e-12 && off(behind.left, 170.0) < 1e-12, "{behind:?}");
+        let left = behind.departure(DVec2::from_angle(160_f64.to_radians()));
+        assert!(left.distance(DVec2::from_angle(20_f64.to_radians())) < 1e-12, "{left}");
+        for (deg, inside) in
+            [(149.0, false), (151.0, true), (169.0, true), (171.0, false), (340.0, false)]
+        {
+            assert_eq!(behind.holds(DVec2::from_angle(f64::to_radians(deg))), inside, "{deg}");
+        }
+    }
+}

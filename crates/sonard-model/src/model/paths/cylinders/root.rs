@@ -44,3 +44,34 @@ pub(crate) fn zero_between(
     }
     at
 }
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    #[test]
+    fn zeros_are_found_in_few_steps() {
+        let asked = Cell::new(0);
+        let cubic = |x: f64| {
+            asked.set(asked.get() + 1);
+            (x.powi(3) - 2.0, 3.0 * x * x)
+        };
+        let found = zero_between([0.0, 2.0], [-2.0, 6.0], 1e-13, cubic);
+        assert!((found - 2_f64.cbrt()).abs() < 1e-13, "{found}");
+        assert!(asked.get() <= 10, "{} steps", asked.get());
+        // One that falls, and whose slope leads astray: halving keeps it between the ends.
+        let falls =
+            |x: f64| (-(40.0 * (x - 0.3)).atan(), -40.0 / (1.0 + (40.0 * (x - 0.3)).powi(2)));
+        let found = zero_between([0.0, 1.0], [falls(0.0).0, falls(1.0).0], 1e-12, falls);
+        assert!((found - 0.3).abs() < 1e-12, "{found}");
+    }
+
+    #[test]
+    fn without_a_change_of_sign_it_is_the_end_nearer_to_zero() {
+        let never = |_: f64| -> (f64, f64) { panic!("nothing to look for") };
+        assert_eq!(zero_between([1.0, 2.0], [0.5, 3.0], 1e-9, never), 1.0);
+        assert_eq!(zero_between([1.0, 2.0], [-3.0, -0.5], 1e-9, never), 2.0);
+    }
+}

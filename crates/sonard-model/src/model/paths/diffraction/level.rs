@@ -32,23 +32,24 @@
 //! Where sound grazes an edge both on its way out and on its way back, as it does straight over a low wall and
 //! back, both halves are taken away, where less would be.
 
-use std::f64::consts::TAU;
+mod edge;
 
 use num_complex::Complex64;
 
+use self::edge::{EdgeBeam, LevelEdge};
 use super::edge_ray::distance_parameter_m;
 use crate::{
-    acoustics::edge::{Aspect, EdgeLaw, Wedge},
-    geometry::{DVec2, Mirror},
+    acoustics::edge::{Aspect, EdgeLaw},
+    geometry::DVec2,
     model::{
         Diffractor, Mechanism, SearchPart,
         paths::{
             beams::{Beams, Leg, LitSpan, Ray},
             echo::{Echo, Via, drop_repeats},
-            height::{Ends, Heights, VerticalImage},
-            plan::{ALL_SLOPES, Plan, WallMirror},
+            height::{Ends, Heights},
+            plan::{ALL_SLOPES, Plan},
             rays::wall_contacts,
-            tolerance::{SAME_M, SAME_RAD, TIE_M},
+            tolerance::{SAME_M, SAME_RAD},
         },
     },
 };
@@ -142,132 +143,6 @@ fn is_same(
         && is_near(one.arrival, other.arrival)
         && path.images == its_path.images
         && (first_leg_m(path) - first_leg_m(its_path)).abs() < SAME_M
-}
-
-/// A level edge as sound meets it.
-#[derive(Debug, Clone, Copy)]
-struct LevelEdge {
-    wall: u32,
-    is_upper: bool,
-    /// Above the ranger, metres.
-    rise_m: f64,
-    /// The wall's in the plan.
-    mirror: Mirror,
-    wedge: Wedge,
-}
-
-/// Rays to any point of a level edge: a beam, and an image by floor and ceiling.
-#[derive(Debug, Clone, Copy)]
-struct EdgeBeam<'a> {
-    lit: &'a LitSpan,
-    /// Counted as in [`Echo::image`].
-    image: u16,
-    /// Reflections at walls, floor and ceiling.
-    order: u16,
-    gain: f64,
-    /// Height gained along it if floor and ceiling are windows, metres.
-    climb_m: f64,
-    /// Distance of the beam's image from the line in the plan, metres; negative behind it.
-    before_m: f64,
-    /// Distance of the image from the line in space, metres, and the position that it is abreast of.
-    off_m: f64,
-    foot_m: f64,
-    /// Direction from the line towards the image, around it from the wall's face, radians.
-    around_rad: f64,
-    /// Length of the shortest ray to what the beam lights, metres.
-    least_m: f64,
-}
-
-impl LevelEdge {
-    fn new(plan: &Plan, wall: u32, rise_m: f64, is_upper: bool) -> Self {
-        let WallMirror { mirror, gain, .. } = plan.walls[wall as usize];
-        let wedge = Wedge { opening_rad: TAU, reflectance: [gain; 2] };
-        Self { wall, is_upper, rise_m, mirror, wedge }
-    }
-
-    /// The beams to it, shortest first. Left out are those too long or weak for any path back.
-    fn beams<'a>(
-        &self,
-        scene: Surroundings,
-        beams: &Beams,
-        lit: &'a [LitSpan],
-    ) -> Vec<EdgeBeam<'a>> {
-        let settings = &scene.plan.settings;
-        let effort = &scene.plan.effort;
-        let images = || std::iter::once(&VerticalImage::NONE).chain(&scene.heights.images).zip(0..);
-        let mut found: Vec<EdgeBeam> = lit
-            .iter()
-            .flat_map(|lit| images().filter_map(|(image, index)| self.beam(lit, image, index)))
-            .filter(|beam| 2.0 * beam.gain >= settings.floor && beam.least_m <= settings.max_path_m)
-            .filter(|beam| beams.slopes.any_in(beam.lit.beam.slopes, beam.slopes()))
-            .take_while(|_| !effort.is_over())
-            .inspect(|_| effort.keep::<EdgeBeam>(1))
-            .collect();
-        effort.step(SearchPart::LevelEdges, lit.len() * (1 + scene.heights.images.len()));
-        found.sort_by(|one, other| one.least_m.total_cmp(&other.least_m));
-        found
-    }
-
-    /// None from within the wall's own plane.
-    fn beam<'a>(
-        &self,
-        lit: &'a LitSpan,
-        image: &VerticalImage,
-        index: u16,
-    ) -> Option<EdgeBeam<'a>> {
-        let before_m = self.mirror.height_m(lit.beam.image);
-        if before_m.abs() <= TIE_M {
-            return None;
-        }
-        let below_m = self.rise_m - image.rise_m;
-        let off_m = before_m.hypot(below_m);
-        let foot_m = self.mirror.normal.perp().dot(lit.beam.image);
-        let [low_m, high_m] = lit.span_m;
-        let beside_m = (low_m - foot_m).max(foot_m - high_m).max(0.0);
-        let along_face_m = if self.is_upper { below_m } else { -below_m };
-        Some(EdgeBeam {
-            lit,
-            image: index,
-            order: lit.beam.order + image.bounces,
-            gain: lit.beam.gain * image.gain,
-            climb_m: image.climb_m(self.rise_m),
-            before_m,
-            off_m,
-            foot_m,
-            around_rad: before_m.atan2(along_face_m).rem_euclid(TAU),
-            least_m: off_m.hypot(beside_m),
-        })
-    }
-
-    /// The point at a position along the wall's line.
-    fn point(&self, along_m: f64) -> DVec2 {
-        self.mirror.offset_m * self.mirror.normal + along_m * self.mirror.normal.perp()
-    }
-}
-
-impl EdgeBeam<'_> {
-    /// The least and the greatest slope of its rays.
-    fn slopes(&self) -> [f64; 2] {
-        let [low_m, high_m] = self.lit.span_m;
-        let beside_m = [low_m, high_m].map(|end| (end - self.foot_m).abs());
-        let nearest_m = (low_m - self.foot_m).max(self.foot_m - high_m).max(0.0);
-        let [near_m, far_m] =
-            [nearest_m, beside_m[0].max(beside_m[1])].map(|m| m.hypot(self.before_m));
-        let [one, other] = [near_m, far_m].map(|run_m| self.climb_m / run_m);
-        [one.min(other), one.max(other)]
-    }
-
-    /// Whether the slopes of its beam leave it a ray to a position along the wall's line.
-    fn climbs_to(&self, beams: &Beams, along_m: f64) -> bool {
-        let beside_m = along_m - self.foot_m;
-        let run_m = (self.before_m * self.before_m + beside_m * beside_m).sqrt();
-        beams.slopes.holds(self.lit.beam.slopes, self.climb_m, run_m)
-    }
-
-    fn lights(&self, along_m: f64) -> bool {
-        let [low_m, high_m] = self.lit.span_m;
-        (low_m - TIE_M..=high_m + TIE_M).contains(&along_m)
-    }
 }
 
 /// Pairs of beams at one level edge.

@@ -318,3 +318,6 @@ pub(crate) fn holds(limits: Option<[f64; 2]>, z_m: f64) -> bool {
     // On the very end counts as met; the echo of a level edge knows that.
     limits.is_none_or(|[from, to]| (from - TIE_M..=to + TIE_M).contains(&z_m))
 }
+
+#[cfg(test)]
+mod tests;

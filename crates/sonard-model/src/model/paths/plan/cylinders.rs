@@ -186,3 +186,75 @@ impl Circle {
         (from + nearest * run).distance(self.center) < self.radius_m - TIE_M
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
+    use super::*;
+
+    fn circle(x: f64, y: f64, radius_m: f64) -> Circle {
+        Circle { center: DVec2::new(x, y), radius_m, gain: 1.0, is_opaque: true }
+    }
+
+    /// Lengths of the free parts and whether a direction is in one.
+    fn free(circles: &[Circle], number: u32) -> (f64, impl Fn(f64) -> bool) {
+        let spans = free_spans(circles, number);
+        let length_rad = spans.iter().map(|span| span.to_rad - span.from_rad).sum();
+        let holds = move |angle: f64| {
+            let within =
+                |span: &Span| (angle - span.from_rad).rem_euclid(TAU) < span.to_rad - span.from_rad;
+            spans.iter().any(within)
+        };
+        (length_rad, holds)
+    }
+
+    /// Two circles of radius 1 whose centres are the root of 2 apart cross at 45 degrees off the line
+    /// between them: a quarter of each is in the other.
+    #[test]
+    fn what_another_cylinder_covers_is_not_free() {
+        let pair = [circle(1.0, 1.0, 1.0), circle(2.0, 2.0, 1.0)];
+        for (number, covered_rad) in [(0, PI / 4.0), (1, -0.75 * PI)] {
+            let (length_rad, holds) = free(&pair, number);
+            assert!((length_rad - 1.5 * PI).abs() < 1e-9, "{length_rad}");
+            for off_rad in [0.0, 0.7, -0.7] {
+                assert!(!holds(covered_rad + off_rad), "{number} {off_rad}");
+            }
+            for off_rad in [0.9, -0.9, PI] {
+                assert!(holds(covered_rad + off_rad), "{number} {off_rad}");
+            }
+        }
+        // Of unlike ones: 3, 4 and 5 make a right angle where they cross.
+        let unlike = [circle(0.0, 0.0, 3.0), circle(5.0, 0.0, 4.0)];
+        let half_rad = (3.0_f64 / 5.0).acos();
+        assert!((free(&unlike, 0).0 - (TAU - 2.0 * half_rad)).abs() < 1e-9);
+        assert!((free(&unlike, 1).0 - (TAU - 2.0 * (FRAC_PI_2 - half_rad))).abs() < 1e-9);
+    }
+
+    #[test]
+    fn cylinders_apart_and_within_each_other() {
+        let whole = |circles: &[Circle], number| (free(circles, number).0 - TAU).abs() < 1e-9;
+        let apart = [circle(0.0, 0.0, 1.0), circle(3.0, 0.0, 1.0)];
+        assert!(whole(&apart, 0) && whole(&apart, 1));
+        let within = [circle(0.0, 0.0, 1.0), circle(0.2, 0.0, 0.5)];
+        assert!(whole(&within, 0) && free(&within, 1).0 == 0.0);
+        // Of two that are one the first is there; one that lets sound pass or has no size covers nothing.
+        let same = [circle(0.0, 0.0, 1.0), circle(0.0, 0.0, 1.0)];
+        assert!(whole(&same, 0) && free(&same, 1).0 == 0.0);
+        let low = Circle { is_opaque: false, ..circle(1.0, 0.0, 1.0) };
+        assert!(whole(&[circle(0.0, 0.0, 1.0), low, circle(0.5, 0.0, 0.0)], 0));
+    }
+
+    #[test]
+    fn tangents_and_chords_are_euclids() {
+        let round = circle(1.0, 2.0, 3.0);
+        // A tangent of 4 from 5 away; from within the power is negative.
+        assert_eq!(round.power(DVec2::new(6.0, 2.0)), 16.0);
+        assert_eq!(round.power(DVec2::new(1.0, 1.0)), -8.0);
+        // 10 long and 2.4 beside the middle: half the chord is 1.8, about its middle.
+        let chord = round.chord(DVec2::new(-4.0, 4.4), DVec2::new(6.0, 4.4)).expect("it cuts");
+        assert!((chord[0] - 0.32).abs() < 1e-12 && (chord[1] - 0.68).abs() < 1e-12, "{chord:?}");
+        assert_eq!(round.chord(DVec2::new(-4.0, 5.1), DVec2::new(6.0, 5.1)), None);
+        assert_eq!(round.chord(DVec2::new(4.5, 2.0), DVec2::new(6.0, 2.0)), None);
+    }
+}

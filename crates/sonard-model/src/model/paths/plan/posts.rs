@@ -57,3 +57,38 @@ fn stands_free(circle: &Circle, number: u32, circles: &[Circle], walls: &[[DVec2
     };
     far_from_circles && walls.iter().all(is_far)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn thin(x: f64, radius_m: f64) -> Circle {
+        Circle { center: DVec2::new(x, 0.0), radius_m, gain: 1.0, is_opaque: true }
+    }
+
+    /// Four radii of the thin one, from surface to surface, from cylinders and from walls.
+    #[test]
+    fn thin_cylinders_that_stand_free_are_posts() {
+        let wave_number_per_m = std::f64::consts::TAU * 49_400.0 / 343.2;
+        let taken = |others: &[Circle], walls: &[(DVec2, DVec2)]| {
+            let mut circles = [&[thin(0.0, 0.004)], others].concat();
+            let mut plan = Arrangement::of(walls);
+            let posts = take_posts(&mut plan, &mut circles, wave_number_per_m);
+            for post in &posts {
+                assert_eq!(
+                    plan.points[post.point as usize],
+                    circles[post.cylinder as usize].center
+                );
+                assert_eq!(circles[post.cylinder as usize].radius_m, 0.0);
+            }
+            posts.iter().map(|post| post.cylinder).collect::<Vec<_>>()
+        };
+        assert_eq!(taken(&[], &[]), [0]);
+        assert_eq!(taken(&[thin(0.3, 0.004), thin(1.0, 0.2)], &[]), [0, 1]);
+        assert_eq!(taken(&[thin(0.2 + 0.021, 0.2)], &[]), [0]);
+        assert_eq!(taken(&[thin(0.2 + 0.019, 0.2)], &[]), [] as [u32; 0]);
+        let wall = |x: f64| [(DVec2::new(x, -1.0), DVec2::new(x, 1.0))];
+        assert_eq!(taken(&[], &wall(0.021)), [0]);
+        assert_eq!(taken(&[], &wall(0.019)), [] as [u32; 0]);
+    }
+}

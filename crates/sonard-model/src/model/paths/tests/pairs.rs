@@ -123,3 +123,50 @@ fn a_pair_hears_the_wall_before_it_wherever_it_stands_along_it() {
         }
     }
 }
+
+/// Straight up to the ceiling and down to the other one: half of the way apart beside the height.
+#[test]
+fn a_pair_hears_floor_and_ceiling_between_it() {
+    let mut room = scene(&[[-9.0, 5.0, 9.0, 5.0]]);
+    (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(2.5));
+    let settings = Settings { max_path_m: 6.0, sensor_z_m: Some(0.9), ..LOSSLESS };
+    let paths = Paths::new(&room, settings);
+    let apart_m = T.distance(R);
+    let found = |echoes: Vec<EchoPath>| -> Vec<f64> {
+        let upright = echoes.iter().filter(|echo| {
+            let met = reflectors(&echo.path);
+            met.iter().all(|met| matches!(met, Reflector::Floor | Reflector::Ceiling))
+        });
+        upright.map(|echo| echo.length_m).collect()
+    };
+    // By the floor, the ceiling, and both in either order.
+    let climbs_m = [1.8, 3.2, 5.0, 5.0];
+    let between = found(paths.enumerate_between(T, R).expect("few paths"));
+    assert_eq!(between.len(), 4, "{between:?}");
+    for (length_m, climb_m) in between.iter().zip(climbs_m) {
+        assert!((length_m - apart_m.hypot(climb_m)).abs() < 1e-12, "{between:?}");
+    }
+    let alone = found(paths.enumerate(T).expect("few paths"));
+    assert_eq!(alone.len(), climbs_m.len(), "{alone:?}");
+    for (length_m, climb_m) in alone.iter().zip(climbs_m) {
+        assert!((length_m - climb_m).abs() < 1e-12, "{alone:?}");
+    }
+}
+
+/// Diffracted paths end where all do.
+#[test]
+fn no_path_of_a_pair_is_too_long() {
+    let max_path_m = 3.4;
+    let all = Settings { max_path_m: 8.0, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
+    let all = Paths::new(&plan(), all).enumerate_between(T, R).expect("few paths");
+    let settings = Settings { max_path_m, edge_law: Some(EdgeLaw::Utd), floor: 1e-5, ..LOSSLESS };
+    let short = Paths::new(&plan(), settings).enumerate_between(T, R).expect("few paths");
+    let lengths = |echoes: &[EchoPath]| -> Vec<f64> {
+        let near = echoes.iter().filter(|echo| echo.length_m <= max_path_m);
+        near.map(|echo| echo.length_m).collect()
+    };
+    assert!(all.len() > short.len() && short.len() > 3, "{} {}", all.len(), short.len());
+    assert!(short.iter().any(|echo| !diffractors(&echo.path).is_empty()));
+    assert_eq!(short.len(), lengths(&short).len());
+    assert_eq!(lengths(&all).len(), short.len());
+}

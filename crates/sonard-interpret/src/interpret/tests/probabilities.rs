@@ -1,0 +1,61 @@
+//! Probabilities of kinds, and how sure a border is, by hand.
+
+use crate::interpret::{
+    Extents, Probabilities,
+    belief::{ExtentLikelihood, probabilities},
+};
+use sonard_model::acoustics::{Air, Sensor};
+
+fn check(found: &Probabilities, weights: [f64; 4]) {
+    let all: f64 = weights.iter().sum();
+    let found = [found.plane, found.corner, found.edge, found.other];
+    for (found, weight) in found.into_iter().zip(weights) {
+        assert!((found - weight / all).abs() < 1e-12, "{found} {weights:?}");
+    }
+}
+
+/// Densities of 0.2 and 0.1 per degree where a plane would be 20 degrees wide, so that anything has 1/30.
+#[test]
+fn priors_and_likelihoods_multiply() {
+    let extent = ExtentLikelihood::new(0.2, 0.1, 20.0);
+    // Of arcs that one nearer arc would hide 32 in 100 are something else.
+    let like_plane = 0.99 * 0.2 + 0.01 / 30.0;
+    let plane = 0.68 * 0.58 * like_plane;
+    let corner = 0.68 * 0.34 * like_plane;
+    let edge = 0.68 * 0.08 * (0.7 * 0.1 + 0.3 / 30.0);
+    let other = 0.32 * (0.65 * 0.2 + 0.35 / 30.0);
+    check(&probabilities(&extent, 1, []), [plane, corner, edge, other]);
+    // A turn that is three times as likely of a plane; something else may turn by any of 60 degrees.
+    let turned = probabilities(&extent, 1, [[0.3, 0.1]]);
+    let other = other * (0.8 * 0.2 + 0.2 / 60.0);
+    check(&turned, [0.3 * plane, 0.1 * corner, 0.1 * edge, other]);
+    // Beyond five nearer arcs nothing changes.
+    assert_eq!(probabilities(&extent, 5, []), probabilities(&extent, 9, []));
+    assert!(probabilities(&extent, 0, []).other < 0.05);
+    let nothing = probabilities(&ExtentLikelihood::NONE, 0, []);
+    assert_eq!(nothing, Probabilities { other: 1.0, ..Probabilities::default() });
+}
+
+/// Noise moves the border by as much as another threshold does.
+#[test]
+fn a_border_is_as_unsure_as_a_threshold_by_the_noise() {
+    for name in ["bozma-kuc-60khz", "senscomp-6500"] {
+        let sensor = Sensor::preset(name).expect("a preset");
+        let extent_deg = |share: f64| {
+            let sensor = Sensor { threshold: share * sensor.threshold, ..sensor.clone() };
+            let extents = Extents::new(&sensor, &Air::default(), true).expect("figures");
+            (extents.plane_corner_deg(0.5, 1.0), extents)
+        };
+        let (at_deg, extents) = extent_deg(1.0);
+        let (wider_deg, narrower_deg) = (extent_deg(0.99).0, extent_deg(1.01).0);
+        // Half the extent, by 2 % of the threshold.
+        let by_threshold = (wider_deg - narrower_deg) / 2.0 / 0.02;
+        let noise = 0.001 * sensor.threshold;
+        let found_deg = extents.border_sigma_deg(at_deg, noise);
+        assert!((found_deg / (0.001 * by_threshold) - 1.0).abs() < 0.02, "{name}: {found_deg}");
+        assert_eq!(extents.border_sigma_deg(at_deg, 0.0), 0.0);
+        assert_eq!(extents.border_sigma_deg(0.0, noise), 0.0);
+        // No further than the arc is wide.
+        assert!((extents.border_sigma_deg(at_deg, 10.0) - at_deg / 2.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,116 @@
+//! What the receiver makes of what it hears: the first rise of ECHO and those after it, or silence and what came
+//! closest to ending it.
+
+use smallvec::SmallVec;
+
+use super::{Latch, PulseArrival, Receiver, hearing::Hearing};
+use crate::reading::PingStatus;
+
+/// Most echoes a firing reports.
+const MOST_ECHOES: usize = 8;
+
+/// The receiver's detection of a firing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detection {
+    /// `Echo`, `NoEcho` or `MinRange`.
+    pub status: PingStatus,
+    /// Half the detected path; for `MinRange` the range of the end of blanking; metres.
+    pub range_m: Option<f64>,
+    /// The arrival that drove the detector, if it was sound; for `NoEcho` the one that came closest.
+    pub arrival: Option<PulseArrival>,
+    /// The most that the envelope reached with it, all arrivals together.
+    pub amplitude: Option<f64>,
+    /// The same above the threshold in force, decibels.
+    pub margin_db: Option<f64>,
+    /// Times at which ECHO rises, microseconds after firing.
+    pub echoes_us: SmallVec<[f64; MOST_ECHOES]>,
+}
+
+impl Receiver {
+    pub(super) fn detection(
+        &self,
+        hearing: &mut Hearing,
+        latch: Latch,
+        ready_us: f64,
+    ) -> Detection {
+        let mut echoes_us = SmallVec::new();
+        // What has been above before, for less than it takes to rise, counts.
+        let from_us = (ready_us - 2.0 * self.integration_us).max(self.blanking_us);
+        let Some(first_us) = hearing.next_rise(from_us) else {
+            return self.silence(hearing);
+        };
+        let already_there = first_us <= self.blanking_us + 1e-6;
+        let cause = hearing.cause(first_us);
+        let peak = if already_there {
+            hearing.level(first_us)
+        } else {
+            hearing.peak(first_us, cause.as_ref())
+        };
+        let mut last_us = first_us;
+        echoes_us.push(first_us);
+        while latch == Latch::Rearmed
+            && echoes_us.len() < MOST_ECHOES
+            && let Some(next_us) = hearing.next_rise(last_us + self.rearm_us)
+        {
+            echoes_us.push(next_us);
+            last_us = next_us;
+        }
+        let status = if already_there { PingStatus::MinRange } else { PingStatus::Echo };
+        Detection {
+            status,
+            range_m: Some(self.range_m(first_us)),
+            arrival: cause,
+            amplitude: Some(peak),
+            margin_db: Some(20.0 * (peak / self.threshold_at(first_us)).log10()),
+            echoes_us,
+        }
+    }
+
+    /// As the module tells it: in whole steps of range. The end of the blanking is no range.
+    pub(super) fn told(&self, mut detection: Detection) -> Detection {
+        if self.range_step_m == 0.0 {
+            return detection;
+        }
+        let us_per_m = 2e6 / self.sound_speed_m_s;
+        let stepped_m = |range_m: f64| (range_m / self.range_step_m).round() * self.range_step_m;
+        let blanked = usize::from(detection.status == PingStatus::MinRange);
+        for echo_us in detection.echoes_us.iter_mut().skip(blanked) {
+            *echo_us = us_per_m * stepped_m(self.range_m(*echo_us));
+        }
+        if detection.status == PingStatus::Echo {
+            detection.range_m = detection.range_m.map(stepped_m);
+        }
+        detection
+    }
+
+    /// The arrival that came closest within the listening window.
+    fn silence(&self, hearing: &mut Hearing) -> Detection {
+        let (echoes_us, window_us) = (SmallVec::new(), self.window_us());
+        // More has to be known before anything can be said.
+        let known: &[PulseArrival] = if hearing.asked_beyond() { &[] } else { hearing.arrivals };
+        let relative =
+            |arrival: &PulseArrival| arrival.amplitude / self.threshold_at(self.tof_us(arrival));
+        let arrival = known
+            .iter()
+            .filter(|arrival| (self.blanking_us..=window_us).contains(&self.tof_us(arrival)))
+            .filter(|arrival| arrival.amplitude > 0.0)
+            .max_by(|one, other| relative(one).total_cmp(&relative(other)))
+            .copied();
+        let peak = arrival.map(|arrival| {
+            hearing.rewind();
+            hearing.peak(self.tof_us(&arrival), Some(&arrival))
+        });
+        Detection {
+            status: PingStatus::NoEcho,
+            range_m: None,
+            arrival,
+            amplitude: peak,
+            // It may have been strong enough, but not for long enough.
+            margin_db: arrival.zip(peak).map(|(arrival, peak)| {
+                let threshold = self.threshold_at(self.tof_us(&arrival));
+                (20.0 * (peak / threshold).log10()).min(0.0)
+            }),
+            echoes_us,
+        }
+    }
+}

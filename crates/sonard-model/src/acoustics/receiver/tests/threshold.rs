@@ -1,0 +1,82 @@
+//! Thresholds that move: with the steps of the gain, and with the range.
+
+use super::*;
+
+/// The threshold in force drifts up with the range within a step and falls at its end.
+#[test]
+fn gain_steps_move_the_threshold() {
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    let receiver = Receiver::new(&sensor, 343.99);
+    let [before, after] = [5119.0, 5121.0].map(|t_us| receiver.threshold_at(t_us));
+    assert!((20.0 * (before / after).log10() - 5.2).abs() < 0.01, "{before} {after}");
+    // It is the sensor's own within each step, and at the rated range.
+    assert!((receiver.threshold_at(3491.0) / sensor.threshold - 1.0).abs() < 0.01);
+    assert!((receiver.threshold_at(62_210.0) / sensor.threshold - 1.0).abs() < 0.01);
+    // An echo too weak at the end of step 1 is heard once the gain has risen.
+    let tof_us = 5000.0;
+    let weak = PulseArrival {
+        length_m: tof_us * 343.99e-6,
+        amplitude: 0.8 * before,
+        phase_rad: 0.0,
+        index: 0,
+    };
+    let detection = receiver.detect(&[weak]);
+    assert_eq!(detection.status, PingStatus::Echo);
+    assert!((detection.echoes_us[0] - 5120.0).abs() < 0.1, "{detection:?}");
+}
+
+#[test]
+fn a_threshold_that_rises_is_continuous_and_never_hears_more_or_earlier() {
+    let flat = receiver();
+    let mut rng = Pcg64::seed_from_u64(1);
+    for _ in 0..300 {
+        let sounds = arrivals(&random_sounds(&mut rng));
+        let mut last_us = 0.0;
+        for rise_db in [0.0, 0.5, 2.0, 6.0, 15.0] {
+            let found = rising(rise_db).detect(&sounds);
+            let first_us = found.echoes_us.first().copied().unwrap_or(f64::INFINITY);
+            assert!(first_us >= last_us - 0.02, "{rise_db}: {first_us} after {last_us}");
+            last_us = first_us;
+            if rise_db == 0.0 {
+                assert_eq!(found, flat.detect(&sounds));
+            }
+        }
+    }
+    let rising = rising(4.0);
+    // 6000 us are 1.02 m.
+    assert!((rising.threshold_at(6000.0) / 0.02 - 10f64.powf(4.08 / 20.0)).abs() < 1e-9);
+    let steps = (0..20_000).map(|t_us| rising.threshold_at(f64::from(t_us)));
+    let steps: Vec<f64> = steps.collect();
+    for pair in steps.windows(2) {
+        assert!((1.0..1.0001).contains(&(pair[1] / pair[0])), "{pair:?}");
+    }
+}
+
+/// Whether the receiver hears worse or the sounds are weaker is the same.
+#[test]
+fn a_threshold_that_rises_is_sound_that_falls() {
+    let mut rng = Pcg64::seed_from_u64(2);
+    let (mut same, mut heard) = (0, 0);
+    for _ in 0..400 {
+        let sounds = random_sounds(&mut rng);
+        // At the middle of the pulse, which lasts 324 us.
+        let weaker = |&(tof_us, amplitude, phase): &(f64, f64, f64)| {
+            let range_m = 0.5e-6 * SPEED_M_S * (tof_us + 100.0);
+            (tof_us, amplitude * 10f64.powf(-5.0 * range_m / 20.0), phase)
+        };
+        let weaker: Vec<_> = sounds.iter().map(weaker).collect();
+        let [one, other] =
+            [rising(5.0).detect(&arrivals(&sounds)), receiver().detect(&arrivals(&weaker))];
+        let firsts = [&one, &other].map(|found| found.echoes_us.first().copied());
+        match firsts {
+            [Some(one_us), Some(other_us)] if (one_us - other_us).abs() < 4.0 => {
+                heard += 1;
+                same += 1;
+            }
+            [None, None] => same += 1,
+            _ => {}
+        }
+    }
+    // Some stand within a few tenths of a decibel of the threshold.
+    assert!(same >= 385 && heard > 150, "{same} of 400, {heard} heard");
+}

@@ -1,0 +1,58 @@
+//! Sound that the transducer's own face sends back.
+
+use super::*;
+use crate::model::Mechanism;
+
+/// What an arrival brings is its path's strength by the beam pattern at both of its ends.
+#[test]
+fn arrivals_are_paths_seen_by_the_beam() {
+    let room = scene(vec![
+        wall("wall", (0.5, -3.0), (0.5, 3.0), 1.0),
+        wall("far", (-1.0, -3.0), (2.0, 3.0), 0.9),
+    ]);
+    let simulator = simulator(room, PathOptions { lossless: true, ..PathOptions::default() });
+    let mut multiples = 0;
+    for direction_deg in [0.0_f64, 4.0, -7.0] {
+        let direction_rad = direction_deg.to_radians();
+        let point = simulator.at(DVec2::new(0.0, 0.2));
+        for arrival in point.arrivals(direction_rad).expect("few paths") {
+            let returns =
+                arrival.path.mechanisms().filter(|met| *met == Mechanism::Transducer).count();
+            let one_way = |end_rad: f64| {
+                simulator.beam().one_way(crate::geometry::wrap_pi(end_rad - direction_rad))
+            };
+            let ends = one_way(arrival.departure_rad) * one_way(arrival.arrival_rad);
+            let expected = arrival.path_amplitude * ends;
+            assert!(
+                (arrival.amplitude - expected).abs() <= 1e-6 * arrival.amplitude,
+                "{direction_deg}: {arrival:?} {ends}"
+            );
+            multiples += usize::from(returns > 0);
+        }
+    }
+    assert!(multiples > 1, "{multiples}");
+}
+
+/// Sound to and fro before one wall: `n` ways there and back are `n` times as long, and leave and come back along
+/// the wall's normal.
+#[test]
+fn sound_to_and_fro_is_as_long_as_its_ways() {
+    let before = scene(vec![wall("wall", (0.5, -3.0), (0.5, 3.0), 1.0)]);
+    let simulator = simulator(before, PathOptions { lossless: true, ..PathOptions::default() });
+    let arrivals = simulator.at(DVec2::ZERO).arrivals(0.05).expect("few paths");
+    let mirrored: Vec<_> = arrivals
+        .iter()
+        .filter(|arrival| {
+            arrival.path.mechanisms().all(|met| !matches!(met, Mechanism::Diffraction(_)))
+        })
+        .collect();
+    assert!(mirrored.len() >= 2, "{mirrored:?}");
+    for (arrival, ways) in mirrored.iter().zip(1..) {
+        assert!((arrival.length_m - f64::from(ways)).abs() < 1e-9, "{arrival:?}");
+        assert!(
+            arrival.departure_rad.abs() < 1e-9 && arrival.arrival_rad.abs() < 1e-9,
+            "{arrival:?}"
+        );
+        assert_eq!(arrival.path.interactions.len(), 2 * ways as usize - 1);
+    }
+}
