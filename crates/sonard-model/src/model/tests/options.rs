@@ -23,7 +23,7 @@ fn figures_out_of_range_are_named() {
     ] {
         let scene = Arc::new(shipped_scene("simple-room"));
         let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-        let made = Simulator::new(scene, sensor, Air::default(), options.clone());
+        let made = Simulator::new(scene, sensor, Air::default(), options);
         let said = made.err().map(|error| error.to_string());
         match wrong {
             Some(name) => {
