@@ -73,15 +73,15 @@ for kind in caught timeout unviable left; do
   sed -E "s|^crates/([^/]+)/src/([a-z_]+).*|$kind \1::\2|" "$work/$kind"
 done | awk '
   { of[$2] = 1; count[$2, $1]++; all[$1]++ }
-  function line(name, caught, timeout, missed, unviable) {
+  function line(name, caught, timeout, missed, unviable,   viable, share) {
     viable = caught + timeout + missed
     share = viable ? sprintf("%d %%", 100 * (caught + timeout) / viable) : "-"
-    printf "%-32s %7d %7d %7d %9d %7s\n", name, caught, timeout, missed, unviable, share
+    return sprintf("%-32s %7d %7d %7d %9d %7s", name, caught, timeout, missed, unviable, share)
   }
   END {
     for (name in of) {
-      line(name, count[name, "caught"], count[name, "timeout"], count[name, "left"], count[name, "unviable"]) | "sort"
+      print line(name, count[name, "caught"], count[name, "timeout"], count[name, "left"], count[name, "unviable"]) | "sort"
     }
     close("sort")
-    line("all", all["caught"], all["timeout"], all["left"], all["unviable"])
+    print line("all", all["caught"], all["timeout"], all["left"], all["unviable"])
   }'

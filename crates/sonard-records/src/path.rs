@@ -301,4 +301,12 @@ mod tests {
             Point::Space([0.333_333, 0.0, 0.1])
         );
     }
+
+    #[test]
+    fn what_was_met_is_told_in_order_and_edges_as_such() {
+        let text = r#"{"kind":"diffracted","order":1,"walls":["south"],"edge":"p.a","length_m":1}"#;
+        let path = read(text).expect(text);
+        assert_eq!(path.in_words(), "edge p.a, south");
+        assert_eq!(["p.a", "south", "p"].map(|id| path.meets(id)), [true, true, false]);
+    }
 }

@@ -130,6 +130,18 @@ fn the_weight_of_equation_1_is_a_share_of_both_lengths() {
     assert!((merged.confidence - 1.9 / 3.5).abs() < 1e-12, "{merged:?}");
 }
 
+/// Lines are held beside each other where both are: what lies beyond the end of one may be farther off.
+#[test]
+fn lines_are_close_where_they_lie_beside_each_other() {
+    let wall = line([0.0, 0.0], [1.0, 0.0], LineKind::Sonar, 0.9);
+    let slanted = |at_end_m: f64, beyond_m: f64| {
+        line([0.5, 0.0], [1.0 + beyond_m, at_end_m * (0.5 + beyond_m) / 0.5], LineKind::Sonar, 0.5)
+    };
+    let merged = |other: &MapLine| merge(&wall, other, &MergeSettings::default()).is_some();
+    assert!(merged(&slanted(0.03, 1.0)) && merged(&slanted(0.045, 0.2)));
+    assert!(!merged(&slanted(0.055, 0.2)));
+}
+
 #[test]
 fn crossing_lines_blend_through_their_crossing() {
     let one = line([0.0, 0.0], [2.0, 0.0], LineKind::Laser, 1.0);

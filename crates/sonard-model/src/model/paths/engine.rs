@@ -288,3 +288,39 @@ impl Arrivals for PathArrivals<'_> {
         self.multiple_arrival(direction_rad, multiple, arrival.amplitude)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        acoustics::{PulseArrival, Sensor},
+        model::paths::tests::LOSSLESS,
+        scene::{Scene, shipped},
+    };
+
+    /// Who hears pulses is told also what a steady tone loses in a null of the beam, and nothing less of the rest.
+    #[test]
+    fn nulls_of_the_beam_hide_nothing_from_who_hears_through_them() {
+        let scene = Scene::from_json(shipped::text("two-surface-room").expect("shipped"));
+        let scene = scene.expect("a scene");
+        let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+        let settings = Settings { max_path_m: 3.0, floor: 2e-3, ..LOSSLESS };
+        let told = |through_nulls: bool, direction_rad: f64| {
+            let beam = BeamPattern::new(&sensor, 343.0);
+            let engine = PathEngine::new(&scene, beam, None, settings.clone());
+            let engine = engine.through_nulls(through_nulls);
+            let mut told: Vec<PulseArrival> = Vec::new();
+            let arrivals = engine.arrivals_at(DVec2::new(1.2, 0.9)).expect("few paths");
+            arrivals.listen(direction_rad, &mut told);
+            told.len()
+        };
+        let mut more = 0;
+        for at in 0..40 {
+            let direction_rad = 0.15 * f64::from(at) - 3.0;
+            let [steady, through] = [false, true].map(|nulls| told(nulls, direction_rad));
+            assert!(through >= steady, "{direction_rad}: {through} of {steady}");
+            more += through - steady;
+        }
+        assert!(more > 0);
+    }
+}
