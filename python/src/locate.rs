@@ -39,8 +39,7 @@ impl Locator {
     #[pyo3(signature = (model, spacing_m = None))]
     fn new(py: Python<'_>, model: Py<Model>, spacing_m: Option<f64>) -> PyResult<Self> {
         let world = model.get().world();
-        let spacing_m =
-            spacing_m.unwrap_or_else(|| inverse::Atlas::usual_spacing_m(&world.scene));
+        let spacing_m = spacing_m.unwrap_or_else(|| inverse::Atlas::usual_spacing_m(&world.scene));
         if !(0.01..=2.0).contains(&spacing_m) {
             let message = format!("spacing_m is {spacing_m}: it must be from 0.01 to 2");
             return Err(PyValueError::new_err(message));
