@@ -8,6 +8,7 @@ Each message has to be what `sonard export` makes of the same log, field by fiel
 readings have to be what the log says.
 """
 
+import atexit
 import collections
 import datetime
 import json
@@ -57,6 +58,8 @@ class Daemon:
         self.said = WORK / f"{name}.said"
         with open(self.said, "wb") as said:
             self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said)
+        # It ends with this program, however that ends.
+        atexit.register(self.process.kill)
         until(lambda: self.socket.exists() and self.status()["link"]["state"] in ("ready", "scanning"), "a daemon")
 
     def ask(self, method, path, body=None):
