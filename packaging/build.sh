@@ -25,11 +25,11 @@ install rustc-web cargo-web libstd-rust-web-dev:arm64 gcc-aarch64-linux-gnu libc
       gcc-aarch64-linux-gnu libc6-dev-arm64-cross >&2
   fi
   PATH=/usr/bin:/bin CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
-    /usr/bin/cargo build --release --quiet --features mqtt,ros --bin sonard --target aarch64-unknown-linux-gnu
+    /usr/bin/cargo build --release --quiet --features mqtt,ros,sqlite --bin sonard --target aarch64-unknown-linux-gnu
 }
 
 # Pages and completions are the same everywhere, and are written by the program itself.
-cargo build --release --quiet --features mqtt,ros --bin sonard
+cargo build --release --quiet --features mqtt,ros,sqlite --bin sonard
 rm -rf "$target/package"
 "$target/release/sonard" package-files "$target/package"
 

@@ -1,9 +1,11 @@
 //! `sonard import`.
 
 mod bag;
+#[cfg(feature = "sqlite")]
+mod database;
 
 use std::{
-    fs::{self, File},
+    fs,
     io::{self, Read as _},
     path::{Path, PathBuf},
     sync::Arc,
@@ -16,7 +18,7 @@ use super::{
     array::load_array,
     options::{AirArgs, SensorArgs},
     output::{OutPath, Overwrite, closed, records_to},
-    progress, scene_file,
+    scene_file,
 };
 use crate::{
     acoustics::{Air, Sensor},
@@ -107,7 +109,7 @@ enum FormatName {
     Carmen,
     /// The log of Player
     Player,
-    /// A recording of ROS 2 (MCAP), of sensor_msgs/Range or LaserScan
+    /// A recording of ROS 2 (MCAP or SQLite), of sensor_msgs/Range or LaserScan
     Mcap,
 }
 
@@ -121,7 +123,7 @@ that stands for silence) are refused. A file makes the same log whenever it is i
 
 Scans are told apart by the field `scan`, else by where the robot stood, else by full turns.
 
-Of a recording (MCAP, or a folder of rosbag2 with such) all sensor_msgs/Range are read, else LaserScan; /tf and \
+Of a recording (MCAP, or a file or folder of rosbag2 in MCAP or SQLite) all sensor_msgs/Range are read, else LaserScan; /tf and \
 /tf_static say where the ranger was at each reading, and have to. One that turns on the robot makes scans, those that do \
 not are an array. Ranges at or below min_range are too near, from max_range on silent, NaN no readings.";
 
@@ -150,13 +152,17 @@ pub(super) fn run(args: &Args) -> Outcome {
     let taken = taken(args, scene.as_ref(), &sensor, &air)?;
     let bytes = if args.file.as_os_str() == "-" { Some(standard_input()?) } else { None };
     let files = if args.file.is_dir() { bag::files(&args.file)? } else { vec![args.file.clone()] };
+    bag::check(&files)?;
     let open = || -> io::Result<Box<dyn io::Read>> {
         Ok(match &bytes {
             Some(bytes) => Box::new(io::Cursor::new(Arc::clone(bytes))),
-            None => one_after_the_other(&files)?,
+            None => bag::one_after_the_other(&files)?,
         })
     };
-    let found = Source { open: &open }.examine(mapping, taken).map_err(refuse)?;
+    let mut found = Source { open: &open }.examine(mapping, taken).map_err(refuse)?;
+    if let Some(sha256) = bag::digest_of_databases(&files).map_err(|error| refuse(error.into()))? {
+        found.taken.sha256 = sha256;
+    }
     let mut out = records_to(args.output.as_deref(), args.overwrite)?;
     let source = open().map_err(|error| refuse(error.into()))?;
     let session = session(args, &found, scene.as_ref(), sensor, &air);
@@ -172,16 +178,6 @@ pub(super) fn run(args: &Args) -> Outcome {
         }
         Err(Stop::Write(error)) => closed(Err(error)),
     }
-}
-
-/// The bytes of files that follow each other.
-fn one_after_the_other(files: &[PathBuf]) -> io::Result<Box<dyn io::Read>> {
-    let mut all: Box<dyn io::Read> = Box::new(io::empty());
-    for file in files {
-        let next = progress::reading(file, io::BufReader::new(File::open(file)?));
-        all = Box::new(all.chain(next));
-    }
-    Ok(all)
 }
 
 /// Why it ended before the last scan.

@@ -1,5 +1,8 @@
 //! Readings from elsewhere, through the whole program.
 
+#[cfg(feature = "sqlite")]
+mod databases;
+
 use std::{fs, path::Path};
 
 use crate::common::{Log, run, sonard, stderr};
@@ -273,20 +276,32 @@ fn an_exported_recording_is_the_same_log_again() {
 }
 
 #[test]
-fn the_folder_of_a_recording_is_read_and_one_with_sqlite_is_told_how_to_convert() {
+fn the_folder_of_a_recording_is_read() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
     let (log, bag) = (path("log.jsonl"), path("bag"));
     done(&["simulate", "--scene", "simple-room", "--pose", "fig9", "-o", &log]);
     fs::create_dir(&bag).expect("writable");
     assert!(refused(&["import", &bag]).contains("no recording"));
-    fs::write(path("bag/bag_0.db3"), b"SQLite format 3\0").expect("writable");
-    assert!(refused(&["import", &bag]).contains("ros2 bag convert"));
-    assert!(refused(&["import", &path("bag/bag_0.db3")]).contains("ros2 bag convert"));
+    fs::write(path("bag/bag_0.mcap.zstd"), b"").expect("writable");
+    assert!(refused(&["import", &bag]).contains("zstd -d"));
     // The tenth file comes behind the second.
     for name in ["bag/bag_10.mcap", "bag/bag_2.mcap"] {
         done(&["export", &log, "-o", &path(name)]);
     }
     let again = done(&["import", &bag]);
     assert_eq!(Log::parse(&again).pings().len(), 800);
+}
+
+#[cfg(not(feature = "sqlite"))]
+#[test]
+fn a_database_is_told_what_reads_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let bag = folder.path().to_str().expect("a plain path");
+    let file = folder.path().join("bag_0.db3");
+    fs::write(&file, b"SQLite format 3\0").expect("writable");
+    for given in [bag, file.to_str().expect("a plain path")] {
+        let told = refused(&["import", given]);
+        assert!(told.contains("ros2 bag convert") && told.contains("--features sqlite"), "{told}");
+    }
 }

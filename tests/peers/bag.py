@@ -46,8 +46,11 @@ def transform(time_s, parent, child, x, y, yaw_deg):
     return message("geometry_msgs/msg/TransformStamped", header(time_s, parent), child, placed)
 
 
-def write(folder, storage):
-    with Writer(folder, version=9, storage_plugin=storage) as bag:
+def write(folder, storage, packed=False):
+    bag = Writer(folder, version=9, storage_plugin=storage)
+    if packed:
+        bag.set_compression(Writer.CompressionMode.STORAGE, Writer.CompressionFormat.ZSTD)
+    with bag:
         topics = {
             topic: bag.add_connection(topic, kind, typestore=STORE)
             for topic, kind in [("/tf_static", "tf2_msgs/msg/TFMessage"), ("/tf", "tf2_msgs/msg/TFMessage"),
@@ -73,4 +76,5 @@ def write(folder, storage):
 if __name__ == "__main__":
     folder = pathlib.Path(sys.argv[1])
     write(folder, StoragePlugin.MCAP)
+    write(folder.with_name(folder.name + "-zstd"), StoragePlugin.MCAP, packed=True)
     write(folder.with_name(folder.name + "-sqlite"), StoragePlugin.SQLITE3)

@@ -567,5 +567,5 @@ if __name__ == "__main__":
     check_map(folder / "places" / "map")
     check_found(folder / "places", "lines", 5)
     check_found(folder / "places", "features", 7)
-    check_imported(folder / "places" / "bag.jsonl")
-    check_imported(folder / "places" / "bag-converted.jsonl")
+    for name in ("bag", "bag-zstd", "bag-sqlite", "bag-converted"):
+        check_imported(folder / "places" / f"{name}.jsonl")

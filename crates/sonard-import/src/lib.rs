@@ -31,7 +31,7 @@ pub use field::{Field, Quantity};
 pub use mapping::{Column, Format, Mapping};
 pub use reading::Reading;
 #[cfg(feature = "recordings")]
-pub use recording::read_message;
-pub use source::{Imported, Source, Taken};
+pub use recording::{MESSAGE_TYPES, read_message};
+pub use source::{Imported, Source, Taken, digest};
 
 use reading::Row;

@@ -67,6 +67,8 @@ const RANGE: &str = "sensor_msgs/msg/Range";
 const LASER_SCAN: &str = "sensor_msgs/msg/LaserScan";
 const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
 const READINGS: [&str; 2] = [RANGE, LASER_SCAN];
+/// The types of the messages that are read; all others in a recording are passed over.
+pub const MESSAGE_TYPES: [&str; 3] = [RANGE, LASER_SCAN, TRANSFORMS];
 
 /// Rangers that turn by less than this stand still, degrees.
 const STILL_DEG: f64 = 0.05;
@@ -84,7 +86,7 @@ impl Bag {
     ) -> Result<Self, ImportError> {
         let mut transforms = Transforms::default();
         let mut kinds: BTreeMap<String, bool> = BTreeMap::new();
-        for message in Messages::of(open()?, &[RANGE, LASER_SCAN, TRANSFORMS]) {
+        for message in Messages::of(open()?, &MESSAGE_TYPES) {
             let message = message?;
             let channel = &message.channel;
             if channel.type_name != TRANSFORMS {

@@ -88,7 +88,7 @@ impl Source<'_> {
             format,
             guessed: mapping.columns.is_empty(),
             mapping: Mapping { format: Some(format), ..mapping },
-            taken: Taken { sha256: self.hash()?, ..taken },
+            taken: Taken { sha256: digest((self.open)()?)?, ..taken },
             readings: 0,
             echoes: 0,
             has_poses: false,
@@ -129,21 +129,6 @@ impl Source<'_> {
         }
         found.bag = Some(bag);
         Ok(())
-    }
-
-    fn hash(&self) -> io::Result<String> {
-        let (mut source, mut hash) = ((self.open)()?, Sha256::new());
-        let mut piece = vec![0; 1 << 16];
-        loop {
-            match source.read(&mut piece) {
-                Ok(0) => {
-                    return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect());
-                }
-                Ok(count) => hash.update(&piece[..count]),
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
-            }
-        }
     }
 
     fn examine_rows(&self, head: &str, found: &mut Imported) -> Result<(), ImportError> {
@@ -230,6 +215,22 @@ impl Source<'_> {
     }
 }
 
+/// SHA-256 of all bytes of a file, in hexadecimal digits.
+///
+/// # Errors
+/// It can't be read.
+pub fn digest(mut source: impl Read) -> io::Result<String> {
+    let (mut hash, mut piece) = (Sha256::new(), vec![0; 1 << 16]);
+    loop {
+        match source.read(&mut piece) {
+            Ok(0) => return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()),
+            Ok(count) => hash.update(&piece[..count]),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
 fn unguessed(error: &ImportError, names: &[String]) -> ImportError {
     let help = if names.is_empty() {
         "the first line has no names: --columns azimuth_deg=1,range_cm=2".to_owned()
@@ -254,9 +255,8 @@ fn text(head: &[u8]) -> Result<&str, ImportError> {
     }
     if head.starts_with(b"SQLite format 3\0") {
         return Err(ImportError::mapping(
-            "it is an SQLite database, as older recordings of ROS 2 are",
-            "write it as MCAP: `ros2 bag convert`, or `rosbags-convert --src BAG --dst NEW --dst-storage mcap` \
-             without ROS",
+            "it is an SQLite database, as some recordings of ROS 2 are",
+            "give the file by its name: it can't be read from its beginning to its end",
         ));
     }
     Err(ImportError::mapping("it is no text", "is it compressed? Unpack it first: `gunzip FILE`"))

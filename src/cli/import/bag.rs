@@ -1,11 +1,16 @@
-//! Folders of rosbag2: the recordings in them.
+//! Recordings of rosbag2: the files of a folder, and what they are stored in.
 
 use std::{
-    fs,
+    fs::{self, File},
+    io::{self, Read},
     path::{Path, PathBuf},
 };
 
-use super::super::{Failure, output::note_input};
+use super::super::{Failure, output::note_input, progress};
+use crate::import;
+
+/// How every SQLite database begins.
+const SQLITE: &[u8] = b"SQLite format 3\0";
 
 /// The recordings of a folder, in the order in which they were written.
 pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
@@ -16,21 +21,22 @@ pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
         .map_err(|error| {
             refuse(format!("cannot be read: {error}"), "give the folder of a recording")
         })?;
-    let ends = |path: &&PathBuf, ending: &str| path.extension().is_some_and(|end| end == ending);
-    let mut files: Vec<PathBuf> =
-        entries.iter().filter(|path| ends(path, "mcap")).cloned().collect();
-    if files.is_empty() {
-        return Err(match entries.iter().any(|path| ends(&path, "db3")) {
-            true => refuse(
-                "its recording is an SQLite database".to_owned(),
-                "write it as MCAP: `ros2 bag convert`, or `rosbags-convert --src BAG --dst NEW --dst-storage \
-                 mcap` without ROS",
-            ),
-            false => {
-                refuse("there is no recording (.mcap) in it".to_owned(), "give a folder of rosbag2")
-            }
+    let ending_in = |ending: &str| -> Vec<PathBuf> {
+        let is_one = |path: &&PathBuf| path.extension().is_some_and(|end| end == ending);
+        entries.iter().filter(is_one).cloned().collect()
+    };
+    let found = ["mcap", "db3"].map(ending_in).into_iter().find(|files| !files.is_empty());
+    let Some(mut files) = found else {
+        let is_packed = !ending_in("zstd").is_empty();
+        return Err(if is_packed {
+            refuse("its recording is packed".to_owned(), "unpack it: `zstd -d FOLDER/*.zstd`")
+        } else {
+            refuse(
+                "there is no recording (.mcap or .db3) in it".to_owned(),
+                "give a folder of rosbag2",
+            )
         });
-    }
+    };
     files.sort_by_key(|path| (number(path), path.clone()));
     files.iter().for_each(|path| note_input(path));
     Ok(files)
@@ -40,4 +46,62 @@ pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 fn number(path: &Path) -> u64 {
     let name = path.file_stem().and_then(|name| name.to_str()).unwrap_or_default();
     name.rsplit('_').next().and_then(|number| number.parse().ok()).unwrap_or(0)
+}
+
+/// Refuses databases where this program can't read them.
+pub(super) fn check(files: &[PathBuf]) -> Result<(), Failure> {
+    match files.iter().find(|path| is_database(path)) {
+        Some(path) if !cfg!(feature = "sqlite") => Err(Failure::input(
+            format!(
+                "{}: it is an SQLite database, and this program was built without the feature sqlite",
+                path.display()
+            ),
+            "build it with `cargo build --release --features sqlite`, or write the recording as MCAP: `ros2 bag \
+             convert`, or `rosbags-convert --src BAG --dst NEW --dst-storage mcap` without ROS",
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn is_database(path: &Path) -> bool {
+    let mut head = [0; SQLITE.len()];
+    // A pipe is read once: to look at it would take its beginning away.
+    fs::metadata(path).is_ok_and(|file| file.is_file())
+        && File::open(path).and_then(|mut file| file.read_exact(&mut head)).is_ok()
+        && head == SQLITE
+}
+
+/// The bytes of files that follow each other; of databases, those of the MCAP files that they would be.
+pub(super) fn one_after_the_other(files: &[PathBuf]) -> io::Result<Box<dyn Read>> {
+    let mut all: Box<dyn Read> = Box::new(io::empty());
+    for file in files {
+        let next: Box<dyn Read> = match is_database(file) {
+            true => database(file)?,
+            false => Box::new(progress::reading(file, io::BufReader::new(File::open(file)?))),
+        };
+        all = Box::new(all.chain(next));
+    }
+    Ok(all)
+}
+
+#[cfg(feature = "sqlite")]
+fn database(file: &Path) -> io::Result<Box<dyn Read>> {
+    Ok(Box::new(super::database::Database::open(file, &import::MESSAGE_TYPES)?))
+}
+
+#[cfg(not(feature = "sqlite"))]
+fn database(_file: &Path) -> io::Result<Box<dyn Read>> {
+    Err(io::ErrorKind::Unsupported.into())
+}
+
+/// SHA-256 of databases as they are on the disk; `None` of other files, which are read as they are.
+pub(super) fn digest_of_databases(files: &[PathBuf]) -> io::Result<Option<String>> {
+    if !files.iter().any(|path| is_database(path)) {
+        return Ok(None);
+    }
+    let mut all: Box<dyn Read> = Box::new(io::empty());
+    for file in files {
+        all = Box::new(all.chain(File::open(file)?));
+    }
+    import::digest(all).map(Some)
 }

@@ -9,9 +9,11 @@ use std::{
 use mcap::{
     McapError,
     read::parse_record,
-    records::{Record, op},
+    records::{ChunkHeader, Record, op},
     sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
 };
+
+use ruzstd::decoding::StreamingDecoder;
 
 use crate::ImportError;
 
@@ -20,6 +22,9 @@ pub(crate) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
 /// The longest record that is taken into memory, and what a chunk may become, bytes.
 const MOST_BYTES: u64 = 1 << 28;
+
+/// The compression that recorders of ROS 2 and `mcap` prefer.
+const ZSTD: &str = "zstd";
 
 /// What stands before the records of a chunk, without the name of its compression: three times eight bytes, a check
 /// sum and the lengths of name and records.
@@ -73,16 +78,22 @@ impl<R: Read> Messages<'_, R> {
         };
         let files = &self.files;
         let record = parse_record(opcode, &body).map_err(|error| files.damaged(&error))?;
-        let Record::Chunk { header, .. } = record else {
+        let Record::Chunk { header, data } = record else {
             self.waiting.extend(topics.take(record, self.types));
             return Ok(true);
         };
         if header.uncompressed_size > MOST_BYTES {
             return Err(files.damaged(&"a chunk of it is too long"));
         }
-        // What is told of it, and its records; more may stand behind them.
-        let end = CHUNK_HEAD + header.compression.len() + header.compressed_size as usize;
-        let chunk = body.get(..end).unwrap_or(&body);
+        let plain;
+        let chunk = if header.compression == ZSTD {
+            plain = without_zstd(&header, &data).map_err(|error| files.damaged(&error))?;
+            &plain
+        } else {
+            // What is told of it, and its records; more may stand behind them.
+            let end = CHUNK_HEAD + header.compression.len() + header.compressed_size as usize;
+            body.get(..end).unwrap_or(&body)
+        };
         let mut take = |record: Record<'_>| self.waiting.extend(topics.take(record, self.types));
         each_of_chunk(chunk, header.uncompressed_size as usize, &mut take)
             .map_err(|error| files.unpacked(error))?;
@@ -104,6 +115,31 @@ impl<R: Read> Iterator for Messages<'_, R> {
                 Err(error) => return Some(Err(error)),
             }
         }
+    }
+}
+
+/// The body of the same chunk, not compressed.
+///
+/// Zstandard is unpacked here, by a decoder in Rust, because the library's needs a C library of its own.
+///
+/// # Errors
+/// No such data, or another length of it than the chunk's head says.
+fn without_zstd(header: &ChunkHeader, data: &[u8]) -> io::Result<Vec<u8>> {
+    let length = header.uncompressed_size;
+    let mut body = Vec::with_capacity(CHUNK_HEAD + length as usize);
+    for number in [header.message_start_time, header.message_end_time, length] {
+        body.extend(number.to_le_bytes());
+    }
+    body.extend(header.uncompressed_crc.to_le_bytes());
+    body.extend(0_u32.to_le_bytes()); // no compression's name
+    body.extend(length.to_le_bytes());
+    let decoder = StreamingDecoder::new(data).map_err(io::Error::other)?;
+    // One byte more than there may be tells that there is more.
+    let unpacked = decoder.take(length + 1).read_to_end(&mut body)?;
+    if unpacked as u64 == length {
+        Ok(body)
+    } else {
+        Err(io::Error::other("a chunk unpacks to another length than it says"))
     }
 }
 

@@ -63,7 +63,7 @@ struct Bag {
 
 impl Bag {
     fn new(order: Order) -> Self {
-        let options = mcap::WriteOptions::new().profile("ros2");
+        let options = mcap::WriteOptions::new().profile("ros2").compression(None);
         let out = options.create(Cursor::new(Vec::new())).expect("memory takes it");
         Self { out, channels: BTreeMap::new(), order }
     }
@@ -293,6 +293,73 @@ fn topics_are_chosen_and_predictions_left_alone() {
     assert!(said(examine(&empty, Mapping::default())).contains("no message of sensor_msgs/Range"));
 }
 
+/// The same recording, its chunks packed by Zstandard; its index is wrong then, which is passed over.
+fn packed_by_zstd(recording: &[u8]) -> Vec<u8> {
+    let (magic, mut rest) = recording.split_at(super::mcap::MAGIC.len());
+    let mut packed = magic.to_vec();
+    while rest.len() > super::mcap::MAGIC.len() {
+        let (opcode, length) = (rest[0], u64::from_le_bytes(rest[1..9].try_into().expect("eight")));
+        let (body, behind) = rest[9..].split_at(length as usize);
+        rest = behind;
+        let body = if opcode == 0x06 { packed_chunk(body) } else { body.to_vec() };
+        packed.push(opcode);
+        packed.extend((body.len() as u64).to_le_bytes());
+        packed.extend(body);
+    }
+    [&packed, rest].concat()
+}
+
+/// Times, length and checksum as they were; the name of the compression; length and bytes of what is packed.
+fn packed_chunk(body: &[u8]) -> Vec<u8> {
+    let (head, records) = (&body[..28], &body[40..]);
+    assert_eq!(body[28..32], [0; 4], "it is not compressed");
+    let level = ruzstd::encoding::CompressionLevel::Fastest;
+    let records = ruzstd::encoding::compress_to_vec(records, level);
+    let length = (records.len() as u64).to_le_bytes();
+    [head, &4_u32.to_le_bytes(), b"zstd", &length, &records].concat()
+}
+
+#[test]
+fn chunks_packed_by_zstandard_hold_the_same_readings() {
+    let plain = driving(Order::Little).bytes();
+    let packed = packed_by_zstd(&plain);
+    assert!(packed.windows(4).any(|bytes| bytes == b"zstd"));
+    let readings = |bytes: &[u8]| -> Vec<_> {
+        let scans = scans(bytes, Mapping::default()).expect("a recording");
+        let told = |(start, pings): (ScanStart, Vec<Ping>)| {
+            (
+                start.pose,
+                pings
+                    .into_iter()
+                    .map(|ping| (ping.time, ping.status, ping.range_m))
+                    .collect::<Vec<_>>(),
+            )
+        };
+        scans.into_iter().map(told).collect()
+    };
+    assert_eq!(readings(&packed), readings(&plain));
+    assert_eq!(readings(&plain).len(), 3);
+}
+
+#[test]
+fn a_chunk_that_unpacks_to_another_length_than_it_says_is_refused() {
+    let packed = packed_by_zstd(&driving(Order::Little).bytes());
+    let name = packed.windows(4).position(|bytes| bytes == b"zstd").expect("there");
+    let length = name - 16..name - 8;
+    let true_length = u64::from_le_bytes(packed[length.clone()].try_into().expect("eight"));
+    for lie in [0, true_length - 1, true_length + 1, 1 << 27] {
+        let mut lying = packed.clone();
+        lying[length.clone()].copy_from_slice(&lie.to_le_bytes());
+        let told = said(examine(&lying, Mapping::default()));
+        assert!(told.contains("another length"), "{lie}: {told}");
+    }
+    for at in 0..packed.len() {
+        let mut damaged = packed.clone();
+        damaged[at] ^= 0x55;
+        let _ = scans(&damaged, Mapping::default());
+    }
+}
+
 #[test]
 fn recordings_in_several_files_follow_each_other() {
     let one = driving(Order::Little).bytes();
@@ -310,7 +377,7 @@ fn what_is_cut_off_or_no_recording_is_told() {
         assert!(told.contains("ends within a record") || told.contains("damaged"), "{end}: {told}");
     }
     let sqlite = said(examine(b"SQLite format 3\0\x10\0", Mapping::default()));
-    assert!(sqlite.contains("ros2 bag convert"), "{sqlite}");
+    assert!(sqlite.contains("SQLite database"), "{sqlite}");
     let mapping = || Mapping {
         columns: Mapping::columns_of("azimuth_deg=1,range_m=2").expect("columns"),
         ..Mapping::default()
