@@ -14,7 +14,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 pub use snap::{Cause, End, Move, snap};
 
-/// Where the ranger's rotation axis stands and where azimuth 0 points.
+/// Position of the ranger's rotation axis and direction of azimuth 0.
 ///
 /// On the command line a pose is written `X,Y,DEG`, in records `{"x_m","y_m","heading_deg"}`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -1,8 +1,8 @@
 //! Physical model of an ultrasonic ranger on a stepper, or of several on a robot.
 //!
-//! A [`scene`] (walls and cylinders of some material) and the [`acoustics`] of air, transducer and receiver
-//! go into a [`model`], which predicts what the ranger reads at each azimuth of a [`plan`]. An
-//! [`array`](mod@array) is several rangers at fixed bearings in place of one that turns.
+//! From a [`scene`] (walls and cylinders with materials) and the [`acoustics`] of air, transducer and receiver, a
+//! [`model`] predicts the reading at each azimuth of a [`plan`]. An [`array`](mod@array) has several rangers at fixed
+//! bearings instead of one that turns.
 //!
 //! A room in ten lines:
 //!
@@ -17,13 +17,13 @@
 //! let simulator = Simulator::new(room.into(), sensor, Air::default(), Options::default())?;
 //! let pose = Pose { x_m: 1.0, y_m: 1.0, heading_deg: 0.0 };
 //! let readings = simulator.predict(&pose, &ScanPlan::default())?;
-//! // Straight ahead the wall is 3 m away; a weak echo passes the threshold a little late.
+//! // The wall ahead is 3 m away; the echo crosses the threshold a little late.
 //! let range_m = readings[0].range_m.ok_or("silent")?;
 //! assert!((3.0..3.005).contains(&range_m));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Nothing here knows a clock, a file or a socket; random numbers are passed in.
+//! The crate uses no clock, file or socket; random numbers are passed in.
 
 // Modules are `foo.rs` beside `foo/`.
 #![warn(clippy::mod_module_files)]

@@ -30,7 +30,7 @@ impl Default for ScanPlan {
     }
 }
 
-/// Why a plan can't be carried out.
+/// An error in a plan.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum PlanError {
     /// Not a finite number.

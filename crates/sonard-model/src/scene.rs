@@ -93,7 +93,7 @@ impl Scene {
     }
 }
 
-/// How a surface treats sound.
+/// Acoustic properties of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, expecting = "an object { ... }")]
 pub struct Material {

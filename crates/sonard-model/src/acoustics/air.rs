@@ -161,6 +161,20 @@ mod tests {
         }
     }
 
+    /// Equation (15) worked out apart from this code, for saturated air. At 30 degrees and 101.325 kPa the saturation
+    /// pressure is 4,245.19 Pa and the enhancement factor 1.0043056, so 4.2077 % of the air are water; at 50 degrees
+    /// 11.284 and 20.655 %.
+    #[test]
+    fn moist_air_has_the_speed_of_the_published_equation() {
+        for (temperature_c, pressure_kpa, expected) in
+            [(30.0, 101.325, 351.46888), (50.0, 110.0, 366.79618), (50.0, 60.0, 372.00668)]
+        {
+            let air = Air::new(temperature_c, 100.0, pressure_kpa).expect("in range");
+            let speed_m_s = air.sound_speed_m_s();
+            assert!((speed_m_s - expected).abs() < 1e-4, "{temperature_c} C: {speed_m_s}");
+        }
+    }
+
     #[test]
     fn absorption_matches_iso_9613_to_its_digits() {
         for (frequency_hz, expected) in [(49.4e3, 1.641), (50e3, 1.661), (60e3, 1.980)] {

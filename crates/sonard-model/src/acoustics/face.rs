@@ -15,7 +15,7 @@ pub struct Face {
     pub reflectance: f64,
 }
 
-/// A disc that turns sound back at some frequency.
+/// A disc that reflects sound of some frequency.
 ///
 /// Its back is left out: sound that comes from behind the face is not reflected.
 #[derive(Debug, Clone, Copy, PartialEq)]

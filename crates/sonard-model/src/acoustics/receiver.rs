@@ -40,7 +40,7 @@ use self::{
 use super::{ApertureResponse, EchoShape, Gain, Incidence, Response, Sensor};
 use crate::reading::PingStatus;
 
-/// Whether ECHO is made ready again after it has risen.
+/// Behaviour of ECHO after it has risen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Latch {
     /// It stays up until the next firing: only the first echo is timed.
@@ -68,7 +68,7 @@ pub struct PulseArrival {
     pub index: u32,
 }
 
-/// How overlapping arrivals are combined.
+/// Combination of overlapping arrivals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Combining {
     /// As pulses that rise and fall and, where they overlap, add up with their phases.

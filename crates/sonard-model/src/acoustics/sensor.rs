@@ -72,7 +72,7 @@ pub struct Sensor {
     pub integration_us: f64,
     /// Farthest range it is made for, metres.
     pub max_range_m: f64,
-    /// How the amplifier follows the spreading of the sound.
+    /// Time-variable gain of the amplifier.
     #[serde(default, skip_serializing_if = "is_default")]
     pub gain: Gain,
     /// How the face answers to a pulse.
@@ -121,7 +121,7 @@ pub enum Response {
     Full,
 }
 
-/// Why a sensor's data can't be used.
+/// An error in a sensor's data.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SensorError {
     /// Not JSON, or not of a sensor's form.

@@ -17,7 +17,7 @@ pub struct Course {
     times_s: Vec<f64>,
 }
 
-/// What is wrong with a course.
+/// An error in a course.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("line {line}: {message}")]
 pub struct CourseError {

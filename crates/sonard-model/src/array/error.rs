@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use crate::scene::{PoseError, suggest};
 
-/// Why an array's data can't be used.
+/// An error in an array's data.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ArrayError {
     /// Not JSON, or not of an array's form.
@@ -116,7 +116,7 @@ impl ArrayError {
     }
 }
 
-/// Why an array can't stand at a pose.
+/// An error in the pose of an array.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArrayPoseError {
     /// The ranger that can't be there; `None` for the robot itself.

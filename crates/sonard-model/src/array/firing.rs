@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ArrayError, MOST, RangerArray};
 
-/// A turn of a round: who fires then.
+/// A turn of a round: the rangers that fire together.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "a ranger's id, or a list of ids that fire at once")]
 pub enum Turn {
@@ -15,7 +15,7 @@ pub enum Turn {
     Together(Vec<String>),
 }
 
-/// A firing beside the one whose echoes are listened for.
+/// Another firing, whose sound a listening ranger may receive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OtherFiring {
     /// The ranger that fired, as an index into the array's.

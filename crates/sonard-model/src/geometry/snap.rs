@@ -32,7 +32,7 @@ pub struct Move {
     pub cause: Cause,
 }
 
-/// What a move makes good.
+/// The defect of a drawing that a move corrects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cause {
     /// It was apart from another end.
@@ -97,4 +97,38 @@ fn cause(vertices: &Vertices, joints: &Joints, end: End) -> Cause {
         vertices.ends(vertex).map(|other| (vertices.drawn_end(other).distance(here), other));
     let farthest = other.filter(|(apart_m, _)| *apart_m > 0.0).max_by(|a, b| a.0.total_cmp(&b.0));
     farthest.map_or(Cause::Turned, |(_, other)| Cause::Apart(other))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A corner 0.04 mm off a right angle, one side of which is drawn as two of 10 m, three tenths of a nanometre off
+    /// a line: rounding. The corner is made right with the whole side, and the point within it goes along.
+    #[test]
+    fn a_side_goes_on_through_a_point_within_it() {
+        let middle = DVec2::new(0.0, 3e-10);
+        let (end, corner, up) =
+            (DVec2::new(-10.0, 0.0), DVec2::new(10.0, 0.0), DVec2::new(10.00004, 5.0));
+        let mut segments = [(end, middle), (middle, corner), (corner, up)];
+        snap(&mut segments, 2e-3, true);
+        let [(end, middle), (again, corner), (_, up)] = segments;
+        assert_eq!(middle, again);
+        let cosine = (end - corner).normalize().dot((up - corner).normalize());
+        assert!(cosine.abs() < 1e-12, "{cosine}");
+        let off_m = (corner - end).normalize().perp_dot(middle - end);
+        assert!(off_m.abs() < 1e-9, "{off_m}");
+    }
+
+    /// A bend of a micrometre is a bend, however short what follows it: the corner is one of three, not of two.
+    #[test]
+    fn a_bend_ends_a_side() {
+        let bend = DVec2::new(0.01, 1e-6);
+        let (end, corner, up) = (DVec2::ZERO, DVec2::new(0.02, 0.0), DVec2::new(0.02 + 4e-5, 5.0));
+        let mut segments = [(end, bend), (bend, corner), (corner, up)];
+        snap(&mut segments, 2e-4, true);
+        let [(_, bend), (_, corner), (_, up)] = segments;
+        let cosine = (bend - corner).normalize().dot((up - corner).normalize());
+        assert!(cosine.abs() < 1e-9, "{cosine}");
+    }
 }

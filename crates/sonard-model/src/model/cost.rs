@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// What a search spends its effort on.
+/// A part of the search, by which its effort is counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SearchPart {
     /// Beams that walls return.

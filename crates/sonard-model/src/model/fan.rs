@@ -52,7 +52,7 @@ pub struct Fan {
     settings: FanSettings,
 }
 
-/// How the fan is traced.
+/// Settings of the fan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FanSettings {
     /// Angle between rays, radians; made a little smaller to divide the circle.

@@ -22,7 +22,7 @@ mod settings;
 
 use settings::{fan_settings, path_settings, receiver};
 
-/// Why a simulator can't be made.
+/// An error in sensor, scene or options that prevents a simulator.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ModelError {
     /// The sensor's data make no sense.

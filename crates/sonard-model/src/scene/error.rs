@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::pose::PoseError;
 
-/// A scene file that can't be used: where, what, and what would be right.
+/// An error in a scene file: where, what, and the remedy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneError {
     /// Line, counted from 1.
@@ -88,7 +88,7 @@ pub(super) fn floor_char_boundary(text: &str, offset: usize) -> usize {
     (0..=offset).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0)
 }
 
-/// What is wrong with a scene file.
+/// The kind of an error in a scene file.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SceneProblem {
@@ -218,65 +218,72 @@ impl SceneProblem {
         match self {
             Self::Syntax(found) => syntax_help(found),
             Self::Unclosed(open) => unclosed_help(*open),
-            Self::DuplicateKey(_) => "keep one of the two; only one could count".to_owned(),
             Self::UnknownField { field, known } => suggest(field, known, "fields here"),
             Self::MissingField(field) => format!("add \"{field}\" to this object"),
-            Self::Type(_) => {
-                "`sonard scene schema` prints what each field holds; numbers stand without quotes"
-                    .to_owned()
-            }
-            Self::EmptyName => "give it a name of one character or more".to_owned(),
-            Self::ControlCharacter(_) => {
-                "leave out tabs, line ends and other control characters".to_owned()
-            }
-            Self::CommaInName(_) => {
-                "leave the comma out: on the command line X,Y,DEG is a pose by its numbers"
-                    .to_owned()
-            }
             Self::UnknownMaterial { name, known } => suggest(name, known, "materials"),
-            Self::DuplicateId { .. } => {
-                "give each wall, cylinder and body a name of its own: records refer to them by it \
-                 (segments of a polyline are `id.0`, `id.1`, ...)"
-                    .to_owned()
-            }
-            Self::WallShape(_) => {
-                "write \"from\": [x, y] and \"to\": [x, y] for one wall, or \"polyline\": \
-                 [[x, y], [x, y], ...] (with \"closed\": true if it returns to its beginning)"
-                    .to_owned()
-            }
-            Self::RobotShape => {
-                "write \"circle\": {\"center\": [ahead, left], \"radius_m\": r} or \"outline\": \
-                 [[ahead, left], ...]"
-                    .to_owned()
-            }
-            Self::RangerInBody => {
-                "the origin of the robot's frame is the ranger's rotation axis: move the body, as \
-                 in \"center\": [-0.16, 0] for a round body 0.16 m behind the ranger"
-                    .to_owned()
-            }
-            Self::NoLength { .. } => {
-                "its ends must differ by at least 0.1 mm; a closed polyline does not repeat its \
-                 first point"
-                    .to_owned()
-            }
             Self::TooFewPoints { needed, .. } => format!("give at least {needed}"),
             Self::OutOfBounds { .. } => format!(
                 "lengths are in metres, at most {MAX_COORDINATE_M} from the origin; is this in millimetres?"
             ),
-            Self::Heading(_) => "use degrees between -360 and 360".to_owned(),
             Self::Radius(_) => {
                 format!("use metres, greater than 0 and at most {MAX_COORDINATE_M}")
             }
-            Self::Snap(_) => {
-                "use metres, from 0 (the plan is taken as drawn) to 0.005; without it 0.002"
-                    .to_owned()
-            }
-            Self::Share { .. } => "use a number from 0 to 1".to_owned(),
-            Self::HeightsReversed { .. } => "write the lower height first, in metres".to_owned(),
             Self::NoSuchLevel(height) => {
                 format!("give its height as `{height}`, in metres, or leave the material out")
             }
             Self::Pose(error) => error.help(),
+            other => other.fixed_help().to_owned(),
+        }
+    }
+
+    /// Help that is the same whatever was found.
+    const fn fixed_help(&self) -> &'static str {
+        match self {
+            Self::DuplicateKey(_) => "keep one of the two; only one could count",
+            Self::Type(_) => {
+                "`sonard scene schema` prints what each field holds; numbers stand without quotes"
+            }
+            Self::EmptyName => "give it a name of one character or more",
+            Self::ControlCharacter(_) => "leave out tabs, line ends and other control characters",
+            Self::CommaInName(_) => {
+                "leave the comma out: on the command line X,Y,DEG is a pose by its numbers"
+            }
+            Self::DuplicateId { .. } => {
+                "give each wall, cylinder and body a name of its own: records refer to them by it \
+                 (segments of a polyline are `id.0`, `id.1`, ...)"
+            }
+            Self::WallShape(_) => {
+                "write \"from\": [x, y] and \"to\": [x, y] for one wall, or \"polyline\": \
+                 [[x, y], [x, y], ...] (with \"closed\": true if it returns to its beginning)"
+            }
+            Self::RobotShape => {
+                "write \"circle\": {\"center\": [ahead, left], \"radius_m\": r} or \"outline\": \
+                 [[ahead, left], ...]"
+            }
+            Self::RangerInBody => {
+                "the origin of the robot's frame is the ranger's rotation axis: move the body, as \
+                 in \"center\": [-0.16, 0] for a round body 0.16 m behind the ranger"
+            }
+            Self::NoLength { .. } => {
+                "its ends must differ by at least 0.1 mm; a closed polyline does not repeat its \
+                 first point"
+            }
+            Self::Heading(_) => "use degrees between -360 and 360",
+            Self::Snap(_) => {
+                "use metres, from 0 (the plan is taken as drawn) to 0.005; without it 0.002"
+            }
+            Self::Share { .. } => "use a number from 0 to 1",
+            Self::HeightsReversed { .. } => "write the lower height first, in metres",
+            Self::Syntax(_)
+            | Self::Unclosed(_)
+            | Self::UnknownField { .. }
+            | Self::MissingField(_)
+            | Self::UnknownMaterial { .. }
+            | Self::TooFewPoints { .. }
+            | Self::OutOfBounds { .. }
+            | Self::Radius(_)
+            | Self::NoSuchLevel(_)
+            | Self::Pose(_) => "",
         }
     }
 }

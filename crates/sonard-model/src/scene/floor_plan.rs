@@ -30,7 +30,7 @@ pub struct FloorPlan {
     pub changes: Vec<Change>,
 }
 
-/// Something about a wall that is not as it was drawn.
+/// A difference between a wall of the plan and the wall as drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
     /// One of its ends was moved.

@@ -11,14 +11,14 @@ use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 /// Text that is not JSON.
 pub(super) fn is_plain(text: &str) -> serde_json::Result<bool> {
     let mut json = serde_json::Deserializer::from_str(text);
-    let is_plain = Place::Scene.deserialize(&mut json)?;
+    let is_plain = ValueKind::Scene.deserialize(&mut json)?;
     json.end()?;
     Ok(is_plain)
 }
 
 /// What a value stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Place {
+enum ValueKind {
     Scene,
     /// A list of objects.
     Objects,
@@ -29,7 +29,7 @@ enum Place {
     Any,
 }
 
-impl Place {
+impl ValueKind {
     fn of_member(self, name: &str) -> Self {
         match (self, name) {
             (Self::Scene, "walls" | "cylinders") => Self::Objects,
@@ -41,7 +41,7 @@ impl Place {
     }
 }
 
-impl<'de> DeserializeSeed<'de> for Place {
+impl<'de> DeserializeSeed<'de> for ValueKind {
     type Value = bool;
 
     fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<bool, D::Error> {
@@ -49,7 +49,7 @@ impl<'de> DeserializeSeed<'de> for Place {
     }
 }
 
-impl<'de> Visitor<'de> for Place {
+impl<'de> Visitor<'de> for ValueKind {
     type Value = bool;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

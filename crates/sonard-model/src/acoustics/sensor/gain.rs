@@ -8,7 +8,7 @@ use super::{
     figures::{not_negative, positive},
 };
 
-/// How the amplifier follows the spreading of the sound.
+/// Time-variable gain of the amplifier.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Gain {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{SensorError, figures::within};
 use crate::geometry::DVec2;
 
-/// Where the transducer sits on the rotation axis, and turns with it.
+/// Position of the transducer relative to the rotation axis, with which it turns.
 ///
 /// Ranges are measured from the face, or from the middle between transmitter and receiver: half
 /// the path of the sound. What is met ahead lies `ahead_m` farther from the axis.

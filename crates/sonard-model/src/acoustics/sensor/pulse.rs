@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{SensorError, figures::positive};
 
-/// What the ranger sends.
+/// The transmitted pulse.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "shape", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Pulse {

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::{
     Fan,
-    ray::{Candidate, Met, Weighing},
+    ray::{Candidate, PathKey, Weighing},
 };
 use crate::{
     acoustics::PulseArrival,
@@ -71,7 +71,7 @@ impl Arrivals for FanArrivals<'_> {
 
 /// Of the rays that took the same path, the one that passed closest.
 #[derive(Default)]
-struct Closest(HashMap<Met, Candidate>);
+struct Closest(HashMap<PathKey, Candidate>);
 
 impl Closest {
     fn offer(&mut self, candidate: Candidate) {

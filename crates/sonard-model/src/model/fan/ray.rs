@@ -54,12 +54,12 @@ pub(super) struct Candidate {
     pub(super) share: f64,
     /// In which direction the ray itself leaves, radians.
     ray_departure_rad: f64,
-    pub(super) met: Met,
+    pub(super) met: PathKey,
 }
 
 /// The interactions of a path: reflectors, in order, and then perhaps an edge.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) struct Met {
+pub(super) struct PathKey {
     reflectors: SmallVec<[Reflector; 4]>,
     edge: Option<Edge>,
 }
@@ -118,7 +118,7 @@ impl Ray {
             miss_m: target.offset_m.abs(),
             share: target.offset_m.abs() / half_m,
             ray_departure_rad: self.departure_rad,
-            met: Met { reflectors: self.walls.clone(), edge: None },
+            met: PathKey { reflectors: self.walls.clone(), edge: None },
         })
     }
 
@@ -164,7 +164,7 @@ impl Ray {
             miss_m: target.offset_m.abs(),
             share: 0.0,
             ray_departure_rad: self.departure_rad,
-            met: Met { reflectors: self.walls.clone(), edge: Some(edge) },
+            met: PathKey { reflectors: self.walls.clone(), edge: Some(edge) },
         })
     }
 

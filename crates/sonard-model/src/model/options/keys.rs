@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::{ConeOptions, EngineKind, EngineOptions, FanOptions, Options, PathOptions};
 use crate::acoustics::{EdgeLawKind, Response};
 
-/// The settings as flags, keys of a file and records give them: side by side, of whatever engine.
+/// The settings of all engines side by side, as flags, configuration keys and records give them.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 #[cfg_attr(feature = "clap", command(next_help_heading = "Model"))]
@@ -34,15 +34,15 @@ pub struct OptionKeys {
     /// Leave out the absorption of the air; with paths and fan.
     #[cfg_attr(feature = "clap", arg(long))]
     pub lossless: bool,
-    /// Most mirror reflections on a path, instead of as many as can matter; with paths and fan.
+    /// Most mirror reflections on a path, if limited; with paths and fan.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
     #[schemars(range(min = 0, max = 65_535), example = 3)]
     pub max_order: Option<u32>,
-    /// How edges diffract, instead of the sensor's law, or else utd; with paths.
+    /// Law of edge diffraction, if not the sensor's (or else utd); with paths.
     #[cfg_attr(feature = "clap", arg(long, value_enum, value_name = "LAW"))]
     #[schemars(example = &"kuc-siegel")]
     pub edge_law: Option<EdgeLawKind>,
-    /// Also follow sound that bends at two edges; with paths.
+    /// Also find paths diffracted at two edges; with paths.
     #[cfg_attr(feature = "clap", arg(long))]
     pub double_diffraction: bool,
     /// Leave out what a ranger of an array receives of other firings than its own; with paths, the others know no

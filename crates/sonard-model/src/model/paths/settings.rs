@@ -7,7 +7,7 @@ use crate::acoustics::edge::EdgeLaw;
 /// less.
 pub const REPEATED_CONTACTS_ABOVE: f64 = 10.0;
 
-/// Which paths count, and the physics along them.
+/// Limits of the path search, and the physics along paths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Longest path there and back, metres.

@@ -178,3 +178,29 @@ fn where_a_ranger_can_stand_follows_from_the_plan_alone() {
         }
     }
 }
+
+/// A large body is told from a second room by the larger outline around it, on whichever side of its walls that is found.
+#[test]
+fn an_outline_encloses_the_same_whichever_way_round_it_is_drawn() {
+    let ring = |id: &str, corners: &str| {
+        let m = r#""closed": true, "material": "m""#;
+        format!(r#"{{"id": "{id}", "polyline": [{corners}], {m}}}"#)
+    };
+    let rooms = ["[0,0],[4,0],[4,3],[0,3]", "[0,3],[4,3],[4,0],[0,0]"];
+    let bodies =
+        ["[0.7,0.5],[3.5,0.5],[3.5,2.5],[0.7,2.5]", "[0.7,2.5],[3.5,2.5],[3.5,0.5],[0.7,0.5]"];
+    let at = |x_m: f64, y_m: f64| Pose { x_m, y_m, heading_deg: 0.0 };
+    for room in rooms {
+        for body in bodies {
+            let scene = plan_of(&[&ring("R", room), &ring("B", body)], "");
+            assert_eq!(scene.check_pose(&at(0.3, 0.3)), Ok(()), "{room} {body}");
+            let inside = scene.check_pose(&at(2.0, 1.5));
+            assert!(
+                matches!(inside, Err(PoseError::InsideBody { .. })),
+                "{room} {body}: {inside:?}"
+            );
+            let outside = scene.check_pose(&at(5.0, 1.0));
+            assert!(matches!(outside, Err(PoseError::OutsideRoom { .. })), "{room} {body}");
+        }
+    }
+}

@@ -42,11 +42,11 @@ pub(crate) fn trace(
     let mut outs = TubeGrower::new(plan, out, receiver);
     let mut backs = back.map(|beams| TubeGrower::new(plan, beams, transmitter));
     loop {
-        let partners = Partners::of(outs.last_level().iter(), bound);
+        let partners = Partners::of(outs.last_level(), bound);
         let more = match &mut backs {
             None => outs.grow(&partners),
             Some(backs) => {
-                let others = Partners::of(backs.last_level().iter(), bound);
+                let others = Partners::of(backs.last_level(), bound);
                 // Both, always.
                 outs.grow(&others) | backs.grow(&partners)
             }

@@ -283,3 +283,20 @@ fn few_readings_depend_on_what_is_left_out_below_the_threshold() {
     println!("{} of {all} readings differ: {differ:?}", differ.len());
     assert!(30 * differ.len() <= all, "{} of {all}", differ.len());
 }
+
+/// Where the order allows one reflection alone, nothing is followed from one cylinder to the next.
+#[test]
+fn what_the_order_forbids_is_not_searched() {
+    let at = DVec2::new(0.1, -0.2);
+    let mut plan = scene(&[]);
+    plan.cylinders = vec![cylinder(1.0, 0.3, 0.25), cylinder(-0.9, 0.6, 0.35)];
+    let steps = |max_order: u16| {
+        let settings = Settings { max_path_m: 6.0, max_order: Some(max_order), ..LOSSLESS };
+        let paths = Paths::new(&plan, settings);
+        let search = Paths { plan: paths.plan.for_search(paths.bound), ..paths };
+        search.trace_all(at, at, None);
+        search.plan.effort.steps()
+    };
+    let [once, twice] = [1, 2].map(steps);
+    assert!(4 * once < twice, "{once} and {twice} steps");
+}

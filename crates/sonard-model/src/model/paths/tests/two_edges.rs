@@ -277,3 +277,27 @@ fn a_plate_is_crossed_from_end_to_end() {
     let single = Settings { double_diffraction: false, ..double() };
     assert!(bent_twice(Paths::new(&plan, single).enumerate(at).expect("few paths")).is_empty());
 }
+
+/// Edges some metres apart are found if the whole path is short enough: no factor of its length counts twice.
+#[test]
+fn a_longer_search_adds_no_shorter_path_by_two_edges() {
+    let plan = scene(&[[4.0, 0.3, 5.5, 1.8], [3.0, -4.0, 4.5, -5.5]]);
+    let found = |max_path_m: f64| {
+        let settings = Settings {
+            max_path_m,
+            floor: 1e-9,
+            edge_law: Some(EdgeLaw::Utd),
+            double_diffraction: true,
+            ..LOSSLESS
+        };
+        let mut echoes = Paths::new(&plan, settings).enumerate(DVec2::ZERO).expect("few paths");
+        echoes.retain(|echo| echo.length_m <= 14.0 && diffractors(&echo.path).len() == 2);
+        echoes.into_iter().map(|echo| echo.length_m).collect::<Vec<_>>()
+    };
+    // Out to one edge, on to the other, and back; the other way round it is as long.
+    let (one, other) = (DVec2::new(4.0, 0.3), DVec2::new(3.0, -4.0));
+    let length_m = one.length() + one.distance(other) + other.length();
+    let near = found(14.0);
+    assert_eq!(near.iter().filter(|found| (**found - length_m).abs() < 1e-9).count(), 2);
+    assert_eq!(near, found(100.0));
+}
