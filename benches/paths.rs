@@ -82,6 +82,11 @@ fn small_room() {
     });
     report("paths, listening 400 times to all of them", listen, None);
     println!("  {} echo paths, {:.1} sounds a ping", echoes.len(), heard as f64 / 400.0);
+    fans(&scene, &paths, &pose, range, exact);
+}
+
+/// The same scan by fans of rays.
+fn fans(scene: &Arc<Scene>, paths: &Simulator, pose: &Pose, range: Options, exact: Time) {
     // The fan knows neither pulses nor the face: it is held to what is left of the same paths.
     let faceless = Sensor { face: None, ..paths.sensor().clone() };
     let with = |options| {
@@ -95,19 +100,19 @@ fn small_room() {
     for ray_spacing_deg in [1.0, 0.1, 0.02] {
         let engine = FanOptions { ray_spacing_deg, ..FanOptions::default() }.into();
         let fan = with(Options { engine, ..range });
-        let time = time(|| drop(black_box(fan.predict(&pose, &FULL_SCAN).expect("few paths"))));
-        let off = readings_off(&fan, &ideal, &pose);
+        let time = time(|| drop(black_box(fan.predict(pose, &FULL_SCAN).expect("few paths"))));
+        let off = readings_off(&fan, &ideal, pose);
         report(
             &format!("fan at {ray_spacing_deg} degrees, {off} readings off by 1 mm"),
             time,
             Some(exact),
         );
     }
-    let truth = ideal.predict(&pose, &FULL_SCAN).expect("few paths");
+    let truth = ideal.predict(pose, &FULL_SCAN).expect("few paths");
     for spacing_deg in [1.0, 0.1] {
-        let fan = PrintedFan::new(&scene, &paths, spacing_deg);
-        let (off, echoes) = fan.readings_off(&pose, &truth);
-        let time = time(|| drop(black_box(fan.scan(&pose))));
+        let fan = PrintedFan::new(scene, paths, spacing_deg);
+        let (off, echoes) = fan.readings_off(pose, &truth);
+        let time = time(|| drop(black_box(fan.scan(pose))));
         let what = format!("as printed, at {spacing_deg} degrees, {off} of {echoes} echoes off");
         report(&what, time, Some(exact));
     }

@@ -82,36 +82,36 @@ enum Verb {
     /// Run the daemon: scan by plan, keep logs, serve the API
     #[command(long_about = run::ABOUT)]
     Run(Box<run::Args>),
-    /// Say what a running daemon is doing
+    /// Show what a running daemon is doing
     Status(status::Args),
     /// Show the records of a running daemon as they are made
     Watch(watch::Args),
-    /// Bring the logs of many daemons into one folder
+    /// Collect the logs of many daemons in one folder
     #[command(long_about = gather::ABOUT)]
     Gather(gather::Args),
-    /// Play a ranger on a pty, with sound from the model
+    /// Run a mock ranger on a pty, with echoes from the model
     #[command(long_about = mock::ABOUT)]
     Mock(mock::Args),
-    /// Be a ranger: drive module and stepper from this Raspberry Pi's own pins
+    /// Act as a ranger: drive module and stepper from this Raspberry Pi's own pins
     #[cfg(feature = "pi")]
     #[command(long_about = board::ABOUT)]
     Board(board::Args),
-    /// Find out what is wrong with a ranger: port, firmware, motor, echo
+    /// Diagnose a ranger: port, firmware, motor, echo
     #[command(long_about = doctor::ABOUT)]
     Doctor(doctor::Args),
     /// Predict a scan with the model alone
     #[command(long_about = simulate::ABOUT)]
     Simulate(simulate::Args),
-    /// List the propagation paths of echoes at a place
+    /// List the propagation paths of echoes at a position
     #[command(long_about = paths::ABOUT)]
     Paths(paths::Args),
     /// Show the echo trace of one firing, each peak with its path
     #[command(long_about = trace::ABOUT)]
     Trace(trace::Args),
-    /// Make a data set for learners: rooms, poses, sensors and air drawn at random, shard by shard
+    /// Make a data set for machine learning: rooms, poses, sensors and air drawn at random, shard by shard
     #[command(long_about = generate::ABOUT)]
     Generate(generate::Args),
-    /// Make a log of readings from elsewhere: tables, JSON, logs of CARMEN and Player
+    /// Convert readings from elsewhere to a log: tables, JSON, logs of CARMEN and Player
     #[command(long_about = import::ABOUT)]
     Import(Box<import::Args>),
     /// Write logs for other tools: recordings of ROS 2, tables
@@ -122,19 +122,19 @@ enum Verb {
     Predict(Box<predict::Args>),
     /// Compare a log's readings with the predictions beside them
     Compare(compare::Args),
-    /// Fit sensor, air, scene and poses to what was measured
+    /// Fit sensor, air, scene and poses to measurements
     #[command(long_about = calibrate::ABOUT)]
     Calibrate(Box<calibrate::Args>),
-    /// Find where sweeps were taken, without any guess
+    /// Find the poses of sweeps without an initial guess
     #[command(long_about = locate::ABOUT)]
     Locate(Box<locate::Args>),
-    /// Tell planes, corners and edges apart in scans
+    /// Classify planes, corners and edges in scans
     #[command(long_about = interpret::ABOUT)]
     Interpret(interpret::Args),
-    /// Make a map of line segments of the scans of logs
+    /// Make a map of line segments from the scans of logs
     #[command(long_about = lines::ABOUT)]
     Lines(lines::Args),
-    /// Make an occupancy grid of the scans of logs
+    /// Make an occupancy grid from the scans of logs
     #[command(long_about = map::ABOUT)]
     Map(map::Args),
     /// Let a simulated robot explore a scene and map it with lines
@@ -146,19 +146,19 @@ enum Verb {
     /// Check, repair or show a log
     #[command(subcommand)]
     Log(log::Verb),
-    /// Measure how well maps, interpretations and explorations do, as papers count it
+    /// Measure maps, interpretations and explorations with the metrics of the papers
     #[command(subcommand)]
     Benchmark(benchmark::Verb),
     /// Write manual pages and shell completions, for packages
     #[command(hide = true)]
     PackageFiles(package_files::Args),
-    /// Check, draw or make a scene file (of a map or drawing), list or print those that come with sonard
+    /// Check, draw or make a scene file (from a map or drawing), list or print the shipped ones
     #[command(subcommand)]
     Scene(scene::Verb),
-    /// List or print the sensors that come with sonard
+    /// List or print the shipped sensors
     #[command(subcommand)]
     Sensor(preset::SensorVerb),
-    /// List or print the arrays of rangers that come with sonard
+    /// List or print the shipped arrays of rangers
     #[command(subcommand)]
     Array(preset::ArrayVerb),
 }

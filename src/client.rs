@@ -30,9 +30,9 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// Longest refusal that is read, bytes.
 const MOST_REFUSAL_BYTES: usize = 64 * 1024;
 
-/// Where a daemon is.
+/// The address of a daemon.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
+pub enum Endpoint {
     /// At a unix socket.
     Socket(PathBuf),
     /// At a TCP address, `HOST:PORT`.
@@ -42,11 +42,11 @@ pub enum Place {
 /// Asks one daemon.
 #[derive(Clone)]
 pub struct Client {
-    place: Place,
+    place: Endpoint,
     token: Option<String>,
 }
 
-/// Why a daemon did not answer as asked.
+/// A request that a daemon did not answer as expected.
 #[derive(Debug, Error)]
 pub enum ClientError {
     /// Nobody is there.
@@ -109,7 +109,7 @@ impl Client {
     /// A client of the daemon there. Over TCP, orders need the daemon's token, and from another
     /// computer every question does.
     #[must_use]
-    pub const fn new(place: Place, token: Option<String>) -> Self {
+    pub const fn new(place: Endpoint, token: Option<String>) -> Self {
         Self { place, token }
     }
 
@@ -230,17 +230,17 @@ async fn within(mut body: Incoming, most_bytes: usize) -> Result<Vec<u8>, Client
 }
 
 async fn begin(
-    place: &Place,
+    place: &Endpoint,
     request: Builder,
     body: Bytes,
 ) -> Result<Response<Incoming>, ClientError> {
     match place {
-        Place::Socket(socket) => {
+        Endpoint::Socket(socket) => {
             let stream = UnixStream::connect(socket).await;
             let stream = stream.map_err(|source| no_daemon(&socket.display(), source))?;
             send(stream, "localhost", request, body).await
         }
-        Place::Address(address) => {
+        Endpoint::Address(address) => {
             let stream = TcpStream::connect(address).await;
             let stream = stream.map_err(|source| no_daemon(address, source))?;
             send(stream, address, request, body).await

@@ -1,7 +1,7 @@
 //! The daemon: one task a resource, an explicit state machine for the link, orders at any time.
 //!
 //! ```text
-//!  API, signals ──orders──> Desk ──┐                        ┌──> Journal (thread: log folder)
+//!  API, signals ──orders──> Control ──┐                        ┌──> Journal (thread: log folder)
 //!  emergency stop, thermometer ────┤   Operator (port,      ├──> Hub ──> subscribers
 //!                                  └─> Ranger) ──records──> ┤
 //!                      LinkMachine, Agenda: what to do      └──> Shared: status, latest scan
@@ -12,7 +12,8 @@
 
 mod agenda;
 mod air;
-mod desk;
+mod control;
+mod fan_out;
 mod fit;
 mod follower;
 mod forecast;
@@ -22,12 +23,11 @@ mod judged;
 mod machine;
 mod notify;
 mod operator;
-mod outlet;
-mod player;
 mod refusal;
 mod sensor;
 mod settings;
 mod shared;
+mod simulated_array;
 
 use std::sync::Arc;
 
@@ -40,7 +40,7 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 pub use agenda::{Agenda, Asked, Due};
-pub use desk::{Order, Request};
+pub use control::{Order, Request};
 pub(crate) use follower::{Audience, Follower};
 pub(crate) use hub::Shelf;
 pub use hub::{Attendance, Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
@@ -58,26 +58,26 @@ use crate::{
         ClockReport, ConfigurationReport, Health, InForce, LinkState, MqttReport, RosReport,
         ScanRequest, ScanTotals, Setup, SimulationReport, Started, Status, SubscriberReport,
     },
-    board::{Board, NoBoard},
+    host_gpio::{HostGpio, NoGpio},
     scan::{Event, EventKind, Record, Session},
     scene::Scene,
 };
-use air::AirDesk;
-use desk::Desk;
+use air::AirControl;
+use control::Control;
+use fan_out::RecordFanOut;
 use operator::Operator;
-use outlet::Outlet;
-use player::Player;
 use shared::{Shared, Terms, View};
+use simulated_array::SimulatedArray;
 
 /// Orders that may wait while one is carried out.
 const ORDERS: usize = 64;
 
-/// What the daemon owns.
+/// Resources that the daemon owns.
 pub struct Resources {
     /// Opens the serial port.
     pub open_port: OpenPort,
     /// Pins of the computer.
-    pub board: Box<dyn Board>,
+    pub gpio: Box<dyn HostGpio>,
     /// The log.
     pub journal: Journal,
 }
@@ -102,41 +102,41 @@ pub struct Daemon {
 /// Who has the readings: a ranger on a port, or the model.
 enum Worker {
     Ranger(Box<Operator>),
-    Array(Box<Player>),
+    Array(Box<SimulatedArray>),
 }
 
 /// A daemon that owns `resources` and works by `settings`, and the handle to it. Must be called
 /// within a multi-threaded tokio runtime.
 #[must_use]
 pub fn prepare(resources: Resources, settings: Settings) -> (Daemon, Handle) {
-    let Resources { open_port, board, journal } = resources;
-    wire(board, journal, settings, |desk, outlet| {
-        Worker::Ranger(Box::new(Operator::new(desk, open_port, outlet)))
+    let Resources { open_port, gpio, journal } = resources;
+    wire(gpio, journal, settings, |control, out| {
+        Worker::Ranger(Box::new(Operator::new(control, open_port, out)))
     })
 }
 
 /// The same for the array that `settings` name, played by the model: no port and no pin is opened.
 #[must_use]
 pub fn prepare_simulated(journal: Journal, settings: Settings) -> (Daemon, Handle) {
-    wire(Box::new(NoBoard), journal, settings, |desk, outlet| {
-        Worker::Array(Box::new(Player::new(desk, outlet)))
+    wire(Box::new(NoGpio), journal, settings, |control, out| {
+        Worker::Array(Box::new(SimulatedArray::new(control, out)))
     })
 }
 
 fn wire(
-    board: Box<dyn Board>,
+    gpio: Box<dyn HostGpio>,
     journal: Journal,
     settings: Settings,
-    employ: impl FnOnce(Desk, Outlet) -> Worker,
+    employ: impl FnOnce(Control, RecordFanOut) -> Worker,
 ) -> (Daemon, Handle) {
     let (orders, requests) = mpsc::channel(ORDERS);
     let shutdown = CancellationToken::new();
     let hub = Hub::new(settings.keys.server.queue as usize);
     let shared = Arc::new(Shared::new(first_view(&settings), settings.keys.fleet.robot.clone()));
     let gate = (shutdown.clone(), Arc::clone(&shared));
-    let desk = Desk::new(settings, board, requests, gate, journal.clone());
-    let outlet = Outlet::new(journal.clone(), hub.clone(), Arc::clone(&shared));
-    let worker = employ(desk, outlet);
+    let control = Control::new(settings, gpio, requests, gate, journal.clone());
+    let out = RecordFanOut::new(journal.clone(), hub.clone(), Arc::clone(&shared));
+    let worker = employ(control, out);
     let handle = Handle { orders, shared: Arc::clone(&shared), hub: hub.clone(), journal };
     (Daemon { worker, shared, hub, shutdown }, handle)
 }
@@ -149,7 +149,7 @@ impl Daemon {
         let operator = tokio::spawn(async {
             match self.worker {
                 Worker::Ranger(operator) => operator.run().await,
-                Worker::Array(player) => player.run().await,
+                Worker::Array(array) => array.run().await,
             }
         });
         stop.await;
@@ -284,7 +284,7 @@ fn first_view(settings: &Settings) -> View {
         scene: settings.scene.clone(),
         setup: Arc::new(settings.setup()),
         array: settings.simulated.as_ref().map(|simulated| Arc::clone(&simulated.array)),
-        air: AirDesk::new(settings.keys.air.clone()),
+        air: AirControl::new(settings.keys.air.clone()),
     };
     View {
         state: LinkState::Opening,
@@ -304,7 +304,7 @@ fn first_view(settings: &Settings) -> View {
         now: terms.clone(),
         next: terms,
         configuration: ConfigurationReport::default(),
-        line: shared::Line::default(),
+        line: shared::LinkFigures::default(),
         scans: ScanTotals::default(),
         clock: ClockReport::default(),
         // From the first look on: nobody shall take a simulation for a ranger.

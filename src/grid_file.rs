@@ -21,7 +21,7 @@ pub struct GridFileError {
     pub fault: GridFileFault,
 }
 
-/// What is wrong with a file of a map.
+/// An error in a map file.
 #[derive(Debug, Error)]
 pub enum GridFileFault {
     /// The disk does not give it.

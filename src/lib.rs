@@ -2,11 +2,10 @@
 //!
 //! The data flow, in the order of the modules:
 //!
-//! a [`scene`] (walls and cylinders of some material) and the [`acoustics`] of air, transducer
-//! and receiver go into a [`model`], which predicts what the ranger reads at each azimuth of a
-//! [`scan`]; the same scan record holds measured readings, and [`compare`] sets the two side
-//! by side. [`plot`] draws all of it. An [`array`](mod@array) is several rangers at fixed bearings in
-//! place of one that turns.
+//! From a [`scene`] (walls and cylinders with materials) and the [`acoustics`] of air, transducer and receiver, a
+//! [`model`] predicts the reading at each azimuth of a [`scan`]; the same records hold measured readings, and
+//! [`compare`] compares the two. [`plot`] draws all of it. An [`array`](mod@array) has several rangers at fixed bearings
+//! instead of one that turns.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -24,11 +23,11 @@
 //! let sensor = Sensor::preset("senscomp-6500")?;
 //! let simulator = Simulator::new(scene, sensor, Air::default(), Options::default())?;
 //! let readings = simulator.predict(&pose, &ScanPlan::default())?;
-//! // At azimuth 270 the wall is 85 mm away; what is heard took the way near, far, near wall.
+//! // At azimuth 270 the wall is 85 mm away; the echo was reflected by the near, the far and again the near wall.
 //! let range_m = readings[300].range_m.ok_or("silent")?;
 //! let path = readings[300].arrival.as_ref().ok_or("silent")?;
 //! assert!((path.length_m - 1.654).abs() < 1e-6);
-//! // Reflectances and air have weakened it, so it passes the threshold a little late.
+//! // Weakened by reflectances and air, it crosses the threshold a little late.
 //! assert!((range_m - 0.828).abs() < 0.001);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -52,8 +51,6 @@ pub use sonard_records as scan;
 #[cfg(feature = "daemon")]
 pub mod api;
 #[cfg(feature = "daemon")]
-pub mod board;
-#[cfg(feature = "daemon")]
 pub mod cli;
 #[cfg(feature = "daemon")]
 pub mod client;
@@ -71,6 +68,8 @@ pub mod fleet;
 pub mod gather;
 #[cfg(feature = "store")]
 pub mod grid_file;
+#[cfg(feature = "daemon")]
+pub mod host_gpio;
 #[cfg(feature = "daemon")]
 pub mod interrupts;
 #[cfg(feature = "daemon")]

@@ -20,7 +20,7 @@ pub const BAUD: u32 = 115_200;
 
 const BY_ID: &str = "/dev/serial/by-id";
 
-/// Why a line can't be used.
+/// A serial line that can't be used.
 #[derive(Debug, Error)]
 pub enum LinkError {
     /// No path and no stable id of that name.

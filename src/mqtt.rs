@@ -24,7 +24,7 @@ use tokio_util::sync::CancellationToken;
 
 pub use account::{Account, AccountError};
 pub use topics::{Kind, Topics};
-pub use window::{MOST_UNDER_WAY, Message, Place, Read, Window};
+pub use window::{LogPosition, MOST_UNDER_WAY, Message, Read, Window};
 
 use crate::{api::MqttReport, config::MqttKeys, daemon::Handle, scan::EventKind};
 use courier::{Courier, Troubles};

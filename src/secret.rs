@@ -10,7 +10,7 @@ use std::{
 use rustix::fs::OFlags;
 use thiserror::Error;
 
-/// Why a secret can't be had from its file.
+/// A secret that can't be read from its file.
 #[derive(Debug, Error)]
 pub enum SecretError {
     /// It can't be read.
@@ -51,7 +51,7 @@ impl SecretError {
     }
 }
 
-/// What kind of secret a file is to hold.
+/// The kind of secret in a file.
 #[derive(Debug, Clone, Copy)]
 pub struct Secret {
     /// What errors call it.

@@ -12,10 +12,10 @@ mod connection;
 mod foxglove;
 mod listen;
 mod openapi;
-mod places;
 mod plain;
 mod rate;
 mod routes;
+mod slots;
 mod token;
 
 use std::{
@@ -49,9 +49,9 @@ use crate::{
     config::Keys, daemon::Handle, fleet::Asked, scan::Session, scene::Scene, store::History,
 };
 use answer::{Failed, Shelved};
-use foxglove::Stage;
-use places::Places;
+use foxglove::Viewers;
 use rate::Buckets;
+use slots::Slots;
 
 /// How long a request may take until its answer begins.
 const REQUEST_TIME: Duration = Duration::from_secs(10);
@@ -71,7 +71,7 @@ pub(crate) struct Api {
     access: Arc<Access>,
     history: Arc<Mutex<History>>,
     /// Where viewers come together, if there are any.
-    foxglove: Option<Arc<Stage>>,
+    foxglove: Option<Arc<Viewers>>,
     /// Said once that a viewer's page may not ask: browsers hide why from whom they refuse.
     has_told_origin: Arc<AtomicBool>,
     /// What is known of other robots, if they are asked.
@@ -86,7 +86,7 @@ pub(crate) struct Api {
     reading: Arc<Semaphore>,
     scene: Shelved<Scene>,
     session: Shelved<Session>,
-    places: Arc<Places>,
+    places: Arc<Slots>,
     buckets: Arc<Mutex<Buckets>>,
     epoch: Instant,
 }
@@ -95,8 +95,8 @@ pub(crate) struct Api {
 pub struct Server {
     router: Router,
     daemon: Handle,
-    foxglove: Option<Arc<Stage>>,
-    places: Arc<Places>,
+    foxglove: Option<Arc<Viewers>>,
+    places: Arc<Slots>,
     doorstep: Arc<Semaphore>,
     stall: Duration,
 }
@@ -114,9 +114,9 @@ impl Server {
     ) -> Self {
         let endpoints = routes::endpoints();
         let viewers = &keys.foxglove;
-        let foxglove = viewers.enabled.then(|| Stage::open(&daemon, viewers));
+        let foxglove = viewers.enabled.then(|| Viewers::open(&daemon, viewers));
         let keys = &keys.server;
-        let places = Arc::new(Places::new(keys.max_clients as usize));
+        let places = Arc::new(Slots::new(keys.max_clients as usize));
         let api = Api {
             daemon: daemon.clone(),
             history: Arc::new(Mutex::new(History::new(log_folder.clone()))),

@@ -1,12 +1,6 @@
 //! The chip, and what its pins are wired to.
 
-use std::{
-    collections::VecDeque,
-    ffi::{CString, c_char, c_void},
-    fmt,
-    path::Path,
-    ptr::NonNull,
-};
+use std::{collections::VecDeque, ffi::c_void, fmt, path::Path, ptr::NonNull};
 
 use board_config::Config;
 use firmware_protocol::conformance::DeviceUnderTest;
@@ -14,7 +8,9 @@ use firmware_protocol::conformance::DeviceUnderTest;
 use crate::rig::{
     HEARTBEAT, Rig, feed, heartbeat, keep_on, on_binh, on_blnk, on_init, on_sent, on_step,
 };
-use crate::{CYCLES_PER_US, Commanded, HZ, Module, MotorLimits, Surroundings, motor::Motor, sys};
+use crate::{
+    CYCLES_PER_US, Commanded, HZ, Module, MotorLimits, Surroundings, firmware, motor::Motor, sys,
+};
 
 const fn ioctl(name: [u8; 4]) -> u32 {
     u32::from_be_bytes(name)
@@ -106,18 +102,10 @@ impl Emulator {
         config: &Config,
         surroundings: Box<dyn Surroundings>,
     ) -> Result<Self, String> {
-        let path = CString::new(elf.as_os_str().as_encoded_bytes()).map_err(|e| e.to_string())?;
+        let mut firmware = firmware::read(elf)?;
         // SAFETY: simavr's own order of calls; every pointer is checked or its own, and the rig
         // outlives the chip, whose timers and notifications end with it.
         unsafe {
-            let mut firmware: sys::elf_firmware_t = std::mem::zeroed();
-            if sys::elf_read_firmware(path.as_ptr(), &raw mut firmware) != 0 {
-                return Err(format!("{} is no firmware", elf.display()));
-            }
-            for (slot, byte) in firmware.mmcu.iter_mut().zip(b"atmega328p\0") {
-                *slot = *byte as c_char;
-            }
-            firmware.frequency = HZ as u32;
             let avr = sys::avr_make_mcu_by_name(firmware.mmcu.as_ptr());
             let mut avr = NonNull::new(avr).ok_or("this simavr knows no ATmega328P")?;
             sys::avr_init(avr.as_ptr());

@@ -15,6 +15,7 @@
 #![cfg(feature = "simavr")]
 
 mod emulator;
+mod firmware;
 mod module;
 mod motor;
 mod rig;

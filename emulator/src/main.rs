@@ -35,7 +35,7 @@ struct Args {
     /// Scene file, or the name of a shipped scene
     #[arg(long, value_name = "SCENE")]
     scene: String,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: String,
     /// Make this symbolic link to the pty

@@ -51,7 +51,7 @@ const USUAL: [&str; 3] = ["pose", "air", "threshold"];
 /// poses : array_like, shape (scans, 3), optional
 ///     Where the ranger is believed to have stood: x and y (metres) and heading (degrees); the scans' own without it.
 /// widest_m : float
-///     How far off predicted ranges may be at first, metres, 0.005 to 1.
+///     Largest initial error of predicted ranges, metres, 0.005 to 1.
 ///
 /// Returns
 /// -------

@@ -34,7 +34,7 @@ use crate::{
 /// feature_prediction : bool
 ///     Whether readings that predicted walls contradict count less.
 /// extend_m : float
-///     How far walls are taken to go on beyond what was seen of them, metres.
+///     How far walls are extended beyond their observed part, metres.
 /// least_confidence : float
 ///     Readings of less confidence are left out; 0.5 is full confidence.
 ///

@@ -49,7 +49,7 @@ use crate::{
 /// edge_law : {"utd", "kuc-siegel", "bozma-kuc"}, optional
 ///     How edges diffract, in place of the sensor's law; with ``paths``.
 /// double_diffraction : bool
-///     Also follow sound that bends at two edges; with ``paths``.
+///     Also find paths diffracted at two edges; with ``paths``.
 /// ray_spacing_deg : float, optional
 ///     Angle between the rays, degrees, in place of 0.05; with ``fan``.
 /// aperture_deg : float, optional

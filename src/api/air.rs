@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::scan::AirSource;
 
-/// What a program says about the air; what it leaves out stays.
+/// A change of the air; omitted fields stay as they are.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AirOrder {

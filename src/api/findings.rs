@@ -8,7 +8,7 @@ use crate::{
     scan::PlanPoint,
 };
 
-/// What the readings of a scan say of the floor plan.
+/// Features, lines and map found in a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Findings {
     /// Occupancy grid; `null` where nothing was heard near enough to be mapped.

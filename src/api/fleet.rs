@@ -36,7 +36,7 @@ pub struct FleetRobot {
     pub report: Option<FleetReport>,
 }
 
-/// How a robot is, as far as whoever asks can tell.
+/// State of a robot, as seen by the one that asks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FleetState {
@@ -56,7 +56,7 @@ pub enum FleetState {
     OtherRobot,
 }
 
-/// What a robot said of itself.
+/// A robot's report of itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FleetReport {
     /// Version of its program.

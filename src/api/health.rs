@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use crate::compare::Explanation;
 
-/// Whether all is well, with the figures to judge by.
+/// Health of the daemon, with the underlying figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Health {
     /// Whether the device can be used, the log written, and the temperature is fresh.
@@ -26,7 +26,7 @@ pub struct Health {
     pub reading_lateness_s: Option<f64>,
 }
 
-/// How a scan agrees with the model's prediction, by its last reading of each beam.
+/// Agreement of a scan with the model's prediction, by its last reading of each beam.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanFit {
     /// The scan.

@@ -21,7 +21,7 @@ pub struct LinkReport {
     pub retry_in_s: Option<f64>,
 }
 
-/// What the link is doing or suffering.
+/// State of the link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LinkState {
@@ -46,7 +46,7 @@ pub enum LinkState {
     Down(Trouble),
 }
 
-/// Why the link can't be used.
+/// The reason why the link can't be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Trouble {

@@ -6,7 +6,7 @@ use uuid::Uuid;
 
 use crate::inverse::{Doubt, Mode};
 
-/// Where a scan was taken.
+/// The estimated pose of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Location {
     /// Which scan.

@@ -6,7 +6,7 @@ use uuid::Uuid;
 
 use crate::{config::Mode, geometry::Pose, scan::ScanPlan};
 
-/// How many scans to take.
+/// A request for scans.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ScanRequest {
@@ -32,7 +32,7 @@ pub struct Started {
     pub request: Uuid,
 }
 
-/// Which request.
+/// A request to cancel another one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CancelRequest {

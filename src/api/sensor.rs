@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::acoustics::{Gain, Sensor, SensorError};
 
-/// What a program says of the sensor; what it leaves out is as in the preset, or without one as in the next scan.
+/// A change of the sensor; an omitted field is as in the preset, or without one as in the next scan.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SensorOrder {

@@ -8,7 +8,7 @@ use crate::{
     config::{ModelKeys, MotionKeys},
 };
 
-/// What the configuration decides about every scan; of it requests change the sensor alone.
+/// Settings of every scan by the configuration, of which requests can change only the sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Setup {
     /// The sensor's data.

@@ -16,7 +16,7 @@ use crate::{
     scan::{Device, Provenance, ScanPlan, SceneRef},
 };
 
-/// What the daemon is doing.
+/// State of the daemon.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Status {
     /// The robot's name (`fleet.robot`).
@@ -65,7 +65,7 @@ pub struct Status {
     pub simulation: Option<SimulationReport>,
 }
 
-/// What counts from the next scan on, where that differs from what the one under way is taken by.
+/// Settings of the next scan that differ from those of the current one.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Pending {
     /// Other azimuths.
@@ -82,7 +82,7 @@ pub struct Pending {
     pub setup: Option<Setup>,
 }
 
-/// What is in force, and what is to be.
+/// Current and pending settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct InForce<T> {
     /// In force: for the daemon's own scan that is under way, else for the next.
@@ -110,7 +110,7 @@ pub struct ScanningReport {
     pub next_in_s: Option<f64>,
 }
 
-/// How far a scan is.
+/// Progress of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScanProgress {
     /// The scan.
@@ -132,7 +132,7 @@ pub struct SubscriberReport {
     pub cut_off: u64,
 }
 
-/// What became of the last change of the configuration.
+/// The outcome of the last change of the configuration.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct ConfigurationReport {
     /// Why it was refused, if it was; what was in force before is in force still.
@@ -141,7 +141,7 @@ pub struct ConfigurationReport {
     pub needs_restart: Vec<String>,
 }
 
-/// What the log is doing.
+/// State of the log.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct LogStatus {
     /// The log that is being written.

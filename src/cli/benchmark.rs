@@ -14,13 +14,13 @@ pub(super) enum Verb {
     /// Map simulated courses without and with Feature Prediction, and score the maps
     #[command(long_about = map::ABOUT)]
     Map(map::Args),
-    /// Set a map beside the ideal one
+    /// Compare a map with the ideal one
     #[command(long_about = score::ABOUT)]
     Score(score::Args),
-    /// Explore made-up rooms with sonar, laser, and laser just in time, and compare the maps
+    /// Explore random rooms with sonar, laser, and laser just in time, and compare the maps
     #[command(long_about = explore::ABOUT)]
     Explore(explore::Args),
-    /// Measure on made-up rooms how often the probabilities of `interpret` come true
+    /// Measure on random rooms how often the claims of `interpret` are true
     #[command(long_about = interpret::ABOUT)]
     Interpret(interpret::Args),
 }

@@ -20,7 +20,7 @@ pub(super) struct Args {
     /// Make this symbolic link to the pty
     #[arg(long, value_name = "PATH")]
     link: Option<OutPath>,
-    /// Motor steps a revolution, microsteps and gears counted in
+    /// Motor steps a revolution, including microsteps and gears
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u16).range(4..))]
     steps_per_revolution: u16,
     /// Serial number: up to ten characters
@@ -31,12 +31,12 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Be a ranger: drive module and stepper from this Raspberry Pi's own pins.
+Act as a ranger: drive module and stepper from this Raspberry Pi's own pins.
 
-The device's own protocol code runs here, and speaks on a pty as a board with the firmware does \
-on its serial port. Linux is between it and its pins: readings are some 5 to 50 us (1 to 9 mm) \
-long and scatter with the load of the computer, and a motor over some 1,000 steps/s does not run \
-smoothly. A board with a microcontroller times echoes to 0.5 us.";
+The device's own protocol code runs here and speaks on a pty as a board with the firmware does on its serial \
+port. Linux adds latency: readings are some 5 to 50 us (1 to 9 mm) too long and scatter with the load of the \
+computer, and a motor above some 1,000 steps/s does not run smoothly. A board with a microcontroller times \
+echoes to 0.5 us.";
 
 const EXAMPLES: &str = "\
 Example:

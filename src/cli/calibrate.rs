@@ -40,13 +40,13 @@ pub(super) struct Args {
     /// What to fit, separated by commas
     #[arg(long, value_name = "WHAT", value_delimiter = ',', default_value = "pose,air,threshold")]
     fit: Vec<Group>,
-    /// Standard deviation of what is believed beforehand about a parameter, in its unit; several are possible
+    /// Prior standard deviation of a parameter, in its unit; may be given several times
     #[arg(long, value_name = "NAME=SIGMA")]
     prior: Vec<PriorSigma>,
-    /// How far off predicted ranges may be at first, metres
+    /// Largest initial error of predicted ranges, metres
     #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = within(0.005..=1.0))]
     widest_m: f64,
-    /// Folder for what is written; the fitted sensor, scene, air and poses, the estimates and a report
+    /// Output folder; the fitted sensor, scene, air and poses, the estimates and a report
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
     #[command(flatten)]
@@ -59,15 +59,17 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Fit sensor, air, scene and poses to what was measured.
+Fit sensor, air, scene and poses to measurements.
 
-Starts from what the logs and files say, with the stated doubt about each parameter, and finds the values with which \
-the model explains the readings best: the ranges of echoes by any path that the receiver may have reported, silences, \
-and where arcs begin and end. Each value comes with its standard deviation, and with a word whether the readings say \
-more about it than was believed before: what they can't tell stays where it was. The share of readings that nothing \
-explains is part of the answer.
+Starting from the values in logs and files, with a prior uncertainty for each parameter, it finds the values \
+with which the model explains the readings best: the ranges of echoes by any path that the receiver may have \
+reported, missing echoes, and the ends of arcs. Each value comes with its standard deviation, and a remark if \
+the readings do not determine it better than the prior: such values stay where they were. The share of \
+unexplained readings is part of the result.
 
-With --out, what was found so far is kept in DIR/unfinished.jsonl until the results are there: whenever a calibration was stopped or killed, the same command goes on from there and comes to the same answer. Another one is refused there.";
+With --out, intermediate results are kept in DIR/unfinished.jsonl until the final ones are written: a stopped or \
+killed calibration continues when the same command is given again, and comes to the same result. Another \
+calibration is refused there.";
 
 const HELP: &str = "\
 What to fit (--fit), with the doubt that is assumed:
@@ -97,11 +99,10 @@ Exit codes: 0 done, 1 stopped on request, 2 wrong usage or input, 3 the disk gav
 
 pub(super) fn run(args: &Args) -> Outcome {
     let what_if = args.what_if.load()?;
-    if let Some(out) = &args.out {
-        unfinished::check(out, args.overwrite)?;
-        if !unfinished::has_results(out) {
-            report::check(out, args.overwrite)?;
-        }
+    if let Some(out) = &args.out
+        && !unfinished::check(out, args.overwrite)?
+    {
+        report::check(out, args.overwrite)?;
     }
     let (sweeps, world) = read(args, &what_if)?;
     let what = Fit::usual(wanted(args, &world, sweeps.len())?, args.widest_m);

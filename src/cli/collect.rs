@@ -2,7 +2,7 @@
 
 mod adopt;
 mod load;
-mod own;
+mod local_device;
 mod person;
 mod preview;
 mod report;
@@ -32,7 +32,7 @@ use crate::{
     config::document,
 };
 use load::{in_words, load};
-use own::Own;
+use local_device::LocalDevice;
 use person::Person;
 
 /// Options of `sonard collect`.
@@ -44,35 +44,34 @@ pub(super) struct Args {
     /// The plan, a TOML file: `sonard collect --example` prints one with every key explained
     #[arg(value_name = "PLAN.toml", required_unless_present_any = ["example", "verify", "report"])]
     plan: Option<PathBuf>,
-    /// Folder for what is written; in place of the one that the plan names
+    /// Output folder; in place of the one that the plan names
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
-    /// Set a key over the file; may be given several times
+    /// Override a key of the file; may be given several times
     #[arg(long, value_name = "SECTION.KEY=VALUE")]
     set: Vec<String>,
-    /// Print a file with every key explained, and end; a plan, with ranges and defaults
+    /// Print a file with every key explained, and exit; a plan, with ranges and defaults
     #[arg(long)]
     example: bool,
-    /// Check all that is named, and end
+    /// Check all that is named, and exit
     #[arg(long)]
     check: bool,
-    /// Say how long it takes, how it splits into acoustics, motor and link, and how much disk, and
-    /// end
+    /// Say how long it takes, how it splits into acoustics, motor and link, and how much disk, and exit
     #[arg(long)]
     plan_only: bool,
     /// JSON instead of text; one object, with --plan-only
     #[arg(long, requires = "plan_only")]
     json: bool,
-    /// Check files against their digests, and end; those of a collection's folder
+    /// Check files against their digests, and exit; those of a collection's folder
     #[arg(long, value_name = "DIR", conflicts_with = "plan")]
     verify: Option<PathBuf>,
-    /// Write a collection's report and manifest anew, and end
+    /// Write a collection's report and manifest anew, and exit
     #[arg(long, value_name = "DIR", conflicts_with = "plan")]
     report: Option<PathBuf>,
-    /// Go on although the plan, the scene or the ranger is not what it was when it began
+    /// Continue although plan, scene or ranger have changed since the start
     #[arg(long)]
     accept_changed_plan: bool,
-    /// Try those scans again that were given up
+    /// Retry the scans that were given up
     #[arg(long)]
     retry_given_up: bool,
     /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number
@@ -96,16 +95,16 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Take scans by a plan: poses, repeats, checks, retakes; over days if need be.
+Take scans by a plan, over days: poses, repeats, checks, a report.
 
-Each scan is a log of its own; it counts once it is whole and the plan's checks let it pass. What was \
-cut off or refused is kept beside and taken again. An interrupted collection (a signal, a crash, a \
-power cut, a ranger that is gone) goes on where it stopped when it is started again. In the end there \
-are a report with pictures and a manifest with checksums.
+Each scan is a log of its own; it counts once it is complete and passes the plan's checks. Interrupted or \
+refused scans are kept aside and repeated. An interrupted collection (signal, crash, power cut, lost ranger) \
+continues where it stopped when it is started again. At the end there is a report with pictures and a manifest \
+with checksums.
 
-With --daemon, a running `sonard run` takes the scans, and logs them too. What the plan says nothing \
-about (motion, sensor, air) is as the daemon has it; where it says otherwise it is refused with the \
-key to change. The daemon's own scans are held meanwhile, and go on in the end.";
+With --daemon, a running `sonard run` takes the scans, and logs them too. Motion, sensor and air that the plan \
+does not state are the daemon's; a plan that states others is refused with the key to change. The daemon's own \
+scans are paused meanwhile and resume at the end.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -117,7 +116,7 @@ Examples:
   sonard collect --verify collection
   sonard compare collection/scans/*.jsonl
 
-In the folder: scans/ (those that count), set-aside/ (cut off or refused), journal.jsonl, manifest.json,
+In the folder: scans/ (valid scans), set-aside/ (interrupted or refused), journal.jsonl, manifest.json,
 report.md with report/, inputs/ (plan, scene and sensor as used).
 
 Exit codes: 0 every scan is there, 1 stopped on request, given up, or --verify found something, 2 wrong
@@ -151,8 +150,8 @@ pub(super) fn run(args: &Args) -> Outcome {
         match daemon {
             Some(daemon) => collect(args, plan, daemon, interrupts).await,
             None => {
-                let own = Own::new(args, &plan, interrupts.clone());
-                collect(args, plan, own, interrupts).await
+                let device = LocalDevice::new(args, &plan, interrupts.clone());
+                collect(args, plan, device, interrupts).await
             }
         }
     })

@@ -51,15 +51,15 @@ pub(super) struct Args {
 
 const HELP: &str = "\
 Ranges agree when they differ by at most 1 % of the measured range or 10 mm, whichever is more. \
-Verdicts: direct (agree, one reflection), multiple (agree, two or more), edge (agree, bent at an \
-edge), min_range (closer than can be measured, on both sides or with ranges that agree), silent (on \
-both sides), unexplained (all else). They add up to the beams compared; beams whose reading was \
+Verdicts: direct (agree, one reflection), multiple (agree, two or more), edge (agree, diffracted at an \
+edge), min_range (closer than can be measured, in both or with ranges that agree), silent (no echo in \
+both), unexplained (all else). They add up to the beams compared; beams whose reading was \
 lost, whose step is in doubt or that have no prediction are counted under not_compared.
 
-What would explain the readings better is found to first order from the predictions in the log: another pose (of all \
+Changes that would explain the readings better are found to first order from the predictions in the log: another pose (of all \
 scans), heading, speed of sound, constant offset of all ranges, threshold, or a wall elsewhere (positive away from \
 the ranger), each by itself, with its gain in log-likelihood. Only changes with a gain of 10 and more are shown; \
-several of one size explain the same and can't be told apart so.
+several with the same gain explain the same readings and can't be told apart.
 
 Exit codes: 0 it ran, whatever the result, 2 a log can't be opened or \
 holds no record, or the scene is wrong.";

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Failure, Outcome};
 use crate::{
-    client::{Client, ClientError, Place, ScansError},
+    client::{Client, ClientError, Endpoint, ScansError},
     fleet::{Asked, Member, MemberError, check_all, read_members},
     scan::SceneRef,
     scene::Scene,
@@ -25,8 +25,7 @@ pub(super) struct DaemonArgs {
     /// TCP address of the daemon, HOST:PORT, instead of its socket
     #[arg(long, value_name = "ADDRESS")]
     address: Option<String>,
-    /// File with the daemon's token: over TCP it wants it for orders, from another computer for
-    /// everything
+    /// File with the daemon's token: needed over TCP for commands, from another computer for everything
     #[arg(long, value_name = "FILE", env = "SONARD_SERVER_TOKEN_FILE")]
     token_file: Option<PathBuf>,
 }
@@ -34,7 +33,7 @@ pub(super) struct DaemonArgs {
 impl DaemonArgs {
     pub(super) fn client(&self) -> Result<Client, Failure> {
         let Some(address) = &self.address else {
-            return Ok(Client::new(Place::Socket(self.socket.clone()), None));
+            return Ok(Client::new(Endpoint::Socket(self.socket.clone()), None));
         };
         let host = address.strip_prefix("http://").unwrap_or(address).trim_end_matches('/');
         if host.contains('/') {
@@ -45,7 +44,7 @@ impl DaemonArgs {
             ));
         }
         let token = self.token_file.as_deref().map(token).transpose()?;
-        Ok(Client::new(Place::Address(host.to_owned()), token))
+        Ok(Client::new(Endpoint::Address(host.to_owned()), token))
     }
 }
 
@@ -63,8 +62,7 @@ pub(super) struct DaemonsArgs {
     /// TCP address of the daemon, HOST:PORT, instead of its socket; of each, if given several times
     #[arg(long, value_name = "ADDRESS")]
     address: Vec<String>,
-    /// File with the daemon's token: over TCP it wants it for orders, from another computer for
-    /// everything
+    /// File with the daemon's token: needed over TCP for commands, from another computer for everything
     #[arg(long, value_name = "FILE", env = "SONARD_SERVER_TOKEN_FILE")]
     token_file: Option<PathBuf>,
     /// File that lists daemons, a [[daemon]] for each, or a configuration with [fleet]: all of them
@@ -114,7 +112,7 @@ impl DaemonsArgs {
 /// Daemons with the way to ask them: their tokens are read.
 pub(super) fn asked(members: Vec<Member>) -> Result<Vec<Asked>, Failure> {
     let asked = members.into_iter().map(|member| {
-        let by_tcp = matches!(member.place, Place::Address(_));
+        let by_tcp = matches!(member.place, Endpoint::Address(_));
         let file = member.token_file.as_deref().filter(|_| by_tcp);
         let client = Client::new(member.place.clone(), file.map(token).transpose()?);
         Ok(Asked { member, client })

@@ -29,12 +29,12 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Find out what is wrong with a ranger: port, firmware, motor, echo.
+Diagnose a ranger: port, firmware, motor, echo.
 
-With --port, opens that port, asks the board who it is, measures the line, turns the motor a few \
-steps there and back, fires some times, and sets the board's clock beside this computer's. Each check says what it found and, where something \
-is wrong, what to do. Without --port it lists the serial ports by their stable names and opens \
-none of them: another device might take offence.";
+With --port it opens that port, identifies the board, measures the line, turns the motor a few steps back and \
+forth, fires some times, and compares the board's clock with this computer's. Each check reports what it found \
+and, if something is wrong, what to do. Without --port it lists the serial ports by their stable names and opens \
+none of them, because other devices may react to it.";
 
 const EXAMPLES: &str = "\
 Examples:

@@ -38,15 +38,15 @@ use crate::{
 pub(super) struct Args {
     #[command(flatten)]
     place: PlaceArgs,
-    /// What the map is made with
+    /// Sensors that the map is made with
     #[arg(long, value_enum, default_value_t = SensingName::JustInTime)]
     sensing: SensingName,
     #[command(flatten)]
     robot: RobotArgs,
-    /// Seed of what is random; noise of ranges, laser and odometry
+    /// Random seed; noise of ranges, laser and odometry
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder for what is written; the map, what the laser saw, the stops and pictures
+    /// Output folder; the map, what the laser saw, the stops and pictures
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
     /// JSON instead of text; one object
@@ -64,10 +64,10 @@ pub(super) struct Args {
 #[derive(Debug, Clone, Copy, clap::Args)]
 #[command(next_help_heading = "Robot")]
 pub(super) struct RobotArgs {
-    /// How its sonars are arranged
+    /// Arrangement of its sonars
     #[arg(long, value_enum, default_value_t = RangerName::Ring)]
     ranger: RangerName,
-    /// Standard deviation of each drive's way and turn, as a share of them
+    /// Standard deviation of each drive's distance and turn, as a share of them
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     odometry_noise: f64,
     /// Distance from the object that is followed, metres
@@ -76,7 +76,7 @@ pub(super) struct RobotArgs {
     /// Leave out sonar readings beyond this "logical" distance, metres
     #[arg(long, value_name = "M", default_value_t = ExploreSettings::default().map.logical_m)]
     logical: f64,
-    /// How far the sonars listen, metres
+    /// Maximum range of the sonars, metres
     #[arg(long, value_name = "M", default_value_t = 8.0)]
     pub(super) sonar_range: f64,
     /// Give up after so many stops
@@ -106,11 +106,11 @@ enum RangerName {
 pub(super) const ABOUT: &str = "\
 Let a simulated robot explore a scene and map it with lines.
 
-After G. Dudek, P. Freedman and I. Rekleitis, \"Just-in-time sensing\" (ICRA 1996): the robot follows \
-the nearest object at about a metre and goes on to the next in the order of their discovery. Sonar, \
-heard by the model, finds walls; where it is ambiguous, at corners and borders, a laser with 25 \
-degrees of view is aimed at the end of the line and confirms it. The robot knows nothing but what it \
-sensed, and what it can't pass stops it.";
+After G. Dudek, P. Freedman and I. Rekleitis, \"Just-in-time sensing\" (ICRA 1996): the robot follows the \
+nearest object at about a metre and goes on to the next in the order of their discovery. Sonar, simulated by the \
+model, finds walls; where it is ambiguous, at corners and ends of walls, a laser with a field of view of 25 \
+degrees is aimed at the end of the line and confirms it. The robot knows only what it sensed, and obstacles stop \
+it.";
 
 const HELP: &str = "\
 Examples:

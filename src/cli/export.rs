@@ -44,11 +44,10 @@ pub(super) struct Args {
 #[derive(Debug, Clone, PartialEq, clap::Args)]
 #[command(next_help_heading = "Recordings (mcap)")]
 struct RecordingArgs {
-    /// What a Range says of silence and of what is too near
+    /// How a Range encodes no echo and too-near readings
     #[arg(long, value_enum, value_name = "PROFILE")]
     profile: Option<ProfileName>,
-    /// Full angle that a Range is said to be valid for, degrees [default: where the beam is 6 dB down, there and
-    /// back]
+    /// Full angle that a Range is said to be valid for, degrees [default: the two-way 6 dB width of the beam]
     #[arg(long, value_name = "DEG", value_parser = angle)]
     field_of_view_deg: Option<f64>,
     /// Frame of the transducer, which the others are named after [default: sonar]
@@ -73,15 +72,15 @@ enum FormatName {
 enum ProfileName {
     /// Infinite ranges, as REP 117 says
     Rep117,
-    /// The greatest range for silence and the least for what is too near, as nav2's range layer asks for
+    /// max_range for no echo and min_range for too near, as nav2's range layer requires
     Nav2,
 }
 
 pub(super) const ABOUT: &str = "\
 Write logs for other tools: recordings of ROS 2 (MCAP), tables (Parquet, CSV).
 
-All logs go into one output, scan by scan in their order. Of a folder the logs in it are taken, of a \
-collection's those in its folder `scans`, of gathered ones those of each robot, in the order of their names.";
+All logs go into one output, scan by scan in their order. A folder stands for its logs in the order of their \
+names: of a collection those in `scans`, of gathered logs those of each robot.";
 
 const HELP: &str = "\
 Examples:
@@ -91,12 +90,12 @@ Examples:
   sonard simulate --scene corridor --pose beside-wall | sonard export - --to csv | head -n 3
 
 A recording has /sonar/range (of arrays /sonar/RANGER/range), /sonar/scan, /sonar/points, /sonar/paths, /tf, \
-/tf_static, and below /sonar/predicted what the model says; stamps are those of the firing. A sonar is no laser: see \
+/tf_static, and below /sonar/predicted what the model says; stamps are those of the firing. A sonar is not a laser: see \
 docs/export.md before a map is made of its scans.
 
-In tables a column has the name that the field has in the log, with the unit in it; those that begin with sim_ are \
-the prediction's. What the log does not say is empty: no range is no number. In Parquet columns have types, and the \
-records of the sessions stand in the file's metadata; for many readings that is the smaller and faster one.
+Columns of tables have the names of the fields in the log, with their units; those that begin with sim_ are predictions. \
+Cells without a value in the log are empty. Parquet has typed columns, and the sessions' records in the file's metadata; \
+it is smaller and faster for many readings.
 
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 

@@ -9,7 +9,7 @@ use crate::{collect::Halt, scan::SinkError};
 /// What a verb returns.
 pub type Outcome = Result<(), Failure>;
 
-/// Why a verb did not simply succeed.
+/// The reason why a verb did not succeed.
 #[derive(Debug)]
 pub enum Failure {
     /// It ran and found what it was asked to look for (exit code 1). The finding is already

@@ -14,7 +14,7 @@ use super::{
     picture,
 };
 use crate::{
-    export::{self, ExportError, Place},
+    export::{self, ExportError, Findings},
     interpret::{Feature, grid::Grid, lines::MapLine},
     plot::{MAX_WIDTH_PX, Picture},
     scan::{Provenance, ScanView},
@@ -24,7 +24,7 @@ use crate::{
 #[derive(Debug, clap::Args)]
 pub(super) struct FindingsArgs {
     /// File to write; by its name a picture (.svg, .png), GeoJSON in local metres (.geojson) or a recording
-    /// of ROS 2 with markers (.mcap), or - for SVG to standard output; several are possible
+    /// of ROS 2 with markers (.mcap), or - for SVG to standard output; may be given several times
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Vec<OutPath>,
     /// Width of a PNG, pixels
@@ -81,7 +81,7 @@ impl Targets<'_> {
     /// Writes all; the picture is drawn if there is one among them.
     pub(super) fn write(
         &self,
-        place: &Place<'_>,
+        place: &Findings<'_>,
         picture: impl FnOnce() -> Result<Picture, Failure>,
     ) -> Outcome {
         let has_picture = self.all.iter().any(|target| matches!(target, Target::Picture(_)));
@@ -106,14 +106,14 @@ pub(super) fn write(
     path: &Path,
     product: Product,
     overwrite: Overwrite,
-    place: &Place<'_>,
+    place: &Findings<'_>,
 ) -> Outcome {
     let mut stream = overwrite.begin(path, product)?;
     let written = match product {
         Product::GeoJson => {
             stream.write_all(export::to_geojson(place).as_bytes()).map_err(ExportError::from)
         }
-        _ => export::write_place(&mut stream, place),
+        _ => export::write_findings(&mut stream, place),
     };
     let finished = written.and_then(|()| Ok(stream.finish()?));
     finished.or_else(|error| match error {
@@ -148,9 +148,9 @@ impl Seen {
         grid: Option<&'a Grid>,
         lines: &'a [MapLine],
         features: &'a [Feature],
-    ) -> Place<'a> {
+    ) -> Findings<'a> {
         let Self { time, provenance, scene } = self;
-        Place {
+        Findings {
             time: *time,
             provenance: *provenance,
             scene: scene.as_deref(),

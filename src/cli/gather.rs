@@ -38,7 +38,7 @@ const SHOWN: u64 = 5;
 pub(super) struct Args {
     #[command(flatten)]
     daemon: DaemonsArgs,
-    /// Folder for what is written; made if it is not there
+    /// Output folder; made if it is not there
     #[arg(long, value_name = "DIR", required = true)]
     out: OutPath,
     /// Leave out logs that ended before: a time (2026-03-01T08:00Z), a day (UTC), or how long ago (36h)
@@ -53,15 +53,15 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Bring the logs of many daemons into one folder, which `sonard export` takes as one data set.
+Collect the logs of many daemons in one folder, which `sonard export` takes as one data set.
 
-Each robot has a folder DIR/ROBOT with its logs, record by record as its daemon has them, and gathered.json, which \
-says how far they are. Run again, it takes what is new; killed at any moment, it goes on where it stood: nothing is \
-doubled, and nothing that was logged is left out. Daemons are asked side by side; one that is away delays no other.
+Each robot has a folder DIR/ROBOT with its logs, record by record as on its daemon, and gathered.json, which \
+records how far each was copied. Run again, it copies what is new; killed at any moment, it continues where it \
+stopped, without duplicates or gaps. Daemons are queried in parallel; an unreachable one delays no other.
 
-What can't be true (no record, longer than one may be, of a scan that is not under way) is left out and named by \
-robot, log and scan. Robots are told apart by their names (fleet.robot): two of one name, another than the one that \
-was named or answered there before, and logs that are not those that were taken before are refused and never mixed.";
+Invalid records (no record, too long, or of a scan that is not in progress) are left out and reported with \
+robot, log and scan. Robots are identified by name (fleet.robot): two with the same name, another one than was \
+named or answered there before, and logs that differ from those copied before are refused and never mixed.";
 
 const HELP: &str = "\
 Examples:

@@ -28,42 +28,42 @@ pub(super) struct Args {
     /// The specification, a TOML file, or spec.json of a data set
     #[arg(value_name = "SPEC.toml", required_unless_present_any = ["example", "verify"])]
     spec: Option<PathBuf>,
-    /// Folder for what is written; the data set, a folder for each shard in it
+    /// Output folder; the data set, a folder for each shard in it
     #[arg(long, value_name = "DIR", required_unless_present = "instead")]
     out: Option<OutPath>,
     /// The part of the set that this process makes: every N-th shard from the I-th on, I from 1
     /// [default: as an array job's environment says, else all]
     #[arg(long, value_name = "I/N", conflicts_with = "instead")]
     shard: Option<Part>,
-    /// Print a file with every key explained, and end; a specification
+    /// Print a file with every key explained, and exit; a specification
     #[arg(long)]
     example: bool,
-    /// Check all that is named, and end
+    /// Check all that is named, and exit
     #[arg(long)]
     check: bool,
-    /// Check files against their digests, and end; those of a data set's folder
+    /// Check files against their digests, and exit; those of a data set's folder
     #[arg(long, value_name = "DIR", conflicts_with = "spec")]
     verify: Option<PathBuf>,
-    /// Also draw so many shards anew and hold them against those that are there
+    /// Also recompute so many shards and compare them with the existing ones
     #[arg(long, value_name = "SHARDS", requires = "verify", default_value_t = 0)]
     again: u32,
 }
 
 pub(super) const ABOUT: &str = "\
-Make a data set for learners: rooms, poses, sensors and air drawn at random, shard by shard.
+Make a data set for machine learning: rooms, poses, sensors and air drawn at random, shard by shard.
 
-A specification says how large the set is, what scenes, furniture, materials, poses, sensors, air and noise are drawn \
-from, and what is kept: readings, their paths, every echo, traces, ideal ranges, features as labels, maps as they \
-should be. What does not fit is drawn again, and counted.
+A specification states the size of the set, the distributions of scenes, furniture, materials, poses, sensors, \
+air and noise, and what is kept: readings, their paths, every echo, traces, ideal ranges, features as labels, \
+true maps. What does not fit is redrawn and counted.
 
-A shard is a function of the specification and its number alone, so any engine can make a set: each process makes its \
-part (--shard I/N), in whatever order. Shards that are there are left out, so a set that was interrupted goes on \
-when the command is given again; one that was killed leaves nothing that looks whole. Who finds all shards there \
-writes manifest.json (counts, digests) and README.md (what the set is, what its columns mean).
+A shard depends on the specification and its number only, so any engine can make a set: each process makes its \
+part (--shard I/N), in any order. Existing shards are skipped, so an interrupted set continues when the command \
+is repeated; a killed process leaves nothing that looks complete. The process that completes the set writes \
+manifest.json (counts, digests) and README.md (description of the set and its columns).
 
-Without --shard the index of an array job is taken from its environment: SLURM_ARRAY_TASK_ID with its count, \
-JOB_COMPLETION_INDEX (Kubernetes) and AWS_BATCH_JOB_ARRAY_INDEX of as many as the set has shards. Which was taken is \
-said. --shard goes before them; --shard 1/1 makes all.";
+Without --shard the index of an array job is taken from its environment: SLURM_ARRAY_TASK_ID with its count, or \
+JOB_COMPLETION_INDEX (Kubernetes) or AWS_BATCH_JOB_ARRAY_INDEX out of the number of shards. The command reports \
+which it used. --shard takes precedence; --shard 1/1 makes all.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -75,7 +75,7 @@ Examples:
   sbatch --array=1-20 --wrap 'sonard generate rooms.toml --out /shared/rooms'
   sonard generate --verify rooms --again 2      # digests, and two shards drawn anew
 
-Threads are as many as there are cores, or as RAYON_NUM_THREADS says. docs/generate.md says how to read a set.
+It uses all cores, or RAYON_NUM_THREADS threads. docs/generate.md explains how to read a set.
 
 Exit codes: 0 done (also: was there), 1 --verify found a fault, 2 wrong usage, specification or folder, 3 the disk gave \
 up: the same command goes on.";

@@ -42,7 +42,7 @@ pub(super) struct Args {
     overwrite: Overwrite,
     #[command(flatten)]
     columns: ColumnArgs,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene; as far as
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene; as far as
     /// the file does not say
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
@@ -50,11 +50,11 @@ pub(super) struct Args {
     /// goes into the log
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// Array of rangers, a preset (pioneer-8, pioneer-7, ring-12) or a file with an array's data; of a
+    /// Array of rangers, a preset (`sonard array list`) or a file with an array's data; of a
     /// CARMEN or Player log that does not say where its rangers are
     #[arg(long, value_name = "NAME|FILE")]
     array: Option<String>,
-    /// Take the numbers for what they are said to be, whatever speaks against it
+    /// Accept the numbers as declared, even if they look wrong
     #[arg(long)]
     as_said: bool,
     #[command(flatten)]
@@ -67,18 +67,18 @@ pub(super) struct Args {
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Columns")]
 struct ColumnArgs {
-    /// Which column has what: FIELD=COLUMN,... with the number of the column, from 1, or its name; of JSON,
+    /// Meaning of the columns: FIELD=COLUMN,... with the number of the column, from 1, or its name; of JSON,
     /// the name of the member [default: as the header says]
     #[arg(long, value_name = "FIELD=COLUMN,...")]
     columns: Option<String>,
-    /// How the file is written [default: as it looks]
+    /// Format of the file [default: guessed from its content]
     #[arg(long, value_enum)]
     format: Option<FormatName>,
     /// File (TOML) with all of this: the keys format, columns, topics, clockwise, zero_deg, none, none_from and
-    /// sound_speed_m_s; options go over it
+    /// sound_speed_m_s; options override it
     #[arg(long, value_name = "FILE")]
     mapping: Option<PathBuf>,
-    /// Topic of a recording to read; several are possible [default: all Range but predictions, else LaserScan]
+    /// Topic of a recording to read; may be given several times [default: all Range but predictions, else LaserScan]
     #[arg(long, value_name = "TOPIC")]
     topic: Vec<String>,
     /// Azimuths and bearings count clockwise
@@ -87,10 +87,10 @@ struct ColumnArgs {
     /// Where azimuth zero points, degrees counter-clockwise from the heading (bearing zero: from the x axis)
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     zero_deg: Option<f64>,
-    /// A range, in the file's unit, that means that nothing was heard; several are possible
+    /// A range, in the file's unit, that means no echo; may be given several times
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     none: Vec<f64>,
-    /// A range, in the file's unit, from which on nothing was heard
+    /// A range, in the file's unit, at and beyond which there is no echo
     #[arg(long, value_name = "VALUE")]
     none_from: Option<f64>,
     /// Speed of sound that the file's ranges were computed with, metres a second: they are computed again
@@ -114,18 +114,19 @@ enum FormatName {
 }
 
 pub(super) const ABOUT: &str = "\
-Make a log of readings from elsewhere: tables, JSON, logs of CARMEN and Player, recordings of ROS 2.
+Convert readings from elsewhere to a log: tables, JSON, logs of CARMEN and Player, recordings of ROS 2.
 
-The log is like any other, with provenance `imported`; its session says from which file, and what its \
-columns were taken to mean. Without --columns the header is asked, and what it was understood to say is \
-shown. Numbers that can't be what they are said to be (radians for degrees, centimetres for metres, a value \
-that stands for silence) are refused. A file makes the same log whenever it is imported.
+The log is like any other, with provenance `imported`; its session states the source file and the meaning of its \
+columns. Without --columns the meaning is taken from the header and shown. Numbers that contradict their stated \
+unit (radians for degrees, centimetres for metres, a constant that stands for no echo) are refused. A file \
+always makes the same log.
 
-Scans are told apart by the field `scan`, else by where the robot stood, else by full turns.
+Scans are separated by the field `scan`, or else by the robot's position, or else by full turns.
 
-Of a recording (MCAP, or a file or folder of rosbag2 in MCAP or SQLite) all sensor_msgs/Range are read, else LaserScan; /tf and \
-/tf_static say where the ranger was at each reading, and have to. One that turns on the robot makes scans, those that do \
-not are an array. Ranges at or below min_range are too near, from max_range on silent, NaN no readings.";
+Of a recording (MCAP, or a file or folder of rosbag2 in MCAP or SQLite) all sensor_msgs/Range are read, or else LaserScan; \
+/tf and /tf_static must give the pose of the ranger at each reading. A ranger that turns on the robot makes \
+scans; fixed rangers are an array. Ranges at or below min_range are too near, those at or above max_range no \
+echo, NaN is no reading.";
 
 const HELP: &str = "\
 Fields: azimuth_deg|rad|grad (from the heading) or bearing_deg|rad|grad (in the world); range_m|cm|mm|in|ft or \

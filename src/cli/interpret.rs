@@ -54,22 +54,22 @@ pub(super) struct Args {
     /// Standard deviation of the heading from scan to scan, degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, value_parser = not_negative)]
     heading_sigma_deg: f64,
-    /// Name nothing that is less probable than this
+    /// Report nothing less probable than this
     #[arg(long, value_name = "P", default_value_t = Settings::default().min_confidence, value_parser = probability)]
     min_confidence: f64,
 }
 
 pub(super) const ABOUT: &str = "\
-Tell planes, corners and edges apart in scans.
+Classify planes, corners and edges in scans.
 
-After O. Bozma and R. Kuc (IEEE PAMI 13, 1991): beams that read one range make an arc. An arc \
-narrower than b(r), half way between what the sensor gives edges and what it gives planes and \
-corners, is an edge. A plane is seen in the same direction from a second place, a corner is not. \
-Beyond the paper, an arc may be something else: sound by way of several walls, between a wall and \
-the ranger, from a round body; it has a probability too, the greater the more nearer arcs the arc lies \
-behind. `sonard benchmark interpret` measures how often probabilities come true. Repeats from one \
-pose count as one scan. With one scan, planes and corners stay `unresolved`, with the place to scan from next that decides \
-most of them; give the log of that scan too, and they are decided.";
+After O. Bozma and R. Kuc (IEEE PAMI 13, 1991): beams with the same range form an arc. An arc narrower than \
+b(r), half way between what the sensor gives edges and what it gives planes and corners, is an edge. A plane is \
+seen in the same direction from a second position, a corner is not. Beyond the paper, an arc may have another \
+cause: reflections by several walls, multiple echoes between a wall and the ranger, a round body. That has a \
+probability too, which grows with the number of nearer arcs in front of it. `sonard benchmark interpret` \
+measures how often the claims are true. Repeats from one pose count as one scan. With one scan, planes and \
+corners stay `unresolved`, with the position for the next scan that decides most of them; give the log of that \
+scan too, and they are decided.";
 
 const HELP: &str = "\
 Examples:

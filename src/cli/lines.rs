@@ -28,7 +28,7 @@ pub(super) struct Args {
     /// Logs whose scans have poses, or folders of such; - for standard input
     #[arg(required_unless_present = "laser", value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// What a laser saw in the same place, after the sonar's scans: one JSON object a line; - for
+    /// Laser scans of the same place, used after the sonar's: one JSON object a line; - for
     /// standard input
     #[arg(long, value_name = "FILE")]
     laser: Vec<PathBuf>,
@@ -47,12 +47,11 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Make a map of line segments of the scans of logs.
+Make a map of line segments from the scans of logs.
 
-After G. Dudek, P. Freedman and I. Rekleitis (ICRA 1996): readings that can't be right are left \
-out (too far, or against what was seen from close by), the rest are grouped by the \
-sphere-of-influence graph, segments are fitted to each group by split and merge, and segments of \
-one wall are merged.";
+After G. Dudek, P. Freedman and I. Rekleitis (ICRA 1996): readings that can't be right are left out (too far, or \
+contradicted by nearer observations), the rest are grouped by the sphere-of-influence graph, segments are fitted \
+to each group by split and merge, and segments of one wall are merged.";
 
 const HELP: &str = "\
 Examples:
@@ -61,9 +60,9 @@ Examples:
   sonard lines run/*.jsonl -o lines.geojson -o lines.mcap
   sonard lines run/*.jsonl --laser laser.jsonl -o lines.png
 
-A line of a laser's file is what it saw from one place, counter-clockwise, null where nothing came \
-back: {\"pose\":{\"x_m\":1,\"y_m\":0.5,\"heading_deg\":90},\"returns\":[{\"azimuth_deg\":-12.5,\"range_m\":1.21}, ...]}
-Lines it saw are `laser`, and `complex` where sonar lines were laid onto them; ends that it saw are \
+A line of a laser's file is a scan from one place, counter-clockwise, null where nothing \
+returned: {\"pose\":{\"x_m\":1,\"y_m\":0.5,\"heading_deg\":90},\"returns\":[{\"azimuth_deg\":-12.5,\"range_m\":1.21}, ...]}
+Lines that it saw are `laser`, or `complex` if merged with sonar lines; ends that it saw are \
 terminal.
 
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";

@@ -21,7 +21,7 @@ use crate::inverse::{Atlas, Course, Doubt, Mode, Odometry, World, doubts, locate
 pub(super) struct Args {
     #[command(flatten)]
     sweeps: SweepArgs,
-    /// Distance of the places that are tried first, metres [default: 0.05 in small scenes to 0.1]
+    /// Spacing of the positions that are tried first, metres [default: 0.05 in small scenes to 0.1]
     #[arg(long, value_name = "M", value_parser = within(0.01..=2.0))]
     spacing_m: Option<f64>,
     /// JSON instead of text; one object a pose, most probable first
@@ -37,14 +37,14 @@ pub(super) struct Args {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Course")]
 struct CourseArgs {
-    /// The scans follow each other, and the poses in the log are odometry's, in any frame
+    /// The scans are consecutive, and the poses in the log are odometry, in any frame
     #[arg(long)]
     course: bool,
-    /// What odometry is off by for each metre driven (standard deviation), metres
+    /// Standard deviation of odometry's position for each metre driven, metres
     #[arg(long, value_name = "M", requires = "course", default_value_t = 0.05,
           value_parser = within(0.0..=1.0))]
     drift_m_per_m: f64,
-    /// What its heading is off by for each metre driven (standard deviation), degrees
+    /// Standard deviation of odometry's heading for each metre driven, degrees
     #[arg(long, value_name = "DEG", requires = "course", default_value_t = 5.0,
           value_parser = within(0.0..=180.0))]
     drift_deg_per_m: f64,
@@ -63,20 +63,21 @@ impl CourseArgs {
 }
 
 pub(super) const ABOUT: &str = "\
-Find where sweeps were taken, without any guess.
+Find the poses of sweeps without an initial guess.
 
-Each scan's readings alone say where in the scene the ranger stood and where it looked: every pose that explains them \
-is listed with its probability, because rooms with a symmetry have several. First the model predicts what would be \
-read on a grid of places all over the scene; the best matches are then improved until all readings - echoes by any \
-path, silences, the ends of arcs - are as likely as they can be. The pose in the log is not used, or as odometry alone.
+The readings of a scan alone determine where in the scene the ranger was: every pose that explains them is \
+listed with its probability, because symmetric rooms have several. The model first predicts readings on a grid \
+of positions all over the scene; the best matches are then refined until all readings (echoes by any path, \
+missing echoes, ends of arcs) are as likely as possible. The pose in the log is ignored, or used as odometry \
+only.
 
-With --course what the scans before say counts too: from each pose that explained the last one odometry leads to one \
-where this one should have been taken, and the poses that agree with it gain. So rooms that look alike are told \
-apart once the robot was where they do not, and one that was carried elsewhere is found again. Each scan is answered \
-as soon as it is read: a log may come through a pipe while it is taken.
+With --course earlier scans count too: odometry leads from each pose of the last scan to an expected pose of \
+this one, and poses that agree gain probability. So rooms that look alike are told apart once the robot has been \
+where they differ, and a robot that was carried elsewhere is found again. Each scan is answered as soon as it is \
+read: a log may come through a pipe while it is taken.
 
-A scan that nothing in the scene explains gets its best pose all the same, with the share of readings that it explains \
-and, where the readings can tell, what may be wrong with them: azimuths counted clockwise, another unit.";
+A scan that nothing in the scene explains still gets its best pose, with the share of readings that it explains \
+and, if the readings show it, what may be wrong with them: azimuths counted clockwise, or another unit.";
 
 const HELP: &str = "\
 Examples:

@@ -35,10 +35,10 @@ pub(super) struct Args {
     /// Logs whose scans have poses, or folders of such; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// Folder for what is written; map.pgm, map.yaml, map.mcap and map.png
+    /// Output folder; map.pgm, map.yaml, map.mcap and map.png
     #[arg(long, value_name = "DIR")]
     out: OutPath,
-    /// Whether readings that predicted features contradict count less
+    /// Whether readings that contradict predicted features count less
     #[arg(long, value_enum, value_name = "ON|OFF", default_value_t = Switch::On)]
     feature_prediction: Switch,
     /// What a reading says about the space before the ranger
@@ -47,7 +47,7 @@ pub(super) struct Args {
     /// Side of a cell, metres
     #[arg(long, value_name = "M", default_value_t = Mapping::default().resolution_m)]
     resolution: f64,
-    /// Take ranges beyond this as silence, metres [default: the sensor's, at most 5]
+    /// Treat ranges beyond this as no echo, metres [default: the sensor's, at most 5]
     #[arg(long, value_name = "M")]
     silent_beyond: Option<f64>,
     /// Map this region: X0,Y0,X1,Y1 in metres [default: around what was seen]
@@ -62,13 +62,13 @@ pub(super) struct Args {
     /// Exponent of the confidence with the distance of the feature
     #[arg(long, value_name = "E", default_value_t = Mapping::default().exponent)]
     exponent: f64,
-    /// How far walls are taken to go on beyond what was seen of them, metres
+    /// How far walls are extended beyond their observed part, metres
     #[arg(long, value_name = "M", default_value_t = Mapping::default().extend_m)]
     extend: f64,
     /// Leave readings of less confidence out; 0.5 is full confidence
     #[arg(long, value_name = "C", default_value_t = Mapping::default().least_confidence)]
     least_confidence: f64,
-    /// Count each scan so many times [default: 5 over the number of scans, rounded up: few scans
+    /// Count each scan this many times [default: 5 over the number of scans, rounded up: few scans
     /// would leave every cell undecided; 1 with --onto]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=20))]
     evidence: Option<u8>,
@@ -101,13 +101,13 @@ enum ModelName {
 }
 
 pub(super) const ABOUT: &str = "\
-Make an occupancy grid of the scans of logs.
+Make an occupancy grid from the scans of logs.
 
-Each scan is taken at its pose. Feature Prediction (O'Sullivan and others) predicts walls from \
-readings that are right and gives readings that such walls contradict less confidence, so that \
-mirror-like walls are not mapped as free space. Writes the pair map.pgm and map.yaml that ROS's \
-map_server reads (bright is free, dark occupied, in between is how likely), the same as a recording \
-of ROS 2 (map.mcap, topic /map) and map.png with the way of the ranger.";
+Each scan is placed at its pose. Feature Prediction (O'Sullivan and others) predicts walls from consistent \
+readings and lowers the confidence of readings that contradict them, so that specular walls are not mapped as \
+free space. Writes map.pgm and map.yaml for ROS's map_server (bright is free, dark occupied, in between the \
+probability), the same as a recording of ROS 2 (map.mcap, topic /map), and map.png with the course of the \
+ranger.";
 
 const HELP: &str = "\
 Examples:
@@ -116,8 +116,8 @@ Examples:
   sonard map today.jsonl --onto map --out map-today
   sonard benchmark score map simple-room
 
-A confidence is 0.5 where nothing speaks against a reading and less where something does; clear_m \
-is how far the reading is right in any case.
+A confidence is 0.5 for a reading that nothing contradicts, and less otherwise; clear_m is the \
+distance up to which the reading is right in any case.
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{
     Failure, Outcome,
     array::NoArray,
-    mock_world::{Belief, MockWorldArgs},
+    mock_world::{AssumedModel, MockWorldArgs},
     options::{AirArgs, SensorArgs, engine_options},
     output::OutPath,
     place::PlaceArgs,
@@ -41,12 +41,11 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Play a ranger on a pty, with sound from the model.
+Run a mock ranger on a pty, with echoes from the model.
 
-The device's own protocol code runs on a pseudo-terminal, in a world made of a scene and the \
-model. Whatever speaks the protocol can open the port, `sonard scan --port` first of all. It \
-plays until it is interrupted. The device says of itself that it is simulated, so every log \
-taken from it does too.";
+The device's own protocol code runs on a pseudo-terminal, in a simulated world made from a scene. Any program \
+that speaks the protocol can open the port, such as `sonard scan --port`. It runs until it is interrupted. The \
+device identifies itself as simulated, and so does every log taken from it.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -61,9 +60,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     let scene = Arc::new(scene);
     let (sensor, air, options) =
         (args.sensor.sensor()?, args.air.air()?, engine_options(&args.engine)?);
-    let belief =
-        Belief { scene: &scene, pose: &pose, sensor: &sensor, air: &air, options: &options };
-    let board = args.world.board(&belief)?;
+    let assumed =
+        AssumedModel { scene: &scene, pose: &pose, sensor: &sensor, air: &air, options: &options };
+    let board = args.world.board(&assumed)?;
     runtime::new()?.block_on(async {
         let port = MockPort::open(board, args.link.as_deref()).map_err(|error| {
             Failure::input(

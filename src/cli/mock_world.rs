@@ -37,19 +37,19 @@ pub(super) const OPTIONS: [&str; 9] = [
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Mock")]
 pub(super) struct MockWorldArgs {
-    /// Scene the mock's sound comes from, if it is to differ from --scene
+    /// True scene of the mock, if different from --scene
     #[arg(long, value_name = "SCENE")]
     truth: Option<PathBuf>,
-    /// Air temperature of the mock's world, degrees Celsius, if it is to differ
+    /// Air temperature of the mock's world, degrees Celsius, if different
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     truth_temperature_c: Option<f64>,
     /// Pace the mock by the wall clock instead of as fast as possible
     #[arg(long)]
     realtime: bool,
-    /// Seed of what is random; noise, missed steps and faults
+    /// Random seed; noise, missed steps and faults
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Faults to play
+    /// Faults to inject
     #[arg(long, value_name = "SPEC", long_help = FAULT_HELP)]
     faults: Option<FaultPlan>,
     /// Standard deviation of the range noise, millimetres (the far tail is longer)
@@ -61,13 +61,13 @@ pub(super) struct MockWorldArgs {
     /// How far the transducer is turned on the motor's shaft, degrees
     #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true)]
     mounting_offset_deg: f64,
-    /// Motor steps a revolution, microsteps and gears counted in
+    /// Motor steps a revolution, including microsteps and gears
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u16).range(4..=12800))]
     steps_per_revolution: u16,
 }
 
 /// What the host believes, from which the truth differs only where it is told to.
-pub(super) struct Belief<'a> {
+pub(super) struct AssumedModel<'a> {
     pub(super) scene: &'a Arc<Scene>,
     pub(super) pose: &'a Pose,
     pub(super) sensor: &'a Sensor,
@@ -77,15 +77,19 @@ pub(super) struct Belief<'a> {
 
 impl MockWorldArgs {
     /// The board, powered up in its world.
-    pub(super) fn board(&self, belief: &Belief<'_>) -> Result<MockBoard, Failure> {
+    pub(super) fn board(&self, assumed: &AssumedModel<'_>) -> Result<MockBoard, Failure> {
         let pace = if self.realtime { Pace::RealTime } else { Pace::Virtual };
-        self.board_at(pace, belief)
+        self.board_at(pace, assumed)
     }
 
     /// The same at a given pace.
-    pub(super) fn board_at(&self, pace: Pace, belief: &Belief<'_>) -> Result<MockBoard, Failure> {
-        let sound_speed_m_s = self.truth_air(belief.air)?.sound_speed_m_s();
-        let soundings = self.soundings(belief)?;
+    pub(super) fn board_at(
+        &self,
+        pace: Pace,
+        assumed: &AssumedModel<'_>,
+    ) -> Result<MockBoard, Failure> {
+        let sound_speed_m_s = self.truth_air(assumed.air)?.sound_speed_m_s();
+        let soundings = self.soundings(assumed)?;
         let steps = self.steps_per_revolution;
         let noise = TofNoise::of_range_mm(self.noise_mm, sound_speed_m_s);
         let world = World::new(soundings, noise, self.missed_steps, self.seed);
@@ -103,23 +107,23 @@ impl MockWorldArgs {
     }
 
     /// What is heard at the pose believed in.
-    pub(super) fn soundings(&self, belief: &Belief<'_>) -> Result<Soundings, Failure> {
+    pub(super) fn soundings(&self, assumed: &AssumedModel<'_>) -> Result<Soundings, Failure> {
         let scene = match &self.truth {
             Some(name) => Arc::new(scene_file::load(name)?),
-            None => Arc::clone(belief.scene),
+            None => Arc::clone(assumed.scene),
         };
-        let air = self.truth_air(belief.air)?;
+        let air = self.truth_air(assumed.air)?;
         // The mock hears to the end of whatever window it is told; the model must reach as far.
-        let options = Options { max_range_m: None, ..*belief.options };
+        let options = Options { max_range_m: None, ..*assumed.options };
         let simulator = Simulator::new(
-            Arc::new(scene.with_robot_at(belief.pose)),
-            belief.sensor.clone(),
+            Arc::new(scene.with_robot_at(assumed.pose)),
+            assumed.sensor.clone(),
             air,
             options,
         )
         .map_err(|error| Failure::input(error, "see `sonard mock --help`"))?;
         let steps = self.steps_per_revolution;
-        Soundings::of(&simulator, belief.pose, steps, self.mounting_offset_deg)
+        Soundings::of(&simulator, assumed.pose, steps, self.mounting_offset_deg)
             .map_err(|error| Failure::input(error, "give a simpler scene"))
     }
 

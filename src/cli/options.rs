@@ -16,8 +16,7 @@ const SENSOR: &str = "senscomp-6500";
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Sensor and air")]
 pub(super) struct SensorArgs {
-    /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, hc-sr04,
-    /// lego-nxt, fullwave-line), or a file with a sensor's data [default: senscomp-6500; of an array, its own]
+    /// Sensor preset (`sonard sensor list`), or a file with a sensor's data [default: senscomp-6500; of an array, its own]
     #[arg(long, value_name = "NAME|FILE")]
     sensor: Option<String>,
     /// End the blanking by hand as early as the sensor allows, as BINH does
@@ -30,7 +29,7 @@ pub(super) struct SensorArgs {
     /// sensor's, else half a metre above the floor]
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     sensor_z: Option<f64>,
-    /// How far the transducer's axis points up, degrees [default: the sensor's]
+    /// Elevation of the transducer's axis, degrees [default: the sensor's]
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     tilt_deg: Option<f64>,
     /// How far the transducer's face is ahead of the rotation axis, metres [default: the sensor's]

@@ -196,12 +196,12 @@ fn of_descriptor(fd: BorrowedFd<'_>) -> Option<Metadata> {
 }
 
 /// Where a file is to be: behind links, and what is there.
-struct Place {
+struct Destination {
     path: PathBuf,
     there: Option<Metadata>,
 }
 
-impl Place {
+impl Destination {
     fn find(path: &Path) -> Result<Self, Failure> {
         let cannot = |error: &dyn std::fmt::Display| {
             Failure::input(
@@ -272,7 +272,7 @@ impl Overwrite {
 
     /// Begins a file, or standard output where there is no name.
     pub(super) fn begin(self, path: &Path, product: Product) -> Result<Stream, Failure> {
-        let Place { path: at, there } = self.place(path, product)?;
+        let Destination { path: at, there } = self.place(path, product)?;
         let stream = match &there {
             Some(there) if !there.is_file() => {
                 OpenOptions::new().write(true).open(&at).map(Stream::Device)
@@ -287,8 +287,8 @@ impl Overwrite {
         stream.map_err(|error| failed(path, &error))
     }
 
-    fn place(self, path: &Path, product: Product) -> Result<Place, Failure> {
-        let place = Place::find(path)?;
+    fn place(self, path: &Path, product: Product) -> Result<Destination, Failure> {
+        let place = Destination::find(path)?;
         if place.there.is_none() || place.is_stream() {
             return Ok(place);
         }

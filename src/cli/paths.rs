@@ -35,17 +35,17 @@ pub(super) struct Args {
     /// Listen and predict up to this range, metres, instead of the sensor's
     #[arg(long, value_name = "M")]
     max_range: Option<f64>,
-    /// Most mirror reflections on a path, instead of as many as can matter
+    /// Most mirror reflections on a path, if limited
     #[arg(long, value_name = "N")]
     max_order: Option<u32>,
     /// Leave out paths weaker than this; a head-on, perfect wall gives 1. Those that touch cylinders more than once,
     /// or a cylinder and an edge, are listed from ten times this where they are longer than the blanking covers
     #[arg(long, value_name = "A", default_value_t = 0.001)]
     weakest: f64,
-    /// How edges diffract, instead of the sensor's law, or else utd
+    /// Law of edge diffraction, if not the sensor's (or else utd)
     #[arg(long, value_enum, value_name = "LAW")]
     edge_law: Option<EdgeLawKind>,
-    /// Also follow sound that bends at two edges
+    /// Also find paths diffracted at two edges
     #[arg(long)]
     double_diffraction: bool,
     /// Leave out the absorption of the air
@@ -61,14 +61,13 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-List the propagation paths of echoes at a place, shortest first.
+List the propagation paths of echoes at a position, shortest first.
 
-All mirror reflections, and one diffraction (two with --double-diffraction) with any reflections before \
-and after. The amplitude \
-counts reflectances, edges, curvature and absorption but no beam pattern: what the echo would be \
-if the ranger faced it both on leaving and on arriving. A path that can be run through in both \
-directions is listed twice, with departure and arrival swapped. Departure and arrival are directions in the world, \
-degrees counter-clockwise from +x; those of `sonard simulate` (azimuth_deg) count from the heading.";
+Paths have any number of mirror reflections, and one diffraction (two with --double-diffraction) with any \
+reflections before and after. The amplitude includes reflectances, edges, curvature and absorption but no beam \
+pattern: it is that of a ranger pointed along both departure and arrival. A path that can be followed in both \
+directions is listed twice, with departure and arrival swapped. Departure and arrival are directions in the \
+world, degrees counter-clockwise from +x; azimuth_deg of `sonard simulate` counts from the heading.";
 
 const EXAMPLES: &str = "\
 Examples:

@@ -19,8 +19,7 @@ use crate::{
 /// Which pictures.
 #[derive(Debug, clap::Args)]
 pub(super) struct PictureArgs {
-    /// File to write; a picture, .svg or .png by its name, or - for SVG to standard output; several
-    /// are possible
+    /// File to write; a picture, .svg or .png by its name, or - for SVG to standard output; may be given several times
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Vec<OutPath>,
     /// Width of a PNG, pixels

@@ -11,7 +11,7 @@ pub(super) struct PlaceArgs {
     /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it
     #[arg(long, value_name = "SCENE")]
     pub(super) scene: PathBuf,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pub(super) pose: String,
 }

@@ -31,11 +31,10 @@ pub(super) struct Args {
     /// are drawn over each other
     #[arg(long, value_name = "N|ID")]
     scan: Vec<String>,
-    /// Draw the path of one beam's sound: the beam's index in the plan
+    /// Draw the propagation path of one beam: its index in the plan
     #[arg(long, value_name = "INDEX", conflicts_with = "azimuth_deg")]
     beam: Option<u32>,
-    /// Azimuth, degrees counter-clockwise from the heading; draws the path of the sound of the beam
-    /// nearest to it
+    /// Azimuth, degrees counter-clockwise from the heading; draws the propagation path of the beam nearest to it
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     azimuth_deg: Option<f64>,
     #[command(flatten)]
@@ -60,12 +59,11 @@ enum Kind {
 pub(super) const ABOUT: &str = "\
 Draw the scans of a log as SVG or PNG.
 
-Filled marks are readings; shape and colour say what made them: a direct echo, multiple \
-reflections, an edge, sound that was there when the receiver opened (minimum range), or nothing \
-the model knows. Rings and thin rays are the model's. Ticks on the border are silent beams, \
-arrows readings that lie beyond the view. In a browser, pointing at a mark of an SVG tells its \
-numbers. Scans of one log are drawn over each other. With --beam or --azimuth-deg the path of one \
-beam's sound is drawn instead, reflection by reflection.";
+Filled marks are readings; shape and colour show their cause: a direct echo, multiple reflections, an edge, \
+sound already arriving when the blanking ended (minimum range), or nothing the model knows. Rings and thin rays \
+are predictions. Ticks on the border are beams without an echo, arrows are readings beyond the view. In a \
+browser, pointing at a mark of an SVG shows its numbers. Scans of one log are drawn over each other. With --beam \
+or --azimuth-deg the propagation path of one beam is drawn instead, interaction by interaction.";
 
 const HELP: &str = "\
 Examples:

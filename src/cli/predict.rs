@@ -41,9 +41,9 @@ pub(super) struct Args {
 pub(super) const ABOUT: &str = "\
 Write a log again with the model's predictions beside its readings.
 
-Each reading gets the model's for the same place and direction, with the path of its sound, in place of \
-any that it had; sessions say which scene, sensor, air and model that was. Readings stay as they are, but \
-for ranges under another speed of sound: those are computed again from their times of flight.";
+Each reading gets the model's reading for the same position and direction, with its propagation path, replacing \
+any earlier one; sessions state the scene, sensor, air and model. Measured readings are unchanged, except that \
+under another speed of sound ranges are recomputed from their times of flight.";
 
 const HELP: &str = "\
 Examples:

@@ -197,18 +197,15 @@ fn refuse(log: &Path, error: &dyn std::fmt::Display) -> Failure {
 /// # Errors
 /// Air that there is not.
 pub(super) fn conditions(log: &Path, session: &Session) -> Result<(Air, Options), Failure> {
-    let air = Air::try_from(&session.air).map_err(|error| refuse(log, &error))?;
-    let options = session.model.as_ref().map_or_else(Options::default, |model| {
-        model.options().unwrap_or_else(|| {
-            let engine = EngineKind::default().name();
-            let had = &model.engine;
-            anstream::eprintln!(
-                "{}: the log's model ({had}) can't be set up again: {engine} with its defaults \
-                 is used",
-                log.display()
-            );
-            Options::default()
-        })
+    let (air, options) = session.conditions().map_err(|error| refuse(log, &error))?;
+    let options = options.unwrap_or_else(|| {
+        let engine = EngineKind::default().name();
+        let had = session.model.as_ref().map_or("", |model| &model.engine);
+        anstream::eprintln!(
+            "{}: the log's model ({had}) can't be set up again: {engine} with its defaults is used",
+            log.display()
+        );
+        Options::default()
     });
     Ok((air, options))
 }

@@ -12,9 +12,9 @@ use crate::{
 /// Verbs of `sonard sensor`.
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum SensorVerb {
-    /// List the sensors that come with sonard
+    /// List the shipped sensors
     List,
-    /// Print a sensor's data file, every figure with its source: a start for one of your own
+    /// Print the file of a shipped sensor, each figure with its source, to start one of your own
     #[command(after_help = "Examples:\n  sonard sensor show senscomp-6500 > my-sensor.json\n  \
                             sonard simulate --sensor my-sensor.json --scene simple-room --pose fig9")]
     Show(Name),
@@ -23,9 +23,9 @@ pub(super) enum SensorVerb {
 /// Verbs of `sonard array`.
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum ArrayVerb {
-    /// List the arrays of rangers that come with sonard
+    /// List the shipped arrays of rangers
     List,
-    /// Print an array's file: a start for one of your own
+    /// Print the file of a shipped array, to start one of your own
     #[command(after_help = "Examples:\n  sonard array show pioneer-8 > my-robot.json\n  \
                             sonard simulate --array my-robot.json --scene mcgill-lab --pose fig4")]
     Show(Name),

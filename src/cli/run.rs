@@ -21,9 +21,8 @@ use super::{
     runtime::{self, Interrupts},
 };
 use crate::{
-    board,
     daemon::{self, Handle, Journal, Order, Resources, Settings},
-    link,
+    host_gpio, link,
     server::{Access, Listeners, Server, read_token, token_help},
 };
 use broker::Broker;
@@ -38,13 +37,13 @@ pub(super) struct Args {
     /// Configuration file [default: /etc/sonard/sonard.toml if it is there]
     #[arg(long, value_name = "FILE", env = "SONARD_CONFIG")]
     config: Option<PathBuf>,
-    /// Set a key over the file; over the environment, too; may be given several times
+    /// Override a key of the file; over the environment, too; may be given several times
     #[arg(long, value_name = "SECTION.KEY=VALUE")]
     set: Vec<String>,
-    /// Check all that is named, and end; says what is in force
+    /// Check all that is named, and exit; says what is in force
     #[arg(long)]
     check: bool,
-    /// Print the configuration file that documents every key, and end
+    /// Print the configuration file that documents every key, and exit
     #[arg(long)]
     print_config: bool,
     /// Serial port of the ranger: a path, a name in /dev/serial/by-id, or a USB serial number; sets
@@ -54,10 +53,10 @@ pub(super) struct Args {
     /// Use a mock ranger instead of a real one; in real time, with sound from the scene
     #[arg(long, conflicts_with = "port")]
     mock: bool,
-    /// Play an array of rangers from the model, in real time, instead of using a device
+    /// Simulate an array of rangers with the model, in real time, instead of using a device
     #[arg(long, conflicts_with_all = ["port", "mock"])]
     simulate: bool,
-    /// Array of rangers, a preset (pioneer-8, pioneer-7, ring-12) or a file with an array's data;
+    /// Array of rangers, a preset (`sonard array list`) or a file with an array's data;
     /// what --simulate plays (simulate.array)
     #[arg(long, value_name = "NAME|FILE", requires = "simulate")]
     array: Option<String>,
@@ -68,7 +67,7 @@ pub(super) struct Args {
     /// (place.scene)
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene; sets
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene; sets
     /// place.pose
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
@@ -86,15 +85,14 @@ pub(super) struct Args {
 pub(super) const ABOUT: &str = "\
 Run the daemon: scan by plan, keep logs, serve the API.
 
-It finds the ranger by its stable name, homes it, and scans continuously, on a schedule or on \
-request. A ranger that goes away is waited for; nothing is measured that can't be logged. SIGHUP \
-reads the configuration again; SIGTERM and SIGINT stop the motor, close the scan and sync the \
-log. `sonard status`, `sonard watch` and curl talk to it.
+The daemon finds the ranger by its stable name, homes it, and scans continuously, on a schedule or on request. \
+It waits for a ranger that disconnects, and measures nothing that can't be logged. SIGHUP reloads the \
+configuration; SIGTERM and SIGINT stop the motor, close the scan and sync the log. Control it with `sonard \
+status`, `sonard watch` and curl.
 
-With --simulate there is no device: the model plays an array of rangers at fixed bearings on a \
-robot, fired in turn (pioneer-8: one each 40 ms, so each of eight every 320 ms), round after round \
-unless scanning.mode says otherwise. Every record says that it is simulated. PUT /v1/pose moves the \
-robot, simulate.course drives it.";
+With --simulate there is no device: the model simulates an array of rangers at fixed bearings on a robot, fired \
+in turn (pioneer-8: one every 40 ms, so each of the eight every 320 ms), round after round unless scanning.mode \
+says otherwise. Every record is marked as simulated. PUT /v1/pose moves the robot, simulate.course drives it.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -109,7 +107,7 @@ Examples:
   sonard run --print-config > sonard.toml
   sonard run --config sonard.toml --check
 
-SONARD_LOG sets what is said on standard error: error, warn, info (default), debug.
+SONARD_LOG sets the level of messages on standard error: error, warn, info (default), debug.
 Exit codes: 0 stopped by a signal, 2 wrong configuration, 3 the log or a socket is another's, or the disk gave up.";
 
 pub(super) fn run(args: Args) -> Outcome {
@@ -150,12 +148,12 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     // or be lost where whoever started it ignores hangups.
     let hangups = signal(SignalKind::hangup());
     let keys = &settings.keys;
-    let board = match settings.simulated {
+    let gpio = match settings.simulated {
         // What is made up touches no pins.
         Some(_) => None,
-        None => {
-            Some(board::open(&keys.gpio).map_err(|error| Failure::input(&error, error.help()))?)
-        }
+        None => Some(
+            host_gpio::open(&keys.gpio).map_err(|error| Failure::input(&error, error.help()))?,
+        ),
     };
     let mut broker = Broker::open(&settings)?;
     let log_folder = PathBuf::from(&keys.log.folder);
@@ -168,9 +166,9 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     let keys = keys.clone();
     let access = access(&settings, &listeners)?;
     let fleet = load::fleet(&keys.fleet)?;
-    let (daemon, handle) = match board {
-        Some(board) => {
-            let resources = Resources { open_port: Box::new(link::open), board, journal };
+    let (daemon, handle) = match gpio {
+        Some(gpio) => {
+            let resources = Resources { open_port: Box::new(link::open), gpio, journal };
             daemon::prepare(resources, settings.clone())
         }
         None => daemon::prepare_simulated(journal, settings.clone()),

@@ -32,7 +32,7 @@ use crate::{
 };
 use emulator::Emulator;
 use output::Output;
-use setup::{belief, prepared};
+use setup::{assumed, prepared};
 
 /// How often a request is sent before the device counts as gone: some nine seconds, in which a
 /// board that the opening of its port has reset is long awake.
@@ -89,7 +89,7 @@ pub(super) struct Args {
     at: DaemonArgs,
     #[command(flatten)]
     place: PlaceArgs,
-    /// Folder for what is written; scan.jsonl, scan.svg and scan.png; without it records go to
+    /// Output folder; scan.jsonl, scan.svg and scan.png; without it records go to
     /// standard output; a log that is there is added to if its scans are of the same setup
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
@@ -122,10 +122,10 @@ struct MotionArgs {
     /// Listening window after each firing, milliseconds, instead of the time to the maximum range
     #[arg(long, value_name = "MS", value_parser = within(0.0..=8_000.0))]
     window_ms: Option<f64>,
-    /// Rest between the end of a step and firing, milliseconds
+    /// Settling time between the end of a step and firing, milliseconds
     #[arg(long, value_name = "MS", default_value_t = 5.0, value_parser = within(0.0..=8_000.0))]
     settle_ms: f64,
-    /// Least time from firing to firing, milliseconds, to protect the module
+    /// Least time between firings, milliseconds, to protect the module
     #[arg(long, value_name = "MS", default_value_t = 20.0, value_parser = within(0.0..=8_000.0))]
     min_interval_ms: f64,
     /// Echoes to record for each firing, at most
@@ -149,9 +149,9 @@ impl MotionArgs {
 pub(super) const ABOUT: &str = "\
 Take one or more scans and log each reading beside the model's prediction.
 
-The device goes home, then steps, fires and listens by itself along the plan; readings that the \
-line lost are fetched again. Records go to standard output, or with --out to a folder that also \
-gets a picture. An interrupt stops the motor and closes the log.";
+The device homes, then steps, fires and listens on its own along the plan; readings that the line lost are \
+requested again. Records go to standard output, or with --out to a folder that also gets a picture. An interrupt \
+stops the motor and closes the log.";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -182,7 +182,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 async fn measure(args: &Args, setup: &PreparedScan, output: &mut Output) -> Outcome {
     let interrupts = Interrupts::listen();
     let mock = match args.mock {
-        true => Some(Mock::start(args.world.board(&belief(setup))?, None)?),
+        true => Some(Mock::start(args.world.board(&assumed(setup))?, None)?),
         false => None,
     };
     let emulator = match args.emulator {

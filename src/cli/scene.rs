@@ -30,27 +30,27 @@ const MOST_CHANGES: usize = 100;
 /// Verbs of `sonard scene`.
 #[derive(Debug, clap::Subcommand)]
 pub(super) enum Verb {
-    /// Check a scene file and say in a line what it holds
+    /// Check a scene file and summarise it in a line
     #[command(long_about = CHECK_ABOUT, after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
     /// Draw a scene's floor plan as SVG or PNG
     #[command(long_about = DRAW_ABOUT, after_help = DRAW_EXAMPLES)]
     Draw(DrawArgs),
-    /// Make a scene of a drawing of a CAD program: the lines of a DXF file
+    /// Make a scene from a CAD drawing: the lines of a DXF file
     #[command(long_about = from_dxf::ABOUT, after_help = from_dxf::EXAMPLES)]
     FromDxf(from_dxf::FromDxfArgs),
-    /// Make a scene of a map of map_server: its walls, traced as lines
+    /// Make a scene from a map of map_server: its walls, traced as lines
     #[command(long_about = from_grid::ABOUT, after_help = from_grid::EXAMPLES)]
     FromGrid(from_grid::FromGridArgs),
-    /// Make a scene of a world of Gazebo: the boxes and cylinders of an SDF file
+    /// Make a scene from a Gazebo world: the boxes and cylinders of an SDF file
     #[command(long_about = from_sdf::ABOUT, after_help = from_sdf::EXAMPLES)]
     FromSdf(from_sdf::FromSdfArgs),
-    /// Make a scene of a drawing: the lines of an SVG file
+    /// Make a scene from a drawing: the lines of an SVG file
     #[command(long_about = from_svg::ABOUT, after_help = from_svg::EXAMPLES)]
     FromSvg(from_svg::FromSvgArgs),
-    /// List the scenes that come with sonard, with their poses
+    /// List the shipped scenes, with their poses
     List,
-    /// Print the file of a scene that comes with sonard: a start for one of your own
+    /// Print the file of a shipped scene, to start a scene of your own
     Show(preset::Name),
     /// Print the JSON Schema of scene files
     #[command(long_about = SCHEMA_ABOUT, after_help = SCHEMA_EXAMPLES)]
@@ -63,7 +63,7 @@ pub(super) struct CheckArgs {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(value_name = "FILE")]
     scene: PathBuf,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene;
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene;
     /// checks that it can stand there
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
@@ -75,7 +75,7 @@ pub(super) struct DrawArgs {
     /// Scene file, or the name of a shipped scene (`sonard scene list`)
     #[arg(value_name = "FILE")]
     scene: PathBuf,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene; draws
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene; draws
     /// it alone, instead of all named poses
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
@@ -90,7 +90,7 @@ pub(super) struct DrawArgs {
 }
 
 const CHECK_ABOUT: &str = "\
-Check a scene file and say in a line what it holds.
+Check a scene file and summarise it in a line.
 
 A scene is a floor plan in JSON: materials with their reflectance, walls (from one point to \
 another, or a polyline), cylinders, and named poses of the ranger. With floor_z_m and ceiling_z_m \

@@ -36,7 +36,7 @@ pub(super) struct Args {
     /// Scene file, or the name of a shipped scene (`sonard scene list`); predicts in it
     #[arg(long, value_name = "SCENE")]
     scene: PathBuf,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene
     #[arg(
         long,
         value_name = "POSE",
@@ -77,7 +77,7 @@ struct NoiseArgs {
     /// Standard deviation of the time of flight beside what the noise does to it, microseconds
     #[arg(long, value_name = "US", default_value_t = 0.0)]
     jitter_us: f64,
-    /// Seed of what is random; the same one gives the same readings
+    /// Random seed; the same one gives the same readings
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
@@ -101,15 +101,15 @@ impl NoiseArgs {
 pub(super) const ABOUT: &str = "\
 Predict a scan with the model alone.
 
-Writes the records of a log, one JSON object a line, with provenance `simulated`: each reading \
-carries the path its sound took, its amplitude and its margin over the threshold. A silence \
-carries the candidate that came closest, with a negative margin.
+Writes the records of a log, one JSON object a line, with provenance `simulated`. Each reading has its \
+propagation path, amplitude and margin over the threshold. A reading without an echo has the candidate nearest \
+to the threshold, with a negative margin.
 
-With --array, several rangers at fixed bearings on a robot fire in turn, each from its own place. \
-Their readings say which ranger (`ranger`) and, where the robot turned or moved within a scan, \
-where it stood (`pose`). azimuth_deg counts counter-clockwise from the heading; the directions of `sonard paths` \
-are the world's. Where rangers fire at once, or before the sound of an earlier turn has died away, each also hears \
-the others; a reading that is another's sound says whose (`crosstalk`).";
+With --array, several rangers at fixed bearings on a robot fire in turn, each from its own position. Their \
+readings name the ranger (`ranger`) and, if the robot turned or moved within a scan, its pose (`pose`). \
+azimuth_deg counts counter-clockwise from the heading; the directions of `sonard paths` are in world \
+coordinates. If rangers fire simultaneously, or before the sound of an earlier firing has decayed, their \
+readings include crosstalk, with its source (`crosstalk`).";
 
 const EXAMPLES: &str = "\
 Examples:

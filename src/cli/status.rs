@@ -34,7 +34,7 @@ Examples:
   sonard status --address kiwi=10.0.0.7:8765 --address 10.0.0.8:8765 --token-file fleet-token
   sonard status --fleet fleet.toml
 
-Of several daemons each has its line, also one that is silent, refuses, or is not the robot that was named before the `=`.
+Each of several daemons has its line, including one that is silent, refuses, or is not the robot named before the `=`.
 Exit codes: 0 all is well, 1 something is not, 3 no daemon answers (of several: not each of them).";
 
 /// What is told with `--json`.

@@ -48,12 +48,12 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Show what an oscilloscope would show of one firing.
+Show the echo trace of one firing, as on an oscilloscope.
 
-The envelope of all echoes together against time, with the gain, the threshold in force, the \
-blanking and the moments at which ECHO rises; each peak with the path it came by. Without -o and \
---json, a table of the peaks. Times are counted as a calibrated ranger counts them: a head-on, \
-perfectly reflecting wall rises at its path's length over the speed of sound.";
+The trace is the envelope of the sum of all echoes against time, with the gain, the current threshold, the \
+blanking and the moments at which ECHO rises; each peak has its path. Without -o and --json, a table of the \
+peaks. Times are those of a calibrated ranger: the echo of a head-on, perfectly reflecting wall rises at the \
+length of its path over the speed of sound.";
 
 const HELP: &str = "\
 Examples:

@@ -15,11 +15,11 @@ use crate::{
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "What if")]
 pub(super) struct WhatIfArgs {
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene;
-    /// supposed of all scans, and only X,Y,DEG here
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene;
+    /// assumed for all scans, and only X,Y,DEG here
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
-    /// Suppose that the ranger looked there, degrees counter-clockwise from the x axis
+    /// Assume this heading, degrees counter-clockwise from the x axis
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with = "pose")]
     heading: Option<f64>,
     #[command(flatten)]
@@ -30,20 +30,19 @@ pub(super) struct WhatIfArgs {
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "What if")]
 pub(super) struct InsteadArgs {
-    /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, hc-sr04,
-    /// lego-nxt, fullwave-line), or a file with a sensor's data; supposed in place of the log's
+    /// Sensor preset (`sonard sensor list`), or a file with a sensor's data; assumed instead of the log's
     #[arg(long, value_name = "NAME|FILE")]
     sensor: Option<String>,
-    /// Air temperature, degrees Celsius; supposed: measured ranges change with the speed of sound
+    /// Air temperature, degrees Celsius; assumed: measured ranges change with the speed of sound
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     temperature_c: Option<f64>,
-    /// Relative humidity, percent; supposed in place of the log's
+    /// Relative humidity, percent; assumed instead of the log's
     #[arg(long, value_name = "PERCENT")]
     humidity_percent: Option<f64>,
-    /// Static pressure, kilopascals; supposed in place of the log's
+    /// Static pressure, kilopascals; assumed instead of the log's
     #[arg(long, value_name = "KPA")]
     pressure_kpa: Option<f64>,
-    /// Speed of sound, metres a second; supposed in place of the log's
+    /// Speed of sound, metres a second; assumed instead of the log's
     #[arg(long, value_name = "M/S")]
     sound_speed: Option<f64>,
 }

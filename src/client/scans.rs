@@ -46,7 +46,7 @@ pub struct RequestedScans {
     reason: Option<String>,
 }
 
-/// Why no more of them come.
+/// The reason why no more scans arrive.
 #[derive(Debug, Error)]
 pub enum ScansError {
     /// The daemon does not answer as it should.
@@ -83,10 +83,10 @@ impl RequestedScans {
     ///
     /// # Errors
     /// When nobody answers, or the daemon refuses.
-    pub async fn ask(client: Client, wish: &ScanRequest) -> Result<Self, ClientError> {
+    pub async fn ask(client: Client, request: &ScanRequest) -> Result<Self, ClientError> {
         // Listening before asking: nothing is missed.
         let stream = client.get("/v1/live/records").await?.into_body();
-        let Started { request, .. } = client.post("/v1/start", wish).await?;
+        let Started { request, .. } = client.post("/v1/start", request).await?;
         Ok(Self {
             client,
             stream,

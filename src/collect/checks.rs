@@ -8,7 +8,7 @@ use crate::{
     scan::{EventKind, PingStatus, ScanView},
 };
 
-/// Something that a check found in a scan.
+/// A finding of a check of a scan.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// Which check, as its key in `[checks]` is called without `max_`.
@@ -19,7 +19,7 @@ pub struct Finding {
     pub action: Action,
 }
 
-/// What can be said about a whole scan in figures; what a report and its pictures are made of.
+/// Figures of a whole scan, for the report and its pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Figures {
     /// Beams of the plan.

@@ -10,7 +10,7 @@ use crate::{
     scan::{self, CollectionRef, Provenance, ScanAir, ScanPlan},
 };
 
-/// Who takes the scans of a collection: a ranger that is driven from here, or a daemon that has one.
+/// A device that takes the scans of a collection: a ranger that is driven from here, or a daemon that has one.
 pub trait Device {
     /// Whether the ranger is driven from here: its scans are predicted here, and it may be carried.
     fn is_local(&self) -> bool;

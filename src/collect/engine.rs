@@ -23,12 +23,12 @@ use super::{
 };
 use crate::{acoustics::Air, interrupts::Interrupts, ranger::PreparedScan, scan::CollectionRef};
 
-/// What a person decides about a run.
+/// Choices of the operator for a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Choices {
-    /// Go on although the plan, the scene or the ranger is not what it was when it began.
+    /// Continue although plan, scene or ranger have changed since the start.
     pub accept_changed_plan: bool,
-    /// Try those scans again that were given up.
+    /// Retry the scans that were given up.
     pub retry_given_up: bool,
 }
 

@@ -10,7 +10,7 @@ use crate::{
     store::StoreError,
 };
 
-/// Why a collection does not go on, and what a person can do about it.
+/// The reason why a collection stopped, and the remedy.
 #[derive(Debug, Error)]
 pub enum Halt {
     /// Somebody wanted it so, or the plan did.

@@ -95,7 +95,7 @@ pub struct Started {
     pub conditions: Conditions,
 }
 
-/// What a daemon did by itself before a collection changed it; nothing of what stayed as it was.
+/// Settings of a daemon before a collection changed them; unchanged ones are left out.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Borrowed {
     /// When it took scans.
@@ -116,7 +116,7 @@ pub enum AirBefore {
     Given(AirOrder),
 }
 
-/// What became of a scan.
+/// The outcome of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {

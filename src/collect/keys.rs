@@ -165,7 +165,7 @@ pub struct SensorKeys {
     /// Height of the transducer in a scene with floor, ceiling or low walls, metres.
     #[schemars(range(min = -100, max = 100), example = 0.3)]
     pub height_m: Option<f64>,
-    /// How far the transducer's axis points up, degrees, instead of the sensor's.
+    /// Elevation of the transducer's axis, degrees, instead of the sensor's.
     #[schemars(range(min = -90, max = 90), example = 2)]
     pub tilt_deg: Option<f64>,
     /// How echoes are predicted.

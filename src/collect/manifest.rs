@@ -28,7 +28,7 @@ pub const MANIFEST: &str = "manifest.json";
 /// Version of the manifest's form.
 const FORMAT: u32 = 1;
 
-/// What belongs to a collection.
+/// The files of a collection.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Version of this form.
@@ -61,7 +61,7 @@ pub struct Manifest {
     pub files: Vec<FileEntry>,
 }
 
-/// How many of what.
+/// Counts of scans by outcome.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// Scans of the plan, as far as its poses are known.
@@ -196,7 +196,7 @@ impl Manifest {
     }
 }
 
-/// What a check of a collection came to.
+/// The result of verifying a collection.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verified {
     /// The manifest it was checked against.

@@ -15,7 +15,7 @@ use crate::{
 /// What a plan may say about the air.
 const AIR: [&str; 4] = ["temperature_c", "humidity_percent", "pressure_kpa", "file"];
 
-/// Where poses come from.
+/// A source of poses.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Poses {
     /// They are all known.

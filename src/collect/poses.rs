@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use super::keys::Conditions;
 use crate::{geometry::Pose, scene::Scene};
 
-/// Where a scan is taken, with what was noted about it.
+/// A pose of a collection, with its notes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NamedPose {
     /// What it is called.
@@ -22,7 +22,7 @@ pub struct NamedPose {
     pub conditions: Conditions,
 }
 
-/// Why there is no pose where one should be.
+/// The reason why a pose is missing or invalid.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PoseFault {
     /// Line of the file, from 1, if it is one.
@@ -135,7 +135,7 @@ const JSON_HELP: &str = "a pose is {\"x_m\": 1.2, \"y_m\": 0.8, \"heading_deg\":
 const CSV_HELP: &str = "the first line names the columns: x_m,y_m,heading_deg, perhaps name, and \
                         any others, which are noted as conditions";
 
-/// What stands on a line of a file of poses.
+/// A line of a file of poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseLine {
     /// Number of the line, from 1.

@@ -9,7 +9,7 @@ use crate::{
     scan::{PingStatus, ScanView},
 };
 
-/// How well the scans at a pose repeat, beam by beam.
+/// Repeatability of the scans at a pose, beam by beam.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Repeatability {
     /// Scans looked at.

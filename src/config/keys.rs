@@ -69,7 +69,7 @@ pub struct PlaceKeys {
     /// Scene file, or the name of a shipped scene. Without one nothing is predicted.
     #[schemars(example = "simple-room")]
     pub scene: Option<String>,
-    /// Where the ranger stands: X,Y,DEG (metres, degrees) or the name of a pose in the scene.
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene.
     pub pose: String,
 }
 
@@ -122,10 +122,10 @@ pub enum Mode {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MotionKeys {
-    /// Rest between the end of a step and firing, milliseconds.
+    /// Settling time between the end of a step and firing, milliseconds.
     #[schemars(range(min = 0, max = 8000))]
     pub settle_ms: f64,
-    /// Least time from firing to firing, milliseconds, to protect the module.
+    /// Least time between firings, milliseconds, to protect the module.
     #[schemars(range(min = 0, max = 8000))]
     pub min_interval_ms: f64,
     /// Listening window after each firing, milliseconds, instead of the time to the maximum range.
@@ -159,7 +159,7 @@ pub struct ModelKeys {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulateKeys {
-    /// Array of rangers: a preset (pioneer-8, pioneer-7, ring-12), or a file with an array's data.
+    /// Array of rangers: a preset (`sonard array list`), or a file with an array's data.
     /// Unless model.sensor is set, its rangers are what the array says.
     pub array: String,
     /// From one firing to the next, milliseconds, instead of the array's own interval.

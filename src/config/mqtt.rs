@@ -69,7 +69,7 @@ impl Default for MqttKeys {
     }
 }
 
-/// Where a broker is.
+/// The address of a broker.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Broker {
     /// Name or address of its computer; an address of IPv6 in brackets.

@@ -70,7 +70,7 @@ pub struct Key {
     pub default_yields: bool,
 }
 
-/// What a key may be given.
+/// The kind of value of a key.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Kind {
     /// Any finite number between two.

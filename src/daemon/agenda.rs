@@ -23,7 +23,7 @@ pub struct Asked {
     pub pose: Option<Pose>,
 }
 
-/// What is to be scanned when.
+/// The schedule of scans.
 #[derive(Debug, Clone)]
 pub struct Agenda {
     mode: Mode,

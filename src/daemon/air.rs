@@ -18,7 +18,7 @@ const NOTABLE_C: f64 = 0.1;
 
 /// What is known about the air. The newest reading counts, whoever gave it.
 #[derive(Debug, Clone)]
-pub(super) struct AirDesk {
+pub(super) struct AirControl {
     keys: AirKeys,
     humidity_percent: f64,
     pressure_kpa: f64,
@@ -33,7 +33,7 @@ pub(super) struct AirDesk {
 /// A thermometer's reading, or why there is none.
 pub(super) type Reading = Result<f64, String>;
 
-impl AirDesk {
+impl AirControl {
     /// The air of the configuration.
     #[must_use]
     pub(super) fn new(keys: AirKeys) -> Self {
@@ -167,35 +167,35 @@ mod tests {
 
     #[test]
     fn the_newest_reading_counts_and_its_age_is_told() {
-        let (mut desk, start) = (AirDesk::new(AirKeys::default()), Instant::now());
-        assert_eq!(desk.status(start).age_s, None);
-        desk.read(&Ok(25.0), start);
+        let (mut control, start) = (AirControl::new(AirKeys::default()), Instant::now());
+        assert_eq!(control.status(start).age_s, None);
+        control.read(&Ok(25.0), start);
         let later = start + Duration::from_secs(700);
-        desk.read(&Err("gone".into()), later);
-        let status = desk.status(later);
+        control.read(&Err("gone".into()), later);
+        let status = control.status(later);
         assert_eq!((status.temperature_c, status.source), (25.0, AirSource::File));
         assert_eq!(status.age_s, Some(700.0));
         assert!(status.stale && status.error.is_some(), "{status:?}");
         let order =
             AirOrder { temperature_c: 21.0, humidity_percent: Some(30.0), pressure_kpa: None };
-        desk.order(&order, later).expect("in range");
-        let status = desk.status(later);
+        control.order(&order, later).expect("in range");
+        let status = control.status(later);
         assert_eq!((status.source, status.age_s), (AirSource::Api, Some(0.0)));
-        assert!(desk.order(&AirOrder { temperature_c: 70.0, ..order }, later).is_err());
-        assert_eq!(desk.status(later).temperature_c, 21.0);
+        assert!(control.order(&AirOrder { temperature_c: 70.0, ..order }, later).is_err());
+        assert_eq!(control.status(later).temperature_c, 21.0);
     }
 
     #[test]
     fn small_changes_do_not_make_everything_be_predicted_anew() {
-        let mut desk = AirDesk::new(AirKeys::default());
+        let mut control = AirControl::new(AirKeys::default());
         let now = Instant::now();
-        desk.read(&Ok(20.0), now);
-        let first = desk.settled();
+        control.read(&Ok(20.0), now);
+        let first = control.settled();
         for temperature_c in [20.04, 20.09, 19.95] {
-            desk.read(&Ok(temperature_c), now);
-            assert_eq!(desk.settled(), first);
+            control.read(&Ok(temperature_c), now);
+            assert_eq!(control.settled(), first);
         }
-        desk.read(&Ok(20.11), now);
-        assert_eq!(desk.settled().temperature_c(), 20.11);
+        control.read(&Ok(20.11), now);
+        assert_eq!(control.settled().temperature_c(), 20.11);
     }
 }

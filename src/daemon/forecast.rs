@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// What predictions depend on, besides scene and sensor.
-pub(super) type Place = (Pose, ScanPlan, Air);
+pub(super) type ForecastKey = (Pose, ScanPlan, Air);
 
 /// What the model says.
 #[derive(Debug, Default)]
@@ -31,7 +31,7 @@ pub(super) struct Predicted {
 /// The predictions made last, kept for as long as nothing they depend on changes.
 #[derive(Debug, Default)]
 pub(super) struct Forecast {
-    made_for: Option<Place>,
+    made_for: Option<ForecastKey>,
     predictions: Vec<SimRecord>,
     model: Option<ModelRecord>,
 }
@@ -43,12 +43,12 @@ impl Forecast {
     }
 
     /// Whether there are predictions for this.
-    pub(super) fn knows(&self, what: Place) -> bool {
+    pub(super) fn knows(&self, what: ForecastKey) -> bool {
         self.made_for == Some(what)
     }
 
     /// Takes predictions in.
-    pub(super) fn learn(&mut self, what: Place, predicted: Predicted) {
+    pub(super) fn learn(&mut self, what: ForecastKey, predicted: Predicted) {
         let Predicted { predictions, model, .. } = predicted;
         *self = Self { made_for: Some(what), predictions, model };
     }
@@ -57,7 +57,7 @@ impl Forecast {
     pub(super) fn job(
         &self,
         settings: &Settings,
-        (pose, plan, air): Place,
+        (pose, plan, air): ForecastKey,
         scan_air: ScanAir,
         identity: &Identity,
     ) -> ScanJob {
@@ -102,7 +102,7 @@ pub(super) fn listening(settings: &Settings, air: &Air) -> Listening {
 /// When the model refuses sensor or options, in words.
 pub(super) fn predict(
     settings: &Settings,
-    (pose, plan, air): Place,
+    (pose, plan, air): ForecastKey,
 ) -> impl Future<Output = Result<Predicted, String>> + use<> {
     let (scene, sensor) = (settings.scene.clone(), settings.sensor.clone());
     let options = settings.options();

@@ -34,7 +34,7 @@ const CONTROLS: usize = 1024;
 /// The same in bytes.
 const CONTROL_BYTES: usize = 4 << 20;
 
-/// What a subscriber wants of records.
+/// The records that a subscriber wants.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wanted {
     /// Only readings whose range moved by more than this since it was last sent for that

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::api::{LinkState, Trouble};
 
-/// What came of a step, or what happened by itself.
+/// The outcome of a step, or an external event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Input {
     /// The port is open and locked.
@@ -37,7 +37,7 @@ pub enum Input {
     Shutdown,
 }
 
-/// What to do now.
+/// The next step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
     /// Open the port.

@@ -14,11 +14,11 @@ use tokio_serial::SerialStream;
 
 use super::{
     agenda::Due,
-    desk::{Desk, Interrupt},
+    control::{Control, Interrupt},
+    fan_out::RecordFanOut,
     forecast::{Forecast, listening},
     machine::{Input, LinkMachine, Step},
-    outlet::Outlet,
-    shared::Line,
+    shared::LinkFigures,
 };
 use crate::{
     api::{ScanTotals, Trouble},
@@ -37,7 +37,7 @@ const BEAT: Duration = Duration::from_secs(1);
 pub type OpenPort = Box<dyn FnMut(&str) -> Result<SerialStream, LinkError> + Send>;
 
 pub(super) struct Operator {
-    desk: Desk,
+    control: Control,
     machine: LinkMachine,
     open_port: OpenPort,
     ranger: Option<Ranger<SerialStream>>,
@@ -47,18 +47,18 @@ pub(super) struct Operator {
     met: Option<Identity>,
     /// The session's record that is in force in the log.
     session: Option<Session>,
-    out: Outlet,
+    out: RecordFanOut,
     trouble: Option<String>,
-    line_figures: Line,
+    line_figures: LinkFigures,
     scans: ScanTotals,
     next_check: Instant,
 }
 
 impl Operator {
-    pub(super) fn new(desk: Desk, open_port: OpenPort, out: Outlet) -> Self {
-        let machine = LinkMachine::new(desk.settings.back_off(), desk.now());
+    pub(super) fn new(control: Control, open_port: OpenPort, out: RecordFanOut) -> Self {
+        let machine = LinkMachine::new(control.settings.back_off(), control.now());
         Self {
-            desk,
+            control,
             machine,
             open_port,
             ranger: None,
@@ -68,7 +68,7 @@ impl Operator {
             session: None,
             out,
             trouble: None,
-            line_figures: Line::default(),
+            line_figures: LinkFigures::default(),
             scans: ScanTotals::default(),
             next_check: Instant::now(),
         }
@@ -77,7 +77,7 @@ impl Operator {
     /// Works until the machine has ended.
     pub(super) async fn run(mut self) {
         loop {
-            let step = self.machine.poll(self.desk.now());
+            let step = self.machine.poll(self.control.now());
             self.tell();
             match step {
                 Step::Open => self.open(),
@@ -86,24 +86,24 @@ impl Operator {
                 Step::Serve => self.serve().await,
                 Step::Wait(until) => {
                     self.close();
-                    self.wait(Some(self.desk.epoch + until)).await;
+                    self.wait(Some(self.control.epoch + until)).await;
                 }
                 Step::Rest => {
                     self.close();
-                    self.desk.board.set_power(false);
+                    self.control.gpio.set_power(false);
                     self.wait(None).await;
                 }
                 Step::End => break,
             }
         }
         self.close();
-        self.desk.board.set_light(false);
-        self.desk.board.set_power(false);
+        self.control.gpio.set_light(false);
+        self.control.gpio.set_power(false);
     }
 
     fn handle(&mut self, input: Input) {
         self.out.shared.beat();
-        self.machine.handle(self.desk.now(), input);
+        self.machine.handle(self.control.now(), input);
     }
 
     fn fail(&mut self, trouble: Trouble, why: String) {
@@ -114,8 +114,8 @@ impl Operator {
 
     fn open(&mut self) {
         self.close();
-        self.desk.board.set_power(true);
-        let port = self.desk.settings.keys.device.port.clone().unwrap_or_default();
+        self.control.gpio.set_power(true);
+        let port = self.control.settings.keys.device.port.clone().unwrap_or_default();
         match (self.open_port)(&port) {
             Ok(line) => {
                 self.line = Some(line);
@@ -135,19 +135,19 @@ impl Operator {
     }
 
     async fn identify(&mut self) {
-        let attempts = self.desk.settings.keys.link.attempts;
+        let attempts = self.control.settings.keys.link.attempts;
         let met = match (self.line.take(), self.ranger.take()) {
             (Some(line), _) => {
                 let config =
                     HostConfig { max_attempts: attempts, ..HostConfig::new(BAUD, rand::random()) };
-                attended(&mut self.desk, Ranger::meet(Driver::new(line, config))).await
+                attended(&mut self.control, Ranger::meet(Driver::new(line, config))).await
             }
             (None, Some(mut ranger)) => {
                 let again = async {
                     ranger.meet_again().await?;
                     Ok(ranger)
                 };
-                attended(&mut self.desk, again).await
+                attended(&mut self.control, again).await
             }
             (None, None) => return self.fail(Trouble::Lost, "the line is gone".into()),
         };
@@ -161,7 +161,7 @@ impl Operator {
     /// Takes the device if it is the right one.
     fn meet(&mut self, ranger: Ranger<SerialStream>) {
         let serial = serial_text(ranger.identity());
-        let wanted = self.desk.settings.keys.device.serial.clone();
+        let wanted = self.control.settings.keys.device.serial.clone();
         if let Some(wanted) = wanted.filter(|wanted| *wanted != serial) {
             let why = format!(
                 "the device says it is {serial}, not {wanted}; connect that one, or change \
@@ -176,7 +176,7 @@ impl Operator {
             self.session = None;
         }
         self.met = Some(identity);
-        self.desk.identity = Some(identity);
+        self.control.identity = Some(identity);
         self.line_figures.live = Some(ranger.watch_link());
         self.ranger = Some(ranger);
         self.handle(Input::Identified);
@@ -184,20 +184,20 @@ impl Operator {
 
     async fn home(&mut self) {
         let Some(ranger) = &mut self.ranger else { return };
-        let air = self.desk.air.settled();
+        let air = self.control.air.settled();
         let settings = self
-            .desk
+            .control
             .settings
             .motion()
-            .settings(&listening(&self.desk.settings, &air), ranger.identity());
-        match attended(&mut self.desk, ranger.home(settings)).await {
+            .settings(&listening(&self.control.settings, &air), ranger.identity());
+        match attended(&mut self.control, ranger.home(settings)).await {
             Err(interrupt) => {
                 // The motor is turning. A device that does not hear this stops at its index.
                 let _ = ranger.stop().await;
                 self.react(interrupt);
             }
             Ok(Err(error)) => self.device_failed(&error),
-            Ok(Ok(_drift)) if self.desk.board.at_home() == Some(false) => {
+            Ok(Ok(_drift)) if self.control.gpio.at_home() == Some(false) => {
                 let why = "the motor says it is home, but the home switch is open".into();
                 self.fail(Trouble::Fault, why);
             }
@@ -210,11 +210,11 @@ impl Operator {
 
     /// The device can be used: scans if that is due, else listens until it is.
     async fn serve(&mut self) {
-        let due = match self.desk.agenda.due(self.desk.now()) {
+        let due = match self.control.agenda.due(self.control.now()) {
             // Nothing is measured that can't be kept.
             Due::Now if self.out.journal.is_well() => return self.scan().await,
             Due::Now | Due::OnRequest => None,
-            Due::At(at) => Some(self.desk.epoch + at),
+            Due::At(at) => Some(self.control.epoch + at),
         };
         let Some(ranger) = &mut self.ranger else {
             return self.fail(Trouble::Lost, "the line is gone".into());
@@ -224,7 +224,7 @@ impl Operator {
         let wake = due.map_or(wake, |due| due.min(wake));
         tokio::select! {
             unasked = ranger.unasked() => self.unasked(unasked),
-            interrupt = self.desk.next() => self.react(interrupt),
+            interrupt = self.control.next() => self.react(interrupt),
             () = sleep_until(wake) => self.check_if_due().await,
         }
     }
@@ -257,7 +257,7 @@ impl Operator {
         self.next_check = Instant::now() + self.check_interval();
         self.out.shared.beat();
         let Some(ranger) = &mut self.ranger else { return };
-        match attended(&mut self.desk, ranger.check()).await {
+        match attended(&mut self.control, ranger.check()).await {
             Err(interrupt) => self.react(interrupt),
             Ok(Err(DriveError::Host(HostError::Rebooted))) => self.unasked(Unasked::Restarted),
             Ok(Err(error)) => self.device_failed(&error),
@@ -292,9 +292,9 @@ impl Operator {
             DriveError::Host(Host::Hangup) => Trouble::Lost,
             _ => Trouble::Fault,
         };
-        if trouble == Trouble::NotAnswering && self.desk.board.can_reset() {
+        if trouble == Trouble::NotAnswering && self.control.gpio.can_reset() {
             tracing::warn!("the device does not answer: pulling its reset line");
-            tokio::task::block_in_place(|| self.desk.board.reset());
+            tokio::task::block_in_place(|| self.control.gpio.reset());
         }
         self.fail(trouble, format!("{error}; {}", error.help()));
     }
@@ -305,7 +305,7 @@ impl Operator {
         let beat = Instant::now() + BEAT;
         tokio::select! {
             () = sleep_until(until.map_or(beat, |until| until.min(beat))) => {}
-            interrupt = self.desk.next() => self.react(interrupt),
+            interrupt = self.control.next() => self.react(interrupt),
         }
     }
 
@@ -332,34 +332,34 @@ impl Operator {
             Interrupt::Start => self.handle(Input::Start),
             Interrupt::Stop | Interrupt::Agenda => {}
         }
-        self.machine.set_back_off(self.desk.settings.back_off());
+        self.machine.set_back_off(self.control.settings.back_off());
         self.machine.set_resumes(self.resumes());
     }
 
     const fn resumes(&self) -> bool {
-        self.desk.settings.keys.safety.resume_after_emergency_stop
+        self.control.settings.keys.safety.resume_after_emergency_stop
     }
 
     fn close(&mut self) {
         self.line = None;
         self.ranger = None;
         self.line_figures.close();
-        self.desk.identity = None;
+        self.control.identity = None;
     }
 
     fn check_interval(&self) -> Duration {
-        Duration::from_secs_f64(self.desk.settings.keys.link.check_s)
+        Duration::from_secs_f64(self.control.settings.keys.link.check_s)
     }
 }
 
 /// Waits for something of the device, carrying out orders meanwhile; broken off only by what
 /// can't wait.
-async fn attended<T>(desk: &mut Desk, work: impl Future<Output = T>) -> Result<T, Interrupt> {
+async fn attended<T>(control: &mut Control, work: impl Future<Output = T>) -> Result<T, Interrupt> {
     tokio::pin!(work);
     loop {
         tokio::select! {
             done = &mut work => return Ok(done),
-            interrupt = desk.next() => match interrupt {
+            interrupt = control.next() => match interrupt {
                 Interrupt::Shutdown | Interrupt::EmergencyStop(_) | Interrupt::PortChanged => {
                     return Err(interrupt);
                 }

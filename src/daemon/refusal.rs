@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// Why an order is not carried out.
+/// The reason why an order is refused.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{message}")]
 pub struct Refusal {
@@ -14,7 +14,7 @@ pub struct Refusal {
     pub help: String,
 }
 
-/// Whether a refused order is wrong at all times.
+/// The kind of a refusal: wrong at all times, or now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RefusalKind {
     /// It is wrong in itself.

@@ -40,7 +40,7 @@ pub struct Simulated {
     pub course: Option<Arc<Course>>,
 }
 
-/// What is wrong with values that are each within their range.
+/// Values that are each in range but do not fit together.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mismatch {
     /// The section of the key to look at.

@@ -11,7 +11,7 @@ use tokio::{sync::watch, time::Instant};
 use uuid::Uuid;
 
 use super::{
-    air::AirDesk,
+    air::AirControl,
     fit::{Fit, news},
 };
 use crate::{
@@ -50,13 +50,13 @@ pub(super) struct View {
     /// What the next one will be taken by.
     pub(super) next: Terms,
     pub(super) configuration: ConfigurationReport,
-    pub(super) line: Line,
+    pub(super) line: LinkFigures,
     pub(super) scans: ScanTotals,
     pub(super) clock: ClockReport,
     pub(super) simulation: Option<SimulationReport>,
 }
 
-/// What the next scan is taken by.
+/// Settings of the next scan.
 #[derive(Debug, Clone)]
 pub struct NextScan {
     /// Azimuths.
@@ -82,7 +82,7 @@ pub(super) struct Terms {
     pub(super) setup: Arc<Setup>,
     /// The array that is played, where nothing is measured.
     pub(super) array: Option<Arc<RangerArray>>,
-    pub(super) air: AirDesk,
+    pub(super) air: AirControl,
 }
 
 impl Terms {
@@ -125,14 +125,14 @@ impl View {
 
 /// Figures of the line: what is settled, and the connection that there is.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Line {
+pub(super) struct LinkFigures {
     /// Connections before this one, and losses.
     pub(super) earlier: LineTotals,
     /// This one's, which go on changing.
     pub(super) live: Option<watch::Receiver<LinkStats>>,
 }
 
-impl Line {
+impl LinkFigures {
     /// All together, now.
     pub(super) fn totals(&self) -> LineTotals {
         self.live.as_ref().map_or(self.earlier, |live| with(self.earlier, &live.borrow()))

@@ -8,7 +8,7 @@ use std::{
 use sonard_generate::{ManifestError, ShardError, SpecError};
 use thiserror::Error;
 
-/// Why a shard or a set is not made, or not read.
+/// An error in making or reading a data set.
 #[derive(Debug, Error)]
 pub enum DataSetError {
     /// The folder is in use for something else.

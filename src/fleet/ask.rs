@@ -15,7 +15,7 @@ const LIMIT: Duration = Duration::from_millis(1500);
 /// Longest status and longest health that are read, bytes.
 const MOST_BYTES: usize = 256 * 1024;
 
-/// What a daemon says of itself.
+/// A daemon's report of itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Told {
     /// What it is doing.

@@ -7,7 +7,7 @@ use crate::{api::FleetState, config::is_robot_name};
 const MOST_REASONS: usize = 3;
 const MOST_CHARACTERS: usize = 120;
 
-/// Why a daemon did not say how it is, in words.
+/// The reason why a daemon did not report, in words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Unheard {
     /// Nobody answers, or not in time.
@@ -18,7 +18,7 @@ pub enum Unheard {
     Strange(String),
 }
 
-/// What was seen of a robot.
+/// The observed state of a robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
     /// How it is.

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use thiserror::Error;
 
 use crate::{
-    client::{Client, Place},
+    client::{Client, Endpoint},
     config::{FleetKeys, Keys, Layers, is_robot_name},
 };
 
@@ -19,7 +19,7 @@ pub struct Member {
     /// The robot that it is to be of, if that was said.
     pub robot: Option<String>,
     /// Where it is.
-    pub place: Place,
+    pub place: Endpoint,
     /// File with its token.
     pub token_file: Option<PathBuf>,
 }
@@ -33,7 +33,7 @@ pub struct Asked {
     pub client: Client,
 }
 
-/// Why daemons can't be named so.
+/// An error in a list of daemons.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{message}")]
 pub struct MemberError {
@@ -60,7 +60,7 @@ impl Member {
                 help: "letters, digits, `-`, `_` and `.`: kiwi=10.0.0.7:8765".into(),
             });
         }
-        let place = read_place(place).ok_or_else(|| MemberError {
+        let place = read_endpoint(place).ok_or_else(|| MemberError {
             message: format!("{place:?} is no place of a daemon"),
             help: "HOST:PORT, or the path of a socket, which begins with /; a daemon speaks plain \
                    HTTP, so ask through a tunnel where others listen in"
@@ -72,15 +72,15 @@ impl Member {
     /// One at a socket.
     #[must_use]
     pub const fn at_socket(path: PathBuf) -> Self {
-        Self { robot: None, place: Place::Socket(path), token_file: None }
+        Self { robot: None, place: Endpoint::Socket(path), token_file: None }
     }
 
     /// Where it is asked, for people.
     #[must_use]
     pub fn address(&self) -> String {
         match &self.place {
-            Place::Socket(path) => path.display().to_string(),
-            Place::Address(address) => address.clone(),
+            Endpoint::Socket(path) => path.display().to_string(),
+            Endpoint::Address(address) => address.clone(),
         }
     }
 
@@ -88,22 +88,22 @@ impl Member {
     #[must_use]
     pub fn page(&self) -> Option<String> {
         match &self.place {
-            Place::Socket(_) => None,
-            Place::Address(address) => Some(format!("http://{address}/")),
+            Endpoint::Socket(_) => None,
+            Endpoint::Address(address) => Some(format!("http://{address}/")),
         }
     }
 }
 
-fn read_place(text: &str) -> Option<Place> {
+fn read_endpoint(text: &str) -> Option<Endpoint> {
     if text.starts_with('/') {
-        return Some(Place::Socket(text.into()));
+        return Some(Endpoint::Socket(text.into()));
     }
     let address = text.strip_prefix("http://").unwrap_or(text);
     let address = address.strip_suffix('/').unwrap_or(address);
     let (host, port) = address.rsplit_once(':')?;
     let is_host = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.:[]".contains(&byte);
     let is_good = !host.is_empty() && host.bytes().all(is_host) && port.parse::<u16>().is_ok();
-    is_good.then(|| Place::Address(address.to_owned()))
+    is_good.then(|| Endpoint::Address(address.to_owned()))
 }
 
 /// The daemons that a configuration names, its file's among them.
@@ -115,8 +115,8 @@ pub fn members_of(keys: &FleetKeys) -> Result<Vec<Member>, MemberError> {
     for text in &keys.daemons {
         let member = Member::parse(text)?;
         let token_file = match member.place {
-            Place::Address(_) => keys.token_file.as_ref().map(PathBuf::from),
-            Place::Socket(_) => None,
+            Endpoint::Address(_) => keys.token_file.as_ref().map(PathBuf::from),
+            Endpoint::Socket(_) => None,
         };
         members.push(Member { token_file, ..member });
     }
@@ -246,9 +246,9 @@ mod tests {
         let parsed = |text: &str| Member::parse(text).expect(text);
         let kiwi = parsed("kiwi=http://10.0.0.7:8765/");
         assert_eq!(kiwi.robot.as_deref(), Some("kiwi"));
-        assert_eq!(kiwi.place, Place::Address("10.0.0.7:8765".into()));
+        assert_eq!(kiwi.place, Endpoint::Address("10.0.0.7:8765".into()));
         assert_eq!(kiwi.page().as_deref(), Some("http://10.0.0.7:8765/"));
-        assert_eq!(parsed("[::1]:80").place, Place::Address("[::1]:80".into()));
+        assert_eq!(parsed("[::1]:80").place, Endpoint::Address("[::1]:80".into()));
         assert_eq!(parsed("/run/a=b.sock"), Member::at_socket("/run/a=b.sock".into()));
         for bad in ["", "kiwi", "kiwi=", "a b=h:1", "h:port", "h:99999", "https://h:1", "h:1/x"] {
             assert!(Member::parse(bad).is_err(), "{bad}");
@@ -269,7 +269,7 @@ mod tests {
         );
         let members = members.expect("it is right");
         assert_eq!(members[0].token_file.as_deref(), Some(&*folder.path().join("kiwi.token")));
-        assert_eq!(members[1].place, Place::Socket("/run/s".into()));
+        assert_eq!(members[1].place, Endpoint::Socket("/run/s".into()));
         let members = read("[fleet]\ndaemons = [\"a=h:1\", \"/s\"]\ntoken_file = \"/t\"\n");
         let members = members.expect("it is right");
         assert_eq!(members[0].token_file.as_deref(), Some(Path::new("/t")));

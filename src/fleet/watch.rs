@@ -29,7 +29,7 @@ enum News {
 
 /// A scan whose picture is wanted.
 #[derive(Debug, Clone, Copy, Default)]
-struct Wish {
+struct PictureRequest {
     scan: Option<Uuid>,
     tries: u8,
     is_pending: bool,
@@ -57,7 +57,7 @@ async fn keep(mut roll: Roll, fleet: Vec<Asked>, tell: watch::Sender<Bytes>) {
     // Scans are large: one is read at a time.
     let drawing = Arc::new(Semaphore::new(1));
     let most_bytes = MOST_PICTURE_BYTES / clients.len().max(1);
-    let mut wishes = vec![Wish::default(); clients.len()];
+    let mut requests = vec![PictureRequest::default(); clients.len()];
     loop {
         let (number, news) = tokio::select! {
             Some(news) = news.recv() => news,
@@ -66,11 +66,11 @@ async fn keep(mut roll: Roll, fleet: Vec<Asked>, tell: watch::Sender<Bytes>) {
         match news {
             News::Answer(answer) => roll.take(number, *answer, Timestamp::now()),
             News::Picture(scan, picture) => {
-                wishes[number].is_pending = false;
+                requests[number].is_pending = false;
                 picture.into_iter().for_each(|picture| roll.show(number, scan, picture));
             }
         }
-        if let Some(scan) = wishes[number].next(roll.lacks_picture(number)) {
+        if let Some(scan) = requests[number].next(roll.lacks_picture(number)) {
             let (client, send) = (clients[number].clone(), send.clone());
             let turn = Arc::clone(&drawing);
             asking.spawn(async move {
@@ -89,7 +89,7 @@ async fn keep(mut roll: Roll, fleet: Vec<Asked>, tell: watch::Sender<Bytes>) {
     }
 }
 
-impl Wish {
+impl PictureRequest {
     /// The scan to ask for now, if one is lacking that may be had.
     fn next(&mut self, lacking: Option<Uuid>) -> Option<Uuid> {
         let scan = lacking.filter(|_| !self.is_pending)?;
@@ -128,14 +128,14 @@ mod tests {
     #[test]
     fn a_scan_is_asked_for_once_at_a_time_and_not_for_ever() {
         let (scan, next) = (Uuid::from_u128(1), Uuid::from_u128(2));
-        let mut wish = Wish::default();
-        assert_eq!(wish.next(None), None);
+        let mut request = PictureRequest::default();
+        assert_eq!(request.next(None), None);
         for _ in 0..MOST_TRIES {
-            assert_eq!(wish.next(Some(scan)), Some(scan));
-            assert_eq!(wish.next(Some(next)), None, "one is on its way");
-            wish.is_pending = false;
+            assert_eq!(request.next(Some(scan)), Some(scan));
+            assert_eq!(request.next(Some(next)), None, "one is on its way");
+            request.is_pending = false;
         }
-        assert_eq!(wish.next(Some(scan)), None);
-        assert_eq!(wish.next(Some(next)), Some(next));
+        assert_eq!(request.next(Some(scan)), None);
+        assert_eq!(request.next(Some(next)), Some(next));
     }
 }

@@ -19,7 +19,7 @@ use crate::{
 const LEAST_WAIT: Duration = Duration::from_secs(2);
 const MOST_WAIT: Duration = Duration::from_secs(30);
 
-/// What is gathered, and where to.
+/// Sources and destination of gathering.
 #[derive(Debug, Clone)]
 pub struct Choices {
     /// The folder of all robots' folders.
@@ -45,7 +45,7 @@ struct Mate {
     wait: Duration,
 }
 
-/// How it went with a daemon.
+/// The result for one daemon.
 #[derive(Debug)]
 pub struct Report {
     /// Its robot, if it said so or was named.

@@ -11,7 +11,7 @@ pub const LEDGER: &str = "gathered.json";
 /// Largest one that is read, bytes.
 const MOST_BYTES: u64 = 16 << 20;
 
-/// What was taken from a robot.
+/// A record of what was gathered from a robot.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ledger {
@@ -23,7 +23,7 @@ pub struct Ledger {
     pub logs: BTreeMap<String, Taken>,
 }
 
-/// How far a log was taken.
+/// How far a log was gathered.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Taken {

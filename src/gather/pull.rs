@@ -37,7 +37,7 @@ pub trait Watcher: Send + Sync {
     fn refused(&self, robot: &str, log: &str, refusal: &Refusal);
 }
 
-/// What was taken.
+/// Counts of what was gathered.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Logs that something was taken of.
@@ -52,7 +52,7 @@ pub struct Tally {
     pub bytes: u64,
 }
 
-/// Why not all could be taken.
+/// The reason why not all could be gathered.
 #[derive(Debug, Error)]
 pub enum PullError {
     /// The daemon does not answer as it should.

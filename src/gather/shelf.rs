@@ -29,7 +29,7 @@ pub struct Shelf {
     _lock: File,
 }
 
-/// Why nothing can be put into a robot's folder.
+/// An error in the folder of a robot.
 #[derive(Debug, Error)]
 #[error("{message}")]
 pub struct ShelfError {

@@ -21,7 +21,7 @@ const TICK_HZ: u32 = limits::TICK_HZ;
 /// Time from the machine's wish to fire until INIT rises, ticks: the compare unit's lead.
 const FIRE_LEAD_TICKS: u64 = 32;
 
-/// Why the board wants to be woken.
+/// The reason for which the board wants to be woken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WakeKind {
     /// A move, a rest or a listening window ends: virtual time may jump there.

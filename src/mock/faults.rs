@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::liar::Lie;
 
-/// How often what goes wrong. Written `flip=0.001,drop=0.001,reset=0.002,version=9`.
+/// Rates of injected faults. Written `flip=0.001,drop=0.001,reset=0.002,version=9`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FaultPlan {
     /// Probability that a byte has one bit flipped.
@@ -50,7 +50,7 @@ delay (probability a chunk; delay_ms, default 20), stall (probability a firing; 
 (probability a turn of the motor), version (protocol version to claim), lie (what to say wrongly: \
 lie=? names them)";
 
-/// Why a fault specification can't be read.
+/// An error in a fault specification.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum FaultSpecError {
     /// No `=` in a part.

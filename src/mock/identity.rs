@@ -7,7 +7,7 @@ use firmware_protocol::{
 
 use super::faults::FaultPlan;
 
-/// What the mock claims to be.
+/// Settings of the mock board.
 #[derive(Debug, Clone, Copy)]
 pub struct BoardSettings {
     /// Boot nonce of the first boot.
@@ -24,7 +24,7 @@ pub struct BoardSettings {
     pub pace: Pace,
 }
 
-/// How device time passes.
+/// The passage of device time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
     /// As on a wall clock.

@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::faults::DeviceFault;
 
-/// Something a person watching the mock wants to see.
+/// A message for a person watching the mock.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Note {
     /// The device booted with this nonce.

@@ -35,19 +35,19 @@ pub struct MockPort {
     link: Option<PathBuf>,
     epoch: Instant,
     epoch_ticks: u64,
-    to_host: Line,
-    to_board: Line,
+    to_host: DelayedBytes,
+    to_board: DelayedBytes,
     lock_check: Instant,
     moves: Option<UnboundedReceiver<Soundings>>,
 }
 
 /// One direction of the line, with bytes that are held back.
 #[derive(Debug, Default)]
-struct Line {
+struct DelayedBytes {
     chunks: VecDeque<(Instant, Vec<u8>)>,
 }
 
-impl Line {
+impl DelayedBytes {
     /// Bytes never overtake bytes.
     fn push(&mut self, bytes: Vec<u8>, delay: Duration) {
         let earliest = self.chunks.back().map(|(at, _)| *at);
@@ -77,8 +77,8 @@ impl MockPort {
             pty: open_watched(link)?,
             link: link.map(Path::to_path_buf),
             board,
-            to_host: Line::default(),
-            to_board: Line::default(),
+            to_host: DelayedBytes::default(),
+            to_board: DelayedBytes::default(),
             lock_check: Instant::now() + LOCK_CHECK,
             moves: None,
         })

@@ -13,7 +13,7 @@ use crate::{
     scan::{PingStatus, ScanPlan},
 };
 
-/// What the ranger hears in each direction of the motor, from the model.
+/// The model's readings in each direction of the motor.
 #[derive(Debug, Clone)]
 pub struct Soundings {
     rows: Vec<Sounding>,

@@ -29,7 +29,7 @@ const MOST_CERTIFICATE_BYTES: u64 = 1 << 20;
 /// How a certificate begins.
 const CERTIFICATE: &str = "-----BEGIN CERTIFICATE-----";
 
-/// Why a broker can't be asked at all.
+/// An error in the settings of a broker.
 #[derive(Debug, Error)]
 #[error("mqtt.{key} {file}: {message}")]
 pub struct AccountError {
@@ -40,7 +40,7 @@ pub struct AccountError {
     pub help: String,
 }
 
-/// How the broker is reached, and as whom.
+/// Address and credentials of a broker.
 #[derive(Clone)]
 pub struct Account {
     options: MqttOptions,

@@ -10,7 +10,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use super::window::Place;
+use super::window::LogPosition;
 use crate::store::{MARK_BYTES, WholeFile, hexadecimal, read_small};
 
 /// The file's name in the folder of the logs.
@@ -32,8 +32,8 @@ pub(super) struct Bookmark {
 
 impl Bookmark {
     /// The place.
-    pub(super) fn place(&self) -> Place {
-        Place { file: self.file.as_str().into(), bytes: self.bytes }
+    pub(super) fn place(&self) -> LogPosition {
+        LogPosition { file: self.file.as_str().into(), bytes: self.bytes }
     }
 
     /// Whether the log in `folder` is still what was read up to the place.
@@ -53,7 +53,7 @@ impl Bookmark {
     ///
     /// # Errors
     /// When the log can't be read, or the file not be written.
-    pub(super) fn write(folder: &Path, place: &Place) -> io::Result<()> {
+    pub(super) fn write(folder: &Path, place: &LogPosition) -> io::Result<()> {
         let sha256 = match before(folder, place) {
             // It was removed, and that is told when it is read on.
             Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
@@ -69,7 +69,7 @@ fn path_in(folder: &Path) -> PathBuf {
 }
 
 /// SHA-256 of what stands before a place.
-fn before(folder: &Path, place: &Place) -> io::Result<String> {
+fn before(folder: &Path, place: &LogPosition) -> io::Result<String> {
     let from = place.bytes.saturating_sub(MARK_BYTES);
     let mut bytes = vec![0; usize::try_from(place.bytes - from).unwrap_or_default()];
     // What a damaged file names must not lead out of the folder.
@@ -91,7 +91,7 @@ mod tests {
         assert_eq!(Bookmark::read(folder).expect("none yet"), None);
         let log = folder.join("sonard-1.jsonl");
         fs::write(&log, "one\ntwo\n").expect("writes");
-        let place = Place { file: "sonard-1.jsonl".into(), bytes: 4 };
+        let place = LogPosition { file: "sonard-1.jsonl".into(), bytes: 4 };
         Bookmark::write(folder, &place).expect("writes");
         let mark = Bookmark::read(folder).expect("reads").expect("one");
         assert!(mark.place() == place && mark.fits(folder));

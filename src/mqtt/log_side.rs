@@ -7,7 +7,7 @@ use tokio::task::{JoinHandle, spawn_blocking};
 use super::{
     bookmark::Bookmark,
     tail::{Piece, Tail},
-    window::Place,
+    window::LogPosition,
 };
 
 /// What is asked.
@@ -16,16 +16,16 @@ pub(super) struct Errand {
     /// Read on, so many bytes.
     pub(super) read: Option<usize>,
     /// Remember this place.
-    pub(super) remember: Option<Place>,
+    pub(super) remember: Option<LogPosition>,
     /// Say how much stands behind this place.
-    pub(super) behind: Option<Place>,
+    pub(super) behind: Option<LogPosition>,
 }
 
 /// What came of it.
 #[derive(Debug)]
 pub(super) struct Outcome {
     pub(super) piece: Option<io::Result<Piece>>,
-    pub(super) remembered: Option<(Place, io::Result<()>)>,
+    pub(super) remembered: Option<(LogPosition, io::Result<()>)>,
     pub(super) behind_bytes: Option<u64>,
 }
 
@@ -46,7 +46,7 @@ impl LogSide {
     }
 
     fn carry_out(&mut self, errand: Errand) -> Outcome {
-        let remember = |place: Place| {
+        let remember = |place: LogPosition| {
             let written = Bookmark::write(&self.folder, &place);
             (place, written)
         };

@@ -11,7 +11,7 @@ use bytes::Bytes;
 use super::{
     bookmark::Bookmark,
     topics::Kind,
-    window::{Message, Place, Read},
+    window::{LogPosition, Message, Read},
 };
 use crate::{
     scan::{MAX_LINE_BYTES, decode_line},
@@ -22,7 +22,7 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct Tail {
     folder: PathBuf,
-    at: Place,
+    at: LogPosition,
 }
 
 /// What reading on came to.
@@ -43,14 +43,15 @@ impl Tail {
     /// # Errors
     /// When the folder can't be read, or the place not be remembered.
     pub(super) fn open(folder: &Path, history: bool) -> io::Result<(Self, Option<String>)> {
-        let mut tail = Self { folder: folder.into(), at: Place { file: "".into(), bytes: 0 } };
+        let mut tail =
+            Self { folder: folder.into(), at: LogPosition { file: "".into(), bytes: 0 } };
         let why = match Bookmark::read(folder) {
             Ok(Some(mark)) => {
                 tail.at = mark.place();
                 if mark.fits(folder) {
                     return Ok((tail, None));
                 }
-                let Place { file, bytes } = &tail.at;
+                let LogPosition { file, bytes } = &tail.at;
                 format!("the broker has {file} up to byte {bytes}, and that is gone or was changed")
             }
             Ok(None) => {
@@ -67,7 +68,7 @@ impl Tail {
     }
 
     /// The place that was read to.
-    pub(super) const fn place(&self) -> &Place {
+    pub(super) const fn place(&self) -> &LogPosition {
         &self.at
     }
 
@@ -88,7 +89,7 @@ impl Tail {
                 Err(error) if is_gone(&error) => {
                     let next = self.next_log()?;
                     let before = std::mem::replace(&mut self.at, next);
-                    let Place { file, bytes } = before;
+                    let LogPosition { file, bytes } = before;
                     piece.gap = Some(format!(
                         "{file} was removed or cut before the broker had all from byte {bytes} on: \
                          sent on from the beginning of {}",
@@ -102,7 +103,7 @@ impl Tail {
                 return Ok(piece);
             }
             match next {
-                Some(next) => self.at = Place { file: next.into(), bytes: 0 },
+                Some(next) => self.at = LogPosition { file: next.into(), bytes: 0 },
                 None => {
                     piece.is_end = true;
                     return Ok(piece);
@@ -116,7 +117,7 @@ impl Tail {
     ///
     /// # Errors
     /// When the folder can't be read.
-    pub(super) fn behind(&self, place: &Place) -> io::Result<u64> {
+    pub(super) fn behind(&self, place: &LogPosition) -> io::Result<u64> {
         let files = log_files(&self.folder)?;
         let behind = files.iter().filter(|file| *file.name >= *place.file);
         let all: u64 = behind.map(|file| file.bytes).sum();
@@ -158,10 +159,10 @@ impl Tail {
 
     /// Where to go on if not where it was: the log after it, itself from its beginning if it is there, or else
     /// the oldest there is.
-    fn next_log(&self) -> io::Result<Place> {
+    fn next_log(&self) -> io::Result<LogPosition> {
         let files = log_files(&self.folder)?;
         let from = files.iter().find(|file| *file.name >= *self.at.file).or(files.first());
-        Ok(Place { file: from.map_or("", |file| &file.name).into(), bytes: 0 })
+        Ok(LogPosition { file: from.map_or("", |file| &file.name).into(), bytes: 0 })
     }
 
     fn log_after(&self, name: &str) -> io::Result<Option<String>> {
@@ -170,9 +171,9 @@ impl Tail {
     }
 
     /// The end of the newest log, which is being written.
-    fn end(&self) -> io::Result<Place> {
+    fn end(&self) -> io::Result<LogPosition> {
         let newest = log_files(&self.folder)?.pop();
-        Ok(newest.map_or(Place { file: "".into(), bytes: 0 }, |file| Place {
+        Ok(newest.map_or(LogPosition { file: "".into(), bytes: 0 }, |file| LogPosition {
             file: file.name.into(),
             bytes: file.bytes,
         }))

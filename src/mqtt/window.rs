@@ -21,7 +21,7 @@ const REMEMBERED_AFTER: Duration = Duration::from_secs(2);
 
 /// Behind a line of a log.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
+pub struct LogPosition {
     /// The log's name in its folder.
     pub file: Arc<str>,
     /// So many bytes of it are behind.
@@ -43,7 +43,7 @@ pub struct Read {
     /// The record; `None` if there is none on it that could be sent.
     pub message: Option<Message>,
     /// The place behind it.
-    pub after: Place,
+    pub after: LogPosition,
 }
 
 /// The records between the log and the broker, as the head of this file describes them.
@@ -57,7 +57,7 @@ pub struct Window {
     given: usize,
     bytes: usize,
     /// Everything before it is acknowledged.
-    place: Place,
+    place: LogPosition,
     acknowledged: u64,
     passed_over: u64,
     /// What of it is to be remembered still, and since when.
@@ -69,7 +69,7 @@ pub struct Window {
 #[derive(Debug)]
 struct Entry {
     message: Option<Message>,
-    after: Place,
+    after: LogPosition,
     is_done: bool,
 }
 
@@ -82,7 +82,7 @@ impl Entry {
 impl Window {
     /// Nothing under way; everything before `place` was acknowledged earlier.
     #[must_use]
-    pub const fn new(most_bytes: usize, place: Place) -> Self {
+    pub const fn new(most_bytes: usize, place: LogPosition) -> Self {
         Self {
             most_bytes,
             entries: VecDeque::new(),
@@ -149,7 +149,7 @@ impl Window {
 
     /// The place that is to be remembered now, if it is time.
     #[must_use]
-    pub fn due(&self, now: Duration) -> Option<&Place> {
+    pub fn due(&self, now: Duration) -> Option<&LogPosition> {
         let is_old = self.since.is_some_and(|since| now >= since + REMEMBERED_AFTER);
         let is_far = self.unremembered >= REMEMBERED_RECORDS;
         Some(&self.place).filter(|_| self.moved && (is_old || is_far))
@@ -157,12 +157,12 @@ impl Window {
 
     /// The place that is to be remembered at the end, if it is not yet.
     #[must_use]
-    pub fn last(&self) -> Option<&Place> {
+    pub fn last(&self) -> Option<&LogPosition> {
         Some(&self.place).filter(|_| self.moved)
     }
 
     /// This place is remembered.
-    pub fn remembered(&mut self, place: &Place, now: Duration) {
+    pub fn remembered(&mut self, place: &LogPosition, now: Duration) {
         self.moved = self.place != *place;
         self.unremembered = 0;
         self.since = self.moved.then_some(now);
@@ -170,7 +170,7 @@ impl Window {
 
     /// The place that everything before is acknowledged of.
     #[must_use]
-    pub const fn place(&self) -> &Place {
+    pub const fn place(&self) -> &LogPosition {
         &self.place
     }
 

@@ -16,7 +16,7 @@ const BLNK_TICKS: u64 = 1_000;
 /// How often the board looks for a first echo that others may follow, ticks.
 pub const LOOK_TICKS: u64 = 200;
 
-/// What the board is.
+/// Settings of the board.
 #[derive(Debug, Clone, Copy)]
 pub struct PiSettings {
     /// Boot nonce of the first start; another one than before.

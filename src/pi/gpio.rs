@@ -48,7 +48,7 @@ pub struct PinNumbers {
     pub emergency_stop: Option<u8>,
 }
 
-/// Why the pins can't be had.
+/// Pins that can't be used.
 #[derive(Debug, Error)]
 pub enum GpioError {
     /// Another computer.

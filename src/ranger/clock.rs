@@ -77,14 +77,14 @@ impl ClockFit {
     #[must_use]
     pub fn host_time(&self, ticks: u64) -> Option<HostTime> {
         let quick = self.quick_samples();
-        let line = Line::through(&quick, self.tick_us)?;
+        let line = LinearFit::through(&quick, self.tick_us)?;
         Some(HostTime { us: line.at(ticks), sigma_us: line.sigma_us })
     }
 
     /// Relative deviation of the device's clock from its nominal rate; `None` until known.
     #[must_use]
     pub fn drift(&self) -> Option<f64> {
-        let line = Line::through(&self.quick_samples(), self.tick_us)?;
+        let line = LinearFit::through(&self.quick_samples(), self.tick_us)?;
         line.fitted.then(|| line.tick_us / self.tick_us - 1.0)
     }
 
@@ -95,7 +95,7 @@ impl ClockFit {
     }
 }
 
-struct Line {
+struct LinearFit {
     origin: Sample,
     offset_us: f64,
     tick_us: f64,
@@ -103,7 +103,7 @@ struct Line {
     fitted: bool,
 }
 
-impl Line {
+impl LinearFit {
     /// Least squares; the nominal rate if the span is short or the slope is not believable.
     fn through(samples: &[Sample], nominal_tick_us: f64) -> Option<Self> {
         let origin = *samples.first()?;

@@ -30,7 +30,7 @@ pub struct Driver<L> {
     stats: watch::Sender<LinkStats>,
 }
 
-/// How a command ended well.
+/// The result of a successful command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ended {
     /// An Identify.
@@ -46,7 +46,7 @@ pub enum Ended {
     Done(Outcome),
 }
 
-/// Why a command did not end well.
+/// The reason why a command failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum DriveError {
     /// It was not begun.

@@ -8,7 +8,7 @@ use crate::{
     scan::{ScanAir, ScanPlan, SimRecord},
 };
 
-/// What is to be scanned, and what the model says about it.
+/// A scan to take, with its predictions.
 #[derive(Debug, Clone)]
 pub struct ScanJob {
     /// Where the ranger stands.

@@ -15,7 +15,7 @@ use crate::{
     scene::Scene,
 };
 
-/// What is to be measured, where and with what; each part is right by itself.
+/// The inputs of a scan, each of them checked by itself.
 #[derive(Debug, Clone)]
 pub struct ScanInputs {
     /// The scene.
@@ -59,7 +59,7 @@ pub struct PreparedScan {
     predictions: Vec<SimRecord>,
 }
 
-/// Why a scan can't be taken so.
+/// Inputs with which a scan can't be taken.
 #[derive(Debug, Error)]
 pub enum PrepareError {
     /// The window is over before the receiver opens.

@@ -27,7 +27,7 @@ const FRUITLESS_RESTARTS: u32 = 3;
 /// Exchanges before a scan that give the clock fit its first points.
 const CLOCK_EXCHANGES: u32 = 4;
 
-/// How a scan went.
+/// Summary of a scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScanSummary {
     /// Its last record.
@@ -42,7 +42,7 @@ pub struct ScanSummary {
     pub not_home: Option<DriveError>,
 }
 
-/// Why a scan ended early. Its records up to there are written, `scan_end` included.
+/// The reason why a scan ended early. Its records up to there are written, `scan_end` included.
 #[derive(Debug, Error)]
 pub enum ScanError {
     /// The plan does not fit the device's motor.
@@ -66,7 +66,7 @@ pub struct Ranger<L> {
     clock_steps: u32,
 }
 
-/// What happened on a line without work.
+/// An unrequested event on an idle line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unasked {
     /// The line was closed.

@@ -11,14 +11,14 @@ use crate::config::MotionKeys;
 /// Blanking of the module when nothing shortens it, microseconds.
 const INTERNAL_BLANKING_US: f64 = 2380.0;
 
-/// How the motor turns and the ranger listens.
+/// Settings of motor and listening.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// Listening window after each firing, milliseconds; `None`: the time to the maximum range.
     pub window_ms: Option<f64>,
-    /// Rest between the end of a step and firing, milliseconds.
+    /// Settling time between the end of a step and firing, milliseconds.
     pub settle_ms: f64,
-    /// Least time from firing to firing, milliseconds.
+    /// Least time between firings, milliseconds.
     pub min_interval_ms: f64,
     /// Echoes to record for each firing, at most.
     pub max_echoes: u8,
@@ -41,7 +41,7 @@ impl From<&MotionKeys> for Motion {
     }
 }
 
-/// What listening has to reach and where it begins.
+/// The range that listening must reach, and the blanking.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Listening {
     /// Farthest range of interest, metres.

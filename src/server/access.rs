@@ -18,7 +18,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::routes::{FOXGLOVE, is_public};
 
-/// How a client came in.
+/// The way in which a client connected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Peer {
     /// By the unix socket.
@@ -41,7 +41,7 @@ pub enum Standing {
     Guest,
 }
 
-/// Why a request is refused.
+/// The reason why a request is refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refused {
     /// Status of the answer.

@@ -17,7 +17,7 @@ use tokio_io_timeout::TimeoutStream;
 use tokio_util::sync::CancellationToken;
 use tower::ServiceExt as _;
 
-use super::{Listeners, Peer, Server, places::Place, plain::Worded};
+use super::{Listeners, Peer, Server, plain::Worded, slots::Slot};
 
 /// How long the head of a request may take.
 const HEAD_TIME: Duration = Duration::from_secs(5);
@@ -51,8 +51,8 @@ impl Server {
         stop.await;
         shutdown.cancel();
         while accepting.join_next().await.is_some() {}
-        if let Some(stage) = foxglove {
-            drop(timeout(LAST_CALL, stage.is_empty()).await);
+        if let Some(viewers) = foxglove {
+            drop(timeout(LAST_CALL, viewers.is_empty()).await);
         }
         listeners.remove_made();
     }
@@ -90,7 +90,7 @@ impl Server {
         self: Arc<Self>,
         peer: Peer,
         stream: S,
-        place: Place,
+        place: Slot,
         shutdown: CancellationToken,
     ) {
         // What is made of the connection later keeps its place.

@@ -1,7 +1,7 @@
 //! Live messages for viewers that speak Foxglove's protocol: one follower makes them of the daemon's records, and each
-//! viewer takes them from the board at its own pace.
+//! viewer takes them from the queue at its own pace.
 
-mod board;
+mod message_queue;
 
 use std::{
     error::Error as _,
@@ -26,7 +26,7 @@ use crate::{
         foxglove::{MOST_TEXT_BYTES, server_info},
     },
 };
-use board::{Board, Found, MOST_MESSAGE_BYTES, Outgoing, Viewer};
+use message_queue::{Found, MOST_MESSAGE_BYTES, MessageQueue, Outgoing, Viewer};
 
 /// Least time from one thing that a viewer sends to the next that is read.
 const BETWEEN_READS: Duration = Duration::from_millis(10);
@@ -46,34 +46,34 @@ pub(super) const WRITE_BYTES: usize = MOST_MESSAGE_BYTES + (1 << 16);
 
 /// Where viewers come together.
 #[derive(Debug)]
-pub(super) struct Stage {
+pub(super) struct Viewers {
     daemon: Handle,
-    board: Mutex<Board>,
+    queue: Mutex<MessageQueue>,
     /// Changes with whatever viewers have to look at.
     changed: watch::Sender<()>,
-    /// Places of guests, and of all others: nobody takes them from those.
+    /// Slots of guests, and of all others: nobody takes them from those.
     places: [Arc<Semaphore>; 2],
     most_viewers: u32,
     /// Another one after a restart, so that viewers know.
     session: String,
 }
 
-impl Stage {
+impl Viewers {
     /// Begins to follow the daemon, until that ends. Must be called within a runtime.
     pub(super) fn open(daemon: &Handle, keys: &FoxgloveKeys) -> Arc<Self> {
-        let stage = Arc::new(Self {
+        let viewers = Arc::new(Self {
             daemon: daemon.clone(),
-            board: Mutex::new(Board::new(keys.queue_kb as usize * 1000)),
+            queue: Mutex::new(MessageQueue::new(keys.queue_kb as usize * 1000)),
             changed: watch::Sender::new(()),
             places: [(); 2].map(|()| Arc::new(Semaphore::new(keys.max_clients as usize))),
             most_viewers: keys.max_clients,
             session: Uuid::new_v4().to_string(),
         });
-        let mut told = Told(Arc::clone(&stage));
+        let mut told = Told(Arc::clone(&viewers));
         let live = Live::new(Settings::default()).with_map(keys.map);
         let follower = Follower::begin(daemon, live, &mut told);
         tokio::spawn(follow(follower, told));
-        stage
+        viewers
     }
 
     /// A place for a viewer, if one is free.
@@ -104,13 +104,13 @@ impl Stage {
     /// Tells a viewer what it asks for; why that ended in order.
     async fn tell(&self, socket: &mut WebSocket) -> Result<CloseFrame, axum::Error> {
         let mut changed = self.changed.subscribe();
-        let mut viewer = Viewer::new(&self.board(), server_info(&self.session));
+        let mut viewer = Viewer::new(&self.queue(), server_info(&self.session));
         let mut heard = Instant::now();
         let (mut may_read, mut next_ping) = (heard, heard + SIGN_OF_LIFE);
         loop {
             // What comes after this look makes it ready again.
             changed.mark_unchanged();
-            let found = viewer.look(&self.board());
+            let found = viewer.look(&self.queue());
             let is_idle = found == Found::Nothing;
             match found {
                 Found::Something(Outgoing::Text(text)) => socket.send(text.into()).await?,
@@ -136,8 +136,8 @@ impl Stage {
                     heard = Instant::now();
                     may_read = heard + BETWEEN_READS;
                     match came {
-                        Ok(Message::Text(text)) => viewer.take_text(&text, &self.board()),
-                        Ok(Message::Binary(_)) => viewer.take_binary(&self.board()),
+                        Ok(Message::Text(text)) => viewer.take_text(&text, &self.queue()),
+                        Ok(Message::Binary(_)) => viewer.take_binary(&self.queue()),
                         Ok(Message::Ping(_) | Message::Pong(_)) => {}
                         Ok(Message::Close(_)) => return Ok(goodbye(close_code::NORMAL, "")),
                         Err(error) => return refused(error),
@@ -152,25 +152,25 @@ impl Stage {
     }
 
     /// Nothing under this lock can panic, so a poisoned one holds what it should.
-    fn board(&self) -> MutexGuard<'_, Board> {
-        self.board.lock().unwrap_or_else(PoisonError::into_inner)
+    fn queue(&self) -> MutexGuard<'_, MessageQueue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The stage as the follower tells it.
-struct Told(Arc<Stage>);
+/// The viewers as the follower tells it.
+struct Told(Arc<Viewers>);
 
 impl Audience for Told {
     fn set_topics(&mut self, topics: &[Topic]) {
-        self.0.board().set_topics(topics);
+        self.0.queue().set_topics(topics);
     }
 
     fn tell(&mut self, message: &LiveMessage<'_>) {
-        self.0.board().put(message);
+        self.0.queue().put(message);
     }
 
     fn announce(&mut self, words: String) {
-        self.0.board().announce(words);
+        self.0.queue().announce(words);
     }
 
     fn told(&mut self) {
@@ -180,7 +180,7 @@ impl Audience for Told {
 
 async fn follow(mut follower: Follower, mut told: Told) {
     while follower.next(&mut told).await {}
-    told.0.board().close();
+    told.0.queue().close();
     told.0.changed.send_replace(());
 }
 

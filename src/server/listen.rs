@@ -52,7 +52,7 @@ impl Made {
     }
 }
 
-/// Why a socket can't be had.
+/// A socket that can't be opened.
 #[derive(Debug, Error)]
 #[error("cannot listen on {place}: {source}")]
 pub struct ListenError {

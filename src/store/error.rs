@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::FileKind;
 use crate::scan::{EncodeError, SinkError};
 
-/// Why a log can't be opened, written, synced or repaired.
+/// A log that can't be opened, written, synced or repaired.
 #[derive(Debug, Error)]
 pub enum StoreError {
     /// The file can't be opened or created.

@@ -53,12 +53,12 @@ struct Index {
     session: Option<Arc<SessionPlace>>,
     /// Where the last session stands that has the text of its scene, and which scene.
     text: Option<(u64, Option<SceneRef>)>,
-    scans: Vec<Place>,
+    scans: Vec<ScanLines>,
 }
 
 /// A log may hold tens of thousands of scans: what is told of them is read when it is asked for.
 #[derive(Debug, Clone)]
-struct Place {
+struct ScanLines {
     scan: Uuid,
     from: u64,
     to: u64,
@@ -75,7 +75,7 @@ struct SessionPlace {
     scene: Option<SceneRef>,
 }
 
-/// Where the records of a scan stand in a log, to be read piece by piece.
+/// The position of a scan's records in a log, to be read piece by piece.
 #[derive(Debug, Clone)]
 pub struct Passage {
     /// The scan, without its readings and events.
@@ -118,7 +118,7 @@ impl History {
                 continue;
             }
             before = None;
-            let places: Vec<Place> = places.take(most - listed.len()).cloned().collect();
+            let places: Vec<ScanLines> = places.take(most - listed.len()).cloned().collect();
             let mut file = BufReader::new(File::open(self.folder.join(&log))?);
             for place in places {
                 listed.extend(place.summary(&log, &mut file)?);
@@ -204,7 +204,7 @@ impl Index {
             Some(Ok(Record::ScanStart(start))) => {
                 let session = self.session.clone();
                 let (scan, to) = (start.scan, self.read_to);
-                self.scans.push(Place { scan, from: at, to, end_at: None, session });
+                self.scans.push(ScanLines { scan, from: at, to, end_at: None, session });
             }
             Some(Ok(Record::ScanEnd(end))) => {
                 let of = self.scans.iter_mut().rev().find(|place| place.scan == end.scan);
@@ -222,7 +222,7 @@ impl Index {
     }
 }
 
-impl Place {
+impl ScanLines {
     /// How it began and ended, if that can still be read.
     fn bounds(
         &self,

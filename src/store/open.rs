@@ -15,7 +15,7 @@ use crate::scan::{Event, EventKind, MAX_LINE_BYTES};
 
 use super::{FileMedium, Medium, Pipe, StoreError, reader};
 
-/// What was wrong with the end of a log and how it was mended.
+/// The damage at the end of a log and its repair.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Recovered {
     /// The last record was whole and only its newline was missing.

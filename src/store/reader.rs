@@ -31,7 +31,7 @@ pub struct Line {
     pub record: Result<Record, LineError>,
 }
 
-/// Why a line is not a record.
+/// A line that is not a record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LineError {
     /// Number of the line, from 1.

@@ -27,7 +27,7 @@ pub struct LeftOut {
     pub fault: RecordError,
 }
 
-/// What a repair did.
+/// The result of a repair.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Repair {
     /// Records kept, byte for byte.

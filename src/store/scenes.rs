@@ -20,7 +20,7 @@ pub const MAX_LOGGED_SCENE_BYTES: usize = 1 << 18;
 /// Folder beside a log for longer ones, in files `SHA256.json`.
 const FOLDER: &str = "scenes";
 
-/// Why a log's scene is not to be had from the log.
+/// The reason why a log's scene can't be read from the log.
 #[derive(Debug, Error)]
 pub enum SceneLost {
     /// Logs of format 1 could leave it out, and a scene too long for a line needs its folder.

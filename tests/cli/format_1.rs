@@ -49,6 +49,14 @@ fn every_verb_that_reads_logs_reads_them() {
         }
         runs.push(vec!["plot", &log, "--scene", &scene, "--beam", "0", "-o", &picture]);
         runs.push(vec!["log", "annotate", &log, "-o", &trusted]);
+        let predicted = out(&format!("predicted-{name}"));
+        runs.push(vec!["predict", &log, "--scene", &scene, "-o", &predicted]);
+        let exports = ["csv", "parquet", "mcap"].map(|ending| out(&format!("{name}.{ending}")));
+        runs.extend(exports.iter().map(|export| vec!["export", &log, "-o", export]));
+        if name == "scan.jsonl" {
+            runs.push(vec!["locate", &log, "--scene", &scene]);
+            runs.push(vec!["calibrate", &log, "--scene", &scene, "--fit", "delay"]);
+        }
         // An array's few bearings are no arcs.
         let is_array = name.starts_with("array");
         assert_eq!(code(&["interpret", &log]), Some(if is_array { 2 } else { 0 }), "{name}");

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Has programs of others read what `sonard export` writes, and holds every field against the logs (exports.py;
-# tools from PyPI, in an environment of their own under target/tools).
+# Has programs of others read what `sonard export` writes, and holds every field against the logs (exports.py, with
+# recordings.py and tables.py; tools from PyPI, in an environment of their own under target/tools).
 #
 #   tests/peers/exports.sh [PROGRAM]    without a program, it is built
 set -euo pipefail

@@ -1,6 +1,6 @@
 //! From records to messages of ROS 2, one record at a time: what recordings hold and what live viewers are told.
 //!
-//! Pure: it is told when each reading was fired, and hands messages to an [`Outlet`].
+//! Pure: it is told when each reading was fired, and hands messages to an [`MessageSink`].
 
 mod frames;
 mod readings;
@@ -31,7 +31,7 @@ use topics::{FIXED_TRANSFORMS, SCENE};
 pub(crate) use topics::{MAP_TOPIC, stands_still};
 
 /// Where messages go.
-pub(crate) trait Outlet {
+pub(crate) trait MessageSink {
     type Error;
 
     /// Takes a message, told at a time.
@@ -111,7 +111,7 @@ impl Converter {
     }
 
     /// Tells a reading, with the robot at a pose, and where the transducer was.
-    pub(crate) fn reading<O: Outlet>(
+    pub(crate) fn reading<O: MessageSink>(
         &mut self,
         robot: Pose,
         ping: &Ping,
@@ -131,7 +131,7 @@ impl Converter {
     }
 
     /// Tells a scan whose readings are told, in the order of its plan.
-    pub(crate) fn scan<O: Outlet>(
+    pub(crate) fn scan<O: MessageSink>(
         &mut self,
         scan: &ScanView,
         (pings, firings): (&[&Ping], &Firings),
@@ -160,7 +160,7 @@ impl Converter {
     }
 
     /// Tells where the transducer was when the last reading's window ended, or at `latest`.
-    fn close<O: Outlet>(&mut self, latest: Stamp, out: &mut O) -> Result<(), O::Error> {
+    fn close<O: MessageSink>(&mut self, latest: Stamp, out: &mut O) -> Result<(), O::Error> {
         let Some((last, figures)) = self.listening.take().zip(self.figures.as_ref()) else {
             return Ok(());
         };
@@ -176,7 +176,7 @@ impl Converter {
 
 impl Settings {
     /// Tells where what moves is at a time.
-    fn place<O: Outlet>(
+    fn place<O: MessageSink>(
         &self,
         figures: &Figures,
         at: Stamp,
@@ -195,7 +195,12 @@ impl Settings {
 }
 
 impl Untold {
-    fn tell<O: Outlet>(self, figures: &Figures, at: Stamp, out: &mut O) -> Result<(), O::Error> {
+    fn tell<O: MessageSink>(
+        self,
+        figures: &Figures,
+        at: Stamp,
+        out: &mut O,
+    ) -> Result<(), O::Error> {
         let fixed = Transforms(figures.frames.fixed(at));
         out.message(FIXED_TRANSFORMS, TRANSFORMS, at, &fixed)?;
         if self.scene.is_empty() {
@@ -213,7 +218,7 @@ impl Figures {
     }
 
     /// Tells what was heard, what was predicted, and by how much they differ, when both are known.
-    fn tell<O: Outlet>(
+    fn tell<O: MessageSink>(
         &self,
         settings: &Settings,
         ping: &Ping,

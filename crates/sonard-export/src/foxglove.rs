@@ -61,13 +61,13 @@ pub struct Session {
 struct Order {
     op: String,
     #[serde(default)]
-    subscriptions: Vec<Wish>,
+    subscriptions: Vec<Subscription>,
     #[serde(default, rename = "subscriptionIds")]
     subscription_ids: Vec<u32>,
 }
 
 #[derive(Debug, Deserialize)]
-struct Wish {
+struct Subscription {
     id: u32,
     #[serde(rename = "channelId")]
     channel: u32,
@@ -97,9 +97,9 @@ impl Session {
         self.fault("messages are not taken here: this server only tells")
     }
 
-    fn subscribe(&mut self, wishes: &[Wish], is_there: impl Fn(u32) -> bool) -> Vec<Step> {
+    fn subscribe(&mut self, asked: &[Subscription], is_there: impl Fn(u32) -> bool) -> Vec<Step> {
         let (mut steps, mut refused) = (Vec::new(), Refusals::default());
-        for Wish { id, channel } in wishes {
+        for Subscription { id, channel } in asked {
             if !is_there(*channel) {
                 refused.add(|| format!("there is no channel {channel}"));
             } else if self.subscriptions.contains_key(channel) {

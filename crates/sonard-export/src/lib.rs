@@ -1,11 +1,11 @@
 //! Scans in the formats of other tools: tables (CSV, Parquet) of readings beside predictions, and recordings of
 //! ROS 2 (MCAP); maps, lines and features as recordings and as GeoJSON.
 //!
-//! [`Live`] makes the messages of a recording of records as they come, and [`foxglove`] speaks the protocol that
-//! viewers ask for them by; [`dds`] says how ROS 2 itself passes them on.
+//! [`Live`] converts records to the messages of a recording as they arrive. [`foxglove`] is the protocol of live
+//! viewers, [`dds`] has topic names and encapsulation for ROS 2.
 //!
-//! An [`Export`] takes scans one by one and writes to whatever takes bytes, so that what it has in memory
-//! does not grow with the number of scans.
+//! An [`Export`] takes scans one by one and writes to any `Write`, so that its memory does not grow with the number of
+//! scans.
 
 #![warn(clippy::mod_module_files)]
 
@@ -33,7 +33,7 @@ pub use conversion::{Distribution, Profile, Settings, Topic};
 pub use error::{ExportError, LeftOut};
 pub use live::{Live, LiveMessage};
 pub use parquet::{ParquetExport, TypedTable};
-pub use place::{Place, begins_geojson, to_geojson, write_place};
+pub use place::{Findings, begins_geojson, to_geojson, write_findings};
 pub use recording::McapExport;
 pub use table::CsvExport;
 

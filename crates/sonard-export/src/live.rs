@@ -8,7 +8,7 @@ use sonard_records::{Ping, Record, ScanStart, ScanView, Session};
 
 use crate::{
     LeftOut, Settings, Topic,
-    conversion::{Converter, Firings, Outlet, in_order},
+    conversion::{Converter, Firings, MessageSink, in_order},
     live::map::LiveMap,
     recording::nanoseconds,
     ros::{
@@ -127,7 +127,7 @@ impl Live {
     /// A scan whose end never came is on the map as well.
     fn end_without_word(
         &mut self,
-        out: &mut impl Outlet<Error = Infallible>,
+        out: &mut impl MessageSink<Error = Infallible>,
     ) -> Result<(), LeftOut> {
         let scan = self.scan.take();
         scan.map_or(Ok(()), |scan| self.map(&scan, out))
@@ -136,7 +136,7 @@ impl Live {
     fn map(
         &mut self,
         scan: &UnderWay,
-        out: &mut impl Outlet<Error = Infallible>,
+        out: &mut impl MessageSink<Error = Infallible>,
     ) -> Result<(), LeftOut> {
         match &mut self.map {
             Some(map) if !scan.is_too_long => map.add(&scan.view, self.converter.end(), out),
@@ -144,7 +144,7 @@ impl Live {
         }
     }
 
-    fn take_reading(&mut self, ping: Ping, out: &mut impl Outlet<Error = Infallible>) {
+    fn take_reading(&mut self, ping: Ping, out: &mut impl MessageSink<Error = Infallible>) {
         let Some(scan) = self.scan.as_mut().filter(|scan| scan.view.scan == ping.scan) else {
             return;
         };
@@ -158,7 +158,7 @@ impl Live {
     fn end_scan(
         &mut self,
         scan: &UnderWay,
-        out: &mut impl Outlet<Error = Infallible>,
+        out: &mut impl MessageSink<Error = Infallible>,
     ) -> Result<(), LeftOut> {
         if scan.is_too_long {
             return Ok(());
@@ -200,7 +200,7 @@ struct Teller<F> {
     buffer: Vec<u8>,
 }
 
-impl<F: FnMut(LiveMessage<'_>)> Outlet for Teller<F> {
+impl<F: FnMut(LiveMessage<'_>)> MessageSink for Teller<F> {
     type Error = Infallible;
 
     fn message(

@@ -26,7 +26,7 @@ pub use geojson::{begins_geojson, to_geojson};
 
 /// What was found of a place, in its own metres.
 #[derive(Debug, Clone, Copy)]
-pub struct Place<'a> {
+pub struct Findings<'a> {
     /// When it was found so: the start of the last scan, if there is one.
     pub time: Option<Timestamp>,
     /// Where the readings come from.
@@ -46,7 +46,7 @@ pub struct Place<'a> {
 ///
 /// # Errors
 /// What the output refuses.
-pub fn write_place(out: impl Write, place: &Place<'_>) -> Result<(), ExportError> {
+pub fn write_findings(out: impl Write, place: &Findings<'_>) -> Result<(), ExportError> {
     let mut messages = Messages::new(out)?;
     let stamp = Stamp(place.time.map_or(0, nanoseconds));
     let header = Header { stamp, frame: MAP };

@@ -1,9 +1,9 @@
-//! Data sets of simulated readings, for whoever learns from them: scenes, poses, sensors, air and noise drawn from
-//! the distributions of a specification.
+//! Data sets of simulated readings for machine learning: scenes, poses, sensors, air and noise drawn from the
+//! distributions of a specification.
 //!
-//! A set is divided into shards. A shard is a function of specification and number alone, whoever makes it, when, and
-//! beside how many others, so that any engine that hands out numbers can make a set, and one that was killed can go
-//! on: [`Generator::shard`] writes the tables of one to whatever takes bytes.
+//! A set is divided into shards. A shard depends on the specification and its number only, so that any engine that
+//! distributes numbers can make a set, and a killed run can continue: [`Generator::shard`] writes the tables of one shard
+//! to any `Write`.
 //!
 //! ```
 //! use sonard_generate::{Generator, Table};
@@ -28,7 +28,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Nothing here knows a clock, a file or a socket.
+//! The crate uses no clock, file or socket.
 
 // Modules are `foo.rs` beside `foo/`.
 #![warn(clippy::mod_module_files)]

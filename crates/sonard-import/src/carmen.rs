@@ -5,7 +5,7 @@
 //! out, and so are comments and parameters.
 
 use crate::{
-    ImportError, Place,
+    ImportError, Location,
     rounds::{self, Message, count, number, numbers},
 };
 
@@ -16,7 +16,7 @@ const AFTER: usize = 3;
 ///
 /// # Errors
 /// A line of such a kind that holds something else.
-pub(crate) fn message(place: Place, line: &str) -> Result<Option<Message>, ImportError> {
+pub(crate) fn message(place: Location, line: &str) -> Result<Option<Message>, ImportError> {
     let words: Vec<&str> = line.split_whitespace().collect();
     match words.first() {
         Some(&"ODOM") => pose(place, &words, false).map(Some),
@@ -26,14 +26,14 @@ pub(crate) fn message(place: Place, line: &str) -> Result<Option<Message>, Impor
     }
 }
 
-fn pose(place: Place, words: &[&str], is_true: bool) -> Result<Message, ImportError> {
+fn pose(place: Location, words: &[&str], is_true: bool) -> Result<Message, ImportError> {
     let [x_m, y_m, heading_rad] =
         [(1, "x"), (2, "y"), (3, "theta")].map(|(at, what)| number(place, words, at, what));
     Ok(Message::Pose { pose: rounds::pose(x_m?, y_m?, heading_rad?), is_true })
 }
 
 /// The count of words tells how the line is made.
-fn ranges(place: Place, words: &[&str]) -> Result<Message, ImportError> {
+fn ranges(place: Location, words: &[&str]) -> Result<Message, ImportError> {
     let fits = |at: usize| {
         let count: usize = words.get(at)?.parse().ok().filter(|count| *count > 0)?;
         let rest = words.len().checked_sub(at + 1 + count + AFTER)?;

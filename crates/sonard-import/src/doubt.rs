@@ -13,7 +13,7 @@ pub(crate) struct Doubts {
     pub(crate) echoes: u64,
     /// Ranges beyond what the sensor can hear, and where the first of them stands.
     far: u64,
-    first_far: Option<(crate::Place, f64)>,
+    first_far: Option<(crate::Location, f64)>,
     /// Ranges below a tenth of its least.
     near: u64,
 }

@@ -6,7 +6,7 @@ use thiserror::Error;
 
 /// Where in a file something stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum Location {
     /// A line, from 1.
     Line(u64),
     /// An object of a JSON file, and one of the numbers in its lists, both from 1.
@@ -18,7 +18,7 @@ pub enum Place {
     },
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Line(line) => write!(f, "line {line}"),
@@ -40,7 +40,7 @@ pub enum ImportError {
     #[error("{place}{}: {what}", column.as_ref().map(|column| format!(", {column}")).unwrap_or_default())]
     At {
         /// Where.
-        place: Place,
+        place: Location,
         /// The field, and the column that it was looked for in.
         column: Option<String>,
         /// What is wrong.
@@ -71,7 +71,7 @@ impl ImportError {
         Self::Mapping { what: what.into(), help: help.into() }
     }
 
-    pub(crate) fn at(place: Place, what: impl Into<String>, help: impl Into<String>) -> Self {
+    pub(crate) fn at(place: Location, what: impl Into<String>, help: impl Into<String>) -> Self {
         Self::At { place, column: None, what: what.into(), help: help.into() }
     }
 

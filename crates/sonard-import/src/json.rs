@@ -4,7 +4,7 @@ use std::io::Read;
 
 use serde_json::Value;
 
-use crate::{Column, ImportError, Mapping, Place, Row, table::Lines};
+use crate::{Column, ImportError, Location, Mapping, Row, table::Lines};
 
 /// The rows of a file that holds a list of objects, an object, or an object a line. Where a member of the
 /// mapping is a list there is a row for each of its numbers, with what is no list repeated.
@@ -58,12 +58,12 @@ fn objects<'a>(
 fn parse(first_line: u64, text: &str) -> Object {
     serde_json::from_str(text).map_err(|error| {
         let line = first_line + (error.line() as u64).saturating_sub(1);
-        ImportError::at(Place::Line(line), format!("no JSON: {error}"), "correct the file")
+        ImportError::at(Location::Line(line), format!("no JSON: {error}"), "correct the file")
     })
 }
 
 fn rows_of(number: u64, object: &Value, mapping: &Mapping) -> Result<Vec<Row>, ImportError> {
-    let whole = Place::Entry { object: number, number: None };
+    let whole = Location::Entry { object: number, number: None };
     let members = mapping
         .columns
         .values()
@@ -88,7 +88,7 @@ fn rows_of(number: u64, object: &Value, mapping: &Mapping) -> Result<Vec<Row>, I
         return Ok(vec![Row { place: whole, cells: members.into_iter().map(cell).collect() }]);
     };
     let row = |at: usize| Row {
-        place: Place::Entry { object: number, number: Some(at as u64 + 1) },
+        place: Location::Entry { object: number, number: Some(at as u64 + 1) },
         cells: members
             .iter()
             .map(|member| cell(member.as_array().map_or(*member, |values| &values[at])))
@@ -98,7 +98,11 @@ fn rows_of(number: u64, object: &Value, mapping: &Mapping) -> Result<Vec<Row>, I
 }
 
 /// A member, by names and places with dots between.
-fn member<'a>(whole: Place, object: &'a Value, column: &Column) -> Result<&'a Value, ImportError> {
+fn member<'a>(
+    whole: Location,
+    object: &'a Value,
+    column: &Column,
+) -> Result<&'a Value, ImportError> {
     let Column::Name(path) = column else {
         return Err(ImportError::mapping(
             format!("{column}: the members of a JSON object have names"),

@@ -1,9 +1,9 @@
-//! Readings of ultrasonic rangers from elsewhere, as records of a log: from tables (CSV and its kin), from
-//! numbers in JSON, from the logs of CARMEN and Player, and, with the feature `recordings`, from recordings of ROS 2 (MCAP).
+//! Converts readings of ultrasonic rangers to records of a log: from tables (CSV and similar), JSON, the logs of CARMEN
+//! and Player, and, with the feature `recordings`, recordings of ROS 2 (MCAP).
 //!
-//! A [`Mapping`] says what the columns mean; [`Source`] finds out how a file is written, reads it once for
-//! its hash, once to find what speaks against the mapping and once to make records, and holds no
-//! more of it than a scan (of JSON that is no object a line, all).
+//! A [`Mapping`] states the meaning of the columns. [`Source`] detects the format of a file, reads it once for its hash,
+//! once to check it against the mapping and once to make records, and holds at most one scan in memory (a JSON file that is
+//! not JSON Lines is held as a whole).
 
 mod carmen;
 mod doubt;
@@ -26,7 +26,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub use error::{ImportError, Place};
+pub use error::{ImportError, Location};
 pub use field::{Field, Quantity};
 pub use mapping::{Column, Format, Mapping};
 pub use reading::Reading;

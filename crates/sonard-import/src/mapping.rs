@@ -66,7 +66,7 @@ pub struct Mapping {
     /// Ranges, in the file's unit, that mean that nothing was heard.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub none: Vec<f64>,
-    /// Ranges, in the file's unit, from which on nothing was heard.
+    /// Ranges, in the file's unit, at and beyond which there is no echo.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub none_from: Option<f64>,
     /// Speed of sound that the file's ranges were computed with, metres a second; they are computed again

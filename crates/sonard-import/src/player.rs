@@ -6,7 +6,7 @@
 //! are left out, and so are comments.
 
 use crate::{
-    ImportError, Place,
+    ImportError, Location,
     rounds::{self, Message, count, number, numbers},
 };
 
@@ -18,7 +18,7 @@ const BEFORE_IN_OLD: usize = 5;
 ///
 /// # Errors
 /// A line of such a kind that holds something else.
-pub(crate) fn message(place: Place, line: &str) -> Result<Option<Message>, ImportError> {
+pub(crate) fn message(place: Location, line: &str) -> Result<Option<Message>, ImportError> {
     if line.trim_start().starts_with('#') {
         return Ok(None);
     }
@@ -40,7 +40,7 @@ pub(crate) fn message(place: Place, line: &str) -> Result<Option<Message>, Impor
 }
 
 fn sonar(
-    place: Place,
+    place: Location,
     words: &[&str],
     from: usize,
     is_geometry: bool,
@@ -60,7 +60,7 @@ fn sonar(
     Ok(Message::Ranges { seconds: Some(seconds), ranges_m, geometry: None })
 }
 
-fn position(place: Place, words: &[&str], from: usize) -> Result<Message, ImportError> {
+fn position(place: Location, words: &[&str], from: usize) -> Result<Message, ImportError> {
     let [x_m, y_m, heading_rad] =
         [(0, "x"), (1, "y"), (2, "angle")].map(|(at, what)| number(place, words, from + at, what));
     Ok(Message::Pose { pose: rounds::pose(x_m?, y_m?, heading_rad?), is_true: false })

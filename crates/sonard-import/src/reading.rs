@@ -3,12 +3,12 @@
 use jiff::Timestamp;
 use sonard_model::{acoustics::Air, geometry::Pose, reading::PingStatus};
 
-use crate::{Field, ImportError, Mapping, Place, Quantity, Taken};
+use crate::{Field, ImportError, Location, Mapping, Quantity, Taken};
 
 /// The values of the mapping's columns, in its order; `None` where there is nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Row {
-    pub(crate) place: Place,
+    pub(crate) place: Location,
     pub(crate) cells: Vec<Option<String>>,
 }
 
@@ -16,7 +16,7 @@ pub(crate) struct Row {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
     /// Where it stands in the file.
-    pub place: Place,
+    pub place: Location,
     /// Direction of the beam, degrees counter-clockwise: from the heading, or of a bearing in the world.
     pub direction_deg: f64,
     /// Whether that is a bearing.
@@ -117,7 +117,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn air(&self, place: Place, temperature_c: f64) -> Result<Air, ImportError> {
+    fn air(&self, place: Location, temperature_c: f64) -> Result<Air, ImportError> {
         let Taken { air, .. } = self.taken;
         Air::new(temperature_c, air.humidity_percent(), air.pressure_kpa())
             .map_err(|error| ImportError::at(place, error.to_string(), "is the unit right?"))
@@ -126,7 +126,7 @@ impl<'a> Reader<'a> {
     /// The time of flight of a row, microseconds; `None` where nothing was heard.
     fn tof_us(
         &self,
-        place: Place,
+        place: Location,
         measured: Option<(Field, f64)>,
         status: Option<PingStatus>,
         sound_speed_m_s: f64,
@@ -156,7 +156,12 @@ impl<'a> Reader<'a> {
     }
 
     /// A number; `None` where the cell says that there is none.
-    fn number(&self, place: Place, field: Field, cell: &str) -> Result<Option<f64>, ImportError> {
+    fn number(
+        &self,
+        place: Location,
+        field: Field,
+        cell: &str,
+    ) -> Result<Option<f64>, ImportError> {
         match cell.to_lowercase().as_str() {
             "nan" | "null" | "none" | "na" | "n/a" | "-" => return Ok(None),
             _ => {}
@@ -173,7 +178,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn status(&self, place: Place, word: &str) -> Result<PingStatus, ImportError> {
+    fn status(&self, place: Location, word: &str) -> Result<PingStatus, ImportError> {
         serde_json::from_value(word.to_lowercase().into()).map_err(|_| {
             let what = format!("`{}` is no status", shortened(word));
             ImportError::at(place, what, "write echo, no_echo, min_range or link_lost")
@@ -207,7 +212,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn wrong(&self, place: Place, field: Field, what: String, help: &str) -> ImportError {
+    fn wrong(&self, place: Location, field: Field, what: String, help: &str) -> ImportError {
         let column = self.mapping.columns.get(&field).map(|column| format!("{field} ({column})"));
         ImportError::At { place, column, what, help: help.to_owned() }
     }

@@ -8,7 +8,7 @@ use sonard_model::{
     geometry::Pose,
 };
 
-use crate::{ImportError, Mapping, Place};
+use crate::{ImportError, Location, Mapping};
 
 /// What all rangers said at one time.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +54,7 @@ impl<'a> Rounds<'a> {
     /// The rangers are others than before.
     pub(crate) fn take(
         &mut self,
-        place: Place,
+        place: Location,
         message: Message,
     ) -> Result<Option<Round>, ImportError> {
         match message {
@@ -99,7 +99,7 @@ impl<'a> Rounds<'a> {
         }
     }
 
-    fn know(&mut self, place: Place, geometry: Vec<[f64; 3]>) -> Result<(), ImportError> {
+    fn know(&mut self, place: Location, geometry: Vec<[f64; 3]>) -> Result<(), ImportError> {
         match &self.geometry {
             Some(known) if *known != geometry => Err(ImportError::at(
                 place,
@@ -145,7 +145,7 @@ pub(crate) fn pose(x_m: f64, y_m: f64, heading_rad: f64) -> Pose {
 
 /// A word of a line as a number.
 pub(crate) fn number(
-    place: Place,
+    place: Location,
     words: &[&str],
     at: usize,
     what: &str,
@@ -162,7 +162,7 @@ pub(crate) fn number(
 
 /// So many numbers from a place on.
 pub(crate) fn numbers(
-    place: Place,
+    place: Location,
     words: &[&str],
     from: usize,
     count: usize,
@@ -175,7 +175,7 @@ pub(crate) fn numbers(
 pub(crate) const MOST_RANGERS: f64 = 256.0;
 
 /// The count of rangers that a line begins with.
-pub(crate) fn count(place: Place, words: &[&str], at: usize) -> Result<usize, ImportError> {
+pub(crate) fn count(place: Location, words: &[&str], at: usize) -> Result<usize, ImportError> {
     let count = number(place, words, at, "count of rangers")?;
     if count.fract() == 0.0 && (1.0..=MOST_RANGERS).contains(&count) {
         return Ok(count as usize);

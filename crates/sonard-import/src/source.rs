@@ -9,7 +9,7 @@ use sonard_model::{acoustics::Air, array::RangerArray, geometry::Pose};
 use sonard_records::Record;
 
 use crate::{
-    Format, ImportError, Mapping, Place, Quantity, Reading, Row, carmen,
+    Format, ImportError, Location, Mapping, Quantity, Reading, Row, carmen,
     doubt::Doubts,
     json, player,
     reading::Reader,
@@ -164,7 +164,7 @@ impl Source<'_> {
         let value: Value =
             serde_json::from_reader(io::BufReader::new((self.open)()?)).map_err(|error| {
                 ImportError::at(
-                    Place::Line(error.line() as u64),
+                    Location::Line(error.line() as u64),
                     format!("no JSON: {error}"),
                     "correct the file",
                 )
@@ -355,10 +355,10 @@ impl Imported {
 fn messages(
     format: Format,
     source: impl Read,
-) -> impl Iterator<Item = Result<(Place, Message), ImportError>> {
+) -> impl Iterator<Item = Result<(Location, Message), ImportError>> {
     Lines::of(source).filter_map(move |line| {
         let read = |(number, line): (u64, String)| {
-            let place = Place::Line(number);
+            let place = Location::Line(number);
             let message = match format {
                 Format::Carmen => carmen::message(place, &line),
                 _ => player::message(place, &line),

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Read};
 
 use csv::{ReaderBuilder, StringRecord, Trim};
 
-use crate::{Column, ImportError, Mapping, Place, Row};
+use crate::{Column, ImportError, Location, Mapping, Row};
 
 /// A line longer than this is no row of readings, bytes.
 const LONGEST_LINE: u64 = 1 << 20;
@@ -45,7 +45,7 @@ impl Header {
             Between::Byte(byte) => {
                 let mut record = StringRecord::new();
                 reader(byte, first.as_bytes()).read_record(&mut record).map_err(|error| {
-                    ImportError::at(Place::Line(1), error.to_string(), "correct the first line")
+                    ImportError::at(Location::Line(1), error.to_string(), "correct the first line")
                 })?;
                 record.iter().map(str::to_owned).collect()
             }
@@ -119,7 +119,7 @@ pub(crate) fn rows<'a>(
         if std::mem::take(&mut names) {
             return None;
         }
-        let place = Place::Line(number);
+        let place = Location::Line(number);
         Some(cells(between, &line, place).map(|cells| {
             let cell = |&at: &usize| cells.get(at).filter(|cell| !cell.is_empty()).cloned();
             Row { place, cells: places.iter().map(cell).collect() }
@@ -127,7 +127,7 @@ pub(crate) fn rows<'a>(
     }))
 }
 
-fn cells(between: Between, line: &str, place: Place) -> Result<Vec<String>, ImportError> {
+fn cells(between: Between, line: &str, place: Location) -> Result<Vec<String>, ImportError> {
     match between {
         Between::Blanks => Ok(line.split_whitespace().map(str::to_owned).collect()),
         Between::Byte(byte) => {
@@ -158,7 +158,7 @@ impl<R: Read> Lines<R> {
             return Ok(None);
         }
         self.count += 1;
-        let place = Place::Line(self.count);
+        let place = Location::Line(self.count);
         if length == LONGEST_LINE {
             let what = format!("longer than {LONGEST_LINE} bytes");
             return Err(ImportError::at(place, what, "give a file with a reading a line"));

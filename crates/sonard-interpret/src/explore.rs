@@ -26,7 +26,7 @@ use crate::interpret::{
 };
 use sonard_model::geometry::{DVec2, Pose};
 
-/// What maps are made with.
+/// Sensors of an exploration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sensing {
@@ -53,7 +53,7 @@ impl Sensing {
     }
 }
 
-/// How a robot explores.
+/// Settings of an exploration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExploreSettings {
     /// Distance from the object that is followed, metres.
@@ -91,7 +91,7 @@ impl Default for ExploreSettings {
     }
 }
 
-/// What the robot was up to when it came to a stop.
+/// Task of the robot when it came to a stop.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Task {

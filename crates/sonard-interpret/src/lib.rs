@@ -1,7 +1,7 @@
-//! What scans say: [`compare`] sets readings beside predictions, [`interpret`] finds planes, corners and
-//! edges and makes maps, [`explore`] lets a robot map a scene.
+//! Interpretation of scans: [`compare`] compares readings with predictions, [`interpret`] finds planes, corners and
+//! edges and makes maps, [`explore`] has a simulated robot map a scene.
 //!
-//! Nothing here knows a clock, a file or a socket; random numbers are passed in.
+//! The crate uses no clock, file or socket; random numbers are passed in.
 
 // Modules are `foo.rs` beside `foo/`.
 #![warn(clippy::mod_module_files)]

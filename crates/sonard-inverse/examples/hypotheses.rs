@@ -5,19 +5,22 @@
 //! of scenes as arguments choose among them.
 
 mod rooms;
+#[path = "rooms/spread.rs"]
+mod spread;
 
 use std::{hint::black_box, sync::Arc, time::Instant};
 
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use rooms::{place, readings};
-use sonard_inverse::{ErrorModel, Hypotheses, Parameter, Sweep, World};
+use sonard_inverse::{Hypotheses, Parameter, Sweep, World};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::Pose,
     model::Options,
     scene::{Scene, shipped},
 };
+use spread::SPREAD;
 use uuid::Uuid;
 
 /// Scenes, and how far they are looked at, metres.
@@ -52,15 +55,6 @@ fn times(name: &str, to_m: f64) -> Option<(f64, f64)> {
     let mut rng = Pcg64::seed_from_u64(1);
     let parameters = vec![Parameter::X(0), Parameter::Y(0), Parameter::Heading(0)];
     let hypotheses = Hypotheses::new(world.clone(), parameters).ok()?;
-    let errors = ErrorModel {
-        sigma_m: 1e-3,
-        tail_share: 0.1,
-        tail_ratio: 2.0,
-        sigma_db: 0.5,
-        clutter: 0.002,
-        clutter_silent: 0.3,
-        clutter_m: 4.0,
-    };
     let (mut alone, mut whole) = (Vec::new(), Vec::new());
     for _ in 0..PLACES {
         let pose = place(&world.scene, &mut rng)?;
@@ -77,7 +71,7 @@ fn times(name: &str, to_m: f64) -> Option<(f64, f64)> {
             Some(())
         })?);
         whole.push(best_ms(|| {
-            black_box(hypotheses.log_likelihood(&sweep, &off, &errors).ok()?);
+            black_box(hypotheses.log_likelihood(&sweep, &off, &SPREAD).ok()?);
             Some(())
         })?);
     }

@@ -8,6 +8,8 @@
 //! wrong with a small interval (beyond six standard deviations).
 
 mod rooms;
+#[path = "rooms/spread.rs"]
+mod spread;
 
 use std::sync::Arc;
 
@@ -15,13 +17,14 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use rooms::{BEAMS, NOISE_MM, place, readings};
-use sonard_inverse::{ErrorModel, Fit, Parameter, Prior, Sweep, World, bound, fit};
+use sonard_inverse::{Fit, Parameter, Prior, Sweep, World, bound, fit};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
     model::Options,
     scene::{Scene, shipped},
 };
+use spread::SPREAD;
 use uuid::Uuid;
 
 /// What a trial found of a parameter.
@@ -96,16 +99,7 @@ fn trial(seed: u64) -> Option<Trial> {
         least_sigma_m: 2e-4,
         least_sigma_db: 0.5,
     };
-    let errors = ErrorModel {
-        sigma_m: NOISE_MM * 1e-3,
-        tail_share: 0.1,
-        tail_ratio: 2.0,
-        sigma_db: 0.5,
-        clutter: 0.002,
-        clutter_silent: 0.3,
-        clutter_m: 4.0,
-    };
-    let bounds = bound(&truth, std::slice::from_ref(&there), &what, &errors).ok()?;
+    let bounds = bound(&truth, std::slice::from_ref(&there), &what, &SPREAD).ok()?;
     let began = std::time::Instant::now();
     let fitted = fit(&believed, std::slice::from_ref(&here), &what).ok()?;
     let took_s = began.elapsed().as_secs_f64();

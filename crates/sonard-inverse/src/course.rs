@@ -16,7 +16,7 @@ use crate::{
     world::World,
 };
 
-/// How far odometry is believed.
+/// Error model of odometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Odometry {
     /// Standard deviation of the place for each metre driven, metres.

@@ -12,7 +12,7 @@ use crate::{
     world::World,
 };
 
-/// What may be wrong with a sweep.
+/// A likely fault of a sweep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Doubt {

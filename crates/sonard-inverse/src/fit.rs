@@ -25,7 +25,7 @@ use crate::{
 };
 pub use journal::Found;
 
-/// A parameter to fit, and what is known of it beforehand.
+/// A parameter to fit, with its prior.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     /// Which.

@@ -41,7 +41,7 @@ pub enum Group {
     Walls,
 }
 
-/// Why parameters can't be fitted.
+/// A group of parameters that cannot be fitted.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum GroupError {
     /// A height in the plane.

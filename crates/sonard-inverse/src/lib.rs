@@ -1,14 +1,13 @@
-//! From readings back to the world: what a sensor, the air, a scene and a pose must be for the model to explain
-//! what was measured.
+//! Inverse problems: estimates sensor, air, scene and pose from measured readings.
 //!
-//! [`fit`] improves the [`Parameter`]s of a [`World`] until the readings of some [`Sweep`]s are as likely as they
-//! can be, and says how sure that is. [`locate`] finds with an [`Atlas`] where a sweep was taken without any guess,
-//! and a [`Course`] follows a robot from sweep to sweep.
+//! [`fit`] maximises the likelihood of the readings of [`Sweep`]s over the [`Parameter`]s of a [`World`] and returns
+//! estimates with their uncertainty. [`locate`] finds the pose of a sweep without an initial guess, with an [`Atlas`] of
+//! predicted readings, and a [`Course`] tracks a robot from sweep to sweep.
 //!
-//! A reading is taken for what a receiver says whose threshold differs a little from firing to firing: from the
-//! lowest to the highest it would have reported one arrival after the other and in the end nothing
-//! (`candidates`). So an echo may be of any arrival near the threshold, a silence says that none was strong
-//! enough, and where arcs begin and end counts as much as their ranges (`likelihood`).
+//! The likelihood assumes a receiver whose threshold varies a little from firing to firing: from the lowest threshold to
+//! the highest it would report one arrival after the other, and finally none (`candidates`). So an echo may be any
+//! arrival near the threshold, a missing echo means that none was strong enough, and the ends of arcs carry as much
+//! information as their ranges (`likelihood`).
 
 mod atlas;
 mod candidates;

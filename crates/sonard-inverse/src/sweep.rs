@@ -25,7 +25,7 @@ pub struct Beam {
     pub heard: Heard,
 }
 
-/// What came back of a firing.
+/// The outcome of a firing, as fits use it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Heard {
     /// The first echo so long after firing, microseconds.

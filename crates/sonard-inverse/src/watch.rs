@@ -18,13 +18,13 @@ pub trait Watch: Sync {
     }
 }
 
-/// Nobody watches.
+/// A [`Watch`] that does nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Unwatched;
 
 impl Watch for Unwatched {}
 
-/// How far a fit has come.
+/// Progress of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Progress {
     /// Goes from wide spreads of readings to the ones that they have: which of so many it is at, from 1.

@@ -36,7 +36,7 @@ pub struct World {
     pub gear: f64,
 }
 
-/// Why a world can't be had.
+/// An error in a world, or in a pose in it.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum WorldError {
     /// Its sensor or options make no sense.

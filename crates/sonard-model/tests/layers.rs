@@ -125,9 +125,9 @@ fn path(module: &str) -> Module {
     module.split("::").filter(|name| !name.is_empty()).map(str::to_owned).collect()
 }
 
-/// One style of module files in the shell: `foo.rs` beside the folder `foo`.
+/// One style of module files: `foo.rs` beside the folder `foo`.
 #[test]
-fn a_module_of_the_shell_is_a_file_beside_its_folder() {
+fn a_module_is_a_file_beside_its_folder() {
     fn look(folder: &Path, found: &mut Vec<PathBuf>) {
         for entry in fs::read_dir(folder).expect("a source folder") {
             let path = entry.expect("an entry").path();
@@ -139,6 +139,10 @@ fn a_module_of_the_shell_is_a_file_beside_its_folder() {
         }
     }
     let mut found = Vec::new();
-    look(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../src"), &mut found);
+    let crates = fs::read_dir(root().join("crates")).expect("crates");
+    let crates = crates.map(|entry| entry.expect("an entry").path().join("src"));
+    let others = ["src", "firmware-protocol/src", "firmware/src", "emulator/src", "tests/cli"];
+    let others = others.map(|folder| root().join(folder));
+    crates.chain(others).for_each(|folder| look(&folder, &mut found));
     assert!(found.is_empty(), "foo.rs, not foo/mod.rs: {found:?}");
 }

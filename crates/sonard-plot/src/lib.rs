@@ -1,7 +1,6 @@
 //! Pictures of scenes and scans, as SVG and PNG.
 //!
-//! Everything here is a pure function from data to a [`Picture`]; writing it to a file is the
-//! caller's business.
+//! Everything here is a pure function from data to a [`Picture`]; the caller writes it to a file.
 
 // Modules are `foo.rs` beside `foo/`.
 #![warn(clippy::mod_module_files)]

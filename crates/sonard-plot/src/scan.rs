@@ -102,7 +102,7 @@ impl Layout {
 }
 
 /// What was read at one pose.
-struct Stand<'a> {
+struct PosedScans<'a> {
     pose: Pose,
     /// The scan whose predictions are shown.
     first: &'a Readings,
@@ -110,18 +110,18 @@ struct Stand<'a> {
     all: Readings,
 }
 
-impl<'a> Stand<'a> {
+impl<'a> PosedScans<'a> {
     /// The scans by pose, in the order of the log.
     fn gather(scans: &[(Pose, &'a Readings)]) -> Vec<Self> {
-        let mut stands: Vec<Self> = Vec::new();
+        let mut by_pose: Vec<Self> = Vec::new();
         for &(pose, first) in scans {
-            if stands.iter().all(|stand| stand.pose != pose) {
+            if by_pose.iter().all(|at_pose| at_pose.pose != pose) {
                 let here = scans.iter().filter(|(other, _)| *other == pose);
                 let all = Readings::merged(here.map(|(_, scan)| *scan));
-                stands.push(Self { pose, first, all });
+                by_pose.push(Self { pose, first, all });
             }
         }
-        stands
+        by_pose
     }
 
     fn predicted(&self, plan: &'a Plan) -> Floor<'_> {
@@ -135,29 +135,29 @@ impl<'a> Stand<'a> {
 
 /// The floor plan, and how many readings lie beyond it.
 fn floor_plan(plan: &Plan, scans: &[(Pose, &Readings)], scene: Option<&Scene>) -> (Layer, usize) {
-    let stands = Stand::gather(scans);
+    let by_pose = PosedScans::gather(scans);
     let mut inside = Layer::new("inside").clipped("plan-window", plan.panel);
-    inside.extend(stands.iter().map(|stand| stand.predicted(plan).model()));
+    inside.extend(by_pose.iter().map(|at_pose| at_pose.predicted(plan).model()));
     inside.extend(scene.map(|scene| plan.walls(scene)));
-    for stand in &stands {
-        inside.extend(scene.map(|scene| plan.body(scene, &stand.pose)));
-        inside.add(stand.predicted(plan).min_range());
+    for at_pose in &by_pose {
+        inside.extend(scene.map(|scene| plan.body(scene, &at_pose.pose)));
+        inside.add(at_pose.predicted(plan).min_range());
     }
     let opacity = if scans.len() > 1 { 0.6 } else { 1.0 };
-    inside.extend(stands.iter().map(|stand| stand.measured(plan).marks(opacity)));
-    inside.extend(stands.iter().map(|stand| plan.pose(&stand.pose)));
+    inside.extend(by_pose.iter().map(|at_pose| at_pose.measured(plan).marks(opacity)));
+    inside.extend(by_pose.iter().map(|at_pose| plan.pose(&at_pose.pose)));
 
     let mut labels = plan.labels(scene);
     let mut layer = Layer::new("floor-plan");
     layer.add(plan.frame());
     layer.add(inside);
-    for floor in stands.iter().map(|stand| stand.measured(plan)) {
+    for floor in by_pose.iter().map(|at_pose| at_pose.measured(plan)) {
         layer.add(floor.silent_ticks());
         layer.add(floor.beyond(&mut labels));
     }
     layer.extend(scene.map(|scene| plan.names(scene, &mut labels)));
     layer.add(plan.scale_bar());
-    (layer, stands.iter().map(|stand| stand.measured(plan).count_beyond()).sum())
+    (layer, by_pose.iter().map(|at_pose| at_pose.measured(plan).count_beyond()).sum())
 }
 
 fn strips_beside(panels: &[Rect; 2], azimuths: AzimuthAxis, scans: &[Readings]) -> Layer {

@@ -10,7 +10,7 @@ use super::{LOG_FORMAT, PathRecord, Point, Record, Session};
 /// Longest line that is written or read, bytes. A record of 65535 echo times would fit.
 pub const MAX_LINE_BYTES: usize = 1 << 20;
 
-/// What kind of thing is wrong with a line.
+/// The kind of an error in a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum FaultKind {
     /// Nothing on it.
@@ -33,7 +33,7 @@ pub enum FaultKind {
     Torn,
 }
 
-/// Why a line is not a record.
+/// A line that is not a record.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub struct RecordError {
     /// What kind of thing is wrong.
@@ -68,7 +68,7 @@ impl RecordError {
     }
 }
 
-/// Why a record can't be written.
+/// A record that cannot be written.
 #[derive(Debug, Error)]
 pub enum EncodeError {
     /// JSON has no such number, and the field may not be `null`.

@@ -1,4 +1,4 @@
-//! Scans: the plan, the readings, and the records they are logged as.
+//! Records of scans: sessions, plans, readings, and their format in a log.
 
 // Modules are `foo.rs` beside `foo/`.
 #![warn(clippy::mod_module_files)]

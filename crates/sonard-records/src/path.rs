@@ -40,7 +40,7 @@ pub struct InteractionRecord {
     pub point: Option<Point>,
 }
 
-/// How a direction of propagation is changed.
+/// Kind of a change of direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum InteractionKind {

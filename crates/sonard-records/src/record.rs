@@ -71,7 +71,7 @@ pub struct ScanAir {
     pub age_s: Option<f64>,
 }
 
-/// Who gave a temperature.
+/// Source of a temperature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AirSource {
@@ -233,7 +233,7 @@ pub struct ScanEnd {
     pub provenance: Option<Provenance>,
 }
 
-/// Something happened that a reader of the data must know.
+/// An event that matters for the interpretation of the data.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Event {
     /// Wall clock.

@@ -8,8 +8,9 @@ use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
 use sonard_model::{
-    acoustics::{Air, Sensor},
+    acoustics::{Air, AirError, Sensor},
     array::RangerArray,
+    model::Options,
     scene::Scene,
 };
 
@@ -35,7 +36,7 @@ pub enum Provenance {
     Replay,
 }
 
-/// Opens a log, and again after each reconnection to a different device.
+/// The record that opens a log, and again follows each reconnection to a different device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Session {
     /// Record format: [`LOG_FORMAT`], or of a log that was read an earlier one.
@@ -102,9 +103,20 @@ impl Session {
         self.scene = Some(SceneRef::of(scene));
         self.scene_text = Some(Arc::clone(&scene.text)).filter(|text| !text.is_empty());
     }
+
+    /// Air and options to predict this session's readings with: the default options if it names no model, `None` if
+    /// this program cannot set up the model that it names.
+    ///
+    /// # Errors
+    /// When the air is out of the range of the model.
+    pub fn conditions(&self) -> Result<(Air, Option<Options>), AirError> {
+        let options =
+            self.model.as_ref().map_or_else(|| Some(Options::default()), ModelRecord::options);
+        Ok((Air::try_from(&self.air)?, options))
+    }
 }
 
-/// What readings were imported from, and how.
+/// Source and interpretation of imported readings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ImportRef {
     /// The file's name.
@@ -118,7 +130,7 @@ pub struct ImportRef {
     pub poses_known: bool,
 }
 
-/// What a scan was taken for, and what was noted about it.
+/// Place of a scan in a collection, with its notes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CollectionRef {
     /// Identifies the collection.
@@ -167,7 +179,7 @@ pub struct AirRecord {
     pub sound_speed_m_s: f64,
 }
 
-/// Which scene file the model used.
+/// Reference to the scene file of the model.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct SceneRef {
     /// The scene's own name.
@@ -184,7 +196,7 @@ impl SceneRef {
     }
 }
 
-/// Which engine predicted, and with what settings.
+/// Engine and settings of the predictions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ModelRecord {
     /// Engine: `paths`, `fan` or `cone`.

@@ -15,7 +15,7 @@ pub trait Sink: Send {
     fn record(&mut self, record: &Record) -> Result<(), SinkError>;
 }
 
-/// Why a record could not be kept.
+/// A record could not be stored.
 #[derive(Debug, Error)]
 #[error("{cause}")]
 pub struct SinkError {

@@ -7,7 +7,7 @@ use sonard_model::{acoustics::EchoTrace, model::Simulator};
 /// More points than this are told as so many, each the highest of its neighbours.
 const MOST_POINTS: usize = 4096;
 
-/// The signal that the model predicts, as an oscilloscope would show it.
+/// The echo trace that the model predicts.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TraceLine {
     /// Between its points, microseconds; the first is the firing.

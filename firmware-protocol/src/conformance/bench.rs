@@ -25,7 +25,7 @@ pub struct Bench<D> {
     events: Vec<HostEvent>,
 }
 
-/// Why a command did not come to its end.
+/// A command that did not finish.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BenchError<E> {
     /// It was not begun.

@@ -2,7 +2,7 @@
 
 use crate::messages::{Blanking, Capabilities, Echoes, FirmwareVersion, ReadingStatus, ResetCause};
 
-/// What the board knows of itself at boot.
+/// Properties of the board, known at boot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Board {
     /// A number that no earlier boot had (best: a counter in EEPROM). 0 is taken for 1.
@@ -19,7 +19,7 @@ pub struct Board {
     pub reset_cause: ResetCause,
 }
 
-/// What the board must do now. Actions are to be carried out in the order they come.
+/// An action that the board must carry out now. Actions are to be carried out in the order they come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
     /// Search the index and end on it, at the position that is zero from then on; without an
@@ -60,7 +60,7 @@ pub enum Action {
     Reset,
 }
 
-/// What came of one [`Action::Fire`].
+/// The outcome of one [`Action::Fire`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EchoReport {
     /// Device clock when INIT rose, ticks.
@@ -72,7 +72,7 @@ pub struct EchoReport {
     pub echoes: Echoes,
 }
 
-/// Why homing failed.
+/// The reason why homing failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HomeError {
     /// The index was not found within the search.

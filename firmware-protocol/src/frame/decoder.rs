@@ -25,7 +25,7 @@ enum State {
     Dropping(DropReason),
 }
 
-/// What a byte completed.
+/// The event that a byte completed.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Received<'a> {
     /// Nothing yet.
@@ -51,7 +51,7 @@ pub struct RawFrame<'a> {
     pub wire_len: u8,
 }
 
-/// Why bytes were dropped.
+/// The reason why bytes were dropped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DropReason {
     /// The delimiter came inside a COBS block.
@@ -64,7 +64,7 @@ pub enum DropReason {
     Line,
 }
 
-/// What a receiver threw away, by kind. Counters stop at their largest value.
+/// Counts of what a receiver dropped, by kind. Counters stop at their largest value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LinkCounters {
     /// Frames with a wrong CRC or too short for one.

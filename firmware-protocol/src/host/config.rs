@@ -59,7 +59,7 @@ impl HostConfig {
     }
 }
 
-/// What the host can be asked to do, one at a time; [`Command::Stop`] may come in between.
+/// A command to the host machine, one at a time; [`Command::Stop`] may come in between.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Command {
     /// Meet the device. Ends with [`super::HostEvent::Identified`].
@@ -86,7 +86,7 @@ pub enum Command {
     Reset,
 }
 
-/// Why a command was not begun.
+/// The reason why a command was not started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StartError {
     /// Another one is under way.

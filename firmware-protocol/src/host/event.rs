@@ -7,7 +7,7 @@ use crate::messages::{
     FaultKind, FirmwareVersion, Identity, NakReason, ProtocolId, Reading, Status, SweepState,
 };
 
-/// Something the caller may want to know. Every command ends with exactly one of
+/// An event of the host machine. Every command ends with exactly one of
 /// [`Identified`](Self::Identified), [`Done`](Self::Done), [`SweepDone`](Self::SweepDone) or
 /// [`Failed`](Self::Failed); a sweep that Stop ends counts together with that Stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,7 +64,7 @@ pub enum HostEvent {
     Failed(HostError),
 }
 
-/// How a command succeeded.
+/// The result of a successful command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// Configure was accepted.
@@ -89,7 +89,7 @@ pub enum Outcome {
     Reset,
 }
 
-/// Why a command failed.
+/// The reason why a command failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HostError {
     /// Nothing came back.

@@ -6,7 +6,7 @@ use crate::frame::Header;
 use crate::messages::limits::{self, kept_bytes};
 use crate::messages::{Capabilities, Identity, Reading, ReadingStatus, Settings};
 
-/// Why an Identity is refused.
+/// The reason why an Identity is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum IdentityFault {
     /// It says this host's version, but is not of its form.
@@ -36,7 +36,7 @@ pub enum IdentityFault {
     },
 }
 
-/// Why a reading is refused. Its place in the plan is another matter:
+/// The reason why a reading is refused. Its place in the plan is another matter:
 /// [`super::HostError::WrongReading`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReadingFault {
@@ -76,7 +76,7 @@ pub enum ReadingFault {
     },
 }
 
-/// Why the answer to a command is refused.
+/// The reason why the answer to a command is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReplyFault {
     /// Home found the index farther from where it was expected than it can be.

@@ -2,7 +2,7 @@
 
 use crate::frame::LinkCounters;
 
-/// What went over the link since the host machine was made.
+/// Counts of the link since the host machine was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LinkStats {
     /// Bytes handed out for sending.

@@ -4,7 +4,7 @@ use super::config::ACKNOWLEDGEMENTS_A_RING;
 use super::deadline::{beam_us, longest_frame_us, slew_us};
 use super::firings::Firings;
 use super::sense::check_echoes;
-use super::track::{Place, Track};
+use super::track::{Reception, Track};
 use super::{Command, Host, HostError, HostEvent, ReadingFault, StartError};
 use crate::messages::limits::readings_in;
 use crate::messages::{Alive, Reading, Request, Sweep, SweepDone, SweepState};
@@ -37,16 +37,16 @@ impl Host {
         };
         match track.place(reading) {
             Err(error) => self.give_up(now_us, error),
-            Ok(Place::Duplicate) => self.stats.duplicates += 1,
-            Ok(Place::Beyond) => {}
-            Ok(Place::New { repaired }) if self.has_room_for_reading() => {
+            Ok(Reception::Duplicate) => self.stats.duplicates += 1,
+            Ok(Reception::Beyond) => {}
+            Ok(Reception::New { repaired }) if self.has_room_for_reading() => {
                 match self.check_beam(now_us, track, reading) {
                     Ok(()) => self.deliver(reading, repaired),
                     Err(fault) => self.refuse(reading, fault),
                 }
                 self.beam_settled(now_us);
             }
-            Ok(Place::New { .. }) => {}
+            Ok(Reception::New { .. }) => {}
         }
     }
 

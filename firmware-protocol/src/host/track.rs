@@ -39,7 +39,7 @@ pub(super) struct Track {
 
 /// What a reading is to the sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum Reception {
     /// Not seen before.
     New {
         /// Whether it was lost at first.
@@ -80,17 +80,17 @@ impl Track {
     }
 
     /// Checks a reading against the plan and tells its place. Changes nothing.
-    pub(super) fn place(&self, reading: &Reading) -> Result<Place, HostError> {
+    pub(super) fn place(&self, reading: &Reading) -> Result<Reception, HostError> {
         let index = reading.index;
         let planned = self.plan.step_of(index).filter(|_| index < self.beams);
         if planned != Some(reading.step) {
             return Err(HostError::WrongReading { index, step: reading.step, planned });
         }
         Ok(match index.checked_sub(self.next) {
-            None => Place::Duplicate,
-            Some(ahead) if ahead >= WINDOW => Place::Beyond,
-            Some(ahead) if self.seen >> ahead & 1 == 1 => Place::Duplicate,
-            Some(_) => Place::New { repaired: index < self.sent },
+            None => Reception::Duplicate,
+            Some(ahead) if ahead >= WINDOW => Reception::Beyond,
+            Some(ahead) if self.seen >> ahead & 1 == 1 => Reception::Duplicate,
+            Some(_) => Reception::New { repaired: index < self.sent },
         })
     }
 

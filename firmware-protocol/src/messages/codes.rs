@@ -5,7 +5,7 @@ use core::fmt;
 use super::table::wire_enum;
 
 wire_enum! {
-    /// Why the device refused a request.
+    /// The reason why the device refused a request.
     pub enum NakReason {
         /// Something is under way; only Stop, Identify, KeepAlive, Resend and Status are served.
         0 Busy,
@@ -53,7 +53,7 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// Why the device stopped by itself. The coils are released and the position is unknown.
+    /// The reason why the device stopped by itself. The coils are released and the position is unknown.
     pub enum FaultKind {
         /// The host was silent for longer than the sweep's lease.
         0 LeaseExpired,
@@ -67,7 +67,7 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// How far the device's latest sweep is.
+    /// State of the device's latest sweep.
     pub enum SweepState {
         /// There was none since boot.
         0 None,
@@ -89,7 +89,7 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// What the device is doing.
+    /// State of the device.
     pub enum DeviceState {
         /// Nothing.
         0 Idle,
@@ -107,7 +107,7 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// What became of one firing.
+    /// The outcome of one firing.
     pub enum ReadingStatus {
         /// At least one echo.
         0 Echo,
@@ -121,7 +121,7 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// Why the device booted.
+    /// The cause of the device's boot.
     pub enum ResetCause {
         /// The board cannot tell.
         0 Unknown,

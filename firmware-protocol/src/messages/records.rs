@@ -6,7 +6,7 @@ use super::table::{wire_enum, wire_struct};
 use super::wire::{Reader, Wire, Writer};
 
 wire_struct! {
-    /// Which protocol a device speaks. The front of every Identity, frozen.
+    /// Protocol version of a device. The front of every Identity, frozen.
     pub struct ProtocolId {
         /// Counts up with incompatible changes.
         version: u8,
@@ -28,7 +28,7 @@ wire_struct! {
 }
 
 wire_struct! {
-    /// Who the device is. `protocol` and `firmware` come first in every version.
+    /// Identity of the device. `protocol` and `firmware` come first in every version.
     pub struct Identity {
         /// Protocol spoken.
         protocol: ProtocolId,
@@ -53,7 +53,7 @@ wire_struct! {
     }
 }
 
-/// What a board can do, as bits.
+/// Features of a board, as bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Capabilities(pub u16);
 
@@ -113,7 +113,7 @@ impl Capabilities {
 }
 
 wire_struct! {
-    /// How to move and how to listen. See [`super::limits`] for the ranges.
+    /// Settings of motion and listening. See [`super::limits`] for the ranges.
     pub struct Settings {
         /// Listening time after each firing, ticks.
         window_ticks: u32,
@@ -135,7 +135,7 @@ wire_struct! {
 }
 
 wire_enum! {
-    /// How long the receiver stays deaf after firing.
+    /// How long the receiver is disabled after firing.
     pub enum Blanking {
         /// As long as the module does by itself (2.38 ms).
         0 Internal,
@@ -200,7 +200,7 @@ wire_struct! {
 }
 
 wire_struct! {
-    /// How far the device is with its latest sweep.
+    /// Progress of the device's latest sweep.
     pub struct Alive {
         /// Device clock when the request came in, ticks.
         ticks: u32,

@@ -3,7 +3,7 @@
 //! On the microcontroller postcard and serde's generated code would take four kilobytes more
 //! than this. `tests/wire.rs` holds the two equal, on every message and on arbitrary bytes.
 
-/// Something that has a place in a message.
+/// A value that can be encoded in a message.
 pub trait Wire: Sized {
     /// Appends the encoding.
     fn put(&self, out: &mut Writer<'_>);

@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Firings of a round one after the other, from a pose.
-struct Stand {
+struct FiringPose {
     pose: Pose,
     /// Place in the round of the first of them.
     first: usize,
@@ -31,7 +31,7 @@ pub(super) fn predict<'py>(
     let array = model.rangers();
     let stands: Vec<Pose> = poses.list.iter().flat_map(|pose| array.turned(pose, rounds)).collect();
     checked(model, py, &stands, |at| poses.index(at / rounds as usize))?;
-    let stands: Vec<Stand> = stands.into_iter().map(|pose| Stand { pose, first: 0 }).collect();
+    let stands: Vec<FiringPose> = stands.into_iter().map(|pose| FiringPose { pose, first: 0 }).collect();
     let firings = array.round().count();
     let mut shape = poses.shape;
     shape.push(firings * rounds as usize);
@@ -50,8 +50,8 @@ pub(super) fn fire<'py>(
     // A single pose is that of the first firing.
     let along = poses.shape.last().copied().unwrap_or(1).max(1);
     let firings = model.rangers().round().count();
-    let stand = |(at, pose): (usize, &Pose)| Stand { pose: *pose, first: at % along % firings };
-    let stands: Vec<Stand> = poses.list.iter().enumerate().map(stand).collect();
+    let stand = |(at, pose): (usize, &Pose)| FiringPose { pose: *pose, first: at % along % firings };
+    let stands: Vec<FiringPose> = poses.list.iter().enumerate().map(stand).collect();
     readings(model, py, &stands, 1, threads, poses.shape)
 }
 
@@ -70,18 +70,18 @@ fn checked(
 fn readings<'py>(
     model: &ArrayModel,
     py: Python<'py>,
-    stands: &[Stand],
+    stands: &[FiringPose],
     each: usize,
     threads: Option<usize>,
     shape: Vec<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let simulated = model.simulated(py)?;
-    let fire = |stand: &Stand, row: &mut [f64]| fire_at(&simulated, stand, row);
+    let fire = |stand: &FiringPose, row: &mut [f64]| fire_at(&simulated, stand, row);
     let table = firing::table(py, stands, each, threads, fire)?;
     firing::shaped(py, table, arrays::array_reading_dtype(py)?, shape)
 }
 
-fn fire_at(model: &model::ArrayModel, stand: &Stand, row: &mut [f64]) -> Result<(), ModelError> {
+fn fire_at(model: &model::ArrayModel, stand: &FiringPose, row: &mut [f64]) -> Result<(), ModelError> {
     let here = model.at(stand.pose)?;
     for (firing, words) in (stand.first..).zip(row.chunks_exact_mut(READING_WORDS)) {
         words.copy_from_slice(&arrays::words_of_array(&here.ping_in_round(firing)?));

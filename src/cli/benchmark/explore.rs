@@ -35,7 +35,7 @@ pub(in crate::cli) struct Args {
     /// How many rooms, each explored three times
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     rooms: u32,
-    /// Seed of what is random; rooms and noise
+    /// Random seed; rooms and noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     #[command(flatten)]
@@ -43,7 +43,7 @@ pub(in crate::cli) struct Args {
     /// JSON instead of text; one object for each exploration
     #[arg(long)]
     json: bool,
-    /// Folder for what is written; what `sonard explore --out` writes, and a picture of each room's
+    /// Output folder; what `sonard explore --out` writes, and a picture of each room's
     /// three maps
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
@@ -52,7 +52,7 @@ pub(in crate::cli) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Explore made-up rooms with sonar, laser, and laser just in time, and compare the maps.
+Explore random rooms with sonar, laser, and laser just in time, and compare the maps.
 
 Each room is 6 to 8 m by 5 to 6.5 m with two or three objects in it, its walls at an odd angle. The \
 three robots begin at the same place; the table has every room, and the means.";

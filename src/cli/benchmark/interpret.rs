@@ -24,11 +24,10 @@ pub(in crate::cli) struct Args {
     /// How many made-up rooms, each read from one or two places
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     trials: u64,
-    /// Seed of what is random; rooms, places and noise
+    /// Random seed; rooms, places and noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Sensor preset (senscomp-6500, polaroid-chirp, bozma-kuc-60khz, pioneer, hc-sr04,
-    /// lego-nxt, fullwave-line), or a file with a sensor's data; with its whole receiver
+    /// Sensor preset (`sonard sensor list`), or a file with a sensor's data; with its whole receiver
     #[arg(long, value_name = "NAME|FILE", default_value = "senscomp-6500")]
     sensor: String,
     /// JSON instead of text; one object

@@ -44,7 +44,7 @@ pub(in crate::cli) struct Args {
     /// How many courses, each mapped without and with Feature Prediction
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     maps: u32,
-    /// Seed of what is random; rooms, courses and noise
+    /// Random seed; rooms, courses and noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Sets of readings in each course
@@ -53,13 +53,13 @@ pub(in crate::cli) struct Args {
     /// Side of a cell, metres
     #[arg(long, value_name = "M", default_value_t = 0.05)]
     resolution: f64,
-    /// Take ranges beyond this as silence, metres [default: the sensor's, at most 5]
+    /// Treat ranges beyond this as no echo, metres [default: the sensor's, at most 5]
     #[arg(long, value_name = "M")]
     silent_beyond: Option<f64>,
     /// Exponent of the confidence with the distance of the feature; the paper also says 1
     #[arg(long, value_name = "E", default_value_t = 2.0)]
     exponent: f64,
-    /// How far walls are taken to go on beyond what was seen of them, metres
+    /// How far walls are extended beyond their observed part, metres
     #[arg(long, value_name = "M", default_value_t = Mapping::default().extend_m)]
     extend: f64,
     /// Weigh whole readings, also what they say of the space before the feature, as the paper does
@@ -74,7 +74,7 @@ pub(in crate::cli) struct Args {
     /// JSON instead of text; one object for each course
     #[arg(long)]
     json: bool,
-    /// Folder for what is written; pictures of the maps: ideal, without, with
+    /// Output folder; pictures of the maps: ideal, without, with
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
     #[command(flatten)]

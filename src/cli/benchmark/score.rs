@@ -41,7 +41,7 @@ pub(in crate::cli) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Set a map beside the ideal one.
+Compare a map with the ideal one.
 
 Four benchmarks, in percent. Correlation of the two maps' cells: more is better. Map score: the \
 squared difference of the cells, summed, over the number of cells: less is better. The same sum \

@@ -87,22 +87,18 @@ pub(super) struct Unfinished {
     file: Mutex<Option<File>>,
 }
 
-/// Whether a folder may be written to, but for its results; before any work.
+/// Checks before any work that the file may be written in a folder. Returns whether the results in the folder are those
+/// of the calibration that it holds unfinished.
 ///
 /// # Errors
-/// Something else in the file's place.
-pub(super) fn check(folder: &Path, overwrite: Overwrite) -> Outcome {
-    // A first line that was cut off says nothing yet.
+/// When something else is in the file's place.
+pub(super) fn check(folder: &Path, overwrite: Overwrite) -> Result<bool, Failure> {
     let text = fs::read(folder.join(NAME)).unwrap_or_default();
+    // A first line that was cut off says nothing yet.
     let is_cut = text.starts_with(BEGINNING) || BEGINNING.starts_with(&text);
     let is_cut = is_cut && !text.contains(&b'\n');
-    overwrite.or_forced(is_cut).check_in(folder, NAME, PRODUCT)
-}
-
-/// Whether a folder's results were begun by the calibration that it holds unfinished.
-pub(super) fn has_results(folder: &Path) -> bool {
-    let text = fs::read(folder.join(NAME)).unwrap_or_default();
-    text.split(|byte| *byte == b'\n').any(|line| line == RESULTS.as_bytes())
+    overwrite.or_forced(is_cut).check_in(folder, NAME, PRODUCT)?;
+    Ok(text.split(|byte| *byte == b'\n').any(|line| line == RESULTS.as_bytes()))
 }
 
 impl Unfinished {
@@ -256,6 +252,10 @@ mod tests {
 
     fn place(value: f64) -> Found {
         Found::Place { values: vec![value, -1.0 / 3.0], log_posterior: 1e-300 }
+    }
+
+    fn has_results(folder: &Path) -> bool {
+        check(folder, Overwrite::default()).expect("it is a calibration's")
     }
 
     fn open(folder: &Path, digest: &str) -> Result<Unfinished, Failure> {

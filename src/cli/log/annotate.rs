@@ -32,13 +32,13 @@ pub(in crate::cli) struct Args {
     output: Option<OutPath>,
     #[command(flatten)]
     overwrite: Overwrite,
-    /// Take ranges beyond this as silence, metres [default: the sensor's, at most 5]
+    /// Treat ranges beyond this as no echo, metres [default: the sensor's, at most 5]
     #[arg(long, value_name = "M")]
     silent_beyond: Option<f64>,
     /// Exponent of the confidence with the distance of the feature
     #[arg(long, value_name = "E", default_value_t = 2.0)]
     exponent: f64,
-    /// How far walls are taken to go on beyond what was seen of them, metres
+    /// How far walls are extended beyond their observed part, metres
     #[arg(long, value_name = "M", default_value_t = Mapping::default().extend_m)]
     extend: f64,
 }

@@ -9,7 +9,7 @@ use crate::{
     acoustics::Air,
     cli::{
         Failure,
-        mock_world::{Belief, MockWorldArgs},
+        mock_world::{AssumedModel, MockWorldArgs},
     },
     daemon::Settings,
     mock::{MockPort, Pace},
@@ -34,7 +34,7 @@ impl Mock {
         let Some(scene) = &settings.scene else {
             return Err(Failure::input("a mock needs a scene", "give --scene"));
         };
-        let belief = Belief {
+        let assumed = AssumedModel {
             scene,
             pose: &settings.pose,
             sensor: &settings.sensor,
@@ -42,7 +42,7 @@ impl Mock {
             options: &settings.options(),
         };
         let pace = if virtual_time { Pace::Virtual } else { Pace::RealTime };
-        let board = world.board_at(pace, &belief)?;
+        let board = world.board_at(pace, &assumed)?;
         let link = std::env::temp_dir().join(format!("sonard-mock-{}", std::process::id()));
         let port = MockPort::open(board, Some(&link)).map_err(|error| {
             Failure::device(format!("cannot make a pty: {error}"), "is /dev/pts mounted?")

@@ -16,7 +16,7 @@ use crate::{
 pub(super) fn run(args: &Args) -> Outcome {
     let (scene, pose) = args.place.load()?;
     let plan = args.azimuths.plan(args.pings_per_stop)?;
-    let wish = ScanRequest { scans: Some(args.repeat), plan: Some(plan), pose: Some(pose) };
+    let request = ScanRequest { scans: Some(args.repeat), plan: Some(plan), pose: Some(pose) };
     let client = args.at.client()?;
     let output = Output::open(args.out.as_deref())?;
     let mut scans =
@@ -25,7 +25,8 @@ pub(super) fn run(args: &Args) -> Outcome {
         let interrupts = Interrupts::listen();
         let status: Status = client.get_json("/v1/status").await.map_err(|error| refuse(&error))?;
         check_scene(status.scene.as_ref(), &scene)?;
-        let requested = RequestedScans::ask(client, &wish).await.map_err(|error| refuse(&error))?;
+        let requested =
+            RequestedScans::ask(client, &request).await.map_err(|error| refuse(&error))?;
         anstream::eprintln!("the daemon takes {} scan(s), {}", args.repeat, first(&status));
         let followed = scans.follow(requested, &interrupts).await;
         scans.output.end_scan();

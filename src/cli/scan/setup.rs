@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{super::mock_world::Belief, Args};
+use super::{super::mock_world::AssumedModel, Args};
 use crate::{
     cli::{Failure, options::engine_options},
     ranger::{PrepareError, PreparedScan, ScanInputs},
@@ -32,8 +32,8 @@ fn refuse(error: &PrepareError) -> Failure {
 }
 
 /// What the host believes of a mock's world.
-pub(in crate::cli) const fn belief(scan: &PreparedScan) -> Belief<'_> {
-    Belief {
+pub(in crate::cli) const fn assumed(scan: &PreparedScan) -> AssumedModel<'_> {
+    AssumedModel {
         scene: &scan.scene,
         pose: &scan.pose,
         sensor: &scan.sensor,

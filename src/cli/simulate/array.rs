@@ -27,7 +27,7 @@ use crate::{
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "Array")]
 pub(super) struct ArrayArgs {
-    /// Array of rangers, a preset (pioneer-8, pioneer-7, ring-12) or a file with an array's data;
+    /// Array of rangers, a preset (`sonard array list`) or a file with an array's data;
     /// they fire in turn, and the pose is the robot's
     #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["from_deg", "to_deg", "step_deg"])]
     pub(super) array: Option<String>,
@@ -53,8 +53,9 @@ pub(super) fn run(args: &Args, name: &str) -> Outcome {
             .map_err(|error| refuse(&error))?;
     let noise = args.noise.noise()?;
     let mut out = records_to(args.output.as_deref(), args.overwrite)?;
-    let mut player = Player { model: &model, noise, rng: Pcg64::seed_from_u64(args.noise.seed) };
-    match player.play(&mut *out, &rounds) {
+    let mut firing =
+        ArrayFiring { model: &model, noise, rng: Pcg64::seed_from_u64(args.noise.seed) };
+    match firing.fire(&mut *out, &rounds) {
         Ok(()) => {
             closed(out.finish())?;
             left_out
@@ -68,15 +69,15 @@ fn refuse(error: &ModelError) -> Failure {
     Failure::input(error, "see `sonard simulate --help`")
 }
 
-struct Player<'a> {
+struct ArrayFiring<'a> {
     model: &'a ArrayModel,
     noise: Option<ReceiverNoise>,
     rng: Pcg64,
 }
 
-impl Player<'_> {
+impl ArrayFiring<'_> {
     /// Writes the session, and a scan for each place with its rounds.
-    fn play(&mut self, out: &mut dyn RecordWriter, places: &[Vec<Pose>]) -> Result<(), Stop> {
+    fn fire(&mut self, out: &mut dyn RecordWriter, places: &[Vec<Pose>]) -> Result<(), Stop> {
         out.write(&Record::Session(Box::new(Session::of_array(self.model, Timestamp::now()))))?;
         let round: Vec<usize> = self.model.array().round().collect();
         let firings = round.len() * places.iter().map(Vec::len).sum::<usize>();

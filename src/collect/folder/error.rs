@@ -7,7 +7,7 @@ use std::{
 
 use thiserror::Error;
 
-/// What can go wrong with the folder.
+/// An error in the folder of a collection.
 #[derive(Debug, Error)]
 pub enum FolderError {
     /// The system refused.

@@ -4,7 +4,7 @@ use std::fmt;
 
 use thiserror::Error;
 
-/// Where a value was given.
+/// Source of a value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origin {
     /// In a file, at this line and column (from 1).
@@ -32,7 +32,7 @@ impl fmt::Display for Origin {
     }
 }
 
-/// Something wrong with the configuration.
+/// An error in the configuration.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{origin}: {message}")]
 pub struct ConfigError {

@@ -8,7 +8,7 @@ use tokio_serial::SerialStream;
 use uuid::Uuid;
 
 use super::{
-    super::{agenda::Asked, desk::Interrupt, forecast::predict, machine::Input},
+    super::{agenda::Asked, control::Interrupt, forecast::predict, machine::Input},
     Operator, attended,
 };
 use crate::{
@@ -20,24 +20,24 @@ use crate::{
 impl Operator {
     pub(super) async fn scan(&mut self) {
         let Some(identity) = self.recognise().await else { return };
-        let (asked, terms) = (self.desk.agenda.next(), self.desk.terms());
+        let (asked, terms) = (self.control.agenda.next(), self.control.terms());
         let Some(job) = self.prepare(&identity, asked).await else { return };
-        let now = self.desk.terms();
-        if self.desk.agenda.next() != asked || !now.measures_as(&terms) {
+        let now = self.control.terms();
+        if self.control.agenda.next() != asked || !now.measures_as(&terms) {
             // While the model was asked, somebody wanted something else.
             return;
         }
         let Some(mut ranger) = self.ranger.take() else { return };
-        self.desk.agenda.begun(self.desk.now());
-        self.desk.serving = job.request;
+        self.control.agenda.begun(self.control.now());
+        self.control.serving = job.request;
         self.handle(Input::ScanBegun);
         self.tell();
         let before = self.out.shared.latest_scan();
         let clock_steps = ranger.clock_steps();
         let (outcome, interrupts) = self.scan_attended(&mut ranger, &job).await;
         self.count_clock_steps(ranger.clock_steps() - clock_steps);
-        self.desk.serving = None;
-        self.desk.identity = Some(*ranger.identity());
+        self.control.serving = None;
+        self.control.identity = Some(*ranger.identity());
         self.ranger = Some(ranger);
         self.next_check = Instant::now() + self.check_interval();
         self.out.shared.view.send_modify(|view| view.scan = None);
@@ -49,12 +49,12 @@ impl Operator {
     /// since the last one is no other device, but begins a session.
     async fn recognise(&mut self) -> Option<Identity> {
         let ranger = self.ranger.as_mut()?;
-        match attended(&mut self.desk, ranger.recognise()).await {
+        match attended(&mut self.control, ranger.recognise()).await {
             Err(interrupt) => self.react(interrupt),
             Ok(Err(error)) => self.device_failed(&error),
             Ok(Ok(())) => {
-                self.desk.identity = Some(*ranger.identity());
-                return self.desk.identity;
+                self.control.identity = Some(*ranger.identity());
+                return self.control.identity;
             }
         }
         None
@@ -62,19 +62,19 @@ impl Operator {
 
     /// The next scan, and a session in the log that it fits; `None` if it can't be taken now.
     async fn prepare(&mut self, identity: &Identity, asked: Option<Asked>) -> Option<ScanJob> {
-        if std::mem::take(&mut self.desk.stale) {
+        if std::mem::take(&mut self.control.stale) {
             self.forecast.forget();
         }
-        let air = self.desk.air.settled();
-        let pose = asked.and_then(|asked| asked.pose).unwrap_or(self.desk.pose);
-        let plan = asked.and_then(|asked| asked.plan).unwrap_or(self.desk.plan);
+        let air = self.control.air.settled();
+        let pose = asked.and_then(|asked| asked.pose).unwrap_or(self.control.pose);
+        let plan = asked.and_then(|asked| asked.plan).unwrap_or(self.control.plan);
         let what = (pose, plan, air);
         if let Err(error) = what.1.motor_steps(identity.steps_per_revolution.into()) {
             return self.give_up_scans(&error.to_string(), asked);
         }
         if !self.forecast.knows(what) {
-            let predicting = predict(&self.desk.settings, what);
-            match attended(&mut self.desk, predicting).await {
+            let predicting = predict(&self.control.settings, what);
+            match attended(&mut self.control, predicting).await {
                 Err(interrupt) => {
                     self.react(interrupt);
                     return None;
@@ -89,10 +89,10 @@ impl Operator {
                 }
             }
         }
-        let session = self.forecast.session(&self.desk.settings, &air, identity);
+        let session = self.forecast.session(&self.control.settings, &air, identity);
         self.put_session(session);
-        let scan_air = self.desk.air.scan_air(&air, Instant::now());
-        let job = self.forecast.job(&self.desk.settings, what, scan_air, identity);
+        let scan_air = self.control.air.scan_air(&air, Instant::now());
+        let job = self.forecast.job(&self.control.settings, what, scan_air, identity);
         Some(ScanJob { request: asked.map(|asked| asked.request), ..job })
     }
 
@@ -100,8 +100,8 @@ impl Operator {
     /// fail again, until somebody changes something.
     fn give_up_scans(&mut self, why: &str, asked: Option<Asked>) -> Option<ScanJob> {
         match asked.filter(|asked| asked.plan.is_some() || asked.pose.is_some()) {
-            Some(asked) => drop(self.desk.agenda.cancel(asked.request)),
-            None => self.desk.agenda.stop(),
+            Some(asked) => drop(self.control.agenda.cancel(asked.request)),
+            None => self.control.agenda.stop(),
         }
         tracing::error!("no scan is taken: {why}");
         self.out.event(EventKind::Stopped, format!("no scan is taken: {why}"));
@@ -150,7 +150,7 @@ impl Operator {
             let interrupt = tokio::select! {
                 outcome = &mut scan => break outcome,
                 // After the end there is nothing more to be told.
-                interrupt = self.desk.next(), if !interrupts.contains(&Interrupt::Shutdown) => interrupt,
+                interrupt = self.control.next(), if !interrupts.contains(&Interrupt::Shutdown) => interrupt,
             };
             let why = match interrupt {
                 Interrupt::Shutdown => "the daemon is stopping",

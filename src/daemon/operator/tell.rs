@@ -19,33 +19,34 @@ impl Operator {
             self.trouble = None;
         }
         let since = Timestamp::now()
-            - SignedDuration::try_from(self.desk.now().saturating_sub(self.machine.since()))
+            - SignedDuration::try_from(self.control.now().saturating_sub(self.machine.since()))
                 .unwrap_or_default();
-        let next_at = match self.desk.agenda.due(self.desk.now()) {
-            Due::At(at) => Some(self.desk.epoch + at),
+        let next_at = match self.control.agenda.due(self.control.now()) {
+            Due::At(at) => Some(self.control.epoch + at),
             Due::Now | Due::OnRequest => None,
         };
-        let retry_at = self.machine.retry_at().map(|at| self.desk.epoch + at);
-        let (desk, machine) = (&self.desk, &self.machine);
+        let retry_at = self.machine.retry_at().map(|at| self.control.epoch + at);
+        let (control, machine) = (&self.control, &self.machine);
         self.out.shared.view.send_modify(|view| {
             if view.state != machine.state() {
                 view.since = since;
             }
             view.state = machine.state();
-            view.port = desk.settings.keys.device.port.clone().unwrap_or_default();
+            view.port = control.settings.keys.device.port.clone().unwrap_or_default();
             view.trouble.clone_from(&self.trouble);
             (view.failures, view.retry_at) = (machine.failures(), retry_at);
-            view.device = desk.identity.as_ref().map(device_record);
-            view.provenance = desk.identity.as_ref().map(provenance);
-            view.scanning = desk.scanning.clone();
-            (view.paused, view.requested) = (desk.agenda.is_paused(), desk.agenda.requested());
+            view.device = control.identity.as_ref().map(device_record);
+            view.provenance = control.identity.as_ref().map(provenance);
+            view.scanning = control.scanning.clone();
+            (view.paused, view.requested) =
+                (control.agenda.is_paused(), control.agenda.requested());
             view.next_at = next_at;
-            (view.now, view.next) = (desk.terms(), desk.terms());
-            view.configuration = desk.configuration.clone();
+            (view.now, view.next) = (control.terms(), control.terms());
+            view.configuration = control.configuration.clone();
             view.line.clone_from(&self.line_figures);
             view.scans = self.scans;
         });
-        self.desk.board.set_light(self.machine.state().is_up());
+        self.control.gpio.set_light(self.machine.state().is_up());
     }
 
     fn tell_transition(&mut self, from: Option<LinkState>, to: LinkState) {

@@ -70,7 +70,10 @@ fn a_line_is_read_once_it_is_whole_and_what_is_no_record_is_passed_over() {
     append(&folder, 2, &(event(2) + "\n"));
     let lines = read(&mut tail).lines;
     assert_eq!(texts(&lines), [event(2)]);
-    assert_eq!(tail.place(), &Place { file: name(2).as_str().into(), bytes: text.len() as u64 });
+    assert_eq!(
+        tail.place(),
+        &LogPosition { file: name(2).as_str().into(), bytes: text.len() as u64 }
+    );
 }
 
 #[test]

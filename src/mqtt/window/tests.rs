@@ -7,8 +7,8 @@ use super::{super::topics::Kind, *};
 
 const NOW: Duration = Duration::ZERO;
 
-fn place(line: u64) -> Place {
-    Place { file: "log".into(), bytes: line }
+fn place(line: u64) -> LogPosition {
+    LogPosition { file: "log".into(), bytes: line }
 }
 
 /// The line of this number; every fifth is none that could be sent.
@@ -59,7 +59,7 @@ struct Play {
     had: BTreeSet<u64>,
     /// Lines in the order of their first delivery on this connection.
     order: Vec<u64>,
-    remembered: Place,
+    remembered: LogPosition,
     now: Duration,
 }
 

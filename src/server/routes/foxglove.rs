@@ -20,7 +20,7 @@ use crate::{
         answer::Failed,
         foxglove::{MOST_RECEIVED_BYTES, READ_BYTES, WRITE_BYTES},
         openapi::Endpoint,
-        places::Place,
+        slots::Slot,
     },
 };
 
@@ -42,10 +42,10 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
 async fn upgrade(
     State(api): State<Api>,
     Extension(standing): Extension<Standing>,
-    Extension(place): Extension<Arc<Place>>,
+    Extension(place): Extension<Arc<Slot>>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, Failed> {
-    let stage = api.foxglove.ok_or_else(|| {
+    let viewers = api.foxglove.ok_or_else(|| {
         let help = "set foxglove.enabled, and start the daemon again";
         Failed::new(StatusCode::NOT_FOUND, "nothing is told to viewers here", help)
     })?;
@@ -69,11 +69,11 @@ async fn upgrade(
     let leave = api.places.take_stream(standing).ok_or_else(|| {
         full("too many live streams of guests", "show the token, or raise server.max_clients")
     })?;
-    let seat = stage
+    let seat = viewers
         .take_place(standing)
         .ok_or_else(|| full("too many viewers", "close one, or raise foxglove.max_clients"))?;
     Ok(upgrade.on_upgrade(async move |socket| {
-        stage.attend(socket).await;
+        viewers.attend(socket).await;
         drop((seat, leave, place));
     }))
 }

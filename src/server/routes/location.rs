@@ -29,10 +29,8 @@ use super::{
     scans::{broken, find_written, in_history, no_such_scan, taken_in},
 };
 use crate::{
-    acoustics::Air,
     api::Location,
     inverse::{Atlas, Course, Odometry, Sweep, Watch, World, doubts, locate_watched},
-    model::Options,
     scan::Session,
     server::{
         Api,
@@ -84,13 +82,13 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
             "query",
             "drift_m_per_m",
             up_to(1.0),
-            "What odometry is off by for each metre driven (standard deviation), metres; without it, 0.05",
+            "Standard deviation of odometry's position for each metre driven, metres; without it, 0.05",
         )
         .parameter(
             "query",
             "drift_deg_per_m",
             up_to(180.0),
-            "What its heading is off by for each metre driven (standard deviation), degrees; without it, 5",
+            "Standard deviation of odometry's heading for each metre driven, degrees; without it, 5",
         )
         .parameter(
             "query",
@@ -110,7 +108,7 @@ async fn location(State(api): State<Api>, Path(scan): Path<String>) -> Result<Re
     let passage = find_written(&api, &scan).await?;
     let turn = turn(&api).await?;
     let asked = api.clone();
-    let reading = tokio::task::spawn_blocking(move || Place::of(&asked, &passage, None));
+    let reading = tokio::task::spawn_blocking(move || Located::of(&asked, &passage, None));
     let place = reading
         .await
         .map_err(|error| broken(&error))?
@@ -250,24 +248,24 @@ impl Watch for Answers {
     }
 }
 
-/// A scan, and in what it was taken.
-struct Place {
+/// A scan, and the world in which it was taken.
+struct Located {
     sweep: Sweep,
     session: Arc<Session>,
     world: Arc<World>,
 }
 
 /// What can be located of a scan of the logs.
-fn place(api: &Api, scan: Uuid, locator: &Locator) -> Result<Place, String> {
+fn place(api: &Api, scan: Uuid, locator: &Locator) -> Result<Located, String> {
     let found = api.history.lock().unwrap_or_else(PoisonError::into_inner).passage(scan);
     let passage = found.map_err(|error| format!("cannot read the logs: {error}"))?;
     let passage = passage.ok_or("the newest logs have no such scan")?;
-    Place::of(api, &passage, locator.known.as_ref())
+    Located::of(api, &passage, locator.known.as_ref())
 }
 
-impl Place {
-    /// What can be located of a scan; or why nothing can. The world of the scan before may be its own. It reads the
-    /// disk.
+impl Located {
+    /// What can be located of a scan, or why nothing can. The world of the previous scan is reused if the session is the
+    /// same. Reads the disk.
     fn of(api: &Api, passage: &Passage, known: Option<&Known>) -> Result<Self, String> {
         let view = read(passage).map_err(|failed| failed.problem.error)?;
         let sweep = Sweep::of(&view).map_err(|error| error.to_string())?;
@@ -281,11 +279,8 @@ impl Place {
         let scene = scene
             .filter(|scene| is_own.is_none_or(|own| own.sha256 == scene.sha256))
             .ok_or("the log does not hold the scan's scene, and none such is in force")?;
-        let options = match &session.model {
-            None => Options::default(),
-            Some(model) => model.options().ok_or("the scan's model is unknown here")?,
-        };
-        let air = Air::try_from(&session.air).map_err(|error| error.to_string())?;
+        let (air, options) = session.conditions().map_err(|error| error.to_string())?;
+        let options = options.ok_or("the scan's model is unknown here")?;
         let world = Arc::new(World::new(scene, session.sensor.clone(), air, options));
         Ok(Self { sweep, session, world })
     }
@@ -309,13 +304,13 @@ impl Locator {
         Self { course, known: None }
     }
 
-    fn locate(&mut self, place: Place, watch: &dyn Watch) -> Location {
+    fn locate(&mut self, place: Located, watch: &dyn Watch) -> Location {
         let scan = place.sweep.scan;
         self.found(place, watch).unwrap_or_else(|why| lacking(scan, why))
     }
 
-    fn found(&mut self, place: Place, watch: &dyn Watch) -> Result<Location, String> {
-        let Place { sweep, session, world } = place;
+    fn found(&mut self, place: Located, watch: &dyn Watch) -> Result<Location, String> {
+        let Located { sweep, session, world } = place;
         // One atlas at a time: each may have megabytes.
         let known = self.known.take().filter(|known| Arc::ptr_eq(&known.session, &session));
         let known = match known {

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-/// How bad a finding is.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
@@ -14,7 +14,7 @@ pub enum Severity {
     Warning,
 }
 
-/// What kind of thing was found.
+/// The kind of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FindingKind {
@@ -54,7 +54,7 @@ pub enum FindingKind {
     TimeBackwards,
 }
 
-/// Something found in a log.
+/// A finding in a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
     /// Number of the line, from 1 (for what is missing at the end: of the last line).
@@ -74,7 +74,7 @@ impl fmt::Display for Finding {
     }
 }
 
-/// What a log holds, in numbers.
+/// Numbers of records in a log.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Totals {
     /// Lines, damaged ones included.

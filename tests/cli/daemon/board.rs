@@ -1,6 +1,7 @@
 //! Pins: emergency stop, power, reset line, home switch and light, on a board made of switches.
 
 use std::{
+    path::Path,
     sync::{
         Arc,
         atomic::{AtomicBool, AtomicU32, Ordering::SeqCst},
@@ -11,9 +12,9 @@ use std::{
 use sonard::{
     acoustics::Sensor,
     api::{LinkState, Trouble},
-    board::Board,
     config::{Keys, Mode},
     daemon::{Asked, Handle, Journal, Order, Resources, Settings, prepare},
+    host_gpio::HostGpio,
     link,
     mock::Pace,
     scene::parse_pose,
@@ -35,7 +36,7 @@ struct Switches {
 
 struct Switchboard(Arc<Switches>);
 
-impl Board for Switchboard {
+impl HostGpio for Switchboard {
     fn can_reset(&self) -> bool {
         true
     }
@@ -68,27 +69,38 @@ fn settings(port: String) -> Settings {
     Settings { keys, scene: None, sensor, pose, simulated: None }
 }
 
-#[test]
-fn pins_stop_power_reset_and_show() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mut rig = Rig::new(folder.path(), Pace::RealTime);
+/// Runs a daemon with pins made of switches while `act` goes on. Returns the switches as the daemon left them.
+fn run(
+    settings: Settings,
+    folder: &Path,
+    act: impl FnOnce(&Runtime, &Handle, &Switches),
+) -> Arc<Switches> {
     let switches = Arc::new(Switches::default());
     let runtime = Runtime::new().expect("threads");
-    let settings = settings(folder.path().join("ranger").display().to_string());
-    let (journal, thread) =
-        Journal::open(&folder.path().join("log"), settings.rotation()).expect("a log");
-    let board = Box::new(Switchboard(Arc::clone(&switches)));
-    let resources = Resources { open_port: Box::new(link::open), board, journal };
+    let (journal, thread) = Journal::open(&folder.join("log"), settings.rotation()).expect("a log");
+    let gpio = Box::new(Switchboard(Arc::clone(&switches)));
+    let resources = Resources { open_port: Box::new(link::open), gpio, journal };
     let stop = CancellationToken::new();
     let context = runtime.enter();
     let (daemon, handle) = prepare(resources, settings);
     drop(context);
     let running = runtime.spawn(daemon.run(stop.clone().cancelled_owned()));
-    play(&mut rig, &runtime, &handle, &switches);
+    act(&runtime, &handle, &switches);
     stop.cancel();
     runtime.block_on(running).expect("it ends");
-    assert!(!switches.power.load(SeqCst) && !switches.light.load(SeqCst), "off at the end");
     assert_eq!(thread.close().error, None);
+    switches
+}
+
+#[test]
+fn pins_stop_power_reset_and_show() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut rig = Rig::new(folder.path(), Pace::RealTime);
+    let settings = settings(folder.path().join("ranger").display().to_string());
+    let switches = run(settings, folder.path(), |runtime, handle, switches| {
+        play(&mut rig, runtime, handle, switches);
+    });
+    assert!(!switches.power.load(SeqCst) && !switches.light.load(SeqCst), "off at the end");
     let events = clean_log(folder.path()).events();
     for part in ["emergency stop was pressed", "emergency stop was released", "home switch is open"]
     {
@@ -142,28 +154,16 @@ fn where_it_may_it_goes_on_by_itself_after_an_emergency_stop() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut rig = Rig::new(folder.path(), Pace::RealTime);
     rig.plug("", 1);
-    let switches = Arc::new(Switches::default());
-    let runtime = Runtime::new().expect("threads");
     let mut settings = settings(folder.path().join("ranger").display().to_string());
     settings.keys.safety.resume_after_emergency_stop = true;
-    let (journal, thread) =
-        Journal::open(&folder.path().join("log"), settings.rotation()).expect("a log");
-    let board = Box::new(Switchboard(Arc::clone(&switches)));
-    let resources = Resources { open_port: Box::new(link::open), board, journal };
-    let stop = CancellationToken::new();
-    let context = runtime.enter();
-    let (daemon, handle) = prepare(resources, settings);
-    drop(context);
-    let running = runtime.spawn(daemon.run(stop.clone().cancelled_owned()));
-    let scans = || {
-        wait_until("beams", || handle.status().scan.is_some_and(|scan| scan.done >= 3));
-    };
-    scans();
-    switches.pressed.store(true, SeqCst);
-    wait_until("the stop", || handle.status().link.state == LinkState::EmergencyStop);
-    switches.pressed.store(false, SeqCst);
-    scans();
-    stop.cancel();
-    runtime.block_on(running).expect("it ends");
-    assert_eq!(thread.close().error, None);
+    run(settings, folder.path(), |_, handle, switches| {
+        let scans = || {
+            wait_until("beams", || handle.status().scan.is_some_and(|scan| scan.done >= 3));
+        };
+        scans();
+        switches.pressed.store(true, SeqCst);
+        wait_until("the stop", || handle.status().link.state == LinkState::EmergencyStop);
+        switches.pressed.store(false, SeqCst);
+        scans();
+    });
 }

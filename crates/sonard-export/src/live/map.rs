@@ -11,7 +11,7 @@ use sonard_records::{ScanView, Session};
 
 use crate::{
     LeftOut,
-    conversion::{MAP, MAP_TOPIC, Outlet},
+    conversion::{MAP, MAP_TOPIC, MessageSink},
     recording::nanoseconds,
     ros::{
         interface::OCCUPANCY_GRID,
@@ -49,7 +49,7 @@ impl LiveMap {
         &mut self,
         scan: &ScanView,
         at: Stamp,
-        out: &mut impl Outlet<Error = Infallible>,
+        out: &mut impl MessageSink<Error = Infallible>,
     ) -> Result<(), LeftOut> {
         let (Some(start), Some(session)) = (scan.start.as_ref(), scan.session.as_deref()) else {
             return Ok(());

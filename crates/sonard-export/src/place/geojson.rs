@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 use sonard_interpret::interpret::{Feature, lines::MapLine};
 
-use super::Place;
+use super::Findings;
 use crate::columns::logged_word;
 
 /// How such a file begins.
@@ -20,7 +20,7 @@ pub fn begins_geojson(head: &[u8]) -> bool {
 /// RFC 7946 knows degrees of longitude and latitude only. A room has none: coordinates are metres in its own
 /// frame, which the member `sonard` says. Nothing that the format has would keep GDAL from taking them for degrees.
 #[must_use]
-pub fn to_geojson(place: &Place<'_>) -> String {
+pub fn to_geojson(place: &Findings<'_>) -> String {
     let about = json!({
         "version": env!("CARGO_PKG_VERSION"),
         "units": "metres",

@@ -13,7 +13,7 @@ use mcap::{
 
 use crate::{
     ExportError,
-    conversion::{Outlet, stands_still},
+    conversion::{MessageSink, stands_still},
     ros::{
         cdr::{Cdr, Encode},
         interface::Interface,
@@ -106,7 +106,7 @@ impl<W: Write> Messages<W> {
     }
 }
 
-impl<W: Write> Outlet for Messages<W> {
+impl<W: Write> MessageSink for Messages<W> {
     type Error = ExportError;
 
     fn message(

@@ -7,7 +7,7 @@ use sonard_model::geometry::Pose;
 use sonard_records::{Record, ScanView};
 use uuid::Uuid;
 
-use crate::{LeftOut, Live, Place, Settings, Topic, write_place};
+use crate::{Findings, LeftOut, Live, Settings, Topic, write_findings};
 
 use super::scans::records_of_measured;
 
@@ -65,9 +65,10 @@ fn recorded(records: &[Record]) -> Vec<u8> {
     assert!(grid.probabilities().any(|p| p > 0.5) && grid.probabilities().any(|p| p < 0.5));
     let time = scans.iter().filter_map(|scan| Some(scan.start.as_ref()?.time)).max();
     let (lines, features) = (&[], &[]);
-    let place = Place { time, provenance: None, scene: None, grid: Some(&grid), lines, features };
+    let place =
+        Findings { time, provenance: None, scene: None, grid: Some(&grid), lines, features };
     let mut bytes = Vec::new();
-    write_place(&mut bytes, &place).expect("memory takes it");
+    write_findings(&mut bytes, &place).expect("memory takes it");
     let mut messages = mcap::MessageStream::new(&bytes).expect("a recording");
     messages.next().expect("one").expect("whole").data.into_owned()
 }

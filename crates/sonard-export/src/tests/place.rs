@@ -13,9 +13,9 @@ use sonard_model::geometry::DVec2;
 use sonard_records::Provenance;
 
 use crate::{
-    Place, begins_geojson,
+    Findings, begins_geojson,
     ros::interface::{MARKERS, OCCUPANCY_GRID},
-    to_geojson, write_place,
+    to_geojson, write_findings,
 };
 
 use super::scans::{Full, simulated};
@@ -55,9 +55,9 @@ const fn place<'a>(
     grid: Option<&'a Grid>,
     lines: &'a [MapLine],
     features: &'a [Feature],
-) -> Place<'a> {
+) -> Findings<'a> {
     let (provenance, scene) = (Some(Provenance::Simulated), Some("simple-room"));
-    Place { time: None, provenance, scene, grid, lines, features }
+    Findings { time: None, provenance, scene, grid, lines, features }
 }
 
 #[derive(Debug, Deserialize)]
@@ -76,7 +76,7 @@ struct OccupancyGrid {
 fn a_grid_is_a_topic_that_those_who_come_late_get() {
     let grid = grid();
     let mut bytes = Vec::new();
-    write_place(&mut bytes, &place(Some(&grid), &[], &[])).expect("memory takes it");
+    write_findings(&mut bytes, &place(Some(&grid), &[], &[])).expect("memory takes it");
     let messages: Vec<_> = mcap::MessageStream::new(&bytes).expect("a recording").collect();
     let [Ok(message)] = &messages[..] else { panic!("{messages:?}") };
     assert_eq!(message.channel.topic, "/map");
@@ -97,7 +97,7 @@ fn a_grid_is_a_topic_that_those_who_come_late_get() {
 fn lines_and_features_are_markers() {
     let (lines, features) = (lines(), features());
     let mut bytes = Vec::new();
-    write_place(&mut bytes, &place(None, &lines, &features)).expect("memory takes it");
+    write_findings(&mut bytes, &place(None, &lines, &features)).expect("memory takes it");
     let topics: BTreeMap<_, _> = mcap::MessageStream::new(&bytes)
         .expect("a recording")
         .map(|message| message.expect("a message").channel)
@@ -150,6 +150,6 @@ fn geojson_has_each_line_and_feature_with_what_is_known_of_it() {
 #[test]
 fn a_full_disk_is_told() {
     let grid = grid();
-    let written = write_place(Full(500), &place(Some(&grid), &[], &[]));
+    let written = write_findings(Full(500), &place(Some(&grid), &[], &[]));
     assert!(matches!(written, Err(crate::ExportError::Write(_))), "{written:?}");
 }

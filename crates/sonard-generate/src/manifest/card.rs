@@ -84,6 +84,11 @@ fn drawn(text: &mut String, spec: &Spec) {
             );
         }
     }
+    measured(text, spec);
+}
+
+/// From where readings are taken, and with what.
+fn measured(text: &mut String, spec: &Spec) {
     let _ = writeln!(
         text,
         "- Poses anywhere, at least {} m from everything, heading {}",

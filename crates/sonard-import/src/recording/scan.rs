@@ -5,7 +5,7 @@ use sonard_records::Record;
 
 use super::{Heard, message::moment};
 use crate::{
-    Place, Reading, Taken,
+    Location, Reading, Taken,
     scans::{self, Firing, MOST_FIRINGS},
 };
 
@@ -85,7 +85,7 @@ impl<'a> Gathered<'a> {
         let mended_m = |tof_us: f64| tof_us * 1e-6 * sound_m_s / 2.0;
         Reading {
             // A recording's messages have no lines: what is wrong with one is told before.
-            place: Place::Line(self.scans),
+            place: Location::Line(self.scans),
             direction_deg: heard.direction_deg,
             is_bearing: false,
             status: heard.status,

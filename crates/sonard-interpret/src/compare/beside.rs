@@ -18,7 +18,7 @@ pub struct JudgedPing {
     pub beside: Beside,
 }
 
-/// What the API tells beside a reading, where its record alone does not say it.
+/// What the API adds to a reading's record.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Beside {
     /// What explains the reading.
@@ -27,7 +27,7 @@ pub struct Beside {
     pub viewpoint: Option<Viewpoint>,
 }
 
-/// What explains a reading, or why it can't be compared with a prediction.
+/// The verdict on a reading, or the reason why there is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Word {

@@ -10,7 +10,7 @@ use sonard_model::{
     model::{Simulator, TooCostly, raycast::Reflectors},
 };
 
-/// What an exploration can do and know: no more than this.
+/// A robot as an exploration sees it.
 pub trait Robot {
     /// Where the robot believes to be.
     fn pose(&self) -> Pose;
@@ -24,7 +24,7 @@ pub trait Robot {
     fn drive(&mut self, to: DVec2) -> Drive;
 }
 
-/// How a drive ended.
+/// The outcome of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Drive {
     /// At the place.
@@ -33,7 +33,7 @@ pub enum Drive {
     Bumped,
 }
 
-/// How its sonars are arranged.
+/// Arrangement of its sonars.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ranger {
     /// Twelve sonars at equal angles; the robot turns 2 degrees between their readings: 180 at each

@@ -35,7 +35,7 @@ const RANGE_SIGMA_M: f64 = 0.002;
 /// metres.
 const CORNER_M: f64 = 0.005;
 
-/// What an arc is of.
+/// The true cause of an arc.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Truth {
     /// A wall.

@@ -28,7 +28,7 @@ pub struct Extents {
     pub max_range_m: f64,
 }
 
-/// Why a session's figures give no extents.
+/// An error in a session's figures.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ExtentError {
     /// The sensor's data make no sense.

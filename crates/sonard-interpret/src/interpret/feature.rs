@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-/// How scans are interpreted.
+/// Settings of the interpretation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Scattering strength of edges, for which the boundary is drawn. Bozma and Kuc found 0.095

@@ -34,7 +34,7 @@ const MOST_CELLS: u64 = 1 << 26;
 /// Odds don't leave 1 : 1000 to 1000 : 1, so that a cell can still change its mind.
 const MOST_LOG_ODDS: f32 = 6.9;
 
-/// Where a grid lies and how fine it is.
+/// Position and resolution of a grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridShape {
     /// World place of the lower left corner, metres.
@@ -47,7 +47,7 @@ pub struct GridShape {
     pub height: usize,
 }
 
-/// Why there is no such grid.
+/// A grid that cannot be made.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum GridError {
     /// Cells without size.

@@ -25,7 +25,7 @@ use serde::Serialize;
 
 use sonard_model::geometry::{DVec2, distance_to_segment};
 
-/// What a line was made of.
+/// Source of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LineKind {

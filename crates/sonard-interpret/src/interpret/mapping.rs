@@ -20,7 +20,7 @@ const MARGIN_M: f64 = 0.5;
 /// From so many scans on each counts once.
 const ENOUGH_SCANS: usize = 5;
 
-/// How scans become a map; what is `None` follows from them.
+/// Settings of a map; what is `None` follows from the scans.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mapping {
     /// Side of a cell, metres.
@@ -33,13 +33,13 @@ pub struct Mapping {
     pub beam_deg: Option<f64>,
     /// Exponent of the confidence with the distance of a feature.
     pub exponent: f64,
-    /// How far walls are taken to go on beyond what was seen of them, metres.
+    /// How far walls are extended beyond their observed part, metres.
     pub extend_m: f64,
     /// Readings of less confidence are left out; 0.5 is full confidence.
     pub least_confidence: f64,
     /// How often each scan counts; without it, so often that few scans decide their cells.
     pub evidence: Option<u8>,
-    /// Whether readings that predicted features contradict count less.
+    /// Whether readings that contradict predicted features count less.
     pub predicts_features: bool,
     /// Whether a reading says of cells what the sensor's beam pattern and threshold do, and not a Gaussian.
     pub is_physical: bool,
@@ -157,7 +157,7 @@ struct Appraiser {
     trust: Trust,
 }
 
-/// What came of a scan on a map.
+/// The result of adding a scan to a map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Added {
     /// Of its beams, where features are predicted.

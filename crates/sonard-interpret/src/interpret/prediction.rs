@@ -20,7 +20,7 @@ use self::obstacle::Obstacle;
 use crate::interpret::{Heard, Sweep};
 use sonard_model::geometry::{DVec2, wrap_pi};
 
-/// How features are predicted.
+/// Settings of Feature Prediction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictionSettings {
     /// Full width of a beam, degrees: how wide a feature a reading makes.
@@ -88,7 +88,7 @@ impl PredictionSettings {
     }
 }
 
-/// How far a reading is to be trusted.
+/// Trust in a reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Assessment {
     /// 0 (not to be believed) to 0.5 (nothing speaks against it).

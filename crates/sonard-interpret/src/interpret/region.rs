@@ -4,7 +4,7 @@ use super::{Heard, Settings, Sweep};
 use crate::compare::quantile;
 use sonard_model::geometry::wrap_360;
 
-/// What ends a region on one side.
+/// The end of a region on one side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
     /// Silence or something farther: the element's own echo ended here.

@@ -12,7 +12,7 @@ use sonard_records::{Ping, PingStatus, ScanView};
 /// Azimuths closer than this are one stop, degrees.
 const SAME_STOP_DEG: f64 = 1e-6;
 
-/// What was heard at one stop.
+/// The outcome at one stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Heard {
     /// An echo, at a range in metres.
@@ -50,7 +50,7 @@ pub struct Sweep {
     pub closed: bool,
 }
 
-/// Why a scan can't be interpreted.
+/// A scan that cannot be interpreted.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SweepError {
     /// The log does not say where the ranger stood.

@@ -27,7 +27,7 @@ use sonard_model::{
 };
 use sonard_records::PingStatus;
 
-/// How the readings of a set are arranged.
+/// Arrangement of the readings of a set.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Arrangement {
     /// One round of an array's rangers.
@@ -36,7 +36,7 @@ pub enum Arrangement {
     Stepper,
 }
 
-/// How a trial goes.
+/// Settings of a trial.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrialSettings {
     /// Side of a cell, metres.

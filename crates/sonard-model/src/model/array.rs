@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rand::Rng;
 
 use super::{
-    EngineOptions, ModelError, Options, Prediction, Simulator, TooCostly,
+    ModelError, Options, Prediction, Simulator, TooCostly,
     crosstalk::{Others, turns_heard},
     paths::{Aimed, PathEngine},
 };
@@ -142,7 +142,7 @@ impl Crosstalk {
     /// `None` where there can't be any, or it is left out.
     fn new(array: &RangerArray, simulators: &[Simulator]) -> Option<Self> {
         let simulator = simulators.first()?;
-        let EngineOptions::Paths(options) = simulator.options().engine else { return None };
+        let options = simulator.options().engine.paths()?;
         if options.without_crosstalk {
             return None;
         }

@@ -118,11 +118,11 @@ impl EngineOptions {
         }
     }
 
-    /// Whether one sound is detected at a time, timed by its path alone.
-    pub(super) const fn has_ideal_receiver(&self) -> bool {
+    /// The settings of `paths`, the only engine that knows phases; `None` for another one.
+    pub(super) const fn paths(&self) -> Option<&PathOptions> {
         match self {
-            Self::Paths(paths) => paths.ideal_receiver,
-            Self::Fan(_) | Self::Cone(_) => true,
+            Self::Paths(paths) => Some(paths),
+            _ => None,
         }
     }
 }

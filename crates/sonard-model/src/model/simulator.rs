@@ -5,7 +5,7 @@ use std::sync::Arc;
 use thiserror::Error;
 
 use super::{
-    Cone, Engine, EngineOptions, Fan, ObservationPoint, Options, PathOptions, Prediction,
+    Cone, Engine, EngineOptions, Fan, ObservationPoint, Options, Prediction,
     cost::TooCostly,
     lazy::LazyArrivals,
     options::OutOfRange,
@@ -212,10 +212,7 @@ impl Simulator {
     /// of `paths`.
     #[must_use]
     pub fn path_settings(&self) -> paths::Settings {
-        let options = match self.ranger.options.engine {
-            EngineOptions::Paths(options) => options,
-            EngineOptions::Fan(_) | EngineOptions::Cone(_) => PathOptions::default(),
-        };
+        let options = self.ranger.options.engine.paths().copied().unwrap_or_default();
         let Ranger { sensor, air, receiver, scatter_height_rad, .. } = &self.ranger;
         path_settings(sensor, air, &options, receiver, *scatter_height_rad)
     }
@@ -223,7 +220,7 @@ impl Simulator {
     /// An engine for sound of other transducers that arrives while this one listens, up to a length of path in
     /// metres; `None` if the simulator's own is not `paths`.
     pub(super) fn stray_engine(&self, max_path_m: f64) -> Option<PathEngine> {
-        let EngineOptions::Paths(_) = self.ranger.options.engine else { return None };
+        self.ranger.options.engine.paths()?;
         let settings = paths::Settings { max_path_m, direct: true, ..self.path_settings() };
         Some(self.ranger.path_engine(&self.scene, None, settings))
     }

@@ -32,7 +32,7 @@ pub struct Estimate {
     pub sigma: f64,
 }
 
-/// What a change has values of; each with its unit.
+/// A quantity that a change alters, with its unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {

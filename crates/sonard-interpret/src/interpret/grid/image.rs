@@ -23,7 +23,7 @@ pub struct MapYaml {
     pub free_thresh: f64,
 }
 
-/// Why an image or its description is no map.
+/// An error in the image of a map or its description.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ImageError {
     /// Not a binary PGM with 8 bits a pixel.

@@ -28,7 +28,7 @@ pub struct MapScore {
     pub paths: u64,
 }
 
-/// Which ways are tried.
+/// The paths that are tried.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathSettings {
     /// From place to place of the lattice, metres.
@@ -45,7 +45,7 @@ impl Default for PathSettings {
     }
 }
 
-/// Why two maps can't be compared.
+/// Maps that cannot be compared.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ScoreError {
     /// They don't lie on each other.

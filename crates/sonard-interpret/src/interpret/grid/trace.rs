@@ -17,7 +17,7 @@ pub struct WallLine {
     pub is_closed: bool,
 }
 
-/// What is traced, and how exactly.
+/// Settings of the tracing of walls.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TraceSettings {
     /// Cells above this probability are occupied.

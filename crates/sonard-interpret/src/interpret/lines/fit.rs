@@ -2,7 +2,7 @@
 
 use sonard_model::geometry::DVec2;
 
-/// How segments are fitted.
+/// Settings of the fit of segments.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitSettings {
     /// A point may be this far from its segment, metres.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{LineKind, LineMapSettings, MapLine, clusters, fit};
 use sonard_model::geometry::{DVec2, Pose, wrap_360};
 
-/// What a laser range finder saw from one place.
+/// A laser scan from one position.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LaserScan {

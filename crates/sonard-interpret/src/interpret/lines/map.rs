@@ -4,7 +4,7 @@ use super::{FitSettings, LaserScan, LineKind, MapLine, MergeSettings, clusters, 
 use crate::interpret::{Heard, Sweep};
 use sonard_model::geometry::DVec2;
 
-/// How a line map is made.
+/// Settings of a line map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineMapSettings {
     /// Sonar readings beyond this "logical" distance are left out, metres.

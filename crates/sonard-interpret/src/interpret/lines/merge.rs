@@ -3,7 +3,7 @@
 use super::{LineKind, MapLine};
 use sonard_model::geometry::DVec2;
 
-/// Which lines are merged.
+/// Settings of the merging of lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MergeSettings {
     /// Nearly parallel: at most this angle, degrees.

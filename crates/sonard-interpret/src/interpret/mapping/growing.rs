@@ -35,7 +35,7 @@ pub struct GrowingMap {
     tiles: Tiles,
 }
 
-/// Why a map grows no more.
+/// The reason why a map stopped growing.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum GrowError {
     /// There is no such grid.

@@ -4,7 +4,7 @@ use std::f64::consts::{LOG10_E, TAU};
 
 use crate::{
     acoustics::{Air, Combining, EdgeLawKind, Receiver, Sensor, edge::EdgeLaw},
-    model::{EngineOptions, FanOptions, FanSettings, Options, PathOptions, paths},
+    model::{FanOptions, FanSettings, Options, PathOptions, paths},
 };
 
 /// Paths this far below the threshold are given up, decibels: a silence is still explained by
@@ -19,15 +19,13 @@ const SIGMA_E: f64 = 0.095;
 
 /// The sensor's receiver with the options applied. Only `paths` knows phases.
 pub(super) fn receiver(sensor: &Sensor, air: &Air, options: &Options) -> Receiver {
-    let response = match options.engine {
-        EngineOptions::Paths(paths) => paths.response.unwrap_or(sensor.response),
-        EngineOptions::Fan(_) | EngineOptions::Cone(_) => sensor.response,
-    };
+    let paths = options.engine.paths();
+    let response = paths.and_then(|paths| paths.response).unwrap_or(sensor.response);
     let sensor = Sensor { response, ..sensor.clone() };
     let mut receiver = Receiver::new(&sensor, air.sound_speed_m_s())
         .with_threshold(options.threshold.unwrap_or(sensor.threshold));
     receiver.max_range_m = options.max_range_m.unwrap_or(sensor.max_range_m);
-    if options.engine.has_ideal_receiver() {
+    if paths.is_none_or(|paths| paths.ideal_receiver) {
         receiver.combining = Combining::Ideal;
     }
     receiver

@@ -23,7 +23,7 @@ const MOST_MESSAGES: usize = 1 << 16;
 
 /// What there is to be told to all viewers.
 #[derive(Debug)]
-pub(super) struct Board {
+pub(super) struct MessageQueue {
     channels: BTreeMap<u32, Channel>,
     /// Channels so far: numbers are not given twice.
     numbered: u32,
@@ -72,7 +72,7 @@ pub(super) enum Found {
     ShownOut,
 }
 
-impl Board {
+impl MessageQueue {
     /// An empty one, on which so many bytes may wait.
     pub(super) fn new(most_bytes: usize) -> Self {
         Self {
@@ -137,7 +137,7 @@ impl Board {
     }
 }
 
-/// One who looks at the board. What it holds grows with the channels that there are and with nothing else.
+/// One who looks at the queue. What it holds grows with the channels that there are and with nothing else.
 #[derive(Debug)]
 pub(super) struct Viewer {
     session: Session,
@@ -158,42 +158,42 @@ pub(super) struct Viewer {
 
 impl Viewer {
     /// One that comes now.
-    pub(super) fn new(board: &Board, greeting: String) -> Self {
+    pub(super) fn new(queue: &MessageQueue, greeting: String) -> Self {
         let mut texts = VecDeque::from([greeting]);
-        if board.channels.is_empty() {
+        if queue.channels.is_empty() {
             let words = "there are no topics yet: they come with the first scan";
             texts.push_back(status(Level::Info, words));
         }
         Self {
             session: Session::default(),
-            place: board.waiting.end(),
+            place: queue.waiting.end(),
             due: BTreeMap::new(),
             late_for: BTreeSet::new(),
             advertised: BTreeSet::new(),
             changes: 0,
-            notices: board.notices.0,
+            notices: queue.notices.0,
             texts,
             is_shown_out: false,
         }
     }
 
     /// Takes what it sent.
-    pub(super) fn take_text(&mut self, text: &str, board: &Board) {
-        let steps = self.session.take_text(text, |channel| board.has(channel));
-        self.follow(steps, board);
+    pub(super) fn take_text(&mut self, text: &str, queue: &MessageQueue) {
+        let steps = self.session.take_text(text, |channel| queue.has(channel));
+        self.follow(steps, queue);
     }
 
     /// Takes what it sent, if that is binary.
-    pub(super) fn take_binary(&mut self, board: &Board) {
+    pub(super) fn take_binary(&mut self, queue: &MessageQueue) {
         let steps = self.session.take_binary();
-        self.follow(steps, board);
+        self.follow(steps, queue);
     }
 
-    fn follow(&mut self, steps: Vec<Step>, board: &Board) {
+    fn follow(&mut self, steps: Vec<Step>, queue: &MessageQueue) {
         for step in steps {
             match step {
                 Step::Begin(channel) => {
-                    let Some(begun) = board.channels.get(&channel) else { continue };
+                    let Some(begun) = queue.channels.get(&channel) else { continue };
                     self.due.insert(channel, begun.end);
                     if begun.kept.is_some() {
                         self.late_for.insert(channel);
@@ -210,13 +210,13 @@ impl Viewer {
     }
 
     /// What it is told next.
-    pub(super) fn look(&mut self, board: &Board) -> Found {
-        self.hear_of_channels(board);
-        if self.notices != board.notices.0 {
-            self.notices = board.notices.0;
-            self.texts.push_back(status(Level::Warning, &board.notices.1));
+    pub(super) fn look(&mut self, queue: &MessageQueue) -> Found {
+        self.hear_of_channels(queue);
+        if self.notices != queue.notices.0 {
+            self.notices = queue.notices.0;
+            self.texts.push_back(status(Level::Warning, &queue.notices.1));
         }
-        let missed = self.fall_behind(board);
+        let missed = self.fall_behind(queue);
         if missed > 0 {
             self.texts.push_back(left_out(missed));
         }
@@ -226,27 +226,27 @@ impl Viewer {
         if self.is_shown_out {
             return Found::ShownOut;
         }
-        match self.next_message(board) {
+        match self.next_message(queue) {
             Some(outgoing) => Found::Something(outgoing),
-            None if board.is_closed => Found::Over,
+            None if queue.is_closed => Found::Over,
             None => Found::Nothing,
         }
     }
 
-    fn hear_of_channels(&mut self, board: &Board) {
-        if self.changes == board.changes {
+    fn hear_of_channels(&mut self, queue: &MessageQueue) {
+        if self.changes == queue.changes {
             return;
         }
-        self.changes = board.changes;
-        let there: BTreeSet<u32> = board.channels.keys().copied().collect();
+        self.changes = queue.changes;
+        let there: BTreeSet<u32> = queue.channels.keys().copied().collect();
         let gone: Vec<u32> = self.advertised.difference(&there).copied().collect();
         if !gone.is_empty() {
-            self.session.keep_only(|channel| board.has(channel));
-            self.due.retain(|channel, _| board.has(*channel));
-            self.late_for.retain(|channel| board.has(*channel));
+            self.session.keep_only(|channel| queue.has(channel));
+            self.due.retain(|channel, _| queue.has(*channel));
+            self.late_for.retain(|channel| queue.has(*channel));
             self.texts.push_back(unadvertise(&gone));
         }
-        let new = board.channels.iter().filter(|(id, _)| !self.advertised.contains(id));
+        let new = queue.channels.iter().filter(|(id, _)| !self.advertised.contains(id));
         let mut new = new.map(|(id, channel)| (*id, &channel.topic)).peekable();
         if new.peek().is_some() {
             self.texts.push_back(advertise(new));
@@ -255,14 +255,14 @@ impl Viewer {
     }
 
     /// Goes on to what is there if what it was to be told has fallen off; how many messages it missed by that.
-    fn fall_behind(&mut self, board: &Board) -> u64 {
-        if self.place >= board.waiting.first() {
+    fn fall_behind(&mut self, queue: &MessageQueue) -> u64 {
+        if self.place >= queue.waiting.first() {
             return 0;
         }
-        self.place = board.waiting.first();
+        self.place = queue.waiting.first();
         let mut missed = 0;
         for (id, due) in &mut self.due {
-            let Some(channel) = board.channels.get(id) else { continue };
+            let Some(channel) = queue.channels.get(id) else { continue };
             let fallen = channel.first.saturating_sub(*due);
             *due = channel.first.max(*due);
             // The last one of what stands still is told all the same.
@@ -275,9 +275,9 @@ impl Viewer {
         missed
     }
 
-    fn next_message(&mut self, board: &Board) -> Option<Outgoing> {
+    fn next_message(&mut self, queue: &MessageQueue) -> Option<Outgoing> {
         while let Some(id) = self.late_for.pop_first() {
-            let kept = board.channels.get(&id).and_then(|channel| channel.kept.as_ref());
+            let kept = queue.channels.get(&id).and_then(|channel| channel.kept.as_ref());
             // A newer one waits for it.
             let kept = kept.filter(|kept| self.due.get(&id).is_some_and(|due| kept.number < *due));
             let frame = kept.and_then(|kept| self.session.frame(id, kept.at_ns, &kept.bytes));
@@ -286,7 +286,7 @@ impl Viewer {
             }
         }
         loop {
-            let message = board.waiting.get(self.place)?;
+            let message = queue.waiting.get(self.place)?;
             let due = self.due.get_mut(&message.channel);
             let Some(due) = due.filter(|due| message.number >= **due) else {
                 self.place += 1;

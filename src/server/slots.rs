@@ -1,4 +1,4 @@
-//! Places for connections and for live streams: who takes all of one kind leaves the others theirs.
+//! Slots for connections and for live streams: who takes all of one kind leaves the others theirs.
 
 use std::{
     collections::HashMap,
@@ -13,9 +13,9 @@ use super::access::{Peer, Standing};
 /// Connections from each address.
 type Counts = Arc<Mutex<HashMap<IpAddr, usize>>>;
 
-/// Places, each way in by itself.
+/// Slots, each way in by itself.
 #[derive(Debug)]
-pub(super) struct Places {
+pub(super) struct Slots {
     socket: Arc<Semaphore>,
     loopback: Arc<Semaphore>,
     network: Arc<Semaphore>,
@@ -28,12 +28,12 @@ pub(super) struct Places {
 
 /// A connection's place, given back when dropped.
 #[derive(Debug)]
-pub(super) struct Place {
+pub(super) struct Slot {
     _permit: OwnedSemaphorePermit,
     address: Option<(IpAddr, Counts)>,
 }
 
-impl Places {
+impl Slots {
     /// So many for each way in; half of them for one address, and for streams of guests.
     pub(super) fn new(most: usize) -> Self {
         let places = |count: usize| Arc::new(Semaphore::new(count));
@@ -49,7 +49,7 @@ impl Places {
     }
 
     /// A place for a connection, if one is free.
-    pub(super) fn take(&self, peer: Peer, address: Option<IpAddr>) -> Option<Place> {
+    pub(super) fn take(&self, peer: Peer, address: Option<IpAddr>) -> Option<Slot> {
         let places = match peer {
             Peer::Unix => &self.socket,
             Peer::Loopback => &self.loopback,
@@ -66,7 +66,7 @@ impl Places {
             *count += 1;
         }
         let address = address.map(|address| (address, Arc::clone(&self.by_address)));
-        Some(Place { _permit: permit, address })
+        Some(Slot { _permit: permit, address })
     }
 
     /// Leave for a live stream: only guests need any. `None` if too many of them have one.
@@ -78,7 +78,7 @@ impl Places {
     }
 }
 
-impl Drop for Place {
+impl Drop for Slot {
     fn drop(&mut self) {
         let Some((address, by_address)) = &self.address else { return };
         let mut by_address = held(by_address);
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn nobody_takes_the_places_of_another_way_in_or_address() {
-        let places = Places::new(4);
+        let places = Slots::new(4);
         let [one, other] = [1, 2].map(|last| IpAddr::from([192, 168, 1, last]));
         let mut taken = Vec::new();
         for (peer, address, free) in [
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn streams_of_guests_leave_half_of_the_places() {
-        let places = Places::new(5);
+        let places = Slots::new(5);
         let guests: Vec<_> = (0..10).filter_map(|_| places.take_stream(Standing::Guest)).collect();
         assert_eq!(guests.len(), 3);
         assert!(places.take_stream(Standing::Token).is_some());

@@ -5,7 +5,7 @@
 //! paths of an observation point once: a robot that stands costs nothing new, one that moves a search for each firing.
 
 mod rhythm;
-mod stage;
+mod simulation;
 
 use std::{ops::ControlFlow, time::Duration};
 
@@ -15,8 +15,8 @@ use uuid::Uuid;
 
 use super::{
     agenda::Due,
-    desk::{Desk, Interrupt},
-    outlet::Outlet,
+    control::{Control, Interrupt},
+    fan_out::RecordFanOut,
 };
 use crate::{
     api::{LinkState, ScanTotals, SimulationReport},
@@ -27,15 +27,15 @@ use crate::{
     },
 };
 use rhythm::Rhythm;
-use stage::{Drive, Stage};
+use simulation::{Drive, Simulation};
 
-/// How often a player that waits shows that it is alive.
+/// How often a array that waits shows that it is alive.
 const BEAT: Duration = Duration::from_secs(1);
 
-pub(super) struct Player {
-    desk: Desk,
-    out: Outlet,
-    stage: Option<Stage>,
+pub(super) struct SimulatedArray {
+    control: Control,
+    out: RecordFanOut,
+    simulation: Option<Simulation>,
     drive: Drive,
     rhythm: Rhythm,
     /// The session's record that is in force in the log.
@@ -52,13 +52,13 @@ struct Round {
     pose: Pose,
 }
 
-impl Player {
-    pub(super) fn new(desk: Desk, out: Outlet) -> Self {
+impl SimulatedArray {
+    pub(super) fn new(control: Control, out: RecordFanOut) -> Self {
         Self {
-            drive: Drive::new(&desk),
-            desk,
+            drive: Drive::new(&control),
+            control,
             out,
-            stage: None,
+            simulation: None,
             rhythm: Rhythm::new(Instant::now()),
             session: None,
             state: LinkState::Ready,
@@ -69,13 +69,13 @@ impl Player {
 
     /// Plays until the end.
     pub(super) async fn run(mut self) {
-        if let Some(simulated) = &self.desk.settings.simulated {
+        if let Some(simulated) = &self.control.settings.simulated {
             let array = &simulated.array;
             let (name, count) = (&array.name, array.rangers.len());
             tracing::info!("nothing is measured: the model plays {count} rangers, array {name}");
         }
         loop {
-            let due = match self.desk.agenda.due(self.desk.now()) {
+            let due = match self.control.agenda.due(self.control.now()) {
                 // Nothing is told that can't be kept.
                 Due::Now if self.out.journal.is_well() => {
                     if self.round().await.is_break() {
@@ -84,7 +84,7 @@ impl Player {
                     continue;
                 }
                 Due::Now | Due::OnRequest => None,
-                Due::At(at) => Some(self.desk.epoch + at),
+                Due::At(at) => Some(self.control.epoch + at),
             };
             self.enter(LinkState::Ready);
             let beat = Instant::now() + BEAT;
@@ -101,21 +101,21 @@ impl Player {
     async fn round(&mut self) -> ControlFlow<()> {
         if let Err(why) = self.set_stage().await {
             // Trying again would fail again, until somebody changes something.
-            self.desk.agenda.stop();
+            self.control.agenda.stop();
             tracing::error!("no scan is taken: {why}");
             self.out.event(EventKind::Stopped, format!("no scan is taken: {why}"));
             return ControlFlow::Continue(());
         }
-        let Some(stage) = &self.stage else { return ControlFlow::Continue(()) };
-        let (model, turns) = (stage.model(), stage.turns());
+        let Some(simulation) = &self.simulation else { return ControlFlow::Continue(()) };
+        let (model, turns) = (simulation.model(), simulation.turns());
         self.enter(LinkState::Scanning);
-        self.desk.agenda.begun(self.desk.now());
+        self.control.agenda.begun(self.control.now());
         self.rhythm.resume(Instant::now());
         let round =
-            Round { scan: Uuid::new_v4(), pose: self.drive.pose(&mut self.desk, &self.out) };
-        let air = self.desk.air.settled();
+            Round { scan: Uuid::new_v4(), pose: self.drive.pose(&mut self.control, &self.out) };
+        let air = self.control.air.settled();
         let start = ScanStart {
-            air: Some(self.desk.air.scan_air(&air, Instant::now())),
+            air: Some(self.control.air.scan_air(&air, Instant::now())),
             ..ScanStart::of_array(&model, round.scan, round.pose, 1, Timestamp::now())
         };
         self.put(&Record::ScanStart(start));
@@ -156,9 +156,9 @@ impl Player {
         ranger: usize,
         (slot, time): (Instant, Timestamp),
     ) -> bool {
-        let pose = self.drive.pose(&mut self.desk, &self.out);
-        let Some(stage) = &mut self.stage else { return false };
-        let heard = match stage.reading(index as usize, pose).await {
+        let pose = self.drive.pose(&mut self.control, &self.out);
+        let Some(simulation) = &mut self.simulation else { return false };
+        let heard = match simulation.reading(index as usize, pose).await {
             Ok(heard) => heard,
             Err(why) => {
                 tracing::error!("ranger {ranger}: {why}");
@@ -167,7 +167,7 @@ impl Player {
         };
         let pose = Some(pose).filter(|pose| *pose != round.pose);
         let ping = Ping { scan: round.scan, index, pose, time: Some(time), ..heard };
-        let listening_s = ping.tof_us.map_or_else(|| stage.window_s(), |tof_us| tof_us * 1e-6);
+        let listening_s = ping.tof_us.map_or_else(|| simulation.window_s(), |tof_us| tof_us * 1e-6);
         sleep_until(slot + Duration::from_secs_f64(listening_s.max(0.0))).await;
         self.out.shared.view.send_modify(|view| {
             let readings = view.simulation.as_mut().map(|told| &mut told.readings);
@@ -185,7 +185,7 @@ impl Player {
         loop {
             let interrupt = tokio::select! {
                 () = sleep_until(until) => return None,
-                interrupt = self.desk.next() => interrupt,
+                interrupt = self.control.next() => interrupt,
             };
             match interrupt {
                 Interrupt::Shutdown | Interrupt::Stop => return Some(interrupt),
@@ -202,7 +202,7 @@ impl Player {
                 | Interrupt::Agenda => {}
             }
             self.tell();
-            // A waiting player has to look at its agenda again.
+            // A waiting array has to look at its agenda again.
             if self.state == LinkState::Ready {
                 return Some(interrupt);
             }
@@ -211,16 +211,16 @@ impl Player {
 
     /// The model of what is in force now, and a session that says so.
     async fn set_stage(&mut self) -> Result<(), String> {
-        let air = self.desk.air.settled();
-        let stale = std::mem::take(&mut self.desk.stale);
+        let air = self.control.air.settled();
+        let stale = std::mem::take(&mut self.control.stale);
         if stale {
-            self.drive.reload(&self.desk);
+            self.drive.reload(&self.control);
         }
-        if stale || self.stage.as_ref().is_none_or(|stage| !stage.is_of(&air)) {
-            self.stage = Some(Stage::set(&self.desk.settings, air).await?);
+        if stale || self.simulation.as_ref().is_none_or(|simulation| !simulation.is_of(&air)) {
+            self.simulation = Some(Simulation::set(&self.control.settings, air).await?);
         }
-        let Some(stage) = &self.stage else { return Ok(()) };
-        let session = self.out.named(Session::of_array(&stage.model(), Timestamp::now()));
+        let Some(simulation) = &self.simulation else { return Ok(()) };
+        let session = self.out.named(Session::of_array(&simulation.model(), Timestamp::now()));
         let same = self.session.as_ref().is_some_and(|before| {
             *before == Session { started: before.started, ..session.clone() }
         });
@@ -257,23 +257,24 @@ impl Player {
 
     /// Publishes what is in force.
     fn tell(&mut self) {
-        let next_at = match self.desk.agenda.due(self.desk.now()) {
-            Due::At(at) => Some(self.desk.epoch + at),
+        let next_at = match self.control.agenda.due(self.control.now()) {
+            Due::At(at) => Some(self.control.epoch + at),
             Due::Now | Due::OnRequest => None,
         };
-        let (desk, drive, rhythm) = (&self.desk, &self.drive, &self.rhythm);
+        let (control, drive, rhythm) = (&self.control, &self.drive, &self.rhythm);
         self.out.shared.view.send_modify(|view| {
             (view.state, view.since) = (self.state, self.since);
             view.provenance = Some(Provenance::Simulated);
             // Whatever port is configured, none is open.
             view.port.clear();
-            view.scanning = desk.scanning.clone();
-            (view.paused, view.requested) = (desk.agenda.is_paused(), desk.agenda.requested());
+            view.scanning = control.scanning.clone();
+            (view.paused, view.requested) =
+                (control.agenda.is_paused(), control.agenda.requested());
             view.next_at = next_at;
-            (view.now, view.next) = (desk.terms(), desk.terms());
-            view.configuration = desk.configuration.clone();
+            (view.now, view.next) = (control.terms(), control.terms());
+            view.configuration = control.configuration.clone();
             view.scans = self.scans;
-            let told = desk.settings.simulated.as_ref().map(|simulated| {
+            let told = control.settings.simulated.as_ref().map(|simulated| {
                 let array = &simulated.array;
                 let now = SimulationReport::of(array);
                 let before = view.simulation.take().filter(|told| told.is_of(array));
@@ -286,7 +287,7 @@ impl Player {
     }
 
     fn interval(&self) -> Duration {
-        let simulated = self.desk.settings.simulated.as_ref();
+        let simulated = self.control.settings.simulated.as_ref();
         let interval_ms = simulated.map_or(40.0, |simulated| simulated.array.interval_ms);
         Duration::from_secs_f64(interval_ms * 1e-3)
     }

@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 use tokio::time::Instant;
 use uuid::Uuid;
 
-use super::super::{desk::Desk, outlet::Outlet, settings::Settings};
+use super::super::{control::Control, fan_out::RecordFanOut, settings::Settings};
 use crate::{
     acoustics::{Air, TofNoise},
     array::Course,
@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// The model in force, with the last reading of each firing of a round and the pose it is of.
-pub(super) struct Stage {
+pub(super) struct Simulation {
     model: Arc<ArrayModel>,
     air: Air,
     heard: Vec<Option<(Pose, Ping)>>,
@@ -25,7 +25,7 @@ pub(super) struct Stage {
     rng: Pcg64,
 }
 
-impl Stage {
+impl Simulation {
     /// Makes the model of what the configuration names, beside everything else.
     pub(super) async fn set(settings: &Settings, air: Air) -> Result<Self, String> {
         let (Some(simulated), Some(scene)) = (&settings.simulated, &settings.scene) else {
@@ -118,14 +118,14 @@ pub(super) struct Drive {
 }
 
 impl Drive {
-    pub(super) fn new(desk: &Desk) -> Self {
-        let course = desk.settings.simulated.as_ref().and_then(|one| one.course.clone());
-        Self { left: course.is_some().then(Instant::now), course, at: desk.pose }
+    pub(super) fn new(control: &Control) -> Self {
+        let course = control.settings.simulated.as_ref().and_then(|one| one.course.clone());
+        Self { left: course.is_some().then(Instant::now), course, at: control.pose }
     }
 
     /// Takes another course, if the configuration has one.
-    pub(super) fn reload(&mut self, desk: &Desk) {
-        let other = Self::new(desk);
+    pub(super) fn reload(&mut self, control: &Control) {
+        let other = Self::new(control);
         if other.course != self.course {
             *self = other;
         }
@@ -135,16 +135,16 @@ impl Drive {
         self.left.is_some()
     }
 
-    /// Where it is now; the desk knows it too.
-    pub(super) fn pose(&mut self, desk: &mut Desk, out: &Outlet) -> Pose {
-        if desk.pose != self.at {
+    /// Where it is now; the control knows it too.
+    pub(super) fn pose(&mut self, control: &mut Control, out: &RecordFanOut) -> Pose {
+        if control.pose != self.at {
             // A program has put it there: the course is over.
-            (self.left, self.at) = (None, desk.pose);
+            (self.left, self.at) = (None, control.pose);
         }
         let (Some(course), Some(left)) = (&self.course, self.left) else { return self.at };
         let driven_s = left.elapsed().as_secs_f64();
         let pose = course.pose_at(driven_s);
-        if let Err(refusal) = desk.check_pose(&pose) {
+        if let Err(refusal) = control.check_pose(&pose) {
             self.left = None;
             let detail = format!("the robot stops on its course: {}", refusal.message);
             tracing::warn!("{detail}");
@@ -154,7 +154,7 @@ impl Drive {
         if driven_s >= course.duration_s() {
             self.left = None;
         }
-        (self.at, desk.pose) = (pose, pose);
+        (self.at, control.pose) = (pose, pose);
         pose
     }
 }

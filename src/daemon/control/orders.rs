@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use tokio::time::Instant;
 use uuid::Uuid;
 
-use super::{Desk, Interrupt};
+use super::{Control, Interrupt};
 use crate::{
     acoustics::Sensor,
     api::SensorOrder,
@@ -20,7 +20,7 @@ use crate::{
     scan::{PlanError, ScanPlan},
 };
 
-impl Desk {
+impl Control {
     pub(super) fn start(&mut self, asked: Asked) -> Result<(), Refusal> {
         if self.pressed {
             return Err(Refusal {

@@ -13,7 +13,7 @@ use crate::{
 
 /// Where records and news go.
 #[derive(Clone)]
-pub(super) struct Outlet {
+pub(super) struct RecordFanOut {
     pub(super) journal: Journal,
     pub(super) hub: Hub,
     pub(super) shared: Arc<Shared>,
@@ -21,7 +21,7 @@ pub(super) struct Outlet {
     explaining: Arc<Semaphore>,
 }
 
-impl Outlet {
+impl RecordFanOut {
     pub(super) fn new(journal: Journal, hub: Hub, shared: Arc<Shared>) -> Self {
         Self { journal, hub, shared, explaining: Arc::new(Semaphore::new(1)) }
     }
@@ -54,11 +54,11 @@ impl Outlet {
     /// while another is looked at is passed over.
     fn explain(&self, scan: ScanView) {
         let Ok(turn) = Arc::clone(&self.explaining).try_acquire_owned() else { return };
-        let outlet = self.clone();
+        let out = self.clone();
         tokio::task::spawn_blocking(move || {
             let id = scan.scan;
-            if let Some(news) = outlet.shared.explained(id, &explanations(scan)) {
-                outlet.event(EventKind::Explanation, format!("scan {id}: {news}"));
+            if let Some(news) = out.shared.explained(id, &explanations(scan)) {
+                out.event(EventKind::Explanation, format!("scan {id}: {news}"));
             }
             drop(turn);
         });
@@ -78,7 +78,7 @@ impl Outlet {
     }
 }
 
-impl Sink for Outlet {
+impl Sink for RecordFanOut {
     fn record(&mut self, record: &Record) -> Result<(), SinkError> {
         if let Record::ScanStart(start) = record {
             let begun = (start.scan, start.plan.beams());

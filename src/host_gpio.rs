@@ -5,9 +5,9 @@ use thiserror::Error;
 
 use crate::config::GpioKeys;
 
-/// What the daemon can do and see besides the serial line. Without a pin, doing is nothing and
+/// The host's pins around the ranger. Without a pin, doing is nothing and
 /// seeing is `None`.
-pub trait Board: Send {
+pub trait HostGpio: Send {
     /// Whether the microcontroller can be reset.
     fn can_reset(&self) -> bool {
         false
@@ -31,13 +31,13 @@ pub trait Board: Send {
 
 /// A computer without such pins.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct NoBoard;
+pub struct NoGpio;
 
-impl Board for NoBoard {}
+impl HostGpio for NoGpio {}
 
-/// Why pins that the configuration names can't be used.
+/// Configured pins that can't be used.
 #[derive(Debug, Error)]
-pub enum BoardError {
+pub enum HostGpioError {
     /// Built without them.
     #[error("the configuration names pins, but this sonard was built without the feature pi")]
     NotBuilt,
@@ -47,7 +47,7 @@ pub enum BoardError {
     Gpio(crate::pi::GpioError),
 }
 
-impl BoardError {
+impl HostGpioError {
     /// What a person can do about it.
     #[must_use]
     pub const fn help(&self) -> &'static str {
@@ -68,17 +68,17 @@ impl BoardError {
 /// # Errors
 /// When it names some and they can't be used: a reset line or an emergency stop that is
 /// silently not there would be worse than no daemon.
-pub fn open(keys: &GpioKeys) -> Result<Box<dyn Board>, BoardError> {
+pub fn open(keys: &GpioKeys) -> Result<Box<dyn HostGpio>, HostGpioError> {
     if *keys == GpioKeys::default() {
-        return Ok(Box::new(NoBoard));
+        return Ok(Box::new(NoGpio));
     }
     #[cfg(feature = "pi")]
     return match raspberry_pi::Pins::open(keys) {
         Ok(pins) => Ok(Box::new(pins)),
-        Err(error) => Err(BoardError::Gpio(error.into())),
+        Err(error) => Err(HostGpioError::Gpio(error.into())),
     };
     #[cfg(not(feature = "pi"))]
-    Err(BoardError::NotBuilt)
+    Err(HostGpioError::NotBuilt)
 }
 
 #[cfg(feature = "pi")]
@@ -87,7 +87,7 @@ mod raspberry_pi {
 
     use rppal::gpio::{Error, Gpio, InputPin, OutputPin};
 
-    use super::Board;
+    use super::HostGpio;
     use crate::config::GpioKeys;
 
     const RESET: Duration = Duration::from_millis(50);
@@ -117,7 +117,7 @@ mod raspberry_pi {
         }
     }
 
-    impl Board for Pins {
+    impl HostGpio for Pins {
         fn can_reset(&self) -> bool {
             self.reset.is_some()
         }
@@ -157,10 +157,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_pins_in_the_configuration_there_is_no_board_and_no_error() {
-        let board = open(&GpioKeys::default()).expect("nothing to open");
-        assert!(!board.can_reset());
-        assert_eq!((board.at_home(), board.emergency_stop()), (None, None));
+    fn without_pins_in_the_configuration_there_are_none_and_no_error() {
+        let gpio = open(&GpioKeys::default()).expect("nothing to open");
+        assert!(!gpio.can_reset());
+        assert_eq!((gpio.at_home(), gpio.emergency_stop()), (None, None));
     }
 
     #[test]

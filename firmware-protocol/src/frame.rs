@@ -25,7 +25,7 @@ pub const FRAME_MAX: usize = PAYLOAD_MAX + 2;
 /// The byte between frames. It never occurs inside one.
 pub const DELIMITER: u8 = 0;
 
-/// What stands before every message, in both directions. Its layout is frozen.
+/// The header of every message, in both directions. Its layout is frozen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
     /// The device's boot nonce, or [`Header::BOOT_UNKNOWN`] from a host that has not met the device.

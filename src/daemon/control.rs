@@ -14,7 +14,7 @@ use uuid::Uuid;
 
 use super::{
     agenda::{Agenda, Asked},
-    air::{AirDesk, Reading, watch_thermometer},
+    air::{AirControl, Reading, watch_thermometer},
     journal::Journal,
     refusal::{Refusal, RefusalKind},
     settings::Settings,
@@ -23,16 +23,16 @@ use super::{
 use crate::{
     acoustics::Sensor,
     api::{AirOrder, ConfigurationReport, SensorOrder, Setup},
-    board::Board,
     config::{Mode, ScanningKeys},
     geometry::Pose,
+    host_gpio::HostGpio,
     scan::ScanPlan,
 };
 
 /// How often the emergency stop is looked at.
 const STOP_CHECK: Duration = Duration::from_millis(50);
 
-/// What the daemon can be told.
+/// An order to the daemon.
 #[derive(Debug)]
 pub enum Order {
     /// Take scans, or go on with those of the mode.
@@ -88,7 +88,7 @@ pub(super) enum Interrupt {
 }
 
 /// What is in force, and the ends of everything that may change it.
-pub(super) struct Desk {
+pub(super) struct Control {
     pub(super) settings: Settings,
     /// The configuration's sensor, in whose place `settings` has one that a program wants.
     own_sensor: Sensor,
@@ -100,8 +100,8 @@ pub(super) struct Desk {
     pub(super) agenda: Agenda,
     /// The request that the scan under way was asked for by.
     pub(super) serving: Option<Uuid>,
-    pub(super) air: AirDesk,
-    pub(super) board: Box<dyn Board>,
+    pub(super) air: AirControl,
+    pub(super) gpio: Box<dyn HostGpio>,
     pub(super) configuration: ConfigurationReport,
     pub(super) epoch: Instant,
     /// The device, for the check of plans.
@@ -116,10 +116,10 @@ pub(super) struct Desk {
     pressed: bool,
 }
 
-impl Desk {
+impl Control {
     pub(super) fn new(
         settings: Settings,
-        board: Box<dyn Board>,
+        gpio: Box<dyn HostGpio>,
         requests: mpsc::Receiver<Request>,
         (shutdown, shared): (CancellationToken, Arc<Shared>),
         journal: Journal,
@@ -132,9 +132,9 @@ impl Desk {
             scanning: settings.keys.scanning.clone(),
             agenda: Agenda::new(settings.keys.scanning.mode, settings.every(), Duration::ZERO),
             serving: None,
-            air: AirDesk::new(settings.keys.air.clone()),
+            air: AirControl::new(settings.keys.air.clone()),
             thermometer: watch_thermometer(&settings.keys.air),
-            board,
+            gpio,
             configuration: ConfigurationReport::default(),
             epoch: Instant::now(),
             identity: None,
@@ -183,12 +183,12 @@ impl Desk {
     /// Carries out orders until one needs the operator. Cancel-safe.
     pub(super) async fn next(&mut self) -> Interrupt {
         loop {
-            let watches_stop = self.board.emergency_stop().is_some();
+            let watches_stop = self.gpio.emergency_stop().is_some();
             tokio::select! {
                 biased;
                 () = self.shutdown.cancelled() => return Interrupt::Shutdown,
                 () = sleep(STOP_CHECK), if watches_stop => {
-                    let pressed = self.board.emergency_stop() == Some(true);
+                    let pressed = self.gpio.emergency_stop() == Some(true);
                     if std::mem::replace(&mut self.pressed, pressed) != pressed {
                         return Interrupt::EmergencyStop(pressed);
                     }
@@ -259,7 +259,7 @@ impl Desk {
 
     /// Forgets what programs said about the air.
     fn take_own_air(&mut self) {
-        self.air = AirDesk::new(self.settings.keys.air.clone());
+        self.air = AirControl::new(self.settings.keys.air.clone());
         self.thermometer = watch_thermometer(&self.settings.keys.air);
     }
 
@@ -284,7 +284,7 @@ impl Desk {
         self.stale |= keys.simulate != then.simulate || self.settings.simulated != before.simulated;
         self.setup = Arc::new(self.settings.setup());
         if keys.air != then.air {
-            self.air = AirDesk::new(keys.air.clone());
+            self.air = AirControl::new(keys.air.clone());
             self.thermometer = watch_thermometer(&keys.air);
         }
         if keys.scanning != then.scanning {

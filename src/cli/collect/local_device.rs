@@ -12,7 +12,7 @@ use crate::{
     cli::{
         mock_world::MockWorldArgs,
         runtime::Interrupts,
-        scan::{self, Mock, emulator::Emulator, setup::belief},
+        scan::{self, Mock, emulator::Emulator, setup::assumed},
     },
     collect::{Borrowed, Connected, Device, Halt, Patience, Plan, ScanOrder, Taken, take},
     ranger::{PreparedScan, Ranger, ScanError, device_record, provenance},
@@ -27,7 +27,7 @@ enum Kind {
 }
 
 /// A ranger that the collection itself drives.
-pub(super) struct Own {
+pub(super) struct LocalDevice {
     kind: Kind,
     world: MockWorldArgs,
     scene: String,
@@ -38,7 +38,7 @@ pub(super) struct Own {
     met: Option<Identity>,
 }
 
-impl Own {
+impl LocalDevice {
     /// The one that the options or the plan name.
     pub(super) fn new(args: &Args, plan: &Plan, interrupts: Interrupts) -> Self {
         let keys = &plan.keys;
@@ -124,7 +124,7 @@ impl Own {
     }
 }
 
-impl Device for Own {
+impl Device for LocalDevice {
     fn is_local(&self) -> bool {
         true
     }
@@ -136,7 +136,7 @@ impl Device for Own {
     fn prepare(&mut self, _plan: &Plan, first: &PreparedScan) -> Result<(), Halt> {
         if let Kind::Mock(mock) = &mut self.kind {
             let link = std::env::temp_dir().join(format!("sonard-mock-{}", std::process::id()));
-            *mock = Some(Mock::start(self.world.board(&belief(first))?, Some(&link))?);
+            *mock = Some(Mock::start(self.world.board(&assumed(first))?, Some(&link))?);
         }
         self.start_emulator(first)
     }
@@ -149,7 +149,7 @@ impl Device for Own {
     /// A real ranger stands where somebody put it.
     fn carry_to(&mut self, to: &PreparedScan) -> Result<(), Halt> {
         if let Kind::Mock(Some(mock)) = &self.kind {
-            mock.carry_to(self.world.soundings(&belief(to))?);
+            mock.carry_to(self.world.soundings(&assumed(to))?);
         }
         self.start_emulator(to)
     }

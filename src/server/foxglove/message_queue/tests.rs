@@ -18,14 +18,14 @@ fn topics() -> Vec<Topic> {
     live.topics().to_vec()
 }
 
-fn board(most_bytes: usize) -> Board {
-    let mut board = Board::new(most_bytes);
-    board.set_topics(&topics());
-    board
+fn queue(most_bytes: usize) -> MessageQueue {
+    let mut queue = MessageQueue::new(most_bytes);
+    queue.set_topics(&topics());
+    queue
 }
 
-fn put(board: &mut Board, topic: &str, number: u64, bytes: usize) {
-    board.put(&LiveMessage { topic, at_ns: number, bytes: &vec![7; bytes] });
+fn put(queue: &mut MessageQueue, topic: &str, number: u64, bytes: usize) {
+    queue.put(&LiveMessage { topic, at_ns: number, bytes: &vec![7; bytes] });
 }
 
 /// What a viewer is told until there is nothing more.
@@ -38,10 +38,10 @@ struct Told {
 }
 
 impl Told {
-    fn of(viewer: &mut Viewer, board: &Board) -> Self {
+    fn of(viewer: &mut Viewer, queue: &MessageQueue) -> Self {
         let mut told = Self::default();
         loop {
-            match viewer.look(board) {
+            match viewer.look(queue) {
                 Found::Something(Outgoing::Text(text)) => {
                     told.texts.push(serde_json::from_str(&text).expect("JSON"));
                 }
@@ -71,66 +71,66 @@ impl Told {
     }
 }
 
-fn channel(board: &Board, topic: &str) -> u32 {
-    let found = board.channels.iter().find(|(_, channel)| channel.topic.name == topic);
+fn channel(queue: &MessageQueue, topic: &str) -> u32 {
+    let found = queue.channels.iter().find(|(_, channel)| channel.topic.name == topic);
     *found.expect("a channel").0
 }
 
-fn subscribe(viewer: &mut Viewer, board: &Board, topic: &str, id: u32) {
-    let wish = json!({"id": id, "channelId": channel(board, topic)});
+fn subscribe(viewer: &mut Viewer, queue: &MessageQueue, topic: &str, id: u32) {
+    let wish = json!({"id": id, "channelId": channel(queue, topic)});
     let order = json!({"op": "subscribe", "subscriptions": [wish]});
-    viewer.take_text(&order.to_string(), board);
+    viewer.take_text(&order.to_string(), queue);
 }
 
 #[test]
 fn who_comes_is_greeted_and_told_of_the_channels() {
-    let mut board = Board::new(1000);
-    let mut early = Viewer::new(&board, "{\"op\":\"serverInfo\"}".into());
-    let told = Told::of(&mut early, &board);
+    let mut queue = MessageQueue::new(1000);
+    let mut early = Viewer::new(&queue, "{\"op\":\"serverInfo\"}".into());
+    let told = Told::of(&mut early, &queue);
     assert_eq!(told.texts[0]["op"], "serverInfo");
     assert!(told.texts[1]["message"].as_str().is_some_and(|words| words.contains("first scan")));
-    board.set_topics(&topics());
-    let told = Told::of(&mut early, &board);
+    queue.set_topics(&topics());
+    let told = Told::of(&mut early, &queue);
     assert_eq!((told.texts.len(), &told.texts[0]["op"]), (1, &json!("advertise")));
-    let mut late = Viewer::new(&board, "{\"op\":\"serverInfo\"}".into());
+    let mut late = Viewer::new(&queue, "{\"op\":\"serverInfo\"}".into());
     let ops: Vec<_> =
-        Told::of(&mut late, &board).texts.iter().map(|text| text["op"].clone()).collect();
+        Told::of(&mut late, &queue).texts.iter().map(|text| text["op"].clone()).collect();
     assert_eq!(ops, ["serverInfo", "advertise"]);
-    board.close();
-    assert!(Told::of(&mut late, &board).is_over);
+    queue.close();
+    assert!(Told::of(&mut late, &queue).is_over);
 }
 
 #[test]
 fn who_comes_late_is_told_the_last_of_what_stands_still_and_no_reading_of_before() {
-    let mut board = board(1000);
+    let mut queue = queue(1000);
     for number in 0..10 {
-        put(&mut board, "/tf_static", number, 10);
-        put(&mut board, "/sonar/range", number, 10);
+        put(&mut queue, "/tf_static", number, 10);
+        put(&mut queue, "/sonar/range", number, 10);
     }
-    let mut late = Viewer::new(&board, "{}".into());
-    subscribe(&mut late, &board, "/tf_static", 1);
-    subscribe(&mut late, &board, "/sonar/range", 2);
-    let told = Told::of(&mut late, &board);
+    let mut late = Viewer::new(&queue, "{}".into());
+    subscribe(&mut late, &queue, "/tf_static", 1);
+    subscribe(&mut late, &queue, "/sonar/range", 2);
+    let told = Told::of(&mut late, &queue);
     assert_eq!((told.times(1), told.times(2)), (vec![9], vec![]));
-    put(&mut board, "/tf_static", 10, 10);
-    put(&mut board, "/sonar/range", 10, 10);
-    let told = Told::of(&mut late, &board);
+    put(&mut queue, "/tf_static", 10, 10);
+    put(&mut queue, "/sonar/range", 10, 10);
+    let told = Told::of(&mut late, &queue);
     assert_eq!((told.times(1), told.times(2), told.left_out()), (vec![10], vec![10], 0));
 }
 
 #[test]
 fn a_slow_viewer_is_told_what_it_missed_and_still_what_stands_still() {
-    let mut board = board(2000);
-    let mut slow = Viewer::new(&board, "{}".into());
+    let mut queue = queue(2000);
+    let mut slow = Viewer::new(&queue, "{}".into());
     for (topic, id) in [("/sonar/range", 1), ("/tf_static", 2), ("/sonar/points", 3)] {
-        subscribe(&mut slow, &board, topic, id);
+        subscribe(&mut slow, &queue, topic, id);
     }
-    put(&mut board, "/tf_static", 0, 10);
-    put(&mut board, "/tf_static", 1, 10);
+    put(&mut queue, "/tf_static", 0, 10);
+    put(&mut queue, "/tf_static", 1, 10);
     for number in 0..100 {
-        put(&mut board, "/sonar/range", number, 100);
+        put(&mut queue, "/sonar/range", number, 100);
     }
-    let told = Told::of(&mut slow, &board);
+    let told = Told::of(&mut slow, &queue);
     let ranges = told.times(1);
     assert!(ranges.len() > 5 && ranges.len() < 20 && ranges.last() == Some(&99), "{ranges:?}");
     assert_eq!((told.times(2), told.times(3)), (vec![1], vec![]));
@@ -140,60 +140,60 @@ fn a_slow_viewer_is_told_what_it_missed_and_still_what_stands_still() {
 
 #[test]
 fn a_message_that_is_too_long_is_missed_by_everybody() {
-    let mut board = board(10 << 20);
-    let mut viewer = Viewer::new(&board, "{}".into());
-    subscribe(&mut viewer, &board, "/sonar/points", 1);
+    let mut queue = queue(10 << 20);
+    let mut viewer = Viewer::new(&queue, "{}".into());
+    subscribe(&mut viewer, &queue, "/sonar/points", 1);
     for (number, bytes) in [(0, 10), (1, MOST_MESSAGE_BYTES + 1), (2, MOST_MESSAGE_BYTES)] {
-        put(&mut board, "/sonar/points", number, bytes);
+        put(&mut queue, "/sonar/points", number, bytes);
     }
-    let told = Told::of(&mut viewer, &board);
+    let told = Told::of(&mut viewer, &queue);
     assert_eq!((told.times(1), told.left_out()), (vec![0, 2], 1));
 }
 
 #[test]
 fn topics_that_go_end_their_subscriptions_and_numbers_are_not_given_twice() {
-    let mut board = board(1000);
-    let mut viewer = Viewer::new(&board, "{}".into());
-    subscribe(&mut viewer, &board, "/sonar/scan", 1);
-    drop(Told::of(&mut viewer, &board));
-    let before = channel(&board, "/sonar/scan");
+    let mut queue = queue(1000);
+    let mut viewer = Viewer::new(&queue, "{}".into());
+    subscribe(&mut viewer, &queue, "/sonar/scan", 1);
+    drop(Told::of(&mut viewer, &queue));
+    let before = channel(&queue, "/sonar/scan");
     let others: Vec<Topic> =
         topics().into_iter().filter(|topic| topic.name != "/sonar/scan").collect();
-    board.set_topics(&others);
-    let told = Told::of(&mut viewer, &board);
+    queue.set_topics(&others);
+    let told = Told::of(&mut viewer, &queue);
     assert_eq!(told.texts, [json!({"op": "unadvertise", "channelIds": [before]})]);
-    board.set_topics(&topics());
-    assert!(channel(&board, "/sonar/scan") > before);
-    put(&mut board, "/sonar/scan", 0, 10);
-    let told = Told::of(&mut viewer, &board);
+    queue.set_topics(&topics());
+    assert!(channel(&queue, "/sonar/scan") > before);
+    put(&mut queue, "/sonar/scan", 0, 10);
+    let told = Told::of(&mut viewer, &queue);
     assert_eq!((told.messages.len(), &told.texts[0]["op"]), (0, &json!("advertise")));
 }
 
 #[test]
 fn what_waits_is_bounded_in_bytes_however_many_viewers_sleep() {
-    let mut board = board(1 << 20);
+    let mut queue = queue(1 << 20);
     let asleep: Vec<Viewer> = (0..100)
         .map(|_| {
-            let mut viewer = Viewer::new(&board, "{}".into());
+            let mut viewer = Viewer::new(&queue, "{}".into());
             topics().iter().zip(1..).for_each(|(topic, id)| {
-                subscribe(&mut viewer, &board, &topic.name, id);
+                subscribe(&mut viewer, &queue, &topic.name, id);
             });
             viewer
         })
         .collect();
     for number in 0..20_000 {
-        put(&mut board, "/sonar/range", number, 100);
-        put(&mut board, "/tf", number, 200);
+        put(&mut queue, "/sonar/range", number, 100);
+        put(&mut queue, "/tf", number, 200);
     }
-    let numbers = board.waiting.first()..board.waiting.end();
-    let waiting = numbers.filter_map(|number| board.waiting.get(number));
+    let numbers = queue.waiting.first()..queue.waiting.end();
+    let waiting = numbers.filter_map(|number| queue.waiting.get(number));
     let bytes: usize = waiting.map(|message| message.bytes.len()).sum();
     assert!((1 << 18..=1 << 20).contains(&bytes), "{bytes} bytes wait");
     let held = asleep.iter().map(|viewer| viewer.texts.len() + viewer.late_for.len());
     assert!(held.max() <= Some(3), "a viewer that sleeps holds nothing");
 }
 
-/// What happens at a board.
+/// What happens at a queue.
 #[derive(Debug, Clone)]
 enum Happens {
     Put { topic: usize, bytes: usize },
@@ -218,13 +218,13 @@ proptest! {
     fn each_message_is_told_once_or_counted(steps in prop::collection::vec(happens(), 0..200)) {
         // No kept ones among them: those may be told again.
         let names = ["/sonar/range", "/sonar/residual", "/sonar/predicted/range"];
-        let mut board = board(1500);
-        let mut viewer = Viewer::new(&board, "{}".into());
+        let mut queue = queue(1500);
+        let mut viewer = Viewer::new(&queue, "{}".into());
         let mut all = Told::default();
         let (mut expected, mut subscribed) = (0, [false; 4]);
-        let mut look = |viewer: &mut Viewer, board: &Board, times: usize| {
+        let mut look = |viewer: &mut Viewer, queue: &MessageQueue, times: usize| {
             for _ in 0..times {
-                match viewer.look(board) {
+                match viewer.look(queue) {
                     Found::Something(Outgoing::Text(text)) => {
                         all.texts.push(serde_json::from_str(&text).expect("JSON"));
                     }
@@ -241,25 +241,25 @@ proptest! {
             match step {
                 Happens::Put { topic, bytes } => {
                     let Some(name) = names.get(topic) else { continue };
-                    put(&mut board, name, number, bytes);
+                    put(&mut queue, name, number, bytes);
                     expected += u64::from(subscribed[topic]);
                 }
                 Happens::Subscribe(topic) => {
                     let Some(name) = names.get(topic) else { continue };
-                    subscribe(&mut viewer, &board, name, topic as u32);
+                    subscribe(&mut viewer, &queue, name, topic as u32);
                     subscribed[topic] = true;
                 }
                 Happens::Unsubscribe(topic) => {
                     // What it was still to be told is over with that: it takes that first.
-                    look(&mut viewer, &board, usize::MAX);
+                    look(&mut viewer, &queue, usize::MAX);
                     let order = json!({"op": "unsubscribe", "subscriptionIds": [topic]});
-                    viewer.take_text(&order.to_string(), &board);
+                    viewer.take_text(&order.to_string(), &queue);
                     subscribed[topic] = false;
                 }
-                Happens::Look { times } => look(&mut viewer, &board, times),
+                Happens::Look { times } => look(&mut viewer, &queue, times),
             }
         }
-        look(&mut viewer, &board, usize::MAX);
+        look(&mut viewer, &queue, usize::MAX);
         prop_assert_eq!(all.messages.len() as u64 + all.left_out(), expected);
         for id in 0..3 {
             prop_assert!(all.times(id).is_sorted_by(|a, b| a < b));

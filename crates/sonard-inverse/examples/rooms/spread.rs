@@ -1,0 +1,15 @@
+//! The spread of the readings of `rooms`, as fits and bounds are given it.
+
+use sonard_inverse::ErrorModel;
+
+use crate::rooms::NOISE_MM;
+
+pub(crate) const SPREAD: ErrorModel = ErrorModel {
+    sigma_m: NOISE_MM * 1e-3,
+    tail_share: 0.1,
+    tail_ratio: 2.0,
+    sigma_db: 0.5,
+    clutter: 0.002,
+    clutter_silent: 0.3,
+    clutter_m: 4.0,
+};
