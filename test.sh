@@ -110,9 +110,9 @@ build_tests() {
     tests/install.sh "leave the clock that is set out with FAKETIME=0" libfaketime
   fi
   if [ "$runner" = nextest ]; then
-    cargo nextest run --workspace "${features[@]}" --no-run --cargo-quiet
+    cargo nextest run --workspace "${tested[@]}" "${features[@]}" --no-run --cargo-quiet
   else
-    cargo test --workspace --lib --bins --tests "${features[@]}" --no-run --quiet
+    cargo test --workspace "${tested[@]}" "${features[@]}" --no-run --quiet
   fi
 }
 
@@ -250,13 +250,13 @@ check_monitoring() {
 
 # run_tests [ARGUMENT...]: the closing lines are kept for the end.
 run_tests() {
+  if [ $# = 0 ]; then set -- "${tested[@]}"; fi
   if [ "$runner" = nextest ]; then
     local filter=(-E 'not test(/^(live_page|playground)::/)')
     if has_playground; then filter=(); elif [ "${PAGE:-1}" != 0 ]; then filter=(-E 'not test(/^playground::/)'); fi
     cargo nextest run --workspace "${features[@]}" "$@" "${filter[@]}" --cargo-quiet --no-fail-fast \
       --status-level slow --final-status-level fail 2>&1
   else
-    if [ $# = 0 ]; then set -- --lib --bins --tests; fi
     cargo test --workspace "${features[@]}" "$@" --no-fail-fast --quiet -- --skip live_page:: --skip playground:: 2>&1
   fi | tee "$work/tests" | head -n "-$closing_lines"
 }
@@ -272,6 +272,8 @@ test_page() {
 
 runner=cargo
 if cargo nextest --version >/dev/null 2>&1; then runner=nextest; fi
+# Examples are not run: Clippy looks at them.
+tested=(--lib --bins --tests)
 # What the runner says of all tests, with an empty line around it.
 closing_lines=3
 features=()

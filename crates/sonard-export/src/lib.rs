@@ -1,5 +1,5 @@
-//! Scans in the formats of other tools: tables (CSV, Parquet) of readings beside predictions, and recordings of
-//! ROS 2 (MCAP); maps, lines and features as recordings and as GeoJSON.
+//! Scans in the formats of other tools: tables (CSV, and with the feature `parquet` Parquet) of readings beside
+//! predictions, and recordings of ROS 2 (MCAP); maps, lines and features as recordings and as GeoJSON.
 //!
 //! [`Live`] makes the messages of a recording of records as they come, and [`foxglove`] speaks the protocol that
 //! viewers ask for them by; [`dds`] says how ROS 2 itself passes them on.
@@ -15,6 +15,7 @@ pub mod dds;
 mod error;
 pub mod foxglove;
 mod live;
+#[cfg(feature = "parquet")]
 mod parquet;
 mod place;
 mod recording;
@@ -32,6 +33,7 @@ pub use columns::{COLUMNS, Column, Field, Kind, Row, Value};
 pub use conversion::{Distribution, Profile, Settings, Topic};
 pub use error::{ExportError, LeftOut};
 pub use live::{Live, LiveMessage};
+#[cfg(feature = "parquet")]
 pub use parquet::{ParquetExport, TypedTable};
 pub use place::{Place, begins_geojson, to_geojson, write_place};
 pub use recording::McapExport;
