@@ -62,7 +62,9 @@ arm64)
   ;;
 dev)
   prepare dev
-  "$tools/bin/cargo-deb" --profile dev --no-build --strip --fast --quiet
+  # cargo-deb wants no profile that is meant for work, so the program gets a folder as another one would have it.
+  install -D "$target/debug/sonard" "$target/packaged-dev/sonard"
+  "$tools/bin/cargo-deb" --profile packaged-dev --no-build --strip --fast --quiet
   ;;
 tools) ;;
 *)
