@@ -3,7 +3,8 @@
 #
 #   ./test.sh            all of it
 #   ./test.sh quick      format, lints, unit tests: what to run while at work
-#   FUZZ_SECONDS=60 ./test.sh   fuzz each target for a minute (default 5 s; 0 leaves fuzzing out)
+#   FUZZ_SECONDS=60 ./test.sh   fuzz each target for a minute (default 8 s, beside
+#                               other steps; 0 leaves fuzzing out)
 #   FIRMWARE=0 ./test.sh        leave firmware and emulator out, where they can't be built: they
 #                               need Debian's packages (firmware/test.sh)
 #   PAGE=0 ./test.sh            leave the live page out, where there is no Chromium to look at it
@@ -18,49 +19,27 @@
 #   PROMTOOL=0 ./test.sh        leave promtool out, where Debian's prometheus can't be had
 #   FAKETIME=0 ./test.sh        leave the clock that is set out, where there is no libfaketime
 #   BOOT=0 ./test.sh            leave the units under a booted systemd out (systemd/boot-test.sh)
-#   PACKAGE=1 ./test.sh         build, install, upgrade and remove the Debian package, too; PACKAGE=all
-#                               also cross-builds that for a Raspberry Pi and runs it in an emulator
+#   PACKAGE=1 ./test.sh         make, install, upgrade and remove the Debian package, too, with the program that
+#                               the tests use in it; PACKAGE=release with the one that is shipped, which takes ten
+#                               minutes more; PACKAGE=all also cross-builds that for a Raspberry Pi and runs it in
+#                               an emulator
 #   PROPTEST_RNG_SEED=$RANDOM PROPTEST_CASES=5000 ./test.sh quick   other random cases than each time's
 #   SONARD_SOAK_FAULTS=1000 SONARD_KILLS=200 SONARD_COLLECT_KILLS=200 ./test.sh   longer runs of daemon
 #                               and collection among faults
 #
 # Everything is built with --workspace and the same features, so that nothing is built twice
-# (workspace-hack). Tests are run by cargo-nextest where it is installed, else by cargo test.
+# (workspace-hack). Steps that build something of their own, or wait more than they compute, run beside the others
+# (tests/steps.sh), and the tests by themselves at the end: by cargo-nextest where it is installed, else by cargo test.
 set -euo pipefail
 cd "$(dirname "$0")"
-fuzz_seconds=${FUZZ_SECONDS:-5}
+fuzz_seconds=${FUZZ_SECONDS:-8}
 work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
+trap 'end_lanes; rm -rf "$work"' EXIT
 
 fail() { printf 'test.sh: %s\n' "$*" >&2; exit 1; }
-
-# Seconds of processor time of all that has run so far, into `cpu_s`: a subshell would count its own.
-count_cpu() {
-  times >"$work/times"
-  cpu_s=$(tail -n 1 "$work/times" | tr 'ms' '  ' | awk '{printf "%.0f", 60 * ($1 + $3) + $2 + $4}')
-}
-
-step_name=
-step() {
-  end_step
-  step_name=$*
-  step_began=$SECONDS
-  count_cpu
-  step_cpu=$cpu_s
-  printf '\n== %s\n' "$*"
-}
-end_step() {
-  if [ -z "$step_name" ]; then return; fi
-  count_cpu
-  printf '%6d %6d  %s\n' $((SECONDS - step_began)) $((cpu_s - step_cpu)) "$step_name" >>"$work/took"
-}
-print_times() {
-  end_step
-  printf '\n== time\n  wall    cpu  step (seconds)\n'
-  cat "$work/took"
-  count_cpu
-  printf '%6d %6d  all\n\n' "$SECONDS" "$cpu_s"
-}
+. tests/steps.sh
+# What computes beside programs that are timed leaves them the processors.
+gently() { nice -n 10 "$@"; }
 
 check_tools() {
   step "tools"
@@ -72,6 +51,11 @@ check_tools() {
     cargo "${component/rustfmt/fmt}" --version >/dev/null 2>&1 || rustup component add "$component" ||
       fail "$component is missing: rustup component add $component"
   done
+  # Not installed here: to build it takes longer than it saves.
+  case $runner in
+  nextest) printf 'tests are run by cargo-nextest: %s\n' "$(cargo nextest --version | head -n 1)" ;;
+  cargo) printf 'tests are run by cargo test; cargo-nextest, which is not installed, would run them side by side\n' ;;
+  esac
 }
 
 check_text() {
@@ -97,7 +81,7 @@ check_pure_part() {
 
 check_documentation() {
   step "documentation, warnings denied"
-  RUSTDOCFLAGS="-D warnings" cargo doc --workspace "${features[@]}" --no-deps --quiet
+  RUSTDOCFLAGS="-D warnings" gently cargo doc --workspace "${features[@]}" --no-deps --quiet
 }
 
 fuzz() {
@@ -126,9 +110,9 @@ build_tests() {
     tests/install.sh "leave the clock that is set out with FAKETIME=0" libfaketime
   fi
   if [ "$runner" = nextest ]; then
-    cargo nextest run --workspace "${features[@]}" --no-run --cargo-quiet
+    cargo nextest run --workspace "${tested[@]}" "${features[@]}" --no-run --cargo-quiet
   else
-    cargo test --workspace --lib --bins --tests "${features[@]}" --no-run --quiet
+    cargo test --workspace "${tested[@]}" "${features[@]}" --no-run --quiet
   fi
 }
 
@@ -155,14 +139,27 @@ build_playground() {
   fi
   step "the playground"
   if ! command -v node >/dev/null; then tests/install.sh "leave the playground out with PLAYGROUND=0" nodejs npm; fi
-  web/build.sh || fail "the playground: see above. Where it can't be built, PLAYGROUND=0 leaves it out"
+  gently web/build.sh || fail "the playground: see above. Where it can't be built, PLAYGROUND=0 leaves it out"
 }
 
-check_units_and_package() {
+check_units() {
   step "systemd units"
   systemd/test.sh
+}
+
+get_package_tools() {
+  if [ "${PACKAGE:-0}" = 0 ]; then return; fi
+  step "tools for the Debian package"
+  gently packaging/test.sh tools
+}
+
+check_package() {
   case ${PACKAGE:-0} in
-  1 | all)
+  1)
+    step "the Debian package, around the tests' program"
+    packaging/test.sh dev
+    ;;
+  release | all)
     step "the Debian package"
     packaging/test.sh
     ;;
@@ -190,7 +187,7 @@ play_emulator() {
 
 check_examples() {
   step "examples in the documentation"
-  cargo test --workspace "${features[@]}" --doc --quiet
+  gently cargo test --workspace "${features[@]}" --doc --quiet
 }
 
 check_api() {
@@ -205,13 +202,19 @@ check_api() {
   }
 }
 
-check_python() {
+build_python() {
   if [ "${PYTHON:-1}" = 0 ]; then
     step "the package for Python: LEFT OUT, because PYTHON=0"
     return
   fi
-  step "the package for Python"
-  python/test.sh || fail "the package for Python: see above. Where it can't be built, PYTHON=0 leaves it out"
+  step "the package for Python: wheel, lints"
+  gently python/test.sh build || fail "the package for Python: see above. Where it can't be built, PYTHON=0 leaves it out"
+}
+
+test_python() {
+  if [ "${PYTHON:-1}" = 0 ]; then return; fi
+  step "the package for Python: types, tests"
+  python/test.sh tests || fail "the package for Python: see above. PYTHON=0 leaves it out"
 }
 
 # NAME SCRIPT WHAT FAILURE: what other programs read of sonard; NAME=0 leaves it out.
@@ -247,13 +250,13 @@ check_monitoring() {
 
 # run_tests [ARGUMENT...]: the closing lines are kept for the end.
 run_tests() {
+  if [ $# = 0 ]; then set -- "${tested[@]}"; fi
   if [ "$runner" = nextest ]; then
     local filter=(-E 'not test(/^(live_page|playground)::/)')
     if has_playground; then filter=(); elif [ "${PAGE:-1}" != 0 ]; then filter=(-E 'not test(/^playground::/)'); fi
     cargo nextest run --workspace "${features[@]}" "$@" "${filter[@]}" --cargo-quiet --no-fail-fast \
       --status-level slow --final-status-level fail 2>&1
   else
-    if [ $# = 0 ]; then set -- --lib --bins --tests; fi
     cargo test --workspace "${features[@]}" "$@" --no-fail-fast --quiet -- --skip live_page:: --skip playground:: 2>&1
   fi | tee "$work/tests" | head -n "-$closing_lines"
 }
@@ -269,6 +272,8 @@ test_page() {
 
 runner=cargo
 if cargo nextest --version >/dev/null 2>&1; then runner=nextest; fi
+# Examples are not run: Clippy looks at them.
+tested=(--lib --bins --tests)
 # What the runner says of all tests, with an empty line around it.
 closing_lines=3
 features=()
@@ -292,21 +297,21 @@ quick)
   ;;
 "")
   check_tools
+  lane "tools of others" prepare_browser get_package_tools
+  lane "apart from the workspace" build_playground fuzz build_python
   build_firmware
   check_text
   check_pure_part
   build_tests
+  join "tools of others"
+  lane "programs of others" check_api check_peers check_monitoring play_emulator
+  lane "units and package" check_units check_package
   check_documentation
-  fuzz
-  prepare_browser
-  build_playground
-  check_units_and_package
-  play_emulator
   check_examples
-  check_api
-  check_python
-  check_peers
-  check_monitoring
+  join "apart from the workspace"
+  test_python
+  join "programs of others"
+  join "units and package"
   test_page
   step "tests"
   run_tests || finish $?

@@ -12,7 +12,8 @@ triple=$(rustc -vV | sed -n 's/^host: //p')
 coverage="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4
   -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table
   -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1 -Cdebug-assertions -Coverflow-checks"
-RUSTFLAGS=$(echo $coverage) cargo build --release --target "$triple"
+# Gently, because test.sh has other things to do meanwhile.
+RUSTFLAGS=$(echo $coverage) nice -n 10 cargo build --release --target "$triple"
 binaries=${CARGO_TARGET_DIR:-target}/$triple/release
 for target in $targets; do
   mkdir -p "corpus/$target" "artifacts/$target"

@@ -1,7 +1,13 @@
 #!/usr/bin/env bash
-# Builds the Debian package: `packaging/build.sh` for this computer, `packaging/build.sh arm64` for
-# a Raspberry Pi (64 bit). Prints the package's path. cargo-deb is installed into target/tools if it
-# is missing, and Debian's cross tools where that may be done.
+# Builds the Debian package and prints its path:
+#
+#   packaging/build.sh         for this computer
+#   packaging/build.sh arm64   for a Raspberry Pi (64 bit)
+#   packaging/build.sh dev     for this computer, around the program that the tests use: for tests of what the package
+#                              does, not to be given to anybody
+#   packaging/build.sh tools   no package, but what makes one
+#
+# cargo-deb is installed into target/tools if it is missing, and Debian's cross tools where that may be done.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 fail() { printf 'packaging/build.sh: %s\n' "$*" >&2; exit 1; }
@@ -28,18 +34,39 @@ install rustc-web cargo-web libstd-rust-web-dev:arm64 gcc-aarch64-linux-gnu libc
     /usr/bin/cargo build --release --quiet --features mqtt,ros,sqlite --bin sonard --target aarch64-unknown-linux-gnu
 }
 
-# Pages and completions are the same everywhere, and are written by the program itself.
-cargo build --release --quiet --features mqtt,ros,sqlite --bin sonard
-rm -rf "$target/package"
-"$target/release/sonard" package-files "$target/package"
+# prepare PROFILE: builds the program and has it write pages and completions, which are the same everywhere.
+prepare() {
+  local folder=$1
+  case $1 in
+  release) cargo build --release --quiet --features mqtt,ros,sqlite --bin sonard ;;
+  dev)
+    # As tests build it, with the features of the other one.
+    folder=debug
+    [ -x "$target/debug/sonard" ] || cargo build --workspace --quiet
+    ;;
+  esac
+  rm -rf "$target/package"
+  "$target/$folder/sonard" package-files "$target/package"
+}
 
 case ${1:-} in
 "")
-  "$tools/bin/cargo-deb" --no-build --strip --quiet ;;
+  prepare release
+  "$tools/bin/cargo-deb" --no-build --strip --quiet
+  ;;
 arm64)
+  prepare release
   build_for_arm64
   CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_STRIP=aarch64-linux-gnu-strip \
-    "$tools/bin/cargo-deb" --no-build --strip --quiet --target aarch64-unknown-linux-gnu ;;
+    "$tools/bin/cargo-deb" --no-build --strip --quiet --target aarch64-unknown-linux-gnu
+  ;;
+dev)
+  prepare dev
+  # cargo-deb wants no profile that is meant for work, so the program gets a folder as another one would have it.
+  install -D "$target/debug/sonard" "$target/packaged-dev/sonard"
+  "$tools/bin/cargo-deb" --profile packaged-dev --no-build --strip --fast --quiet
+  ;;
+tools) ;;
 *)
-  fail "for this computer (no argument) or for arm64, not $1" ;;
+  fail "for this computer (no argument), arm64, dev or tools, not $1" ;;
 esac

@@ -1,18 +1,21 @@
 # A throw-away Debian for tests; to be sourced from the repository's root.
 
-# new_debian FOLDER: makes a Debian of this computer's release there, with systemd as its init. What
-# the archive gave is kept for a week under target/tools, because fetching it takes a minute.
+# new_debian FOLDER: makes a Debian of this computer's release there, with systemd as its init.
 new_debian() {
-  local root=$1 suite kept
-  local packages=systemd,dbus,udev,procps,curl
+  keep_debian
+  mkdir -p "$1"
+  tar --extract --file "$kept_debian" --directory "$1" --numeric-owner --xattrs --xattrs-include='*'
+}
+
+# What the archive gave is kept for a week under target/tools, because fetching it takes a minute; where, says `kept_debian`.
+keep_debian() {
+  local suite packages=systemd,dbus,udev,procps,curl
   command -v mmdebstrap >/dev/null || tests/install.sh "" mmdebstrap
   suite=$(. /etc/os-release && echo "$VERSION_CODENAME")
-  kept=${CARGO_TARGET_DIR:-target}/tools/debian-$suite-${packages//,/-}.tar
-  if [ -z "$(find "$kept" -mtime -7 2>/dev/null)" ]; then
-    mkdir -p "$(dirname "$kept")"
-    mmdebstrap --quiet --variant=apt --include="$packages" "$suite" "${kept%.tar}.new.tar" >/dev/null
-    mv "${kept%.tar}.new.tar" "$kept"
+  kept_debian=${CARGO_TARGET_DIR:-target}/tools/debian-$suite-${packages//,/-}.tar
+  if [ -z "$(find "$kept_debian" -mtime -7 2>/dev/null)" ]; then
+    mkdir -p "$(dirname "$kept_debian")"
+    mmdebstrap --quiet --variant=apt --include="$packages" "$suite" "${kept_debian%.tar}.new.tar" >/dev/null
+    mv "${kept_debian%.tar}.new.tar" "$kept_debian"
   fi
-  mkdir -p "$root"
-  tar --extract --file "$kept" --directory "$root" --numeric-owner --xattrs --xattrs-include='*'
 }

@@ -3,7 +3,9 @@
 # configuration, upgrades, removes and purges it, in a Debian of its own that is thrown away.
 #
 #   packaging/test.sh         for this computer
+#   packaging/test.sh dev     for this computer, around the program that the tests use, which takes no build
 #   packaging/test.sh arm64   for a Raspberry Pi: cross-built, looked into, run in an emulator
+#   packaging/test.sh tools   no test, but what these need
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . packaging/debian.sh
@@ -57,15 +59,25 @@ test_arm64() {
   grep -q device.port "$work/said" || fail "$(cat "$work/said")"
 }
 
+get_tools() {
+  packaging/build.sh tools
+  local needed=()
+  command -v lintian >/dev/null || needed+=(lintian)
+  command -v man >/dev/null || needed+=(man-db)
+  command -v systemd-nspawn >/dev/null || needed+=(systemd-container)
+  if [ ${#needed[@]} != 0 ]; then tests/install.sh "" "${needed[@]}"; fi
+  keep_debian
+}
+
+# test_here [dev]
 test_here() {
   step "build"
   local deb architecture
-  deb=$(packaging/build.sh | tail -n 1)
+  deb=$(packaging/build.sh "$@" | tail -n 1)
   architecture=$(dpkg --print-architecture)
   look_into "$deb" "$architecture"
 
   step "lintian"
-  command -v lintian >/dev/null || tests/install.sh "" lintian
   # A package outside of Debian's archive closes no bug there, and who gives it to others puts an
   # address into it.
   lintian --fail-on error,warning --allow-root "$deb" \
@@ -73,7 +85,6 @@ test_here() {
     fail "lintian finds fault with it"
 
   step "manual pages"
-  command -v man >/dev/null || tests/install.sh "" man-db
   local page said
   for page in "$work"/tree/usr/share/man/man?/*.gz; do
     said=$(LC_ALL=C.UTF-8 MANROFFSEQ='' MANWIDTH=80 man --warnings -E UTF-8 -l -Tutf8 -Z "$page" 2>&1 >/dev/null)
@@ -100,12 +111,20 @@ older() {
   sed -i 's/^Version: .*/Version: 0.0.9-1/' "$tree/DEBIAN/control"
   sed -i 's/^# Configuration of/# Older configuration of/' "$tree/etc/sonard/sonard.toml"
   rm -f "$tree/DEBIAN/md5sums"
-  dpkg-deb --root-owner-group --build "$tree" "$2" >/dev/null
+  dpkg-deb -Zgzip -z1 --root-owner-group --build "$tree" "$2" >/dev/null
 }
 
 case ${1:-} in
-"") test_here ;;
-arm64) test_arm64 ;;
-*) fail "for this computer (no argument) or for arm64, not $1" ;;
+"" | dev)
+  get_tools
+  test_here "$@"
+  printf 'the package is right\n'
+  ;;
+arm64)
+  test_arm64
+  printf 'the package is right\n'
+  ;;
+tools) get_tools ;;
+*) fail "for this computer (no argument), dev, arm64 or tools, not $1" ;;
 esac
-printf 'the package is right\n'
+

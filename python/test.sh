@@ -3,6 +3,8 @@
 # environment of its own under target/, made anew when what it needs has changed.
 #
 #   python/test.sh                          with the python3 on the path
+#   python/test.sh build                    the wheel and lints alone, which needs no command `sonard`
+#   python/test.sh tests                    the rest, with the wheel that was built
 #   PYTHON_INTERPRETERS="python3.10 python3.13" python/test.sh   run the tests with each of these, too
 #
 # The command `sonard` that readings are compared with is taken from the repository's target/debug; if there is
@@ -15,28 +17,50 @@ export SONARD=${SONARD:-${CARGO_TARGET_DIR:-$root/target}/debug/sonard}
 export CARGO_TARGET_DIR=$PWD/target
 needed=(maturin mypy numpy pytest hypothesis matplotlib pyroomacoustics pyarrow scikit-learn mujoco shapely)
 
-[ -x "$SONARD" ] || (cd .. && unset CARGO_TARGET_DIR && cargo build --workspace --quiet)
-../tests/venv.sh target/venv PYTHON=0 "${needed[@]}"
+build_wheel() {
+  rm -rf target/wheels
+  target/venv/bin/maturin build --release --locked --quiet --interpreter target/venv/bin/python
+  ls -lh target/wheels/*.whl | awk '{print "wheel: " $5}'
+  cargo clippy --release --locked --quiet -- -D warnings
+}
 
-rm -rf target/wheels
-target/venv/bin/maturin build --release --locked --quiet --interpreter target/venv/bin/python
-wheel=$(ls target/wheels/*.whl)
-target/venv/bin/pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$wheel"
-ls -lh "$wheel" | awk '{print "wheel: " $5}'
-cargo clippy --release --locked --quiet -- -D warnings
+# install FOLDER: the wheel into an environment.
+install_wheel() {
+  "$1/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps target/wheels/*.whl
+}
 
 # Not from this folder, whose package has no compiled part.
+tool() { (cd "$work" && "$OLDPWD/target/venv/bin/$1" "${@:2}"); }
+
+run_tests() {
+  [ -x "$SONARD" ] || (cd .. && unset CARGO_TARGET_DIR && cargo build --workspace --quiet)
+  install_wheel target/venv
+  tool python -m mypy.stubtest --mypy-config-file "$PWD/pyproject.toml" sonard
+  tool python -m mypy --config-file "$PWD/pyproject.toml" --cache-dir "$work/mypy" \
+    "$PWD/package" "$PWD/tests" "$PWD/gallery"
+  target/venv/bin/pytest --durations=5 -rs
+  local interpreter folder
+  for interpreter in ${PYTHON_INTERPRETERS:-}; do
+    folder=target/venv-$(basename "$interpreter")
+    INTERPRETER=$interpreter ../tests/venv.sh "$folder" PYTHON=0 numpy pytest hypothesis matplotlib
+    install_wheel "$folder"
+    "$folder/bin/python" --version
+    "$folder/bin/pytest"
+  done
+}
+
+../tests/venv.sh target/venv PYTHON=0 "${needed[@]}"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-tool() { (cd "$work" && "$OLDPWD/target/venv/bin/$1" "${@:2}"); }
-tool python -m mypy.stubtest --mypy-config-file "$PWD/pyproject.toml" sonard
-tool python -m mypy --config-file "$PWD/pyproject.toml" --cache-dir "$work/mypy" \
-  "$PWD/package" "$PWD/tests" "$PWD/gallery"
-target/venv/bin/pytest --durations=5 -rs
-for interpreter in ${PYTHON_INTERPRETERS:-}; do
-  folder=target/venv-$(basename "$interpreter")
-  INTERPRETER=$interpreter ../tests/venv.sh "$folder" PYTHON=0 numpy pytest hypothesis matplotlib
-  "$folder/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps "$wheel"
-  "$folder/bin/python" --version
-  "$folder/bin/pytest"
-done
+case ${1:-} in
+"")
+  build_wheel
+  run_tests
+  ;;
+build) build_wheel ;;
+tests) run_tests ;;
+*)
+  echo "python/test.sh: all (no argument), build or tests, not $1" >&2
+  exit 1
+  ;;
+esac

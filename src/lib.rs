@@ -39,9 +39,11 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub use sonard_export as export;
+#[cfg(feature = "generate")]
 pub use sonard_generate as generate;
 pub use sonard_import as import;
 pub use sonard_interpret::{compare, explore, interpret};
+#[cfg(feature = "inverse")]
 pub use sonard_inverse as inverse;
 pub use sonard_model::{acoustics, array, geometry, model, motion, scene, viewpoint};
 #[cfg(feature = "plot")]
@@ -60,7 +62,7 @@ pub mod collect;
 pub mod config;
 #[cfg(feature = "daemon")]
 pub mod daemon;
-#[cfg(feature = "store")]
+#[cfg(feature = "generate")]
 pub mod dataset;
 #[cfg(feature = "daemon")]
 pub mod fleet;

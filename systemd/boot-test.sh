@@ -70,7 +70,7 @@ install_program() {
 later_package() {
   dpkg-deb --raw-extract "$1" "$work/later"
   sed -i 's/^Version: .*/Version: 99.0-1/' "$work/later/DEBIAN/control"
-  dpkg-deb --root-owner-group --build "$work/later" "$2" >/dev/null
+  dpkg-deb -Zgzip -z1 --root-owner-group --build "$work/later" "$2" >/dev/null
 }
 
 install_checks() {

@@ -6,6 +6,9 @@ set -euo pipefail
 without=$1
 shift
 if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
+  # One at a time: steps of test.sh run beside each other.
+  exec 9<"$0"
+  flock 9
   apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@" >/dev/null
 else
   echo "missing here: sudo apt-get install --no-install-recommends $*${without:+, or $without}" >&2

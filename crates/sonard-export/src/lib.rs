@@ -1,5 +1,5 @@
-//! Scans in the formats of other tools: tables (CSV, Parquet) of readings beside predictions, and recordings of
-//! ROS 2 (MCAP); maps, lines and features as recordings and as GeoJSON.
+//! Scans in the formats of other tools: tables (CSV, and with the feature `parquet` Parquet) of readings beside
+//! predictions, and recordings of ROS 2 (MCAP); maps, lines and features as recordings and as GeoJSON.
 //!
 //! [`Live`] converts records to the messages of a recording as they arrive. [`foxglove`] is the protocol of live
 //! viewers, [`dds`] has topic names and encapsulation for ROS 2.
@@ -15,6 +15,7 @@ pub mod dds;
 mod error;
 pub mod foxglove;
 mod live;
+#[cfg(feature = "parquet")]
 mod parquet;
 mod place;
 mod recording;
@@ -32,6 +33,7 @@ pub use columns::{COLUMNS, Column, Field, Kind, Row, Value};
 pub use conversion::{Distribution, Profile, Settings, Topic};
 pub use error::{ExportError, LeftOut};
 pub use live::{Live, LiveMessage};
+#[cfg(feature = "parquet")]
 pub use parquet::{ParquetExport, TypedTable};
 pub use place::{Findings, begins_geojson, to_geojson, write_findings};
 pub use recording::McapExport;
