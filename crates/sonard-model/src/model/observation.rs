@@ -95,12 +95,12 @@ impl<'a> ObservationPoint<'a> {
     ) -> Result<(T, f64), TooCostly> {
         let mut arrivals = Vec::with_capacity(USUAL_ARRIVALS);
         self.at(direction_rad, |all| {
-            let ((heard, needed_m), _) = all.nearest(|near, reach_m| {
+            let ((heard, needed_m), _) = all.nearest(|near| {
                 near.listen(direction_rad, &mut arrivals);
                 let ear = Ear {
                     firing: Firing { from: near, direction_rad },
                     arrivals: &arrivals,
-                    reach_m,
+                    reach_m: near.reach_m,
                     needed_m: Cell::new(Some(0.0)),
                 };
                 let heard = listen(&ear);
@@ -132,19 +132,19 @@ impl<'a> ObservationPoint<'a> {
     ) -> Result<(Prediction, f64), TooCostly> {
         let (receiver, mut own) = (self.simulator.receiver(), Vec::new());
         self.at(direction_rad, |all| {
-            let ((detection, sorted, needed_m), near) = all.nearest(|near, reach_m| {
+            let ((detection, sorted, needed_m), near) = all.nearest(|near| {
                 near.listen(direction_rad, &mut own);
                 let sorted = medley.sorted(&own);
                 let firing = Firing { from: near, direction_rad };
                 let incident = |arrival: &PulseArrival| {
                     Some(medley.incident(&sorted, arrival, |own| firing.incident(own)))
                 };
-                let known_m = reach_m.min(medley.known_m);
+                let known_m = near.reach_m.min(medley.known_m);
                 let (detection, needed_m) =
                     receiver.detect_within(known_m, &sorted.arrivals, &incident, Latch::First, 0.0);
                 ((detection, sorted, needed_m.unwrap_or(f64::INFINITY)), needed_m)
             })?;
-            let firing = Firing { from: near, direction_rad };
+            let firing = Firing { from: &near, direction_rad };
             Ok((firing.prediction_among(detection, medley, &sorted), needed_m))
         })
     }
