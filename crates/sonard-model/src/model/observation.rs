@@ -13,7 +13,9 @@ use super::{
     simulator::Simulator,
 };
 use crate::{
-    acoustics::{Detection, EchoTrace, Incident, Latch, PulseArrival, Receiver, ReceiverNoise},
+    acoustics::{
+        Detection, EchoTrace, Incident, Latch, Listening, PulseArrival, Receiver, ReceiverNoise,
+    },
     geometry::DVec2,
 };
 
@@ -283,9 +285,25 @@ impl Ear<'_> {
             if receiver.asks_incidents() { &incident } else { &|_| None };
         let (detection, needed_m) =
             receiver.detect_within(self.reach_m, self.arrivals, incident, latch, ready_us);
+        self.needs(needed_m);
+        detection
+    }
+
+    /// Listens with receivers that have a threshold of their own each, and are otherwise this one.
+    pub fn listen<T>(&self, receiver: &Receiver, listen: impl FnOnce(&mut Listening) -> T) -> T {
+        let incident = |arrival: &PulseArrival| Some(self.firing.incident(arrival));
+        let incident: &dyn Fn(&PulseArrival) -> Option<Incident> =
+            if receiver.asks_incidents() { &incident } else { &|_| None };
+        let mut listening = receiver.listen(self.reach_m, self.arrivals, incident);
+        let heard = listen(&mut listening);
+        self.needs(listening.needed_m());
+        heard
+    }
+
+    /// Takes down up to which length arrivals mattered to one more answer.
+    fn needs(&self, needed_m: Option<f64>) {
         let both = self.needed_m.get().zip(needed_m);
         self.needed_m.set(both.map(|(one_m, other_m)| one_m.max(other_m)));
-        detection
     }
 
     /// A detection as a reading, with the path of its arrival.
