@@ -146,7 +146,7 @@ impl<'a> Connector<'a> {
                 .contact_floor(half_path.level > 0, half_path.least_m + other_m)
                 .powi(2)
         };
-        let tracer = HalfPathTracer::new(self.plan, out.views, half_path);
+        let mut tracer = None;
         for group in groups {
             let (most, least) = (half_path.strength.with(&group.most), floor(group.least_m));
             // In whatever directions: a cheap test before the one that asks for them.
@@ -166,9 +166,12 @@ impl<'a> Connector<'a> {
                     return;
                 }
                 if self.may_meet(half_path, other, floor(other.least_m)) {
+                    let tracer = tracer.get_or_insert_with(|| {
+                        HalfPathTracer::new(self.plan, out.views, half_path)
+                    });
                     let other = HalfPathTracer::new(self.plan, back.views, other);
                     self.plan.effort.step(SearchPart::Cylinders, STEPS_A_PAIR);
-                    let pair = self.pair(&tracer, &other);
+                    let pair = self.pair(tracer, &other);
                     self.plan.effort.keep::<(Pair, Echo, Echo)>(pair.iter().len());
                     found.extend(pair);
                 }

@@ -113,7 +113,7 @@ impl<'a> TubeGrower<'a> {
         if !self.plan.settings.allows(beam.order + 1) {
             return;
         }
-        let tracer = Tracer { plan: self.plan, view: &self.views[index as usize], surfaces: &[] };
+        let tracer = Tracer::new(self.plan, &self.views[index as usize], &[]);
         let ends = [span.from_rad, span.to_rad];
         // As they leave: before its first cylinder a ray has no front.
         let borders = ends.map(|at| tracer.front(at));
@@ -188,11 +188,8 @@ impl<'a> TubeGrower<'a> {
         if half_path.link != DIRECT {
             surfaces.push(surface);
         }
-        let tracer = Tracer {
-            plan: self.plan,
-            view: &self.views[half_path.view as usize],
-            surfaces: &surfaces,
-        };
+        let view = &self.views[half_path.view as usize];
+        let tracer = Tracer::new(self.plan, view, &surfaces);
         split(&tube, &tracer, circle, 0, partners, &mut self.waiting);
     }
 
@@ -203,32 +200,44 @@ impl<'a> TubeGrower<'a> {
         }
         let surfaces = surfaces_to(&self.rays.links, tube.link);
         let view = &self.views[tube.view as usize];
-        let tracer = Tracer { plan: self.plan, view, surfaces: &surfaces };
+        let tracer = Tracer::new(self.plan, view, &surfaces);
         let mut cuts: SmallVec<[f64; 8]> = self.meet_corners(tube, &tracer);
         let mut hits = Hits::of(tube, &tracer);
         cuts.extend(hits.cuts());
         cuts.sort_by(f64::total_cmp);
-        let inside = cuts.iter().filter(|&&at| tube.span.from_rad < at && at < tube.span.to_rad);
-        let inside = inside.map(|&at| (at, tracer.front(at)));
-        let [from, to] = tube.borders;
-        let first = (tube.span.from_rad, from);
-        let ends: SmallVec<[(f64, Front); 8]> =
-            [first].into_iter().chain(inside).chain([(tube.span.to_rad, to)]).collect();
-        for pair in ends.windows(2) {
-            let span = Span { from_rad: pair[0].0, to_rad: pair[1].0 };
-            if span.to_rad <= span.from_rad {
-                continue;
-            }
-            let middle = tracer.front(0.5 * (span.from_rad + span.to_rad));
-            if hits.lets_pass(span, &middle) {
-                let part = Tube { span, borders: [pair[0].1, pair[1].1], ..*tube };
-                self.leave(&part, &middle);
+        let Span { from_rad, to_rad } = tube.span;
+        let [mut from, last] = [(from_rad, tube.borders[0]), (to_rad, tube.borders[1])];
+        for &at in cuts.iter().filter(|&&at| from_rad < at && at < to_rad) {
+            if at > from.0 {
+                let to = (at, tracer.front(at));
+                self.follow_part(tube, &tracer, &mut hits, [from, to]);
+                from = to;
             }
         }
-        let met = hits.met();
-        let met = met.filter_map(|(cylinder, span)| self.half_path(tube, &tracer, cylinder, span));
-        let met: SmallVec<[HalfPath; 2]> = met.collect();
-        self.half_paths.extend(met);
+        self.follow_part(tube, &tracer, &mut hits, [from, last]);
+        for (cylinder, span) in hits.met() {
+            let met = self.half_path(tube, &tracer, cylinder, span);
+            self.half_paths.extend(met);
+        }
+    }
+
+    /// Follows the part of a tube between two rays, by their contacts, all of which meets the same.
+    fn follow_part(
+        &mut self,
+        tube: &Tube,
+        tracer: &Tracer,
+        hits: &mut Hits,
+        [from, to]: [(f64, Front); 2],
+    ) {
+        let span = Span { from_rad: from.0, to_rad: to.0 };
+        if span.to_rad <= span.from_rad {
+            return;
+        }
+        let middle = tracer.front(0.5 * (span.from_rad + span.to_rad));
+        if hits.lets_pass(span, &middle) {
+            let part = Tube { span, borders: [from.1, to.1], ..*tube };
+            self.leave(&part, &middle);
+        }
     }
 
     /// Whether an echo of the tube can still be short and strong enough.

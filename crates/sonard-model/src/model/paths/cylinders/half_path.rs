@@ -59,7 +59,7 @@ pub(crate) struct HalfPathTracer<'a> {
 impl<'a> HalfPathTracer<'a> {
     pub(crate) fn new(plan: &'a Plan, views: &'a [View], half_path: &'a HalfPath) -> Self {
         let view = &views[half_path.view as usize];
-        Self { half_path, tracer: Tracer { plan, view, surfaces: &half_path.surfaces } }
+        Self { half_path, tracer: Tracer::new(plan, view, &half_path.surfaces) }
     }
 
     /// How steeply its rays can climb, as far as the beam before its first cylinder tells.

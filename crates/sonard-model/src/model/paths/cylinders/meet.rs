@@ -110,17 +110,11 @@ impl TubeGrower<'_> {
         }
         let Span { from_rad, to_rad } = span;
         let borders = [from_rad, to_rad].map(|at| tracer.front(at));
-        let middle = 0.5 * (from_rad + to_rad);
-        let contact = |front: &Front, at, near| Contact::of(front, circle, tube.mirrored, at, near);
-        let half = contact(&tracer.front(middle), middle, 0.0);
-        let near = half.angle_rad;
-        let mut ends = [(&borders[0], from_rad), (&borders[1], to_rad)]
-            .map(|(front, at)| contact(front, at, near));
-        if !tube.mirrored {
-            ends.reverse();
-        }
-        let least = |of: fn(&Contact) -> f64| of(&ends[0]).min(of(&ends[1])).min(of(&half));
-        let spread = [least(|c| c.length_m), least(|c| c.width_m), least(|c| c.growth)];
+        let middle = tracer.front(0.5 * (from_rad + to_rad));
+        let hits = [&borders[0], &borders[1], &middle].map(|front| front.onto(circle));
+        let least =
+            |of: fn(&Front) -> f64| hits.iter().map(|hit| of(&hit.0)).fold(f64::MAX, f64::min);
+        let spread = [least(|hit| hit.length_m), least(|hit| hit.width_m), least(|hit| hit.growth)];
         let strength = Strength::of(tube.gain, spread, self.radius_m, settings);
         let least_m = spread[0] + self.back_m(circle);
         let is_worth = strength.with(&tube.partner)
@@ -128,6 +122,12 @@ impl TubeGrower<'_> {
             || self.has_edges && self.is_worth_an_edge(tube.gain, spread, least_m);
         if !is_worth || least_m > settings.max_path_m {
             return None;
+        }
+        let near = hits[2].1.to_angle();
+        let mut ends = [(hits[0], from_rad), (hits[1], to_rad)]
+            .map(|(hit, at)| Contact::at(hit, circle, tube.mirrored, at, near));
+        if !tube.mirrored {
+            ends.reverse();
         }
         Some(HalfPath {
             cylinder,
