@@ -85,11 +85,14 @@ impl<'a> HalfPathTracer<'a> {
         if !self.half_path.mirrored {
             ends.reverse();
         }
+        let mut last = None;
         let at_rad = zero_between([from_rad, to_rad], ends, EXACT_RAD, |at| {
             let contact = self.contact(at, near_rad);
+            last = Some(contact);
             (contact.angle_rad - angle_rad, contact.angle_rate)
         });
-        self.contact(at_rad, near_rad)
+        let found = last.filter(|contact| contact.at_rad == at_rad);
+        found.unwrap_or_else(|| self.contact(at_rad, near_rad))
     }
 
     /// The direction in which that ray leaves.

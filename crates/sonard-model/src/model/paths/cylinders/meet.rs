@@ -12,7 +12,7 @@ use super::{
     half_path::HalfPath,
     strength::Strength,
     tracer::Tracer,
-    tube::{Tube, ray_past},
+    tube::{Tube, front_past, ray_past},
 };
 use crate::{
     geometry::DVec2,
@@ -167,15 +167,15 @@ fn met_spans(
         return SmallVec::new();
     }
     // Where the rays touch the circle, its centre to their left and to their right.
-    let ends = [(right, 1.0), (left, -1.0)].map(|(border, side)| {
+    let touching = [(right, 1.0), (left, -1.0)].map(|(border, side)| {
         let beyond = side * border.offset_m(center) > r;
         let own = if std::ptr::eq(border, &tube.borders[0]) { from_rad } else { to_rad };
-        if beyond { ray_past(tube, tracer, center, side * r) } else { own }
+        if beyond { front_past(tube, tracer, center, side * r) } else { (own, *border) }
     });
+    let ends = touching.each_ref().map(|ray| ray.0);
     // Their contacts: clockwise around the circle from right to left.
-    let contact = |at: f64| (tracer.front(at).onto(circle).1).to_angle();
-    let last = contact(ends[1]);
-    let turn = (contact(ends[0]) - last).rem_euclid(TAU);
+    let [first, last] = touching.map(|(_, front)| front.onto(circle).1.to_angle());
+    let turn = (first - last).rem_euclid(TAU);
     let lit = Span { from_rad: last, to_rad: last + turn };
     lit.common(&arc.span)
         .into_iter()

@@ -100,14 +100,36 @@ pub(crate) fn split(
 /// distance between neighbouring rays abreast of the point, `width + growth * ahead`, times the angle between
 /// them at departure over that between their contacts (`rate`).
 pub(crate) fn ray_past(tube: &Tube, tracer: &Tracer, point: DVec2, offset_m: f64) -> f64 {
-    let ends = tube.borders.each_ref().map(|border| border.offset_m(point) - offset_m);
+    front_past(tube, tracer, point, offset_m).0
+}
+
+/// The same with the ray.
+pub(crate) fn front_past(
+    tube: &Tube,
+    tracer: &Tracer,
+    point: DVec2,
+    offset_m: f64,
+) -> (f64, Front) {
+    let Span { from_rad, to_rad } = tube.span;
+    let [from, to] = &tube.borders;
+    let ends = [from, to].map(|border| border.offset_m(point) - offset_m);
     // Farther along the first contact's surface a ray is farther to the left.
     let sense = if tube.mirrored { 1.0 } else { -1.0 };
-    zero_between([tube.span.from_rad, tube.span.to_rad], ends, EXACT_M, |at| {
+    let mut last = (from_rad, *from);
+    let at = zero_between([from_rad, to_rad], ends, EXACT_M, |at| {
         let front = tracer.front(at);
+        last = (at, front);
         let width_m = front.width_m + front.growth * front.ahead_m(point);
         (front.offset_m(point) - offset_m, sense * front.rate * width_m)
-    })
+    });
+    let front = if at == last.0 {
+        last.1
+    } else if at == to_rad {
+        *to
+    } else {
+        tracer.front(at)
+    };
+    (at, front)
 }
 
 /// The ray of the tube through a point; `None` if the point is beside it.
@@ -117,8 +139,7 @@ pub(crate) fn ray_through(tube: &Tube, tracer: &Tracer, point: DVec2) -> Option<
     if !is_between {
         return None;
     }
-    let at = ray_past(tube, tracer, point, 0.0);
-    let front = tracer.front(at);
+    let (at, front) = front_past(tube, tracer, point, 0.0);
     (front.ahead_m(point) > 0.0).then_some((at, front))
 }
 
