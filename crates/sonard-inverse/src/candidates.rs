@@ -2,8 +2,9 @@
 
 use smallvec::SmallVec;
 use sonard_model::{
-    acoustics::{Combining, Detection, Latch, Receiver},
+    acoustics::{Combining, Detection, Listening, PulseArrival, Receiver},
     model::{Ear, ObservationPoint, Prediction, TooCostly},
+    reading::PingStatus,
 };
 
 /// Thresholds that are looked at, decibels to both sides of the nominal one.
@@ -50,7 +51,8 @@ pub(crate) type Candidates = SmallVec<[Candidate; 3]>;
 /// Asks the model what a receiver would report at thresholds other than its own.
 pub(crate) struct Listener {
     receiver: Receiver,
-    threshold: f64,
+    /// Thresholds that are looked at, decibels to both sides of the nominal one.
+    span_db: f64,
 }
 
 /// What a receiver with some threshold detects.
@@ -62,44 +64,60 @@ struct Detected {
     reaches_db: f64,
 }
 
+/// A detection as far as it takes to tell whether another one is of the same rise.
+struct Told {
+    status: PingStatus,
+    range_m: f64,
+    arrival: Option<PulseArrival>,
+    /// The threshold, decibels above the nominal one.
+    by_db: f64,
+}
+
 impl Listener {
-    pub(crate) fn new(receiver: &Receiver, phases: Phases) -> Self {
+    /// For thresholds up to `span_db` decibels to both sides of the nominal one.
+    pub(crate) fn new(receiver: &Receiver, phases: Phases, span_db: f64) -> Self {
         // Steps in which ranges are told would hide how they move.
         let mut receiver = receiver.clone();
         receiver.range_step_m = 0.0;
         if phases == Phases::Unknown && receiver.combining == Combining::Coherent {
             receiver.combining = Combining::Incoherent;
         }
-        Self { threshold: receiver.threshold, receiver }
+        Self { receiver, span_db }
     }
 
     /// All that a firing could come to.
     pub(crate) fn candidates(
-        &mut self,
+        &self,
         point: &ObservationPoint,
         direction_rad: f64,
     ) -> Result<Candidates, TooCostly> {
-        point.hear(direction_rad, |ear| self.rising(ear))
+        point.hear(direction_rad, |ear| {
+            ear.listen(&self.receiver, |listening| self.rising(ear, listening))
+        })
     }
 
     /// From the lowest threshold up. A higher one is passed no earlier, so that time runs forward, too.
-    fn rising(&mut self, ear: &Ear) -> Candidates {
+    fn rising(&self, ear: &Ear, listening: &mut Listening) -> Candidates {
         let mut found = Candidates::new();
         let mut last: Option<Detected> = None;
-        let (mut by_db, mut ready_us) = (-SPAN_DB, 0.0);
-        while by_db < SPAN_DB && found.len() < MOST {
-            let mut next = self.detect(ear, by_db, ready_us);
+        let (mut by_db, mut ready_us) = (-self.span_db, 0.0);
+        while by_db < self.span_db && found.len() < MOST {
+            let mut next = detected(listening, by_db, ready_us);
             ready_us = next.detection.echoes_us.first().copied().unwrap_or(ready_us);
-            let until_db = self.lost(ear, by_db, &next, ready_us);
+            let until_db = self.lost(listening, by_db, &next, ready_us);
             if by_db < 0.0 && until_db > 0.0 {
                 // What is reported at the usual threshold is told as it is there.
-                let usual = self.detect(ear, 0.0, ready_us);
-                if self.is_same(&next, &usual) {
+                let usual = detected(listening, 0.0, ready_us);
+                if self.is_same(&next, usual.told().as_ref()) {
                     (next, by_db) = (usual, 0.0);
                 }
             }
             match found.last_mut() {
-                Some(known) if last.as_ref().is_some_and(|last| self.is_same(last, &next)) => {
+                Some(known)
+                    if last
+                        .as_ref()
+                        .is_some_and(|last| self.is_same(last, next.told().as_ref())) =>
+                {
                     known.until_db = known.until_db.max(until_db);
                 }
                 _ => {
@@ -114,17 +132,6 @@ impl Listener {
         }
         found
     }
-
-    fn detect(&mut self, ear: &Ear, by_db: f64, ready_us: f64) -> Detected {
-        // The time that a firing with another threshold is late by stays in: `with_threshold` would take it out.
-        self.receiver.threshold = self.threshold * 10f64.powf(by_db / 20.0);
-        let detection = ear.detect(&self.receiver, Latch::First, ready_us);
-        let margin_db = detection.margin_db.unwrap_or(0.0).max(0.0);
-        let reaches_db =
-            if detection.status.has_range() { by_db + margin_db } else { f64::INFINITY };
-        Detected { detection, by_db, reaches_db }
-    }
-
     /// By how much the strength of an arrival may be off that meets others with unknown phases. Of two sounds whose
     /// amplitudes have the ratio `r`, the sum's level spreads by 6.1 `r` decibels for small `r` and by 7.8 for 1, once
     /// all phases are equally likely.
@@ -147,15 +154,27 @@ impl Listener {
 
     /// The threshold at which an arrival is no longer reported that is at `from_db`. The peak of its envelope says
     /// so, unless another follows so closely that the peak is that one's.
-    fn lost(&mut self, ear: &Ear, from_db: f64, reported: &Detected, ready_us: f64) -> f64 {
-        let said_db = reported.reaches_db;
-        let beyond = if said_db < SPAN_DB { said_db - STEP_DB } else { SPAN_DB };
+    fn lost(
+        &self,
+        listening: &mut Listening,
+        from_db: f64,
+        reported: &Detected,
+        ready_us: f64,
+    ) -> f64 {
+        let (said_db, span_db) = (reported.reaches_db, self.span_db);
+        let beyond = if said_db < span_db { said_db - STEP_DB } else { span_db };
         if said_db.is_infinite() || beyond <= from_db {
-            return said_db.min(SPAN_DB.max(from_db));
+            return said_db.min(span_db.max(from_db));
         }
         let mut is_reported = |by_db: f64| {
-            let detected = self.detect(ear, by_db, ready_us);
-            self.is_same(reported, &detected)
+            let rise = listening.rise(factor(by_db), ready_us);
+            let told = rise.map(|rise| Told {
+                status: rise.status,
+                range_m: rise.range_m,
+                arrival: rise.arrival,
+                by_db,
+            });
+            self.is_same(reported, told.as_ref())
         };
         if is_reported(beyond) {
             return said_db;
@@ -171,22 +190,45 @@ impl Listener {
     /// Whether two detections are of the same rise of the envelope, one at a higher threshold: of the same arrival, and
     /// no later than that arrival takes to rise further. Where arrivals overlap the first may fade before the next one
     /// drives the envelope on, and a little more of threshold makes the echo centimetres later.
-    fn is_same(&self, one: &Detected, higher: &Detected) -> bool {
-        let length_m = |detection: &Detection| match detection.status.has_range() {
-            true => detection.arrival.map(|arrival| arrival.length_m),
-            false => None,
+    fn is_same(&self, reported: &Detected, higher: Option<&Told>) -> bool {
+        let (one, higher) = match (reported.told(), higher) {
+            (None, None) => return true,
+            (Some(one), Some(higher)) => (one, higher),
+            _ => return false,
         };
-        let [first, second] = [&one.detection, &higher.detection];
-        let is_same_arrival = match (length_m(first), length_m(second)) {
-            (Some(one_m), Some(other_m)) => (one_m - other_m).abs() < 1e-6,
+        let is_same_arrival = match (&one.arrival, &higher.arrival) {
+            (Some(one), Some(other)) => (one.length_m - other.length_m).abs() < 1e-6,
             (None, None) => true,
             _ => false,
         };
-        let later_m = first.range_m.zip(second.range_m).map_or(0.0, |(one, other)| other - one);
+        if one.status != higher.status || !is_same_arrival {
+            return false;
+        }
         // At the very top, where a pulse is flat, its rise takes any time.
-        let margin_db = |of: &Detected| (one.reaches_db - of.by_db).max(LEAST_MARGIN_DB);
-        let walk_m = |of: &Detected| self.receiver.time_walk_m(margin_db(of));
-        let jump_m = later_m - (walk_m(higher) - walk_m(one));
-        first.status == second.status && is_same_arrival && jump_m < JUMP_M
+        let margin_db = |of: &Told| (reported.reaches_db - of.by_db).max(LEAST_MARGIN_DB);
+        let walk_m = |of: &Told| self.receiver.time_walk_m(margin_db(of));
+        let later_m = higher.range_m - one.range_m;
+        later_m < JUMP_M || later_m - (walk_m(higher) - walk_m(&one)) < JUMP_M
     }
+}
+
+impl Detected {
+    /// `None` of silence.
+    fn told(&self) -> Option<Told> {
+        let Detection { status, range_m, arrival, .. } = self.detection;
+        Some(Told { status, range_m: range_m?, arrival, by_db: self.by_db })
+    }
+}
+
+/// What a receiver detects whose threshold is higher by so many decibels.
+fn detected(listening: &mut Listening, by_db: f64, ready_us: f64) -> Detected {
+    // The time that a firing with another threshold is late by stays in: `with_threshold` would take it out.
+    let detection = listening.detect(factor(by_db), ready_us);
+    let margin_db = detection.margin_db.unwrap_or(0.0).max(0.0);
+    let reaches_db = if detection.status.has_range() { by_db + margin_db } else { f64::INFINITY };
+    Detected { detection, by_db, reaches_db }
+}
+
+fn factor(by_db: f64) -> f64 {
+    10f64.powf(by_db / 20.0)
 }

@@ -57,7 +57,8 @@ impl Hypotheses {
     ) -> Result<LogLikelihood, WorldError> {
         let parameters: Vec<&Parameter> = self.parameters.iter().collect();
         let reference_m_s = self.world.air.sound_speed_m_s();
-        let rates = RateFinder::new(&self.world, &parameters, reference_m_s, Phases::Known);
+        let rates = RateFinder::new(&self.world, &parameters, reference_m_s, Phases::Known)
+            .with_threshold_spread(errors.sigma_db);
         let linear = Linear::about(
             &self.models,
             &rates,

@@ -51,9 +51,14 @@ impl Linear {
                 Ok(rates.sweep(simulator, point, number, sweep, pose)?)
             })
         };
+        let count = rates.parameters();
+        if let ([sweep], [pose]) = (sweeps, poses) {
+            // Another thread would take longer to wake up than most sweeps take.
+            return Ok(Self { beams: of((0, (sweep, pose)))?, count });
+        }
         let beams: Result<Vec<Vec<Judged>>, WorldError> =
             sweeps.par_iter().zip(poses).enumerate().map(of).collect();
-        Ok(Self { beams: beams?.into_iter().flatten().collect(), count: rates.parameters() })
+        Ok(Self { beams: beams?.into_iter().flatten().collect(), count })
     }
 
     /// Log-likelihoods of one sweep from a pose turned by so many degrees each and at thresholds higher by so many

@@ -11,7 +11,7 @@ use sonard_model::{
 };
 
 use crate::{
-    candidates::{Candidate, Listener, Phases},
+    candidates::{Candidate, Listener, Phases, SPAN_DB},
     judged::{Judged, Possible, Rates},
     motion::{Motion, length_rate},
     parameter::Parameter,
@@ -32,6 +32,8 @@ pub(crate) struct RateFinder<'a> {
     changed_beams: Vec<Option<(BeamPattern, f64)>>,
     reference_m_s: f64,
     phases: Phases,
+    /// Thresholds that are looked at, decibels to both sides of the nominal one.
+    span_db: f64,
 }
 
 /// A firing.
@@ -57,7 +59,16 @@ impl<'a> RateFinder<'a> {
         let steady = parameters.iter().map(|parameter| world.steady_motion(parameter)).collect();
         let changed = |parameter: &&Parameter| changed_beam(world, parameter);
         let changed_beams = parameters.iter().map(changed).collect();
-        Self { world, parameters, steady, changed_beams, reference_m_s, phases }
+        let span_db = SPAN_DB;
+        Self { world, parameters, steady, changed_beams, reference_m_s, phases, span_db }
+    }
+
+    /// The same for thresholds that vary by a standard deviation in decibels and are not changed: what only others
+    /// would report is left out.
+    pub(crate) fn with_threshold_spread(self, sigma_db: f64) -> Self {
+        /// Beyond so many standard deviations there is less than 1e-23.
+        const SIGMAS: f64 = 10.0;
+        Self { span_db: SPAN_DB.min(SIGMAS * sigma_db), ..self }
     }
 
     /// How many parameters there are.
@@ -74,7 +85,7 @@ impl<'a> RateFinder<'a> {
         sweep: &Sweep,
         pose: &Pose,
     ) -> Result<Vec<Judged>, TooCostly> {
-        let mut listener = Listener::new(simulator.receiver(), self.phases);
+        let listener = Listener::new(simulator.receiver(), self.phases, self.span_db);
         let concerns = |parameter: &Parameter| parameter.sweep().is_none_or(|of| of == number);
         let all = self.parameters.iter().zip(0u32..);
         let concerning: Vec<u32> =
@@ -82,7 +93,7 @@ impl<'a> RateFinder<'a> {
         let mut judged = |beam: &Beam| {
             let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
             let firing = Firing::new(simulator, pose, direction_rad, beam);
-            let possible = self.all_possible(&mut listener, point, &firing, &concerning)?;
+            let possible = self.all_possible(&listener, point, &firing, &concerning)?;
             Ok(Judged { heard_m: beam.heard.range_m(self.reference_m_s), possible })
         };
         sweep.beams.iter().map(&mut judged).collect()
@@ -98,7 +109,7 @@ impl<'a> RateFinder<'a> {
         pose: &Pose,
         turns_deg: &[f64],
     ) -> Result<Vec<Vec<Judged>>, TooCostly> {
-        let mut listener = Listener::new(simulator.receiver(), self.phases);
+        let listener = Listener::new(simulator.receiver(), self.phases, self.span_db);
         let all: Vec<u32> = (0..self.parameters.len() as u32).collect();
         let mut known: HashMap<i64, SmallVec<[Possible; 3]>> = HashMap::new();
         let mut judged = |beam: &Beam, by_deg: f64| {
@@ -109,7 +120,7 @@ impl<'a> RateFinder<'a> {
                 Entry::Vacant(unknown) => {
                     let direction_rad = (place as f64 * GRID_DEG).to_radians();
                     let firing = Firing::new(simulator, pose, direction_rad, beam);
-                    let possible = self.all_possible(&mut listener, point, &firing, &all)?;
+                    let possible = self.all_possible(&listener, point, &firing, &all)?;
                     unknown.insert(possible).clone()
                 }
             };
@@ -122,7 +133,7 @@ impl<'a> RateFinder<'a> {
 
     fn all_possible(
         &self,
-        listener: &mut Listener,
+        listener: &Listener,
         point: &ObservationPoint,
         firing: &Firing,
         concerning: &[u32],

@@ -86,6 +86,16 @@ pub fn wrap_180(angle_deg: f64) -> f64 {
 #[must_use]
 pub fn wrap_pi(angle_rad: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
+    // Nearly all are a turn off at most; the remainder of a division costs more than what they are for.
+    if angle_rad.abs() < 3.0 * PI {
+        return if angle_rad > PI {
+            angle_rad - TAU
+        } else if angle_rad <= -PI {
+            angle_rad + TAU
+        } else {
+            angle_rad
+        };
+    }
     let wrapped = angle_rad.rem_euclid(TAU);
     if wrapped > PI { wrapped - TAU } else { wrapped }
 }

@@ -5,7 +5,7 @@ use sonard_model::{acoustics::Latch, geometry::Pose};
 
 use crate::{
     World,
-    candidates::{Listener, Phases},
+    candidates::{Listener, Phases, SPAN_DB},
 };
 
 /// Where arrivals overlap, the first may fade before the next one drives the envelope on, and a little more of threshold
@@ -24,7 +24,7 @@ fn jumps_from(here: &World, x_m: f64) -> u32 {
     let pose = Pose { x_m, y_m: -0.3, heading_deg: 0.0 };
     let simulator = here.simulator(&pose).expect("a model");
     let point = simulator.at(pose.position());
-    let mut listener = Listener::new(simulator.receiver(), Phases::Known);
+    let listener = Listener::new(simulator.receiver(), Phases::Known, SPAN_DB);
     let mut receiver = simulator.receiver().clone();
     let mut jumps = 0;
     for step in 0..400 {
@@ -60,7 +60,7 @@ fn at_each_threshold_the_candidate_is_what_a_receiver_with_it_reports() {
         let pose = first_pose(&here.scene);
         let simulator = here.simulator(&pose).expect("a model");
         let point = simulator.at(pose.position());
-        let mut listener = Listener::new(simulator.receiver(), Phases::Known);
+        let listener = Listener::new(simulator.receiver(), Phases::Known, SPAN_DB);
         let mut receiver = simulator.receiver().clone();
         for step in 0..200 {
             let direction_rad = here.direction_rad(&pose, 1.8 * f64::from(step));

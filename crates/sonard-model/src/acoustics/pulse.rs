@@ -18,6 +18,8 @@ pub struct EchoShape {
     step_us: f64,
     steps_per_us: f64,
     samples: Vec<Complex64>,
+    /// The same of an envelope that is real; empty of another.
+    real: Vec<f64>,
     /// The largest modulus up to each sample, and from each sample on.
     so_far: Vec<f64>,
     to_come: Vec<f64>,
@@ -81,11 +83,14 @@ impl EchoShape {
         }
         let steps = samples.windows(2).map(|pair| (pair[1] - pair[0]).norm());
         let steepest = steps.fold(0.0, f64::max) / step_us;
+        let is_real = samples.iter().all(|sample| sample.im == 0.0);
+        let real = samples.iter().take_while(|_| is_real).map(|sample| sample.re).collect();
         Self {
             first_us,
             step_us,
             steps_per_us: step_us.recip(),
             samples,
+            real,
             so_far,
             to_come,
             steepest,
@@ -115,6 +120,26 @@ impl EchoShape {
         let below = place as usize;
         let part = place - below as f64;
         let (low, high) = (self.samples[below], self.samples[below + 1]);
+        low + part * (high - low)
+    }
+
+    /// Whether its phase stays that of the carrier.
+    #[must_use]
+    pub(super) fn is_real(&self) -> bool {
+        !self.real.is_empty()
+    }
+
+    /// The envelope at a time, microseconds, if it [is real](Self::is_real).
+    #[must_use]
+    #[inline]
+    pub(super) fn real_at(&self, t_us: f64) -> f64 {
+        let place = (t_us - self.first_us) * self.steps_per_us;
+        if place < 0.0 || place >= self.real.len() as f64 - 1.0 {
+            return 0.0;
+        }
+        let below = place as usize;
+        let part = place - below as f64;
+        let (low, high) = (self.real[below], self.real[below + 1]);
         low + part * (high - low)
     }
 

@@ -19,6 +19,7 @@
 mod detection;
 mod gain;
 mod hearing;
+mod listening;
 mod noise;
 mod trace;
 
@@ -29,6 +30,7 @@ use std::f64::consts::TAU;
 
 pub use self::{
     detection::Detection,
+    listening::{Listening, Rise},
     noise::ReceiverNoise,
     trace::{EchoTrace, EnvelopePeak, TracePoint},
 };

@@ -74,6 +74,32 @@ pub trait Arrivals: Send + Sync {
     /// as far as the engine knows them.
     fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>);
 
+    /// The same of arrivals up to a length there and back alone, in metres.
+    fn listen_within(&self, direction_rad: f64, length_m: f64, arrivals: &mut Vec<PulseArrival>) {
+        self.listen(direction_rad, arrivals);
+        arrivals.retain(|arrival| arrival.length_m <= length_m);
+    }
+
+    /// [`arrival`](Self::arrival) of one that [`listen_within`](Self::listen_within) gave for this length.
+    fn arrival_within(
+        &self,
+        direction_rad: f64,
+        _length_m: f64,
+        arrival: &PulseArrival,
+    ) -> Arrival {
+        self.arrival(direction_rad, arrival)
+    }
+
+    /// [`incident`](Self::incident) of one that [`listen_within`](Self::listen_within) gave for this length.
+    fn incident_within(
+        &self,
+        direction_rad: f64,
+        _length_m: f64,
+        arrival: &PulseArrival,
+    ) -> Incident {
+        self.incident(direction_rad, arrival)
+    }
+
     /// The full account of an arrival that [`listen`](Self::listen) gave for the same direction.
     fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival;
 

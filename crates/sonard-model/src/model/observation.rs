@@ -13,7 +13,9 @@ use super::{
     simulator::Simulator,
 };
 use crate::{
-    acoustics::{Detection, EchoTrace, Incident, Latch, PulseArrival, Receiver, ReceiverNoise},
+    acoustics::{
+        Detection, EchoTrace, Incident, Latch, Listening, PulseArrival, Receiver, ReceiverNoise,
+    },
     geometry::DVec2,
 };
 
@@ -95,12 +97,12 @@ impl<'a> ObservationPoint<'a> {
     ) -> Result<(T, f64), TooCostly> {
         let mut arrivals = Vec::with_capacity(USUAL_ARRIVALS);
         self.at(direction_rad, |all| {
-            let ((heard, needed_m), _) = all.nearest(|near, reach_m| {
+            let ((heard, needed_m), _) = all.nearest(|near| {
                 near.listen(direction_rad, &mut arrivals);
                 let ear = Ear {
                     firing: Firing { from: near, direction_rad },
                     arrivals: &arrivals,
-                    reach_m,
+                    reach_m: near.reach_m,
                     needed_m: Cell::new(Some(0.0)),
                 };
                 let heard = listen(&ear);
@@ -132,19 +134,19 @@ impl<'a> ObservationPoint<'a> {
     ) -> Result<(Prediction, f64), TooCostly> {
         let (receiver, mut own) = (self.simulator.receiver(), Vec::new());
         self.at(direction_rad, |all| {
-            let ((detection, sorted, needed_m), near) = all.nearest(|near, reach_m| {
+            let ((detection, sorted, needed_m), near) = all.nearest(|near| {
                 near.listen(direction_rad, &mut own);
                 let sorted = medley.sorted(&own);
                 let firing = Firing { from: near, direction_rad };
                 let incident = |arrival: &PulseArrival| {
                     Some(medley.incident(&sorted, arrival, |own| firing.incident(own)))
                 };
-                let known_m = reach_m.min(medley.known_m);
+                let known_m = near.reach_m.min(medley.known_m);
                 let (detection, needed_m) =
                     receiver.detect_within(known_m, &sorted.arrivals, &incident, Latch::First, 0.0);
                 ((detection, sorted, needed_m.unwrap_or(f64::INFINITY)), needed_m)
             })?;
-            let firing = Firing { from: near, direction_rad };
+            let firing = Firing { from: &near, direction_rad };
             Ok((firing.prediction_among(detection, medley, &sorted), needed_m))
         })
     }
@@ -283,9 +285,25 @@ impl Ear<'_> {
             if receiver.asks_incidents() { &incident } else { &|_| None };
         let (detection, needed_m) =
             receiver.detect_within(self.reach_m, self.arrivals, incident, latch, ready_us);
+        self.needs(needed_m);
+        detection
+    }
+
+    /// Listens with receivers that have a threshold of their own each, and are otherwise this one.
+    pub fn listen<T>(&self, receiver: &Receiver, listen: impl FnOnce(&mut Listening) -> T) -> T {
+        let incident = |arrival: &PulseArrival| Some(self.firing.incident(arrival));
+        let incident: &dyn Fn(&PulseArrival) -> Option<Incident> =
+            if receiver.asks_incidents() { &incident } else { &|_| None };
+        let mut listening = receiver.listen(self.reach_m, self.arrivals, incident);
+        let heard = listen(&mut listening);
+        self.needs(listening.needed_m());
+        heard
+    }
+
+    /// Takes down up to which length arrivals mattered to one more answer.
+    fn needs(&self, needed_m: Option<f64>) {
         let both = self.needed_m.get().zip(needed_m);
         self.needed_m.set(both.map(|(one_m, other_m)| one_m.max(other_m)));
-        detection
     }
 
     /// A detection as a reading, with the path of its arrival.

@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::{
     Cone, Engine, EngineOptions, Fan, ObservationPoint, Options, Prediction,
     cost::TooCostly,
-    lazy::LazyArrivals,
+    lazy::{Expected, LazyArrivals},
     options::OutOfRange,
     paths::{self, PathEngine},
 };
@@ -72,6 +72,7 @@ struct Ranger {
     receiver: Receiver,
     beam: BeamPattern,
     scatter_height_rad: f64,
+    expected: Arc<Expected>,
 }
 
 impl Ranger {
@@ -145,7 +146,9 @@ impl Simulator {
         let receiver = receiver(&sensor, &air, &options);
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
         let scatter_height_rad = beam.two_way_power_rad();
-        Ranger { sensor, air, options, receiver, beam, scatter_height_rad }.simulator(scene)
+        let expected = Arc::default();
+        Ranger { sensor, air, options, receiver, beam, scatter_height_rad, expected }
+            .simulator(scene)
     }
 
     /// The same ranger in another scene. Its receiver and its beam pattern, which take longer to make than a room's
@@ -238,7 +241,8 @@ impl Simulator {
     }
 
     pub(super) fn arrivals_between(&self, at: [DVec2; 2]) -> LazyArrivals<'_> {
-        LazyArrivals::new(self.engine.as_ref(), at, 2.0 * self.ranger.receiver.max_range_m)
+        let Ranger { receiver, expected, .. } = &self.ranger;
+        LazyArrivals::new(self.engine.as_ref(), at, 2.0 * receiver.max_range_m, expected)
     }
 
     /// The options.

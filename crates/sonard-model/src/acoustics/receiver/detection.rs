@@ -34,12 +34,11 @@ impl Receiver {
         ready_us: f64,
     ) -> Detection {
         let mut echoes_us = SmallVec::new();
-        // What has been above before, for less than it takes to rise, counts.
-        let from_us = (ready_us - 2.0 * self.integration_us).max(self.blanking_us);
-        let Some(first_us) = hearing.next_rise(from_us) else {
+        let Some(first_us) = hearing.next_rise(self.listens_from_us(ready_us)) else {
             return self.silence(hearing);
         };
-        let already_there = first_us <= self.blanking_us + 1e-6;
+        let status = self.status_at(first_us);
+        let already_there = status == PingStatus::MinRange;
         let cause = hearing.cause(first_us);
         let peak = if already_there {
             hearing.level(first_us)
@@ -55,15 +54,26 @@ impl Receiver {
             echoes_us.push(next_us);
             last_us = next_us;
         }
-        let status = if already_there { PingStatus::MinRange } else { PingStatus::Echo };
         Detection {
             status,
             range_m: Some(self.range_m(first_us)),
             arrival: cause,
             amplitude: Some(peak),
-            margin_db: Some(20.0 * (peak / self.threshold_at(first_us)).log10()),
+            margin_db: Some(20.0 * (peak / hearing.threshold_at(first_us)).log10()),
             echoes_us,
         }
+    }
+
+    /// From when on the envelope matters to a detector that can't be raised before `ready_us`: what has been above
+    /// before, for less than it takes to rise, counts.
+    pub(super) fn listens_from_us(&self, ready_us: f64) -> f64 {
+        (ready_us - 2.0 * self.integration_us).max(self.blanking_us)
+    }
+
+    /// The status of a first rise.
+    pub(super) fn status_at(&self, first_us: f64) -> PingStatus {
+        let already_there = first_us <= self.blanking_us + 1e-6;
+        if already_there { PingStatus::MinRange } else { PingStatus::Echo }
     }
 
     /// As the module tells it: in whole steps of range. The end of the blanking is no range.
@@ -107,7 +117,7 @@ impl Receiver {
             amplitude: peak,
             // It may have been strong enough, but not for long enough.
             margin_db: arrival.zip(peak).map(|(arrival, peak)| {
-                let threshold = self.threshold_at(self.tof_us(&arrival));
+                let threshold = hearing.threshold_at(self.tof_us(&arrival));
                 (20.0 * (peak / threshold).log10()).min(0.0)
             }),
             echoes_us,

@@ -78,8 +78,14 @@ impl DirectionIndex {
         Self { entries: sorted, bins, reach_rad }
     }
 
-    /// Tells the entries within their reach of a direction in (-pi, pi], and how far off each is.
-    pub(crate) fn near<'a>(&'a self, direction_rad: f64, mut tell: impl FnMut(&'a Entry, f64)) {
+    /// Tells the entries within their reach of a direction in (-pi, pi], and how far off each is, of echoes numbered
+    /// below `end`.
+    pub(crate) fn near<'a>(
+        &'a self,
+        direction_rad: f64,
+        end: u32,
+        mut tell: impl FnMut(&'a Entry, f64),
+    ) {
         if self.entries.is_empty() {
             return;
         }
@@ -87,7 +93,7 @@ impl DirectionIndex {
             let at = |bin: i64| self.bins[bin.clamp(0, BINS as i64) as usize] as usize;
             for entry in &self.entries[at(from)..at(to).max(at(from))] {
                 let off_rad = wrap_once(direction_rad - entry.middle_rad);
-                if off_rad.abs() <= entry.reach_rad {
+                if off_rad.abs() <= entry.reach_rad && entry.echo < end {
                     tell(entry, off_rad);
                 }
             }
@@ -177,7 +183,7 @@ mod tests {
                     if amplitude * one_way(departure_rad) * one_way(arrival_rad) >= floor {
                         heard += 1;
                         let mut told = 0;
-                        index.near(direction_rad, |entry, off_rad| {
+                        index.near(direction_rad, u32::MAX, |entry, off_rad| {
                             told += 1;
                             let off = wrap_pi(direction_rad - middle_deg.to_radians());
                             assert!(entry.echo == 7 && (off_rad - off).abs() < 1e-9);
@@ -190,6 +196,6 @@ mod tests {
         assert!(heard > 5000, "{heard}");
         // And it is a bound that bounds: far off the axis nothing is told.
         let narrow = DirectionIndex::new(&[]);
-        narrow.near(0.0, |_, _| panic!("nothing is there"));
+        narrow.near(0.0, u32::MAX, |_, _| panic!("nothing is there"));
     }
 }

@@ -154,10 +154,13 @@ impl<'a> PathArrivals<'a> {
         Ok(Self { engine, found, indexes, face_echoes })
     }
 
-    /// Echoes by way of the face, in a direction in (-pi, pi].
-    fn multiple_echoes(&self, direction_rad: f64) -> Vec<MultipleEcho> {
+    /// Echoes by way of the face up to a length, metres, in a direction in (-pi, pi].
+    fn multiple_echoes(&self, direction_rad: f64, length_m: f64) -> Vec<MultipleEcho> {
         let (beam, settings) = (&self.engine.beam, &self.found.paths.plan.settings);
-        let found = |echoes: &FaceEchoes| echoes.multiple_echoes(direction_rad, beam, settings);
+        let most_m = length_m.min(settings.max_path_m);
+        let found = |echoes: &FaceEchoes| {
+            echoes.multiple_echoes(direction_rad, beam, settings.floor, most_m)
+        };
         self.face_echoes.as_ref().map_or_else(Vec::new, found)
     }
 
@@ -232,13 +235,18 @@ impl<'a> PathArrivals<'a> {
 
 impl Arrivals for PathArrivals<'_> {
     fn listen(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
+        self.listen_within(direction_rad, f64::INFINITY, arrivals);
+    }
+
+    fn listen_within(&self, direction_rad: f64, length_m: f64, arrivals: &mut Vec<PulseArrival>) {
         arrivals.clear();
         let direction_rad = wrap_pi(direction_rad);
         let Found { paths, echoes, .. } = &self.found;
+        let within = self.found.count_within(length_m) as u32;
         let (beam, floor) = (&self.engine.beam, paths.plan.settings.floor);
         let is_flat = self.engine.is_flat();
         for directions in &self.indexes {
-            directions.near(direction_rad, |entry, off_rad| {
+            directions.near(direction_rad, within, |entry, off_rad| {
                 let mut ends = [off_rad + entry.half_rad, off_rad - entry.half_rad];
                 if !is_flat {
                     let rise_rad = echoes[entry.echo as usize].rise_rad;
@@ -259,7 +267,7 @@ impl Arrivals for PathArrivals<'_> {
         }
         // Echoes are numbered by the lengths of their paths; multiple echoes come after all of them.
         arrivals.sort_unstable_by_key(|arrival| arrival.index);
-        let multiple = self.multiple_echoes(direction_rad);
+        let multiple = self.multiple_echoes(direction_rad, length_m);
         if !multiple.is_empty() || self.found.is_reordered() {
             let numbers = echoes.len() as u32..;
             arrivals.extend(multiple.iter().zip(numbers).map(|(echo, index)| echo.arrival(index)));
@@ -268,24 +276,38 @@ impl Arrivals for PathArrivals<'_> {
     }
 
     fn incident(&self, direction_rad: f64, arrival: &PulseArrival) -> Incident {
+        self.incident_within(direction_rad, f64::INFINITY, arrival)
+    }
+
+    fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival {
+        self.arrival_within(direction_rad, f64::INFINITY, arrival)
+    }
+
+    fn incident_within(
+        &self,
+        direction_rad: f64,
+        length_m: f64,
+        arrival: &PulseArrival,
+    ) -> Incident {
         let (echoes, index) = (&self.found.echoes, arrival.index as usize);
         if index < echoes.len() {
             return self.found.incident(arrival.index, [direction_rad; 2]);
         }
-        let multiple = &self.multiple_echoes(wrap_pi(direction_rad))[index - echoes.len()];
+        let multiple = self.multiple_echoes(wrap_pi(direction_rad), length_m);
+        let multiple = &multiple[index - echoes.len()];
         let (strength, ends_rad) = self.multiple_ends(direction_rad, multiple, arrival.amplitude);
         let [leaving_rad, arriving_rad] = ends_rad.map(|end_rad| wrap_pi(end_rad - direction_rad));
         let (length_m, image) = (multiple.length_m, self.multiple_image(multiple));
         Incident { strength, incidence: Incidence { leaving_rad, arriving_rad, length_m, image } }
     }
 
-    fn arrival(&self, direction_rad: f64, arrival: &PulseArrival) -> Arrival {
+    fn arrival_within(&self, direction_rad: f64, length_m: f64, arrival: &PulseArrival) -> Arrival {
         let (echoes, index) = (&self.found.echoes, arrival.index as usize);
         if index < echoes.len() {
             return self.found.arrival(arrival.index, arrival.amplitude);
         }
-        let multiple = &self.multiple_echoes(wrap_pi(direction_rad))[index - echoes.len()];
-        self.multiple_arrival(direction_rad, multiple, arrival.amplitude)
+        let multiple = self.multiple_echoes(wrap_pi(direction_rad), length_m);
+        self.multiple_arrival(direction_rad, &multiple[index - echoes.len()], arrival.amplitude)
     }
 }
 

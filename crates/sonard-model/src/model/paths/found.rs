@@ -64,6 +64,12 @@ impl Found {
         !self.leads_m.is_empty()
     }
 
+    /// How many of the echoes may arrive by pulses that have run up to a length, metres.
+    pub(super) fn count_within(&self, length_m: f64) -> usize {
+        let most_m = length_m + self.paths.plan.corners.most_lead_m;
+        self.echoes.partition_point(|echo| echo.length_m <= most_m)
+    }
+
     /// The full account of an echo that arrives with an amplitude.
     pub(super) fn arrival(&self, index: u32, amplitude: f64) -> Arrival {
         let path = self.paths.path(&self.traced, &self.echoes[index as usize]);

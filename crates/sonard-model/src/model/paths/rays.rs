@@ -95,7 +95,7 @@ impl Rays {
         let CylinderRay { view, link, contact_rad } = self.cylinders.rays[number as usize];
         let view = &self.beams.to_cylinders[view as usize];
         let surfaces = surfaces_to(&self.cylinders.links, link);
-        tell(&Tracer { plan, view, surfaces: &surfaces }, contact_rad)
+        tell(&Tracer::new(plan, view, &surfaces), contact_rad)
     }
 }
 

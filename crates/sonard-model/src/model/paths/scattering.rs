@@ -99,7 +99,7 @@ impl<'a> LitPart<'a> {
         let wall_mirror = &plan.walls[*wall as usize];
         let Mirror { normal, .. } = wall_mirror.mirror;
         let height_m = wall_mirror.mirror.height_m(beam.image);
-        if height_m == 0.0 {
+        if height_m == 0.0 || !is_worth(&plan.settings, beam, wall_mirror, height_m.abs()) {
             return None;
         }
         let foot_m = normal.perp().dot(beam.image);
@@ -120,6 +120,15 @@ impl<'a> LitPart<'a> {
         let WallMirror { gain: own, scatter, .. } = wall;
         [image.x, image.y, to_foot.x, to_foot.y, *gain, *own, *scatter, bottom_m, top_m]
     }
+}
+
+/// Whether any patch of a wall can be heard that an image of the start, at this height before it, lights by a beam: the
+/// one at its foot, which is nearest and squarely met. All beams of a surface ([`LitPart::surface`]) have one answer.
+fn is_worth(settings: &Settings, beam: &Beam, wall_mirror: &WallMirror, height_m: f64) -> bool {
+    let share = share(wall_mirror, 1.0, PATCH_RAD, settings);
+    let most = beam.gain * beam.gain * share.sqrt() * settings.air_gain(2.0 * height_m);
+    // Patches may be larger than that by rounding.
+    1.001 * most >= settings.floor && 2.0 * height_m <= 1.001 * settings.max_path_m
 }
 
 /// Hands on items in groups that agree in all figures from the given one on, but for rounding.

@@ -74,7 +74,9 @@ impl Hearing<'_> {
             let entry_us = self.next_entry_us();
             let live = &self.parts[self.over..];
             let most: f64 = live.iter().map(|part| part.strength).sum();
-            if most * self.rise_of_gain(t_us).max(1.0) >= self.least_threshold {
+            if most * self.rise_of_gain(t_us).max(1.0)
+                >= self.threshold_factor * self.least_threshold
+            {
                 let [part] = live else { return Skip::To(t_us) };
                 if self.gain_steps_during(part) {
                     return Skip::To(t_us);
@@ -118,7 +120,7 @@ impl Hearing<'_> {
     /// How the envelope stands to the threshold at a time; no earlier time can be asked for
     /// afterwards.
     fn standing(&mut self, t_us: f64) -> Standing {
-        let (level, threshold) = (self.level(t_us), self.receiver.threshold_at(t_us));
+        let (level, threshold) = (self.level(t_us), self.threshold_at(t_us));
         Standing { relative: level / threshold, threshold }
     }
 
@@ -135,7 +137,7 @@ impl Hearing<'_> {
             ((1.0 - here.relative) * threshold / (grows * steepest)).min(entry_us - t_us);
         let is_long = self.noise.is_none() && quiet_us.min(LONG_QUIET_US) > STEP_US;
         // The threshold drifts up with the range and falls where the gain rises by a step.
-        if is_long && self.receiver.threshold_at(t_us + quiet_us.min(LONG_QUIET_US)) >= threshold {
+        if is_long && self.threshold_at(t_us + quiet_us.min(LONG_QUIET_US)) >= threshold {
             quiet_us.min(LONG_QUIET_US)
         } else {
             STEP_US
@@ -145,8 +147,7 @@ impl Hearing<'_> {
     /// When an arrival alone passes the threshold after `t_us`, and when it is last above.
     fn lone_rise(&self, part: &Part, t_us: f64) -> Option<(f64, f64)> {
         let at = |offset_us: f64| part.tof_us + offset_us - self.receiver.lead_us;
-        let level_at =
-            |t_us: f64| self.receiver.threshold_at(t_us) / (part.size * self.rise_of_gain(t_us));
+        let level_at = |t_us: f64| self.threshold_at(t_us) / (part.size * self.rise_of_gain(t_us));
         let mut rise_us = part.tof_us;
         // The threshold drifts with the range, and the gain with the time.
         for _ in 0..2 {
@@ -189,7 +190,7 @@ impl Hearing<'_> {
     /// Envelope over threshold a step or less before the last time asked for.
     fn relative_level_back(&self, t_us: f64) -> f64 {
         // What was over at the later time may not have been.
-        self.level_of(self.over.saturating_sub(8), t_us) / self.receiver.threshold_at(t_us)
+        self.level_of(self.over.saturating_sub(8), t_us) / self.threshold_at(t_us)
     }
 }
 

@@ -13,7 +13,7 @@ use super::{
     groups::{Group, Groups},
     half_path::{DIRECT, HalfPath, HalfPathTracer},
     rays::{CylinderRay, CylinderRays, OneWay},
-    stationary::{SLACK, stationary_contact},
+    stationary::{SLACK, overlap, stationary_contact},
     strength::Strength,
 };
 use crate::{
@@ -107,12 +107,26 @@ impl<'a> Connector<'a> {
             for (key, is_level) in [(key, true)].into_iter().chain(lower) {
                 let Some(backs) = other.groups.by_cylinder.get(key) else { continue };
                 let once = is_level && back.is_none();
-                for &half_path in outs.iter().flat_map(|group| &group.half_paths) {
-                    self.partners_of(out, half_path, other, backs, once, &mut found);
+                for group in outs {
+                    let backs: Vec<&Group> =
+                        backs.iter().filter(|back| self.may_meet_any(out, group, back)).collect();
+                    for &half_path in &group.half_paths {
+                        self.partners_of(out, half_path, other, &backs, once, &mut found);
+                    }
                 }
             }
         }
         found
+    }
+
+    /// Whether any half-path of a group can give an echo with any of another.
+    fn may_meet_any(&self, out: &Sorted, group: &Group, back: &Group) -> bool {
+        let is_repeated = out.all[group.half_paths[0] as usize].level > 0;
+        let least_m = group.least_m + back.least_m;
+        let floor = self.plan.settings.contact_floor(is_repeated, least_m).powi(2);
+        let most = group.most.with(&back.most);
+        most * self.most_heard() >= floor
+            && most * self.heard(&group.departures, &back.departures) >= floor
     }
 
     /// Connects a half-path to others; with `once`, only with those whose number is not smaller.
@@ -121,7 +135,7 @@ impl<'a> Connector<'a> {
         out: &Sorted,
         number: u32,
         back: &Sorted,
-        groups: &[Group],
+        groups: &[&Group],
         once: bool,
         found: &mut Vec<Pair>,
     ) {
@@ -132,27 +146,32 @@ impl<'a> Connector<'a> {
                 .contact_floor(half_path.level > 0, half_path.least_m + other_m)
                 .powi(2)
         };
-        let tracer = HalfPathTracer::new(self.plan, out.views, half_path);
+        let mut tracer = None;
         for group in groups {
-            let most = half_path.strength.with(&group.most)
-                * self.heard(&half_path.departures, &group.departures);
-            if most < floor(group.least_m) {
+            let (most, least) = (half_path.strength.with(&group.most), floor(group.least_m));
+            // In whatever directions: a cheap test before the one that asks for them.
+            let is_loud = most * self.most_heard() >= least
+                && most * self.heard(&half_path.departures, &group.departures) >= least;
+            if !is_loud {
                 continue;
             }
             for &other in group.half_paths.iter().filter(|&&other| !once || other >= number) {
                 let other = &back.all[other as usize];
                 // Sorted by falling `x`: the bound of all that follow falls with it.
                 let most = Strength { x: other.strength.x, ..group.most };
-                if half_path.strength.with(&most) < floor(group.least_m) {
+                if half_path.strength.with(&most) < least {
                     break;
                 }
                 if !self.plan.effort.step(SearchPart::Cylinders, 1) {
                     return;
                 }
                 if self.may_meet(half_path, other, floor(other.least_m)) {
+                    let tracer = tracer.get_or_insert_with(|| {
+                        HalfPathTracer::new(self.plan, out.views, half_path)
+                    });
                     let other = HalfPathTracer::new(self.plan, back.views, other);
                     self.plan.effort.step(SearchPart::Cylinders, STEPS_A_PAIR);
-                    let pair = self.pair(&tracer, &other);
+                    let pair = self.pair(tracer, &other);
                     self.plan.effort.keep::<(Pair, Echo, Echo)>(pair.iter().len());
                     found.extend(pair);
                 }
@@ -165,13 +184,20 @@ impl<'a> Connector<'a> {
         self.bound.map_or(1.0, |bound| bound.at(one.gap_rad(other)).powi(2))
     }
 
+    /// The most that it is in any directions.
+    fn most_heard(&self) -> f64 {
+        self.bound.map_or(1.0, |bound| bound.at(0.0).powi(2))
+    }
+
     /// Cheap tests: whether two half-paths can give an echo at all.
     fn may_meet(&self, out: &HalfPath, back: &HalfPath, floor: f64) -> bool {
         let [[a, b], [c, d]] = [&out.ends, &back.ends];
+        let most = out.strength.with(&back.strength);
         a.slope + c.slope < SLACK
             && b.slope + d.slope > -SLACK
-            && out.strength.with(&back.strength) * self.heard(&out.departures, &back.departures)
-                >= floor
+            && most * self.most_heard() >= floor
+            && overlap(&out.ends, &back.ends).is_some()
+            && most * self.heard(&out.departures, &back.departures) >= floor
             && self.plan.settings.allows(out.order + back.order + 1)
     }
 

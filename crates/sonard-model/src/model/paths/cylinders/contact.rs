@@ -1,7 +1,10 @@
 //! Rays where they meet cylinders.
 
 use super::front::Front;
-use crate::{geometry::wrap_pi, model::paths::plan::Circle};
+use crate::{
+    geometry::{DVec2, wrap_pi},
+    model::paths::plan::Circle,
+};
 
 /// A ray where it meets a cylinder.
 #[derive(Debug, Clone, Copy)]
@@ -31,7 +34,17 @@ impl Contact {
         at_rad: f64,
         near_rad: f64,
     ) -> Self {
-        let (hit, normal, cosine) = front.onto(circle);
+        Self::at(front.onto(circle), circle, mirrored, at_rad, near_rad)
+    }
+
+    /// The same of a ray at the circle, with the normal there and the cosine of the angle of incidence.
+    pub(crate) fn at(
+        (hit, normal, cosine): (Front, DVec2, f64),
+        circle: &Circle,
+        mirrored: bool,
+        at_rad: f64,
+        near_rad: f64,
+    ) -> Self {
         let angle_rad = near_rad + wrap_pi(normal.to_angle() - near_rad);
         // Counter-clockwise is to the right for one who looks at the surface.
         let sense = if mirrored { 1.0 } else { -1.0 };

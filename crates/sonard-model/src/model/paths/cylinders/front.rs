@@ -76,7 +76,7 @@ impl Front {
     /// Off the outside of a circle: the mirror equation in the plane of incidence (Keller and Lewis
     /// 1995, for instance), by which the curvature of the front grows by `2 / (r cos i)`. With `width_m`
     /// the same on both sides of the surface, `growth` (curvature times width) grows by `2 w / (r cos i)`.
-    fn off_circle(&self, circle: &Circle) -> Self {
+    pub(crate) fn off_circle(&self, circle: &Circle) -> Self {
         let (hit, normal, cosine) = self.onto(circle);
         Self {
             along: hit.along + 2.0 * cosine * normal,

@@ -29,26 +29,27 @@ impl Groups {
             let cylinder = half_path.level as usize * cylinders + half_path.cylinder as usize;
             (cylinder, (half_path.departures.middle_rad / GROUP_RAD).floor() as i64)
         };
-        let mut order: Vec<u32> = (0..all.len() as u32).collect();
-        order.sort_by(|&one, &other| {
-            let [one, other] = [one, other].map(|index| &all[index as usize]);
-            let by_x = other.strength.x.total_cmp(&one.strength.x);
-            key(one).cmp(&key(other)).then(by_x)
+        let keyed =
+            |(half_path, index): (&HalfPath, u32)| (key(half_path), half_path.strength.x, index);
+        let mut order: Vec<((usize, i64), f64, u32)> = all.iter().zip(0..).map(keyed).collect();
+        order.sort_unstable_by(|one, other| {
+            let by_x = other.1.total_cmp(&one.1);
+            one.0.cmp(&other.0).then(by_x).then(one.2.cmp(&other.2))
         });
-        let same = |&one: &u32, &other: &u32| key(&all[one as usize]) == key(&all[other as usize]);
-        for group in order.chunk_by(same) {
-            let (cylinder, _) = key(&all[group[0] as usize]);
+        for group in order.chunk_by(|one, other| one.0 == other.0) {
+            let (cylinder, _) = group[0].0;
             if by_cylinder.len() <= cylinder {
                 by_cylinder.resize_with(cylinder + 1, Vec::new);
             }
-            by_cylinder[cylinder].push(Group::of(group, all));
+            let half_paths: Vec<u32> = group.iter().map(|keyed| keyed.2).collect();
+            by_cylinder[cylinder].push(Group::of(half_paths, all));
         }
         Self { by_cylinder, cylinders }
     }
 }
 
 impl Group {
-    fn of(half_paths: &[u32], all: &[HalfPath]) -> Self {
+    fn of(half_paths: Vec<u32>, all: &[HalfPath]) -> Self {
         let first = all[half_paths[0] as usize].departures;
         let each = || half_paths.iter().map(|&index| &all[index as usize]);
         let reach = |half_path: &HalfPath| {
@@ -59,11 +60,6 @@ impl Group {
         let most =
             each().map(|half_path| half_path.strength).fold(Strength::default(), Strength::max);
         let least_m = each().map(|half_path| half_path.least_m).fold(f64::INFINITY, f64::min);
-        Self {
-            half_paths: half_paths.to_vec(),
-            departures: Departures { half_rad, ..first },
-            most,
-            least_m,
-        }
+        Self { departures: Departures { half_rad, ..first }, most, least_m, half_paths }
     }
 }

@@ -39,6 +39,9 @@ use crate::{
 /// Effort of a tube in a triangle, in steps of a beam.
 const STEPS_A_TUBE: usize = 16;
 
+/// In scenes of more cylinders than that a tube is not asked how far it is to the nearest.
+const MOST_ASKED: usize = 16;
+
 /// An edge sends back as much as a mirror at most: half of each of two images whose boundaries lie together.
 const EDGE_MOST: f64 = 1.0;
 
@@ -113,7 +116,7 @@ impl<'a> TubeGrower<'a> {
         if !self.plan.settings.allows(beam.order + 1) {
             return;
         }
-        let tracer = Tracer { plan: self.plan, view: &self.views[index as usize], surfaces: &[] };
+        let tracer = Tracer::new(self.plan, &self.views[index as usize], &[]);
         let ends = [span.from_rad, span.to_rad];
         // As they leave: before its first cylinder a ray has no front.
         let borders = ends.map(|at| tracer.front(at));
@@ -188,11 +191,8 @@ impl<'a> TubeGrower<'a> {
         if half_path.link != DIRECT {
             surfaces.push(surface);
         }
-        let tracer = Tracer {
-            plan: self.plan,
-            view: &self.views[half_path.view as usize],
-            surfaces: &surfaces,
-        };
+        let view = &self.views[half_path.view as usize];
+        let tracer = Tracer::new(self.plan, view, &surfaces);
         split(&tube, &tracer, circle, 0, partners, &mut self.waiting);
     }
 
@@ -203,55 +203,86 @@ impl<'a> TubeGrower<'a> {
         }
         let surfaces = surfaces_to(&self.rays.links, tube.link);
         let view = &self.views[tube.view as usize];
-        let tracer = Tracer { plan: self.plan, view, surfaces: &surfaces };
+        let tracer = Tracer::new(self.plan, view, &surfaces);
         let mut cuts: SmallVec<[f64; 8]> = self.meet_corners(tube, &tracer);
         let mut hits = Hits::of(tube, &tracer);
         cuts.extend(hits.cuts());
         cuts.sort_by(f64::total_cmp);
-        let inside = cuts.iter().filter(|&&at| tube.span.from_rad < at && at < tube.span.to_rad);
-        let inside = inside.map(|&at| (at, tracer.front(at)));
-        let [from, to] = tube.borders;
-        let first = (tube.span.from_rad, from);
-        let ends: SmallVec<[(f64, Front); 8]> =
-            [first].into_iter().chain(inside).chain([(tube.span.to_rad, to)]).collect();
-        for pair in ends.windows(2) {
-            let span = Span { from_rad: pair[0].0, to_rad: pair[1].0 };
-            if span.to_rad <= span.from_rad {
-                continue;
-            }
-            let middle = tracer.front(0.5 * (span.from_rad + span.to_rad));
-            if hits.lets_pass(span, &middle) {
-                let part = Tube { span, borders: [pair[0].1, pair[1].1], ..*tube };
-                self.leave(&part, &middle);
+        let Span { from_rad, to_rad } = tube.span;
+        let [mut from, last] = [(from_rad, tube.borders[0]), (to_rad, tube.borders[1])];
+        for &at in cuts.iter().filter(|&&at| from_rad < at && at < to_rad) {
+            if at > from.0 {
+                let to = (at, tracer.front(at));
+                self.follow_part(tube, &tracer, &mut hits, [from, to]);
+                from = to;
             }
         }
-        let met = hits.met();
-        let met = met.filter_map(|(cylinder, span)| self.half_path(tube, &tracer, cylinder, span));
-        let met: SmallVec<[HalfPath; 2]> = met.collect();
-        self.half_paths.extend(met);
+        self.follow_part(tube, &tracer, &mut hits, [from, last]);
+        for (cylinder, span) in hits.met() {
+            let met = self.half_path(tube, &tracer, cylinder, span);
+            self.half_paths.extend(met);
+        }
     }
 
-    /// Whether an echo of the tube can still be short and strong enough.
+    /// Follows the part of a tube between two rays, by their contacts, all of which meets the same.
+    fn follow_part(
+        &mut self,
+        tube: &Tube,
+        tracer: &Tracer,
+        hits: &mut Hits,
+        [from, to]: [(f64, Front); 2],
+    ) {
+        let span = Span { from_rad: from.0, to_rad: to.0 };
+        if span.to_rad <= span.from_rad {
+            return;
+        }
+        let middle = tracer.front(0.5 * (span.from_rad + span.to_rad));
+        if hits.lets_pass(span, &middle) {
+            let part = Tube { span, borders: [from.1, to.1], ..*tube };
+            self.leave(&part, &middle);
+        }
+    }
+
+    /// Whether an echo of the tube can still be short and strong enough, by a cylinder or by an edge.
     ///
     /// The least of length, width and growth of its borders is the least of all its rays (to within
     /// [`LOUDER`]), and with the best partner left it bounds every echo ([`strength`](super::strength)).
     fn is_worth(&self, tube: &Tube) -> bool {
         let settings = &self.plan.settings;
-        let left_m = tube.side.map_or(0.0, |side| {
-            let [a, b] = self.side_of(tube.triangle, side as usize);
-            distance_to_segment(self.target, a, b)
-        });
+        let side = tube.side.map(|side| self.side_of(tube.triangle, side as usize));
         let length_m = tube.least(|front| front.length_m);
-        let least_m = length_m + left_m;
-        if least_m > settings.max_path_m {
-            return false;
-        }
         let width_m = tube.least(|front| front.width_m);
         let growth = tube.least(|front| front.growth);
-        let spread = [length_m, width_m, growth];
-        let strength = Strength::of(tube.gain, spread, self.radius_m, &self.plan.settings);
-        strength.with(&tube.partner) >= settings.contact_floor(true, least_m).powi(2)
-            || self.has_edges && self.is_worth_an_edge(tube.gain, spread, least_m)
+        let is_worth_a_cylinder = || {
+            let [ahead_m, left_m] = self.to_cylinder_m(side);
+            let least_m = length_m + left_m;
+            // It spreads on the way there.
+            let spread = [length_m + ahead_m, width_m + ahead_m * growth, growth];
+            let strength = Strength::of(tube.gain, spread, self.radius_m, settings);
+            least_m <= settings.max_path_m
+                && strength.with(&tube.partner) >= settings.contact_floor(true, least_m).powi(2)
+        };
+        let is_worth_an_edge = || {
+            let left_m = side.map_or(0.0, |[a, b]| distance_to_segment(self.target, a, b));
+            let least_m = length_m + left_m;
+            least_m <= settings.max_path_m
+                && self.is_worth_an_edge(tube.gain, [length_m, width_m, growth], least_m)
+        };
+        is_worth_a_cylinder() || self.has_edges && is_worth_an_edge()
+    }
+
+    /// At least how far it is from a side to a cylinder, and from there on to the receiver, metres.
+    fn to_cylinder_m(&self, side: Option<[DVec2; 2]>) -> [f64; 2] {
+        let circles = &self.plan.cylinders.circles;
+        let Some([a, b]) = side else { return [0.0; 2] };
+        if circles.len() > MOST_ASKED {
+            return [0.0, distance_to_segment(self.target, a, b)];
+        }
+        let there = circles.iter().filter(|circle| circle.radius_m > 0.0);
+        there.fold([f64::INFINITY; 2], |[ahead_m, left_m], circle| {
+            let to_m = (distance_to_segment(circle.center, a, b) - circle.radius_m).max(0.0);
+            [ahead_m.min(to_m), left_m.min(to_m + self.back_m(circle))]
+        })
     }
 
     /// Whether an edge could send back enough of rays that have spread so, in echoes of at least a length there and

@@ -59,7 +59,7 @@ pub(crate) struct HalfPathTracer<'a> {
 impl<'a> HalfPathTracer<'a> {
     pub(crate) fn new(plan: &'a Plan, views: &'a [View], half_path: &'a HalfPath) -> Self {
         let view = &views[half_path.view as usize];
-        Self { half_path, tracer: Tracer { plan, view, surfaces: &half_path.surfaces } }
+        Self { half_path, tracer: Tracer::new(plan, view, &half_path.surfaces) }
     }
 
     /// How steeply its rays can climb, as far as the beam before its first cylinder tells.
@@ -85,11 +85,14 @@ impl<'a> HalfPathTracer<'a> {
         if !self.half_path.mirrored {
             ends.reverse();
         }
+        let mut last = None;
         let at_rad = zero_between([from_rad, to_rad], ends, EXACT_RAD, |at| {
             let contact = self.contact(at, near_rad);
+            last = Some(contact);
             (contact.angle_rad - angle_rad, contact.angle_rate)
         });
-        self.contact(at_rad, near_rad)
+        let found = last.filter(|contact| contact.at_rad == at_rad);
+        found.unwrap_or_else(|| self.contact(at_rad, near_rad))
     }
 
     /// The direction in which that ray leaves.

@@ -12,7 +12,7 @@ use super::{
     half_path::HalfPath,
     strength::Strength,
     tracer::Tracer,
-    tube::{Tube, ray_past},
+    tube::{Tube, front_past, ray_past},
 };
 use crate::{
     geometry::DVec2,
@@ -110,17 +110,11 @@ impl TubeGrower<'_> {
         }
         let Span { from_rad, to_rad } = span;
         let borders = [from_rad, to_rad].map(|at| tracer.front(at));
-        let middle = 0.5 * (from_rad + to_rad);
-        let contact = |front: &Front, at, near| Contact::of(front, circle, tube.mirrored, at, near);
-        let half = contact(&tracer.front(middle), middle, 0.0);
-        let near = half.angle_rad;
-        let mut ends = [(&borders[0], from_rad), (&borders[1], to_rad)]
-            .map(|(front, at)| contact(front, at, near));
-        if !tube.mirrored {
-            ends.reverse();
-        }
-        let least = |of: fn(&Contact) -> f64| of(&ends[0]).min(of(&ends[1])).min(of(&half));
-        let spread = [least(|c| c.length_m), least(|c| c.width_m), least(|c| c.growth)];
+        let middle = tracer.front(0.5 * (from_rad + to_rad));
+        let hits = [&borders[0], &borders[1], &middle].map(|front| front.onto(circle));
+        let least =
+            |of: fn(&Front) -> f64| hits.iter().map(|hit| of(&hit.0)).fold(f64::MAX, f64::min);
+        let spread = [least(|hit| hit.length_m), least(|hit| hit.width_m), least(|hit| hit.growth)];
         let strength = Strength::of(tube.gain, spread, self.radius_m, settings);
         let least_m = spread[0] + self.back_m(circle);
         let is_worth = strength.with(&tube.partner)
@@ -128,6 +122,12 @@ impl TubeGrower<'_> {
             || self.has_edges && self.is_worth_an_edge(tube.gain, spread, least_m);
         if !is_worth || least_m > settings.max_path_m {
             return None;
+        }
+        let near = hits[2].1.to_angle();
+        let mut ends = [(hits[0], from_rad), (hits[1], to_rad)]
+            .map(|(hit, at)| Contact::at(hit, circle, tube.mirrored, at, near));
+        if !tube.mirrored {
+            ends.reverse();
         }
         Some(HalfPath {
             cylinder,
@@ -167,15 +167,15 @@ fn met_spans(
         return SmallVec::new();
     }
     // Where the rays touch the circle, its centre to their left and to their right.
-    let ends = [(right, 1.0), (left, -1.0)].map(|(border, side)| {
+    let touching = [(right, 1.0), (left, -1.0)].map(|(border, side)| {
         let beyond = side * border.offset_m(center) > r;
         let own = if std::ptr::eq(border, &tube.borders[0]) { from_rad } else { to_rad };
-        if beyond { ray_past(tube, tracer, center, side * r) } else { own }
+        if beyond { front_past(tube, tracer, center, side * r) } else { (own, *border) }
     });
+    let ends = touching.each_ref().map(|ray| ray.0);
     // Their contacts: clockwise around the circle from right to left.
-    let contact = |at: f64| (tracer.front(at).onto(circle).1).to_angle();
-    let last = contact(ends[1]);
-    let turn = (contact(ends[0]) - last).rem_euclid(TAU);
+    let [first, last] = touching.map(|(_, front)| front.onto(circle).1.to_angle());
+    let turn = (first - last).rem_euclid(TAU);
     let lit = Span { from_rad: last, to_rad: last + turn };
     lit.common(&arc.span)
         .into_iter()

@@ -38,8 +38,11 @@ impl Partners {
         let heard: Vec<f64> = (0..=BINS / 2)
             .map(|apart| bound.at((apart as f64 - 1.0).max(0.0) * width_rad).powi(2))
             .collect();
+        // In most directions there is none.
+        let known: Vec<(usize, Strength)> =
+            own.into_iter().enumerate().filter(|(_, strength)| strength.y > 0.0).collect();
         let best = |bin: usize| {
-            own.iter().enumerate().fold(Strength::default(), |best, (other, strength)| {
+            known.iter().fold(Strength::default(), |best, &(other, strength)| {
                 let apart = bin.abs_diff(other);
                 let heard = heard[apart.min(BINS - apart)];
                 best.max(Strength { x: heard * strength.x, y: heard * strength.y })

@@ -13,7 +13,7 @@ pub(crate) fn zero_between(
     [mut low, mut high]: [f64; 2],
     at_ends: [f64; 2],
     exact: f64,
-    f: impl Fn(f64) -> (f64, f64),
+    mut f: impl FnMut(f64) -> (f64, f64),
 ) -> f64 {
     let [at_low, at_high] = at_ends;
     if (at_low < 0.0) == (at_high < 0.0) {

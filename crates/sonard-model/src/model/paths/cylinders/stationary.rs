@@ -19,6 +19,26 @@ const MOST_STEPS: usize = 40;
 /// A contact is found when both half-paths have it to within this, radians.
 const SAME_ANGLE_RAD: f64 = 1e-11;
 
+/// The angles around a cylinder that two half-paths both reach.
+pub(crate) struct Overlap {
+    /// The middle of each.
+    middles: [f64; 2],
+    /// Whole turns that the second one's angles are behind the first one's.
+    turn: f64,
+    low: f64,
+    high: f64,
+}
+
+/// The angles that two half-paths with these ends both reach, if any.
+pub(crate) fn overlap(a: &[Contact; 2], b: &[Contact; 2]) -> Option<Overlap> {
+    let middles = [a, b].map(|[from, to]| 0.5 * (from.angle_rad + to.angle_rad));
+    let [middle, others] = middles;
+    let turn = middle + wrap_pi(others - middle) - others;
+    let low = a[0].angle_rad.max(b[0].angle_rad + turn);
+    let high = a[1].angle_rad.min(b[1].angle_rad + turn);
+    (high >= low).then_some(Overlap { middles, turn, low, high })
+}
+
 /// The mirror reflection between two half-paths: the contact of each, and the angle around the cylinder;
 /// `None` if nowhere.
 ///
@@ -31,14 +51,7 @@ pub(crate) fn stationary_contact(
     radius_m: f64,
 ) -> Option<([Contact; 2], f64)> {
     let [a, b] = [&one.half_path.ends, &other.half_path.ends];
-    let middle = 0.5 * (a[0].angle_rad + a[1].angle_rad);
-    let others = 0.5 * (b[0].angle_rad + b[1].angle_rad);
-    let turn = middle + wrap_pi(others - middle) - others;
-    let low = a[0].angle_rad.max(b[0].angle_rad + turn);
-    let high = a[1].angle_rad.min(b[1].angle_rad + turn);
-    if high < low {
-        return None;
-    }
+    let Overlap { middles: [middle, others], turn, low, high } = overlap(a, b)?;
     // Straight lines through the ends for a start.
     let slope = |[from, to]: &[Contact; 2], angle: f64| {
         let rate = (to.slope - from.slope) / (to.angle_rad - from.angle_rad);

@@ -1,11 +1,13 @@
 //! Rays by way of cylinders, traced from their contact with the first one.
 
+use smallvec::SmallVec;
+
 use super::{
     contact::Contact,
     front::{Front, LEAST_COSINE},
 };
 use crate::{
-    geometry::DVec2,
+    geometry::{DVec2, Mirror},
     model::{
         Reflector,
         paths::{
@@ -23,13 +25,92 @@ pub(crate) struct Tracer<'a> {
     pub(crate) plan: &'a Plan,
     pub(crate) view: &'a View,
     pub(crate) surfaces: &'a [Reflector],
+    /// The same surfaces, walls one after the other as one.
+    hops: SmallVec<[Hop; 4]>,
+}
+
+/// What a ray meets after its first cylinder.
+#[derive(Debug, Clone, Copy)]
+enum Hop {
+    Cylinder(u32),
+    /// Walls, up to `last`.
+    Walls {
+        images: Images,
+        last: u32,
+    },
+}
+
+/// Mirror images by several walls: a turn, perhaps with a mirror, and a shift.
+#[derive(Debug, Clone, Copy)]
+struct Images {
+    /// Those of the unit vectors, and of the origin.
+    x: DVec2,
+    y: DVec2,
+    origin: DVec2,
+}
+
+impl Images {
+    const NONE: Self = Self { x: DVec2::X, y: DVec2::Y, origin: DVec2::ZERO };
+
+    /// By one more wall.
+    fn by(self, mirror: &Mirror) -> Self {
+        let Self { x, y, origin } = self;
+        Self { x: mirror.turn(x), y: mirror.turn(y), origin: mirror.image(origin) }
+    }
+
+    fn of_direction(&self, direction: DVec2) -> DVec2 {
+        direction.x * self.x + direction.y * self.y
+    }
+
+    fn of_point(&self, point: DVec2) -> DVec2 {
+        self.origin + self.of_direction(point)
+    }
+}
+
+fn hops(plan: &Plan, surfaces: &[Reflector]) -> SmallVec<[Hop; 4]> {
+    let mut hops = SmallVec::new();
+    for &surface in surfaces {
+        match (surface, hops.last_mut()) {
+            (Reflector::Cylinder(cylinder), _) => hops.push(Hop::Cylinder(cylinder)),
+            (Reflector::Wall(wall), Some(Hop::Walls { images, last })) => {
+                *images = images.by(&plan.walls[wall as usize].mirror);
+                *last = wall;
+            }
+            (Reflector::Wall(wall), _) => {
+                let images = Images::NONE.by(&plan.walls[wall as usize].mirror);
+                hops.push(Hop::Walls { images, last: wall });
+            }
+            (Reflector::Floor | Reflector::Ceiling, _) => {}
+        }
+    }
+    hops
 }
 
 impl<'a> Tracer<'a> {
+    pub(crate) fn new(plan: &'a Plan, view: &'a View, surfaces: &'a [Reflector]) -> Self {
+        Self { plan, view, surfaces, hops: hops(plan, surfaces) }
+    }
+
     /// The ray as it leaves its last surface.
+    ///
+    /// Over walls it is straight in their images; where it crosses the last one it is in the plan again.
     pub(crate) fn front(&self, contact_rad: f64) -> Front {
-        let first = self.first(contact_rad);
-        self.surfaces.iter().fold(first, |front, &surface| self.plan.reflect(&front, surface))
+        let mut front = self.first(contact_rad);
+        for hop in &self.hops {
+            front = match hop {
+                Hop::Cylinder(cylinder) => {
+                    front.off_circle(&self.plan.cylinders.circles[*cylinder as usize])
+                }
+                Hop::Walls { images, last } => {
+                    let origin = images.of_point(front.origin);
+                    let along = images.of_direction(front.along);
+                    let mirror = &self.plan.walls[*last as usize].mirror;
+                    let distance_m = -mirror.height_m(origin) / mirror.normal.dot(along);
+                    Front { origin, along, ..front }.moved(distance_m)
+                }
+            };
+        }
+        front
     }
 
     /// Its contacts with the surfaces, the first cylinder included.

@@ -5,7 +5,7 @@ use super::{
     strength::Strength, tracer::Tracer,
 };
 use crate::{
-    geometry::{DVec2, turn_rad},
+    geometry::DVec2,
     model::paths::{
         plan::{Circle, Span},
         tolerance::TIE_M,
@@ -16,9 +16,9 @@ use crate::{
 /// as a tie.
 const EXACT_M: f64 = 1e-12;
 
-/// A tube's part of a cylinder is split until it turns the rays by no more than twice this,
-/// radians.
-const MOST_TURN_RAD: f64 = 0.7;
+/// A tube's part of a cylinder is split until it turns the rays by no more than twice 0.7 radians: the cosines of
+/// that and of twice that.
+const MOST_TURN_COSINES: [f64; 2] = [0.764_842_187_284_488_5, 0.169_967_142_900_241];
 
 /// Halvings of a tube at a cylinder, at most: what grazes it is then too weak.
 const MOST_HALVINGS: u32 = 12;
@@ -77,10 +77,13 @@ pub(crate) fn split(
 ) {
     let [from, to] = tube.borders;
     let middle = |front: &Front| front.origin - circle.center;
-    let turn = turn_rad(middle(&from), middle(&to)).abs();
-    let opens = turn_rad(from.along, to.along).abs();
+    let is_wider = |one: DVec2, other: DVec2, cosine: f64| {
+        one.dot(other) < cosine * (one.length_squared() * other.length_squared()).sqrt()
+    };
+    let turns = is_wider(middle(&from), middle(&to), MOST_TURN_COSINES[0]);
+    let is_wide = turns || is_wider(from.along, to.along, MOST_TURN_COSINES[1]);
     let Span { from_rad, to_rad } = tube.span;
-    if halvings < MOST_HALVINGS && (turn > MOST_TURN_RAD || opens > 2.0 * MOST_TURN_RAD) {
+    if halvings < MOST_HALVINGS && is_wide {
         let half = 0.5 * (from_rad + to_rad);
         for part in tube.halves(half, tracer.front(half)) {
             split(&part, tracer, circle, halvings + 1, partners, waiting);
@@ -97,14 +100,36 @@ pub(crate) fn split(
 /// distance between neighbouring rays abreast of the point, `width + growth * ahead`, times the angle between
 /// them at departure over that between their contacts (`rate`).
 pub(crate) fn ray_past(tube: &Tube, tracer: &Tracer, point: DVec2, offset_m: f64) -> f64 {
-    let ends = tube.borders.each_ref().map(|border| border.offset_m(point) - offset_m);
+    front_past(tube, tracer, point, offset_m).0
+}
+
+/// The same with the ray.
+pub(crate) fn front_past(
+    tube: &Tube,
+    tracer: &Tracer,
+    point: DVec2,
+    offset_m: f64,
+) -> (f64, Front) {
+    let Span { from_rad, to_rad } = tube.span;
+    let [from, to] = &tube.borders;
+    let ends = [from, to].map(|border| border.offset_m(point) - offset_m);
     // Farther along the first contact's surface a ray is farther to the left.
     let sense = if tube.mirrored { 1.0 } else { -1.0 };
-    zero_between([tube.span.from_rad, tube.span.to_rad], ends, EXACT_M, |at| {
+    let mut last = (from_rad, *from);
+    let at = zero_between([from_rad, to_rad], ends, EXACT_M, |at| {
         let front = tracer.front(at);
+        last = (at, front);
         let width_m = front.width_m + front.growth * front.ahead_m(point);
         (front.offset_m(point) - offset_m, sense * front.rate * width_m)
-    })
+    });
+    let front = if at == last.0 {
+        last.1
+    } else if at == to_rad {
+        *to
+    } else {
+        tracer.front(at)
+    };
+    (at, front)
 }
 
 /// The ray of the tube through a point; `None` if the point is beside it.
@@ -114,7 +139,17 @@ pub(crate) fn ray_through(tube: &Tube, tracer: &Tracer, point: DVec2) -> Option<
     if !is_between {
         return None;
     }
-    let at = ray_past(tube, tracer, point, 0.0);
-    let front = tracer.front(at);
+    let (at, front) = front_past(tube, tracer, point, 0.0);
     (front.ahead_m(point) > 0.0).then_some((at, front))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cosines_are_those_of_the_angle() {
+        let of = [0.7, 1.4].map(f64::cos);
+        assert!(of.iter().zip(MOST_TURN_COSINES).all(|(one, other)| (one - other).abs() < 1e-15));
+    }
 }

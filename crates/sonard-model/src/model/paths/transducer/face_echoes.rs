@@ -80,16 +80,19 @@ impl FaceEchoes {
         Self { face, paths, departures: DirectionIndex::new(&entries) }
     }
 
-    /// All multiple echoes with at least one reflection at the face, which looks into `direction_rad`.
+    /// All multiple echoes up to a length, metres, with at least one reflection at the face, which looks into
+    /// `direction_rad`; `floor` is the weakest echo of the search.
     pub(crate) fn multiple_echoes(
         &self,
         direction_rad: f64,
         beam: &BeamPattern,
-        settings: &Settings,
+        floor: f64,
+        most_m: f64,
     ) -> Vec<MultipleEcho> {
-        let floor = FLOOR_ABOVE * settings.floor;
+        let floor = FLOOR_ABOVE * floor;
+        let within = self.paths.partition_point(|path| path.length_m < most_m) as u32;
         let mut near: SmallVec<[(&FacePath, f64); 16]> = SmallVec::new();
-        self.departures.near(direction_rad, |entry, _| {
+        self.departures.near(direction_rad, within, |entry, _| {
             let path = &self.paths[entry.echo as usize];
             let leaves_rad = wrap_once(path.leaves_rad - direction_rad);
             let returns_rad = wrap_once(path.returns_rad - direction_rad);
@@ -109,6 +112,6 @@ impl FaceEchoes {
             (FacePath { leaves_rad, returns_rad, ..*path }, leaving)
         };
         let outs: SmallVec<[(FacePath, f64); 16]> = near.iter().map(turned).collect();
-        Search::new(self.face, &outs, floor, settings).run()
+        Search::new(self.face, &outs, floor, most_m).run()
     }
 }

@@ -7,10 +7,7 @@ use super::{
     bound::Best,
     face_path::{DirectedPath, FacePath, MultipleEcho},
 };
-use crate::{
-    acoustics::{Disc, FaceAspect},
-    model::paths::settings::Settings,
-};
+use crate::acoustics::{Disc, FaceAspect};
 
 /// Sequences longer than this in all would not be told apart any more.
 const MOST_PATHS: usize = 32;
@@ -20,10 +17,11 @@ const MOST_PATHS: usize = 32;
 const MOST_ECHOES: usize = 4096;
 
 /// Sequences of paths, each longer one from a shorter one.
-pub(crate) struct Search<'a> {
+pub(crate) struct Search {
     face: Disc,
-    settings: &'a Settings,
     floor: f64,
+    /// The longest that is asked for, metres.
+    most_m: f64,
     best: Best,
     /// The paths out run backwards, which a sequence may end with, and then the paths out themselves.
     paths: Vec<FacePath>,
@@ -37,13 +35,8 @@ pub(crate) struct Search<'a> {
     found: Vec<MultipleEcho>,
 }
 
-impl<'a> Search<'a> {
-    pub(crate) fn new(
-        face: Disc,
-        outs: &[(FacePath, f64)],
-        floor: f64,
-        settings: &'a Settings,
-    ) -> Self {
+impl Search {
+    pub(crate) fn new(face: Disc, outs: &[(FacePath, f64)], floor: f64, most_m: f64) -> Self {
         let backwards = |(path, _): &(FacePath, f64)| FacePath {
             path: DirectedPath { echo: path.path.echo, reversed: !path.own_reverse },
             leaves_rad: path.returns_rad,
@@ -54,8 +47,8 @@ impl<'a> Search<'a> {
         let others = (0..count).filter(|at| !outs[*at].0.own_reverse).map(|at| count + at);
         Self {
             face,
-            settings,
             floor,
+            most_m,
             best: Best::of(outs.iter().map(|(out, weight)| (out.length_m, *weight))),
             paths: outs.iter().map(backwards).chain(outs.iter().map(|(out, _)| *out)).collect(),
             weights: outs.iter().map(|(_, weight)| *weight).collect(),
@@ -97,9 +90,7 @@ impl<'a> Search<'a> {
         for at in 0..self.weights.len() {
             let (end, weight) = (self.paths[at], self.weights[at]);
             let total_m = length_m + end.length_m;
-            if bound * weight / end.length_m * total_m < self.floor
-                || total_m > self.settings.max_path_m
-            {
+            if bound * weight / end.length_m * total_m < self.floor || total_m > self.most_m {
                 continue;
             }
             let field = strength
@@ -119,7 +110,7 @@ impl<'a> Search<'a> {
             let total_m = length_m + middle.length_m;
             let per_m = middle.amplitude / middle.length_m;
             if bound * per_m * disc_m * self.best.beside(total_m) < self.floor
-                || total_m >= self.settings.max_path_m
+                || total_m >= self.most_m
             {
                 continue;
             }

@@ -53,7 +53,7 @@ fn before_a_wall(disc: Disc, path_m: f64, direction_rad: f64) -> Vec<MultipleEch
     let beam = BeamPattern::new(&Sensor::preset("senscomp-6500").expect("a preset"), 343.99);
     let mut multiple_echoes =
         FaceEchoes::new(disc, &[echo], &PatternEnvelope::of(&beam), &settings(4.5 * path_m))
-            .multiple_echoes(direction_rad, &beam, &settings(4.5 * path_m));
+            .multiple_echoes(direction_rad, &beam, settings(0.0).floor, 4.5 * path_m);
     multiple_echoes.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
     multiple_echoes
 }
