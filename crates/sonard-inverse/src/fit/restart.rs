@@ -31,10 +31,11 @@ const ROUGH: (f64, f64, f64) = (0.03, 3.0, 0.05);
 const CLOSE: (f64, f64, f64) = (0.005, 1.5, 0.03);
 /// Directions of less doubt than this share of what was believed are held well enough.
 const LEAST_SHARE: f64 = 0.1;
-/// Places that are followed to their ends.
-const FOLLOWED: usize = 2;
-/// The stage that these start with.
-const STAGE: usize = STAGES.len() - 1;
+/// Places from which a fit goes on to where it ends without phases, and of these ends how many are followed with them.
+const ENDS: usize = 8;
+const FOLLOWED: usize = 3;
+/// More than polishing an end makes it likelier, as a logarithm.
+const FAR_BELOW: f64 = 30.0;
 /// A fit has gone astray that explains less than all readings but this share, or contradicts what was believed by
 /// this many standard deviations.
 const ASTRAY: (f64, f64) = (0.03, 3.5);
@@ -58,12 +59,36 @@ impl State<'_> {
                 keep_likelier(&mut best, self.attempt(start, 0))?;
             }
         }
+        best = self.polished(best)?;
         let places = self.places(&best)?;
-        for place in places.iter().take(FOLLOWED) {
-            keep_likelier(&mut best, self.attempt(place.values.clone(), STAGE))?;
+        for end in self.ends(&best, &places)? {
+            let Some(end) = one_of_many(self.with_phases(end))? else { continue };
+            if end.value > best.value - FAR_BELOW {
+                keep_likelier(&mut best, self.polished(end))?;
+            }
         }
         let beside = self.beside(&best, &places)?;
         Ok((best, beside))
+    }
+
+    /// Where fits end that begin in some places, without phases: the likeliest, each once.
+    fn ends(&mut self, best: &Settled, places: &[Place]) -> Result<Vec<Settled>, FitError> {
+        let close = widened(&best.errors, CLOSE);
+        let mut tried: Vec<Settled> = Vec::new();
+        for place in places.iter().take(ENDS) {
+            (self.values, self.phases) = (place.values.clone(), Phases::Unknown);
+            tried.extend(one_of_many(self.settled(close))?);
+        }
+        tried.sort_by(|one, other| other.value.total_cmp(&one.value));
+        let mut ends: Vec<Settled> = Vec::new();
+        for end in tried {
+            let is_apart = |other: &Settled| self.is_apart(&end.values, &other.values);
+            if ends.iter().chain([best]).all(is_apart) {
+                ends.push(end);
+            }
+        }
+        ends.truncate(FOLLOWED);
+        Ok(ends)
     }
 
     /// Where a fit ends that begins there, with the spreads from this stage on.
@@ -188,7 +213,7 @@ impl State<'_> {
         )
     }
 
-    fn limited(&self, mut values: DVector<f64>) -> DVector<f64> {
+    pub(super) fn limited(&self, mut values: DVector<f64>) -> DVector<f64> {
         for (value, parameter) in values.iter_mut().zip(&self.parameters) {
             let (least, most) = self.start.limits(parameter);
             *value = value.clamp(least, most);
