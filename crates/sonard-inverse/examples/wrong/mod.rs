@@ -106,7 +106,7 @@ impl Wrong {
             widest_m: 0.15,
             widest_turn_deg: 12.0,
             least_sigma_m: 2e-4,
-            least_sigma_db: 0.5,
+            least_sigma_db: 0.1,
         };
         Some(Self { scene: name, truth, believed, there, here, fit, expected })
     }

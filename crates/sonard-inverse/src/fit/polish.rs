@@ -13,12 +13,14 @@ use super::{
     FitError, Settled, State,
     journal::{Found, listed},
 };
-use crate::candidates::Phases;
+use crate::{candidates::Phases, likelihood::ErrorModel};
 
-/// Predictions that are made.
+/// Places on each side along the directions that are held least, and how far apart, in standard deviations.
+const SCANNED: (i32, f64) = (5, 0.8);
+/// Predictions that are made about the best of them.
 const TRIED: usize = 60;
 /// Of a robot with a body.
-const TRIED_OF_BODY: usize = 20;
+const TRIED_OF_BODY: usize = 40;
 /// Steps to begin with, in standard deviations, and what becomes of them after one that is better, and one that is not:
 /// as large as lets one in five be better (Rechenberg's rule for an evolution strategy of one parent and one child).
 const STEP: f64 = 0.4;
@@ -49,6 +51,9 @@ impl State<'_> {
         let linear = self.linear()?;
         let mut errors = self.spread(&linear, &end.errors);
         let mut best = (self.value(&linear, &errors), self.values.clone());
+        best = self.scanned(best, &errors)?;
+        self.values = best.1.clone();
+        let linear = self.linear()?;
         let curve = linear.curve(&self.still(), &errors);
         let covariance = self.covariance(curve.information).ok_or(FitError::Degenerate)?;
         let root = Cholesky::new(covariance).ok_or(FitError::Degenerate)?.unpack();
@@ -74,5 +79,30 @@ impl State<'_> {
         }
         let (log_posterior, values) = best;
         Ok(Found::End { values: listed(&values), errors, log_posterior })
+    }
+
+    /// The likeliest of some places along the directions that are held least, farther off than polishing goes, each
+    /// improved once.
+    fn scanned(
+        &mut self,
+        mut best: (f64, DVector<f64>),
+        errors: &ErrorModel,
+    ) -> Result<(f64, DVector<f64>), FitError> {
+        let (places, apart) = SCANNED;
+        let about = best.1.clone();
+        for (direction, sigma) in self.doubtful(&about, errors, Phases::Known)? {
+            for place in (-places..=places).filter(|place| *place != 0) {
+                let by = f64::from(place) * apart * sigma;
+                self.values = self.limited(&about + by * &direction);
+                let linear = self.linear()?;
+                self.improve(&linear, errors)?;
+                let linear = self.linear()?;
+                let value = self.value(&linear, errors);
+                if value > best.0 {
+                    best = (value, self.values.clone());
+                }
+            }
+        }
+        Ok(best)
     }
 }

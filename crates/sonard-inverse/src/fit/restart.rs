@@ -31,7 +31,7 @@ const ROUGH: (f64, f64, f64) = (0.03, 3.0, 0.05);
 const CLOSE: (f64, f64, f64) = (0.005, 1.5, 0.03);
 /// Directions of less doubt than this share of what was believed are held well enough.
 const LEAST_SHARE: f64 = 0.1;
-/// Places from which a fit goes on to where it ends without phases, and of these ends how many are followed with them.
+/// Places from which a fit goes on to where it ends, and how many of these ends are polished.
 const ENDS: usize = 8;
 const FOLLOWED: usize = 3;
 /// More than polishing an end makes it likelier, as a logarithm.
@@ -62,7 +62,6 @@ impl State<'_> {
         best = self.polished(best)?;
         let places = self.places(&best)?;
         for end in self.ends(&best, &places)? {
-            let Some(end) = one_of_many(self.with_phases(end))? else { continue };
             if end.value > best.value - FAR_BELOW {
                 keep_likelier(&mut best, self.polished(end))?;
             }
@@ -71,13 +70,14 @@ impl State<'_> {
         Ok((best, beside))
     }
 
-    /// Where fits end that begin in some places, without phases: the likeliest, each once.
+    /// Where fits end that begin in some places: the likeliest, each once.
     fn ends(&mut self, best: &Settled, places: &[Place]) -> Result<Vec<Settled>, FitError> {
         let close = widened(&best.errors, CLOSE);
         let mut tried: Vec<Settled> = Vec::new();
         for place in places.iter().take(ENDS) {
             (self.values, self.phases) = (place.values.clone(), Phases::Unknown);
-            tried.extend(one_of_many(self.settled(close))?);
+            let end = self.settled(close).and_then(|end| self.with_phases(end));
+            tried.extend(one_of_many(end)?);
         }
         tried.sort_by(|one, other| other.value.total_cmp(&one.value));
         let mut ends: Vec<Settled> = Vec::new();
@@ -112,7 +112,7 @@ impl State<'_> {
 
     /// Other beginnings than what was believed.
     fn beginnings(&mut self) -> Result<Vec<DVector<f64>>, FitError> {
-        let doubtful = self.doubtful(&self.still(), &self.rough_errors())?;
+        let doubtful = self.doubtful(&self.still(), &self.rough_errors(), Phases::Unknown)?;
         let sides = doubtful
             .into_iter()
             .flat_map(|(direction, sigma)| [-ANEW, ANEW].map(|side| side * sigma * &direction));
@@ -126,7 +126,7 @@ impl State<'_> {
         let has_body = self.start.scene.robot.is_some();
         let (places, apart) = if has_body { PLACES_OF_BODY } else { PLACES };
         let mut tried: Vec<Place> = Vec::new();
-        let doubtful = self.doubtful(&end.values, &widened(&end.errors, ROUGH))?;
+        let doubtful = self.doubtful(&end.values, &widened(&end.errors, ROUGH), Phases::Unknown)?;
         let (mut number, of) = (0, doubtful.len() * 2 * places as usize);
         for (direction, sigma) in doubtful {
             for place in (-places..=places).filter(|place| *place != 0) {
@@ -186,12 +186,13 @@ impl State<'_> {
 
     /// The directions, in the parameters' units, in which readings that spread so much leave the most in doubt beside
     /// what was believed, with the standard deviation in each.
-    fn doubtful(
+    pub(super) fn doubtful(
         &mut self,
         about: &DVector<f64>,
         errors: &ErrorModel,
+        phases: Phases,
     ) -> Result<Vec<(DVector<f64>, f64)>, FitError> {
-        (self.values, self.phases) = (about.clone(), Phases::Unknown);
+        (self.values, self.phases) = (about.clone(), phases);
         let curve = self.linear()?.curve(&self.still(), errors);
         let covariance = self.covariance(curve.information).ok_or(FitError::Degenerate)?;
         let sigmas = self.prior_sigmas();

@@ -7,6 +7,7 @@ use sonard_model::geometry::Pose;
 
 use super::{Fit, FitError, Fitted, State};
 use crate::{
+    candidates::Phases,
     likelihood::ErrorModel,
     sweep::Sweep,
     watch::{Unwatched, Watch},
@@ -20,8 +21,8 @@ pub(crate) struct Approached {
     pub(crate) sigma_m: f64,
 }
 
-/// Where a fit ends that begins at other values than those believed: `start`, one change of each parameter. Nothing is
-/// searched beside it. For simulations, where the truth is known: whether a fit that ended elsewhere was led astray by
+/// Where a fit ends that begins at other values than those believed: `start`, one change of each parameter. Arrivals meet with
+/// the phases that the model tells, and nothing is searched beside it. For simulations, where the truth is known: whether a fit that ended elsewhere was led astray by
 /// its search, or by readings that are likelier there.
 ///
 /// # Errors
@@ -40,7 +41,9 @@ pub fn fit_from(
     let models = Models::of(&world.with_face_on_axis())?;
     let mut state = State::new(models, world, sweeps, fit, &Unwatched)?;
     state.values = DVector::from_row_slice(start);
-    let end = state.settle(*errors)?;
+    state.phases = Phases::Known;
+    let end = state.settled(*errors)?;
+    let end = state.polished(end)?;
     let beside = state.still();
     state.end(end, &beside)
 }
