@@ -5,7 +5,7 @@
 //! degrees, air by 8 degrees Celsius, a wall by 5 cm, threshold by 6 dB; with `mounting` the face by 3 cm ahead and
 //! aside, with `furniture` five round things that the scene lacks). Readings have noise of 1 mm with the far tail of
 //! `TofNoise`. None is begun after so many minutes. Prints for each parameter the root mean square of the errors, the
-//! same as a multiple of the bound, the median of that and of the standard deviations told, the share of 95 % intervals
+//! same as a multiple of the bound and of the standard deviations told, the median of that and of the standard deviations told, the share of 95 % intervals
 //! that hold the truth, and how many trials went wrong with a small interval (beyond six standard deviations).
 //!
 //! Each trial is fitted a second time from the truth. Where that ends in the same place, the bound tells how far off an
@@ -81,16 +81,6 @@ fn trial(number: u64, seed: u64, kinds: Kinds) -> Option<Trial> {
     let fitted = fit(&wrong.believed, here, &wrong.fit).ok()?;
     let took_s = began.elapsed().as_secs_f64();
     let of_truth = fit_from(&wrong.believed, here, &wrong.fit, &wrong.expected, &ERRORS).ok()?;
-    if std::env::var_os("DEBUG_TRIAL").is_some() {
-        eprintln!("{number} found {:?}\n   truth's {:?}", fitted.errors, of_truth.errors);
-        for (at, prior) in wrong.fit.priors.iter().enumerate() {
-            let (one, two) = (&fitted.estimates[at], &of_truth.estimates[at]);
-            eprintln!(
-                "   {}: found {:.6} truth's {:.6} expected {:.6} sigma {:.6} bound {:.6}",
-                prior.parameter, one.change, two.change, wrong.expected[at], two.sigma, bounds[at]
-            );
-        }
-    }
     let both = fitted.estimates.iter().zip(&of_truth.estimates);
     let is_same =
         both.clone().all(|(one, other)| (one.change - other.change).abs() < SAME * other.sigma);
@@ -150,8 +140,8 @@ fn print(trials: &[Trial]) {
 
 fn table(trials: &[&Trial]) {
     println!(
-        "{:16} {:>10} {:>10} {:>10} {:>10} {:>9} {:>8}",
-        "", "rms", "rms/bound", "median/b.", "sigma/b.", "95 % hold", "wrong"
+        "{:16} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>8}",
+        "", "rms", "rms/bound", "rms/sigma", "median/b.", "sigma/b.", "95 % hold", "wrong"
     );
     let names = trials.first().map_or(0, |trial| trial.found.len());
     for at in 0..names {
@@ -168,10 +158,11 @@ fn table(trials: &[&Trial]) {
         let holds = of.iter().filter(|found| found.error.abs() < 1.96 * found.sigma).count();
         let wrong = of.iter().filter(|found| found.error.abs() > 6.0 * found.sigma).count();
         println!(
-            "{:16} {:10.5} {:10.2} {:10.2} {:10.2} {:7.1} % {wrong:8}",
+            "{:16} {:10.5} {:10.2} {:10.2} {:10.2} {:10.2} {:7.1} % {wrong:8}",
             of[0].name,
             rms(&mut of.iter().map(|found| found.error)),
             rms(&mut of.iter().map(|found| found.error / found.bound)),
+            rms(&mut of.iter().map(|found| found.error / found.sigma)),
             // Of a normal distribution as many standard deviations.
             median(&mut of.iter().map(|found| found.error / found.bound)) / 0.6745,
             median(&mut of.iter().map(|found| found.sigma / found.bound)),

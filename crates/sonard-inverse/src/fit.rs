@@ -331,9 +331,10 @@ impl<'a> State<'a> {
             self.improve(&exact, &errors)?;
         }
         let linear = self.exact()?;
-        let curve = linear.curve(&self.still(), &errors);
+        let curve = linear.curve(&self.still(), &errors.for_information());
         let mut covariance =
             self.covariance(curve.information.clone()).ok_or(FitError::Degenerate)?;
+        let log_likelihood = linear.log_likelihood(&self.still(), &errors);
         // Ranges depend on the threshold, too, by their time walk; what its doubt does to the other values comes on top.
         let threshold = self.parameters.iter().position(|of| **of == Parameter::Threshold);
         let sigma_db = threshold.map_or(NOT_FITTED_DB, |at| covariance[(at, at)].sqrt());
@@ -349,9 +350,9 @@ impl<'a> State<'a> {
             world: self.world()?,
             poses: self.poses(),
             errors,
-            log_likelihood: curve.value,
+            log_likelihood,
             readings: linear.len(),
-            log_posterior: curve.value + self.log_prior(&self.values),
+            log_posterior: log_likelihood + self.log_prior(&self.values),
         })
     }
 }

@@ -16,11 +16,11 @@ use super::{
 use crate::{candidates::Phases, likelihood::ErrorModel};
 
 /// Places on each side along the directions that are held least, and how far apart, in standard deviations.
-const SCANNED: (i32, f64) = (5, 0.8);
+const SCANNED: (i32, f64) = (4, 1.0);
 /// Predictions that are made about the best of them.
 const TRIED: usize = 60;
-/// Of a robot with a body.
-const TRIED_OF_BODY: usize = 40;
+/// More than polishing an end makes it likelier, as a logarithm.
+pub(super) const FAR_BELOW: f64 = 30.0;
 /// Steps to begin with, in standard deviations, and what becomes of them after one that is better, and one that is not:
 /// as large as lets one in five be better (Rechenberg's rule for an evolution strategy of one parent and one child).
 const STEP: f64 = 0.4;
@@ -28,22 +28,30 @@ const GROWS: f64 = 1.5;
 const SHRINKS: f64 = 0.9;
 
 impl State<'_> {
-    /// The likeliest place of some that are tried about an end, in steps that spread as its covariance does. Without
-    /// phases nothing changes so quickly, and the end stays where it is.
+    /// The likeliest place of some that are tried about an end with phases, in steps that spread as its covariance does.
+    /// Without phases nothing changes so quickly: where readings are far likelier so, the end stays where it is.
     pub(super) fn polished(&mut self, end: Settled) -> Result<Settled, FitError> {
-        let phases = end.phases;
-        if phases == Phases::Unknown {
+        let with = match end.phases {
+            Phases::Known => None,
+            Phases::Unknown => {
+                (self.values, self.phases) = (end.values.clone(), Phases::Known);
+                Some(self.settled(end.errors)?)
+            }
+        };
+        let from = with.as_ref().unwrap_or(&end);
+        if from.value < end.value - FAR_BELOW {
             return Ok(end);
         }
-        match self.found(|state| state.polish(&end))? {
-            Found::End { values, errors, log_posterior } => Ok(Settled {
-                value: log_posterior,
-                values: DVector::from_vec(values),
-                errors,
-                phases,
-            }),
-            _ => Err(FitError::OtherFit),
+        let Found::End { values, errors, log_posterior } =
+            self.found(|state| state.polish(from))?
+        else {
+            return Err(FitError::OtherFit);
+        };
+        if log_posterior < end.value {
+            return Ok(end);
         }
+        let values = DVector::from_vec(values);
+        Ok(Settled { value: log_posterior, values, errors, phases: Phases::Known })
     }
 
     fn polish(&mut self, end: &Settled) -> Result<Found, FitError> {
@@ -54,15 +62,15 @@ impl State<'_> {
         best = self.scanned(best, &errors)?;
         self.values = best.1.clone();
         let linear = self.linear()?;
-        let curve = linear.curve(&self.still(), &errors);
+        let curve = linear.curve(&self.still(), &errors.for_information());
         let covariance = self.covariance(curve.information).ok_or(FitError::Degenerate)?;
         let root = Cholesky::new(covariance).ok_or(FitError::Degenerate)?.unpack();
         let mut rng = Pcg64::seed_from_u64(1);
         let mut step = STEP;
-        let tried = if self.start.scene.robot.is_some() { TRIED_OF_BODY } else { TRIED };
-        for _ in 0..tried {
+        for _ in 0..TRIED {
             let normal = self.still().map(|_: f64| StandardNormal.sample(&mut rng));
-            self.values = self.limited(&best.1 + step * (&root * normal));
+            let longer: f64 = StandardNormal.sample(&mut rng);
+            self.values = self.limited(&best.1 + step * longer.exp() * (&root * normal));
             let linear = self.linear()?;
             let value = self.value(&linear, &errors);
             if value > best.0 {

@@ -11,6 +11,7 @@ use super::{
     FitError, Settled, State,
     journal::{Found, listed},
     one_of_many,
+    polish::FAR_BELOW,
     settle::STAGES,
 };
 use crate::{
@@ -34,8 +35,6 @@ const LEAST_SHARE: f64 = 0.1;
 /// Places from which a fit goes on to where it ends, and how many of these ends are polished.
 const ENDS: usize = 8;
 const FOLLOWED: usize = 3;
-/// More than polishing an end makes it likelier, as a logarithm.
-const FAR_BELOW: f64 = 30.0;
 /// A fit has gone astray that explains less than all readings but this share, or contradicts what was believed by
 /// this many standard deviations.
 const ASTRAY: (f64, f64) = (0.03, 3.5);
