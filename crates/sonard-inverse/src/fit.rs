@@ -27,7 +27,7 @@ use crate::{
 };
 pub use journal::Found;
 pub use shorter::fit_from;
-pub(crate) use shorter::{Approached, approach, fit_with};
+pub(crate) use shorter::{Approached, approach, fit_near};
 
 /// A parameter to fit, and what is known of it beforehand.
 #[derive(Debug, Clone, PartialEq)]

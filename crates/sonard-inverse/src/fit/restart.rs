@@ -52,10 +52,10 @@ impl State<'_> {
     /// The likeliest end of all beginnings, and what the other places add to the variances of its values. Where there
     /// is nothing to predict, as within a wall, there is no other beginning.
     pub(super) fn likeliest(&mut self) -> Result<(Settled, DVector<f64>), FitError> {
-        let mut best = self.attempt(self.still(), 0)?;
+        let mut best = self.attempt(self.still())?;
         if self.is_astray(&best) && self.start.scene.robot.is_none() {
             for start in self.beginnings()? {
-                keep_likelier(&mut best, self.attempt(start, 0))?;
+                keep_likelier(&mut best, self.attempt(start))?;
             }
         }
         best = self.polished(best)?;
@@ -90,16 +90,11 @@ impl State<'_> {
         Ok(ends)
     }
 
-    /// Where a fit ends that begins there, with the spreads from this stage on.
-    pub(super) fn attempt(
-        &mut self,
-        start: DVector<f64>,
-        stage: usize,
-    ) -> Result<Settled, FitError> {
+    /// Where a fit ends that begins there.
+    fn attempt(&mut self, start: DVector<f64>) -> Result<Settled, FitError> {
         (self.values, self.phases) = (start, Phases::Unknown);
         let mut errors = self.rough_errors();
-        errors.sigma_m *= STAGES[stage].0;
-        self.approach(&mut errors, stage)?;
+        self.approach(&mut errors, 0..STAGES.len())?;
         self.settle(errors)
     }
 

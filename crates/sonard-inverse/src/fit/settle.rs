@@ -18,13 +18,13 @@ const LAST_STAGES: usize = 5;
 const TURNS: [(f64, i32); STAGES.len()] = [(1.5, 8), (1.5, 8), (1.0, 10), (0.75, 12), (0.5, 10)];
 
 impl State<'_> {
-    /// Goes from spread to spread.
+    /// Goes from spread to spread, by some of the stages.
     pub(super) fn approach(
         &mut self,
         errors: &mut ErrorModel,
-        stage: usize,
+        stages: impl Iterator<Item = usize>,
     ) -> Result<(), FitError> {
-        for stage in stage..STAGES.len() {
+        for stage in stages {
             let from = *errors;
             let found = self.found(|state| state.narrowed(from, stage))?;
             let Found::Spread { values, errors: narrowed, is_last } = found else {

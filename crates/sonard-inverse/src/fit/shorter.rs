@@ -5,7 +5,7 @@ use std::slice;
 use nalgebra::DVector;
 use sonard_model::geometry::Pose;
 
-use super::{Fit, FitError, Fitted, State};
+use super::{Fit, FitError, Fitted, State, settle::STAGES};
 use crate::{
     candidates::Phases,
     likelihood::ErrorModel,
@@ -13,6 +13,9 @@ use crate::{
     watch::{Unwatched, Watch},
     world::{Models, World},
 };
+
+/// Stages of a fit that begins near where it ends.
+const NEAR: [usize; 3] = [0, 2, 4];
 
 /// Where a single sweep was taken, roughly.
 pub(crate) struct Approached {
@@ -48,21 +51,7 @@ pub fn fit_from(
     state.end(end, &beside)
 }
 
-/// The same with models of the world with the transducer on its axis, which it may have in common with other fits.
-pub(crate) fn fit_with(
-    models: Models,
-    world: &World,
-    sweeps: &[Sweep],
-    fit: &Fit,
-    watch: &dyn Watch,
-) -> Result<Fitted, FitError> {
-    let mut state = State::new(models, world, sweeps, fit, watch)?;
-    let end = state.attempt(state.still(), 0)?;
-    let beside = state.still();
-    state.end(end, &beside)
-}
-
-/// Goes near to where a fit would end, with a single sweep.
+/// Goes near to where a fit of a single sweep would end, by every other spread.
 pub(crate) fn approach(
     models: Models,
     world: &World,
@@ -70,12 +59,41 @@ pub(crate) fn approach(
     fit: &Fit,
     watch: &dyn Watch,
 ) -> Result<Approached, FitError> {
-    let sweeps = slice::from_ref(sweep);
-    let mut state = State::new(models, world, sweeps, fit, watch)?;
-    let mut errors = state.rough_errors();
-    state.approach(&mut errors, 0)?;
-    let linear = state.linear()?;
-    let errors = state.spread(&linear, &errors);
-    let log_posterior = state.value(&linear, &errors);
-    Ok(Approached { pose: state.poses()[0], log_posterior, sigma_m: errors.sigma_m })
+    let mut state = State::new(models, world, slice::from_ref(sweep), fit, watch)?;
+    Ok(state.approached((0..STAGES.len()).step_by(2))?.0)
+}
+
+/// Fits a single sweep that begins near where it ends, unless it turns out to be less likely than `least`. Gives how likely
+/// it was before it settled, too.
+pub(crate) fn fit_near(
+    models: Models,
+    world: &World,
+    sweep: &Sweep,
+    fit: &Fit,
+    least: f64,
+    watch: &dyn Watch,
+) -> Result<Option<(Fitted, f64)>, FitError> {
+    let mut state = State::new(models, world, slice::from_ref(sweep), fit, watch)?;
+    let (Approached { log_posterior, .. }, errors) = state.approached(NEAR.into_iter())?;
+    if log_posterior < least {
+        return Ok(None);
+    }
+    let end = state.settle(errors)?;
+    let beside = state.still();
+    Ok(Some((state.end(end, &beside)?, log_posterior)))
+}
+
+impl State<'_> {
+    fn approached(
+        &mut self,
+        stages: impl Iterator<Item = usize>,
+    ) -> Result<(Approached, ErrorModel), FitError> {
+        let mut errors = self.rough_errors();
+        self.approach(&mut errors, stages)?;
+        let linear = self.linear()?;
+        let spread = self.spread(&linear, &errors);
+        let log_posterior = self.value(&linear, &spread);
+        let found = Approached { pose: self.poses()[0], log_posterior, sigma_m: spread.sigma_m };
+        Ok((found, errors))
+    }
 }
