@@ -1,5 +1,6 @@
 //! `sonard calibrate`.
 
+mod doubt;
 mod prior;
 mod report;
 mod unfinished;
@@ -27,6 +28,7 @@ use crate::inverse::{
     Fit, FitError, Fitted, Found, Group, GroupError, Prior, Progress, Sweep, Told, Watch, World,
     fit_watched, priors,
 };
+use doubt::doubts_of;
 use prior::PriorSigma;
 use report::write_folder;
 use unfinished::{Head, Unfinished};
@@ -111,12 +113,17 @@ pub(super) fn run(args: &Args) -> Outcome {
     let unfinished = args.out.as_ref().map(open).transpose()?;
     let fitted = find(&world, &sweeps, &what, unfinished.as_ref())?;
     let lines = fitted.told(&world, &sweeps, &what);
+    let doubts = doubts_of(&world, &sweeps, &fitted);
+    if args.json {
+        doubts.iter().for_each(|doubt| anstream::eprintln!("{doubt}"));
+    }
+    let words = report::fit_words(&lines, &fitted, doubts);
     if let (Some(out), Some(unfinished)) = (&args.out, unfinished) {
         let overwrite = args.overwrite.or_forced(unfinished.begin_results());
-        write_folder(out, overwrite, &world, &sweeps, &fitted, &lines)?;
+        write_folder(out, overwrite, &world, &sweeps, &fitted, &lines, &words)?;
         unfinished.remove()?;
     }
-    answer(args.json, &lines, |out| print(out, &lines, &fitted))
+    answer(args.json, &lines, |out| print(out, &lines, &words))
 }
 
 /// The sweeps, and the world that they have in common.
@@ -219,7 +226,7 @@ fn wanted(args: &Args, world: &World, sweeps: usize) -> Result<Vec<Prior>, Failu
     })
 }
 
-fn print(out: &mut impl Write, lines: &[Told], fitted: &Fitted) -> io::Result<()> {
+fn print(out: &mut impl Write, lines: &[Told], words: &[String]) -> io::Result<()> {
     let mut table = Table::new();
     table.load_style(RULED);
     table.set_header(["parameter", "was", "is", "\u{b1}", "95 %", ""]);
@@ -237,5 +244,5 @@ fn print(out: &mut impl Write, lines: &[Told], fitted: &Fitted) -> io::Result<()
         column.set_cell_alignment(CellAlignment::Right);
     }
     writeln!(out, "{table}")?;
-    report::fit_words(lines, fitted).iter().try_for_each(|line| writeln!(out, "{line}"))
+    words.iter().try_for_each(|line| writeln!(out, "{line}"))
 }

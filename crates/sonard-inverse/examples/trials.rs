@@ -1,31 +1,27 @@
 //! How well parameters are found again in simulation, beside the bound of Cramer and Rao.
 //!
-//! `cargo run --release -p sonard-inverse --example trials -- COUNT [SEED]` draws COUNT worlds: a shipped scene, a place
-//! in it, and what is wrong with what is believed of it (pose by up to 10 cm and 8 degrees, air by 8 degrees
-//! Celsius, a wall by 5 cm, threshold by 6 dB). Readings have noise of 1 mm with the far tail of `TofNoise`.
-//! Prints for each parameter the root mean square of the errors, the same as a multiple of the bound, the median of
-//! that and of the standard deviations told, the share of 95 % intervals that hold the truth, and how many trials went
-//! wrong with a small interval (beyond six standard deviations).
+//! `cargo run --release -p sonard-inverse --example trials -- COUNT [SEED] [MINUTES] [mounting] [furniture] [each]` draws
+//! COUNT worlds: a shipped scene, a place in it, and what is wrong with what is believed of it (pose by up to 10 cm and 8
+//! degrees, air by 8 degrees Celsius, a wall by 5 cm, threshold by 6 dB; with `mounting` the face by 3 cm ahead and
+//! aside, with `furniture` five round things that the scene lacks). Readings have noise of 1 mm with the far tail of
+//! `TofNoise`. None is begun after so many minutes. Prints for each parameter the root mean square of the errors, the
+//! same as a multiple of the bound and of the standard deviations told, the median of that and of the standard deviations told, the share of 95 % intervals
+//! that hold the truth, and how many trials went wrong with a small interval (beyond six standard deviations).
+//!
+//! Each trial is fitted a second time from the truth. Where that ends in the same place, the bound tells how far off an
+//! estimate should be. Where it ends elsewhere and is likelier, the search failed; where it is less likely, the readings
+//! mislead whoever believes them. The table is printed for all trials, and for those that ended where the truth's own fit
+//! does. `each` prints a line for every trial, `at=N` runs that one alone.
 
 mod rooms;
-#[path = "rooms/spread.rs"]
-mod spread;
+mod wrong;
 
-use std::sync::Arc;
+use std::time::{Duration, Instant};
 
-use rand::{RngExt as _, SeedableRng as _};
-use rand_pcg::Pcg64;
 use rayon::prelude::*;
-use rooms::{BEAMS, NOISE_MM, place, readings};
-use sonard_inverse::{Fit, Parameter, Prior, Sweep, World, bound, fit};
-use sonard_model::{
-    acoustics::{Air, Sensor},
-    geometry::{DVec2, Pose},
-    model::Options,
-    scene::{Scene, shipped},
-};
-use spread::SPREAD;
-use uuid::Uuid;
+use rooms::{BEAMS, NOISE_MM};
+use sonard_inverse::{Parameter, bound, fit, fit_from};
+use wrong::{ERRORS, Kinds, Wrong};
 
 /// What a trial found of a parameter.
 #[derive(Clone)]
@@ -37,144 +33,163 @@ struct Found {
 }
 
 struct Trial {
+    number: u64,
     scene: &'static str,
     found: Vec<Found>,
     took_s: f64,
     explained: f64,
+    /// By how much the logarithm of the posterior is higher where the fit ended than where one ends that begins at the
+    /// truth.
+    likelier: f64,
+    /// Whether both ended in the same place.
+    is_same: bool,
 }
+
+/// Ends this near to each other are the same: in standard deviations that the truth's own fit tells.
+const SAME: f64 = 4.0;
 
 fn main() {
-    let mut arguments = std::env::args().skip(1).filter_map(|text| text.parse::<u64>().ok());
-    let (count, seed) = (arguments.next().unwrap_or(50), arguments.next().unwrap_or(1));
-    let trials: Vec<Trial> = (0..count)
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let numbers: Vec<u64> = words.iter().filter_map(|text| text.parse().ok()).collect();
+    let number = |at: usize, usual: u64| numbers.get(at).copied().unwrap_or(usual);
+    let (count, seed, minutes) = (number(0, 50), number(1, 1), number(2, 1_000_000));
+    let has = |wanted: &str| words.iter().any(|word| word == wanted);
+    let kinds = Kinds { mounting: has("mounting"), furniture: has("furniture") };
+    let alone = words.iter().find_map(|word| word.strip_prefix("at=")?.parse().ok());
+    let wanted = alone.map_or(0..count, |at: u64| at..at + 1);
+    let (began, is_each) = (Instant::now(), has("each") || alone.is_some());
+    let trials: Vec<Trial> = wanted
         .into_par_iter()
-        .filter_map(|at| trial(seed.wrapping_mul(1_000_003) + at))
+        .filter(|_| began.elapsed() < Duration::from_secs(60 * minutes))
+        .filter_map(|at| {
+            let trial = trial(at, seed, kinds)?;
+            if is_each {
+                println!("{}", line(&trial));
+            }
+            Some(trial)
+        })
         .collect();
-    print(&trials, count);
+    print(&trials);
 }
 
-fn trial(seed: u64) -> Option<Trial> {
-    let mut rng = Pcg64::seed_from_u64(seed);
-    let names: Vec<&'static str> = shipped::names().collect();
-    let name = names[rng.random_range(0..names.len())];
-    let scene = Arc::new(Scene::from_json(shipped::text(name)?).ok()?);
-    let sensor = Sensor::preset("senscomp-6500").ok()?;
-    let mut believed = World::new(scene, sensor, Air::default(), Options::default());
-    believed.options.max_range_m = Some(4.0);
-    let pose = place(&believed.scene, &mut rng)?;
-    let mut off = |most: f64| rng.random_range(-most..most);
-    let (wall_m, shift, turn_deg) = (off(0.05), DVec2::new(off(0.1), off(0.1)), off(8.0));
-    let (air_c, threshold_db) = (off(8.0), off(6.0));
-    let wall = rng.random_range(0..believed.scene.walls.len());
-    let warmer = Air::new(20.0 + air_c, 50.0, 101.325).ok()?.sound_speed_m_s();
-    let faster = warmer / believed.air.sound_speed_m_s() - 1.0;
-    // From the truth to what is believed.
-    let parameters = [
-        (Parameter::X(0), -shift.x, 0.058),
-        (Parameter::Y(0), -shift.y, 0.058),
-        (Parameter::Heading(0), -turn_deg, 4.6),
-        (Parameter::SoundSpeed, faster, 0.008),
-        (Parameter::Threshold, threshold_db, 3.5),
-        (Parameter::Wall(wall), wall_m, 0.029),
-    ];
-    let changes: Vec<_> = parameters.iter().map(|(parameter, by, _)| (parameter, *by)).collect();
-    let truth = believed.changed(&changes).ok()?;
-    if truth.scene.check_pose(&pose).is_err() {
-        return None;
-    }
-    let beams = readings(&truth, &pose, &mut rng)?;
-    let there = Sweep { scan: Uuid::nil(), pose, beams };
-    let said = Pose {
-        x_m: pose.x_m + shift.x,
-        y_m: pose.y_m + shift.y,
-        heading_deg: pose.heading_deg + turn_deg,
-    };
-    let here = Sweep { pose: said, ..there.clone() };
-    let priors =
-        parameters.iter().map(|(of, _, sigma)| Prior { parameter: of.clone(), sigma: *sigma });
-    let what = Fit {
-        priors: priors.collect(),
-        widest_m: 0.15,
-        widest_turn_deg: 12.0,
-        least_sigma_m: 2e-4,
-        least_sigma_db: 0.5,
-    };
-    let bounds = bound(&truth, std::slice::from_ref(&there), &what, &SPREAD).ok()?;
-    let began = std::time::Instant::now();
-    let fitted = fit(&believed, std::slice::from_ref(&here), &what).ok()?;
+fn trial(number: u64, seed: u64, kinds: Kinds) -> Option<Trial> {
+    let wrong = Wrong::drawn(seed.wrapping_mul(1_000_003) + number, kinds)?;
+    let there = std::slice::from_ref(&wrong.there);
+    let bounds = bound(&wrong.truth, there, &wrong.fit, &ERRORS).ok()?;
+    let began = Instant::now();
+    let here = std::slice::from_ref(&wrong.here);
+    let fitted = fit(&wrong.believed, here, &wrong.fit).ok()?;
     let took_s = began.elapsed().as_secs_f64();
-    let found = parameters.iter().zip(&fitted.estimates).zip(bounds).map(
-        |(((parameter, expected, _), estimate), bound)| Found {
-            name: match parameter {
-                Parameter::Wall(_) => "wall".to_owned(),
-                other => other.to_string(),
+    let of_truth = fit_from(&wrong.believed, here, &wrong.fit, &wrong.expected, &ERRORS).ok()?;
+    let both = fitted.estimates.iter().zip(&of_truth.estimates);
+    let is_same =
+        both.clone().all(|(one, other)| (one.change - other.change).abs() < SAME * other.sigma);
+    let found =
+        wrong.fit.priors.iter().zip(&fitted.estimates).zip(&wrong.expected).zip(bounds).map(
+            |(((prior, estimate), expected), bound)| Found {
+                name: match &prior.parameter {
+                    Parameter::Wall(_) => "wall".to_owned(),
+                    other => other.to_string(),
+                },
+                error: estimate.change - expected,
+                sigma: estimate.sigma,
+                bound,
             },
-            error: estimate.change - expected,
-            sigma: estimate.sigma,
-            bound,
-        },
-    );
+        );
     Some(Trial {
-        scene: name,
+        number,
+        scene: wrong.scene,
         found: found.collect(),
         took_s,
         explained: 1.0 - fitted.errors.clutter,
+        likelier: fitted.log_posterior - of_truth.log_posterior,
+        is_same,
     })
 }
 
-fn print(trials: &[Trial], count: u64) {
-    println!("{} of {count} trials, {BEAMS} beams, noise {NOISE_MM} mm", trials.len());
+fn print(trials: &[Trial]) {
+    println!("{} trials, {BEAMS} beams, noise {NOISE_MM} mm", trials.len());
     let mut times: Vec<f64> = trials.iter().map(|trial| trial.took_s).collect();
     times.sort_by(f64::total_cmp);
     if let Some(median) = times.get(times.len() / 2) {
         println!("a fit took {median:.2} s (median), {:.2} s (most)", times[times.len() - 1]);
     }
+    table(&trials.iter().collect::<Vec<_>>());
+    let (same, other): (Vec<&Trial>, Vec<&Trial>) = trials.iter().partition(|trial| trial.is_same);
+    let (likelier, less): (Vec<&Trial>, Vec<&Trial>) =
+        other.iter().copied().partition(|trial| trial.likelier > 0.0);
+    println!("\n{} ended where the truth's own fit does:", same.len());
+    table(&same);
+    let mut by: Vec<f64> = likelier.iter().map(|trial| trial.likelier).collect();
+    by.sort_by(f64::total_cmp);
     println!(
-        "{:16} {:>10} {:>10} {:>10} {:>10} {:>9} {:>8}",
-        "", "rms", "rms/bound", "median/b.", "sigma/b.", "95 % hold", "wrong"
+        "\n{} ended elsewhere where the posterior is higher, its logarithm by {:.1} (median), {:.1} (most)",
+        likelier.len(),
+        by.get(by.len() / 2).copied().unwrap_or(0.0),
+        by.last().copied().unwrap_or(0.0)
+    );
+    println!("{} ended elsewhere where it is lower: the search failed\n", less.len());
+    let of_sigma = |trial: &Trial| {
+        trial.found.iter().map(|found| (found.error / found.sigma).abs()).fold(0.0, f64::max)
+    };
+    println!("beyond 6 sigma:");
+    for trial in trials.iter().filter(|trial| of_sigma(trial) > 6.0) {
+        println!("{}", line(trial));
+    }
+}
+
+fn table(trials: &[&Trial]) {
+    println!(
+        "{:16} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>8}",
+        "", "rms", "rms/bound", "rms/sigma", "median/b.", "sigma/b.", "95 % hold", "wrong"
     );
     let names = trials.first().map_or(0, |trial| trial.found.len());
     for at in 0..names {
         let of: Vec<&Found> = trials.iter().map(|trial| &trial.found[at]).collect();
         let count = of.len() as f64;
-        let rms = (of.iter().map(|found| found.error.powi(2)).sum::<f64>() / count).sqrt();
-        let ratio = (of.iter().map(|found| (found.error / found.bound).powi(2)).sum::<f64>()
-            / count)
-            .sqrt();
-        let mut sizes: Vec<f64> =
-            of.iter().map(|found| (found.error / found.bound).abs()).collect();
-        sizes.sort_by(f64::total_cmp);
+        let rms = |of: &mut dyn Iterator<Item = f64>| {
+            (of.map(|error| error * error).sum::<f64>() / count).sqrt()
+        };
+        let median = |of: &mut dyn Iterator<Item = f64>| {
+            let mut sizes: Vec<f64> = of.map(f64::abs).collect();
+            sizes.sort_by(f64::total_cmp);
+            sizes[sizes.len() / 2]
+        };
         let holds = of.iter().filter(|found| found.error.abs() < 1.96 * found.sigma).count();
         let wrong = of.iter().filter(|found| found.error.abs() > 6.0 * found.sigma).count();
-        let mut doubts: Vec<f64> = of.iter().map(|found| found.sigma / found.bound).collect();
-        doubts.sort_by(f64::total_cmp);
         println!(
-            "{:16} {rms:10.5} {ratio:10.2} {:10.2} {:10.2} {:7.1} % {wrong:8}",
+            "{:16} {:10.5} {:10.2} {:10.2} {:10.2} {:10.2} {:7.1} % {wrong:8}",
             of[0].name,
-            sizes[sizes.len() / 2] / 0.6745,
-            doubts[doubts.len() / 2],
+            rms(&mut of.iter().map(|found| found.error)),
+            rms(&mut of.iter().map(|found| found.error / found.bound)),
+            rms(&mut of.iter().map(|found| found.error / found.sigma)),
+            // Of a normal distribution as many standard deviations.
+            median(&mut of.iter().map(|found| found.error / found.bound)) / 0.6745,
+            median(&mut of.iter().map(|found| found.sigma / found.bound)),
             100.0 * holds as f64 / count
         );
     }
-    for trial in trials {
-        let worst =
-            trial.found.iter().map(|found| (found.error / found.sigma).abs()).fold(0.0, f64::max);
-        if worst > 6.0 {
-            let of = |found: &Found| {
-                format!(
-                    "{} {:.4} ({:.1} sigma)",
-                    found.name,
-                    found.error,
-                    found.error / found.sigma
-                )
-            };
-            let all: Vec<String> = trial.found.iter().map(of).collect();
-            println!(
-                "{}: {:.0} % explained, {}",
-                trial.scene,
-                100.0 * trial.explained,
-                all.join(", ")
-            );
-        }
-    }
+}
+
+fn line(trial: &Trial) -> String {
+    let of = |found: &Found| {
+        format!(
+            "{} {:.4} ({:.1} sigma, {:.1} bounds)",
+            found.name,
+            found.error,
+            found.error / found.sigma,
+            found.error / found.bound
+        )
+    };
+    let all: Vec<String> = trial.found.iter().map(of).collect();
+    format!(
+        "{} {}: {:.0} % explained, {} {:.2}, {:.1} s, {}",
+        trial.number,
+        trial.scene,
+        100.0 * trial.explained,
+        if trial.is_same { "same" } else { "other" },
+        trial.likelier,
+        trial.took_s,
+        all.join(", ")
+    )
 }

@@ -1,8 +1,10 @@
 //! The most likely values of parameters, and how sure they are.
 
 mod journal;
+mod polish;
 mod restart;
 mod settle;
+mod shorter;
 mod spread;
 mod step;
 
@@ -24,6 +26,8 @@ use crate::{
     world::{Models, World, WorldError},
 };
 pub use journal::Found;
+pub use shorter::fit_from;
+pub(crate) use shorter::{Approached, approach, fit_near};
 
 /// A parameter to fit, with its prior.
 #[derive(Debug, Clone, PartialEq)]
@@ -148,13 +152,6 @@ struct Settled {
     phases: Phases,
 }
 
-/// Where a single sweep was taken, roughly.
-pub(crate) struct Approached {
-    pub(crate) pose: Pose,
-    pub(crate) log_posterior: f64,
-    pub(crate) sigma_m: f64,
-}
-
 /// Doubt of a threshold that is not fitted, decibels.
 const NOT_FITTED_DB: f64 = 0.5;
 
@@ -188,38 +185,6 @@ pub fn fit_watched(
     state.known = known.iter();
     let (best, beside) = state.likeliest()?;
     state.end(best, &beside)
-}
-
-/// The same with models of the world with the transducer on its axis, which it may have in common with other fits.
-pub(crate) fn fit_with(
-    models: Models,
-    world: &World,
-    sweeps: &[Sweep],
-    fit: &Fit,
-    watch: &dyn Watch,
-) -> Result<Fitted, FitError> {
-    let mut state = State::new(models, world, sweeps, fit, watch)?;
-    let end = state.attempt(state.still(), 0)?;
-    let beside = state.still();
-    state.end(end, &beside)
-}
-
-/// Goes near to where a fit would end, with a single sweep.
-pub(crate) fn approach(
-    models: Models,
-    world: &World,
-    sweep: &Sweep,
-    fit: &Fit,
-    watch: &dyn Watch,
-) -> Result<Approached, FitError> {
-    let sweeps = slice::from_ref(sweep);
-    let mut state = State::new(models, world, sweeps, fit, watch)?;
-    let mut errors = state.rough_errors();
-    state.approach(&mut errors, 0)?;
-    let linear = state.linear()?;
-    let errors = state.spread(&linear, &errors);
-    let log_posterior = state.value(&linear, &errors);
-    Ok(Approached { pose: state.poses()[0], log_posterior, sigma_m: errors.sigma_m })
 }
 
 /// Standard deviations that no unbiased estimate from such readings can fall below (Cramer and Rao), where `world` and
@@ -366,9 +331,10 @@ impl<'a> State<'a> {
             self.improve(&exact, &errors)?;
         }
         let linear = self.exact()?;
-        let curve = linear.curve(&self.still(), &errors);
+        let curve = linear.curve(&self.still(), &errors.for_information());
         let mut covariance =
             self.covariance(curve.information.clone()).ok_or(FitError::Degenerate)?;
+        let log_likelihood = linear.log_likelihood(&self.still(), &errors);
         // Ranges depend on the threshold, too, by their time walk; what its doubt does to the other values comes on top.
         let threshold = self.parameters.iter().position(|of| **of == Parameter::Threshold);
         let sigma_db = threshold.map_or(NOT_FITTED_DB, |at| covariance[(at, at)].sqrt());
@@ -384,9 +350,9 @@ impl<'a> State<'a> {
             world: self.world()?,
             poses: self.poses(),
             errors,
-            log_likelihood: curve.value,
+            log_likelihood,
             readings: linear.len(),
-            log_posterior: curve.value + self.log_prior(&self.values),
+            log_posterior: log_likelihood + self.log_prior(&self.values),
         })
     }
 }

@@ -64,6 +64,13 @@ impl ErrorModel {
         ]
     }
 
+    /// The same for what readings say about parameters. Of a threshold that hardly varies only those tell that happen to lie
+    /// there, which are too few to say how much others would: so it counts as one that varies.
+    pub(crate) fn for_information(self) -> Self {
+        const LEAST_DB: f64 = 0.5;
+        Self { sigma_db: self.sigma_db.max(LEAST_DB), ..self }
+    }
+
     /// What the range of an echo that is explained says about where it was expected, as Fisher's information: a little
     /// less than of normal errors alone.
     pub(crate) fn range_information(&self) -> f64 {

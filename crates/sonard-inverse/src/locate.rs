@@ -7,7 +7,7 @@ use sonard_model::geometry::{Pose, wrap_180};
 
 use crate::{
     atlas::{Atlas, AtlasError, Match, is_apart},
-    fit::{Approached, Fit, FitError, Fitted, Prior, approach, fit_with, one_of_many},
+    fit::{Approached, Fit, FitError, Fitted, Prior, approach, fit_near, one_of_many},
     likelihood::READINGS_OF_ARC,
     parameter::Parameter,
     sweep::{Beam, Heard, Sweep},
@@ -73,6 +73,8 @@ const FEW_BEAMS: usize = 60;
 const LEAST_PROBABILITY: f64 = 1e-3;
 /// Logarithm of how much less likely a rough fit may be and still be improved.
 const FAR_BELOW: f64 = 60.0;
+/// The same of a fit to all beams before it settles: what is not listed, with as much again for what settling may change.
+const FAR_BELOW_WHOLE: f64 = 120.0;
 
 /// Finds where a sweep was taken, without any guess: all poses that explain it, most probable first.
 ///
@@ -150,13 +152,17 @@ impl Search<'_> {
         let best = rough.first().map_or(0.0, |best| best.log_posterior);
         rough.retain(|found| found.log_posterior > best - FAR_BELOW);
         let mut whole: Vec<Fitted> = Vec::new();
+        let mut nearly = f64::NEG_INFINITY;
         for found in distinct(rough, 0.05, |found| &found.pose).into_iter().take(most) {
             // A rough fit is off by little more than its readings spread.
             let widest_m = (3.0 * found.sigma_m).clamp(LEAST_WIDEST_M, 0.03);
             let near = Sweep { pose: found.pose, ..sweep.clone() };
             let what = pose_alone((widest_m, WHOLE_TURN_DEG));
-            let found = fit_with(models.clone(), world, std::slice::from_ref(&near), &what, watch);
-            whole.extend(one_of_many(found)?);
+            let least = nearly - FAR_BELOW_WHOLE;
+            let found = fit_near(models.clone(), world, &near, &what, least, watch);
+            let Some((found, log_posterior)) = one_of_many(found)?.flatten() else { continue };
+            nearly = nearly.max(log_posterior);
+            whole.push(found);
         }
         whole.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
         Ok(whole)

@@ -17,8 +17,8 @@ use crate::{
 const FILES: [&str; 6] =
     ["estimates.jsonl", "poses.jsonl", "sensor.json", "scene.json", "air.json", "report.md"];
 
-/// How well it fits, in sentences.
-pub(super) fn fit_words(lines: &[Told], fitted: &Fitted) -> Vec<String> {
+/// How well it fits, in sentences, with those that say what may be wrong.
+pub(super) fn fit_words(lines: &[Told], fitted: &Fitted, doubts: Vec<String>) -> Vec<String> {
     let errors = &fitted.errors;
     let mut said = vec![format!(
         "{} readings: {:.0} % explained, ranges within {:.1} mm (standard deviation), strengths within {:.1} dB",
@@ -34,6 +34,7 @@ pub(super) fn fit_words(lines: &[Told], fitted: &Fitted) -> Vec<String> {
                 .to_owned(),
         );
     }
+    said.extend(doubts);
     for (one, other, correlation) in fitted.hardly_told_apart() {
         let [one, other] = [&lines[one], &lines[other]].map(Told::title);
         said.push(format!("hardly told apart: {one} and {other} (correlation {correlation:.2})"));
@@ -60,6 +61,7 @@ pub(super) fn write_folder(
     sweeps: &[Sweep],
     fitted: &Fitted,
     lines: &[Told],
+    words: &[String],
 ) -> Outcome {
     make_folder(folder)?;
     let poses: String = sweeps
@@ -79,7 +81,7 @@ pub(super) fn write_folder(
         json(&fitted.sensor(&world.sensor)),
         fitted.world.scene.rewritten(),
         json(&AirRecord::from(&fitted.world.air)),
-        report(lines, fitted),
+        report(lines, words),
     ];
     FILES.iter().zip(contents).try_for_each(|(name, text)| {
         overwrite.save(&folder.join(name), Product::Log, text.as_bytes())
@@ -92,9 +94,9 @@ fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default() + "\n"
 }
 
-fn report(lines: &[Told], fitted: &Fitted) -> String {
+fn report(lines: &[Told], words: &[String]) -> String {
     let mut text = String::from("# Calibration\n\n");
-    for line in fit_words(lines, fitted) {
+    for line in words {
         let _ = writeln!(text, "{line}\n");
     }
     text.push_str(

@@ -11,6 +11,7 @@ use super::{
     FitError, Settled, State,
     journal::{Found, listed},
     one_of_many,
+    polish::FAR_BELOW,
     settle::STAGES,
 };
 use crate::{
@@ -31,10 +32,9 @@ const ROUGH: (f64, f64, f64) = (0.03, 3.0, 0.05);
 const CLOSE: (f64, f64, f64) = (0.005, 1.5, 0.03);
 /// Directions of less doubt than this share of what was believed are held well enough.
 const LEAST_SHARE: f64 = 0.1;
-/// Places that are followed to their ends.
-const FOLLOWED: usize = 2;
-/// The stage that these start with.
-const STAGE: usize = STAGES.len() - 1;
+/// Places from which a fit goes on to where it ends, and how many of these ends are polished.
+const ENDS: usize = 8;
+const FOLLOWED: usize = 3;
 /// A fit has gone astray that explains less than all readings but this share, or contradicts what was believed by
 /// this many standard deviations.
 const ASTRAY: (f64, f64) = (0.03, 3.5);
@@ -52,30 +52,49 @@ impl State<'_> {
     /// The likeliest end of all beginnings, and what the other places add to the variances of its values. Where there
     /// is nothing to predict, as within a wall, there is no other beginning.
     pub(super) fn likeliest(&mut self) -> Result<(Settled, DVector<f64>), FitError> {
-        let mut best = self.attempt(self.still(), 0)?;
+        let mut best = self.attempt(self.still())?;
         if self.is_astray(&best) && self.start.scene.robot.is_none() {
             for start in self.beginnings()? {
-                keep_likelier(&mut best, self.attempt(start, 0))?;
+                keep_likelier(&mut best, self.attempt(start))?;
             }
         }
+        best = self.polished(best)?;
         let places = self.places(&best)?;
-        for place in places.iter().take(FOLLOWED) {
-            keep_likelier(&mut best, self.attempt(place.values.clone(), STAGE))?;
+        for end in self.ends(&best, &places)? {
+            if end.value > best.value - FAR_BELOW {
+                keep_likelier(&mut best, self.polished(end))?;
+            }
         }
         let beside = self.beside(&best, &places)?;
         Ok((best, beside))
     }
 
-    /// Where a fit ends that begins there, with the spreads from this stage on.
-    pub(super) fn attempt(
-        &mut self,
-        start: DVector<f64>,
-        stage: usize,
-    ) -> Result<Settled, FitError> {
+    /// Where fits end that begin in some places: the likeliest, each once.
+    fn ends(&mut self, best: &Settled, places: &[Place]) -> Result<Vec<Settled>, FitError> {
+        let close = widened(&best.errors, CLOSE);
+        let mut tried: Vec<Settled> = Vec::new();
+        for place in places.iter().take(ENDS) {
+            (self.values, self.phases) = (place.values.clone(), Phases::Unknown);
+            let end = self.settled(close).and_then(|end| self.with_phases(end));
+            tried.extend(one_of_many(end)?);
+        }
+        tried.sort_by(|one, other| other.value.total_cmp(&one.value));
+        let mut ends: Vec<Settled> = Vec::new();
+        for end in tried {
+            let is_apart = |other: &Settled| self.is_apart(&end.values, &other.values);
+            if ends.iter().chain([best]).all(is_apart) {
+                ends.push(end);
+            }
+        }
+        ends.truncate(FOLLOWED);
+        Ok(ends)
+    }
+
+    /// Where a fit ends that begins there.
+    fn attempt(&mut self, start: DVector<f64>) -> Result<Settled, FitError> {
         (self.values, self.phases) = (start, Phases::Unknown);
         let mut errors = self.rough_errors();
-        errors.sigma_m *= STAGES[stage].0;
-        self.approach(&mut errors, stage)?;
+        self.approach(&mut errors, 0..STAGES.len())?;
         self.settle(errors)
     }
 
@@ -87,7 +106,7 @@ impl State<'_> {
 
     /// Other beginnings than what was believed.
     fn beginnings(&mut self) -> Result<Vec<DVector<f64>>, FitError> {
-        let doubtful = self.doubtful(&self.still(), &self.rough_errors())?;
+        let doubtful = self.doubtful(&self.still(), &self.rough_errors(), Phases::Unknown)?;
         let sides = doubtful
             .into_iter()
             .flat_map(|(direction, sigma)| [-ANEW, ANEW].map(|side| side * sigma * &direction));
@@ -101,7 +120,7 @@ impl State<'_> {
         let has_body = self.start.scene.robot.is_some();
         let (places, apart) = if has_body { PLACES_OF_BODY } else { PLACES };
         let mut tried: Vec<Place> = Vec::new();
-        let doubtful = self.doubtful(&end.values, &widened(&end.errors, ROUGH))?;
+        let doubtful = self.doubtful(&end.values, &widened(&end.errors, ROUGH), Phases::Unknown)?;
         let (mut number, of) = (0, doubtful.len() * 2 * places as usize);
         for (direction, sigma) in doubtful {
             for place in (-places..=places).filter(|place| *place != 0) {
@@ -161,12 +180,13 @@ impl State<'_> {
 
     /// The directions, in the parameters' units, in which readings that spread so much leave the most in doubt beside
     /// what was believed, with the standard deviation in each.
-    fn doubtful(
+    pub(super) fn doubtful(
         &mut self,
         about: &DVector<f64>,
         errors: &ErrorModel,
+        phases: Phases,
     ) -> Result<Vec<(DVector<f64>, f64)>, FitError> {
-        (self.values, self.phases) = (about.clone(), Phases::Unknown);
+        (self.values, self.phases) = (about.clone(), phases);
         let curve = self.linear()?.curve(&self.still(), errors);
         let covariance = self.covariance(curve.information).ok_or(FitError::Degenerate)?;
         let sigmas = self.prior_sigmas();
@@ -188,7 +208,7 @@ impl State<'_> {
         )
     }
 
-    fn limited(&self, mut values: DVector<f64>) -> DVector<f64> {
+    pub(super) fn limited(&self, mut values: DVector<f64>) -> DVector<f64> {
         for (value, parameter) in values.iter_mut().zip(&self.parameters) {
             let (least, most) = self.start.limits(parameter);
             *value = value.clamp(least, most);

@@ -18,13 +18,13 @@ const LAST_STAGES: usize = 5;
 const TURNS: [(f64, i32); STAGES.len()] = [(1.5, 8), (1.5, 8), (1.0, 10), (0.75, 12), (0.5, 10)];
 
 impl State<'_> {
-    /// Goes from spread to spread.
+    /// Goes from spread to spread, by some of the stages.
     pub(super) fn approach(
         &mut self,
         errors: &mut ErrorModel,
-        stage: usize,
+        stages: impl Iterator<Item = usize>,
     ) -> Result<(), FitError> {
-        for stage in stage..STAGES.len() {
+        for stage in stages {
             let from = *errors;
             let found = self.found(|state| state.narrowed(from, stage))?;
             let Found::Spread { values, errors: narrowed, is_last } = found else {
@@ -71,13 +71,18 @@ impl State<'_> {
     /// Settles without phases, and with them; the likelier one counts.
     pub(super) fn settle(&mut self, errors: ErrorModel) -> Result<Settled, FitError> {
         let without = self.settled(errors)?;
+        self.with_phases(without)
+    }
+
+    /// The likelier of two ends: without phases, and the one with them that follows from it.
+    pub(super) fn with_phases(&mut self, without: Settled) -> Result<Settled, FitError> {
         (self.values, self.phases) = (without.values.clone(), Phases::Known);
         let with = self.settled(without.errors)?;
         Ok(if with.value > without.value { with } else { without })
     }
 
     /// Finds the spread and the values in turn, as long as both get likelier.
-    fn settled(&mut self, from: ErrorModel) -> Result<Settled, FitError> {
+    pub(super) fn settled(&mut self, from: ErrorModel) -> Result<Settled, FitError> {
         let phases = self.phases;
         match self.found(|state| state.likeliest_here(from))? {
             Found::End { values, errors, log_posterior } => Ok(Settled {
