@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 use sonard_model::{
-    acoustics::{Combining, Detection, Latch, Receiver},
+    acoustics::{Combining, Detection, Detector, Latch, Receiver},
     model::{Ear, ObservationPoint, Prediction, TooCostly},
 };
 
@@ -64,9 +64,9 @@ struct Detected {
 
 impl Listener {
     pub(crate) fn new(receiver: &Receiver, phases: Phases) -> Self {
-        // Steps in which ranges are told would hide how they move.
+        // Steps in which ranges are told, and whole cycles, would hide how they move.
         let mut receiver = receiver.clone();
-        receiver.range_step_m = 0.0;
+        (receiver.range_step_m, receiver.detector) = (0.0, Detector::Envelope);
         if phases == Phases::Unknown && receiver.combining == Combining::Coherent {
             receiver.combining = Combining::Incoherent;
         }
