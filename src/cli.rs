@@ -38,6 +38,7 @@ mod plot;
 mod predict;
 mod predictor;
 mod preset;
+mod prior;
 mod progress;
 mod renamed;
 mod run;

@@ -1,7 +1,6 @@
 //! `sonard calibrate`.
 
 mod doubt;
-mod prior;
 mod report;
 mod unfinished;
 
@@ -19,17 +18,16 @@ use super::{
     compare::RULED,
     numbers::within,
     output::{OutPath, Overwrite},
+    prior::{self, PriorSigma},
     progress,
     runtime::{self, Interrupts},
     what_if::{WhatIf, WhatIfArgs},
     worlds::SweepArgs,
 };
 use crate::inverse::{
-    Fit, FitError, Fitted, Found, Group, GroupError, Prior, Progress, Sweep, Told, Watch, World,
-    fit_watched, priors,
+    Fit, FitError, Fitted, Found, Group, Progress, Sweep, Told, Watch, World, fit_watched,
 };
 use doubt::doubts_of;
-use prior::PriorSigma;
 use report::write_folder;
 use unfinished::{Head, Unfinished};
 
@@ -107,7 +105,8 @@ pub(super) fn run(args: &Args) -> Outcome {
         report::check(out, args.overwrite)?;
     }
     let (sweeps, world) = read(args, &what_if)?;
-    let what = Fit::usual(wanted(args, &world, sweeps.len())?, args.widest_m);
+    let priors = prior::fitted(&args.fit, &args.prior, &world, sweeps.len())?;
+    let what = Fit::usual(priors, args.widest_m);
     let head = Head::of(&world, &sweeps, &what);
     let open = |out: &OutPath| Unfinished::open(out, args.overwrite, &head);
     let unfinished = args.out.as_ref().map(open).transpose()?;
@@ -214,18 +213,7 @@ fn refuse(error: &FitError, unfinished: Option<&Unfinished>) -> Failure {
     }
 }
 
-/// What is to be fitted, with its priors.
-fn wanted(args: &Args, world: &World, sweeps: usize) -> Result<Vec<Prior>, Failure> {
-    let given: Vec<(String, f64)> = args.prior.iter().map(|PriorSigma(one)| one.clone()).collect();
-    priors(&args.fit, &given, world, sweeps).map_err(|error| {
-        let option = match error {
-            GroupError::NoHeight | GroupError::NoSkirts { .. } => "--fit ",
-            GroupError::NotFitted { .. } | GroupError::Sigma { .. } => "--prior: ",
-        };
-        Failure::input(format!("{option}{error}"), error.help())
-    })
-}
-
+/// The parameters as a table, then what is remarkable in words.
 fn print(out: &mut impl Write, lines: &[Told], words: &[String]) -> io::Result<()> {
     let mut table = Table::new();
     table.load_style(RULED);

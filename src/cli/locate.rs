@@ -10,10 +10,16 @@ use serde::Serialize;
 use uuid::Uuid;
 
 use super::{
-    Failure, Outcome, answer::answer, compare::RULED, numbers::within, progress,
-    what_if::InsteadArgs, worlds::SweepArgs,
+    Failure, Outcome,
+    answer::answer,
+    compare::RULED,
+    numbers::within,
+    prior::{self, PriorSigma},
+    progress,
+    what_if::InsteadArgs,
+    worlds::SweepArgs,
 };
-use crate::inverse::{Atlas, Course, Doubt, Mode, Odometry, World, doubts, locate};
+use crate::inverse::{Atlas, Besides, Course, Doubt, Group, Mode, Odometry, World, doubts, locate};
 
 /// Options of `sonard locate`.
 #[derive(Debug, clap::Args)]
@@ -24,6 +30,14 @@ pub(super) struct Args {
     /// Spacing of the positions that are tried first, metres [default: 0.05 in small scenes to 0.1]
     #[arg(long, value_name = "M", value_parser = within(0.01..=2.0))]
     spacing_m: Option<f64>,
+    /// Fit these to each scan besides its pose, separated by commas: the threshold of a ranger that is not the one that
+    /// was calibrated. Names are those of `sonard calibrate`
+    #[arg(long, value_name = "WHAT", value_delimiter = ',')]
+    fit: Vec<Group>,
+    /// Standard deviation of what is believed beforehand about a parameter that is fitted, in its unit; several are
+    /// possible
+    #[arg(long, value_name = "NAME=SIGMA", requires = "fit")]
+    prior: Vec<PriorSigma>,
     /// JSON instead of text; one object a pose, most probable first
     #[arg(long)]
     json: bool,
@@ -76,6 +90,9 @@ this one, and poses that agree gain probability. So rooms that look alike are to
 where they differ, and a robot that was carried elsewhere is found again. Each scan is answered as soon as it is \
 read: a log may come through a pipe while it is taken.
 
+Cheap rangers of one kind differ by some decibels. With --fit threshold each scan also tells how sensitive its \
+ranger was, and each pose is listed with what was found.
+
 A scan that nothing in the scene explains still gets its best pose, with the share of readings that it explains \
 and, if the readings show it, what may be wrong with them: azimuths counted clockwise, or another unit.";
 
@@ -85,9 +102,10 @@ Examples:
   sonard locate scan.jsonl
   sonard locate sweep.jsonl --scene my-room.json --sensor hc-sr04 --json
   sonard locate way.jsonl --scene my-room.json --course --drift-m-per-m 0.1
+  sonard locate sweep.jsonl --scene my-room.json --sensor lego-nxt --fit threshold   # of another specimen
 
 Of --json: log, scan, x_m, y_m, heading_deg, probability, sigma_x_m, sigma_y_m, sigma_heading_deg, explained (share of \
-the readings), doubts.
+the readings), besides (name, value and sigma of what --fit names), doubts.
 Exit codes: 0 done, 2 wrong usage or input.";
 
 /// A line of `--json`.
@@ -108,7 +126,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let mut any = false;
     args.sweeps.for_each(&what_if, |log, sweep, world| {
         if known.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, world)) {
-            known = Some((Arc::clone(world), atlas(world, args.spacing_m)?));
+            known = Some((Arc::clone(world), atlas(world, args)?));
         }
         let Some((_, atlas)) = &known else { return Ok(()) };
         let modes = match &mut course {
@@ -128,12 +146,13 @@ pub(super) fn run(args: &Args) -> Outcome {
     Err(Failure::input("there is no sweep to locate", "give a log of a ranger on a stepper"))
 }
 
-fn atlas(world: &World, spacing_m: Option<f64>) -> Result<Atlas, Failure> {
-    let spacing_m = spacing_m.unwrap_or_else(|| Atlas::usual_spacing_m(&world.scene));
+fn atlas(world: &World, args: &Args) -> Result<Atlas, Failure> {
+    let besides = prior::fitted(&args.fit, &args.prior, world, 1)?;
+    let spacing_m = args.spacing_m.unwrap_or_else(|| Atlas::usual_spacing_m(&world.scene));
     let bar = progress::spinner("scenes looked over");
     let atlas = Atlas::new(world, spacing_m).map_err(|error| refuse(&error))?;
     bar.finish_and_clear();
-    Ok(atlas)
+    Ok(atlas.fitting(besides))
 }
 
 fn refuse(error: &dyn std::fmt::Display) -> Failure {
@@ -153,15 +172,19 @@ fn print(
     writeln!(out, "{log}: scan {scan}")?;
     let mut table = Table::new();
     table.load_style(RULED);
-    table.set_header(["probability", "x m", "y m", "heading deg", "explained"]);
+    let besides = modes.first().map_or(&[][..], |mode| &mode.besides);
+    let head = ["probability", "x m", "y m", "heading deg", "explained"].map(str::to_owned);
+    table.set_header(head.into_iter().chain(besides.iter().map(|of| of.name.clone())));
     for mode in modes {
-        table.add_row([
+        let pose = [
             format!("{:.3}", mode.probability),
             format!("{:.3} \u{b1} {:.3}", mode.x_m, mode.sigma_x_m),
             format!("{:.3} \u{b1} {:.3}", mode.y_m, mode.sigma_y_m),
             format!("{:.2} \u{b1} {:.2}", mode.heading_deg, mode.sigma_heading_deg),
             format!("{:.0} %", 100.0 * mode.explained),
-        ]);
+        ];
+        let told = |of: &Besides| format!("{:.2} \u{b1} {:.2}", of.value, of.sigma);
+        table.add_row(pose.into_iter().chain(mode.besides.iter().map(told)));
     }
     for column in table.column_iter_mut() {
         column.set_cell_alignment(CellAlignment::Right);

@@ -92,6 +92,27 @@ fn a_symmetric_room_has_its_poses_listed_and_another_room_is_doubted() {
     assert!(elsewhere[0]["doubts"][0]["kind"].is_string(), "{}", elsewhere[0]);
 }
 
+/// The log's session says how sensitive its ranger was; asked by the sensor's file, which says otherwise, `locate` finds it.
+#[test]
+fn how_sensitive_a_ranger_was_is_found_with_its_place() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let further =
+        ["--sensor", "hc-sr04", "--threshold", "0.3", "--step-deg", "4", "--max-range", "4"];
+    let log = sweep(folder.path(), "mcgill-lab", "1.0,1.0,25", &further);
+    for (own, threshold) in [(&[][..], "session"), (&["--sensor", "hc-sr04"], "file")] {
+        let fit = ["locate", &log, "--fit", "threshold", "--prior", "threshold_db=8", "--json"];
+        let found = lines(&[&fit[..], own].concat());
+        let off_m = (number(&found[0], "x_m") - 1.0).hypot(number(&found[0], "y_m") - 1.0);
+        assert!(off_m < 0.02, "{threshold}: {}", found[0]);
+        let besides = &found[0]["besides"][0];
+        assert_eq!(besides["name"], "threshold_db");
+        let off_db = number(besides, "value") - 20.0 * 0.3_f64.log10();
+        assert!(off_db.abs() < 1.0 && number(besides, "sigma") < 1.0, "{threshold}: {besides}");
+    }
+    let without = lines(&["locate", &log, "--json"]);
+    assert!(without[0]["besides"].is_null(), "{}", without[0]);
+}
+
 /// A robot drives from one end of a room, whose ends look alike, past a short wall to the other; its log comes through
 /// a pipe, and each scan is answered before the next is there.
 #[test]
@@ -151,6 +172,9 @@ fn what_can_not_be_fitted_is_said() {
         (vec!["locate", &log, "--scene", "nowhere"], "nowhere"),
         (vec!["locate", &log, "--spacing-m", "0"], "0.01 to 2"),
         (vec!["locate", &log, "--carried", "0.1"], "--course"),
+        (vec!["locate", &log, "--prior", "threshold_db=3"], "--fit"),
+        (vec!["locate", &log, "--fit", "height"], "neither floor nor ceiling"),
+        (vec!["locate", &log, "--fit", "threshold", "--prior", "gear=1"], "is not fitted"),
         (vec!["locate", &log, "--course", "--carried", "1.1"], "0 to 1"),
     ] {
         let output = run(&arguments);

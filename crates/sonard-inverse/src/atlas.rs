@@ -10,6 +10,7 @@ use sonard_model::{
 use thiserror::Error;
 
 use crate::{
+    fit::Prior,
     sweep::Sweep,
     watch::{Unwatched, Watch},
     world::{Models, World, WorldError},
@@ -48,6 +49,8 @@ pub struct Atlas {
     models: Models,
     /// What ranges there lack, metres.
     shift_m: f64,
+    /// What is fitted to each sweep besides its pose.
+    pub(crate) besides: Vec<Prior>,
 }
 
 /// Places, and what would be read there.
@@ -111,7 +114,17 @@ impl Atlas {
         let models = Models::of(&alone)?;
         let ranges_m = readings(&models, shift_m, &usual, watch)?;
         let usual = Region { places: usual, ranges_m };
-        Ok(Self { spacing_m, usual, beside, beside_m: OnceLock::new(), models, shift_m })
+        let (beside_m, besides) = (OnceLock::new(), Vec::new());
+        Ok(Self { spacing_m, usual, beside, beside_m, models, shift_m, besides })
+    }
+
+    /// The same for sweeps to each of which more than its pose is to be fitted: the threshold of a ranger that is not the
+    /// one that was calibrated. What is of single sweeps among the priors is left out.
+    #[must_use]
+    pub fn fitting(mut self, mut priors: Vec<Prior>) -> Self {
+        priors.retain(|prior| prior.parameter.sweep().is_none());
+        self.besides = priors;
+        self
     }
 
     /// The spacing that suits a scene, metres: the finer, the smaller it is.

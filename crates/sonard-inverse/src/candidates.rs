@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 use sonard_model::{
-    acoustics::{Combining, Detection, Listening, PulseArrival, Receiver},
+    acoustics::{Combining, Detection, Detector, Listening, PulseArrival, Receiver},
     model::{Ear, ObservationPoint, Prediction, TooCostly},
     reading::PingStatus,
 };
@@ -76,9 +76,9 @@ struct Told {
 impl Listener {
     /// For thresholds up to `span_db` decibels to both sides of the nominal one.
     pub(crate) fn new(receiver: &Receiver, phases: Phases, span_db: f64) -> Self {
-        // Steps in which ranges are told would hide how they move.
+        // Steps in which ranges are told, and whole cycles, would hide how they move.
         let mut receiver = receiver.clone();
-        receiver.range_step_m = 0.0;
+        (receiver.range_step_m, receiver.detector) = (0.0, Detector::Envelope);
         if phases == Phases::Unknown && receiver.combining == Combining::Coherent {
             receiver.combining = Combining::Incoherent;
         }

@@ -103,7 +103,7 @@ impl Course {
         let poses: Vec<Pose> = expected.iter().map(|expected| expected.pose).collect();
         let found = explaining(world, atlas, sweep, &poses, watch)?;
         let volume = atlas.area_m2() * 360.0;
-        let modes = modes(&found, |mode| self.log_prior(mode, &expected, volume));
+        let modes = modes(&found, world, atlas, |mode| self.log_prior(mode, &expected, volume));
         if !modes.is_empty() {
             let (scene, modes) = (Arc::clone(&world.scene), modes.clone());
             self.last = Some(Last { scene, told: sweep.pose, modes });

@@ -38,7 +38,7 @@ pub use fit::{Estimate, Fit, FitError, Fitted, Found, Prior, bound, fit, fit_fro
 pub use groups::{Group, GroupError, name, priors};
 pub use hypothesis::{Hypotheses, LogLikelihood};
 pub use likelihood::ErrorModel;
-pub use locate::{Mode, locate, locate_watched};
+pub use locate::{Besides, Mode, locate, locate_watched};
 pub use motion::{Motion, length_rate};
 pub use parameter::Parameter;
 pub use sweep::{Beam, Heard, Sweep, SweepError};

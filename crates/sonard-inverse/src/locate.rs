@@ -34,12 +34,32 @@ pub struct Mode {
     pub sigma_heading_deg: f64,
     /// Share of the readings that it explains.
     pub explained: f64,
+    /// What else was fitted with it; see [`Atlas::fitting`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub besides: Vec<Besides>,
+}
+
+/// A value that was fitted together with a pose.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Besides {
+    /// What it is.
+    pub name: String,
+    /// In the unit of the figure that files have.
+    pub value: f64,
+    /// Standard deviation.
+    pub sigma: f64,
 }
 
 impl Mode {
-    /// Where a sweep was fitted, for certain as long as there is no other.
-    fn of(fitted: &Fitted) -> Self {
+    /// Where a sweep was fitted, for certain as long as there is no other; and what was fitted besides, from `world` on.
+    fn of(fitted: &Fitted, world: &World, besides: &[Prior]) -> Self {
         let (pose, of) = (&fitted.poses[0], &fitted.estimates);
+        let told = fitted.told(world, &[], &with_pose(ROUGH_WIDEST, besides));
+        let besides = told.into_iter().skip(POSE).map(|told| Besides {
+            name: told.name,
+            value: told.value,
+            sigma: told.sigma,
+        });
         Self {
             x_m: pose.x_m,
             y_m: pose.y_m,
@@ -49,6 +69,7 @@ impl Mode {
             sigma_y_m: of[1].sigma,
             sigma_heading_deg: of[2].sigma,
             explained: 1.0 - fitted.errors.clutter,
+            besides: besides.collect(),
         }
     }
 
@@ -94,7 +115,7 @@ pub fn locate_watched(
     sweep: &Sweep,
     watch: &dyn Watch,
 ) -> Result<Vec<Mode>, FitError> {
-    Ok(modes(&explaining(world, atlas, sweep, &[], watch)?, |_| 0.0))
+    Ok(modes(&explaining(world, atlas, sweep, &[], watch)?, world, atlas, |_| 0.0))
 }
 
 /// Fits the poses of the atlas that a sweep goes with best, and those where it is expected; the likeliest ones, each once.
@@ -109,7 +130,8 @@ pub(crate) fn explaining(
     expected: &[Pose],
     watch: &dyn Watch,
 ) -> Result<Vec<Fitted>, FitError> {
-    let search = Search { models: atlas.models(world)?, world, sweep, watch };
+    let besides = &atlas.besides;
+    let search = Search { models: atlas.models(world)?, world, sweep, besides, watch };
     let matches = atlas.matches(world, sweep, ROUGH);
     let starts = matches.iter().map(|Match { pose, .. }| pose).chain(expected);
     let mut found = search.improved(starts, WHOLE + expected.len())?;
@@ -130,6 +152,8 @@ struct Search<'a> {
     models: Models,
     world: &'a World,
     sweep: &'a Sweep,
+    /// What is fitted besides the pose.
+    besides: &'a [Prior],
     watch: &'a dyn Watch,
 }
 
@@ -140,12 +164,13 @@ impl Search<'_> {
         starts: impl Iterator<Item = &'p Pose>,
         most: usize,
     ) -> Result<Vec<Fitted>, FitError> {
-        let &Self { ref models, world, sweep, watch } = self;
+        let &Self { ref models, world, sweep, besides, watch } = self;
         let few = thinned(sweep, FEW_BEAMS);
+        let what = with_pose(ROUGH_WIDEST, besides);
         let mut rough: Vec<Approached> = Vec::new();
         for pose in starts {
             let near = Sweep { pose: *pose, ..few.clone() };
-            let found = approach(models.clone(), world, &near, &pose_alone(ROUGH_WIDEST), watch);
+            let found = approach(models.clone(), world, &near, &what, watch);
             rough.extend(one_of_many(found)?);
         }
         rough.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
@@ -157,7 +182,7 @@ impl Search<'_> {
             // A rough fit is off by little more than its readings spread.
             let widest_m = (3.0 * found.sigma_m).clamp(LEAST_WIDEST_M, 0.03);
             let near = Sweep { pose: found.pose, ..sweep.clone() };
-            let what = pose_alone((widest_m, WHOLE_TURN_DEG));
+            let what = with_pose((widest_m, WHOLE_TURN_DEG), besides);
             let least = nearly - FAR_BELOW_WHOLE;
             let found = fit_near(models.clone(), world, &near, &what, least, watch);
             let Some((found, log_posterior)) = one_of_many(found)?.flatten() else { continue };
@@ -169,11 +194,15 @@ impl Search<'_> {
     }
 }
 
-/// Fits a pose alone, that may be so many metres and degrees off.
-fn pose_alone((widest_m, widest_turn_deg): (f64, f64)) -> Fit {
+/// How many values a pose has.
+const POSE: usize = 3;
+
+/// Fits a pose, that may be so many metres and degrees off, and what is fitted besides.
+fn with_pose((widest_m, widest_turn_deg): (f64, f64), besides: &[Prior]) -> Fit {
     let of = |parameter, sigma| Prior { parameter, sigma };
-    let priors =
-        vec![of(Parameter::X(0), 0.5), of(Parameter::Y(0), 0.5), of(Parameter::Heading(0), 20.0)];
+    let pose: [Prior; POSE] =
+        [of(Parameter::X(0), 0.5), of(Parameter::Y(0), 0.5), of(Parameter::Heading(0), 20.0)];
+    let priors = pose.into_iter().chain(besides.iter().cloned()).collect();
     Fit { priors, widest_m, widest_turn_deg, least_sigma_m: 5e-4, least_sigma_db: 0.5 }
 }
 
@@ -205,8 +234,14 @@ fn distinct<T>(sorted: Vec<T>, within_m: f64, pose: impl Fn(&T) -> &Pose) -> Vec
 
 /// Modes with their probabilities: each one's evidence by Laplace's approximation, times how probable it was beforehand,
 /// whose logarithm `log_prior` gives.
-pub(crate) fn modes(found: &[Fitted], log_prior: impl Fn(&Mode) -> f64) -> Vec<Mode> {
-    let mut modes: Vec<Mode> = found.iter().map(Mode::of).collect();
+pub(crate) fn modes(
+    found: &[Fitted],
+    world: &World,
+    atlas: &Atlas,
+    log_prior: impl Fn(&Mode) -> f64,
+) -> Vec<Mode> {
+    let of = |fitted: &Fitted| Mode::of(fitted, world, &atlas.besides);
+    let mut modes: Vec<Mode> = found.iter().map(of).collect();
     let evidence = |fitted: &Fitted| {
         (fitted.log_posterior + 0.5 * log_volume(&fitted.covariance)) / READINGS_OF_ARC
     };

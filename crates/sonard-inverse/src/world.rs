@@ -57,9 +57,11 @@ pub enum WorldError {
 const ANYWHERE: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
 
 impl World {
-    /// A world with a range without delay and an exact stepper.
+    /// A world with a range without delay and an exact stepper. A threshold among the options becomes the sensor's, so that
+    /// predictions follow it.
     #[must_use]
-    pub fn new(scene: Arc<Scene>, sensor: Sensor, air: Air, options: Options) -> Self {
+    pub fn new(scene: Arc<Scene>, mut sensor: Sensor, air: Air, mut options: Options) -> Self {
+        sensor.threshold = options.threshold.take().unwrap_or(sensor.threshold);
         Self { scene, sensor, air, options, delay_m: 0.0, heading_zero_deg: 0.0, gear: 1.0 }
     }
 

@@ -19,8 +19,8 @@ pub use receiver::{
     Receiver, ReceiverNoise, Rise, TracePoint, classify_tof,
 };
 pub use sensor::{
-    Aperture, BeamPoint, ChirpPart, EdgeLawKind, Gain, GainStep, Mounting, Pulse, Response, Sensor,
-    SensorError,
+    Aperture, BeamPoint, ChirpPart, Detector, EdgeLawKind, Gain, GainStep, Mounting, Pulse,
+    Response, Sensor, SensorError,
 };
 pub use tof_noise::TofNoise;
 pub use transducer::{BeamPattern, kuc_siegel_response, piston_directivity};

@@ -275,6 +275,30 @@ fn a_sweep_is_found_where_a_robot_hardly_ever_is() {
     }
 }
 
+/// A ranger that is less sensitive than the one of the sensor's file, which says that far more would be heard.
+#[test]
+fn a_sweep_of_another_specimen_is_found_with_its_threshold() {
+    const LESS_DB: f64 = 8.0;
+    let (mut here, mut deaf) = (world("mcgill-lab", "hc-sr04"), world("mcgill-lab", "hc-sr04"));
+    (here.options.max_range_m, deaf.options.max_range_m) = (Some(4.0), Some(4.0));
+    deaf.sensor.threshold *= 10f64.powf(LESS_DB / 20.0);
+    let pose = Pose { x_m: 1.0, y_m: 1.0, heading_deg: 25.0 };
+    let noise = TofNoise::of_range_mm(1.0, here.air.sound_speed_m_s());
+    let unknown = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
+    let swept = sweep(&deaf, &pose, &unknown, 120, noise, 5);
+    let atlas = Atlas::new(&here, 0.1).expect("an atlas");
+    let sensitivity = Prior { parameter: Parameter::Threshold, sigma: 6.0 };
+    let poses = [Parameter::X(0), Parameter::Heading(0)];
+    let priors = poses.map(|parameter| Prior { parameter, sigma: 1.0 });
+    let atlas = atlas.fitting(priors.into_iter().chain([sensitivity]).collect());
+    let modes = locate(&here, &atlas, &swept).expect("modes");
+    assert_found(&modes[..1], &pose);
+    let [told] = &modes[0].besides[..] else { panic!("{modes:?}") };
+    assert_eq!(told.name, "threshold_db");
+    let off_db = told.value - 20.0 * deaf.sensor.threshold.log10();
+    assert!(off_db.abs() < 1.0 && told.sigma < 1.0, "{told:?}: {off_db}");
+}
+
 fn assert_found(modes: &[Mode], pose: &Pose) {
     let is_right = modes.iter().any(|mode| {
         let off_m = (mode.x_m - pose.x_m).hypot(mode.y_m - pose.y_m);

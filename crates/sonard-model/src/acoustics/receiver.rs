@@ -39,7 +39,7 @@ use self::{
     gain::{Sensitivity, gain_db},
     hearing::Hearing,
 };
-use super::{ApertureResponse, EchoShape, Gain, Incidence, Response, Sensor};
+use super::{ApertureResponse, Detector, EchoShape, Gain, Incidence, Response, Sensor};
 use crate::reading::PingStatus;
 
 /// Behaviour of ECHO after it has risen.
@@ -104,6 +104,9 @@ pub struct Receiver {
     pub max_range_m: f64,
     /// How overlapping arrivals are combined.
     pub combining: Combining,
+    /// What it watches; phases that are not known have no crests.
+    pub detector: Detector,
+    averaged_firings: u32,
     gain: Gain,
     sensitivity: Sensitivity,
     /// Carrier, radians a microsecond.
@@ -115,6 +118,8 @@ pub struct Receiver {
     noise_sigma_us: f64,
     /// When the reference echo passes the threshold, from its nominal onset, microseconds.
     lead_us: f64,
+    /// How long after that the reference echo's carrier has its next crest, microseconds.
+    crest_us: f64,
 }
 
 /// An arrival as the full response of the face needs it.
@@ -143,6 +148,8 @@ impl Receiver {
             sound_speed_m_s,
             max_range_m: sensor.max_range_m,
             combining: Combining::Coherent,
+            detector: sensor.detector,
+            averaged_firings: sensor.averaged_firings,
             sensitivity: Sensitivity::of(sensor),
             gain: sensor.gain.clone(),
             omega: 1e-6 * TAU * sensor.frequency_hz,
@@ -151,6 +158,7 @@ impl Receiver {
             response,
             noise_sigma_us: noise::sigma_us(sensor),
             lead_us: 0.0,
+            crest_us: 0.0,
         }
         .with_threshold(sensor.threshold)
     }
@@ -159,7 +167,9 @@ impl Receiver {
     #[must_use]
     pub fn with_threshold(mut self, threshold: f64) -> Self {
         self.threshold = threshold;
-        self.lead_us = self.reference_echo().rise_us(threshold).unwrap_or(0.0);
+        let reference = self.reference_echo();
+        self.lead_us = reference.rise_us(threshold).unwrap_or(0.0);
+        self.crest_us = self.until_crest_us(reference.at(self.lead_us).arg(), 0.0);
         self
     }
 
@@ -211,9 +221,22 @@ impl Receiver {
         (self.told(detection), needed_m)
     }
 
-    /// The same in noise.
+    /// The same in noise. Of a module that averages, the first echo is the mean of those of its firings, if more than half
+    /// of them hear one.
     #[must_use]
     pub fn detect_in_noise(
+        &self,
+        arrivals: &[PulseArrival],
+        incident: &dyn Fn(&PulseArrival) -> Option<Incident>,
+        noise: &ReceiverNoise,
+        rng: &mut impl rand::Rng,
+    ) -> Detection {
+        let firings =
+            (0..self.averaged_firings).map(|_| self.fire_in_noise(arrivals, incident, noise, rng));
+        self.told(self.averaged(firings.collect()))
+    }
+
+    fn fire_in_noise(
         &self,
         arrivals: &[PulseArrival],
         incident: &dyn Fn(&PulseArrival) -> Option<Incident>,
@@ -235,7 +258,7 @@ impl Receiver {
         if detection.status == PingStatus::Echo {
             detection.range_m = detection.echoes_us.first().map(|echo_us| self.range_m(*echo_us));
         }
-        self.told(detection)
+        detection
     }
 
     /// The range that belongs to the end of blanking, metres.
@@ -272,6 +295,13 @@ impl Receiver {
         }
         let level = 10f64.powf(-margin_db.max(0.0) / 20.0);
         self.range_m(self.shape.rise_us(level).map_or(0.0, |rise_us| rise_us - self.lead_us))
+    }
+
+    /// How long after a time (microseconds, counted as echoes are) a carrier that then has a phase beside its own has its
+    /// next crest.
+    fn until_crest_us(&self, phase_rad: f64, t_us: f64) -> f64 {
+        let phase_rad = phase_rad + self.omega * (t_us + self.lead_us);
+        (-phase_rad).rem_euclid(TAU) / self.omega
     }
 
     /// The echo that is timed without bias: a head-on, perfectly reflecting wall at 1 m.

@@ -1,6 +1,7 @@
 //! What is known about a ranger: one data file a preset, with a source for each figure.
 
 mod aperture;
+mod detector;
 mod figures;
 mod gain;
 mod mounting;
@@ -8,6 +9,7 @@ mod pulse;
 
 pub(super) use aperture::level_at;
 pub use aperture::{Aperture, BeamPoint};
+pub use detector::Detector;
 pub use gain::{Gain, GainStep};
 pub use mounting::Mounting;
 pub use pulse::{ChirpPart, Pulse};
@@ -18,7 +20,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use self::figures::{at_most_1, from_0_to, not_negative, positive};
+use self::{
+    detector::{check_firings, is_once, once},
+    figures::{at_most_1, from_0_to, not_negative, positive},
+};
 use super::Face;
 
 /// The data files that come with the program, by name.
@@ -91,6 +96,12 @@ pub struct Sensor {
     /// Whole steps in which the module tells ranges, metres, each rounded to the nearest; 0 for ranges as they are.
     #[serde(default, skip_serializing_if = "is_default")]
     pub range_step_m: f64,
+    /// What the detector watches.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub detector: Detector,
+    /// How many firings a reading is the mean of; it matters where there is noise.
+    #[serde(default = "once", skip_serializing_if = "is_once")]
+    pub averaged_firings: u32,
     /// For each figure above, by field name, where it comes from.
     pub sources: BTreeMap<String, String>,
 }
@@ -218,7 +229,8 @@ impl Sensor {
         positive("max_range_m", self.max_range_m)?;
         positive("threshold", self.threshold)?;
         from_0_to("threshold_rise_db_per_m", self.threshold_rise_db_per_m, MOST_RISE_DB_PER_M)?;
-        from_0_to("range_step_m", self.range_step_m, MOST_RANGE_STEP_M)
+        from_0_to("range_step_m", self.range_step_m, MOST_RANGE_STEP_M)?;
+        check_firings(self.averaged_firings)
     }
 
     /// How long the pulse lasts, seconds (a Gaussian one: three sigma to each side).
@@ -296,6 +308,8 @@ mod tests {
         };
         for (wrong, part) in [
             (text.replace("49400.0", "-1"), "frequency_hz is -1"),
+            (text.replacen('{', r#"{"averaged_firings": 0,"#, 1), "averaged_firings is 0"),
+            (text.replacen('{', r#"{"detector": "cycle","#, 1), "detector"),
             (text.replace("0.0193", "0"), "aperture.radius_m"),
             (text.replace("\"blanking_us\": 2380.0", "\"blanking\": 2380.0"), "blanking"),
             (text.replace("10.7,", "\"far\","), "max_range_m"),

@@ -1,6 +1,8 @@
 //! The transducer's face: how strong a sound leaves or arrives at an angle to its axis.
 
 use std::{
+    cell::RefCell,
+    collections::VecDeque,
     f64::consts::{FRAC_PI_2, PI, TAU},
     sync::Arc,
 };
@@ -29,6 +31,24 @@ enum Shape {
     Gaussian { half_angle_rad: f64 },
 }
 
+/// What a pattern follows from.
+#[derive(Debug, Clone, PartialEq)]
+struct Origin {
+    aperture: Aperture,
+    pulse: Pulse,
+    frequency_hz: f64,
+    sound_speed_m_s: f64,
+}
+
+/// How many patterns a thread remembers.
+const REMEMBERED: usize = 4;
+
+thread_local! {
+    /// The patterns that were asked for last. A fit asks for those of the same few apertures hundreds of times while
+    /// thresholds and poses change, and a table takes a millisecond or two.
+    static REMEMBERED_PATTERNS: RefCell<VecDeque<(Origin, BeamPattern)>> = const { RefCell::new(VecDeque::new()) };
+}
+
 impl BeamPattern {
     /// The pattern of a sensor at a speed of sound in metres a second.
     ///
@@ -37,6 +57,24 @@ impl BeamPattern {
     /// [`piston_directivity`] times `cos(theta)`; a short one fills the nulls.
     #[must_use]
     pub fn new(sensor: &Sensor, sound_speed_m_s: f64) -> Self {
+        let origin = Origin {
+            aperture: sensor.aperture.clone(),
+            pulse: sensor.pulse.clone(),
+            frequency_hz: sensor.frequency_hz,
+            sound_speed_m_s,
+        };
+        REMEMBERED_PATTERNS.with_borrow_mut(|known| {
+            if let Some((_, pattern)) = known.iter().find(|(of, _)| *of == origin) {
+                return pattern.clone();
+            }
+            let pattern = Self::tabulated(sensor, sound_speed_m_s);
+            known.truncate(REMEMBERED - 1);
+            known.push_front((origin, pattern.clone()));
+            pattern
+        })
+    }
+
+    fn tabulated(sensor: &Sensor, sound_speed_m_s: f64) -> Self {
         let tabulated = |level: &dyn Fn(f64) -> f64| {
             let mut table: Vec<f64> = (0..TABLE_LENGTH)
                 .map(|i| i as f64 * STEP_RAD)

@@ -39,6 +39,7 @@ impl Receiver {
         };
         let status = self.status_at(first_us);
         let already_there = status == PingStatus::MinRange;
+        let told_us = first_us + if already_there { 0.0 } else { hearing.crest_after_us(first_us) };
         let cause = hearing.cause(first_us);
         let peak = if already_there {
             hearing.level(first_us)
@@ -46,17 +47,17 @@ impl Receiver {
             hearing.peak(first_us, cause.as_ref())
         };
         let mut last_us = first_us;
-        echoes_us.push(first_us);
+        echoes_us.push(told_us);
         while latch == Latch::Rearmed
             && echoes_us.len() < MOST_ECHOES
             && let Some(next_us) = hearing.next_rise(last_us + self.rearm_us)
         {
-            echoes_us.push(next_us);
+            echoes_us.push(next_us + hearing.crest_after_us(next_us));
             last_us = next_us;
         }
         Detection {
             status,
-            range_m: Some(self.range_m(first_us)),
+            range_m: Some(self.range_m(told_us)),
             arrival: cause,
             amplitude: Some(peak),
             margin_db: Some(20.0 * (peak / hearing.threshold_at(first_us)).log10()),
@@ -74,6 +75,27 @@ impl Receiver {
     pub(super) fn status_at(&self, first_us: f64) -> PingStatus {
         let already_there = first_us <= self.blanking_us + 1e-6;
         if already_there { PingStatus::MinRange } else { PingStatus::Echo }
+    }
+
+    /// What a module tells that averages several firings, of which there is one at least: the mean of the first echoes, if
+    /// more than half of the firings have one; one echo, then.
+    pub(super) fn averaged(&self, mut firings: Vec<Detection>) -> Detection {
+        if firings.len() == 1 {
+            return firings.remove(0);
+        }
+        let is_echo = |firing: &&Detection| firing.status == PingStatus::Echo;
+        let first_us: Vec<f64> =
+            firings.iter().filter(is_echo).filter_map(|of| of.echoes_us.first().copied()).collect();
+        let is_heard = 2 * first_us.len() > firings.len();
+        let wanted = |firing: &Detection| (firing.status == PingStatus::Echo) == is_heard;
+        let at = firings.iter().position(wanted).unwrap_or(0);
+        let mut told = firings.swap_remove(at);
+        if is_heard {
+            let mean_us = first_us.iter().sum::<f64>() / first_us.len() as f64;
+            told.range_m = Some(self.range_m(mean_us));
+            told.echoes_us = SmallVec::from_slice(&[mean_us]);
+        }
+        told
     }
 
     /// As the module tells it: in whole steps of range. The end of the blanking is no range.

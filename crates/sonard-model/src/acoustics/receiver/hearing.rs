@@ -11,7 +11,7 @@ use num_complex::Complex64;
 use smallvec::SmallVec;
 
 use super::{Combining, Incident, PulseArrival, Receiver, noise::NoiseTrack};
-use crate::acoustics::{EchoShape, Gain};
+use crate::acoustics::{Detector, EchoShape, Gain};
 
 /// Arrivals that together add less than this part to another's amplitude leave it as it is.
 const NEGLIGIBLE: f64 = 3e-3;
@@ -205,6 +205,22 @@ impl<'a> Hearing<'a> {
         }
         self.summed = self.parts.len();
         self.level_of(self.over, t_us)
+    }
+
+    /// By how much later the carrier passes the threshold than the envelope, which does at `t_us`: at its next crest,
+    /// counted so that the reference echo's is not late. Within a cycle the sum's phase is that of its carrier.
+    pub(super) fn crest_after_us(&mut self, t_us: f64) -> f64 {
+        let receiver = self.receiver;
+        if receiver.detector == Detector::Envelope || receiver.combining != Combining::Coherent {
+            return 0.0;
+        }
+        // All that lasts then has its field.
+        self.level(t_us);
+        let live = self.parts[self.over..].iter();
+        let sum: Complex64 = live.map(|part| part.field * self.shape_at(part, t_us)).sum();
+        let noise = self.noise.map_or(Complex64::ZERO, |noise| noise.at(t_us));
+        let phase_rad = (sum * self.rise_of_gain(t_us) + noise).arg();
+        receiver.until_crest_us(phase_rad, t_us) - receiver.crest_us
     }
 
     /// Places of the arrivals that last now.

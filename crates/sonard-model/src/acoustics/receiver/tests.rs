@@ -1,5 +1,6 @@
 //! Arrivals at given times against what the module's description says of them.
 
+mod carrier;
 mod noise;
 mod threshold;
 
