@@ -6,8 +6,10 @@
 
 use std::sync::{
     OnceLock,
-    atomic::{AtomicUsize, Ordering},
+    atomic::{AtomicU64, AtomicUsize, Ordering},
 };
+
+use smallvec::SmallVec;
 
 use super::{
     cost::TooCostly,
@@ -22,16 +24,19 @@ use crate::{
 /// found again in the next, at about a quarter of its work; beside a round body at more.
 const REACHES: [f64; 3] = [0.125, 0.25, 0.5];
 
-/// The step that has all paths.
-const WHOLE: usize = REACHES.len();
+/// A search goes so much farther than the last one had to.
+const AHEAD: f64 = 1.1;
+
+/// From this part of the longest path on a search goes all the way.
+const NEARLY_ALL: f64 = 0.8;
 
 /// What a search came to.
 type Found<'a> = Box<dyn Arrivals + 'a>;
 
-/// How far observation points have lately had to search, as the number of a step: from the next one it is searched as
-/// far at once, if at all. Only what is searched for in vain depends on it.
+/// How far the last observation point had to search, there and back: the next one begins with a search as far. Only
+/// what is searched for in vain depends on it.
 #[derive(Debug, Default)]
-pub(super) struct Expected(AtomicUsize);
+pub(super) struct Expected(AtomicU64);
 
 /// Arrivals between a transmitter and a receiver, as far as they were asked for.
 pub(super) struct LazyArrivals<'a> {
@@ -39,15 +44,24 @@ pub(super) struct LazyArrivals<'a> {
     /// Transmitter and receiver.
     at: [DVec2; 2],
     max_path_m: f64,
-    /// Found at the first call; `None` from an engine that finds all at once.
-    near: [OnceLock<Result<Option<Found<'a>>, TooCostly>>; REACHES.len()],
+    /// From near to far.
+    steps: SmallVec<[Step<'a>; 4]>,
     whole: OnceLock<Result<Found<'a>, TooCostly>>,
+    /// Which of the steps is searched first, if it is not nearer than what is asked for; their number for the whole.
+    first: usize,
     /// Which of the steps, from near to whole, would have settled the last firing: the next one
     /// looks beside it and is likely to need the same. The answer does not depend on it.
     enough: AtomicUsize,
-    /// The farthest of the steps that settled a firing, counted from 1; 0 before any.
-    farthest: AtomicUsize,
+    /// The length that settled all firings, metres, as bits, by which positive numbers sort.
+    needed_m: AtomicU64,
     expected: &'a Expected,
+}
+
+/// A search up to a length.
+struct Step<'a> {
+    reach_m: f64,
+    /// Found at the first call; `None` from an engine that finds all at once.
+    found: OnceLock<Result<Option<Found<'a>>, TooCostly>>,
 }
 
 /// Arrivals up to a length, of a search that went so far or farther.
@@ -78,17 +92,21 @@ impl<'a> LazyArrivals<'a> {
         max_path_m: f64,
         expected: &'a Expected,
     ) -> Self {
-        let (near, whole, farthest) = Default::default();
-        Self {
-            engine,
-            at,
-            max_path_m,
-            near,
-            whole,
-            enough: AtomicUsize::new(0),
-            farthest,
-            expected,
-        }
+        let step = |reach_m: f64| Step { reach_m, found: OnceLock::new() };
+        let mut steps: SmallVec<[Step; 4]> =
+            REACHES.iter().map(|reach| step(reach * max_path_m)).collect();
+        let ahead_m = AHEAD * f64::from_bits(expected.0.load(Ordering::Relaxed));
+        let first = if ahead_m > NEARLY_ALL * max_path_m {
+            steps.len()
+        } else {
+            let at = steps.partition_point(|step| step.reach_m < ahead_m);
+            if ahead_m > 0.0 {
+                steps.insert(at, step(ahead_m));
+            }
+            at
+        };
+        let (whole, enough, needed_m) = Default::default();
+        Self { engine, at, max_path_m, steps, whole, first, enough, needed_m, expected }
     }
 
     /// All arrivals.
@@ -115,15 +133,14 @@ impl<'a> LazyArrivals<'a> {
         mut listen: impl FnMut(&Near) -> (T, Option<f64>),
     ) -> Result<(T, Near<'_>), TooCostly> {
         let settled = |needed_m: f64| {
-            let enough = REACHES.iter().position(|reach| reach * self.max_path_m > needed_m);
-            let enough = enough.unwrap_or(WHOLE);
-            self.enough.store(enough, Ordering::Relaxed);
-            self.farthest.fetch_max(enough + 1, Ordering::Relaxed);
+            let enough = self.steps.iter().position(|step| step.reach_m > needed_m);
+            self.enough.store(enough.unwrap_or(self.steps.len()), Ordering::Relaxed);
+            self.needed_m.fetch_max(needed_m.max(0.0).to_bits(), Ordering::Relaxed);
         };
         let begin = self.enough.load(Ordering::Relaxed);
-        for (step, reach) in REACHES.iter().enumerate().skip(begin) {
-            let Some(arrivals) = self.reaching(step)? else { break };
-            let near = Near { arrivals, reach_m: reach * self.max_path_m };
+        for (at, step) in self.steps.iter().enumerate().skip(begin) {
+            let Some(arrivals) = self.reaching(at)? else { break };
+            let near = Near { arrivals, reach_m: step.reach_m };
             let (heard, needed_m) = listen(&near);
             if let Some(needed_m) = needed_m {
                 settled(needed_m);
@@ -139,24 +156,23 @@ impl<'a> LazyArrivals<'a> {
     /// Arrivals at least up to the reach of a step: those that are known, or those of a search that goes as far as
     /// expected. `None` from an engine that finds all at once.
     fn reaching(&self, step: usize) -> Result<Option<&(dyn Arrivals + 'a)>, TooCostly> {
-        if let Some(known) = (step..WHOLE).find(|&at| matches!(self.near[at].get(), Some(Ok(_)))) {
+        let is_known = |at: &usize| matches!(self.steps[*at].found.get(), Some(Ok(_)));
+        if let Some(known) = (step..self.steps.len()).find(is_known) {
             return self.search(known);
         }
         if let Some(Ok(whole)) = self.whole.get() {
             return Ok(Some(whole.as_ref()));
         }
-        let expected = step.max(self.expected.0.load(Ordering::Relaxed));
         // What is expected may be more than can be found here, and is not asked for yet.
-        self.search(expected).or_else(|_| self.search(step))
+        self.search(step.max(self.first)).or_else(|_| self.search(step))
     }
 
     /// All arrivals up to the reach of a step.
     fn search(&self, step: usize) -> Result<Option<&(dyn Arrivals + 'a)>, TooCostly> {
-        let (Some(near), Some(reach)) = (self.near.get(step), REACHES.get(step)) else {
+        let Some(Step { reach_m, found }) = self.steps.get(step) else {
             return self.whole().map(Some);
         };
-        let reach_m = reach * self.max_path_m;
-        let found = near.get_or_init(|| self.engine.arrivals_within(self.at, reach_m));
+        let found = found.get_or_init(|| self.engine.arrivals_within(self.at, *reach_m));
         // Whoever asks knows nothing of steps: what is too far is the range that was asked for.
         let asked = |error: &TooCostly| TooCostly { max_path_m: self.max_path_m, ..error.clone() };
         Ok(found.as_ref().map_err(asked)?.as_deref())
@@ -165,8 +181,9 @@ impl<'a> LazyArrivals<'a> {
 
 impl Drop for LazyArrivals<'_> {
     fn drop(&mut self) {
-        if let Some(farthest) = self.farthest.get_mut().checked_sub(1) {
-            self.expected.0.store(farthest, Ordering::Relaxed);
+        let needed_m = *self.needed_m.get_mut();
+        if needed_m > 0 {
+            self.expected.0.store(needed_m, Ordering::Relaxed);
         }
     }
 }
