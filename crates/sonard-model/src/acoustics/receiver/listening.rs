@@ -1,0 +1,71 @@
+//! A firing that several receivers listen to, each with another threshold.
+
+use super::{Detection, Incident, Latch, PulseArrival, Receiver, hearing::Hearing};
+use crate::reading::PingStatus;
+
+/// A firing listened to by receivers that differ in their threshold alone: what arrives is summed up once for all.
+pub struct Listening<'a> {
+    receiver: &'a Receiver,
+    hearing: Hearing<'a>,
+}
+
+/// A rise of ECHO.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rise {
+    /// `Echo` or `MinRange`.
+    pub status: PingStatus,
+    /// Half the detected path, or the range of the end of blanking, metres.
+    pub range_m: f64,
+    /// The arrival that drove the detector.
+    pub arrival: Option<PulseArrival>,
+}
+
+impl Receiver {
+    /// Listens to the arrivals of one firing, of which those up to a length there and back are known, in metres;
+    /// `incident` as for [`detect_at_face`](Self::detect_at_face).
+    #[must_use]
+    pub fn listen<'a>(
+        &'a self,
+        length_m: f64,
+        arrivals: &'a [PulseArrival],
+        incident: &'a dyn Fn(&PulseArrival) -> Option<Incident>,
+    ) -> Listening<'a> {
+        let mut hearing = Hearing::new(self, arrivals, incident);
+        hearing.hear_within(length_m);
+        Listening { receiver: self, hearing }
+    }
+}
+
+impl Listening<'_> {
+    /// The first echo that a receiver with `factor` times the threshold detects, which can't be raised before
+    /// `ready_us`, microseconds.
+    #[must_use]
+    pub fn detect(&mut self, factor: f64, ready_us: f64) -> Detection {
+        self.begin(factor, ready_us);
+        let detection = self.receiver.detection(&mut self.hearing, Latch::First, ready_us);
+        self.receiver.told(detection)
+    }
+
+    /// The same without what it takes to tell how strong the echo is; `None` of silence.
+    #[must_use]
+    pub fn rise(&mut self, factor: f64, ready_us: f64) -> Option<Rise> {
+        self.begin(factor, ready_us);
+        let receiver = self.receiver;
+        let at_us = self.hearing.next_rise(receiver.listens_from_us(ready_us))?;
+        let status = receiver.status_at(at_us);
+        let range_m = receiver.range_m(at_us);
+        Some(Rise { status, range_m, arrival: self.hearing.cause(at_us) })
+    }
+
+    /// Up to which length there and back arrivals matter to what was told so far, metres; `None` if longer ones than
+    /// are known could.
+    #[must_use]
+    pub fn needed_m(&self) -> Option<f64> {
+        (!self.hearing.asked_beyond()).then(|| self.hearing.needed_m())
+    }
+
+    fn begin(&mut self, factor: f64, ready_us: f64) {
+        self.hearing.threshold_factor = factor;
+        self.hearing.rewind_to(self.receiver.listens_from_us(ready_us));
+    }
+}
