@@ -6,10 +6,8 @@ set -euo pipefail
 without=$1
 shift
 if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
-  # One at a time: steps of test.sh run beside each other.
-  exec 9<"$0"
-  flock 9
-  apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+  # One at a time, because steps of test.sh run beside each other; what a package starts does not keep the lock.
+  flock --close "$0" sh -c 'apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@" >/dev/null' sh "$@"
 else
   echo "missing here: sudo apt-get install --no-install-recommends $*${without:+, or $without}" >&2
   exit 1
