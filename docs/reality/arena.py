@@ -3,12 +3,15 @@
 import collections
 import json
 from concurrent.futures import ThreadPoolExecutor
+from statistics import median
 
-from work import share, table
+from work import DATA_SHEET, share, table
 
 FITTED = ("roberto-a", "roberto-b", "roberto-c", "roberto-d")
 FIT = "pose,mounting,threshold,rise,beam,skirts"
 PRIORS = ("x_m=0.03", "y_m=0.03", "heading_deg=4")
+# Each sweep says as well how sensitive its ranger was and how far ahead of the axis its face sat; aside, where a heading would do the same, that is believed.
+OF_ITS_OWN = ("--fit", "threshold,mounting", "--prior", "threshold_db=6", "--prior", "left_m=0.001")
 NEAR_M = 0.03
 # 255 stands for no echo.
 REACH_M = "2.55"
@@ -22,7 +25,7 @@ RANGES_M = (0, 0.4, 0.6, 0.9, 1.3, 1.7, 2.1, 2.6)
 def main(work):
     with open(work.given("arena-sweeps.json")) as file:
         sweeps = json.load(file)
-    start = work.keep("start.json", start_sensor(work))
+    start = work.keep("start.json", start_sensor())
     groups = {
         "fitted": [sweep for sweep in sweeps if sweep["group"] in FITTED],
         "blind": [sweep for sweep in sweeps if sweep["group"] not in FITTED],
@@ -31,11 +34,12 @@ def main(work):
         imported(work, name, of, start)
     calibrate(work, start)
     sensor = work.path("calibrated", "sensor.json")
-    placed = {name: located(work, name, sensor) for name in groups}
+    placed = {name: located(work, name, sensor, *OF_ITS_OWN) for name in groups}
     courses = {name: along_course(work, of, sensor) for name, of in groups.items()}
     by_run(work, groups["blind"], placed["blind"], courses["blind"], sensor)
     found = located_by(groups["blind"], placed["blind"])
-    by_model(work, groups["blind"], found, located_by(groups["blind"], courses["blind"]), sensor)
+    as_fitted = located_by(groups["blind"], located(work, "blind", sensor))
+    by_model(work, groups["blind"], found, located_by(groups["blind"], courses["blind"]), as_fitted, sensor)
     by_range(work, found, sensor)
     picture(work, *next(pair for pair in found if pair[0]["id"] == DRAWN), sensor)
     count, course = (located_rightly(groups["fitted"], of["fitted"]) for of in (placed, courses))
@@ -43,14 +47,12 @@ def main(work):
         len(groups["fitted"]), count["first"], count["later"], course["first"]))
 
 
-def start_sensor(work):
-    """hc-sr04 with a plain amplifier, two cans 3 cm apart, and skirts."""
-    sensor = json.loads(work.run("sensor", "show", "hc-sr04"))
-    sensor.update(
-        name="nxt", aperture={"shape": "piston", "radius_m": 0.0055, "skirts_db": -10.0}, threshold=0.15,
+def start_sensor():
+    """An HC-SR04 by data sheets with a plain amplifier, two cans 3 cm apart, and skirts."""
+    sensor = dict(
+        DATA_SHEET, name="nxt", aperture={"shape": "piston", "radius_m": 0.0055, "skirts_db": -10.0}, threshold=0.15,
         threshold_rise_db_per_m=1.0, gain={"kind": "steps", "steps": [{"until_us": None, "gain_db": 0.0}]},
         mounting={"separation_m": 0.03, "ahead_m": 0.03}, max_range_m=float(REACH_M))
-    sensor["sources"] = {key: "where the fit begins" for key in sensor if key not in ("name", "description", "sources")}
     return sensor
 
 
@@ -88,13 +90,22 @@ def along_course(work, sweeps, sensor):
     placed = []
     for run in dict.fromkeys(sweep["group"] for sweep in sweeps):
         imported(work, run, [sweep for sweep in sweeps if sweep["group"] == run], sensor, "waypoint_m")
-        placed += located(work, run, sensor, "--course", "--drift-deg-per-m", "180")
+        placed += located(work, run, sensor, "--course", "--drift-deg-per-m", "180", *OF_ITS_OWN)
     return placed
 
 
 def located_by(sweeps, placed):
     """Each sweep with the first pose that was found; bearings in the file are the world's, so headings are near 0."""
     return [(sweep, modes[0]) for sweep, modes in zip(sweeps, placed) if modes]
+
+
+def by_others(found):
+    """The same poses, each with what was found besides in the other sweeps of its run: the median."""
+    def own(sweep, mode):
+        others = [of["besides"] for other, of in found if other["group"] == sweep["group"] and other is not sweep]
+        besides = [dict(one, value=median(of[at]["value"] for of in others)) for at, one in enumerate(mode["besides"])]
+        return sweep, dict(mode, besides=besides)
+    return [own(*pair) for pair in found]
 
 
 def by_hand_of(sweep):
@@ -126,22 +137,28 @@ def by_run(work, sweeps, placed, courses, sensor):
         of = [at for at, sweep in enumerate(sweeps) if run in ("all", sweep["group"])]
         right, course = (located_rightly([sweeps[at] for at in of], [modes[at] for at in of])
                          for modes in (placed, courses))
-        rows.append([run, "%d of %d" % (right["first"], len(of)), right["later"], "%d of %d" % (course["first"], len(of)),
+        own = [median(value["value"] for at in of for value in placed[at][0]["besides"] if value["name"] == name)
+               for name in ("threshold_db", "ahead_m")]
+        rows.append([run, "%.1f dB, %.0f mm" % (own[0], 1e3 * own[1]), "%d of %d" % (right["first"], len(of)),
+                     right["later"], "%d of %d" % (course["first"], len(of)),
                      "%s of %d" % (share(count["near"], count["echo"]), count["echo"]),
                      share(count["unheard"], count["echo"]),
                      "%s of %d" % (share(count["agreed"], count["silent"]), count["silent"]), count["body"]])
-    table(["run", "located within 10 cm and 10 degrees", "right pose only in a later answer", "located along the course",
+    table(["run", "threshold and place ahead, medians", "located within 10 cm and 10 degrees",
+           "right pose only in a later answer", "located along the course",
            "echoes within 3 cm", "not heard", "silences predicted", "of the body"], rows)
 
 
-def by_model(work, sweeps, found, along, sensor):
+def by_model(work, sweeps, found, along, as_fitted, sensor):
     by_hand = [by_hand_of(sweep) for sweep in sweeps]
     nearest = ("--engine", "cone")
     rows = []
     for title, poses, of, options in (
-        ("fitted sensor, poses by `locate`", found, sensor, ()),
+        ("fitted sensor, poses, thresholds and mountings by `locate`", found, sensor, ()),
+        ("the same poses, thresholds and mountings of the run's other sweeps", by_others(found), sensor, ()),
         ("nearest hit, the same poses", found, sensor, nearest),
-        ("fitted sensor, poses along the courses", along, sensor, ()),
+        ("fitted sensor, poses, thresholds and mountings along the courses", along, sensor, ()),
+        ("fitted sensor as it is, poses by `locate`", as_fitted, sensor, ()),
         ("`lego-nxt`, poses and offsets by hand", by_hand, "lego-nxt", ()),
         ("`hc-sr04` as shipped, poses and offsets by hand", by_hand, "hc-sr04", ()),
         ("nearest hit, poses and offsets by hand", by_hand, "hc-sr04", nearest),
@@ -166,7 +183,8 @@ def picture(work, sweep, mode, sensor):
     """One blind sweep on the floor plan, beside what the fitted sensor reads at the pose that was located."""
     imported(work, "drawn", [sweep], sensor)
     pose = "--pose=%f,%f,%f" % (mode["x_m"], mode["y_m"], mode["heading_deg"])
-    work.run("predict", work.path("drawn.jsonl"), pose, "--sensor", sensor, "--force", "-o", work.path("predicted.jsonl"))
+    own = of_its_own(work, sensor, sweep, mode)
+    work.run("predict", work.path("drawn.jsonl"), pose, "--sensor", own, "--force", "-o", work.path("predicted.jsonl"))
     work.run("plot", work.path("predicted.jsonl"), "--force", "-o", work.path("reality-arena.png"), "--width", "1200")
 
 
@@ -192,12 +210,24 @@ def is_echo_of(model, measured):
     return model is not None and abs(model - measured) < NEAR_M
 
 
+def of_its_own(work, sensor, sweep, mode):
+    """The sensor with what was found with a pose."""
+    found = {of["name"]: of["value"] for of in mode.get("besides", ())}
+    if not found:
+        return sensor
+    with open(sensor) as file:
+        own = json.load(file)
+    own["threshold"] = 10 ** (found["threshold_db"] / 20)
+    own["mounting"].update(ahead_m=found["ahead_m"], left_m=found["left_m"])
+    return work.keep("of-its-own-%s.json" % sweep["id"], own)
+
+
 def readings(work, found, sensor, options=()):
     """Run, measured and predicted range of each reading."""
     def one(pair):
         sweep, mode = pair
-        pings = work.pings(work.given("arena.json"), (mode["x_m"], mode["y_m"], 0.0), sensor, "--step-deg", "1",
-                           "--max-range", REACH_M, *options)
+        pings = work.pings(work.given("arena.json"), (mode["x_m"], mode["y_m"], 0.0), 
+                           of_its_own(work, sensor, sweep, mode), "--step-deg", "1", "--max-range", REACH_M, *options)
         predicted = {round(ping["azimuth_deg"]) % 360: ping.get("range_m") for ping in pings}
         return [(sweep["group"], measured, predicted[round(bearing + mode["heading_deg"]) % 360])
                 for bearing, measured in zip(sweep["bearing_deg"], sweep["range_m"])]

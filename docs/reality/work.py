@@ -6,6 +6,21 @@ import subprocess
 import sys
 
 
+# An HC-SR04 by its manual and by data sheets of 16 mm open transducers, from which the fits begin.
+DATA_SHEET = {
+    "name": "data-sheet",
+    "description": "HC-SR04 by its manual and its transducers' data sheets",
+    "frequency_hz": 40000.0,
+    "aperture": {"shape": "piston", "radius_m": 0.0065},
+    "mounting": {"separation_m": 0.026},
+    "pulse": {"shape": "burst", "cycles": 8.0, "bandwidth_hz": 1000.0},
+    "blanking_us": 117.0,
+    "max_range_m": 4.0,
+    "threshold": 0.094,
+    "sources": {},
+}
+
+
 class Work:
     """Runs the built program; `data` has the measurements, `out` takes what is made."""
 
