@@ -39,9 +39,6 @@ use crate::{
 /// Effort of a tube in a triangle, in steps of a beam.
 const STEPS_A_TUBE: usize = 16;
 
-/// In scenes of more cylinders than that a tube is not asked how far it is to the nearest.
-const MOST_ASKED: usize = 16;
-
 /// An edge sends back as much as a mirror at most: half of each of two images whose boundaries lie together.
 const EDGE_MOST: f64 = 1.0;
 
@@ -243,46 +240,27 @@ impl<'a> TubeGrower<'a> {
         }
     }
 
-    /// Whether an echo of the tube can still be short and strong enough, by a cylinder or by an edge.
+    /// Whether an echo of the tube can still be short and strong enough.
     ///
     /// The least of length, width and growth of its borders is the least of all its rays (to within
     /// [`LOUDER`]), and with the best partner left it bounds every echo ([`strength`](super::strength)).
     fn is_worth(&self, tube: &Tube) -> bool {
         let settings = &self.plan.settings;
-        let side = tube.side.map(|side| self.side_of(tube.triangle, side as usize));
+        let left_m = tube.side.map_or(0.0, |side| {
+            let [a, b] = self.side_of(tube.triangle, side as usize);
+            distance_to_segment(self.target, a, b)
+        });
         let length_m = tube.least(|front| front.length_m);
+        let least_m = length_m + left_m;
+        if least_m > settings.max_path_m {
+            return false;
+        }
         let width_m = tube.least(|front| front.width_m);
         let growth = tube.least(|front| front.growth);
-        let is_worth_a_cylinder = || {
-            let [ahead_m, left_m] = self.to_cylinder_m(side);
-            let least_m = length_m + left_m;
-            // It spreads on the way there.
-            let spread = [length_m + ahead_m, width_m + ahead_m * growth, growth];
-            let strength = Strength::of(tube.gain, spread, self.radius_m, settings);
-            least_m <= settings.max_path_m
-                && strength.with(&tube.partner) >= settings.contact_floor(true, least_m).powi(2)
-        };
-        let is_worth_an_edge = || {
-            let left_m = side.map_or(0.0, |[a, b]| distance_to_segment(self.target, a, b));
-            let least_m = length_m + left_m;
-            least_m <= settings.max_path_m
-                && self.is_worth_an_edge(tube.gain, [length_m, width_m, growth], least_m)
-        };
-        is_worth_a_cylinder() || self.has_edges && is_worth_an_edge()
-    }
-
-    /// At least how far it is from a side to a cylinder, and from there on to the receiver, metres.
-    fn to_cylinder_m(&self, side: Option<[DVec2; 2]>) -> [f64; 2] {
-        let circles = &self.plan.cylinders.circles;
-        let Some([a, b]) = side else { return [0.0; 2] };
-        if circles.len() > MOST_ASKED {
-            return [0.0, distance_to_segment(self.target, a, b)];
-        }
-        let there = circles.iter().filter(|circle| circle.radius_m > 0.0);
-        there.fold([f64::INFINITY; 2], |[ahead_m, left_m], circle| {
-            let to_m = (distance_to_segment(circle.center, a, b) - circle.radius_m).max(0.0);
-            [ahead_m.min(to_m), left_m.min(to_m + self.back_m(circle))]
-        })
+        let spread = [length_m, width_m, growth];
+        let strength = Strength::of(tube.gain, spread, self.radius_m, &self.plan.settings);
+        strength.with(&tube.partner) >= settings.contact_floor(true, least_m).powi(2)
+            || self.has_edges && self.is_worth_an_edge(tube.gain, spread, least_m)
     }
 
     /// Whether an edge could send back enough of rays that have spread so, in echoes of at least a length there and
