@@ -12,6 +12,7 @@ use rand_pcg::Pcg64;
 use super::{
     FitError, Settled, State,
     journal::{Found, listed},
+    one_of_many,
 };
 use crate::{candidates::Phases, likelihood::ErrorModel};
 
@@ -35,17 +36,19 @@ impl State<'_> {
             Phases::Known => None,
             Phases::Unknown => {
                 (self.values, self.phases) = (end.values.clone(), Phases::Known);
-                Some(self.settled(end.errors)?)
+                let Some(with) = one_of_many(self.settled(end.errors))? else { return Ok(end) };
+                Some(with)
             }
         };
         let from = with.as_ref().unwrap_or(&end);
         if from.value < end.value - FAR_BELOW {
             return Ok(end);
         }
-        let Found::End { values, errors, log_posterior } =
-            self.found(|state| state.polish(from))?
-        else {
-            return Err(FitError::OtherFit);
+        let found = self.found(|state| state.polish(from));
+        let (values, errors, log_posterior) = match one_of_many(found)? {
+            Some(Found::End { values, errors, log_posterior }) => (values, errors, log_posterior),
+            Some(_) => return Err(FitError::OtherFit),
+            None => return Ok(end),
         };
         if log_posterior < end.value {
             return Ok(end);
@@ -71,7 +74,8 @@ impl State<'_> {
             let normal = self.still().map(|_: f64| StandardNormal.sample(&mut rng));
             let longer: f64 = StandardNormal.sample(&mut rng);
             self.values = self.limited(&best.1 + step * longer.exp() * (&root * normal));
-            let linear = self.linear()?;
+            // There may be nothing to predict with, as within a wall.
+            let Some(linear) = one_of_many(self.linear())? else { continue };
             let value = self.value(&linear, &errors);
             if value > best.0 {
                 let spread = self.spread(&linear, &errors);
@@ -102,15 +106,20 @@ impl State<'_> {
             for place in (-places..=places).filter(|place| *place != 0) {
                 let by = f64::from(place) * apart * sigma;
                 self.values = self.limited(&about + by * &direction);
-                let linear = self.linear()?;
-                self.improve(&linear, errors)?;
-                let linear = self.linear()?;
-                let value = self.value(&linear, errors);
-                if value > best.0 {
+                let value = one_of_many(self.value_improved(errors))?;
+                if let Some(value) = value.filter(|value| *value > best.0) {
                     best = (value, self.values.clone());
                 }
             }
         }
         Ok(best)
+    }
+
+    /// How likely it is after one improvement from where it stands.
+    fn value_improved(&mut self, errors: &ErrorModel) -> Result<f64, FitError> {
+        let linear = self.linear()?;
+        self.improve(&linear, errors)?;
+        let linear = self.linear()?;
+        Ok(self.value(&linear, errors))
     }
 }

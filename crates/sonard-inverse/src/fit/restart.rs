@@ -168,10 +168,18 @@ impl State<'_> {
         let close = widened(&best.errors, CLOSE);
         let linear = self.linear()?;
         let of_best = self.value(&linear, &close);
-        let odds = |place: &Place| ((place.value - of_best) / READINGS_OF_ARC).min(0.0).exp();
-        let all: f64 = 1.0 + places.iter().map(odds).sum::<f64>();
+        // What is best with the spreads that readings have need not be so with wider ones: what is near it is the same place.
+        let home = match one_of_many(self.improved(best.values.clone(), &close))? {
+            Some(Found::Place { values, log_posterior }) if log_posterior > of_best => {
+                Place { values: DVector::from_vec(values), value: log_posterior }
+            }
+            _ => Place { values: best.values.clone(), value: of_best },
+        };
+        let odds = |place: &Place| ((place.value - home.value) / READINGS_OF_ARC).min(0.0).exp();
+        let others = |place: &&Place| self.is_apart(&place.values, &home.values);
+        let all: f64 = 1.0 + places.iter().filter(others).map(odds).sum::<f64>();
         let mut beside = self.still();
-        for place in places {
+        for place in places.iter().filter(others) {
             let away = &place.values - &best.values;
             beside += away.component_mul(&away) * (odds(place) / all);
         }
