@@ -1,7 +1,7 @@
 //! The daemon: one task a resource, an explicit state machine for the link, orders at any time.
 //!
 //! ```text
-//!  API, signals ──orders──> Control ┐                       ┌──> Journal (thread: log folder)
+//!  API, signals ──orders─> Control ┐                        ┌──> Journal (thread: log folder)
 //!  emergency stop, thermometer ────┤   Operator (port,      ├──> Hub ──> subscribers
 //!                                  └─> Ranger) ──records──> ┤
 //!                      LinkMachine, Agenda: what to do      └──> Shared: status, latest scan
