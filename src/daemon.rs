@@ -1,14 +1,14 @@
 //! The daemon: one task a resource, an explicit state machine for the link, orders at any time.
 //!
 //! ```text
-//!  API, signals ──orders──> Control ──┐                        ┌──> Journal (thread: log folder)
+//!  API, signals ──orders─> Control ┐                        ┌──> Journal (thread: log folder)
 //!  emergency stop, thermometer ────┤   Operator (port,      ├──> Hub ──> subscribers
 //!                                  └─> Ranger) ──records──> ┤
 //!                      LinkMachine, Agenda: what to do      └──> Shared: status, latest scan
 //! ```
 //!
-//! [`LinkMachine`] and [`Agenda`] are pure and decide; the operator does what they say and tells
-//! them what came of it. [`prepare`] wires them, and [`Daemon::run`] returns when all are done.
+//! [`LinkMachine`] and [`Agenda`] are pure and decide; the operator carries out their decisions and reports the
+//! outcome to them. [`prepare`] wires them, and [`Daemon::run`] returns when all are done.
 
 mod agenda;
 mod air;
