@@ -110,7 +110,7 @@ fn how_sensitive_a_ranger_was_is_found_with_its_place() {
         let steps = ["--step-deg", "4", "--max-range", "4"];
         let log =
             sweep(folder.path(), "two-surface-room", "1.0,1.3,25", &[&sensor[..], &steps].concat());
-        let found = lines(&[&fit[..], &[&log], &told].concat());
+        let found = lines(&[&fit[..], &[log.as_str()], &told[..]].concat());
         let off_m = (number(&found[0], "x_m") - 1.0).hypot(number(&found[0], "y_m") - 1.3);
         assert!(off_m < 0.02, "{sensor:?}: {}", found[0]);
         let besides = &found[0]["besides"][0];
