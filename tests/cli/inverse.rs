@@ -92,25 +92,32 @@ fn a_symmetric_room_has_its_poses_listed_and_another_room_is_doubted() {
     assert!(elsewhere[0]["doubts"][0]["kind"].is_string(), "{}", elsewhere[0]);
 }
 
-/// The log's session says how sensitive its ranger was; asked by the sensor's file, which says otherwise, `locate` finds it.
+/// A ranger less sensitive than the one that `locate` is told of, and one whose log says so.
 #[test]
 fn how_sensitive_a_ranger_was_is_found_with_its_place() {
+    const THRESHOLD: f64 = 0.3;
     let folder = tempfile::tempdir().expect("a folder");
-    let further =
-        ["--sensor", "hc-sr04", "--threshold", "0.3", "--step-deg", "4", "--max-range", "4"];
-    let log = sweep(folder.path(), "mcgill-lab", "1.0,1.0,25", &further);
-    for (own, threshold) in [(&[][..], "session"), (&["--sensor", "hc-sr04"], "file")] {
-        let fit = ["locate", &log, "--fit", "threshold", "--prior", "threshold_db=8", "--json"];
-        let found = lines(&[&fit[..], own].concat());
-        let off_m = (number(&found[0], "x_m") - 1.0).hypot(number(&found[0], "y_m") - 1.0);
-        assert!(off_m < 0.02, "{threshold}: {}", found[0]);
+    let usual = sonard::acoustics::Sensor::preset("hc-sr04").expect("a preset");
+    let deaf = sonard::acoustics::Sensor { threshold: THRESHOLD, ..usual };
+    let file = folder.path().join("deaf.json");
+    fs::write(&file, serde_json::to_string(&deaf).expect("JSON")).expect("a file");
+    let (file, threshold) = (file.to_str().expect("a plain path"), THRESHOLD.to_string());
+    let fit = ["locate", "--fit", "threshold", "--prior", "threshold_db=8", "--json"];
+    for (sensor, told) in [
+        (vec!["--sensor", file], vec!["--sensor", "hc-sr04"]),
+        (vec!["--sensor", "hc-sr04", "--threshold", &threshold], vec![]),
+    ] {
+        let steps = ["--step-deg", "4", "--max-range", "4"];
+        let log =
+            sweep(folder.path(), "two-surface-room", "1.0,1.3,25", &[&sensor[..], &steps].concat());
+        let found = lines(&[&fit[..], &[log.as_str()], &told[..]].concat());
+        let off_m = (number(&found[0], "x_m") - 1.0).hypot(number(&found[0], "y_m") - 1.3);
+        assert!(off_m < 0.02, "{sensor:?}: {}", found[0]);
         let besides = &found[0]["besides"][0];
         assert_eq!(besides["name"], "threshold_db");
-        let off_db = number(besides, "value") - 20.0 * 0.3_f64.log10();
-        assert!(off_db.abs() < 1.0 && number(besides, "sigma") < 1.0, "{threshold}: {besides}");
+        let off_db = number(besides, "value") - 20.0 * THRESHOLD.log10();
+        assert!(off_db.abs() < 1.0 && number(besides, "sigma") < 1.0, "{sensor:?}: {besides}");
     }
-    let without = lines(&["locate", &log, "--json"]);
-    assert!(without[0]["besides"].is_null(), "{}", without[0]);
 }
 
 /// A robot drives from one end of a room, whose ends look alike, past a short wall to the other; its log comes through
