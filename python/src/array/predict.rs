@@ -31,7 +31,8 @@ pub(super) fn predict<'py>(
     let array = model.rangers();
     let stands: Vec<Pose> = poses.list.iter().flat_map(|pose| array.turned(pose, rounds)).collect();
     checked(model, py, &stands, |at| poses.index(at / rounds as usize))?;
-    let stands: Vec<FiringPose> = stands.into_iter().map(|pose| FiringPose { pose, first: 0 }).collect();
+    let stands: Vec<FiringPose> =
+        stands.into_iter().map(|pose| FiringPose { pose, first: 0 }).collect();
     let firings = array.round().count();
     let mut shape = poses.shape;
     shape.push(firings * rounds as usize);
@@ -50,7 +51,8 @@ pub(super) fn fire<'py>(
     // A single pose is that of the first firing.
     let along = poses.shape.last().copied().unwrap_or(1).max(1);
     let firings = model.rangers().round().count();
-    let stand = |(at, pose): (usize, &Pose)| FiringPose { pose: *pose, first: at % along % firings };
+    let stand =
+        |(at, pose): (usize, &Pose)| FiringPose { pose: *pose, first: at % along % firings };
     let stands: Vec<FiringPose> = poses.list.iter().enumerate().map(stand).collect();
     readings(model, py, &stands, 1, threads, poses.shape)
 }
@@ -81,7 +83,11 @@ fn readings<'py>(
     firing::shaped(py, table, arrays::array_reading_dtype(py)?, shape)
 }
 
-fn fire_at(model: &model::ArrayModel, stand: &FiringPose, row: &mut [f64]) -> Result<(), ModelError> {
+fn fire_at(
+    model: &model::ArrayModel,
+    stand: &FiringPose,
+    row: &mut [f64],
+) -> Result<(), ModelError> {
     let here = model.at(stand.pose)?;
     for (firing, words) in (stand.first..).zip(row.chunks_exact_mut(READING_WORDS)) {
         words.copy_from_slice(&arrays::words_of_array(&here.ping_in_round(firing)?));
