@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 use rooms::{BEAMS, NOISE_MM};
-use sonard_inverse::{Parameter, bound, fit, fit_from};
+use sonard_inverse::{Parameter, bound, fit_from, fit_thoroughly};
 use wrong::{ERRORS, Kinds, Wrong};
 
 /// What a trial found of a parameter.
@@ -78,7 +78,7 @@ fn trial(number: u64, seed: u64, kinds: Kinds) -> Option<Trial> {
     let bounds = bound(&wrong.truth, there, &wrong.fit, &ERRORS).ok()?;
     let began = Instant::now();
     let here = std::slice::from_ref(&wrong.here);
-    let fitted = fit(&wrong.believed, here, &wrong.fit).ok()?;
+    let fitted = fit_thoroughly(&wrong.believed, here, &wrong.fit).ok()?;
     let took_s = began.elapsed().as_secs_f64();
     let of_truth = fit_from(&wrong.believed, here, &wrong.fit, &wrong.expected, &ERRORS).ok()?;
     let both = fitted.estimates.iter().zip(&of_truth.estimates);

@@ -35,6 +35,9 @@ const LEAST_SHARE: f64 = 0.1;
 /// Places from which a fit goes on to where it ends, and how many of these ends are polished.
 const ENDS: usize = 8;
 const FOLLOWED: usize = 3;
+/// Places that are followed to their ends where a fit is not thorough, and the stage that these start with.
+const FOLLOWED_USUALLY: usize = 2;
+const STAGE: usize = STAGES.len() - 1;
 /// A fit has gone astray that explains less than all readings but this share, or contradicts what was believed by
 /// this many standard deviations.
 const ASTRAY: (f64, f64) = (0.03, 3.5);
@@ -52,17 +55,25 @@ impl State<'_> {
     /// The likeliest end of all beginnings, and what the other places add to the variances of its values. Where there
     /// is nothing to predict, as within a wall, there is no other beginning.
     pub(super) fn likeliest(&mut self) -> Result<(Settled, DVector<f64>), FitError> {
-        let mut best = self.attempt(self.still())?;
+        let mut best = self.attempt(self.still(), 0)?;
         if self.is_astray(&best) && self.start.scene.robot.is_none() {
             for start in self.beginnings()? {
-                keep_likelier(&mut best, self.attempt(start))?;
+                keep_likelier(&mut best, self.attempt(start, 0))?;
             }
         }
-        best = self.polished(best)?;
+        if self.is_thorough {
+            best = self.polished(best)?;
+        }
         let places = self.places(&best)?;
-        for end in self.ends(&best, &places)? {
-            if end.value > best.value - FAR_BELOW {
-                keep_likelier(&mut best, self.polished(end))?;
+        if self.is_thorough {
+            for end in self.ends(&best, &places)? {
+                if end.value > best.value - FAR_BELOW {
+                    keep_likelier(&mut best, self.polished(end))?;
+                }
+            }
+        } else {
+            for place in places.iter().take(FOLLOWED_USUALLY) {
+                keep_likelier(&mut best, self.attempt(place.values.clone(), STAGE))?;
             }
         }
         let beside = self.beside(&best, &places)?;
@@ -90,11 +101,12 @@ impl State<'_> {
         Ok(ends)
     }
 
-    /// Where a fit ends that begins there.
-    fn attempt(&mut self, start: DVector<f64>) -> Result<Settled, FitError> {
+    /// Where a fit ends that begins there, with the spreads from this stage on.
+    fn attempt(&mut self, start: DVector<f64>, stage: usize) -> Result<Settled, FitError> {
         (self.values, self.phases) = (start, Phases::Unknown);
         let mut errors = self.rough_errors();
-        self.approach(&mut errors, 0..STAGES.len())?;
+        errors.sigma_m *= STAGES[stage].0;
+        self.approach(&mut errors, stage..STAGES.len())?;
         self.settle(errors)
     }
 
@@ -169,14 +181,19 @@ impl State<'_> {
         let linear = self.linear()?;
         let of_best = self.value(&linear, &close);
         // What is best with the spreads that readings have need not be so with wider ones: what is near it is the same place.
-        let home = match one_of_many(self.improved(best.values.clone(), &close))? {
+        let improved = match self.is_thorough {
+            true => one_of_many(self.improved(best.values.clone(), &close))?,
+            false => None,
+        };
+        let home = match improved {
             Some(Found::Place { values, log_posterior }) if log_posterior > of_best => {
                 Place { values: DVector::from_vec(values), value: log_posterior }
             }
             _ => Place { values: best.values.clone(), value: of_best },
         };
         let odds = |place: &Place| ((place.value - home.value) / READINGS_OF_ARC).min(0.0).exp();
-        let others = |place: &&Place| self.is_apart(&place.values, &home.values);
+        let others =
+            |place: &&Place| !self.is_thorough || self.is_apart(&place.values, &home.values);
         let all: f64 = 1.0 + places.iter().filter(others).map(odds).sum::<f64>();
         let mut beside = self.still();
         for place in places.iter().filter(others) {
