@@ -33,6 +33,15 @@ pub(super) struct Database {
     ready: io::Cursor<Vec<u8>>,
 }
 
+/// A row of the table `messages`.
+struct Row {
+    id: i64,
+    topic: i64,
+    /// When it was recorded, nanoseconds since 1970.
+    time_ns: i64,
+    data: Vec<u8>,
+}
+
 impl Database {
     /// Opens a database for reading alone; `types` are those of the messages that are wanted.
     ///
@@ -68,8 +77,8 @@ impl Database {
 
     fn next_message(&mut self) -> io::Result<Option<Vec<u8>>> {
         loop {
-            let found = self.row_behind(self.last_id)?;
-            let Some((id, topic, time_ns, data)) = found else { return Ok(None) };
+            let Some(row) = self.row_behind(self.last_id)? else { return Ok(None) };
+            let Row { id, topic, time_ns, data } = row;
             self.last_id = id;
             let Some(channel) = self.channels.get(&topic) else { continue };
             let mut body = Vec::with_capacity(22 + data.len());
@@ -81,10 +90,10 @@ impl Database {
         }
     }
 
-    /// The next row of a wanted topic: its number, topic, time of recording in nanoseconds, and bytes.
+    /// The next row of a wanted topic.
     ///
     /// One row a query, found by its number: so nothing borrows the database between two calls.
-    fn row_behind(&self, id: i64) -> io::Result<Option<(i64, i64, i64, Vec<u8>)>> {
+    fn row_behind(&self, id: i64) -> io::Result<Option<Row>> {
         let topics: Vec<String> = self.channels.keys().map(i64::to_string).collect();
         let sql = format!(
             "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ?1 AND topic_id IN ({}) ORDER BY id \
@@ -93,7 +102,10 @@ impl Database {
         );
         let mut query = self.connection.prepare_cached(&sql).map_err(told)?;
         query
-            .query_row(params![id], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?)))
+            .query_row(params![id], |row| {
+                let (id, topic) = (row.get(0)?, row.get(1)?);
+                Ok(Row { id, topic, time_ns: row.get(2)?, data: row.get(3)? })
+            })
             .optional()
             .map_err(told)
     }
@@ -180,6 +192,11 @@ fn text(out: &mut Vec<u8>, text: &str) {
     out.extend(text.as_bytes());
 }
 
+/// What SQLite says of a file.
+#[derive(Debug, thiserror::Error)]
+#[error("as an SQLite database: {0}")]
+struct Unreadable(#[source] rusqlite::Error);
+
 fn told(error: rusqlite::Error) -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidData, format!("as an SQLite database: {error}"))
+    io::Error::new(io::ErrorKind::InvalidData, Unreadable(error))
 }
