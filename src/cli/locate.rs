@@ -30,12 +30,10 @@ pub(super) struct Args {
     /// Spacing of the positions that are tried first, metres [default: 0.05 in small scenes to 0.1]
     #[arg(long, value_name = "M", value_parser = within(0.01..=2.0))]
     spacing_m: Option<f64>,
-    /// Fit these to each scan besides its pose, separated by commas: the threshold of a ranger that is not the one that
-    /// was calibrated. Names are those of `sonard calibrate`
+    /// What to fit, separated by commas
     #[arg(long, value_name = "WHAT", value_delimiter = ',')]
     fit: Vec<Group>,
-    /// Standard deviation of what is believed beforehand about a parameter that is fitted, in its unit; several are
-    /// possible
+    /// Prior standard deviation of a parameter, in its unit; may be given several times
     #[arg(long, value_name = "NAME=SIGMA", requires = "fit")]
     prior: Vec<PriorSigma>,
     /// JSON instead of text; one object a pose, most probable first
@@ -90,8 +88,8 @@ this one, and poses that agree gain probability. So rooms that look alike are to
 where they differ, and a robot that was carried elsewhere is found again. Each scan is answered as soon as it is \
 read: a log may come through a pipe while it is taken.
 
-Cheap rangers of one kind differ by some decibels. With --fit threshold each scan also tells how sensitive its \
-ranger was, and each pose is listed with what was found.
+Cheap rangers of one kind differ by some decibels. With --fit threshold (or any other parameters of `sonard \
+calibrate`) these are fitted to each scan besides its pose, and listed with it.
 
 A scan that nothing in the scene explains still gets its best pose, with the share of readings that it explains \
 and, if the readings show it, what may be wrong with them: azimuths counted clockwise, or another unit.";
