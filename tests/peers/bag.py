@@ -9,7 +9,7 @@ import math
 import pathlib
 import sys
 
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -49,7 +49,7 @@ def transform(time_s, parent, child, x, y, yaw_deg):
 def write(folder, storage, packed=False):
     bag = Writer(folder, version=9, storage_plugin=storage)
     if packed:
-        bag.set_compression(Writer.CompressionMode.STORAGE, Writer.CompressionFormat.ZSTD)
+        bag.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
     with bag:
         topics = {
             topic: bag.add_connection(topic, kind, typestore=STORE)
