@@ -136,7 +136,7 @@ impl<'a> DataSet<'a> {
             Err(_) if self.facts(shard).is_ok_and(|facts| facts.is_some()) => Outcome::WasThere,
             Err(error) => return Err(error),
         };
-        Draft::clear(&self.root, &name(shard));
+        Draft::clear(&self.root);
         Ok(outcome)
     }
 
@@ -178,6 +178,8 @@ impl<'a> DataSet<'a> {
     /// When what is in a shard's place is not that shard, and what the disk refuses.
     pub fn seal(&self) -> Result<Option<Manifest>, DataSetError> {
         let Some(manifest) = self.manifest()? else { return Ok(None) };
+        // Who was killed between a shard's rename and clearing up after it has left what no one else looks for.
+        Draft::clear(&self.root);
         let text = manifest.to_text();
         let (path, card) = (self.root.join(MANIFEST), self.root.join(CARD));
         // A card that somebody has written on since stays.

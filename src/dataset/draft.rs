@@ -56,17 +56,15 @@ impl Draft {
         File::open(root).and_then(|root| root.sync_all()).map_err(fail)
     }
 
-    /// Removes what killed processes left of a shard that is there now. What can't be removed stays: it is hidden,
+    /// Removes what killed processes left of shards that are there now. What can't be removed stays: it is hidden,
     /// and nobody takes it for a shard.
-    pub(super) fn clear(root: &Path, shard: &str) {
+    pub(super) fn clear(root: &Path) {
         let Ok(entries) = fs::read_dir(root) else { return };
-        let prefix = format!(".{shard}.");
         for entry in entries.filter_map(Result::ok) {
             let name = entry.file_name();
-            let is_draft = name
-                .to_str()
-                .is_some_and(|name| name.starts_with(&prefix) && name.ends_with(ENDING));
-            if is_draft {
+            let draft = name.to_str().filter(|name| name.ends_with(ENDING));
+            let shard = draft.and_then(|name| name.strip_prefix('.')?.split('.').next());
+            if shard.is_some_and(|shard| root.join(shard).is_dir()) {
                 let _ = remove(&entry.path());
             }
         }
