@@ -8,6 +8,7 @@ mod floor_plans;
 mod full_wave;
 mod interactions;
 mod laws;
+mod listening;
 mod multiples;
 mod options;
 mod phenomena;

@@ -53,7 +53,12 @@ impl Listening<'_> {
         let receiver = self.receiver;
         let at_us = self.hearing.next_rise(receiver.listens_from_us(ready_us))?;
         let status = receiver.status_at(at_us);
-        let range_m = receiver.range_m(at_us);
+        // As a detection tells it: a comparator of the carrier rises at the crest behind.
+        let later_us = match status {
+            PingStatus::Echo => self.hearing.crest_after_us(at_us),
+            _ => 0.0,
+        };
+        let range_m = receiver.range_m(at_us + later_us);
         Some(Rise { status, range_m, arrival: self.hearing.cause(at_us) })
     }
 

@@ -1,0 +1,83 @@
+//! A firing listened to once for all thresholds gives what each receiver detects by itself.
+
+use std::sync::Arc;
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use crate::{
+    acoustics::{Air, Latch, PulseArrival, Sensor},
+    geometry::DVec2,
+    model::{Options, Simulator},
+    scene::{Scene, shipped},
+};
+
+/// Thresholds from the lowest up, and some of them again after higher ones, decibels above the nominal one.
+const BY_DB: [f64; 14] =
+    [-12.0, -9.5, -7.0, -9.0, -4.1, -1.7, 2.3, -0.6, 0.0, 0.8, 6.2, 2.9, 10.4, 12.0];
+
+/// Ranges agree to rounding, which has a part of a nanometre where false position ends.
+const SAME_M: f64 = 1e-9;
+
+/// How many detections were compared.
+fn check(scene: &str, sensor: &str, max_range_m: f64) -> usize {
+    let text = shipped::text(scene).expect("a shipped scene");
+    let scene = Arc::new(Scene::from_json(text).expect("a valid scene"));
+    let sensor = Sensor::preset(sensor).expect("a preset");
+    let options = Options { max_range_m: Some(max_range_m), ..Options::default() };
+    let simulator = Simulator::new(scene.clone(), sensor, Air::default(), options).expect("valid");
+    let mut random = Pcg64::seed_from_u64(9);
+    let mut compared = 0;
+    for pose in scene.poses.values() {
+        let off = DVec2::new(random.random_range(-0.02..0.02), random.random_range(-0.02..0.02));
+        let point = simulator.at(pose.position() + off);
+        for _ in 0..25 {
+            let direction_rad = random.random_range(-3.1..3.1);
+            let factors = BY_DB.map(|by_db| 10f64.powf(by_db / 20.0));
+            let usual = simulator.receiver();
+            let together = point.hear(direction_rad, |ear| {
+                ear.listen(usual, |listening| {
+                    factors.map(|by| (listening.detect(by, 0.0), listening.rise(by, 0.0)))
+                })
+            });
+            let together = together.expect("few paths");
+            for ((detected, rise), by) in together.into_iter().zip(factors) {
+                let mut receiver = usual.clone();
+                receiver.threshold *= by;
+                let alone =
+                    point.hear(direction_rad, |ear| ear.detect(&receiver, Latch::First, 0.0));
+                let alone = alone.expect("few paths");
+                let place = format!("{} {pose:?} {direction_rad} {by}", scene.name);
+                assert_eq!(detected.status, alone.status, "{place}");
+                // The same path may have another number in a search that went farther.
+                let known = |arrival: PulseArrival| PulseArrival { index: 0, ..arrival };
+                let arrival = alone.arrival.map(known);
+                assert_eq!(detected.arrival.map(known), arrival, "{place}");
+                let ranges = [detected.range_m, rise.map(|rise| rise.range_m)];
+                for range_m in ranges {
+                    assert_eq!(range_m.is_some(), alone.range_m.is_some(), "{place}");
+                    let off_m = range_m.zip(alone.range_m).map_or(0.0, |(one, two)| one - two);
+                    assert!(off_m.abs() < SAME_M, "{place}: {off_m}");
+                }
+                if let Some(rise) = rise {
+                    assert_eq!(rise.arrival.map(known), arrival, "{place}");
+                }
+                let off_db = detected.margin_db.zip(alone.margin_db).map_or(0.0, |(a, b)| a - b);
+                assert!(off_db.abs() < 1e-6, "{place}: {off_db} dB");
+                compared += 1;
+            }
+        }
+    }
+    compared
+}
+
+#[test]
+fn one_hearing_detects_for_each_threshold_what_its_receiver_does() {
+    let mut compared = 0;
+    for (scene, _) in shipped::SCENES {
+        compared += check(scene, "senscomp-6500", 4.0);
+    }
+    compared += check("oblique-corner", "pioneer", 4.0);
+    compared += check("corridor", "hc-sr04", 3.0);
+    assert!(compared > 4000, "{compared}");
+}
