@@ -66,7 +66,7 @@ const waterfall = new Waterfall(byId("over-time"), {
     select(index);
   },
 });
-const say = (text) => summary.say(text);
+const say = (text) => summary.answer(text);
 control(byId("control"), byId("stop"), say);
 const overlays = new Overlays(byId("overlays"), plan, strip, say);
 const next = new Next(byId("next"), plan, say);

@@ -2,26 +2,48 @@
 
 import { count, setText } from "./words.js";
 
+/** For so long an answer stands, however fast scans follow each other. */
+const ANSWER_MS = 3000;
+
 export class Summary {
   constructor(place) {
     this.place = place;
+    this.timer = null;
+    this.news = null;
   }
 
   say(text) {
+    clearTimeout(this.timer);
+    this.timer = null;
     setText(this.place, text);
   }
 
+  /** What came of something that was asked for on this page; news of scans waits behind it. */
+  answer(text) {
+    this.say(text);
+    this.news = null;
+    this.timer = setTimeout(() => {
+      this.timer = null;
+      if (this.news !== null) this.say(this.news);
+    }, ANSWER_MS);
+  }
+
+  tell(text) {
+    if (this.timer === null) this.say(text);
+    else this.news = text;
+  }
+
   began(scan) {
-    this.say(`A scan of ${count(scan.planned, "beam")} is under way.`);
+    this.tell(`A scan of ${count(scan.planned, "beam")} is under way.`);
   }
 
   ended(scan) {
-    this.say(`Scan over: ${scan.inWords()}.`);
+    this.tell(`Scan over: ${scan.inWords()}.`);
   }
 
   /** The daemon is gone, and with it what it might say of the scan. */
   lost(scan) {
-    this.say(`Heard last of the scan: ${scan.inWords()}. Whether it goes on is not known.`);
+    this.tell(`Heard last of the scan: ${scan.inWords()}. Whether it goes on is not known.`);
   }
 
   /** Counts of a scan under way would be out of date at once: they stand above the plan. */
@@ -34,7 +56,7 @@ export class Summary {
   event({ kind, detail }) {
     // An explanation is of the last scan, which nobody knows by its id.
     const of = /^scan [0-9a-f-]{36}: /;
-    if (kind === "explanation") this.say(`The last scan is ${detail.replace(of, "")}.`);
-    else this.say(`${kind.replaceAll("_", " ")}: ${detail}`);
+    if (kind === "explanation") this.tell(`The last scan is ${detail.replace(of, "")}.`);
+    else this.tell(`${kind.replaceAll("_", " ")}: ${detail}`);
   }
 }
