@@ -53,6 +53,18 @@ cp "$work/rooms/room-2/maps.png" "$pictures/explored.png"
 "$SONARD" simulate --array pioneer-8 --scene mcgill-lab --pose fig4 -o "$work/array.jsonl"
 "$SONARD" plot "$work/array.jsonl" -o "$pictures/array-mcgill-lab.png"
 
+# A recording as Rerun's viewer shows it.
+tests/install.sh "" xvfb xauth mesa-vulkan-drivers
+tests/venv.sh target/tools/rerun "" rerun-sdk==0.41.0
+"$SONARD" export "$work/fig9/scan.jsonl" -o "$work/fig9.mcap" 2>/dev/null
+# On a screen so large that its pointer is not over the window.
+xvfb-run --auto-servernum --server-args "-screen 0 2600x1600x24" \
+  target/tools/rerun/bin/python docs/recording_picture.py "$work/fig9.mcap" "$pictures/recording.png" 2>/dev/null
+
+# A daemon as Prometheus shows it.
+tests/install.sh "" prometheus chromium
+docs/monitoring-picture.sh "$SONARD" "$pictures/prometheus.png"
+
 # The live page, as its test sees it in Chromium.
 tests/axe.sh
 cargo test --quiet --test cli live_page::accessible
