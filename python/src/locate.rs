@@ -1,15 +1,18 @@
 //! Where scans were taken.
 
+use std::collections::BTreeMap;
+
 use pyo3::{exceptions::PyValueError, prelude::*};
-use sonard::inverse;
+use sonard::inverse::{self, Group};
 use sonard_model::{geometry::Pose, reading::PingStatus};
 use uuid::Uuid;
 
 use crate::{
-    error::{LogError, SonardError, refuse},
+    error::{LogError, OptionError, SonardError, refuse},
     json,
     log::Scan,
     model::Model,
+    options::word,
     pool::pool,
     readings::Heard,
     sense::warn,
@@ -25,29 +28,52 @@ use crate::{
 ///     With the scene to locate in.
 /// spacing_m : float, optional
 ///     Spacing of the grid, metres, 0.01 to 2; without it 0.05 in small scenes to 0.1.
+/// fit : sequence of str, optional
+///     What is fitted to each sweep besides its pose, as ``calibrate`` names it: ``"threshold"`` for a ranger of the same
+///     kind as the model's, but not the same.
+/// priors : dict of str to float, optional
+///     Standard deviation of what is believed of a parameter that is fitted; see ``calibrate``.
+///
+/// Raises
+/// ------
+/// OptionError
+///     If something can't be fitted.
 #[pyclass(frozen, module = "sonard")]
 pub(crate) struct Locator {
     model: Py<Model>,
     world: inverse::World,
     atlas: inverse::Atlas,
     spacing_m: f64,
+    fit: Vec<String>,
+    priors: BTreeMap<String, f64>,
 }
+
+/// What a locator is made of again.
+type Arguments = (Py<Model>, f64, Vec<String>, BTreeMap<String, f64>);
 
 #[pymethods]
 impl Locator {
     #[new]
-    #[pyo3(signature = (model, spacing_m = None))]
-    fn new(py: Python<'_>, model: Py<Model>, spacing_m: Option<f64>) -> PyResult<Self> {
+    #[pyo3(signature = (model, spacing_m = None, fit = None, priors = None))]
+    fn new(
+        py: Python<'_>,
+        model: Py<Model>,
+        spacing_m: Option<f64>,
+        fit: Option<Vec<String>>,
+        priors: Option<BTreeMap<String, f64>>,
+    ) -> PyResult<Self> {
         let world = model.get().world();
         let spacing_m = spacing_m.unwrap_or_else(|| inverse::Atlas::usual_spacing_m(&world.scene));
         if !(0.01..=2.0).contains(&spacing_m) {
             let message = format!("spacing_m is {spacing_m}: it must be from 0.01 to 2");
             return Err(PyValueError::new_err(message));
         }
+        let (fit, priors) = (fit.unwrap_or_default(), priors.unwrap_or_default());
+        let besides = besides(py, &fit, &priors, &world)?;
         let pool = pool(py, None)?;
         let atlas = py.detach(|| pool.install(|| inverse::Atlas::new(&world, spacing_m)));
         let atlas = atlas.map_err(|error| refuse::<SonardError>(py, &error.to_string(), ""))?;
-        Ok(Self { model, world, atlas, spacing_m })
+        Ok(Self { model, world, atlas: atlas.fitting(besides), spacing_m, fit, priors })
     }
 
     /// The poses that explain a sweep, most probable first.
@@ -64,7 +90,8 @@ impl Locator {
     /// -------
     /// list of dict
     ///     ``x_m``, ``y_m``, ``heading_deg``, ``probability``, ``sigma_x_m``, ``sigma_y_m``, ``sigma_heading_deg``
-    ///     and ``explained``, the share of the readings that the pose explains.
+    ///     and ``explained``, the share of the readings that the pose explains; of a locator with ``fit`` also ``besides``,
+    ///     a list of dict with ``name``, ``value`` and ``sigma``.
     #[pyo3(signature = (readings, azimuths_deg = None))]
     fn locate<'py>(
         &self,
@@ -92,8 +119,8 @@ impl Locator {
         Ok(format!("<Locator, {} m apart, by {model}>", self.spacing_m))
     }
 
-    fn __getnewargs__(&self, py: Python<'_>) -> (Py<Model>, f64) {
-        (self.model.clone_ref(py), self.spacing_m)
+    fn __getnewargs__(&self, py: Python<'_>) -> Arguments {
+        (self.model.clone_ref(py), self.spacing_m, self.fit.clone(), self.priors.clone())
     }
 }
 
@@ -134,6 +161,19 @@ impl Locator {
         let pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
         Ok(inverse::Sweep { scan: Uuid::nil(), pose, beams })
     }
+}
+
+/// The parameters that are fitted besides a pose, with what is believed of them.
+fn besides(
+    py: Python<'_>,
+    fit: &[String],
+    priors: &BTreeMap<String, f64>,
+    world: &inverse::World,
+) -> PyResult<Vec<inverse::Prior>> {
+    let groups = fit.iter().map(|name| word(py, "fit", name)).collect::<PyResult<Vec<Group>>>()?;
+    let given: Vec<(String, f64)> = priors.clone().into_iter().collect();
+    let found = inverse::priors(&groups, &given, world, 1);
+    found.map_err(|error| refuse::<OptionError>(py, &error.to_string(), &error.help()))
 }
 
 /// Fewer say too little about three values of a pose.

@@ -157,6 +157,23 @@ def test_a_sweep_is_located(command: Command, tmp_path: Path) -> None:
     assert repr(pickle.loads(pickle.dumps(locator))) == repr(locator)
 
 
+def test_a_sweep_tells_how_sensitive_its_ranger_was() -> None:
+    usual = sonard.Sensor.preset("senscomp-6500")
+    # Half as sensitive as is believed: 6 dB.
+    deaf = usual.replace(threshold=2 * usual.threshold)
+    scan = sonard.Model("simple-room", deaf, max_range_m=3).predict([0.3, 0.3, 20.0])
+    model = sonard.Model("simple-room", usual, max_range_m=3)
+    locator = sonard.Locator(model, fit=["threshold"], priors={"threshold_db": 4.0})
+    (threshold,) = locator.locate(scan)[0]["besides"]
+    usual_db = 20 * np.log10(usual.threshold)
+    assert threshold["name"] == "threshold_db" and abs(threshold["value"] - usual_db - 6.02) < 1
+    again = pickle.loads(pickle.dumps(locator)).locate(scan)[0]["besides"]
+    assert again == [threshold]
+    assert "besides" not in sonard.Locator(model).locate(scan)[0]
+    with pytest.raises(sonard.OptionError, match="`gear` is not fitted"):
+        sonard.Locator(model, fit=["threshold"], priors={"gear": 1.0})
+
+
 @pytest.mark.parametrize("feature_prediction", [True, False])
 def test_a_map_is_that_of_the_command(
     course: Path, feature_prediction: bool, command: Command, tmp_path: Path
