@@ -53,6 +53,13 @@ cp "$work/rooms/room-2/maps.png" "$pictures/explored.png"
 "$SONARD" simulate --array pioneer-8 --scene mcgill-lab --pose fig4 -o "$work/array.jsonl"
 "$SONARD" plot "$work/array.jsonl" -o "$pictures/array-mcgill-lab.png"
 
+# A live scan as Foxglove Studio shows it; from npm, under the MPL 2.0 and no part of this repository.
+command -v npm >/dev/null || tests/install.sh "" nodejs npm
+mkdir -p target/tools/studio
+cp docs/studio/* target/tools/studio/
+npm ci --silent --no-fund --no-audit --prefix target/tools/studio
+node target/tools/studio/picture.mjs "$SONARD" config/foxglove-layout.json "$pictures/foxglove.png"
+
 # The live page, as its test sees it in Chromium.
 tests/axe.sh
 cargo test --quiet --test cli live_page::accessible
