@@ -64,6 +64,12 @@ xvfb-run --auto-servernum --server-args "-screen 0 2600x1600x24" \
 # A daemon as Prometheus shows it.
 tests/install.sh "" prometheus chromium
 docs/monitoring-picture.sh "$SONARD" "$pictures/prometheus.png"
+# A live scan as Foxglove Studio shows it; from npm, under the MPL 2.0 and no part of this repository.
+command -v npm >/dev/null || tests/install.sh "" nodejs npm
+mkdir -p target/tools/studio
+cp docs/studio/* target/tools/studio/
+npm ci --silent --no-fund --no-audit --prefix target/tools/studio
+node target/tools/studio/picture.mjs "$SONARD" config/foxglove-layout.json "$pictures/foxglove.png"
 
 # The live page, as its test sees it in Chromium.
 tests/axe.sh
