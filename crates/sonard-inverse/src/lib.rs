@@ -9,6 +9,7 @@
 //! arrival near the threshold, a missing echo means that none was strong enough, and the ends of arcs carry as much
 //! information as their ranges (`likelihood`).
 
+mod arcs;
 mod atlas;
 mod candidates;
 mod course;

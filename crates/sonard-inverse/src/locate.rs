@@ -68,7 +68,7 @@ impl Mode {
             sigma_x_m: of[0].sigma,
             sigma_y_m: of[1].sigma,
             sigma_heading_deg: of[2].sigma,
-            explained: 1.0 - fitted.errors.clutter,
+            explained: fitted.errors.explained(),
             besides: besides.collect(),
         }
     }
@@ -213,7 +213,10 @@ fn thinned(sweep: &Sweep, count: usize) -> Sweep {
     let (echoes, silent): (Vec<&Beam>, Vec<&Beam>) = sweep.beams.iter().partition(is_echo);
     let of_silent = silent.len().min(count - echoes.len().min(2 * count / 3));
     let of_echoes = echoes.len().min(count - of_silent);
-    let beams = evenly(&echoes, of_echoes).chain(evenly(&silent, of_silent)).copied().collect();
+    let mut beams: Vec<Beam> =
+        evenly(&echoes, of_echoes).chain(evenly(&silent, of_silent)).copied().collect();
+    // Neighbours are judged together.
+    beams.sort_by(|one, other| one.azimuth_deg.total_cmp(&other.azimuth_deg));
     Sweep { beams, ..sweep.clone() }
 }
 

@@ -113,7 +113,7 @@ impl State<'_> {
     fn is_astray(&self, end: &Settled) -> bool {
         let (unexplained, sigmas) = ASTRAY;
         let contradicts = end.values.component_div(&self.prior_sigmas()).amax() > sigmas;
-        contradicts || end.errors.clutter > unexplained
+        contradicts || end.errors.explained() < 1.0 - unexplained
     }
 
     /// Other beginnings than what was believed.
