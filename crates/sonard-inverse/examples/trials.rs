@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 use rooms::{BEAMS, NOISE_MM};
-use sonard_inverse::{Parameter, bound, fit_from, fit_thoroughly};
+use sonard_inverse::{Parameter, bound, fit, fit_from};
 use spread::SPREAD;
 use wrong::{Kinds, Wrong};
 
@@ -87,7 +87,7 @@ fn trial(number: u64, seed: u64, kinds: Kinds) -> Option<Trial> {
     let unhindered = bound(&wrong.truth, unhindered, &wrong.fit, &SPREAD).ok()?;
     let began = Instant::now();
     let here = std::slice::from_ref(&wrong.here);
-    let fitted = fit_thoroughly(&wrong.believed, here, &wrong.fit).ok()?;
+    let fitted = fit(&wrong.believed, here, &wrong.fit).ok()?;
     let took_s = began.elapsed().as_secs_f64();
     let of_truth = fit_from(&wrong.believed, here, &wrong.fit, &wrong.expected, &SPREAD).ok()?;
     let both = fitted.estimates.iter().zip(&of_truth.estimates);

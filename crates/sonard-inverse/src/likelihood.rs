@@ -23,7 +23,7 @@ pub struct ErrorModel {
     pub sigma_db: f64,
     /// Share of single readings that nothing explains, of those that are not in arcs of something else.
     pub clutter: f64,
-    /// Share of readings in arcs of what the scene lacks: people, furniture, the robot itself.
+    /// Share of readings in arcs of what the scene lacks: people, furniture, the robot itself. None are looked for if it is 0.
     pub arcs: f64,
     /// How long such arcs are on average, in readings.
     pub arc_beams: f64,
@@ -54,6 +54,12 @@ impl ErrorModel {
             clutter_silent: 0.3,
             clutter_m: reach_m,
         }
+    }
+
+    /// The same without arcs: single readings alone may be unexplained, and so they stay. Poses are weighed against each other
+    /// so, each of which would have what it does not explain for arcs of something else.
+    pub(crate) const fn without_arcs(self) -> Self {
+        Self { arcs: 0.0, ..self }
     }
 
     /// The same with another standard deviation of ranges; the far tail keeps its length.

@@ -213,10 +213,7 @@ fn thinned(sweep: &Sweep, count: usize) -> Sweep {
     let (echoes, silent): (Vec<&Beam>, Vec<&Beam>) = sweep.beams.iter().partition(is_echo);
     let of_silent = silent.len().min(count - echoes.len().min(2 * count / 3));
     let of_echoes = echoes.len().min(count - of_silent);
-    let mut beams: Vec<Beam> =
-        evenly(&echoes, of_echoes).chain(evenly(&silent, of_silent)).copied().collect();
-    // Neighbours are judged together.
-    beams.sort_by(|one, other| one.azimuth_deg.total_cmp(&other.azimuth_deg));
+    let beams = evenly(&echoes, of_echoes).chain(evenly(&silent, of_silent)).copied().collect();
     Sweep { beams, ..sweep.clone() }
 }
 

@@ -56,9 +56,13 @@ fn of_clutter(residuals: &Residuals, errors: &ErrorModel) -> ErrorModel {
     let (arcs, beams) = BELIEVED_ARCS;
     let (believed, silent) = BELIEVED_SILENT;
     let of_scene = (counts.all - counts.of_else).max(1.0);
+    let clutter = (unexplained / of_scene).clamp(0.002, 0.5);
+    if errors.arcs == 0.0 {
+        return ErrorModel { clutter, ..*errors };
+    }
     let silences = counts.silent_of_else + silent_unexplained + believed * silent;
     ErrorModel {
-        clutter: (unexplained / of_scene).clamp(0.002, 0.5),
+        clutter,
         arcs: (counts.of_else / counts.all.max(1.0)).clamp(0.002, 0.7),
         arc_beams: ((counts.staying + counts.leaving + arcs * beams) / (counts.leaving + arcs))
             .clamp(2.0, 60.0),
