@@ -5,11 +5,12 @@
 //! where one arrival is alone its rise is looked up in the table of the pulse.
 
 mod ideal;
+mod part;
 mod rise;
 
 use num_complex::Complex64;
-use smallvec::SmallVec;
 
+use self::part::Part;
 use super::{Combining, Incident, PulseArrival, Receiver, noise::NoiseTrack};
 use crate::acoustics::{Detector, EchoShape, Gain};
 
@@ -31,11 +32,15 @@ pub(super) struct Hearing<'a> {
     horizon_us: f64,
     /// The latest time that anything was asked about.
     asked_us: f64,
-    /// Arrivals that have begun, the first `over` of which are over.
-    parts: SmallVec<[Part; 16]>,
+    /// The first arrivals, as far as they were ever asked about: what is known of them stays when time is turned back.
+    parts: Vec<Part>,
+    /// How many of them have begun now, the first `over` of which are over.
+    begun: usize,
     over: usize,
-    /// Number of them that have their fields.
+    /// Number of them that have their fields, of those that are not over.
     summed: usize,
+    /// When the next arrival begins, or what is not known; infinite if nothing does.
+    next_us: f64,
     /// The arrivals that last, by [`Self::lasting`], when it was last found out that
     /// they have to be watched.
     watched: Option<(usize, usize)>,
@@ -48,33 +53,6 @@ pub(super) struct Hearing<'a> {
     span_us: (f64, f64),
 }
 
-struct Part {
-    tof_us: f64,
-    /// To be multiplied with the shape and with what the gain adds while it sounds.
-    size: f64,
-    /// Phase of the carrier.
-    phase_rad: f64,
-    /// Size and phase, once they are wanted.
-    field: Complex64,
-    /// The most of its modulus.
-    strength: f64,
-    /// The most that its shape changes it in a microsecond.
-    steepest: f64,
-    /// Its own shape; without it, the pulse's.
-    shape: Option<Box<EchoShape>>,
-}
-
-impl Part {
-    const fn gone(tof_us: f64) -> Self {
-        let field = Complex64::ZERO;
-        Self { tof_us, size: 0.0, phase_rad: 0.0, field, strength: 0.0, steepest: 0.0, shape: None }
-    }
-
-    fn is_gone(&self) -> bool {
-        self.size == 0.0
-    }
-}
-
 impl<'a> Hearing<'a> {
     pub(super) fn new(
         receiver: &'a Receiver,
@@ -83,16 +61,22 @@ impl<'a> Hearing<'a> {
     ) -> Self {
         let longest = receiver.response.as_ref().map_or(0.0, |response| response.crossing_us());
         let shape = &receiver.shape;
-        Self {
+        let span_us = (
+            shape.first_us() - receiver.lead_us - longest,
+            shape.last_us() - receiver.lead_us + longest,
+        );
+        let mut hearing = Self {
             receiver,
             arrivals,
             incident,
             noise: None,
             horizon_us: f64::INFINITY,
             asked_us: 0.0,
-            parts: SmallVec::new(),
+            parts: Vec::with_capacity(arrivals.len()),
+            begun: 0,
             over: 0,
             summed: 0,
+            next_us: f64::INFINITY,
             watched: None,
             exponent: match receiver.gain {
                 Gain::Compensating { exponent, .. } => exponent,
@@ -100,11 +84,10 @@ impl<'a> Hearing<'a> {
             },
             threshold_factor: 1.0,
             least_threshold: least_threshold(receiver),
-            span_us: (
-                shape.first_us() - receiver.lead_us - longest,
-                shape.last_us() - receiver.lead_us + longest,
-            ),
-        }
+            span_us,
+        };
+        hearing.expect();
+        hearing
     }
 
     pub(super) fn in_noise(mut self, noise: &'a NoiseTrack) -> Self {
@@ -119,6 +102,7 @@ impl<'a> Hearing<'a> {
             Combining::Coherent | Combining::Incoherent => arrives_us + self.span_us.0,
             Combining::Ideal => arrives_us,
         };
+        self.expect();
     }
 
     /// Whether an answer so far might have been another one if arrivals beyond the horizon were
@@ -139,18 +123,18 @@ impl<'a> Hearing<'a> {
 
     /// Back to the firing.
     pub(super) fn rewind(&mut self) {
-        self.parts.clear();
-        (self.over, self.summed, self.watched) = (0, 0, None);
+        self.rewind_to(0.0);
     }
 
     /// Back to a time after firing: as if nothing later had been asked about.
     pub(super) fn rewind_to(&mut self, t_us: f64) {
-        let (begins_us, ends_us) = self.span_us;
-        self.over = self.parts.partition_point(|part| part.tof_us + ends_us < t_us);
-        let is_there = |part: &&Part| !part.is_gone() && part.tof_us + begins_us <= t_us;
-        let lasting = self.parts[self.over..].iter().take_while(is_there).count();
-        self.parts.truncate(self.over + lasting);
-        (self.summed, self.watched) = (self.summed.min(self.parts.len()), None);
+        self.over = self.parts.partition_point(|part| part.lasts_us[1] < t_us);
+        // What was over when it was first asked about is not known.
+        let known = self.parts[self.over..].iter().take_while(|part| !part.is_gone()).count();
+        self.parts.truncate(self.over + known);
+        self.begun = self.parts.partition_point(|part| part.lasts_us[0] <= t_us).max(self.over);
+        (self.summed, self.watched) = (0, None);
+        self.expect();
     }
 
     /// The least amplitude noticed at a time after firing.
@@ -174,8 +158,8 @@ impl<'a> Hearing<'a> {
         }
         let t_us = t_us + CYCLE_US;
         self.advance(t_us);
-        let size = |part: &Part| part.size * modulus(self.shape_at(part, t_us));
-        let (place, _) = self.parts[self.over..]
+        let size = |part: &Part| part.size * self.modulus_at(part, t_us);
+        let (place, _) = self.parts[self.over..self.begun]
             .iter()
             .enumerate()
             .map(|(place, part)| (place, size(part)))
@@ -200,10 +184,10 @@ impl<'a> Hearing<'a> {
     /// Envelope at a time; no earlier time can be asked for afterwards.
     pub(super) fn level(&mut self, t_us: f64) -> f64 {
         self.advance(t_us);
-        for part in &mut self.parts[self.summed.max(self.over)..] {
-            part.field = Complex64::from_polar(part.size, part.phase_rad);
+        for part in &mut self.parts[self.summed.max(self.over)..self.begun] {
+            part.find_field();
         }
-        self.summed = self.parts.len();
+        self.summed = self.begun;
         self.level_of(self.over, t_us)
     }
 
@@ -216,7 +200,7 @@ impl<'a> Hearing<'a> {
         }
         // All that lasts then has its field.
         self.level(t_us);
-        let live = self.parts[self.over..].iter();
+        let live = self.parts[self.over..self.begun].iter();
         let sum: Complex64 = live.map(|part| part.field * self.shape_at(part, t_us)).sum();
         let noise = self.noise.map_or(Complex64::ZERO, |noise| noise.at(t_us));
         let phase_rad = (sum * self.rise_of_gain(t_us) + noise).arg();
@@ -225,13 +209,13 @@ impl<'a> Hearing<'a> {
 
     /// Places of the arrivals that last now.
     pub(super) fn living(&self) -> std::ops::Range<usize> {
-        self.over..self.parts.len()
+        self.over..self.begun
     }
 
     /// The part of an arrival in the envelope.
     pub(super) fn share(&self, place: usize, t_us: f64) -> f64 {
         self.parts.get(place).map_or(0.0, |part| {
-            part.size * modulus(self.shape_at(part, t_us)) * self.rise_of_gain(t_us)
+            part.size * self.modulus_at(part, t_us) * self.rise_of_gain(t_us)
         })
     }
 
@@ -244,7 +228,7 @@ impl<'a> Hearing<'a> {
         }
         self.enter(t_us + self.span_us.1, t_us);
         let first_us = t_us - self.span_us.1 + self.span_us.0;
-        let others = self.arrivals[..self.parts.len()]
+        let others = self.arrivals[..self.begun]
             .iter()
             .rev()
             .take_while(|other| self.receiver.tof_us(other) > first_us);
@@ -254,7 +238,7 @@ impl<'a> Hearing<'a> {
 
     /// Envelope of the parts from a place on.
     fn level_of(&self, from: usize, t_us: f64) -> f64 {
-        let live = &self.parts[from..];
+        let live = &self.parts[from..self.begun];
         let noise = self.noise.map_or(Complex64::ZERO, |noise| noise.at(t_us));
         let gain = self.rise_of_gain(t_us);
         match self.receiver.combining {
@@ -281,7 +265,7 @@ impl<'a> Hearing<'a> {
             }
             Combining::Ideal => live
                 .iter()
-                .map(|part| part.size * modulus(self.shape_at(part, t_us)) * gain)
+                .map(|part| part.size * self.modulus_at(part, t_us) * gain)
                 .fold(modulus(noise), f64::max),
         }
     }
@@ -289,6 +273,16 @@ impl<'a> Hearing<'a> {
     #[inline]
     fn shape_at(&self, part: &Part, t_us: f64) -> Complex64 {
         self.shape(part).at(t_us - part.tof_us + self.receiver.lead_us)
+    }
+
+    /// The modulus of its shape.
+    #[inline]
+    fn modulus_at(&self, part: &Part, t_us: f64) -> f64 {
+        if part.shape.is_none() && self.receiver.shape.is_real() {
+            let at_us = t_us - part.tof_us + self.receiver.lead_us;
+            return self.receiver.shape.real_at(at_us).abs();
+        }
+        modulus(self.shape_at(part, t_us))
     }
 
     fn shape<'p>(&'p self, part: &'p Part) -> &'p EchoShape {
@@ -301,60 +295,56 @@ impl<'a> Hearing<'a> {
     }
 
     fn lasting(&self) -> (usize, usize) {
-        (self.over, self.parts.len())
+        (self.over, self.begun)
     }
 
     fn next_entry_us(&self) -> Option<f64> {
-        let next = self.arrivals.get(self.parts.len());
-        let entry_us = next.map(|next| self.receiver.tof_us(next) + self.span_us.0);
-        entry_us.or_else(|| self.horizon_us.is_finite().then_some(self.horizon_us))
+        self.next_us.is_finite().then_some(self.next_us)
+    }
+
+    /// Finds out when the next arrival begins.
+    fn expect(&mut self) {
+        self.next_us = match (self.parts.get(self.begun), self.arrivals.get(self.begun)) {
+            (Some(part), _) => part.lasts_us[0],
+            (None, Some(arrival)) => self.receiver.tof_us(arrival) + self.span_us.0,
+            (None, None) => self.horizon_us,
+        };
     }
 
     /// Lets arrivals enter and leave up to a time.
+    #[inline]
     fn advance(&mut self, t_us: f64) {
         self.enter(t_us, t_us);
         if self.receiver.combining != Combining::Ideal {
-            let is_over = |part: &Part| part.tof_us + self.span_us.1 < t_us;
-            self.over += self.parts[self.over..].iter().take_while(|part| is_over(part)).count();
+            while self.over < self.begun && self.parts[self.over].lasts_us[1] < t_us {
+                self.over += 1;
+            }
         }
     }
 
     /// Lets arrivals enter that begin up to a time; what is over by `now_us` only keeps its place.
+    #[inline]
     fn enter(&mut self, t_us: f64, now_us: f64) {
         self.asked_us = self.asked_us.max(t_us);
-        while let Some(arrival) = self.arrivals.get(self.parts.len()) {
-            let tof_us = self.receiver.tof_us(arrival);
-            if tof_us + self.span_us.0 > t_us {
-                break;
-            }
-            let is_over = tof_us + self.span_us.1 < now_us;
-            let part = if is_over { Part::gone(tof_us) } else { self.part(arrival, tof_us) };
-            self.parts.push(part);
+        // Invariant: `next_us` is when the first one begins that has not entered.
+        while self.next_us <= t_us && self.begun < self.arrivals.len() {
+            self.enter_next(now_us);
         }
     }
 
-    fn part(&self, arrival: &PulseArrival, tof_us: f64) -> Part {
-        let receiver = self.receiver;
-        let at_face = receiver.response.as_ref().and_then(|response| {
-            let Incident { strength, incidence } = (self.incident)(arrival)?;
-            Some((strength, response.echo(&incidence)))
-        });
-        let (strength, shape) = match at_face {
-            Some((strength, Some(shape))) => (strength, Some(Box::new(shape))),
-            Some((_, None)) => (0.0, None),
-            None => (arrival.amplitude, None),
-        };
-        let size = strength / self.rise_of_gain(tof_us);
-        let of = shape.as_deref().unwrap_or(&receiver.shape);
-        Part {
-            tof_us,
-            size,
-            phase_rad: arrival.phase_rad - receiver.omega * tof_us,
-            field: Complex64::ZERO,
-            strength: size * of.peak(),
-            steepest: size * of.steepest(),
-            shape,
+    fn enter_next(&mut self, now_us: f64) {
+        if self.begun == self.parts.len() {
+            let arrival = &self.arrivals[self.begun];
+            let tof_us = self.receiver.tof_us(arrival);
+            let lasts_us = [tof_us + self.span_us.0, tof_us + self.span_us.1];
+            let part = match lasts_us[1] < now_us {
+                true => Part::gone(tof_us, lasts_us),
+                false => self.part(arrival, tof_us, lasts_us),
+            };
+            self.parts.push(part);
         }
+        self.begun += 1;
+        self.expect();
     }
 }
 
