@@ -8,10 +8,12 @@ mod ideal;
 mod part;
 mod rise;
 
+use std::cell::Cell;
+
 use num_complex::Complex64;
 
 use self::part::Part;
-use super::{Combining, Incident, PulseArrival, Receiver, noise::NoiseTrack};
+use super::{Combining, Incident, PulseArrival, Receiver, gain::Step, noise::NoiseTrack};
 use crate::acoustics::{Detector, EchoShape, Gain};
 
 /// Arrivals that together add less than this part to another's amplitude leave it as it is.
@@ -44,6 +46,10 @@ pub(super) struct Hearing<'a> {
     /// The arrivals that last, by [`Self::lasting`], when it was last found out that
     /// they have to be watched.
     watched: Option<(usize, usize)>,
+    /// The bounds of what lasts, by [`Self::lasting`].
+    bounds: Bounds,
+    /// The step of the gain that was last asked about.
+    step: Cell<Step>,
     /// Power of the time by which the gain rises.
     exponent: f64,
     /// What the receiver's threshold is multiplied with.
@@ -51,6 +57,16 @@ pub(super) struct Hearing<'a> {
     least_threshold: f64,
     /// An arrival lasts from so long before its nominal time to so long after it.
     span_us: (f64, f64),
+}
+
+/// What arrivals that last can add up to at most.
+#[derive(Clone, Copy, Default)]
+struct Bounds {
+    /// Which they are.
+    of: (usize, usize),
+    strength: f64,
+    /// A microsecond.
+    steepest: f64,
 }
 
 impl<'a> Hearing<'a> {
@@ -78,6 +94,8 @@ impl<'a> Hearing<'a> {
             summed: 0,
             next_us: f64::INFINITY,
             watched: None,
+            bounds: Bounds::default(),
+            step: Cell::new(receiver.sensitivity.step_at(0.0)),
             exponent: match receiver.gain {
                 Gain::Compensating { exponent, .. } => exponent,
                 Gain::Steps { .. } => 0.0,
@@ -133,13 +151,18 @@ impl<'a> Hearing<'a> {
         let known = self.parts[self.over..].iter().take_while(|part| !part.is_gone()).count();
         self.parts.truncate(self.over + known);
         self.begun = self.parts.partition_point(|part| part.lasts_us[0] <= t_us).max(self.over);
-        (self.summed, self.watched) = (0, None);
+        (self.summed, self.watched, self.bounds) = (0, None, Bounds::default());
         self.expect();
     }
 
     /// The least amplitude noticed at a time after firing.
     pub(super) fn threshold_at(&self, t_us: f64) -> f64 {
-        self.threshold_factor * self.receiver.threshold_at(t_us)
+        let Receiver { sensitivity, threshold, .. } = self.receiver;
+        if !self.step.get().holds(t_us) {
+            self.step.set(sensitivity.step_at(t_us));
+        }
+        let range_m = self.receiver.range_m(t_us);
+        self.threshold_factor * sensitivity.in_step(&self.step.get(), *threshold, range_m)
     }
 
     /// When ECHO next rises if the detector is ready from `ready_us` on: at once if the envelope is
@@ -214,9 +237,9 @@ impl<'a> Hearing<'a> {
 
     /// The part of an arrival in the envelope.
     pub(super) fn share(&self, place: usize, t_us: f64) -> f64 {
-        self.parts.get(place).map_or(0.0, |part| {
-            part.size * self.modulus_at(part, t_us) * self.rise_of_gain(t_us)
-        })
+        self.parts
+            .get(place)
+            .map_or(0.0, |part| part.size * self.modulus_at(part, t_us) * self.rise_of_gain(t_us))
     }
 
     /// Whether nothing else sounds with `arrival` or within its length after it, and its strength is
@@ -296,6 +319,19 @@ impl<'a> Hearing<'a> {
 
     fn lasting(&self) -> (usize, usize) {
         (self.over, self.begun)
+    }
+
+    /// The most that what lasts can add up to.
+    fn bounds(&mut self) -> Bounds {
+        if self.bounds.of != self.lasting() {
+            let live = &self.parts[self.over..self.begun];
+            self.bounds = Bounds {
+                of: self.lasting(),
+                strength: live.iter().map(|part| part.strength).sum(),
+                steepest: live.iter().map(|part| part.steepest).sum(),
+            };
+        }
+        self.bounds
     }
 
     fn next_entry_us(&self) -> Option<f64> {

@@ -18,6 +18,9 @@ pub struct Rise {
     pub range_m: f64,
     /// The arrival that drove the detector.
     pub arrival: Option<PulseArrival>,
+    /// When the envelope passed the threshold, microseconds after firing: a receiver with a higher one can't be raised
+    /// before.
+    pub passed_us: f64,
 }
 
 impl Receiver {
@@ -59,7 +62,15 @@ impl Listening<'_> {
             _ => 0.0,
         };
         let range_m = receiver.range_m(at_us + later_us);
-        Some(Rise { status, range_m, arrival: self.hearing.cause(at_us) })
+        let arrival = self.hearing.cause(at_us);
+        Some(Rise { status, range_m, arrival, passed_us: at_us })
+    }
+
+    /// The most that the envelope reaches with the rise that was told last, and how far that is above its threshold,
+    /// decibels.
+    #[must_use]
+    pub fn peak(&mut self, rise: &Rise) -> (f64, f64) {
+        self.receiver.peak(&mut self.hearing, rise.passed_us, rise.arrival.as_ref())
     }
 
     /// Up to which length there and back arrivals matter to what was told so far, metres; `None` if longer ones than
