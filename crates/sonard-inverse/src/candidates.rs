@@ -63,7 +63,9 @@ struct Reported {
     rise: Rise,
     /// The threshold, decibels above the nominal one.
     by_db: f64,
-    /// The threshold up to which its envelope reaches, decibels above the nominal one.
+    /// The most of its envelope.
+    peak: f64,
+    /// The threshold up to which that reaches, decibels above the nominal one.
     reaches_db: f64,
 }
 
@@ -103,11 +105,18 @@ impl Listener {
                 return;
             };
             ready_us = rise.passed_us;
-            let (peak, margin_db) = listening.peak(&rise);
-            let reaches_db = by_db + margin_db.max(0.0);
-            let spread_db = self.spread_db(&rise, peak);
-            let mut next = Reported { rise, by_db, reaches_db };
-            let until_db = self.lost(listening, &mut next);
+            let mut next = Self::reported(listening, rise, by_db);
+            let until_db = self.lost(listening, &next, ready_us);
+            if by_db < 0.0 && until_db > 0.0 {
+                // What is reported at the usual threshold is told as it is there.
+                let usual = listening.rise(1.0, ready_us);
+                if let Some(rise) = usual.filter(|rise| self.is_same(&next, rise, 0.0)) {
+                    next = match self.is_asked_again(until_db) {
+                        true => Self::reported(listening, rise, 0.0),
+                        false => Reported { rise, by_db: 0.0, ..next },
+                    };
+                }
+            }
             match found.last_mut() {
                 Some(known)
                     if last
@@ -121,10 +130,10 @@ impl Listener {
                         range_m: Some(next.rise.range_m),
                         arrival: next.rise.arrival.map(|arrival| ear.arrival(&arrival)),
                         until_db,
-                        spread_db,
+                        spread_db: self.spread_db(&next),
                         walk_m_per_db: self.walk_m_per_db(until_db - next.by_db),
                     });
-                    (by_db, ready_us) = (next.by_db, next.rise.passed_us);
+                    by_db = next.by_db;
                     last = Some(next);
                 }
             }
@@ -132,10 +141,22 @@ impl Listener {
         }
     }
 
+    /// A rise that was just told at a threshold, with how far its envelope reaches.
+    fn reported(listening: &mut Listening, rise: Rise, by_db: f64) -> Reported {
+        let (peak, margin_db) = listening.peak(&rise);
+        Reported { rise, by_db, peak, reaches_db: by_db + margin_db.max(0.0) }
+    }
+
+    /// Whether how far the envelope of a rise reaches, which is reported up to a threshold, is wanted any more: for its
+    /// spread, or for what is reported at higher thresholds.
+    fn is_asked_again(&self, until_db: f64) -> bool {
+        self.receiver.combining == Combining::Incoherent || until_db < self.span_db
+    }
+
     /// By how much the strength of an arrival may be off that meets others with unknown phases. Of two sounds whose
     /// amplitudes have the ratio `r`, the sum's level spreads by 6.1 `r` decibels for small `r` and by 7.8 for 1, once
     /// all phases are equally likely.
-    fn spread_db(&self, rise: &Rise, peak: f64) -> f64 {
+    fn spread_db(&self, Reported { rise, peak, .. }: &Reported) -> f64 {
         const DB_OF_RATIO: f64 = 6.5;
         if self.receiver.combining != Combining::Incoherent {
             return 0.0;
@@ -152,45 +173,22 @@ impl Listener {
     }
 
     /// The threshold at which what is reported no longer is. The peak of its envelope says so, unless another arrival
-    /// follows so closely that the peak is that one's. What is reported at the usual threshold, too, is told as it is
-    /// there.
-    fn lost(&self, listening: &mut Listening, reported: &mut Reported) -> f64 {
+    /// follows so closely that the peak is that one's.
+    fn lost(&self, listening: &mut Listening, reported: &Reported, ready_us: f64) -> f64 {
         let Reported { by_db: from_db, reaches_db, .. } = *reported;
         let span_db = self.span_db;
         let beyond_db = if reaches_db < span_db { reaches_db - STEP_DB } else { span_db };
-        // Thresholds are asked about from the lowest up, each from when the one below it is passed.
-        let mut usual = match from_db < 0.0 && beyond_db > 0.0 {
-            true => Some(self.usual(listening, reported)),
-            false => None,
-        };
-        let until_db = if beyond_db <= from_db {
-            reaches_db.min(span_db.max(from_db))
-        } else {
-            let at_usual = usual.as_ref().and_then(Option::as_ref).map(|usual| usual.passed_us);
-            let mut is_reported = |by_db: f64| {
-                let ready_us = at_usual.filter(|_| by_db >= 0.0);
-                let ready_us = ready_us.unwrap_or(reported.rise.passed_us);
-                let rise = listening.rise(self.factor(by_db), ready_us);
-                rise.is_some_and(|rise| self.is_same(reported, &rise, by_db))
-            };
-            match is_reported(beyond_db) {
-                true => reaches_db,
-                false => last_of(from_db, beyond_db, is_reported),
-            }
-        };
-        if from_db < 0.0 && until_db > 0.0 {
-            let usual = usual.take().unwrap_or_else(|| self.usual(listening, reported));
-            if let Some(rise) = usual {
-                *reported = Reported { rise, by_db: 0.0, reaches_db };
-            }
+        if beyond_db <= from_db {
+            return reaches_db.min(span_db.max(from_db));
         }
-        until_db
-    }
-
-    /// What is reported, at the usual threshold, if it is reported there.
-    fn usual(&self, listening: &mut Listening, reported: &Reported) -> Option<Rise> {
-        let rise = listening.rise(1.0, reported.rise.passed_us);
-        rise.filter(|rise| self.is_same(reported, rise, 0.0))
+        let mut is_reported = |by_db: f64| {
+            let rise = listening.rise(self.factor(by_db), ready_us);
+            rise.is_some_and(|rise| self.is_same(reported, &rise, by_db))
+        };
+        match is_reported(beyond_db) {
+            true => reaches_db,
+            false => last_of(from_db, beyond_db, is_reported),
+        }
     }
 
     /// Whether two rises are the same rise of the envelope, the second at a higher threshold: of the same arrival, and

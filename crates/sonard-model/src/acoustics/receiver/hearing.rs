@@ -5,6 +5,7 @@
 //! where one arrival is alone its rise is looked up in the table of the pulse.
 
 mod ideal;
+mod level;
 mod part;
 mod rise;
 
@@ -14,7 +15,7 @@ use num_complex::Complex64;
 
 use self::part::Part;
 use super::{Combining, Incident, PulseArrival, Receiver, gain::Step, noise::NoiseTrack};
-use crate::acoustics::{Detector, EchoShape, Gain};
+use crate::acoustics::{EchoShape, Gain};
 
 /// Arrivals that together add less than this part to another's amplitude leave it as it is.
 const NEGLIGIBLE: f64 = 3e-3;
@@ -50,6 +51,8 @@ pub(super) struct Hearing<'a> {
     bounds: Bounds,
     /// The step of the gain that was last asked about.
     step: Cell<Step>,
+    /// Whether all arrivals have the pulse's shape, whose phase stays the carrier's, and the gain is steady, without noise.
+    is_plain: bool,
     /// Power of the time by which the gain rises.
     exponent: f64,
     /// What the receiver's threshold is multiplied with.
@@ -81,6 +84,14 @@ impl<'a> Hearing<'a> {
             shape.first_us() - receiver.lead_us - longest,
             shape.last_us() - receiver.lead_us + longest,
         );
+        let exponent = match receiver.gain {
+            Gain::Compensating { exponent, .. } => exponent,
+            Gain::Steps { .. } => 0.0,
+        };
+        let is_plain = receiver.combining != Combining::Ideal
+            && receiver.response.is_none()
+            && shape.is_real()
+            && exponent == 0.0;
         let mut hearing = Self {
             receiver,
             arrivals,
@@ -96,10 +107,8 @@ impl<'a> Hearing<'a> {
             watched: None,
             bounds: Bounds::default(),
             step: Cell::new(receiver.sensitivity.step_at(0.0)),
-            exponent: match receiver.gain {
-                Gain::Compensating { exponent, .. } => exponent,
-                Gain::Steps { .. } => 0.0,
-            },
+            is_plain,
+            exponent,
             threshold_factor: 1.0,
             least_threshold: least_threshold(receiver),
             span_us,
@@ -109,7 +118,7 @@ impl<'a> Hearing<'a> {
     }
 
     pub(super) fn in_noise(mut self, noise: &'a NoiseTrack) -> Self {
-        self.noise = Some(noise);
+        (self.noise, self.is_plain) = (Some(noise), false);
         self
     }
 
@@ -204,32 +213,6 @@ impl<'a> Hearing<'a> {
             .fold(0.0, f64::max)
     }
 
-    /// Envelope at a time; no earlier time can be asked for afterwards.
-    pub(super) fn level(&mut self, t_us: f64) -> f64 {
-        self.advance(t_us);
-        for part in &mut self.parts[self.summed.max(self.over)..self.begun] {
-            part.find_field();
-        }
-        self.summed = self.begun;
-        self.level_of(self.over, t_us)
-    }
-
-    /// By how much later the carrier passes the threshold than the envelope, which does at `t_us`: at its next crest,
-    /// counted so that the reference echo's is not late. Within a cycle the sum's phase is that of its carrier.
-    pub(super) fn crest_after_us(&mut self, t_us: f64) -> f64 {
-        let receiver = self.receiver;
-        if receiver.detector == Detector::Envelope || receiver.combining != Combining::Coherent {
-            return 0.0;
-        }
-        // All that lasts then has its field.
-        self.level(t_us);
-        let live = self.parts[self.over..self.begun].iter();
-        let sum: Complex64 = live.map(|part| part.field * self.shape_at(part, t_us)).sum();
-        let noise = self.noise.map_or(Complex64::ZERO, |noise| noise.at(t_us));
-        let phase_rad = (sum * self.rise_of_gain(t_us) + noise).arg();
-        receiver.until_crest_us(phase_rad, t_us) - receiver.crest_us
-    }
-
     /// Places of the arrivals that last now.
     pub(super) fn living(&self) -> std::ops::Range<usize> {
         self.over..self.begun
@@ -257,40 +240,6 @@ impl<'a> Hearing<'a> {
             .take_while(|other| self.receiver.tof_us(other) > first_us);
         let rest: f64 = others.filter(|other| *other != arrival).map(|other| other.amplitude).sum();
         rest < NEGLIGIBLE * arrival.amplitude
-    }
-
-    /// Envelope of the parts from a place on.
-    fn level_of(&self, from: usize, t_us: f64) -> f64 {
-        let live = &self.parts[from..self.begun];
-        let noise = self.noise.map_or(Complex64::ZERO, |noise| noise.at(t_us));
-        let gain = self.rise_of_gain(t_us);
-        match self.receiver.combining {
-            Combining::Coherent
-                if self.receiver.response.is_none() && self.receiver.shape.is_real() =>
-            {
-                // What most sensors have, at half the cost.
-                let mut sum = Complex64::ZERO;
-                for part in live {
-                    let at_us = t_us - part.tof_us + self.receiver.lead_us;
-                    sum += part.field * self.receiver.shape.real_at(at_us);
-                }
-                modulus(sum * gain + noise)
-            }
-            Combining::Coherent => {
-                let sum: Complex64 =
-                    live.iter().map(|part| part.field * self.shape_at(part, t_us)).sum();
-                modulus(sum * gain + noise)
-            }
-            Combining::Incoherent => {
-                let power = |part: &Part| (part.field * self.shape_at(part, t_us)).norm_sqr();
-                let power: f64 = live.iter().map(power).sum();
-                modulus(noise).hypot(power.sqrt() * gain)
-            }
-            Combining::Ideal => live
-                .iter()
-                .map(|part| part.size * self.modulus_at(part, t_us) * gain)
-                .fold(modulus(noise), f64::max),
-        }
     }
 
     #[inline]
@@ -381,6 +330,24 @@ impl<'a> Hearing<'a> {
         }
         self.begun += 1;
         self.expect();
+    }
+
+    fn part(&self, arrival: &PulseArrival, tof_us: f64, lasts_us: [f64; 2]) -> Part {
+        let receiver = self.receiver;
+        let at_face = receiver.response.as_ref().and_then(|response| {
+            let Incident { strength, incidence } = (self.incident)(arrival)?;
+            Some((strength, response.echo(&incidence)))
+        });
+        let (strength, shape) = match at_face {
+            Some((strength, Some(shape))) => (strength, Some(Box::new(shape))),
+            Some((_, None)) => (0.0, None),
+            None => (arrival.amplitude, None),
+        };
+        let size = strength / self.rise_of_gain(tof_us);
+        let phase_rad = arrival.phase_rad - receiver.omega * tof_us;
+        // Nothing that sounds when it begins, or later, was over before the time that was last asked about.
+        let others = self.parts[self.over..].iter().map(|part| part.strength).sum();
+        Part::new((tof_us, lasts_us), (size, phase_rad), shape, &receiver.shape, others)
     }
 }
 

@@ -2,8 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::Hearing;
-use crate::acoustics::{EchoShape, Incident, PulseArrival};
+use crate::acoustics::EchoShape;
 
 pub(super) struct Part {
     pub(super) tof_us: f64,
@@ -43,6 +42,31 @@ impl Part {
         }
     }
 
+    /// One of a size and a phase of the carrier, with its own shape or that of the `pulse`; at most so strong are all
+    /// `others` that are not over when it begins.
+    pub(super) fn new(
+        (tof_us, lasts_us): (f64, [f64; 2]),
+        (size, phase_rad): (f64, f64),
+        shape: Option<Box<EchoShape>>,
+        pulse: &EchoShape,
+        others: f64,
+    ) -> Self {
+        let of = shape.as_deref().unwrap_or(pulse);
+        let strength = size * of.peak();
+        Self {
+            tof_us,
+            lasts_us,
+            size,
+            phase_rad,
+            field: Complex64::ZERO,
+            has_field: false,
+            strength,
+            with_others: others + strength,
+            steepest: size * of.steepest(),
+            shape,
+        }
+    }
+
     pub(super) fn is_gone(&self) -> bool {
         self.size == 0.0
     }
@@ -51,38 +75,6 @@ impl Part {
         if !self.has_field {
             self.field = Complex64::from_polar(self.size, self.phase_rad);
             self.has_field = true;
-        }
-    }
-}
-
-impl Hearing<'_> {
-    pub(super) fn part(&self, arrival: &PulseArrival, tof_us: f64, lasts_us: [f64; 2]) -> Part {
-        let receiver = self.receiver;
-        let at_face = receiver.response.as_ref().and_then(|response| {
-            let Incident { strength, incidence } = (self.incident)(arrival)?;
-            Some((strength, response.echo(&incidence)))
-        });
-        let (strength, shape) = match at_face {
-            Some((strength, Some(shape))) => (strength, Some(Box::new(shape))),
-            Some((_, None)) => (0.0, None),
-            None => (arrival.amplitude, None),
-        };
-        let size = strength / self.rise_of_gain(tof_us);
-        let of = shape.as_deref().unwrap_or(&receiver.shape);
-        let strength = size * of.peak();
-        // Nothing that sounds when it begins, or later, was over before the time that was last asked about.
-        let others = self.parts[self.over..].iter().map(|part| part.strength);
-        Part {
-            tof_us,
-            lasts_us,
-            size,
-            phase_rad: arrival.phase_rad - receiver.omega * tof_us,
-            field: Complex64::ZERO,
-            has_field: false,
-            strength,
-            with_others: others.sum::<f64>() + strength,
-            steepest: size * of.steepest(),
-            shape,
         }
     }
 }
