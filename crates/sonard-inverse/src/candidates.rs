@@ -2,9 +2,8 @@
 
 use smallvec::SmallVec;
 use sonard_model::{
-    acoustics::{Combining, Detection, Detector, Listening, PulseArrival, Receiver},
-    model::{Ear, ObservationPoint, Prediction, TooCostly},
-    reading::PingStatus,
+    acoustics::{Combining, Detector, Listening, Receiver, Rise},
+    model::{Arrival, Ear, ObservationPoint, TooCostly},
 };
 
 /// Thresholds that are looked at, decibels to both sides of the nominal one.
@@ -34,8 +33,10 @@ pub(crate) enum Phases {
 /// The first echo for a range of thresholds.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
-    /// What is read.
-    pub(crate) prediction: Prediction,
+    /// What is read, metres; `None` of silence.
+    pub(crate) range_m: Option<f64>,
+    /// The echo that raised ECHO.
+    pub(crate) arrival: Option<Arrival>,
     /// Up to this threshold, decibels above the nominal one.
     pub(crate) until_db: f64,
     /// By how much that may be off, because it is not known with which phase its arrival meets others: a standard
@@ -53,24 +54,19 @@ pub(crate) struct Listener {
     receiver: Receiver,
     /// Thresholds that are looked at, decibels to both sides of the nominal one.
     span_db: f64,
+    /// What the lowest and the highest of them are multiplied with.
+    ends: [f64; 2],
 }
 
-/// What a receiver with some threshold detects.
-struct Detected {
-    detection: Detection,
+/// What a receiver with some threshold reports.
+struct Reported {
+    rise: Rise,
     /// The threshold, decibels above the nominal one.
     by_db: f64,
-    /// The threshold up to which its envelope reaches, decibels above the nominal one; infinite of silence.
+    /// The most of its envelope.
+    peak: f64,
+    /// The threshold up to which that reaches, decibels above the nominal one.
     reaches_db: f64,
-}
-
-/// A detection as far as it takes to tell whether another one is of the same rise.
-struct Told {
-    status: PingStatus,
-    range_m: f64,
-    arrival: Option<PulseArrival>,
-    /// The threshold, decibels above the nominal one.
-    by_db: f64,
 }
 
 impl Listener {
@@ -82,66 +78,90 @@ impl Listener {
         if phases == Phases::Unknown && receiver.combining == Combining::Coherent {
             receiver.combining = Combining::Incoherent;
         }
-        Self { receiver, span_db }
+        Self { receiver, span_db, ends: [-span_db, span_db].map(factor) }
     }
 
-    /// All that a firing could come to.
+    /// All that a firing could come to, in the place of what was there.
     pub(crate) fn candidates(
         &self,
         point: &ObservationPoint,
         direction_rad: f64,
-    ) -> Result<Candidates, TooCostly> {
+        found: &mut Candidates,
+    ) -> Result<(), TooCostly> {
         point.hear(direction_rad, |ear| {
-            ear.listen(&self.receiver, |listening| self.rising(ear, listening))
+            found.clear();
+            ear.listen(&self.receiver, |listening| self.rising(ear, listening, found));
         })
     }
 
     /// From the lowest threshold up. A higher one is passed no earlier, so that time runs forward, too.
-    fn rising(&self, ear: &Ear, listening: &mut Listening) -> Candidates {
-        let mut found = Candidates::new();
-        let mut last: Option<Detected> = None;
+    fn rising(&self, ear: &Ear, listening: &mut Listening, found: &mut Candidates) {
+        let mut last: Option<Reported> = None;
         let (mut by_db, mut ready_us) = (-self.span_db, 0.0);
         while by_db < self.span_db && found.len() < MOST {
-            let mut next = detected(listening, by_db, ready_us);
-            ready_us = next.detection.echoes_us.first().copied().unwrap_or(ready_us);
-            let until_db = self.lost(listening, by_db, &next, ready_us);
+            let Some(rise) = listening.rise(self.factor(by_db), ready_us) else {
+                // And nothing by a receiver that is less sensitive.
+                found.push(Candidate::silence(self.span_db));
+                return;
+            };
+            ready_us = rise.passed_us;
+            let mut next = Self::reported(listening, rise, by_db);
+            let until_db = self.lost(listening, &next, ready_us);
             if by_db < 0.0 && until_db > 0.0 {
                 // What is reported at the usual threshold is told as it is there.
-                let usual = detected(listening, 0.0, ready_us);
-                if self.is_same(&next, usual.told().as_ref()) {
-                    (next, by_db) = (usual, 0.0);
+                let usual = listening.rise(1.0, ready_us);
+                if let Some(rise) = usual.filter(|rise| self.is_same(&next, rise, 0.0)) {
+                    next = match self.is_asked_again(until_db) {
+                        true => Self::reported(listening, rise, 0.0),
+                        false => Reported { rise, by_db: 0.0, ..next },
+                    };
                 }
             }
             match found.last_mut() {
                 Some(known)
                     if last
                         .as_ref()
-                        .is_some_and(|last| self.is_same(last, next.told().as_ref())) =>
+                        .is_some_and(|last| self.is_same(last, &next.rise, next.by_db)) =>
                 {
                     known.until_db = known.until_db.max(until_db);
                 }
                 _ => {
-                    let spread_db = self.spread_db(&next.detection);
-                    let walk_m_per_db = self.walk_m_per_db(until_db - by_db);
-                    let prediction = ear.prediction(next.detection.clone());
-                    found.push(Candidate { prediction, until_db, spread_db, walk_m_per_db });
+                    found.push(Candidate {
+                        range_m: Some(next.rise.range_m),
+                        arrival: next.rise.arrival.map(|arrival| ear.arrival(&arrival)),
+                        until_db,
+                        spread_db: self.spread_db(&next),
+                        walk_m_per_db: self.walk_m_per_db(until_db - next.by_db),
+                    });
+                    by_db = next.by_db;
                     last = Some(next);
                 }
             }
             by_db = until_db.max(by_db + STEP_DB) + ABOVE_DB;
         }
-        found
     }
+
+    /// A rise that was just told at a threshold, with how far its envelope reaches.
+    fn reported(listening: &mut Listening, rise: Rise, by_db: f64) -> Reported {
+        let (peak, margin_db) = listening.peak(&rise);
+        Reported { rise, by_db, peak, reaches_db: by_db + margin_db.max(0.0) }
+    }
+
+    /// Whether how far the envelope of a rise reaches, which is reported up to a threshold, is wanted any more: for its
+    /// spread, or for what is reported at higher thresholds.
+    fn is_asked_again(&self, until_db: f64) -> bool {
+        self.receiver.combining == Combining::Incoherent || until_db < self.span_db
+    }
+
     /// By how much the strength of an arrival may be off that meets others with unknown phases. Of two sounds whose
     /// amplitudes have the ratio `r`, the sum's level spreads by 6.1 `r` decibels for small `r` and by 7.8 for 1, once
     /// all phases are equally likely.
-    fn spread_db(&self, detection: &Detection) -> f64 {
+    fn spread_db(&self, Reported { rise, peak, .. }: &Reported) -> f64 {
         const DB_OF_RATIO: f64 = 6.5;
         if self.receiver.combining != Combining::Incoherent {
             return 0.0;
         }
-        let both = detection.arrival.zip(detection.amplitude);
-        let beside = both.map_or(0.0, |(arrival, all)| (all / arrival.amplitude).powi(2) - 1.0);
+        let beside = rise.arrival.map_or(0.0, |arrival| (peak / arrival.amplitude).powi(2) - 1.0);
         DB_OF_RATIO * beside.clamp(0.0, 1.0).sqrt()
     }
 
@@ -152,50 +172,30 @@ impl Listener {
         (late_m - early_m) / (high_db - low_db)
     }
 
-    /// The threshold at which an arrival is no longer reported that is at `from_db`. The peak of its envelope says
-    /// so, unless another follows so closely that the peak is that one's.
-    fn lost(
-        &self,
-        listening: &mut Listening,
-        from_db: f64,
-        reported: &Detected,
-        ready_us: f64,
-    ) -> f64 {
-        let (said_db, span_db) = (reported.reaches_db, self.span_db);
-        let beyond = if said_db < span_db { said_db - STEP_DB } else { span_db };
-        if said_db.is_infinite() || beyond <= from_db {
-            return said_db.min(span_db.max(from_db));
+    /// The threshold at which what is reported no longer is. The peak of its envelope says so, unless another arrival
+    /// follows so closely that the peak is that one's.
+    fn lost(&self, listening: &mut Listening, reported: &Reported, ready_us: f64) -> f64 {
+        let Reported { by_db: from_db, reaches_db, .. } = *reported;
+        let span_db = self.span_db;
+        let beyond_db = if reaches_db < span_db { reaches_db - STEP_DB } else { span_db };
+        if beyond_db <= from_db {
+            return reaches_db.min(span_db.max(from_db));
         }
         let mut is_reported = |by_db: f64| {
-            let rise = listening.rise(factor(by_db), ready_us);
-            let told = rise.map(|rise| Told {
-                status: rise.status,
-                range_m: rise.range_m,
-                arrival: rise.arrival,
-                by_db,
-            });
-            self.is_same(reported, told.as_ref())
+            let rise = listening.rise(self.factor(by_db), ready_us);
+            rise.is_some_and(|rise| self.is_same(reported, &rise, by_db))
         };
-        if is_reported(beyond) {
-            return said_db;
+        match is_reported(beyond_db) {
+            true => reaches_db,
+            false => last_of(from_db, beyond_db, is_reported),
         }
-        let (mut low, mut high) = (from_db, beyond);
-        while high - low > STEP_DB {
-            let middle = 0.5 * (low + high);
-            if is_reported(middle) { low = middle } else { high = middle }
-        }
-        0.5 * (low + high)
     }
 
-    /// Whether two detections are of the same rise of the envelope, one at a higher threshold: of the same arrival, and
+    /// Whether two rises are the same rise of the envelope, the second at a higher threshold: of the same arrival, and
     /// no later than that arrival takes to rise further. Where arrivals overlap the first may fade before the next one
     /// drives the envelope on, and a little more of threshold makes the echo centimetres later.
-    fn is_same(&self, reported: &Detected, higher: Option<&Told>) -> bool {
-        let (one, higher) = match (reported.told(), higher) {
-            (None, None) => return true,
-            (Some(one), Some(higher)) => (one, higher),
-            _ => return false,
-        };
+    fn is_same(&self, reported: &Reported, higher: &Rise, higher_db: f64) -> bool {
+        let one = &reported.rise;
         let is_same_arrival = match (&one.arrival, &higher.arrival) {
             (Some(one), Some(other)) => (one.length_m - other.length_m).abs() < 1e-6,
             (None, None) => true,
@@ -204,29 +204,43 @@ impl Listener {
         if one.status != higher.status || !is_same_arrival {
             return false;
         }
-        // At the very top, where a pulse is flat, its rise takes any time.
-        let margin_db = |of: &Told| (reported.reaches_db - of.by_db).max(LEAST_MARGIN_DB);
-        let walk_m = |of: &Told| self.receiver.time_walk_m(margin_db(of));
         let later_m = higher.range_m - one.range_m;
-        later_m < JUMP_M || later_m - (walk_m(higher) - walk_m(&one)) < JUMP_M
+        if later_m < JUMP_M {
+            return true;
+        }
+        // At the very top, where a pulse is flat, its rise takes any time.
+        let walk_m = |by_db: f64| {
+            self.receiver.time_walk_m((reported.reaches_db - by_db).max(LEAST_MARGIN_DB))
+        };
+        later_m - (walk_m(higher_db) - walk_m(reported.by_db)) < JUMP_M
+    }
+
+    /// What the threshold is multiplied with where it is higher by so many decibels.
+    fn factor(&self, by_db: f64) -> f64 {
+        let [lowest, highest] = self.ends;
+        match by_db / self.span_db {
+            -1.0 => lowest,
+            1.0 => highest,
+            _ => factor(by_db),
+        }
     }
 }
 
-impl Detected {
-    /// `None` of silence.
-    fn told(&self) -> Option<Told> {
-        let Detection { status, range_m, arrival, .. } = self.detection;
-        Some(Told { status, range_m: range_m?, arrival, by_db: self.by_db })
+impl Candidate {
+    /// For all thresholds that are higher still.
+    const fn silence(until_db: f64) -> Self {
+        Self { range_m: None, arrival: None, until_db, spread_db: 0.0, walk_m_per_db: 0.0 }
     }
 }
 
-/// What a receiver detects whose threshold is higher by so many decibels.
-fn detected(listening: &mut Listening, by_db: f64, ready_us: f64) -> Detected {
-    // The time that a firing with another threshold is late by stays in: `with_threshold` would take it out.
-    let detection = listening.detect(factor(by_db), ready_us);
-    let margin_db = detection.margin_db.unwrap_or(0.0).max(0.0);
-    let reaches_db = if detection.status.has_range() { by_db + margin_db } else { f64::INFINITY };
-    Detected { detection, by_db, reaches_db }
+/// Where, between a threshold at which something is and a higher one at which it is not, it ends, to a step.
+fn last_of(from_db: f64, beyond_db: f64, mut is_there: impl FnMut(f64) -> bool) -> f64 {
+    let (mut low, mut high) = (from_db, beyond_db);
+    while high - low > STEP_DB {
+        let middle = 0.5 * (low + high);
+        if is_there(middle) { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
 }
 
 fn factor(by_db: f64) -> f64 {

@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 use crate::likelihood::{ErrorModel, normal_density, normal_up_to};
 
 /// What a number gains for each unit of some of the parameters.
-pub(crate) type Rates = SmallVec<[(u32, f64); 6]>;
+pub(crate) type Rates = SmallVec<[(u32, f64); 4]>;
 
 /// One of the readings that a firing could have had.
 #[derive(Debug, Clone)]
@@ -28,7 +28,7 @@ pub(crate) struct Possible {
 pub(crate) struct Judged {
     /// Metres at the reference speed of sound; `None` of silence.
     pub(crate) heard_m: Option<f64>,
-    pub(crate) possible: SmallVec<[Possible; 3]>,
+    pub(crate) possible: SmallVec<[Possible; 2]>,
 }
 
 /// A reading's density and its derivatives, if it is in no arc of something else.

@@ -103,10 +103,14 @@ pub fn length_rate(
     let mut rate = -toward(transmitter, point(0)).dot(velocity(motion.transducer[0]))
         - toward(receiver, point(last)).dot(velocity(motion.transducer[1]));
     for (at, interaction) in met.iter().enumerate() {
+        let velocity = motion.of(scene, interaction.mechanism, interaction.point);
+        if velocity == DVec3::ZERO {
+            continue;
+        }
         let before = if at == 0 { transmitter } else { point(at - 1) };
         let after = if at == last { receiver } else { point(at + 1) };
         let turn = toward(before, point(at)) - toward(point(at), after);
-        rate += turn.dot(motion.of(scene, interaction.mechanism, interaction.point));
+        rate += turn.dot(velocity);
     }
     rate
 }

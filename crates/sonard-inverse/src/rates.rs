@@ -11,7 +11,7 @@ use sonard_model::{
 };
 
 use crate::{
-    candidates::{Candidate, Listener, Phases, SPAN_DB},
+    candidates::{Candidate, Candidates, Listener, Phases, SPAN_DB},
     judged::{Judged, Possible, Rates},
     motion::{Motion, length_rate},
     parameter::Parameter,
@@ -90,13 +90,14 @@ impl<'a> RateFinder<'a> {
         let all = self.parameters.iter().zip(0u32..);
         let concerning: Vec<u32> =
             all.filter(|(parameter, _)| concerns(parameter)).map(|(_, at)| at).collect();
-        let mut judged = |beam: &Beam| {
+        let mut judged = Vec::with_capacity(sweep.beams.len());
+        for beam in &sweep.beams {
             let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
             let firing = Firing::new(simulator, pose, direction_rad, beam);
             let possible = self.all_possible(&listener, point, &firing, &concerning)?;
-            Ok(Judged { heard_m: beam.heard.range_m(self.reference_m_s), possible })
-        };
-        sweep.beams.iter().map(&mut judged).collect()
+            judged.push(Judged { heard_m: beam.heard.range_m(self.reference_m_s), possible });
+        }
+        Ok(judged)
     }
 
     /// What each beam of a sweep could have been after turns by so many degrees, up to half a step of [`GRID_DEG`]:
@@ -111,7 +112,7 @@ impl<'a> RateFinder<'a> {
     ) -> Result<Vec<Vec<Judged>>, TooCostly> {
         let listener = Listener::new(simulator.receiver(), self.phases, self.span_db);
         let all: Vec<u32> = (0..self.parameters.len() as u32).collect();
-        let mut known: HashMap<i64, SmallVec<[Possible; 3]>> = HashMap::new();
+        let mut known: HashMap<i64, SmallVec<[Possible; 2]>> = HashMap::new();
         let mut judged = |beam: &Beam, by_deg: f64| {
             let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
             let place = (wrap_360(direction_rad.to_degrees() + by_deg) / GRID_DEG).round() as i64;
@@ -137,20 +138,20 @@ impl<'a> RateFinder<'a> {
         point: &ObservationPoint,
         firing: &Firing,
         concerning: &[u32],
-    ) -> Result<SmallVec<[Possible; 3]>, TooCostly> {
-        let found = listener.candidates(point, firing.direction_rad)?;
+    ) -> Result<SmallVec<[Possible; 2]>, TooCostly> {
+        let mut found = Candidates::new();
+        listener.candidates(point, firing.direction_rad, &mut found)?;
         Ok(found.iter().map(|candidate| self.possible(candidate, firing, concerning)).collect())
     }
 
     fn possible(&self, candidate: &Candidate, firing: &Firing, concerning: &[u32]) -> Possible {
-        let prediction = &candidate.prediction;
         let stretch = self.reference_m_s / firing.simulator.sound_speed_m_s();
         let beside_m =
-            prediction.arrival.as_ref().map_or(0.0, |arrival| 0.5 * self.longer_m(arrival, firing));
+            candidate.arrival.as_ref().map_or(0.0, |arrival| 0.5 * self.longer_m(arrival, firing));
         let range_m =
-            prediction.range_m.map(|range_m| stretch * (range_m + beside_m) + self.world.delay_m);
+            candidate.range_m.map(|range_m| stretch * (range_m + beside_m) + self.world.delay_m);
         let (mut range_rates, mut until_rates) = (Rates::new(), Rates::new());
-        if let (Some(arrival), Some(predicted_m)) = (&prediction.arrival, prediction.range_m) {
+        if let (Some(arrival), Some(predicted_m)) = (&candidate.arrival, candidate.range_m) {
             for &at in concerning {
                 let by_range = match self.parameters[at as usize] {
                     Parameter::SoundSpeed => -stretch * predicted_m,

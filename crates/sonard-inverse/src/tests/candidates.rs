@@ -5,7 +5,7 @@ use sonard_model::{acoustics::Latch, geometry::Pose};
 
 use crate::{
     World,
-    candidates::{Listener, Phases, SPAN_DB},
+    candidates::{Candidates, Listener, Phases, SPAN_DB},
 };
 
 /// Where arrivals overlap, the first may fade before the next one drives the envelope on, and a little more of threshold
@@ -26,10 +26,11 @@ fn jumps_from(here: &World, x_m: f64) -> u32 {
     let point = simulator.at(pose.position());
     let listener = Listener::new(simulator.receiver(), Phases::Known, SPAN_DB);
     let mut receiver = simulator.receiver().clone();
+    let mut found = Candidates::new();
     let mut jumps = 0;
     for step in 0..400 {
         let direction_rad = (0.9 * f64::from(step)).to_radians();
-        let found = listener.candidates(&point, direction_rad).expect("paths");
+        listener.candidates(&point, direction_rad, &mut found).expect("paths");
         let mut read_m = |by_db: f64| {
             receiver.threshold = simulator.receiver().threshold * 10f64.powf(by_db / 20.0);
             let read = point.hear(direction_rad, |ear| ear.detect(&receiver, Latch::First, 0.0));
@@ -62,16 +63,17 @@ fn at_each_threshold_the_candidate_is_what_a_receiver_with_it_reports() {
         let point = simulator.at(pose.position());
         let listener = Listener::new(simulator.receiver(), Phases::Known, SPAN_DB);
         let mut receiver = simulator.receiver().clone();
+        let mut found = Candidates::new();
         for step in 0..200 {
             let direction_rad = here.direction_rad(&pose, 1.8 * f64::from(step));
-            let found = listener.candidates(&point, direction_rad).expect("paths");
+            listener.candidates(&point, direction_rad, &mut found).expect("paths");
             for by_db in [-9.3, -4.1, -1.7, 0.0, 0.8, 2.9, 6.2, 10.4] {
                 receiver.threshold = simulator.receiver().threshold * 10f64.powf(by_db / 20.0);
                 let read = point
                     .hear(direction_rad, |ear| ear.detect(&receiver, Latch::First, 0.0))
                     .expect("paths");
                 let at = found.iter().position(|candidate| by_db < candidate.until_db);
-                let said = &found[at.unwrap_or(found.len() - 1)].prediction;
+                let said = &found[at.unwrap_or(found.len() - 1)];
                 let off = match (said.range_m, read.range_m) {
                     (None, None) => 0.0,
                     (Some(said_m), Some(read_m)) => (said_m - read_m).abs() - 0.04,
@@ -84,10 +86,7 @@ fn at_each_threshold_the_candidate_is_what_a_receiver_with_it_reports() {
                         "{scene} {step} {by_db}: {:?} for {:?}; {:?}",
                         said.range_m,
                         read.range_m,
-                        found
-                            .iter()
-                            .map(|c| (c.prediction.range_m, c.until_db))
-                            .collect::<Vec<_>>()
+                        found.iter().map(|c| (c.range_m, c.until_db)).collect::<Vec<_>>()
                     );
                 }
             }

@@ -306,6 +306,12 @@ impl Ear<'_> {
         self.needed_m.set(both.map(|(one_m, other_m)| one_m.max(other_m)));
     }
 
+    /// The full account of one of the arrivals.
+    #[must_use]
+    pub fn arrival(&self, arrival: &PulseArrival) -> Arrival {
+        self.firing.from.arrival(self.firing.direction_rad, arrival)
+    }
+
     /// A detection as a reading, with the path of its arrival.
     #[must_use]
     pub fn prediction(&self, detection: Detection) -> Prediction {

@@ -41,11 +41,7 @@ impl Receiver {
         let already_there = status == PingStatus::MinRange;
         let told_us = first_us + if already_there { 0.0 } else { hearing.crest_after_us(first_us) };
         let cause = hearing.cause(first_us);
-        let peak = if already_there {
-            hearing.level(first_us)
-        } else {
-            hearing.peak(first_us, cause.as_ref())
-        };
+        let (peak, margin_db) = self.peak(hearing, first_us, cause.as_ref());
         let mut last_us = first_us;
         echoes_us.push(told_us);
         while latch == Latch::Rearmed
@@ -60,9 +56,24 @@ impl Receiver {
             range_m: Some(self.range_m(told_us)),
             arrival: cause,
             amplitude: Some(peak),
-            margin_db: Some(20.0 * (peak / hearing.threshold_at(first_us)).log10()),
+            margin_db: Some(margin_db),
             echoes_us,
         }
+    }
+
+    /// The most that the envelope reaches with an echo that rose at a time, and how far that is above the threshold in
+    /// force then, decibels. To be asked for before another rise.
+    pub(super) fn peak(
+        &self,
+        hearing: &mut Hearing,
+        first_us: f64,
+        cause: Option<&PulseArrival>,
+    ) -> (f64, f64) {
+        let peak = match self.status_at(first_us) {
+            PingStatus::MinRange => hearing.level(first_us),
+            _ => hearing.peak(first_us, cause),
+        };
+        (peak, 20.0 * (peak / hearing.threshold_at(first_us)).log10())
     }
 
     /// From when on the envelope matters to a detector that can't be raised before `ready_us`: what has been above

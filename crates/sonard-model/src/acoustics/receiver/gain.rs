@@ -28,12 +28,49 @@ impl Sensitivity {
     /// What a threshold is at a time after firing, which belongs to a range.
     #[inline]
     pub(super) fn threshold(&self, nominal: f64, t_us: f64, range_m: f64) -> f64 {
-        let step = self.steps.iter().find(|step| t_us < step.0).or(self.steps.last());
-        let threshold = step.map_or(nominal, |step| nominal * range_m.max(1e-3) * step.1);
+        self.in_step(&self.step_at(t_us), nominal, range_m)
+    }
+
+    /// The same within a step of the gain.
+    #[inline]
+    pub(super) fn in_step(&self, step: &Step, nominal: f64, range_m: f64) -> f64 {
+        let reciprocal = step.reciprocal;
+        let threshold = reciprocal.map_or(nominal, |by| nominal * range_m.max(1e-3) * by);
         if self.rise_db_per_m == 0.0 {
             return threshold;
         }
         threshold * 10f64.powf(self.rise_db_per_m * range_m / 20.0)
+    }
+
+    /// The step of the gain at a time after firing.
+    pub(super) fn step_at(&self, t_us: f64) -> Step {
+        let mut from_us = f64::NEG_INFINITY;
+        for &(until_us, reciprocal) in &self.steps {
+            if t_us < until_us {
+                return Step { from_us, until_us, reciprocal: Some(reciprocal) };
+            }
+            from_us = from_us.max(until_us);
+        }
+        // The last one goes on.
+        let reciprocal = self.steps.last().map(|step| step.1);
+        Step { from_us, until_us: f64::INFINITY, reciprocal }
+    }
+}
+
+/// A step of the gain.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step {
+    /// Microseconds after firing.
+    from_us: f64,
+    until_us: f64,
+    /// Of its gain; `None` of one that makes up for the spreading.
+    reciprocal: Option<f64>,
+}
+
+impl Step {
+    #[inline]
+    pub(super) fn holds(&self, t_us: f64) -> bool {
+        self.from_us <= t_us && t_us < self.until_us
     }
 }
 

@@ -5,13 +5,17 @@
 //! where one arrival is alone its rise is looked up in the table of the pulse.
 
 mod ideal;
+mod level;
+mod part;
 mod rise;
 
-use num_complex::Complex64;
-use smallvec::SmallVec;
+use std::cell::Cell;
 
-use super::{Combining, Incident, PulseArrival, Receiver, noise::NoiseTrack};
-use crate::acoustics::{Detector, EchoShape, Gain};
+use num_complex::Complex64;
+
+use self::part::Part;
+use super::{Combining, Incident, PulseArrival, Receiver, gain::Step, noise::NoiseTrack};
+use crate::acoustics::{EchoShape, Gain};
 
 /// Arrivals that together add less than this part to another's amplitude leave it as it is.
 const NEGLIGIBLE: f64 = 3e-3;
@@ -31,14 +35,24 @@ pub(super) struct Hearing<'a> {
     horizon_us: f64,
     /// The latest time that anything was asked about.
     asked_us: f64,
-    /// Arrivals that have begun, the first `over` of which are over.
-    parts: SmallVec<[Part; 16]>,
+    /// The first arrivals, as far as they were ever asked about: what is known of them stays when time is turned back.
+    parts: Vec<Part>,
+    /// How many of them have begun now, the first `over` of which are over.
+    begun: usize,
     over: usize,
-    /// Number of them that have their fields.
+    /// Number of them that have their fields, of those that are not over.
     summed: usize,
+    /// When the next arrival begins, or what is not known; infinite if nothing does.
+    next_us: f64,
     /// The arrivals that last, by [`Self::lasting`], when it was last found out that
     /// they have to be watched.
     watched: Option<(usize, usize)>,
+    /// The bounds of what lasts, by [`Self::lasting`].
+    bounds: Bounds,
+    /// The step of the gain that was last asked about.
+    step: Cell<Step>,
+    /// Whether all arrivals have the pulse's shape, whose phase stays the carrier's, and the gain is steady, without noise.
+    is_plain: bool,
     /// Power of the time by which the gain rises.
     exponent: f64,
     /// What the receiver's threshold is multiplied with.
@@ -48,31 +62,14 @@ pub(super) struct Hearing<'a> {
     span_us: (f64, f64),
 }
 
-struct Part {
-    tof_us: f64,
-    /// To be multiplied with the shape and with what the gain adds while it sounds.
-    size: f64,
-    /// Phase of the carrier.
-    phase_rad: f64,
-    /// Size and phase, once they are wanted.
-    field: Complex64,
-    /// The most of its modulus.
+/// What arrivals that last can add up to at most.
+#[derive(Clone, Copy, Default)]
+struct Bounds {
+    /// Which they are.
+    of: (usize, usize),
     strength: f64,
-    /// The most that its shape changes it in a microsecond.
+    /// A microsecond.
     steepest: f64,
-    /// Its own shape; without it, the pulse's.
-    shape: Option<Box<EchoShape>>,
-}
-
-impl Part {
-    const fn gone(tof_us: f64) -> Self {
-        let field = Complex64::ZERO;
-        Self { tof_us, size: 0.0, phase_rad: 0.0, field, strength: 0.0, steepest: 0.0, shape: None }
-    }
-
-    fn is_gone(&self) -> bool {
-        self.size == 0.0
-    }
 }
 
 impl<'a> Hearing<'a> {
@@ -83,32 +80,45 @@ impl<'a> Hearing<'a> {
     ) -> Self {
         let longest = receiver.response.as_ref().map_or(0.0, |response| response.crossing_us());
         let shape = &receiver.shape;
-        Self {
+        let span_us = (
+            shape.first_us() - receiver.lead_us - longest,
+            shape.last_us() - receiver.lead_us + longest,
+        );
+        let exponent = match receiver.gain {
+            Gain::Compensating { exponent, .. } => exponent,
+            Gain::Steps { .. } => 0.0,
+        };
+        let is_plain = receiver.combining != Combining::Ideal
+            && receiver.response.is_none()
+            && shape.is_real()
+            && exponent == 0.0;
+        let mut hearing = Self {
             receiver,
             arrivals,
             incident,
             noise: None,
             horizon_us: f64::INFINITY,
             asked_us: 0.0,
-            parts: SmallVec::new(),
+            parts: Vec::with_capacity(arrivals.len()),
+            begun: 0,
             over: 0,
             summed: 0,
+            next_us: f64::INFINITY,
             watched: None,
-            exponent: match receiver.gain {
-                Gain::Compensating { exponent, .. } => exponent,
-                Gain::Steps { .. } => 0.0,
-            },
+            bounds: Bounds::default(),
+            step: Cell::new(receiver.sensitivity.step_at(0.0)),
+            is_plain,
+            exponent,
             threshold_factor: 1.0,
             least_threshold: least_threshold(receiver),
-            span_us: (
-                shape.first_us() - receiver.lead_us - longest,
-                shape.last_us() - receiver.lead_us + longest,
-            ),
-        }
+            span_us,
+        };
+        hearing.expect();
+        hearing
     }
 
     pub(super) fn in_noise(mut self, noise: &'a NoiseTrack) -> Self {
-        self.noise = Some(noise);
+        (self.noise, self.is_plain) = (Some(noise), false);
         self
     }
 
@@ -119,6 +129,7 @@ impl<'a> Hearing<'a> {
             Combining::Coherent | Combining::Incoherent => arrives_us + self.span_us.0,
             Combining::Ideal => arrives_us,
         };
+        self.expect();
     }
 
     /// Whether an answer so far might have been another one if arrivals beyond the horizon were
@@ -139,23 +150,28 @@ impl<'a> Hearing<'a> {
 
     /// Back to the firing.
     pub(super) fn rewind(&mut self) {
-        self.parts.clear();
-        (self.over, self.summed, self.watched) = (0, 0, None);
+        self.rewind_to(0.0);
     }
 
     /// Back to a time after firing: as if nothing later had been asked about.
     pub(super) fn rewind_to(&mut self, t_us: f64) {
-        let (begins_us, ends_us) = self.span_us;
-        self.over = self.parts.partition_point(|part| part.tof_us + ends_us < t_us);
-        let is_there = |part: &&Part| !part.is_gone() && part.tof_us + begins_us <= t_us;
-        let lasting = self.parts[self.over..].iter().take_while(is_there).count();
-        self.parts.truncate(self.over + lasting);
-        (self.summed, self.watched) = (self.summed.min(self.parts.len()), None);
+        self.over = self.parts.partition_point(|part| part.lasts_us[1] < t_us);
+        // What was over when it was first asked about is not known.
+        let known = self.parts[self.over..].iter().take_while(|part| !part.is_gone()).count();
+        self.parts.truncate(self.over + known);
+        self.begun = self.parts.partition_point(|part| part.lasts_us[0] <= t_us).max(self.over);
+        (self.summed, self.watched, self.bounds) = (0, None, Bounds::default());
+        self.expect();
     }
 
     /// The least amplitude noticed at a time after firing.
     pub(super) fn threshold_at(&self, t_us: f64) -> f64 {
-        self.threshold_factor * self.receiver.threshold_at(t_us)
+        let Receiver { sensitivity, threshold, .. } = self.receiver;
+        if !self.step.get().holds(t_us) {
+            self.step.set(sensitivity.step_at(t_us));
+        }
+        let range_m = self.receiver.range_m(t_us);
+        self.threshold_factor * sensitivity.in_step(&self.step.get(), *threshold, range_m)
     }
 
     /// When ECHO next rises if the detector is ready from `ready_us` on: at once if the envelope is
@@ -174,8 +190,8 @@ impl<'a> Hearing<'a> {
         }
         let t_us = t_us + CYCLE_US;
         self.advance(t_us);
-        let size = |part: &Part| part.size * modulus(self.shape_at(part, t_us));
-        let (place, _) = self.parts[self.over..]
+        let size = |part: &Part| part.size * self.modulus_at(part, t_us);
+        let (place, _) = self.parts[self.over..self.begun]
             .iter()
             .enumerate()
             .map(|(place, part)| (place, size(part)))
@@ -197,42 +213,16 @@ impl<'a> Hearing<'a> {
             .fold(0.0, f64::max)
     }
 
-    /// Envelope at a time; no earlier time can be asked for afterwards.
-    pub(super) fn level(&mut self, t_us: f64) -> f64 {
-        self.advance(t_us);
-        for part in &mut self.parts[self.summed.max(self.over)..] {
-            part.field = Complex64::from_polar(part.size, part.phase_rad);
-        }
-        self.summed = self.parts.len();
-        self.level_of(self.over, t_us)
-    }
-
-    /// By how much later the carrier passes the threshold than the envelope, which does at `t_us`: at its next crest,
-    /// counted so that the reference echo's is not late. Within a cycle the sum's phase is that of its carrier.
-    pub(super) fn crest_after_us(&mut self, t_us: f64) -> f64 {
-        let receiver = self.receiver;
-        if receiver.detector == Detector::Envelope || receiver.combining != Combining::Coherent {
-            return 0.0;
-        }
-        // All that lasts then has its field.
-        self.level(t_us);
-        let live = self.parts[self.over..].iter();
-        let sum: Complex64 = live.map(|part| part.field * self.shape_at(part, t_us)).sum();
-        let noise = self.noise.map_or(Complex64::ZERO, |noise| noise.at(t_us));
-        let phase_rad = (sum * self.rise_of_gain(t_us) + noise).arg();
-        receiver.until_crest_us(phase_rad, t_us) - receiver.crest_us
-    }
-
     /// Places of the arrivals that last now.
     pub(super) fn living(&self) -> std::ops::Range<usize> {
-        self.over..self.parts.len()
+        self.over..self.begun
     }
 
     /// The part of an arrival in the envelope.
     pub(super) fn share(&self, place: usize, t_us: f64) -> f64 {
-        self.parts.get(place).map_or(0.0, |part| {
-            part.size * modulus(self.shape_at(part, t_us)) * self.rise_of_gain(t_us)
-        })
+        self.parts
+            .get(place)
+            .map_or(0.0, |part| part.size * self.modulus_at(part, t_us) * self.rise_of_gain(t_us))
     }
 
     /// Whether nothing else sounds with `arrival` or within its length after it, and its strength is
@@ -244,7 +234,7 @@ impl<'a> Hearing<'a> {
         }
         self.enter(t_us + self.span_us.1, t_us);
         let first_us = t_us - self.span_us.1 + self.span_us.0;
-        let others = self.arrivals[..self.parts.len()]
+        let others = self.arrivals[..self.begun]
             .iter()
             .rev()
             .take_while(|other| self.receiver.tof_us(other) > first_us);
@@ -252,43 +242,19 @@ impl<'a> Hearing<'a> {
         rest < NEGLIGIBLE * arrival.amplitude
     }
 
-    /// Envelope of the parts from a place on.
-    fn level_of(&self, from: usize, t_us: f64) -> f64 {
-        let live = &self.parts[from..];
-        let noise = self.noise.map_or(Complex64::ZERO, |noise| noise.at(t_us));
-        let gain = self.rise_of_gain(t_us);
-        match self.receiver.combining {
-            Combining::Coherent
-                if self.receiver.response.is_none() && self.receiver.shape.is_real() =>
-            {
-                // What most sensors have, at half the cost.
-                let mut sum = Complex64::ZERO;
-                for part in live {
-                    let at_us = t_us - part.tof_us + self.receiver.lead_us;
-                    sum += part.field * self.receiver.shape.real_at(at_us);
-                }
-                modulus(sum * gain + noise)
-            }
-            Combining::Coherent => {
-                let sum: Complex64 =
-                    live.iter().map(|part| part.field * self.shape_at(part, t_us)).sum();
-                modulus(sum * gain + noise)
-            }
-            Combining::Incoherent => {
-                let power = |part: &Part| (part.field * self.shape_at(part, t_us)).norm_sqr();
-                let power: f64 = live.iter().map(power).sum();
-                modulus(noise).hypot(power.sqrt() * gain)
-            }
-            Combining::Ideal => live
-                .iter()
-                .map(|part| part.size * modulus(self.shape_at(part, t_us)) * gain)
-                .fold(modulus(noise), f64::max),
-        }
-    }
-
     #[inline]
     fn shape_at(&self, part: &Part, t_us: f64) -> Complex64 {
         self.shape(part).at(t_us - part.tof_us + self.receiver.lead_us)
+    }
+
+    /// The modulus of its shape.
+    #[inline]
+    fn modulus_at(&self, part: &Part, t_us: f64) -> f64 {
+        if part.shape.is_none() && self.receiver.shape.is_real() {
+            let at_us = t_us - part.tof_us + self.receiver.lead_us;
+            return self.receiver.shape.real_at(at_us).abs();
+        }
+        modulus(self.shape_at(part, t_us))
     }
 
     fn shape<'p>(&'p self, part: &'p Part) -> &'p EchoShape {
@@ -301,39 +267,72 @@ impl<'a> Hearing<'a> {
     }
 
     fn lasting(&self) -> (usize, usize) {
-        (self.over, self.parts.len())
+        (self.over, self.begun)
+    }
+
+    /// The most that what lasts can add up to.
+    fn bounds(&mut self) -> Bounds {
+        if self.bounds.of != self.lasting() {
+            let live = &self.parts[self.over..self.begun];
+            self.bounds = Bounds {
+                of: self.lasting(),
+                strength: live.iter().map(|part| part.strength).sum(),
+                steepest: live.iter().map(|part| part.steepest).sum(),
+            };
+        }
+        self.bounds
     }
 
     fn next_entry_us(&self) -> Option<f64> {
-        let next = self.arrivals.get(self.parts.len());
-        let entry_us = next.map(|next| self.receiver.tof_us(next) + self.span_us.0);
-        entry_us.or_else(|| self.horizon_us.is_finite().then_some(self.horizon_us))
+        self.next_us.is_finite().then_some(self.next_us)
+    }
+
+    /// Finds out when the next arrival begins.
+    fn expect(&mut self) {
+        self.next_us = match (self.parts.get(self.begun), self.arrivals.get(self.begun)) {
+            (Some(part), _) => part.lasts_us[0],
+            (None, Some(arrival)) => self.receiver.tof_us(arrival) + self.span_us.0,
+            (None, None) => self.horizon_us,
+        };
     }
 
     /// Lets arrivals enter and leave up to a time.
+    #[inline]
     fn advance(&mut self, t_us: f64) {
         self.enter(t_us, t_us);
         if self.receiver.combining != Combining::Ideal {
-            let is_over = |part: &Part| part.tof_us + self.span_us.1 < t_us;
-            self.over += self.parts[self.over..].iter().take_while(|part| is_over(part)).count();
+            while self.over < self.begun && self.parts[self.over].lasts_us[1] < t_us {
+                self.over += 1;
+            }
         }
     }
 
     /// Lets arrivals enter that begin up to a time; what is over by `now_us` only keeps its place.
+    #[inline]
     fn enter(&mut self, t_us: f64, now_us: f64) {
         self.asked_us = self.asked_us.max(t_us);
-        while let Some(arrival) = self.arrivals.get(self.parts.len()) {
-            let tof_us = self.receiver.tof_us(arrival);
-            if tof_us + self.span_us.0 > t_us {
-                break;
-            }
-            let is_over = tof_us + self.span_us.1 < now_us;
-            let part = if is_over { Part::gone(tof_us) } else { self.part(arrival, tof_us) };
-            self.parts.push(part);
+        // Invariant: `next_us` is when the first one begins that has not entered.
+        while self.next_us <= t_us && self.begun < self.arrivals.len() {
+            self.enter_next(now_us);
         }
     }
 
-    fn part(&self, arrival: &PulseArrival, tof_us: f64) -> Part {
+    fn enter_next(&mut self, now_us: f64) {
+        if self.begun == self.parts.len() {
+            let arrival = &self.arrivals[self.begun];
+            let tof_us = self.receiver.tof_us(arrival);
+            let lasts_us = [tof_us + self.span_us.0, tof_us + self.span_us.1];
+            let part = match lasts_us[1] < now_us {
+                true => Part::gone(tof_us, lasts_us),
+                false => self.part(arrival, tof_us, lasts_us),
+            };
+            self.parts.push(part);
+        }
+        self.begun += 1;
+        self.expect();
+    }
+
+    fn part(&self, arrival: &PulseArrival, tof_us: f64, lasts_us: [f64; 2]) -> Part {
         let receiver = self.receiver;
         let at_face = receiver.response.as_ref().and_then(|response| {
             let Incident { strength, incidence } = (self.incident)(arrival)?;
@@ -345,16 +344,10 @@ impl<'a> Hearing<'a> {
             None => (arrival.amplitude, None),
         };
         let size = strength / self.rise_of_gain(tof_us);
-        let of = shape.as_deref().unwrap_or(&receiver.shape);
-        Part {
-            tof_us,
-            size,
-            phase_rad: arrival.phase_rad - receiver.omega * tof_us,
-            field: Complex64::ZERO,
-            strength: size * of.peak(),
-            steepest: size * of.steepest(),
-            shape,
-        }
+        let phase_rad = arrival.phase_rad - receiver.omega * tof_us;
+        // Nothing that sounds when it begins, or later, was over before the time that was last asked about.
+        let others = self.parts[self.over..].iter().map(|part| part.strength).sum();
+        Part::new((tof_us, lasts_us), (size, phase_rad), shape, &receiver.shape, others)
     }
 }
 

@@ -1,6 +1,6 @@
 //! A firing that several receivers listen to, each with another threshold.
 
-use super::{Detection, Incident, Latch, PulseArrival, Receiver, hearing::Hearing};
+use super::{Incident, PulseArrival, Receiver, hearing::Hearing};
 use crate::reading::PingStatus;
 
 /// A firing listened to by receivers that differ in their threshold alone: what arrives is summed up once for all.
@@ -18,6 +18,9 @@ pub struct Rise {
     pub range_m: f64,
     /// The arrival that drove the detector.
     pub arrival: Option<PulseArrival>,
+    /// When the envelope passed the threshold, microseconds after firing: a receiver with a higher one can't be raised
+    /// before.
+    pub passed_us: f64,
 }
 
 impl Receiver {
@@ -37,20 +40,13 @@ impl Receiver {
 }
 
 impl Listening<'_> {
-    /// The first echo that a receiver with `factor` times the threshold detects, which can't be raised before
-    /// `ready_us`, microseconds.
-    #[must_use]
-    pub fn detect(&mut self, factor: f64, ready_us: f64) -> Detection {
-        self.begin(factor, ready_us);
-        let detection = self.receiver.detection(&mut self.hearing, Latch::First, ready_us);
-        self.receiver.told(detection)
-    }
-
-    /// The same without what it takes to tell how strong the echo is; `None` of silence.
+    /// How the first echo is raised that a receiver with `factor` times the threshold detects, which can't be raised
+    /// before `ready_us`, microseconds; `None` of silence.
     #[must_use]
     pub fn rise(&mut self, factor: f64, ready_us: f64) -> Option<Rise> {
-        self.begin(factor, ready_us);
         let receiver = self.receiver;
+        self.hearing.threshold_factor = factor;
+        self.hearing.rewind_to(receiver.listens_from_us(ready_us));
         let at_us = self.hearing.next_rise(receiver.listens_from_us(ready_us))?;
         let status = receiver.status_at(at_us);
         // As a detection tells it: a comparator of the carrier rises at the crest behind.
@@ -59,7 +55,15 @@ impl Listening<'_> {
             _ => 0.0,
         };
         let range_m = receiver.range_m(at_us + later_us);
-        Some(Rise { status, range_m, arrival: self.hearing.cause(at_us) })
+        let arrival = self.hearing.cause(at_us);
+        Some(Rise { status, range_m, arrival, passed_us: at_us })
+    }
+
+    /// The most that the envelope reaches with the rise that was told last, and how far that is above its threshold,
+    /// decibels.
+    #[must_use]
+    pub fn peak(&mut self, rise: &Rise) -> (f64, f64) {
+        self.receiver.peak(&mut self.hearing, rise.passed_us, rise.arrival.as_ref())
     }
 
     /// Up to which length there and back arrivals matter to what was told so far, metres; `None` if longer ones than
@@ -67,10 +71,5 @@ impl Listening<'_> {
     #[must_use]
     pub fn needed_m(&self) -> Option<f64> {
         (!self.hearing.asked_beyond()).then(|| self.hearing.needed_m())
-    }
-
-    fn begin(&mut self, factor: f64, ready_us: f64) {
-        self.hearing.threshold_factor = factor;
-        self.hearing.rewind_to(self.receiver.listens_from_us(ready_us));
     }
 }

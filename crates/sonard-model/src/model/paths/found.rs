@@ -1,7 +1,13 @@
 //! The echo paths that were found between a transmitter and a receiver, and what is told of each.
 
+use std::{
+    collections::HashMap,
+    sync::{Mutex, PoisonError},
+};
+
 use super::{
-    diffraction::single, echo::Echo, pattern::TwoWayBound, prepare::Paths, traced::Traced,
+    diffraction::single, echo::Echo, interactions::EchoPath, pattern::TwoWayBound, prepare::Paths,
+    traced::Traced,
 };
 use crate::{
     acoustics::{Image, Incidence, Incident},
@@ -18,6 +24,8 @@ pub(super) struct Found {
     pub(super) echoes: Vec<Echo>,
     /// Of each echo; empty where all are 0. See [`Self::heard`].
     leads_m: Vec<f64>,
+    /// The paths that were asked for: neighbouring directions ask for the same few.
+    told: Mutex<HashMap<u32, EchoPath>>,
 }
 
 /// An echo as its pulse arrives.
@@ -41,7 +49,7 @@ impl Found {
             true => echoes.iter().map(lead_m).collect(),
             false => Vec::new(),
         };
-        Ok(Self { paths, traced, echoes, leads_m })
+        Ok(Self { paths, traced, echoes, leads_m, told: Mutex::default() })
     }
 
     /// An echo as its pulse arrives: that of a post by its surface, while the path is told to its axis and the carrier
@@ -72,7 +80,10 @@ impl Found {
 
     /// The full account of an echo that arrives with an amplitude.
     pub(super) fn arrival(&self, index: u32, amplitude: f64) -> Arrival {
-        let path = self.paths.path(&self.traced, &self.echoes[index as usize]);
+        // What another thread left behind when it panicked are whole paths.
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let path = || self.paths.path(&self.traced, &self.echoes[index as usize]);
+        let path = told.entry(index).or_insert_with(path).clone();
         let Heard { length_m, phase_rad, gain } = self.heard(index);
         Arrival {
             length_m,

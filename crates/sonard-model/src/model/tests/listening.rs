@@ -9,6 +9,7 @@ use crate::{
     acoustics::{Air, Latch, PulseArrival, Sensor},
     geometry::DVec2,
     model::{Options, Simulator},
+    reading::PingStatus,
     scene::{Scene, shipped},
 };
 
@@ -37,33 +38,34 @@ fn check(scene: &str, sensor: &str, max_range_m: f64) -> usize {
             let usual = simulator.receiver();
             let together = point.hear(direction_rad, |ear| {
                 ear.listen(usual, |listening| {
-                    factors.map(|by| (listening.detect(by, 0.0), listening.rise(by, 0.0)))
+                    factors.map(|by| {
+                        let rise = listening.rise(by, 0.0);
+                        (rise, rise.map(|rise| listening.peak(&rise)))
+                    })
                 })
             });
             let together = together.expect("few paths");
-            for ((detected, rise), by) in together.into_iter().zip(factors) {
+            for ((rise, peak), by) in together.into_iter().zip(factors) {
                 let mut receiver = usual.clone();
                 receiver.threshold *= by;
                 let alone =
                     point.hear(direction_rad, |ear| ear.detect(&receiver, Latch::First, 0.0));
                 let alone = alone.expect("few paths");
                 let place = format!("{} {pose:?} {direction_rad} {by}", scene.name);
-                assert_eq!(detected.status, alone.status, "{place}");
+                let status = rise.map_or(PingStatus::NoEcho, |rise| rise.status);
+                assert_eq!(status, alone.status, "{place}");
+                let Some((rise, (amplitude, margin_db))) = rise.zip(peak) else {
+                    compared += 1;
+                    continue;
+                };
                 // The same path may have another number in a search that went farther.
                 let known = |arrival: PulseArrival| PulseArrival { index: 0, ..arrival };
-                let arrival = alone.arrival.map(known);
-                assert_eq!(detected.arrival.map(known), arrival, "{place}");
-                let ranges = [detected.range_m, rise.map(|rise| rise.range_m)];
-                for range_m in ranges {
-                    assert_eq!(range_m.is_some(), alone.range_m.is_some(), "{place}");
-                    let off_m = range_m.zip(alone.range_m).map_or(0.0, |(one, two)| one - two);
-                    assert!(off_m.abs() < SAME_M, "{place}: {off_m}");
-                }
-                if let Some(rise) = rise {
-                    assert_eq!(rise.arrival.map(known), arrival, "{place}");
-                }
-                let off_db = detected.margin_db.zip(alone.margin_db).map_or(0.0, |(a, b)| a - b);
-                assert!(off_db.abs() < 1e-6, "{place}: {off_db} dB");
+                assert_eq!(rise.arrival.map(known), alone.arrival.map(known), "{place}");
+                let off_m = rise.range_m - alone.range_m.expect("an echo");
+                assert!(off_m.abs() < SAME_M, "{place}: {off_m}");
+                let off = amplitude / alone.amplitude.expect("an echo") - 1.0;
+                let off_db = margin_db - alone.margin_db.expect("an echo");
+                assert!(off.abs() < 1e-7 && off_db.abs() < 1e-6, "{place}: {off_db} dB");
                 compared += 1;
             }
         }

@@ -72,11 +72,8 @@ impl Hearing<'_> {
                 return Skip::Silence;
             }
             let entry_us = self.next_entry_us();
-            let live = &self.parts[self.over..];
-            let most: f64 = live.iter().map(|part| part.strength).sum();
-            if most * self.rise_of_gain(t_us).max(1.0)
-                >= self.threshold_factor * self.least_threshold
-            {
+            if self.may_pass(t_us) {
+                let live = &self.parts[self.over..self.begun];
                 let [part] = live else { return Skip::To(t_us) };
                 if self.gain_steps_during(part) {
                     return Skip::To(t_us);
@@ -111,6 +108,16 @@ impl Hearing<'_> {
         }
     }
 
+    /// Whether what sounds could pass the least threshold there is, if all of it added up.
+    fn may_pass(&mut self, t_us: f64) -> bool {
+        let least = self.threshold_factor * self.least_threshold;
+        let gain = self.rise_of_gain(t_us).max(1.0);
+        let last = self.parts[self.over..self.begun].last();
+        // The first is a bound of the second, which is told by one number.
+        last.is_some_and(|last| last.with_others * gain >= least)
+            && self.bounds().strength * gain >= least
+    }
+
     /// Nothing comes any more, which only those know who know all arrivals.
     const fn silence(&mut self) -> Skip {
         self.asked_us = f64::MAX;
@@ -126,11 +133,10 @@ impl Hearing<'_> {
 
     /// How long the envelope, which stands as `here` now, certainly stays below the threshold, but
     /// at least the step at which it is watched.
-    fn quiet_us(&self, t_us: f64, here: &Standing) -> f64 {
+    fn quiet_us(&mut self, t_us: f64, here: &Standing) -> f64 {
         // What the gain adds in that time is within the tenth.
         let grows = 1.1 * self.rise_of_gain(t_us);
-        let live = &self.parts[self.over..];
-        let steepest: f64 = live.iter().map(|part| part.steepest).sum();
+        let steepest = self.bounds().steepest;
         let threshold = here.threshold;
         let entry_us = self.next_entry_us().unwrap_or(f64::INFINITY);
         let quiet_us =

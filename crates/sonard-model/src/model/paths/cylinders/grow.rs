@@ -176,6 +176,7 @@ impl<'a> TubeGrower<'a> {
             link,
             span: half_path.span,
             borders,
+            middle: None,
             mirrored: !half_path.mirrored,
             triangle: half_path.triangle,
             side: None,
@@ -233,9 +234,13 @@ impl<'a> TubeGrower<'a> {
         if span.to_rad <= span.from_rad {
             return;
         }
-        let middle = tracer.front(0.5 * (span.from_rad + span.to_rad));
+        // As long as nothing cuts a tube its middle stays the same.
+        let is_whole = (span.from_rad, span.to_rad) == (tube.span.from_rad, tube.span.to_rad);
+        let known = tube.middle.filter(|_| is_whole);
+        let middle = known.unwrap_or_else(|| tracer.front(0.5 * (span.from_rad + span.to_rad)));
         if hits.lets_pass(span, &middle) {
-            let part = Tube { span, borders: [from.1, to.1], ..*tube };
+            let borders = [from.1, to.1];
+            let part = Tube { span, borders, middle: Some(middle), ..*tube };
             self.leave(&part, &middle);
         }
     }
@@ -333,6 +338,7 @@ impl<'a> TubeGrower<'a> {
     fn reflected(&mut self, tube: &Tube, wall: u32) -> Tube {
         let surface = Reflector::Wall(wall);
         let borders = tube.borders.map(|border| self.plan.reflect(&border, surface));
+        let middle = tube.middle.map(|middle| self.plan.reflect(&middle, surface));
         let links = &mut self.rays.links;
         links.push(Link { surface, before: tube.link });
         Tube {
@@ -341,6 +347,7 @@ impl<'a> TubeGrower<'a> {
             gain: tube.gain * self.plan.walls[wall as usize].gain,
             order: tube.order + 1,
             borders,
+            middle,
             ..*tube
         }
     }

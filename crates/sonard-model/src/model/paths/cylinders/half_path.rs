@@ -5,8 +5,13 @@
 //! ([`connect`](super::connect)).
 
 use super::{
-    contact::Contact, departures::Departures, front::Front, rays::Surfaces, root::zero_between,
-    strength::Strength, tracer::Tracer,
+    contact::Contact,
+    departures::Departures,
+    front::Front,
+    rays::Surfaces,
+    root::{End, zero_between},
+    strength::Strength,
+    tracer::Tracer,
 };
 use crate::{
     geometry::DVec2,
@@ -81,12 +86,18 @@ impl<'a> HalfPathTracer<'a> {
     /// The ray that comes to an angle around the cylinder between its ends.
     pub(crate) fn contact_at(&self, angle_rad: f64, near_rad: f64) -> Contact {
         let Span { from_rad, to_rad } = self.half_path.span;
-        let mut ends = self.half_path.ends.map(|end| end.angle_rad - angle_rad);
+        let mut ends = self.half_path.ends;
         if !self.half_path.mirrored {
             ends.reverse();
         }
+        let end = |at: f64, end: &Contact| End {
+            at,
+            value: end.angle_rad - angle_rad,
+            slope: end.angle_rate,
+        };
         let mut last = None;
-        let at_rad = zero_between([from_rad, to_rad], ends, EXACT_RAD, |at| {
+        let ends = [end(from_rad, &ends[0]), end(to_rad, &ends[1])];
+        let at_rad = zero_between(ends, EXACT_RAD, |at| {
             let contact = self.contact(at, near_rad);
             last = Some(contact);
             (contact.angle_rad - angle_rad, contact.angle_rate)

@@ -1,25 +1,56 @@
 //! Zeros of monotone functions.
 
+/// The cubic with these values and slopes at two arguments (Hermite's), at another one.
+pub(crate) fn cubic([from, to]: [f64; 2], values: [f64; 2], slopes: [f64; 2], at: f64) -> f64 {
+    let width = to - from;
+    let share = (at - from) / width;
+    let rest = 1.0 - share;
+    let straight = values[0] + share * (values[1] - values[0]);
+    let rise = values[1] - values[0];
+    let bends = rest * (width * slopes[0] - rise) - share * (width * slopes[1] - rise);
+    straight + share * rest * bends
+}
+
+/// An end between which a zero is looked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct End {
+    pub(crate) at: f64,
+    /// Value and slope of the function there.
+    pub(crate) value: f64,
+    pub(crate) slope: f64,
+}
+
+/// Where a monotone function has its zero, roughly: by the cubic of its inverse.
+pub(crate) fn zero_near([from, to]: [End; 2]) -> f64 {
+    let ends = [from.at, to.at];
+    let slopes = [from.slope.recip(), to.slope.recip()];
+    let near = cubic([from.value, to.value], ends, slopes, 0.0);
+    if ends[0] < near && near < ends[1] {
+        return near;
+    }
+    (from.at * to.value - to.at * from.value) / (to.value - from.value)
+}
+
 /// Steps at most; ten are usual.
 const MOST_STEPS: usize = 100;
 
-/// Zero of a monotone function between two arguments where it has the values `at_ends`, whose signs
+/// Zero of a monotone function between two arguments where it has values whose signs
 /// differ (else the end that is closer to zero), to within `exact` of the function. `f` gives value
 /// and slope: Newton's method, kept between the arguments by halving.
 ///
 /// Invariant: the zero lies between `low` and `high`, at which the function has opposite signs; both only
 /// approach each other.
 pub(crate) fn zero_between(
-    [mut low, mut high]: [f64; 2],
-    at_ends: [f64; 2],
+    ends: [End; 2],
     exact: f64,
     mut f: impl FnMut(f64) -> (f64, f64),
 ) -> f64 {
-    let [at_low, at_high] = at_ends;
+    let [mut low, mut high] = ends.map(|end| end.at);
+    let [at_low, at_high] = ends.map(|end| end.value);
     if (at_low < 0.0) == (at_high < 0.0) {
         return if at_low.abs() <= at_high.abs() { low } else { high };
     }
-    let mut at = (low * at_high - high * at_low) / (at_high - at_low);
+    let mut at = zero_near(ends);
     for _ in 0..MOST_STEPS {
         if !(low < at && at < high) {
             at = 0.5 * (low + high);
@@ -51,27 +82,52 @@ mod tests {
 
     use super::*;
 
+    fn ends(at: [f64; 2], f: impl Fn(f64) -> (f64, f64)) -> [End; 2] {
+        at.map(|at| {
+            let (value, slope) = f(at);
+            End { at, value, slope }
+        })
+    }
+
+    #[test]
+    fn a_cubic_is_told_by_its_ends() {
+        let of = |x: f64| 2.0 * x.powi(3) - x * x + 3.0;
+        let slope = |x: f64| 6.0 * x * x - 2.0 * x;
+        let (at, values, slopes) = ([-1.0, 2.0], [-1.0, 2.0].map(of), [-1.0, 2.0].map(slope));
+        for x in [-1.0, -0.3, 0.0, 1.1, 2.0] {
+            assert!((cubic(at, values, slopes, x) - of(x)).abs() < 1e-12, "{x}");
+        }
+        // What runs out of its ends is left for the straight line.
+        let steep =
+            [End { at: 0.0, value: -1.0, slope: 1e-3 }, End { at: 1.0, value: 1.0, slope: 1.0 }];
+        assert_eq!(zero_near(steep), 0.5);
+    }
+
     #[test]
     fn zeros_are_found_in_few_steps() {
         let asked = Cell::new(0);
-        let cubic = |x: f64| {
+        let cube = |x: f64| {
             asked.set(asked.get() + 1);
             (x.powi(3) - 2.0, 3.0 * x * x)
         };
-        let found = zero_between([0.0, 2.0], [-2.0, 6.0], 1e-13, cubic);
+        let found = zero_between(ends([0.0, 2.0], cube), 1e-13, cube);
         assert!((found - 2_f64.cbrt()).abs() < 1e-13, "{found}");
-        assert!(asked.get() <= 10, "{} steps", asked.get());
+        assert!(asked.get() <= 12, "{} steps", asked.get());
         // One that falls, and whose slope leads astray: halving keeps it between the ends.
         let falls =
             |x: f64| (-(40.0 * (x - 0.3)).atan(), -40.0 / (1.0 + (40.0 * (x - 0.3)).powi(2)));
-        let found = zero_between([0.0, 1.0], [falls(0.0).0, falls(1.0).0], 1e-12, falls);
+        let found = zero_between(ends([0.0, 1.0], falls), 1e-12, falls);
         assert!((found - 0.3).abs() < 1e-12, "{found}");
     }
 
     #[test]
     fn without_a_change_of_sign_it_is_the_end_nearer_to_zero() {
         let never = |_: f64| -> (f64, f64) { panic!("nothing to look for") };
-        assert_eq!(zero_between([1.0, 2.0], [0.5, 3.0], 1e-9, never), 1.0);
-        assert_eq!(zero_between([1.0, 2.0], [-3.0, -0.5], 1e-9, never), 2.0);
+        let of = |value: f64| move |_: f64| (value, 1.0);
+        let [one, _] = ends([1.0, 2.0], of(0.5));
+        let [low, _] = ends([1.0, 2.0], of(-3.0));
+        let [[_, far], [_, near]] = [3.0, -0.5].map(|value| ends([1.0, 2.0], of(value)));
+        assert_eq!(zero_between([one, far], 1e-9, never), 1.0);
+        assert_eq!(zero_between([low, near], 1e-9, never), 2.0);
     }
 }

@@ -7,6 +7,7 @@
 use super::{
     contact::Contact,
     half_path::{HalfPath, HalfPathTracer},
+    root::{End, cubic, zero_between, zero_near},
 };
 use crate::{geometry::wrap_pi, model::paths::tolerance::TIE_M};
 
@@ -52,20 +53,19 @@ pub(crate) fn stationary_contact(
 ) -> Option<([Contact; 2], f64)> {
     let [a, b] = [&one.half_path.ends, &other.half_path.ends];
     let Overlap { middles: [middle, others], turn, low, high } = overlap(a, b)?;
-    // Straight lines through the ends for a start.
-    let slope = |[from, to]: &[Contact; 2], angle: f64| {
-        let rate = (to.slope - from.slope) / (to.angle_rad - from.angle_rad);
-        (from.slope + rate * (angle - from.angle_rad), rate)
+    // Cubics through the ends for a start.
+    let sum = |angle: f64| {
+        let ((t, rate), (u, other_rate)) =
+            (slope_near(a, angle, radius_m), slope_near(b, angle - turn, radius_m));
+        End { at: angle, value: t + u, slope: rate + other_rate }
     };
-    let ((t, rate), (u, other_rate)) = (slope(a, low), slope(b, low - turn));
-    let start = (low - (t + u) / (rate + other_rate)).max(low).min(high);
+    let start = zero_near([sum(low), sum(high)]).max(low).min(high);
     let mut at = [guess(a, start), guess(b, start - turn)];
     for _ in 0..MOST_STEPS {
         let p = one.contact(at[0], middle);
         let mut q = other.contact(at[1], others);
         q.angle_rad += turn;
-        let rates =
-            [&p, &q].map(|c| c.cosine + radius_m * c.cosine * c.cosine * c.growth / c.width_m);
+        let rates = [&p, &q].map(|contact| slope_rate(contact, radius_m));
         let sum = rates[0] * p.angle_rad + rates[1] * q.angle_rad - p.slope - q.slope;
         let best = sum / (rates[0] + rates[1]);
         let angle = best.max(low).min(high);
@@ -77,16 +77,16 @@ pub(crate) fn stationary_contact(
         at[0] = step(one.half_path, &p, angle);
         at[1] = step(other.half_path, &q, angle);
     }
-    by_halving(one, other, [low, high], [middle, others, turn])
+    within(one, other, [low, high], [middle, others, turn], radius_m)
 }
 
-/// The same by halving the interval between `low` and `high`, for the few angles between which Newton's steps
-/// run to and fro. Invariant: the sum of the slopes is negative at `from` and not at `to`.
-fn by_halving(
+/// The same by steps that stay between `low` and `high`, for the few angles between which Newton's steps run to and fro.
+fn within(
     one: &HalfPathTracer,
     other: &HalfPathTracer,
     [low, high]: [f64; 2],
     [middle, others, turn]: [f64; 3],
+    radius_m: f64,
 ) -> Option<([Contact; 2], f64)> {
     let at = |angle: f64| {
         let p = one.contact_at(angle, middle);
@@ -94,22 +94,48 @@ fn by_halving(
         q.angle_rad += turn;
         [p, q]
     };
-    let sum = |angle: f64| at(angle).map(|contact| contact.slope).iter().sum::<f64>();
+    let sum = |angle: f64| {
+        let [p, q] = at(angle);
+        let slope = slope_rate(&p, radius_m) + slope_rate(&q, radius_m);
+        End { at: angle, value: p.slope + q.slope, slope }
+    };
     let ends = [low, high].map(sum);
-    if ends[0] > SLACK || ends[1] < -SLACK {
+    if ends[0].value > SLACK || ends[1].value < -SLACK {
         return None;
     }
-    let (mut from, mut to) = (low, high);
-    while to - from > SAME_ANGLE_RAD {
-        let middle = 0.5 * (from + to);
-        if sum(middle) < 0.0 { from = middle } else { to = middle }
-    }
-    let angle = 0.5 * (from + to);
+    let angle = zero_between(ends, SAME_ANGLE_RAD, |angle| {
+        let End { value, slope, .. } = sum(angle);
+        (value, slope)
+    });
     Some((at(angle), angle))
 }
 
-/// The contact with the first cylinder of the ray to an angle, by linear interpolation.
-fn guess([from, to]: &[Contact; 2], angle: f64) -> f64 {
+/// How fast the slope of a contact grows with the angle around a cylinder.
+fn slope_rate(contact: &Contact, radius_m: f64) -> f64 {
+    let Contact { cosine, growth, width_m, .. } = contact;
+    cosine + radius_m * cosine * cosine * growth / width_m
+}
+
+/// The slope of a half-path at an angle and how fast it grows, roughly.
+fn slope_near(ends: &[Contact; 2], angle: f64, radius_m: f64) -> (f64, f64) {
+    let [from, to] = ends;
+    let rates = ends.each_ref().map(|end| slope_rate(end, radius_m));
+    let share = (angle - from.angle_rad) / (to.angle_rad - from.angle_rad);
+    let slopes = [from.slope, to.slope];
+    let slope = cubic([from.angle_rad, to.angle_rad], slopes, rates, angle);
+    (slope, rates[0] + share * (rates[1] - rates[0]))
+}
+
+/// The contact with the first cylinder of the ray to an angle, roughly.
+fn guess(ends: &[Contact; 2], angle: f64) -> f64 {
+    let [from, to] = ends;
+    let angles = [from.angle_rad, to.angle_rad];
+    let (values, rates) = ([from.at_rad, to.at_rad], [from, to].map(|end| end.angle_rate.recip()));
+    let near = cubic(angles, values, rates, angle);
+    let [low, high] = [from.at_rad.min(to.at_rad), from.at_rad.max(to.at_rad)];
+    if low <= near && near <= high {
+        return near;
+    }
     let share = (angle - from.angle_rad) / (to.angle_rad - from.angle_rad);
     from.at_rad + share.clamp(0.0, 1.0) * (to.at_rad - from.at_rad)
 }

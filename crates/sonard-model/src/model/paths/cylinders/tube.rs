@@ -1,8 +1,12 @@
 //! One tube, and the rays in it.
 
 use super::{
-    departures::Departures, front::Front, partners::Partners, root::zero_between,
-    strength::Strength, tracer::Tracer,
+    departures::Departures,
+    front::Front,
+    partners::Partners,
+    root::{End, zero_between},
+    strength::Strength,
+    tracer::Tracer,
 };
 use crate::{
     geometry::DVec2,
@@ -32,6 +36,8 @@ pub(crate) struct Tube {
     pub(crate) span: Span,
     /// The borders as they leave the last surface, in the same order.
     pub(crate) borders: [Front; 2],
+    /// The ray in the middle of its contacts, if it is known.
+    pub(crate) middle: Option<Front>,
     /// Whether the ray at `from_rad` is the left border.
     pub(crate) mirrored: bool,
     pub(crate) triangle: u32,
@@ -55,8 +61,12 @@ impl Tube {
     pub(crate) fn halves(&self, at_rad: f64, front: Front) -> [Self; 2] {
         let Span { from_rad, to_rad } = self.span;
         let [from, to] = self.borders;
-        let part =
-            |from_rad, to_rad, borders| Self { span: Span { from_rad, to_rad }, borders, ..*self };
+        let part = |from_rad, to_rad, borders| Self {
+            span: Span { from_rad, to_rad },
+            borders,
+            middle: None,
+            ..*self
+        };
         [part(from_rad, at_rad, [from, front]), part(at_rad, to_rad, [front, to])]
     }
 
@@ -112,15 +122,21 @@ pub(crate) fn front_past(
 ) -> (f64, Front) {
     let Span { from_rad, to_rad } = tube.span;
     let [from, to] = &tube.borders;
-    let ends = [from, to].map(|border| border.offset_m(point) - offset_m);
     // Farther along the first contact's surface a ray is farther to the left.
     let sense = if tube.mirrored { 1.0 } else { -1.0 };
-    let mut last = (from_rad, *from);
-    let at = zero_between([from_rad, to_rad], ends, EXACT_M, |at| {
-        let front = tracer.front(at);
-        last = (at, front);
+    let passes = |front: &Front| {
         let width_m = front.width_m + front.growth * front.ahead_m(point);
         (front.offset_m(point) - offset_m, sense * front.rate * width_m)
+    };
+    let end = |at: f64, front: &Front| {
+        let (value, slope) = passes(front);
+        End { at, value, slope }
+    };
+    let mut last = (from_rad, *from);
+    let at = zero_between([end(from_rad, from), end(to_rad, to)], EXACT_M, |at| {
+        let front = tracer.front(at);
+        last = (at, front);
+        passes(&front)
     });
     let front = if at == last.0 {
         last.1

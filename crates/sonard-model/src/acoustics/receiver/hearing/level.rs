@@ -1,0 +1,75 @@
+//! The envelope of the sum at a time.
+
+use num_complex::Complex64;
+
+use super::{Combining, Hearing, Part, Receiver, modulus};
+use crate::acoustics::Detector;
+
+impl Hearing<'_> {
+    /// Envelope at a time; no earlier time can be asked for afterwards.
+    pub(in super::super) fn level(&mut self, t_us: f64) -> f64 {
+        self.advance(t_us);
+        if self.summed < self.begun {
+            for part in &mut self.parts[self.summed.max(self.over)..self.begun] {
+                part.find_field();
+            }
+            self.summed = self.begun;
+        }
+        self.level_of(self.over, t_us)
+    }
+
+    /// By how much later the carrier passes the threshold than the envelope, which does at `t_us`: at its next crest,
+    /// counted so that the reference echo's is not late. Within a cycle the sum's phase is that of its carrier.
+    pub(in super::super) fn crest_after_us(&mut self, t_us: f64) -> f64 {
+        let receiver = self.receiver;
+        if receiver.detector == Detector::Envelope || receiver.combining != Combining::Coherent {
+            return 0.0;
+        }
+        // All that lasts then has its field.
+        self.level(t_us);
+        let live = self.parts[self.over..self.begun].iter();
+        let sum: Complex64 = live.map(|part| part.field * self.shape_at(part, t_us)).sum();
+        let noise = self.noise.map_or(Complex64::ZERO, |noise| noise.at(t_us));
+        let phase_rad = (sum * self.rise_of_gain(t_us) + noise).arg();
+        receiver.until_crest_us(phase_rad, t_us) - receiver.crest_us
+    }
+
+    /// Envelope of the parts from a place on.
+    #[inline]
+    pub(super) fn level_of(&self, from: usize, t_us: f64) -> f64 {
+        let live = &self.parts[from..self.begun];
+        if !self.is_plain {
+            return self.any_level(live, t_us);
+        }
+        // What most sensors have, at a part of the cost.
+        let Receiver { shape, lead_us, .. } = self.receiver;
+        let fields =
+            live.iter().map(|part| part.field * shape.real_at(t_us - part.tof_us + lead_us));
+        match self.receiver.combining {
+            Combining::Incoherent => fields.map(|field| field.norm_sqr()).sum::<f64>().sqrt(),
+            _ => modulus(fields.fold(Complex64::ZERO, |sum, field| sum + field)),
+        }
+    }
+
+    /// The same of any sensor, in noise too.
+    fn any_level(&self, live: &[Part], t_us: f64) -> f64 {
+        let noise = self.noise.map_or(Complex64::ZERO, |noise| noise.at(t_us));
+        let gain = self.rise_of_gain(t_us);
+        match self.receiver.combining {
+            Combining::Coherent => {
+                let sum: Complex64 =
+                    live.iter().map(|part| part.field * self.shape_at(part, t_us)).sum();
+                modulus(sum * gain + noise)
+            }
+            Combining::Incoherent => {
+                let power = |part: &Part| (part.field * self.shape_at(part, t_us)).norm_sqr();
+                let power: f64 = live.iter().map(power).sum();
+                modulus(noise).hypot(power.sqrt() * gain)
+            }
+            Combining::Ideal => live
+                .iter()
+                .map(|part| part.size * self.modulus_at(part, t_us) * gain)
+                .fold(modulus(noise), f64::max),
+        }
+    }
+}
