@@ -117,6 +117,7 @@ impl Listener {
                     };
                 }
             }
+            by_db = next.by_db;
             match found.last_mut() {
                 Some(known)
                     if last
@@ -133,7 +134,6 @@ impl Listener {
                         spread_db: self.spread_db(&next),
                         walk_m_per_db: self.walk_m_per_db(until_db - next.by_db),
                     });
-                    by_db = next.by_db;
                     last = Some(next);
                 }
             }

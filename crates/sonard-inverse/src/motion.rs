@@ -47,6 +47,10 @@ impl Motion {
     }
 
     fn of(&self, scene: &Scene, mechanism: Mechanism, point: DVec2) -> DVec3 {
+        let stands = self.walls.is_empty() && self.cylinders.is_empty();
+        if stands && mechanism != Mechanism::Transducer {
+            return DVec3::ZERO;
+        }
         let in_plane = match mechanism {
             Mechanism::Reflection(Reflector::Wall(wall))
             | Mechanism::Scattering { wall }

@@ -218,6 +218,19 @@ impl EchoShape {
         Some(self.first_us + self.step_us * (above as f64 + part))
     }
 
+    /// The largest modulus from a time on, up to which [`fall_us`](Self::fall_us) finds that time.
+    #[must_use]
+    pub fn most_from(&self, t_us: f64) -> f64 {
+        let place = (t_us - self.first_us) / self.step_us;
+        if place < 0.0 {
+            return self.peak();
+        }
+        let below = place as usize;
+        let Some(&low) = self.to_come.get(below) else { return 0.0 };
+        let high = self.to_come.get(below + 1).copied().unwrap_or(0.0);
+        low + (place - below as f64) * (high - low)
+    }
+
     /// Samples and their times, microseconds.
     pub(super) fn samples(&self) -> impl Iterator<Item = (f64, Complex64)> {
         self.samples
@@ -304,6 +317,12 @@ mod tests {
         }
         assert!((shape.at(0.0).norm() - 0.5).abs() < 1e-6, "half way up at the onset");
         assert!(shape.rise_us(1.01).is_none() && shape.fall_us(1.01).is_none());
+        // What is still to come falls from the peak to each level when that is passed for the last time.
+        for level in [0.02, 0.3, 0.99] {
+            let fall_us = shape.fall_us(level).expect("it gets there");
+            assert!((shape.most_from(fall_us) - level).abs() < 1e-9, "{level}");
+        }
+        assert_eq!((shape.most_from(-1e3), shape.most_from(1e4)), (1.0, 0.0));
     }
 
     #[test]

@@ -72,6 +72,12 @@ impl Step {
     pub(super) fn holds(&self, t_us: f64) -> bool {
         self.from_us <= t_us && t_us < self.until_us
     }
+
+    /// Whether it neither begins nor ends between two times.
+    #[inline]
+    pub(super) fn holds_all(&self, from_us: f64, to_us: f64) -> bool {
+        self.from_us < from_us && to_us <= self.until_us
+    }
 }
 
 /// Gain at a time after firing, decibels above what makes up for the spreading from a wall at 1 m.

@@ -44,6 +44,8 @@ pub(super) struct Hearing<'a> {
     summed: usize,
     /// When the next arrival begins, or what is not known; infinite if nothing does.
     next_us: f64,
+    /// When that one comes by its path.
+    next_tof_us: f64,
     /// The arrivals that last, by [`Self::lasting`], when it was last found out that
     /// they have to be watched.
     watched: Option<(usize, usize)>,
@@ -104,6 +106,7 @@ impl<'a> Hearing<'a> {
             over: 0,
             summed: 0,
             next_us: f64::INFINITY,
+            next_tof_us: f64::INFINITY,
             watched: None,
             bounds: Bounds::default(),
             step: Cell::new(receiver.sensitivity.step_at(0.0)),
@@ -289,11 +292,15 @@ impl<'a> Hearing<'a> {
 
     /// Finds out when the next arrival begins.
     fn expect(&mut self) {
-        self.next_us = match (self.parts.get(self.begun), self.arrivals.get(self.begun)) {
-            (Some(part), _) => part.lasts_us[0],
-            (None, Some(arrival)) => self.receiver.tof_us(arrival) + self.span_us.0,
-            (None, None) => self.horizon_us,
-        };
+        (self.next_tof_us, self.next_us) =
+            match (self.parts.get(self.begun), self.arrivals.get(self.begun)) {
+                (Some(part), _) => (part.tof_us, part.lasts_us[0]),
+                (None, Some(arrival)) => {
+                    let tof_us = self.receiver.tof_us(arrival);
+                    (tof_us, tof_us + self.span_us.0)
+                }
+                (None, None) => (self.horizon_us, self.horizon_us),
+            };
     }
 
     /// Lets arrivals enter and leave up to a time.
@@ -319,9 +326,8 @@ impl<'a> Hearing<'a> {
 
     fn enter_next(&mut self, now_us: f64) {
         if self.begun == self.parts.len() {
-            let arrival = &self.arrivals[self.begun];
-            let tof_us = self.receiver.tof_us(arrival);
-            let lasts_us = [tof_us + self.span_us.0, tof_us + self.span_us.1];
+            let (arrival, tof_us) = (&self.arrivals[self.begun], self.next_tof_us);
+            let lasts_us = [self.next_us, tof_us + self.span_us.1];
             let part = match lasts_us[1] < now_us {
                 true => Part::gone(tof_us, lasts_us),
                 false => self.part(arrival, tof_us, lasts_us),

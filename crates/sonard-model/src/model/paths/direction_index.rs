@@ -16,8 +16,8 @@ pub(crate) struct DirectionIndex {
     entries: Vec<Entry>,
     /// Index at which each bin begins in `entries`, and the end of the last.
     bins: Vec<u32>,
-    /// The widest reach of its entries.
-    reach_rad: f64,
+    /// The widest reach of its entries, in bins.
+    reach: i64,
 }
 
 /// An echo as an azimuth needs it.
@@ -75,7 +75,7 @@ impl DirectionIndex {
             *free += 1;
         }
         let reach_rad = entries.iter().map(|entry| entry.reach_rad).fold(0.0, f64::max);
-        Self { entries: sorted, bins, reach_rad }
+        Self { entries: sorted, bins, reach: (reach_rad / TAU * BINS as f64).ceil() as i64 }
     }
 
     /// Tells the entries within their reach of a direction in (-pi, pi], and how far off each is, of echoes numbered
@@ -100,15 +100,19 @@ impl DirectionIndex {
         };
         let bins = BINS as i64;
         let middle = bin(direction_rad) as i64;
-        let reach = (self.reach_rad / TAU * BINS as f64).ceil() as i64;
+        let reach = self.reach;
         if 2 * reach + 1 >= bins {
             return part(0, bins);
         }
         let (from, to) = (middle - reach, middle + reach + 1);
         part(from, to);
         // What leaves the circle on one side comes in on the other.
-        part(from + bins, bins);
-        part(0, to - bins);
+        if from < 0 {
+            part(from + bins, bins);
+        }
+        if to > bins {
+            part(0, to - bins);
+        }
     }
 }
 

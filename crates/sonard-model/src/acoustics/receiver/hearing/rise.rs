@@ -51,11 +51,11 @@ impl Hearing<'_> {
                 self.turn((t_us, here.relative), (next_us, next.relative))
             };
             // Before the turn as it is here, after it as it is next.
-            for (part_us, above) in
-                [(turn_us - t_us, here.is_above()), (next_us - turn_us, next.is_above())]
-            {
-                charge_us = (charge_us + if above { part_us } else { -part_us }).max(0.0);
-            }
+            let charged = |charge_us: f64, part_us: f64, above: bool| {
+                (charge_us + if above { part_us } else { -part_us }).max(0.0)
+            };
+            charge_us = charged(charge_us, turn_us - t_us, here.is_above());
+            charge_us = charged(charge_us, next_us - turn_us, next.is_above());
             (t_us, here) = (next_us, next);
         }
         None
@@ -78,7 +78,7 @@ impl Hearing<'_> {
                 if self.gain_steps_during(part) {
                     return Skip::To(t_us);
                 }
-                let Some((rise_us, fall_us)) = self.lone_rise(part, t_us) else {
+                let Some((rise_us, lasts)) = self.lone_rise(part, t_us) else {
                     // It has passed already, or never does.
                     let end_us = part.tof_us + self.span_us.1 + 1e-3;
                     match entry_us {
@@ -89,7 +89,7 @@ impl Hearing<'_> {
                 };
                 let done_us = rise_us + self.receiver.integration_us;
                 if entry_us.is_none_or(|entry_us| entry_us > done_us) {
-                    if fall_us >= done_us {
+                    if lasts {
                         self.asked_us = self.asked_us.max(done_us);
                         return Skip::Lone { rise_us };
                     }
@@ -150,8 +150,9 @@ impl Hearing<'_> {
         }
     }
 
-    /// When an arrival alone passes the threshold after `t_us`, and when it is last above.
-    fn lone_rise(&self, part: &Part, t_us: f64) -> Option<(f64, f64)> {
+    /// When an arrival alone passes the threshold after `t_us`, and whether it is above for the integration time or
+    /// longer, or again after it.
+    fn lone_rise(&self, part: &Part, t_us: f64) -> Option<(f64, bool)> {
         let at = |offset_us: f64| part.tof_us + offset_us - self.receiver.lead_us;
         let level_at = |t_us: f64| self.threshold_at(t_us) / (part.size * self.rise_of_gain(t_us));
         let mut rise_us = part.tof_us;
@@ -159,15 +160,22 @@ impl Hearing<'_> {
         for _ in 0..2 {
             rise_us = at(self.shape(part).rise_us(level_at(rise_us))?);
         }
-        let fall_us = at(self.shape(part).fall_us(level_at(rise_us))?);
-        (rise_us >= t_us).then_some((rise_us, fall_us))
+        if rise_us < t_us {
+            return None;
+        }
+        let done_us = rise_us + self.receiver.integration_us - part.tof_us + self.receiver.lead_us;
+        Some((rise_us, self.shape(part).most_from(done_us) >= level_at(rise_us)))
     }
 
     /// Whether the gain rises by a step while an arrival lasts.
     fn gain_steps_during(&self, part: &Part) -> bool {
         let Gain::Steps { steps } = &self.receiver.gain else { return false };
-        let lasts = part.tof_us + self.span_us.0..part.tof_us + self.span_us.1;
-        steps.iter().filter_map(|step| step.until_us).any(|until_us| lasts.contains(&until_us))
+        let [begins_us, ends_us] = part.lasts_us;
+        if self.step.get().holds_all(begins_us, ends_us) {
+            return false;
+        }
+        let mut ends = steps.iter().filter_map(|step| step.until_us);
+        ends.any(|until_us| (begins_us..ends_us).contains(&until_us))
     }
 
     /// Where the envelope passes the threshold between two times, by false position on its
