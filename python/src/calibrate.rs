@@ -100,7 +100,7 @@ pub(crate) fn calibrate<'py>(
         refuse::<SonardError>(py, &error.to_string(), help)
     })?;
     if fitted.is_doubtful() {
-        let share = 100.0 * fitted.errors.clutter;
+        let share = 100.0 * (1.0 - fitted.errors.explained());
         warn(
             py,
             &format!("{share:.0} % of the readings are not explained: is the scene the right one?"),
@@ -218,7 +218,7 @@ impl Found {
             ("delay_m", world.delay_m),
             ("heading_zero_deg", world.heading_zero_deg),
             ("gear", world.gear),
-            ("explained", 1.0 - errors.clutter),
+            ("explained", errors.explained()),
             ("sigma_m", errors.sigma_m),
             ("sigma_db", errors.sigma_db),
             ("log_likelihood", self.fitted.log_likelihood),

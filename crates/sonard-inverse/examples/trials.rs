@@ -14,14 +14,17 @@
 //! does. `each` prints a line for every trial, `at=N` runs that one alone.
 
 mod rooms;
+#[path = "rooms/spread.rs"]
+mod spread;
 mod wrong;
 
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 use rooms::{BEAMS, NOISE_MM};
-use sonard_inverse::{Parameter, bound, fit_from, fit_thoroughly};
-use wrong::{ERRORS, Kinds, Wrong};
+use sonard_inverse::{Parameter, bound, fit, fit_from};
+use spread::SPREAD;
+use wrong::{Kinds, Wrong};
 
 /// What a trial found of a parameter.
 #[derive(Clone)]
@@ -29,7 +32,10 @@ struct Found {
     name: String,
     error: f64,
     sigma: f64,
+    /// Of the readings as they are, furniture left out.
     bound: f64,
+    /// Of those that there would be without furniture.
+    unhindered: f64,
 }
 
 struct Trial {
@@ -54,7 +60,8 @@ fn main() {
     let number = |at: usize, usual: u64| numbers.get(at).copied().unwrap_or(usual);
     let (count, seed, minutes) = (number(0, 50), number(1, 1), number(2, 1_000_000));
     let has = |wanted: &str| words.iter().any(|word| word == wanted);
-    let kinds = Kinds { mounting: has("mounting"), furniture: has("furniture") };
+    let kinds =
+        Kinds { mounting: has("mounting"), furniture: has("furniture"), bodiless: has("bodiless") };
     let alone = words.iter().find_map(|word| word.strip_prefix("at=")?.parse().ok());
     let wanted = alone.map_or(0..count, |at: u64| at..at + 1);
     let (began, is_each) = (Instant::now(), has("each") || alone.is_some());
@@ -75,33 +82,33 @@ fn main() {
 fn trial(number: u64, seed: u64, kinds: Kinds) -> Option<Trial> {
     let wrong = Wrong::drawn(seed.wrapping_mul(1_000_003) + number, kinds)?;
     let there = std::slice::from_ref(&wrong.there);
-    let bounds = bound(&wrong.truth, there, &wrong.fit, &ERRORS).ok()?;
+    let bounds = bound(&wrong.truth, there, &wrong.fit, &SPREAD).ok()?;
+    let unhindered = std::slice::from_ref(&wrong.unhindered);
+    let unhindered = bound(&wrong.truth, unhindered, &wrong.fit, &SPREAD).ok()?;
     let began = Instant::now();
     let here = std::slice::from_ref(&wrong.here);
-    let fitted = fit_thoroughly(&wrong.believed, here, &wrong.fit).ok()?;
+    let fitted = fit(&wrong.believed, here, &wrong.fit).ok()?;
     let took_s = began.elapsed().as_secs_f64();
-    let of_truth = fit_from(&wrong.believed, here, &wrong.fit, &wrong.expected, &ERRORS).ok()?;
+    let of_truth = fit_from(&wrong.believed, here, &wrong.fit, &wrong.expected, &SPREAD).ok()?;
     let both = fitted.estimates.iter().zip(&of_truth.estimates);
     let is_same =
         both.clone().all(|(one, other)| (one.change - other.change).abs() < SAME * other.sigma);
-    let found =
-        wrong.fit.priors.iter().zip(&fitted.estimates).zip(&wrong.expected).zip(bounds).map(
-            |(((prior, estimate), expected), bound)| Found {
-                name: match &prior.parameter {
-                    Parameter::Wall(_) => "wall".to_owned(),
-                    other => other.to_string(),
-                },
-                error: estimate.change - expected,
-                sigma: estimate.sigma,
-                bound,
-            },
-        );
+    let found = wrong.fit.priors.iter().enumerate().map(|(at, prior)| Found {
+        name: match &prior.parameter {
+            Parameter::Wall(_) => "wall".to_owned(),
+            other => other.to_string(),
+        },
+        error: fitted.estimates[at].change - wrong.expected[at],
+        sigma: fitted.estimates[at].sigma,
+        bound: bounds[at],
+        unhindered: unhindered[at],
+    });
     Some(Trial {
         number,
         scene: wrong.scene,
         found: found.collect(),
         took_s,
-        explained: 1.0 - fitted.errors.clutter,
+        explained: fitted.errors.explained(),
         likelier: fitted.log_posterior - of_truth.log_posterior,
         is_same,
     })
@@ -140,8 +147,16 @@ fn print(trials: &[Trial]) {
 
 fn table(trials: &[&Trial]) {
     println!(
-        "{:16} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>8}",
-        "", "rms", "rms/bound", "rms/sigma", "median/b.", "sigma/b.", "95 % hold", "wrong"
+        "{:16} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>8}",
+        "",
+        "rms",
+        "rms/bound",
+        "rms/sigma",
+        "median/b.",
+        "median/u.",
+        "sigma/b.",
+        "95 % hold",
+        "wrong"
     );
     let names = trials.first().map_or(0, |trial| trial.found.len());
     for at in 0..names {
@@ -158,13 +173,14 @@ fn table(trials: &[&Trial]) {
         let holds = of.iter().filter(|found| found.error.abs() < 1.96 * found.sigma).count();
         let wrong = of.iter().filter(|found| found.error.abs() > 6.0 * found.sigma).count();
         println!(
-            "{:16} {:10.5} {:10.2} {:10.2} {:10.2} {:10.2} {:7.1} % {wrong:8}",
+            "{:16} {:10.5} {:10.2} {:10.2} {:10.2} {:10.2} {:10.2} {:7.1} % {wrong:8}",
             of[0].name,
             rms(&mut of.iter().map(|found| found.error)),
             rms(&mut of.iter().map(|found| found.error / found.bound)),
             rms(&mut of.iter().map(|found| found.error / found.sigma)),
             // Of a normal distribution as many standard deviations.
             median(&mut of.iter().map(|found| found.error / found.bound)) / 0.6745,
+            median(&mut of.iter().map(|found| found.error / found.unhindered)) / 0.6745,
             median(&mut of.iter().map(|found| found.sigma / found.bound)),
             100.0 * holds as f64 / count
         );

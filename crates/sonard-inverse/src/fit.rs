@@ -26,8 +26,8 @@ use crate::{
     world::{Models, World, WorldError},
 };
 pub use journal::Found;
+pub use shorter::fit_from;
 pub(crate) use shorter::{Approached, approach, fit_near};
-pub use shorter::{fit_from, fit_thoroughly};
 
 /// A parameter to fit, with its prior.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,8 +128,6 @@ pub(crate) fn one_of_many<T>(result: Result<T, FitError>) -> Result<Option<T>, F
 struct State<'a> {
     fit: &'a Fit,
     watch: &'a dyn Watch,
-    /// Whether ends are polished, and more places followed.
-    is_thorough: bool,
     /// What the next searches came to, if it goes on from there.
     known: slice::Iter<'a, Found>,
     start: &'a World,
@@ -224,7 +222,6 @@ impl<'a> State<'a> {
         Ok(Self {
             fit,
             watch,
-            is_thorough: false,
             known: [].iter(),
             start,
             sweeps,

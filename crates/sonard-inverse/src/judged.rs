@@ -31,7 +31,7 @@ pub(crate) struct Judged {
     pub(crate) possible: SmallVec<[Possible; 2]>,
 }
 
-/// A reading's density and its derivatives.
+/// A reading's density and its derivatives, if it is in no arc of something else.
 pub(crate) struct Terms {
     pub(crate) density: f64,
     /// Probability that the scene does not explain it.
@@ -71,7 +71,7 @@ impl Judged {
             value + rates.iter().map(|&(at, rate)| rate * change[at as usize]).sum::<f64>()
         };
         let explained = 1.0 - errors.clutter;
-        let unexplained = errors.of_clutter(self.heard_m.is_some());
+        let unexplained = errors.clutter * errors.of_clutter(self.heard_m.is_some());
         // Density of the reading if it is this one, and its derivative by the range.
         let densities: SmallVec<[[f64; 2]; 3]> = self
             .possible
@@ -119,6 +119,14 @@ impl Judged {
             term.by_until /= density;
         }
         Terms { density, unexplained: unexplained / density, of }
+    }
+
+    /// The range of an echo less that of its likeliest explanation, with the probability that it is the right one, where the
+    /// reading is of the scene with some probability.
+    pub(crate) fn residual(&self, terms: &Terms, of_scene: f64) -> Option<(f64, f64)> {
+        let best = (0..self.possible.len())
+            .max_by(|&one, &other| terms.of[one].share.total_cmp(&terms.of[other].share))?;
+        Some((self.heard_m? - self.possible[best].range_m?, of_scene * terms.of[best].share))
     }
 
     /// How well one of the possible readings can be told from the next, from 0 to 1.

@@ -9,6 +9,7 @@
 //! arrival near the threshold, a missing echo means that none was strong enough, and the ends of arcs carry as much
 //! information as their ranges (`likelihood`).
 
+mod arcs;
 mod atlas;
 mod candidates;
 mod course;
@@ -34,10 +35,7 @@ mod world;
 pub use atlas::{Atlas, AtlasError};
 pub use course::{Course, Odometry};
 pub use doubt::{Doubt, doubts};
-pub use fit::{
-    Estimate, Fit, FitError, Fitted, Found, Prior, bound, fit, fit_from, fit_thoroughly,
-    fit_watched,
-};
+pub use fit::{Estimate, Fit, FitError, Fitted, Found, Prior, bound, fit, fit_from, fit_watched};
 pub use groups::{Group, GroupError, name, priors};
 pub use hypothesis::{Hypotheses, LogLikelihood};
 pub use likelihood::ErrorModel;

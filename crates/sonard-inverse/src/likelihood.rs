@@ -21,13 +21,23 @@ pub struct ErrorModel {
     /// Standard deviation of the threshold from firing to firing, decibels; it also has to cover by how much the
     /// model misses strengths.
     pub sigma_db: f64,
-    /// Share of readings that the scene does not explain: people, furniture, the robot itself.
+    /// Share of single readings that nothing explains, of those that are not in arcs of something else.
     pub clutter: f64,
-    /// Share of those that are silences.
+    /// Share of readings in arcs of what the scene lacks: people, furniture, the robot itself. None are looked for if it is 0.
+    pub arcs: f64,
+    /// How long such arcs are on average, in readings.
+    pub arc_beams: f64,
+    /// Share of all those that are silences.
     pub clutter_silent: f64,
     /// Where their echoes lie, metres: anywhere up to here.
     pub clutter_m: f64,
 }
+
+/// Share of the readings within an arc that are as the one before: silent too, or at nearly its range.
+const ALIKE: f64 = 0.85;
+/// How much the ranges of one differ, metres, on average; and by how many standard deviations of ranges that are told apart.
+const ARC_M: f64 = 0.01;
+const ARC_SIGMAS: f64 = 3.0;
 
 impl ErrorModel {
     /// Spread as of a first look: centimetres, some decibels, one reading in ten unexplained.
@@ -39,9 +49,17 @@ impl ErrorModel {
             tail_ratio: 2.0,
             sigma_db,
             clutter: 0.1,
+            arcs: 0.1,
+            arc_beams: 8.0,
             clutter_silent: 0.3,
             clutter_m: reach_m,
         }
+    }
+
+    /// The same without arcs: single readings alone may be unexplained, and so they stay. Poses are weighed against each other
+    /// so, each of which would have what it does not explain for arcs of something else.
+    pub(crate) const fn without_arcs(self) -> Self {
+        Self { arcs: 0.0, ..self }
     }
 
     /// The same with another standard deviation of ranges; the far tail keeps its length.
@@ -84,12 +102,42 @@ impl ErrorModel {
         (0..=STEPS).map(at).sum::<f64>() * step_m
     }
 
+    /// Share of readings that the scene explains, 0 to 1.
+    #[must_use]
+    pub const fn explained(&self) -> f64 {
+        (1.0 - self.arcs) * (1.0 - self.clutter)
+    }
+
     /// Density of a reading that nothing explains: of a range in metres, or the probability of a silence.
     pub(crate) fn of_clutter(&self, is_echo: bool) -> f64 {
         match is_echo {
-            true => self.clutter * (1.0 - self.clutter_silent) / self.clutter_m,
-            false => self.clutter * self.clutter_silent,
+            true => (1.0 - self.clutter_silent) / self.clutter_m,
+            false => self.clutter_silent,
         }
+    }
+
+    /// The same within an arc of something that the scene lacks, by the reading before if it was of that, too.
+    pub(crate) fn of_else(&self, before: Option<Option<f64>>, heard_m: Option<f64>) -> f64 {
+        let anywhere = self.of_clutter(heard_m.is_some());
+        let alike = match (before, heard_m) {
+            (None, _) => return anywhere,
+            (Some(None), None) => 1.0,
+            (Some(Some(before_m)), Some(heard_m)) => {
+                // Ranges that are not told apart yet can't be told to be alike: as long as predictions may be far off, what
+                // they say is not outdone by what any arc says of itself.
+                let width_m = ARC_M.hypot(ARC_SIGMAS * self.sigma_m);
+                (-(heard_m - before_m).abs() / width_m).exp() / (2.0 * width_m)
+            }
+            _ => 0.0,
+        };
+        ALIKE * alike + (1.0 - ALIKE) * anywhere
+    }
+
+    /// Probabilities of the next reading's state, of the scene or of something else, after each of them.
+    pub(crate) fn changes(&self) -> [[f64; 2]; 2] {
+        let leaves = 1.0 / self.arc_beams;
+        let enters = (leaves * self.arcs / (1.0 - self.arcs)).min(0.5);
+        [[1.0 - enters, enters], [leaves, 1.0 - leaves]]
     }
 }
 

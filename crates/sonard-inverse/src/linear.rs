@@ -5,8 +5,9 @@ use rayon::prelude::*;
 use sonard_model::geometry::Pose;
 
 use crate::{
+    arcs::{self, Counts, Emission, States},
     candidates::Phases,
-    judged::{Judged, Rates},
+    judged::{Judged, Rates, Terms},
     likelihood::ErrorModel,
     parameter::Parameter,
     rates::RateFinder,
@@ -17,7 +18,8 @@ use crate::{
 /// All readings, about one hypothesis.
 #[derive(Debug, Clone)]
 pub(crate) struct Linear {
-    beams: Vec<Judged>,
+    /// By sweep, in the order of its directions.
+    sweeps: Vec<Vec<Judged>>,
     /// How many parameters there are.
     count: usize,
 }
@@ -54,11 +56,11 @@ impl Linear {
         let count = rates.parameters();
         if let ([sweep], [pose]) = (sweeps, poses) {
             // Another thread would take longer to wake up than most sweeps take.
-            return Ok(Self { beams: of((0, (sweep, pose)))?, count });
+            return Ok(Self { sweeps: vec![of((0, (sweep, pose)))?], count });
         }
-        let beams: Result<Vec<Vec<Judged>>, WorldError> =
+        let sweeps: Result<Vec<Vec<Judged>>, WorldError> =
             sweeps.par_iter().zip(poses).enumerate().map(of).collect();
-        Ok(Self { beams: beams?.into_iter().flatten().collect(), count })
+        Ok(Self { sweeps: sweeps?, count })
     }
 
     /// Log-likelihoods of one sweep from a pose turned by so many degrees each and at thresholds higher by so many
@@ -79,7 +81,7 @@ impl Linear {
             Ok(rates.turned(simulator, point, sweep, pose, turns_deg)?)
         })?;
         let likely = |(beams, &turn_deg): (Vec<Judged>, &f64)| {
-            let linear = Self { beams, count: parameters.len() };
+            let linear = Self { sweeps: vec![beams], count: parameters.len() };
             let at = |db: f64| linear.log_likelihood(&DVector::from_element(1, db), errors);
             thresholds_db.iter().map(|&db| (turn_deg, db, at(db))).collect::<Vec<_>>()
         };
@@ -88,7 +90,11 @@ impl Linear {
 
     /// Log-likelihood of all readings after a change of the parameters.
     pub(crate) fn log_likelihood(&self, change: &DVector<f64>, errors: &ErrorModel) -> f64 {
-        self.beams.iter().map(|beam| beam.terms(change, errors).density.ln()).sum()
+        let of = |sweep: &Vec<Judged>| {
+            let emission = |beam: &Judged| emission(beam, &beam.terms(change, errors));
+            arcs::log_likelihood(sweep.iter().map(emission), errors)
+        };
+        self.sweeps.iter().map(of).sum()
     }
 
     /// The same with what it takes to improve it.
@@ -100,46 +106,91 @@ impl Linear {
             walk: DVector::zeros(self.count),
         };
         let of_range = errors.range_information();
-        for beam in &self.beams {
-            let terms = beam.terms(change, errors);
-            curve.value += terms.density.ln();
-            for (possible, term) in beam.possible.iter().zip(&terms.of) {
-                let of_range = of_range * possible.certainty(errors);
-                let weight = term.share * of_range;
-                for &(at, rate) in &possible.range_rates {
-                    curve.gradient[at as usize] += term.by_range * rate;
-                    curve.walk[at as usize] += weight * rate * possible.walk_m_per_db;
-                }
-                for &(at, rate) in &possible.until_rates {
-                    curve.gradient[at as usize] += term.by_until * rate;
-                }
-                add_outer(&mut curve.information, &possible.range_rates, weight);
-                add_outer(&mut curve.information, &possible.until_rates, term.expected_of_until);
+        for sweep in &self.sweeps {
+            let (terms, states) = beside_else(sweep, change, errors);
+            curve.value += states.log_likelihood;
+            for ((beam, terms), of_scene) in sweep.iter().zip(&terms).zip(states.of_scene) {
+                curve.add(beam, terms, of_scene, of_range, errors);
             }
         }
         curve
     }
 
-    /// Ranges of echoes that are explained, as differences from the likeliest explanation, with the probability that
-    /// it is the right one; and the share of readings that nothing explains.
-    pub(crate) fn residuals(&self, errors: &ErrorModel) -> (Vec<(f64, f64)>, f64) {
+    /// What there is to estimate the spread of readings from.
+    pub(crate) fn residuals(&self, errors: &ErrorModel) -> Residuals {
         let still = DVector::zeros(self.count);
-        let mut unexplained = 0.0;
-        let residuals = self.beams.iter().filter_map(|beam| {
-            let terms = beam.terms(&still, errors);
-            unexplained += terms.unexplained;
-            let best = (0..beam.possible.len())
-                .max_by(|&one, &other| terms.of[one].share.total_cmp(&terms.of[other].share))?;
-            Some((beam.heard_m? - beam.possible[best].range_m?, terms.of[best].share))
-        });
-        let residuals = residuals.collect();
-        (residuals, unexplained / self.beams.len().max(1) as f64)
+        let mut found = Residuals::default();
+        for sweep in &self.sweeps {
+            let (terms, states) = beside_else(sweep, &still, errors);
+            found.counts += states.counts;
+            for ((beam, terms), of_scene) in sweep.iter().zip(&terms).zip(states.of_scene) {
+                let unexplained = of_scene * terms.unexplained;
+                found.unexplained += unexplained;
+                found.silent_unexplained += if beam.heard_m.is_none() { unexplained } else { 0.0 };
+                found.of_ranges.extend(beam.residual(terms, of_scene));
+            }
+        }
+        found
     }
 
     /// How many readings there are.
-    pub(crate) const fn len(&self) -> usize {
-        self.beams.len()
+    pub(crate) fn len(&self) -> usize {
+        self.sweeps.iter().map(Vec::len).sum()
     }
+}
+
+/// What the readings are off by, and how many are not of the scene.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Residuals {
+    /// Ranges of echoes, as differences from the likeliest explanation, with the probability that it is the right one.
+    pub(crate) of_ranges: Vec<(f64, f64)>,
+    /// Expected number of single readings that nothing explains, and of those that are silences.
+    pub(crate) unexplained: f64,
+    pub(crate) silent_unexplained: f64,
+    /// Expected numbers of readings in arcs of something else.
+    pub(crate) counts: Counts,
+}
+
+impl Curve {
+    /// What a reading adds that is of the scene with some probability.
+    fn add(
+        &mut self,
+        beam: &Judged,
+        terms: &Terms,
+        of_scene: f64,
+        of_range: f64,
+        errors: &ErrorModel,
+    ) {
+        for (possible, term) in beam.possible.iter().zip(&terms.of) {
+            let weight = of_scene * term.share * of_range * possible.certainty(errors);
+            for &(at, rate) in &possible.range_rates {
+                self.gradient[at as usize] += of_scene * term.by_range * rate;
+                self.walk[at as usize] += weight * rate * possible.walk_m_per_db;
+            }
+            for &(at, rate) in &possible.until_rates {
+                self.gradient[at as usize] += of_scene * term.by_until * rate;
+            }
+            let of_until = of_scene * term.expected_of_until;
+            add_outer(&mut self.information, &possible.range_rates, weight);
+            add_outer(&mut self.information, &possible.until_rates, of_until);
+        }
+    }
+}
+
+/// The readings of a sweep if they are of the scene, and whether they are.
+fn beside_else(
+    sweep: &[Judged],
+    change: &DVector<f64>,
+    errors: &ErrorModel,
+) -> (Vec<Terms>, States) {
+    let terms: Vec<Terms> = sweep.iter().map(|beam| beam.terms(change, errors)).collect();
+    let emissions: Vec<Emission> =
+        sweep.iter().zip(&terms).map(|(beam, terms)| emission(beam, terms)).collect();
+    (terms, arcs::states(&emissions, errors))
+}
+
+const fn emission(beam: &Judged, terms: &Terms) -> Emission {
+    Emission { heard_m: beam.heard_m, of_scene: terms.density }
 }
 
 fn add_outer(to: &mut DMatrix<f64>, rates: &Rates, weight: f64) {

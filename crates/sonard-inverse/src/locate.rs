@@ -68,7 +68,7 @@ impl Mode {
             sigma_x_m: of[0].sigma,
             sigma_y_m: of[1].sigma,
             sigma_heading_deg: of[2].sigma,
-            explained: 1.0 - fitted.errors.clutter,
+            explained: fitted.errors.explained(),
             besides: besides.collect(),
         }
     }

@@ -116,7 +116,7 @@ impl Fitted {
     /// Whether a good part of the readings is not explained.
     #[must_use]
     pub const fn is_doubtful(&self) -> bool {
-        self.errors.clutter > 0.3
+        self.errors.explained() < 0.7
     }
 
     /// Pairs of estimates, by their places, that can hardly be told apart, with their correlation.

@@ -23,7 +23,7 @@ pub(super) fn fit_words(lines: &[Told], fitted: &Fitted, doubts: Vec<String>) ->
     let mut said = vec![format!(
         "{} readings: {:.0} % explained, ranges within {:.1} mm (standard deviation), strengths within {:.1} dB",
         fitted.readings,
-        100.0 * (1.0 - errors.clutter),
+        100.0 * errors.explained(),
         1e3 * errors.sigma_m,
         errors.sigma_db
     )];

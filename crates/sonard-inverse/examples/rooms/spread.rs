@@ -10,6 +10,8 @@ pub(crate) const SPREAD: ErrorModel = ErrorModel {
     tail_ratio: 2.0,
     sigma_db: 0.5,
     clutter: 0.002,
+    arcs: 0.002,
+    arc_beams: 8.0,
     clutter_silent: 0.3,
     clutter_m: 4.0,
 };

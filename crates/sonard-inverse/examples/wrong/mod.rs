@@ -4,7 +4,7 @@ use std::{f64::consts::TAU, sync::Arc};
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
-use sonard_inverse::{ErrorModel, Fit, Parameter, Prior, Sweep, World};
+use sonard_inverse::{Fit, Parameter, Prior, Sweep, World};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
@@ -13,13 +13,15 @@ use sonard_model::{
 };
 use uuid::Uuid;
 
-use crate::rooms::{NOISE_MM, place, readings};
+use crate::rooms::{place, readings};
 
 /// What may be wrong besides pose, air, threshold and a wall.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Kinds {
     pub(crate) mounting: bool,
     pub(crate) furniture: bool,
+    /// Only scenes without a robot's body, beside which a fit takes a hundred times as long.
+    pub(crate) bodiless: bool,
 }
 
 /// A world, what is believed of it, and a sweep in it.
@@ -30,23 +32,14 @@ pub(crate) struct Wrong {
     pub(crate) believed: World,
     /// The sweep with its pose.
     pub(crate) there: Sweep,
+    /// As it would be read without the furniture.
+    pub(crate) unhindered: Sweep,
     /// The sweep with what is believed of its pose.
     pub(crate) here: Sweep,
     pub(crate) fit: Fit,
     /// By parameter, what leads from what is believed to the truth.
     pub(crate) expected: Vec<f64>,
 }
-
-/// How readings spread.
-pub(crate) const ERRORS: ErrorModel = ErrorModel {
-    sigma_m: NOISE_MM * 1e-3,
-    tail_share: 0.1,
-    tail_ratio: 2.0,
-    sigma_db: 0.5,
-    clutter: 0.002,
-    clutter_silent: 0.3,
-    clutter_m: 4.0,
-};
 
 /// Pieces of furniture that the scene lacks: legs and bins of these radii, metres.
 const PIECES: usize = 5;
@@ -58,6 +51,9 @@ impl Wrong {
         let names: Vec<&'static str> = shipped::names().collect();
         let name = names[rng.random_range(0..names.len())];
         let scene = Arc::new(Scene::from_json(shipped::text(name)?).ok()?);
+        if kinds.bodiless && scene.robot.is_some() {
+            return None;
+        }
         let sensor = Sensor::preset("senscomp-6500").ok()?;
         let mut believed = World::new(scene, sensor, Air::default(), Options::default());
         believed.options.max_range_m = Some(4.0);
@@ -90,8 +86,10 @@ impl Wrong {
             true => furnished(&truth, &pose, &mut Pcg64::seed_from_u64(!seed))?,
             false => truth.clone(),
         };
+        let unhindered = readings(&truth, &pose, &mut rng.clone())?;
         let beams = readings(&measured, &pose, &mut rng)?;
         let there = Sweep { scan: Uuid::nil(), pose, beams };
+        let unhindered = Sweep { beams: unhindered, ..there.clone() };
         let said = Pose {
             x_m: pose.x_m + shift.x,
             y_m: pose.y_m + shift.y,
@@ -108,7 +106,7 @@ impl Wrong {
             least_sigma_m: 2e-4,
             least_sigma_db: 0.1,
         };
-        Some(Self { scene: name, truth, believed, there, here, fit, expected })
+        Some(Self { scene: name, truth, believed, there, unhindered, here, fit, expected })
     }
 }
 

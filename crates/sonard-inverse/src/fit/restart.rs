@@ -35,8 +35,8 @@ const LEAST_SHARE: f64 = 0.1;
 /// Places from which a fit goes on to where it ends, and how many of these ends are polished.
 const ENDS: usize = 8;
 const FOLLOWED: usize = 3;
-/// Places that are followed to their ends where a fit is not thorough, and the stage that these start with.
-const FOLLOWED_USUALLY: usize = 2;
+/// So many of these places are left by way of the last stage, too.
+const STAGED: usize = 2;
 const STAGE: usize = STAGES.len() - 1;
 /// A fit has gone astray that explains less than all readings but this share, or contradicts what was believed by
 /// this many standard deviations.
@@ -61,19 +61,11 @@ impl State<'_> {
                 keep_likelier(&mut best, self.attempt(start, 0))?;
             }
         }
-        if self.is_thorough {
-            best = self.polished(best)?;
-        }
+        best = self.polished(best)?;
         let places = self.places(&best)?;
-        if self.is_thorough {
-            for end in self.ends(&best, &places)? {
-                if end.value > best.value - FAR_BELOW {
-                    keep_likelier(&mut best, self.polished(end))?;
-                }
-            }
-        } else {
-            for place in places.iter().take(FOLLOWED_USUALLY) {
-                keep_likelier(&mut best, self.attempt(place.values.clone(), STAGE))?;
+        for end in self.ends(&best, &places)? {
+            if end.value > best.value - FAR_BELOW {
+                keep_likelier(&mut best, self.polished(end))?;
             }
         }
         let beside = self.beside(&best, &places)?;
@@ -84,10 +76,13 @@ impl State<'_> {
     fn ends(&mut self, best: &Settled, places: &[Place]) -> Result<Vec<Settled>, FitError> {
         let close = widened(&best.errors, CLOSE);
         let mut tried: Vec<Settled> = Vec::new();
-        for place in places.iter().take(ENDS) {
+        for (number, place) in places.iter().take(ENDS).enumerate() {
             (self.values, self.phases) = (place.values.clone(), Phases::Unknown);
             let end = self.settled(close).and_then(|end| self.with_phases(end));
             tried.extend(one_of_many(end)?);
+            if number < STAGED {
+                tried.extend(one_of_many(self.attempt(place.values.clone(), STAGE))?);
+            }
         }
         tried.sort_by(|one, other| other.value.total_cmp(&one.value));
         let mut ends: Vec<Settled> = Vec::new();
@@ -113,7 +108,7 @@ impl State<'_> {
     fn is_astray(&self, end: &Settled) -> bool {
         let (unexplained, sigmas) = ASTRAY;
         let contradicts = end.values.component_div(&self.prior_sigmas()).amax() > sigmas;
-        contradicts || end.errors.clutter > unexplained
+        contradicts || end.errors.explained() < 1.0 - unexplained
     }
 
     /// Other beginnings than what was believed.
@@ -181,10 +176,7 @@ impl State<'_> {
         let linear = self.linear()?;
         let of_best = self.value(&linear, &close);
         // What is best with the spreads that readings have need not be so with wider ones: what is near it is the same place.
-        let improved = match self.is_thorough {
-            true => one_of_many(self.improved(best.values.clone(), &close))?,
-            false => None,
-        };
+        let improved = one_of_many(self.improved(best.values.clone(), &close))?;
         let home = match improved {
             Some(Found::Place { values, log_posterior }) if log_posterior > of_best => {
                 Place { values: DVector::from_vec(values), value: log_posterior }
@@ -192,8 +184,7 @@ impl State<'_> {
             _ => Place { values: best.values.clone(), value: of_best },
         };
         let odds = |place: &Place| ((place.value - home.value) / READINGS_OF_ARC).min(0.0).exp();
-        let others =
-            |place: &&Place| !self.is_thorough || self.is_apart(&place.values, &home.values);
+        let others = |place: &&Place| self.is_apart(&place.values, &home.values);
         let all: f64 = 1.0 + places.iter().filter(others).map(odds).sum::<f64>();
         let mut beside = self.still();
         for place in places.iter().filter(others) {

@@ -1,4 +1,4 @@
-//! Fits that search more than usual, or less.
+//! Fits that search less than usual.
 
 use std::slice;
 
@@ -22,19 +22,6 @@ pub(crate) struct Approached {
     pub(crate) pose: Pose,
     pub(crate) log_posterior: f64,
     pub(crate) sigma_m: f64,
-}
-
-/// As [`fit`](super::fit), with ends that are polished and more places followed: some three times as long. Half of the fits
-/// in simulation end likelier so.
-///
-/// # Errors
-/// As [`fit`](super::fit).
-pub fn fit_thoroughly(world: &World, sweeps: &[Sweep], fit: &Fit) -> Result<Fitted, FitError> {
-    let models = Models::of(&world.with_face_on_axis())?;
-    let mut state = State::new(models, world, sweeps, fit, &Unwatched)?;
-    state.is_thorough = true;
-    let (best, beside) = state.likeliest()?;
-    state.end(best, &beside)
 }
 
 /// Where a fit ends that begins at other values than those believed: `start`, one change of each parameter. Arrivals meet with
@@ -101,7 +88,7 @@ impl State<'_> {
         &mut self,
         stages: impl Iterator<Item = usize>,
     ) -> Result<(Approached, ErrorModel), FitError> {
-        let mut errors = self.rough_errors();
+        let mut errors = self.rough_errors().without_arcs();
         self.approach(&mut errors, stages)?;
         let linear = self.linear()?;
         let spread = self.spread(&linear, &errors);

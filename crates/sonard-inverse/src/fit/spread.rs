@@ -1,7 +1,10 @@
 //! How readings spread about predictions.
 
 use super::State;
-use crate::{likelihood::ErrorModel, linear::Linear};
+use crate::{
+    likelihood::ErrorModel,
+    linear::{Linear, Residuals},
+};
 
 /// Shares of readings in the far tail that are tried.
 const TAILS: [f64; 5] = [0.0, 0.03, 0.06, 0.1, 0.2];
@@ -11,10 +14,10 @@ const SPREADS_DB: [f64; 9] = [0.1, 0.25, 0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0];
 impl State<'_> {
     /// The spread of readings about the present predictions: one step of expectation-maximisation.
     pub(super) fn spread(&self, linear: &Linear, errors: &ErrorModel) -> ErrorModel {
-        let (residuals, unexplained) = linear.residuals(errors);
-        let mut spread = *errors;
-        spread.clutter = unexplained.clamp(0.002, 0.5);
+        let residuals = linear.residuals(errors);
+        let spread = of_clutter(&residuals, errors);
         let mut sizes: Vec<f64> = residuals
+            .of_ranges
             .iter()
             .filter(|(_, share)| *share > 0.5)
             .map(|(residual_m, _)| residual_m.abs())
@@ -39,5 +42,31 @@ impl State<'_> {
         let of_threshold = |&sigma_db: &f64| ErrorModel { sigma_db, ..spread };
         let believed = SPREADS_DB.iter().filter(|sigma_db| **sigma_db >= self.fit.least_sigma_db);
         likeliest(&mut believed.map(of_threshold), spread)
+    }
+}
+
+/// Readings that are believed beforehand: how many in arcs of what the scene lacks and how long these are, and how many
+/// that nothing explains, with the share of silences.
+const BELIEVED_ARCS: (f64, f64) = (2.0, 8.0);
+const BELIEVED_SILENT: (f64, f64) = (5.0, 0.3);
+
+/// The same with the shares of what the scene does not explain: one step of Baum's and Welch's.
+fn of_clutter(residuals: &Residuals, errors: &ErrorModel) -> ErrorModel {
+    let Residuals { unexplained, silent_unexplained, counts, .. } = *residuals;
+    let (arcs, beams) = BELIEVED_ARCS;
+    let (believed, silent) = BELIEVED_SILENT;
+    let of_scene = (counts.all - counts.of_else).max(1.0);
+    let clutter = (unexplained / of_scene).clamp(0.002, 0.5);
+    if errors.arcs == 0.0 {
+        return ErrorModel { clutter, ..*errors };
+    }
+    let silences = counts.silent_of_else + silent_unexplained + believed * silent;
+    ErrorModel {
+        clutter,
+        arcs: (counts.of_else / counts.all.max(1.0)).clamp(0.002, 0.7),
+        arc_beams: ((counts.staying + counts.leaving + arcs * beams) / (counts.leaving + arcs))
+            .clamp(2.0, 60.0),
+        clutter_silent: (silences / (counts.of_else + unexplained + believed)).clamp(0.05, 0.8),
+        ..*errors
     }
 }

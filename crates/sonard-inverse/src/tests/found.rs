@@ -95,6 +95,7 @@ fn the_roughness_of_a_wall_comes_back() {
     let what = Fit::usual(priors, 0.02);
     let fitted = fit(&here, &sweeps, &what).expect("a fit");
     let told = &fitted.told(&here, &sweeps, &what)[0];
+    println!("{told:?}");
     assert!((told.value - 0.35).abs() < 2.0 * told.sigma && told.identified, "{told:?}");
     let scene = &fitted.world.scene;
     assert!((scene.walls[0].material.roughness - told.value).abs() < 1e-12, "{:?}", scene.walls[0]);
@@ -169,17 +170,18 @@ fn what_several_places_explain_is_not_told_for_sure() {
     }
     // Ten of them are where nothing is searched beside the place where a fit ends; three of the four that are left are from
     // one place, where the next best explanation is five standard deviations of the air's temperature away.
+    println!("{wrong} of {fits}");
     assert!(wrong <= 4, "{wrong} of {fits}");
 }
 
-/// Held to a threshold that is 9 dB too high, a fit would have it fall with the range, which no receiver's does: it
+/// Held to a threshold that is 4 dB too high, a fit would have it fall with the range, which no receiver's does: it
 /// stops where there is no rise, with an interval that begins there, and says so.
 #[test]
 fn what_would_go_past_its_limit_is_held_there_and_told() {
     let mut here = world("simple-room", "senscomp-6500");
     let pose = first_pose(&here.scene);
     let sweeps = [sweep(&here, &pose, &pose, 400, TofNoise::NONE, 1)];
-    here.sensor.threshold *= 10f64.powf(9.0 / 20.0);
+    here.sensor.threshold *= 10f64.powf(4.0 / 20.0);
     here.sensor.threshold_rise_db_per_m = 0.5;
     let of = |parameter, sigma| Prior { parameter, sigma };
     let what = Fit {
