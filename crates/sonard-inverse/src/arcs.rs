@@ -140,3 +140,78 @@ impl<I: Iterator<Item = Emission>> Iterator for Forward<'_, I> {
         Some(Step { states, norm, densities })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two silences, an arc at 0.7 m, and echoes that the scene makes likely.
+    fn readings() -> Vec<Emission> {
+        let heard_m = [None, None, Some(0.7), Some(0.702), Some(0.699), Some(1.4), Some(1.41)];
+        let of_scene = [0.9, 0.01, 1e-4, 3.0, 1e-3, 300.0, 0.2];
+        let of = |(heard_m, of_scene)| Emission { heard_m, of_scene };
+        heard_m.into_iter().zip(of_scene).map(of).collect()
+    }
+
+    /// The probability of the readings with one sequence of states.
+    fn joint(readings: &[Emission], is_else: &[bool], errors: &ErrorModel) -> f64 {
+        let changes = errors.changes();
+        let mut joint = 1.0;
+        for at in 0..readings.len() {
+            let own = usize::from(is_else[at]);
+            let before = at.checked_sub(1).map(|before| usize::from(is_else[before]));
+            joint *= match before {
+                None => [1.0 - errors.arcs, errors.arcs][own],
+                Some(before) => changes[before][own],
+            };
+            joint *= match (own, before) {
+                (0, _) => readings[at].of_scene,
+                (_, Some(1)) => {
+                    errors.of_else(Some(readings[at - 1].heard_m), readings[at].heard_m)
+                }
+                _ => errors.of_else(None, readings[at].heard_m),
+            };
+        }
+        joint
+    }
+
+    #[test]
+    fn recursions_sum_over_all_sequences_of_states() {
+        let readings = readings();
+        let errors = ErrorModel { arc_beams: 3.0, ..ErrorModel::rough(0.002, 1.0, 4.0) };
+        let (mut all, mut staying, mut leaving) = (0.0, 0.0, 0.0);
+        let mut of_scene = vec![0.0; readings.len()];
+        for sequence in 0u32..1 << readings.len() {
+            let is_else: Vec<bool> =
+                (0..readings.len()).map(|at| sequence & (1 << at) != 0).collect();
+            let joint = joint(&readings, &is_else, &errors);
+            all += joint;
+            for (at, of) in is_else.iter().enumerate() {
+                of_scene[at] += if *of { 0.0 } else { joint };
+            }
+            for pair in is_else.windows(2).filter(|pair| pair[0]) {
+                *(if pair[1] { &mut staying } else { &mut leaving }) += joint;
+            }
+        }
+        let states = states(&readings, &errors);
+        assert!((states.log_likelihood - all.ln()).abs() < 1e-12);
+        let alone = log_likelihood(readings.iter().copied(), &errors);
+        assert!((states.log_likelihood - alone).abs() < 1e-12);
+        for (found, expected) in states.of_scene.iter().zip(&of_scene) {
+            assert!((found - expected / all).abs() < 1e-12, "{found} {expected}");
+        }
+        assert!((states.counts.staying - staying / all).abs() < 1e-12, "{:?}", states.counts);
+        assert!((states.counts.leaving - leaving / all).abs() < 1e-12, "{:?}", states.counts);
+        // The arc is of something else, the echo that fits to the millimetre is not.
+        assert!(states.of_scene[2] < 0.01 && states.of_scene[5] > 0.9, "{:?}", states.of_scene);
+    }
+
+    #[test]
+    fn without_arcs_every_reading_stands_alone() {
+        let errors = ErrorModel::rough(0.002, 1.0, 4.0).without_arcs();
+        let alone: f64 = readings().iter().map(|reading| reading.of_scene.ln()).sum();
+        let states = states(&readings(), &errors);
+        assert!((states.log_likelihood - alone).abs() < 1e-12);
+        assert!(states.of_scene.iter().all(|of_scene| *of_scene == 1.0), "{:?}", states.of_scene);
+    }
+}

@@ -6,6 +6,9 @@
 //! is nearly as likely widens the intervals.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rand::SeedableRng as _;
+use rand_distr::{Distribution as _, StandardNormal};
+use rand_pcg::Pcg64;
 
 use super::{
     FitError, Settled, State,
@@ -41,8 +44,14 @@ const STAGE: usize = STAGES.len() - 1;
 /// A fit has gone astray that explains less than all readings but this share, or contradicts what was believed by
 /// this many standard deviations.
 const ASTRAY: (f64, f64) = (0.03, 3.5);
-/// Beginnings anew of such a one, in standard deviations of what a first look leaves in doubt.
+/// Beginnings anew of such a one: to both sides, in standard deviations of what a first look leaves in doubt.
 const ANEW: f64 = 1.5;
+/// Further ones, drawn from what was believed: how many, with which share of readings in arcs of something else they are looked
+/// at, how many are followed, and from which stage on.
+const DRAWN: usize = 48;
+const DRAWN_ARCS: f64 = 0.3;
+const DRAWN_FOLLOWED: usize = 4;
+const DRAWN_STAGE: usize = 3;
 
 /// Somewhere beside the end of a fit.
 struct Place {
@@ -51,24 +60,37 @@ struct Place {
     value: f64,
 }
 
+impl Settled {
+    fn place(&self) -> Place {
+        Place { values: self.values.clone(), value: self.value }
+    }
+}
+
 impl State<'_> {
     /// The likeliest end of all beginnings, and what the other places add to the variances of its values. Where there
     /// is nothing to predict, as within a wall, there is no other beginning.
     pub(super) fn likeliest(&mut self) -> Result<(Settled, DVector<f64>), FitError> {
         let mut best = self.attempt(self.still(), 0)?;
+        let mut seen: Vec<Place> = vec![best.place()];
         if self.is_astray(&best) && self.start.scene.robot.is_none() {
-            for start in self.beginnings()? {
-                keep_likelier(&mut best, self.attempt(start, 0))?;
+            let mut beginnings: Vec<(DVector<f64>, usize)> =
+                self.beginnings()?.into_iter().map(|start| (start, 0)).collect();
+            beginnings.extend(self.drawn()?.into_iter().map(|place| (place.values, DRAWN_STAGE)));
+            for (start, stage) in beginnings {
+                let end = one_of_many(self.attempt(start, stage))?;
+                seen.extend(end.as_ref().map(Settled::place));
+                keep_likelier(&mut best, end);
             }
         }
         best = self.polished(best)?;
         let places = self.places(&best)?;
         for end in self.ends(&best, &places)? {
             if end.value > best.value - FAR_BELOW {
-                keep_likelier(&mut best, self.polished(end))?;
+                seen.push(end.place());
+                keep_likelier(&mut best, one_of_many(self.polished(end))?);
             }
         }
-        let beside = self.beside(&best, &places)?;
+        let beside = self.beside(&best, &places, &seen)?;
         Ok((best, beside))
     }
 
@@ -120,6 +142,29 @@ impl State<'_> {
         Ok(sides.map(|start| self.limited(start)).collect())
     }
 
+    /// Of places drawn from what was believed, each improved, the likeliest: where an unmodelled thing answers most beams, wide
+    /// spreads of readings lead to it and not to the walls, from wherever one begins. Of many sweeps none are drawn: each could be
+    /// astray by itself.
+    fn drawn(&mut self) -> Result<Vec<Place>, FitError> {
+        if self.sweeps.len() > 1 {
+            return Ok(Vec::new());
+        }
+        let errors = ErrorModel { arcs: DRAWN_ARCS, ..widened(&self.rough_errors(), ROUGH) };
+        let errors = ErrorModel { sigma_m: ROUGH.0, sigma_db: ROUGH.1, ..errors };
+        let mut rng = Pcg64::seed_from_u64(1);
+        let sigmas = self.prior_sigmas();
+        let mut tried: Vec<Place> = Vec::new();
+        for number in 0..DRAWN {
+            let normal = sigmas.map(|_: f64| StandardNormal.sample(&mut rng));
+            let start = self.limited(sigmas.component_mul(&normal));
+            self.phases = Phases::Unknown;
+            tried.extend(self.place(start, &errors, (number + 1, DRAWN))?);
+        }
+        let mut places = self.distinct(tried, &[]);
+        places.truncate(DRAWN_FOLLOWED);
+        Ok(places)
+    }
+
     /// Places along the directions that are held least beside where a fit ended, each improved; the likeliest first, and
     /// one of those that are the same.
     fn places(&mut self, end: &Settled) -> Result<Vec<Place>, FitError> {
@@ -134,26 +179,43 @@ impl State<'_> {
                 number += 1;
                 let by = f64::from(place) * apart * sigma;
                 let start = self.limited(&end.values + by * &direction);
-                let found = self.found(|state| {
-                    state.watch.progress(Progress::Searching { place: number, of });
-                    state.improved(start, &close)
-                });
-                let Some(found) = one_of_many(found)? else { continue };
-                let Found::Place { values, log_posterior } = found else {
-                    return Err(FitError::OtherFit);
-                };
-                tried.push(Place { values: DVector::from_vec(values), value: log_posterior });
+                tried.extend(self.place(start, &close, (number, of))?);
             }
         }
+        Ok(self.distinct(tried, &[&end.values]))
+    }
+
+    /// A place that is improved, which of so many; nothing if there is nothing to predict with.
+    fn place(
+        &mut self,
+        start: DVector<f64>,
+        errors: &ErrorModel,
+        (place, of): (usize, usize),
+    ) -> Result<Option<Place>, FitError> {
+        let found = self.found(|state| {
+            state.watch.progress(Progress::Searching { place, of });
+            state.improved(start, errors)
+        });
+        match one_of_many(found)? {
+            None => Ok(None),
+            Some(Found::Place { values, log_posterior: value }) => {
+                Ok(Some(Place { values: DVector::from_vec(values), value }))
+            }
+            Some(_) => Err(FitError::OtherFit),
+        }
+    }
+
+    /// Places that are apart from each other and from those known, the likeliest first.
+    fn distinct(&self, mut tried: Vec<Place>, known: &[&DVector<f64>]) -> Vec<Place> {
         tried.sort_by(|one, other| other.value.total_cmp(&one.value));
         let mut places: Vec<Place> = Vec::new();
         for place in tried {
-            let known = places.iter().map(|other| &other.values).chain([&end.values]);
+            let known = places.iter().map(|other| &other.values).chain(known.iter().copied());
             if known.into_iter().all(|other| self.is_apart(&place.values, other)) {
                 places.push(place);
             }
         }
-        Ok(places)
+        places
     }
 
     /// Where it is likelier near a place.
@@ -169,8 +231,13 @@ impl State<'_> {
     }
 
     /// What variances gain because the values may be those of other places, which explain the readings nearly as
-    /// well.
-    fn beside(&mut self, best: &Settled, places: &[Place]) -> Result<DVector<f64>, FitError> {
+    /// well, or of other ends.
+    fn beside(
+        &mut self,
+        best: &Settled,
+        places: &[Place],
+        ends: &[Place],
+    ) -> Result<DVector<f64>, FitError> {
         (self.values, self.phases) = (best.values.clone(), Phases::Unknown);
         let close = widened(&best.errors, CLOSE);
         let linear = self.linear()?;
@@ -183,13 +250,24 @@ impl State<'_> {
             }
             _ => Place { values: best.values.clone(), value: of_best },
         };
-        let odds = |place: &Place| ((place.value - home.value) / READINGS_OF_ARC).min(0.0).exp();
-        let others = |place: &&Place| self.is_apart(&place.values, &home.values);
-        let all: f64 = 1.0 + places.iter().filter(others).map(odds).sum::<f64>();
+        let odds = |value: f64, of: f64| ((value - of) / READINGS_OF_ARC).min(0.0).exp();
+        let mut others: Vec<(&DVector<f64>, f64)> = Vec::new();
+        for (place, of) in places
+            .iter()
+            .map(|place| (place, home.value))
+            .chain(ends.iter().map(|end| (end, best.value)))
+        {
+            let known =
+                others.iter().map(|(values, _)| *values).chain([&home.values, &best.values]);
+            if known.into_iter().all(|known| self.is_apart(&place.values, known)) {
+                others.push((&place.values, odds(place.value, of)));
+            }
+        }
+        let all: f64 = 1.0 + others.iter().map(|(_, odds)| odds).sum::<f64>();
         let mut beside = self.still();
-        for place in places.iter().filter(others) {
-            let away = &place.values - &best.values;
-            beside += away.component_mul(&away) * (odds(place) / all);
+        for (values, odds) in others {
+            let away = values - &best.values;
+            beside += away.component_mul(&away) * (odds / all);
         }
         Ok(beside)
     }
@@ -247,11 +325,10 @@ fn widened(errors: &ErrorModel, (sigma_m, sigma_db, clutter): (f64, f64, f64)) -
     }
 }
 
-fn keep_likelier(best: &mut Settled, end: Result<Settled, FitError>) -> Result<(), FitError> {
-    if let Some(end) = one_of_many(end)?
+fn keep_likelier(best: &mut Settled, end: Option<Settled>) {
+    if let Some(end) = end
         && end.value > best.value
     {
         *best = end;
     }
-    Ok(())
 }
