@@ -46,6 +46,9 @@ pub(super) struct Args {
     /// Largest initial error of predicted ranges, metres
     #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = within(0.005..=1.0))]
     widest_m: f64,
+    /// Allow for things that the scene lacks, such as furniture: each may answer or hide many beams in a row
+    #[arg(long)]
+    furnished: bool,
     /// Output folder; the fitted sensor, scene, air and poses, the estimates and a report
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
@@ -66,6 +69,10 @@ with which the model explains the readings best: the ranges of echoes by any pat
 reported, missing echoes, and the ends of arcs. Each value comes with its standard deviation, and a remark if \
 the readings do not determine it better than the prior: such values stay where they were. The share of \
 unexplained readings is part of the result.
+
+A few unexplained readings do no harm. Where furniture that the scene lacks answers or hides a good part of the \
+beams, --furnished keeps it from bending the values. It is no default, because what the model misses of a wall or at \
+the edge of the beam may be taken for furniture, too.
 
 With --out, intermediate results are kept in DIR/unfinished.jsonl until the final ones are written: a stopped or \
 killed calibration continues when the same command is given again, and comes to the same result. Another \
@@ -106,7 +113,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let (sweeps, world) = read(args, &what_if)?;
     let priors = prior::fitted(&args.fit, &args.prior, &world, sweeps.len())?;
-    let what = Fit::usual(priors, args.widest_m);
+    let what = Fit { is_furnished: args.furnished, ..Fit::usual(priors, args.widest_m) };
     let head = Head::of(&world, &sweeps, &what);
     let open = |out: &OutPath| Unfinished::open(out, args.overwrite, &head);
     let unfinished = args.out.as_ref().map(open).transpose()?;

@@ -51,6 +51,9 @@ pub struct Fit {
     pub least_sigma_m: f64,
     /// Least spread of the threshold that is believed, decibels.
     pub least_sigma_db: f64,
+    /// Whether consecutive readings may be of things that the scene lacks, such as furniture. Where the model misses by
+    /// centimetres what one wall answers, or where a beam's edge is fitted, these explain too much.
+    pub is_furnished: bool,
 }
 
 /// A value found.
@@ -236,7 +239,8 @@ impl<'a> State<'a> {
     fn rough_errors(&self) -> ErrorModel {
         let World { options, sensor, .. } = self.start;
         let reach_m = options.max_range_m.unwrap_or(sensor.max_range_m);
-        ErrorModel::rough(self.fit.widest_m, settle::STAGES[0].1, reach_m)
+        let errors = ErrorModel::rough(self.fit.widest_m, settle::STAGES[0].1, reach_m);
+        if self.fit.is_furnished { errors } else { errors.without_arcs() }
     }
 
     /// Least spread of ranges that is believed, metres: that of steps in which they are told is theirs at least.

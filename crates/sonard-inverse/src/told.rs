@@ -72,6 +72,7 @@ impl Fit {
             widest_turn_deg: WIDEST_TURN_DEG,
             least_sigma_m: 2e-4,
             least_sigma_db: 0.5,
+            is_furnished: false,
         }
     }
 }

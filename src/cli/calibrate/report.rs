@@ -30,7 +30,7 @@ pub(super) fn fit_words(lines: &[Told], fitted: &Fitted, doubts: Vec<String>) ->
     if fitted.is_doubtful() {
         said.push(
             "doubt: a good part of the readings is not explained; see `sonard locate` whether the scene is the \
-             right one, and free what else may be wrong with --fit"
+             right one, free what else may be wrong with --fit, and allow for furniture with --furnished"
                 .to_owned(),
         );
     }

@@ -105,6 +105,7 @@ impl Wrong {
             widest_turn_deg: 12.0,
             least_sigma_m: 2e-4,
             least_sigma_db: 0.1,
+            is_furnished: kinds.furniture,
         };
         Some(Self { scene: name, truth, believed, there, unhindered, here, fit, expected })
     }

@@ -149,7 +149,8 @@ impl State<'_> {
         if self.sweeps.len() > 1 {
             return Ok(Vec::new());
         }
-        let errors = ErrorModel { arcs: DRAWN_ARCS, ..widened(&self.rough_errors(), ROUGH) };
+        let arcs = if self.fit.is_furnished { DRAWN_ARCS } else { 0.0 };
+        let errors = ErrorModel { arcs, ..widened(&self.rough_errors(), ROUGH) };
         let errors = ErrorModel { sigma_m: ROUGH.0, sigma_db: ROUGH.1, ..errors };
         let mut rng = Pcg64::seed_from_u64(1);
         let sigmas = self.prior_sigmas();

@@ -67,6 +67,7 @@ fn pose_air_and_threshold_come_back() {
         widest_turn_deg: 12.0,
         least_sigma_m: 2e-4,
         least_sigma_db: 0.5,
+        is_furnished: false,
     };
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
     let expected = [-0.05, 0.06, -5.0, 0.008, 4.0];
@@ -205,9 +206,9 @@ fn what_the_scene_lacks_bends_nothing() {
         ],
         0.1,
     );
+    let what = Fit { is_furnished: true, ..what };
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
     let explained = fitted.errors.explained();
-    println!("{explained} {:?}", fitted.estimates);
     assert!((0.3..0.95).contains(&explained), "{:?}", fitted.errors);
     for (estimate, expected) in fitted.estimates.iter().zip([-0.05, 0.06, -5.0, 3.0]) {
         let off = (estimate.change - expected).abs();
@@ -232,6 +233,7 @@ fn what_would_go_past_its_limit_is_held_there_and_told() {
         widest_turn_deg: 0.0,
         least_sigma_m: 2e-4,
         least_sigma_db: 0.5,
+        is_furnished: false,
     };
     let fitted = fit(&here, &sweeps, &what).expect("a fit");
     assert_eq!(fitted.world.sensor.threshold_rise_db_per_m, 0.0);
@@ -264,6 +266,7 @@ fn steps_of_the_range_are_part_of_its_spread() {
         widest_turn_deg: 12.0,
         least_sigma_m: 2e-4,
         least_sigma_db: 0.5,
+        is_furnished: false,
     };
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
     let spread_m = STEP_M / 12f64.sqrt();
