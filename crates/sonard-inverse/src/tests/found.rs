@@ -90,9 +90,12 @@ fn the_roughness_of_a_wall_comes_back() {
     let truth = here.changed(&[(&roughness, 0.15)]).expect("a world");
     assert_eq!(truth.scene.walls[0].material, truth.scene.materials["brick"]);
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
-    let sweeps = [sweep(&truth, &pose, &pose, 120, noise, 3)];
+    // One sweep leaves another roughness nearly as likely: what is scattered meets what is mirrored with phases of its own.
+    let beside = Pose { x_m: 2.1, y_m: 1.3, ..pose };
+    let sweeps =
+        [(pose, 3), (beside, 4)].map(|(pose, seed)| sweep(&truth, &pose, &pose, 120, noise, seed));
     let given = [("roughness brick".to_owned(), 0.3)];
-    let priors = priors(&[Group::Roughness], &given, &here, 1).expect("it is fitted");
+    let priors = priors(&[Group::Roughness], &given, &here, 2).expect("it is fitted");
     let what = Fit::usual(priors, 0.02);
     let fitted = fit(&here, &sweeps, &what).expect("a fit");
     let told = &fitted.told(&here, &sweeps, &what)[0];
@@ -195,18 +198,15 @@ fn what_the_scene_lacks_bends_nothing() {
     let believed =
         Pose { x_m: pose.x_m + 0.05, y_m: pose.y_m - 0.06, heading_deg: pose.heading_deg + 5.0 };
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
-    let sweep = sweep(&truth, &pose, &believed, 200, noise, 1);
-    let of = |parameter, sigma| Prior { parameter, sigma };
-    let what = Fit::usual(
-        vec![
-            of(Parameter::X(0), 0.06),
-            of(Parameter::Y(0), 0.06),
-            of(Parameter::Heading(0), 5.0),
-            of(Parameter::Threshold, 4.0),
-        ],
-        0.1,
-    );
-    let what = Fit { is_furnished: true, ..what };
+    let sweep = sweep(&truth, &pose, &believed, 400, noise, 1);
+    let priors = [
+        (Parameter::X(0), 0.06),
+        (Parameter::Y(0), 0.06),
+        (Parameter::Heading(0), 5.0),
+        (Parameter::Threshold, 4.0),
+    ];
+    let priors = priors.map(|(parameter, sigma)| Prior { parameter, sigma }).into();
+    let what = Fit { is_furnished: true, ..Fit::usual(priors, 0.1) };
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
     let explained = fitted.errors.explained();
     assert!((0.3..0.95).contains(&explained), "{:?}", fitted.errors);
