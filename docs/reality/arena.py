@@ -65,7 +65,7 @@ def imported(work, name, sweeps, sensor, place="fit_m"):
 
 def calibrate(work, sensor):
     priors = [arg for prior in PRIORS for arg in ("--prior", prior)]
-    lines = work.lines("calibrate", work.path("fitted.jsonl"), "--sensor", sensor, "--fit", FIT, *priors, "--out",
+    lines = work.lines("calibrate", work.path("fitted.jsonl"), "--sensor", sensor, "--fit", FIT, *priors, "--search", "thorough", "--out",
                        work.path("calibrated"), "--force", "--json")
     rows = [[line["name"], "%.5g" % line["prior"], "%.5g" % line["value"], "%.2g" % line["sigma"]]
             for line in lines if "scan" not in line]

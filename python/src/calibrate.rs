@@ -52,8 +52,9 @@ const USUAL: [&str; 3] = ["pose", "air", "threshold"];
 ///     Where the ranger is believed to have stood: x and y (metres) and heading (degrees); the scans' own without it.
 /// widest_m : float
 ///     Largest initial error of predicted ranges, metres, 0.005 to 1.
-/// furnished : bool
-///     Whether there may be things that the scene lacks, each of which answers or hides many beams in a row.
+/// search : {'usual', 'thorough', 'furnished'}
+///     How much to search: 'thorough' takes about three times as long and ends in the likeliest explanation more often;
+///     'furnished' searches as thoroughly, and things that the scene lacks may answer or hide many beams in a row.
 ///
 /// Returns
 /// -------
@@ -68,8 +69,8 @@ const USUAL: [&str; 3] = ["pose", "air", "threshold"];
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
 #[pyo3(signature = (scans, model = None, *, fit = None, priors = None, poses = None, widest_m = 0.1,
-    furnished = false),
-    text_signature = "(scans, model=None, *, fit=('pose', 'air', 'threshold'), priors=None, poses=None, widest_m=0.1, furnished=False)")]
+    search = "usual"),
+    text_signature = "(scans, model=None, *, fit=('pose', 'air', 'threshold'), priors=None, poses=None, widest_m=0.1, search='usual')")]
 pub(crate) fn calibrate<'py>(
     py: Python<'py>,
     scans: &Bound<'py, PyAny>,
@@ -78,7 +79,7 @@ pub(crate) fn calibrate<'py>(
     priors: Option<BTreeMap<String, f64>>,
     poses: Option<&Bound<'py, PyAny>>,
     widest_m: f64,
-    furnished: bool,
+    search: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
     if !(0.005..=1.0).contains(&widest_m) {
         let message = format!("widest_m is {widest_m}: it must be from 0.005 to 1");
@@ -97,7 +98,7 @@ pub(crate) fn calibrate<'py>(
     let priors = inverse::priors(&groups, &given, &believed, sweeps.len());
     let priors =
         priors.map_err(|error| refuse::<OptionError>(py, &error.to_string(), &error.help()))?;
-    let what = Fit { is_furnished: furnished, ..Fit::usual(priors, widest_m) };
+    let what = Fit { search: word(py, "search", search)?, ..Fit::usual(priors, widest_m) };
     let pool = pool(py, None)?;
     let fitted = py.detach(|| pool.install(|| inverse::fit(&believed, &sweeps, &what)));
     let fitted = fitted.map_err(|error| {

@@ -97,6 +97,15 @@ def test_priors_hold_what_they_say(log: Path, command: Command) -> None:
     assert found["x_m"].prior_sigma == pytest.approx(0.03)
 
 
+@pytest.mark.parametrize("search", ["thorough", "furnished"])
+def test_searches_are_those_of_the_command(log: Path, command: Command, search: str) -> None:
+    scans = sonard.read_log(log)
+    options = ("--fit", "pose", "--pose", ",".join(map(str, BELIEVED)), "--search", search, "--json")
+    lines = command("calibrate", log, *options)
+    found = sonard.calibrate(scans, fit=["pose"], poses=[BELIEVED], search=search)
+    assert [as_line(estimate) for estimate in found.estimates] == lines
+
+
 def test_what_can_not_be_fitted_says_why(log: Path, command: Command, tmp_path: Path) -> None:
     scans = sonard.read_log(log)
     for kind, words, options in [
@@ -105,6 +114,7 @@ def test_what_can_not_be_fitted_says_why(log: Path, command: Command, tmp_path: 
         (sonard.OptionError, "the prior of x_m is NaN", {"priors": {"x_m": np.nan}}),
         (sonard.OptionError, "neither floor nor ceiling", {"fit": ["height"]}),
         (sonard.OptionError, "expected one of `pose`", {"fit": ["everything"]}),
+        (sonard.OptionError, "expected one of `usual`", {"search": "everywhere"}),
         (sonard.SonardError, "no parameter to fit", {"fit": []}),
         (TypeError, "str", {"fit": "pose"}),
         (ValueError, "widest_m is 0", {"widest_m": 0.0}),

@@ -25,7 +25,7 @@ use super::{
     worlds::SweepArgs,
 };
 use crate::inverse::{
-    Fit, FitError, Fitted, Found, Group, Progress, Sweep, Told, Watch, World, fit_watched,
+    Fit, FitError, Fitted, Found, Group, Progress, Search, Sweep, Told, Watch, World, fit_watched,
 };
 use doubt::doubts_of;
 use report::write_folder;
@@ -46,9 +46,9 @@ pub(super) struct Args {
     /// Largest initial error of predicted ranges, metres
     #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = within(0.005..=1.0))]
     widest_m: f64,
-    /// Allow for things that the scene lacks, such as furniture: each may answer or hide many beams in a row
-    #[arg(long)]
-    furnished: bool,
+    /// How much to search, and for what
+    #[arg(long, value_name = "HOW", default_value = "usual", value_enum)]
+    search: Search,
     /// Output folder; the fitted sensor, scene, air and poses, the estimates and a report
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
@@ -71,8 +71,8 @@ the readings do not determine it better than the prior: such values stay where t
 unexplained readings is part of the result.
 
 A few unexplained readings do no harm. Where furniture that the scene lacks answers or hides a good part of the \
-beams, --furnished keeps it from bending the values. It is no default, because what the model misses of a wall or at \
-the edge of the beam may be taken for furniture, too.
+beams, --search furnished keeps it from bending the values. It is no default, because what the model misses of a wall \
+or at the edge of the beam may be taken for furniture, too.
 
 With --out, intermediate results are kept in DIR/unfinished.jsonl until the final ones are written: a stopped or \
 killed calibration continues when the same command is given again, and comes to the same result. Another \
@@ -113,7 +113,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let (sweeps, world) = read(args, &what_if)?;
     let priors = prior::fitted(&args.fit, &args.prior, &world, sweeps.len())?;
-    let what = Fit { is_furnished: args.furnished, ..Fit::usual(priors, args.widest_m) };
+    let what = Fit { search: args.search, ..Fit::usual(priors, args.widest_m) };
     let head = Head::of(&world, &sweeps, &what);
     let open = |out: &OutPath| Unfinished::open(out, args.overwrite, &head);
     let unfinished = args.out.as_ref().map(open).transpose()?;

@@ -9,7 +9,7 @@ use std::{
     process::Stdio,
 };
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::common::{run, sonard, stderr};
 
@@ -166,6 +166,34 @@ fn a_course_is_followed_while_its_log_is_written() {
     assert_eq!(of_end.count(), 2, "{alone:?}");
 }
 
+/// Two chair legs and a bin stand in a room of which the scene knows the walls alone.
+#[test]
+fn what_the_scene_lacks_bends_no_values_if_it_is_allowed_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let room = fs::read_to_string("scenes/simple-room.json").expect("it ships");
+    let mut room: Value = serde_json::from_str(&room).expect("JSON");
+    let cylinder = |id: &str, center: [f64; 2], radius_m: f64| json!({"id": id, "center": center, "radius_m": radius_m, "material": "shelving"});
+    room["cylinders"] = json!([
+        cylinder("leg", [0.58, 0.45], 0.02),
+        cylinder("other leg", [0.25, 0.53], 0.03),
+        cylinder("bin", [0.38, 0.1], 0.08),
+    ]);
+    let scene = folder.path().join("furnished.json");
+    fs::write(&scene, room.to_string()).expect("a file");
+    let log = sweep(folder.path(), scene.to_str().expect("plain"), "0.464,0.371,20", &COLD[2..]);
+    let calibrate =
+        ["calibrate", &log, "--scene", "simple-room", "--pose", "0.52,0.31,25", "--json"];
+    let found = lines(&[&calibrate[..], &["--search", "furnished"]].concat());
+    // Without this, the threshold would be 9 dB too low.
+    assert_eq!(found[4]["name"], "threshold_db");
+    assert!((number(&found[4], "value") - number(&found[4], "prior")).abs() < 3.0, "{}", found[4]);
+    for (line, value) in found.iter().zip([0.464, 0.371, 20.0]) {
+        let off = (number(line, "value") - value).abs();
+        assert!(off < 4.0 * number(line, "sigma") && line["identified"] == true, "{line}");
+    }
+    assert!(number(&found[0], "sigma") < 5e-3, "{}", found[0]);
+}
+
 #[test]
 fn what_can_not_be_fitted_is_said() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -175,6 +203,7 @@ fn what_can_not_be_fitted_is_said() {
         (vec!["calibrate", &log, "--prior", "x_m=-1"], "greater than 0"),
         (vec!["calibrate", &log, "--fit", "height"], "neither floor nor ceiling"),
         (vec!["calibrate", &log, "--fit", "everything"], "possible values"),
+        (vec!["calibrate", &log, "--search", "everywhere"], "usual, thorough, furnished"),
         (vec!["calibrate", "nowhere.jsonl"], "nowhere.jsonl"),
         (vec!["locate", &log, "--scene", "nowhere"], "nowhere"),
         (vec!["locate", &log, "--spacing-m", "0"], "0.01 to 2"),

@@ -61,6 +61,9 @@ pub(crate) fn log_likelihood(readings: impl Iterator<Item = Emission>, errors: &
 
 /// The same with what the readings say about each state.
 pub(crate) fn states(readings: &[Emission], errors: &ErrorModel) -> States {
+    if errors.arcs == 0.0 {
+        return alone(readings);
+    }
     let steps: Vec<Step> = Forward::new(readings.iter().copied(), errors).collect();
     let changes = errors.changes();
     let mut counts = Counts { all: readings.len() as f64, ..Counts::default() };
@@ -84,6 +87,15 @@ pub(crate) fn states(readings: &[Emission], errors: &ErrorModel) -> States {
     }
     let log_likelihood = steps.iter().map(|step| step.norm.ln()).sum();
     States { log_likelihood, of_scene, counts }
+}
+
+/// The same where nothing is looked for but the scene.
+fn alone(readings: &[Emission]) -> States {
+    States {
+        log_likelihood: readings.iter().map(|reading| reading.of_scene.ln()).sum(),
+        of_scene: vec![1.0; readings.len()],
+        counts: Counts { all: readings.len() as f64, ..Counts::default() },
+    }
 }
 
 /// A beam of the forward recursion.
@@ -206,12 +218,28 @@ mod tests {
         assert!(states.of_scene[2] < 0.01 && states.of_scene[5] > 0.9, "{:?}", states.of_scene);
     }
 
+    /// Also of a whole sweep that the scene explains nowhere, which an arc of something else would explain 10^1000 times as
+    /// well.
     #[test]
     fn without_arcs_every_reading_stands_alone() {
         let errors = ErrorModel::rough(0.002, 1.0, 4.0).without_arcs();
-        let alone: f64 = readings().iter().map(|reading| reading.of_scene.ln()).sum();
-        let states = states(&readings(), &errors);
-        assert!((states.log_likelihood - alone).abs() < 1e-12);
-        assert!(states.of_scene.iter().all(|of_scene| *of_scene == 1.0), "{:?}", states.of_scene);
+        let one_arc = vec![Emission { heard_m: Some(0.7), of_scene: 1e-4 }; 400];
+        for readings in [readings(), one_arc] {
+            let alone: f64 = readings.iter().map(|reading| reading.of_scene.ln()).sum();
+            let states = states(&readings, &errors);
+            assert!((states.log_likelihood - alone).abs() < 1e-9);
+            let likely = log_likelihood(readings.iter().copied(), &errors);
+            assert!((likely - alone).abs() < 1e-9);
+            assert!(states.of_scene.iter().all(|of_scene| *of_scene == 1.0), "{states:?}");
+        }
+    }
+
+    /// The same sweep with arcs: all of it is of one, and nothing overflows.
+    #[test]
+    fn a_sweep_may_be_one_arc() {
+        let errors = ErrorModel { arcs: 1e-3, ..ErrorModel::rough(0.002, 1.0, 4.0) };
+        let states = states(&[Emission { heard_m: Some(0.7), of_scene: 1e-4 }; 400], &errors);
+        assert!((states.counts.of_else - 400.0).abs() < 1e-3, "{:?}", states.counts);
+        assert!(states.of_scene.iter().all(|of_scene| (0.0..1e-3).contains(of_scene)));
     }
 }

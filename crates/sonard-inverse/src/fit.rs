@@ -11,7 +11,7 @@ mod step;
 use std::{rc::Rc, slice};
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sonard_model::geometry::{Pose, wrap_180};
 use thiserror::Error;
 
@@ -51,9 +51,24 @@ pub struct Fit {
     pub least_sigma_m: f64,
     /// Least spread of the threshold that is believed, decibels.
     pub least_sigma_db: f64,
-    /// Whether consecutive readings may be of things that the scene lacks, such as furniture. Where the model misses by
-    /// centimetres what one wall answers, or where a beam's edge is fitted, these explain too much.
-    pub is_furnished: bool,
+    /// How much is searched.
+    pub search: Search,
+}
+
+/// How much is searched, and for what. Of simulated sweeps half end likelier when searched thoroughly. Things that the scene
+/// lacks are no default, because they explain too much where the model misses by centimetres what one wall answers, or where a
+/// beam's edge is fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
+pub enum Search {
+    /// A few places beside the likeliest one
+    #[default]
+    Usual,
+    /// More places, and each to its end: about three times as long
+    Thorough,
+    /// As thoroughly, and things that the scene lacks may answer or hide many beams in a row
+    Furnished,
 }
 
 /// A value found.
@@ -240,7 +255,7 @@ impl<'a> State<'a> {
         let World { options, sensor, .. } = self.start;
         let reach_m = options.max_range_m.unwrap_or(sensor.max_range_m);
         let errors = ErrorModel::rough(self.fit.widest_m, settle::STAGES[0].1, reach_m);
-        if self.fit.is_furnished { errors } else { errors.without_arcs() }
+        if self.fit.search == Search::Furnished { errors } else { errors.without_arcs() }
     }
 
     /// Least spread of ranges that is believed, metres: that of steps in which they are told is theirs at least.

@@ -35,7 +35,9 @@ mod world;
 pub use atlas::{Atlas, AtlasError};
 pub use course::{Course, Odometry};
 pub use doubt::{Doubt, doubts};
-pub use fit::{Estimate, Fit, FitError, Fitted, Found, Prior, bound, fit, fit_from, fit_watched};
+pub use fit::{
+    Estimate, Fit, FitError, Fitted, Found, Prior, Search, bound, fit, fit_from, fit_watched,
+};
 pub use groups::{Group, GroupError, name, priors};
 pub use hypothesis::{Hypotheses, LogLikelihood};
 pub use likelihood::ErrorModel;

@@ -203,14 +203,7 @@ fn with_pose((widest_m, widest_turn_deg): (f64, f64), besides: &[Prior]) -> Fit 
     let pose: [Prior; POSE] =
         [of(Parameter::X(0), 0.5), of(Parameter::Y(0), 0.5), of(Parameter::Heading(0), 20.0)];
     let priors = pose.into_iter().chain(besides.iter().cloned()).collect();
-    Fit {
-        priors,
-        widest_m,
-        widest_turn_deg,
-        least_sigma_m: 5e-4,
-        least_sigma_db: 0.5,
-        is_furnished: false,
-    }
+    Fit { widest_turn_deg, least_sigma_m: 5e-4, ..Fit::usual(priors, widest_m) }
 }
 
 /// So many of a sweep's beams, evenly spread: two of three that heard something, where there are as many, because what

@@ -5,7 +5,7 @@ use sonard_model::acoustics::{Aperture, Sensor};
 use uuid::Uuid;
 
 use crate::{
-    fit::{Estimate, Fit, Fitted, Prior},
+    fit::{Estimate, Fit, Fitted, Prior, Search},
     groups::name,
     parameter::Parameter,
     sweep::Sweep,
@@ -72,7 +72,7 @@ impl Fit {
             widest_turn_deg: WIDEST_TURN_DEG,
             least_sigma_m: 2e-4,
             least_sigma_db: 0.5,
-            is_furnished: false,
+            search: Search::Usual,
         }
     }
 }

@@ -435,7 +435,7 @@ def calibrate(
     priors: dict[str, float] | None = None,
     poses: ArrayLike | None = None,
     widest_m: float = 0.1,
-    furnished: bool = False,
+    search: Literal["usual", "thorough", "furnished"] = "usual",
 ) -> Calibration: ...
 def compare(scans: Log | Scan | Iterable[Log | Scan]) -> dict[str, Any]: ...
 def interpret(

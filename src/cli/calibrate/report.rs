@@ -27,12 +27,21 @@ pub(super) fn fit_words(lines: &[Told], fitted: &Fitted, doubts: Vec<String>) ->
         1e3 * errors.sigma_m,
         errors.sigma_db
     )];
+    let is_furnished = errors.arcs > 0.0;
+    if is_furnished {
+        said.push(format!(
+            "{:.0} % are taken for things that the scene lacks, of {:.0} beams on average",
+            100.0 * errors.arcs,
+            errors.arc_beams
+        ));
+    }
     if fitted.is_doubtful() {
-        said.push(
+        let furniture =
+            if is_furnished { "" } else { ", or allow for furniture with --search furnished" };
+        said.push(format!(
             "doubt: a good part of the readings is not explained; see `sonard locate` whether the scene is the \
-             right one, free what else may be wrong with --fit, and allow for furniture with --furnished"
-                .to_owned(),
-        );
+             right one, and free what else may be wrong with --fit{furniture}"
+        ));
     }
     said.extend(doubts);
     for (one, other, correlation) in fitted.hardly_told_apart() {

@@ -4,7 +4,7 @@ use std::{f64::consts::TAU, sync::Arc};
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
-use sonard_inverse::{Fit, Parameter, Prior, Sweep, World};
+use sonard_inverse::{Fit, Parameter, Prior, Search, Sweep, World};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
@@ -105,7 +105,7 @@ impl Wrong {
             widest_turn_deg: 12.0,
             least_sigma_m: 2e-4,
             least_sigma_db: 0.1,
-            is_furnished: kinds.furniture,
+            search: if kinds.furniture { Search::Furnished } else { Search::Thorough },
         };
         Some(Self { scene: name, truth, believed, there, unhindered, here, fit, expected })
     }

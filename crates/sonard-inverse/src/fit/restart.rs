@@ -11,7 +11,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::{
-    FitError, Settled, State,
+    FitError, Search, Settled, State,
     journal::{Found, listed},
     one_of_many,
     polish::FAR_BELOW,
@@ -35,12 +35,14 @@ const ROUGH: (f64, f64, f64) = (0.03, 3.0, 0.05);
 const CLOSE: (f64, f64, f64) = (0.005, 1.5, 0.03);
 /// Directions of less doubt than this share of what was believed are held well enough.
 const LEAST_SHARE: f64 = 0.1;
-/// Places from which a fit goes on to where it ends, and how many of these ends are polished.
-const ENDS: usize = 8;
-const FOLLOWED: usize = 3;
-/// So many of these places are left by way of the last stage, too.
-const STAGED: usize = 2;
+/// Places that are followed to their ends, and the stage that these begin with.
+const FOLLOWED: usize = 2;
 const STAGE: usize = STAGES.len() - 1;
+/// Places from which a thorough fit goes on to where it ends, how many of them are left by way of that stage, too, and how
+/// many of these ends are polished.
+const ENDS: usize = 8;
+const STAGED: usize = 2;
+const POLISHED: usize = 3;
 /// A fit has gone astray that explains less than all readings but this share, or contradicts what was believed by
 /// this many standard deviations.
 const ASTRAY: (f64, f64) = (0.03, 3.5);
@@ -73,14 +75,19 @@ impl State<'_> {
         let mut best = self.attempt(self.still(), 0)?;
         let mut seen: Vec<Place> = vec![best.place()];
         if self.is_astray(&best) && self.start.scene.robot.is_none() {
-            let mut beginnings: Vec<(DVector<f64>, usize)> =
-                self.beginnings()?.into_iter().map(|start| (start, 0)).collect();
-            beginnings.extend(self.drawn()?.into_iter().map(|place| (place.values, DRAWN_STAGE)));
-            for (start, stage) in beginnings {
+            for (start, stage) in self.beginnings()? {
                 let end = one_of_many(self.attempt(start, stage))?;
                 seen.extend(end.as_ref().map(Settled::place));
                 keep_likelier(&mut best, end);
             }
+        }
+        if self.fit.search == Search::Usual {
+            let places = self.places(&best)?;
+            for place in places.iter().take(FOLLOWED) {
+                keep_likelier(&mut best, one_of_many(self.attempt(place.values.clone(), STAGE))?);
+            }
+            let beside = self.beside(&best, &places)?;
+            return Ok((best, beside));
         }
         best = self.polished(best)?;
         let places = self.places(&best)?;
@@ -90,7 +97,7 @@ impl State<'_> {
                 keep_likelier(&mut best, one_of_many(self.polished(end))?);
             }
         }
-        let beside = self.beside(&best, &places, &seen)?;
+        let beside = self.beside_thoroughly(&best, &places, &seen)?;
         Ok((best, beside))
     }
 
@@ -114,7 +121,7 @@ impl State<'_> {
                 ends.push(end);
             }
         }
-        ends.truncate(FOLLOWED);
+        ends.truncate(POLISHED);
         Ok(ends)
     }
 
@@ -133,13 +140,17 @@ impl State<'_> {
         contradicts || end.errors.explained() < 1.0 - unexplained
     }
 
-    /// Other beginnings than what was believed.
-    fn beginnings(&mut self) -> Result<Vec<DVector<f64>>, FitError> {
+    /// Other beginnings than what was believed, each with the stage it begins with.
+    fn beginnings(&mut self) -> Result<Vec<(DVector<f64>, usize)>, FitError> {
         let doubtful = self.doubtful(&self.still(), &self.rough_errors(), Phases::Unknown)?;
         let sides = doubtful
             .into_iter()
             .flat_map(|(direction, sigma)| [-ANEW, ANEW].map(|side| side * sigma * &direction));
-        Ok(sides.map(|start| self.limited(start)).collect())
+        let mut beginnings: Vec<_> = sides.map(|start| (self.limited(start), 0)).collect();
+        if self.fit.search != Search::Usual {
+            beginnings.extend(self.drawn()?.into_iter().map(|place| (place.values, DRAWN_STAGE)));
+        }
+        Ok(beginnings)
     }
 
     /// Of places drawn from what was believed, each improved, the likeliest: where an unmodelled thing answers most beams, wide
@@ -149,7 +160,7 @@ impl State<'_> {
         if self.sweeps.len() > 1 {
             return Ok(Vec::new());
         }
-        let arcs = if self.fit.is_furnished { DRAWN_ARCS } else { 0.0 };
+        let arcs = if self.fit.search == Search::Furnished { DRAWN_ARCS } else { 0.0 };
         let errors = ErrorModel { arcs, ..widened(&self.rough_errors(), ROUGH) };
         let errors = ErrorModel { sigma_m: ROUGH.0, sigma_db: ROUGH.1, ..errors };
         let mut rng = Pcg64::seed_from_u64(1);
@@ -232,8 +243,17 @@ impl State<'_> {
     }
 
     /// What variances gain because the values may be those of other places, which explain the readings nearly as
-    /// well, or of other ends.
-    fn beside(
+    /// well.
+    fn beside(&mut self, best: &Settled, places: &[Place]) -> Result<DVector<f64>, FitError> {
+        (self.values, self.phases) = (best.values.clone(), Phases::Unknown);
+        let linear = self.linear()?;
+        let of_best = self.value(&linear, &widened(&best.errors, CLOSE));
+        let others = places.iter().map(|place| (&place.values, odds(place.value, of_best)));
+        Ok(self.spread_of(best, others.collect()))
+    }
+
+    /// As `beside`, of a thorough fit: other ends count, too, and each place once.
+    fn beside_thoroughly(
         &mut self,
         best: &Settled,
         places: &[Place],
@@ -244,33 +264,34 @@ impl State<'_> {
         let linear = self.linear()?;
         let of_best = self.value(&linear, &close);
         // What is best with the spreads that readings have need not be so with wider ones: what is near it is the same place.
-        let improved = one_of_many(self.improved(best.values.clone(), &close))?;
-        let home = match improved {
+        let home = match one_of_many(self.improved(best.values.clone(), &close))? {
             Some(Found::Place { values, log_posterior }) if log_posterior > of_best => {
                 Place { values: DVector::from_vec(values), value: log_posterior }
             }
             _ => Place { values: best.values.clone(), value: of_best },
         };
-        let odds = |value: f64, of: f64| ((value - of) / READINGS_OF_ARC).min(0.0).exp();
+        let places = places.iter().map(|place| (place, home.value));
+        let ends = ends.iter().map(|end| (end, best.value));
         let mut others: Vec<(&DVector<f64>, f64)> = Vec::new();
-        for (place, of) in places
-            .iter()
-            .map(|place| (place, home.value))
-            .chain(ends.iter().map(|end| (end, best.value)))
-        {
-            let known =
-                others.iter().map(|(values, _)| *values).chain([&home.values, &best.values]);
-            if known.into_iter().all(|known| self.is_apart(&place.values, known)) {
+        for (place, of) in places.chain(ends) {
+            let known = others.iter().map(|(values, _)| *values);
+            let mut known = known.chain([&home.values, &best.values]);
+            if known.all(|known| self.is_apart(&place.values, known)) {
                 others.push((&place.values, odds(place.value, of)));
             }
         }
+        Ok(self.spread_of(best, others))
+    }
+
+    /// Variances about the best of other values with their odds.
+    fn spread_of(&self, best: &Settled, others: Vec<(&DVector<f64>, f64)>) -> DVector<f64> {
         let all: f64 = 1.0 + others.iter().map(|(_, odds)| odds).sum::<f64>();
         let mut beside = self.still();
         for (values, odds) in others {
             let away = values - &best.values;
             beside += away.component_mul(&away) * (odds / all);
         }
-        Ok(beside)
+        beside
     }
 
     /// The directions, in the parameters' units, in which readings that spread so much leave the most in doubt beside
@@ -315,6 +336,11 @@ impl State<'_> {
     fn is_apart(&self, one: &DVector<f64>, other: &DVector<f64>) -> bool {
         (one - other).component_div(&self.prior_sigmas()).amax() > 0.5 * LEAST_SHARE
     }
+}
+
+/// Of a place, beside another one that is as likely as `of` or more; at most one.
+fn odds(value: f64, of: f64) -> f64 {
+    ((value - of) / READINGS_OF_ARC).min(0.0).exp()
 }
 
 fn widened(errors: &ErrorModel, (sigma_m, sigma_db, clutter): (f64, f64, f64)) -> ErrorModel {

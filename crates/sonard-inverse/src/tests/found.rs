@@ -12,7 +12,8 @@ use uuid::Uuid;
 
 use super::{first_pose, world};
 use crate::{
-    Atlas, Beam, Fit, Group, Heard, Mode, Parameter, Prior, Sweep, World, fit, locate, priors,
+    Atlas, Beam, Fit, Group, Heard, Mode, Parameter, Prior, Search, Sweep, World, fit, locate,
+    priors,
 };
 
 /// A sweep as a world has it, with noise, said to be from another pose.
@@ -67,7 +68,7 @@ fn pose_air_and_threshold_come_back() {
         widest_turn_deg: 12.0,
         least_sigma_m: 2e-4,
         least_sigma_db: 0.5,
-        is_furnished: false,
+        search: Search::Usual,
     };
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
     let expected = [-0.05, 0.06, -5.0, 0.008, 4.0];
@@ -90,16 +91,12 @@ fn the_roughness_of_a_wall_comes_back() {
     let truth = here.changed(&[(&roughness, 0.15)]).expect("a world");
     assert_eq!(truth.scene.walls[0].material, truth.scene.materials["brick"]);
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
-    // One sweep leaves another roughness nearly as likely: what is scattered meets what is mirrored with phases of its own.
-    let beside = Pose { x_m: 2.1, y_m: 1.3, ..pose };
-    let sweeps =
-        [(pose, 3), (beside, 4)].map(|(pose, seed)| sweep(&truth, &pose, &pose, 120, noise, seed));
+    let sweeps = [sweep(&truth, &pose, &pose, 240, noise, 3)];
     let given = [("roughness brick".to_owned(), 0.3)];
-    let priors = priors(&[Group::Roughness], &given, &here, 2).expect("it is fitted");
+    let priors = priors(&[Group::Roughness], &given, &here, 1).expect("it is fitted");
     let what = Fit::usual(priors, 0.02);
     let fitted = fit(&here, &sweeps, &what).expect("a fit");
     let told = &fitted.told(&here, &sweeps, &what)[0];
-    println!("{told:?}");
     assert!((told.value - 0.35).abs() < 2.0 * told.sigma && told.identified, "{told:?}");
     let scene = &fitted.world.scene;
     assert!((scene.walls[0].material.roughness - told.value).abs() < 1e-12, "{:?}", scene.walls[0]);
@@ -160,7 +157,7 @@ fn what_several_places_explain_is_not_told_for_sure() {
         let priors =
             parameters.iter().map(|(of, sigma)| Prior { parameter: of.clone(), sigma: *sigma });
         let what = Fit::usual(priors.collect(), 0.15);
-        for seed in 1..=2 {
+        for seed in 1..=3 {
             let sweep = sweep(&truth, &pose, &believed, 400, noise, seed);
             let fitted = fit(&here, &[sweep], &what).expect("a fit");
             let mut off = fitted
@@ -174,7 +171,6 @@ fn what_several_places_explain_is_not_told_for_sure() {
     }
     // Ten of them are where nothing is searched beside the place where a fit ends; three of the four that are left are from
     // one place, where the next best explanation is five standard deviations of the air's temperature away.
-    println!("{wrong} of {fits}");
     assert!(wrong <= 4, "{wrong} of {fits}");
 }
 
@@ -206,7 +202,7 @@ fn what_the_scene_lacks_bends_nothing() {
         (Parameter::Threshold, 4.0),
     ];
     let priors = priors.map(|(parameter, sigma)| Prior { parameter, sigma }).into();
-    let what = Fit { is_furnished: true, ..Fit::usual(priors, 0.1) };
+    let what = Fit { search: Search::Furnished, ..Fit::usual(priors, 0.1) };
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
     let explained = fitted.errors.explained();
     assert!((0.3..0.95).contains(&explained), "{:?}", fitted.errors);
@@ -217,14 +213,14 @@ fn what_the_scene_lacks_bends_nothing() {
     assert!(fitted.estimates[0].sigma < 3e-3, "{:?}", fitted.estimates);
 }
 
-/// Held to a threshold that is 4 dB too high, a fit would have it fall with the range, which no receiver's does: it
+/// Held to a threshold that is 9 dB too high, a fit would have it fall with the range, which no receiver's does: it
 /// stops where there is no rise, with an interval that begins there, and says so.
 #[test]
 fn what_would_go_past_its_limit_is_held_there_and_told() {
     let mut here = world("simple-room", "senscomp-6500");
     let pose = first_pose(&here.scene);
     let sweeps = [sweep(&here, &pose, &pose, 400, TofNoise::NONE, 1)];
-    here.sensor.threshold *= 10f64.powf(4.0 / 20.0);
+    here.sensor.threshold *= 10f64.powf(9.0 / 20.0);
     here.sensor.threshold_rise_db_per_m = 0.5;
     let of = |parameter, sigma| Prior { parameter, sigma };
     let what = Fit {
@@ -233,7 +229,7 @@ fn what_would_go_past_its_limit_is_held_there_and_told() {
         widest_turn_deg: 0.0,
         least_sigma_m: 2e-4,
         least_sigma_db: 0.5,
-        is_furnished: false,
+        search: Search::Usual,
     };
     let fitted = fit(&here, &sweeps, &what).expect("a fit");
     assert_eq!(fitted.world.sensor.threshold_rise_db_per_m, 0.0);
@@ -266,7 +262,7 @@ fn steps_of_the_range_are_part_of_its_spread() {
         widest_turn_deg: 12.0,
         least_sigma_m: 2e-4,
         least_sigma_db: 0.5,
-        is_furnished: false,
+        search: Search::Usual,
     };
     let fitted = fit(&here, &[sweep], &what).expect("a fit");
     let spread_m = STEP_M / 12f64.sqrt();
