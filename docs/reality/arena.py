@@ -35,17 +35,18 @@ def main(work):
         imported(work, name, of, start)
     calibrate(work, start)
     sensor = work.path("calibrated", "sensor.json")
-    placed = {name: located(work, name, sensor, *OF_ITS_OWN) for name in groups}
-    courses = {name: along_course(work, of, sensor) for name, of in groups.items()}
-    by_run(work, groups["blind"], placed["blind"], courses["blind"], sensor)
-    found = located_by(groups["blind"], placed["blind"])
-    as_fitted = located_by(groups["blind"], located(work, "blind", sensor))
-    by_model(work, groups["blind"], found, located_by(groups["blind"], courses["blind"]), as_fitted, sensor)
+    ways = {"threshold and mounting of its own": OF_ITS_OWN, "the sensor as fitted": ()}
+    placed = {(name, way): located(work, name, sensor, *own) for name in groups for way, own in ways.items()}
+    courses = {(name, way): along_course(work, of, sensor, own)
+               for name, of in groups.items() for way, own in ways.items()}
+    table(["sweeps", "with", "located first", "right pose only in a later answer", "located along the course"],
+          [[name, way, *of_all(groups[name], placed[name, way], courses[name, way])] for name, way in placed])
+    blind, own, as_fitted = groups["blind"], *(("blind", way) for way in ways)
+    by_run(work, blind, placed[own], courses[own], sensor)
+    found = located_by(blind, placed[own])
+    by_model(work, blind, found, located_by(blind, courses[own]), located_by(blind, placed[as_fitted]), sensor)
     by_range(work, found, sensor)
     picture(work, *next(pair for pair in found if pair[0]["id"] == DRAWN), sensor)
-    count, course = (located_rightly(groups["fitted"], of["fitted"]) for of in (placed, courses))
-    print("of the %d fitted sweeps %d located first, %d in a later answer, %d along their courses\n" % (
-        len(groups["fitted"]), count["first"], count["later"], course["first"]))
 
 
 def start_sensor():
@@ -65,8 +66,8 @@ def imported(work, name, sweeps, sensor, place="fit_m"):
 
 def calibrate(work, sensor):
     priors = [arg for prior in PRIORS for arg in ("--prior", prior)]
-    lines = work.lines("calibrate", work.path("fitted.jsonl"), "--sensor", sensor, "--fit", FIT, *priors, "--search", "thorough", "--out",
-                       work.path("calibrated"), "--force", "--json")
+    lines = work.lines("calibrate", work.path("fitted.jsonl"), "--sensor", sensor, "--fit", FIT, *priors, "--search",
+                       "thorough", "--out", work.path("calibrated"), "--force", "--json")
     rows = [[line["name"], "%.5g" % line["prior"], "%.5g" % line["value"], "%.2g" % line["sigma"]]
             for line in lines if "scan" not in line]
     table(["", "was", "is", "standard deviation"], rows)
@@ -85,13 +86,13 @@ def located(work, name, sensor, *options):
     return [modes[scan] for scan in scans]
 
 
-def along_course(work, sweeps, sensor):
+def along_course(work, sweeps, sensor, own):
     """The modes of each sweep with those before it in its run. Odometry are the waypoints that the robots were sent to;
     headings, which are of the fits by hand, are not used."""
     placed = []
     for run in dict.fromkeys(sweep["group"] for sweep in sweeps):
         imported(work, run, [sweep for sweep in sweeps if sweep["group"] == run], sensor, "waypoint_m")
-        placed += located(work, run, sensor, "--course", "--drift-deg-per-m", "180", *OF_ITS_OWN)
+        placed += located(work, run, sensor, "--course", "--drift-deg-per-m", "180", *own)
     return placed
 
 
@@ -124,6 +125,11 @@ def located_rightly(sweeps, placed):
         count["first"] += is_right[:1] == [True]
         count["later"] += any(is_right[1:]) and not is_right[0]
     return count
+
+
+def of_all(sweeps, placed, courses):
+    alone, along = (located_rightly(sweeps, of) for of in (placed, courses))
+    return "%d of %d" % (alone["first"], len(sweeps)), alone["later"], "%d of %d" % (along["first"], len(sweeps))
 
 
 def is_near(mode, place):

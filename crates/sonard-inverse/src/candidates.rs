@@ -3,7 +3,7 @@
 use smallvec::SmallVec;
 use sonard_model::{
     acoustics::{Combining, Detector, Listening, Receiver, Rise},
-    model::{Arrival, Ear, ObservationPoint, TooCostly},
+    model::{Arrival, FiringArrivals, ObservationPoint, TooCostly},
 };
 
 /// Thresholds that are looked at, decibels to both sides of the nominal one.
@@ -88,14 +88,14 @@ impl Listener {
         direction_rad: f64,
         found: &mut Candidates,
     ) -> Result<(), TooCostly> {
-        point.hear(direction_rad, |ear| {
+        point.hear(direction_rad, |firing| {
             found.clear();
-            ear.listen(&self.receiver, |listening| self.rising(ear, listening, found));
+            firing.listen(&self.receiver, |listening| self.rising(firing, listening, found));
         })
     }
 
     /// From the lowest threshold up. A higher one is passed no earlier, so that time runs forward, too.
-    fn rising(&self, ear: &Ear, listening: &mut Listening, found: &mut Candidates) {
+    fn rising(&self, firing: &FiringArrivals, listening: &mut Listening, found: &mut Candidates) {
         let mut last: Option<Reported> = None;
         let (mut by_db, mut ready_us) = (-self.span_db, 0.0);
         while by_db < self.span_db && found.len() < MOST {
@@ -129,7 +129,7 @@ impl Listener {
                 _ => {
                     found.push(Candidate {
                         range_m: Some(next.rise.range_m),
-                        arrival: next.rise.arrival.map(|arrival| ear.arrival(&arrival)),
+                        arrival: next.rise.arrival.map(|arrival| firing.arrival(&arrival)),
                         until_db,
                         spread_db: self.spread_db(&next),
                         walk_m_per_db: self.walk_m_per_db(until_db - next.by_db),

@@ -28,7 +28,7 @@ pub use cost::{SearchPart, TooCostly};
 pub use engine::{Arrival, Arrivals, Engine};
 pub use fan::{Fan, FanSettings};
 pub use names::FACE_NAME;
-pub use observation::{Ear, ObservationPoint};
+pub use observation::{FiringArrivals, ObservationPoint};
 pub use options::{
     ConeOptions, EngineKind, EngineOptions, FanOptions, ForeignOption, OptionKeys, Options,
     PathOptions,

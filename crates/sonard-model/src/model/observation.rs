@@ -56,7 +56,7 @@ impl<'a> ObservationPoint<'a> {
     pub fn hear<T>(
         &self,
         direction_rad: f64,
-        listen: impl FnMut(&Ear) -> T,
+        listen: impl FnMut(&FiringArrivals) -> T,
     ) -> Result<T, TooCostly> {
         self.heard(direction_rad, listen).map(|(heard, _)| heard)
     }
@@ -85,7 +85,7 @@ impl<'a> ObservationPoint<'a> {
         direction_rad: f64,
         latch: Latch,
     ) -> Result<(Prediction, f64), TooCostly> {
-        self.heard(direction_rad, |ear| ear.prediction(ear.detect(receiver, latch, 0.0)))
+        self.heard(direction_rad, |firing| firing.prediction(firing.detect(receiver, latch, 0.0)))
     }
 
     /// What `listen` tells once it has enough of the arrivals, and up to which length there and back they matter,
@@ -93,27 +93,27 @@ impl<'a> ObservationPoint<'a> {
     fn heard<T>(
         &self,
         direction_rad: f64,
-        mut listen: impl FnMut(&Ear) -> T,
+        mut listen: impl FnMut(&FiringArrivals) -> T,
     ) -> Result<(T, f64), TooCostly> {
         let mut arrivals = Vec::with_capacity(USUAL_ARRIVALS);
         self.at(direction_rad, |all| {
             let ((heard, needed_m), _) = all.nearest(|near| {
                 near.listen(direction_rad, &mut arrivals);
-                let ear = Ear {
+                let firing = FiringArrivals {
                     firing: Firing { from: near, direction_rad },
                     arrivals: &arrivals,
                     reach_m: near.reach_m,
                     needed_m: Cell::new(Some(0.0)),
                 };
-                let heard = listen(&ear);
-                let needed_m = ear.needed_m.get();
+                let heard = listen(&firing);
+                let needed_m = firing.needed_m.get();
                 ((heard, needed_m.unwrap_or(f64::INFINITY)), needed_m)
             })?;
             Ok((heard, needed_m))
         })
     }
 
-    /// The same with the sound of other firings in the ear.
+    /// The same with the sound of other firings beside it.
     pub(super) fn ping_among(
         &self,
         direction_rad: f64,
@@ -151,7 +151,7 @@ impl<'a> ObservationPoint<'a> {
         })
     }
 
-    /// [`ping_in_noise`](Self::ping_in_noise) with the sound of other firings in the ear.
+    /// [`ping_in_noise`](Self::ping_in_noise) with the sound of other firings beside it.
     pub(super) fn ping_among_in_noise(
         &self,
         direction_rad: f64,
@@ -265,7 +265,7 @@ impl<'a> ObservationPoint<'a> {
 }
 
 /// A firing's arrivals, for receivers to listen to.
-pub struct Ear<'a> {
+pub struct FiringArrivals<'a> {
     firing: Firing<'a>,
     /// Shortest path first.
     arrivals: &'a [PulseArrival],
@@ -275,7 +275,7 @@ pub struct Ear<'a> {
     needed_m: Cell<Option<f64>>,
 }
 
-impl Ear<'_> {
+impl FiringArrivals<'_> {
     /// What a receiver detects that is ready from the end of blanking on, or from `ready_us` microseconds after firing
     /// if that is later: for one that is known not to have been raised before, because a more sensitive one was not.
     #[must_use]

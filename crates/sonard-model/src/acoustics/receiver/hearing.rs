@@ -6,18 +6,18 @@
 
 mod ideal;
 mod level;
-mod part;
 mod rise;
+mod summand;
 
 use std::cell::Cell;
 
 use num_complex::Complex64;
 
-use self::part::Part;
+use self::summand::Summand;
 use super::{Combining, Incident, PulseArrival, Receiver, gain::Step, noise::NoiseTrack};
 use crate::acoustics::{EchoShape, Gain};
 
-/// Arrivals that together add less than this part to another's amplitude leave it as it is.
+/// Arrivals that together add less than this share to another's amplitude leave it as it is.
 const NEGLIGIBLE: f64 = 3e-3;
 
 /// About one cycle of the carrier, microseconds.
@@ -36,7 +36,7 @@ pub(super) struct Hearing<'a> {
     /// The latest time that anything was asked about.
     asked_us: f64,
     /// The first arrivals, as far as they were ever asked about: what is known of them stays when time is turned back.
-    parts: Vec<Part>,
+    summands: Vec<Summand>,
     /// How many of them have begun now, the first `over` of which are over.
     begun: usize,
     over: usize,
@@ -101,7 +101,7 @@ impl<'a> Hearing<'a> {
             noise: None,
             horizon_us: f64::INFINITY,
             asked_us: 0.0,
-            parts: Vec::with_capacity(arrivals.len()),
+            summands: Vec::with_capacity(arrivals.len()),
             begun: 0,
             over: 0,
             summed: 0,
@@ -158,11 +158,13 @@ impl<'a> Hearing<'a> {
 
     /// Back to a time after firing: as if nothing later had been asked about.
     pub(super) fn rewind_to(&mut self, t_us: f64) {
-        self.over = self.parts.partition_point(|part| part.lasts_us[1] < t_us);
+        self.over = self.summands.partition_point(|summand| summand.lasts_us[1] < t_us);
         // What was over when it was first asked about is not known.
-        let known = self.parts[self.over..].iter().take_while(|part| !part.is_gone()).count();
-        self.parts.truncate(self.over + known);
-        self.begun = self.parts.partition_point(|part| part.lasts_us[0] <= t_us).max(self.over);
+        let known =
+            self.summands[self.over..].iter().take_while(|summand| !summand.is_gone()).count();
+        self.summands.truncate(self.over + known);
+        self.begun =
+            self.summands.partition_point(|summand| summand.lasts_us[0] <= t_us).max(self.over);
         (self.summed, self.watched, self.bounds) = (0, None, Bounds::default());
         self.expect();
     }
@@ -193,11 +195,11 @@ impl<'a> Hearing<'a> {
         }
         let t_us = t_us + CYCLE_US;
         self.advance(t_us);
-        let size = |part: &Part| part.size * self.modulus_at(part, t_us);
-        let (place, _) = self.parts[self.over..self.begun]
+        let size = |summand: &Summand| summand.size * self.modulus_at(summand, t_us);
+        let (place, _) = self.summands[self.over..self.begun]
             .iter()
             .enumerate()
-            .map(|(place, part)| (place, size(part)))
+            .map(|(place, summand)| (place, size(summand)))
             .filter(|(_, size)| *size > 0.0)
             .max_by(|one, other| one.1.total_cmp(&other.1))?;
         self.arrivals.get(self.over + place).copied()
@@ -221,11 +223,11 @@ impl<'a> Hearing<'a> {
         self.over..self.begun
     }
 
-    /// The part of an arrival in the envelope.
+    /// What an arrival adds to the envelope.
     pub(super) fn share(&self, place: usize, t_us: f64) -> f64 {
-        self.parts
-            .get(place)
-            .map_or(0.0, |part| part.size * self.modulus_at(part, t_us) * self.rise_of_gain(t_us))
+        self.summands.get(place).map_or(0.0, |summand| {
+            summand.size * self.modulus_at(summand, t_us) * self.rise_of_gain(t_us)
+        })
     }
 
     /// Whether nothing else sounds with `arrival` or within its length after it, and its strength is
@@ -246,22 +248,22 @@ impl<'a> Hearing<'a> {
     }
 
     #[inline]
-    fn shape_at(&self, part: &Part, t_us: f64) -> Complex64 {
-        self.shape(part).at(t_us - part.tof_us + self.receiver.lead_us)
+    fn shape_at(&self, summand: &Summand, t_us: f64) -> Complex64 {
+        self.shape(summand).at(t_us - summand.tof_us + self.receiver.lead_us)
     }
 
     /// The modulus of its shape.
     #[inline]
-    fn modulus_at(&self, part: &Part, t_us: f64) -> f64 {
-        if part.shape.is_none() && self.receiver.shape.is_real() {
-            let at_us = t_us - part.tof_us + self.receiver.lead_us;
+    fn modulus_at(&self, summand: &Summand, t_us: f64) -> f64 {
+        if summand.shape.is_none() && self.receiver.shape.is_real() {
+            let at_us = t_us - summand.tof_us + self.receiver.lead_us;
             return self.receiver.shape.real_at(at_us).abs();
         }
-        modulus(self.shape_at(part, t_us))
+        modulus(self.shape_at(summand, t_us))
     }
 
-    fn shape<'p>(&'p self, part: &'p Part) -> &'p EchoShape {
-        part.shape.as_deref().unwrap_or(&self.receiver.shape)
+    fn shape<'p>(&'p self, summand: &'p Summand) -> &'p EchoShape {
+        summand.shape.as_deref().unwrap_or(&self.receiver.shape)
     }
 
     /// The growth by the gain while an echo sounds; the other half is in the fields.
@@ -276,11 +278,11 @@ impl<'a> Hearing<'a> {
     /// The most that what lasts can add up to.
     fn bounds(&mut self) -> Bounds {
         if self.bounds.of != self.lasting() {
-            let live = &self.parts[self.over..self.begun];
+            let live = &self.summands[self.over..self.begun];
             self.bounds = Bounds {
                 of: self.lasting(),
-                strength: live.iter().map(|part| part.strength).sum(),
-                steepest: live.iter().map(|part| part.steepest).sum(),
+                strength: live.iter().map(|summand| summand.strength).sum(),
+                steepest: live.iter().map(|summand| summand.steepest).sum(),
             };
         }
         self.bounds
@@ -293,8 +295,8 @@ impl<'a> Hearing<'a> {
     /// Finds out when the next arrival begins.
     fn expect(&mut self) {
         (self.next_tof_us, self.next_us) =
-            match (self.parts.get(self.begun), self.arrivals.get(self.begun)) {
-                (Some(part), _) => (part.tof_us, part.lasts_us[0]),
+            match (self.summands.get(self.begun), self.arrivals.get(self.begun)) {
+                (Some(summand), _) => (summand.tof_us, summand.lasts_us[0]),
                 (None, Some(arrival)) => {
                     let tof_us = self.receiver.tof_us(arrival);
                     (tof_us, tof_us + self.span_us.0)
@@ -308,7 +310,7 @@ impl<'a> Hearing<'a> {
     fn advance(&mut self, t_us: f64) {
         self.enter(t_us, t_us);
         if self.receiver.combining != Combining::Ideal {
-            while self.over < self.begun && self.parts[self.over].lasts_us[1] < t_us {
+            while self.over < self.begun && self.summands[self.over].lasts_us[1] < t_us {
                 self.over += 1;
             }
         }
@@ -325,20 +327,20 @@ impl<'a> Hearing<'a> {
     }
 
     fn enter_next(&mut self, now_us: f64) {
-        if self.begun == self.parts.len() {
+        if self.begun == self.summands.len() {
             let (arrival, tof_us) = (&self.arrivals[self.begun], self.next_tof_us);
             let lasts_us = [self.next_us, tof_us + self.span_us.1];
-            let part = match lasts_us[1] < now_us {
-                true => Part::gone(tof_us, lasts_us),
-                false => self.part(arrival, tof_us, lasts_us),
+            let summand = match lasts_us[1] < now_us {
+                true => Summand::gone(tof_us, lasts_us),
+                false => self.summand_of(arrival, tof_us, lasts_us),
             };
-            self.parts.push(part);
+            self.summands.push(summand);
         }
         self.begun += 1;
         self.expect();
     }
 
-    fn part(&self, arrival: &PulseArrival, tof_us: f64, lasts_us: [f64; 2]) -> Part {
+    fn summand_of(&self, arrival: &PulseArrival, tof_us: f64, lasts_us: [f64; 2]) -> Summand {
         let receiver = self.receiver;
         let at_face = receiver.response.as_ref().and_then(|response| {
             let Incident { strength, incidence } = (self.incident)(arrival)?;
@@ -352,8 +354,8 @@ impl<'a> Hearing<'a> {
         let size = strength / self.rise_of_gain(tof_us);
         let phase_rad = arrival.phase_rad - receiver.omega * tof_us;
         // Nothing that sounds when it begins, or later, was over before the time that was last asked about.
-        let others = self.parts[self.over..].iter().map(|part| part.strength).sum();
-        Part::new((tof_us, lasts_us), (size, phase_rad), shape, &receiver.shape, others)
+        let others = self.summands[self.over..].iter().map(|summand| summand.strength).sum();
+        Summand::new((tof_us, lasts_us), (size, phase_rad), shape, &receiver.shape, others)
     }
 }
 

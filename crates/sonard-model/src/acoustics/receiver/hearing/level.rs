@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::{Combining, Hearing, Part, Receiver, modulus};
+use super::{Combining, Hearing, Receiver, Summand, modulus};
 use crate::acoustics::Detector;
 
 impl Hearing<'_> {
@@ -10,8 +10,8 @@ impl Hearing<'_> {
     pub(in super::super) fn level(&mut self, t_us: f64) -> f64 {
         self.advance(t_us);
         if self.summed < self.begun {
-            for part in &mut self.parts[self.summed.max(self.over)..self.begun] {
-                part.find_field();
+            for summand in &mut self.summands[self.summed.max(self.over)..self.begun] {
+                summand.find_field();
             }
             self.summed = self.begun;
         }
@@ -27,24 +27,25 @@ impl Hearing<'_> {
         }
         // All that lasts then has its field.
         self.level(t_us);
-        let live = self.parts[self.over..self.begun].iter();
-        let sum: Complex64 = live.map(|part| part.field * self.shape_at(part, t_us)).sum();
+        let live = self.summands[self.over..self.begun].iter();
+        let sum: Complex64 = live.map(|summand| summand.field * self.shape_at(summand, t_us)).sum();
         let noise = self.noise.map_or(Complex64::ZERO, |noise| noise.at(t_us));
         let phase_rad = (sum * self.rise_of_gain(t_us) + noise).arg();
         receiver.until_crest_us(phase_rad, t_us) - receiver.crest_us
     }
 
-    /// Envelope of the parts from a place on.
+    /// Envelope of the summands from a place on.
     #[inline]
     pub(super) fn level_of(&self, from: usize, t_us: f64) -> f64 {
-        let live = &self.parts[from..self.begun];
+        let live = &self.summands[from..self.begun];
         if !self.is_plain {
             return self.any_level(live, t_us);
         }
         // What most sensors have, at a part of the cost.
         let Receiver { shape, lead_us, .. } = self.receiver;
-        let fields =
-            live.iter().map(|part| part.field * shape.real_at(t_us - part.tof_us + lead_us));
+        let fields = live
+            .iter()
+            .map(|summand| summand.field * shape.real_at(t_us - summand.tof_us + lead_us));
         match self.receiver.combining {
             Combining::Incoherent => fields.map(|field| field.norm_sqr()).sum::<f64>().sqrt(),
             _ => modulus(fields.fold(Complex64::ZERO, |sum, field| sum + field)),
@@ -52,23 +53,24 @@ impl Hearing<'_> {
     }
 
     /// The same of any sensor, in noise too.
-    fn any_level(&self, live: &[Part], t_us: f64) -> f64 {
+    fn any_level(&self, live: &[Summand], t_us: f64) -> f64 {
         let noise = self.noise.map_or(Complex64::ZERO, |noise| noise.at(t_us));
         let gain = self.rise_of_gain(t_us);
         match self.receiver.combining {
             Combining::Coherent => {
                 let sum: Complex64 =
-                    live.iter().map(|part| part.field * self.shape_at(part, t_us)).sum();
+                    live.iter().map(|summand| summand.field * self.shape_at(summand, t_us)).sum();
                 modulus(sum * gain + noise)
             }
             Combining::Incoherent => {
-                let power = |part: &Part| (part.field * self.shape_at(part, t_us)).norm_sqr();
+                let power =
+                    |summand: &Summand| (summand.field * self.shape_at(summand, t_us)).norm_sqr();
                 let power: f64 = live.iter().map(power).sum();
                 modulus(noise).hypot(power.sqrt() * gain)
             }
             Combining::Ideal => live
                 .iter()
-                .map(|part| part.size * self.modulus_at(part, t_us) * gain)
+                .map(|summand| summand.size * self.modulus_at(summand, t_us) * gain)
                 .fold(modulus(noise), f64::max),
         }
     }

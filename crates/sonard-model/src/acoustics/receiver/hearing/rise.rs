@@ -1,6 +1,6 @@
 //! When the envelope of all arrivals together has been above the threshold for long enough.
 
-use super::{Hearing, Part, WINDOW_SLACK_US};
+use super::{Hearing, Summand, WINDOW_SLACK_US};
 use crate::acoustics::Gain;
 
 /// Steps at which an envelope is watched, microseconds: a third of the standard deviation of a
@@ -73,14 +73,14 @@ impl Hearing<'_> {
             }
             let entry_us = self.next_entry_us();
             if self.may_pass(t_us) {
-                let live = &self.parts[self.over..self.begun];
-                let [part] = live else { return Skip::To(t_us) };
-                if self.gain_steps_during(part) {
+                let live = &self.summands[self.over..self.begun];
+                let [summand] = live else { return Skip::To(t_us) };
+                if self.gain_steps_during(summand) {
                     return Skip::To(t_us);
                 }
-                let Some((rise_us, lasts)) = self.lone_rise(part, t_us) else {
+                let Some((rise_us, lasts)) = self.lone_rise(summand, t_us) else {
                     // It has passed already, or never does.
-                    let end_us = part.tof_us + self.span_us.1 + 1e-3;
+                    let end_us = summand.tof_us + self.span_us.1 + 1e-3;
                     match entry_us {
                         Some(entry_us) => t_us = entry_us.min(end_us),
                         None => return self.silence(),
@@ -93,7 +93,7 @@ impl Hearing<'_> {
                         self.asked_us = self.asked_us.max(done_us);
                         return Skip::Lone { rise_us };
                     }
-                    t_us = part.tof_us + self.span_us.1 + 1e-3;
+                    t_us = summand.tof_us + self.span_us.1 + 1e-3;
                     if let Some(entry_us) = entry_us {
                         t_us = t_us.min(entry_us);
                     }
@@ -112,7 +112,7 @@ impl Hearing<'_> {
     fn may_pass(&mut self, t_us: f64) -> bool {
         let least = self.threshold_factor * self.least_threshold;
         let gain = self.rise_of_gain(t_us).max(1.0);
-        let last = self.parts[self.over..self.begun].last();
+        let last = self.summands[self.over..self.begun].last();
         // The first is a bound of the second, which is told by one number.
         last.is_some_and(|last| last.with_others * gain >= least)
             && self.bounds().strength * gain >= least
@@ -152,25 +152,27 @@ impl Hearing<'_> {
 
     /// When an arrival alone passes the threshold after `t_us`, and whether it is above for the integration time or
     /// longer, or again after it.
-    fn lone_rise(&self, part: &Part, t_us: f64) -> Option<(f64, bool)> {
-        let at = |offset_us: f64| part.tof_us + offset_us - self.receiver.lead_us;
-        let level_at = |t_us: f64| self.threshold_at(t_us) / (part.size * self.rise_of_gain(t_us));
-        let mut rise_us = part.tof_us;
+    fn lone_rise(&self, summand: &Summand, t_us: f64) -> Option<(f64, bool)> {
+        let at = |offset_us: f64| summand.tof_us + offset_us - self.receiver.lead_us;
+        let level_at =
+            |t_us: f64| self.threshold_at(t_us) / (summand.size * self.rise_of_gain(t_us));
+        let mut rise_us = summand.tof_us;
         // The threshold drifts with the range, and the gain with the time.
         for _ in 0..2 {
-            rise_us = at(self.shape(part).rise_us(level_at(rise_us))?);
+            rise_us = at(self.shape(summand).rise_us(level_at(rise_us))?);
         }
         if rise_us < t_us {
             return None;
         }
-        let done_us = rise_us + self.receiver.integration_us - part.tof_us + self.receiver.lead_us;
-        Some((rise_us, self.shape(part).most_from(done_us) >= level_at(rise_us)))
+        let done_us =
+            rise_us + self.receiver.integration_us - summand.tof_us + self.receiver.lead_us;
+        Some((rise_us, self.shape(summand).most_from(done_us) >= level_at(rise_us)))
     }
 
     /// Whether the gain rises by a step while an arrival lasts.
-    fn gain_steps_during(&self, part: &Part) -> bool {
+    fn gain_steps_during(&self, summand: &Summand) -> bool {
         let Gain::Steps { steps } = &self.receiver.gain else { return false };
-        let [begins_us, ends_us] = part.lasts_us;
+        let [begins_us, ends_us] = summand.lasts_us;
         if self.step.get().holds_all(begins_us, ends_us) {
             return false;
         }

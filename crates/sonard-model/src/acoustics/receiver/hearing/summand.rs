@@ -1,10 +1,10 @@
-//! An arrival as a part of the sum.
+//! An arrival as a summand of the envelope.
 
 use num_complex::Complex64;
 
 use crate::acoustics::EchoShape;
 
-pub(super) struct Part {
+pub(super) struct Summand {
     pub(super) tof_us: f64,
     /// When it begins and when it is over.
     pub(super) lasts_us: [f64; 2],
@@ -25,7 +25,7 @@ pub(super) struct Part {
     pub(super) shape: Option<Box<EchoShape>>,
 }
 
-impl Part {
+impl Summand {
     /// One that is over and only keeps its place.
     pub(super) const fn gone(tof_us: f64, lasts_us: [f64; 2]) -> Self {
         Self {
