@@ -156,6 +156,8 @@ struct State<'a> {
     /// Of the world as it was last asked for, with the transducer on the axis.
     models: Models,
     phases: Phases,
+    /// Whether predictions are made with the transducer where it is, and not on the axis.
+    is_exact: bool,
     /// The predictions that were made last, and where.
     last: Option<(DVector<f64>, Phases, Rc<Linear>)>,
 }
@@ -247,6 +249,7 @@ impl<'a> State<'a> {
             values,
             models,
             phases: Phases::Unknown,
+            is_exact: false,
             last: None,
         })
     }
@@ -297,15 +300,20 @@ impl<'a> State<'a> {
         self.start.changed(&self.changes(&self.values))
     }
 
-    /// Predictions where it stands, with the transducer on the axis.
+    /// Predictions where it stands, with the transducer on the axis unless exact ones are wanted.
     fn linear(&mut self) -> Result<Rc<Linear>, FitError> {
         if let Some((values, phases, linear)) = &self.last
             && (values, *phases) == (&self.values, self.phases)
         {
             return Ok(Rc::clone(linear));
         }
-        let world = self.moved_world()?;
-        let linear = Rc::new(self.about(&self.models, &world)?);
+        let linear = if self.is_exact {
+            self.exact()?
+        } else {
+            let world = self.moved_world()?;
+            self.about(&self.models, &world)?
+        };
+        let linear = Rc::new(linear);
         self.last = Some((self.values.clone(), self.phases, Rc::clone(&linear)));
         Ok(linear)
     }
@@ -343,12 +351,8 @@ impl<'a> State<'a> {
 
     /// What came of it, where it settled; other places add so much to the variances.
     fn end(mut self, best: Settled, beside: &DVector<f64>) -> Result<Fitted, FitError> {
-        (self.values, self.phases) = (best.values, best.phases);
-        let errors = best.errors;
-        if !self.start.sensor.mounting.is_on_axis() {
-            let exact = self.exact()?;
-            self.improve(&exact, &errors)?;
-        }
+        let Settled { values, phases, errors, .. } = self.exactly(best)?;
+        (self.values, self.phases) = (values, phases);
         let linear = self.exact()?;
         let curve = linear.curve(&self.still(), &errors.for_information());
         let mut covariance =

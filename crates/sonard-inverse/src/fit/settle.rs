@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::{
-    FitError, Settled, State,
+    FitError, Search, Settled, State,
     journal::{Found, listed},
 };
 use crate::{candidates::Phases, likelihood::ErrorModel, linear::Linear, watch::Progress};
@@ -93,6 +93,25 @@ impl State<'_> {
             }),
             _ => Err(FitError::OtherFit),
         }
+    }
+
+    /// By exact predictions, where those from the axis have led: a thorough search polishes by them, the usual one makes a step.
+    pub(super) fn exactly(&mut self, end: Settled) -> Result<Settled, FitError> {
+        (self.values, self.phases) = (end.values.clone(), end.phases);
+        // Where it stands, which need not be where it began.
+        if self.world()?.sensor.mounting.is_on_axis() {
+            return Ok(end);
+        }
+        if self.fit.search == Search::Usual {
+            let exact = self.exact()?;
+            self.improve(&exact, &end.errors)?;
+            return Ok(Settled { values: self.values.clone(), ..end });
+        }
+        (self.is_exact, self.last) = (true, None);
+        let settled = self.settled(end.errors)?;
+        let polished = self.polished(settled)?;
+        (self.is_exact, self.last) = (false, None);
+        Ok(polished)
     }
 
     fn likeliest_here(&mut self, mut errors: ErrorModel) -> Result<Found, FitError> {

@@ -213,6 +213,36 @@ fn what_the_scene_lacks_bends_nothing() {
     assert!(fitted.estimates[0].sigma < 3e-3, "{:?}", fitted.estimates);
 }
 
+/// Believed on the axis, a face is 20 mm behind and 28 mm aside, which turns what it hears of corners by a degree: predictions
+/// from the axis, with paths longer to first order, would have the heading a degree off, six standard deviations.
+#[test]
+fn a_face_beside_the_axis_is_found_with_its_heading() {
+    let here = world("simple-room", "senscomp-6500");
+    let pose = first_pose(&here.scene);
+    let changes = [
+        (Parameter::X(0), -0.05, 0.06),
+        (Parameter::Y(0), 0.06, 0.06),
+        (Parameter::Heading(0), -5.0, 5.0),
+        (Parameter::Threshold, 3.0, 4.0),
+        (Parameter::Ahead, -0.02, 0.03),
+        (Parameter::Left, 0.028, 0.03),
+    ];
+    let of_sensor: Vec<_> = changes[3..].iter().map(|(of, by, _)| (of, *by)).collect();
+    let truth = here.changed(&of_sensor).expect("a world");
+    let believed =
+        Pose { x_m: pose.x_m + 0.05, y_m: pose.y_m - 0.06, heading_deg: pose.heading_deg + 5.0 };
+    let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
+    let sweep = sweep(&truth, &pose, &believed, 200, noise, 1);
+    let priors = changes.clone().map(|(parameter, _, sigma)| Prior { parameter, sigma }).into();
+    let what = Fit { search: Search::Thorough, ..Fit::usual(priors, 0.1) };
+    let fitted = fit(&here, &[sweep], &what).expect("a fit");
+    for (estimate, (of, expected, _)) in fitted.estimates.iter().zip(&changes) {
+        let off = (estimate.change - expected).abs();
+        assert!(off < 4.0 * estimate.sigma, "{of}: {estimate:?} for {expected}");
+    }
+    assert!(fitted.estimates[2].sigma < 0.4, "{:?}", fitted.estimates);
+}
+
 /// Held to a threshold that is 9 dB too high, a fit would have it fall with the range, which no receiver's does: it
 /// stops where there is no rise, with an interval that begins there, and says so.
 #[test]
