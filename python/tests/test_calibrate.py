@@ -3,7 +3,7 @@
 import json
 import pickle
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -98,7 +98,9 @@ def test_priors_hold_what_they_say(log: Path, command: Command) -> None:
 
 
 @pytest.mark.parametrize("search", ["thorough", "furnished"])
-def test_searches_are_those_of_the_command(log: Path, command: Command, search: str) -> None:
+def test_searches_are_those_of_the_command(
+    log: Path, command: Command, search: Literal["thorough", "furnished"]
+) -> None:
     scans = sonard.read_log(log)
     options = ("--fit", "pose", "--pose", ",".join(map(str, BELIEVED)), "--search", search, "--json")
     lines = command("calibrate", log, *options)
