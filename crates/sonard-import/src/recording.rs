@@ -6,6 +6,7 @@
 mod cdr;
 mod mcap;
 mod message;
+mod numbers;
 mod scan;
 mod transforms;
 
@@ -25,6 +26,7 @@ use crate::{ImportError, Mapping, Taken};
 use cdr::{Cdr, CdrError, Part};
 use mcap::{Message, Messages};
 use message::{Header, LaserScan, Range, Transform};
+use numbers::{as_written, billionths, plain_deg};
 use scan::Gathered;
 use transforms::{Placed, TransformError, Transforms};
 
@@ -381,21 +383,6 @@ fn told(range_m: f32, [least_m, most_m]: [f32; 2]) -> Option<(PingStatus, Option
         (_, true) => (PingStatus::NoEcho, None),
         _ => (PingStatus::Echo, Some(as_written(range_m))),
     })
-}
-
-/// The shortest number that is this one in four bytes: what was written before it became one.
-fn as_written(number: f32) -> f64 {
-    number.to_string().parse().unwrap_or_else(|_| f64::from(number))
-}
-
-/// Degrees of an angle that came through four bytes.
-fn plain_deg(angle_rad: f64) -> f64 {
-    (angle_rad.to_degrees() * 1e4).round() / 1e4
-}
-
-/// Without the last digits that turning back and forth leaves.
-fn billionths(number: f64) -> f64 {
-    (number * 1e9).round() / 1e9 + 0.0
 }
 
 #[cfg(test)]
