@@ -35,16 +35,18 @@ def main(work):
         imported(work, name, of, start)
     calibrate(work, start)
     sensor = work.path("calibrated", "sensor.json")
-    ways = {"threshold and mounting of its own": OF_ITS_OWN, "the sensor as fitted": ()}
-    placed = {(name, way): located(work, name, sensor, *own) for name in groups for way, own in ways.items()}
-    courses = {(name, way): along_course(work, of, sensor, own)
-               for name, of in groups.items() for way, own in ways.items()}
+    own, as_fitted = "threshold and mounting of its own", "the sensor as fitted"
+    ways = {own: OF_ITS_OWN, as_fitted: ()}
+    placed = {(name, way): located(work, name, sensor, *options) for name in groups for way, options in ways.items()}
+    courses = {(name, way): along_course(work, of, sensor, options)
+               for name, of in groups.items() for way, options in ways.items()}
     table(["sweeps", "with", "located first", "right pose only in a later answer", "located along the course"],
-          [[name, way, *of_all(groups[name], placed[name, way], courses[name, way])] for name, way in placed])
-    blind, own, as_fitted = groups["blind"], *(("blind", way) for way in ways)
-    by_run(work, blind, placed[own], courses[own], sensor)
-    found = located_by(blind, placed[own])
-    by_model(work, blind, found, located_by(blind, courses[own]), located_by(blind, placed[as_fitted]), sensor)
+          [[name, way, *how_many(groups[name], placed[name, way], courses[name, way])] for name, way in placed])
+    blind = groups["blind"]
+    by_run(work, blind, placed["blind", own], courses["blind", own], sensor)
+    found = located_by(blind, placed["blind", own])
+    by_model(work, blind, found, located_by(blind, courses["blind", own]),
+             located_by(blind, placed["blind", as_fitted]), sensor)
     by_range(work, found, sensor)
     picture(work, *next(pair for pair in found if pair[0]["id"] == DRAWN), sensor)
 
@@ -127,7 +129,8 @@ def located_rightly(sweeps, placed):
     return count
 
 
-def of_all(sweeps, placed, courses):
+def how_many(sweeps, placed, courses):
+    """How many are located first, only later, and along the course."""
     alone, along = (located_rightly(sweeps, of) for of in (placed, courses))
     return "%d of %d" % (alone["first"], len(sweeps)), alone["later"], "%d of %d" % (along["first"], len(sweeps))
 
@@ -142,12 +145,10 @@ def by_run(work, sweeps, placed, courses, sensor):
     rows = []
     for run, count in counts.items():
         of = [at for at, sweep in enumerate(sweeps) if run in ("all", sweep["group"])]
-        right, course = (located_rightly([sweeps[at] for at in of], [modes[at] for at in of])
-                         for modes in (placed, courses))
+        counted = how_many(*([all[at] for at in of] for all in (sweeps, placed, courses)))
         own = [median(value["value"] for at in of for value in placed[at][0]["besides"] if value["name"] == name)
                for name in ("threshold_db", "ahead_m")]
-        rows.append([run, "%.1f dB, %.0f mm" % (own[0], 1e3 * own[1]), "%d of %d" % (right["first"], len(of)),
-                     right["later"], "%d of %d" % (course["first"], len(of)),
+        rows.append([run, "%.1f dB, %.0f mm" % (own[0], 1e3 * own[1]), *counted,
                      "%s of %d" % (share(count["near"], count["echo"]), count["echo"]),
                      share(count["unheard"], count["echo"]),
                      "%s of %d" % (share(count["agreed"], count["silent"]), count["silent"]), count["body"]])

@@ -221,7 +221,8 @@ pub fn bound(
     let models = Models::of(&world.with_face_on_axis())?;
     let mut state = State::new(models, world, sweeps, fit, &Unwatched)?;
     state.phases = Phases::Known;
-    let curve = state.exact()?.curve(&state.still(), errors);
+    state.be_exact();
+    let curve = state.linear()?.curve(&state.still(), errors);
     let covariance = state.covariance(curve.information).ok_or(FitError::Degenerate)?;
     Ok((0..fit.priors.len()).map(|at| covariance[(at, at)].sqrt()).collect())
 }
@@ -307,10 +308,10 @@ impl<'a> State<'a> {
         {
             return Ok(Rc::clone(linear));
         }
+        let world = self.moved_world()?;
         let linear = if self.is_exact {
-            self.exact()?
+            self.about(&self.models.changed_to(&world)?, &world)?
         } else {
-            let world = self.moved_world()?;
             self.about(&self.models, &world)?
         };
         let linear = Rc::new(linear);
@@ -318,10 +319,9 @@ impl<'a> State<'a> {
         Ok(linear)
     }
 
-    /// Exact ones, with the transducer where it is.
-    fn exact(&mut self) -> Result<Linear, FitError> {
-        let world = self.moved_world()?;
-        self.about(&self.models.changed_to(&world)?, &world)
+    /// Has predictions made with the transducer where it is from here on.
+    fn be_exact(&mut self) {
+        (self.is_exact, self.last) = (true, None);
     }
 
     fn about(&self, models: &Models, world: &World) -> Result<Linear, FitError> {
@@ -353,7 +353,7 @@ impl<'a> State<'a> {
     fn end(mut self, best: Settled, beside: &DVector<f64>) -> Result<Fitted, FitError> {
         let Settled { values, phases, errors, .. } = self.exactly(best)?;
         (self.values, self.phases) = (values, phases);
-        let linear = self.exact()?;
+        let linear = self.linear()?;
         let curve = linear.curve(&self.still(), &errors.for_information());
         let mut covariance =
             self.covariance(curve.information.clone()).ok_or(FitError::Degenerate)?;

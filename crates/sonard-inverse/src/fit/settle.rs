@@ -95,23 +95,22 @@ impl State<'_> {
         }
     }
 
-    /// By exact predictions, where those from the axis have led: a thorough search polishes by them, the usual one makes a step.
+    /// By exact predictions, where those from the axis have led: a thorough search polishes by them, the usual one makes a step. All
+    /// that follow are exact, too.
     pub(super) fn exactly(&mut self, end: Settled) -> Result<Settled, FitError> {
         (self.values, self.phases) = (end.values.clone(), end.phases);
         // Where it stands, which need not be where it began.
         if self.world()?.sensor.mounting.is_on_axis() {
             return Ok(end);
         }
+        self.be_exact();
         if self.fit.search == Search::Usual {
-            let exact = self.exact()?;
+            let exact = self.linear()?;
             self.improve(&exact, &end.errors)?;
             return Ok(Settled { values: self.values.clone(), ..end });
         }
-        (self.is_exact, self.last) = (true, None);
         let settled = self.settled(end.errors)?;
-        let polished = self.polished(settled)?;
-        (self.is_exact, self.last) = (false, None);
-        Ok(polished)
+        self.polished(settled)
     }
 
     fn likeliest_here(&mut self, mut errors: ErrorModel) -> Result<Found, FitError> {

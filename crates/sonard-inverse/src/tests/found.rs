@@ -44,6 +44,11 @@ pub(super) fn sweep(
     Sweep { scan: Uuid::nil(), pose: *believed, beams: beams.collect() }
 }
 
+/// Where a ranger is believed to have stood that stood 5 cm and 6 cm beside it, and 5 degrees off.
+fn beside(pose: &Pose) -> Pose {
+    Pose { x_m: pose.x_m + 0.05, y_m: pose.y_m - 0.06, heading_deg: pose.heading_deg + 5.0 }
+}
+
 #[test]
 fn pose_air_and_threshold_come_back() {
     let here = world("simple-room", "senscomp-6500");
@@ -51,8 +56,7 @@ fn pose_air_and_threshold_come_back() {
     let truth = here
         .changed(&[(&Parameter::SoundSpeed, 0.008), (&Parameter::Threshold, 4.0)])
         .expect("a world");
-    let believed =
-        Pose { x_m: pose.x_m + 0.05, y_m: pose.y_m - 0.06, heading_deg: pose.heading_deg + 5.0 };
+    let believed = beside(&pose);
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
     let sweep = sweep(&truth, &pose, &believed, 400, noise, 1);
     let of = |parameter, sigma| Prior { parameter, sigma };
@@ -191,8 +195,7 @@ fn what_the_scene_lacks_bends_nothing() {
     }
     let furnished = World { scene: scene.into(), ..here.clone() };
     let truth = furnished.changed(&[(&Parameter::Threshold, 3.0)]).expect("a world");
-    let believed =
-        Pose { x_m: pose.x_m + 0.05, y_m: pose.y_m - 0.06, heading_deg: pose.heading_deg + 5.0 };
+    let believed = beside(&pose);
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
     let sweep = sweep(&truth, &pose, &believed, 400, noise, 1);
     let priors = [
@@ -229,8 +232,7 @@ fn a_face_beside_the_axis_is_found_with_its_heading() {
     ];
     let of_sensor: Vec<_> = changes[3..].iter().map(|(of, by, _)| (of, *by)).collect();
     let truth = here.changed(&of_sensor).expect("a world");
-    let believed =
-        Pose { x_m: pose.x_m + 0.05, y_m: pose.y_m - 0.06, heading_deg: pose.heading_deg + 5.0 };
+    let believed = beside(&pose);
     let noise = TofNoise::of_range_mm(1.0, truth.air.sound_speed_m_s());
     let sweep = sweep(&truth, &pose, &believed, 200, noise, 1);
     let priors = changes.clone().map(|(parameter, _, sigma)| Prior { parameter, sigma }).into();
