@@ -6,6 +6,7 @@ Broker, subscriber and daemon are processes; the log is read without sonard. Fig
 """
 
 import atexit
+import contextlib
 import http.client
 import json
 import os
@@ -78,6 +79,22 @@ class Broker:
         self.process.kill()
         self.process.wait()
 
+    def kill_once_read(self):
+        """Kills it in the middle of what it is sent, with all read of what it gave out itself.
+
+        A client that notices that the broker is gone throws away what it has not read yet. The broker told the
+        daemon that it has those messages, and forgets them with its memory: no later sending can bring them back.
+        """
+        self.process.send_signal(signal.SIGSTOP)
+        until("whoever reads from the broker", lambda: not self.unread_bytes())
+        self.kill()
+
+    def unread_bytes(self):
+        """What its clients have not read yet of what it gave out (columns of the kernel's table: proc_net_tcp)."""
+        connections = (line.split() for line in pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:])
+        from_broker = (fields[4] for fields in connections if fields[2].endswith(f":{self.port:04X}"))
+        return sum(int(queues.split(":")[1], 16) for queues in from_broker)
+
     def remember(self):
         """Has it write its sessions to the disk, as a restart does."""
         file = self.folder / "mosquitto.db"
@@ -109,6 +126,12 @@ class Subscriber:
         """Readings that came, each counted once."""
         lines = self.file.read_bytes().split(b"\n")[:-1]
         return len({line for line in lines if line.startswith(f"sonard/{ROBOT}/ping ".encode())})
+
+    @contextlib.contextmanager
+    def stopped(self):
+        self.process.send_signal(signal.SIGSTOP)
+        yield
+        self.process.send_signal(signal.SIGCONT)
 
     def stop(self):
         self.process.terminate()
@@ -240,13 +263,18 @@ def kills(work):
     while pings(folder) < READINGS:
         # What a broker has for a subscriber that is not back yet goes with the broker, and is no daemon's loss.
         until("the subscriber", lambda: subscriber.pings() == pings(folder))
+        # What dies without one is given no last will.
+        until("a connection", lambda: daemon.mqtt()["connected"])
         before = pings(folder)
         take_scans(daemon, 5)
         # In the middle of the scans, and of what is under way.
         until("readings", lambda: pings(folder) > before + 200)
         kills += 1
         if kills % 2:
-            broker.kill()
+            # Behind, as on a computer with much else to do.
+            with subscriber.stopped():
+                until("unread messages", broker.unread_bytes)
+            broker.kill_once_read()
             broker.start()
             until("the scans", lambda: is_idle(daemon))
         else:
