@@ -17,7 +17,7 @@ use std::{
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use rooms::{BEAMS, place, readings};
-use sonard_inverse::{Atlas, Mode, Sweep, World, locate};
+use sonard_inverse::{Atlas, Heard, Mode, Sweep, World, locate};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{Pose, wrap_180},
@@ -75,7 +75,8 @@ fn located_in(name: &str, count: u64, seed: u64, beams: usize) {
         sure += u32::from(found.is_some_and(|mode| mode.probability > 0.5));
         if found.is_none() {
             let how = if is_told { "told as unknown" } else { "not found" };
-            println!("{name}: {how}: {pose:?} in {modes:?}");
+            let echoes = sweep.beams.iter().filter(|beam| matches!(beam.heard, Heard::Echo { .. }));
+            println!("{name}: {how} by {} echoes: {pose:?} in {modes:?}", echoes.count());
         }
     }
     times.sort_by(f64::total_cmp);

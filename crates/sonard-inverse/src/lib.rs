@@ -11,6 +11,7 @@
 
 mod arcs;
 mod atlas;
+mod bearing;
 mod candidates;
 mod course;
 mod doubt;

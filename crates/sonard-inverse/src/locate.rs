@@ -82,6 +82,12 @@ impl Mode {
 /// Matches of the atlas that are improved roughly, and of those how many with all beams.
 const ROUGH: usize = 8;
 const WHOLE: usize = 4;
+/// A place that is known less well than this, metres, is one of many; and so may be one where a smaller share of the beams
+/// heard something. So many more are looked at then.
+const OPEN_M: f64 = 0.1;
+const FEW_ECHOES: f64 = 0.1;
+const ROUGH_OPEN: usize = 56;
+const WHOLE_OPEN: usize = 12;
 /// As far off as a match may be: metres, with places 0.1 m apart, and degrees, with directions 3 apart.
 const ROUGH_WIDEST: (f64, f64) = (0.08, 4.5);
 /// As far off as a rough fit's heading may be, degrees.
@@ -132,12 +138,18 @@ pub(crate) fn explaining(
 ) -> Result<Vec<Fitted>, FitError> {
     let besides = &atlas.besides;
     let search = Search { models: atlas.models(world)?, world, sweep, besides, watch };
-    let matches = atlas.matches(world, sweep, ROUGH);
-    let starts = matches.iter().map(|Match { pose, .. }| pose).chain(expected);
+    let matches = atlas.matches(world, sweep, ROUGH_OPEN);
+    let (best, others) = matches.split_at(ROUGH.min(matches.len()));
+    let starts = best.iter().map(|Match { pose, .. }| pose).chain(expected);
     let mut found = search.improved(starts, WHOLE + expected.len())?;
-    if found.first().is_none_or(|best| best.log_likelihood < 0.0) {
-        match atlas.matches_beside(world, sweep, ROUGH, watch) {
-            Ok(matches) => found.extend(search.improved(matches.iter().map(|of| &of.pose), WHOLE)?),
+    let is_open = is_open(sweep, found.first());
+    if is_open {
+        found.extend(search.improved(others.iter().map(|of| &of.pose), WHOLE_OPEN)?);
+    }
+    if is_open || found.first().is_none_or(|best| best.log_likelihood < 0.0) {
+        let (rough, whole) = if is_open { (ROUGH_OPEN, WHOLE_OPEN) } else { (ROUGH, WHOLE) };
+        match atlas.matches_beside(world, sweep, rough, watch) {
+            Ok(matches) => found.extend(search.improved(matches.iter().map(|of| &of.pose), whole)?),
             Err(AtlasError::Stopped) => return Err(FitError::Stopped),
             Err(AtlasError::World(error)) => return Err(error.into()),
             Err(AtlasError::NoPlace) => {}
@@ -145,6 +157,20 @@ pub(crate) fn explaining(
     }
     found.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
     Ok(distinct(found, 0.05, |found| &found.poses[0]))
+}
+
+/// Whether a sweep may have been taken from many places: it heard little, as of one wall or edge, or the likeliest place is
+/// hardly held.
+fn is_open(sweep: &Sweep, likeliest: Option<&Fitted>) -> bool {
+    let echoes = sweep.beams.iter().filter(is_echo).count() as f64;
+    echoes < FEW_ECHOES * sweep.beams.len() as f64
+        || likeliest.is_some_and(|likeliest| sigma_m(likeliest) > OPEN_M)
+}
+
+/// Standard deviation of the place of a sweep that was fitted, metres: root mean square of both axes.
+fn sigma_m(fitted: &Fitted) -> f64 {
+    let of = &fitted.estimates;
+    (0.5 * (of[0].sigma.powi(2) + of[1].sigma.powi(2))).sqrt()
 }
 
 /// What is looked for where.
@@ -209,12 +235,15 @@ fn with_pose((widest_m, widest_turn_deg): (f64, f64), besides: &[Prior]) -> Fit 
 /// So many of a sweep's beams, evenly spread: two of three that heard something, where there are as many, because what
 /// a place is known by are its echoes, and of a sweep before two walls hardly any other beam has one.
 fn thinned(sweep: &Sweep, count: usize) -> Sweep {
-    let is_echo = |beam: &&Beam| matches!(beam.heard, Heard::Echo { .. });
     let (echoes, silent): (Vec<&Beam>, Vec<&Beam>) = sweep.beams.iter().partition(is_echo);
     let of_silent = silent.len().min(count - echoes.len().min(2 * count / 3));
     let of_echoes = echoes.len().min(count - of_silent);
     let beams = evenly(&echoes, of_echoes).chain(evenly(&silent, of_silent)).copied().collect();
     Sweep { beams, ..sweep.clone() }
+}
+
+const fn is_echo(beam: &&Beam) -> bool {
+    matches!(beam.heard, Heard::Echo { .. })
 }
 
 fn evenly<'a>(of: &'a [&'a Beam], count: usize) -> impl Iterator<Item = &'a Beam> {

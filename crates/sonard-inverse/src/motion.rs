@@ -47,11 +47,17 @@ impl Motion {
     }
 
     fn of(&self, scene: &Scene, mechanism: Mechanism, point: DVec2) -> DVec3 {
+        let up = if mechanism == Mechanism::Transducer { self.up } else { 0.0 };
+        self.of_plan(scene, mechanism, point).extend(up)
+    }
+
+    /// Velocity of what a path meets at a point, in the plan.
+    pub(crate) fn of_plan(&self, scene: &Scene, mechanism: Mechanism, point: DVec2) -> DVec2 {
         let stands = self.walls.is_empty() && self.cylinders.is_empty();
         if stands && mechanism != Mechanism::Transducer {
-            return DVec3::ZERO;
+            return DVec2::ZERO;
         }
-        let in_plane = match mechanism {
+        match mechanism {
             Mechanism::Reflection(Reflector::Wall(wall))
             | Mechanism::Scattering { wall }
             | Mechanism::Diffraction(Diffractor::Level { wall, .. }) => {
@@ -66,17 +72,26 @@ impl Motion {
             }
             Mechanism::Reflection(Reflector::Cylinder(cylinder)) => {
                 let Some((velocity, growth)) = self.of_cylinder(cylinder) else {
-                    return DVec3::ZERO;
+                    return DVec2::ZERO;
                 };
                 let center = scene.cylinders.get(cylinder as usize).map_or(point, |c| c.center);
                 velocity + growth * (point - center).normalize_or_zero()
             }
             Mechanism::Reflection(Reflector::Floor | Reflector::Ceiling) => DVec2::ZERO,
-            Mechanism::Transducer => {
-                return (0.5 * (self.transducer[0] + self.transducer[1])).extend(self.up);
-            }
+            Mechanism::Transducer => 0.5 * (self.transducer[0] + self.transducer[1]),
+        }
+    }
+
+    /// How a wall turns that a path meets, radians for each unit.
+    pub(crate) fn turn_of(&self, scene: &Scene, mechanism: Mechanism) -> f64 {
+        let (Mechanism::Reflection(Reflector::Wall(wall))
+        | Mechanism::Diffraction(Diffractor::Level { wall, .. })) = mechanism
+        else {
+            return 0.0;
         };
-        in_plane.extend(0.0)
+        let [at_a, at_b] = self.of_wall(wall);
+        let along = scene.walls.get(wall as usize).map_or(DVec2::X, |wall| wall.b - wall.a);
+        along.perp_dot(at_b - at_a) / along.length_squared()
     }
 }
 

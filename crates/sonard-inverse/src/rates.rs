@@ -11,6 +11,7 @@ use sonard_model::{
 };
 
 use crate::{
+    bearing::Bearing,
     candidates::{Candidate, Candidates, Listener, Phases, SPAN_DB},
     judged::{Judged, Possible, Rates},
     motion::{Motion, length_rate},
@@ -146,21 +147,37 @@ impl<'a> RateFinder<'a> {
 
     fn possible(&self, candidate: &Candidate, firing: &Firing, concerning: &[u32]) -> Possible {
         let stretch = self.reference_m_s / firing.simulator.sound_speed_m_s();
-        let beside_m =
-            candidate.arrival.as_ref().map_or(0.0, |arrival| 0.5 * self.longer_m(arrival, firing));
-        let range_m =
-            candidate.range_m.map(|range_m| stretch * (range_m + beside_m) + self.world.delay_m);
+        let beside =
+            candidate.arrival.as_ref().and_then(|arrival| self.beside_axis(arrival, firing));
+        let (longer_m, louder_db) = beside.unwrap_or_default();
+        let range_m = candidate
+            .range_m
+            .map(|range_m| stretch * (range_m + 0.5 * longer_m) + self.world.delay_m);
         let (mut range_rates, mut until_rates) = (Rates::new(), Rates::new());
         if let (Some(arrival), Some(predicted_m)) = (&candidate.arrival, candidate.range_m) {
+            let flanks = Flanks::of(arrival, firing);
             for &at in concerning {
+                let turning;
+                let motion = match &self.steady[at as usize] {
+                    Some(motion) => Some(motion),
+                    None => {
+                        turning = self.turning_motion(at, firing);
+                        turning.as_ref()
+                    }
+                };
                 let by_range = match self.parameters[at as usize] {
                     Parameter::SoundSpeed => -stretch * predicted_m,
                     Parameter::Delay => 1.0,
-                    _ => 0.5 * stretch * self.length_rate(at, arrival, firing),
+                    _ => motion.map_or(0.0, |motion| {
+                        0.5 * stretch * firing.length_rate(arrival, firing.ends, motion)
+                    }),
                 };
                 let by_db = match self.parameters[at as usize] {
                     Parameter::ThresholdRise => -predicted_m,
-                    _ => self.margin_rate(at, arrival, firing),
+                    _ => {
+                        motion.map_or(0.0, |motion| flanks.rate_db(firing, motion))
+                            + self.margin_rate(at, arrival, firing, &flanks)
+                    }
                 };
                 range_rates.extend((by_range != 0.0).then_some((at, by_range)));
                 until_rates.extend((by_db != 0.0).then_some((at, by_db)));
@@ -169,65 +186,54 @@ impl<'a> RateFinder<'a> {
         Possible {
             range_m,
             range_rates,
-            until_db: candidate.until_db,
+            until_db: candidate.until_db + louder_db,
             until_rates,
             spread_db: candidate.spread_db,
             walk_m_per_db: stretch * candidate.walk_m_per_db,
         }
     }
 
-    /// What a path from the axis gains where the face is beside it, to first order.
-    fn longer_m(&self, arrival: &Arrival, firing: &Firing) -> f64 {
+    /// What a path from the axis gains where the face is beside it: in length, to first order, and by the beam pattern in
+    /// the directions in which it leaves and comes then, decibels. `None` where it was found from the face.
+    fn beside_axis(&self, arrival: &Arrival, firing: &Firing) -> Option<(f64, f64)> {
         let mounting = &self.world.sensor.mounting;
         if mounting.is_on_axis() || !firing.simulator.sensor().mounting.is_on_axis() {
-            return 0.0;
+            return None;
         }
         let places = mounting.places(DVec2::ZERO, firing.direction_rad);
         let motion = Motion { transducer: places, ..Motion::default() };
-        firing.length_rate(arrival, [firing.axis; 2], &motion)
+        let ends = [firing.axis; 2];
+        let scene = firing.simulator.scene();
+        let louder_db = |(weights, off_rad): ([f64; 2], f64)| {
+            let turn_rad = Bearing::new(arrival, ends, scene, weights)?.rate(scene, &motion);
+            let level_db = |by_rad| one_way_db(firing.simulator.beam(), wrap_pi(off_rad + by_rad));
+            Some(level_db(turn_rad) - level_db(0.0))
+        };
+        let both = [[1.0, 0.0], [0.0, 1.0]].into_iter().zip(firing.off_rad(arrival));
+        let louder_db: Option<f64> = both.map(louder_db).sum();
+        Some((firing.length_rate(arrival, ends, &motion), louder_db.unwrap_or(0.0)))
     }
 
-    fn length_rate(&self, at: u32, arrival: &Arrival, firing: &Firing) -> f64 {
-        let at = at as usize;
-        let turning;
-        let motion = match &self.steady[at] {
-            Some(motion) => motion,
-            None => {
-                let parameter = self.parameters[at];
-                turning =
-                    self.world.turning_motion(parameter, firing.direction_rad, firing.azimuth_deg);
-                let Some(motion) = &turning else { return 0.0 };
-                motion
-            }
-        };
-        firing.length_rate(arrival, firing.ends, motion)
+    /// How the transducer moves in a firing with a parameter.
+    fn turning_motion(&self, at: u32, firing: &Firing) -> Option<Motion> {
+        let parameter = self.parameters[at as usize];
+        self.world.turning_motion(parameter, firing.direction_rad, firing.azimuth_deg)
     }
 
     /// What an arrival's margin above the threshold gains, decibels for each unit. That a stronger echo is also a little
     /// earlier (time walk) is in the predictions and not in the rates: where several arrivals overlap they are not
     /// known so well that tenths of a millimetre could be believed. See [`Curve::walk`](crate::linear::Curve).
-    fn margin_rate(&self, at: u32, arrival: &Arrival, firing: &Firing) -> f64 {
-        let off_rad = [arrival.departure_rad, arrival.arrival_rad]
-            .map(|end| wrap_pi(end - firing.direction_rad));
-        let level_db = |pattern: &BeamPattern, by_rad: f64| {
-            off_rad.map(|off| decibels(pattern.one_way(wrap_pi(off - by_rad)))).iter().sum::<f64>()
-        };
-        let by_turn = |turn_rad: f64| {
-            // Over half a degree to both sides, and no steeper than a main lobe's flank: a null is steeper, but what is
-            // heard there is the sum of several arrivals.
-            const BY_RAD: f64 = 0.01;
-            const STEEPEST_DB_PER_RAD: f64 = 250.0;
-            let pattern = firing.simulator.beam();
-            let slope = (level_db(pattern, BY_RAD) - level_db(pattern, -BY_RAD)) / (2.0 * BY_RAD);
-            turn_rad * slope.clamp(-STEEPEST_DB_PER_RAD, STEEPEST_DB_PER_RAD)
-        };
+    fn margin_rate(&self, at: u32, arrival: &Arrival, firing: &Firing, flanks: &Flanks) -> f64 {
         match self.parameters[at as usize] {
-            Parameter::Heading(_) | Parameter::HeadingZero => by_turn(1f64.to_radians()),
-            Parameter::Gear => by_turn(firing.azimuth_deg.to_radians()),
+            Parameter::Heading(_) | Parameter::HeadingZero => flanks.turned_db(1f64.to_radians()),
+            Parameter::Gear => flanks.turned_db(firing.azimuth_deg.to_radians()),
             Parameter::Threshold => -1.0,
             Parameter::Aperture | Parameter::Skirts => {
                 self.changed_beams[at as usize].as_ref().map_or(0.0, |(pattern, by)| {
-                    (level_db(pattern, 0.0) - level_db(firing.simulator.beam(), 0.0)) / by
+                    let level_db = |pattern| -> f64 {
+                        firing.off_rad(arrival).map(|off| one_way_db(pattern, off)).iter().sum()
+                    };
+                    (level_db(pattern) - level_db(firing.simulator.beam())) / by
                 })
             }
             parameter => material_rate_db(parameter, firing.simulator.scene(), arrival),
@@ -242,9 +248,50 @@ impl<'a> Firing<'a> {
         Self { simulator, azimuth_deg: beam.azimuth_deg, axis, direction_rad, ends }
     }
 
+    /// Beside its axis, the directions in which an arrival leaves and comes, radians.
+    fn off_rad(&self, arrival: &Arrival) -> [f64; 2] {
+        [arrival.departure_rad, arrival.arrival_rad].map(|end| wrap_pi(end - self.direction_rad))
+    }
+
     fn length_rate(&self, arrival: &Arrival, ends: [DVec2; 2], motion: &Motion) -> f64 {
         let z_m = self.simulator.sensor_z_m().unwrap_or(0.0);
         length_rate(arrival, ends, z_m, self.simulator.scene(), motion)
+    }
+}
+
+/// What an arrival's level gains with the directions in which it leaves and comes.
+struct Flanks {
+    /// Of the beam pattern, decibels a radian, at departure and arrival.
+    db_per_rad: [f64; 2],
+    bearing: Option<Bearing>,
+}
+
+impl Flanks {
+    fn of(arrival: &Arrival, firing: &Firing) -> Self {
+        // Over half a degree to both sides, and no steeper than a main lobe's flank: a null is steeper, but what is
+        // heard there is the sum of several arrivals.
+        const BY_RAD: f64 = 0.01;
+        const STEEPEST_DB_PER_RAD: f64 = 125.0;
+        let pattern = firing.simulator.beam();
+        let db_per_rad = firing.off_rad(arrival).map(|off_rad| {
+            let [low, high] =
+                [-BY_RAD, BY_RAD].map(|by| one_way_db(pattern, wrap_pi(off_rad + by)));
+            ((high - low) / (2.0 * BY_RAD)).clamp(-STEEPEST_DB_PER_RAD, STEEPEST_DB_PER_RAD)
+        });
+        let scene = firing.simulator.scene();
+        let bearing = Bearing::new(arrival, firing.ends, scene, db_per_rad);
+        Self { db_per_rad, bearing }
+    }
+
+    /// What the level gains where the transducer turns by so much, decibels.
+    fn turned_db(&self, turn_rad: f64) -> f64 {
+        -turn_rad * self.db_per_rad.iter().sum::<f64>()
+    }
+
+    /// What it gains where transducer and scene move, decibels.
+    fn rate_db(&self, firing: &Firing, motion: &Motion) -> f64 {
+        let bearing = self.bearing.as_ref();
+        bearing.map_or(0.0, |bearing| bearing.rate(firing.simulator.scene(), motion))
     }
 }
 
@@ -260,8 +307,9 @@ fn changed_beam(world: &World, parameter: &Parameter) -> Option<(BeamPattern, f6
     Some((BeamPattern::new(&changed.sensor, changed.air.sound_speed_m_s()), by))
 }
 
-fn decibels(amplitude: f64) -> f64 {
-    20.0 * amplitude.max(1e-6).log10()
+/// Level of the beam pattern in a direction beside its axis, decibels.
+fn one_way_db(pattern: &BeamPattern, off_rad: f64) -> f64 {
+    20.0 * pattern.one_way(off_rad).max(1e-6).log10()
 }
 
 /// What the strength of an arrival gains with a parameter of a material, decibels for each unit; 0 for others.
