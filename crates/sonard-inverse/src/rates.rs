@@ -206,8 +206,7 @@ impl<'a> RateFinder<'a> {
         let scene = firing.simulator.scene();
         let louder_db = |(weights, off_rad): ([f64; 2], f64)| {
             let turn_rad = Bearing::new(arrival, ends, scene, weights)?.rate(scene, &motion);
-            let level_db = |by_rad| one_way_db(firing.simulator.beam(), wrap_pi(off_rad + by_rad));
-            Some(level_db(turn_rad) - level_db(0.0))
+            Some(level_db(firing.simulator.beam(), off_rad, off_rad + turn_rad))
         };
         let both = [[1.0, 0.0], [0.0, 1.0]].into_iter().zip(firing.off_rad(arrival));
         let louder_db: Option<f64> = both.map(louder_db).sum();
@@ -230,10 +229,10 @@ impl<'a> RateFinder<'a> {
             Parameter::Threshold => -1.0,
             Parameter::Aperture | Parameter::Skirts => {
                 self.changed_beams[at as usize].as_ref().map_or(0.0, |(pattern, by)| {
-                    let level_db = |pattern| -> f64 {
-                        firing.off_rad(arrival).map(|off| one_way_db(pattern, off)).iter().sum()
+                    let gain = |off_rad| {
+                        amplitude(pattern, off_rad) / amplitude(firing.simulator.beam(), off_rad)
                     };
-                    (level_db(pattern) - level_db(firing.simulator.beam())) / by
+                    20.0 * firing.off_rad(arrival).map(gain).iter().product::<f64>().log10() / by
                 })
             }
             parameter => material_rate_db(parameter, firing.simulator.scene(), arrival),
@@ -273,11 +272,14 @@ impl Flanks {
         const BY_RAD: f64 = 0.01;
         const STEEPEST_DB_PER_RAD: f64 = 125.0;
         let pattern = firing.simulator.beam();
-        let db_per_rad = firing.off_rad(arrival).map(|off_rad| {
-            let [low, high] =
-                [-BY_RAD, BY_RAD].map(|by| one_way_db(pattern, wrap_pi(off_rad + by)));
-            ((high - low) / (2.0 * BY_RAD)).clamp(-STEEPEST_DB_PER_RAD, STEEPEST_DB_PER_RAD)
-        });
+        let [leaves_rad, comes_rad] = firing.off_rad(arrival);
+        let flank = |off_rad: f64| {
+            let by_db = level_db(pattern, off_rad - BY_RAD, off_rad + BY_RAD);
+            (by_db / (2.0 * BY_RAD)).clamp(-STEEPEST_DB_PER_RAD, STEEPEST_DB_PER_RAD)
+        };
+        let leaves = flank(leaves_rad);
+        let comes = if comes_rad == leaves_rad { leaves } else { flank(comes_rad) };
+        let db_per_rad = [leaves, comes];
         let scene = firing.simulator.scene();
         let bearing = Bearing::new(arrival, firing.ends, scene, db_per_rad);
         Self { db_per_rad, bearing }
@@ -307,9 +309,15 @@ fn changed_beam(world: &World, parameter: &Parameter) -> Option<(BeamPattern, f6
     Some((BeamPattern::new(&changed.sensor, changed.air.sound_speed_m_s()), by))
 }
 
-/// Level of the beam pattern in a direction beside its axis, decibels.
-fn one_way_db(pattern: &BeamPattern, off_rad: f64) -> f64 {
-    20.0 * pattern.one_way(off_rad).max(1e-6).log10()
+/// What a beam pattern's level gains from one direction beside its axis to another, decibels.
+fn level_db(pattern: &BeamPattern, from_rad: f64, to_rad: f64) -> f64 {
+    let [from, to] = [from_rad, to_rad].map(|off_rad| amplitude(pattern, wrap_pi(off_rad)));
+    20.0 * (to / from).log10()
+}
+
+/// Of a beam pattern, beside its axis; so much that it has a level.
+fn amplitude(pattern: &BeamPattern, off_rad: f64) -> f64 {
+    pattern.one_way(off_rad).max(1e-6)
 }
 
 /// What the strength of an arrival gains with a parameter of a material, decibels for each unit; 0 for others.
