@@ -1,8 +1,8 @@
 //! How well parameters are found again in simulation, beside the bound of Cramer and Rao.
 //!
-//! `cargo run --release -p sonard-inverse --example trials -- COUNT [SEED] [MINUTES] [mounting] [furniture] [each]` draws
-//! COUNT worlds: a shipped scene, a place in it, and what is wrong with what is believed of it (pose by up to 10 cm and 8
-//! degrees, air by 8 degrees Celsius, a wall by 5 cm, threshold by 6 dB; with `mounting` the face by 3 cm ahead and
+//! `cargo run --release -p sonard-inverse --example trials -- COUNT [SEED] [MINUTES] [mounting] [furniture] [bodiless] [usual] [each]`
+//! draws COUNT worlds: a shipped scene, a place in it, and what is wrong with what is believed of it (pose by up to 10 cm
+//! and 8 degrees, air by 8 degrees Celsius, a wall by 5 cm, threshold by 6 dB; with `mounting` the face by 3 cm ahead and
 //! aside, with `furniture` five round things that the scene lacks). Readings have noise of 1 mm with the far tail of
 //! `TofNoise`. None is begun after so many minutes. Prints for each parameter the root mean square of the errors, the
 //! same as a multiple of the bound and of the standard deviations told, the median of that and of the standard deviations told, the share of 95 % intervals
@@ -11,7 +11,8 @@
 //! Each trial is fitted a second time from the truth. Where that ends in the same place, the bound tells how far off an
 //! estimate should be. Where it ends elsewhere and is likelier, the search failed; where it is less likely, the readings
 //! mislead whoever believes them. The table is printed for all trials, and for those that ended where the truth's own fit
-//! does. `each` prints a line for every trial, `at=N` runs that one alone.
+//! does. `each` prints a line for every trial, `at=N` runs that one alone; `bodiless` leaves out scenes with a robot's body, and `usual`
+//! fits as `sonard calibrate` does where nothing else is asked for.
 
 mod rooms;
 #[path = "rooms/spread.rs"]
@@ -22,7 +23,7 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 use rooms::{BEAMS, NOISE_MM};
-use sonard_inverse::{Parameter, bound, fit, fit_from};
+use sonard_inverse::{Parameter, Search, bound, fit, fit_from};
 use spread::SPREAD;
 use wrong::{Kinds, Wrong};
 
@@ -60,8 +61,12 @@ fn main() {
     let number = |at: usize, usual: u64| numbers.get(at).copied().unwrap_or(usual);
     let (count, seed, minutes) = (number(0, 50), number(1, 1), number(2, 1_000_000));
     let has = |wanted: &str| words.iter().any(|word| word == wanted);
-    let kinds =
-        Kinds { mounting: has("mounting"), furniture: has("furniture"), bodiless: has("bodiless") };
+    let kinds = Kinds {
+        mounting: has("mounting"),
+        furniture: has("furniture"),
+        bodiless: has("bodiless"),
+        search: has("usual").then_some(Search::Usual),
+    };
     let alone = words.iter().find_map(|word| word.strip_prefix("at=")?.parse().ok());
     let wanted = alone.map_or(0..count, |at: u64| at..at + 1);
     let (began, is_each) = (Instant::now(), has("each") || alone.is_some());

@@ -22,6 +22,8 @@ pub(crate) struct Kinds {
     pub(crate) furniture: bool,
     /// Only scenes without a robot's body, beside which a fit takes a hundred times as long.
     pub(crate) bodiless: bool,
+    /// How parameters are looked for, whatever is wrong.
+    pub(crate) search: Option<Search>,
 }
 
 /// A world, what is believed of it, and a sweep in it.
@@ -105,7 +107,10 @@ impl Wrong {
             widest_turn_deg: 12.0,
             least_sigma_m: 2e-4,
             least_sigma_db: 0.1,
-            search: if kinds.furniture { Search::Furnished } else { Search::Thorough },
+            search: kinds.search.unwrap_or(match kinds.furniture {
+                true => Search::Furnished,
+                false => Search::Thorough,
+            }),
         };
         Some(Self { scene: name, truth, believed, there, unhindered, here, fit, expected })
     }
