@@ -118,7 +118,7 @@ impl World {
                 }
                 Parameter::SoundSpeed => {
                     let speed_m_s = world.air.sound_speed_m_s() * (1.0 + by);
-                    world.air = world.air.with_sound_speed(speed_m_s)?;
+                    world.air = world.air.warmed_to_sound_speed(speed_m_s)?;
                 }
                 Parameter::Delay => world.delay_m += by,
                 Parameter::Threshold => world.sensor.threshold *= 10f64.powf(by / 20.0),

@@ -6,6 +6,9 @@ use thiserror::Error;
 const CARBON_DIOXIDE: f64 = 0.0004;
 const ZERO_CELSIUS_K: f64 = 273.15;
 
+/// Temperatures that the formulas cover, degrees Celsius.
+const TEMPERATURES_C: (f64, f64) = (-20.0, 50.0);
+
 /// The state of the air.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Air {
@@ -55,7 +58,7 @@ impl Air {
         humidity_percent: f64,
         pressure_kpa: f64,
     ) -> Result<Self, AirError> {
-        check("temperature_c", temperature_c, -20.0, 50.0)?;
+        check("temperature_c", temperature_c, TEMPERATURES_C.0, TEMPERATURES_C.1)?;
         check("humidity_percent", humidity_percent, 0.0, 100.0)?;
         check("pressure_kpa", pressure_kpa, 60.0, 110.0)?;
         Ok(Self { temperature_c, humidity_percent, pressure_kpa, sound_speed_override_m_s: None })
@@ -69,6 +72,35 @@ impl Air {
     pub fn with_sound_speed(self, sound_speed_m_s: f64) -> Result<Self, AirError> {
         check("sound_speed_m_s", sound_speed_m_s, 200.0, 500.0)?;
         Ok(Self { sound_speed_override_m_s: Some(sound_speed_m_s), ..self })
+    }
+
+    /// The same air as warm as it must be to have this speed of sound (metres a second), at its humidity and pressure, so
+    /// that its absorption follows. Air whose speed was given is left as warm as it is, and so, at the end of the range,
+    /// is air that would have to be colder or warmer than [`Air::new`] allows.
+    ///
+    /// # Errors
+    /// When the speed is out of range (200 to 500) or not a number.
+    pub fn warmed_to_sound_speed(self, sound_speed_m_s: f64) -> Result<Self, AirError> {
+        let given = self.with_sound_speed(sound_speed_m_s)?;
+        if self.sound_speed_override_m_s.is_some() {
+            return Ok(given);
+        }
+        let is_colder =
+            |temperature_c: f64| Self { temperature_c, ..self }.sound_speed_m_s() < sound_speed_m_s;
+        let (mut low_c, mut high_c) = TEMPERATURES_C;
+        if !is_colder(low_c) {
+            return Ok(Self { temperature_c: low_c, ..given });
+        }
+        if is_colder(high_c) {
+            return Ok(Self { temperature_c: high_c, ..given });
+        }
+        // Invariant: the speed, which rises with the temperature, is passed between the two. Half as far apart each time, they
+        // come as near as numbers do.
+        for _ in 0..f64::MANTISSA_DIGITS {
+            let middle_c = 0.5 * (low_c + high_c);
+            *(if is_colder(middle_c) { &mut low_c } else { &mut high_c }) = middle_c;
+        }
+        Ok(Self { temperature_c: high_c, ..self })
     }
 
     /// Temperature, degrees Celsius.
@@ -173,6 +205,29 @@ mod tests {
             let speed_m_s = air.sound_speed_m_s();
             assert!((speed_m_s - expected).abs() < 1e-4, "{temperature_c} C: {speed_m_s}");
         }
+    }
+
+    #[test]
+    fn air_is_warmed_to_a_speed_of_sound() {
+        for (humidity_percent, pressure_kpa) in [(0.0, 110.0), (50.0, 101.325), (100.0, 60.0)] {
+            for temperature_c in [-19.0, 3.0, 20.0, 49.0] {
+                let wanted = Air::new(temperature_c, humidity_percent, pressure_kpa);
+                let wanted = wanted.expect("in range");
+                let air = Air::new(20.0, humidity_percent, pressure_kpa).expect("in range");
+                let speed_m_s = wanted.sound_speed_m_s();
+                let warmed = air.warmed_to_sound_speed(speed_m_s).expect("in range");
+                assert!((warmed.temperature_c() - temperature_c).abs() < 1e-9, "{warmed:?}");
+                assert!((warmed.sound_speed_m_s() - speed_m_s).abs() < 1e-10, "{warmed:?}");
+            }
+        }
+        for (speed_m_s, temperature_c) in [(250.0, -20.0), (450.0, 50.0)] {
+            let air = Air::default().warmed_to_sound_speed(speed_m_s).expect("in range");
+            assert_eq!((air.sound_speed_m_s(), air.temperature_c()), (speed_m_s, temperature_c));
+        }
+        let given = Air::default().with_sound_speed(340.0).expect("in range");
+        let other = given.warmed_to_sound_speed(341.0).expect("in range");
+        assert_eq!((other.sound_speed_m_s(), other.temperature_c()), (341.0, 20.0));
+        assert!(given.warmed_to_sound_speed(f64::NAN).is_err());
     }
 
     #[test]
