@@ -146,7 +146,7 @@ impl<'a> RateFinder<'a> {
     }
 
     fn possible(&self, candidate: &Candidate, firing: &Firing, concerning: &[u32]) -> Possible {
-        let stretch = self.reference_m_s / firing.simulator.sound_speed_m_s();
+        let stretch = self.stretch(firing);
         let beside =
             candidate.arrival.as_ref().and_then(|arrival| self.beside_axis(arrival, firing));
         let (longer_m, louder_db) = beside.unwrap_or_default();
@@ -157,28 +157,7 @@ impl<'a> RateFinder<'a> {
         if let (Some(arrival), Some(predicted_m)) = (&candidate.arrival, candidate.range_m) {
             let flanks = Flanks::of(arrival, firing);
             for &at in concerning {
-                let turning;
-                let motion = match &self.steady[at as usize] {
-                    Some(motion) => Some(motion),
-                    None => {
-                        turning = self.turning_motion(at, firing);
-                        turning.as_ref()
-                    }
-                };
-                let by_range = match self.parameters[at as usize] {
-                    Parameter::SoundSpeed => -stretch * predicted_m,
-                    Parameter::Delay => 1.0,
-                    _ => motion.map_or(0.0, |motion| {
-                        0.5 * stretch * firing.length_rate(arrival, firing.ends, motion)
-                    }),
-                };
-                let by_db = match self.parameters[at as usize] {
-                    Parameter::ThresholdRise => -predicted_m,
-                    _ => {
-                        motion.map_or(0.0, |motion| flanks.rate_db(firing, motion))
-                            + self.margin_rate(at, arrival, firing, &flanks)
-                    }
-                };
+                let (by_range, by_db) = self.rates(at, arrival, predicted_m, firing, &flanks);
                 range_rates.extend((by_range != 0.0).then_some((at, by_range)));
                 until_rates.extend((by_db != 0.0).then_some((at, by_db)));
             }
@@ -191,6 +170,40 @@ impl<'a> RateFinder<'a> {
             spread_db: candidate.spread_db,
             walk_m_per_db: stretch * candidate.walk_m_per_db,
         }
+    }
+
+    /// What an arrival's range and its margin above the threshold gain with a parameter, metres and decibels for each unit.
+    fn rates(
+        &self,
+        at: u32,
+        arrival: &Arrival,
+        predicted_m: f64,
+        firing: &Firing,
+        flanks: &Flanks,
+    ) -> (f64, f64) {
+        let parameter = self.parameters[at as usize];
+        let turning = match &self.steady[at as usize] {
+            Some(_) => None,
+            None => self.world.turning_motion(parameter, firing.direction_rad, firing.azimuth_deg),
+        };
+        let motion = self.steady[at as usize].as_ref().or(turning.as_ref());
+        let longer_m =
+            motion.map_or(0.0, |motion| firing.length_rate(arrival, firing.ends, motion));
+        let louder_db = motion.map_or(0.0, |motion| flanks.rate_db(firing, motion));
+        match parameter {
+            Parameter::SoundSpeed => (-self.stretch(firing) * predicted_m, 0.0),
+            Parameter::Delay => (1.0, 0.0),
+            Parameter::ThresholdRise => (0.0, -predicted_m),
+            _ => (
+                0.5 * self.stretch(firing) * longer_m,
+                louder_db + self.margin_rate(at, arrival, firing, flanks),
+            ),
+        }
+    }
+
+    /// What a predicted range is longer at the speed of sound that ranges are told at.
+    fn stretch(&self, firing: &Firing) -> f64 {
+        self.reference_m_s / firing.simulator.sound_speed_m_s()
     }
 
     /// What a path from the axis gains where the face is beside it: in length, to first order, and by the beam pattern in
@@ -211,12 +224,6 @@ impl<'a> RateFinder<'a> {
         let both = [[1.0, 0.0], [0.0, 1.0]].into_iter().zip(firing.off_rad(arrival));
         let louder_db: Option<f64> = both.map(louder_db).sum();
         Some((firing.length_rate(arrival, ends, &motion), louder_db.unwrap_or(0.0)))
-    }
-
-    /// How the transducer moves in a firing with a parameter.
-    fn turning_motion(&self, at: u32, firing: &Firing) -> Option<Motion> {
-        let parameter = self.parameters[at as usize];
-        self.world.turning_motion(parameter, firing.direction_rad, firing.azimuth_deg)
     }
 
     /// What an arrival's margin above the threshold gains, decibels for each unit. That a stronger echo is also a little

@@ -4,6 +4,7 @@ mod candidates;
 mod course;
 mod derivatives;
 mod found;
+mod margins;
 mod stopped;
 
 use std::sync::Arc;
