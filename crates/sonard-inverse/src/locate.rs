@@ -75,7 +75,7 @@ impl Mode {
 
     /// Standard deviation of its place, metres: root mean square of both axes.
     pub(crate) fn sigma_m(&self) -> f64 {
-        (0.5 * (self.sigma_x_m.powi(2) + self.sigma_y_m.powi(2))).sqrt()
+        of_place(self.sigma_x_m, self.sigma_y_m)
     }
 }
 
@@ -164,13 +164,15 @@ pub(crate) fn explaining(
 fn is_open(sweep: &Sweep, likeliest: Option<&Fitted>) -> bool {
     let echoes = sweep.beams.iter().filter(is_echo).count() as f64;
     echoes < FEW_ECHOES * sweep.beams.len() as f64
-        || likeliest.is_some_and(|likeliest| sigma_m(likeliest) > OPEN_M)
+        || likeliest.is_some_and(|likeliest| {
+            let of = &likeliest.estimates;
+            of_place(of[0].sigma, of[1].sigma) > OPEN_M
+        })
 }
 
-/// Standard deviation of the place of a sweep that was fitted, metres: root mean square of both axes.
-fn sigma_m(fitted: &Fitted) -> f64 {
-    let of = &fitted.estimates;
-    (0.5 * (of[0].sigma.powi(2) + of[1].sigma.powi(2))).sqrt()
+/// Standard deviation of a place by those along x and y, metres: their root mean square.
+fn of_place(sigma_x_m: f64, sigma_y_m: f64) -> f64 {
+    (0.5 * (sigma_x_m.powi(2) + sigma_y_m.powi(2))).sqrt()
 }
 
 /// What is looked for where.

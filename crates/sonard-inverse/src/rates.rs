@@ -1,6 +1,9 @@
 //! What could have been reported of each firing, and how that moves with the parameters.
 
-use std::collections::{HashMap, hash_map::Entry};
+use std::{
+    cell::LazyCell,
+    collections::{HashMap, hash_map::Entry},
+};
 
 use smallvec::SmallVec;
 use sonard_model::{
@@ -155,7 +158,8 @@ impl<'a> RateFinder<'a> {
             .map(|range_m| stretch * (range_m + 0.5 * longer_m) + self.world.delay_m);
         let (mut range_rates, mut until_rates) = (Rates::new(), Rates::new());
         if let (Some(arrival), Some(predicted_m)) = (&candidate.arrival, candidate.range_m) {
-            let flanks = Flanks::of(arrival, firing);
+            // A threshold alone, as turned sweeps are asked about, needs none.
+            let flanks = LazyCell::new(|| Flanks::of(arrival, firing));
             for &at in concerning {
                 let (by_range, by_db) = self.rates(at, arrival, predicted_m, firing, &flanks);
                 range_rates.extend((by_range != 0.0).then_some((at, by_range)));
@@ -179,7 +183,7 @@ impl<'a> RateFinder<'a> {
         arrival: &Arrival,
         predicted_m: f64,
         firing: &Firing,
-        flanks: &Flanks,
+        flanks: &LazyCell<Flanks, impl FnOnce() -> Flanks>,
     ) -> (f64, f64) {
         let parameter = self.parameters[at as usize];
         let turning = match &self.steady[at as usize] {
@@ -229,7 +233,13 @@ impl<'a> RateFinder<'a> {
     /// What an arrival's margin above the threshold gains, decibels for each unit. That a stronger echo is also a little
     /// earlier (time walk) is in the predictions and not in the rates: where several arrivals overlap they are not
     /// known so well that tenths of a millimetre could be believed. See [`Curve::walk`](crate::linear::Curve).
-    fn margin_rate(&self, at: u32, arrival: &Arrival, firing: &Firing, flanks: &Flanks) -> f64 {
+    fn margin_rate(
+        &self,
+        at: u32,
+        arrival: &Arrival,
+        firing: &Firing,
+        flanks: &LazyCell<Flanks, impl FnOnce() -> Flanks>,
+    ) -> f64 {
         match self.parameters[at as usize] {
             Parameter::Heading(_) | Parameter::HeadingZero => flanks.turned_db(1f64.to_radians()),
             Parameter::Gear => flanks.turned_db(firing.azimuth_deg.to_radians()),
