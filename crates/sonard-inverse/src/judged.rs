@@ -19,6 +19,8 @@ pub(crate) struct Possible {
     pub(crate) until_rates: Rates,
     /// Standard deviation of that beside the threshold's own, decibels.
     pub(crate) spread_db: f64,
+    /// Mirror reflections after the first, each of which may add to that.
+    pub(crate) further_reflections: f64,
     /// What the range gains with the threshold, metres a decibel.
     pub(crate) walk_m_per_db: f64,
 }
@@ -54,8 +56,14 @@ pub(crate) struct Term {
 impl Possible {
     /// How its range spreads: a threshold in doubt makes that of a weak echo doubtful, too, by its time walk.
     pub(crate) fn errors(&self, errors: &ErrorModel) -> ErrorModel {
-        let sigma_db = errors.sigma_db.hypot(self.spread_db);
+        let sigma_db = self.sigma_db(errors);
         errors.with_range_spread(errors.sigma_m.hypot(self.walk_m_per_db * sigma_db))
+    }
+
+    /// Standard deviation of the threshold up to which it is, decibels.
+    fn sigma_db(&self, errors: &ErrorModel) -> f64 {
+        let by_reflections_db = errors.sigma_db_per_reflection * self.further_reflections;
+        errors.sigma_db.hypot(self.spread_db).hypot(by_reflections_db)
     }
 
     /// What its range says beside that of a strong echo, 0 to 1.
@@ -92,7 +100,7 @@ impl Judged {
         let mut of: SmallVec<[Term; 3]> = SmallVec::new();
         for (at, (possible, &[own, slope])) in self.possible.iter().zip(&densities).enumerate() {
             let is_last = at + 1 == self.possible.len();
-            let sigma_db = errors.sigma_db.hypot(possible.spread_db);
+            let sigma_db = possible.sigma_db(errors);
             let until = after(possible.until_db, &possible.until_rates) / sigma_db;
             let up_to = if is_last { 1.0 } else { normal_up_to(until).max(below) };
             let probability = up_to - below;

@@ -21,6 +21,10 @@ pub struct ErrorModel {
     /// Standard deviation of the threshold from firing to firing, decibels; it also has to cover by how much the
     /// model misses strengths.
     pub sigma_db: f64,
+    /// Standard deviation that each mirror reflection after the first adds to the strength of an echo, decibels, where no wall
+    /// is quite flat or square to the next.
+    #[serde(default)]
+    pub sigma_db_per_reflection: f64,
     /// Share of single readings that nothing explains, of those that are not in arcs of something else.
     pub clutter: f64,
     /// Share of readings in arcs of what the scene lacks: people, furniture, the robot itself. None are looked for if it is 0.
@@ -48,6 +52,7 @@ impl ErrorModel {
             tail_share: 0.1,
             tail_ratio: 2.0,
             sigma_db,
+            sigma_db_per_reflection: 0.0,
             clutter: 0.1,
             arcs: 0.1,
             arc_beams: 8.0,

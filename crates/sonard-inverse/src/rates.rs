@@ -172,6 +172,7 @@ impl<'a> RateFinder<'a> {
             until_db: candidate.until_db + louder_db,
             until_rates,
             spread_db: candidate.spread_db,
+            further_reflections: candidate.arrival.as_ref().map_or(0.0, further_reflections),
             walk_m_per_db: stretch * candidate.walk_m_per_db,
         }
     }
@@ -312,6 +313,11 @@ impl Flanks {
         let bearing = self.bearing.as_ref();
         bearing.map_or(0.0, |bearing| bearing.rate(firing.simulator.scene(), motion))
     }
+}
+
+/// Mirror reflections of an arrival after its first.
+fn further_reflections(arrival: &Arrival) -> f64 {
+    arrival.path.order().saturating_sub(1) as f64
 }
 
 /// The beam pattern slightly changed by a parameter, if it is about the beam, and by how much.

@@ -9,6 +9,7 @@ pub(crate) const SPREAD: ErrorModel = ErrorModel {
     tail_share: 0.1,
     tail_ratio: 2.0,
     sigma_db: 0.5,
+    sigma_db_per_reflection: 0.0,
     clutter: 0.002,
     arcs: 0.002,
     arc_beams: 8.0,

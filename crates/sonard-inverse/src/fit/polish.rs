@@ -20,8 +20,6 @@ use crate::{candidates::Phases, likelihood::ErrorModel};
 const SCANNED: (i32, f64) = (4, 1.0);
 /// Predictions that are made about the best of them.
 const TRIED: usize = 60;
-/// Ranges that are missed by more than this, in wavelengths, say nothing of phases.
-const MISSED: f64 = 0.5;
 /// More than polishing an end makes it likelier, as a logarithm.
 pub(super) const FAR_BELOW: f64 = 30.0;
 /// Steps to begin with, in standard deviations, and what becomes of them after one that is better, and one that is not:
@@ -32,11 +30,9 @@ const SHRINKS: f64 = 0.9;
 
 impl State<'_> {
     /// The likeliest place of some that are tried about an end with phases, in steps that spread as its covariance does.
-    /// Without phases nothing changes so quickly: where readings are far likelier so, the end stays where it is. It does, too, where
-    /// ranges are missed by so much that lengths can't tell phases, as those of a room that was measured with a tape.
+    /// Without phases nothing changes so quickly: where readings are far likelier so, the end stays where it is.
     pub(super) fn polished(&mut self, end: Settled) -> Result<Settled, FitError> {
-        let wavelength_m = self.start.air.sound_speed_m_s() / self.start.sensor.frequency_hz;
-        if end.errors.sigma_m > MISSED * wavelength_m {
+        if self.is_beyond_phases(&end.errors) {
             return Ok(end);
         }
         let with = match end.phases {

@@ -5,6 +5,7 @@ use nalgebra::DVector;
 use super::{
     FitError, Search, Settled, State,
     journal::{Found, listed},
+    one_of_many,
 };
 use crate::{candidates::Phases, likelihood::ErrorModel, linear::Linear, watch::Progress};
 
@@ -12,10 +13,20 @@ use crate::{candidates::Phases, likelihood::ErrorModel, linear::Linear, watch::P
 /// that it finds its way to what readings really spread by.
 pub(super) const STAGES: [(f64, f64); 5] =
     [(1.0, 6.0), (0.5, 5.0), (0.25, 4.0), (0.12, 3.0), (0.06, 2.5)];
-/// Improvements of the spread itself at the end.
-const LAST_STAGES: usize = 5;
+/// Steps at the end: as many where phases are asked for next, and as many as are tried where they are not.
+const FIRST_STEPS: usize = 4;
+const LAST_STEPS: usize = 12;
+/// What becomes of a step that makes readings less likely, and how short it may become, as a share of
+/// [`Parameter::step`](crate::parameter::Parameter::step).
+const SHORTER: f64 = 0.3;
+const LEAST_STEP: f64 = 0.003;
+/// As much likelier, as a logarithm, is a place that is worth a step.
+const LEAST_GAIN: f64 = 1e-3;
 /// Turns that are tried at each of them, degrees, and how many to both sides.
 const TURNS: [(f64, i32); STAGES.len()] = [(1.5, 8), (1.5, 8), (1.0, 10), (0.75, 12), (0.5, 10)];
+
+/// Ranges that are missed by more than this, in wavelengths, say nothing of phases.
+const MISSED: f64 = 0.5;
 
 impl State<'_> {
     /// Goes from spread to spread, by some of the stages.
@@ -68,14 +79,23 @@ impl State<'_> {
         linear.log_likelihood(&self.still(), errors) + self.log_prior(&self.values)
     }
 
-    /// Settles without phases, and with them; the likelier one counts.
+    /// Settles without phases, and with them where ranges tell any; the likelier one counts.
     pub(super) fn settle(&mut self, errors: ErrorModel) -> Result<Settled, FitError> {
         let without = self.settled(errors)?;
         self.with_phases(without)
     }
 
+    /// Whether ranges are missed by so much that lengths can't tell phases, as those of a room that was measured with a tape.
+    pub(super) fn is_beyond_phases(&self, errors: &ErrorModel) -> bool {
+        let wavelength_m = self.start.air.sound_speed_m_s() / self.start.sensor.frequency_hz;
+        errors.sigma_m > MISSED * wavelength_m
+    }
+
     /// The likelier of two ends: without phases, and the one with them that follows from it.
     pub(super) fn with_phases(&mut self, without: Settled) -> Result<Settled, FitError> {
+        if self.is_beyond_phases(&without.errors) {
+            return Ok(without);
+        }
         (self.values, self.phases) = (without.values.clone(), Phases::Known);
         let with = self.settled(without.errors)?;
         Ok(if with.value > without.value { with } else { without })
@@ -113,19 +133,52 @@ impl State<'_> {
         self.polished(settled)
     }
 
-    fn likeliest_here(&mut self, mut errors: ErrorModel) -> Result<Found, FitError> {
-        let mut best: Option<(f64, DVector<f64>, ErrorModel)> = None;
-        for _ in 0..LAST_STAGES {
-            let linear = self.linear()?;
-            errors = self.spread(&linear, &errors);
-            let value = self.value(&linear, &errors);
-            if best.as_ref().is_some_and(|(known, ..)| value <= known + 1e-3) {
+    fn likeliest_here(&mut self, from: ErrorModel) -> Result<Found, FitError> {
+        let linear = self.linear()?;
+        let mut errors = self.spread(&linear, &from);
+        let mut best = (self.value(&linear, &errors), self.values.clone());
+        let mut step = self.step_from(&linear, &errors)?;
+        for number in 0..LAST_STEPS {
+            // What is found without phases need not be the last word: with them it is another place that is likeliest.
+            let is_final = self.is_beyond_phases(&errors);
+            if number >= FIRST_STEPS && !is_final {
                 break;
             }
-            best = Some((value, self.values.clone(), errors));
-            self.improve(&linear, &errors)?;
+            self.values = self.limited(&best.1 + &step);
+            // There may be nothing to predict with, as within a wall.
+            let linear = one_of_many(self.linear())?;
+            let there = linear.map(|linear| {
+                let spread = self.spread(&linear, &errors);
+                (self.value(&linear, &spread), spread, linear)
+            });
+            match there {
+                Some((value, spread, linear)) if value > best.0 + LEAST_GAIN => {
+                    (best, errors) = ((value, self.values.clone()), spread);
+                    step = self.step_from(&linear, &errors)?;
+                }
+                // Too far: the predictions there are not those of the linearisation.
+                _ if is_final && !self.is_nothing(&step) => step *= SHORTER,
+                _ => break,
+            }
         }
-        let (log_posterior, values, errors) = best.ok_or(FitError::Degenerate)?;
-        Ok(Found::End { values: listed(&values), errors, log_posterior })
+        self.values = best.1;
+        Ok(Found::End { values: listed(&self.values), errors, log_posterior: best.0 })
+    }
+
+    /// Where the linearisation is best from here.
+    fn step_from(
+        &mut self,
+        linear: &Linear,
+        errors: &ErrorModel,
+    ) -> Result<DVector<f64>, FitError> {
+        let from = self.values.clone();
+        self.improve(linear, errors)?;
+        Ok(&self.values - from)
+    }
+
+    /// Whether a step is too short for predictions to change.
+    fn is_nothing(&self, step: &DVector<f64>) -> bool {
+        let shares = step.iter().zip(&self.parameters).map(|(by, of)| by.abs() / of.step());
+        shares.fold(0.0, f64::max) < LEAST_STEP
     }
 }

@@ -6,6 +6,9 @@ use crate::{
     linear::{Linear, Residuals},
 };
 
+/// How doubtful each reflection after the first makes strengths where walls are not known to a part of a wavelength, decibels:
+/// with this twenty real sweeps are likeliest (docs/reality.md).
+const DB_PER_REFLECTION: f64 = 1.5;
 /// Shares of readings in the far tail that are tried.
 const TAILS: [f64; 5] = [0.0, 0.03, 0.06, 0.1, 0.2];
 /// Spreads of the threshold that are tried, decibels.
@@ -39,6 +42,9 @@ impl State<'_> {
             ErrorModel { sigma_m, tail_share, ..spread }
         };
         let spread = likeliest(&mut TAILS.iter().map(of_tail), spread);
+        let sigma_db_per_reflection =
+            if self.is_beyond_phases(&spread) { DB_PER_REFLECTION } else { 0.0 };
+        let spread = ErrorModel { sigma_db_per_reflection, ..spread };
         let of_threshold = |&sigma_db: &f64| ErrorModel { sigma_db, ..spread };
         let believed = SPREADS_DB.iter().filter(|sigma_db| **sigma_db >= self.fit.least_sigma_db);
         likeliest(&mut believed.map(of_threshold), spread)
