@@ -1,6 +1,7 @@
 //! Held to the model itself: what it predicts is what has to be found again.
 
 mod candidates;
+mod coarse;
 mod course;
 mod derivatives;
 mod found;
