@@ -157,7 +157,7 @@ impl State<'_> {
                     step = self.step_from(&linear, &errors)?;
                 }
                 // Too far: the predictions there are not those of the linearisation.
-                _ if is_final && !self.is_nothing(&step) => step *= SHORTER,
+                _ if is_final && self.largest_share(&step) >= LEAST_STEP => step *= SHORTER,
                 _ => break,
             }
         }
@@ -174,11 +174,5 @@ impl State<'_> {
         let from = self.values.clone();
         self.improve(linear, errors)?;
         Ok(&self.values - from)
-    }
-
-    /// Whether a step is too short for predictions to change.
-    fn is_nothing(&self, step: &DVector<f64>) -> bool {
-        let shares = step.iter().zip(&self.parameters).map(|(by, of)| by.abs() / of.step());
-        shares.fold(0.0, f64::max) < LEAST_STEP
     }
 }

@@ -84,10 +84,15 @@ impl State<'_> {
                 }
             }
         }
-        let shares = change.iter().zip(&self.parameters).map(|(by, of)| by.abs() / of.step());
-        let largest = shares.fold(0.0, f64::max);
+        let largest = self.largest_share(&change);
         self.values += change;
         Ok(largest)
+    }
+
+    /// The largest part of a change, as a share of what its parameter may be moved at a time.
+    pub(super) fn largest_share(&self, change: &DVector<f64>) -> f64 {
+        let shares = change.iter().zip(&self.parameters).map(|(by, of)| by.abs() / of.step());
+        shares.fold(0.0, f64::max)
     }
 
     /// Solves the damped normal equations; what stands at its limit and would go past it is held.
