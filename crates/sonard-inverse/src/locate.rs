@@ -83,11 +83,12 @@ impl Mode {
 const ROUGH: usize = 8;
 const WHOLE: usize = 4;
 /// A place that is known less well than this, metres, is one of many; and so may be one where a smaller share of the beams
-/// heard something. So many more are looked at then.
+/// heard something, of which a rough look tells little. So many more are looked at then, from the beginning where echoes are
+/// few.
 const OPEN_M: f64 = 0.1;
-const FEW_ECHOES: f64 = 0.1;
+const FEW_ECHOES: f64 = 0.12;
 const ROUGH_OPEN: usize = 56;
-const WHOLE_OPEN: usize = 12;
+const WHOLE_OPEN: usize = 20;
 /// As far off as a match may be: metres, with places 0.1 m apart, and degrees, with directions 3 apart.
 const ROUGH_WIDEST: (f64, f64) = (0.08, 4.5);
 /// As far off as a rough fit's heading may be, degrees.
@@ -139,10 +140,12 @@ pub(crate) fn explaining(
     let besides = &atlas.besides;
     let search = Search { models: atlas.models(world)?, world, sweep, besides, watch };
     let matches = atlas.matches(world, sweep, ROUGH_OPEN);
-    let (best, others) = matches.split_at(ROUGH.min(matches.len()));
+    let has_few_echoes = has_few_echoes(sweep);
+    let (rough, whole) = if has_few_echoes { (ROUGH_OPEN, WHOLE_OPEN) } else { (ROUGH, WHOLE) };
+    let (best, others) = matches.split_at(rough.min(matches.len()));
     let starts = best.iter().map(|Match { pose, .. }| pose).chain(expected);
-    let mut found = search.improved(starts, WHOLE + expected.len())?;
-    let is_open = is_open(sweep, found.first());
+    let mut found = search.improved(starts, whole + expected.len())?;
+    let is_open = has_few_echoes || found.first().is_some_and(is_hardly_held);
     if is_open {
         found.extend(search.improved(others.iter().map(|of| &of.pose), WHOLE_OPEN)?);
     }
@@ -159,15 +162,16 @@ pub(crate) fn explaining(
     Ok(distinct(found, 0.05, |found| &found.poses[0]))
 }
 
-/// Whether a sweep may have been taken from many places: it heard little, as of one wall or edge, or the likeliest place is
-/// hardly held.
-fn is_open(sweep: &Sweep, likeliest: Option<&Fitted>) -> bool {
+/// Whether a sweep heard so little, as of one wall or edge, that it may have been taken from many places.
+fn has_few_echoes(sweep: &Sweep) -> bool {
     let echoes = sweep.beams.iter().filter(is_echo).count() as f64;
     echoes < FEW_ECHOES * sweep.beams.len() as f64
-        || likeliest.is_some_and(|likeliest| {
-            let of = &likeliest.estimates;
-            of_place(of[0].sigma, of[1].sigma) > OPEN_M
-        })
+}
+
+/// Whether so little holds a place that there may be others like it.
+fn is_hardly_held(found: &Fitted) -> bool {
+    let of = &found.estimates;
+    of_place(of[0].sigma, of[1].sigma) > OPEN_M
 }
 
 /// Standard deviation of a place by those along x and y, metres: their root mean square.
