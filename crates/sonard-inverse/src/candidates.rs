@@ -42,6 +42,8 @@ pub(crate) struct Candidate {
     /// By how much that may be off, because it is not known with which phase its arrival meets others: a standard
     /// deviation, decibels.
     pub(crate) spread_db: f64,
+    /// How far its envelope reaches above the threshold that its range is told at, decibels.
+    pub(crate) margin_db: f64,
     /// What its range gains with the threshold, metres a decibel (time walk).
     pub(crate) walk_m_per_db: f64,
 }
@@ -132,6 +134,7 @@ impl Listener {
                         arrival: next.rise.arrival.map(|arrival| firing.arrival(&arrival)),
                         until_db,
                         spread_db: self.spread_db(&next),
+                        margin_db: until_db - next.by_db,
                         walk_m_per_db: self.walk_m_per_db(until_db - next.by_db),
                     });
                     last = Some(next);
@@ -229,7 +232,8 @@ impl Listener {
 impl Candidate {
     /// For all thresholds that are higher still.
     const fn silence(until_db: f64) -> Self {
-        Self { range_m: None, arrival: None, until_db, spread_db: 0.0, walk_m_per_db: 0.0 }
+        let (range_m, arrival) = (None, None);
+        Self { range_m, arrival, until_db, spread_db: 0.0, margin_db: 0.0, walk_m_per_db: 0.0 }
     }
 }
 

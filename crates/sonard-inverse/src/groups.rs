@@ -31,6 +31,8 @@ pub enum Group {
     Rise,
     /// Width of the beam.
     Beam,
+    /// How fast a pulse rises: the band of transducer and receiver.
+    Pulse,
     /// Skirts of the beam.
     Skirts,
     /// Reflectances.
@@ -101,6 +103,7 @@ const fn usual_sigma(parameter: &Parameter) -> f64 {
         Parameter::Threshold | Parameter::Skirts => 6.0,
         Parameter::ThresholdRise => 5.0,
         Parameter::Aperture => 0.3,
+        Parameter::Bandwidth => 0.5,
         Parameter::Reflectance(_) | Parameter::Roughness(_) => 0.1,
         Parameter::Wall(_) => 0.05,
     }
@@ -169,6 +172,7 @@ fn of_group(group: Group, world: &World, sweeps: usize) -> Result<Vec<Parameter>
         Group::Threshold => vec![Parameter::Threshold],
         Group::Rise => vec![Parameter::ThresholdRise],
         Group::Beam => vec![Parameter::Aperture],
+        Group::Pulse => vec![Parameter::Bandwidth],
         Group::Skirts => match world.sensor.aperture {
             Aperture::Piston { skirts_db: Some(_), .. } => vec![Parameter::Skirts],
             _ => return Err(GroupError::NoSkirts { sensor: world.sensor.name.clone() }),

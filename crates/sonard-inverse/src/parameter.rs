@@ -31,6 +31,8 @@ pub enum Parameter {
     ThresholdRise,
     /// Natural logarithm of how much wider the radiating face is; a wider one has a narrower beam.
     Aperture,
+    /// Natural logarithm of how much wider the band of transducer and receiver is; a wider one lets pulses rise faster.
+    Bandwidth,
     /// Stronger skirts of the beam, decibels; only of a piston that has some.
     Skirts,
     /// Natural logarithm of how much more a material reflects.
@@ -64,7 +66,7 @@ impl Parameter {
             Self::Delay => 0.05,
             Self::Threshold | Self::Skirts => 3.0,
             Self::ThresholdRise => 2.0,
-            Self::Aperture | Self::Reflectance(_) => 0.15,
+            Self::Aperture | Self::Bandwidth | Self::Reflectance(_) => 0.15,
             Self::Roughness(_) => 0.05,
         }
     }
@@ -86,6 +88,7 @@ impl fmt::Display for Parameter {
             Self::Threshold => f.write_str("threshold_db"),
             Self::ThresholdRise => f.write_str("threshold_rise_db_per_m"),
             Self::Aperture => f.write_str("aperture"),
+            Self::Bandwidth => f.write_str("bandwidth"),
             Self::Skirts => f.write_str("skirts_db"),
             Self::Reflectance(material) => write!(f, "reflectance {material}"),
             Self::Roughness(material) => write!(f, "roughness {material}"),

@@ -7,7 +7,7 @@ use std::{
 
 use smallvec::SmallVec;
 use sonard_model::{
-    acoustics::BeamPattern,
+    acoustics::{BeamPattern, Receiver},
     geometry::{DVec2, Pose, wrap_360, wrap_pi},
     model::{Arrival, Mechanism, ObservationPoint, Reflector, Simulator, TooCostly},
     scene::Scene,
@@ -25,6 +25,9 @@ use crate::{
 
 /// Step of the directions that turned sweeps share, degrees.
 const GRID_DEG: f64 = 0.5;
+/// Natural logarithm of how much wider and narrower a band is tried, for the difference: so much that the steps of a pulse's table
+/// do not show.
+const BY_BAND: f64 = 0.02;
 
 /// Predicts sweeps in a world, with what they gain for each unit of the parameters.
 pub(crate) struct RateFinder<'a> {
@@ -34,6 +37,8 @@ pub(crate) struct RateFinder<'a> {
     steady: Vec<Option<Motion>>,
     /// By parameter, the beam pattern slightly changed by it, if it is about the beam, and by how much.
     changed_beams: Vec<Option<(BeamPattern, f64)>>,
+    /// Receivers with a slightly narrower and a slightly wider band, if that is a parameter.
+    other_bands: Option<[Receiver; 2]>,
     reference_m_s: f64,
     phases: Phases,
     /// Thresholds that are looked at, decibels to both sides of the nominal one.
@@ -63,8 +68,16 @@ impl<'a> RateFinder<'a> {
         let steady = parameters.iter().map(|parameter| world.steady_motion(parameter)).collect();
         let changed = |parameter: &&Parameter| changed_beam(world, parameter);
         let changed_beams = parameters.iter().map(changed).collect();
-        let span_db = SPAN_DB;
-        Self { world, parameters, steady, changed_beams, reference_m_s, phases, span_db }
+        Self {
+            world,
+            parameters,
+            steady,
+            changed_beams,
+            other_bands: other_bands(world, parameters),
+            reference_m_s,
+            phases,
+            span_db: SPAN_DB,
+        }
     }
 
     /// The same for thresholds that vary by a standard deviation in decibels and are not changed: what only others
@@ -161,7 +174,10 @@ impl<'a> RateFinder<'a> {
             // A threshold alone, as turned sweeps are asked about, needs none.
             let flanks = LazyCell::new(|| Flanks::of(arrival, firing));
             for &at in concerning {
-                let (by_range, by_db) = self.rates(at, arrival, predicted_m, firing, &flanks);
+                let (by_range, by_db) = match self.parameters[at as usize] {
+                    Parameter::Bandwidth => (self.earlier_m(candidate, firing), 0.0),
+                    _ => self.rates(at, arrival, predicted_m, firing, &flanks),
+                };
                 range_rates.extend((by_range != 0.0).then_some((at, by_range)));
                 until_rates.extend((by_db != 0.0).then_some((at, by_db)));
             }
@@ -204,6 +220,17 @@ impl<'a> RateFinder<'a> {
                 louder_db + self.margin_rate(at, arrival, firing, flanks),
             ),
         }
+    }
+
+    /// What the range of a lone echo gains with the width of the band: its pulse rises faster, so that it is less late. How far it
+    /// reaches above the threshold is by its peak, which stays.
+    fn earlier_m(&self, candidate: &Candidate, firing: &Firing) -> f64 {
+        let gain_m = self.other_bands.as_ref().map_or(0.0, |bands| {
+            let [narrower_m, wider_m] =
+                bands.each_ref().map(|of| of.time_walk_m(candidate.margin_db));
+            (wider_m - narrower_m) / (2.0 * BY_BAND)
+        });
+        self.stretch(firing) * gain_m
     }
 
     /// What a predicted range is longer at the speed of sound that ranges are told at.
@@ -330,6 +357,17 @@ fn changed_beam(world: &World, parameter: &Parameter) -> Option<(BeamPattern, f6
     };
     let changed = world.changed(&[(parameter, by)]).ok()?;
     Some((BeamPattern::new(&changed.sensor, changed.air.sound_speed_m_s()), by))
+}
+
+/// Receivers with a slightly narrower and a slightly wider band, if that is a parameter.
+fn other_bands(world: &World, parameters: &[&Parameter]) -> Option<[Receiver; 2]> {
+    let parameter = parameters.iter().find(|of| ***of == Parameter::Bandwidth)?;
+    let receiver = |by: f64| {
+        let changed = world.changed(&[(*parameter, by)]).ok()?;
+        let anywhere = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
+        Some(changed.simulator(&anywhere).ok()?.receiver().clone())
+    };
+    Some([receiver(-BY_BAND)?, receiver(BY_BAND)?])
 }
 
 /// What a beam pattern's level gains from one direction beside its axis to another, decibels.

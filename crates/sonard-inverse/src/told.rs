@@ -152,6 +152,7 @@ impl Fitted {
             ("threshold", sensor.threshold != before.threshold),
             ("threshold_rise_db_per_m", rise),
             ("mounting", sensor.mounting != before.mounting),
+            ("pulse", sensor.pulse != before.pulse),
         ] {
             if is_changed {
                 let source = "fitted by `sonard calibrate`: see report.md";
@@ -184,6 +185,7 @@ fn value(world: &World, sweeps: &[Sweep], parameter: &Parameter, by: f64) -> f64
             _ => by,
         },
         Parameter::Aperture => world.sensor.half_width_m() * by.exp(),
+        Parameter::Bandwidth => world.sensor.pulse.bandwidth_hz() * by.exp(),
         Parameter::Reflectance(name) => {
             world.scene.materials.get(name).map_or(1.0, |material| material.reflectance) * by.exp()
         }

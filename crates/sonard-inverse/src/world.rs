@@ -130,6 +130,7 @@ impl World {
                     }
                 }
                 Parameter::Aperture => scale_aperture(&mut world.sensor.aperture, by.exp()),
+                Parameter::Bandwidth => world.sensor.pulse.widen_band(by.exp()),
                 Parameter::Reflectance(name) | Parameter::Roughness(name) => {
                     if let Some(material) = self.scene.materials.get(name) {
                         let new = materials.entry(name).or_insert(*material);

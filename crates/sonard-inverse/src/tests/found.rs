@@ -247,6 +247,32 @@ fn a_face_beside_the_axis_is_found_with_its_heading() {
     assert!(fitted.estimates[2].sigma < 0.4, "{:?}", fitted.estimates);
 }
 
+/// How fast pulses rise is in how late the ends of arcs are: a ranger whose band is taken for three fifths of what it is, in a
+/// room, with its pose and threshold in doubt.
+#[test]
+fn the_band_of_a_pulse_is_found_by_its_time_walk() {
+    let mut there = world("simple-room", "lego-nxt");
+    there.sensor.range_step_m = 0.0;
+    let pose = first_pose(&there.scene);
+    let believed =
+        Pose { x_m: pose.x_m + 0.01, y_m: pose.y_m - 0.01, heading_deg: pose.heading_deg + 1.0 };
+    let sweep = sweep(&there, &pose, &believed, 240, TofNoise::NONE, 1);
+    let mut here = there.clone();
+    let too_narrow = 0.6_f64;
+    here.sensor.pulse.widen_band(too_narrow);
+    let groups = [Group::Pose, Group::Threshold, Group::Pulse];
+    let what = Fit::usual(priors(&groups, &[], &here, 1).expect("priors"), 0.03);
+    let fitted = fit(&here, &[sweep], &what).expect("a fit");
+    let band = fitted.told(&here, &[], &what).pop().expect("the band is the last");
+    assert_eq!(band.name, "bandwidth");
+    let expected_hz = there.sensor.pulse.bandwidth_hz();
+    assert!(band.identified && band.sigma < 0.2 * expected_hz, "{band:?}");
+    assert!((band.value - expected_hz).abs() < 3.0 * band.sigma, "{band:?} for {expected_hz}");
+    let sensor = fitted.sensor(&here.sensor);
+    assert!(sensor.sources.contains_key("pulse"), "{:?}", sensor.sources);
+    assert_eq!(sensor.pulse.bandwidth_hz(), band.value);
+}
+
 /// Held to a threshold that is 9 dB too high, a fit would have it fall with the range, which no receiver's does: it
 /// stops where there is no rise, with an interval that begins there, and says so.
 #[test]

@@ -1,5 +1,7 @@
 //! What a ranger sends, as its data say.
 
+use std::f64::consts::TAU;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +44,26 @@ pub struct ChirpPart {
 }
 
 impl Pulse {
+    /// Standard deviation of the band that transducer and receiver let through, hertz; of a Gaussian envelope that of its
+    /// spectrum.
+    #[must_use]
+    pub fn bandwidth_hz(&self) -> f64 {
+        match self {
+            Self::Burst { bandwidth_hz, .. } | Self::Chirp { bandwidth_hz, .. } => *bandwidth_hz,
+            Self::Gaussian { sigma_us } => 1e6 / (TAU * sigma_us),
+        }
+    }
+
+    /// Makes its [band](Self::bandwidth_hz) so many times as wide.
+    pub fn widen_band(&mut self, by: f64) {
+        match self {
+            Self::Burst { bandwidth_hz, .. } | Self::Chirp { bandwidth_hz, .. } => {
+                *bandwidth_hz *= by
+            }
+            Self::Gaussian { sigma_us } => *sigma_us /= by,
+        }
+    }
+
     pub(super) fn check(&self) -> Result<(), SensorError> {
         match self {
             Self::Burst { cycles, bandwidth_hz } => {
