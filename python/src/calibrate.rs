@@ -52,9 +52,9 @@ const USUAL: [&str; 3] = ["pose", "air", "threshold"];
 ///     Where the ranger is believed to have stood: x and y (metres) and heading (degrees); the scans' own without it.
 /// widest_m : float
 ///     Largest initial error of predicted ranges, metres, 0.005 to 1.
-/// search : {'usual', 'thorough', 'furnished'}
-///     How much to search: 'thorough' takes about three times as long and ends in the likeliest explanation more often;
-///     'furnished' searches as thoroughly, and things that the scene lacks may answer or hide many beams in a row.
+/// search : {'thorough', 'quick', 'furnished'}
+///     How much to search: 'quick' takes half as long and misses the likeliest explanation more often; 'furnished' searches
+///     thoroughly, and things that the scene lacks may answer or hide many beams in a row.
 ///
 /// Returns
 /// -------
@@ -69,8 +69,8 @@ const USUAL: [&str; 3] = ["pose", "air", "threshold"];
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
 #[pyo3(signature = (scans, model = None, *, fit = None, priors = None, poses = None, widest_m = 0.1,
-    search = "usual"),
-    text_signature = "(scans, model=None, *, fit=('pose', 'air', 'threshold'), priors=None, poses=None, widest_m=0.1, search='usual')")]
+    search = "thorough"),
+    text_signature = "(scans, model=None, *, fit=('pose', 'air', 'threshold'), priors=None, poses=None, widest_m=0.1, search='thorough')")]
 pub(crate) fn calibrate<'py>(
     py: Python<'py>,
     scans: &Bound<'py, PyAny>,

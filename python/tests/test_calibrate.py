@@ -116,7 +116,7 @@ def test_what_can_not_be_fitted_says_why(log: Path, command: Command, tmp_path: 
         (sonard.OptionError, "the prior of x_m is NaN", {"priors": {"x_m": np.nan}}),
         (sonard.OptionError, "neither floor nor ceiling", {"fit": ["height"]}),
         (sonard.OptionError, "expected one of `pose`", {"fit": ["everything"]}),
-        (sonard.OptionError, "expected one of `usual`", {"search": "everywhere"}),
+        (sonard.OptionError, "expected one of `quick`", {"search": "everywhere"}),
         (sonard.SonardError, "no parameter to fit", {"fit": []}),
         (TypeError, "str", {"fit": "pose"}),
         (ValueError, "widest_m is 0", {"widest_m": 0.0}),

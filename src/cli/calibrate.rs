@@ -47,9 +47,9 @@ pub(super) struct Args {
     #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = within(0.005..=1.0))]
     widest_m: f64,
     /// How much to search, and for what
-    #[arg(long, value_name = "HOW", default_value = "usual", value_enum)]
+    #[arg(long, value_name = "HOW", default_value = "thorough", value_enum)]
     search: Search,
-    /// Output folder; the fitted sensor, scene, air and poses, the estimates and a report
+    /// Output folder; the fitted sensor, scene, air and poses, the estimates, their correlations and a report
     #[arg(long, value_name = "DIR")]
     out: Option<OutPath>,
     #[command(flatten)]

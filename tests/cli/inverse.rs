@@ -203,7 +203,7 @@ fn what_can_not_be_fitted_is_said() {
         (vec!["calibrate", &log, "--prior", "x_m=-1"], "greater than 0"),
         (vec!["calibrate", &log, "--fit", "height"], "neither floor nor ceiling"),
         (vec!["calibrate", &log, "--fit", "everything"], "possible values"),
-        (vec!["calibrate", &log, "--search", "everywhere"], "usual, thorough, furnished"),
+        (vec!["calibrate", &log, "--search", "everywhere"], "quick, thorough, furnished"),
         (vec!["calibrate", "nowhere.jsonl"], "nowhere.jsonl"),
         (vec!["locate", &log, "--scene", "nowhere"], "nowhere"),
         (vec!["locate", &log, "--spacing-m", "0"], "0.01 to 2"),

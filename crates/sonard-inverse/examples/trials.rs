@@ -1,6 +1,6 @@
 //! How well parameters are found again in simulation, beside the bound of Cramer and Rao.
 //!
-//! `cargo run --release -p sonard-inverse --example trials -- COUNT [SEED] [MINUTES] [mounting] [furniture] [bodiless] [usual] [each]`
+//! `cargo run --release -p sonard-inverse --example trials -- COUNT [SEED] [MINUTES] [mounting] [furniture] [bodiless] [quick] [each]`
 //! draws COUNT worlds: a shipped scene, a place in it, and what is wrong with what is believed of it (pose by up to 10 cm
 //! and 8 degrees, air by 8 degrees Celsius, a wall by 5 cm, threshold by 6 dB; with `mounting` the face by 3 cm ahead and
 //! aside, with `furniture` five round things that the scene lacks). Readings have noise of 1 mm with the far tail of
@@ -11,8 +11,8 @@
 //! Each trial is fitted a second time from the truth. Where that ends in the same place, the bound tells how far off an
 //! estimate should be. Where it ends elsewhere and is likelier, the search failed; where it is less likely, the readings
 //! mislead whoever believes them. The table is printed for all trials, and for those that ended where the truth's own fit
-//! does. `each` prints a line for every trial, `at=N` runs that one alone; `bodiless` leaves out scenes with a robot's body, and `usual`
-//! fits as `sonard calibrate` does where nothing else is asked for.
+//! does. `each` prints a line for every trial, `at=N` runs that one alone; `bodiless` leaves out scenes with a robot's body, and `quick`
+//! fits as `sonard calibrate --search quick` does.
 
 mod rooms;
 #[path = "rooms/spread.rs"]
@@ -65,7 +65,7 @@ fn main() {
         mounting: has("mounting"),
         furniture: has("furniture"),
         bodiless: has("bodiless"),
-        search: has("usual").then_some(Search::Usual),
+        search: has("quick").then_some(Search::Quick),
     };
     let alone = words.iter().find_map(|word| word.strip_prefix("at=")?.parse().ok());
     let wanted = alone.map_or(0..count, |at: u64| at..at + 1);

@@ -7,7 +7,7 @@ use sonard_model::geometry::{Pose, wrap_180};
 
 use crate::{
     atlas::{Atlas, AtlasError, Match, is_apart},
-    fit::{Approached, Fit, FitError, Fitted, Prior, approach, fit_near, one_of_many},
+    fit::{self, Approached, Fit, FitError, Fitted, Prior, approach, fit_near, one_of_many},
     likelihood::READINGS_OF_ARC,
     parameter::Parameter,
     sweep::{Beam, Heard, Sweep},
@@ -235,7 +235,8 @@ fn with_pose((widest_m, widest_turn_deg): (f64, f64), besides: &[Prior]) -> Fit 
     let pose: [Prior; POSE] =
         [of(Parameter::X(0), 0.5), of(Parameter::Y(0), 0.5), of(Parameter::Heading(0), 20.0)];
     let priors = pose.into_iter().chain(besides.iter().cloned()).collect();
-    Fit { widest_turn_deg, least_sigma_m: 5e-4, ..Fit::usual(priors, widest_m) }
+    let search = fit::Search::Quick;
+    Fit { widest_turn_deg, least_sigma_m: 5e-4, search, ..Fit::usual(priors, widest_m) }
 }
 
 /// So many of a sweep's beams, evenly spread: two of three that heard something, where there are as many, because what

@@ -9,7 +9,7 @@ use smallvec::SmallVec;
 use sonard_model::{
     acoustics::{BeamPattern, Receiver},
     geometry::{DVec2, Pose, wrap_360, wrap_pi},
-    model::{Arrival, Mechanism, ObservationPoint, Reflector, Simulator, TooCostly},
+    model::{Arrival, Mechanism, ObservationPoint, Reflector, Simulator, TooCostly, receiver},
     scene::Scene,
 };
 
@@ -362,12 +362,11 @@ fn changed_beam(world: &World, parameter: &Parameter) -> Option<(BeamPattern, f6
 /// Receivers with a slightly narrower and a slightly wider band, if that is a parameter.
 fn other_bands(world: &World, parameters: &[&Parameter]) -> Option<[Receiver; 2]> {
     let parameter = parameters.iter().find(|of| ***of == Parameter::Bandwidth)?;
-    let receiver = |by: f64| {
+    let with_band = |by: f64| {
         let changed = world.changed(&[(*parameter, by)]).ok()?;
-        let anywhere = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
-        Some(changed.simulator(&anywhere).ok()?.receiver().clone())
+        Some(receiver(&changed.sensor, &changed.air, &changed.options))
     };
-    Some([receiver(-BY_BAND)?, receiver(BY_BAND)?])
+    Some([with_band(-BY_BAND)?, with_band(BY_BAND)?])
 }
 
 /// What a beam pattern's level gains from one direction beside its axis to another, decibels.

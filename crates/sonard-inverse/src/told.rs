@@ -1,5 +1,6 @@
 //! What a fit found, as figures that people and files have.
 
+use nalgebra::DMatrix;
 use serde::Serialize;
 use sonard_model::acoustics::{Aperture, Sensor};
 use uuid::Uuid;
@@ -72,7 +73,7 @@ impl Fit {
             widest_turn_deg: WIDEST_TURN_DEG,
             least_sigma_m: 2e-4,
             least_sigma_db: 0.5,
-            search: Search::Usual,
+            search: Search::Thorough,
         }
     }
 }
@@ -81,6 +82,8 @@ impl Fit {
 const WIDEST_TURN_DEG: f64 = 12.0;
 /// Standard deviations to both sides that hold 95 %.
 const HALF_WIDTH: f64 = 1.959_964;
+/// Correlation from which on two estimates can hardly be told apart.
+const HARDLY_TOLD_APART: f64 = 0.95;
 /// What sums of changes are off by, beside a limit.
 const ROUNDING: f64 = 1e-9;
 
@@ -120,19 +123,21 @@ impl Fitted {
         self.errors.explained() < 0.7
     }
 
-    /// Pairs of estimates, by their places, that can hardly be told apart, with their correlation.
+    /// Correlations of the estimates, in the order of the priors, -1 to 1.
+    #[must_use]
+    pub fn correlations(&self) -> DMatrix<f64> {
+        let sigma = self.covariance.diagonal().map(f64::sqrt);
+        self.covariance.component_div(&(&sigma * sigma.transpose()))
+    }
+
+    /// Pairs of estimates, by their places, that can hardly be told apart, with their correlation; the closest first.
     #[must_use]
     pub fn hardly_told_apart(&self) -> Vec<(usize, usize, f64)> {
-        let sigma = |at: usize| self.covariance[(at, at)].sqrt();
-        let mut found = Vec::new();
-        for one in 0..self.estimates.len() {
-            for other in 0..one {
-                let correlation = self.covariance[(one, other)] / (sigma(one) * sigma(other));
-                if correlation.abs() > 0.95 {
-                    found.push((other, one, correlation));
-                }
-            }
-        }
+        let all = self.correlations();
+        let pairs = (0..all.nrows()).flat_map(|one| (0..one).map(move |other| (other, one)));
+        let told = pairs.map(|(other, one)| (other, one, all[(one, other)]));
+        let mut found: Vec<_> = told.filter(|(.., of)| of.abs() > HARDLY_TOLD_APART).collect();
+        found.sort_by(|one, other| other.2.abs().total_cmp(&one.2.abs()));
         found
     }
 

@@ -35,6 +35,6 @@ pub use options::{
 };
 pub use path::{Diffractor, Edge, Interaction, Mechanism, Path, Reflector};
 pub use prediction::Prediction;
-pub use simulator::{ModelError, Simulator, sensor_z_m};
+pub use simulator::{ModelError, Simulator, receiver, sensor_z_m};
 
 pub use crate::acoustics::EdgeLawKind;

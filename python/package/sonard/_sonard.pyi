@@ -435,7 +435,7 @@ def calibrate(
     priors: dict[str, float] | None = None,
     poses: ArrayLike | None = None,
     widest_m: float = 0.1,
-    search: Literal["usual", "thorough", "furnished"] = "usual",
+    search: Literal["thorough", "quick", "furnished"] = "thorough",
 ) -> Calibration: ...
 def compare(scans: Log | Scan | Iterable[Log | Scan]) -> dict[str, Any]: ...
 def interpret(

@@ -14,8 +14,17 @@ use crate::{
 };
 
 /// Files of the folder.
-const FILES: [&str; 6] =
-    ["estimates.jsonl", "poses.jsonl", "sensor.json", "scene.json", "air.json", "report.md"];
+const FILES: [&str; 7] = [
+    "estimates.jsonl",
+    "correlations.csv",
+    "poses.jsonl",
+    "sensor.json",
+    "scene.json",
+    "air.json",
+    "report.md",
+];
+/// So many pairs that can hardly be told apart are named: of many scans there are hundreds.
+const PAIRS: usize = 8;
 
 /// How well it fits, in sentences, with those that say what may be wrong.
 pub(super) fn fit_words(lines: &[Told], fitted: &Fitted, doubts: Vec<String>) -> Vec<String> {
@@ -44,9 +53,16 @@ pub(super) fn fit_words(lines: &[Told], fitted: &Fitted, doubts: Vec<String>) ->
         ));
     }
     said.extend(doubts);
-    for (one, other, correlation) in fitted.hardly_told_apart() {
+    let pairs = fitted.hardly_told_apart();
+    for &(one, other, correlation) in pairs.iter().take(PAIRS) {
         let [one, other] = [&lines[one], &lines[other]].map(Told::title);
         said.push(format!("hardly told apart: {one} and {other} (correlation {correlation:.2})"));
+    }
+    if pairs.len() > PAIRS {
+        let more = pairs.len() - PAIRS;
+        said.push(format!(
+            "hardly told apart: {more} more pairs, all in correlations.csv of --out"
+        ));
     }
     said
 }
@@ -86,6 +102,7 @@ pub(super) fn write_folder(
     let estimates: String = lines.iter().map(json).collect();
     let contents = [
         estimates,
+        correlations(lines, fitted),
         poses,
         json(&fitted.sensor(&world.sensor)),
         fitted.world.scene.rewritten(),
@@ -101,6 +118,21 @@ pub(super) fn write_folder(
 fn json(value: &impl Serialize) -> String {
     // Numbers, texts and maps with text keys can always be written.
     serde_json::to_string(value).unwrap_or_default() + "\n"
+}
+
+/// The matrix of correlations, each row and column under the name of its estimate.
+fn correlations(lines: &[Told], fitted: &Fitted) -> String {
+    let titles = || lines.iter().map(Told::title);
+    let figures = fitted.correlations();
+    let mut table = csv::Writer::from_writer(Vec::new());
+    let mut rows = vec![[String::new()].into_iter().chain(titles()).collect::<Vec<_>>()];
+    for (title, row) in titles().zip(figures.row_iter()) {
+        rows.push([title].into_iter().chain(row.iter().map(|of| format!("{of:.4}"))).collect());
+    }
+    // Rows of one length are always written to memory.
+    rows.iter().for_each(|row| table.write_record(row).unwrap_or_default());
+    let bytes = table.into_inner().unwrap_or_default();
+    String::from_utf8_lossy(&bytes).into_owned()
 }
 
 fn report(lines: &[Told], words: &[String]) -> String {

@@ -81,7 +81,7 @@ impl State<'_> {
                 keep_likelier(&mut best, end);
             }
         }
-        if self.fit.search == Search::Usual {
+        if self.fit.search == Search::Quick {
             let places = self.places(&best)?;
             for place in places.iter().take(FOLLOWED) {
                 keep_likelier(&mut best, one_of_many(self.attempt(place.values.clone(), STAGE))?);
@@ -147,7 +147,7 @@ impl State<'_> {
             .into_iter()
             .flat_map(|(direction, sigma)| [-ANEW, ANEW].map(|side| side * sigma * &direction));
         let mut beginnings: Vec<_> = sides.map(|start| (self.limited(start), 0)).collect();
-        if self.fit.search != Search::Usual {
+        if self.fit.search != Search::Quick {
             beginnings.extend(self.drawn()?.into_iter().map(|place| (place.values, DRAWN_STAGE)));
         }
         Ok(beginnings)

@@ -115,7 +115,7 @@ impl State<'_> {
         }
     }
 
-    /// By exact predictions, where those from the axis have led: a thorough search polishes by them, the usual one makes a step. All
+    /// By exact predictions, where those from the axis have led: a thorough search polishes by them, a quick one makes a step. All
     /// that follow are exact, too.
     pub(super) fn exactly(&mut self, end: Settled) -> Result<Settled, FitError> {
         (self.values, self.phases) = (end.values.clone(), end.phases);
@@ -124,7 +124,7 @@ impl State<'_> {
             return Ok(end);
         }
         self.be_exact();
-        if self.fit.search == Search::Usual {
+        if self.fit.search == Search::Quick {
             let exact = self.linear()?;
             self.improve(&exact, &end.errors)?;
             return Ok(Settled { values: self.values.clone(), ..end });

@@ -20,7 +20,8 @@ use crate::{
 
 mod settings;
 
-use settings::{fan_settings, path_settings, receiver};
+pub use settings::receiver;
+use settings::{fan_settings, path_settings};
 
 /// An error in sensor, scene or options that prevents a simulator.
 #[derive(Debug, Clone, PartialEq, Error)]

@@ -58,7 +58,7 @@ impl Pulse {
     pub fn widen_band(&mut self, by: f64) {
         match self {
             Self::Burst { bandwidth_hz, .. } | Self::Chirp { bandwidth_hz, .. } => {
-                *bandwidth_hz *= by
+                *bandwidth_hz *= by;
             }
             Self::Gaussian { sigma_us } => *sigma_us /= by,
         }

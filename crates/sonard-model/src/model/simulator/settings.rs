@@ -18,7 +18,8 @@ const PATHS_KEPT_DB: f64 = 20.0;
 const SIGMA_E: f64 = 0.095;
 
 /// The sensor's receiver with the options applied. Only `paths` knows phases.
-pub(super) fn receiver(sensor: &Sensor, air: &Air, options: &Options) -> Receiver {
+#[must_use]
+pub fn receiver(sensor: &Sensor, air: &Air, options: &Options) -> Receiver {
     let paths = options.engine.paths();
     let response = paths.and_then(|paths| paths.response).unwrap_or(sensor.response);
     let sensor = Sensor { response, ..sensor.clone() };
