@@ -3,16 +3,13 @@
 import collections
 import json
 import os
-import re
 from concurrent.futures import ThreadPoolExecutor
 from statistics import median
 
 from work import DATA_SHEET, share, table
 
 FITTED = ("roberto-a", "roberto-b", "roberto-c", "roberto-d")
-FIT = "pose,mounting,threshold,rise,beam,skirts"
-# Of the pulse, tried one by one: no parameter of `calibrate` moves it.
-BANDWIDTHS_HZ = (1000, 1500, 1750, 2000, 2500)
+FIT = "pose,mounting,threshold,rise,beam,skirts,pulse"
 PRIORS = ("x_m=0.03", "y_m=0.03", "heading_deg=4")
 # Each sweep says as well how sensitive its ranger was and how far ahead of the axis its face sat; how far aside is
 # believed within 5 mm, because a heading does nearly the same.
@@ -30,14 +27,13 @@ RANGES_M = (0, 0.4, 0.6, 0.9, 1.3, 1.7, 2.1, 2.6)
 def main(work):
     with open(work.given("arena-sweeps.json")) as file:
         sweeps = json.load(file)
-    plain = work.keep("start-1000.json", start_sensor(1000))
+    start = work.keep("start.json", start_sensor())
     groups = {
         "fitted": [sweep for sweep in sweeps if sweep["group"] in FITTED],
         "blind": [sweep for sweep in sweeps if sweep["group"] not in FITTED],
     }
     for name, of in groups.items():
-        imported(work, name, of, plain)
-    start = work.keep("start.json", start_sensor(likeliest_bandwidth_hz(work)))
+        imported(work, name, of, start)
     calibrate(work, start)
     sensor = work.path("calibrated", "sensor.json")
     own, as_fitted = "threshold and mounting of its own", "the sensor as fitted"
@@ -56,13 +52,12 @@ def main(work):
     picture(work, *next(pair for pair in found if pair[0]["id"] == DRAWN), sensor)
 
 
-def start_sensor(bandwidth_hz):
-    """An HC-SR04 by data sheets with a plain amplifier, two cans 3 cm apart, skirts, and a pulse that rises as this bandwidth lets it."""
-    sensor = dict(
-        DATA_SHEET, name="nxt", pulse=dict(DATA_SHEET["pulse"], bandwidth_hz=bandwidth_hz), aperture={"shape": "piston", "radius_m": 0.0055, "skirts_db": -10.0}, threshold=0.15,
+def start_sensor():
+    """An HC-SR04 by data sheets, its pulse too, with a plain amplifier, two cans 3 cm apart, and skirts."""
+    return dict(
+        DATA_SHEET, name="nxt", aperture={"shape": "piston", "radius_m": 0.0055, "skirts_db": -10.0}, threshold=0.15,
         threshold_rise_db_per_m=1.0, gain={"kind": "steps", "steps": [{"until_us": None, "gain_db": 0.0}]},
         mounting={"separation_m": 0.03, "ahead_m": 0.03}, max_range_m=float(REACH_M))
-    return sensor
 
 
 def imported(work, name, sweeps, sensor, place="fit_m"):
@@ -71,28 +66,10 @@ def imported(work, name, sweeps, sensor, place="fit_m"):
              "--sensor", sensor, "--force", "-o", work.path(name + ".jsonl"))
 
 
-def likeliest_bandwidth_hz(work):
-    """The bandwidth with which ranges spread least about what is predicted."""
-    rows = []
-    for bandwidth_hz in BANDWIDTHS_HZ:
-        out = work.path("bandwidth-%d" % bandwidth_hz)
-        sensor = work.keep("start-%d.json" % bandwidth_hz, start_sensor(bandwidth_hz))
-        work.run("calibrate", work.path("fitted.jsonl"), "--sensor", sensor, "--fit", FIT, *priors(), "--out", out, "--force")
-        with open(os.path.join(out, "report.md")) as file:
-            told = next(line for line in file if "ranges within" in line)
-        rows.append((bandwidth_hz, re.search(r"(\d+) % explained", told)[1], float(re.search(r"within ([\d.]+) mm", told)[1])))
-    table(["bandwidth of the pulse", "explained", "ranges within"],
-          [["%d Hz" % bandwidth_hz, explained + " %", "%.1f mm" % spread_mm] for bandwidth_hz, explained, spread_mm in rows])
-    return min(rows, key=lambda row: row[2])[0]
-
-
-def priors():
-    return [arg for prior in PRIORS for arg in ("--prior", prior)]
-
-
 def calibrate(work, sensor):
-    lines = work.lines("calibrate", work.path("fitted.jsonl"), "--sensor", sensor, "--fit", FIT, *priors(), "--search",
-                       "thorough", "--out", work.path("calibrated"), "--force", "--json")
+    priors = [arg for prior in PRIORS for arg in ("--prior", prior)]
+    lines = work.lines("calibrate", work.path("fitted.jsonl"), "--sensor", sensor, "--fit", FIT, *priors,
+                       "--out", work.path("calibrated"), "--force", "--json")
     rows = [[line["name"], "%.5g" % line["prior"], "%.5g" % line["value"], "%.2g" % line["sigma"]]
             for line in lines if "scan" not in line]
     table(["", "was", "is", "standard deviation"], rows)

@@ -43,10 +43,10 @@ def main(work):
     log = imported(work, "targets", readings)
     sensors = {
         "data sheet": (DATA_SHEET, REFLECTANCE),
-        "fitted to the panel": fitted(work, panel_log, "piston", DATA_SHEET, "pose,threshold,beam"),
-        "with skirts": fitted(work, panel_log, "skirts", skirted, "pose,threshold,beam,skirts"),
+        "fitted to the panel": fitted(work, panel_log, "piston", DATA_SHEET, "pose,threshold,beam,pulse"),
+        "with skirts": fitted(work, panel_log, "skirts", skirted, "pose,threshold,beam,skirts,pulse"),
         "fitted to panel, sheet and ruler": fitted(
-            work, log, "joint", skirted, "pose,threshold,beam,skirts,materials", MATERIALS),
+            work, log, "joint", skirted, "pose,threshold,beam,skirts,pulse,materials", MATERIALS),
     }
     panels(work, sweeps, sensors)
     aimed(work, envelopes, sensors)
