@@ -63,6 +63,8 @@ pub struct Fit {
 #[serde(rename_all = "lowercase")]
 pub enum Search {
     /// A few places beside the likeliest one: half as long
+    #[serde(alias = "usual")]
+    #[cfg_attr(feature = "clap", value(alias = "usual"))]
     Quick,
     /// Many places, and each to its end
     #[default]
