@@ -2,7 +2,6 @@
 
 import collections
 import json
-import os
 from concurrent.futures import ThreadPoolExecutor
 from statistics import median
 

@@ -44,7 +44,8 @@ const USUAL: [&str; 3] = ["pose", "air", "threshold"];
 /// fit : sequence of str
 ///     What to fit: ``"pose"`` (of each scan), ``"heading"`` and ``"gear"`` of the stepper, ``"mounting"``, ``"height"``,
 ///     ``"air"`` (speed of sound), ``"delay"``, ``"threshold"``, ``"rise"`` (of the threshold with range), ``"beam"``,
-///     ``"skirts"``, ``"pulse"`` (how fast it rises), ``"materials"``, ``"roughness"``, ``"walls"``; ``sonard calibrate --help`` tells of each.
+///     ``"skirts"``, ``"pulse"`` (how fast it rises), ``"materials"``, ``"roughness"``, ``"walls"``;
+///     ``sonard calibrate --help`` tells of each.
 /// priors : dict of str to float, optional
 ///     Standard deviation of what is believed of a parameter, by the name that its estimate has, in its unit; the
 ///     command's without it.

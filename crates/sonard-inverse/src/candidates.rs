@@ -129,13 +129,14 @@ impl Listener {
                     known.until_db = known.until_db.max(until_db);
                 }
                 _ => {
+                    let margin_db = until_db - next.by_db;
                     found.push(Candidate {
                         range_m: Some(next.rise.range_m),
                         arrival: next.rise.arrival.map(|arrival| firing.arrival(&arrival)),
                         until_db,
                         spread_db: self.spread_db(&next),
-                        margin_db: until_db - next.by_db,
-                        walk_m_per_db: self.walk_m_per_db(until_db - next.by_db),
+                        margin_db,
+                        walk_m_per_db: self.walk_m_per_db(margin_db),
                     });
                     last = Some(next);
                 }

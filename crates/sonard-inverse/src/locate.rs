@@ -141,7 +141,7 @@ pub(crate) fn explaining(
     let search = Search { models: atlas.models(world)?, world, sweep, besides, watch };
     let matches = atlas.matches(world, sweep, ROUGH_OPEN);
     let has_few_echoes = has_few_echoes(sweep);
-    let (rough, whole) = if has_few_echoes { (ROUGH_OPEN, WHOLE_OPEN) } else { (ROUGH, WHOLE) };
+    let (rough, whole) = looked_at(has_few_echoes);
     let (best, others) = matches.split_at(rough.min(matches.len()));
     let starts = best.iter().map(|Match { pose, .. }| pose).chain(expected);
     let mut found = search.improved(starts, whole + expected.len())?;
@@ -150,7 +150,7 @@ pub(crate) fn explaining(
         found.extend(search.improved(others.iter().map(|of| &of.pose), WHOLE_OPEN)?);
     }
     if is_open || found.first().is_none_or(|best| best.log_likelihood < 0.0) {
-        let (rough, whole) = if is_open { (ROUGH_OPEN, WHOLE_OPEN) } else { (ROUGH, WHOLE) };
+        let (rough, whole) = looked_at(is_open);
         match atlas.matches_beside(world, sweep, rough, watch) {
             Ok(matches) => found.extend(search.improved(matches.iter().map(|of| &of.pose), whole)?),
             Err(AtlasError::Stopped) => return Err(FitError::Stopped),
@@ -160,6 +160,11 @@ pub(crate) fn explaining(
     }
     found.sort_by(|one, other| other.log_posterior.total_cmp(&one.log_posterior));
     Ok(distinct(found, 0.05, |found| &found.poses[0]))
+}
+
+/// How many matches are improved roughly, and how many of them with all beams.
+const fn looked_at(is_open: bool) -> (usize, usize) {
+    if is_open { (ROUGH_OPEN, WHOLE_OPEN) } else { (ROUGH, WHOLE) }
 }
 
 /// Whether a sweep heard so little, as of one wall or edge, that it may have been taken from many places.

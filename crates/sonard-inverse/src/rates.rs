@@ -174,10 +174,8 @@ impl<'a> RateFinder<'a> {
             // A threshold alone, as turned sweeps are asked about, needs none.
             let flanks = LazyCell::new(|| Flanks::of(arrival, firing));
             for &at in concerning {
-                let (by_range, by_db) = match self.parameters[at as usize] {
-                    Parameter::Bandwidth => (self.earlier_m(candidate, firing), 0.0),
-                    _ => self.rates(at, arrival, predicted_m, firing, &flanks),
-                };
+                let told = (predicted_m, candidate.margin_db);
+                let (by_range, by_db) = self.rates(at, arrival, told, firing, &flanks);
                 range_rates.extend((by_range != 0.0).then_some((at, by_range)));
                 until_rates.extend((by_db != 0.0).then_some((at, by_db)));
             }
@@ -193,12 +191,13 @@ impl<'a> RateFinder<'a> {
         }
     }
 
-    /// What an arrival's range and its margin above the threshold gain with a parameter, metres and decibels for each unit.
+    /// What an arrival's range and its margin above the threshold, which are told as they are, gain with a parameter, metres and
+    /// decibels for each unit.
     fn rates(
         &self,
         at: u32,
         arrival: &Arrival,
-        predicted_m: f64,
+        (predicted_m, margin_db): (f64, f64),
         firing: &Firing,
         flanks: &LazyCell<Flanks, impl FnOnce() -> Flanks>,
     ) -> (f64, f64) {
@@ -214,6 +213,7 @@ impl<'a> RateFinder<'a> {
         match parameter {
             Parameter::SoundSpeed => (-self.stretch(firing) * predicted_m, 0.0),
             Parameter::Delay => (1.0, 0.0),
+            Parameter::Bandwidth => (self.stretch(firing) * self.earlier_m(margin_db), 0.0),
             Parameter::ThresholdRise => (0.0, -predicted_m),
             _ => (
                 0.5 * self.stretch(firing) * longer_m,
@@ -224,13 +224,11 @@ impl<'a> RateFinder<'a> {
 
     /// What the range of a lone echo gains with the width of the band: its pulse rises faster, so that it is less late. How far it
     /// reaches above the threshold is by its peak, which stays.
-    fn earlier_m(&self, candidate: &Candidate, firing: &Firing) -> f64 {
-        let gain_m = self.other_bands.as_ref().map_or(0.0, |bands| {
-            let [narrower_m, wider_m] =
-                bands.each_ref().map(|of| of.time_walk_m(candidate.margin_db));
+    fn earlier_m(&self, margin_db: f64) -> f64 {
+        self.other_bands.as_ref().map_or(0.0, |bands| {
+            let [narrower_m, wider_m] = bands.each_ref().map(|of| of.time_walk_m(margin_db));
             (wider_m - narrower_m) / (2.0 * BY_BAND)
-        });
-        self.stretch(firing) * gain_m
+        })
     }
 
     /// What a predicted range is longer at the speed of sound that ranges are told at.

@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use super::{Aperture, EchoShape, Gain, Pulse, Sensor, edge::EdgeView, pulse::filter_sigma_us};
+use super::{Aperture, EchoShape, Gain, Sensor, edge::EdgeView};
 
 /// Points across a face: enough for a phase that runs over 40 radians.
 const POINTS: usize = 24;
@@ -207,12 +207,7 @@ impl ApertureResponse {
 
 /// The pulse's lines `1 / period` apart over its band.
 fn spectrum(sensor: &Sensor, pulse: &EchoShape, period_us: f64) -> Vec<(f64, Complex64)> {
-    let band_hz = BAND_SIGMAS
-        * match &sensor.pulse {
-            Pulse::Burst { bandwidth_hz, .. } | Pulse::Chirp { bandwidth_hz, .. } => *bandwidth_hz,
-            // A Gaussian's spectrum is as wide as that of the filter with the same response.
-            Pulse::Gaussian { sigma_us } => 1e12 * filter_sigma_us(1.0) / (1e12 * sigma_us),
-        };
+    let band_hz = BAND_SIGMAS * sensor.pulse.bandwidth_hz();
     let spacing_hz = 1e6 / period_us;
     let each_side = (band_hz / spacing_hz).ceil() as i32;
     (-each_side..=each_side)

@@ -7,7 +7,7 @@ use rand::Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use super::Receiver;
-use crate::acoustics::{Pulse, Sensor, pulse::filter_sigma_us};
+use crate::acoustics::{Sensor, pulse::filter_sigma_us};
 
 /// Disturbances of a reading.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -74,10 +74,5 @@ impl NoiseTrack {
 
 /// Standard deviation of the receiver's impulse response, microseconds.
 pub(super) fn sigma_us(sensor: &Sensor) -> f64 {
-    match &sensor.pulse {
-        Pulse::Burst { bandwidth_hz, .. } | Pulse::Chirp { bandwidth_hz, .. } => {
-            filter_sigma_us(*bandwidth_hz)
-        }
-        Pulse::Gaussian { sigma_us } => *sigma_us,
-    }
+    filter_sigma_us(sensor.pulse.bandwidth_hz())
 }
