@@ -1,15 +1,14 @@
 //! The transducer's face: how strong a sound leaves or arrives at an angle to its axis.
 
+mod face;
+
 use std::{
-    cell::RefCell,
-    collections::VecDeque,
     f64::consts::{FRAC_PI_2, PI, TAU},
     sync::Arc,
 };
 
-use num_complex::Complex64;
-
-use super::{Aperture, EchoShape, Pulse, Sensor, aperture::points, sensor::level_at};
+use self::face::FaceResponse;
+use super::{Aperture, Sensor, sensor::level_at};
 
 /// Table spacing: 0.05 degrees. For a 19 mm face at 50 kHz a straight line between entries errs by
 /// less than 2e-5 in the main lobe, and by less than 4e-4 where a side lobe's steady part overtakes
@@ -31,24 +30,6 @@ enum Shape {
     Gaussian { half_angle_rad: f64 },
 }
 
-/// What a pattern follows from.
-#[derive(Debug, Clone, PartialEq)]
-struct Origin {
-    aperture: Aperture,
-    pulse: Pulse,
-    frequency_hz: f64,
-    sound_speed_m_s: f64,
-}
-
-/// How many patterns a thread remembers.
-const REMEMBERED: usize = 4;
-
-thread_local! {
-    /// The patterns that were asked for last. A fit asks for those of the same few apertures hundreds of times while
-    /// thresholds and poses change, and a table takes a millisecond or two.
-    static REMEMBERED_PATTERNS: RefCell<VecDeque<(Origin, BeamPattern)>> = const { RefCell::new(VecDeque::new()) };
-}
-
 impl BeamPattern {
     /// The pattern of a sensor at a speed of sound in metres a second.
     ///
@@ -57,24 +38,6 @@ impl BeamPattern {
     /// [`piston_directivity`] times `cos(theta)`; a short one fills the nulls.
     #[must_use]
     pub fn new(sensor: &Sensor, sound_speed_m_s: f64) -> Self {
-        let origin = Origin {
-            aperture: sensor.aperture.clone(),
-            pulse: sensor.pulse.clone(),
-            frequency_hz: sensor.frequency_hz,
-            sound_speed_m_s,
-        };
-        REMEMBERED_PATTERNS.with_borrow_mut(|known| {
-            if let Some((_, pattern)) = known.iter().find(|(of, _)| *of == origin) {
-                return pattern.clone();
-            }
-            let pattern = Self::tabulated(sensor, sound_speed_m_s);
-            known.truncate(REMEMBERED - 1);
-            known.push_front((origin, pattern.clone()));
-            pattern
-        })
-    }
-
-    fn tabulated(sensor: &Sensor, sound_speed_m_s: f64) -> Self {
         let tabulated = |level: &dyn Fn(f64) -> f64| {
             let mut table: Vec<f64> = (0..TABLE_LENGTH)
                 .map(|i| i as f64 * STEP_RAD)
@@ -86,8 +49,13 @@ impl BeamPattern {
         };
         Self(match sensor.aperture {
             Aperture::Piston { .. } | Aperture::Line { .. } => {
-                let face = Face::new(sensor, sound_speed_m_s);
-                tabulated(&|theta_rad| face.peak(theta_rad))
+                let ka = TAU * sensor.frequency_hz / sound_speed_m_s * sensor.half_width_m();
+                let face = FaceResponse::of(sensor, ka);
+                tabulated(&|theta_rad| {
+                    let alone =
+                        sensor.aperture.obliquity(theta_rad) * face.at(ka * theta_rad.sin().abs());
+                    with_skirts(&sensor.aperture, alone, theta_rad)
+                })
             }
             Aperture::Table { ref points, .. } => {
                 tabulated(&|theta_rad| level_at(points, theta_rad))
@@ -148,6 +116,14 @@ impl BeamPattern {
     }
 }
 
+/// Amplitude at an angle of a face that has one alone, with the skirts' power if there are any.
+fn with_skirts(aperture: &Aperture, alone: f64, theta_rad: f64) -> f64 {
+    let Aperture::Piston { skirts_db: Some(level_db), .. } = *aperture else { return alone };
+    let skirts = 10f64.powf(level_db / 20.0) * aperture.obliquity(theta_rad);
+    // Nothing is added on the axis.
+    (alone * alone + (1.0 - alone * alone) * skirts * skirts).sqrt()
+}
+
 /// Far-field amplitude of a circular piston in a baffle at one frequency, relative to its axis:
 /// `2 J1(x)/x` with `x = k a sin(theta)`; negative in every other side lobe.
 ///
@@ -178,113 +154,6 @@ pub fn kuc_siegel_response(
         return 0.0;
     }
     2.0 * theta_rad.cos() / (PI * half_span_s) * (1.0 - place * place).sqrt()
-}
-
-/// A face that meets a pulse.
-struct Face {
-    aperture: Aperture,
-    /// Radians a second.
-    omega: f64,
-    sound_speed_m_s: f64,
-    /// `k a` of the face's half width.
-    ka: f64,
-    pulse: EchoShape,
-    /// About which the pulse is even, if it is, microseconds.
-    middle_us: Option<f64>,
-}
-
-/// Spacing at which the peak is looked for, microseconds.
-const SEARCH_US: f64 = 6.0;
-
-impl Face {
-    fn new(sensor: &Sensor, sound_speed_m_s: f64) -> Self {
-        let omega = TAU * sensor.frequency_hz;
-        let ka = omega / sound_speed_m_s * sensor.half_width_m();
-        let (aperture, pulse) = (sensor.aperture.clone(), EchoShape::of(sensor));
-        let middle_us = match sensor.pulse {
-            Pulse::Burst { .. } => Some(0.5e6 * sensor.pulse_s()),
-            Pulse::Gaussian { .. } => Some(0.0),
-            Pulse::Chirp { .. } => None,
-        };
-        Self { aperture, omega, sound_speed_m_s, ka, pulse, middle_us }
-    }
-
-    /// Peak over time of `|h * pulse|` at an angle, relative to the axis, with the skirts' power if there are any.
-    fn peak(&self, theta_rad: f64) -> f64 {
-        let alone = self.peak_of_face(theta_rad);
-        let Aperture::Piston { skirts_db: Some(level_db), .. } = self.aperture else {
-            return alone;
-        };
-        let skirts = 10f64.powf(level_db / 20.0) * self.aperture.obliquity(theta_rad);
-        // Nothing is added on the axis.
-        (alone * alone + (1.0 - alone * alone) * skirts * skirts).sqrt()
-    }
-
-    fn peak_of_face(&self, theta_rad: f64) -> f64 {
-        let points = self.quadrature(theta_rad);
-        let reach_us = points.iter().map(|point| point.0.abs()).fold(0.0, f64::max);
-        // An even pulse has an even response: its first half will do.
-        let first_us = self.pulse.first_us() - reach_us;
-        let last_us = self.middle_us.unwrap_or_else(|| self.pulse.last_us() + reach_us);
-        let steps = ((last_us - first_us) / SEARCH_US).ceil().max(2.0) as usize;
-        let step_us = (last_us - first_us) / steps as f64;
-        let at = |t_us: f64| self.magnitude(t_us.min(last_us), &points);
-        let times: Vec<f64> = (0..=steps).map(|i| first_us + i as f64 * step_us).collect();
-        let samples: Vec<f64> = times.iter().map(|&t_us| at(t_us)).collect();
-        let highest_sample = samples.iter().copied().fold(0.0, f64::max);
-        // Several peaks can be nearly as high: each that may be the highest is climbed.
-        let peaks = (1..steps).filter(|&i| {
-            samples[i] >= samples[i - 1].max(samples[i + 1]) && samples[i] > 0.8 * highest_sample
-        });
-        let peak = peaks.map(|i| highest(at, times[i - 1], times[i + 1])).fold(0.0, f64::max);
-        // Rounding must not let any direction beat the axis.
-        peak.max(highest_sample).min(1.0)
-    }
-
-    /// Delays (microseconds) and complex shares of the face's points.
-    fn quadrature(&self, theta_rad: f64) -> Vec<(f64, Complex64)> {
-        let sine = theta_rad.sin();
-        // The phase runs over +-ka sin(theta); from half of that on, more points gain nothing
-        // but the digits of the rest.
-        let count = (0.5 * self.ka * sine).ceil() as usize + 14;
-        let obliquity = self.aperture.obliquity(theta_rad);
-        points(&self.aperture, count)
-            .unwrap_or_default()
-            .into_iter()
-            .map(|(place_m, share)| {
-                let delay_s = place_m * sine / self.sound_speed_m_s;
-                (1e6 * delay_s, obliquity * share * Complex64::cis(-self.omega * delay_s))
-            })
-            .collect()
-    }
-
-    fn magnitude(&self, t_us: f64, points: &[(f64, Complex64)]) -> f64 {
-        points
-            .iter()
-            .map(|(delay_us, share)| share * self.pulse.at(t_us - delay_us))
-            .sum::<Complex64>()
-            .norm()
-    }
-}
-
-/// Maximum of a curve with one peak between two places, by golden section.
-fn highest(curve: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
-    const PART: f64 = 0.618_033_988_749_895;
-    let mut left = high - PART * (high - low);
-    let mut right = low + PART * (high - low);
-    let (mut at_left, mut at_right) = (curve(left), curve(right));
-    for _ in 0..8 {
-        if at_left < at_right {
-            (low, left, at_left) = (left, right, at_right);
-            right = low + PART * (high - low);
-            at_right = curve(right);
-        } else {
-            (high, right, at_right) = (right, left, at_left);
-            left = high - PART * (high - low);
-            at_left = curve(left);
-        }
-    }
-    at_left.max(at_right)
 }
 
 #[cfg(test)]
