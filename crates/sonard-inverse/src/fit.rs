@@ -1,8 +1,10 @@
 //! The most likely values of parameters, and how sure they are.
 
+mod elsewhere;
 mod journal;
 mod polish;
 mod restart;
+mod ridge;
 mod settle;
 mod shorter;
 mod spread;
@@ -160,6 +162,8 @@ struct State<'a> {
     phases: Phases,
     /// Whether predictions are made with the transducer where it is, and not on the axis.
     is_exact: bool,
+    /// A combination of the parameters that steps leave as it is.
+    held: Option<DVector<f64>>,
     /// The predictions that were made last, and where.
     last: Option<(DVector<f64>, Phases, Rc<Linear>)>,
 }
@@ -253,6 +257,7 @@ impl<'a> State<'a> {
             models,
             phases: Phases::Unknown,
             is_exact: false,
+            held: None,
             last: None,
         })
     }

@@ -86,7 +86,6 @@ const WHOLE: usize = 4;
 /// heard something, of which a rough look tells little. So many more are looked at then, from the beginning where echoes are
 /// few.
 const OPEN_M: f64 = 0.1;
-const FEW_ECHOES: f64 = 0.12;
 const ROUGH_OPEN: usize = 56;
 const WHOLE_OPEN: usize = 20;
 /// As far off as a match may be: metres, with places 0.1 m apart, and degrees, with directions 3 apart.
@@ -140,7 +139,7 @@ pub(crate) fn explaining(
     let besides = &atlas.besides;
     let search = Search { models: atlas.models(world)?, world, sweep, besides, watch };
     let matches = atlas.matches(world, sweep, ROUGH_OPEN);
-    let has_few_echoes = has_few_echoes(sweep);
+    let has_few_echoes = sweep.hears_little();
     let (rough, whole) = looked_at(has_few_echoes);
     let (best, others) = matches.split_at(rough.min(matches.len()));
     let starts = best.iter().map(|Match { pose, .. }| pose).chain(expected);
@@ -165,12 +164,6 @@ pub(crate) fn explaining(
 /// How many matches are improved roughly, and how many of them with all beams.
 const fn looked_at(is_open: bool) -> (usize, usize) {
     if is_open { (ROUGH_OPEN, WHOLE_OPEN) } else { (ROUGH, WHOLE) }
-}
-
-/// Whether a sweep heard so little, as of one wall or edge, that it may have been taken from many places.
-fn has_few_echoes(sweep: &Sweep) -> bool {
-    let echoes = sweep.beams.iter().filter(is_echo).count() as f64;
-    echoes < FEW_ECHOES * sweep.beams.len() as f64
 }
 
 /// Whether so little holds a place that there may be others like it.

@@ -74,6 +74,8 @@ pub enum SweepError {
 
 /// Fewer say too little about three values of a pose.
 const LEAST_BEAMS: usize = 8;
+/// Less than this share of echoes is little.
+const FEW_ECHOES: f64 = 0.12;
 
 impl Sweep {
     /// The readings of a logged scan.
@@ -115,5 +117,12 @@ impl Sweep {
             return Err(SweepError::TooFew { scan: id, beams: beams.len() });
         }
         Ok(Self { scan: id, pose, beams })
+    }
+
+    /// Whether it heard so little, as of one wall or edge, that it may have been taken from many places.
+    pub(crate) fn hears_little(&self) -> bool {
+        let is_echo = |beam: &&Beam| matches!(beam.heard, Heard::Echo { .. });
+        let echoes = self.beams.iter().filter(is_echo).count() as f64;
+        echoes < FEW_ECHOES * self.beams.len() as f64
     }
 }

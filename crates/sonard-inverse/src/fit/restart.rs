@@ -6,9 +6,6 @@
 //! is nearly as likely widens the intervals.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use rand::SeedableRng as _;
-use rand_distr::{Distribution as _, StandardNormal};
-use rand_pcg::Pcg64;
 
 use super::{
     FitError, Search, Settled, State,
@@ -27,12 +24,10 @@ use crate::{
 const DIRECTIONS: usize = 2;
 /// Places on each side, and how far apart, in standard deviations of what a rough look leaves in doubt.
 const PLACES: (i32, f64) = (6, 0.5);
-/// Of a robot with a body, whose paths have to be found anew for each: a prediction costs some hundred times as much.
-const PLACES_OF_BODY: (i32, f64) = (2, 1.5);
 /// A rough look: spread of ranges, metres, of the threshold, decibels, and the share of clutter.
-const ROUGH: (f64, f64, f64) = (0.03, 3.0, 0.05);
+pub(super) const ROUGH: (f64, f64, f64) = (0.03, 3.0, 0.05);
 /// A close one, by which places are told apart.
-const CLOSE: (f64, f64, f64) = (0.005, 1.5, 0.03);
+pub(super) const CLOSE: (f64, f64, f64) = (0.005, 1.5, 0.03);
 /// Directions of less doubt than this share of what was believed are held well enough.
 const LEAST_SHARE: f64 = 0.1;
 /// Places that are followed to their ends, and the stage that these begin with.
@@ -43,23 +38,11 @@ const STAGE: usize = STAGES.len() - 1;
 const ENDS: usize = 8;
 const STAGED: usize = 2;
 const POLISHED: usize = 3;
-/// A fit has gone astray that explains less than all readings but this share, or contradicts what was believed by
-/// this many standard deviations.
-const ASTRAY: (f64, f64) = (0.03, 3.5);
-/// Beginnings anew of such a one: to both sides, in standard deviations of what a first look leaves in doubt.
-const ANEW: f64 = 1.5;
-/// Further ones, drawn from what was believed: how many, with which share of readings in arcs of something else they are looked
-/// at, how many are followed, and from which stage on.
-const DRAWN: usize = 48;
-const DRAWN_ARCS: f64 = 0.3;
-const DRAWN_FOLLOWED: usize = 4;
-const DRAWN_STAGE: usize = 3;
-
 /// Somewhere beside the end of a fit.
-struct Place {
-    values: DVector<f64>,
+pub(super) struct Place {
+    pub(super) values: DVector<f64>,
     /// Log-posterior with spreads by which places are told apart.
-    value: f64,
+    pub(super) value: f64,
 }
 
 impl Settled {
@@ -74,11 +57,10 @@ impl State<'_> {
     pub(super) fn likeliest(&mut self) -> Result<(Settled, DVector<f64>), FitError> {
         let mut best = self.attempt(self.still(), 0)?;
         let mut seen: Vec<Place> = vec![best.place()];
-        if self.is_astray(&best) && self.start.scene.robot.is_none() {
-            for (start, stage) in self.beginnings()? {
-                let end = one_of_many(self.attempt(start, stage))?;
-                seen.extend(end.as_ref().map(Settled::place));
-                keep_likelier(&mut best, end);
+        if self.is_astray(&best) || self.hears_little() {
+            for end in self.ends_from_elsewhere()? {
+                seen.push(end.place());
+                keep_likelier(&mut best, Some(end));
             }
         }
         if self.fit.search == Search::Quick {
@@ -97,6 +79,7 @@ impl State<'_> {
                 keep_likelier(&mut best, one_of_many(self.polished(end))?);
             }
         }
+        best = self.along_ridges(best)?;
         let beside = self.beside_thoroughly(&best, &places, &seen)?;
         Ok((best, beside))
     }
@@ -126,7 +109,11 @@ impl State<'_> {
     }
 
     /// Where a fit ends that begins there, with the spreads from this stage on.
-    fn attempt(&mut self, start: DVector<f64>, stage: usize) -> Result<Settled, FitError> {
+    pub(super) fn attempt(
+        &mut self,
+        start: DVector<f64>,
+        stage: usize,
+    ) -> Result<Settled, FitError> {
         (self.values, self.phases) = (start, Phases::Unknown);
         let mut errors = self.rough_errors();
         errors.sigma_m *= STAGES[stage].0;
@@ -134,55 +121,11 @@ impl State<'_> {
         self.settle(errors)
     }
 
-    fn is_astray(&self, end: &Settled) -> bool {
-        let (unexplained, sigmas) = ASTRAY;
-        let contradicts = end.values.component_div(&self.prior_sigmas()).amax() > sigmas;
-        contradicts || end.errors.explained() < 1.0 - unexplained
-    }
-
-    /// Other beginnings than what was believed, each with the stage it begins with.
-    fn beginnings(&mut self) -> Result<Vec<(DVector<f64>, usize)>, FitError> {
-        let doubtful = self.doubtful(&self.still(), &self.rough_errors(), Phases::Unknown)?;
-        let sides = doubtful
-            .into_iter()
-            .flat_map(|(direction, sigma)| [-ANEW, ANEW].map(|side| side * sigma * &direction));
-        let mut beginnings: Vec<_> = sides.map(|start| (self.limited(start), 0)).collect();
-        if self.fit.search != Search::Quick {
-            beginnings.extend(self.drawn()?.into_iter().map(|place| (place.values, DRAWN_STAGE)));
-        }
-        Ok(beginnings)
-    }
-
-    /// Of places drawn from what was believed, each improved, the likeliest: where an unmodelled thing answers most beams, wide
-    /// spreads of readings lead to it and not to the walls, from wherever one begins. Of many sweeps none are drawn: each could be
-    /// astray by itself.
-    fn drawn(&mut self) -> Result<Vec<Place>, FitError> {
-        if self.sweeps.len() > 1 {
-            return Ok(Vec::new());
-        }
-        let arcs = if self.fit.search == Search::Furnished { DRAWN_ARCS } else { 0.0 };
-        let errors = ErrorModel { arcs, ..widened(&self.rough_errors(), ROUGH) };
-        let errors = ErrorModel { sigma_m: ROUGH.0, sigma_db: ROUGH.1, ..errors };
-        let mut rng = Pcg64::seed_from_u64(1);
-        let sigmas = self.prior_sigmas();
-        let mut tried: Vec<Place> = Vec::new();
-        for number in 0..DRAWN {
-            let normal = sigmas.map(|_: f64| StandardNormal.sample(&mut rng));
-            let start = self.limited(sigmas.component_mul(&normal));
-            self.phases = Phases::Unknown;
-            tried.extend(self.place(start, &errors, (number + 1, DRAWN))?);
-        }
-        let mut places = self.distinct(tried, &[]);
-        places.truncate(DRAWN_FOLLOWED);
-        Ok(places)
-    }
-
     /// Places along the directions that are held least beside where a fit ended, each improved; the likeliest first, and
     /// one of those that are the same.
     fn places(&mut self, end: &Settled) -> Result<Vec<Place>, FitError> {
         let close = widened(&end.errors, CLOSE);
-        let has_body = self.start.scene.robot.is_some();
-        let (places, apart) = if has_body { PLACES_OF_BODY } else { PLACES };
+        let (places, apart) = PLACES;
         let mut tried: Vec<Place> = Vec::new();
         let doubtful = self.doubtful(&end.values, &widened(&end.errors, ROUGH), Phases::Unknown)?;
         let (mut number, of) = (0, doubtful.len() * 2 * places as usize);
@@ -198,17 +141,24 @@ impl State<'_> {
     }
 
     /// A place that is improved, which of so many; nothing if there is nothing to predict with.
-    fn place(
+    pub(super) fn place(
         &mut self,
         start: DVector<f64>,
         errors: &ErrorModel,
         (place, of): (usize, usize),
     ) -> Result<Option<Place>, FitError> {
-        let found = self.found(|state| {
+        self.place_by(|state| {
             state.watch.progress(Progress::Searching { place, of });
             state.improved(start, errors)
-        });
-        match one_of_many(found)? {
+        })
+    }
+
+    /// The place that a search comes to; nothing if there is nothing to predict with.
+    pub(super) fn place_by(
+        &mut self,
+        search: impl FnOnce(&mut Self) -> Result<Found, FitError>,
+    ) -> Result<Option<Place>, FitError> {
+        match one_of_many(self.found(search))? {
             None => Ok(None),
             Some(Found::Place { values, log_posterior: value }) => {
                 Ok(Some(Place { values: DVector::from_vec(values), value }))
@@ -218,7 +168,7 @@ impl State<'_> {
     }
 
     /// Places that are apart from each other and from those known, the likeliest first.
-    fn distinct(&self, mut tried: Vec<Place>, known: &[&DVector<f64>]) -> Vec<Place> {
+    pub(super) fn distinct(&self, mut tried: Vec<Place>, known: &[&DVector<f64>]) -> Vec<Place> {
         tried.sort_by(|one, other| other.value.total_cmp(&one.value));
         let mut places: Vec<Place> = Vec::new();
         for place in tried {
@@ -317,7 +267,7 @@ impl State<'_> {
         Ok(order.into_iter().take(DIRECTIONS).map(direction).collect())
     }
 
-    fn prior_sigmas(&self) -> DVector<f64> {
+    pub(super) fn prior_sigmas(&self) -> DVector<f64> {
         DVector::from_iterator(
             self.fit.priors.len(),
             self.fit.priors.iter().map(|prior| prior.sigma),
@@ -333,7 +283,7 @@ impl State<'_> {
     }
 
     /// Whether a fit from one of two places would hardly end as from the other.
-    fn is_apart(&self, one: &DVector<f64>, other: &DVector<f64>) -> bool {
+    pub(super) fn is_apart(&self, one: &DVector<f64>, other: &DVector<f64>) -> bool {
         (one - other).component_div(&self.prior_sigmas()).amax() > 0.5 * LEAST_SHARE
     }
 }
@@ -343,7 +293,10 @@ fn odds(value: f64, of: f64) -> f64 {
     ((value - of) / READINGS_OF_ARC).min(0.0).exp()
 }
 
-fn widened(errors: &ErrorModel, (sigma_m, sigma_db, clutter): (f64, f64, f64)) -> ErrorModel {
+pub(super) fn widened(
+    errors: &ErrorModel,
+    (sigma_m, sigma_db, clutter): (f64, f64, f64),
+) -> ErrorModel {
     ErrorModel {
         sigma_m: errors.sigma_m.max(sigma_m),
         sigma_db: errors.sigma_db.max(sigma_db),
@@ -352,7 +305,7 @@ fn widened(errors: &ErrorModel, (sigma_m, sigma_db, clutter): (f64, f64, f64)) -
     }
 }
 
-fn keep_likelier(best: &mut Settled, end: Option<Settled>) {
+pub(super) fn keep_likelier(best: &mut Settled, end: Option<Settled>) {
     if let Some(end) = end
         && end.value > best.value
     {

@@ -13,6 +13,8 @@ use crate::{
 const THRESHOLD_OF_TURN: f64 = 1.5;
 /// Steps on one linearisation.
 const STEPS: usize = 12;
+/// How much stiffer a combination is that is held than anything else.
+const STIFF: f64 = 1e3;
 
 impl State<'_> {
     /// Turns each sweep whose heading is in doubt to where it fits best as a whole, in so many steps to both sides:
@@ -103,6 +105,12 @@ impl State<'_> {
             normal[(at, at)] *= 1.0 + damping;
             normal[(at, at)] += self.precision(at) * (1.0 + damping);
             right[at] -= self.precision(at) * (self.values[at] + change[at]);
+        }
+        if let Some(held) = &self.held {
+            let sigmas = self.prior_sigmas();
+            let stiffest = normal.diagonal().component_mul(&sigmas).component_mul(&sigmas).max();
+            normal += STIFF * stiffest * held * held.transpose();
+            right -= STIFF * stiffest * held.dot(change) * held;
         }
         for at in 0..right.len() {
             let (least, most) = self.limits_of_change(at);
