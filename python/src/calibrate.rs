@@ -54,7 +54,7 @@ const USUAL: [&str; 3] = ["pose", "air", "threshold"];
 /// widest_m : float
 ///     Largest initial error of predicted ranges, metres, 0.005 to 1.
 /// search : {'thorough', 'quick', 'furnished'}
-///     How much to search: 'quick' takes half as long and misses the likeliest explanation more often; 'furnished' searches
+///     How much to search: 'quick' is four to ten times as fast and misses the likeliest explanation more often; 'furnished' searches
 ///     thoroughly, and things that the scene lacks may answer or hide many beams in a row.
 ///
 /// Returns

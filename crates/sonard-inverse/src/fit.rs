@@ -64,7 +64,7 @@ pub struct Fit {
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Search {
-    /// A few places beside the likeliest one: half as long
+    /// A few places beside the likeliest one: four to ten times as fast
     #[serde(alias = "usual")]
     #[cfg_attr(feature = "clap", value(alias = "usual"))]
     Quick,
