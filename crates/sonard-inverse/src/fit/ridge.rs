@@ -26,14 +26,17 @@ const POLISHED: usize = 2;
 /// How often ridges are gone along, from a better end elsewhere each time.
 const ROUNDS: usize = 3;
 
+/// Ranges that are missed by more than this, in wavelengths, say too little of phases to choose a place far off by.
+const MISSED: f64 = 0.35;
+
 /// A direction in the parameters' units, and how far values may be off along it, in standard deviations.
 type Direction = (DVector<f64>, f64);
 
 impl State<'_> {
-    /// The likeliest end of those from peaks along the ridges through an end, or that one itself; and where phases are
-    /// not told, always that one.
+    /// The likeliest end of those from peaks along the ridges through an end, or that one itself; and where ranges hardly tell
+    /// phases, always that one.
     pub(super) fn along_ridges(&mut self, mut best: Settled) -> Result<Settled, FitError> {
-        if self.is_beyond_phases(&best.errors) {
+        if self.missed_wavelengths(&best.errors) > MISSED {
             return Ok(best);
         }
         for _ in 0..ROUNDS {

@@ -87,8 +87,12 @@ impl State<'_> {
 
     /// Whether ranges are missed by so much that lengths can't tell phases, as those of a room that was measured with a tape.
     pub(super) fn is_beyond_phases(&self, errors: &ErrorModel) -> bool {
-        let wavelength_m = self.start.air.sound_speed_m_s() / self.start.sensor.frequency_hz;
-        errors.sigma_m > MISSED * wavelength_m
+        self.missed_wavelengths(errors) > MISSED
+    }
+
+    /// By how much ranges are missed, in wavelengths.
+    pub(super) fn missed_wavelengths(&self, errors: &ErrorModel) -> f64 {
+        errors.sigma_m * self.start.sensor.frequency_hz / self.start.air.sound_speed_m_s()
     }
 
     /// The likelier of two ends: without phases, and the one with them that follows from it.
