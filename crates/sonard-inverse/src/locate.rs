@@ -10,7 +10,7 @@ use crate::{
     fit::{self, Approached, Fit, FitError, Fitted, Prior, approach, fit_near, one_of_many},
     likelihood::READINGS_OF_ARC,
     parameter::Parameter,
-    sweep::{Beam, Heard, Sweep},
+    sweep::{Beam, Sweep},
     watch::{Unwatched, Watch},
     world::{Models, World},
 };
@@ -240,15 +240,12 @@ fn with_pose((widest_m, widest_turn_deg): (f64, f64), besides: &[Prior]) -> Fit 
 /// So many of a sweep's beams, evenly spread: two of three that heard something, where there are as many, because what
 /// a place is known by are its echoes, and of a sweep before two walls hardly any other beam has one.
 fn thinned(sweep: &Sweep, count: usize) -> Sweep {
-    let (echoes, silent): (Vec<&Beam>, Vec<&Beam>) = sweep.beams.iter().partition(is_echo);
+    let (echoes, silent): (Vec<&Beam>, Vec<&Beam>) =
+        sweep.beams.iter().partition(|beam| beam.is_echo());
     let of_silent = silent.len().min(count - echoes.len().min(2 * count / 3));
     let of_echoes = echoes.len().min(count - of_silent);
     let beams = evenly(&echoes, of_echoes).chain(evenly(&silent, of_silent)).copied().collect();
     Sweep { beams, ..sweep.clone() }
-}
-
-const fn is_echo(beam: &&Beam) -> bool {
-    matches!(beam.heard, Heard::Echo { .. })
 }
 
 fn evenly<'a>(of: &'a [&'a Beam], count: usize) -> impl Iterator<Item = &'a Beam> {

@@ -25,6 +25,12 @@ pub struct Beam {
     pub heard: Heard,
 }
 
+impl Beam {
+    pub(crate) const fn is_echo(&self) -> bool {
+        matches!(self.heard, Heard::Echo { .. })
+    }
+}
+
 /// The outcome of a firing, as fits use it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Heard {
@@ -121,8 +127,7 @@ impl Sweep {
 
     /// Whether it heard so little, as of one wall or edge, that it may have been taken from many places.
     pub(crate) fn hears_little(&self) -> bool {
-        let is_echo = |beam: &&Beam| matches!(beam.heard, Heard::Echo { .. });
-        let echoes = self.beams.iter().filter(is_echo).count() as f64;
+        let echoes = self.beams.iter().filter(|beam| beam.is_echo()).count() as f64;
         echoes < FEW_ECHOES * self.beams.len() as f64
     }
 }

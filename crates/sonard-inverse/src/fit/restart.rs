@@ -38,6 +38,7 @@ const STAGE: usize = STAGES.len() - 1;
 const ENDS: usize = 8;
 const STAGED: usize = 2;
 const POLISHED: usize = 3;
+
 /// Somewhere beside the end of a fit.
 pub(super) struct Place {
     pub(super) values: DVector<f64>,

@@ -89,16 +89,15 @@ impl State<'_> {
         let of = ridges.len() * 2 * STEPS.0;
         let mut peaks: Vec<Place> = Vec::new();
         for (number, ridge) in ridges.iter().enumerate() {
-            let mut ridge = self.profile(best, ridge, (number * 2 * STEPS.0, of))?;
+            let steps = self.profile(best, ridge, (number * 2 * STEPS.0, of))?;
+            let values: Vec<f64> = steps.iter().map(|step| step.value).collect();
             let value = |at: Option<usize>| {
-                at.and_then(|at| ridge.get(at)).map_or(f64::NEG_INFINITY, |step| step.value)
+                at.and_then(|at| values.get(at)).copied().unwrap_or(f64::NEG_INFINITY)
             };
-            let is_peak =
-                |at: usize| value(Some(at)) >= value(at.checked_sub(1)).max(value(Some(at + 1)));
-            let are_peaks: Vec<bool> = (0..ridge.len()).map(is_peak).collect();
-            let mut are_peaks = are_peaks.into_iter();
-            ridge.retain(|_| are_peaks.next() == Some(true));
-            peaks.append(&mut ridge);
+            let is_peak = |&(at, ref step): &(usize, Place)| {
+                step.value >= value(at.checked_sub(1)).max(value(Some(at + 1)))
+            };
+            peaks.extend(steps.into_iter().enumerate().filter(is_peak).map(|(_, step)| step));
         }
         peaks.sort_by(|one, other| other.value.total_cmp(&one.value));
         peaks.truncate(FOLLOWED);

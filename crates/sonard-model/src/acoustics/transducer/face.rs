@@ -38,12 +38,17 @@ impl FaceResponse {
     /// Of a sensor's face to its pulse, up to a phase of `most_rad` at least; flat where the aperture is given by its beam.
     pub(super) fn of(sensor: &Sensor, most_rad: f64) -> Rc<Self> {
         let step_rad = STEP_RAD * (most_rad / (ENTRIES * STEP_RAD)).log2().ceil().max(0.0).exp2();
-        let face = Face { step_rad, ..Face::of(sensor) };
+        let face = Face {
+            aperture: of_width_one(&sensor.aperture),
+            pulse: sensor.pulse.clone(),
+            frequency_hz: sensor.frequency_hz,
+            step_rad,
+        };
         REMEMBERED_RESPONSES.with_borrow_mut(|known| {
-            let at =
-                known.iter().position(|(of, response)| *of == face && response.reaches(most_rad));
-            if let Some(at) = at {
-                return Rc::clone(&known[at].1);
+            let serves =
+                |(of, response): &&(Face, Rc<Self>)| *of == face && response.reaches(most_rad);
+            if let Some((_, response)) = known.iter().find(serves) {
+                return Rc::clone(response);
             }
             known.retain(|(of, _)| *of != face);
             let response = Rc::new(Self::tabulated(&MetFace::of(sensor), step_rad, most_rad));
@@ -86,9 +91,10 @@ impl FaceResponse {
     }
 }
 
-/// What a response follows from: the shape of the face, with a half width of a metre, and the pulse.
+/// What a response follows from.
 #[derive(PartialEq)]
 struct Face {
+    /// [`of_width_one`].
     aperture: Aperture,
     pulse: Pulse,
     frequency_hz: f64,
@@ -96,19 +102,17 @@ struct Face {
     step_rad: f64,
 }
 
-impl Face {
-    fn of(sensor: &Sensor) -> Self {
-        let mut aperture = sensor.aperture.clone();
-        match &mut aperture {
-            Aperture::Piston { radius_m, skirts_db } => (*radius_m, *skirts_db) = (1.0, None),
-            Aperture::Line { half_length_m, full_within_deg, none_beyond_deg } => {
-                (*half_length_m, *full_within_deg, *none_beyond_deg) = (1.0, 90.0, 90.0);
-            }
-            Aperture::Gaussian { .. } | Aperture::Table { .. } => {}
+/// The shape of a face alone: with a half width of 1, without skirts and windows.
+fn of_width_one(aperture: &Aperture) -> Aperture {
+    let mut aperture = aperture.clone();
+    match &mut aperture {
+        Aperture::Piston { radius_m, skirts_db } => (*radius_m, *skirts_db) = (1.0, None),
+        Aperture::Line { half_length_m, full_within_deg, none_beyond_deg } => {
+            (*half_length_m, *full_within_deg, *none_beyond_deg) = (1.0, 90.0, 90.0);
         }
-        let (pulse, frequency_hz) = (sensor.pulse.clone(), sensor.frequency_hz);
-        Self { aperture, pulse, frequency_hz, step_rad: STEP_RAD }
+        Aperture::Gaussian { .. } | Aperture::Table { .. } => {}
     }
+    aperture
 }
 
 /// A face of half width 1 and the pulse that it meets.
@@ -131,7 +135,7 @@ impl MetFace {
             Pulse::Gaussian { .. } => Some(0.0),
             Pulse::Chirp { .. } => None,
         };
-        let aperture = Face::of(sensor).aperture;
+        let aperture = of_width_one(&sensor.aperture);
         let omega = 1e-6 * TAU * sensor.frequency_hz;
         Self { aperture, omega, pulse: EchoShape::of(sensor), middle_us }
     }
