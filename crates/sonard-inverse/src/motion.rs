@@ -3,7 +3,7 @@
 use glam::DVec3;
 use sonard_model::{
     geometry::DVec2,
-    model::{Arrival, Diffractor, Edge, Mechanism, Reflector},
+    model::{Diffractor, Edge, Mechanism, Path, Reflector},
     scene::Scene,
 };
 
@@ -103,14 +103,8 @@ impl Motion {
 /// `-u . dx` for an end that sound leaves, or comes back to, from the direction `u`. Held to finite differences
 /// in the tests, relative to a metre for each unit: 1e-5.
 #[must_use]
-pub fn length_rate(
-    arrival: &Arrival,
-    ends: [DVec2; 2],
-    z_m: f64,
-    scene: &Scene,
-    motion: &Motion,
-) -> f64 {
-    let met = &arrival.path.interactions;
+pub fn length_rate(path: &Path, ends: [DVec2; 2], z_m: f64, scene: &Scene, motion: &Motion) -> f64 {
+    let met = &path.interactions;
     let point = |at: usize| met[at].point.extend(met[at].z_m.unwrap_or(z_m));
     let (Some(last), [transmitter, receiver]) =
         (met.len().checked_sub(1), ends.map(|end| end.extend(z_m)))

@@ -1,5 +1,8 @@
 //! What could have been reported of each firing, and how that moves with the parameters.
 
+mod firing;
+mod known;
+
 use std::{
     cell::LazyCell,
     collections::{HashMap, hash_map::Entry},
@@ -8,16 +11,21 @@ use std::{
 use smallvec::SmallVec;
 use sonard_model::{
     acoustics::{BeamPattern, Receiver},
-    geometry::{DVec2, Pose, wrap_360, wrap_pi},
-    model::{Arrival, Mechanism, ObservationPoint, Reflector, Simulator, TooCostly, receiver},
+    geometry::{DVec2, Pose, wrap_360},
+    model::{
+        Arrival, Mechanism, ObservationPoint, Path, Reflector, Simulator, TooCostly, receiver,
+    },
     scene::Scene,
 };
 
+use self::{
+    firing::{Firing, Flanks, amplitude, level_db},
+    known::{KnownPaths, Moved, PathRates},
+};
 use crate::{
-    bearing::Bearing,
     candidates::{Candidate, Candidates, Listener, Phases, SPAN_DB},
     judged::{Judged, Possible, Rates},
-    motion::{Motion, length_rate},
+    motion::Motion,
     parameter::Parameter,
     sweep::{Beam, Sweep},
     world::World,
@@ -43,18 +51,6 @@ pub(crate) struct RateFinder<'a> {
     phases: Phases,
     /// Thresholds that are looked at, decibels to both sides of the nominal one.
     span_db: f64,
-}
-
-/// A firing.
-struct Firing<'a> {
-    simulator: &'a Simulator,
-    /// Where the stepper says it points, degrees.
-    azimuth_deg: f64,
-    /// Where the stepper's axis is.
-    axis: DVec2,
-    direction_rad: f64,
-    /// Transmitter and receiver.
-    ends: [DVec2; 2],
 }
 
 impl<'a> RateFinder<'a> {
@@ -107,11 +103,12 @@ impl<'a> RateFinder<'a> {
         let all = self.parameters.iter().zip(0u32..);
         let concerning: Vec<u32> =
             all.filter(|(parameter, _)| concerns(parameter)).map(|(_, at)| at).collect();
+        let mut known = KnownPaths::new(self, concerning);
         let mut judged = Vec::with_capacity(sweep.beams.len());
         for beam in &sweep.beams {
             let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
             let firing = Firing::new(simulator, pose, direction_rad, beam);
-            let possible = self.all_possible(&listener, point, &firing, &concerning)?;
+            let possible = self.all_possible(&listener, point, &firing, &mut known)?;
             judged.push(Judged { heard_m: beam.heard.range_m(self.reference_m_s), possible });
         }
         Ok(judged)
@@ -129,6 +126,7 @@ impl<'a> RateFinder<'a> {
     ) -> Result<Vec<Vec<Judged>>, TooCostly> {
         let listener = Listener::new(simulator.receiver(), self.phases, self.span_db);
         let all: Vec<u32> = (0..self.parameters.len() as u32).collect();
+        let mut paths = KnownPaths::new(self, all);
         let mut known: HashMap<i64, SmallVec<[Possible; 2]>> = HashMap::new();
         let mut judged = |beam: &Beam, by_deg: f64| {
             let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
@@ -138,7 +136,7 @@ impl<'a> RateFinder<'a> {
                 Entry::Vacant(unknown) => {
                     let direction_rad = (place as f64 * GRID_DEG).to_radians();
                     let firing = Firing::new(simulator, pose, direction_rad, beam);
-                    let possible = self.all_possible(&listener, point, &firing, &all)?;
+                    let possible = self.all_possible(&listener, point, &firing, &mut paths)?;
                     unknown.insert(possible).clone()
                 }
             };
@@ -154,72 +152,98 @@ impl<'a> RateFinder<'a> {
         listener: &Listener,
         point: &ObservationPoint,
         firing: &Firing,
-        concerning: &[u32],
+        known: &mut KnownPaths,
     ) -> Result<SmallVec<[Possible; 2]>, TooCostly> {
         let mut found = Candidates::new();
         listener.candidates(point, firing.direction_rad, &mut found)?;
-        Ok(found.iter().map(|candidate| self.possible(candidate, firing, concerning)).collect())
+        Ok(found.iter().map(|candidate| self.possible(candidate, firing, known)).collect())
     }
 
-    fn possible(&self, candidate: &Candidate, firing: &Firing, concerning: &[u32]) -> Possible {
+    fn possible(&self, candidate: &Candidate, firing: &Firing, known: &mut KnownPaths) -> Possible {
         let stretch = self.stretch(firing);
-        let beside =
-            candidate.arrival.as_ref().and_then(|arrival| self.beside_axis(arrival, firing));
-        let (longer_m, louder_db) = beside.unwrap_or_default();
-        let range_m = candidate
-            .range_m
-            .map(|range_m| stretch * (range_m + 0.5 * longer_m) + self.world.delay_m);
-        let (mut range_rates, mut until_rates) = (Rates::new(), Rates::new());
-        if let (Some(arrival), Some(predicted_m)) = (&candidate.arrival, candidate.range_m) {
-            // A threshold alone, as turned sweeps are asked about, needs none.
-            let flanks = LazyCell::new(|| Flanks::of(arrival, firing));
-            for &at in concerning {
-                let told = (predicted_m, candidate.margin_db);
-                let (by_range, by_db) = self.rates(at, arrival, told, firing, &flanks);
-                range_rates.extend((by_range != 0.0).then_some((at, by_range)));
-                until_rates.extend((by_db != 0.0).then_some((at, by_db)));
-            }
-        }
-        Possible {
-            range_m,
-            range_rates,
-            until_db: candidate.until_db + louder_db,
-            until_rates,
+        let mut possible = Possible {
+            range_m: candidate.range_m.map(|range_m| stretch * range_m + self.world.delay_m),
+            range_rates: Rates::new(),
+            until_db: candidate.until_db,
+            until_rates: Rates::new(),
             spread_db: candidate.spread_db,
             further_reflections: candidate.arrival.as_ref().map_or(0.0, further_reflections),
             walk_m_per_db: stretch * candidate.walk_m_per_db,
+        };
+        let Some(arrival) = &candidate.arrival else { return possible };
+        let path = known.of(arrival, firing);
+        if let Some((longer_m, louder_db)) = self.beside_axis(arrival, path, firing) {
+            possible.range_m = possible.range_m.map(|range_m| range_m + 0.5 * stretch * longer_m);
+            possible.until_db += louder_db;
         }
+        if let Some(predicted_m) = candidate.range_m {
+            let told = (predicted_m, candidate.margin_db);
+            // A threshold alone, as turned sweeps are asked about, needs none.
+            let flanks = LazyCell::new(|| Flanks::of(arrival, firing));
+            for &(at, steady) in &path.steady {
+                let moved = self.moved(at, steady, path, firing);
+                let (by_range, by_db) = self.rates(at, &moved, (arrival, told), firing, &flanks);
+                possible.range_rates.extend((by_range != 0.0).then_some((at, by_range)));
+                possible.until_rates.extend((by_db != 0.0).then_some((at, by_db)));
+            }
+        }
+        possible
     }
 
-    /// What an arrival's range and its margin above the threshold, which are told as they are, gain with a parameter, metres and
-    /// decibels for each unit.
-    fn rates(
-        &self,
-        at: u32,
-        arrival: &Arrival,
-        (predicted_m, margin_db): (f64, f64),
-        firing: &Firing,
-        flanks: &LazyCell<Flanks, impl FnOnce() -> Flanks>,
-    ) -> (f64, f64) {
+    /// What a path gains with a parameter, if in all directions it gains so much with it.
+    fn moved(&self, at: u32, steady: Moved, path: &PathRates, firing: &Firing) -> Moved {
         let parameter = self.parameters[at as usize];
         let turning = match &self.steady[at as usize] {
             Some(_) => None,
             None => self.world.turning_motion(parameter, firing.direction_rad, firing.azimuth_deg),
         };
-        let motion = self.steady[at as usize].as_ref().or(turning.as_ref());
-        let longer_m =
-            motion.map_or(0.0, |motion| firing.length_rate(arrival, firing.ends, motion));
-        let louder_db = motion.map_or(0.0, |motion| flanks.rate_db(firing, motion));
-        match parameter {
-            Parameter::SoundSpeed => (-self.stretch(firing) * predicted_m, 0.0),
-            Parameter::Delay => (1.0, 0.0),
-            Parameter::Bandwidth => (self.stretch(firing) * self.earlier_m(margin_db), 0.0),
-            Parameter::ThresholdRise => (0.0, -predicted_m),
-            _ => (
-                0.5 * self.stretch(firing) * longer_m,
-                louder_db + self.margin_rate(at, arrival, firing, flanks),
-            ),
-        }
+        turning.map_or(steady, |motion| path.moved(firing, &motion))
+    }
+
+    /// What an arrival's range and its margin above the threshold, which are told as they are, gain with a parameter by which
+    /// its path moves so, metres and decibels for each unit.
+    ///
+    /// That a stronger echo is also a little earlier (time walk) is in the predictions and not in the rates: where several
+    /// arrivals overlap they are not known so well that tenths of a millimetre could be believed. See
+    /// [`Curve::walk`](crate::linear::Curve).
+    fn rates(
+        &self,
+        at: u32,
+        moved: &Moved,
+        (arrival, (predicted_m, margin_db)): (&Arrival, (f64, f64)),
+        firing: &Firing,
+        flanks: &LazyCell<Flanks, impl FnOnce() -> Flanks>,
+    ) -> (f64, f64) {
+        let stretch = self.stretch(firing);
+        // A transducer that turns has all directions turn back beside its axis.
+        let turned_back = |by_rad: f64| moved.turned_rad.map(|rad| rad - by_rad);
+        let turned_rad = match self.parameters[at as usize] {
+            Parameter::SoundSpeed => return (-stretch * predicted_m, 0.0),
+            Parameter::Delay => return (1.0, 0.0),
+            Parameter::Bandwidth => return (stretch * self.earlier_m(margin_db), 0.0),
+            Parameter::ThresholdRise => return (0.0, -predicted_m),
+            Parameter::Threshold => return (0.0, -1.0),
+            Parameter::Aperture | Parameter::Skirts => {
+                return (0.0, self.by_beam_db(at, arrival, firing));
+            }
+            Parameter::Heading(_) | Parameter::HeadingZero => turned_back(1f64.to_radians()),
+            Parameter::Gear => turned_back(firing.azimuth_deg.to_radians()),
+            _ => moved.turned_rad,
+        };
+        let by_directions_db = match turned_rad {
+            [0.0, 0.0] => 0.0,
+            turned_rad => flanks.rate_db(turned_rad),
+        };
+        (0.5 * stretch * moved.longer_m, moved.louder_db + by_directions_db)
+    }
+
+    /// What an arrival's level gains with a parameter of the beam, decibels for each unit.
+    fn by_beam_db(&self, at: u32, arrival: &Arrival, firing: &Firing) -> f64 {
+        self.changed_beams[at as usize].as_ref().map_or(0.0, |(pattern, by)| {
+            let gain =
+                |off_rad| amplitude(pattern, off_rad) / amplitude(firing.simulator.beam(), off_rad);
+            20.0 * firing.off_rad(arrival).map(gain).iter().product::<f64>().log10() / by
+        })
     }
 
     /// What the range of a lone echo gains with the width of the band: its pulse rises faster, so that it is less late. How far it
@@ -238,105 +262,23 @@ impl<'a> RateFinder<'a> {
 
     /// What a path from the axis gains where the face is beside it: in length, to first order, and by the beam pattern in
     /// the directions in which it leaves and comes then, decibels. `None` where it was found from the face.
-    fn beside_axis(&self, arrival: &Arrival, firing: &Firing) -> Option<(f64, f64)> {
+    fn beside_axis(
+        &self,
+        arrival: &Arrival,
+        path: &PathRates,
+        firing: &Firing,
+    ) -> Option<(f64, f64)> {
         let mounting = &self.world.sensor.mounting;
         if mounting.is_on_axis() || !firing.simulator.sensor().mounting.is_on_axis() {
             return None;
         }
         let places = mounting.places(DVec2::ZERO, firing.direction_rad);
-        let motion = Motion { transducer: places, ..Motion::default() };
-        let ends = [firing.axis; 2];
-        let scene = firing.simulator.scene();
-        let louder_db = |(weights, off_rad): ([f64; 2], f64)| {
-            let turn_rad = Bearing::new(arrival, ends, scene, weights)?.rate(scene, &motion);
-            Some(level_db(firing.simulator.beam(), off_rad, off_rad + turn_rad))
+        let moved = path.moved(firing, &Motion { transducer: places, ..Motion::default() });
+        let louder_db = |(off_rad, turn_rad): (f64, f64)| {
+            level_db(firing.simulator.beam(), off_rad, off_rad + turn_rad)
         };
-        let both = [[1.0, 0.0], [0.0, 1.0]].into_iter().zip(firing.off_rad(arrival));
-        let louder_db: Option<f64> = both.map(louder_db).sum();
-        Some((firing.length_rate(arrival, ends, &motion), louder_db.unwrap_or(0.0)))
-    }
-
-    /// What an arrival's margin above the threshold gains, decibels for each unit. That a stronger echo is also a little
-    /// earlier (time walk) is in the predictions and not in the rates: where several arrivals overlap they are not
-    /// known so well that tenths of a millimetre could be believed. See [`Curve::walk`](crate::linear::Curve).
-    fn margin_rate(
-        &self,
-        at: u32,
-        arrival: &Arrival,
-        firing: &Firing,
-        flanks: &LazyCell<Flanks, impl FnOnce() -> Flanks>,
-    ) -> f64 {
-        match self.parameters[at as usize] {
-            Parameter::Heading(_) | Parameter::HeadingZero => flanks.turned_db(1f64.to_radians()),
-            Parameter::Gear => flanks.turned_db(firing.azimuth_deg.to_radians()),
-            Parameter::Threshold => -1.0,
-            Parameter::Aperture | Parameter::Skirts => {
-                self.changed_beams[at as usize].as_ref().map_or(0.0, |(pattern, by)| {
-                    let gain = |off_rad| {
-                        amplitude(pattern, off_rad) / amplitude(firing.simulator.beam(), off_rad)
-                    };
-                    20.0 * firing.off_rad(arrival).map(gain).iter().product::<f64>().log10() / by
-                })
-            }
-            parameter => material_rate_db(parameter, firing.simulator.scene(), arrival),
-        }
-    }
-}
-
-impl<'a> Firing<'a> {
-    fn new(simulator: &'a Simulator, pose: &Pose, direction_rad: f64, beam: &Beam) -> Self {
-        let axis = pose.position();
-        let ends = simulator.sensor().mounting.places(axis, direction_rad);
-        Self { simulator, azimuth_deg: beam.azimuth_deg, axis, direction_rad, ends }
-    }
-
-    /// Beside its axis, the directions in which an arrival leaves and comes, radians.
-    fn off_rad(&self, arrival: &Arrival) -> [f64; 2] {
-        [arrival.departure_rad, arrival.arrival_rad].map(|end| wrap_pi(end - self.direction_rad))
-    }
-
-    fn length_rate(&self, arrival: &Arrival, ends: [DVec2; 2], motion: &Motion) -> f64 {
-        let z_m = self.simulator.sensor_z_m().unwrap_or(0.0);
-        length_rate(arrival, ends, z_m, self.simulator.scene(), motion)
-    }
-}
-
-/// What an arrival's level gains with the directions in which it leaves and comes.
-struct Flanks {
-    /// Of the beam pattern, decibels a radian, at departure and arrival.
-    db_per_rad: [f64; 2],
-    bearing: Option<Bearing>,
-}
-
-impl Flanks {
-    fn of(arrival: &Arrival, firing: &Firing) -> Self {
-        // Over half a degree to both sides, and no steeper than a main lobe's flank: a null is steeper, but what is
-        // heard there is the sum of several arrivals.
-        const BY_RAD: f64 = 0.01;
-        const STEEPEST_DB_PER_RAD: f64 = 125.0;
-        let pattern = firing.simulator.beam();
-        let [leaves_rad, comes_rad] = firing.off_rad(arrival);
-        let flank = |off_rad: f64| {
-            let by_db = level_db(pattern, off_rad - BY_RAD, off_rad + BY_RAD);
-            (by_db / (2.0 * BY_RAD)).clamp(-STEEPEST_DB_PER_RAD, STEEPEST_DB_PER_RAD)
-        };
-        let leaves = flank(leaves_rad);
-        let comes = if comes_rad == leaves_rad { leaves } else { flank(comes_rad) };
-        let db_per_rad = [leaves, comes];
-        let scene = firing.simulator.scene();
-        let bearing = Bearing::new(arrival, firing.ends, scene, db_per_rad);
-        Self { db_per_rad, bearing }
-    }
-
-    /// What the level gains where the transducer turns by so much, decibels.
-    fn turned_db(&self, turn_rad: f64) -> f64 {
-        -turn_rad * self.db_per_rad.iter().sum::<f64>()
-    }
-
-    /// What it gains where transducer and scene move, decibels.
-    fn rate_db(&self, firing: &Firing, motion: &Motion) -> f64 {
-        let bearing = self.bearing.as_ref();
-        bearing.map_or(0.0, |bearing| bearing.rate(firing.simulator.scene(), motion))
+        let ends = firing.off_rad(arrival).into_iter().zip(moved.turned_rad);
+        Some((moved.longer_m, ends.map(louder_db).sum()))
     }
 }
 
@@ -367,19 +309,8 @@ fn other_bands(world: &World, parameters: &[&Parameter]) -> Option<[Receiver; 2]
     Some([with_band(-BY_BAND)?, with_band(BY_BAND)?])
 }
 
-/// What a beam pattern's level gains from one direction beside its axis to another, decibels.
-fn level_db(pattern: &BeamPattern, from_rad: f64, to_rad: f64) -> f64 {
-    let [from, to] = [from_rad, to_rad].map(|off_rad| amplitude(pattern, wrap_pi(off_rad)));
-    20.0 * (to / from).log10()
-}
-
-/// Of a beam pattern, beside its axis; so much that it has a level.
-fn amplitude(pattern: &BeamPattern, off_rad: f64) -> f64 {
-    pattern.one_way(off_rad).max(1e-6)
-}
-
-/// What the strength of an arrival gains with a parameter of a material, decibels for each unit; 0 for others.
-pub(crate) fn material_rate_db(parameter: &Parameter, scene: &Scene, arrival: &Arrival) -> f64 {
+/// What the strength of a path gains with a parameter of a material, decibels for each unit; 0 for others.
+pub(crate) fn material_rate_db(parameter: &Parameter, scene: &Scene, path: &Path) -> f64 {
     /// Where a material hardly mirrors or scatters, a little more is many decibels, which no step would hold.
     const LEAST_SHARE: f64 = 0.02;
     let (Parameter::Reflectance(name) | Parameter::Roughness(name)) = parameter else { return 0.0 };
@@ -406,5 +337,5 @@ pub(crate) fn material_rate_db(parameter: &Parameter, scene: &Scene, arrival: &A
         };
         if of == Some(*material) { rate } else { 0.0 }
     };
-    20.0 * std::f64::consts::LOG10_E * arrival.path.mechanisms().map(rate).sum::<f64>()
+    20.0 * std::f64::consts::LOG10_E * path.mechanisms().map(rate).sum::<f64>()
 }

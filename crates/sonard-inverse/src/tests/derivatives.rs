@@ -59,15 +59,15 @@ fn compare(
             let (Some(before), Some(after)) = (before.get(&key), after.get(&key)) else { continue };
             let expected = (after.length_m - before.length_m) / (2.0 * BY_M);
             let motion = motion(&here, direction_rad);
-            let rate = length_rate(&arrival, ends, z_m, simulator.scene(), &motion);
+            let rate = length_rate(&arrival.path, ends, z_m, simulator.scene(), &motion);
             let error = (rate - expected).abs();
             assert!(error < 1e-5, "{name}: {rate} for {expected} of {key:?} at {azimuth_deg}");
             let directions = |of: &Arrival| [of.departure_rad, of.arrival_rad];
-            for (end, weights) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
+            let rates = Bearing::new(&arrival.path, ends, simulator.scene())
+                .map_or([0.0; 2], |bearing| bearing.rates(simulator.scene(), &motion));
+            for (end, rate) in rates.into_iter().enumerate() {
                 let [before, after] = [before, after].map(|of| directions(of)[end]);
                 let expected = wrap_pi(after - before) / (2.0 * BY_M);
-                let rate = Bearing::new(&arrival, ends, simulator.scene(), weights)
-                    .map_or(0.0, |bearing| bearing.rate(simulator.scene(), &motion));
                 let error = (rate - expected).abs();
                 let most = 1e-4 * expected.abs().max(1.0);
                 assert!(
@@ -132,7 +132,7 @@ fn strengths_with_materials() {
                     if any(|met| matches!(met, Mechanism::Diffraction(_))) {
                         continue;
                     }
-                    let rate = material_rate_db(&parameter, &here.scene, &arrival);
+                    let rate = material_rate_db(&parameter, &here.scene, &arrival.path);
                     let error = (rate - expected).abs();
                     assert!(error < 1e-3, "{parameter}: {rate} for {expected} of {key:?}");
                     let at = usize::from(any(|met| matches!(met, Mechanism::Scattering { .. })));

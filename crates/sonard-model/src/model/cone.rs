@@ -71,11 +71,12 @@ impl ConeArrivals<'_> {
             departure_rad: ray_rad,
             arrival_rad: ray_rad,
             path: Path {
-                interactions: vec![Interaction {
+                interactions: [Interaction {
                     mechanism: Mechanism::Reflection(hit.reflector),
                     point: self.position + hit.distance_m * DVec2::from_angle(ray_rad),
                     z_m: None,
-                }],
+                }]
+                .into(),
             },
         })
     }

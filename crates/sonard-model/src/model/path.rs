@@ -1,5 +1,7 @@
 //! Propagation paths: what the sound interacts with between transmitter and receiver.
 
+use std::sync::Arc;
+
 use crate::{geometry::DVec2, reading::PathKind};
 
 /// A propagation path: its interactions in the order in which the sound meets them.
@@ -7,8 +9,9 @@ use crate::{geometry::DVec2, reading::PathKind};
 /// From transmitter over all points to receiver it runs straight from each to the next.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Path {
-    /// From the transmitter to the receiver.
-    pub interactions: Vec<Interaction>,
+    /// From the transmitter to the receiver. Firings from a point in several directions share those of the paths they have
+    /// in common.
+    pub interactions: Arc<[Interaction]>,
 }
 
 /// A point where the sound changes its direction.
@@ -125,9 +128,8 @@ impl Path {
 
     /// The same path from the receiver to the transmitter.
     #[must_use]
-    pub fn reversed(mut self) -> Self {
-        self.interactions.reverse();
-        self
+    pub fn reversed(&self) -> Self {
+        Self { interactions: self.interactions.iter().rev().copied().collect() }
     }
 }
 

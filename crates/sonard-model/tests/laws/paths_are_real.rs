@@ -42,7 +42,7 @@ fn reflections_obey_the_mirror_law() {
         on_random_worlds(name, kind, |world, _| {
             for echo in world.echoes(&settings()) {
                 let line = polyline(world, &echo);
-                for (turn, met) in line.windows(3).zip(&echo.path.interactions) {
+                for (turn, met) in line.windows(3).zip(echo.path.interactions.iter()) {
                     let Mechanism::Reflection(surface) = met.mechanism else { continue };
                     let normal = normal_at(world, surface, met.point);
                     let [to, from] = [turn[1] - turn[0], turn[2] - turn[1]].map(DVec2::normalize);

@@ -184,7 +184,7 @@ impl<'a> PathArrivals<'a> {
         let mut interactions = Vec::new();
         for (number, path) in multiple.paths.iter().enumerate() {
             interactions.extend((number > 0).then_some(at_face));
-            interactions.extend(run_through(path).interactions);
+            interactions.extend(run_through(path).interactions.iter());
         }
         let (path_amplitude, [departure_rad, arrival_rad]) =
             self.multiple_ends(direction_rad, multiple, amplitude);
@@ -195,7 +195,7 @@ impl<'a> PathArrivals<'a> {
             phase_rad: multiple.phase_rad,
             departure_rad,
             arrival_rad,
-            path: Path { interactions },
+            path: Path { interactions: interactions.into() },
         }
     }
 

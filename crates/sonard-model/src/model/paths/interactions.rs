@@ -69,7 +69,7 @@ impl Paths {
             departure_rad: echo.departure.to_angle(),
             arrival_rad: echo.arrival.to_angle(),
             rise_rad: echo.rise_rad,
-            path: Path { interactions: self.interactions(traced, echo) },
+            path: Path { interactions: self.interactions(traced, echo).into() },
         }
     }
 
