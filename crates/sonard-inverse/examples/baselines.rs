@@ -80,7 +80,7 @@ fn compared_in(name: &str, count: u64, seed: u64) {
     let mut rng = Pcg64::seed_from_u64(seed);
     let taken = |rng: &mut Pcg64| {
         let pose = place(&world.scene, rng)?;
-        let beams = readings(&world, &pose, rng)?;
+        let beams = readings(&world, &pose, 0.0, rng)?;
         let unknown = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
         Some((pose, Sweep { scan: Uuid::nil(), pose: unknown, beams }))
     };

@@ -95,7 +95,7 @@ fn drive(world: &World, atlas: &Atlas, beams: usize, rng: &mut Pcg64, tally: &mu
         } else if at > 0 {
             (pose, told) = next(&world.scene, &pose, &told, rng);
         }
-        let Some(all) = readings(world, &pose, rng) else { return };
+        let Some(all) = readings(world, &pose, 0.0, rng) else { return };
         let every = (all.len() / beams).max(1);
         let sweep = Sweep {
             scan: Uuid::nil(),

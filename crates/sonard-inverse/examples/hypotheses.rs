@@ -58,7 +58,8 @@ fn times(name: &str, to_m: f64) -> Option<(f64, f64)> {
     let (mut alone, mut whole) = (Vec::new(), Vec::new());
     for _ in 0..PLACES {
         let pose = place(&world.scene, &mut rng)?;
-        let sweep = Sweep { scan: Uuid::nil(), pose, beams: readings(&world, &pose, &mut rng)? };
+        let sweep =
+            Sweep { scan: Uuid::nil(), pose, beams: readings(&world, &pose, 0.0, &mut rng)? };
         let off = Pose { x_m: pose.x_m + 0.02, ..pose };
         let simulator = world.simulator(&off).ok()?;
         alone.push(best_ms(|| {

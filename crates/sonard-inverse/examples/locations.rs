@@ -60,7 +60,7 @@ fn located_in(name: &str, count: u64, seed: u64, beams: usize) {
     let (mut right, mut told, mut sure, mut times) = (0, 0, 0, Vec::new());
     for _ in 0..count {
         let Some(pose) = place(&world.scene, &mut rng) else { continue };
-        let Some(all) = readings(&world, &pose, &mut rng) else { continue };
+        let Some(all) = readings(&world, &pose, 0.0, &mut rng) else { continue };
         let every = (all.len() / beams).max(1);
         let unknown = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
         let beams_of = all.into_iter().step_by(every).collect();

@@ -4,7 +4,7 @@
 //! draws COUNT worlds: a shipped scene, a place in it, and what is wrong with what is believed of it (pose by up to 10 cm
 //! and 8 degrees, air by 8 degrees Celsius, a wall by 5 cm, threshold by 6 dB; with `mounting` the face by 3 cm ahead and
 //! aside, with `furniture` five round things that the scene lacks). Readings have noise of 1 mm with the far tail of
-//! `TofNoise`. None is begun after so many minutes. Prints for each parameter the root mean square of the errors, the
+//! `TofNoise`, and thresholds that vary by 0.5 dB from firing to firing. None is begun after so many minutes. Prints for each parameter the root mean square of the errors, the
 //! same as a multiple of the bound and of the standard deviations told, the median of that and of the standard deviations told, the share of 95 % intervals
 //! that hold the truth, and how many trials went wrong with a small interval (beyond six standard deviations).
 //!

@@ -4,14 +4,15 @@ use smallvec::SmallVec;
 use sonard_model::{
     acoustics::{Combining, Detector, Listening, Receiver, Rise},
     model::{Arrival, FiringArrivals, ObservationPoint, TooCostly},
+    reading::PingStatus,
 };
 
 /// Thresholds that are looked at, decibels to both sides of the nominal one.
 pub(crate) const SPAN_DB: f64 = 12.0;
 /// Least step from one to the next, decibels.
 const STEP_DB: f64 = 0.25;
-/// Margins between which time walk is found out, decibels to both sides.
-const WALK_DB: f64 = 0.5;
+/// So far below where it is lost an echo is told that only lower thresholds than the usual one report, decibels.
+const BELOW_DB: f64 = 0.5;
 /// Just above where an echo is lost.
 const ABOVE_DB: f64 = 0.02;
 /// Margin below which time walk is not followed, decibels.
@@ -19,7 +20,7 @@ const LEAST_MARGIN_DB: f64 = 0.1;
 /// Later than time walk explains by this much is another rise of the envelope, metres.
 const JUMP_M: f64 = 0.003;
 /// More than this many changes of the first echo are not followed.
-const MOST: usize = 12;
+const MOST: usize = 48;
 
 /// Whether it is known with which phases arrivals meet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,10 +43,9 @@ pub(crate) struct Candidate {
     /// By how much that may be off, because it is not known with which phase its arrival meets others: a standard
     /// deviation, decibels.
     pub(crate) spread_db: f64,
-    /// How far its envelope reaches above the threshold that its range is told at, decibels.
+    /// How far its envelope reaches above the threshold that its range is told at, decibels; infinite where that moves with
+    /// no threshold, as of silence and of what is there at the end of blanking.
     pub(crate) margin_db: f64,
-    /// What its range gains with the threshold, metres a decibel (time walk).
-    pub(crate) walk_m_per_db: f64,
 }
 
 /// The readings of a firing from the lowest threshold up; the last holds for all thresholds above.
@@ -109,39 +109,53 @@ impl Listener {
             ready_us = rise.passed_us;
             let mut next = Self::reported(listening, rise, by_db);
             let until_db = self.lost(listening, &next, ready_us);
-            if by_db < 0.0 && until_db > 0.0 {
-                // What is reported at the usual threshold is told as it is there.
-                let usual = listening.rise(1.0, ready_us);
-                if let Some(rise) = usual.filter(|rise| self.is_same(&next, rise, 0.0)) {
-                    next = match self.is_asked_again(until_db) {
-                        true => Self::reported(listening, rise, 0.0),
-                        false => Reported { rise, by_db: 0.0, ..next },
-                    };
-                }
-            }
+            self.tell_where_likely(listening, &mut next, until_db, ready_us);
             by_db = next.by_db;
+            let is_same = |last: &Reported| self.is_same(last, &next.rise, next.by_db);
             match found.last_mut() {
-                Some(known)
-                    if last
-                        .as_ref()
-                        .is_some_and(|last| self.is_same(last, &next.rise, next.by_db)) =>
-                {
-                    known.until_db = known.until_db.max(until_db);
+                Some(known) if last.as_ref().is_some_and(is_same) => {
+                    known.go_on(until_db, &next);
                 }
                 _ => {
-                    let margin_db = until_db - next.by_db;
+                    let margin_db = match next.rise.status {
+                        PingStatus::Echo => until_db - next.by_db,
+                        _ => f64::INFINITY,
+                    };
                     found.push(Candidate {
                         range_m: Some(next.rise.range_m),
                         arrival: next.rise.arrival.map(|arrival| firing.arrival(&arrival)),
                         until_db,
                         spread_db: self.spread_db(&next),
                         margin_db,
-                        walk_m_per_db: self.walk_m_per_db(margin_db),
                     });
                     last = Some(next);
                 }
             }
             by_db = until_db.max(by_db + STEP_DB) + ABOVE_DB;
+        }
+    }
+
+    /// Tells a rise that is reported up to some threshold as it is at the usual one, or below that at the highest that reports
+    /// it: the nearer to the usual one, the likelier.
+    fn tell_where_likely(
+        &self,
+        listening: &mut Listening,
+        reported: &mut Reported,
+        until_db: f64,
+        ready_us: f64,
+    ) {
+        let at_db = (until_db - BELOW_DB).min(0.0);
+        // A lone pulse rises as it does at any threshold.
+        let is_lone = reported.rise.arrival.is_some_and(|of| of.amplitude == reported.peak);
+        if reported.by_db >= at_db || until_db <= 0.0 && is_lone {
+            return;
+        }
+        let rise = listening.rise(self.factor(at_db), ready_us);
+        if let Some(rise) = rise.filter(|rise| self.is_same(reported, rise, at_db)) {
+            *reported = match self.is_asked_again(until_db) {
+                true => Self::reported(listening, rise, at_db),
+                false => Reported { rise, by_db: at_db, ..*reported },
+            };
         }
     }
 
@@ -167,13 +181,6 @@ impl Listener {
         }
         let beside = rise.arrival.map_or(0.0, |arrival| (peak / arrival.amplitude).powi(2) - 1.0);
         DB_OF_RATIO * beside.clamp(0.0, 1.0).sqrt()
-    }
-
-    /// What the range of an arrival that reaches so far above the threshold gains with the threshold.
-    fn walk_m_per_db(&self, margin_db: f64) -> f64 {
-        let (low_db, high_db) = ((margin_db - WALK_DB).max(0.0), margin_db.max(0.0) + WALK_DB);
-        let [late_m, early_m] = [low_db, high_db].map(|db| self.receiver.time_walk_m(db));
-        (late_m - early_m) / (high_db - low_db)
     }
 
     /// The threshold at which what is reported no longer is. The peak of its envelope says so, unless another arrival
@@ -231,10 +238,22 @@ impl Listener {
 }
 
 impl Candidate {
+    /// Its rise is reported up to another threshold, too, and told as it is there unless only thresholds above the usual one
+    /// report that.
+    fn go_on(&mut self, until_db: f64, Reported { rise, by_db, .. }: &Reported) {
+        let last_db = self.until_db;
+        self.until_db = last_db.max(until_db);
+        if *by_db <= 0.0 && self.margin_db.is_finite() {
+            (self.range_m, self.margin_db) = (Some(rise.range_m), self.until_db - by_db);
+        } else {
+            self.margin_db += self.until_db - last_db;
+        }
+    }
+
     /// For all thresholds that are higher still.
     const fn silence(until_db: f64) -> Self {
         let (range_m, arrival) = (None, None);
-        Self { range_m, arrival, until_db, spread_db: 0.0, margin_db: 0.0, walk_m_per_db: 0.0 }
+        Self { range_m, arrival, until_db, spread_db: 0.0, margin_db: f64::INFINITY }
     }
 }
 

@@ -365,11 +365,11 @@ impl<'a> State<'a> {
         let mut covariance =
             self.covariance(curve.information.clone()).ok_or(FitError::Degenerate)?;
         let log_likelihood = linear.log_likelihood(&self.still(), &errors);
-        // Ranges depend on the threshold, too, by their time walk; what its doubt does to the other values comes on top.
-        let threshold = self.parameters.iter().position(|of| **of == Parameter::Threshold);
-        let sigma_db = threshold.map_or(NOT_FITTED_DB, |at| covariance[(at, at)].sqrt());
-        let moved = &covariance * &curve.walk * sigma_db;
-        covariance += &moved * moved.transpose();
+        // Ranges depend on the threshold, too, by their time walk: where it is not fitted, its doubt comes on top.
+        if !self.parameters.contains(&&Parameter::Threshold) {
+            let moved = &covariance * &curve.walk * NOT_FITTED_DB;
+            covariance += &moved * moved.transpose();
+        }
         let estimates = self.values.iter().enumerate().map(|(at, &change)| {
             let sigma = (covariance[(at, at)] + beside[at]).max(0.0).sqrt();
             Estimate { change, sigma, identified: sigma < 0.5 * self.fit.priors[at].sigma }

@@ -3,7 +3,10 @@
 use nalgebra::DVector;
 use smallvec::SmallVec;
 
-use crate::likelihood::{ErrorModel, normal_density, normal_up_to};
+use crate::{
+    likelihood::{ErrorModel, normal_density, normal_up_to},
+    walk::{TimeWalk, between},
+};
 
 /// What a number gains for each unit of some of the parameters.
 pub(crate) type Rates = SmallVec<[(u32, f64); 4]>;
@@ -11,8 +14,10 @@ pub(crate) type Rates = SmallVec<[(u32, f64); 4]>;
 /// One of the readings that a firing could have had.
 #[derive(Debug, Clone)]
 pub(crate) struct Possible {
-    /// Its range, metres at the reference speed of sound; `None` of silence.
+    /// Its range where it reaches `margin_db` above the threshold, metres at the reference speed of sound; `None` of silence.
     pub(crate) range_m: Option<f64>,
+    /// Infinite if its range does not move with the threshold.
+    pub(crate) margin_db: f64,
     pub(crate) range_rates: Rates,
     /// The threshold up to which it is, decibels above the nominal one.
     pub(crate) until_db: f64,
@@ -21,8 +26,17 @@ pub(crate) struct Possible {
     pub(crate) spread_db: f64,
     /// Mirror reflections after the first, each of which may add to that.
     pub(crate) further_reflections: f64,
-    /// What the range gains with the threshold, metres a decibel.
-    pub(crate) walk_m_per_db: f64,
+}
+
+/// One of the possible readings as it is expected where it is told: by thresholds that vary, but not beyond what bounds it.
+#[derive(Clone, Copy)]
+pub(crate) struct Expected {
+    /// Metres at the reference speed of sound.
+    pub(crate) range_m: f64,
+    /// What that gains with the threshold up to which it is, metres a decibel (time walk).
+    pub(crate) by_until_m: f64,
+    /// Standard deviation, metres: a threshold in doubt makes the range of a weak echo doubtful, too.
+    pub(crate) sigma_m: f64,
 }
 
 /// A reading beside what it could have been.
@@ -43,21 +57,56 @@ pub(crate) struct Terms {
 
 /// What one of the possible readings has to do with it.
 pub(crate) struct Term {
+    /// Of an echo.
+    pub(crate) expected: Option<Expected>,
     /// Probability that the reading is this one.
     pub(crate) share: f64,
     /// Derivative of the log-density by its range.
     pub(crate) by_range: f64,
-    /// By the threshold up to which it is.
+    /// By the threshold up to which it is, its range left as it is.
     pub(crate) by_until: f64,
     /// What a reading is expected to say about that threshold, as information.
     pub(crate) expected_of_until: f64,
 }
 
 impl Possible {
-    /// How its range spreads: a threshold in doubt makes that of a weak echo doubtful, too, by its time walk.
-    pub(crate) fn errors(&self, errors: &ErrorModel) -> ErrorModel {
+    /// As it is expected after a change of the parameters, up to a threshold and from the one up to which another reading is;
+    /// `None` of silence.
+    fn expected(
+        &self,
+        change: &DVector<f64>,
+        [from_db, until_db]: [f64; 2],
+        errors: &ErrorModel,
+        walk: &TimeWalk,
+    ) -> Option<Expected> {
+        let range_m = after(self.range_m?, &self.range_rates, change);
+        if self.margin_db.is_infinite() {
+            return Some(Expected { range_m, by_until_m: 0.0, sigma_m: errors.sigma_m });
+        }
         let sigma_db = self.sigma_db(errors);
-        errors.with_range_spread(errors.sigma_m.hypot(self.walk_m_per_db * sigma_db))
+        let (mean, variance) = between(from_db / sigma_db, until_db / sigma_db);
+        let margin_db = until_db - sigma_db * mean;
+        let late = walk.among(margin_db, sigma_db * sigma_db * variance);
+        let [told_m, _] = walk.at(self.margin_db);
+        Some(Expected {
+            range_m: range_m + late.mean_m - told_m,
+            // The mean margin moves by as much as the threshold may vary beside it.
+            by_until_m: late.per_db * variance,
+            sigma_m: errors.sigma_m.hypot(late.sigma_m),
+        })
+    }
+
+    /// What its range gains with the parameters, as it is expected: what is louder, or heard at a lower threshold, is earlier.
+    pub(crate) fn rates_with_walk(&self, expected: &Expected) -> Rates {
+        let mut rates = self.range_rates.clone();
+        for &(at, by_db) in &self.until_rates {
+            let by_m = expected.by_until_m * by_db;
+            match rates.iter_mut().find(|(known, _)| *known == at) {
+                Some((_, rate)) => *rate += by_m,
+                None => rates.push((at, by_m)),
+            }
+        }
+        rates
     }
 
     /// Standard deviation of the threshold up to which it is, decibels.
@@ -65,30 +114,46 @@ impl Possible {
         let by_reflections_db = errors.sigma_db_per_reflection * self.further_reflections;
         errors.sigma_db.hypot(self.spread_db).hypot(by_reflections_db)
     }
+}
 
+impl Expected {
     /// What its range says beside that of a strong echo, 0 to 1.
     pub(crate) fn certainty(&self, errors: &ErrorModel) -> f64 {
-        (errors.sigma_m / self.errors(errors).sigma_m).powi(2)
+        (errors.sigma_m / self.sigma_m).powi(2)
     }
 }
 
 impl Judged {
     /// How likely the reading is after a change of the parameters.
-    pub(crate) fn terms(&self, change: &DVector<f64>, errors: &ErrorModel) -> Terms {
-        let after = |value: f64, rates: &Rates| {
-            value + rates.iter().map(|&(at, rate)| rate * change[at as usize]).sum::<f64>()
-        };
+    pub(crate) fn terms(
+        &self,
+        change: &DVector<f64>,
+        errors: &ErrorModel,
+        walk: &TimeWalk,
+    ) -> Terms {
         let explained = 1.0 - errors.clutter;
         let unexplained = errors.clutter * errors.of_clutter(self.heard_m.is_some());
-        // Density of the reading if it is this one, and its derivative by the range.
-        let densities: SmallVec<[[f64; 2]; 3]> = self
+        let untils_db: SmallVec<[f64; 3]> = self
             .possible
             .iter()
-            .map(|possible| match (self.heard_m, possible.range_m) {
-                (Some(heard_m), Some(range_m)) => {
-                    let [density, slope] = possible
-                        .errors(errors)
-                        .range(heard_m - after(range_m, &possible.range_rates));
+            .map(|possible| after(possible.until_db, &possible.until_rates, change))
+            .collect();
+        let expected: SmallVec<[Option<Expected>; 3]> = self
+            .possible
+            .iter()
+            .enumerate()
+            .map(|(at, possible)| {
+                let from_db = at.checked_sub(1).map_or(f64::NEG_INFINITY, |last| untils_db[last]);
+                possible.expected(change, [from_db, untils_db[at]], errors, walk)
+            })
+            .collect();
+        // Density of the reading if it is this one, and its derivative by the range.
+        let densities: SmallVec<[[f64; 2]; 3]> = expected
+            .iter()
+            .map(|expected| match (self.heard_m, expected) {
+                (Some(heard_m), Some(expected)) => {
+                    let spread = errors.with_range_spread(expected.sigma_m);
+                    let [density, slope] = spread.range(heard_m - expected.range_m);
                     [density, -slope]
                 }
                 (None, None) => [1.0, 0.0],
@@ -101,7 +166,7 @@ impl Judged {
         for (at, (possible, &[own, slope])) in self.possible.iter().zip(&densities).enumerate() {
             let is_last = at + 1 == self.possible.len();
             let sigma_db = possible.sigma_db(errors);
-            let until = after(possible.until_db, &possible.until_rates) / sigma_db;
+            let until = untils_db[at] / sigma_db;
             let up_to = if is_last { 1.0 } else { normal_up_to(until).max(below) };
             let probability = up_to - below;
             below = up_to;
@@ -109,6 +174,7 @@ impl Judged {
             let by_until = explained * normal_density(until) / sigma_db * gain;
             density += explained * probability * own;
             of.push(Term {
+                expected: expected[at],
                 share: explained * probability * own,
                 by_range: explained * probability * slope,
                 by_until: if by_until.is_finite() { by_until } else { 0.0 },
@@ -134,7 +200,8 @@ impl Judged {
     pub(crate) fn residual(&self, terms: &Terms, of_scene: f64) -> Option<(f64, f64)> {
         let best = (0..self.possible.len())
             .max_by(|&one, &other| terms.of[one].share.total_cmp(&terms.of[other].share))?;
-        Some((self.heard_m? - self.possible[best].range_m?, of_scene * terms.of[best].share))
+        let term = &terms.of[best];
+        Some((self.heard_m? - term.expected?.range_m, of_scene * term.share))
     }
 
     /// How well one of the possible readings can be told from the next, from 0 to 1.
@@ -147,6 +214,11 @@ impl Judged {
             _ => 1.0,
         }
     }
+}
+
+/// A value after a change of the parameters.
+fn after(value: f64, rates: &Rates, change: &DVector<f64>) -> f64 {
+    value + rates.iter().map(|&(at, rate)| rate * change[at as usize]).sum::<f64>()
 }
 
 /// What one reading, of either side of a step of the probability at `place` standard deviations, is expected to say

@@ -29,6 +29,7 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 mod told;
+mod walk;
 mod walls;
 mod watch;
 mod world;

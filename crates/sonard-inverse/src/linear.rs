@@ -12,6 +12,7 @@ use crate::{
     parameter::Parameter,
     rates::RateFinder,
     sweep::Sweep,
+    walk::TimeWalk,
     world::{Models, World, WorldError},
 };
 
@@ -22,6 +23,7 @@ pub(crate) struct Linear {
     sweeps: Vec<Vec<Judged>>,
     /// How many parameters there are.
     count: usize,
+    walk: TimeWalk,
 }
 
 /// Log-likelihood with its gradient and curvature.
@@ -53,14 +55,14 @@ impl Linear {
                 Ok(rates.sweep(simulator, point, number, sweep, pose)?)
             })
         };
-        let count = rates.parameters();
+        let (count, walk) = (rates.parameters(), rates.time_walk(models.receiver()));
         if let ([sweep], [pose]) = (sweeps, poses) {
             // Another thread would take longer to wake up than most sweeps take.
-            return Ok(Self { sweeps: vec![of((0, (sweep, pose)))?], count });
+            return Ok(Self { sweeps: vec![of((0, (sweep, pose)))?], count, walk });
         }
         let sweeps: Result<Vec<Vec<Judged>>, WorldError> =
             sweeps.par_iter().zip(poses).enumerate().map(of).collect();
-        Ok(Self { sweeps: sweeps?, count })
+        Ok(Self { sweeps: sweeps?, count, walk })
     }
 
     /// Log-likelihoods of one sweep from a pose turned by so many degrees each and at thresholds higher by so many
@@ -80,8 +82,10 @@ impl Linear {
         let turned = models.at(pose, |simulator, point| {
             Ok(rates.turned(simulator, point, sweep, pose, turns_deg)?)
         })?;
+        let walk = rates.time_walk(models.receiver());
         let likely = |(beams, &turn_deg): (Vec<Judged>, &f64)| {
-            let linear = Self { sweeps: vec![beams], count: parameters.len() };
+            let (sweeps, count) = (vec![beams], parameters.len());
+            let linear = Self { sweeps, count, walk: walk.clone() };
             let at = |db: f64| linear.log_likelihood(&DVector::from_element(1, db), errors);
             thresholds_db.iter().map(|&db| (turn_deg, db, at(db))).collect::<Vec<_>>()
         };
@@ -91,7 +95,7 @@ impl Linear {
     /// Log-likelihood of all readings after a change of the parameters.
     pub(crate) fn log_likelihood(&self, change: &DVector<f64>, errors: &ErrorModel) -> f64 {
         let of = |sweep: &Vec<Judged>| {
-            let emission = |beam: &Judged| emission(beam, &beam.terms(change, errors));
+            let emission = |beam: &Judged| emission(beam, &beam.terms(change, errors, &self.walk));
             arcs::log_likelihood(sweep.iter().map(emission), errors)
         };
         self.sweeps.iter().map(of).sum()
@@ -107,7 +111,7 @@ impl Linear {
         };
         let of_range = errors.range_information();
         for sweep in &self.sweeps {
-            let (terms, states) = beside_else(sweep, change, errors);
+            let (terms, states) = self.beside_else(sweep, change, errors);
             curve.value += states.log_likelihood;
             for ((beam, terms), of_scene) in sweep.iter().zip(&terms).zip(states.of_scene) {
                 curve.add(beam, terms, of_scene, of_range, errors);
@@ -121,7 +125,7 @@ impl Linear {
         let still = DVector::zeros(self.count);
         let mut found = Residuals::default();
         for sweep in &self.sweeps {
-            let (terms, states) = beside_else(sweep, &still, errors);
+            let (terms, states) = self.beside_else(sweep, &still, errors);
             found.counts += states.counts;
             for ((beam, terms), of_scene) in sweep.iter().zip(&terms).zip(states.of_scene) {
                 let unexplained = of_scene * terms.unexplained;
@@ -136,6 +140,20 @@ impl Linear {
     /// How many readings there are.
     pub(crate) fn len(&self) -> usize {
         self.sweeps.iter().map(Vec::len).sum()
+    }
+
+    /// The readings of a sweep if they are of the scene, and whether they are.
+    fn beside_else(
+        &self,
+        sweep: &[Judged],
+        change: &DVector<f64>,
+        errors: &ErrorModel,
+    ) -> (Vec<Terms>, States) {
+        let terms: Vec<Terms> =
+            sweep.iter().map(|beam| beam.terms(change, errors, &self.walk)).collect();
+        let emissions: Vec<Emission> =
+            sweep.iter().zip(&terms).map(|(beam, terms)| emission(beam, terms)).collect();
+        (terms, arcs::states(&emissions, errors))
     }
 }
 
@@ -162,31 +180,21 @@ impl Curve {
         errors: &ErrorModel,
     ) {
         for (possible, term) in beam.possible.iter().zip(&terms.of) {
-            let weight = of_scene * term.share * of_range * possible.certainty(errors);
-            for &(at, rate) in &possible.range_rates {
-                self.gradient[at as usize] += of_scene * term.by_range * rate;
-                self.walk[at as usize] += weight * rate * possible.walk_m_per_db;
-            }
             for &(at, rate) in &possible.until_rates {
                 self.gradient[at as usize] += of_scene * term.by_until * rate;
             }
             let of_until = of_scene * term.expected_of_until;
-            add_outer(&mut self.information, &possible.range_rates, weight);
             add_outer(&mut self.information, &possible.until_rates, of_until);
+            let Some(expected) = &term.expected else { continue };
+            let weight = of_scene * term.share * of_range * expected.certainty(errors);
+            let rates = possible.rates_with_walk(expected);
+            for &(at, rate) in &rates {
+                self.gradient[at as usize] += of_scene * term.by_range * rate;
+                self.walk[at as usize] -= weight * rate * expected.by_until_m;
+            }
+            add_outer(&mut self.information, &rates, weight);
         }
     }
-}
-
-/// The readings of a sweep if they are of the scene, and whether they are.
-fn beside_else(
-    sweep: &[Judged],
-    change: &DVector<f64>,
-    errors: &ErrorModel,
-) -> (Vec<Terms>, States) {
-    let terms: Vec<Terms> = sweep.iter().map(|beam| beam.terms(change, errors)).collect();
-    let emissions: Vec<Emission> =
-        sweep.iter().zip(&terms).map(|(beam, terms)| emission(beam, terms)).collect();
-    (terms, arcs::states(&emissions, errors))
 }
 
 const fn emission(beam: &Judged, terms: &Terms) -> Emission {

@@ -28,6 +28,7 @@ use crate::{
     motion::Motion,
     parameter::Parameter,
     sweep::{Beam, Sweep},
+    walk::TimeWalk,
     world::World,
 };
 
@@ -79,8 +80,8 @@ impl<'a> RateFinder<'a> {
     /// The same for thresholds that vary by a standard deviation in decibels and are not changed: what only others
     /// would report is left out.
     pub(crate) fn with_threshold_spread(self, sigma_db: f64) -> Self {
-        /// Beyond so many standard deviations there is less than 1e-23.
-        const SIGMAS: f64 = 10.0;
+        /// Beyond so many standard deviations there is less than 2e-12.
+        const SIGMAS: f64 = 7.0;
         Self { span_db: SPAN_DB.min(SIGMAS * sigma_db), ..self }
     }
 
@@ -164,11 +165,11 @@ impl<'a> RateFinder<'a> {
         let mut possible = Possible {
             range_m: candidate.range_m.map(|range_m| stretch * range_m + self.world.delay_m),
             range_rates: Rates::new(),
+            margin_db: candidate.margin_db,
             until_db: candidate.until_db,
             until_rates: Rates::new(),
             spread_db: candidate.spread_db,
             further_reflections: candidate.arrival.as_ref().map_or(0.0, further_reflections),
-            walk_m_per_db: stretch * candidate.walk_m_per_db,
         };
         let Some(arrival) = &candidate.arrival else { return possible };
         let path = known.of(arrival, firing);
@@ -203,9 +204,8 @@ impl<'a> RateFinder<'a> {
     /// What an arrival's range and its margin above the threshold, which are told as they are, gain with a parameter by which
     /// its path moves so, metres and decibels for each unit.
     ///
-    /// That a stronger echo is also a little earlier (time walk) is in the predictions and not in the rates: where several
-    /// arrivals overlap they are not known so well that tenths of a millimetre could be believed. See
-    /// [`Curve::walk`](crate::linear::Curve).
+    /// That a stronger echo is also earlier (time walk) comes on top, once it is known how thresholds vary: see
+    /// [`Possible::rates_with_walk`].
     fn rates(
         &self,
         at: u32,
@@ -249,7 +249,8 @@ impl<'a> RateFinder<'a> {
     /// What the range of a lone echo gains with the width of the band: its pulse rises faster, so that it is less late. How far it
     /// reaches above the threshold is by its peak, which stays.
     fn earlier_m(&self, margin_db: f64) -> f64 {
-        self.other_bands.as_ref().map_or(0.0, |bands| {
+        let moving = self.other_bands.as_ref().filter(|_| margin_db.is_finite());
+        moving.map_or(0.0, |bands| {
             let [narrower_m, wider_m] = bands.each_ref().map(|of| of.time_walk_m(margin_db));
             (wider_m - narrower_m) / (2.0 * BY_BAND)
         })
@@ -258,6 +259,11 @@ impl<'a> RateFinder<'a> {
     /// What a predicted range is longer at the speed of sound that ranges are told at.
     fn stretch(&self, firing: &Firing) -> f64 {
         self.reference_m_s / firing.simulator.sound_speed_m_s()
+    }
+
+    /// How ranges that a receiver tells move with the threshold.
+    pub(crate) fn time_walk(&self, receiver: &Receiver) -> TimeWalk {
+        TimeWalk::of(receiver, self.reference_m_s / receiver.sound_speed_m_s)
     }
 
     /// What a path from the axis gains where the face is beside it: in length, to first order, and by the beam pattern in

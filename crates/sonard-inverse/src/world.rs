@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use glam::DVec2;
 use sonard_model::{
-    acoustics::{Air, Aperture, Sensor},
+    acoustics::{Air, Aperture, Receiver, Sensor},
     geometry::Pose,
     model::{ModelError, ObservationPoint, Options, Simulator, TooCostly},
     scene::{Material, PoseError, Scene},
@@ -264,6 +264,11 @@ impl Models {
             false => Arc::new(self.anywhere.in_scene(world.scene_around(&ANYWHERE))?),
         };
         Ok(Self { world: world.clone(), anywhere })
+    }
+
+    /// The receiver that all poses have in common.
+    pub(crate) fn receiver(&self) -> &Receiver {
+        self.anywhere.receiver()
     }
 
     /// Asks the model of a robot at a pose what is heard there.

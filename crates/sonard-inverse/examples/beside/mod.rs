@@ -248,7 +248,7 @@ impl Histograms {
         let learned = grid.places.iter().filter_map(|(at, _)| {
             let heading_deg = rng.random_range(-180.0..180.0);
             let pose = Pose { x_m: at.x, y_m: at.y, heading_deg };
-            let beams = readings(world, &pose, rng)?;
+            let beams = readings(world, &pose, 0.0, rng)?;
             let mut ranges: Ranges = vec![None; DIRECTIONS];
             let mut heard = Vec::new();
             for beam in beams {

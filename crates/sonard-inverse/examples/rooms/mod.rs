@@ -1,10 +1,11 @@
 //! Sweeps as a world has them, from random places.
 
 use rand::RngExt as _;
+use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
 use sonard_inverse::{Beam, Heard, World};
 use sonard_model::{
-    acoustics::TofNoise,
+    acoustics::{Rise, TofNoise},
     geometry::{DVec2, Pose},
     reading::PingStatus,
     scene::Scene,
@@ -15,25 +16,40 @@ pub(crate) const BEAMS: u32 = 400;
 /// Spread of ranges, millimetres.
 pub(crate) const NOISE_MM: f64 = 1.0;
 
-/// A sweep with noise and its far tail.
-pub(crate) fn readings(truth: &World, pose: &Pose, rng: &mut Pcg64) -> Option<Vec<Beam>> {
+/// A sweep with noise of ranges and its far tail, by a threshold that varies from firing to firing by a standard deviation
+/// in decibels.
+pub(crate) fn readings(
+    truth: &World,
+    pose: &Pose,
+    sigma_db: f64,
+    rng: &mut Pcg64,
+) -> Option<Vec<Beam>> {
     let simulator = truth.simulator(pose).ok()?;
     let (point, speed_m_s) = (simulator.at(pose.position()), simulator.sound_speed_m_s());
     let noise = TofNoise::of_range_mm(NOISE_MM, speed_m_s);
     let beam = |at: u32| {
         let azimuth_deg = 360.0 * f64::from(at) / f64::from(BEAMS);
-        let read = point.ping(truth.direction_rad(pose, azimuth_deg)).ok()?;
+        let direction_rad = truth.direction_rad(pose, azimuth_deg);
+        let factor = if sigma_db > 0.0 { threshold_factor(sigma_db, rng) } else { 1.0 };
+        let rise = point.hear(direction_rad, |firing| {
+            firing.listen(simulator.receiver(), |listening| listening.rise(factor, 0.0))
+        });
         let late_us = noise.sample_us(rng);
-        let heard = match (read.status, read.range_m) {
-            (PingStatus::Echo, Some(range_m)) => {
+        let heard = match rise.ok()? {
+            Some(Rise { status: PingStatus::Echo, range_m, .. }) => {
                 Heard::Echo { tof_us: 2e6 * range_m / speed_m_s + late_us }
             }
-            (PingStatus::NoEcho, _) => Heard::Silence,
-            _ => return None,
+            None => Heard::Silence,
+            Some(_) => return None,
         };
         Some(Beam { azimuth_deg, heard })
     };
     Some((0..BEAMS).filter_map(beam).collect())
+}
+
+fn threshold_factor(sigma_db: f64, rng: &mut Pcg64) -> f64 {
+    let normal: f64 = StandardNormal.sample(rng);
+    10f64.powf(sigma_db * normal / 20.0)
 }
 
 /// A place with room about it, within the extent of the walls.

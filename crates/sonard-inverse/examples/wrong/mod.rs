@@ -13,7 +13,10 @@ use sonard_model::{
 };
 use uuid::Uuid;
 
-use crate::rooms::{place, readings};
+use crate::{
+    rooms::{place, readings},
+    spread::SPREAD,
+};
 
 /// What may be wrong besides pose, air, threshold and a wall.
 #[derive(Debug, Clone, Copy)]
@@ -88,8 +91,9 @@ impl Wrong {
             true => furnished(&truth, &pose, &mut Pcg64::seed_from_u64(!seed))?,
             false => truth.clone(),
         };
-        let unhindered = readings(&truth, &pose, &mut rng.clone())?;
-        let beams = readings(&measured, &pose, &mut rng)?;
+        let read = |world: &World, rng: &mut Pcg64| readings(world, &pose, SPREAD.sigma_db, rng);
+        let unhindered = read(&truth, &mut rng.clone())?;
+        let beams = read(&measured, &mut rng)?;
         let there = Sweep { scan: Uuid::nil(), pose, beams };
         let unhindered = Sweep { beams: unhindered, ..there.clone() };
         let said = Pose {
