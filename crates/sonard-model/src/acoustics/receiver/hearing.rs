@@ -51,6 +51,9 @@ pub(super) struct Hearing<'a> {
     watched: Option<(usize, usize)>,
     /// The bounds of what lasts, by [`Self::lasting`].
     bounds: Bounds,
+    /// What the last rise was of, if it was of one arrival with which nothing else sounds, and the detector watches the
+    /// envelope of pulses whose phase is the carrier's.
+    lone: Option<Lone>,
     /// The step of the gain that was last asked about.
     step: Cell<Step>,
     /// Whether all arrivals have the pulse's shape, whose phase stays the carrier's, and the gain is steady, without noise.
@@ -62,6 +65,15 @@ pub(super) struct Hearing<'a> {
     least_threshold: f64,
     /// An arrival lasts from so long before its nominal time to so long after it.
     span_us: (f64, f64),
+}
+
+/// An arrival that passed a threshold, and with which nothing else sounds.
+#[derive(Clone, Copy)]
+struct Lone {
+    place: usize,
+    /// What the receiver's threshold was multiplied with, and from when on it listened.
+    factor: f64,
+    from_us: f64,
 }
 
 /// What arrivals that last can add up to at most.
@@ -109,6 +121,7 @@ impl<'a> Hearing<'a> {
             next_tof_us: f64::INFINITY,
             watched: None,
             bounds: Bounds::default(),
+            lone: None,
             step: Cell::new(receiver.sensitivity.step_at(0.0)),
             is_plain,
             exponent,

@@ -45,9 +45,14 @@ impl Listening<'_> {
     #[must_use]
     pub fn rise(&mut self, factor: f64, ready_us: f64) -> Option<Rise> {
         let receiver = self.receiver;
+        let from_us = receiver.listens_from_us(ready_us);
         self.hearing.threshold_factor = factor;
-        self.hearing.rewind_to(receiver.listens_from_us(ready_us));
-        let at_us = self.hearing.next_rise(receiver.listens_from_us(ready_us))?;
+        if let Some((passed_us, arrival)) = self.hearing.lone_rise_again(from_us) {
+            let (status, arrival) = (PingStatus::Echo, Some(arrival));
+            return Some(Rise { status, range_m: receiver.range_m(passed_us), arrival, passed_us });
+        }
+        self.hearing.rewind_to(from_us);
+        let at_us = self.hearing.next_rise(from_us)?;
         let status = receiver.status_at(at_us);
         // As a detection tells it: a comparator of the carrier rises at the crest behind.
         let later_us = match status {

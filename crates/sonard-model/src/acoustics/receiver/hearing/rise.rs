@@ -1,7 +1,10 @@
 //! When the envelope of all arrivals together has been above the threshold for long enough.
 
-use super::{Hearing, Summand, WINDOW_SLACK_US};
-use crate::acoustics::Gain;
+use super::{Hearing, Lone, Summand, WINDOW_SLACK_US};
+use crate::{
+    acoustics::{Detector, Gain, PulseArrival},
+    reading::PingStatus,
+};
 
 /// Steps at which an envelope is watched, microseconds: a third of the standard deviation of a
 /// 7 kHz filter's response, below which nothing rises.
@@ -15,7 +18,28 @@ const LONG_STEP_US: f64 = 30.0;
 const LONG_QUIET_US: f64 = 200.0;
 
 impl Hearing<'_> {
+    /// The next rise at a threshold not below the last one's, if that was of an arrival with which nothing else sounds and
+    /// this one is too, with the arrival: what comes before it does not pass a higher threshold either. `None` if it takes
+    /// [`Self::next_rise`] to tell; for detectors that watch the envelope.
+    pub(in super::super) fn lone_rise_again(
+        &mut self,
+        from_us: f64,
+    ) -> Option<(f64, PulseArrival)> {
+        let Lone { place, factor, from_us: listened_us } = self.lone?;
+        if factor > self.threshold_factor || from_us < listened_us {
+            return None;
+        }
+        let (rise_us, lasts) = self.lone_rise(&self.summands[place], from_us)?;
+        let is_in_window = rise_us <= self.receiver.window_us() + WINDOW_SLACK_US;
+        if !lasts || !is_in_window || self.receiver.status_at(rise_us) != PingStatus::Echo {
+            return None;
+        }
+        self.asked_us = self.asked_us.max(rise_us + self.receiver.integration_us);
+        Some((rise_us, self.arrivals[place]))
+    }
+
     pub(super) fn next_rise_of_sum(&mut self, ready_us: f64) -> Option<f64> {
+        self.lone = None;
         let integration_us = self.receiver.integration_us;
         let window_us = self.receiver.window_us() + WINDOW_SLACK_US;
         let heard = |rise_us: f64| Some(rise_us.max(ready_us)).filter(|us| *us <= window_us);
@@ -26,7 +50,17 @@ impl Hearing<'_> {
             if !here.is_above() && charge_us == 0.0 && self.watched != Some(self.lasting()) {
                 match self.skip(t_us) {
                     Skip::Silence => return None,
-                    Skip::Lone { rise_us } => return heard(rise_us),
+                    Skip::Lone { rise_us } => {
+                        let is_lone = self.is_plain
+                            && self.receiver.detector == Detector::Envelope
+                            && self.is_sounding_alone();
+                        self.lone = is_lone.then_some(Lone {
+                            place: self.over,
+                            factor: self.threshold_factor,
+                            from_us: ready_us,
+                        });
+                        return heard(rise_us);
+                    }
                     Skip::To(later_us) if later_us > t_us => {
                         (t_us, here) = (later_us, self.standing(later_us));
                         continue;
@@ -167,6 +201,14 @@ impl Hearing<'_> {
         let done_us =
             rise_us + self.receiver.integration_us - summand.tof_us + self.receiver.lead_us;
         Some((rise_us, self.shape(summand).most_from(done_us) >= level_at(rise_us)))
+    }
+
+    /// Whether all of the one arrival that sounds is between the end of the last and the beginning of the next one.
+    fn is_sounding_alone(&self) -> bool {
+        let (past, live) = self.summands[..self.begun].split_at(self.over);
+        let [Summand { lasts_us: [begins_us, ends_us], .. }] = live else { return false };
+        let is_last_over = past.last().is_none_or(|last| last.lasts_us[1] < *begins_us);
+        is_last_over && *ends_us < self.next_us
     }
 
     /// Whether the gain rises by a step while an arrival lasts.
