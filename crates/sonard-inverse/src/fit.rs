@@ -365,9 +365,12 @@ impl<'a> State<'a> {
         let mut covariance =
             self.covariance(curve.information.clone()).ok_or(FitError::Degenerate)?;
         let log_likelihood = linear.log_likelihood(&self.still(), &errors);
-        // Ranges depend on the threshold, too, by their time walk: where it is not fitted, its doubt comes on top.
-        if !self.parameters.contains(&&Parameter::Threshold) {
-            let moved = &covariance * &curve.walk * NOT_FITTED_DB;
+        // Ranges depend on the threshold, too, by their time walk; where no rate says so its doubt comes on top.
+        let threshold = self.parameters.iter().position(|of| **of == Parameter::Threshold);
+        let is_in_rates = threshold.is_some() && linear.is_walk_believed(&errors);
+        if !is_in_rates {
+            let sigma_db = threshold.map_or(NOT_FITTED_DB, |at| covariance[(at, at)].sqrt());
+            let moved = &covariance * &curve.walk * sigma_db;
             covariance += &moved * moved.transpose();
         }
         let estimates = self.values.iter().enumerate().map(|(at, &change)| {

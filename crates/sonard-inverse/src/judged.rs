@@ -33,8 +33,10 @@ pub(crate) struct Possible {
 pub(crate) struct Expected {
     /// Metres at the reference speed of sound.
     pub(crate) range_m: f64,
-    /// What that gains with the threshold up to which it is, metres a decibel (time walk).
+    /// What that gains with the threshold up to which it is, metres a decibel (time walk); in the rates only where ranges are
+    /// known well enough.
     pub(crate) by_until_m: f64,
+    is_walk_believed: bool,
     /// Standard deviation, metres: a threshold in doubt makes the range of a weak echo doubtful, too.
     pub(crate) sigma_m: f64,
 }
@@ -81,9 +83,12 @@ impl Possible {
     ) -> Option<Expected> {
         let range_m = after(self.range_m?, &self.range_rates, change);
         if self.margin_db.is_infinite() {
-            return Some(Expected { range_m, by_until_m: 0.0, sigma_m: errors.sigma_m });
+            let (by_until_m, sigma_m) = (0.0, errors.sigma_m);
+            return Some(Expected { range_m, by_until_m, is_walk_believed: false, sigma_m });
         }
         let sigma_db = self.sigma_db(errors);
+        let is_walk_believed = walk.is_believed(errors.sigma_m);
+        let until_db = if is_walk_believed { until_db } else { self.until_db };
         let (mean, variance) = between(from_db / sigma_db, until_db / sigma_db);
         let margin_db = until_db - sigma_db * mean;
         let late = walk.among(margin_db, sigma_db * sigma_db * variance);
@@ -92,6 +97,7 @@ impl Possible {
             range_m: range_m + late.mean_m - told_m,
             // The mean margin moves by as much as the threshold may vary beside it.
             by_until_m: late.per_db * variance,
+            is_walk_believed,
             sigma_m: errors.sigma_m.hypot(late.sigma_m),
         })
     }
@@ -99,6 +105,9 @@ impl Possible {
     /// What its range gains with the parameters, as it is expected: what is louder, or heard at a lower threshold, is earlier.
     pub(crate) fn rates_with_walk(&self, expected: &Expected) -> Rates {
         let mut rates = self.range_rates.clone();
+        if !expected.is_walk_believed {
+            return rates;
+        }
         for &(at, by_db) in &self.until_rates {
             let by_m = expected.by_until_m * by_db;
             match rates.iter_mut().find(|(known, _)| *known == at) {

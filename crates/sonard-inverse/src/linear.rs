@@ -137,6 +137,11 @@ impl Linear {
         found
     }
 
+    /// Whether ranges are known so well that their time walk is in the rates.
+    pub(crate) fn is_walk_believed(&self, errors: &ErrorModel) -> bool {
+        self.walk.is_believed(errors.sigma_m)
+    }
+
     /// How many readings there are.
     pub(crate) fn len(&self) -> usize {
         self.sweeps.iter().map(Vec::len).sum()

@@ -263,7 +263,8 @@ impl<'a> RateFinder<'a> {
 
     /// How ranges that a receiver tells move with the threshold.
     pub(crate) fn time_walk(&self, receiver: &Receiver) -> TimeWalk {
-        TimeWalk::of(receiver, self.reference_m_s / receiver.sound_speed_m_s)
+        let wavelength_m = receiver.sound_speed_m_s / self.world.sensor.frequency_hz;
+        TimeWalk::of(receiver, wavelength_m, self.reference_m_s / receiver.sound_speed_m_s)
     }
 
     /// What a path from the axis gains where the face is beside it: in length, to first order, and by the beam pattern in

@@ -11,18 +11,28 @@ const STEPS: usize = 256;
 /// So unlikely are thresholds that nothing is asked about them.
 const LEAST_PROBABILITY: f64 = 1e-200;
 
+/// Ranges that are missed by more than this, in wavelengths, are not known so well that what moves them by tenths of a
+/// millimetre could be believed, or phases far off.
+pub(crate) const WELL_KNOWN: f64 = 0.35;
+
 /// By how much later an echo is told that reaches less far above the threshold (time walk of a lone echo).
 #[derive(Debug, Clone)]
 pub(crate) struct TimeWalk {
     late_m: Vec<f64>,
+    wavelength_m: f64,
 }
 
 impl TimeWalk {
-    /// Of a receiver, in ranges that are told `stretch` times as long.
-    pub(crate) fn of(receiver: &Receiver, stretch: f64) -> Self {
+    /// Of a receiver that hears a wavelength, in ranges that are told `stretch` times as long.
+    pub(crate) fn of(receiver: &Receiver, wavelength_m: f64, stretch: f64) -> Self {
         let root = |step: usize| step as f64 * MOST_DB.sqrt() / STEPS as f64;
         let late_m = |step: usize| stretch * receiver.time_walk_m(root(step).powi(2));
-        Self { late_m: (0..=STEPS).map(late_m).collect() }
+        Self { late_m: (0..=STEPS).map(late_m).collect(), wavelength_m }
+    }
+
+    /// Whether ranges with a standard deviation, metres, say how strong echoes are.
+    pub(crate) fn is_believed(&self, sigma_m: f64) -> bool {
+        sigma_m < WELL_KNOWN * self.wavelength_m
     }
 
     /// At a margin above the threshold, decibels: metres, and what it gains with each decibel more.

@@ -14,7 +14,10 @@ use super::{
     polish::FAR_BELOW,
     restart::{CLOSE, Place, ROUGH, keep_likelier, widened},
 };
-use crate::{candidates::Phases, likelihood::ErrorModel, parameter::Parameter, watch::Progress};
+use crate::{
+    candidates::Phases, likelihood::ErrorModel, parameter::Parameter, walk::WELL_KNOWN,
+    watch::Progress,
+};
 
 /// Steps to each side, and how long each is, in standard deviations of what a rough look leaves in doubt.
 const STEPS: (usize, f64) = (8, 0.35);
@@ -26,9 +29,6 @@ const POLISHED: usize = 2;
 /// How often ridges are gone along, from a better end elsewhere each time.
 const ROUNDS: usize = 3;
 
-/// Ranges that are missed by more than this, in wavelengths, say too little of phases to choose a place far off by.
-const MISSED: f64 = 0.35;
-
 /// A direction in the parameters' units, and how far values may be off along it, in standard deviations.
 type Direction = (DVector<f64>, f64);
 
@@ -36,7 +36,7 @@ impl State<'_> {
     /// The likeliest end of those from peaks along the ridges through an end, or that one itself; and where ranges hardly tell
     /// phases, always that one.
     pub(super) fn along_ridges(&mut self, mut best: Settled) -> Result<Settled, FitError> {
-        if self.missed_wavelengths(&best.errors) > MISSED {
+        if self.missed_wavelengths(&best.errors) > WELL_KNOWN {
             return Ok(best);
         }
         for _ in 0..ROUNDS {

@@ -12,7 +12,7 @@ const DB_PER_REFLECTION: f64 = 1.5;
 /// Shares of readings in the far tail that are tried.
 const TAILS: [f64; 5] = [0.0, 0.03, 0.06, 0.1, 0.2];
 /// Spreads of the threshold that are tried, decibels.
-const SPREADS_DB: [f64; 9] = [0.1, 0.25, 0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0];
+const SPREADS_DB: [f64; 11] = [0.1, 0.25, 0.35, 0.5, 0.7, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0];
 
 impl State<'_> {
     /// The spread of readings about the present predictions: one step of expectation-maximisation.
