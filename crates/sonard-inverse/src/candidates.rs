@@ -12,7 +12,7 @@ pub(crate) const SPAN_DB: f64 = 12.0;
 /// Least step from one to the next, decibels.
 const STEP_DB: f64 = 0.25;
 /// So far below where it is lost an echo is told that only lower thresholds than the usual one report, decibels.
-const BELOW_DB: f64 = 0.5;
+const BELOW_DB: f64 = 0.3;
 /// Just above where an echo is lost.
 const ABOVE_DB: f64 = 0.02;
 /// Margin below which time walk is not followed, decibels.
@@ -54,6 +54,8 @@ pub(crate) type Candidates = SmallVec<[Candidate; 3]>;
 /// Asks the model what a receiver would report at thresholds other than its own.
 pub(crate) struct Listener {
     receiver: Receiver,
+    /// How far a lone echo has to reach above the threshold to be told, decibels.
+    least_margin_db: f64,
     /// Thresholds that are looked at, decibels to both sides of the nominal one.
     span_db: f64,
     /// What the lowest and the highest of them are multiplied with.
@@ -69,6 +71,8 @@ struct Reported {
     peak: f64,
     /// The threshold up to which that reaches, decibels above the nominal one.
     reaches_db: f64,
+    /// Whether nothing else sounds with its arrival.
+    is_lone: bool,
 }
 
 impl Listener {
@@ -80,7 +84,8 @@ impl Listener {
         if phases == Phases::Unknown && receiver.combining == Combining::Coherent {
             receiver.combining = Combining::Incoherent;
         }
-        Self { receiver, span_db, ends: [-span_db, span_db].map(factor) }
+        let least_margin_db = receiver.least_margin_db();
+        Self { receiver, least_margin_db, span_db, ends: [-span_db, span_db].map(factor) }
     }
 
     /// All that a firing could come to, in the place of what was there.
@@ -108,8 +113,12 @@ impl Listener {
             };
             ready_us = rise.passed_us;
             let mut next = Self::reported(listening, rise, by_db);
-            let until_db = self.lost(listening, &next, ready_us);
+            let mut until_db = self.lost(listening, &next, ready_us);
             self.tell_where_likely(listening, &mut next, until_db, ready_us);
+            if next.is_lone {
+                // The threshold in force drifts while an echo rises: the later it is told, the better is known how far it reaches.
+                until_db = self.lost(listening, &next, ready_us);
+            }
             by_db = next.by_db;
             let is_same = |last: &Reported| self.is_same(last, &next.rise, next.by_db);
             match found.last_mut() {
@@ -145,9 +154,7 @@ impl Listener {
         ready_us: f64,
     ) {
         let at_db = (until_db - BELOW_DB).min(0.0);
-        // A lone pulse rises as it does at any threshold.
-        let is_lone = reported.rise.arrival.is_some_and(|of| of.amplitude == reported.peak);
-        if reported.by_db >= at_db || until_db <= 0.0 && is_lone {
+        if reported.by_db >= at_db {
             return;
         }
         let rise = listening.rise(self.factor(at_db), ready_us);
@@ -162,7 +169,8 @@ impl Listener {
     /// A rise that was just told at a threshold, with how far its envelope reaches.
     fn reported(listening: &mut Listening, rise: Rise, by_db: f64) -> Reported {
         let (peak, margin_db) = listening.peak(&rise);
-        Reported { rise, by_db, peak, reaches_db: by_db + margin_db.max(0.0) }
+        let (reaches_db, is_lone) = (by_db + margin_db.max(0.0), listening.is_lone());
+        Reported { rise, by_db, peak, reaches_db, is_lone }
     }
 
     /// Whether how far the envelope of a rise reaches, which is reported up to a threshold, is wanted any more: for its
@@ -186,8 +194,11 @@ impl Listener {
     /// The threshold at which what is reported no longer is. The peak of its envelope says so, unless another arrival
     /// follows so closely that the peak is that one's.
     fn lost(&self, listening: &mut Listening, reported: &Reported, ready_us: f64) -> f64 {
-        let Reported { by_db: from_db, reaches_db, .. } = *reported;
+        let Reported { by_db: from_db, reaches_db, is_lone, .. } = *reported;
         let span_db = self.span_db;
+        if is_lone {
+            return (reaches_db - self.least_margin_db).max(from_db);
+        }
         let beyond_db = if reaches_db < span_db { reaches_db - STEP_DB } else { span_db };
         if beyond_db <= from_db {
             return reaches_db.min(span_db.max(from_db));

@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 
 use crate::{
     likelihood::{ErrorModel, normal_density, normal_up_to},
-    walk::{TimeWalk, between},
+    walk::TimeWalk,
 };
 
 /// What a number gains for each unit of some of the parameters.
@@ -74,7 +74,7 @@ pub(crate) struct Term {
 impl Possible {
     /// As it is expected after a change of the parameters, up to a threshold and from the one up to which another reading is;
     /// `None` of silence.
-    fn expected(
+    pub(crate) fn expected(
         &self,
         change: &DVector<f64>,
         [from_db, until_db]: [f64; 2],
@@ -86,17 +86,13 @@ impl Possible {
             let (by_until_m, sigma_m) = (0.0, errors.sigma_m);
             return Some(Expected { range_m, by_until_m, is_walk_believed: false, sigma_m });
         }
-        let sigma_db = self.sigma_db(errors);
         let is_walk_believed = walk.is_believed(errors.sigma_m);
         let until_db = if is_walk_believed { until_db } else { self.until_db };
-        let (mean, variance) = between(from_db / sigma_db, until_db / sigma_db);
-        let margin_db = until_db - sigma_db * mean;
-        let late = walk.among(margin_db, sigma_db * sigma_db * variance);
+        let late = walk.expected([from_db, until_db], self.sigma_db(errors), errors.sigma_m);
         let [told_m, _] = walk.at(self.margin_db);
         Some(Expected {
             range_m: range_m + late.mean_m - told_m,
-            // The mean margin moves by as much as the threshold may vary beside it.
-            by_until_m: late.per_db * variance,
+            by_until_m: late.by_until_m,
             is_walk_believed,
             sigma_m: errors.sigma_m.hypot(late.sigma_m),
         })

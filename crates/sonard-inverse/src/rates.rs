@@ -251,7 +251,8 @@ impl<'a> RateFinder<'a> {
     fn earlier_m(&self, margin_db: f64) -> f64 {
         let moving = self.other_bands.as_ref().filter(|_| margin_db.is_finite());
         moving.map_or(0.0, |bands| {
-            let [narrower_m, wider_m] = bands.each_ref().map(|of| of.time_walk_m(margin_db));
+            let [narrower_m, wider_m] =
+                bands.each_ref().map(|of| of.time_walk_m(of.least_margin_db() + margin_db));
             (wider_m - narrower_m) / (2.0 * BY_BAND)
         })
     }

@@ -7,6 +7,7 @@ mod derivatives;
 mod found;
 mod margins;
 mod stopped;
+mod thresholds;
 
 use std::sync::Arc;
 

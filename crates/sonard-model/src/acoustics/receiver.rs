@@ -297,6 +297,30 @@ impl Receiver {
         self.range_m(self.shape.rise_us(level).map_or(0.0, |rise_us| rise_us - self.lead_us))
     }
 
+    /// How far a lone echo has to reach above the threshold in force to be told, decibels: so far that it stays above for the
+    /// integration time.
+    #[must_use]
+    pub fn least_margin_db(&self) -> f64 {
+        if self.combining == Combining::Ideal {
+            return 0.0;
+        }
+        let is_told = |margin_db: f64| {
+            let level = 10f64.powf(-margin_db / 20.0);
+            let rise_us = self.shape.rise_us(level);
+            rise_us.is_some_and(|us| self.shape.most_from(us + self.integration_us) >= level)
+        };
+        // Invariant: told at the larger margin, and not at the smaller one. A pulse too short for the integration never is.
+        let (mut least_db, mut most_db) = (0.0, 60.0);
+        if is_told(least_db) || !is_told(most_db) {
+            return least_db;
+        }
+        while most_db - least_db > 1e-6 {
+            let middle_db = 0.5 * (least_db + most_db);
+            *(if is_told(middle_db) { &mut most_db } else { &mut least_db }) = middle_db;
+        }
+        most_db
+    }
+
     /// How long after a time (microseconds, counted as echoes are) a carrier that then has a phase beside its own has its
     /// next crest.
     fn until_crest_us(&self, phase_rad: f64, t_us: f64) -> f64 {

@@ -64,6 +64,13 @@ impl Listening<'_> {
         Some(Rise { status, range_m, arrival, passed_us: at_us })
     }
 
+    /// Whether the rise that was told last is of an arrival with which nothing else sounds: it is told, as it rises alone, at
+    /// all higher thresholds above which it reaches far enough. Never so of detectors that do not watch the envelope.
+    #[must_use]
+    pub fn is_lone(&self) -> bool {
+        self.hearing.is_lone()
+    }
+
     /// The most that the envelope reaches with the rise that was told last, and how far that is above its threshold,
     /// decibels.
     #[must_use]

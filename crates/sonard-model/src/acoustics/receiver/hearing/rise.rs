@@ -38,6 +38,11 @@ impl Hearing<'_> {
         Some((rise_us, self.arrivals[place]))
     }
 
+    /// Whether the last rise was of an arrival with which nothing else sounds.
+    pub(in super::super) const fn is_lone(&self) -> bool {
+        self.lone.is_some()
+    }
+
     pub(super) fn next_rise_of_sum(&mut self, ready_us: f64) -> Option<f64> {
         self.lone = None;
         let integration_us = self.receiver.integration_us;
