@@ -1,0 +1,134 @@
+//! Ranges where the threshold varies from firing to firing, of one wall before the ranger, whose echo is lost beside.
+
+use nalgebra::DVector;
+use rand::SeedableRng as _;
+use rand_distr::{Distribution as _, Normal};
+use rand_pcg::Pcg64;
+use sonard_model::{
+    acoustics::{Rise, TofNoise},
+    geometry::Pose,
+    scene::Scene,
+};
+
+use super::world;
+use crate::{
+    Beam, ErrorModel, Heard, Hypotheses, Parameter, Sweep, World, candidates::Phases,
+    rates::RateFinder,
+};
+
+const AT: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
+const SIGMA_DB: f64 = 0.5;
+
+fn before_a_wall() -> World {
+    let text = r#"{"name": "wall", "materials": {"wood": {"reflectance": 0.8}},
+        "walls": [{"id": "w", "from": [1.2, -9], "to": [1.2, 9], "material": "wood"}]}"#;
+    let mut here = world("simple-room", "senscomp-6500");
+    here.scene = Scene::from_json(text).expect("a scene").into();
+    here.options.max_range_m = Some(3.0);
+    here
+}
+
+fn sweep(azimuths_deg: impl Iterator<Item = f64>, heard: impl Fn(f64) -> Heard) -> Sweep {
+    let beams = azimuths_deg.map(|azimuth_deg| Beam { azimuth_deg, heard: heard(azimuth_deg) });
+    Sweep { scan: uuid::Uuid::nil(), pose: AT, beams: beams.collect() }
+}
+
+/// What is reported in some directions at thresholds so many decibels above the usual one.
+fn rises(here: &World, azimuth_deg: f64, by_db: &[f64]) -> Vec<Option<Rise>> {
+    let simulator = here.simulator(&AT).expect("a model");
+    let direction_rad = here.direction_rad(&AT, azimuth_deg);
+    let heard = simulator.at(AT.position()).hear(direction_rad, |firing| {
+        let rise = |by_db: &f64| {
+            let factor = 10f64.powf(by_db / 20.0);
+            firing.listen(simulator.receiver(), |listening| listening.rise(factor, 0.0))
+        };
+        by_db.iter().map(rise).collect()
+    });
+    heard.expect("paths")
+}
+
+/// From what is far above the threshold to what one firing in twenty reports: mean and spread of many firings' ranges.
+#[test]
+fn ranges_are_expected_where_thresholds_that_vary_report_them() {
+    let here = before_a_wall();
+    let mut rng = Pcg64::seed_from_u64(1);
+    let normal = Normal::new(0.0, SIGMA_DB).expect("a distribution");
+    let by_db: Vec<f64> = (0..4000).map(|_| normal.sample(&mut rng)).collect();
+    let azimuths_deg = || (0..400).map(|at| 0.05 * f64::from(at));
+    let finder = RateFinder::new(&here, &[], here.air.sound_speed_m_s(), Phases::Known);
+    let simulator = here.simulator(&AT).expect("a model");
+    let asked = sweep(azimuths_deg(), |_| Heard::Silence);
+    let point = simulator.at(AT.position());
+    let judged = finder.sweep(&simulator, &point, 0, &asked, &AT).expect("candidates");
+    let walk = finder.time_walk(simulator.receiver());
+    let errors = ErrorModel::rough(1e-3, SIGMA_DB, 3.0);
+    let (mut weak, mut late_m) = (0, 0.0_f64);
+    for (azimuth_deg, beam) in azimuths_deg().zip(&judged) {
+        let first = &beam.possible[0];
+        if first.range_m.is_none() || first.until_db < -0.8 {
+            continue;
+        }
+        let limits_db = [f64::NEG_INFINITY, first.until_db];
+        let still = DVector::zeros(0);
+        let expected = first.expected(&still, limits_db, &errors, &walk).expect("an echo");
+        let heard: Vec<f64> = rises(&here, azimuth_deg, &by_db)
+            .iter()
+            .filter_map(|rise| rise.map(|rise| rise.range_m))
+            .collect();
+        let count = heard.len() as f64;
+        let mean_m = heard.iter().sum::<f64>() / count;
+        let spread_m =
+            (heard.iter().map(|range_m| (range_m - mean_m).powi(2)).sum::<f64>() / count).sqrt();
+        let off_m = expected.range_m - mean_m;
+        let told_m = (expected.sigma_m.powi(2) - errors.sigma_m.powi(2)).sqrt();
+        let of = format!("at {azimuth_deg}, until {:.2} dB", first.until_db);
+        // Four standard errors, and a part of the spread: the threshold in force drifts while an echo rises.
+        assert!(
+            off_m.abs() < 4.0 * spread_m / count.sqrt() + 0.2 * spread_m + 1e-6,
+            "{of}: {off_m} {spread_m}"
+        );
+        assert!((0.75..1.3).contains(&(told_m / spread_m)), "{of}: {told_m} for {spread_m}");
+        weak += u32::from(first.until_db < 1.0);
+        late_m = late_m.max(expected.range_m - 1.2);
+    }
+    assert!(weak >= 5 && late_m > 0.01, "{weak} {late_m}");
+}
+
+/// What the likelihood gains with the threshold, time walk included, is what it is greater by at a higher one.
+#[test]
+fn likelihoods_gain_with_the_threshold_what_their_derivative_says() {
+    let here = before_a_wall();
+    let mut rng = Pcg64::seed_from_u64(2);
+    let normal = Normal::new(0.0, SIGMA_DB).expect("a distribution");
+    let noise = TofNoise::of_range_mm(1.0, here.air.sound_speed_m_s());
+    let us_per_m = 2e6 / here.air.sound_speed_m_s();
+    let mut read = sweep((-200..200).map(|at| 0.1 * f64::from(at)), |_| Heard::Silence);
+    for beam in &mut read.beams {
+        let rise = rises(&here, beam.azimuth_deg, &[normal.sample(&mut rng)])[0];
+        if let Some(rise) = rise {
+            let tof_us = us_per_m * rise.range_m + noise.sample_us(&mut rng);
+            beam.heard = Heard::Echo { tof_us };
+        }
+    }
+    let errors = ErrorModel { clutter: 1e-3, arcs: 0.0, ..ErrorModel::rough(1e-3, SIGMA_DB, 3.0) };
+    let at = |by_db: f64| {
+        let world = here.changed(&[(&Parameter::Threshold, by_db)]).expect("a world");
+        let asked = Hypotheses::new(world, vec![Parameter::Threshold]).expect("a model");
+        asked.log_likelihood(&read, &AT, &errors).expect("paths")
+    };
+    let most = at(0.0).information[(0, 0)].sqrt();
+    for step in -4..=4 {
+        let (by_db, aside_db) = (0.25 * f64::from(step), 0.05);
+        let [before, here, after] = [by_db - aside_db, by_db, by_db + aside_db].map(at);
+        let expected = (after.value - before.value) / (2.0 * aside_db);
+        let gradient = here.gradient[0];
+        // By how much its share and its spread change, too, is left out.
+        assert!(
+            (gradient - expected).abs() < 0.5 * most + 0.2 * expected.abs(),
+            "{by_db}: {gradient} for {expected}, {most}"
+        );
+    }
+    // And it is likeliest where it is.
+    let likeliest = at(0.0);
+    assert!((likeliest.gradient[0] / most).abs() < 3.0, "{likeliest:?}");
+}
