@@ -112,57 +112,57 @@ impl Listener {
                 return;
             };
             ready_us = rise.passed_us;
-            let mut next = Self::reported(listening, rise, by_db);
-            let mut until_db = self.lost(listening, &next, ready_us);
-            self.tell_where_likely(listening, &mut next, until_db, ready_us);
-            if next.is_lone {
-                // The threshold in force drifts while an echo rises: the later it is told, the better is known how far it reaches.
-                until_db = self.lost(listening, &next, ready_us);
-            }
-            by_db = next.by_db;
+            let first = Self::reported(listening, rise, by_db);
+            let (next, until_db) = self.told_where_likely(listening, first, ready_us);
+            by_db = until_db.max(next.by_db + STEP_DB) + ABOVE_DB;
             let is_same = |last: &Reported| self.is_same(last, &next.rise, next.by_db);
             match found.last_mut() {
-                Some(known) if last.as_ref().is_some_and(is_same) => {
-                    known.go_on(until_db, &next);
-                }
+                Some(known) if last.as_ref().is_some_and(is_same) => known.go_on(until_db, &next),
                 _ => {
-                    let margin_db = match next.rise.status {
-                        PingStatus::Echo => until_db - next.by_db,
-                        _ => f64::INFINITY,
-                    };
-                    found.push(Candidate {
-                        range_m: Some(next.rise.range_m),
-                        arrival: next.rise.arrival.map(|arrival| firing.arrival(&arrival)),
-                        until_db,
-                        spread_db: self.spread_db(&next),
-                        margin_db,
-                    });
+                    found.push(self.candidate(firing, &next, until_db));
                     last = Some(next);
                 }
             }
-            by_db = until_db.max(by_db + STEP_DB) + ABOVE_DB;
         }
     }
 
-    /// Tells a rise that is reported up to some threshold as it is at the usual one, or below that at the highest that reports
-    /// it: the nearer to the usual one, the likelier.
-    fn tell_where_likely(
+    /// A rise as it is at the usual threshold, if that reports it, and else near the highest that does (the nearer to the usual
+    /// one, the likelier), with the threshold at which it is lost.
+    fn told_where_likely(
         &self,
         listening: &mut Listening,
-        reported: &mut Reported,
-        until_db: f64,
+        first: Reported,
         ready_us: f64,
-    ) {
+    ) -> (Reported, f64) {
+        let until_db = self.lost(listening, &first, ready_us);
         let at_db = (until_db - BELOW_DB).min(0.0);
-        if reported.by_db >= at_db {
-            return;
+        if first.by_db >= at_db {
+            return (first, until_db);
         }
         let rise = listening.rise(self.factor(at_db), ready_us);
-        if let Some(rise) = rise.filter(|rise| self.is_same(reported, rise, at_db)) {
-            *reported = match self.is_asked_again(until_db) {
-                true => Self::reported(listening, rise, at_db),
-                false => Reported { rise, by_db: at_db, ..*reported },
-            };
+        let Some(rise) = rise.filter(|rise| self.is_same(&first, rise, at_db)) else {
+            return (first, until_db);
+        };
+        let told = match self.is_asked_again(until_db) {
+            true => Self::reported(listening, rise, at_db),
+            false => Reported { rise, by_db: at_db, ..first },
+        };
+        // The threshold in force drifts while an echo rises: where it is told late it is known better how far it reaches.
+        let until_db = if told.is_lone { self.lost(listening, &told, ready_us) } else { until_db };
+        (told, until_db)
+    }
+
+    fn candidate(&self, firing: &FiringArrivals, told: &Reported, until_db: f64) -> Candidate {
+        let rise = &told.rise;
+        Candidate {
+            range_m: Some(rise.range_m),
+            arrival: rise.arrival.map(|arrival| firing.arrival(&arrival)),
+            until_db,
+            spread_db: self.spread_db(told),
+            margin_db: match rise.status {
+                PingStatus::Echo => until_db - told.by_db,
+                _ => f64::INFINITY,
+            },
         }
     }
 

@@ -46,8 +46,8 @@ pub(crate) struct RateFinder<'a> {
     steady: Vec<Option<Motion>>,
     /// By parameter, the beam pattern slightly changed by it, if it is about the beam, and by how much.
     changed_beams: Vec<Option<(BeamPattern, f64)>>,
-    /// Receivers with a slightly narrower and a slightly wider band, if that is a parameter.
-    other_bands: Option<[Receiver; 2]>,
+    /// Time walk with a slightly narrower and a slightly wider band, if that is a parameter.
+    other_bands: Option<[TimeWalk; 2]>,
     reference_m_s: f64,
     phases: Phases,
     /// Thresholds that are looked at, decibels to both sides of the nominal one.
@@ -251,8 +251,7 @@ impl<'a> RateFinder<'a> {
     fn earlier_m(&self, margin_db: f64) -> f64 {
         let moving = self.other_bands.as_ref().filter(|_| margin_db.is_finite());
         moving.map_or(0.0, |bands| {
-            let [narrower_m, wider_m] =
-                bands.each_ref().map(|of| of.time_walk_m(of.least_margin_db() + margin_db));
+            let [[narrower_m, _], [wider_m, _]] = bands.each_ref().map(|walk| walk.at(margin_db));
             (wider_m - narrower_m) / (2.0 * BY_BAND)
         })
     }
@@ -264,8 +263,7 @@ impl<'a> RateFinder<'a> {
 
     /// How ranges that a receiver tells move with the threshold.
     pub(crate) fn time_walk(&self, receiver: &Receiver) -> TimeWalk {
-        let wavelength_m = receiver.sound_speed_m_s / self.world.sensor.frequency_hz;
-        TimeWalk::of(receiver, wavelength_m, self.reference_m_s / receiver.sound_speed_m_s)
+        time_walk(receiver, self.world, self.reference_m_s / receiver.sound_speed_m_s)
     }
 
     /// What a path from the axis gains where the face is beside it: in length, to first order, and by the beam pattern in
@@ -307,14 +305,19 @@ fn changed_beam(world: &World, parameter: &Parameter) -> Option<(BeamPattern, f6
     Some((BeamPattern::new(&changed.sensor, changed.air.sound_speed_m_s()), by))
 }
 
-/// Receivers with a slightly narrower and a slightly wider band, if that is a parameter.
-fn other_bands(world: &World, parameters: &[&Parameter]) -> Option<[Receiver; 2]> {
+/// Time walk with a slightly narrower and a slightly wider band, if that is a parameter.
+fn other_bands(world: &World, parameters: &[&Parameter]) -> Option<[TimeWalk; 2]> {
     let parameter = parameters.iter().find(|of| ***of == Parameter::Bandwidth)?;
     let with_band = |by: f64| {
         let changed = world.changed(&[(*parameter, by)]).ok()?;
-        Some(receiver(&changed.sensor, &changed.air, &changed.options))
+        let receiver = receiver(&changed.sensor, &changed.air, &changed.options);
+        Some(time_walk(&receiver, &changed, 1.0))
     };
     Some([with_band(-BY_BAND)?, with_band(BY_BAND)?])
+}
+
+fn time_walk(receiver: &Receiver, world: &World, stretch: f64) -> TimeWalk {
+    TimeWalk::of(receiver, receiver.sound_speed_m_s / world.sensor.frequency_hz, stretch)
 }
 
 /// What the strength of a path gains with a parameter of a material, decibels for each unit; 0 for others.

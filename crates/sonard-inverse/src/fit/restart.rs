@@ -38,6 +38,8 @@ const STAGE: usize = STAGES.len() - 1;
 const ENDS: usize = 8;
 const STAGED: usize = 2;
 const POLISHED: usize = 3;
+/// Ends from elsewhere that are polished where a sweep heard little.
+const POLISHED_OPEN: usize = 6;
 
 /// Somewhere beside the end of a fit.
 pub(super) struct Place {
@@ -59,9 +61,15 @@ impl State<'_> {
         let mut best = self.attempt(self.still(), 0)?;
         let mut seen: Vec<Place> = vec![best.place()];
         if self.is_astray(&best) || self.hears_little() {
-            for end in self.ends_from_elsewhere()? {
+            let mut ends = self.ends_from_elsewhere()?;
+            ends.sort_by(|one, other| other.value.total_cmp(&one.value));
+            for (number, end) in ends.into_iter().enumerate() {
                 seen.push(end.place());
-                keep_likelier(&mut best, Some(end));
+                if number < POLISHED_OPEN && self.hears_little() {
+                    keep_likelier(&mut best, one_of_many(self.polished(end))?);
+                } else {
+                    keep_likelier(&mut best, Some(end));
+                }
             }
         }
         if self.fit.search == Search::Quick {
@@ -80,7 +88,21 @@ impl State<'_> {
                 keep_likelier(&mut best, one_of_many(self.polished(end))?);
             }
         }
+        eprintln!(
+            "RIDGE {:.2} {:.3?} {:?} sm {:.4}",
+            best.value,
+            best.values.as_slice(),
+            best.phases,
+            best.errors.sigma_m
+        );
         best = self.along_ridges(best)?;
+        eprintln!(
+            "AFTER {:.2} {:.3?} {:?} sm {:.4}",
+            best.value,
+            best.values.as_slice(),
+            best.phases,
+            best.errors.sigma_m
+        );
         let beside = self.beside_thoroughly(&best, &places, &seen)?;
         Ok((best, beside))
     }
