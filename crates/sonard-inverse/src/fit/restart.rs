@@ -88,21 +88,7 @@ impl State<'_> {
                 keep_likelier(&mut best, one_of_many(self.polished(end))?);
             }
         }
-        eprintln!(
-            "RIDGE {:.2} {:.3?} {:?} sm {:.4}",
-            best.value,
-            best.values.as_slice(),
-            best.phases,
-            best.errors.sigma_m
-        );
         best = self.along_ridges(best)?;
-        eprintln!(
-            "AFTER {:.2} {:.3?} {:?} sm {:.4}",
-            best.value,
-            best.values.as_slice(),
-            best.phases,
-            best.errors.sigma_m
-        );
         let beside = self.beside_thoroughly(&best, &places, &seen)?;
         Ok((best, beside))
     }
