@@ -53,6 +53,8 @@ export class Next {
     this.presets = [];
     this.due = 0;
     this.request = new AbortController();
+    /** Why this draft was not taken in, in words; said until the draft changes. */
+    this.refusal = "";
     this.build(section);
     plan.overlays.push(this);
   }
@@ -122,6 +124,7 @@ export class Next {
     if (!this.draft) return;
     change?.(this.draft);
     this.show();
+    this.refusal = "";
     await this.preview();
   }
 
@@ -131,6 +134,7 @@ export class Next {
     if (!this.draft) return this.enter(change);
     change(this.draft);
     this.show();
+    this.refusal = "";
     await this.preview();
   }
 
@@ -205,6 +209,7 @@ export class Next {
 
   previewSoon() {
     clearTimeout(this.due);
+    this.refusal = "";
     this.due = setTimeout(() => this.preview(), REST_MS);
   }
 
@@ -216,16 +221,27 @@ export class Next {
       const whole = await ask("/v1/preview", { method: "POST", body: this.orderOf(this.draft), signal });
       if (signal.aborted) return;
       this.scan = Scan.of(whole);
-      setText(this.told, `The model expects ${expected(this.scan)}${this.effect()}. Nothing is changed until it is applied.`);
+      this.previewed(`The model expects ${expected(this.scan)}${this.effect()}. Nothing is changed until it is applied.`);
       this.apply.disabled = false;
     } catch (/** @type {any} */ error) {
       if (signal.aborted) return;
       this.scan = null;
       // What can't be previewed, as for want of a scene, can be ordered all the same.
       this.apply.disabled = error.status === undefined;
-      setText(this.told, error.status ? `No preview: ${error.message}. ${error.help}` : "No preview: the daemon does not answer.");
+      this.previewed(error.status ? `No preview: ${error.message}. ${error.help}` : "No preview: the daemon does not answer.");
     }
     this.plan.redraw();
+  }
+
+  /** Says what a preview shows, unless the draft was refused while it was on its way. @param {string} words */
+  previewed(words) {
+    setText(this.told, this.refusal || words);
+  }
+
+  /** @param {string} words */
+  refuse(words) {
+    this.refusal = words;
+    setText(this.told, words);
   }
 
   /** What is said to the daemon, by part; of a sensor what differs from the one that it has or from the preset. @param {any} draft */
@@ -253,12 +269,12 @@ export class Next {
     const [now, { draft }] = [this.coming(), this];
     const parts = PARTS.filter((part) => JSON.stringify(draft[part]) !== JSON.stringify(now[part]));
     const bodies = this.orderOf(draft);
-    if (!parts.length) return setText(this.told, "There is nothing to apply: it is as the next scan is taken.");
+    if (!parts.length) return this.refuse("There is nothing to apply: it is as the next scan is taken.");
     for (const part of parts) {
       try {
         await ask(`/v1/${part}`, { method: "PUT", body: bodies[part] });
       } catch (/** @type {any} */ error) {
-        return setText(this.told, error.status ? `Refused, the ${part}: ${error.message}. ${error.help}` : "The daemon does not answer.");
+        return this.refuse(error.status ? `Refused, the ${part}: ${error.message}. ${error.help}` : "The daemon does not answer.");
       }
     }
     this.leave();

@@ -296,6 +296,38 @@ fn the_sensor_is_changed_and_its_effect_is_seen_before() {
 }
 
 #[test]
+fn a_refusal_stays_to_be_read_when_a_preview_comes_after_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = write_token(folder.path(), TOKEN);
+    let setting = format!("server.token_file={}", file.display());
+    let (_daemon, address) = daemon(folder.path(), "127.0.0.1:0", &["--set", &setting]);
+    let browser = Browser::open(&address, DESK);
+    browser.eval(&format!("sessionStorage.setItem('sonard-token', '{TOKEN}')"));
+    has(&browser, "#next-table", "senscomp-6500");
+    browser.click("#change");
+    has(&browser, "#next-now", "The model expects 100 beams");
+    // Previews are answered once somebody lets them.
+    browser.eval(
+        "(() => { const asked = window.fetch; window.answered = 0; \
+         const held = new Promise((done) => (window.letGo = done)); \
+         window.fetch = async (url, ...rest) => { const answer = await asked(url, ...rest); \
+         if (String(url).includes('preview')) { await held; window.answered += 1; } \
+         return answer; }; })()",
+    );
+    browser.eval(
+        "(() => { const f = document.getElementById('next-name'); f.value = 'hc-sr04'; \
+         f.dispatchEvent(new Event('input')); })()",
+    );
+    browser.click("#apply");
+    has(&browser, "#next-now", "Refused, the sensor");
+    browser.eval("window.letGo()");
+    browser.until("window.answered > 0");
+    browser.until_drawn();
+    has(&browser, "#next-now", "Refused, the sensor");
+    has(&browser, "#next-table", "senscomp-6500");
+}
+
+#[test]
 fn an_array_is_drawn_from_its_sonars_moved_and_previewed() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = write_token(folder.path(), TOKEN);
