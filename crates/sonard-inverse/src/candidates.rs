@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 use sonard_model::{
-    acoustics::{Combining, Detector, Listening, Receiver, Rise},
+    acoustics::{Combining, Detector, Listening, PulseArrival, Receiver, Rise},
     model::{Arrival, FiringArrivals, ObservationPoint, TooCostly},
     reading::PingStatus,
 };
@@ -46,6 +46,8 @@ pub(crate) struct Candidate {
     /// How far its envelope reaches above the threshold that its range is told at, decibels; infinite where that moves with
     /// no threshold, as of silence and of what is there at the end of blanking.
     pub(crate) margin_db: f64,
+    /// Whether how far it reaches is its arrival's strength, and next to nothing is added or taken by what sounds beside it.
+    pub(crate) is_of_one: bool,
 }
 
 /// The readings of a firing from the lowest threshold up; the last holds for all thresholds above.
@@ -73,6 +75,15 @@ struct Reported {
     reaches_db: f64,
     /// Whether nothing else sounds with its arrival.
     is_lone: bool,
+}
+
+impl Reported {
+    fn is_of_one(&self) -> bool {
+        /// Of its arrival's strength.
+        const BESIDE: f64 = 0.1;
+        let of = |arrival: &PulseArrival| (self.peak / arrival.amplitude - 1.0).abs() < BESIDE;
+        self.is_lone || self.rise.arrival.as_ref().is_some_and(of)
+    }
 }
 
 impl Listener {
@@ -163,6 +174,7 @@ impl Listener {
                 PingStatus::Echo => until_db - told.by_db,
                 _ => f64::INFINITY,
             },
+            is_of_one: told.is_of_one(),
         }
     }
 
@@ -264,7 +276,14 @@ impl Candidate {
     /// For all thresholds that are higher still.
     const fn silence(until_db: f64) -> Self {
         let (range_m, arrival) = (None, None);
-        Self { range_m, arrival, until_db, spread_db: 0.0, margin_db: f64::INFINITY }
+        Self {
+            range_m,
+            arrival,
+            until_db,
+            spread_db: 0.0,
+            margin_db: f64::INFINITY,
+            is_of_one: false,
+        }
     }
 }
 

@@ -59,7 +59,7 @@ pub(crate) struct Terms {
 
 /// What one of the possible readings has to do with it.
 pub(crate) struct Term {
-    /// Of an echo.
+    /// Of an echo, where one was heard.
     pub(crate) expected: Option<Expected>,
     /// Probability that the reading is this one.
     pub(crate) share: f64,
@@ -143,25 +143,29 @@ impl Judged {
             .iter()
             .map(|possible| after(possible.until_db, &possible.until_rates, change))
             .collect();
+        // Where an echo is expected says nothing of a silence.
         let expected: SmallVec<[Option<Expected>; 3]> = self
             .possible
             .iter()
             .enumerate()
             .map(|(at, possible)| {
                 let from_db = at.checked_sub(1).map_or(f64::NEG_INFINITY, |last| untils_db[last]);
+                self.heard_m?;
                 possible.expected(change, [from_db, untils_db[at]], errors, walk)
             })
             .collect();
         // Density of the reading if it is this one, and its derivative by the range.
-        let densities: SmallVec<[[f64; 2]; 3]> = expected
+        let densities: SmallVec<[[f64; 2]; 3]> = self
+            .possible
             .iter()
-            .map(|expected| match (self.heard_m, expected) {
+            .zip(&expected)
+            .map(|(possible, expected)| match (self.heard_m, expected) {
                 (Some(heard_m), Some(expected)) => {
                     let spread = errors.with_range_spread(expected.sigma_m);
                     let [density, slope] = spread.range(heard_m - expected.range_m);
                     [density, -slope]
                 }
-                (None, None) => [1.0, 0.0],
+                (None, _) if possible.range_m.is_none() => [1.0, 0.0],
                 _ => [0.0, 0.0],
             })
             .collect();

@@ -180,7 +180,8 @@ impl<'a> RateFinder<'a> {
         if let Some(predicted_m) = candidate.range_m {
             let told = (predicted_m, candidate.margin_db);
             // A threshold alone, as turned sweeps are asked about, needs none.
-            let flanks = LazyCell::new(|| Flanks::of(arrival, firing));
+            let is_sharp = candidate.is_of_one && self.phases == Phases::Known;
+            let flanks = LazyCell::new(|| Flanks::of(arrival, firing, is_sharp));
             for &(at, steady) in &path.steady {
                 let moved = self.moved(at, steady, path, firing);
                 let (by_range, by_db) = self.rates(at, &moved, (arrival, told), firing, &flanks);

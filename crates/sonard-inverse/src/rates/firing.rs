@@ -40,16 +40,16 @@ impl<'a> Firing<'a> {
 }
 
 impl Flanks {
-    pub(super) fn of(arrival: &Arrival, firing: &Firing) -> Self {
-        // Over half a degree to both sides, and no steeper than a main lobe's flank: a null is steeper, but what is
-        // heard there is the sum of several arrivals.
-        const BY_RAD: f64 = 0.01;
-        const STEEPEST_DB_PER_RAD: f64 = 125.0;
+    /// By the pattern as it is, however steep, if they are to be sharp: of an arrival that is heard alone by a ranger whose place
+    /// is known well. Otherwise over half a degree to both sides, and no steeper than a main lobe's flank, so that they hold for
+    /// steps of degrees: a null is steeper, but what is heard there is the sum of several arrivals.
+    pub(super) fn of(arrival: &Arrival, firing: &Firing, is_sharp: bool) -> Self {
+        let (by_rad, steepest) = if is_sharp { (1e-4, 2000.0) } else { (0.01, 125.0) };
         let pattern = firing.simulator.beam();
         let [leaves_rad, comes_rad] = firing.off_rad(arrival);
         let flank = |off_rad: f64| {
-            let by_db = level_db(pattern, off_rad - BY_RAD, off_rad + BY_RAD);
-            (by_db / (2.0 * BY_RAD)).clamp(-STEEPEST_DB_PER_RAD, STEEPEST_DB_PER_RAD)
+            let by_db = level_db(pattern, off_rad - by_rad, off_rad + by_rad);
+            (by_db / (2.0 * by_rad)).clamp(-steepest, steepest)
         };
         let leaves = flank(leaves_rad);
         let comes = if comes_rad == leaves_rad { leaves } else { flank(comes_rad) };
