@@ -147,6 +147,7 @@ impl Locator {
                 let heard = match status {
                     PingStatus::Echo => inverse::Heard::Echo { tof_us: range_m * us_per_m },
                     PingStatus::NoEcho => inverse::Heard::Silence,
+                    PingStatus::MinRange => inverse::Heard::Near,
                     _ => return None,
                 };
                 Some(inverse::Beam { azimuth_deg, heard })

@@ -6,7 +6,8 @@
 //! aside, with `furniture` five round things that the scene lacks). Readings have noise of 1 mm with the far tail of
 //! `TofNoise`, and thresholds that vary by 0.5 dB from firing to firing. None is begun after so many minutes. Prints for each parameter the root mean square of the errors, the
 //! same as a multiple of the bound and of the standard deviations told, the median of that and of the standard deviations told, the share of 95 % intervals
-//! that hold the truth, and how many trials went wrong with a small interval (beyond six standard deviations).
+//! that hold the truth, the same of parameters that readings say more of than was believed, with how many these are (what is left at its prior is
+//! drawn from as wide an interval, which holds it always), and how many trials went wrong with a small interval (beyond six standard deviations).
 //!
 //! Each trial is fitted a second time from the truth. Where that ends in the same place, the bound tells how far off an
 //! estimate should be. Where it ends elsewhere and is likelier, the search failed; where it is less likely, the readings
@@ -33,6 +34,7 @@ struct Found {
     name: String,
     error: f64,
     sigma: f64,
+    is_identified: bool,
     /// Of the readings as they are, furniture left out.
     bound: f64,
     /// Of those that there would be without furniture.
@@ -105,6 +107,7 @@ fn trial(number: u64, seed: u64, kinds: Kinds) -> Option<Trial> {
         },
         error: fitted.estimates[at].change - wrong.expected[at],
         sigma: fitted.estimates[at].sigma,
+        is_identified: fitted.estimates[at].identified,
         bound: bounds[at],
         unhindered: unhindered[at],
     });
@@ -152,7 +155,7 @@ fn print(trials: &[Trial]) {
 
 fn table(trials: &[&Trial]) {
     println!(
-        "{:16} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>8}",
+        "{:16} {:>10} {:>10} {:>10} {:>10} {:>10} {:>10} {:>9} {:>17} {:>8}",
         "",
         "rms",
         "rms/bound",
@@ -161,6 +164,7 @@ fn table(trials: &[&Trial]) {
         "median/u.",
         "sigma/b.",
         "95 % hold",
+        "identified hold",
         "wrong"
     );
     let names = trials.first().map_or(0, |trial| trial.found.len());
@@ -175,10 +179,15 @@ fn table(trials: &[&Trial]) {
             sizes.sort_by(f64::total_cmp);
             sizes[sizes.len() / 2]
         };
-        let holds = of.iter().filter(|found| found.error.abs() < 1.96 * found.sigma).count();
+        let holds = |of: &[&Found]| {
+            let holding = of.iter().filter(|found| found.error.abs() < 1.96 * found.sigma);
+            100.0 * holding.count() as f64 / of.len().max(1) as f64
+        };
+        let identified: Vec<&Found> =
+            of.iter().copied().filter(|found| found.is_identified).collect();
         let wrong = of.iter().filter(|found| found.error.abs() > 6.0 * found.sigma).count();
         println!(
-            "{:16} {:10.5} {:10.2} {:10.2} {:10.2} {:10.2} {:10.2} {:7.1} % {wrong:8}",
+            "{:16} {:10.5} {:10.2} {:10.2} {:10.2} {:10.2} {:10.2} {:7.1} % {:7.1} % of {:4} {wrong:8}",
             of[0].name,
             rms(&mut of.iter().map(|found| found.error)),
             rms(&mut of.iter().map(|found| found.error / found.bound)),
@@ -187,7 +196,9 @@ fn table(trials: &[&Trial]) {
             median(&mut of.iter().map(|found| found.error / found.bound)) / 0.6745,
             median(&mut of.iter().map(|found| found.error / found.unhindered)) / 0.6745,
             median(&mut of.iter().map(|found| found.sigma / found.bound)),
-            100.0 * holds as f64 / count
+            holds(&of),
+            holds(&identified),
+            identified.len()
         );
     }
 }

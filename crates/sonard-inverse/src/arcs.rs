@@ -7,13 +7,12 @@
 //! recursion of a hidden Markov model, and the backward recursion gives each reading's posterior probability of being of
 //! the scene (Rabiner, "A tutorial on hidden Markov models", Proc. IEEE 77, 1989, section III).
 
-use crate::likelihood::ErrorModel;
+use crate::{likelihood::ErrorModel, sweep::Outcome};
 
 /// A reading, as likely as each state makes it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Emission {
-    /// Metres; `None` of silence.
-    pub(crate) heard_m: Option<f64>,
+    pub(crate) heard: Outcome,
     /// Density if it is of the scene.
     pub(crate) of_scene: f64,
 }
@@ -75,7 +74,7 @@ pub(crate) fn states(readings: &[Emission], errors: &ErrorModel) -> States {
         let of_else = states[1] * later[1];
         of_scene[at] = states[0] * later[0];
         counts.of_else += of_else;
-        counts.silent_of_else += if readings[at].heard_m.is_none() { of_else } else { 0.0 };
+        counts.silent_of_else += if readings[at].heard == Outcome::Silence { of_else } else { 0.0 };
         let Some(before) = at.checked_sub(1) else { break };
         let (before, own) = (steps[before].states, steps[at]);
         let pass = |from: usize, to: usize| {
@@ -129,11 +128,11 @@ impl<I: Iterator<Item = Emission>> Iterator for Forward<'_, I> {
 
     fn next(&mut self) -> Option<Step> {
         let reading = self.readings.next()?;
-        let first = self.errors.of_else(None, reading.heard_m);
+        let first = self.errors.of_else(None, reading.heard);
         let densities = match self.before {
             None => [[reading.of_scene, first]; 2],
             Some((before, _)) => {
-                let follows = self.errors.of_else(Some(before.heard_m), reading.heard_m);
+                let follows = self.errors.of_else(Some(before.heard), reading.heard);
                 [[reading.of_scene, first], [reading.of_scene, follows]]
             }
         };
@@ -157,12 +156,24 @@ impl<I: Iterator<Item = Emission>> Iterator for Forward<'_, I> {
 mod tests {
     use super::*;
 
-    /// Two silences, an arc at 0.7 m, and echoes that the scene makes likely.
+    const fn echo(range_m: f64, of_scene: f64) -> Emission {
+        Emission { heard: Outcome::Echo { range_m }, of_scene }
+    }
+
+    /// Two silences, an arc at 0.7 m, echoes that the scene makes likely, and two of something near.
     fn readings() -> Vec<Emission> {
-        let heard_m = [None, None, Some(0.7), Some(0.702), Some(0.699), Some(1.4), Some(1.41)];
-        let of_scene = [0.9, 0.01, 1e-4, 3.0, 1e-3, 300.0, 0.2];
-        let of = |(heard_m, of_scene)| Emission { heard_m, of_scene };
-        heard_m.into_iter().zip(of_scene).map(of).collect()
+        let without = |heard: Outcome, of_scene: f64| Emission { heard, of_scene };
+        vec![
+            without(Outcome::Silence, 0.9),
+            without(Outcome::Silence, 0.01),
+            echo(0.7, 1e-4),
+            echo(0.702, 3.0),
+            echo(0.699, 1e-3),
+            echo(1.4, 300.0),
+            echo(1.41, 0.2),
+            without(Outcome::Near, 0.02),
+            without(Outcome::Near, 0.7),
+        ]
     }
 
     /// The probability of the readings with one sequence of states.
@@ -178,10 +189,8 @@ mod tests {
             };
             joint *= match (own, before) {
                 (0, _) => readings[at].of_scene,
-                (_, Some(1)) => {
-                    errors.of_else(Some(readings[at - 1].heard_m), readings[at].heard_m)
-                }
-                _ => errors.of_else(None, readings[at].heard_m),
+                (_, Some(1)) => errors.of_else(Some(readings[at - 1].heard), readings[at].heard),
+                _ => errors.of_else(None, readings[at].heard),
             };
         }
         joint
@@ -223,7 +232,7 @@ mod tests {
     #[test]
     fn without_arcs_every_reading_stands_alone() {
         let errors = ErrorModel::rough(0.002, 1.0, 4.0).without_arcs();
-        let one_arc = vec![Emission { heard_m: Some(0.7), of_scene: 1e-4 }; 400];
+        let one_arc = vec![echo(0.7, 1e-4); 400];
         for readings in [readings(), one_arc] {
             let alone: f64 = readings.iter().map(|reading| reading.of_scene.ln()).sum();
             let states = states(&readings, &errors);
@@ -238,7 +247,7 @@ mod tests {
     #[test]
     fn a_sweep_may_be_one_arc() {
         let errors = ErrorModel { arcs: 1e-3, ..ErrorModel::rough(0.002, 1.0, 4.0) };
-        let states = states(&[Emission { heard_m: Some(0.7), of_scene: 1e-4 }; 400], &errors);
+        let states = states(&[echo(0.7, 1e-4); 400], &errors);
         assert!((states.counts.of_else - 400.0).abs() < 1e-3, "{:?}", states.counts);
         assert!(states.of_scene.iter().all(|of_scene| (0.0..1e-3).contains(of_scene)));
     }

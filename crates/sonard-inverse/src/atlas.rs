@@ -11,7 +11,7 @@ use thiserror::Error;
 
 use crate::{
     fit::Prior,
-    sweep::Sweep,
+    sweep::{Outcome, Sweep},
     watch::{Unwatched, Watch},
     world::{Models, World, WorldError},
 };
@@ -264,7 +264,7 @@ fn without_robot(scene: &std::sync::Arc<Scene>) -> std::sync::Arc<Scene> {
 }
 
 /// The sweep's reading that looked nearest to each direction of the atlas, as places in it with ranges; a direction
-/// that none looked near is left out.
+/// that none looked near is left out, as is what has no range because it was too near.
 fn resampled(world: &World, sweep: &Sweep) -> Vec<(usize, f32)> {
     let step_deg = 360.0 / DIRECTIONS as f64;
     let mut nearest: Vec<Option<(f64, f32)>> = vec![None; DIRECTIONS];
@@ -274,8 +274,11 @@ fn resampled(world: &World, sweep: &Sweep) -> Vec<(usize, f32)> {
             (world.heading_zero_deg + world.gear * beam.azimuth_deg).rem_euclid(360.0);
         let place = azimuth_deg / step_deg;
         let off = (place - place.round()).abs();
-        let range_m =
-            beam.heard.range_m(sound_speed_m_s).map_or(SILENCE_M, |range_m| range_m as f32);
+        let range_m = match beam.heard.outcome(sound_speed_m_s) {
+            Outcome::Echo { range_m } => range_m as f32,
+            Outcome::Silence => SILENCE_M,
+            Outcome::Near => continue,
+        };
         let slot = &mut nearest[place.round() as usize % DIRECTIONS];
         if slot.is_none_or(|known| off < known.0) {
             *slot = Some((off, range_m));

@@ -36,6 +36,8 @@ pub(crate) enum Phases {
 pub(crate) struct Candidate {
     /// What is read, metres; `None` of silence.
     pub(crate) range_m: Option<f64>,
+    /// Whether it sounded already at the end of blanking, so that its range is the least.
+    pub(crate) is_near: bool,
     /// The echo that raised ECHO.
     pub(crate) arrival: Option<Arrival>,
     /// Up to this threshold, decibels above the nominal one.
@@ -167,6 +169,7 @@ impl Listener {
         let rise = &told.rise;
         Candidate {
             range_m: Some(rise.range_m),
+            is_near: rise.status == PingStatus::MinRange,
             arrival: rise.arrival.map(|arrival| firing.arrival(&arrival)),
             until_db,
             spread_db: self.spread_db(told),
@@ -278,6 +281,7 @@ impl Candidate {
         let (range_m, arrival) = (None, None);
         Self {
             range_m,
+            is_near: false,
             arrival,
             until_db,
             spread_db: 0.0,

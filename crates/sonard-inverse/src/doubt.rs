@@ -86,7 +86,7 @@ pub fn doubts(world: &World, atlas: &Atlas, sweep: &Sweep, modes: &[Mode]) -> Ve
             Heard::Echo { tof_us } => {
                 Beam { heard: Heard::Echo { tof_us: factor * tof_us }, ..beam }
             }
-            Heard::Silence => beam,
+            Heard::Silence | Heard::Near => beam,
         }))
     };
     let tried = [(Doubt::Clockwise, turned(-1.0)), (Doubt::Radians, turned(1f64.to_degrees()))];

@@ -5,6 +5,7 @@ use smallvec::SmallVec;
 
 use crate::{
     likelihood::{ErrorModel, normal_density, normal_up_to},
+    sweep::Outcome,
     walk::TimeWalk,
 };
 
@@ -14,8 +15,8 @@ pub(crate) type Rates = SmallVec<[(u32, f64); 4]>;
 /// One of the readings that a firing could have had.
 #[derive(Debug, Clone)]
 pub(crate) struct Possible {
-    /// Its range where it reaches `margin_db` above the threshold, metres at the reference speed of sound; `None` of silence.
-    pub(crate) range_m: Option<f64>,
+    /// With an echo's range where it reaches `margin_db` above the threshold.
+    pub(crate) outcome: Outcome,
     /// Infinite if its range does not move with the threshold.
     pub(crate) margin_db: f64,
     pub(crate) range_rates: Rates,
@@ -44,8 +45,7 @@ pub(crate) struct Expected {
 /// A reading beside what it could have been.
 #[derive(Debug, Clone)]
 pub(crate) struct Judged {
-    /// Metres at the reference speed of sound; `None` of silence.
-    pub(crate) heard_m: Option<f64>,
+    pub(crate) heard: Outcome,
     pub(crate) possible: SmallVec<[Possible; 2]>,
 }
 
@@ -73,7 +73,7 @@ pub(crate) struct Term {
 
 impl Possible {
     /// As it is expected after a change of the parameters, up to a threshold and from the one up to which another reading is;
-    /// `None` of silence.
+    /// `None` of what is no echo.
     pub(crate) fn expected(
         &self,
         change: &DVector<f64>,
@@ -81,7 +81,7 @@ impl Possible {
         errors: &ErrorModel,
         walk: &TimeWalk,
     ) -> Option<Expected> {
-        let range_m = after(self.range_m?, &self.range_rates, change);
+        let range_m = after(self.outcome.range_m()?, &self.range_rates, change);
         if self.margin_db.is_infinite() {
             let (by_until_m, sigma_m) = (0.0, errors.sigma_m);
             return Some(Expected { range_m, by_until_m, is_walk_believed: false, sigma_m });
@@ -137,20 +137,20 @@ impl Judged {
         walk: &TimeWalk,
     ) -> Terms {
         let explained = 1.0 - errors.clutter;
-        let unexplained = errors.clutter * errors.of_clutter(self.heard_m.is_some());
+        let unexplained = errors.clutter * errors.of_clutter(self.heard);
         let untils_db: SmallVec<[f64; 3]> = self
             .possible
             .iter()
             .map(|possible| after(possible.until_db, &possible.until_rates, change))
             .collect();
-        // Where an echo is expected says nothing of a silence.
+        // Where an echo is expected says nothing of what is none.
         let expected: SmallVec<[Option<Expected>; 3]> = self
             .possible
             .iter()
             .enumerate()
             .map(|(at, possible)| {
                 let from_db = at.checked_sub(1).map_or(f64::NEG_INFINITY, |last| untils_db[last]);
-                self.heard_m?;
+                self.heard.range_m()?;
                 possible.expected(change, [from_db, untils_db[at]], errors, walk)
             })
             .collect();
@@ -159,13 +159,13 @@ impl Judged {
             .possible
             .iter()
             .zip(&expected)
-            .map(|(possible, expected)| match (self.heard_m, expected) {
+            .map(|(possible, expected)| match (self.heard.range_m(), expected) {
                 (Some(heard_m), Some(expected)) => {
                     let spread = errors.with_range_spread(expected.sigma_m);
                     let [density, slope] = spread.range(heard_m - expected.range_m);
                     [density, -slope]
                 }
-                (None, _) if possible.range_m.is_none() => [1.0, 0.0],
+                (None, _) if possible.outcome == self.heard => [1.0, 0.0],
                 _ => [0.0, 0.0],
             })
             .collect();
@@ -210,17 +210,16 @@ impl Judged {
         let best = (0..self.possible.len())
             .max_by(|&one, &other| terms.of[one].share.total_cmp(&terms.of[other].share))?;
         let term = &terms.of[best];
-        Some((self.heard_m? - term.expected?.range_m, of_scene * term.share))
+        Some((self.heard.range_m()? - term.expected?.range_m, of_scene * term.share))
     }
 
     /// How well one of the possible readings can be told from the next, from 0 to 1.
     fn distinct(&self, at: usize, sigma_m: f64) -> f64 {
-        match (self.possible[at].range_m, self.possible[at + 1].range_m) {
-            (Some(one_m), Some(other_m)) => {
-                1.0 - (-((one_m - other_m) / sigma_m).powi(2) / 8.0).exp()
-            }
-            (None, None) => 0.0,
-            _ => 1.0,
+        let [one, other] = [at, at + 1].map(|at| self.possible[at].outcome);
+        match one.range_m().zip(other.range_m()) {
+            Some((one_m, other_m)) => 1.0 - (-((one_m - other_m) / sigma_m).powi(2) / 8.0).exp(),
+            None if one == other => 0.0,
+            None => 1.0,
         }
     }
 }

@@ -4,6 +4,8 @@ use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use serde::{Deserialize, Serialize};
 
+use crate::sweep::Outcome;
+
 /// Readings that share what the model misses of an arc, and so count as one where explanations are weighed against each
 /// other: taken for independent they would make sure of what they can't tell.
 pub(crate) const READINGS_OF_ARC: f64 = 8.0;
@@ -42,6 +44,8 @@ const ALIKE: f64 = 0.85;
 /// How much the ranges of one differ, metres, on average; and by how many standard deviations of ranges that are told apart.
 const ARC_M: f64 = 0.01;
 const ARC_SIGMAS: f64 = 3.0;
+/// Share of what is no silence that is nearer than the least range.
+const NEAR: f64 = 0.1;
 
 impl ErrorModel {
     /// Spread as of a first look: centimetres, some decibels, one reading in ten unexplained.
@@ -113,21 +117,24 @@ impl ErrorModel {
         (1.0 - self.arcs) * (1.0 - self.clutter)
     }
 
-    /// Density of a reading that nothing explains: of a range in metres, or the probability of a silence.
-    pub(crate) fn of_clutter(&self, is_echo: bool) -> f64 {
-        match is_echo {
-            true => (1.0 - self.clutter_silent) / self.clutter_m,
-            false => self.clutter_silent,
+    /// Density of a reading that nothing explains: of a range in metres, or the probability of one without.
+    pub(crate) fn of_clutter(&self, heard: Outcome) -> f64 {
+        match heard {
+            Outcome::Echo { .. } => (1.0 - self.clutter_silent) / self.clutter_m,
+            Outcome::Silence => self.clutter_silent,
+            Outcome::Near => (1.0 - self.clutter_silent) * NEAR,
         }
     }
 
     /// The same within an arc of something that the scene lacks, by the reading before if it was of that, too.
-    pub(crate) fn of_else(&self, before: Option<Option<f64>>, heard_m: Option<f64>) -> f64 {
-        let anywhere = self.of_clutter(heard_m.is_some());
-        let alike = match (before, heard_m) {
+    pub(crate) fn of_else(&self, before: Option<Outcome>, heard: Outcome) -> f64 {
+        let anywhere = self.of_clutter(heard);
+        let alike = match (before, heard) {
             (None, _) => return anywhere,
-            (Some(None), None) => 1.0,
-            (Some(Some(before_m)), Some(heard_m)) => {
+            (Some(Outcome::Silence), Outcome::Silence) | (Some(Outcome::Near), Outcome::Near) => {
+                1.0
+            }
+            (Some(Outcome::Echo { range_m: before_m }), Outcome::Echo { range_m: heard_m }) => {
                 // Ranges that are not told apart yet can't be told to be alike: as long as predictions may be far off, what
                 // they say is not outdone by what any arc says of itself.
                 let width_m = ARC_M.hypot(ARC_SIGMAS * self.sigma_m);

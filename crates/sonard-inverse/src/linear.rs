@@ -11,7 +11,7 @@ use crate::{
     likelihood::ErrorModel,
     parameter::Parameter,
     rates::RateFinder,
-    sweep::Sweep,
+    sweep::{Outcome, Sweep},
     walk::TimeWalk,
     world::{Models, World, WorldError},
 };
@@ -130,7 +130,8 @@ impl Linear {
             for ((beam, terms), of_scene) in sweep.iter().zip(&terms).zip(states.of_scene) {
                 let unexplained = of_scene * terms.unexplained;
                 found.unexplained += unexplained;
-                found.silent_unexplained += if beam.heard_m.is_none() { unexplained } else { 0.0 };
+                found.silent_unexplained +=
+                    if beam.heard == Outcome::Silence { unexplained } else { 0.0 };
                 found.of_ranges.extend(beam.residual(terms, of_scene));
             }
         }
@@ -203,7 +204,7 @@ impl Curve {
 }
 
 const fn emission(beam: &Judged, terms: &Terms) -> Emission {
-    Emission { heard_m: beam.heard_m, of_scene: terms.density }
+    Emission { heard: beam.heard, of_scene: terms.density }
 }
 
 fn add_outer(to: &mut DMatrix<f64>, rates: &Rates, weight: f64) {

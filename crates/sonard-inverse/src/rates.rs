@@ -27,7 +27,7 @@ use crate::{
     judged::{Judged, Possible, Rates},
     motion::Motion,
     parameter::Parameter,
-    sweep::{Beam, Sweep},
+    sweep::{Beam, Outcome, Sweep},
     walk::TimeWalk,
     world::World,
 };
@@ -110,7 +110,7 @@ impl<'a> RateFinder<'a> {
             let direction_rad = self.world.direction_rad(pose, beam.azimuth_deg);
             let firing = Firing::new(simulator, pose, direction_rad, beam);
             let possible = self.all_possible(&listener, point, &firing, &mut known)?;
-            judged.push(Judged { heard_m: beam.heard.range_m(self.reference_m_s), possible });
+            judged.push(Judged { heard: beam.heard.outcome(self.reference_m_s), possible });
         }
         Ok(judged)
     }
@@ -141,7 +141,7 @@ impl<'a> RateFinder<'a> {
                     unknown.insert(possible).clone()
                 }
             };
-            Ok(Judged { heard_m: beam.heard.range_m(self.reference_m_s), possible })
+            Ok(Judged { heard: beam.heard.outcome(self.reference_m_s), possible })
         };
         let mut turned =
             |by_deg: &f64| sweep.beams.iter().map(|beam| judged(beam, *by_deg)).collect();
@@ -163,7 +163,13 @@ impl<'a> RateFinder<'a> {
     fn possible(&self, candidate: &Candidate, firing: &Firing, known: &mut KnownPaths) -> Possible {
         let stretch = self.stretch(firing);
         let mut possible = Possible {
-            range_m: candidate.range_m.map(|range_m| stretch * range_m + self.world.delay_m),
+            outcome: match candidate.range_m {
+                Some(range_m) if !candidate.is_near => {
+                    Outcome::Echo { range_m: stretch * range_m + self.world.delay_m }
+                }
+                Some(_) => Outcome::Near,
+                None => Outcome::Silence,
+            },
             range_rates: Rates::new(),
             margin_db: candidate.margin_db,
             until_db: candidate.until_db,
@@ -174,7 +180,9 @@ impl<'a> RateFinder<'a> {
         let Some(arrival) = &candidate.arrival else { return possible };
         let path = known.of(arrival, firing);
         if let Some((longer_m, louder_db)) = self.beside_axis(arrival, path, firing) {
-            possible.range_m = possible.range_m.map(|range_m| range_m + 0.5 * stretch * longer_m);
+            if let Outcome::Echo { range_m } = &mut possible.outcome {
+                *range_m += 0.5 * stretch * longer_m;
+            }
             possible.until_db += louder_db;
         }
         if let Some(predicted_m) = candidate.range_m {
@@ -185,7 +193,8 @@ impl<'a> RateFinder<'a> {
             for &(at, steady) in &path.steady {
                 let moved = self.moved(at, steady, path, firing);
                 let (by_range, by_db) = self.rates(at, &moved, (arrival, told), firing, &flanks);
-                possible.range_rates.extend((by_range != 0.0).then_some((at, by_range)));
+                let has_range = by_range != 0.0 && !candidate.is_near;
+                possible.range_rates.extend(has_range.then_some((at, by_range)));
                 possible.until_rates.extend((by_db != 0.0).then_some((at, by_db)));
             }
         }

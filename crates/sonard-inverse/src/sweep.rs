@@ -41,6 +41,8 @@ pub enum Heard {
     },
     /// Nothing within the listening window.
     Silence,
+    /// Something sounded already when the receiver began to listen: it is nearer than the least range.
+    Near,
 }
 
 impl Heard {
@@ -49,7 +51,39 @@ impl Heard {
     pub fn range_m(&self, sound_speed_m_s: f64) -> Option<f64> {
         match self {
             Self::Echo { tof_us } => Some(0.5e-6 * sound_speed_m_s * tof_us),
-            Self::Silence => None,
+            Self::Silence | Self::Near => None,
+        }
+    }
+
+    pub(crate) fn outcome(&self, sound_speed_m_s: f64) -> Outcome {
+        match (self, self.range_m(sound_speed_m_s)) {
+            (_, Some(range_m)) => Outcome::Echo { range_m },
+            (Self::Near, None) => Outcome::Near,
+            (_, None) => Outcome::Silence,
+        }
+    }
+}
+
+/// What a firing came to or could have come to, with an echo's range at the reference speed of sound.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Outcome {
+    /// An echo
+    Echo {
+        /// from there, metres.
+        range_m: f64,
+    },
+    /// As [`Heard::Silence`].
+    Silence,
+    /// As [`Heard::Near`].
+    Near,
+}
+
+impl Outcome {
+    /// Of an echo.
+    pub(crate) const fn range_m(&self) -> Option<f64> {
+        match *self {
+            Self::Echo { range_m } => Some(range_m),
+            Self::Silence | Self::Near => None,
         }
     }
 }
@@ -110,11 +144,10 @@ impl Sweep {
                         Heard::Echo { tof_us: ping.tof_us.or_else(of_range)? }
                     }
                     PingStatus::NoEcho => Heard::Silence,
-                    // Sound that was there before the receiver listened has no range.
-                    PingStatus::MinRange
-                    | PingStatus::LinkLost
-                    | PingStatus::StepDoubtful
-                    | PingStatus::ModuleFault => return None,
+                    PingStatus::MinRange => Heard::Near,
+                    PingStatus::LinkLost | PingStatus::StepDoubtful | PingStatus::ModuleFault => {
+                        return None;
+                    }
                 };
                 Some(Beam { azimuth_deg: ping.azimuth_deg, heard })
             })

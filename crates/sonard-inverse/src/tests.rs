@@ -6,6 +6,7 @@ mod course;
 mod derivatives;
 mod found;
 mod margins;
+mod near;
 mod stopped;
 mod thresholds;
 

@@ -2,7 +2,7 @@
 
 use rand::RngExt as _;
 use rand_pcg::Pcg64;
-use sonard_inverse::{Sweep, World};
+use sonard_inverse::{Heard, Sweep, World};
 use sonard_model::{
     geometry::{DVec2, Pose, wrap_180},
     model::Simulator,
@@ -57,7 +57,7 @@ impl Grid {
         let of = |beam: &sonard_inverse::Beam| {
             (beam.azimuth_deg, beam.heard.range_m(self.sound_speed_m_s))
         };
-        sweep.beams.iter().map(of).collect()
+        sweep.beams.iter().filter(|beam| beam.heard != Heard::Near).map(of).collect()
     }
 
     /// The likeliest pose: of the grid's four best, improved.
@@ -251,7 +251,7 @@ impl Histograms {
             let beams = readings(world, &pose, 0.0, rng)?;
             let mut ranges: Ranges = vec![None; DIRECTIONS];
             let mut heard = Vec::new();
-            for beam in beams {
+            for beam in beams.into_iter().filter(|beam| beam.heard != Heard::Near) {
                 let read = beam.heard.range_m(grid.sound_speed_m_s);
                 let direction = ((beam.azimuth_deg + heading_deg) / STEP_DEG).round();
                 ranges[direction.rem_euclid(DIRECTIONS as f64) as usize % DIRECTIONS] = read;

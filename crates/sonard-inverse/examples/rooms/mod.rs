@@ -40,6 +40,7 @@ pub(crate) fn readings(
                 Heard::Echo { tof_us: 2e6 * range_m / speed_m_s + late_us }
             }
             None => Heard::Silence,
+            Some(Rise { status: PingStatus::MinRange, .. }) => Heard::Near,
             Some(_) => return None,
         };
         Some(Beam { azimuth_deg, heard })

@@ -37,6 +37,7 @@ pub(super) fn sweep(
         let heard = match (read.status, read.range_m) {
             (PingStatus::Echo, Some(range_m)) => Heard::Echo { tof_us: tof_us(range_m) },
             (PingStatus::NoEcho, _) => Heard::Silence,
+            (PingStatus::MinRange, _) => Heard::Near,
             _ => return None,
         };
         Some(Beam { azimuth_deg, heard })

@@ -51,7 +51,7 @@ fn compare(
     for ((here, before), after) in found.iter().zip(&before).zip(&after) {
         let rate = here.until_rates.iter().find(|(of, _)| *of == parameter).map_or(0.0, |of| of.1);
         // Lost below the lowest threshold or kept above the highest, it has no margin to compare.
-        if here.range_m.is_none() || here.until_db.abs() >= 11.0 {
+        if here.outcome.range_m().is_none() || here.until_db.abs() >= 11.0 {
             continue;
         }
         let expected = (after.until_db - before.until_db) / (2.0 * by);
@@ -107,7 +107,11 @@ fn with_the_band() {
         let [before, after] = [-BY, BY].map(|by| first_possible(&changed(by), &AT, &parameters, 2));
         let mut rates = Vec::new();
         for ((here, before), after) in found.iter().zip(&before).zip(&after) {
-            let (Some(before_m), Some(after_m)) = (before.range_m, after.range_m) else { continue };
+            let (Some(before_m), Some(after_m)) =
+                (before.outcome.range_m(), after.outcome.range_m())
+            else {
+                continue;
+            };
             // Of what is heard at lower thresholds only, the range is told at another one in each world.
             if here.until_db < 0.5 {
                 continue;

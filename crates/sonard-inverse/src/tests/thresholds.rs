@@ -87,7 +87,7 @@ fn ranges_are_expected_where_thresholds_that_vary_report_them() {
     let (mut weak, mut late_m) = (0, 0.0_f64);
     for (azimuth_deg, beam) in azimuths_deg().zip(&judged) {
         let first = &beam.possible[0];
-        if first.range_m.is_none() || first.until_db < -0.8 {
+        if first.outcome.range_m().is_none() || first.until_db < -0.8 {
             continue;
         }
         let limits_db = [f64::NEG_INFINITY, first.until_db];
