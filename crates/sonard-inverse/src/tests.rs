@@ -30,6 +30,18 @@ fn world(scene: &str, sensor: &str) -> World {
     World::new(shipped(scene), sensor, Air::default(), Options::default())
 }
 
+/// A world of one wall, so many metres ahead.
+fn before_a_wall(at_m: f64, reach_m: f64) -> World {
+    let text = format!(
+        r#"{{"name": "wall", "materials": {{"wood": {{"reflectance": 0.8}}}},
+            "walls": [{{"id": "w", "from": [{at_m}, -9], "to": [{at_m}, 9], "material": "wood"}}]}}"#
+    );
+    let mut here = world("simple-room", "senscomp-6500");
+    here.scene = Scene::from_json(&text).expect("a scene").into();
+    here.options.max_range_m = Some(reach_m);
+    here
+}
+
 fn first_pose(scene: &Scene) -> Pose {
     *scene.poses.values().next().expect("a pose")
 }

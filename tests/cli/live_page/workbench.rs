@@ -30,6 +30,19 @@ fn with_two_scans(folder: &Path, further: &[&str]) -> (Daemon, Browser) {
     (daemon, browser)
 }
 
+/// A page whose sensor somebody who has the token is about to change, and its daemon.
+fn about_to_change(folder: &Path) -> (Daemon, Browser) {
+    let file = write_token(folder, TOKEN);
+    let setting = format!("server.token_file={}", file.display());
+    let (daemon, address) = daemon(folder, "127.0.0.1:0", &["--set", &setting]);
+    let browser = Browser::open(&address, DESK);
+    browser.eval(&format!("sessionStorage.setItem('sonard-token', '{TOKEN}')"));
+    has(&browser, "#next-table", "senscomp-6500");
+    browser.click("#change");
+    has(&browser, "#next-now", "The model expects 100 beams");
+    (daemon, browser)
+}
+
 fn choose(browser: &Browser, index: u32) {
     browser.eval(&format!(
         "(() => {{ const s = document.getElementById('beam'); s.value = {index}; \
@@ -252,14 +265,7 @@ fn the_robot_is_dragged_previewed_and_moved_with_the_token() {
 #[test]
 fn the_sensor_is_changed_and_its_effect_is_seen_before() {
     let folder = tempfile::tempdir().expect("a folder");
-    let file = write_token(folder.path(), TOKEN);
-    let setting = format!("server.token_file={}", file.display());
-    let (daemon, address) = daemon(folder.path(), "127.0.0.1:0", &["--set", &setting]);
-    let browser = Browser::open(&address, DESK);
-    browser.eval(&format!("sessionStorage.setItem('sonard-token', '{TOKEN}')"));
-    has(&browser, "#next-table", "senscomp-6500");
-    browser.click("#change");
-    has(&browser, "#next-now", "The model expects 100 beams");
+    let (daemon, browser) = about_to_change(folder.path());
     let enter = |id: &str, value: &str| {
         browser.eval(&format!(
             "(() => {{ const f = document.getElementById('next-{id}'); f.value = {value:?}; \
@@ -298,14 +304,7 @@ fn the_sensor_is_changed_and_its_effect_is_seen_before() {
 #[test]
 fn a_refusal_stays_to_be_read_when_a_preview_comes_after_it() {
     let folder = tempfile::tempdir().expect("a folder");
-    let file = write_token(folder.path(), TOKEN);
-    let setting = format!("server.token_file={}", file.display());
-    let (_daemon, address) = daemon(folder.path(), "127.0.0.1:0", &["--set", &setting]);
-    let browser = Browser::open(&address, DESK);
-    browser.eval(&format!("sessionStorage.setItem('sonard-token', '{TOKEN}')"));
-    has(&browser, "#next-table", "senscomp-6500");
-    browser.click("#change");
-    has(&browser, "#next-now", "The model expects 100 beams");
+    let (_daemon, browser) = about_to_change(folder.path());
     // Previews are answered once somebody lets them.
     browser.eval(
         "(() => { const asked = window.fetch; window.answered = 0; \

@@ -3,22 +3,15 @@
 use rand::SeedableRng as _;
 use rand_distr::{Distribution as _, Normal};
 use rand_pcg::Pcg64;
-use sonard_model::{acoustics::Rise, geometry::Pose, reading::PingStatus, scene::Scene};
+use sonard_model::{acoustics::Rise, geometry::Pose, reading::PingStatus};
 
-use super::world;
+use super::before_a_wall;
 use crate::{Beam, ErrorModel, Heard, Hypotheses, Parameter, Sweep, World};
 
 const SIGMA_DB: f64 = 0.5;
 
-/// A wall just nearer than the least range of 0.41 m: straight on its echo is there already, aside it rises later.
-fn before_a_near_wall() -> World {
-    let text = r#"{"name": "wall", "materials": {"wood": {"reflectance": 0.8}},
-        "walls": [{"id": "w", "from": [0.408, -9], "to": [0.408, 9], "material": "wood"}]}"#;
-    let mut here = world("simple-room", "senscomp-6500");
-    here.scene = Scene::from_json(text).expect("a scene").into();
-    here.options.max_range_m = Some(2.0);
-    here
-}
+/// Just nearer than the least range of 0.41 m: straight on the echo is there already, aside it rises later.
+const WALL_M: f64 = 0.408;
 
 fn at(x_m: f64) -> Pose {
     Pose { x_m, y_m: 0.0, heading_deg: 0.0 }
@@ -56,7 +49,7 @@ fn as_read() -> ErrorModel {
 #[test]
 fn thresholds_are_right_on_average_beside_what_is_too_near() {
     const SWEEPS: u32 = 200;
-    let (here, errors) = (before_a_near_wall(), as_read());
+    let (here, errors) = (before_a_wall(WALL_M, 2.0), as_read());
     let asked = Hypotheses::new(here.clone(), vec![Parameter::Threshold]).expect("a model");
     let mut rng = Pcg64::seed_from_u64(5);
     let (mut sum, mut squares, mut without) = (0.0, 0.0, 0.0);
@@ -85,7 +78,7 @@ fn thresholds_are_right_on_average_beside_what_is_too_near() {
 /// And they say that there is something, and nothing farther off.
 #[test]
 fn what_is_too_near_is_of_a_near_wall() {
-    let (here, errors) = (before_a_near_wall(), as_read());
+    let (here, errors) = (before_a_wall(WALL_M, 2.0), as_read());
     let mut read = read(&here, &mut Pcg64::seed_from_u64(6));
     read.beams.retain(|beam| beam.heard == Heard::Near);
     let asked = Hypotheses::new(here, vec![Parameter::X(0)]).expect("a model");

@@ -7,10 +7,9 @@ use rand_pcg::Pcg64;
 use sonard_model::{
     acoustics::{Rise, TofNoise},
     geometry::Pose,
-    scene::Scene,
 };
 
-use super::world;
+use super::before_a_wall;
 use crate::{
     Beam, ErrorModel, Heard, Hypotheses, Parameter, Sweep, World, candidates::Phases,
     rates::RateFinder,
@@ -18,15 +17,6 @@ use crate::{
 
 const AT: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
 const SIGMA_DB: f64 = 0.5;
-
-fn before_a_wall() -> World {
-    let text = r#"{"name": "wall", "materials": {"wood": {"reflectance": 0.8}},
-        "walls": [{"id": "w", "from": [1.2, -9], "to": [1.2, 9], "material": "wood"}]}"#;
-    let mut here = world("simple-room", "senscomp-6500");
-    here.scene = Scene::from_json(text).expect("a scene").into();
-    here.options.max_range_m = Some(3.0);
-    here
-}
 
 fn sweep(azimuths_deg: impl Iterator<Item = f64>, heard: impl Fn(f64) -> Heard) -> Sweep {
     let beams = azimuths_deg.map(|azimuth_deg| Beam { azimuth_deg, heard: heard(azimuth_deg) });
@@ -72,7 +62,7 @@ fn rises(here: &World, azimuth_deg: f64, by_db: &[f64]) -> Vec<Option<Rise>> {
 /// From what is far above the threshold to what one firing in twenty reports: mean and spread of many firings' ranges.
 #[test]
 fn ranges_are_expected_where_thresholds_that_vary_report_them() {
-    let here = before_a_wall();
+    let here = before_a_wall(1.2, 3.0);
     let mut rng = Pcg64::seed_from_u64(1);
     let normal = Normal::new(0.0, SIGMA_DB).expect("a distribution");
     let by_db: Vec<f64> = (0..4000).map(|_| normal.sample(&mut rng)).collect();
@@ -119,7 +109,7 @@ fn ranges_are_expected_where_thresholds_that_vary_report_them() {
 /// What the likelihood gains with the threshold, time walk included, is what it is greater by at a higher one.
 #[test]
 fn likelihoods_gain_with_the_threshold_what_their_derivative_says() {
-    let here = before_a_wall();
+    let here = before_a_wall(1.2, 3.0);
     let read = read(&here, 0.1, &mut Pcg64::seed_from_u64(2));
     let errors = as_read();
     let at = |by_db: f64| {
@@ -151,7 +141,7 @@ fn likelihoods_gain_with_the_threshold_what_their_derivative_says() {
 fn a_heading_is_known_as_well_as_readings_tell() {
     const SWEEPS: u32 = 60;
     const BY_DEG: f64 = 0.02;
-    let (here, errors) = (before_a_wall(), as_read());
+    let (here, errors) = (before_a_wall(1.2, 3.0), as_read());
     let mut rng = Pcg64::seed_from_u64(3);
     let asked =
         Hypotheses::new(here.clone(), vec![Parameter::Heading(0)]).expect("something to ask");
