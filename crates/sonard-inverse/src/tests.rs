@@ -19,7 +19,7 @@ use sonard_model::{
     scene::{Scene, shipped},
 };
 
-use crate::World;
+use crate::{ErrorModel, World};
 
 fn shipped(name: &str) -> Arc<Scene> {
     Arc::new(Scene::from_json(shipped::text(name).expect("a shipped scene")).expect("a scene"))
@@ -28,6 +28,14 @@ fn shipped(name: &str) -> Arc<Scene> {
 fn world(scene: &str, sensor: &str) -> World {
     let sensor = Sensor::preset(sensor).expect("a preset");
     World::new(shipped(scene), sensor, Air::default(), Options::default())
+}
+
+/// By how much thresholds vary from firing to firing, decibels.
+const SIGMA_DB: f64 = 0.5;
+
+/// How readings by such thresholds spread, that reach so far.
+fn as_read(reach_m: f64) -> ErrorModel {
+    ErrorModel { clutter: 1e-3, arcs: 0.0, ..ErrorModel::rough(1e-3, SIGMA_DB, reach_m) }
 }
 
 /// A world of one wall, so many metres ahead.

@@ -122,17 +122,19 @@ export class Next {
     this.showHandles(true);
     this.unchanged = await ask("/v1/preview", { method: "POST", body: this.orderOf(this.draft) }).then(Scan.of, () => null);
     if (!this.draft) return;
-    change?.(this.draft);
-    this.show();
-    this.refusal = "";
-    await this.preview();
+    await this.redraft(change);
   }
 
   /** Changes what is about to be changed, or begins with it. @param {(draft: any) => void} change */
   async propose(change) {
     this.section.scrollIntoView({ block: "nearest" });
     if (!this.draft) return this.enter(change);
-    change(this.draft);
+    await this.redraft(change);
+  }
+
+  /** Shows what becomes of the draft. @param {(draft: any) => void} [change] */
+  async redraft(change) {
+    change?.(this.draft);
     this.show();
     this.refusal = "";
     await this.preview();

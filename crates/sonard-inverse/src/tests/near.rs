@@ -5,10 +5,8 @@ use rand_distr::{Distribution as _, Normal};
 use rand_pcg::Pcg64;
 use sonard_model::{acoustics::Rise, geometry::Pose, reading::PingStatus};
 
-use super::before_a_wall;
-use crate::{Beam, ErrorModel, Heard, Hypotheses, Parameter, Sweep, World};
-
-const SIGMA_DB: f64 = 0.5;
+use super::{SIGMA_DB, as_read, before_a_wall};
+use crate::{Beam, Heard, Hypotheses, Parameter, Sweep, World};
 
 /// Just nearer than the least range of 0.41 m: straight on the echo is there already, aside it rises later.
 const WALL_M: f64 = 0.408;
@@ -41,15 +39,11 @@ fn read(here: &World, rng: &mut Pcg64) -> Sweep {
     Sweep { scan: uuid::Uuid::nil(), pose: at(0.0), beams }
 }
 
-fn as_read() -> ErrorModel {
-    ErrorModel { clutter: 1e-3, arcs: 0.0, ..ErrorModel::rough(1e-3, SIGMA_DB, 2.0) }
-}
-
 /// Which of the beams of an arc's ends are too near is decided by the threshold, too: it is right on average only with them.
 #[test]
 fn thresholds_are_right_on_average_beside_what_is_too_near() {
     const SWEEPS: u32 = 200;
-    let (here, errors) = (before_a_wall(WALL_M, 2.0), as_read());
+    let (here, errors) = (before_a_wall(WALL_M, 2.0), as_read(2.0));
     let asked = Hypotheses::new(here.clone(), vec![Parameter::Threshold]).expect("a model");
     let mut rng = Pcg64::seed_from_u64(5);
     let (mut sum, mut squares, mut without) = (0.0, 0.0, 0.0);
@@ -78,7 +72,7 @@ fn thresholds_are_right_on_average_beside_what_is_too_near() {
 /// And they say that there is something, and nothing farther off.
 #[test]
 fn what_is_too_near_is_of_a_near_wall() {
-    let (here, errors) = (before_a_wall(WALL_M, 2.0), as_read());
+    let (here, errors) = (before_a_wall(WALL_M, 2.0), as_read(2.0));
     let mut read = read(&here, &mut Pcg64::seed_from_u64(6));
     read.beams.retain(|beam| beam.heard == Heard::Near);
     let asked = Hypotheses::new(here, vec![Parameter::X(0)]).expect("a model");

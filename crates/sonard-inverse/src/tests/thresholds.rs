@@ -9,14 +9,13 @@ use sonard_model::{
     geometry::Pose,
 };
 
-use super::before_a_wall;
+use super::{SIGMA_DB, as_read, before_a_wall};
 use crate::{
     Beam, ErrorModel, Heard, Hypotheses, Parameter, Sweep, World, candidates::Phases,
     rates::RateFinder,
 };
 
 const AT: Pose = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
-const SIGMA_DB: f64 = 0.5;
 
 fn sweep(azimuths_deg: impl Iterator<Item = f64>, heard: impl Fn(f64) -> Heard) -> Sweep {
     let beams = azimuths_deg.map(|azimuth_deg| Beam { azimuth_deg, heard: heard(azimuth_deg) });
@@ -38,11 +37,6 @@ fn read(here: &World, every_deg: f64, rng: &mut Pcg64) -> Sweep {
         }
     }
     read
-}
-
-/// How such readings spread.
-fn as_read() -> ErrorModel {
-    ErrorModel { clutter: 1e-3, arcs: 0.0, ..ErrorModel::rough(1e-3, SIGMA_DB, 3.0) }
 }
 
 /// What is reported in some directions at thresholds so many decibels above the usual one.
@@ -111,7 +105,7 @@ fn ranges_are_expected_where_thresholds_that_vary_report_them() {
 fn likelihoods_gain_with_the_threshold_what_their_derivative_says() {
     let here = before_a_wall(1.2, 3.0);
     let read = read(&here, 0.1, &mut Pcg64::seed_from_u64(2));
-    let errors = as_read();
+    let errors = as_read(3.0);
     let at = |by_db: f64| {
         let world = here.changed(&[(&Parameter::Threshold, by_db)]).expect("a world");
         let asked = Hypotheses::new(world, vec![Parameter::Threshold]).expect("a model");
@@ -141,7 +135,7 @@ fn likelihoods_gain_with_the_threshold_what_their_derivative_says() {
 fn a_heading_is_known_as_well_as_readings_tell() {
     const SWEEPS: u32 = 60;
     const BY_DEG: f64 = 0.02;
-    let (here, errors) = (before_a_wall(1.2, 3.0), as_read());
+    let (here, errors) = (before_a_wall(1.2, 3.0), as_read(3.0));
     let mut rng = Pcg64::seed_from_u64(3);
     let asked =
         Hypotheses::new(here.clone(), vec![Parameter::Heading(0)]).expect("something to ask");
