@@ -1,5 +1,20 @@
 //! The command line: one file a verb.
 
+/// Writes a line to standard error for people. A recipient that is gone is ignored, and one that does not read delays
+/// the program for a second at most.
+macro_rules! notice {
+    ($($argument:tt)*) => {
+        $crate::cli::terminal::write_notice(&format!($($argument)*))
+    };
+}
+
+/// Writes a line to standard output; a reader that is gone is ignored.
+macro_rules! print_line {
+    ($($argument:tt)*) => {
+        $crate::cli::terminal::print_line(&format!($($argument)*))
+    };
+}
+
 mod answer;
 mod array;
 mod benchmark;
@@ -49,6 +64,7 @@ mod scene_file;
 mod simulate;
 mod status;
 mod sweeps;
+mod terminal;
 mod trace;
 mod watch;
 mod what_if;
@@ -59,6 +75,8 @@ pub use failure::{Failure, Outcome};
 use std::{process::ExitCode, sync::Arc};
 
 use clap::{Command, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
+
+use crate::messages;
 
 /// Drives an ultrasonic ranger on a stepper, and predicts what it reads.
 #[derive(Debug, Parser)]
@@ -192,7 +210,7 @@ pub fn main() -> ExitCode {
     let mut command = command_line();
     let (arguments, hints) = renamed::translated(std::env::args_os());
     for hint in hints {
-        anstream::eprintln!("{hint}");
+        notice!("{hint}");
     }
     let matches = command.try_get_matches_from_mut(arguments).unwrap_or_else(|error| error.exit());
     if let Err(failure) = output::guard(&command, &matches) {
@@ -200,6 +218,10 @@ pub fn main() -> ExitCode {
     }
     let cli =
         Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit());
+    // The daemon has messages of its own.
+    if !matches!(cli.verb, Verb::Run(_)) {
+        messages::warn_on_stderr();
+    }
     let outcome = match cli.verb {
         Verb::Scan(args) => scan::run(&args),
         Verb::Collect(args) => collect::run(&args),

@@ -259,6 +259,7 @@ where
 {
     let (mut sender, connection) = http1::handshake(TokioIo::new(stream)).await?;
     // Its end shows in the body.
+    #[allow(clippy::disallowed_methods, reason = "its end ends the requests on it")]
     tokio::spawn(async move { drop(connection.await) });
     let request = request.header(header::HOST, host).body(Full::new(body));
     let request = request.map_err(|error| no_daemon(&host, io::Error::other(error)))?;

@@ -36,7 +36,6 @@ use tokio::{
     sync::{mpsc, oneshot},
     time::Instant,
 };
-use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 pub use agenda::{Agenda, Asked, Due};
@@ -61,6 +60,7 @@ use crate::{
     host_gpio::{HostGpio, NoGpio},
     scan::{Event, EventKind, Record, Session},
     scene::Scene,
+    supervisor::{Supervisor, Task, TaskFailure},
 };
 use air::AirControl;
 use control::Control;
@@ -80,6 +80,8 @@ pub struct Resources {
     pub gpio: Box<dyn HostGpio>,
     /// The log.
     pub journal: Journal,
+    /// Supervisor of the daemon's tasks.
+    pub supervisor: Supervisor,
 }
 
 /// The daemon for whoever gives it orders or wants to know something: cheap to clone.
@@ -89,6 +91,7 @@ pub struct Handle {
     shared: Arc<Shared>,
     hub: Hub,
     journal: Journal,
+    supervisor: Supervisor,
 }
 
 /// The daemon's tasks, not yet running.
@@ -96,7 +99,7 @@ pub struct Daemon {
     worker: Worker,
     shared: Arc<Shared>,
     hub: Hub,
-    shutdown: CancellationToken,
+    supervisor: Supervisor,
 }
 
 /// Who has the readings: a ranger on a port, or the model.
@@ -109,16 +112,20 @@ enum Worker {
 /// within a multi-threaded tokio runtime.
 #[must_use]
 pub fn prepare(resources: Resources, settings: Settings) -> (Daemon, Handle) {
-    let Resources { open_port, gpio, journal } = resources;
-    wire(gpio, journal, settings, |control, out| {
+    let Resources { open_port, gpio, journal, supervisor } = resources;
+    wire(gpio, journal, supervisor, settings, |control, out| {
         Worker::Ranger(Box::new(Operator::new(control, open_port, out)))
     })
 }
 
 /// The same for the array that `settings` name, played by the model: no port and no pin is opened.
 #[must_use]
-pub fn prepare_simulated(journal: Journal, settings: Settings) -> (Daemon, Handle) {
-    wire(Box::new(NoGpio), journal, settings, |control, out| {
+pub fn prepare_simulated(
+    journal: Journal,
+    supervisor: Supervisor,
+    settings: Settings,
+) -> (Daemon, Handle) {
+    wire(Box::new(NoGpio), journal, supervisor, settings, |control, out| {
         Worker::Array(Box::new(SimulatedArray::new(control, out)))
     })
 }
@@ -126,39 +133,53 @@ pub fn prepare_simulated(journal: Journal, settings: Settings) -> (Daemon, Handl
 fn wire(
     gpio: Box<dyn HostGpio>,
     journal: Journal,
+    supervisor: Supervisor,
     settings: Settings,
     employ: impl FnOnce(Control, RecordFanOut) -> Worker,
 ) -> (Daemon, Handle) {
     let (orders, requests) = mpsc::channel(ORDERS);
-    let shutdown = CancellationToken::new();
     let hub = Hub::new(settings.keys.server.queue as usize);
     let shared = Arc::new(Shared::new(first_view(&settings), settings.keys.fleet.robot.clone()));
-    let gate = (shutdown.clone(), Arc::clone(&shared));
+    let gate = (supervisor.clone(), Arc::clone(&shared));
     let control = Control::new(settings, gpio, requests, gate, journal.clone());
     let out = RecordFanOut::new(journal.clone(), hub.clone(), Arc::clone(&shared));
     let worker = employ(control, out);
-    let handle = Handle { orders, shared: Arc::clone(&shared), hub: hub.clone(), journal };
-    (Daemon { worker, shared, hub, shutdown }, handle)
+    let handle = Handle {
+        orders,
+        shared: Arc::clone(&shared),
+        hub: hub.clone(),
+        journal,
+        supervisor: supervisor.clone(),
+    };
+    (Daemon { worker, shared, hub, supervisor }, handle)
 }
 
 impl Daemon {
-    /// Works until `stop` is ready; then the motor is stopped, the scan closed, and every live
-    /// stream ended.
-    pub async fn run(self, stop: impl Future<Output = ()>) {
-        let notifier = tokio::spawn(notify::run(Arc::clone(&self.shared), self.shutdown.clone()));
-        let operator = tokio::spawn(async {
-            match self.worker {
+    /// Runs until `stop` completes or a task fails; then the motor is stopped, the scan closed, and every live stream
+    /// ended.
+    ///
+    /// # Errors
+    /// The first failure of a task.
+    pub async fn run(self, stop: impl Future<Output = ()>) -> Result<(), TaskFailure> {
+        let Self { worker, shared, hub, supervisor } = self;
+        let stopping = supervisor.stopping().clone();
+        let notifier = supervisor.spawn(Task::Notifications, notify::run(shared, stopping.clone()));
+        let device = supervisor.spawn(Task::Device, async {
+            match worker {
                 Worker::Ranger(operator) => operator.run().await,
                 Worker::Array(array) => array.run().await,
             }
         });
-        stop.await;
-        self.shutdown.cancel();
-        if let Err(error) = operator.await {
-            tracing::error!("the operator failed: {error}");
+        tokio::select! {
+            () = stop => {}
+            _failure = supervisor.failure() => {}
         }
-        self.hub.close();
+        stopping.cancel();
+        // The supervisor has their panics.
+        drop(device.await);
+        hub.close();
         drop(notifier.await);
+        supervisor.first_failure().map_or(Ok(()), Err)
     }
 }
 
@@ -260,6 +281,12 @@ impl Handle {
     #[must_use]
     pub fn session(&self) -> Option<Arc<Session>> {
         self.shared.view.borrow().session.clone()
+    }
+
+    /// Supervisor of the daemon's tasks.
+    #[must_use]
+    pub const fn supervisor(&self) -> &Supervisor {
+        &self.supervisor
     }
 
     /// Live records.

@@ -19,7 +19,7 @@ use std::{
 use rayon::prelude::*;
 use sonard_generate::{Generator, Manifest, Part, ShardFacts, Table};
 
-use crate::store::{WholeFile, digest_of};
+use crate::store::{WholeFile, digest_of, sync_file};
 use draft::Draft;
 pub use error::DataSetError;
 
@@ -289,7 +289,7 @@ fn write(path: &Path, text: &str) -> Result<(), DataSetError> {
 /// Brings a file to the disk; its size and SHA-256.
 fn digest(path: &Path) -> io::Result<(u64, String)> {
     let mut file = File::open(path)?;
-    file.sync_all()?;
+    sync_file(&file)?;
     digest_of(&mut file)
 }
 

@@ -1,57 +1,184 @@
-//! Signals that ask a program to end.
+//! Signals that request the end of a program.
+//!
+//! SIGINT, SIGTERM and, with a controlling terminal, SIGHUP request an orderly end. Process wrappers such as `timeout`
+//! and `sudo` deliver one request as several signals, so signals within [`BURST`] of the first one count as one
+//! request. A later signal requests the end within [`FORCED_END`]: motor and log are still closed.
 
+use std::{fs, fs::File, time::Duration};
+
+use rustix::process::Signal as Number;
 use tokio::{
-    signal::unix::{SignalKind, signal},
+    signal::unix::{Signal, SignalKind, signal},
     sync::watch,
+    time::{Instant, sleep},
 };
 
-/// Remembers an interrupt or a request to terminate, whenever it comes.
+/// Signals within this time of the first one are part of the same request.
+const BURST: Duration = Duration::from_millis(500);
+/// Time allowed for the rest of the shutdown once its end is forced.
+pub const FORCED_END: Duration = Duration::from_secs(3);
+
+/// Urgency of a requested end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+enum Request {
+    #[default]
+    None,
+    Orderly,
+    Forced,
+}
+
+/// Effect of SIGHUP on a process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hangup {
+    /// The controlling terminal has closed: an orderly end.
+    Stop,
+    /// Reload of the configuration: there is no controlling terminal, or the parent process has arranged for this one to
+    /// survive it (`nohup`).
+    Reload,
+}
+
+impl Hangup {
+    /// Effect for this process. Must be called before a handler for SIGHUP is installed.
+    #[must_use]
+    pub fn of_this_process() -> Self {
+        let has_terminal = File::open("/dev/tty").is_ok();
+        if has_terminal && !is_ignored(Number::HUP) { Self::Stop } else { Self::Reload }
+    }
+}
+
+/// Whether this process ignores a signal, by the mask in `/proc/self/status`.
+fn is_ignored(signal: Number) -> bool {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal.as_raw() - 1) & 1 == 1)
+}
+
+/// Requests for the end of this process, from its signals. Clones share them.
 #[derive(Debug, Clone)]
-pub struct Interrupts(watch::Receiver<bool>);
+pub struct Interrupts(watch::Receiver<Request>);
+
+/// Handlers of the stop signals, installed.
+#[derive(Debug)]
+pub struct SignalHandlers {
+    /// The signals that could be handled.
+    streams: Vec<Signal>,
+    requests: watch::Sender<Request>,
+}
 
 impl Interrupts {
-    /// Begins to listen. The first signal is remembered; a second one ends the program at once,
-    /// for whoever can't wait until a device has been stopped in an orderly way.
+    /// Installs handlers for the stop signals, among them SIGHUP, and starts a task that receives them. Must be called
+    /// within a tokio runtime.
     #[must_use]
     pub fn listen() -> Self {
-        let (sender, receiver) = watch::channel(false);
-        tokio::spawn(async move {
-            wait_for_signal().await;
-            // Nobody left to tell is no failure.
-            let _ = sender.send(true);
-            wait_for_signal().await;
-            eprintln!("interrupted again: left at once; a sweep ends with its lease");
-            std::process::exit(1);
-        });
-        Self(receiver)
+        let (interrupts, handlers) = Self::install(Hangup::of_this_process());
+        #[allow(
+            clippy::disallowed_methods,
+            reason = "verbs that end with their work have no supervisor"
+        )]
+        tokio::spawn(handlers.receive());
+        interrupts
     }
 
-    /// Ready once there was a signal.
-    pub async fn wait(mut self) {
-        if self.0.wait_for(|&interrupted| interrupted).await.is_err() {
-            std::future::pending::<()>().await;
-        }
+    /// Installs handlers for the stop signals; [`SignalHandlers::receive`] is to be spawned. Must be called within a tokio
+    /// runtime.
+    #[must_use]
+    pub fn install(hangup: Hangup) -> (Self, SignalHandlers) {
+        let mut kinds = vec![SignalKind::interrupt(), SignalKind::terminate()];
+        kinds.extend((hangup == Hangup::Stop).then(SignalKind::hangup));
+        let (requests, receiver) = watch::channel(Request::default());
+        // A signal without a handler ends the process at once, as the system has it.
+        let streams = kinds.into_iter().filter_map(|kind| signal(kind).ok()).collect();
+        (Self(receiver), SignalHandlers { streams, requests })
     }
 
-    /// The same, with the words for a log.
+    /// Completes once an end is requested.
+    pub async fn wait(self) {
+        self.reach(Request::Orderly).await;
+    }
+
+    /// Completes once the end is forced: a stop signal has come after the first request.
+    pub async fn wait_forced(self) {
+        self.reach(Request::Forced).await;
+    }
+
+    /// Completes [`FORCED_END`] after the end was forced, when waiting any longer is against the user's will.
+    pub async fn wait_overdue(self) {
+        self.wait_forced().await;
+        sleep(FORCED_END).await;
+    }
+
+    /// Completes once an end is requested, with the reason for a log.
     pub async fn reason(self) -> String {
         self.wait().await;
         "stopped on request".into()
     }
 
-    /// Whether there was one.
+    /// Whether an end has been requested.
     #[must_use]
     pub fn happened(&self) -> bool {
-        *self.0.borrow()
+        *self.0.borrow() >= Request::Orderly
+    }
+
+    async fn reach(mut self, request: Request) {
+        if self.0.wait_for(|&now| now >= request).await.is_err() {
+            std::future::pending::<()>().await;
+        }
     }
 }
 
-async fn wait_for_signal() {
-    let Ok(mut terminate) = signal(SignalKind::terminate()) else {
-        return std::future::pending().await;
-    };
-    tokio::select! {
-        interrupt = tokio::signal::ctrl_c() => drop(interrupt),
-        _ = terminate.recv() => {}
+impl SignalHandlers {
+    /// Receives signals for the rest of the process's life.
+    pub async fn receive(mut self) {
+        let mut first: Option<Instant> = None;
+        loop {
+            next_of(&mut self.streams).await;
+            let first = *first.get_or_insert_with(Instant::now);
+            let request = if first.elapsed() <= BURST { Request::Orderly } else { Request::Forced };
+            self.requests.send_if_modified(|now| {
+                let is_news = *now < request;
+                *now = request.max(*now);
+                is_news
+            });
+        }
+    }
+}
+
+/// Completes with the next of several signals.
+async fn next_of(streams: &mut [Signal]) {
+    std::future::poll_fn(|context| {
+        let came = streams.iter_mut().any(|stream| stream.poll_recv(context).is_ready());
+        if came { std::task::Poll::Ready(()) } else { std::task::Poll::Pending }
+    })
+    .await;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ignored_signals_are_recognised() {
+        // The runtime of the standard library ignores it.
+        assert!(is_ignored(Number::PIPE));
+        assert!(!is_ignored(Number::TERM));
+    }
+
+    #[tokio::test]
+    async fn forced_end_follows_an_orderly_one() {
+        let (sender, receiver) = watch::channel(Request::None);
+        let interrupts = Interrupts(receiver);
+        assert!(!interrupts.happened());
+        sender.send_replace(Request::Orderly);
+        interrupts.clone().wait().await;
+        assert!(interrupts.happened());
+        let forced = interrupts.wait_forced();
+        tokio::pin!(forced);
+        let waiting = std::future::poll_fn(|context| {
+            std::task::Poll::Ready(forced.as_mut().poll(context).is_pending())
+        });
+        assert!(waiting.await, "an orderly end is not forced");
+        sender.send_replace(Request::Forced);
+        forced.await;
     }
 }

@@ -37,6 +37,7 @@
 //! drives the protocol, [`mock`] plays the device from the model, [`store`] keeps logs, and [`collect`]
 //! keeps a collection of scans that is taken over days.
 #![cfg_attr(docsrs, feature(doc_cfg))]
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub use sonard_export as export;
 #[cfg(feature = "generate")]
@@ -77,6 +78,8 @@ pub mod interrupts;
 #[cfg(feature = "daemon")]
 pub mod link;
 #[cfg(feature = "daemon")]
+pub mod messages;
+#[cfg(feature = "daemon")]
 pub mod mock;
 #[cfg(feature = "mqtt")]
 pub mod mqtt;
@@ -92,5 +95,7 @@ pub mod secret;
 pub mod server;
 #[cfg(feature = "store")]
 pub mod store;
+#[cfg(feature = "daemon")]
+pub mod supervisor;
 #[cfg(feature = "daemon")]
 pub mod thermometer;

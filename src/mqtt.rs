@@ -26,7 +26,7 @@ pub use account::{Account, AccountError};
 pub use topics::{Kind, Topics};
 pub use window::{LogPosition, MOST_UNDER_WAY, Message, Read, Window};
 
-use crate::{api::MqttReport, config::MqttKeys, daemon::Handle, scan::EventKind};
+use crate::{api::MqttReport, config::MqttKeys, daemon::Handle, scan::EventKind, supervisor::Task};
 use courier::{Courier, Troubles};
 use log_side::LogSide;
 use tail::Tail;
@@ -35,7 +35,7 @@ use tail::Tail;
 #[derive(Debug)]
 pub struct Mqtt {
     stop: CancellationToken,
-    task: JoinHandle<()>,
+    task: JoinHandle<Option<()>>,
 }
 
 impl Mqtt {
@@ -71,6 +71,7 @@ impl Mqtt {
             refused: 0,
         };
         daemon.report_mqtt(report.clone());
+        let supervisor = daemon.supervisor().clone();
         let courier = Courier {
             account,
             topics: Topics::new(keys, robot),
@@ -84,13 +85,14 @@ impl Mqtt {
             epoch: Instant::now(),
             troubles: Troubles::default(),
         };
-        Ok(Self { stop, task: tokio::spawn(courier.run()) })
+        let task = supervisor.spawn(Task::Mqtt, courier.run());
+        Ok(Self { stop, task })
     }
 
     /// Brings what is written to the broker, as far as it takes it within seconds, and says that the daemon leaves.
     pub async fn stop(self) {
         self.stop.cancel();
-        // It ends by itself; a panic in it is printed already.
+        // It ends by itself; the supervisor has its panic.
         drop(self.task.await);
     }
 }

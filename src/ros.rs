@@ -13,7 +13,7 @@ mod services;
 use std::{
     io,
     panic::{AssertUnwindSafe, catch_unwind},
-    thread::{Builder, JoinHandle},
+    thread::JoinHandle,
     time::Duration,
 };
 
@@ -29,6 +29,7 @@ use crate::{
     config::RosKeys,
     daemon::{Audience as _, Follower, Handle},
     export::{Live, Topic},
+    supervisor::Task,
 };
 use node::Node;
 use services::Services;
@@ -42,7 +43,7 @@ const LOOK: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub struct Ros {
     stop: CancellationToken,
-    thread: JoinHandle<()>,
+    thread: JoinHandle<Option<()>>,
 }
 
 impl Ros {
@@ -68,16 +69,17 @@ impl Ros {
             refusal: None,
         };
         daemon.report_ros(report.clone());
+        let supervisor = daemon.supervisor().clone();
         let teller = Teller { keys: keys.clone(), daemon, stop: stop.clone(), report };
         let runtime = Runtime::current();
-        let thread = Builder::new().name("ros".into()).spawn(move || teller.run(&runtime))?;
+        let thread = supervisor.spawn_thread(Task::Ros, move || teller.run(&runtime))?;
         Ok(Self { stop, thread })
     }
 
     /// Waits until what was measured is told, as far as that is taken within a second. The daemon must have ended.
     pub async fn stop(self) {
         self.stop.cancel();
-        // It ends by itself; a panic in it is printed already.
+        // It ends by itself; the supervisor has its panic.
         drop(tokio::task::spawn_blocking(|| self.thread.join()).await);
     }
 }

@@ -9,6 +9,7 @@
 mod access;
 mod answer;
 mod connection;
+mod descriptors;
 mod foxglove;
 mod listen;
 mod openapi;
@@ -49,14 +50,13 @@ use crate::{
     config::Keys, daemon::Handle, fleet::Asked, scan::Session, scene::Scene, store::History,
 };
 use answer::{Failed, Shelved};
+use descriptors::connection_shares;
 use foxglove::Viewers;
 use rate::Buckets;
 use slots::Slots;
 
 /// How long a request may take until its answer begins.
 const REQUEST_TIME: Duration = Duration::from_secs(10);
-/// Connections that may be told at a time that there is no place for them; more are closed unheard.
-const DOORSTEP: usize = 16;
 
 /// Pages of elsewhere may not show or run what is answered here.
 const NO_STRANGERS: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
@@ -116,13 +116,16 @@ impl Server {
         let viewers = &keys.foxglove;
         let foxglove = viewers.enabled.then(|| Viewers::open(&daemon, viewers));
         let keys = &keys.server;
-        let places = Arc::new(Slots::new(keys.max_clients as usize));
+        // Each daemon of the fleet is asked on a connection of its own.
+        let (shares, rejecting) =
+            connection_shares(keys.max_clients as usize, keys.listen.is_some(), fleet.len());
+        let places = Arc::new(Slots::new(shares));
         let api = Api {
             daemon: daemon.clone(),
             history: Arc::new(Mutex::new(History::new(log_folder.clone()))),
             foxglove: foxglove.clone(),
             has_told_origin: Arc::default(),
-            fleet: (!fleet.is_empty()).then(|| crate::fleet::watch(fleet)),
+            fleet: (!fleet.is_empty()).then(|| crate::fleet::watch(fleet, daemon.supervisor())),
             playground: keys.playground.as_deref().map(|folder| Path::new(folder).into()),
             looking: Arc::new(Semaphore::new(1)),
             locating: Arc::new(Semaphore::new(1)),
@@ -155,7 +158,7 @@ impl Server {
             daemon,
             foxglove,
             places,
-            doorstep: Arc::new(Semaphore::new(DOORSTEP)),
+            doorstep: Arc::new(Semaphore::new(rejecting)),
             stall: Duration::from_secs_f64(keys.stall_s),
         }
     }

@@ -17,6 +17,7 @@ mod open;
 mod reader;
 mod repair;
 mod scenes;
+mod sync;
 mod whole;
 mod writer;
 
@@ -27,12 +28,13 @@ pub use format::RecordWriter;
 pub use history::{History, Passage, PassageLines, PastScan};
 pub use kind::{FileKind, HEAD_BYTES};
 pub use mark::{MARK_BYTES, Mark, digest_of, hexadecimal, read_small};
-pub use medium::{FileMedium, Medium, Pipe};
+pub use medium::{Displacement, FileMedium, Medium, Pipe};
 pub use open::{Recovered, is_being_written, open_own};
 pub(crate) use reader::open_for_reading;
 pub use reader::{Line, LineError, Lines, Loaded, load, read_log};
 pub use repair::{LeftOut, Repair, repair};
 pub use scenes::{MAX_LOGGED_SCENE_BYTES, SceneLost, logged_scene};
+pub(crate) use sync::{sync_file, sync_folder, sync_folder_of};
 pub use whole::WholeFile;
 pub use writer::{LogWriter, SYNC_INTERVAL};
 

@@ -142,16 +142,25 @@ pub struct ConfigurationReport {
 }
 
 /// State of the log.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LogStatus {
     /// The log that is being written.
     pub file: Option<PathBuf>,
     /// Records written since the start.
     pub written: u64,
-    /// Of those, records that are on the disk for good.
+    /// Of those, records that are confirmed to be on the disk.
     pub synced: u64,
-    /// Records that could not be written yet.
+    /// Of those, records that will never be confirmed: their sync failed, or their file was removed or changed.
+    #[serde(default)]
+    pub uncertain: u64,
+    /// Records that are not written yet.
     pub waiting: usize,
-    /// Why not, if so: no scan is taken until there is room again.
+    /// Duration of a write or sync under way that takes more than 5 s, seconds.
+    #[serde(default)]
+    pub busy_s: Option<f64>,
+    /// Reason why records can't be written: no scan is taken until they can be.
     pub error: Option<String>,
+    /// A log that had to be replaced within the last 30 s: removed, moved, changed, or its sync failed.
+    #[serde(default)]
+    pub incident: Option<String>,
 }

@@ -60,17 +60,19 @@ pub(super) fn run(args: &Args) -> Outcome {
             "give --link a path that does not exist yet, in a folder that you may write to",
         )
     })?;
-    anstream::println!("listening on {} (interrupt to stop)", pty.path().display());
+    print_line!("listening on {} (interrupt to stop)", pty.path().display());
     let stop = Arc::new(AtomicBool::new(false));
-    runtime::new()?.block_on(async {
-        let interrupts = runtime::Interrupts::listen();
-        let heard = Arc::clone(&stop);
-        let serving = tokio::task::spawn_blocking(move || serve(&mut board, &pty, &stop));
-        tokio::spawn(async move {
-            interrupts.wait().await;
-            heard.store(true, Ordering::Relaxed);
-        });
-        match serving.await {
+    runtime::run_interruptible(async move |interrupts| {
+        let stopping = Arc::clone(&stop);
+        let mut serving = tokio::task::spawn_blocking(move || serve(&mut board, &pty, &stop));
+        let served = tokio::select! {
+            served = &mut serving => served,
+            () = interrupts.wait() => {
+                stopping.store(true, Ordering::Relaxed);
+                serving.await
+            }
+        };
+        match served {
             Ok(Ok(())) => Ok(()),
             Ok(Err(error)) => {
                 Err(Failure::device(format!("the pty failed: {error}"), "start the board again"))

@@ -121,7 +121,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let lines = fitted.told(&world, &sweeps, &what);
     let doubts = doubts_of(&world, &sweeps, &fitted);
     if args.json {
-        doubts.iter().for_each(|doubt| anstream::eprintln!("{doubt}"));
+        doubts.iter().for_each(|doubt| notice!("{doubt}"));
     }
     let words = report::fit_words(&lines, &fitted, doubts);
     if let (Some(out), Some(unfinished)) = (&args.out, unfinished) {
@@ -167,7 +167,7 @@ fn find(
     let known = unfinished.map_or(&[][..], Unfinished::known);
     if let Some(unfinished) = unfinished.filter(|_| !known.is_empty()) {
         let (path, searches) = (unfinished.path().display(), known.len());
-        anstream::eprintln!("{path}: goes on after {searches} searches");
+        notice!("{path}: goes on after {searches} searches");
     }
     let bar = progress::spinner("scans fitted to");
     bar.set_position(sweeps.len() as u64);

@@ -133,8 +133,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return write_report(root);
     }
     let mut plan = load(args)?;
-    runtime::new()?.block_on(async {
-        let interrupts = Interrupts::listen();
+    runtime::run_interruptible(async |interrupts| {
         let daemon = match args.daemon {
             true => Some(daemon(args, &mut plan, interrupts.clone()).await?),
             false => None,
@@ -168,7 +167,7 @@ async fn collect(args: &Args, plan: Plan, device: impl Device, interrupts: Inter
 
 /// The daemon that is to take the scans, if it would take those of the plan.
 async fn daemon(args: &Args, plan: &mut Plan, interrupts: Interrupts) -> Result<ByDaemon, Failure> {
-    let tell = |line: &str| anstream::eprintln!("{line}");
+    let tell = |line: &str| notice!("{line}");
     let (daemon, status) = ByDaemon::find(args.at.client()?, interrupts, tell).await?;
     check_scene(status.scene.as_ref(), &plan.scene)?;
     plan.adopt(&daemon, &status)?;

@@ -151,14 +151,12 @@ fn hint(log: &Path, all_simulated: bool, comparison: &Comparison) {
     }
     let log = log.display();
     if comparison.not_compared.total() == 0 {
-        anstream::eprintln!("{log}: there is no reading in it");
+        notice!("{log}: there is no reading in it");
     } else if comparison.not_compared.no_prediction == 0 {
-        anstream::eprintln!("{log}: no reading came through");
+        notice!("{log}: no reading came through");
     } else if all_simulated {
-        anstream::eprintln!(
-            "{log}: simulated readings have no prediction beside them; --scene makes one"
-        );
+        notice!("{log}: simulated readings have no prediction beside them; --scene makes one");
     } else {
-        anstream::eprintln!("{log}: there are no predictions in it; --scene makes them");
+        notice!("{log}: there are no predictions in it; --scene makes them");
     }
 }

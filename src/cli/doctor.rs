@@ -58,7 +58,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     let Some(port) = &args.port else {
         return list(&link::candidates(), args.json);
     };
-    let report = runtime::new()?.block_on(examine::examine(port, args));
+    let report = runtime::run_interruptible(async |interrupts| {
+        Ok(examine::examine(port, args, interrupts).await)
+    })?;
     report.print(args.json)?;
     report.outcome()
 }
@@ -66,13 +68,13 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn list(candidates: &[Candidate], json: bool) -> Outcome {
     if json {
         let text = serde_json::json!({ "port": null, "candidates": candidates }).to_string();
-        anstream::println!("{text}");
+        print_line!("{text}");
     } else {
         for Candidate { port, id, usb } in candidates {
             let name = id.as_deref().unwrap_or(port);
             let path = id.as_ref().map_or_else(String::new, |_| format!("  ({port})"));
             let usb = usb.as_ref().map_or_else(String::new, |usb| format!("  {usb}"));
-            anstream::println!("{name}{path}{usb}");
+            print_line!("{name}{path}{usb}");
         }
     }
     if candidates.is_empty() {
@@ -83,7 +85,7 @@ fn list(candidates: &[Candidate], json: bool) -> Outcome {
         ));
     }
     if !json {
-        anstream::eprintln!("none was opened: examine one with `sonard doctor --port NAME`");
+        notice!("none was opened: examine one with `sonard doctor --port NAME`");
     }
     Ok(())
 }

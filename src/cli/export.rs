@@ -228,7 +228,7 @@ struct Told {
 impl Told {
     fn tell(&self) {
         let Self { logs, scans, readings } = self;
-        anstream::eprintln!("{logs} logs, {scans} scans, {readings} readings");
+        notice!("{logs} logs, {scans} scans, {readings} readings");
     }
 }
 
@@ -255,7 +255,7 @@ fn write(
                 Ok(())
             }
             Ok(Some(why)) => {
-                anstream::eprintln!("{}: scan {} is left out: {why}", log.display(), scan.scan);
+                notice!("{}: scan {} is left out: {why}", log.display(), scan.scan);
                 Ok(())
             }
             Err(error) => {

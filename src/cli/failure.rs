@@ -106,16 +106,16 @@ pub(super) fn report(outcome: Outcome) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(Failure::Found(finding)) => {
             if let Some(finding) = finding {
-                anstream::eprintln!("{finding}");
+                notice!("{finding}");
             }
             ExitCode::from(1)
         }
         Err(Failure::Input(report)) => {
-            anstream::eprintln!("{report:?}");
+            notice!("{report:?}");
             ExitCode::from(2)
         }
         Err(Failure::Device(report)) => {
-            anstream::eprintln!("{report:?}");
+            notice!("{report:?}");
             ExitCode::from(3)
         }
     }

@@ -181,7 +181,7 @@ fn tell(report: &Report, json: bool, told: &mut BTreeMap<String, Option<String>>
     let written = writeln!(std::io::stdout().lock(), "{line}");
     if let Some((why, help)) = wrong {
         let dash = if help.is_empty() { "" } else { " - " };
-        anstream::eprintln!("{name} ({address}): {why}{dash}{help}");
+        notice!("{name} ({address}): {why}{dash}{help}");
     }
     written.or_else(|error| Failure::from_write("to standard output", &error))
 }
@@ -214,7 +214,7 @@ impl Watcher for Teller {
             let scan = scan.map(|scan| format!(", scan {scan}")).unwrap_or_default();
             let why = plain(why);
             self.bar.suspend(|| {
-                anstream::eprintln!("warning: {robot}: {log}, byte {at}{scan}: refused: {why}");
+                notice!("warning: {robot}: {log}, byte {at}{scan}: refused: {why}");
             });
         }
     }
@@ -228,7 +228,7 @@ impl Teller {
         for ((robot, log), count) in refused {
             if let Some(more) = count.checked_sub(SHOWN).filter(|more| *more > 0) {
                 self.bar.suspend(|| {
-                    anstream::eprintln!("warning: {robot}: {log}: {more} more refused");
+                    notice!("warning: {robot}: {log}: {more} more refused");
                 });
             }
         }

@@ -95,7 +95,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let Some(spec) = &args.spec else { return Ok(()) };
     let generator = read(spec)?;
     let Some(out) = args.out.as_deref().filter(|_| !args.check) else {
-        anstream::println!("{}", size(&generator));
+        print_line!("{}", size(&generator));
         return Ok(());
     };
     let shards = generator.spec().set.shards;
@@ -142,17 +142,13 @@ fn make(generator: &Generator, out: &Path, part: Part) -> Outcome {
     let made = set.make_part(part, &|readings| bar.inc(readings));
     bar.finish_and_clear();
     let PartOutcome { made, were_there } = made.map_err(|error| refused(&error))?;
-    anstream::eprintln!("{made} shards made, {were_there} were there");
+    notice!("{made} shards made, {were_there} were there");
     match set.seal().map_err(|error| refused(&error))? {
-        Some(manifest) => anstream::eprintln!("{}: {}", out.display(), whole(&manifest)),
+        Some(manifest) => notice!("{}: {}", out.display(), whole(&manifest)),
         None => {
             let missing = set.missing().map_err(|error| refused(&error))?;
             let of = generator.spec().set.shards;
-            anstream::eprintln!(
-                "{}: {} of {of} shards are still missing",
-                out.display(),
-                missing.len()
-            );
+            notice!("{}: {} of {of} shards are still missing", out.display(), missing.len());
         }
     }
     Ok(())
@@ -209,11 +205,11 @@ fn verify(folder: &Path, again: u32) -> Outcome {
         problems.extend(drawn.map_err(|error| refused(&error))?.into_iter().flatten());
     }
     if problems.is_empty() {
-        anstream::println!("{}; as it should be, {} drawn anew", size(&generator), sample.len());
+        print_line!("{}; as it should be, {} drawn anew", size(&generator), sample.len());
         return Ok(());
     }
     for problem in problems.iter().take(NAMED) {
-        anstream::println!("{problem}");
+        print_line!("{problem}");
     }
     let hint = "`sonard generate` makes what is missing; remove what is damaged first";
     Err(Failure::Found(Some(format!("{}: {} problems; {hint}", folder.display(), problems.len()))))

@@ -227,17 +227,17 @@ fn tell(found: &Imported, scans: u64, has_poses: bool) {
     if found.guessed && !found.mapping.columns.is_empty() {
         let said = found.mapping.columns.iter();
         let said: Vec<_> = said.map(|(field, column)| format!("{field} from {column}")).collect();
-        anstream::eprintln!("by the header: {}", said.join(", "));
+        notice!("by the header: {}", said.join(", "));
     }
     let silent = found.readings - found.echoes;
-    anstream::eprintln!(
+    notice!(
         "{scans} scans, {} readings: {} with a range, {silent} without; sensor {}",
         found.readings,
         found.echoes,
         found.taken.sensor
     );
     if !has_poses {
-        anstream::eprintln!(
+        notice!(
             "note: where the robot stood is not known: give --pose, or columns x_m, y_m and heading_deg"
         );
     }

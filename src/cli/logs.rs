@@ -29,14 +29,14 @@ impl Damage {
     pub(super) fn note(&mut self, log: &Path, error: &LineError) {
         self.count += 1;
         if self.count <= SHOWN as u64 {
-            anstream::eprintln!("warning: {}: {error}; the line is left out", log.display());
+            notice!("warning: {}: {error}; the line is left out", log.display());
         }
     }
 
     /// Says how many more there were.
     pub(super) fn sum_up(&self, log: &Path) {
         if let Some(more) = self.count.checked_sub(SHOWN as u64).filter(|more| *more > 0) {
-            anstream::eprintln!(
+            notice!(
                 "warning: {}: {more} more damaged lines; see `sonard log verify`",
                 log.display()
             );
@@ -206,7 +206,7 @@ impl Drawn {
     /// The scans to draw; says if these are not all.
     pub(super) fn finish(self) -> Vec<ScanView> {
         if self.every > 1 {
-            anstream::eprintln!(
+            notice!(
                 "note: {} scans are more than a picture shows: one in {} is drawn, {} in all",
                 self.seen,
                 self.every,

@@ -63,16 +63,16 @@ pub(super) fn run(args: &Args) -> Outcome {
     let assumed =
         AssumedModel { scene: &scene, pose: &pose, sensor: &sensor, air: &air, options: &options };
     let board = args.world.board(&assumed)?;
-    runtime::new()?.block_on(async {
+    runtime::run_interruptible(async move |interrupts| {
         let port = MockPort::open(board, args.link.as_deref()).map_err(|error| {
             Failure::input(
                 format!("cannot make the port: {error}"),
                 "give --link a path that does not exist yet, in a folder that you may write to",
             )
         })?;
-        anstream::println!("listening on {} (interrupt to stop)", port.path().display());
-        let played = port.run(runtime::Interrupts::listen().wait(), |note| print(&note)).await;
-        anstream::println!("stopped");
+        print_line!("listening on {} (interrupt to stop)", port.path().display());
+        let played = port.run(interrupts.wait(), |note| print(&note)).await;
+        print_line!("stopped");
         played.map_err(|error| {
             Failure::device(format!("the pty failed: {error}"), "start the mock again")
         })
@@ -82,6 +82,6 @@ pub(super) fn run(args: &Args) -> Outcome {
 fn print(note: &Note) {
     match note {
         Note::Fired(count) if count % FIRINGS_A_LINE != 0 => {}
-        note => anstream::println!("{note}"),
+        note => print_line!("{note}"),
     }
 }

@@ -104,7 +104,7 @@ pub(super) fn scene_for(
         (None, None) => return Ok(None),
     };
     if logged.is_some_and(|logged| logged.sha256 != scene.sha256) {
-        anstream::eprintln!(
+        notice!(
             "warning: the scene `{}` is not the one that the log's model used (its SHA-256 \
              differs): walls and predictions may not fit",
             scene.name

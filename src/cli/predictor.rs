@@ -52,7 +52,7 @@ impl<'a> Predictor<'a> {
         let (Some(pose), Some(session)) = (scan.pose(), scan.session.clone()) else {
             if self.given.is_some() {
                 let (log, id) = (self.log.display(), scan.scan);
-                anstream::eprintln!("{log}: scan {id} lacks its pose or session: no prediction");
+                notice!("{log}: scan {id} lacks its pose or session: no prediction");
                 forget(scan);
             }
             return Ok(());
@@ -201,7 +201,7 @@ pub(super) fn conditions(log: &Path, session: &Session) -> Result<(Air, Options)
     let options = options.unwrap_or_else(|| {
         let engine = EngineKind::default().name();
         let had = session.model.as_ref().map_or("", |model| &model.engine);
-        anstream::eprintln!(
+        notice!(
             "{}: the log's model ({had}) can't be set up again: {engine} with its defaults is used",
             log.display()
         );

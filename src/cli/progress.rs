@@ -28,6 +28,7 @@ pub(super) fn spinner(things: &str) -> ProgressBar {
 fn later(bar: ProgressBar) -> ProgressBar {
     bar.set_draw_target(ProgressDrawTarget::hidden());
     let shown = bar.clone();
+    #[allow(clippy::disallowed_methods, reason = "it only shows a bar")]
     thread::spawn(move || {
         thread::sleep(Duration::from_secs(1));
         if !shown.is_finished() {

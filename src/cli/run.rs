@@ -6,14 +6,13 @@ mod mock;
 mod ros;
 
 use std::{
-    io::{self, IsTerminal as _},
     path::{Path, PathBuf},
+    time::Duration,
 };
 
 use rustix::process::Signal;
 use tokio::signal::unix::{Signal as Hangups, SignalKind, signal};
 use tokio_util::sync::CancellationToken;
-use tracing_subscriber::EnvFilter;
 
 use super::{
     Failure, Outcome,
@@ -22,13 +21,21 @@ use super::{
 };
 use crate::{
     daemon::{self, Handle, Journal, Order, Resources, Settings},
-    host_gpio, link,
+    host_gpio,
+    interrupts::{FORCED_END, Hangup},
+    link, messages,
     server::{Access, Listeners, Server, read_token, token_help},
+    supervisor::{Supervisor, Task},
 };
 use broker::Broker;
 use load::Loader;
 use mock::Mock;
 use ros::Ros;
+
+/// Time allowed for an orderly shutdown; the units' `TimeoutStopSec` is longer.
+const SHUTDOWN_LIMIT: Duration = Duration::from_secs(35);
+/// Time allowed for tasks and blocking calls that are left after it.
+const TASKS_LIMIT: Duration = Duration::from_millis(500);
 
 /// Options of `sonard run`.
 #[derive(Debug, Clone, clap::Args)]
@@ -108,13 +115,14 @@ Examples:
   sonard run --config sonard.toml --check
 
 SONARD_LOG sets the level of messages on standard error: error, warn, info (default), debug.
-Exit codes: 0 stopped by a signal, 2 wrong configuration, 3 the log or a socket is another's, or the disk gave up.";
+Exit codes: 0 stopped by a signal, 1 the end was forced by a second signal, 2 wrong configuration, 3 log or socket \
+belong to another process, the disk failed, or a task of the daemon failed.";
 
 pub(super) fn run(args: Args) -> Outcome {
     if args.print_config {
         return print(&crate::config::document::<crate::config::Keys>());
     }
-    say_on_stderr();
+    let (_messages, _drain) = messages::log_to_stderr();
     let (check, mock, virtual_time) = (args.check, args.mock, args.virtual_time);
     let world = args.world.clone();
     let mut loader = Loader::new(args);
@@ -122,31 +130,65 @@ pub(super) fn run(args: Args) -> Outcome {
     if check {
         return print(&load::in_force(&settings));
     }
-    runtime::new()?.block_on(async move {
-        let interrupts = Interrupts::listen();
+    let hangup = Hangup::of_this_process();
+    let supervisor = Supervisor::default();
+    let runtime = runtime::new()?;
+    let outcome = runtime.block_on(async {
+        let (interrupts, handlers) = Interrupts::install(hangup);
+        drop(supervisor.spawn(Task::Signals, handlers.receive()));
         let mock = match mock {
-            true => Some(Mock::start(&world, virtual_time, &settings)?),
+            true => Some(Mock::start(&world, virtual_time, &settings, &supervisor)?),
             false => None,
         };
         if let Some(mock) = &mock {
             loader.fix_port(mock.port());
             settings.keys.device.port = Some(mock.port());
         }
-        let outcome = serve(loader, settings, interrupts).await;
-        if let Some(mock) = mock {
-            mock.stop().await;
+        let served = async {
+            let outcome = serve(loader, settings, &interrupts, hangup, supervisor.clone()).await;
+            supervisor.stopping().cancel();
+            if let Some(mock) = mock {
+                mock.stop().await;
+            }
+            outcome
+        };
+        tokio::select! {
+            biased;
+            outcome = served => outcome,
+            () = interrupts.clone().wait_overdue() => Err(runtime::abandoned()),
+            () = overdue(supervisor.stopping()) => Err(Failure::device(
+                format!("the shutdown took longer than {} s and was abandoned", SHUTDOWN_LIMIT.as_secs()),
+                "see the messages before this one",
+            )),
         }
-        outcome
-    })
+    });
+    runtime.shutdown_timeout(TASKS_LIMIT);
+    match supervisor.first_failure() {
+        Some(failure) => {
+            Err(Failure::device(failure, "this is a fault of the program: please report it"))
+        }
+        None => outcome,
+    }
 }
 
-/// Gets hold of everything, and lets daemon and server run until an interrupt.
-async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Outcome {
+/// Completes when the shutdown has taken too long.
+async fn overdue(stopping: &CancellationToken) {
+    stopping.cancelled().await;
+    tokio::time::sleep(SHUTDOWN_LIMIT).await;
+}
+
+/// Acquires all resources, and runs daemon and server until an interrupt or until a task fails.
+async fn serve(
+    loader: Loader,
+    settings: Settings,
+    interrupts: &Interrupts,
+    hangup: Hangup,
+    supervisor: Supervisor,
+) -> Outcome {
     // With a handler, a file that gets too large is an error of the write and not the end.
     let _too_large = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()));
-    // Whoever sees that it answers may send one: until there is a handler it would end the process,
-    // or be lost where whoever started it ignores hangups.
-    let hangups = signal(SignalKind::hangup());
+    // Installed before the API answers: a client may send a hangup from then on.
+    let hangups = (hangup == Hangup::Reload).then(|| signal(SignalKind::hangup()));
     let keys = &settings.keys;
     let gpio = match settings.simulated {
         // What is made up touches no pins.
@@ -157,7 +199,9 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     };
     let mut broker = Broker::open(&settings)?;
     let log_folder = PathBuf::from(&keys.log.folder);
-    let (journal, thread) = Journal::open(&log_folder, settings.rotation())?;
+    let (journal, thread) = Journal::open(&log_folder, settings.rotation(), &supervisor)?;
+    // A start that is rejected below stops the log's thread.
+    let _stopping = supervisor.stopping().clone().drop_guard();
     let listeners =
         Listeners::open(&keys.server).map_err(|error| Failure::device(&error, error.help()))?;
     for address in listeners.addresses().into_iter().flatten() {
@@ -168,23 +212,39 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     let fleet = load::fleet(&keys.fleet)?;
     let (daemon, handle) = match gpio {
         Some(gpio) => {
-            let resources = Resources { open_port: Box::new(link::open), gpio, journal };
+            let open_port = Box::new(link::open);
+            let resources = Resources { open_port, gpio, journal, supervisor: supervisor.clone() };
             daemon::prepare(resources, settings.clone())
         }
-        None => daemon::prepare_simulated(journal, settings.clone()),
+        None => daemon::prepare_simulated(journal, supervisor.clone(), settings.clone()),
     };
     let ros = Ros::start(&keys.ros, &handle)?;
     broker.start(&settings, &handle, &log_folder)?;
     let server = Server::new(handle.clone(), log_folder, access, &keys, fleet);
-    let reloading = tokio::spawn(reload_on_hangup(loader, handle, hangups));
+    if let Some(Ok(hangups)) = hangups {
+        drop(supervisor.spawn_finite(Task::Reload, reload_on_hangup(loader, handle, hangups)));
+    }
     let ended = CancellationToken::new();
-    let serving = tokio::spawn(server.run(listeners, ended.clone().cancelled_owned()));
-    daemon.run(interrupts.wait()).await;
-    ended.cancel();
-    reloading.abort();
-    // It ends by itself; a panic in it is printed already.
-    drop(serving.await);
-    ros.stop().await;
+    let serving = server.run(listeners, ended.clone().cancelled_owned());
+    let working = async {
+        let outcome = daemon.run(interrupts.clone().wait()).await;
+        ended.cancel();
+        outcome
+    };
+    // Clients and brokers are waited for, unless the end is forced; the log is closed in either case.
+    let leaving = async {
+        let (outcome, ()) = tokio::join!(working, serving);
+        ros.stop().await;
+        outcome
+    };
+    let forced = async {
+        interrupts.clone().wait_forced().await;
+        tokio::time::sleep(FORCED_END / 2).await;
+    };
+    tokio::select! {
+        _outcome = leaving => {}
+        () = forced => {}
+    }
     let last = tokio::task::spawn_blocking(|| thread.close()).await.unwrap_or_default();
     broker.stop().await;
     match last.error {
@@ -220,8 +280,7 @@ fn access(settings: &Settings, listeners: &Listeners) -> Result<Access, Failure>
 }
 
 /// Reads the configuration again at each SIGHUP.
-async fn reload_on_hangup(mut loader: Loader, daemon: Handle, hangups: io::Result<Hangups>) {
-    let Ok(mut hangups) = hangups else { return };
+async fn reload_on_hangup(mut loader: Loader, daemon: Handle, mut hangups: Hangups) {
     while hangups.recv().await.is_some() {
         let loaded = loader.load().map(Box::new).map_err(|failure| load::words(&failure));
         match &loaded {
@@ -237,25 +296,4 @@ fn print(text: &str) -> Outcome {
     use std::io::Write as _;
     let written = std::io::stdout().lock().write_all(text.as_bytes());
     written.or_else(|error| Failure::from_write("to standard output", &error))
-}
-
-/// What is said unless `SONARD_LOG` asks for something else: libraries say much.
-const BY_DEFAULT: &str = "info,rustdds=off";
-
-/// What the daemon says goes to standard error; under systemd the journal knows the time.
-fn say_on_stderr() {
-    let filter =
-        EnvFilter::try_from_env("SONARD_LOG").unwrap_or_else(|_| EnvFilter::new(BY_DEFAULT));
-    let subscriber = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .with_target(false);
-    let done = if std::env::var_os("JOURNAL_STREAM").is_some() {
-        subscriber.without_time().try_init()
-    } else {
-        subscriber.try_init()
-    };
-    // Somebody who set up another subscriber wants that one.
-    drop(done);
 }

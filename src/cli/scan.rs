@@ -171,7 +171,9 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let setup = prepared(args)?;
     let mut output = Output::open(args.out.as_deref())?;
-    let measured = runtime::new()?.block_on(measure(args, &setup, &mut output));
+    let measured = runtime::run_interruptible(async |interrupts| {
+        measure(args, &setup, &mut output, &interrupts).await
+    });
     // Whatever happened, what was measured is closed properly and drawn.
     let closed = output.close(&setup.scene);
     measured?;
@@ -179,8 +181,12 @@ pub(super) fn run(args: &Args) -> Outcome {
 }
 
 /// Opens the port, meets the device, and takes the scans.
-async fn measure(args: &Args, setup: &PreparedScan, output: &mut Output) -> Outcome {
-    let interrupts = Interrupts::listen();
+async fn measure(
+    args: &Args,
+    setup: &PreparedScan,
+    output: &mut Output,
+    interrupts: &Interrupts,
+) -> Outcome {
     let mock = match args.mock {
         true => Some(Mock::start(args.world.board(&assumed(setup))?, None)?),
         false => None,
@@ -195,7 +201,7 @@ async fn measure(args: &Args, setup: &PreparedScan, output: &mut Output) -> Outc
         .or_else(|| emulator.as_ref().map(Emulator::port))
         .or_else(|| args.port.clone())
         .unwrap_or_default();
-    let mut ranger = meet(&port, &interrupts).await?;
+    let mut ranger = meet(&port, interrupts).await?;
     let job = setup.job(ranger.identity()).map_err(|error| scan_failure(error.into()))?;
     let session = setup.session(ranger.identity());
     output.add_to_earlier(&session, job.pose, job.plan)?;
@@ -267,6 +273,10 @@ impl Mock {
         let (soundings, moves) = mpsc::unbounded_channel();
         let (stop, stopped) = oneshot::channel::<()>();
         let port = port.moved_by(moves);
+        #[allow(
+            clippy::disallowed_methods,
+            reason = "a mock that ends closes its line, which ends the scan"
+        )]
         let playing = tokio::spawn(port.run(async move { drop(stopped.await) }, |_note| {}));
         Ok(Self { port: path, soundings, stop, playing })
     }

@@ -44,12 +44,12 @@ pub(super) fn of_session(log: &Path, session: &Session) -> Result<Option<Scene>,
     };
     let named = session.scene.as_ref().map(|scene| &*scene.name).unwrap_or_default();
     if matches!(lost, SceneLost::Changed(_)) {
-        anstream::eprintln!("warning: {}: {lost}", log.display());
+        notice!("warning: {}: {lost}", log.display());
     }
     if shipped::text(named).is_some() {
         return shipped(named).map(Some);
     }
-    anstream::eprintln!(
+    notice!(
         "note: {}: {lost}, and it does not come with sonard: give its file with --scene; until then \
          it is taken as unknown",
         log.display()

@@ -237,7 +237,7 @@ fn places(
         return Err(Failure::input(format!("{message} (and no other pose is right)"), help));
     }
     for (message, help) in wrong.iter().take(NAMED_LINES) {
-        anstream::eprintln!("{message}: left out; {help}");
+        notice!("{message}: left out; {help}");
     }
     let left_out = match wrong.len() {
         0 => Ok(()),

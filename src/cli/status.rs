@@ -86,13 +86,17 @@ fn screen(status: &Status, health: &Health) -> String {
     lines.extend(better.map(|better| format!("  better   explained: {better}")));
     let (air, log, clients) = (&status.air, &status.log, &status.subscribers);
     let source = word(&air.source);
+    let uncertain = match log.uncertain {
+        0 => String::new(),
+        count => format!(", {count} uncertain"),
+    };
     let file = log.file.as_ref().map_or_else(|| "-".into(), |file| file.display().to_string());
     lines.extend([
         format!(
             "  air      {:.1} C ({source}), sound {:.1} m/s",
             air.temperature_c, air.sound_speed_m_s,
         ),
-        format!("  log      {file} ({} records, {} synced)", log.written, log.synced),
+        format!("  log      {file} ({} records, {} synced{uncertain})", log.written, log.synced),
         format!(
             "  clients  {} live; {} readings dropped, {} cut off",
             clients.now, clients.dropped_readings, clients.cut_off,

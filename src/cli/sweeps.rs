@@ -20,7 +20,7 @@ pub(super) fn for_each_sweep(
                 Ok(sweep) => take(scan, sweep),
                 Err(error) => {
                     let log = log.display();
-                    anstream::eprintln!("{log}: scan {} is left out: {error}", scan.scan);
+                    notice!("{log}: scan {} is left out: {error}", scan.scan);
                 }
             }
             Ok(())

@@ -14,7 +14,7 @@ use tokio::time::sleep;
 use super::{
     Failure, Outcome,
     daemon::{Daemons, DaemonsArgs, refuse},
-    runtime::{self, Interrupts},
+    runtime,
 };
 use crate::{
     client::Client,
@@ -64,8 +64,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         (false, Some(moved_m)) => format!("/v1/live/records?moved_m={moved_m}"),
         (false, None) => "/v1/live/records".to_owned(),
     };
-    runtime::new()?.block_on(async {
-        let interrupts = Interrupts::listen();
+    runtime::run_interruptible(async |interrupts| {
         tokio::select! {
             watched = watched(args, &path) => watched,
             () = interrupts.wait() => Ok(()),
@@ -103,9 +102,9 @@ async fn watch(args: &Args, client: Client, path: &str) -> Outcome {
                  --reconnect waits for it and goes on",
             ));
         }
-        anstream::eprintln!("{why}: waiting for it");
+        notice!("{why}: waiting for it");
         body = again(&client, path).await?;
-        anstream::eprintln!("the daemon answers again; its log has what was measured meanwhile");
+        notice!("the daemon answers again; its log has what was measured meanwhile");
     }
 }
 

@@ -49,7 +49,7 @@ impl SweepArgs {
                 match Sweep::of(&scan) {
                     Ok(sweep) => take(log, sweep, &worlds.world(log, &scan)?),
                     Err(error) => {
-                        anstream::eprintln!("warning: {}: {error}; it is left out", log.display());
+                        notice!("warning: {}: {error}; it is left out", log.display());
                         Ok(())
                     }
                 }

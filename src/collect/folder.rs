@@ -16,7 +16,7 @@ use std::{
 use sha2::{Digest as _, Sha256};
 
 use super::order::Slot;
-use crate::store::{WholeFile, digest_of, hexadecimal};
+use crate::store::{WholeFile, digest_of, hexadecimal, sync_folder_of};
 pub use error::FolderError;
 
 /// Scans under way: empty unless the program is running or was killed.
@@ -234,8 +234,8 @@ impl Folder {
                 return Err(io::ErrorKind::AlreadyExists.into());
             }
             fs::rename(from, &target)?;
-            sync_folder(&target)?;
-            sync_folder(from)
+            sync_folder_of(&target)?;
+            sync_folder_of(from)
         };
         rename().map_err(|source| FolderError::io("move a scan to", &target, source))
     }
@@ -268,10 +268,6 @@ pub fn stem(slot: Slot) -> String {
 fn slot_of(name: &str) -> Option<Slot> {
     let (pose, repeat) = name.strip_suffix(".jsonl")?.strip_prefix('p')?.split_once("-r")?;
     Some(Slot { pose: pose.parse().ok()?, repeat: repeat.parse().ok()? })
-}
-
-fn sync_folder(path: &Path) -> io::Result<()> {
-    path.parent().map_or(Ok(()), |folder| File::open(folder)?.sync_all())
 }
 
 #[cfg(test)]

@@ -24,7 +24,7 @@ use crate::{
     api::AirOrder,
     config::ScanningKeys,
     scan::{Device, Provenance, SceneRef},
-    store::open_own,
+    store::{open_own, sync_file},
 };
 
 /// One line.
@@ -247,7 +247,7 @@ impl Journal {
         // Read before it is cut: what is no journal must stay as it is.
         let history = read(&text[..whole], path)?;
         if whole < text.len() {
-            file.set_len(whole as u64).and_then(|()| file.sync_all()).map_err(fail)?;
+            file.set_len(whole as u64).and_then(|()| sync_file(&file)).map_err(fail)?;
             file.seek(SeekFrom::End(0)).map_err(fail)?;
         }
         Ok(Self { file, path: path.into(), history })
@@ -268,7 +268,7 @@ impl Journal {
         let mut line = serde_json::to_vec(&entry).map_err(|error| fail(error.into()))?;
         line.push(b'\n');
         let before = self.file.metadata().map_err(fail)?.len();
-        if let Err(error) = self.file.write_all(&line).and_then(|()| self.file.sync_data()) {
+        if let Err(error) = self.file.write_all(&line).and_then(|()| sync_file(&self.file)) {
             // Half a line would hide what comes after it. If this fails too, opening mends it.
             let _ = self.file.set_len(before);
             return Err(fail(error));

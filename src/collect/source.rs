@@ -168,6 +168,7 @@ fn start(command: &str, number: u32) -> Result<Stream, Halt> {
     // As many lines as are wanted and one more: who prints faster has to wait.
     let (sender, lines) = channel(1);
     let printed = child.stdout.take();
+    #[allow(clippy::disallowed_methods, reason = "its end is received as the end of a channel")]
     std::thread::spawn(move || {
         for line in printed.into_iter().flat_map(|out| BufReader::new(out).lines()) {
             let Ok(line) = line else { break };

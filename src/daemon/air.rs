@@ -9,6 +9,7 @@ use crate::{
     api::{AirOrder, AirStatus},
     config::AirKeys,
     scan::{AirSource, ScanAir},
+    supervisor::{Supervisor, Task},
     thermometer::read_thermometer,
 };
 
@@ -143,11 +144,14 @@ impl AirControl {
 /// Reads a thermometer every so often; a 1-wire conversion takes most of a second, so it is read
 /// beside everything else.
 #[must_use]
-pub(super) fn watch_thermometer(keys: &AirKeys) -> watch::Receiver<Option<Reading>> {
+pub(super) fn watch_thermometer(
+    keys: &AirKeys,
+    supervisor: &Supervisor,
+) -> watch::Receiver<Option<Reading>> {
     let (sender, receiver) = watch::channel(None);
     let Some(file) = keys.file.clone().map(PathBuf::from) else { return receiver };
     let every = Duration::from_secs_f64(keys.every_s);
-    tokio::spawn(async move {
+    let watching = async move {
         while !sender.is_closed() {
             let path = file.clone();
             let reading = tokio::task::spawn_blocking(move || read_thermometer(&path)).await;
@@ -157,7 +161,8 @@ pub(super) fn watch_thermometer(keys: &AirKeys) -> watch::Receiver<Option<Readin
                 () = sender.closed() => {}
             }
         }
-    });
+    };
+    drop(supervisor.spawn_finite(Task::Thermometer, watching));
     receiver
 }
 

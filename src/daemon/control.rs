@@ -9,7 +9,6 @@ use tokio::{
     sync::{mpsc, oneshot, watch},
     time::{Instant, sleep},
 };
-use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{
@@ -27,6 +26,7 @@ use crate::{
     geometry::Pose,
     host_gpio::HostGpio,
     scan::ScanPlan,
+    supervisor::Supervisor,
 };
 
 /// How often the emergency stop is looked at.
@@ -109,7 +109,7 @@ pub(super) struct Control {
     /// Scene or sensor changed: predictions are out of date.
     pub(super) stale: bool,
     requests: mpsc::Receiver<Request>,
-    shutdown: CancellationToken,
+    supervisor: Supervisor,
     thermometer: watch::Receiver<Option<Reading>>,
     journal: Journal,
     shared: Arc<Shared>,
@@ -121,7 +121,7 @@ impl Control {
         settings: Settings,
         gpio: Box<dyn HostGpio>,
         requests: mpsc::Receiver<Request>,
-        (shutdown, shared): (CancellationToken, Arc<Shared>),
+        (supervisor, shared): (Supervisor, Arc<Shared>),
         journal: Journal,
     ) -> Self {
         Self {
@@ -133,14 +133,14 @@ impl Control {
             agenda: Agenda::new(settings.keys.scanning.mode, settings.every(), Duration::ZERO),
             serving: None,
             air: AirControl::new(settings.keys.air.clone()),
-            thermometer: watch_thermometer(&settings.keys.air),
+            thermometer: watch_thermometer(&settings.keys.air, &supervisor),
             gpio,
             configuration: ConfigurationReport::default(),
             epoch: Instant::now(),
             identity: None,
             stale: false,
             requests,
-            shutdown,
+            supervisor,
             journal,
             shared,
             pressed: false,
@@ -186,7 +186,7 @@ impl Control {
             let watches_stop = self.gpio.emergency_stop().is_some();
             tokio::select! {
                 biased;
-                () = self.shutdown.cancelled() => return Interrupt::Shutdown,
+                () = self.supervisor.stopping().cancelled() => return Interrupt::Shutdown,
                 () = sleep(STOP_CHECK), if watches_stop => {
                     let pressed = self.gpio.emergency_stop() == Some(true);
                     if std::mem::replace(&mut self.pressed, pressed) != pressed {
@@ -260,7 +260,7 @@ impl Control {
     /// Forgets what programs said about the air.
     fn take_own_air(&mut self) {
         self.air = AirControl::new(self.settings.keys.air.clone());
-        self.thermometer = watch_thermometer(&self.settings.keys.air);
+        self.thermometer = watch_thermometer(&self.settings.keys.air, &self.supervisor);
     }
 
     /// Takes a new configuration in: what changed in it goes before what programs said.
@@ -285,7 +285,7 @@ impl Control {
         self.setup = Arc::new(self.settings.setup());
         if keys.air != then.air {
             self.air = AirControl::new(keys.air.clone());
-            self.thermometer = watch_thermometer(&keys.air);
+            self.thermometer = watch_thermometer(&keys.air, &self.supervisor);
         }
         if keys.scanning != then.scanning {
             self.scanning = keys.scanning.clone();

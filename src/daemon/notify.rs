@@ -1,9 +1,20 @@
-//! Tells systemd how it goes: ready once the ranger told its identity, alive as long as the
-//! operator gets on.
+//! Notifications to systemd: ready once the ranger has reported its identity, alive as long as the device task makes
+//! progress.
 
-use std::{sync::Arc, time::Duration};
+use std::{
+    io,
+    os::{
+        linux::net::SocketAddrExt as _,
+        unix::{
+            ffi::OsStrExt as _,
+            net::{SocketAddr, UnixDatagram},
+        },
+    },
+    sync::Arc,
+    time::Duration,
+};
 
-use sd_notify::{NotifyState, notify, watchdog_enabled};
+use sd_notify::{NotifyState, watchdog_enabled};
 use tokio::time::interval;
 use tokio_util::sync::CancellationToken;
 
@@ -15,9 +26,15 @@ const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Notifies until `shutdown`. Does nothing where there is no systemd.
 pub(super) async fn run(shared: Arc<Shared>, shutdown: CancellationToken) {
-    if std::env::var_os("NOTIFY_SOCKET").is_none() {
-        return;
-    }
+    let manager = match Manager::connect() {
+        Ok(Some(manager)) => manager,
+        Ok(None) => return shutdown.cancelled().await,
+        Err(error) => {
+            tracing::warn!("systemd can't be notified: {error}");
+            return shutdown.cancelled().await;
+        }
+    };
+    let say = |states: &[NotifyState<'_>]| manager.notify(states);
     let watchdog = watchdog_enabled();
     let mut tick = interval(watchdog.map_or(PATIENCE, |limit| (limit / 3).min(PATIENCE)));
     let mut views = shared.view.subscribe();
@@ -63,8 +80,28 @@ fn words(state: LinkState, trouble: Option<&str>) -> String {
     }
 }
 
-fn say(state: &[NotifyState<'_>]) {
-    if let Err(error) = notify(state) {
-        tracing::debug!("systemd could not be told: {error}");
+/// Socket of the service manager.
+struct Manager(UnixDatagram);
+
+impl Manager {
+    /// Connects to the socket that `NOTIFY_SOCKET` names, if it names one.
+    fn connect() -> io::Result<Option<Self>> {
+        let Some(name) = std::env::var_os("NOTIFY_SOCKET") else { return Ok(None) };
+        let address = match name.as_bytes().strip_prefix(b"@") {
+            Some(name) => SocketAddr::from_abstract_name(name)?,
+            None => SocketAddr::from_pathname(&name)?,
+        };
+        let socket = UnixDatagram::unbound()?;
+        socket.connect_addr(&address)?;
+        // A service manager that does not read must not stop what it supervises.
+        socket.set_nonblocking(true)?;
+        Ok(Some(Self(socket)))
+    }
+
+    fn notify(&self, states: &[NotifyState<'_>]) {
+        let message: String = states.iter().map(|state| format!("{state}\n")).collect();
+        if let Err(error) = self.0.send(message.as_bytes()) {
+            tracing::debug!("a notification to systemd was dropped: {error}");
+        }
     }
 }

@@ -329,6 +329,12 @@ impl Shared {
             reasons.push(format!("the link is {}: {trouble}", view.state.name()));
         }
         reasons.extend(log.error.iter().map(|error| format!("the log: {error}")));
+        reasons.extend(log.incident.iter().map(|incident| format!("the log: {incident}")));
+        reasons.extend(log.busy_s.map(|busy_s| {
+            format!(
+                "the log: the disk does not respond: a write or sync has taken {busy_s:.0} s so far"
+            )
+        }));
         if air.stale {
             reasons.push("the air temperature is stale".into());
         }

@@ -11,6 +11,7 @@ use rustix::fs::{FlockOperation, flock};
 use tempfile::{Builder, TempDir};
 
 use super::DataSetError;
+use crate::store::sync_folder;
 
 /// A new folder is for whom the umask leaves it.
 const MODE: u32 = 0o777;
@@ -22,7 +23,7 @@ const ENDING: &str = ".draft";
 #[derive(Debug)]
 pub(super) struct Draft {
     folder: TempDir,
-    lock: File,
+    _lock: File,
 }
 
 impl Draft {
@@ -38,7 +39,7 @@ impl Draft {
         let lock = File::open(folder.path()).map_err(fail)?;
         // A file system without locks: then nobody clears away what others left.
         let _ = flock(&lock, FlockOperation::NonBlockingLockExclusive);
-        Ok(Self { folder, lock })
+        Ok(Self { folder, _lock: lock })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -48,12 +49,12 @@ impl Draft {
     /// Brings the folder to the disk and renames it to its place, where nothing may be.
     pub(super) fn take_place(self, place: &Path) -> Result<(), DataSetError> {
         let fail = |error| DataSetError::io("write", place, error);
-        self.lock.sync_all().map_err(fail)?;
+        sync_folder(self.folder.path()).map_err(fail)?;
         fs::rename(self.path(), place).map_err(fail)?;
         // It has another name now: there is nothing to be removed.
         drop(self.folder.keep());
         let root = place.parent().unwrap_or(Path::new("."));
-        File::open(root).and_then(|root| root.sync_all()).map_err(fail)
+        sync_folder(root).map_err(fail)
     }
 
     /// Removes what killed processes left of shards that are there now. What can't be removed stays: it is hidden,

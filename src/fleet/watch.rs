@@ -12,7 +12,11 @@ use tokio::{
 use uuid::Uuid;
 
 use super::{Asked, Roll, Told, Unheard, ask, picture};
-use crate::{api::FleetPicture, client::Client};
+use crate::{
+    api::FleetPicture,
+    client::Client,
+    supervisor::{Supervisor, Task},
+};
 
 /// From question to question.
 const EVERY: Duration = Duration::from_secs(2);
@@ -38,10 +42,10 @@ struct PictureRequest {
 /// Asks daemons every 2 s, for as long as somebody holds what is told: a [`Fleet`](crate::api::Fleet) as
 /// JSON, the same bytes for all. Must be called within a tokio runtime.
 #[must_use]
-pub fn watch(fleet: Vec<Asked>) -> watch::Receiver<Bytes> {
+pub fn watch(fleet: Vec<Asked>, supervisor: &Supervisor) -> watch::Receiver<Bytes> {
     let roll = Roll::new(fleet.iter().map(|one| &one.member), Timestamp::now());
     let (tell, told) = watch::channel(written(&roll));
-    tokio::spawn(keep(roll, fleet, tell));
+    drop(supervisor.spawn_finite(Task::Fleet, keep(roll, fleet, tell)));
     told
 }
 

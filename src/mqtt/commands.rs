@@ -151,7 +151,12 @@ impl Clerk {
             && let Some(command) = self.waiting.pop_front()
         {
             let name = command.name();
-            self.at_work = Some((name, tokio::spawn(command.carry_out(self.daemon.clone()))));
+            #[allow(
+                clippy::disallowed_methods,
+                reason = "its end is awaited as the command's outcome"
+            )]
+            let work = tokio::spawn(command.carry_out(self.daemon.clone()));
+            self.at_work = Some((name, work));
         }
     }
 }

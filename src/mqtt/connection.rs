@@ -65,6 +65,7 @@ impl Connection {
         let built = AsyncClient::builder(options).capacity(capacity).try_build();
         let (client, events) = built.map_err(|error| error.to_string())?;
         let (sender, news) = mpsc::channel(NEWS);
+        #[allow(clippy::disallowed_methods, reason = "its end closes the channel of news")]
         let pump = tokio::spawn(pump(events, sender));
         Ok(Self { client, news, pump, under_way: FuturesUnordered::new() })
     }

@@ -18,6 +18,7 @@ use tokio_util::sync::CancellationToken;
 use tower::ServiceExt as _;
 
 use super::{Listeners, Peer, Server, plain::Worded, slots::Slot};
+use crate::supervisor::Task;
 
 /// How long the head of a request may take.
 const HEAD_TIME: Duration = Duration::from_secs(5);
@@ -31,26 +32,31 @@ impl Server {
     pub async fn run(self, mut listeners: Listeners, stop: impl Future<Output = ()>) {
         let shutdown = CancellationToken::new();
         let foxglove = self.foxglove.clone();
+        let supervisor = self.daemon.supervisor().clone();
         let server = Arc::new(self);
-        let mut accepting = JoinSet::new();
+        let mut accepting = Vec::new();
         for listener in std::mem::take(&mut listeners.unix) {
             let server = Arc::clone(&server);
-            accepting.spawn(server.accept(Peer::Unix, shutdown.clone(), async move || {
+            let accept = server.accept(Peer::Unix, shutdown.clone(), async move || {
                 listener.accept().await.map(|(stream, _)| (stream, None))
-            }));
+            });
+            accepting.push(supervisor.spawn(Task::Server, accept));
         }
         for (listener, peer) in std::mem::take(&mut listeners.tcp) {
             let server = Arc::clone(&server);
-            accepting.spawn(server.accept(peer, shutdown.clone(), async move || {
+            let accept = server.accept(peer, shutdown.clone(), async move || {
                 let (stream, from) = listener.accept().await?;
                 // Each line goes out at once.
                 stream.set_nodelay(true)?;
                 Ok((stream, Some(from.ip())))
-            }));
+            });
+            accepting.push(supervisor.spawn(Task::Server, accept));
         }
         stop.await;
         shutdown.cancel();
-        while accepting.join_next().await.is_some() {}
+        for accept in accepting {
+            drop(accept.await);
+        }
         if let Some(viewers) = foxglove {
             drop(timeout(LAST_CALL, viewers.is_empty()).await);
         }

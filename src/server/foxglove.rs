@@ -25,6 +25,7 @@ use crate::{
         Live, LiveMessage, Settings, Topic,
         foxglove::{MOST_TEXT_BYTES, server_info},
     },
+    supervisor::Task,
 };
 use message_queue::{Found, MOST_MESSAGE_BYTES, MessageQueue, Outgoing, Viewer};
 
@@ -72,7 +73,7 @@ impl Viewers {
         let mut told = Told(Arc::clone(&viewers));
         let live = Live::new(Settings::default()).with_map(keys.map);
         let follower = Follower::begin(daemon, live, &mut told);
-        tokio::spawn(follow(follower, told));
+        drop(daemon.supervisor().spawn(Task::LiveMessages, follow(follower, told)));
         viewers
     }
 

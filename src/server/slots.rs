@@ -33,15 +33,23 @@ pub(super) struct Slot {
     address: Option<(IpAddr, Counts)>,
 }
 
+/// Connections that each way in may have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Shares {
+    pub(super) socket: usize,
+    pub(super) loopback: usize,
+    pub(super) network: usize,
+}
+
 impl Slots {
-    /// So many for each way in; half of them for one address, and for streams of guests.
-    pub(super) fn new(most: usize) -> Self {
+    /// Slots by way in; half of the network's for one address, and as many for streams of guests.
+    pub(super) fn new(shares: Shares) -> Self {
         let places = |count: usize| Arc::new(Semaphore::new(count));
-        let half = most.div_ceil(2);
+        let half = shares.network.div_ceil(2);
         Self {
-            socket: places(most),
-            loopback: places(most),
-            network: places(most),
+            socket: places(shares.socket),
+            loopback: places(shares.loopback),
+            network: places(shares.network),
             guest_streams: places(half),
             by_address: Arc::default(),
             most_by_address: half,
@@ -102,7 +110,7 @@ mod tests {
 
     #[test]
     fn nobody_takes_the_places_of_another_way_in_or_address() {
-        let places = Slots::new(4);
+        let places = Slots::new(Shares { socket: 4, loopback: 4, network: 4 });
         let [one, other] = [1, 2].map(|last| IpAddr::from([192, 168, 1, last]));
         let mut taken = Vec::new();
         for (peer, address, free) in [
@@ -122,7 +130,7 @@ mod tests {
 
     #[test]
     fn streams_of_guests_leave_half_of_the_places() {
-        let places = Slots::new(5);
+        let places = Slots::new(Shares { socket: 5, loopback: 5, network: 5 });
         let guests: Vec<_> = (0..10).filter_map(|_| places.take_stream(Standing::Guest)).collect();
         assert_eq!(guests.len(), 3);
         assert!(places.take_stream(Standing::Token).is_some());

@@ -1,7 +1,11 @@
 //! What can go wrong with a log, and what to do about it.
 
-use std::{io, path::PathBuf};
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
 
+use rustix::{fs::statvfs, io::Errno};
 use thiserror::Error;
 
 use super::FileKind;
@@ -104,13 +108,13 @@ impl StoreError {
             Self::Unreadable { source, .. } | Self::Read { source, .. } => {
                 help_for_reading(source).into()
             }
-            Self::Open { source, .. } | Self::Write { source, .. } | Self::Sync { source, .. } => {
-                help_for(source)
-            }
+            Self::Open { source, path }
+            | Self::Write { source, path }
+            | Self::Sync { source, path, .. } => help_for(source, path),
             Self::NoLog { kind, .. } => kind.instead_of_a_log().into(),
             Self::Busy { .. } => "wait until it is done, stop it, or choose another file".into(),
             Self::Torn { source, path } => {
-                format!("{}; then `sonard log repair {}`", help_for(source), path.display())
+                format!("{}; then `sonard log repair {}`", help_for(source, path), path.display())
             }
             Self::Failed { .. } => "open it again: that repairs its end".into(),
             Self::Record { .. } => "this is a fault of the program: please report it".into(),
@@ -132,22 +136,49 @@ impl From<StoreError> for SinkError {
     }
 }
 
-fn help_for(error: &io::Error) -> String {
+fn help_for(error: &io::Error, path: &Path) -> String {
     use io::ErrorKind as Kind;
     match error.kind() {
-        Kind::StorageFull | Kind::QuotaExceeded | Kind::FileTooLarge => {
-            "make room on that disk (or raise the quota or file-size limit) and start again: \
-             every record before this one is in the log"
+        Kind::StorageFull if !has_free_inodes(path) => {
+            "that file system has bytes left but no inodes (`df -i`): remove files there; every record before this one \
+             is in the log"
+        }
+        Kind::StorageFull => "make room on that disk: every record before this one is in the log",
+        Kind::QuotaExceeded => {
+            "the disk quota of this user is used up: raise it or make room; every record before this one is in the log"
+        }
+        Kind::FileTooLarge => {
+            "the file-size limit of this process is reached (`ulimit -f`, LimitFSIZE=): raise it, or lower \
+             log.rotate_mb; every record before this one is in the log"
         }
         Kind::NotFound => "check the path; its folder must exist",
-        Kind::PermissionDenied | Kind::ReadOnlyFilesystem => {
-            "choose a place where you may write, or change its permissions"
+        Kind::ReadOnlyFilesystem => {
+            "that file system is mounted read-only, perhaps after an error of its disk (`dmesg`): remount it, or \
+             choose another place"
         }
+        Kind::PermissionDenied => "choose a place where you may write, or change its permissions",
         Kind::IsADirectory => "name a file in that folder",
         Kind::InvalidInput => "move it out of the way, or choose another place",
+        _ if is_out_of_descriptors(error) => {
+            "no file descriptors are left: close programs, or raise the limit (`ulimit -n`, LimitNOFILE=)"
+        }
         _ => "check the disk; every record synced before is in the log",
     }
     .into()
+}
+
+/// Whether the file system of a path, or of its folder, can take another file; `true` where that is unknown.
+fn has_free_inodes(path: &Path) -> bool {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let stat = statvfs(path).or_else(|_| statvfs(folder.unwrap_or(Path::new("."))));
+    // File systems without a fixed count of inodes report none at all.
+    stat.map_or(true, |stat| stat.f_files == 0 || stat.f_favail > 0)
+}
+
+/// Whether an error is that of a process or system without free file descriptors.
+pub(crate) fn is_out_of_descriptors(error: &io::Error) -> bool {
+    let errno = error.raw_os_error();
+    [Errno::MFILE, Errno::NFILE].iter().any(|limit| errno == Some(limit.raw_os_error()))
 }
 
 fn help_for_reading(error: &io::Error) -> &'static str {

@@ -1,5 +1,7 @@
 //! A folder of logs: one is written, full ones are left behind, whole sessions in each.
 
+mod replacement;
+
 use std::{
     fs::{self, File},
     io,
@@ -10,8 +12,9 @@ use std::{
 
 use jiff::{Timestamp, tz::TimeZone};
 
-use super::{LogWriter, StoreError, open::sync_folder_of};
-use crate::scan::{Event, EventKind, Record, Session};
+use super::{LogWriter, StoreError, sync::sync_folder_of};
+use crate::scan::{Event, EventKind, Record, ScanStart, Session};
+use replacement::Replacement;
 
 const PREFIX: &str = "sonard-";
 const SUFFIX: &str = ".jsonl";
@@ -49,12 +52,23 @@ pub struct LogFolder {
     writer: Option<LogWriter>,
     day: String,
     session: Option<Box<Session>>,
-    in_scan: bool,
     /// No scan is in the log yet: it has no reason to end.
     fresh: bool,
     /// Whether the file lacks the session in force.
     bare: bool,
+    /// Where the scan under way begins in the file, bytes, with its first record.
+    scan: Option<(u64, Box<ScanStart>)>,
+    /// Gaps that the next file begins with: the present one can't be continued.
+    replacement: Option<Replacement>,
+    /// Records of earlier files: appended, and of those, on the disk for good.
+    appended_before: u64,
     synced_before: u64,
+    /// Records of earlier files that will never be confirmed to be on the disk.
+    uncertain: u64,
+    /// The file was moved during the scan under way.
+    is_displaced: bool,
+    /// Report of a log that had to be replaced.
+    incident: Option<String>,
 }
 
 /// The logs of a folder, oldest first.
@@ -99,18 +113,24 @@ impl LogFolder {
             writer: None,
             day,
             session: None,
-            in_scan: false,
             fresh: false,
             bare: false,
+            scan: None,
+            replacement: None,
+            appended_before: 0,
             synced_before: 0,
+            uncertain: 0,
+            is_displaced: false,
+            incident: None,
         };
-        log.writer()?;
+        log.writer(now)?;
         log.fresh = fs::metadata(&log.path).map_err(fail)?.len() == 0;
         if ends_within_scan(&log.path).map_err(fail)? {
             let detail = "the program ended within the scan before this".to_owned();
             let event = Event { time: now, kind: EventKind::Gap, detail };
-            log.writer()?.append(&Record::Event(event))?;
-            log.writer()?.sync()?;
+            let writer = log.writer(now)?;
+            writer.append(&Record::Event(event))?;
+            writer.sync()?;
         }
         Ok(log)
     }
@@ -124,19 +144,24 @@ impl LogFolder {
     pub fn append(&mut self, record: &Record, now: Timestamp) -> Result<(), StoreError> {
         let begins = matches!(record, Record::ScanStart(_));
         if begins || matches!(record, Record::Session(_)) {
+            self.inspect(now)?;
             self.rotate_if_due(now)?;
             if begins && self.bare {
-                self.put_session()?;
+                self.put_session(now)?;
             }
         }
-        let outcome = self.put(record);
+        let offset = self.writer(now)?.length();
+        let outcome = self.put(record, now);
         if matches!(outcome, Ok(()) | Err(StoreError::Sync { .. })) {
             match record {
                 Record::Session(session) => {
                     (self.session, self.bare) = (Some(session.clone()), false);
                 }
-                Record::ScanStart(_) => (self.in_scan, self.fresh) = (true, false),
-                Record::ScanEnd(_) => self.in_scan = false,
+                Record::ScanStart(start) => {
+                    self.scan = Some((offset, Box::new(start.clone())));
+                    self.fresh = false;
+                }
+                Record::ScanEnd(_) => self.scan = None,
                 Record::Ping(_) | Record::Event(_) => {}
             }
         }
@@ -147,8 +172,8 @@ impl LogFolder {
     ///
     /// # Errors
     /// As [`LogWriter::sync`].
-    pub fn sync_if_due(&mut self) -> Result<(), StoreError> {
-        let outcome = self.writer()?.sync_if_due(Instant::now());
+    pub fn sync_if_due(&mut self, now: Timestamp) -> Result<(), StoreError> {
+        let outcome = self.writer(now)?.sync_if_due(Instant::now());
         self.survive(outcome)
     }
 
@@ -163,50 +188,87 @@ impl LogFolder {
         &self.path
     }
 
-    /// Records that are on the disk for good, of those appended since the folder was opened.
+    /// Records appended since the folder was opened.
+    #[must_use]
+    pub fn appended(&self) -> u64 {
+        self.appended_before + self.writer.as_ref().map_or(0, LogWriter::appended)
+    }
+
+    /// Records that are on the disk for good, of those [`appended`](Self::appended).
     #[must_use]
     pub fn synced(&self) -> u64 {
         self.synced_before + self.writer.as_ref().map_or(0, LogWriter::synced)
+    }
+
+    /// Records that will never be confirmed, of those [`appended`](Self::appended): their sync failed, or their file was
+    /// removed or changed.
+    #[must_use]
+    pub const fn uncertain(&self) -> u64 {
+        self.uncertain
     }
 
     /// Syncs and lets go of the log.
     ///
     /// # Errors
     /// As [`LogWriter::sync`].
-    pub fn close(self) -> Result<(), StoreError> {
-        self.writer.map_or(Ok(()), LogWriter::close)
+    pub fn close(&mut self) -> Result<(), StoreError> {
+        let outcome = self.writer.as_mut().map_or(Ok(()), LogWriter::sync);
+        self.release_writer();
+        outcome
     }
 
-    fn put(&mut self, record: &Record) -> Result<(), StoreError> {
-        let outcome = self.writer()?.append(record);
+    fn put(&mut self, record: &Record, now: Timestamp) -> Result<(), StoreError> {
+        let outcome = self.writer(now)?.append(record);
         self.survive(outcome)
     }
 
-    fn writer(&mut self) -> Result<&mut LogWriter, StoreError> {
-        let interval = self.rotation.sync_interval;
+    fn writer(&mut self, now: Timestamp) -> Result<&mut LogWriter, StoreError> {
+        if self.replacement.is_some() {
+            self.begin_replacement(now)?;
+        }
         let writer = match self.writer.take() {
             Some(writer) => writer,
-            None => LogWriter::open(&self.path)?.with_sync_interval(interval).with_scenes_beside(),
+            None => self.open_writer()?,
         };
         Ok(self.writer.insert(writer))
     }
 
-    /// Lets go of a log that takes no more records, so that it is opened anew.
+    fn open_writer(&self) -> Result<LogWriter, StoreError> {
+        let writer = LogWriter::open(&self.path)?;
+        Ok(writer.with_sync_interval(self.rotation.sync_interval).with_scenes_beside())
+    }
+
+    /// Lets go of a log that takes no more records. After a failed sync another file is begun, since a later sync of
+    /// this one proves nothing about what was written before; after a torn record its end is mended.
     fn survive(&mut self, outcome: Result<(), StoreError>) -> Result<(), StoreError> {
         use StoreError::{Failed, Sync, Torn};
-        if let Err(Torn { .. } | Sync { .. } | Failed { .. }) = &outcome
-            && let Some(writer) = self.writer.take()
-        {
-            self.synced_before += writer.synced();
+        match &outcome {
+            Err(Sync { source, unsynced, .. }) => {
+                let file = self.file_name();
+                let detail = format!(
+                    "{file} could not be synced ({source}): its last {unsynced} record(s) may not be on the disk"
+                );
+                self.replace(detail, Vec::new());
+            }
+            Err(Torn { .. } | Failed { .. }) => self.release_writer(),
+            _ => {}
         }
         outcome
     }
 
+    /// Closes the file and takes over its counts.
+    fn release_writer(&mut self) {
+        if let Some(writer) = self.writer.take() {
+            self.appended_before += writer.appended();
+            self.synced_before += writer.synced();
+        }
+    }
+
     /// Repeats the session in force in a file that lacks it. Until that has succeeded the file
     /// stays bare, so that another try does not leave it out.
-    fn put_session(&mut self) -> Result<(), StoreError> {
+    fn put_session(&mut self, now: Timestamp) -> Result<(), StoreError> {
         let Some(session) = self.session.clone() else { return Ok(()) };
-        match self.put(&Record::Session(session)) {
+        match self.put(&Record::Session(session), now) {
             Ok(()) => {
                 self.bare = false;
                 Ok(())
@@ -225,20 +287,26 @@ impl LogFolder {
     fn rotate_if_due(&mut self, now: Timestamp) -> Result<(), StoreError> {
         let bytes = fs::metadata(&self.path).map_or(0, |metadata| metadata.len());
         let too_old = self.rotation.daily && self.day != day(now);
-        if self.in_scan || self.fresh || !(bytes > self.rotation.max_bytes || too_old) {
+        if self.scan.is_some() || self.fresh || !(bytes > self.rotation.max_bytes || too_old) {
             return Ok(());
         }
-        if let Some(writer) = self.writer.take() {
-            self.synced_before += writer.appended();
+        if let Some(writer) = &mut self.writer {
+            let synced = writer.sync();
             let path = self.path.clone();
             // The record that is to follow is not in any log yet, which `Sync` would say.
-            writer.close().map_err(|_| StoreError::Failed { path })?;
+            self.survive(synced).map_err(|_| StoreError::Failed { path })?;
+            self.release_writer();
         }
-        self.path = self.folder.join(file_name(&self.folder, now));
-        (self.day, self.fresh, self.bare) = (day(now), true, true);
-        self.writer()?;
+        self.name_next_file(now);
+        self.writer(now)?;
         self.remove_oldest();
         Ok(())
+    }
+
+    /// Names the next file, which has no session yet.
+    fn name_next_file(&mut self, now: Timestamp) {
+        self.path = self.folder.join(file_name(&self.folder, now));
+        (self.day, self.fresh, self.bare) = (day(now), true, true);
     }
 
     /// Removes the oldest logs as far as the limit asks for it, never the one being written.

@@ -9,11 +9,17 @@ use std::{
 };
 
 use jiff::Timestamp;
-use rustix::fs::{FlockOperation, OFlags, flock};
+use rustix::{
+    fs::{FlockOperation, OFlags, flock},
+    io::Errno,
+};
 
 use crate::scan::{Event, EventKind, MAX_LINE_BYTES};
 
-use super::{FileMedium, Medium, Pipe, StoreError, reader};
+use super::{
+    FileMedium, Medium, Pipe, StoreError, reader,
+    sync::{is_unsupported, sync_file, sync_folder_of},
+};
 
 /// The damage at the end of a log and its repair.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -59,11 +65,15 @@ pub(super) fn open_file(
         return Ok((Box::new(Pipe(file)), None));
     }
     let file = open_locked(path)?;
-    if existing.is_err() {
-        sync_folder_of(path).map_err(fail)?;
+    if existing.is_err()
+        && let Err(error) = sync_folder_of(path)
+    {
+        // Nothing is written to it yet, and nothing is to be left of a log that could not be made.
+        let _ = fs::remove_file(path);
+        return Err(fail(error));
     }
     let recovered = mend_end(&file, path).map_err(fail)?;
-    Ok((Box::new(FileMedium(file)), recovered))
+    Ok((Box::new(FileMedium::new(file).map_err(fail)?), recovered))
 }
 
 /// Opens a file that is to be changed, where it is: a symbolic link in its place is refused, since
@@ -106,6 +116,13 @@ pub(super) fn lock(file: &File, path: &Path) -> Result<(), StoreError> {
     match flock(file, FlockOperation::NonBlockingLockExclusive) {
         Ok(()) => Ok(()),
         Err(rustix::io::Errno::WOULDBLOCK) => Err(StoreError::Busy { path: path.into() }),
+        Err(error) if is_unsupported(error.raw_os_error()) || error == Errno::NOLCK => {
+            tracing::warn!(
+                "{} can't be locked on this file system ({error}): make sure that no other program writes to it",
+                path.display()
+            );
+            Ok(())
+        }
         Err(error) => Err(StoreError::Open { path: path.into(), source: error.into() }),
     }
 }
@@ -134,13 +151,13 @@ fn mend_end(file: &File, path: &Path) -> io::Result<Option<Recovered>> {
         file.read_exact_at(&mut last, offset)?;
         if reader::decode(&last, if offset == 0 { 1 } else { 2 }, false).is_ok() {
             io::Write::write_all(&mut &*file, b"\n")?;
-            file.sync_data()?;
+            sync_file(file)?;
             return Ok(Some(Recovered::Newline));
         }
     }
     let kept = keep_torn(file, offset, path)?;
     file.set_len(offset)?;
-    file.sync_data()?;
+    sync_file(file)?;
     Ok(Some(Recovered::Torn { offset, bytes, kept }))
 }
 
@@ -164,7 +181,7 @@ fn last_line_offset(file: &File, length: u64) -> io::Result<u64> {
 fn keep_torn(mut file: &File, offset: u64, path: &Path) -> io::Result<PathBuf> {
     let (mut kept, name) = create_next(|n| with_suffix(path, &format!(".torn-{n}")))?;
     file.seek(SeekFrom::Start(offset))?;
-    let copied = io::copy(&mut file, &mut kept).and_then(|_| kept.sync_all());
+    let copied = io::copy(&mut file, &mut kept).and_then(|_| sync_file(&kept));
     if let Err(error) = copied {
         // The log still has the bytes; half a copy would only confuse.
         let _ = fs::remove_file(&name);
@@ -192,10 +209,4 @@ pub(super) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = OsString::from(path);
     name.push(suffix);
     name.into()
-}
-
-/// Brings the folder's entries to the disk, so that a new or renamed file keeps its name.
-pub(super) fn sync_folder_of(path: &Path) -> io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
 }

@@ -10,8 +10,9 @@ use crate::scan::{FaultKind, RecordError};
 
 use super::{
     FileKind, Line, LineError, StoreError,
-    open::{lock, open_own, sync_folder_of, with_suffix},
+    open::{lock, open_own, with_suffix},
     open_for_reading, read_log,
+    sync::{sync_file, sync_folder_of},
 };
 
 /// A line that a repair left out.
@@ -143,7 +144,7 @@ impl Draft {
     fn replace(&self, original: &File, log: &Path) -> Result<PathBuf, StoreError> {
         let swap = || {
             self.file.set_permissions(original.metadata()?.permissions())?;
-            self.file.sync_all()?;
+            sync_file(&self.file)?;
             let kept = keep_original(log)?;
             sync_folder_of(log)?;
             fs::rename(&self.path, log)?;
@@ -174,7 +175,7 @@ fn keep_original(log: &Path) -> io::Result<PathBuf> {
             Err(_) => {
                 let mut copy = OpenOptions::new().write(true).create_new(true).open(&kept)?;
                 io::copy(&mut File::open(log)?, &mut copy)?;
-                copy.sync_all()?;
+                sync_file(&copy)?;
                 return Ok(kept);
             }
         }

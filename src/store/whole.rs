@@ -14,7 +14,7 @@ use rustix::{
 };
 use tempfile::{Builder, NamedTempFile};
 
-use super::open::sync_folder_of;
+use super::sync::{sync_file, sync_folder_of};
 
 /// A new file is readable for whom the umask leaves it.
 const MODE: u32 = 0o666;
@@ -56,7 +56,7 @@ impl WholeFile {
     /// # Errors
     /// As the system says; what was in its place stays.
     pub fn take_place(self) -> io::Result<()> {
-        self.as_file().sync_all()?;
+        sync_file(self.as_file())?;
         let Self { draft, path } = self;
         let persisted = match draft {
             Draft::Named(draft) => draft.persist(&path).map(drop).map_err(|error| error.error),

@@ -9,7 +9,7 @@ use std::{
 use crate::scan::{Record, encode_line};
 
 use super::{
-    Medium, Pipe, StoreError,
+    Displacement, Medium, Pipe, StoreError,
     open::{Recovered, open_file},
     scenes::SceneKeeper,
 };
@@ -181,6 +181,24 @@ impl<M: Medium> LogWriter<M> {
     /// What it writes to: for what is to happen to it after the last record.
     pub fn medium_mut(&mut self) -> &mut M {
         &mut self.medium
+    }
+
+    /// Length of the log by what was written, bytes; 0 where there is none.
+    pub(super) fn length(&self) -> u64 {
+        self.medium.length()
+    }
+
+    /// Everything written from a byte on.
+    pub(super) fn read_from(&self, offset: u64) -> io::Result<Vec<u8>> {
+        self.medium.read_from(offset)
+    }
+
+    /// Deviation of the open file from the one that the log's path names.
+    ///
+    /// # Errors
+    /// When file or path can't be examined.
+    pub fn displacement(&self) -> io::Result<Option<Displacement>> {
+        self.medium.displacement(&self.path)
     }
 
     /// Records appended through this writer.

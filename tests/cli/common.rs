@@ -17,6 +17,17 @@ pub(crate) fn sonard(arguments: &[&str]) -> Command {
     command
 }
 
+/// A command that runs in a session of its own, without a controlling terminal.
+pub(crate) fn without_terminal(mut command: Command) -> Command {
+    use std::os::unix::process::CommandExt as _;
+    #[allow(unsafe_code, reason = "between fork and exec, only a system call is made")]
+    // SAFETY: setsid(2) is async-signal-safe.
+    unsafe {
+        command.pre_exec(|| rustix::process::setsid().map(drop).map_err(Into::into));
+    }
+    command
+}
+
 /// Runs it to its end.
 pub(crate) fn run(arguments: &[&str]) -> Output {
     sonard(arguments).output().expect("the program starts")

@@ -3,8 +3,11 @@
 mod access;
 mod api;
 mod board;
+mod chaos;
 mod clock;
 mod configuration;
+mod descriptors;
+mod disk;
 mod explained;
 mod faults;
 pub(crate) mod fleet;
@@ -13,6 +16,7 @@ mod gather;
 mod kill;
 mod load;
 mod location;
+mod log_file;
 pub(crate) mod model;
 mod monitoring;
 mod mqtt;
@@ -20,9 +24,12 @@ mod requests;
 pub(crate) mod rig;
 mod schema;
 mod sensor;
+mod signals;
 mod simulate;
 mod soak;
+mod stderr;
 mod strangers;
+mod supervision;
 mod systemd;
 pub(crate) mod viewpoint;
 
@@ -76,7 +83,14 @@ impl Daemon {
     }
 
     /// The same by a command that ends in the program.
-    pub(crate) fn start_as(mut command: Command, folder: &Path, further: &[&str]) -> Self {
+    pub(crate) fn start_as(command: Command, folder: &Path, further: &[&str]) -> Self {
+        let daemon = Self::spawn(command, folder, further);
+        wait_until("the API", || daemon.connect().is_ok());
+        daemon
+    }
+
+    /// The same without waiting for its API.
+    pub(crate) fn spawn(mut command: Command, folder: &Path, further: &[&str]) -> Self {
         let mut child = command
             .args(["run", "--log"])
             .arg(folder.join("log"))
@@ -96,9 +110,7 @@ impl Daemon {
                 *heard.lock().expect("no panic") += &(line + "\n");
             }
         });
-        let daemon = Self { child, folder: folder.into(), said };
-        wait_until("the API", || daemon.connect().is_ok());
-        daemon
+        Self { child, folder: folder.into(), said }
     }
 
     pub(crate) fn id(&self) -> u32 {

@@ -1,7 +1,5 @@
 //! What may be wrong with readings that a calibration does not explain.
 
-use anstream::eprintln;
-
 use crate::inverse::{Atlas, Fitted, Mode, Sweep, World, doubts, locate};
 
 /// Below this share of explained readings a pose is not the answer either.
@@ -14,7 +12,7 @@ pub(super) fn doubts_of(world: &World, sweeps: &[Sweep], fitted: &Fitted) -> Vec
     if !fitted.is_doubtful() {
         return Vec::new();
     }
-    eprintln!("a good part of the readings is not explained: looking for the reason");
+    notice!("a good part of the readings is not explained: looking for the reason");
     let Ok(atlas) = Atlas::new(world, Atlas::usual_spacing_m(&world.scene)) else {
         return Vec::new();
     };

@@ -189,7 +189,7 @@ impl Unfinished {
         };
         if let Err(why) = written {
             let path = self.path.display();
-            anstream::eprintln!(
+            notice!(
                 "warning: cannot add to {path}: {why}; if it is stopped, it will go on from before this"
             );
             *file = None;

@@ -85,7 +85,7 @@ impl LocalDevice {
             };
             let Some(wait) = patience.next_wait() else { return Err(halt) };
             if !std::mem::replace(&mut told, true) {
-                anstream::eprintln!("waiting for the ranger: {halt}");
+                notice!("waiting for the ranger: {halt}");
             }
             tokio::select! {
                 () = sleep(wait) => {}

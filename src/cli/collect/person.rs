@@ -41,11 +41,11 @@ impl Watcher for Person {
 
     /// Prints a line above the bar.
     fn say(&self, line: &str) {
-        self.bar.suspend(|| anstream::eprintln!("{line}"));
+        self.bar.suspend(|| notice!("{line}"));
     }
 
     fn announce(&self, scans: u32, left_s: f64) {
-        anstream::eprintln!("{scans} scans to take, about {}", human(left_s));
+        notice!("{scans} scans to take, about {}", human(left_s));
     }
 
     /// Takes the bar away, for a question or for good, until the next scan begins: drawn again

@@ -24,6 +24,7 @@ impl Terminal {
 /// A thread of its own: it ends with the process, however long a line takes.
 fn listen() -> UnboundedReceiver<String> {
     let (sender, lines) = unbounded_channel();
+    #[allow(clippy::disallowed_methods, reason = "it only reads keys")]
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {
             if sender.send(line).is_err() {

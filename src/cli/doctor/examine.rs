@@ -47,7 +47,7 @@ const SETTINGS: Settings = Settings {
 };
 
 /// Examines the board at `port`, as far as one gets.
-pub(super) async fn examine(port: &str, args: &Args) -> Report {
+pub(super) async fn examine(port: &str, args: &Args, interrupts: Interrupts) -> Report {
     let mut report = Report { port: port.to_owned(), checks: Vec::new() };
     let line = match link::open(port) {
         Ok(line) => line,
@@ -57,7 +57,6 @@ pub(super) async fn examine(port: &str, args: &Args) -> Report {
         }
     };
     report.checks.push(Check::ok("port", "opened, and nobody else has it"));
-    let interrupts = Interrupts::listen();
     let config = HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, rand::random()) };
     let driver = Driver::new(line, config);
     let mut patient = Patient { driver, restarts: 0, exchanges: Vec::new() };

@@ -115,7 +115,7 @@ impl Report {
             let text = serde_json::to_string(self).map_err(|error| {
                 Failure::device(error, "this is a fault of the program: report it")
             })?;
-            anstream::println!("{text}");
+            print_line!("{text}");
             return Ok(());
         }
         for Check { check, status, detail, help, .. } in &self.checks {
@@ -125,9 +125,9 @@ impl Report {
                 Status::Failed => "FAILED",
                 Status::Skipped => "skipped",
             };
-            anstream::println!("{check:<9} {word:<8} {detail}");
+            print_line!("{check:<9} {word:<8} {detail}");
             if let Some(help) = help {
-                anstream::println!("{:<18} -> {help}", "");
+                print_line!("{:<18} -> {help}", "");
             }
         }
         Ok(())

@@ -15,7 +15,7 @@ pub(super) fn part(
 ) -> Result<Part, Failure> {
     let (part, told) = told(given, variable, shards)?;
     if let Some(told) = told {
-        anstream::eprintln!("{told}");
+        notice!("{told}");
     }
     Ok(part)
 }

@@ -105,7 +105,7 @@ impl Predictor<'_> {
             Ok(sweep) => sweep,
             Err(error) => {
                 let log = Path::display(&self.args.log);
-                anstream::eprintln!("{log}: scan {} has no confidences: {error}", scan.scan);
+                notice!("{log}: scan {} has no confidences: {error}", scan.scan);
                 return Ok(Confidences::new());
             }
         };

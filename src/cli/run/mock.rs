@@ -13,12 +13,13 @@ use crate::{
     },
     daemon::Settings,
     mock::{MockPort, Pace},
+    supervisor::{Supervisor, Task},
 };
 
 pub(super) struct Mock {
     link: PathBuf,
     stop: CancellationToken,
-    playing: JoinHandle<std::io::Result<()>>,
+    playing: JoinHandle<Option<std::io::Result<()>>>,
 }
 
 impl Mock {
@@ -26,6 +27,7 @@ impl Mock {
         world: &MockWorldArgs,
         virtual_time: bool,
         settings: &Settings,
+        supervisor: &Supervisor,
     ) -> Result<Self, Failure> {
         let air = &settings.keys.air;
         let air = Air::new(air.temperature_c, air.humidity_percent, air.pressure_kpa)
@@ -50,7 +52,7 @@ impl Mock {
         let stop = CancellationToken::new();
         let stopped = stop.clone().cancelled_owned();
         let note = |note: crate::mock::Note| tracing::debug!("mock: {note}");
-        let playing = tokio::spawn(port.run(stopped, note));
+        let playing = supervisor.spawn(Task::Mock, port.run(stopped, note));
         Ok(Self { link, stop, playing })
     }
 

@@ -21,13 +21,12 @@ pub(super) fn run(args: &Args) -> Outcome {
     let output = Output::open(args.out.as_deref())?;
     let mut scans =
         Scans { output, wanted: args.repeat, ends: Vec::new(), told_again: 0, pose, plan };
-    let measured = runtime::new()?.block_on(async {
-        let interrupts = Interrupts::listen();
+    let measured = runtime::run_interruptible(async |interrupts| {
         let status: Status = client.get_json("/v1/status").await.map_err(|error| refuse(&error))?;
         check_scene(status.scene.as_ref(), &scene)?;
         let requested =
             RequestedScans::ask(client, &request).await.map_err(|error| refuse(&error))?;
-        anstream::eprintln!("the daemon takes {} scan(s), {}", args.repeat, first(&status));
+        notice!("the daemon takes {} scan(s), {}", args.repeat, first(&status));
         let followed = scans.follow(requested, &interrupts).await;
         scans.output.end_scan();
         followed
@@ -69,7 +68,7 @@ impl Scans {
             self.take_in(&record)?;
             let again = scans.fetched_again() - self.told_again;
             if again > 0 {
-                anstream::eprintln!("{again} readings were fetched again");
+                notice!("{again} readings were fetched again");
                 self.told_again += again;
             }
         }
@@ -87,7 +86,7 @@ impl Scans {
         if let Record::ScanStart(start) = record {
             let turn = self.ends.len() as u32 + 1;
             let (wanted, beams) = (self.wanted, start.plan.beams());
-            anstream::eprintln!("scan {turn} of {wanted} has begun: {beams} beams");
+            notice!("scan {turn} of {wanted} has begun: {beams} beams");
             self.output.begin_scan(turn, wanted, beams);
         }
         self.output.record(record)?;

@@ -33,7 +33,7 @@ pub(super) fn print(
     .into_iter()
     .flatten()
     {
-        anstream::eprintln!("{line}");
+        notice!("{line}");
     }
 }
 
@@ -45,12 +45,12 @@ pub(super) fn print_of_daemon(end: &ScanEnd, output: &Output) {
         let device = session.device.as_ref().map_or("", |device| &device.serial);
         format!("{} {device}", provenance_text(session.provenance))
     });
-    anstream::eprintln!("by the daemon's {}", by.as_deref().unwrap_or("ranger").trim_end());
-    anstream::eprintln!("{}", beams(end, views.last()));
+    notice!("by the daemon's {}", by.as_deref().unwrap_or("ranger").trim_end());
+    notice!("{}", beams(end, views.last()));
     if let Some(model) = session.and_then(|session| session.model.as_ref()) {
-        anstream::eprintln!("{}", agreement(&compare(&views).0, &model.engine));
+        notice!("{}", agreement(&compare(&views).0, &model.engine));
     }
-    anstream::eprintln!("{}", time(end));
+    notice!("{}", time(end));
 }
 
 fn provenance_text(provenance: Provenance) -> String {
@@ -117,7 +117,7 @@ fn time(end: &ScanEnd) -> String {
 
 /// One line about the line over several scans.
 pub(super) fn print_total(scans: u32, link: &LinkStats) {
-    anstream::eprintln!("{scans} scans in all\n{}", traffic(&LinkStats::default(), link));
+    notice!("{scans} scans in all\n{}", traffic(&LinkStats::default(), link));
 }
 
 fn traffic(before: &LinkStats, now: &LinkStats) -> String {

@@ -65,7 +65,7 @@ impl MadeArgs {
     pub(super) fn write(&self, from: &Path, found: &Surfaces, help_if_none: &str) -> Outcome {
         let shown = from.display();
         for (what, count) in found.left_out() {
-            anstream::eprintln!("warning: {shown}: left out: {count} {what}");
+            notice!("warning: {shown}: left out: {count} {what}");
         }
         if found.is_empty() {
             return Err(refuse(from, &"no wall is found in it", help_if_none));
@@ -80,7 +80,7 @@ impl MadeArgs {
             None => super::print(scene.text().trim_end()),
             Some(path) => {
                 self.overwrite.save(path, Product::Log, scene.text().as_bytes())?;
-                anstream::eprintln!("{}", super::summary(&built));
+                notice!("{}", super::summary(&built));
                 Ok(())
             }
         }

@@ -45,7 +45,7 @@ pub(super) async fn watch(daemons: Vec<Asked>, path: &str, json: bool) -> Outcom
     while let Some(line) = lines.recv().await {
         let text = match line {
             Line::News(news) => {
-                anstream::eprintln!("{news}");
+                notice!("{news}");
                 continue;
             }
             Line::Record(robot, line) if json => of_robot(&robot, &line),

@@ -17,11 +17,13 @@ pub(super) struct OpenScan {
     pub(super) beams: HashMap<u32, (u64, bool)>,
     /// Whether an event in the log accounts for an early end.
     pub(super) interrupted: bool,
+    /// An event reports that records were lost.
+    pub(super) has_gap: bool,
 }
 
 impl OpenScan {
     pub(super) fn new(id: Uuid, line: u64, plan: Option<ScanPlan>) -> Self {
-        Self { id, line, plan, beams: HashMap::new(), interrupted: false }
+        Self { id, line, plan, beams: HashMap::new(), interrupted: false, has_gap: false }
     }
 
     pub(super) fn not_ended(&self, when: &str) -> String {

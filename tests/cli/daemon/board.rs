@@ -18,6 +18,7 @@ use sonard::{
     link,
     mock::Pace,
     scene::parse_pose,
+    supervisor::Supervisor,
 };
 use tokio::runtime::Runtime;
 use tokio_util::sync::CancellationToken;
@@ -77,17 +78,19 @@ fn run(
 ) -> Arc<Switches> {
     let switches = Arc::new(Switches::default());
     let runtime = Runtime::new().expect("threads");
-    let (journal, thread) = Journal::open(&folder.join("log"), settings.rotation()).expect("a log");
-    let gpio = Box::new(Switchboard(Arc::clone(&switches)));
-    let resources = Resources { open_port: Box::new(link::open), gpio, journal };
-    let stop = CancellationToken::new();
+    let supervisor = Supervisor::default();
     let context = runtime.enter();
+    let opened = Journal::open(&folder.join("log"), settings.rotation(), &supervisor);
+    let (journal, thread) = opened.expect("a log");
+    let gpio = Box::new(Switchboard(Arc::clone(&switches)));
+    let resources = Resources { open_port: Box::new(link::open), gpio, journal, supervisor };
+    let stop = CancellationToken::new();
     let (daemon, handle) = prepare(resources, settings);
     drop(context);
     let running = runtime.spawn(daemon.run(stop.clone().cancelled_owned()));
     act(&runtime, &handle, &switches);
     stop.cancel();
-    runtime.block_on(running).expect("it ends");
+    runtime.block_on(running).expect("it ends").expect("no task failed");
     assert_eq!(thread.close().error, None);
     switches
 }

@@ -109,7 +109,7 @@ fn on_a_full_disk_nothing_is_measured_and_nothing_is_lost() {
     limit_files(daemon.id(), Some(size + 20_000));
     wait_until("the disk to be full", || daemon.status()["log"]["error"].is_string());
     let error = daemon.status()["log"]["error"].clone();
-    assert!(error.as_str().is_some_and(|error| error.contains("make room")), "{error}");
+    assert!(error.as_str().is_some_and(|error| error.contains("file-size limit")), "{error}");
     daemon.wait_for("ready");
     let beams = daemon.health()["scans"]["beams"].clone();
     std::thread::sleep(Duration::from_millis(500));

@@ -61,7 +61,7 @@ impl Earlier {
         }
         if self.scans > 0 {
             let scans = self.scans;
-            anstream::eprintln!(
+            notice!(
                 "{log} holds {scans} scan(s) taken alike: this is added to it; the pictures show the \
                  last"
             );

@@ -1,0 +1,22 @@
+//! Lines on standard output and standard error.
+
+use std::io::{self, Write as _};
+
+use anstream::{AutoStream, ColorChoice, adapter::strip_str};
+
+use crate::messages::write_stderr;
+
+/// Writes a line to standard error, without colours where they are not shown.
+pub(super) fn write_notice(line: &str) {
+    match AutoStream::choice(&io::stderr()) {
+        ColorChoice::Never => write_stderr(&format!("{}\n", strip_str(line))),
+        _ => write_stderr(&format!("{line}\n")),
+    }
+}
+
+/// Writes a line to standard output. Verbs whose output is their result use
+/// [`Failure::from_write`](super::Failure::from_write) instead.
+pub(super) fn print_line(line: &str) {
+    // A reader that is gone needs no more lines.
+    drop(writeln!(anstream::stdout(), "{line}"));
+}

@@ -1,0 +1,328 @@
+//! Messages of a long-running program on standard error.
+//!
+//! Standard error can be closed, full (a pipe without reader, a stopped terminal, a stuck journal) or gone with its
+//! terminal. A message must neither fail nor block the task that emits it, so messages pass through a bounded queue to
+//! a thread of its own. When the queue is full, messages are dropped and counted.
+
+use std::{
+    collections::VecDeque,
+    io::{self, IsTerminal as _, Write},
+    os::fd::BorrowedFd,
+    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    thread,
+    time::{Duration, Instant},
+};
+
+use rustix::{
+    event::{PollFd, PollFlags, Timespec, poll},
+    io::Errno,
+};
+use tracing_subscriber::{EnvFilter, fmt::MakeWriter};
+
+/// Upper bound of the queue, bytes.
+const MAX_QUEUED_BYTES: usize = 256 * 1024;
+/// Time allowed for the queued messages to be written when the program ends.
+const DRAIN_TIMEOUT: Duration = Duration::from_millis(500);
+/// Time allowed for a message that is written directly.
+const DIRECT_TIMEOUT: Duration = Duration::from_secs(1);
+/// Largest write that does not block once poll(2) reports a pipe as writable, bytes: PIPE_BUF of Linux.
+const ATOMIC_WRITE_BYTES: usize = 4096;
+/// Level of messages unless `SONARD_LOG` sets another.
+const DEFAULT_FILTER: &str = "info,rustdds=off";
+
+/// Queue of messages for standard error. Clones share it.
+#[derive(Debug, Clone)]
+pub struct MessageQueue(Arc<Shared>);
+
+/// Drains the queue when dropped, within half a second.
+#[derive(Debug)]
+pub struct MessageGuard(MessageQueue);
+
+#[derive(Debug)]
+struct Shared {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    messages: VecDeque<Vec<u8>>,
+    bytes: usize,
+    /// A message taken from the queue is being written.
+    is_writing: bool,
+    dropped: u64,
+    /// Of those, the ones that no message has reported yet.
+    unreported: u64,
+}
+
+/// Sends tracing's messages to standard error through a [`MessageQueue`]. Under systemd the journal adds the time.
+/// Returns the queue, for the count of dropped messages, and the guard that drains it.
+#[must_use]
+pub fn log_to_stderr() -> (MessageQueue, MessageGuard) {
+    let queue = MessageQueue::start(stderr());
+    let filter =
+        EnvFilter::try_from_env("SONARD_LOG").unwrap_or_else(|_| EnvFilter::new(DEFAULT_FILTER));
+    let subscriber = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(queue.clone())
+        .with_ansi(io::stderr().is_terminal())
+        .log_internal_errors(false)
+        .with_target(false);
+    let installed = if std::env::var_os("JOURNAL_STREAM").is_some() {
+        subscriber.without_time().try_init()
+    } else {
+        subscriber.try_init()
+    };
+    // A subscriber that the caller has installed before is kept.
+    drop(installed);
+    // The default hook writes to standard error and would block with it.
+    std::panic::set_hook(Box::new(|panic| {
+        let place = panic.location().map(ToString::to_string).unwrap_or_default();
+        let cause = crate::supervisor::panic_message(panic.payload());
+        tracing::error!("internal error at {place}: {cause}; please report it");
+    }));
+    (queue.clone(), MessageGuard(queue))
+}
+
+/// Sends warnings to standard error, for programs that write their own messages there. `SONARD_LOG` sets another level.
+pub fn warn_on_stderr() {
+    let filter =
+        EnvFilter::try_from_env("SONARD_LOG").unwrap_or_else(|_| EnvFilter::new("off,sonard=warn"));
+    let subscriber = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(|| DirectWriter)
+        .with_ansi(io::stderr().is_terminal())
+        .log_internal_errors(false)
+        .with_target(false)
+        .without_time();
+    // A subscriber that the caller has installed before is kept.
+    drop(subscriber.try_init());
+}
+
+/// Writes through [`write_stderr`]; never fails.
+struct DirectWriter;
+
+impl Write for DirectWriter {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        write_stderr(&String::from_utf8_lossy(bytes));
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Writes a text to standard error for at most a second: a recipient that does not read delays the program no longer,
+/// and one that is gone is ignored.
+pub fn write_stderr(text: &str) {
+    let deadline = Instant::now() + DIRECT_TIMEOUT;
+    for piece in text.as_bytes().chunks(ATOMIC_WRITE_BYTES) {
+        if write_before(stderr(), piece, Some(deadline)).is_err() {
+            return;
+        }
+    }
+}
+
+fn stderr() -> BorrowedFd<'static> {
+    rustix::stdio::stderr()
+}
+
+impl MessageQueue {
+    /// Starts the thread that writes the messages to `output`.
+    fn start(output: BorrowedFd<'static>) -> Self {
+        let shared = Shared { state: Mutex::default(), changed: Condvar::new() };
+        let queue = Self(Arc::new(shared));
+        let writer = queue.clone();
+        #[allow(clippy::disallowed_methods, reason = "supervised tasks depend on this thread")]
+        let started = thread::Builder::new()
+            .name("messages".into())
+            .spawn(move || writer.write_messages(output));
+        // Without a thread, messages are counted as dropped once the queue is full.
+        drop(started);
+        queue
+    }
+
+    /// Messages dropped since the start.
+    #[must_use]
+    pub fn dropped(&self) -> u64 {
+        self.state().dropped
+    }
+
+    fn push(&self, message: &[u8]) {
+        let mut state = self.state();
+        if state.bytes + message.len() > MAX_QUEUED_BYTES {
+            state.dropped += 1;
+            state.unreported += 1;
+            return;
+        }
+        state.bytes += message.len();
+        state.messages.push_back(message.to_vec());
+        self.0.changed.notify_all();
+    }
+
+    fn write_messages(&self, output: BorrowedFd<'_>) {
+        loop {
+            let written = write_before(output, &self.next_message(), None);
+            let mut state = self.state();
+            state.is_writing = false;
+            state.dropped += u64::from(written.is_err());
+            self.0.changed.notify_all();
+        }
+    }
+
+    /// Waits for a message. Once the queue is empty, a message about those that were dropped follows.
+    fn next_message(&self) -> Vec<u8> {
+        let mut state = self.state();
+        loop {
+            if let Some(message) = state.messages.pop_front() {
+                state.bytes -= message.len();
+                state.is_writing = true;
+                return message;
+            }
+            if state.unreported > 0 {
+                state.is_writing = true;
+                let lost = std::mem::take(&mut state.unreported);
+                return format!("{lost} messages were dropped: standard error was blocked\n")
+                    .into();
+            }
+            state = self.0.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Waits until all messages are written, for at most `limit`.
+    fn drain(&self, limit: Duration) {
+        let deadline = Instant::now() + limit;
+        let mut state = self.state();
+        while !state.messages.is_empty() || state.is_writing || state.unreported > 0 {
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return;
+            }
+            let waited = self.0.changed.wait_timeout(state, left);
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// Nothing under this lock can panic.
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for MessageGuard {
+    fn drop(&mut self) {
+        self.0.drain(DRAIN_TIMEOUT);
+    }
+}
+
+/// Queues what is written as one message; never fails.
+impl Write for MessageQueue {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.push(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl MakeWriter<'_> for MessageQueue {
+    type Writer = Self;
+
+    fn make_writer(&self) -> Self {
+        self.clone()
+    }
+}
+
+/// Writes all bytes; before a deadline, `bytes` must not be longer than [`ATOMIC_WRITE_BYTES`]. The standard library's
+/// lock on standard error is not taken, since another thread may hold it while it blocks.
+fn write_before(
+    output: BorrowedFd<'_>,
+    mut bytes: &[u8],
+    deadline: Option<Instant>,
+) -> io::Result<()> {
+    while !bytes.is_empty() {
+        if let Some(deadline) = deadline {
+            wait_writable(output, Some(deadline))?;
+        }
+        match rustix::io::write(output, bytes) {
+            Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+            Ok(written) => bytes = bytes.get(written..).unwrap_or_default(),
+            Err(Errno::INTR) => {}
+            // Another process may have made the shared descriptor non-blocking.
+            Err(Errno::AGAIN) => wait_writable(output, deadline)?,
+            Err(error) => return Err(error.into()),
+        }
+    }
+    Ok(())
+}
+
+fn wait_writable(output: BorrowedFd<'_>, deadline: Option<Instant>) -> io::Result<()> {
+    loop {
+        let left = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
+        let left = left.and_then(|left| Timespec::try_from(left).ok());
+        match poll(&mut [PollFd::from_borrowed_fd(output, PollFlags::OUT)], left.as_ref()) {
+            Ok(0) => return Err(io::ErrorKind::TimedOut.into()),
+            Ok(_) => return Ok(()),
+            Err(Errno::INTR) => {}
+            Err(error) => return Err(error.into()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::{io::Read as _, os::fd::OwnedFd};
+
+    /// A queue that writes to a pipe, with the pipe's reading end.
+    fn piped() -> (MessageQueue, std::io::PipeReader) {
+        let (reader, writer) = io::pipe().expect("a pipe");
+        let writer: &'static OwnedFd = Box::leak(Box::new(writer.into()));
+        (MessageQueue::start(std::os::fd::AsFd::as_fd(writer)), reader)
+    }
+
+    fn read(reader: &mut std::io::PipeReader, bytes: usize) -> String {
+        let mut text = vec![0; bytes];
+        reader.read_exact(&mut text).expect("text");
+        String::from_utf8(text).expect("UTF-8")
+    }
+
+    #[test]
+    fn messages_keep_their_order() {
+        let (mut queue, mut reader) = piped();
+        for number in 10..20 {
+            queue.write_all(format!("{number}\n").as_bytes()).expect("queued");
+        }
+        queue.drain(Duration::from_secs(10));
+        assert_eq!(read(&mut reader, 30), (10..20).map(|n| format!("{n}\n")).collect::<String>());
+        assert_eq!(queue.dropped(), 0);
+    }
+
+    #[test]
+    fn full_pipe_drops_and_counts() {
+        let (mut queue, mut reader) = piped();
+        let message = [b'a'; 8192];
+        for _ in 0..100 {
+            queue.write_all(&message).expect("queued");
+        }
+        let dropped = queue.dropped();
+        // The pipe takes 64 KiB, the queue 256 KiB, and one message is on its way.
+        assert!((50..=70).contains(&dropped), "{dropped}");
+        let kept = (100 - dropped as usize) * message.len();
+        read(&mut reader, kept);
+        let note = format!("{dropped} messages were dropped: standard error was blocked\n");
+        assert_eq!(read(&mut reader, note.len()), note);
+    }
+
+    #[test]
+    fn closed_pipe_drops_and_counts() {
+        let (mut queue, reader) = piped();
+        drop(reader);
+        queue.write_all(b"message").expect("queued");
+        queue.drain(Duration::from_secs(10));
+        assert_eq!(queue.dropped(), 1);
+    }
+}

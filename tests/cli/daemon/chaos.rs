@@ -1,0 +1,285 @@
+//! Faults of the host, the disk, the line and the clients at random, one or two at a time.
+//!
+//! `SONARD_CHAOS_S=3600 SONARD_CHAOS_EVERY_S=20 cargo test --test cli daemon::chaos -- --nocapture` runs for an hour.
+
+use std::{
+    collections::{BTreeMap, HashSet},
+    env, fs,
+    io::{BufRead as _, BufReader, Write as _},
+    os::unix::net::UnixStream,
+    path::{Path, PathBuf},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::{Duration, Instant},
+};
+
+use rand::{RngExt as _, SeedableRng as _, seq::IndexedRandom as _};
+use rustix::process::Signal;
+use serde_json::Value;
+use sonard::{link::Pty, mock::Pace};
+
+use super::{
+    Daemon,
+    disk::on_faulty_disk,
+    logs,
+    rig::{Rig, limit_files},
+};
+use crate::common::{run, sonard, wait_until, without_terminal};
+
+/// A fault that begins and ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Fault {
+    Unplugged,
+    SilentDevice,
+    NoisyLine,
+    LogRemoved,
+    FolderMoved,
+    SyncFails,
+    SyncHangs,
+    DiskFull,
+    Reload,
+    ClientFlood,
+    Suspended,
+}
+
+const FAULTS: [Fault; 11] = [
+    Fault::Unplugged,
+    Fault::SilentDevice,
+    Fault::NoisyLine,
+    Fault::LogRemoved,
+    Fault::FolderMoved,
+    Fault::SyncFails,
+    Fault::SyncHangs,
+    Fault::DiskFull,
+    Fault::Reload,
+    Fault::ClientFlood,
+    Fault::Suspended,
+];
+
+/// Readings that a live client received: scan and beam.
+type Received = Arc<Mutex<HashSet<(String, u64)>>>;
+
+struct Chaos {
+    folder: PathBuf,
+    rig: Rig,
+    daemon: Daemon,
+    /// Logs and folders of logs that faults took away.
+    taken: Vec<PathBuf>,
+    silent: Option<Pty>,
+    clients: Vec<UnixStream>,
+    seed: u64,
+}
+
+impl Chaos {
+    fn begin(&mut self, fault: Fault) {
+        let faults = self.folder.join("faults");
+        match fault {
+            Fault::Unplugged => self.rig.unplug(),
+            Fault::SilentDevice => self.silent = Some(self.rig.plug_silent()),
+            Fault::NoisyLine => {
+                self.rig.plug("flip=0.001,drop=0.001,double=0.001,reset=0.01", self.seed);
+            }
+            // Nothing is written between the copy and the removal.
+            Fault::LogRemoved => self.while_suspended(|chaos| {
+                let Some(log) = logs(&chaos.folder).pop() else { return };
+                let copy = chaos.folder.join(format!("removed-{}.jsonl", chaos.taken.len()));
+                fs::copy(&log, &copy).expect("there is room");
+                fs::remove_file(&log).expect("it is there");
+                chaos.taken.push(copy);
+            }),
+            Fault::FolderMoved => {
+                let moved = self.folder.join(format!("moved-{}", self.taken.len()));
+                fs::rename(self.folder.join("log"), &moved).expect("it is there");
+                self.taken.push(moved);
+            }
+            Fault::SyncFails => fs::write(faults.join("eio"), "").expect("there is room"),
+            Fault::SyncHangs => fs::write(faults.join("slow"), "").expect("there is room"),
+            Fault::DiskFull => limit_files(self.daemon.id(), Some(1)),
+            Fault::Reload => self.daemon.signal(Signal::HUP),
+            Fault::ClientFlood => {
+                for _ in 0..200 {
+                    let Ok(mut client) = self.daemon.connect() else { break };
+                    let request = b"GET /v1/live/records HTTP/1.1\r\nHost: localhost\r\n\r\n";
+                    drop(client.write_all(request));
+                    self.clients.push(client);
+                }
+            }
+            Fault::Suspended => self.daemon.signal(Signal::STOP),
+        }
+    }
+
+    fn end(&mut self, fault: Fault) {
+        let faults = self.folder.join("faults");
+        self.seed += 1;
+        match fault {
+            Fault::Unplugged | Fault::NoisyLine => self.rig.plug("", self.seed),
+            Fault::SilentDevice => {
+                self.silent = None;
+                self.rig.plug("", self.seed);
+            }
+            Fault::SyncFails => drop(fs::remove_file(faults.join("eio"))),
+            Fault::SyncHangs => drop(fs::remove_file(faults.join("slow"))),
+            Fault::DiskFull => limit_files(self.daemon.id(), None),
+            Fault::ClientFlood => self.clients.clear(),
+            Fault::Suspended => self.daemon.signal(Signal::CONT),
+            Fault::LogRemoved | Fault::FolderMoved | Fault::Reload => {}
+        }
+    }
+
+    fn while_suspended(&mut self, act: impl FnOnce(&mut Self)) {
+        self.daemon.signal(Signal::STOP);
+        std::thread::sleep(Duration::from_millis(50));
+        act(self);
+        self.daemon.signal(Signal::CONT);
+    }
+
+    /// Every log that was ever written.
+    fn all_logs(&self) -> Vec<PathBuf> {
+        let mut all = logs(&self.folder);
+        for taken in &self.taken {
+            match fs::read_dir(taken) {
+                Ok(entries) => all.extend(
+                    entries.flatten().map(|entry| entry.path()).filter(|path| is_log(path)),
+                ),
+                Err(_) => all.push(taken.clone()),
+            }
+        }
+        all
+    }
+}
+
+fn is_log(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "jsonl")
+}
+
+fn seconds(variable: &str, default: u64) -> Duration {
+    let value = env::var(variable).ok().and_then(|value| value.parse().ok());
+    Duration::from_secs(value.unwrap_or(default))
+}
+
+/// Faults of one kind of resource exclude each other.
+fn conflict(one: Fault, other: Fault) -> bool {
+    let kind = |fault| match fault {
+        Fault::Unplugged | Fault::SilentDevice | Fault::NoisyLine => 0,
+        Fault::LogRemoved
+        | Fault::FolderMoved
+        | Fault::SyncFails
+        | Fault::SyncHangs
+        | Fault::DiskFull => 1,
+        Fault::Reload => 2,
+        Fault::ClientFlood => 3,
+        // Nothing else can be done to a process that does not run.
+        Fault::Suspended => 4,
+    };
+    kind(one) == kind(other) || one == Fault::Suspended || other == Fault::Suspended
+}
+
+/// Follows the live records, reconnecting whenever the connection ends.
+fn follow(socket: &Path, received: &Received, is_over: &AtomicBool) {
+    while !is_over.load(Ordering::Relaxed) {
+        let Ok(mut stream) = UnixStream::connect(socket) else {
+            std::thread::sleep(Duration::from_millis(20));
+            continue;
+        };
+        drop(stream.set_read_timeout(Some(Duration::from_secs(5))));
+        // Without chunks, each line is a record.
+        drop(stream.write_all(b"GET /v1/live/records HTTP/1.0\r\nHost: localhost\r\n\r\n"));
+        for line in BufReader::new(stream).lines().map_while(Result::ok) {
+            if !line.starts_with("{\"type\":\"ping\"") {
+                continue;
+            }
+            let ping: Value = serde_json::from_str(&line).expect("a record");
+            let scan = ping["scan"].as_str().expect("a scan").to_owned();
+            let index = ping["index"].as_u64().expect("an index");
+            received.lock().expect("no panic").insert((scan, index));
+        }
+    }
+}
+
+#[test]
+fn random_faults_lose_no_reading() {
+    let (length, every) = (seconds("SONARD_CHAOS_S", 45), seconds("SONARD_CHAOS_EVERY_S", 5));
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut rig = Rig::new(folder.path(), Pace::RealTime);
+    rig.plug("", 1);
+    let options = rig.options();
+    let mut options: Vec<&str> = options.iter().map(String::as_str).collect();
+    for setting in
+        ["scanning.mode=continuous", "plan.step_deg=9", "log.sync_s=0.5", "log.rotate_mb=0.2"]
+    {
+        options.extend(["--set", setting]);
+    }
+    let command = on_faulty_disk(without_terminal(sonard(&[])), &folder.path().join("faults"));
+    let daemon = Daemon::start_as(command, folder.path(), &options);
+    daemon.wait_for_scans(1);
+    let (received, is_over) = (Received::default(), Arc::new(AtomicBool::new(false)));
+    let follower = {
+        let (received, is_over) = (Arc::clone(&received), Arc::clone(&is_over));
+        let socket = folder.path().join("s");
+        std::thread::spawn(move || follow(&socket, &received, &is_over))
+    };
+    let mut chaos = Chaos {
+        folder: folder.path().into(),
+        rig,
+        daemon,
+        taken: Vec::new(),
+        silent: None,
+        clients: Vec::new(),
+        seed: 2,
+    };
+    let mut random = rand_pcg::Pcg32::seed_from_u64(6500);
+    let mut tally: BTreeMap<Fault, u32> = BTreeMap::new();
+    let began = Instant::now();
+    while began.elapsed() < length {
+        let next = Instant::now() + every;
+        let first = *FAULTS.choose(&mut random).expect("some");
+        let second = FAULTS
+            .choose(&mut random)
+            .copied()
+            .filter(|second| random.random_bool(0.4) && !conflict(first, *second));
+        let faults: Vec<Fault> = [Some(first), second].into_iter().flatten().collect();
+        println!("{:>5.0} s  {faults:?}", began.elapsed().as_secs_f64());
+        for &fault in &faults {
+            chaos.begin(fault);
+            *tally.entry(fault).or_default() += 1;
+        }
+        std::thread::sleep(every.mul_f64(random.random_range(0.1..0.6)));
+        faults.iter().for_each(|&fault| chaos.end(fault));
+        std::thread::sleep(next.saturating_duration_since(Instant::now()));
+    }
+    let scans = |daemon: &Daemon| daemon.health()["scans"]["completed"].as_u64();
+    wait_until("health", || chaos.daemon.status()["log"]["error"].is_null());
+    let before = scans(&chaos.daemon);
+    wait_until("scans", || scans(&chaos.daemon) > before);
+    is_over.store(true, Ordering::Relaxed);
+    chaos.daemon.signal(Signal::TERM);
+    let code = chaos.daemon.child.wait().expect("it ends").code();
+    assert_eq!(code, Some(0), "{}", chaos.daemon.said());
+    follower.join().expect("no panic");
+    let messages = chaos.daemon.said();
+    assert!(!messages.contains("panicked") && !messages.contains("internal error"), "{messages}");
+    let mut logged = HashSet::new();
+    for log in chaos.all_logs() {
+        let verified = run(&["log", "verify", log.to_str().expect("plain path")]);
+        let found = String::from_utf8_lossy(&verified.stdout).into_owned();
+        assert_eq!(verified.status.code(), Some(0), "{}: {found}", log.display());
+        for line in fs::read_to_string(&log).expect("readable").lines() {
+            let record: Value = serde_json::from_str(line).expect("a record");
+            if record["type"] == "ping" {
+                let scan = record["scan"].as_str().expect("a scan").to_owned();
+                logged.insert((scan, record["index"].as_u64().expect("an index")));
+            }
+        }
+    }
+    let received = received.lock().expect("no panic");
+    let lost = received.difference(&logged).count();
+    println!(
+        "{tally:?} in {:.0} s; {} readings received live, {lost} of them not logged",
+        began.elapsed().as_secs_f64(),
+        received.len()
+    );
+    assert!(received.len() > 100, "the follower received nothing");
+    assert_eq!(lost, 0, "{messages}");
+}

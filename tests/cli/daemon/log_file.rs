@@ -1,0 +1,117 @@
+//! A log that is removed, moved, truncated or replaced while the daemon writes it.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use super::{Daemon, logs};
+use crate::common::{Log, run, wait_until};
+
+/// A scanning daemon, and the log that it writes.
+fn start(folder: &Path) -> (Daemon, PathBuf) {
+    let settings = ["scanning.mode=continuous", "model.max_range_m=3", "plan.step_deg=9"];
+    let further: Vec<&str> = settings.iter().flat_map(|setting| ["--set", setting]).collect();
+    let daemon = Daemon::start_mock(folder, &further);
+    daemon.wait_for_scans(1);
+    wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(5));
+    let log = logs(folder).pop().expect("a log");
+    (daemon, log)
+}
+
+/// Waits until the daemon reports the incident and scans again; returns its logs' records after the end.
+fn recover(daemon: Daemon, incident: &str) -> Log {
+    wait_until("the incident", || {
+        let text = daemon.status()["log"]["incident"].to_string();
+        text.contains(incident)
+    });
+    assert_eq!(daemon.get("/v1/health").status, 503);
+    let scans = daemon.health()["scans"]["completed"].as_u64().expect("a count");
+    daemon.wait_for_scans(scans + 2);
+    let status = daemon.status();
+    let [written, synced, uncertain] =
+        ["written", "synced", "uncertain"].map(|key| status["log"][key].as_u64().expect("a count"));
+    assert!(synced + uncertain <= written, "{status}");
+    let folder = daemon.folder.clone();
+    assert_eq!(daemon.stop(), Some(0));
+    let mut text = String::new();
+    for log in logs(&folder) {
+        let verified = run(&["log", "verify", log.to_str().expect("plain path")]);
+        let found = String::from_utf8_lossy(&verified.stdout).into_owned();
+        assert_eq!(verified.status.code(), Some(0), "{}: {found}", log.display());
+        text += &fs::read_to_string(&log).expect("readable");
+    }
+    Log::parse(&text)
+}
+
+/// Whether a gap says what happened, in a file that begins with a session.
+fn assert_gap(log: &Log, detail: &str) {
+    let events = log.events();
+    assert!(
+        events.iter().any(|event| event.contains("gap") && event.contains(detail)),
+        "{events:?}"
+    );
+    assert_eq!(log.records[0]["type"], "session");
+}
+
+#[test]
+fn removed_log_is_replaced_and_its_scan_kept() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (daemon, log) = start(folder.path());
+    fs::remove_file(&log).expect("it is there");
+    let log = recover(daemon, "was removed");
+    assert_gap(&log, "was removed");
+    // The scan that was under way is whole in the new file.
+    let scan = log.of_type("scan_start").next().expect("a scan")["scan"].clone();
+    let pings = log.of_type("ping").filter(|ping| ping["scan"] == scan).count();
+    let end = log.of_type("scan_end").find(|end| end["scan"] == scan).expect("its end");
+    assert_eq!((pings as u64, end["missing"].as_u64()), (40, Some(0)));
+}
+
+#[test]
+fn moved_log_gets_the_end_of_its_scan() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (daemon, log) = start(folder.path());
+    let moved = folder.path().join("moved.jsonl");
+    fs::rename(&log, &moved).expect("it is there");
+    let log = recover(daemon, "moved or replaced");
+    assert_gap(&log, "moved or replaced");
+    let verified = run(&["log", "verify", "--strict", moved.to_str().expect("plain path")]);
+    assert_eq!(verified.status.code(), Some(0), "{}", String::from_utf8_lossy(&verified.stdout));
+    let moved = Log::read(&moved);
+    assert_eq!(moved.of_type("scan_start").count(), moved.of_type("scan_end").count());
+}
+
+#[test]
+fn removed_folder_is_made_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (daemon, _) = start(folder.path());
+    fs::remove_dir_all(folder.path().join("log")).expect("it is there");
+    assert_gap(&recover(daemon, "was removed"), "was removed");
+}
+
+#[test]
+fn replaced_folder_gets_a_new_log() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (daemon, _) = start(folder.path());
+    fs::rename(folder.path().join("log"), folder.path().join("old")).expect("it is there");
+    fs::create_dir(folder.path().join("log")).expect("the name is free");
+    assert_gap(&recover(daemon, "moved or replaced"), "moved or replaced");
+    for entry in fs::read_dir(folder.path().join("old")).expect("a folder").flatten() {
+        let verified = run(&["log", "verify", entry.path().to_str().expect("plain path")]);
+        assert_eq!(verified.status.code(), Some(0));
+    }
+}
+
+#[test]
+fn truncated_log_is_left_for_a_new_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (daemon, log) = start(folder.path());
+    fs::write(&log, "").expect("it is there");
+    wait_until("the incident", || {
+        daemon.status()["log"]["incident"].to_string().contains("changed by another program")
+    });
+    // The rest of the removed text is no log of its own.
+    fs::remove_file(&log).expect("it is there");
+    assert_gap(&recover(daemon, "changed by another program"), "changed by another program");
+}

@@ -1,0 +1,157 @@
+//! Stop requests, however they arrive.
+
+use std::{
+    fs,
+    os::{fd::OwnedFd, unix::process::CommandExt as _},
+    path::Path,
+    process::Stdio,
+    time::Duration,
+};
+
+use rustix::process::{Pid, Signal, kill_process};
+use sonard::{link::Pty, mock::Pace};
+
+use super::{Daemon, clean_log, rig::Rig};
+use crate::common::{Log, MockProcess, sonard, wait_until, without_terminal};
+
+const FAST: [&str; 6] = [
+    "--set",
+    "scanning.mode=continuous",
+    "--set",
+    "model.max_range_m=3",
+    "--set",
+    "plan.step_deg=9",
+];
+
+fn scanning(folder: &Path) -> Daemon {
+    let daemon = Daemon::start_mock(folder, &FAST);
+    wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(2));
+    daemon
+}
+
+/// Fails unless every scan that has begun has an end, and the socket is gone.
+fn assert_closed(folder: &Path) {
+    let log = clean_log(folder);
+    let count = |kind| log.of_type(kind).count();
+    assert_eq!(count("scan_start"), count("scan_end"));
+    assert!(count("scan_start") > 0);
+    assert!(!folder.join("s").exists(), "the socket is left");
+}
+
+#[test]
+fn signals_in_quick_succession_are_one_request() {
+    use Signal as S;
+    for (first, second, gap_ms) in [
+        (S::TERM, S::TERM, 0),
+        (S::TERM, S::TERM, 1),
+        (S::TERM, S::TERM, 5),
+        (S::TERM, S::TERM, 20),
+        (S::INT, S::TERM, 2),
+        (S::TERM, S::INT, 200),
+        (S::INT, S::INT, 400),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut daemon = scanning(folder.path());
+        daemon.signal(first);
+        std::thread::sleep(Duration::from_millis(gap_ms));
+        // It may have ended in time.
+        let pid = Pid::from_raw(daemon.id().cast_signed()).expect("a process id");
+        if daemon.child.try_wait().expect("it is ours").is_none() {
+            kill_process(pid, second).expect("it runs");
+        }
+        let code = daemon.child.wait().expect("it ends").code();
+        assert_eq!(code, Some(0), "{first:?}, {second:?} after {gap_ms} ms: {}", daemon.said());
+        assert_closed(folder.path());
+    }
+}
+
+/// A client that holds a stream open delays an orderly end by seconds.
+#[test]
+fn later_signal_forces_the_end_and_closes_the_log() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut rig = Rig::new(folder.path(), Pace::RealTime);
+    rig.plug("", 1);
+    let options = rig.options();
+    let options: Vec<&str> = options.iter().map(String::as_str).chain(FAST).collect();
+    let mut daemon = Daemon::start(folder.path(), &options);
+    wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(2));
+    // The stop command is not answered any more.
+    let silent = rig.plug_silent();
+    daemon.signal(Signal::TERM);
+    std::thread::sleep(Duration::from_millis(700));
+    if daemon.child.try_wait().expect("it is ours").is_none() {
+        daemon.signal(Signal::TERM);
+    }
+    let code = daemon.child.wait().expect("it ends").code();
+    assert!(matches!(code, Some(0 | 1)), "{code:?}: {}", daemon.said());
+    drop(silent);
+    assert_closed(folder.path());
+}
+
+/// Spawns a command as the leader of a session with a terminal of its own, and returns the terminal's other end.
+fn with_terminal(mut command: std::process::Command) -> (std::process::Child, Pty) {
+    let terminal = Pty::open(None).expect("a terminal");
+    let name = terminal.path().to_owned();
+    let side: OwnedFd =
+        fs::OpenOptions::new().read(true).write(true).open(name).expect("opens").into();
+    let own = side.try_clone().expect("a descriptor");
+    #[allow(unsafe_code, reason = "between fork and exec, only system calls are made")]
+    // SAFETY: setsid(2) and ioctl(2) are async-signal-safe.
+    unsafe {
+        command.pre_exec(move || {
+            rustix::process::setsid()?;
+            rustix::process::ioctl_tiocsctty(&own)?;
+            Ok(())
+        });
+    }
+    let child = command
+        .stdin(Stdio::from(side.try_clone().expect("a descriptor")))
+        .stdout(Stdio::from(side.try_clone().expect("a descriptor")))
+        .stderr(Stdio::from(side))
+        .spawn()
+        .expect("the program starts");
+    (child, terminal)
+}
+
+#[test]
+fn closed_terminal_ends_the_daemon_in_order() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut command =
+        sonard(&["run", "--mock", "--scene", "simple-room", "--pose", "fig9", "--log"]);
+    command.arg(folder.path().join("log")).arg("--socket").arg(folder.path().join("s")).args(FAST);
+    let (child, terminal) = with_terminal(command);
+    let mut daemon = Daemon { child, folder: folder.path().into(), said: Default::default() };
+    wait_until("the API", || daemon.connect().is_ok());
+    wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(2));
+    drop(terminal);
+    assert_eq!(daemon.child.wait().expect("it ends").code(), Some(0));
+    assert_closed(folder.path());
+}
+
+#[test]
+fn hangup_without_a_terminal_is_a_reload() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let command = without_terminal(sonard(&[]));
+    let mock = ["--mock", "--scene", "simple-room", "--pose", "fig9"];
+    let daemon = Daemon::start_as(command, folder.path(), &[&mock[..], &FAST].concat());
+    daemon.signal(Signal::HUP);
+    wait_until("the reload", || daemon.said().contains("the configuration was read again"));
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn closed_terminal_ends_a_scan_in_order() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mock = MockProcess::start(folder.path(), &["--realtime"]);
+    let mut command = sonard(&["scan", "--port", mock.port(), "--scene", "simple-room"]);
+    command.args(["--pose", "fig9", "--max-range", "3", "--out"]).arg(folder.path().join("out"));
+    let (mut child, terminal) = with_terminal(command);
+    let path = folder.path().join("out/scan.jsonl");
+    wait_until("beams", || {
+        fs::read_to_string(&path).is_ok_and(|text| text.matches("\"ping\"").count() > 3)
+    });
+    drop(terminal);
+    assert_eq!(child.wait().expect("it ends").code(), Some(1));
+    let log = Log::read(&path);
+    assert_eq!(log.of_type("scan_end").count(), 1);
+}
