@@ -4,6 +4,7 @@ mod broker;
 mod load;
 mod mock;
 mod ros;
+mod sandbox;
 
 use std::{
     io::{self, IsTerminal as _},
@@ -157,7 +158,9 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     };
     let mut broker = Broker::open(&settings)?;
     let log_folder = PathBuf::from(&keys.log.folder);
-    let (journal, thread) = Journal::open(&log_folder, settings.rotation())?;
+    let (journal, thread) = Journal::open(&log_folder, settings.rotation())
+        .map_err(|error| sandbox::log_failure(&log_folder, error))?;
+    sandbox::warn_of_private_folder(&log_folder);
     let listeners =
         Listeners::open(&keys.server).map_err(|error| Failure::device(&error, error.help()))?;
     for address in listeners.addresses().into_iter().flatten() {
