@@ -9,6 +9,7 @@ mod sandbox;
 use std::{
     io::{self, IsTerminal as _},
     path::{Path, PathBuf},
+    sync::{Arc, OnceLock},
 };
 
 use rustix::process::Signal;
@@ -22,8 +23,10 @@ use super::{
     runtime::{self, Interrupts},
 };
 use crate::{
-    daemon::{self, Handle, Journal, Order, Resources, Settings},
-    host_gpio, link,
+    daemon::{self, Handle, Journal, OpenPort, Order, Resources, Settings},
+    host_gpio,
+    link::PortOpener,
+    scan::EventKind,
     server::{Access, Listeners, Server, read_token, token_help},
 };
 use broker::Broker;
@@ -171,8 +174,12 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     let fleet = load::fleet(&keys.fleet)?;
     let (daemon, handle) = match gpio {
         Some(gpio) => {
-            let resources = Resources { open_port: Box::new(link::open), gpio, journal };
-            daemon::prepare(resources, settings.clone())
+            let announced = Arc::new(OnceLock::<Handle>::new());
+            let open_port = open_and_announce(Arc::clone(&announced));
+            let prepared =
+                daemon::prepare(Resources { open_port, gpio, journal }, settings.clone());
+            drop(announced.set(prepared.1.clone()));
+            prepared
         }
         None => daemon::prepare_simulated(journal, settings.clone()),
     };
@@ -194,6 +201,21 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
         Some(error) => Err(Failure::device(format!("the log was not closed well: {error}"), "")),
         None => Ok(()),
     }
+}
+
+/// Opens ports; another device than before becomes an event of the daemon, once there is one.
+fn open_and_announce(daemon: Arc<OnceLock<Handle>>) -> OpenPort {
+    let mut ports = PortOpener::default();
+    Box::new(move |port| {
+        let line = ports.open(port)?;
+        if let Some(change) = ports.take_change() {
+            tracing::warn!("{change}");
+            if let Some(daemon) = daemon.get() {
+                daemon.event(EventKind::Reconnected, change);
+            }
+        }
+        Ok(line)
+    })
 }
 
 /// Who may write over TCP, and under which names the server is asked.
