@@ -10,7 +10,7 @@ use crate::compare::Explanation;
 /// Health of the daemon, with the underlying figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Health {
-    /// Whether the device can be used, the log written, and the temperature is fresh.
+    /// Whether the device can be used, the log written, and the temperature is valid and fresh.
     pub healthy: bool,
     /// Why not.
     pub reasons: Vec<String>,

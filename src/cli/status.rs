@@ -85,7 +85,8 @@ fn screen(status: &Status, health: &Health) -> String {
     let better = health.fit.as_ref().and_then(|fit| fit.explanations.first());
     lines.extend(better.map(|better| format!("  better   explained: {better}")));
     let (air, log, clients) = (&status.air, &status.log, &status.subscribers);
-    let source = word(&air.source);
+    let age = air.age_s.map_or_else(String::new, |age_s| format!(", {age_s:.0} s old"));
+    let source = word(&air.source) + &age;
     let file = log.file.as_ref().map_or_else(|| "-".into(), |file| file.display().to_string());
     lines.extend([
         format!(
@@ -102,9 +103,6 @@ fn screen(status: &Status, health: &Health) -> String {
     lines.extend(status.mqtt.as_ref().map(broker));
     lines.extend(pending(&status.pending));
     lines.extend(health.reasons.iter().map(|reason| format!("  not well: {reason}")));
-    if let Some(error) = &air.error {
-        lines.push(format!("  the thermometer can't be read: {error}"));
-    }
     if let Some(error) = &status.configuration.error {
         lines.push(format!("  the last change of the configuration was refused: {error}"));
     }

@@ -1,6 +1,6 @@
 //! The air as it is known now: from the configuration, a thermometer's file, or the API.
 
-use std::{path::PathBuf, time::Duration};
+use std::time::Duration;
 
 use tokio::{sync::watch, time::Instant};
 
@@ -9,7 +9,7 @@ use crate::{
     api::{AirOrder, AirStatus},
     config::AirKeys,
     scan::{AirSource, ScanAir},
-    thermometer::read_thermometer,
+    thermometer::Thermometer,
 };
 
 /// A change smaller than this is no reason to predict everything anew, degrees: it moves a range
@@ -54,14 +54,18 @@ impl AirControl {
         match reading {
             Ok(temperature_c) => {
                 if self.error.is_some() {
-                    tracing::info!("the thermometer can be read again");
+                    tracing::info!("the thermometer has a valid temperature again");
                 }
                 self.temperature_c = *temperature_c;
                 (self.source, self.at, self.error) = (AirSource::File, Some(now), None);
             }
             Err(error) => {
                 if self.error.is_none() {
-                    tracing::warn!("the thermometer can't be read: {error}");
+                    tracing::warn!(
+                        "the thermometer has no valid temperature: {error}; ranges are computed with \
+                         {:.1} C",
+                        self.temperature_c
+                    );
                 }
                 self.error = Some(error.clone());
             }
@@ -145,13 +149,18 @@ impl AirControl {
 #[must_use]
 pub(super) fn watch_thermometer(keys: &AirKeys) -> watch::Receiver<Option<Reading>> {
     let (sender, receiver) = watch::channel(None);
-    let Some(file) = keys.file.clone().map(PathBuf::from) else { return receiver };
+    let Some(mut thermometer) = keys.file.as_ref().map(Thermometer::new) else { return receiver };
     let every = Duration::from_secs_f64(keys.every_s);
     tokio::spawn(async move {
         while !sender.is_closed() {
-            let path = file.clone();
-            let reading = tokio::task::spawn_blocking(move || read_thermometer(&path)).await;
-            sender.send_replace(reading.ok());
+            let reading = tokio::select! {
+                reading = thermometer.read() => reading.map_err(|error| error.to_string()),
+                () = sender.closed() => return,
+            };
+            if let Some(remark) = thermometer.take_remark() {
+                tracing::warn!("{remark}");
+            }
+            sender.send_replace(Some(reading));
             tokio::select! {
                 () = tokio::time::sleep(every) => {}
                 () = sender.closed() => {}

@@ -24,7 +24,7 @@ use crate::{
     compare::Explanation,
     config::ScanningKeys,
     geometry::Pose,
-    scan::{Device, Provenance, Record, ScanEnd, ScanPlan, ScanView, SceneRef, Session},
+    scan::{AirSource, Device, Provenance, Record, ScanEnd, ScanPlan, ScanView, SceneRef, Session},
     scene::Scene,
 };
 
@@ -329,6 +329,7 @@ impl Shared {
             reasons.push(format!("the link is {}: {trouble}", view.state.name()));
         }
         reasons.extend(log.error.iter().map(|error| format!("the log: {error}")));
+        reasons.extend(air.error.as_ref().map(|error| describe_thermometer(error, &air)));
         if air.stale {
             reasons.push("the air temperature is stale".into());
         }
@@ -360,6 +361,19 @@ impl Shared {
     fn scans(&self) -> MutexGuard<'_, Collector> {
         held(&self.scans)
     }
+}
+
+/// A thermometer's fault, and what ranges are computed with meanwhile.
+fn describe_thermometer(error: &str, air: &AirStatus) -> String {
+    let temperature_c = air.temperature_c;
+    let in_use = match (air.source, air.age_s) {
+        (AirSource::File, Some(age_s)) => {
+            format!("the last valid temperature, {temperature_c:.1} C, is {age_s:.0} s old")
+        }
+        (AirSource::Api, _) => format!("{temperature_c:.1} C was set by a program"),
+        _ => format!("{temperature_c:.1} C is the configured temperature"),
+    };
+    format!("the thermometer has no valid temperature: {error}; {in_use}")
 }
 
 /// Nothing under these locks can panic, so a poisoned one holds what it should.

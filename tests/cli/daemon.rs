@@ -24,6 +24,7 @@ mod simulate;
 mod soak;
 mod strangers;
 mod systemd;
+mod thermometer;
 pub(crate) mod viewpoint;
 
 use std::{

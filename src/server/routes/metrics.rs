@@ -160,7 +160,7 @@ fn gauges(status: &Status, health: &Health) -> Vec<(&'static str, &'static str, 
     state_gauges(status, health).into_iter().chain(known).collect()
 }
 
-fn state_gauges(status: &Status, health: &Health) -> [(&'static str, &'static str, f64); 10] {
+fn state_gauges(status: &Status, health: &Health) -> [(&'static str, &'static str, f64); 11] {
     [
         ("healthy", "Whether all is well", f64::from(u8::from(health.healthy))),
         (
@@ -186,6 +186,11 @@ fn state_gauges(status: &Status, health: &Health) -> [(&'static str, &'static st
         ("log_waiting_records", "Records that could not be written yet", status.log.waiting as f64),
         ("subscribers", "Live streams", status.subscribers.now as f64),
         ("air_temperature_celsius", "Air temperature", status.air.temperature_c),
+        (
+            "thermometer_failing",
+            "Whether the thermometer has no valid temperature: the last valid one is in use",
+            f64::from(u8::from(status.air.error.is_some())),
+        ),
         ("sound_speed_meters_per_second", "Speed of sound", status.air.sound_speed_m_s),
         ("uptime_seconds", "How long the daemon runs", status.uptime_s),
     ]
