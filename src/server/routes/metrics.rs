@@ -1,8 +1,10 @@
-//! Figures for Prometheus, in the OpenMetrics text format.
+//! Figures for Prometheus.
+
+mod format;
 
 use axum::{
     extract::State,
-    http::{StatusCode, header},
+    http::{HeaderMap, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use jiff::Timestamp;
@@ -18,18 +20,20 @@ use crate::{
     scan::Provenance,
     server::{Api, answer::Failed, openapi::Endpoint},
 };
-
-const MEDIA: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+use format::Format;
 
 pub(super) fn endpoints() -> Vec<Endpoint> {
-    vec![Endpoint::get("/metrics", metrics, "Figures for Prometheus").answers_text(
-        200,
-        MEDIA,
-        "OpenMetrics text",
-    )]
+    let about = "Figures for Prometheus, in the format that Accept prefers";
+    vec![
+        Endpoint::get("/metrics", metrics, about)
+            .answers_text(200, Format::OpenMetrics.media_type(), "OpenMetrics text")
+            .answers_text(200, Format::Text.media_type(), "Prometheus text"),
+    ]
 }
 
-async fn metrics(State(api): State<Api>) -> Result<Response, Failed> {
+async fn metrics(State(api): State<Api>, headers: HeaderMap) -> Result<Response, Failed> {
+    let accept = headers.get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
+    let format = Format::negotiate(&accept.collect::<Vec<_>>().join(","));
     // A disk may keep its answer back: that of the log is asked how much room it has.
     let written = tokio::task::spawn_blocking(move || {
         let mut text = String::new();
@@ -43,7 +47,8 @@ async fn metrics(State(api): State<Api>) -> Result<Response, Failed> {
         )
     };
     let text = written.await.map_err(|error| fault(&error))?.map_err(|error| fault(&error))?;
-    Ok(([(header::CONTENT_TYPE, MEDIA)], text).into_response())
+    let head = [(header::CONTENT_TYPE, format.media_type()), (header::VARY, "Accept")];
+    Ok((head, format.render(text)).into_response())
 }
 
 /// A mock measures as little as the model does: only hardware is no simulation.
