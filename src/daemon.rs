@@ -289,6 +289,7 @@ fn first_view(settings: &Settings) -> View {
     View {
         state: LinkState::Opening,
         since: Timestamp::now(),
+        changed: Instant::now(),
         port: settings.keys.device.port.clone().unwrap_or_default(),
         trouble: None,
         failures: 0,

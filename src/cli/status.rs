@@ -2,7 +2,6 @@
 
 use std::io::Write as _;
 
-use jiff::Timestamp;
 use serde::Serialize;
 
 mod fleet;
@@ -214,10 +213,10 @@ fn array(status: &Status, simulation: &SimulationReport) -> Vec<String> {
     ]
 }
 
-/// What it is doing or suffering, and for how long.
+/// State of the link, and for how long by the daemon's clock that is never set.
 fn state(link: &LinkReport) -> String {
-    let seconds = Timestamp::now().duration_since(link.since).as_secs_f64();
-    format!("{} for {seconds:.1} s", link.state.name().replace('_', " "))
+    let state = link.state.name().replace('_', " ");
+    link.for_s.map_or_else(|| state.clone(), |for_s| format!("{state} for {for_s:.1} s"))
 }
 
 /// The word that stands for a value in JSON.

@@ -33,6 +33,8 @@ use crate::{
 pub(super) struct View {
     pub(super) state: LinkState,
     pub(super) since: Timestamp,
+    /// `since` on the clock that is never set.
+    pub(super) changed: Instant,
     pub(super) port: String,
     pub(super) trouble: Option<String>,
     pub(super) failures: u32,
@@ -183,6 +185,11 @@ struct Collector {
     /// How the scan under way agrees with the model, and how the last one did.
     fit: Fit,
     latest_fit: Option<ScanFit>,
+    /// When the last one ended.
+    ended: Option<Instant>,
+    /// Start of the scan under way by both clocks. Times of its readings follow the wall clock as it
+    /// was then.
+    began: Option<(Instant, Timestamp)>,
     /// The best explanation that an event told.
     told: Option<Explanation>,
     /// How long after its firing the last reading came in, seconds.
@@ -223,6 +230,7 @@ impl Shared {
             Record::ScanStart(start) => {
                 self.beams_done.store(0, Ordering::Relaxed);
                 (scans.current, scans.sigma_us) = (Some(start.scan), None);
+                scans.began = Some((Instant::now(), start.time));
                 scans.fit = Fit::of(start, session);
             }
             Record::Ping(ping) => {
@@ -231,12 +239,14 @@ impl Shared {
                 scans.read = Some(Instant::now());
                 scans.fit.add(ping);
                 let fired = ping.time.filter(|_| ping.time_sigma_us.is_some());
-                scans.lateness_s =
-                    fired.map(|fired| Timestamp::now().duration_since(fired).as_secs_f64());
+                scans.lateness_s = fired.zip(scans.began).map(|(fired, (at, time))| {
+                    at.elapsed().as_secs_f64() - fired.duration_since(time).as_secs_f64()
+                });
             }
             Record::ScanEnd(end) => {
                 let fit = std::mem::take(&mut scans.fit);
                 scans.latest_fit = Some(fit.report(end));
+                scans.ended = Some(Instant::now());
                 let scan = scans.current.take()?;
                 scans.latest = Some((end.clone(), scans.sigma_us));
                 return Some((scan, fit.into_scan()));
@@ -281,6 +291,7 @@ impl Shared {
             link: LinkReport {
                 state: view.state,
                 since: view.since,
+                for_s: Some(now.saturating_duration_since(view.changed).as_secs_f64()),
                 port: view.port,
                 trouble: view.trouble,
                 failures: view.failures,
@@ -333,9 +344,10 @@ impl Shared {
         if air.stale {
             reasons.push("the air temperature is stale".into());
         }
-        let (fit, reading_lateness_s) = {
+        let (fit, last_scan_age_s, reading_lateness_s) = {
             let scans = self.scans();
-            (scans.latest_fit.clone(), scans.lateness_s)
+            let age_s = scans.ended.map(|ended| ended.elapsed().as_secs_f64());
+            (scans.latest_fit.clone(), age_s, scans.lateness_s)
         };
         Health {
             healthy: reasons.is_empty(),
@@ -344,6 +356,7 @@ impl Shared {
             scans: view.scans,
             clock: view.clock,
             fit,
+            last_scan_age_s,
             reading_lateness_s,
         }
     }

@@ -7,7 +7,6 @@ use axum::{
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse, Response},
 };
-use jiff::Timestamp;
 use prometheus_client::{
     encoding::text::encode,
     metrics::{counter::ConstCounter, gauge::ConstGauge, info::Info},
@@ -207,10 +206,9 @@ fn gauges_if_known(
     health: &Health,
 ) -> [(&'static str, &'static str, Option<f64>); 11] {
     let fit = health.fit.as_ref();
-    let age_s = |ended: Timestamp| Timestamp::now().duration_since(ended).as_secs_f64();
     [
         ("log_free_bytes", "Room on the disk of the log", free_bytes(status)),
-        ("last_scan_age_seconds", "Since the last scan ended", fit.map(|fit| age_s(fit.ended))),
+        ("last_scan_age_seconds", "Since the last scan ended", health.last_scan_age_s),
         (
             "last_scan_compared_beams",
             "Beams of the last scan with an echo, measured and predicted",
