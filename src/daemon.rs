@@ -20,6 +20,7 @@ mod forecast;
 mod hub;
 mod journal;
 mod judged;
+mod limits;
 mod machine;
 mod notify;
 mod operator;
@@ -46,6 +47,7 @@ pub(crate) use hub::Shelf;
 pub use hub::{Attendance, Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
 pub use journal::{Journal, JournalThread};
 pub use judged::judged_line;
+pub use limits::{check_device, check_plan, check_pose, ordered_air};
 pub use machine::{BackOff, Input, LinkMachine, Step, Transition};
 pub use operator::OpenPort;
 pub use refusal::{Refusal, RefusalKind};
@@ -295,6 +297,7 @@ fn first_view(settings: &Settings) -> View {
         failures: 0,
         retry_at: None,
         device: None,
+        identity: None,
         provenance: None,
         scanning: settings.keys.scanning.clone(),
         session: None,

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use tokio::{sync::watch, time::Instant};
 
+use super::{limits::ordered_air, refusal::Refusal};
 use crate::{
-    acoustics::{Air, AirError},
+    acoustics::Air,
     api::{AirOrder, AirStatus},
     config::AirKeys,
     scan::{AirSource, ScanAir},
@@ -76,12 +77,10 @@ impl AirControl {
     ///
     /// # Errors
     /// When a figure is out of range; nothing was changed then.
-    pub(super) fn order(&mut self, order: &AirOrder, now: Instant) -> Result<(), AirError> {
-        let humidity_percent = order.humidity_percent.unwrap_or(self.humidity_percent);
-        let pressure_kpa = order.pressure_kpa.unwrap_or(self.pressure_kpa);
-        Air::new(order.temperature_c, humidity_percent, pressure_kpa)?;
-        (self.humidity_percent, self.pressure_kpa) = (humidity_percent, pressure_kpa);
-        self.temperature_c = order.temperature_c;
+    pub(super) fn order(&mut self, order: &AirOrder, now: Instant) -> Result<(), Refusal> {
+        let air = ordered_air(order, self.humidity_percent, self.pressure_kpa)?;
+        (self.humidity_percent, self.pressure_kpa) = (air.humidity_percent(), air.pressure_kpa());
+        self.temperature_c = air.temperature_c();
         (self.source, self.at) = (AirSource::Api, Some(now));
         Ok(())
     }

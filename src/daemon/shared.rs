@@ -5,7 +5,7 @@ use std::sync::{
     atomic::{AtomicU32, AtomicU64, Ordering},
 };
 
-use firmware_protocol::host::LinkStats;
+use firmware_protocol::{host::LinkStats, messages::Identity};
 use jiff::Timestamp;
 use tokio::{sync::watch, time::Instant};
 use uuid::Uuid;
@@ -40,6 +40,7 @@ pub(super) struct View {
     pub(super) failures: u32,
     pub(super) retry_at: Option<Instant>,
     pub(super) device: Option<Device>,
+    pub(super) identity: Option<Identity>,
     pub(super) provenance: Option<Provenance>,
     pub(super) scanning: ScanningKeys,
     pub(super) session: Option<Arc<Session>>,
@@ -73,6 +74,8 @@ pub struct NextScan {
     pub air: AirStatus,
     /// The array that is played in place of a ranger that turns, if one is.
     pub array: Option<Arc<RangerArray>>,
+    /// The connected device, for its limits.
+    pub device: Option<Identity>,
 }
 
 /// What scans are taken by.
@@ -104,7 +107,8 @@ impl View {
 
     pub(super) fn next_scan(&self, at: Instant) -> NextScan {
         let Terms { plan, pose, scene, setup, array, air } = self.next.clone();
-        NextScan { plan, pose, scene, setup, array, air: air.status(at) }
+        let (air, device) = (air.status(at), self.identity);
+        NextScan { plan, pose, scene, setup, air, array, device }
     }
 
     /// What differs from it in the next scan.

@@ -37,6 +37,7 @@ impl Operator {
             view.trouble.clone_from(&self.trouble);
             (view.failures, view.retry_at) = (machine.failures(), retry_at);
             view.device = control.identity.as_ref().map(device_record);
+            view.identity = control.identity;
             view.provenance = control.identity.as_ref().map(provenance);
             view.scanning = control.scanning.clone();
             (view.paused, view.requested) =
