@@ -20,7 +20,7 @@ use rustix::{
 use serialport::{ClearBuffer, ErrorKind, SerialPort as _};
 use tokio_serial::{SerialPortBuilderExt as _, SerialStream};
 
-pub use adapter::latency_timer_ms;
+pub use adapter::{is_kernel_console, latency_timer_ms};
 pub use error::{LinkError, PortListError};
 pub use holders::{Holder, Holders, find_holders};
 pub use opener::PortOpener;

@@ -265,7 +265,7 @@ fn program_that_reads_the_port_is_named_before_anything_is_moved() {
 fn program_that_locks_the_port_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let mock = MockProcess::start(folder.path(), &[]);
-    let lock = "exec flock --exclusive 1 sleep 60";
+    let lock = "flock --exclusive 1 && exec sleep 60";
     let holder = Holder::start(mock.port(), lock);
     std::thread::sleep(Duration::from_millis(500));
     let (code, report) = doctor(mock.port(), &[]);

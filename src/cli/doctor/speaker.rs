@@ -31,10 +31,9 @@ impl Speaker {
             return Some(Self::Echo);
         }
         let text = printable(received);
-        let lower = text.to_ascii_lowercase();
         let mut lines = text.lines().map(str::trim);
         let printable = received.iter().filter(|byte| is_text(**byte)).count();
-        Some(if lower.contains("login:") || lower.contains("password:") {
+        Some(if lines.clone().any(is_prompt) {
             Self::LoginPrompt
         } else if lines.clone().any(is_modem_command) {
             Self::ModemCommands
@@ -106,10 +105,18 @@ impl Speaker {
     }
 }
 
-/// The first received text, for quoting.
-pub(super) fn quote(received: &[u8]) -> Option<String> {
+/// The received line that reveals a speaker, else the first one, for quoting.
+pub(super) fn quote(received: &[u8], speaker: Speaker) -> Option<String> {
     let text = printable(received);
-    let line = text.lines().map(str::trim).find(|line| line.len() > 1)?;
+    let mut lines = text.lines().map(str::trim).filter(|line| line.len() > 1);
+    let reveals = |line: &&str| match speaker {
+        Speaker::LoginPrompt => is_prompt(line),
+        Speaker::ModemCommands => is_modem_command(line),
+        Speaker::ModemReplies => is_modem_reply(line),
+        Speaker::Gps => is_nmea(line),
+        Speaker::Echo | Speaker::OtherText | Speaker::OtherRate => true,
+    };
+    let line = lines.clone().find(reveals).or_else(|| lines.next())?;
     Some(line.chars().take(MAX_QUOTED).collect())
 }
 
@@ -127,6 +134,11 @@ fn is_text(byte: u8) -> bool {
 
 fn contains(bytes: &[u8], part: &[u8]) -> bool {
     bytes.windows(part.len()).any(|window| window == part)
+}
+
+fn is_prompt(line: &str) -> bool {
+    let lower = line.to_ascii_lowercase();
+    lower.contains("login:") || lower.contains("password:")
 }
 
 fn is_modem_command(line: &str) -> bool {
@@ -181,6 +193,9 @@ mod tests {
             assert_eq!(Speaker::classify(received, &sent), Some(speaker), "{text}");
         }
         assert_eq!(Speaker::classify(b"", &sent), None);
+        let banner = b"Debian GNU/Linux\r\nrobot login: ";
+        assert_eq!(quote(banner, Speaker::LoginPrompt).as_deref(), Some("robot login:"));
+        assert_eq!(quote(banner, Speaker::OtherText).as_deref(), Some("Debian GNU/Linux"));
     }
 
     proptest! {
@@ -188,7 +203,8 @@ mod tests {
         fn any_bytes_are_classified(received: Vec<u8>, sent: Vec<u8>) {
             let speaker = Speaker::classify(&received, &sent);
             prop_assert_eq!(speaker.is_none(), received.len() < 2);
-            prop_assert!(quote(&received).is_none_or(|quoted| quoted.len() <= MAX_QUOTED));
+            let quoted = speaker.and_then(|speaker| quote(&received, speaker));
+            prop_assert!(quoted.is_none_or(|quoted| quoted.len() <= MAX_QUOTED));
         }
     }
 }

@@ -42,6 +42,15 @@ impl Surroundings {
         if let Some(advice) = holders.advice(&self.path) {
             return shared(&holders, advice);
         }
+        if link::is_kernel_console(&self.path) {
+            return Check::warning(
+                "port",
+                Cause::LoginPrompt,
+                "opened, but the kernel writes its console to this port: its messages go to the board",
+                "take `console=` with this port out of the kernel's command line (on a Raspberry Pi: \
+                 raspi-config, Interface Options, Serial Port) and reboot",
+            );
+        }
         match holders.is_partial {
             true => Check::ok(
                 "port",
@@ -84,7 +93,8 @@ impl Surroundings {
             return Some(Check { check: "board", ..check });
         }
         let speaker = Speaker::classify(received, sent)?;
-        let quoted = quote(received).map_or_else(String::new, |line| format!(": {line:?}"));
+        let quoted = quote(received, speaker);
+        let quoted = quoted.map_or_else(String::new, |line| format!(": {line:?}"));
         let detail = format!("{} ({} bytes){quoted}", speaker.name(), received.len());
         Some(Check::failed("board", speaker.cause(), detail, speaker.help()))
     }
