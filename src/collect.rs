@@ -31,7 +31,6 @@ mod poses;
 mod repeatability;
 mod source;
 mod taking;
-mod thermometer;
 mod watcher;
 
 pub use by_daemon::{ByDaemon, steps_per_revolution};

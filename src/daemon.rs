@@ -20,6 +20,7 @@ mod forecast;
 mod hub;
 mod journal;
 mod judged;
+mod limits;
 mod machine;
 mod notify;
 mod operator;
@@ -45,6 +46,7 @@ pub(crate) use hub::Shelf;
 pub use hub::{Attendance, Hub, Line, Moved, ScanSubscription, Subscription, Wanted};
 pub use journal::{Journal, JournalThread};
 pub use judged::judged_line;
+pub use limits::{check_device, check_plan, check_pose, ordered_air};
 pub use machine::{BackOff, Input, LinkMachine, Step, Transition};
 pub use operator::OpenPort;
 pub use refusal::{Refusal, RefusalKind};
@@ -316,11 +318,13 @@ fn first_view(settings: &Settings) -> View {
     View {
         state: LinkState::Opening,
         since: Timestamp::now(),
+        changed: Instant::now(),
         port: settings.keys.device.port.clone().unwrap_or_default(),
         trouble: None,
         failures: 0,
         retry_at: None,
         device: None,
+        identity: None,
         provenance: None,
         scanning: settings.keys.scanning.clone(),
         session: None,

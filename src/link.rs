@@ -1,5 +1,10 @@
 //! Serial lines: finding, opening and locking them, with errors that tell causes apart.
 
+mod adapter;
+mod error;
+mod holders;
+mod opener;
+mod ports;
 mod pty;
 
 use std::{
@@ -8,77 +13,23 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use rustix::fs::{Mode, OFlags};
-use serialport::{ClearBuffer, ErrorKind, SerialPort as _, SerialPortType};
-use thiserror::Error;
+use rustix::{
+    fs::{Access, Mode, OFlags},
+    io::Errno,
+};
+use serialport::{ClearBuffer, ErrorKind, SerialPort as _};
 use tokio_serial::{SerialPortBuilderExt as _, SerialStream};
 
+pub use adapter::{is_kernel_console, latency_timer_ms};
+pub use error::{LinkError, PortListError};
+pub use holders::{Holder, Holders, find_holders};
+pub use opener::PortOpener;
+pub use ports::{Candidate, candidates};
+use ports::{PortFolders, Resolved};
 pub use pty::Pty;
 
 /// Line rate of the firmware, bits a second (8N1).
 pub const BAUD: u32 = 115_200;
-
-const BY_ID: &str = "/dev/serial/by-id";
-
-/// A serial line that can't be used.
-#[derive(Debug, Error)]
-pub enum LinkError {
-    /// No path and no stable id of that name.
-    #[error("there is no serial port {port:?}")]
-    NotFound {
-        /// What was asked for.
-        port: String,
-        /// What there is.
-        present: Vec<String>,
-    },
-    /// It exists, but this user may not open it.
-    #[error("no permission to open {0}")]
-    Permission(PathBuf),
-    /// Another program has it open.
-    #[error("{0} is in use by another program")]
-    Busy(PathBuf),
-    /// A file or a folder, or something else that is no serial line.
-    #[error("{0} is not a serial port")]
-    NotSerial(PathBuf),
-    /// Anything else the system said.
-    #[error("cannot open {port}: {source}")]
-    Io {
-        /// The port's path.
-        port: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-}
-
-impl LinkError {
-    /// What a person can do about it.
-    #[must_use]
-    pub fn help(&self) -> String {
-        match self {
-            Self::NotFound { present, .. } if present.is_empty() => {
-                "no serial port is present: plug the board in, or use --mock to try without one"
-                    .into()
-            }
-            Self::NotFound { present, .. } => format!(
-                "present are {}; give one of them, or use --mock to try without a board",
-                present.join(", ")
-            ),
-            Self::Permission(port) => format!(
-                "add yourself to the group that owns it (`ls -l {}`; usually `sudo usermod -aG \
-                 dialout $USER`), then log in again",
-                port.display()
-            ),
-            Self::Busy(port) => format!(
-                "find the program with `fuser -v {}` and stop it; a running daemon owns its port",
-                port.display()
-            ),
-            Self::NotSerial(_) => {
-                "give a character device such as /dev/ttyACM0, or the link a mock made".into()
-            }
-            Self::Io { .. } => "unplug the board, plug it in again, and look at `dmesg`".into(),
-        }
-    }
-}
 
 /// Opens a line for the ranger's protocol, locked against other programs and emptied of what
 /// was received before.
@@ -87,67 +38,49 @@ impl LinkError {
 /// other), or a USB serial number. Must be called within a tokio runtime.
 ///
 /// # Errors
-/// [`LinkError`] tells a missing, busy, forbidden and wrong port apart.
+/// [`LinkError`] tells a missing, ambiguous, busy, forbidden and wrong port apart.
 pub fn open(port: &str) -> Result<SerialStream, LinkError> {
-    let path = resolve(port)?;
+    open_path(&resolve(port, None)?.path)
+}
+
+fn open_path(path: &Path) -> Result<SerialStream, LinkError> {
     let stream = tokio_serial::new(path.to_string_lossy(), BAUD)
         .open_native_async()
-        .map_err(|error| classify(&path, error))?;
+        .map_err(|error| classify(path, error))?;
     // What a device said to an earlier program is not an answer to this one.
-    stream.clear(ClearBuffer::Input).map_err(|error| classify(&path, error))?;
+    stream.clear(ClearBuffer::Input).map_err(|error| classify(path, error))?;
     Ok(stream)
 }
 
-/// A serial port of this machine, as far as can be told without opening it.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
-pub struct Candidate {
-    /// Its path.
-    pub port: String,
-    /// Its stable name under `/dev/serial/by-id`, which survives replugging.
-    pub id: Option<String>,
-    /// What its USB descriptor says: manufacturer, product, serial number.
-    pub usb: Option<String>,
+/// Path of the device that a port's name stands for, as the kernel names it.
+///
+/// # Errors
+/// As [`open`], apart from what only opening reveals.
+pub fn device_path(port: &str) -> Result<PathBuf, LinkError> {
+    Ok(holders::real_path(&resolve(port, None)?.path))
 }
 
-/// The serial ports of this machine, those with a stable name first. None is opened.
+/// The programs that have `port` open besides this one, with a remedy; `None` if none is visible.
+///
+/// A program that reads the same port takes bytes away, which looks like a silent or faulty board.
 #[must_use]
-pub fn candidates() -> Vec<Candidate> {
-    let ids: Vec<PathBuf> = fs::read_dir(BY_ID)
-        .map(|entries| entries.flatten().map(|entry| entry.path()).collect())
-        .unwrap_or_default();
-    let id_of = |port: &str| {
-        let target = fs::canonicalize(port).ok()?;
-        let id = ids.iter().find(|id| fs::canonicalize(id).is_ok_and(|path| path == target))?;
-        Some(id.file_name()?.to_string_lossy().into_owned())
-    };
-    let mut candidates: Vec<Candidate> = serialport::available_ports()
-        .unwrap_or_default()
-        .into_iter()
-        .map(|port| Candidate {
-            id: id_of(&port.port_name),
-            usb: match port.port_type {
-                SerialPortType::UsbPort(usb) => Some(
-                    [usb.manufacturer, usb.product, usb.serial_number]
-                        .into_iter()
-                        .flatten()
-                        .collect::<Vec<_>>()
-                        .join(" "),
-                ),
-                _ => None,
-            },
-            port: port.port_name,
-        })
-        .collect();
-    candidates.sort_by_key(|candidate| (candidate.id.is_none(), candidate.port.clone()));
-    candidates
+pub fn describe_contention(port: &str) -> Option<String> {
+    let path = device_path(port).ok()?;
+    let holders = find_holders(&path);
+    let advice = holders.advice(&path)?;
+    Some(format!(
+        "{} has the port open, too, and may take its bytes: {advice}",
+        holders.describe("")
+    ))
 }
 
-/// The device path behind a path or a stable id.
-fn resolve(port: &str) -> Result<PathBuf, LinkError> {
+/// The device behind a path, a stable id or a serial number. Of several ids that match, `preferred`
+/// is taken.
+fn resolve(port: &str, preferred: Option<&str>) -> Result<Resolved, LinkError> {
     let path = PathBuf::from(port);
     match fs::metadata(&path) {
         Ok(metadata) if metadata.file_type().is_char_device() && !is_console(&metadata) => {
-            return Ok(path);
+            return Ok(Resolved { path, matched_id: None });
         }
         Ok(_) => return Err(LinkError::NotSerial(path)),
         Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
@@ -155,9 +88,7 @@ fn resolve(port: &str) -> Result<PathBuf, LinkError> {
         }
         Err(_) => {}
     }
-    by_id(port)
-        .or_else(|| by_usb_serial(port))
-        .ok_or_else(|| LinkError::NotFound { port: port.to_owned(), present: present() })
+    PortFolders::system().find(port, preferred)
 }
 
 /// Whether it is a terminal of people's and no line: this process's own (`/dev/tty`), the maker of
@@ -174,43 +105,27 @@ fn is_no_terminal(path: &Path) -> bool {
     rustix::fs::open(path, flags, Mode::empty()).is_ok_and(|file| !rustix::termios::isatty(file))
 }
 
-fn by_id(id: &str) -> Option<PathBuf> {
-    let entries: Vec<PathBuf> =
-        fs::read_dir(BY_ID).ok()?.flatten().map(|entry| entry.path()).collect();
-    let named = |wanted: &dyn Fn(&str) -> bool| {
-        let mut fitting = entries
-            .iter()
-            .filter(|path| path.file_name().and_then(|name| name.to_str()).is_some_and(wanted));
-        fitting.next().filter(|_| fitting.next().is_none()).cloned()
-    };
-    named(&|name| name == id).or_else(|| named(&|name| !id.is_empty() && name.contains(id)))
-}
-
-fn by_usb_serial(serial: &str) -> Option<PathBuf> {
-    serialport::available_ports().ok()?.into_iter().find_map(|port| match port.port_type {
-        SerialPortType::UsbPort(usb) if usb.serial_number.as_deref() == Some(serial) => {
-            Some(PathBuf::from(port.port_name))
-        }
-        _ => None,
-    })
-}
-
-/// Names of the serial ports of this machine.
-fn present() -> Vec<String> {
-    let ports = serialport::available_ports().unwrap_or_default();
-    ports.into_iter().map(|port| port.port_name).collect()
+/// `true` if the kernel denies access by another rule than the file's permissions: those give EACCES,
+/// a cgroup's device policy EPERM.
+fn is_denied_by_policy(path: &Path) -> bool {
+    rustix::fs::access(path, Access::READ_OK | Access::WRITE_OK) == Err(Errno::PERM)
 }
 
 fn classify(path: &Path, error: serialport::Error) -> LinkError {
     let port = path.to_path_buf();
     match error.kind {
         // serialport reports a port that is locked or opened exclusively as "no device".
-        ErrorKind::NoDevice if path.exists() => LinkError::Busy(port),
-        ErrorKind::Io(io::ErrorKind::PermissionDenied) => LinkError::Permission(port),
-        ErrorKind::Io(io::ErrorKind::ResourceBusy) => LinkError::Busy(port),
-        ErrorKind::Io(io::ErrorKind::NotFound) => {
-            LinkError::NotFound { port: port.display().to_string(), present: present() }
+        ErrorKind::NoDevice | ErrorKind::Io(io::ErrorKind::ResourceBusy) if path.exists() => {
+            LinkError::Busy { holders: find_holders(path), port }
         }
+        ErrorKind::Io(io::ErrorKind::PermissionDenied) if is_denied_by_policy(path) => {
+            LinkError::DevicePolicy(port)
+        }
+        ErrorKind::Io(io::ErrorKind::PermissionDenied) => LinkError::Permission(port),
+        ErrorKind::NoDevice | ErrorKind::Io(io::ErrorKind::NotFound) => LinkError::NotFound {
+            port: port.display().to_string(),
+            present: PortFolders::system().present(),
+        },
         _ if is_no_terminal(path) => LinkError::NotSerial(port),
         _ => LinkError::Io { port, source: error.into() },
     }
@@ -222,7 +137,7 @@ mod tests {
 
     #[test]
     fn a_missing_port_is_named_and_what_is_present_is_said() {
-        let error = resolve("/dev/no-such-port").expect_err("it does not exist");
+        let error = resolve("/dev/no-such-port", None).expect_err("it does not exist");
         assert!(error.to_string().contains("/dev/no-such-port"));
         assert!(matches!(error, LinkError::NotFound { .. }));
         assert!(error.help().contains("--mock"));
@@ -232,7 +147,7 @@ mod tests {
     fn a_file_is_not_a_port() {
         let file = tempfile::NamedTempFile::new().expect("a temporary file");
         let path = file.path().to_str().expect("plain name");
-        assert!(matches!(resolve(path), Err(LinkError::NotSerial(_))));
+        assert!(matches!(resolve(path, None), Err(LinkError::NotSerial(_))));
     }
 
     #[tokio::test]

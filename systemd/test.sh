@@ -24,6 +24,22 @@ for unit in sonard.service sonard@front.service; do
   printf '%s: %s\n' "$unit" "$(tail -n 1 "$root/said" | sed 's/^.*Overall/overall/')"
 done
 
+for unit in sonard.service sonard@.service; do
+  # Without a network that target may never be reached, and the daemon would never start.
+  grep -q '^[A-Z][a-z]*=.*time-sync.target' "$unit" && fail "$unit waits for time-sync.target"
+  # The modules that register the drivers which the device policy names; others are built in.
+  for driver in ttyACM:cdc_acm ttyUSB:usbserial; do
+    grep -q "^DeviceAllow=char-${driver%:*} " "$unit" || fail "$unit does not allow ${driver%:*}"
+    for key in Wants After; do
+      grep -q "^$key=.*modprobe@${driver#*:}.service" "$unit" || fail "$unit: ${driver#*:} may be loaded too late"
+    done
+  done
+  # A scan's prediction, a client's preview, all clients, and the rest.
+  bound=$(sed -n 's/.*bytes: \([0-9_]*\) .*/\1/p' ../crates/sonard-model/src/model/paths/effort.rs | head -n 1 | tr -d _)
+  limit=$(sed -n 's/^MemoryMax=\([0-9]*\)M$/\1/p' "$unit")
+  [ $((limit << 20)) -ge $((2 * bound + 64000000 + 50000000)) ] || fail "$unit: MemoryMax=${limit}M, the model may take $bound bytes twice"
+done
+
 # The instance differs from the single unit only where it has to.
 differ=$(diff sonard.service sonard@.service | grep -c '^[<>]') || true
 [ "$differ" -le 18 ] || fail "sonard.service and sonard@.service have drifted apart: $differ lines"

@@ -39,6 +39,6 @@ pub struct AirStatus {
     pub age_s: Option<f64>,
     /// Older than the configuration allows.
     pub stale: bool,
-    /// Why the thermometer can't be read, if so.
+    /// Why the thermometer has no valid temperature now, if so; the last valid one is kept.
     pub error: Option<String>,
 }

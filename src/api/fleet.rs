@@ -30,6 +30,9 @@ pub struct FleetRobot {
     pub since: Timestamp,
     /// When it was heard last.
     pub heard: Option<Timestamp>,
+    /// Time since then, seconds, by a clock that is never set.
+    #[serde(default)]
+    pub heard_s: Option<f64>,
     /// What is wrong, if anything.
     pub wrong: Vec<String>,
     /// What it said when it was heard last.
@@ -69,6 +72,9 @@ pub struct FleetReport {
     pub scan: Option<ScanProgress>,
     /// When the last reading came in, by the clock of whoever asked.
     pub last_reading: Option<Timestamp>,
+    /// Age of the last reading when the robot was heard last, seconds.
+    #[serde(default)]
+    pub last_reading_age_s: Option<f64>,
     /// The last scan that ended.
     pub last_scan: Option<FleetScan>,
 }

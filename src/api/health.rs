@@ -10,7 +10,7 @@ use crate::compare::Explanation;
 /// Health of the daemon, with the underlying figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Health {
-    /// Whether the device can be used, the log written, and the temperature is fresh.
+    /// Whether the device can be used, the log written, and the temperature is valid and fresh.
     pub healthy: bool,
     /// Why not.
     pub reasons: Vec<String>,
@@ -22,6 +22,9 @@ pub struct Health {
     pub clock: ClockReport,
     /// How the last scan that ended agrees with the model.
     pub fit: Option<ScanFit>,
+    /// Time since that scan ended, seconds, by a clock that is never set.
+    #[serde(default)]
+    pub last_scan_age_s: Option<f64>,
     /// How long after its firing the last reading came in, seconds, if it is known when that was.
     pub reading_lateness_s: Option<f64>,
 }

@@ -11,6 +11,9 @@ pub struct LinkReport {
     pub state: LinkState,
     /// Since when, by the wall clock.
     pub since: Timestamp,
+    /// For how long, seconds, by a clock that is never set.
+    #[serde(default)]
+    pub for_s: Option<f64>,
     /// The port, as configured.
     pub port: String,
     /// What went wrong last and what to do, while the device can't be used.

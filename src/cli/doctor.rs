@@ -5,6 +5,9 @@ mod echo;
 mod examine;
 mod line;
 mod report;
+mod speaker;
+mod surroundings;
+mod tap;
 
 use super::{Failure, Outcome, runtime};
 use crate::link::{self, Candidate};
@@ -33,7 +36,8 @@ Diagnose a ranger: port, firmware, motor, echo.
 
 With --port it opens that port, identifies the board, measures the line, turns the motor a few steps back and \
 forth, fires some times, and compares the board's clock with this computer's. Each check reports what it found \
-and, if something is wrong, what to do. Without --port it lists the serial ports by their stable names and opens \
+and, if something is wrong, what to do. Other programs that use the port are named, as far as this user may see \
+them, and nothing is moved then. Without --port it lists the serial ports by their stable names and opens \
 none of them, because other devices may react to it.";
 
 const EXAMPLES: &str = "\
@@ -46,9 +50,10 @@ Point the ranger at a wall 0.5 to 5 m away. The motor turns by 25 steps at 200 s
 of the transducer, which carries 400 V while it fires.
 
 With --json, `checks` holds objects {check, status, detail, cause, help}. status is ok, warning, \
-failed or skipped; cause is null or one of not_found, permission, busy, not_serial, port_error, \
-cable, silent, wrong_firmware, wrong_version, power, line, latency, emergency_stop, motor, \
-missing_echo, stuck_echo, echo_time (before the receiver opens or after the window), scatter (readings \
+failed or skipped; cause is null or one of not_found, ambiguous, permission, busy (another program \
+has the port open), not_serial, port_error, cable, silent, wrong_firmware, wrong_version, \
+login_prompt, modem (commands or replies of one), echo (the line returns what is sent), settings \
+(another program changed the line's), power, line, latency, emergency_stop, motor, missing_echo, stuck_echo, echo_time (before the receiver opens or after the window), scatter (readings \
 that disagree), clock (it stands or runs at another rate), device.
 
 Exit codes: 0 all well, or warnings only (or ports listed), 1 the board works but something failed, 2 wrong \
@@ -56,7 +61,9 @@ usage, 3 no port, no board or no link to it.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let Some(port) = &args.port else {
-        return list(&link::candidates(), args.json);
+        let candidates =
+            link::candidates().map_err(|error| Failure::device(&error, error.help()))?;
+        return list(&candidates, args.json);
     };
     let report = runtime::run_interruptible(async |interrupts| {
         Ok(examine::examine(port, args, interrupts).await)

@@ -4,9 +4,11 @@ mod broker;
 mod load;
 mod mock;
 mod ros;
+mod sandbox;
 
 use std::{
     path::{Path, PathBuf},
+    sync::{Arc, OnceLock},
     time::Duration,
 };
 
@@ -20,10 +22,12 @@ use super::{
     runtime::{self, Interrupts},
 };
 use crate::{
-    daemon::{self, Handle, Journal, Order, Resources, Settings},
+    daemon::{self, Handle, Journal, OpenPort, Order, Resources, Settings},
     host_gpio,
     interrupts::{FORCED_END, Hangup},
-    link, messages,
+    link::PortOpener,
+    messages,
+    scan::EventKind,
     server::{Access, Listeners, Server, read_token, token_help},
     supervisor::{Supervisor, Task},
 };
@@ -199,7 +203,9 @@ async fn serve(
     };
     let mut broker = Broker::open(&settings)?;
     let log_folder = PathBuf::from(&keys.log.folder);
-    let (journal, thread) = Journal::open(&log_folder, settings.rotation(), &supervisor)?;
+    let (journal, thread) = Journal::open(&log_folder, settings.rotation(), &supervisor)
+        .map_err(|error| sandbox::log_failure(&log_folder, error))?;
+    sandbox::warn_of_private_folder(&log_folder);
     // A start that is rejected below stops the log's thread.
     let _stopping = supervisor.stopping().clone().drop_guard();
     let listeners =
@@ -212,9 +218,12 @@ async fn serve(
     let fleet = load::fleet(&keys.fleet)?;
     let (daemon, handle) = match gpio {
         Some(gpio) => {
-            let open_port = Box::new(link::open);
+            let announced = Arc::new(OnceLock::<Handle>::new());
+            let open_port = open_and_announce(Arc::clone(&announced));
             let resources = Resources { open_port, gpio, journal, supervisor: supervisor.clone() };
-            daemon::prepare(resources, settings.clone())
+            let prepared = daemon::prepare(resources, settings.clone());
+            drop(announced.set(prepared.1.clone()));
+            prepared
         }
         None => daemon::prepare_simulated(journal, supervisor.clone(), settings.clone()),
     };
@@ -251,6 +260,21 @@ async fn serve(
         Some(error) => Err(Failure::device(format!("the log was not closed well: {error}"), "")),
         None => Ok(()),
     }
+}
+
+/// Opens ports; another device than before becomes an event of the daemon, once there is one.
+fn open_and_announce(daemon: Arc<OnceLock<Handle>>) -> OpenPort {
+    let mut ports = PortOpener::default();
+    Box::new(move |port| {
+        let line = ports.open(port)?;
+        if let Some(change) = ports.take_change() {
+            tracing::warn!("{change}");
+            if let Some(daemon) = daemon.get() {
+                daemon.event(EventKind::Reconnected, change);
+            }
+        }
+        Ok(line)
+    })
 }
 
 /// Who may write over TCP, and under which names the server is asked.

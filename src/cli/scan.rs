@@ -8,7 +8,7 @@ mod summary;
 
 use std::path::{Path, PathBuf};
 
-use firmware_protocol::host::{HostConfig, LinkStats};
+use firmware_protocol::host::{HostConfig, HostError, LinkStats};
 use tokio::sync::{mpsc, oneshot};
 use tokio_serial::SerialStream;
 
@@ -24,7 +24,7 @@ use super::{
     runtime::{self, Interrupts},
 };
 use crate::{
-    link::{self, BAUD},
+    link::{self, BAUD, PortOpener},
     mock::{MockBoard, MockPort, Soundings},
     model::OptionKeys,
     ranger::{DriveError, Driver, Motion, PreparedScan, Ranger, ScanError, ScanSummary},
@@ -201,7 +201,7 @@ async fn measure(
         .or_else(|| emulator.as_ref().map(Emulator::port))
         .or_else(|| args.port.clone())
         .unwrap_or_default();
-    let mut ranger = meet(&port, interrupts).await?;
+    let mut ranger = meet(&mut PortOpener::default(), &port, interrupts).await?;
     let job = setup.job(ranger.identity()).map_err(|error| scan_failure(error.into()))?;
     let session = setup.session(ranger.identity());
     output.add_to_earlier(&session, job.pose, job.plan)?;
@@ -241,13 +241,23 @@ fn emulator_options(args: &Args, setup: &PreparedScan) -> Result<Vec<String>, Fa
 }
 
 pub(super) async fn meet(
+    ports: &mut PortOpener,
     port: &str,
     interrupts: &Interrupts,
 ) -> Result<Ranger<SerialStream>, Failure> {
-    let line = link::open(port).map_err(|error| Failure::device(&error, error.help()))?;
+    let line = ports.open(port).map_err(|error| Failure::device(&error, error.help()))?;
+    if let Some(change) = ports.take_change() {
+        anstream::eprintln!("{change}");
+    }
     let config = HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, rand::random()) };
     tokio::select! {
-        met = Ranger::meet(Driver::new(line, config)) => met.map_err(|error| device_failure(&error)),
+        met = Ranger::meet(Driver::new(line, config)) => met.map_err(|error| match &error {
+            DriveError::Host(HostError::NoAnswer { .. } | HostError::NotADevice { .. }) => {
+                let help = link::describe_contention(port);
+                Failure::device(error, help.unwrap_or_else(|| error.help().to_owned()))
+            }
+            _ => device_failure(&error),
+        }),
         () = interrupts.clone().wait() => {
             Err(Failure::Found(Some("stopped before the device answered".into())))
         }

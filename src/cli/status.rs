@@ -2,7 +2,6 @@
 
 use std::io::Write as _;
 
-use jiff::Timestamp;
 use serde::Serialize;
 
 mod fleet;
@@ -85,7 +84,8 @@ fn screen(status: &Status, health: &Health) -> String {
     let better = health.fit.as_ref().and_then(|fit| fit.explanations.first());
     lines.extend(better.map(|better| format!("  better   explained: {better}")));
     let (air, log, clients) = (&status.air, &status.log, &status.subscribers);
-    let source = word(&air.source);
+    let age = air.age_s.map_or_else(String::new, |age_s| format!(", {age_s:.0} s old"));
+    let source = word(&air.source) + &age;
     let uncertain = match log.uncertain {
         0 => String::new(),
         count => format!(", {count} uncertain"),
@@ -106,9 +106,6 @@ fn screen(status: &Status, health: &Health) -> String {
     lines.extend(status.mqtt.as_ref().map(broker));
     lines.extend(pending(&status.pending));
     lines.extend(health.reasons.iter().map(|reason| format!("  not well: {reason}")));
-    if let Some(error) = &air.error {
-        lines.push(format!("  the thermometer can't be read: {error}"));
-    }
     if let Some(error) = &status.configuration.error {
         lines.push(format!("  the last change of the configuration was refused: {error}"));
     }
@@ -220,10 +217,10 @@ fn array(status: &Status, simulation: &SimulationReport) -> Vec<String> {
     ]
 }
 
-/// What it is doing or suffering, and for how long.
+/// State of the link, and for how long by the daemon's clock that is never set.
 fn state(link: &LinkReport) -> String {
-    let seconds = Timestamp::now().duration_since(link.since).as_secs_f64();
-    format!("{} for {seconds:.1} s", link.state.name().replace('_', " "))
+    let state = link.state.name().replace('_', " ");
+    link.for_s.map_or_else(|| state.clone(), |for_s| format!("{state} for {for_s:.1} s"))
 }
 
 /// The word that stands for a value in JSON.

@@ -19,9 +19,11 @@ use super::{
     Plan, Slot, Watcher,
     estimate::{Pace, disk_bytes},
     source::{Source, answered},
+};
+use crate::{
+    acoustics::Air, interrupts::Interrupts, ranger::PreparedScan, scan::CollectionRef,
     thermometer::Thermometer,
 };
-use crate::{acoustics::Air, interrupts::Interrupts, ranger::PreparedScan, scan::CollectionRef};
 
 /// Choices of the operator for a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -43,7 +45,7 @@ struct Collector<D, W> {
     source: Source,
     /// Whether the source may have more poses.
     more: bool,
-    thermometer: Thermometer,
+    thermometer: Option<Thermometer>,
     /// The air of the session.
     air: Air,
     /// What is to be measured at each pose in that air.

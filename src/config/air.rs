@@ -23,7 +23,8 @@ macro_rules! air_section {
             #[schemars(range(min = 60, max = 110))]
             pub pressure_kpa: f64,
             /// File of a 1-wire (w1_slave, temperature) or hwmon (temp1_input) thermometer, in
-            /// thousandths of a degree Celsius.
+            /// thousandths of a degree Celsius. Values that sensor or air can't have are rejected; the
+            /// last valid one stays in use.
             #[schemars(example = "/sys/bus/w1/devices/28-0316a1d2f8ff/temperature")]
             pub file: Option<String>,
             $($(#[$further])* pub $key: $kind,)*

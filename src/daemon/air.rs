@@ -1,16 +1,17 @@
 //! The air as it is known now: from the configuration, a thermometer's file, or the API.
 
-use std::{path::PathBuf, time::Duration};
+use std::time::Duration;
 
 use tokio::{sync::watch, time::Instant};
 
+use super::{limits::ordered_air, refusal::Refusal};
 use crate::{
-    acoustics::{Air, AirError},
+    acoustics::Air,
     api::{AirOrder, AirStatus},
     config::AirKeys,
     scan::{AirSource, ScanAir},
     supervisor::{Supervisor, Task},
-    thermometer::read_thermometer,
+    thermometer::Thermometer,
 };
 
 /// A change smaller than this is no reason to predict everything anew, degrees: it moves a range
@@ -55,14 +56,18 @@ impl AirControl {
         match reading {
             Ok(temperature_c) => {
                 if self.error.is_some() {
-                    tracing::info!("the thermometer can be read again");
+                    tracing::info!("the thermometer has a valid temperature again");
                 }
                 self.temperature_c = *temperature_c;
                 (self.source, self.at, self.error) = (AirSource::File, Some(now), None);
             }
             Err(error) => {
                 if self.error.is_none() {
-                    tracing::warn!("the thermometer can't be read: {error}");
+                    tracing::warn!(
+                        "the thermometer has no valid temperature: {error}; ranges are computed with \
+                         {:.1} C",
+                        self.temperature_c
+                    );
                 }
                 self.error = Some(error.clone());
             }
@@ -73,12 +78,10 @@ impl AirControl {
     ///
     /// # Errors
     /// When a figure is out of range; nothing was changed then.
-    pub(super) fn order(&mut self, order: &AirOrder, now: Instant) -> Result<(), AirError> {
-        let humidity_percent = order.humidity_percent.unwrap_or(self.humidity_percent);
-        let pressure_kpa = order.pressure_kpa.unwrap_or(self.pressure_kpa);
-        Air::new(order.temperature_c, humidity_percent, pressure_kpa)?;
-        (self.humidity_percent, self.pressure_kpa) = (humidity_percent, pressure_kpa);
-        self.temperature_c = order.temperature_c;
+    pub(super) fn order(&mut self, order: &AirOrder, now: Instant) -> Result<(), Refusal> {
+        let air = ordered_air(order, self.humidity_percent, self.pressure_kpa)?;
+        (self.humidity_percent, self.pressure_kpa) = (air.humidity_percent(), air.pressure_kpa());
+        self.temperature_c = air.temperature_c();
         (self.source, self.at) = (AirSource::Api, Some(now));
         Ok(())
     }
@@ -149,13 +152,18 @@ pub(super) fn watch_thermometer(
     supervisor: &Supervisor,
 ) -> watch::Receiver<Option<Reading>> {
     let (sender, receiver) = watch::channel(None);
-    let Some(file) = keys.file.clone().map(PathBuf::from) else { return receiver };
+    let Some(mut thermometer) = keys.file.as_ref().map(Thermometer::new) else { return receiver };
     let every = Duration::from_secs_f64(keys.every_s);
     let watching = async move {
         while !sender.is_closed() {
-            let path = file.clone();
-            let reading = tokio::task::spawn_blocking(move || read_thermometer(&path)).await;
-            sender.send_replace(reading.ok());
+            let reading = tokio::select! {
+                reading = thermometer.read() => reading.map_err(|error| error.to_string()),
+                () = sender.closed() => return,
+            };
+            if let Some(remark) = thermometer.take_remark() {
+                tracing::warn!("{remark}");
+            }
+            sender.send_replace(Some(reading));
             tokio::select! {
                 () = tokio::time::sleep(every) => {}
                 () = sender.closed() => {}

@@ -15,7 +15,7 @@ use super::{
     agenda::{Agenda, Asked},
     air::{AirControl, Reading, watch_thermometer},
     journal::Journal,
-    refusal::{Refusal, RefusalKind},
+    refusal::Refusal,
     settings::Settings,
     shared::{Shared, Terms},
 };
@@ -226,15 +226,7 @@ impl Control {
             }
             Order::Plan(plan) => (self.set_plan(plan), Some(Interrupt::Agenda)),
             Order::Pose(pose) => (self.set_pose(pose), Some(Interrupt::Agenda)),
-            Order::Air(order) => {
-                let outcome = self.air.order(&order, Instant::now());
-                let refuse = |error: crate::acoustics::AirError| Refusal {
-                    kind: RefusalKind::Wrong,
-                    message: error.to_string(),
-                    help: "temperatures are degrees Celsius, pressures kilopascals".into(),
-                };
-                (outcome.map_err(refuse), Some(Interrupt::Agenda))
-            }
+            Order::Air(order) => (self.air.order(&order, Instant::now()), Some(Interrupt::Agenda)),
             Order::OwnAir => {
                 self.take_own_air();
                 (Ok(()), Some(Interrupt::Agenda))

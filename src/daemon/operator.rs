@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     api::{ScanTotals, Trouble},
-    link::{BAUD, LinkError},
+    link::{self, BAUD, LinkError},
     ranger::{DriveError, Driver, Ranger, Unasked, serial_text},
     scan::{EventKind, Session},
 };
@@ -123,11 +123,15 @@ impl Operator {
             }
             Err(error) => {
                 let trouble = match &error {
-                    LinkError::NotFound { .. } => Trouble::Absent,
-                    LinkError::Busy(_) => Trouble::Busy,
-                    LinkError::Permission(_) | LinkError::NotSerial(_) => Trouble::Forbidden,
+                    LinkError::NotFound { .. }
+                    | LinkError::Ambiguous { .. }
+                    | LinkError::OtherDevice { .. } => Trouble::Absent,
+                    LinkError::Busy { .. } => Trouble::Busy,
+                    LinkError::Permission(_)
+                    | LinkError::DevicePolicy(_)
+                    | LinkError::NotSerial(_) => Trouble::Forbidden,
                     // A port that is being unplugged says all kinds of things.
-                    LinkError::Io { .. } => Trouble::Lost,
+                    LinkError::NotListed { .. } | LinkError::Io { .. } => Trouble::Lost,
                 };
                 self.fail(trouble, format!("{error}; {}", error.help()));
             }
@@ -296,7 +300,15 @@ impl Operator {
             tracing::warn!("the device does not answer: pulling its reset line");
             tokio::task::block_in_place(|| self.control.gpio.reset());
         }
-        self.fail(trouble, format!("{error}; {}", error.help()));
+        let contention = match trouble {
+            Trouble::NotAnswering => {
+                let port = self.control.settings.keys.device.port.as_deref();
+                port.and_then(link::describe_contention)
+            }
+            _ => None,
+        };
+        let help = contention.unwrap_or_else(|| error.help().to_owned());
+        self.fail(trouble, format!("{error}; {help}"));
     }
 
     /// Waits until a time or until something happens, and for no longer than a heartbeat.

@@ -1,12 +1,10 @@
 //! A sensor that a program wants.
 
-use firmware_protocol::messages::Identity;
-
 use super::refusal::{Refusal, RefusalKind};
 use crate::{
     acoustics::Sensor,
     api::{SensorOrder, Setup},
-    ranger::{Listening, Motion, check_blanking},
+    ranger::{Listening, Motion},
 };
 
 /// The sensor of an order beside what the configuration decides.
@@ -38,22 +36,6 @@ pub fn ordered_sensor(
         heard.map_err(|deaf| conflict(deaf.to_string(), &deaf.help()))?;
     }
     Ok(sensor)
-}
-
-/// Whether a device can keep the blanking of a sensor that is to take another's place.
-///
-/// # Errors
-/// When it can't.
-pub(super) fn check_device(
-    sensor: &Sensor,
-    before: &Sensor,
-    identity: &Identity,
-) -> Result<(), Refusal> {
-    if sensor.blanking_us == before.blanking_us {
-        return Ok(());
-    }
-    let kept = check_blanking(sensor.blanking_us, identity);
-    kept.map_err(|error| conflict(error.to_string(), "leave blanking_us as it is, or give more"))
 }
 
 fn conflict(message: String, help: &str) -> Refusal {

@@ -5,7 +5,7 @@ use std::sync::{
     atomic::{AtomicU32, AtomicU64, Ordering},
 };
 
-use firmware_protocol::host::LinkStats;
+use firmware_protocol::{host::LinkStats, messages::Identity};
 use jiff::Timestamp;
 use tokio::{sync::watch, time::Instant};
 use uuid::Uuid;
@@ -24,7 +24,7 @@ use crate::{
     compare::Explanation,
     config::ScanningKeys,
     geometry::Pose,
-    scan::{Device, Provenance, Record, ScanEnd, ScanPlan, ScanView, SceneRef, Session},
+    scan::{AirSource, Device, Provenance, Record, ScanEnd, ScanPlan, ScanView, SceneRef, Session},
     scene::Scene,
 };
 
@@ -33,11 +33,14 @@ use crate::{
 pub(super) struct View {
     pub(super) state: LinkState,
     pub(super) since: Timestamp,
+    /// `since` on the clock that is never set.
+    pub(super) changed: Instant,
     pub(super) port: String,
     pub(super) trouble: Option<String>,
     pub(super) failures: u32,
     pub(super) retry_at: Option<Instant>,
     pub(super) device: Option<Device>,
+    pub(super) identity: Option<Identity>,
     pub(super) provenance: Option<Provenance>,
     pub(super) scanning: ScanningKeys,
     pub(super) session: Option<Arc<Session>>,
@@ -71,6 +74,8 @@ pub struct NextScan {
     pub air: AirStatus,
     /// The array that is played in place of a ranger that turns, if one is.
     pub array: Option<Arc<RangerArray>>,
+    /// The connected device, for its limits.
+    pub device: Option<Identity>,
 }
 
 /// What scans are taken by.
@@ -102,7 +107,8 @@ impl View {
 
     pub(super) fn next_scan(&self, at: Instant) -> NextScan {
         let Terms { plan, pose, scene, setup, array, air } = self.next.clone();
-        NextScan { plan, pose, scene, setup, array, air: air.status(at) }
+        let (air, device) = (air.status(at), self.identity);
+        NextScan { plan, pose, scene, setup, air, array, device }
     }
 
     /// What differs from it in the next scan.
@@ -183,6 +189,11 @@ struct Collector {
     /// How the scan under way agrees with the model, and how the last one did.
     fit: Fit,
     latest_fit: Option<ScanFit>,
+    /// When the last one ended.
+    ended: Option<Instant>,
+    /// Start of the scan under way by both clocks. Times of its readings follow the wall clock as it
+    /// was then.
+    began: Option<(Instant, Timestamp)>,
     /// The best explanation that an event told.
     told: Option<Explanation>,
     /// How long after its firing the last reading came in, seconds.
@@ -223,6 +234,7 @@ impl Shared {
             Record::ScanStart(start) => {
                 self.beams_done.store(0, Ordering::Relaxed);
                 (scans.current, scans.sigma_us) = (Some(start.scan), None);
+                scans.began = Some((Instant::now(), start.time));
                 scans.fit = Fit::of(start, session);
             }
             Record::Ping(ping) => {
@@ -231,12 +243,14 @@ impl Shared {
                 scans.read = Some(Instant::now());
                 scans.fit.add(ping);
                 let fired = ping.time.filter(|_| ping.time_sigma_us.is_some());
-                scans.lateness_s =
-                    fired.map(|fired| Timestamp::now().duration_since(fired).as_secs_f64());
+                scans.lateness_s = fired.zip(scans.began).map(|(fired, (at, time))| {
+                    at.elapsed().as_secs_f64() - fired.duration_since(time).as_secs_f64()
+                });
             }
             Record::ScanEnd(end) => {
                 let fit = std::mem::take(&mut scans.fit);
                 scans.latest_fit = Some(fit.report(end));
+                scans.ended = Some(Instant::now());
                 let scan = scans.current.take()?;
                 scans.latest = Some((end.clone(), scans.sigma_us));
                 return Some((scan, fit.into_scan()));
@@ -281,6 +295,7 @@ impl Shared {
             link: LinkReport {
                 state: view.state,
                 since: view.since,
+                for_s: Some(now.saturating_duration_since(view.changed).as_secs_f64()),
                 port: view.port,
                 trouble: view.trouble,
                 failures: view.failures,
@@ -335,12 +350,14 @@ impl Shared {
                 "the log: the disk does not respond: a write or sync has taken {busy_s:.0} s so far"
             )
         }));
+        reasons.extend(air.error.as_ref().map(|error| describe_thermometer(error, &air)));
         if air.stale {
             reasons.push("the air temperature is stale".into());
         }
-        let (fit, reading_lateness_s) = {
+        let (fit, last_scan_age_s, reading_lateness_s) = {
             let scans = self.scans();
-            (scans.latest_fit.clone(), scans.lateness_s)
+            let age_s = scans.ended.map(|ended| ended.elapsed().as_secs_f64());
+            (scans.latest_fit.clone(), age_s, scans.lateness_s)
         };
         Health {
             healthy: reasons.is_empty(),
@@ -349,6 +366,7 @@ impl Shared {
             scans: view.scans,
             clock: view.clock,
             fit,
+            last_scan_age_s,
             reading_lateness_s,
         }
     }
@@ -366,6 +384,19 @@ impl Shared {
     fn scans(&self) -> MutexGuard<'_, Collector> {
         held(&self.scans)
     }
+}
+
+/// A thermometer's fault, and what ranges are computed with meanwhile.
+fn describe_thermometer(error: &str, air: &AirStatus) -> String {
+    let temperature_c = air.temperature_c;
+    let in_use = match (air.source, air.age_s) {
+        (AirSource::File, Some(age_s)) => {
+            format!("the last valid temperature, {temperature_c:.1} C, is {age_s:.0} s old")
+        }
+        (AirSource::Api, _) => format!("{temperature_c:.1} C was set by a program"),
+        _ => format!("{temperature_c:.1} C is the configured temperature"),
+    };
+    format!("the thermometer has no valid temperature: {error}; {in_use}")
 }
 
 /// Nothing under these locks can panic, so a poisoned one holds what it should.

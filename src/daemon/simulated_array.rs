@@ -42,6 +42,7 @@ pub(super) struct SimulatedArray {
     session: Option<Session>,
     state: LinkState,
     since: Timestamp,
+    changed: Instant,
     scans: ScanTotals,
 }
 
@@ -63,6 +64,7 @@ impl SimulatedArray {
             session: None,
             state: LinkState::Ready,
             since: Timestamp::now(),
+            changed: Instant::now(),
             scans: ScanTotals::default(),
         }
     }
@@ -247,7 +249,7 @@ impl SimulatedArray {
 
     fn enter(&mut self, state: LinkState) {
         if std::mem::replace(&mut self.state, state) != state {
-            self.since = Timestamp::now();
+            (self.since, self.changed) = (Timestamp::now(), Instant::now());
             if state == LinkState::Stopped {
                 tracing::info!("stopped");
             }
@@ -263,7 +265,7 @@ impl SimulatedArray {
         };
         let (control, drive, rhythm) = (&self.control, &self.drive, &self.rhythm);
         self.out.shared.view.send_modify(|view| {
-            (view.state, view.since) = (self.state, self.since);
+            (view.state, view.since, view.changed) = (self.state, self.since, self.changed);
             view.provenance = Some(Provenance::Simulated);
             // Whatever port is configured, none is open.
             view.port.clear();

@@ -1,5 +1,7 @@
 //! What is known of each robot, kept from answer to answer. Pure: times are told.
 
+use std::time::Duration;
+
 use jiff::{SignedDuration, Timestamp};
 use uuid::Uuid;
 
@@ -10,6 +12,8 @@ use crate::api::{Fleet, FleetPicture, FleetReport, FleetRobot, FleetScan, FleetS
 #[derive(Debug, Clone, PartialEq)]
 pub struct Roll {
     robots: Vec<FleetRobot>,
+    /// When each was heard last, on a clock that is never set.
+    heard_at: Vec<Option<Duration>>,
 }
 
 impl Roll {
@@ -23,14 +27,22 @@ impl Roll {
             state: FleetState::Unasked,
             since: now,
             heard: None,
+            heard_s: None,
             wrong: Vec::new(),
             report: None,
         };
-        Self { robots: members.into_iter().map(robot).collect() }
+        let robots: Vec<_> = members.into_iter().map(robot).collect();
+        Self { heard_at: vec![None; robots.len()], robots }
     }
 
-    /// Takes in an answer, or that there was none. A number that there is not changes nothing.
-    pub fn take(&mut self, number: usize, answer: Result<Told, Unheard>, now: Timestamp) {
+    /// Takes in an answer, or that there was none, at a time by the wall clock and by one that is
+    /// never set. A number that there is not changes nothing.
+    pub fn take(
+        &mut self,
+        number: usize,
+        answer: Result<Told, Unheard>,
+        (now, at): (Timestamp, Duration),
+    ) {
         let Some(robot) = self.robots.get_mut(number) else { return };
         let seen = judge(robot.robot.as_deref(), answer);
         if robot.state != seen.state {
@@ -39,6 +51,9 @@ impl Roll {
         robot.wrong = seen.wrong;
         if let Some(told) = seen.told {
             robot.heard = Some(now);
+            if let Some(heard_at) = self.heard_at.get_mut(number) {
+                *heard_at = Some(at);
+            }
             let before = robot.report.take().and_then(|report| report.last_scan);
             robot.report = Some(report(&told, before, now));
             // Whoever answers there from now on is this one, or another robot.
@@ -63,10 +78,14 @@ impl Roll {
         }
     }
 
-    /// All that is known.
+    /// All that is known at a time by the clock that is never set.
     #[must_use]
-    pub fn fleet(&self) -> Fleet {
-        Fleet { robots: self.robots.clone() }
+    pub fn fleet(&self, at: Duration) -> Fleet {
+        let mut robots = self.robots.clone();
+        for (robot, heard_at) in robots.iter_mut().zip(&self.heard_at) {
+            robot.heard_s = heard_at.map(|heard_at| at.saturating_sub(heard_at).as_secs_f64());
+        }
+        Fleet { robots }
     }
 
     /// Two of one name can't be told apart in logs and figures.
@@ -97,6 +116,7 @@ fn report(told: &Told, before: Option<FleetScan>, now: Timestamp) -> FleetReport
         link: status.link.state,
         provenance: status.provenance,
         scan: status.scan.clone(),
+        last_reading_age_s: status.last_reading_age_s,
         last_reading: age.and_then(|age| now.checked_sub(age).ok()),
         last_scan: health.fit.as_ref().map(|fit| FleetScan {
             scan: fit.scan,
@@ -170,8 +190,13 @@ mod tests {
         Timestamp::from_second(second).expect("a time")
     }
 
+    /// A time by both clocks.
+    fn now(second: u64) -> (Timestamp, Duration) {
+        (at(second.cast_signed()), Duration::from_secs(second))
+    }
+
     fn state(roll: &Roll, number: usize) -> (FleetState, Timestamp) {
-        let robot = &roll.fleet().robots[number];
+        let robot = &roll.fleet(Duration::ZERO).robots[number];
         (robot.state, robot.since)
     }
 
@@ -179,58 +204,73 @@ mod tests {
     fn silence_counts_from_its_first_answer_on_and_touches_no_other() {
         let mut roll = roll();
         let gone = || Err(Unheard::Silent("nobody".into()));
-        roll.take(0, gone(), at(2));
-        roll.take(0, gone(), at(4));
+        roll.take(0, gone(), now(2));
+        roll.take(0, gone(), now(4));
         assert_eq!(state(&roll, 0), (FleetState::Silent, at(2)));
         assert_eq!(state(&roll, 1), (FleetState::Unasked, at(0)));
-        roll.take(0, Err(Unheard::Refusing("no".into())), at(6));
+        roll.take(0, Err(Unheard::Refusing("no".into())), now(6));
         assert_eq!(state(&roll, 0), (FleetState::Refusing, at(6)));
-        roll.take(7, gone(), at(8));
+        roll.take(7, gone(), now(8));
         roll.show(7, Uuid::nil(), PICTURE);
-        assert_eq!(roll.fleet().robots.len(), 2);
+        assert_eq!(roll.fleet(Duration::ZERO).robots.len(), 2);
     }
 
     #[test]
     fn who_answered_first_is_who_is_expected_and_what_it_said_stays_while_another_answers() {
         let (mut roll, scan) = (roll(), Uuid::from_u128(1));
-        roll.take(1, Ok(told("mango", scan)), at(10));
-        let mango = roll.fleet().robots[1].clone();
+        roll.take(1, Ok(told("mango", scan)), now(10));
+        let mango = roll.fleet(Duration::ZERO).robots[1].clone();
         assert_eq!((mango.state, mango.robot.as_deref()), (FleetState::Well, Some("mango")));
         let report = mango.report.expect("it was heard");
-        assert_eq!(report.last_reading, Some(at(8)));
+        assert_eq!((report.last_reading, report.last_reading_age_s), (Some(at(8)), Some(2.0)));
         assert_eq!(mango.wrong, ["2 beams of the last scan are missing"]);
-        roll.take(1, Ok(told("papaya", scan)), at(12));
-        let mango = roll.fleet().robots[1].clone();
+        roll.take(1, Ok(told("papaya", scan)), now(12));
+        let mango = roll.fleet(Duration::ZERO).robots[1].clone();
         assert_eq!((mango.state, mango.since), (FleetState::OtherRobot, at(12)));
         assert_eq!((mango.robot.as_deref(), mango.heard), (Some("mango"), Some(at(10))));
         assert_eq!(mango.report, Some(report));
-        roll.take(1, Ok(told("a/b", scan)), at(14));
+        roll.take(1, Ok(told("a/b", scan)), now(14));
         assert_eq!(state(&roll, 1), (FleetState::Strange, at(14)));
+    }
+
+    #[test]
+    fn age_does_not_follow_a_clock_that_is_set() {
+        let (mut roll, scan) = (roll(), Uuid::from_u128(1));
+        let age_s = |roll: &Roll, at| roll.fleet(Duration::from_secs(at)).robots[0].heard_s;
+        assert_eq!(age_s(&roll, 5), None);
+        roll.take(0, Ok(told("kiwi", scan)), (at(1_800_000_000), Duration::from_secs(10)));
+        roll.take(0, Err(Unheard::Silent("nobody".into())), (at(5), Duration::from_secs(12)));
+        assert_eq!(age_s(&roll, 17), Some(7.0));
+        assert_eq!(age_s(&roll, 0), Some(0.0));
     }
 
     #[test]
     fn a_picture_is_of_its_scan_and_goes_with_it() {
         let (mut roll, scan, next) = (roll(), Uuid::from_u128(1), Uuid::from_u128(2));
-        roll.take(0, Ok(told("kiwi", scan)), at(1));
+        roll.take(0, Ok(told("kiwi", scan)), now(1));
         assert_eq!(roll.lacks_picture(0), Some(scan));
         roll.show(0, next, PICTURE);
         assert_eq!(roll.lacks_picture(0), Some(scan), "that was another scan");
         roll.show(0, scan, PICTURE);
-        roll.take(0, Ok(told("kiwi", scan)), at(3));
+        roll.take(0, Ok(told("kiwi", scan)), now(3));
         assert_eq!(roll.lacks_picture(0), None);
-        roll.take(0, Ok(told("kiwi", next)), at(5));
+        roll.take(0, Ok(told("kiwi", next)), now(5));
         assert_eq!(roll.lacks_picture(0), Some(next));
     }
 
     #[test]
     fn namesakes_are_told_once_and_no_longer_when_one_has_another_name() {
         let (mut roll, scan) = (roll(), Uuid::from_u128(1));
-        roll.take(1, Ok(told("kiwi", scan)), at(1));
-        roll.take(0, Ok(told("kiwi", scan)), at(1));
-        roll.take(0, Ok(told("kiwi", scan)), at(3));
-        let wrong: Vec<_> = roll.fleet().robots.iter().map(|one| one.wrong.len()).collect();
+        roll.take(1, Ok(told("kiwi", scan)), now(1));
+        roll.take(0, Ok(told("kiwi", scan)), now(1));
+        roll.take(0, Ok(told("kiwi", scan)), now(3));
+        let wrong: Vec<_> =
+            roll.fleet(Duration::ZERO).robots.iter().map(|one| one.wrong.len()).collect();
         assert_eq!(wrong, [1, 2]);
-        assert_eq!(roll.fleet().robots[1].wrong[1], "2 robots are called kiwi: set fleet.robot");
+        assert_eq!(
+            roll.fleet(Duration::ZERO).robots[1].wrong[1],
+            "2 robots are called kiwi: set fleet.robot"
+        );
     }
 
     #[test]
@@ -244,9 +284,9 @@ mod tests {
             told.status.sonard = "\u{1F916}".repeat(10_000);
             told.health.reasons = vec!["\u{1F916}\"\\".repeat(10_000); 100];
             told.health.healthy = false;
-            roll.take(number, Ok(told), at(1));
+            roll.take(number, Ok(told), now(1));
         }
-        let bytes = serde_json::to_vec(&roll.fleet()).expect("JSON").len();
+        let bytes = serde_json::to_vec(&roll.fleet(Duration::ZERO)).expect("JSON").len();
         assert!(bytes < 100_000, "{bytes} bytes without pictures");
     }
 }

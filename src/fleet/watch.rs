@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use tokio::{
     sync::{Semaphore, mpsc, watch},
     task::JoinSet,
-    time::{MissedTickBehavior, interval},
+    time::{Instant, MissedTickBehavior, interval},
 };
 use uuid::Uuid;
 
@@ -44,13 +44,14 @@ struct PictureRequest {
 #[must_use]
 pub fn watch(fleet: Vec<Asked>, supervisor: &Supervisor) -> watch::Receiver<Bytes> {
     let roll = Roll::new(fleet.iter().map(|one| &one.member), Timestamp::now());
-    let (tell, told) = watch::channel(written(&roll));
+    let (tell, told) = watch::channel(written(&roll, Duration::ZERO));
     drop(supervisor.spawn_finite(Task::Fleet, keep(roll, fleet, tell)));
     told
 }
 
 /// Owns the roll until nobody looks at it any more.
 async fn keep(mut roll: Roll, fleet: Vec<Asked>, tell: watch::Sender<Bytes>) {
+    let began = Instant::now();
     let (send, mut news) = mpsc::channel(fleet.len().max(1));
     // Those that ask end with this task.
     let mut asking = JoinSet::new();
@@ -68,7 +69,9 @@ async fn keep(mut roll: Roll, fleet: Vec<Asked>, tell: watch::Sender<Bytes>) {
             () = tell.closed() => return,
         };
         match news {
-            News::Answer(answer) => roll.take(number, *answer, Timestamp::now()),
+            News::Answer(answer) => {
+                roll.take(number, *answer, (Timestamp::now(), began.elapsed()));
+            }
             News::Picture(scan, picture) => {
                 requests[number].is_pending = false;
                 picture.into_iter().for_each(|picture| roll.show(number, scan, picture));
@@ -84,7 +87,7 @@ async fn keep(mut roll: Roll, fleet: Vec<Asked>, tell: watch::Sender<Bytes>) {
             });
         }
         while asking.try_join_next().is_some() {}
-        let now = written(&roll);
+        let now = written(&roll, began.elapsed());
         tell.send_if_modified(|before| {
             let is_news = *before != now;
             *before = now;
@@ -121,8 +124,8 @@ async fn keep_asking(number: usize, client: Client, send: mpsc::Sender<(usize, N
     }
 }
 
-fn written(roll: &Roll) -> Bytes {
-    serde_json::to_vec(&roll.fleet()).unwrap_or_default().into()
+fn written(roll: &Roll, at: Duration) -> Bytes {
+    serde_json::to_vec(&roll.fleet(at)).unwrap_or_default().into()
 }
 
 #[cfg(test)]

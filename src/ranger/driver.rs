@@ -81,8 +81,9 @@ impl DriveError {
 const fn host_help(error: &HostError) -> &'static str {
     match error {
         HostError::NoAnswer { .. } => {
-            "check that the port is the ranger's, that the board has power, and the cable; a board \
-             that never ran the firmware does not answer either"
+            "check that no other program reads the port (`sudo fuser -v PORT`), that the port is the \
+             ranger's, that the board has power, and the cable; a board that never ran the firmware \
+             does not answer either"
         }
         HostError::NotADevice { .. } => {
             "check that the port is the ranger's; a modem, a GPS or another firmware speaks \
@@ -165,6 +166,11 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Driver<L> {
             outgoing: Vec::new(),
             stats: watch::Sender::new(LinkStats::default()),
         }
+    }
+
+    /// Gives the line back.
+    pub fn into_line(self) -> L {
+        self.line
     }
 
     /// The machine, for its statistics.

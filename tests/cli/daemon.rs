@@ -31,6 +31,7 @@ mod stderr;
 mod strangers;
 mod supervision;
 mod systemd;
+mod thermometer;
 pub(crate) mod viewpoint;
 
 use std::{

@@ -15,6 +15,7 @@ use crate::{
         scan::{self, Mock, emulator::Emulator, setup::assumed},
     },
     collect::{Borrowed, Connected, Device, Halt, Patience, Plan, ScanOrder, Taken, take},
+    link::PortOpener,
     ranger::{PreparedScan, Ranger, ScanError, device_record, provenance},
     scan::Session,
 };
@@ -29,6 +30,7 @@ enum Kind {
 /// A ranger that the collection itself drives.
 pub(super) struct LocalDevice {
     kind: Kind,
+    ports: PortOpener,
     world: MockWorldArgs,
     scene: String,
     patience: Duration,
@@ -53,14 +55,18 @@ impl LocalDevice {
         };
         let (world, scene) = (args.world.clone(), keys.place.scene.clone());
         let patience = Duration::ZERO;
-        Self { kind, world, scene, patience, interrupts, ranger: None, met: None }
+        let ports = PortOpener::default();
+        Self { kind, ports, world, scene, patience, interrupts, ranger: None, met: None }
     }
 
     /// The ranger, met if it is not yet; a failure is final.
     async fn ranger(&mut self) -> Result<&mut Ranger<SerialStream>, Halt> {
         let ranger = match self.ranger.take() {
             Some(ranger) => ranger,
-            None => scan::meet(&self.port(), &self.interrupts).await?,
+            None => {
+                let port = self.port();
+                scan::meet(&mut self.ports, &port, &self.interrupts).await?
+            }
         };
         let identity = *ranger.identity();
         if let Some(change) = self.met.and_then(|met| BoardChange::between(&met, &identity)) {

@@ -9,7 +9,10 @@ use firmware_protocol::{
     host::{Command, HostConfig, HostError, HostEvent, Outcome},
     messages::{Blanking, Capabilities, Identity, NakReason, Reading, ResetCause, Settings},
 };
-use tokio::time::{sleep, timeout};
+use tokio::{
+    io::{AsyncReadExt as _, AsyncWriteExt as _},
+    time::{sleep, timeout},
+};
 use tokio_serial::SerialStream;
 
 use super::{
@@ -18,6 +21,9 @@ use super::{
     echo,
     line::{self, Questions},
     report::{Cause, Check, Report},
+    speaker::Speaker,
+    surroundings::Surroundings,
+    tap::Tap,
 };
 use crate::{
     cli::{runtime::Interrupts, scan::ATTEMPTS},
@@ -56,12 +62,34 @@ pub(super) async fn examine(port: &str, args: &Args, interrupts: Interrupts) -> 
             return report;
         }
     };
-    report.checks.push(Check::ok("port", "opened, and nobody else has it"));
+    let surroundings = Surroundings::new(port, &line);
+    report.checks.push(surroundings.check_port());
+    if report.worst().is_some() {
+        report.checks.push(Check::skipped("rest", "another program uses the port"));
+        return report;
+    }
+    report.checks.extend(surroundings.check_adapter());
     let config = HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, rand::random()) };
-    let driver = Driver::new(line, config);
+    let driver = Driver::new(Tap::new(line), config);
     let mut patient = Patient { driver, restarts: 0, exchanges: Vec::new() };
     tokio::select! {
-        () = patient.examine(args, &mut report.checks) => {}
+        examined = patient.examine(args, &mut report.checks) => {
+            match examined {
+                // The cause stands before its consequences.
+                Ok(()) => {
+                    let broken = report.worst().is_some();
+                    let cause = surroundings.check_settings().or_else(|| {
+                        Some(surroundings.check_port()).filter(|check| broken && check.cause.is_some())
+                    });
+                    report.checks.splice(1..1, cause);
+                }
+                Err(error) => {
+                    let check = explain_silence(&error, patient, &surroundings).await;
+                    report.checks.push(check);
+                }
+            }
+            return report;
+        }
         () = interrupts.wait() => {
             report.checks.push(Check::skipped("rest", "interrupted"));
             // Whatever turns must not go on turning.
@@ -73,17 +101,18 @@ pub(super) async fn examine(port: &str, args: &Args, interrupts: Interrupts) -> 
 
 fn no_port(error: &LinkError) -> Check {
     let cause = match error {
-        LinkError::NotFound { .. } => Cause::NotFound,
-        LinkError::Permission(_) => Cause::Permission,
-        LinkError::Busy(_) => Cause::Busy,
+        LinkError::NotFound { .. } | LinkError::OtherDevice { .. } => Cause::NotFound,
+        LinkError::Ambiguous { .. } => Cause::Ambiguous,
+        LinkError::Permission(_) | LinkError::DevicePolicy(_) => Cause::Permission,
+        LinkError::Busy { .. } => Cause::Busy,
         LinkError::NotSerial(_) => Cause::NotSerial,
-        LinkError::Io { .. } => Cause::PortError,
+        LinkError::NotListed { .. } | LinkError::Io { .. } => Cause::PortError,
     };
     Check::failed("port", cause, error.to_string(), error.help())
 }
 
 struct Patient {
-    driver: Driver<SerialStream>,
+    driver: Driver<Tap<SerialStream>>,
     /// Restarts noticed.
     restarts: u32,
     /// What both clocks showed, since the board's last restart.
@@ -97,18 +126,17 @@ struct Seen {
 }
 
 impl Patient {
-    async fn examine(&mut self, args: &Args, checks: &mut Vec<Check>) {
-        let identity = match self.identify().await {
-            Ok(identity) => identity,
-            Err(error) => return checks.push(no_answer(&error)),
-        };
+    /// # Errors
+    /// If no board identifies itself.
+    async fn examine(&mut self, args: &Args, checks: &mut Vec<Check>) -> Result<(), DriveError> {
+        let identity = self.identify().await?;
         checks.push(answered(&identity));
         checks.push(last_restart(&identity));
         let line = self.line().await;
         let broken = line.cause == Some(Cause::Cable);
         checks.push(line);
         if broken {
-            return;
+            return Ok(());
         }
         let settings = Settings { hold_s: hold_s(&identity), ..SETTINGS };
         checks.push(match args.no_motion {
@@ -116,7 +144,7 @@ impl Patient {
             false => self.motor(&identity, settings).await,
         });
         if checks.last().is_some_and(|check| check.cause == Some(Cause::Cable)) {
-            return;
+            return Ok(());
         }
         let echo = self.echo(args.pings, settings).await;
         let gone = matches!(echo.cause, Some(Cause::Cable | Cause::Power));
@@ -125,6 +153,7 @@ impl Patient {
             true => Check::skipped("clock", "the board has to stay for that"),
             false => self.clock(&identity).await,
         });
+        Ok(())
     }
 
     /// Who it is; whatever it still does is stopped.
@@ -260,22 +289,60 @@ impl Patient {
     }
 }
 
+/// Time allowed for a terminal or modem to react to an empty line.
+const REACTION: Duration = Duration::from_millis(700);
+
+/// The check of a board that did not identify itself: what else acts on the line comes first, because
+/// it costs less to remedy than a board without firmware.
+async fn explain_silence(
+    error: &DriveError,
+    patient: Patient,
+    surroundings: &Surroundings,
+) -> Check {
+    use HostError as Host;
+    let DriveError::Host(host @ (Host::NoAnswer { .. } | Host::NotADevice { .. })) = error else {
+        return no_answer(error);
+    };
+    let mut line = patient.driver.into_line();
+    // A login or a modem that is silent answers an empty line.
+    let _ = timeout(REACTION, async {
+        line.write_all(b"\r\n").await?;
+        let mut buffer = [0; 256];
+        while line.read(&mut buffer).await? > 0 {}
+        Ok::<(), std::io::Error>(())
+    })
+    .await;
+    if let Some(check) = surroundings.explain(&line.received, &line.sent) {
+        return check;
+    }
+    let check = no_answer(&DriveError::Host(*host));
+    match (surroundings.may_hide_programs(), check.help) {
+        (true, Some(help)) => Check {
+            help: Some(format!(
+                "programs of other users are hidden: `sudo sonard doctor` or `sudo fuser -v PORT` \
+                 shows whether one reads the port; if none does, {help}"
+            )),
+            ..check
+        },
+        (_, help) => Check { help, ..check },
+    }
+}
+
 fn no_answer(error: &DriveError) -> Check {
     match error {
         DriveError::Host(HostError::NoAnswer { .. }) => Check::failed(
             "board",
             Cause::Silent,
             "silence: the port is there, but not a byte came back",
-            "if the port is the board's USB, its program is not running: flash the firmware \
-             (firmware/README.md); on a separate serial adapter, check that the board has power, \
-             and that TX and RX are crossed",
+            "check that the port is the ranger's and, on a separate serial adapter, that the board \
+             has power and TX and RX are crossed; if the port is the board's USB, its program is not \
+             running: flash the firmware (firmware/README.md)",
         ),
         DriveError::Host(HostError::NotADevice { bytes }) => Check::failed(
             "board",
             Cause::WrongFirmware,
             format!("{bytes} bytes came back, but none of them makes sense"),
-            "another program runs on this board, or this is another device: check the port; if it \
-             is the ranger's, flash the firmware (firmware/README.md)",
+            Speaker::OtherRate.help(),
         ),
         DriveError::Host(HostError::WrongIdentity(_)) => {
             Check::failed("board", Cause::WrongFirmware, error.to_string(), error.help())

@@ -19,6 +19,7 @@ pub(super) enum Status {
 #[serde(rename_all = "snake_case")]
 pub(super) enum Cause {
     NotFound,
+    Ambiguous,
     Permission,
     Busy,
     NotSerial,
@@ -27,6 +28,10 @@ pub(super) enum Cause {
     Silent,
     WrongFirmware,
     WrongVersion,
+    LoginPrompt,
+    Modem,
+    Echo,
+    Settings,
     Power,
     Line,
     Latency,
@@ -84,6 +89,7 @@ impl Check {
             self.cause,
             Some(
                 Cause::NotFound
+                    | Cause::Ambiguous
                     | Cause::Permission
                     | Cause::Busy
                     | Cause::NotSerial
@@ -92,6 +98,10 @@ impl Check {
                     | Cause::Silent
                     | Cause::WrongFirmware
                     | Cause::WrongVersion
+                    | Cause::LoginPrompt
+                    | Cause::Modem
+                    | Cause::Echo
+                    | Cause::Settings
             )
         )
     }

@@ -15,11 +15,10 @@ use super::{
         estimate::{Pace, budget},
         numbers_of, sha256,
         source::{Source, answered},
-        thermometer::Thermometer,
     },
     Choices, Collector, warn_of_disk,
 };
-use crate::{interrupts::Interrupts, scan::SceneRef};
+use crate::{interrupts::Interrupts, scan::SceneRef, thermometer::Thermometer};
 
 impl<D: Device, W: Watcher> Collector<D, W> {
     pub(super) async fn begin(
@@ -29,13 +28,16 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         watcher: W,
         interrupts: Interrupts,
     ) -> Result<Self, Halt> {
-        let thermometer = Thermometer::new(plan.keys.air.file.as_deref());
-        let measured_c = thermometer.read().await.map_err(|error| {
-            Halt::failed(
-                format!("the thermometer can't be read: {error}"),
-                "correct air.file in the plan, or leave it out",
-            )
-        })?;
+        let mut thermometer = plan.keys.air.file.as_deref().map(Thermometer::new);
+        let measured_c = match &mut thermometer {
+            Some(thermometer) => Some(thermometer.read().await.map_err(|error| {
+                Halt::failed(
+                    format!("the thermometer has no valid temperature: {error}"),
+                    "correct air.file in the plan, or leave it out",
+                )
+            })?),
+            None => None,
+        };
         let told_c = match device.is_local() || plan.gives_air() {
             true => measured_c,
             false => device.temperature_c().await,

@@ -47,11 +47,13 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         let doing = format!("{label}, scan {} of {of}", done + 1);
         self.watcher.begin(&doing, done, of, self.pace.left_s(of.saturating_sub(done)));
         let before_c = self.temperature().await;
-        let air = before_c.is_some().then(|| ScanAir {
+        // A thermometer that gives no valid value now leaves the last one, with its age.
+        let age_s = self.temperature_age_s().or(before_c.map(|_| 0.0));
+        let air = age_s.map(|age_s| ScanAir {
             temperature_c: self.air.temperature_c(),
             sound_speed_m_s: self.air.sound_speed_m_s(),
             source: AirSource::File,
-            age_s: Some(0.0),
+            age_s: Some(age_s),
         });
         self.borrow().await?;
         let prepared = match self.device.is_local() {
@@ -96,18 +98,38 @@ impl<D: Device, W: Watcher> Collector<D, W> {
         }
     }
 
-    /// The temperature now, if there is a thermometer that can be read.
-    async fn temperature(&self) -> Option<f64> {
+    /// The temperature now, if there is a thermometer with a valid value.
+    async fn temperature(&mut self) -> Option<f64> {
         if !self.device.is_local() && !self.plan.gives_air() {
             return self.device.temperature_c().await;
         }
-        match self.thermometer.read().await {
-            Ok(temperature_c) => temperature_c,
+        let thermometer = self.thermometer.as_mut()?;
+        let read = thermometer.read().await;
+        if let Some(remark) = thermometer.take_remark() {
+            self.watcher.say(&format!("warning: {remark}"));
+        }
+        match read {
+            Ok(temperature_c) => Some(temperature_c),
             Err(error) => {
-                self.watcher.say(&format!("warning: the thermometer can't be read: {error}"));
+                let last = thermometer.last_valid().map_or_else(String::new, |(last_c, age)| {
+                    let age_s = age.as_secs_f64();
+                    format!("; the last valid temperature, {last_c:.2} C, is {age_s:.0} s old")
+                });
+                self.watcher.say(&format!(
+                    "warning: the thermometer has no valid temperature: {error}{last}"
+                ));
                 None
             }
         }
+    }
+
+    /// Age of the last valid temperature, seconds; `None` without a thermometer of its own.
+    fn temperature_age_s(&self) -> Option<f64> {
+        if !self.device.is_local() && !self.plan.gives_air() {
+            return None;
+        }
+        let (_, age) = self.thermometer.as_ref()?.last_valid()?;
+        Some(age.as_secs_f64())
     }
 
     /// What is to be measured at a pose, with the model's predictions in the air of the session.

@@ -12,12 +12,13 @@ use crate::{
     config::{Mode, ScanningKeys},
     daemon::{
         agenda::Asked,
+        limits::{check_device, check_plan, check_pose},
         refusal::{Refusal, RefusalKind},
-        sensor::{check_device, ordered_sensor},
+        sensor::ordered_sensor,
         settings::Settings,
     },
     geometry::Pose,
-    scan::{PlanError, ScanPlan},
+    scan::ScanPlan,
 };
 
 impl Control {
@@ -30,7 +31,7 @@ impl Control {
             });
         }
         asked.plan.map_or(Ok(()), |plan| self.check_plan(&plan))?;
-        asked.pose.map_or(Ok(()), |pose| check_pose(&self.settings, &pose))?;
+        asked.pose.map_or(Ok(()), |pose| self.check_pose(&pose))?;
         if self.agenda.start(asked) {
             return Ok(());
         }
@@ -75,37 +76,19 @@ impl Control {
     }
 
     fn check_plan(&self, plan: &ScanPlan) -> Result<(), Refusal> {
-        if self.settings.simulated.is_some() {
-            return Err(Refusal {
-                kind: RefusalKind::Conflict,
-                message: "an array has no plan: its rangers are fixed".into(),
-                help: "another array is simulate.array in the configuration".into(),
-            });
-        }
-        let refuse = |error: PlanError| Refusal {
-            kind: match error {
-                PlanError::OffMotorGrid { .. } => RefusalKind::Conflict,
-                _ => RefusalKind::Wrong,
-            },
-            message: error.to_string(),
-            help: "a full turn is from_deg 0, to_deg 360, step_deg 0.9, pings_per_stop 1".into(),
-        };
-        plan.check().map_err(refuse)?;
-        if let Some(identity) = &self.identity {
-            plan.motor_steps(identity.steps_per_revolution.into()).map_err(refuse)?;
-        }
-        Ok(())
+        check_plan(plan, self.settings.simulated.is_some(), self.identity.as_ref())
     }
 
     pub(super) fn set_pose(&mut self, pose: Pose) -> Result<(), Refusal> {
-        check_pose(&self.settings, &pose)?;
+        self.check_pose(&pose)?;
         self.pose = pose;
         Ok(())
     }
 
     /// Whether what is simulated, or the ranger, can stand there.
     pub(in crate::daemon) fn check_pose(&self, pose: &Pose) -> Result<(), Refusal> {
-        check_pose(&self.settings, pose)
+        let Settings { scene, simulated, .. } = &self.settings;
+        check_pose(pose, scene.as_deref(), simulated.as_ref().map(|simulated| &*simulated.array))
     }
 
     pub(super) fn set_sensor(&mut self, order: &SensorOrder) -> Result<(), Refusal> {
@@ -126,29 +109,4 @@ impl Control {
             self.stale = true;
         }
     }
-}
-
-/// Whether a ranger can stand there; without a scene it can stand anywhere.
-fn check_pose(settings: &Settings, pose: &Pose) -> Result<(), Refusal> {
-    let finite = [pose.x_m, pose.y_m, pose.heading_deg].iter().all(|figure| figure.is_finite());
-    if !finite {
-        return Err(Refusal {
-            kind: RefusalKind::Wrong,
-            message: "a figure of the pose is not finite".into(),
-            help: "metres and degrees".into(),
-        });
-    }
-    let Some(scene) = &settings.scene else { return Ok(()) };
-    if let Some(simulated) = &settings.simulated {
-        return simulated
-            .array
-            .check_pose(scene, pose)
-            .map_err(|error| in_the_way(&error, error.help()));
-    }
-    scene.check_pose(pose).map_err(|error| in_the_way(&error, error.help()))
-}
-
-/// A pose that is right elsewhere.
-fn in_the_way(error: &impl std::fmt::Display, help: String) -> Refusal {
-    Refusal { kind: RefusalKind::Conflict, message: error.to_string(), help }
 }

@@ -21,6 +21,7 @@ impl Operator {
         let since = Timestamp::now()
             - SignedDuration::try_from(self.control.now().saturating_sub(self.machine.since()))
                 .unwrap_or_default();
+        let changed = self.control.epoch + self.machine.since();
         let next_at = match self.control.agenda.due(self.control.now()) {
             Due::At(at) => Some(self.control.epoch + at),
             Due::Now | Due::OnRequest => None,
@@ -29,13 +30,14 @@ impl Operator {
         let (control, machine) = (&self.control, &self.machine);
         self.out.shared.view.send_modify(|view| {
             if view.state != machine.state() {
-                view.since = since;
+                (view.since, view.changed) = (since, changed);
             }
             view.state = machine.state();
             view.port = control.settings.keys.device.port.clone().unwrap_or_default();
             view.trouble.clone_from(&self.trouble);
             (view.failures, view.retry_at) = (machine.failures(), retry_at);
             view.device = control.identity.as_ref().map(device_record);
+            view.identity = control.identity;
             view.provenance = control.identity.as_ref().map(provenance);
             view.scanning = control.scanning.clone();
             (view.paused, view.requested) =

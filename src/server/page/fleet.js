@@ -103,25 +103,24 @@ function stateOf({ state, report }) {
 }
 
 function facts(robot) {
-  const { report, address, heard } = robot;
+  const { report, address, heard_s } = robot;
   if (!report) return [["Asked at", address]];
-  const { scan, last_reading, last_scan, provenance } = report;
+  const { scan, last_reading_age_s, last_scan, provenance } = report;
   const share = last_scan?.agree_fraction ?? null;
   const off_m = last_scan?.median_abs_residual_m ?? null;
   return [
     ["Readings", words.provenance(provenance) ?? (provenance ? "hardware" : "–")],
     ["Scan", !isHeard(robot) ? "–" : scan ? `${scan.done} of ${words.count(scan.beams, "beam")}` : "none under way"],
-    ["Last reading", last_reading ? `${ago(last_reading)} ago` : "–"],
+    ["Last reading", last_reading_age_s === null ? "–" : `${ago(last_reading_age_s + heard_s)} ago`],
     ["Last scan", last_scan ? words.clock(last_scan.ended) : "–"],
     ["Agreement", share === null ? "–" : `${(100 * share).toFixed(0)} %, half within ${(1e3 * off_m).toFixed(0)} mm`],
     ["Missing beams", last_scan ? `${last_scan.missing}` : "–"],
-    ["Heard", `${ago(heard)} ago, at ${address}`],
+    ["Heard", `${ago(heard_s)} ago, at ${address}`],
   ];
 }
 
-/** How long ago, in words that do not change with every look. */
-function ago(time) {
-  const s = Math.max(0, (Date.now() - Date.parse(time)) / 1000);
+/** An age in seconds, in words that do not change with every look. */
+function ago(s) {
   return s < 5 ? "under 5 s" : s < 120 ? `${s.toFixed(0)} s` : s < 7200 ? `${(s / 60).toFixed(0)} min` : `${(s / 3600).toFixed(0)} h`;
 }
 

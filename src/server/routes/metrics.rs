@@ -1,11 +1,12 @@
-//! Figures for Prometheus, in the OpenMetrics text format.
+//! Figures for Prometheus.
+
+mod format;
 
 use axum::{
     extract::State,
-    http::{StatusCode, header},
+    http::{HeaderMap, StatusCode, header},
     response::{IntoResponse, Response},
 };
-use jiff::Timestamp;
 use prometheus_client::{
     encoding::text::encode,
     metrics::{counter::ConstCounter, gauge::ConstGauge, info::Info},
@@ -18,18 +19,20 @@ use crate::{
     scan::Provenance,
     server::{Api, answer::Failed, openapi::Endpoint},
 };
-
-const MEDIA: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+use format::Format;
 
 pub(super) fn endpoints() -> Vec<Endpoint> {
-    vec![Endpoint::get("/metrics", metrics, "Figures for Prometheus").answers_text(
-        200,
-        MEDIA,
-        "OpenMetrics text",
-    )]
+    let about = "Figures for Prometheus, in the format that Accept prefers";
+    vec![
+        Endpoint::get("/metrics", metrics, about)
+            .answers_text(200, Format::OpenMetrics.media_type(), "OpenMetrics text")
+            .answers_text(200, Format::Text.media_type(), "Prometheus text"),
+    ]
 }
 
-async fn metrics(State(api): State<Api>) -> Result<Response, Failed> {
+async fn metrics(State(api): State<Api>, headers: HeaderMap) -> Result<Response, Failed> {
+    let accept = headers.get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
+    let format = Format::negotiate(&accept.collect::<Vec<_>>().join(","));
     // A disk may keep its answer back: that of the log is asked how much room it has.
     let written = tokio::task::spawn_blocking(move || {
         let mut text = String::new();
@@ -43,7 +46,8 @@ async fn metrics(State(api): State<Api>) -> Result<Response, Failed> {
         )
     };
     let text = written.await.map_err(|error| fault(&error))?.map_err(|error| fault(&error))?;
-    Ok(([(header::CONTENT_TYPE, MEDIA)], text).into_response())
+    let head = [(header::CONTENT_TYPE, format.media_type()), (header::VARY, "Accept")];
+    Ok((head, format.render(text)).into_response())
 }
 
 /// A mock measures as little as the model does: only hardware is no simulation.
@@ -160,7 +164,7 @@ fn gauges(status: &Status, health: &Health) -> Vec<(&'static str, &'static str, 
     state_gauges(status, health).into_iter().chain(known).collect()
 }
 
-fn state_gauges(status: &Status, health: &Health) -> [(&'static str, &'static str, f64); 10] {
+fn state_gauges(status: &Status, health: &Health) -> [(&'static str, &'static str, f64); 11] {
     [
         ("healthy", "Whether all is well", f64::from(u8::from(health.healthy))),
         (
@@ -186,6 +190,11 @@ fn state_gauges(status: &Status, health: &Health) -> [(&'static str, &'static st
         ("log_waiting_records", "Records that could not be written yet", status.log.waiting as f64),
         ("subscribers", "Live streams", status.subscribers.now as f64),
         ("air_temperature_celsius", "Air temperature", status.air.temperature_c),
+        (
+            "thermometer_failing",
+            "Whether the thermometer has no valid temperature: the last valid one is in use",
+            f64::from(u8::from(status.air.error.is_some())),
+        ),
         ("sound_speed_meters_per_second", "Speed of sound", status.air.sound_speed_m_s),
         ("uptime_seconds", "How long the daemon runs", status.uptime_s),
     ]
@@ -197,10 +206,9 @@ fn gauges_if_known(
     health: &Health,
 ) -> [(&'static str, &'static str, Option<f64>); 11] {
     let fit = health.fit.as_ref();
-    let age_s = |ended: Timestamp| Timestamp::now().duration_since(ended).as_secs_f64();
     [
         ("log_free_bytes", "Room on the disk of the log", free_bytes(status)),
-        ("last_scan_age_seconds", "Since the last scan ended", fit.map(|fit| age_s(fit.ended))),
+        ("last_scan_age_seconds", "Since the last scan ended", health.last_scan_age_s),
         (
             "last_scan_compared_beams",
             "Beams of the last scan with an echo, measured and predicted",

@@ -8,9 +8,9 @@ use uuid::Uuid;
 
 use crate::{
     acoustics::{Air, Sensor},
-    api::{JudgedPing, PreviewRequest, WholeScan, Word},
+    api::{AirOrder, JudgedPing, PreviewRequest, WholeScan, Word},
     array::RangerArray,
-    daemon::{NextScan, ordered_sensor},
+    daemon::{NextScan, check_device, check_plan, check_pose, ordered_air, ordered_sensor},
     geometry::Pose,
     model::{ArrayModel, Options, Simulator, TooCostly},
     scan::{Ping, ScanPlan, ScanStart, ScanView, Session, SimRecord},
@@ -74,24 +74,22 @@ impl Wanted {
             .ok_or_else(|| conflict("there is no scene", "give the daemon one with place.scene"))?;
         let plan = plan(&request, &next)?;
         let pose = request.pose.unwrap_or(next.pose);
-        match &next.array {
-            None => scene.check_pose(&pose).map_err(|error| conflict(&error, error.help()))?,
-            Some(array) => {
-                array.check_pose(&scene, &pose).map_err(|error| conflict(&error, error.help()))?;
+        check_pose(&pose, Some(&scene), next.array.as_deref())?;
+        let (now, order) = (&next.air, request.air);
+        let order = order.unwrap_or(AirOrder {
+            temperature_c: now.temperature_c,
+            humidity_percent: None,
+            pressure_kpa: None,
+        });
+        let air = ordered_air(&order, now.humidity_percent, now.pressure_kpa)?;
+        let mut sensor = next.setup.sensor.clone();
+        if let Some(order) = request.sensor {
+            let of_array = next.array.is_some();
+            sensor = ordered_sensor(&order, &next.setup, of_array, air.sound_speed_m_s())?;
+            if let Some(device) = &next.device {
+                check_device(&sensor, &next.setup.sensor, device)?;
             }
         }
-        let (now, order) = (&next.air, request.air);
-        let air = Air::new(
-            order.map_or(now.temperature_c, |order| order.temperature_c),
-            order.and_then(|order| order.humidity_percent).unwrap_or(now.humidity_percent),
-            order.and_then(|order| order.pressure_kpa).unwrap_or(now.pressure_kpa),
-        );
-        let air = air.map_err(|error| wrong(error.to_string(), "see GET /v1/openapi.json"))?;
-        let of_array = next.array.is_some();
-        let sensor = request.sensor.map_or_else(
-            || Ok(next.setup.sensor.clone()),
-            |order| ordered_sensor(&order, &next.setup, of_array, air.sound_speed_m_s()),
-        )?;
         let options = next.setup.model.options.options_of_engine();
         Ok(Self { pose, plan, air, sensor, options, scene, array: next.array })
     }
@@ -141,16 +139,11 @@ impl Wanted {
 
 /// Azimuths, few enough.
 fn plan(request: &PreviewRequest, next: &NextScan) -> Result<ScanPlan, Failed> {
-    let plan = match (&next.array, request.plan) {
-        (Some(_), Some(_)) => {
-            return Err(conflict("an array has no plan", "leave plan out: its rangers are fixed"));
-        }
-        (Some(array), None) => array.plan(1),
-        (None, plan) => plan.unwrap_or(next.plan),
-    };
-    plan.check().map_err(|error| {
-        wrong(error.to_string(), "a full turn is from_deg 0, to_deg 360, step_deg 0.9")
-    })?;
+    let array = next.array.as_ref();
+    let plan = request.plan.or_else(|| Some(array?.plan(1))).unwrap_or(next.plan);
+    if request.plan.is_some() {
+        check_plan(&plan, array.is_some(), next.device.as_ref())?;
+    }
     if plan.beams() > MOST_BEAMS {
         let error = format!("the plan has {} beams", plan.beams());
         return Err(wrong(error, "ask about 4000 or fewer: a greater step_deg"));

@@ -114,3 +114,50 @@ fn a_clock_that_is_set_is_noted_and_costs_no_beam() {
         assert_eq!(beams, end["beams"].as_u64().expect("a count"), "{end}");
     }
 }
+
+#[test]
+fn ages_do_not_follow_a_clock_that_is_set() {
+    if is_left_out() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let offset = folder.path().join("offset");
+    let command = with_clock(&[], &offset);
+    let mock = ["--mock", "--scene", "simple-room", "--pose", "fig9"];
+    let short = ["plan.to_deg=36", "plan.step_deg=3.6", "model.max_range_m=1"];
+    let settings =
+        ["scanning.mode=continuous", "server.listen=127.0.0.1:0"].into_iter().chain(short);
+    let settings: Vec<_> = settings.flat_map(|setting| ["--set", setting]).collect();
+    let daemon = Daemon::start_as(command, folder.path(), &[&mock[..], &settings].concat());
+    daemon.wait_for_scans(2);
+    let socket = folder.path().join("s").display().to_string();
+    for offset_s in ["+1800000000", "-100000", "+0", "+0.3"] {
+        fs::write(&offset, offset_s).expect("writable");
+        // Within a scan, between two, and after.
+        for _ in 0..8 {
+            let health = daemon.health();
+            let link = daemon.status()["link"].clone();
+            let figures = String::from_utf8(daemon.get("/metrics").body).expect("text");
+            for (name, age_s) in [
+                ("last scan", &health["last_scan_age_s"]),
+                ("lateness", &health["reading_lateness_s"]),
+                ("state", &link["for_s"]),
+            ] {
+                let age_s = age_s.as_f64().unwrap_or_else(|| panic!("{name}: {health} {link}"));
+                assert!((-0.2..20.0).contains(&age_s), "{offset_s}, {name}: {age_s}");
+            }
+            for figure in ["sonard_last_scan_age_seconds ", "sonard_reading_lateness_seconds "] {
+                let line = figures.lines().find(|line| line.starts_with(figure)).expect("told");
+                let value: f64 = line[figure.len()..].parse().expect("a number");
+                assert!((-0.2..20.0).contains(&value), "{offset_s}, {line}");
+            }
+            let output = sonard(&["status", "--socket", &socket]).output().expect("it starts");
+            let text = String::from_utf8_lossy(&output.stdout).into_owned();
+            let seconds = text.split(" for ").nth(1).and_then(|rest| rest.split(' ').next());
+            let seconds: f64 =
+                seconds.and_then(|s| s.parse().ok()).unwrap_or_else(|| panic!("{text}"));
+            assert!((0.0..20.0).contains(&seconds), "{offset_s}: {text}");
+        }
+    }
+    assert_eq!(daemon.health()["scans"]["failed"], 0);
+}

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::Daemon;
+use super::{Daemon, ask};
 
 const FILES: [(&str, &str); 3] = [
     ("grafana-sonard.json", include_str!("../../../config/monitoring/grafana-sonard.json")),
@@ -66,4 +66,46 @@ fn every_figure_that_dashboard_and_alerts_ask_for_is_told() {
     assert!(of("sonard_last_scan_age_seconds") < 60.0 && of("sonard_log_free_bytes") > 0.0);
     let lateness_s = of("sonard_reading_lateness_seconds");
     assert!((-1.0..30.0).contains(&lateness_s), "{lateness_s}");
+}
+
+#[test]
+fn format_follows_accept() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &[]);
+    daemon.wait_for("ready");
+    let get = |accept: &str| {
+        let headers = [("Host", "localhost"), ("Accept", accept)];
+        let reply = ask(daemon.connect().expect("it listens"), "GET", "/metrics", &headers, "");
+        (reply.head, String::from_utf8(reply.body).expect("text"))
+    };
+    for accept in ["*/*", "application/openmetrics-text;q=0.5,text/plain;version=0.0.4;q=0.3"] {
+        let (head, body) = get(accept);
+        assert!(
+            head.contains("content-type: application/openmetrics-text; version=1.0.0"),
+            "{head}"
+        );
+        assert!(head.contains("vary: accept"), "{head}");
+        assert!(body.ends_with("# EOF\n") && body.contains("# TYPE sonard_robot info"), "{body}");
+    }
+    for accept in
+        ["text/plain;version=0.0.4", "application/openmetrics-text;q=0.3, text/plain;q=0.5"]
+    {
+        let (head, body) = get(accept);
+        assert!(head.contains("content-type: text/plain; version=0.0.4; charset=utf-8"), "{head}");
+        assert!(!body.contains("# EOF") && !body.contains(" info\n"), "{body}");
+        let mut types = BTreeSet::new();
+        for line in body.lines() {
+            match line.strip_prefix("# TYPE ").and_then(|rest| rest.split(' ').next()) {
+                Some(name) => assert!(types.insert(name), "{name} twice"),
+                None if line.starts_with('#') => {}
+                None => {
+                    let name = line.split(['{', ' ']).next().expect("a name");
+                    assert!(types.contains(name), "{name} has no type:\n{body}");
+                }
+            }
+        }
+        assert!(
+            types.contains("sonard_robot_info") && types.contains("sonard_beams_measured_total")
+        );
+    }
 }

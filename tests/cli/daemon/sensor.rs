@@ -122,6 +122,40 @@ fn a_sensor_is_refused_where_device_or_configuration_says_otherwise() {
 }
 
 #[test]
+fn preview_rejects_what_an_order_is_rejected_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &TURN);
+    daemon.wait_for("ready");
+    for (part, body, status) in [
+        ("sensor", json!({"blanking_us": 5}), 409),
+        ("sensor", json!({"blanking_us": 20000}), 409),
+        ("sensor", json!({"threshold": 0}), 422),
+        ("sensor", json!({"preset": "ear"}), 422),
+        ("sensor", json!({"blanking_us": 900}), 202),
+        ("plan", json!({"from_deg": 0, "to_deg": 90, "step_deg": 1, "pings_per_stop": 1}), 409),
+        ("plan", json!({"from_deg": 0, "to_deg": 90, "step_deg": 0, "pings_per_stop": 1}), 422),
+        ("plan", json!({"from_deg": 0, "to_deg": 90, "step_deg": 1.8, "pings_per_stop": 1}), 202),
+        ("pose", json!({"x_m": -9, "y_m": 1, "heading_deg": 0}), 409),
+        ("air", json!({"temperature_c": 20, "humidity_percent": 101}), 422),
+        ("air", json!({"temperature_c": 70}), 422),
+        ("air", json!({"temperature_c": 25}), 202),
+    ] {
+        let mut request = json!({});
+        request[part] = body.clone();
+        let previewed = daemon.send("POST", "/v1/preview", &request.to_string());
+        let ordered = daemon.send("PUT", &format!("/v1/{part}"), &body.to_string());
+        assert_eq!(ordered.status, status, "{request}: {}", ordered.json());
+        if status == 202 {
+            assert_eq!(previewed.status, 200, "{request}: {}", previewed.json());
+        } else {
+            assert_eq!(previewed.status, status, "{request}: {}", previewed.json());
+            assert_eq!(previewed.json(), ordered.json(), "{request}");
+        }
+    }
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
 fn an_array_is_previewed_and_its_rangers_are_another_sensor_from_the_next_round_on() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start_array(folder.path(), &[]);

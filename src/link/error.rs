@@ -1,0 +1,205 @@
+//! Causes of a serial line that cannot be used, each with a remedy.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use rustix::io::Errno;
+use thiserror::Error;
+
+use super::Holders;
+
+/// A serial line that can't be used.
+#[derive(Debug, Error)]
+pub enum LinkError {
+    /// No path, stable id or USB serial number of that name.
+    #[error("there is no serial port {port:?}")]
+    NotFound {
+        /// The requested name.
+        port: String,
+        /// The ports of this computer.
+        present: Result<Vec<String>, PortListError>,
+    },
+    /// A name that several devices have.
+    #[error("{port:?} matches {} serial ports: {}", matches.len(), matches.join(", "))]
+    Ambiguous {
+        /// The requested name.
+        port: String,
+        /// Full names of the matching ports.
+        matches: Vec<String>,
+    },
+    /// A part of a name that now matches another device than before.
+    #[error("{port:?} matched {before}, which is gone, and now matches {now}")]
+    OtherDevice {
+        /// The requested part of a name.
+        port: String,
+        /// Name of the device that was opened before.
+        before: String,
+        /// Name of the device that matches now.
+        now: String,
+    },
+    /// The stable ids or USB serial numbers can't be looked up.
+    #[error("serial port {port:?} can't be looked up: {source}")]
+    NotListed {
+        /// The requested name.
+        port: String,
+        /// The failed listing.
+        source: PortListError,
+    },
+    /// The port exists, but this user may not open it.
+    #[error("no permission to open {0}")]
+    Permission(PathBuf),
+    /// File permissions allow it, but the cgroup's device policy or a security module does not.
+    #[error("the device policy of this service or container does not allow {0}")]
+    DevicePolicy(PathBuf),
+    /// Another program has it open.
+    #[error("{} is in use by {}", port.display(), holders.describe("another program"))]
+    Busy {
+        /// The port's path.
+        port: PathBuf,
+        /// The programs, as far as this user may see them.
+        holders: Holders,
+    },
+    /// A file or a folder, or something else that is no serial line.
+    #[error("{0} is not a serial port")]
+    NotSerial(PathBuf),
+    /// Any other error of the system.
+    #[error("cannot open {port}: {source}")]
+    Io {
+        /// The port's path.
+        port: PathBuf,
+        /// The system's error.
+        source: io::Error,
+    },
+}
+
+/// A failed listing of serial ports.
+#[derive(Debug, Error)]
+#[error("{}: {source}", folder.display())]
+pub struct PortListError {
+    /// The folder of ports.
+    pub folder: PathBuf,
+    /// The system's error.
+    pub source: io::Error,
+}
+
+impl PortListError {
+    pub(super) fn new(folder: &Path, source: io::Error) -> Self {
+        Self { folder: folder.into(), source }
+    }
+
+    /// A remedy.
+    #[must_use]
+    pub fn help(&self) -> String {
+        exhausted(&self.source).map_or_else(
+            || {
+                format!(
+                    "mount what provides {} (sysfs, udev), or give the port's path, such as \
+                     /dev/ttyACM0",
+                    self.folder.display()
+                )
+            },
+            str::to_owned,
+        )
+    }
+}
+
+impl LinkError {
+    /// A remedy.
+    #[must_use]
+    pub fn help(&self) -> String {
+        match self {
+            Self::NotFound { present: Ok(present), .. } if present.is_empty() => {
+                "no serial port is present: plug the board in, or use --mock to try without one"
+                    .into()
+            }
+            Self::NotFound { present: Ok(present), .. } => format!(
+                "present are {}; give one of them, or use --mock to try without a board",
+                present.join(", ")
+            ),
+            Self::NotFound { present: Err(error), .. } => format!(
+                "plug the board in, or use --mock to try without one; the ports of this computer \
+                 can't be listed ({error}): {}",
+                error.help()
+            ),
+            Self::Ambiguous { .. } => "give one of these names in full".into(),
+            Self::OtherDevice { before, now, .. } => {
+                format!("it was not opened: reconnect {before}, or give {now} in full and restart")
+            }
+            Self::NotListed { source, .. } => source.help(),
+            Self::Permission(port) => format!(
+                "add yourself to the group that owns it (`ls -l {}`; usually `sudo usermod -aG \
+                 dialout $USER`), then log in again",
+                port.display()
+            ),
+            Self::DevicePolicy(port) => format!(
+                "under systemd, allow the driver in a drop-in (`DeviceAllow=char-ttyACM rw`) and \
+                 restart the service: a driver that was loaded after the service started is not \
+                 allowed yet; in a container, pass {} on",
+                port.display()
+            ),
+            Self::Busy { port, holders } => holders.advice(port).unwrap_or_else(|| {
+                format!(
+                    "find the program with `sudo fuser -v {}` and stop it; a running daemon owns \
+                     its port",
+                    port.display()
+                )
+            }),
+            Self::NotSerial(_) => {
+                "give a character device such as /dev/ttyACM0, or the link a mock made".into()
+            }
+            Self::Io { source, .. } => exhausted(source).map_or_else(
+                || "unplug the board, plug it in again, and look at `dmesg`".into(),
+                str::to_owned,
+            ),
+        }
+    }
+}
+
+/// A remedy for an exhausted resource.
+fn exhausted(error: &io::Error) -> Option<&'static str> {
+    match Errno::from_io_error(error)? {
+        Errno::MFILE => Some(
+            "this process has no file descriptors left: disconnect clients, or raise its limit \
+             (`LimitNOFILE=` of the unit, `ulimit -n`)",
+        ),
+        Errno::NFILE => {
+            Some("this computer has no file descriptors left: see `sysctl fs.file-nr fs.file-max`")
+        }
+        Errno::NOMEM => Some("this computer has no memory left: stop what uses it"),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exhausted_resource_is_named() {
+        for (errno, part) in [
+            (Errno::MFILE, "this process has no file descriptors left"),
+            (Errno::NFILE, "this computer has no file descriptors left"),
+            (Errno::NOENT, "mount what provides /sys/class/tty"),
+        ] {
+            let source = PortListError::new(Path::new("/sys/class/tty"), errno.into());
+            let error = LinkError::NotListed { port: "Arduino".into(), source };
+            assert!(error.help().contains(part), "{}", error.help());
+            let text = error.to_string();
+            assert!(text.contains("Arduino") && text.contains("/sys/class/tty"), "{text}");
+        }
+        let error = LinkError::Io { port: "/dev/ttyACM0".into(), source: Errno::MFILE.into() };
+        assert!(error.help().contains("LimitNOFILE"), "{}", error.help());
+    }
+
+    #[test]
+    fn unknown_holder_and_unlisted_ports_have_a_remedy() {
+        let error = LinkError::Busy { port: "/dev/ttyACM0".into(), holders: Holders::default() };
+        assert_eq!(error.to_string(), "/dev/ttyACM0 is in use by another program");
+        assert!(error.help().contains("sudo fuser -v /dev/ttyACM0"), "{}", error.help());
+        let source = PortListError::new(Path::new("/sys/class/tty"), Errno::MFILE.into());
+        let error = LinkError::NotFound { port: "/dev/ttyACM0".into(), present: Err(source) };
+        assert!(error.help().contains("no file descriptors left"), "{}", error.help());
+    }
+}

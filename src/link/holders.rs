@@ -1,0 +1,244 @@
+//! Programs that have a port open, from `/proc`.
+
+use std::{
+    fs,
+    os::unix::fs::MetadataExt as _,
+    path::{Path, PathBuf},
+};
+
+/// Device majors of pseudo-terminals.
+const PTS_MAJORS: std::ops::Range<u32> = 136..144;
+/// Characters of a command line that are shown.
+const MAX_COMMAND: usize = 60;
+
+/// A process that has a port open.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Holder {
+    /// Process id.
+    pub pid: u32,
+    /// Command line, shortened.
+    pub command: String,
+    /// Name of the program.
+    program: String,
+}
+
+/// The processes that have a port open, apart from this one.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Holders {
+    /// Those that this user may see.
+    pub found: Vec<Holder>,
+    /// Further processes may exist whose files this user may not see.
+    pub is_partial: bool,
+}
+
+/// Looks up the processes that have the port at `path` open, as far as this user may see them.
+///
+/// A process that plays the device at the other end of a pseudo-terminal is not listed.
+#[must_use]
+pub fn find_holders(path: &Path) -> Holders {
+    let Some(port) = PortNode::at(path) else { return Holders::default() };
+    let Ok(processes) = fs::read_dir("/proc") else {
+        return Holders { is_partial: true, ..Holders::default() };
+    };
+    let own = std::process::id();
+    let mut holders = Holders { is_partial: hides_processes(), ..Holders::default() };
+    for process in processes.flatten() {
+        let Some(pid) = process.file_name().to_str().and_then(|name| name.parse().ok()) else {
+            continue;
+        };
+        if pid == own {
+            continue;
+        }
+        match port.is_held_by(&process.path()) {
+            Ok(true) => holders.found.push(Holder::read(pid, &process.path())),
+            Ok(false) => {}
+            Err(error) => {
+                // A process that has ended meanwhile holds nothing.
+                holders.is_partial |= error.kind() == std::io::ErrorKind::PermissionDenied;
+            }
+        }
+    }
+    holders.found.sort_by_key(|holder| holder.pid);
+    holders
+}
+
+/// `true` where `/proc` is mounted so that processes of other users are missing from it.
+fn hides_processes() -> bool {
+    !Path::new("/proc/1/stat").exists()
+}
+
+impl Holders {
+    /// Commands and process ids; `unknown` if there are none.
+    #[must_use]
+    pub fn describe(&self, unknown: &str) -> String {
+        if self.found.is_empty() {
+            return unknown.to_owned();
+        }
+        let names =
+            self.found.iter().map(|Holder { pid, command, .. }| format!("`{command}` (pid {pid})"));
+        names.collect::<Vec<_>>().join(", ")
+    }
+
+    /// A remedy for each of them; `None` if there are none.
+    #[must_use]
+    pub fn advice(&self, port: &Path) -> Option<String> {
+        let mut advice: Vec<String> = self.found.iter().map(|holder| holder.advice(port)).collect();
+        advice.dedup();
+        (!advice.is_empty()).then(|| advice.join("; "))
+    }
+}
+
+impl Holder {
+    fn read(pid: u32, process: &Path) -> Self {
+        let read = |name| fs::read(process.join(name)).unwrap_or_default();
+        let printable = |bytes: &[u8]| {
+            let text = String::from_utf8_lossy(bytes).replace(|c: char| c.is_control(), " ");
+            text.trim().to_owned()
+        };
+        let program = printable(&read("comm"));
+        let mut command = printable(&read("cmdline"));
+        if command.is_empty() {
+            command.clone_from(&program);
+        }
+        if let Some((end, _)) = command.char_indices().nth(MAX_COMMAND) {
+            command.truncate(end);
+            command.push_str("...");
+        }
+        Self { pid, command, program }
+    }
+
+    fn advice(&self, port: &Path) -> String {
+        let name = port.file_name().unwrap_or_default().to_string_lossy();
+        match self.program.as_str() {
+            "agetty" | "getty" | "login" | "mgetty" => format!(
+                "the system offers a login on this port: `sudo systemctl disable --now \
+                 serial-getty@{name}.service`"
+            ),
+            "ModemManager" => "ModemManager looks for modems on serial ports: install \
+                               systemd/60-sonard.rules, which excludes the board, or `sudo systemctl \
+                               stop ModemManager`"
+                .into(),
+            "brltty" => "brltty takes CH340 adapters for braille displays: `sudo systemctl disable \
+                         --now brltty`"
+                .into(),
+            "sonard" => format!(
+                "a running daemon owns its port: let it take scans (`sonard scan --daemon`), or stop \
+                 it (pid {})",
+                self.pid
+            ),
+            _ => format!("stop it (`kill {}`), and let only one program use the port", self.pid),
+        }
+    }
+}
+
+/// A device node, and what identifies it among open files.
+struct PortNode {
+    device: u64,
+    /// File system of a pseudo-terminal: each instance of devpts numbers from 0.
+    devpts: Option<u64>,
+}
+
+impl PortNode {
+    fn at(path: &Path) -> Option<Self> {
+        let metadata = fs::metadata(path).ok()?;
+        let device = metadata.rdev();
+        let is_pts = PTS_MAJORS.contains(&rustix::fs::major(device));
+        Some(Self { device, devpts: is_pts.then(|| metadata.dev()) })
+    }
+
+    /// # Errors
+    /// If the process has ended, or this user may not see its files.
+    fn is_held_by(&self, process: &Path) -> std::io::Result<bool> {
+        let mut is_held = false;
+        for file in fs::read_dir(process.join("fd"))?.flatten() {
+            // Only device nodes are examined further: a file on a dead network share would block.
+            let Ok(target) = fs::read_link(file.path()) else { continue };
+            if self.is_other_end(process, &file.file_name(), &target) {
+                return Ok(false);
+            }
+            is_held |= is_device_path(&target)
+                && fs::metadata(file.path()).is_ok_and(|metadata| {
+                    metadata.rdev() == self.device
+                        && self.devpts.is_none_or(|devpts| devpts == metadata.dev())
+                });
+        }
+        Ok(is_held)
+    }
+
+    /// `true` for the master of the pseudo-terminal.
+    fn is_other_end(&self, process: &Path, file: &std::ffi::OsStr, target: &Path) -> bool {
+        if self.devpts.is_none() || target.file_name().is_none_or(|name| name != "ptmx") {
+            return false;
+        }
+        let info = fs::read_to_string(process.join("fdinfo").join(file)).unwrap_or_default();
+        let index = info.lines().find_map(|line| line.strip_prefix("tty-index:"));
+        index.and_then(|index| index.trim().parse().ok()) == Some(rustix::fs::minor(self.device))
+    }
+}
+
+fn is_device_path(target: &Path) -> bool {
+    target.is_absolute() && target.components().any(|part| part.as_os_str() == "dev")
+}
+
+/// The path behind symbolic links, as `/proc` and sysfs name it.
+pub(super) fn real_path(path: &Path) -> PathBuf {
+    fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::process::{Command, Stdio};
+
+    use super::*;
+    use crate::link::Pty;
+
+    #[test]
+    fn holder_is_named_until_it_ends() {
+        let pty = Pty::open(None).expect("a pty");
+        assert_eq!(find_holders(pty.path()).found, [], "the device's own end is no holder");
+        let file = fs::File::open(pty.path()).expect("opens");
+        let mut child = Command::new("sleep").arg("60").stdin(file).spawn().expect("starts");
+        let holders = find_holders(pty.path());
+        child.kill().expect("it runs");
+        child.wait().expect("it ends");
+        let described = holders.describe("nobody");
+        assert_eq!(described, format!("`sleep 60` (pid {})", child.id()));
+        let advice = holders.advice(pty.path()).expect("a remedy");
+        assert!(advice.contains(&format!("kill {}", child.id())), "{advice}");
+        assert_eq!(find_holders(pty.path()).found, []);
+    }
+
+    #[test]
+    fn process_at_the_master_is_the_device() {
+        let pty = Pty::open(None).expect("a pty");
+        let path = pty.path().to_path_buf();
+        let device = "import os,sys,time; os.open(sys.argv[1], os.O_RDWR); time.sleep(60)";
+        let master = rustix::io::dup(&pty).expect("a descriptor");
+        let mut child = Command::new("python3")
+            .args(["-c", device, path.to_str().expect("plain path")])
+            .stdin(Stdio::from(master))
+            .spawn()
+            .expect("starts");
+        std::thread::sleep(std::time::Duration::from_millis(500));
+        let found = find_holders(&path).found;
+        child.kill().expect("it runs");
+        child.wait().expect("it ends");
+        assert_eq!(found, []);
+    }
+
+    #[test]
+    fn advice_depends_on_the_program() {
+        let port = Path::new("/dev/ttyAMA0");
+        for (program, remedy) in [
+            ("agetty", "serial-getty@ttyAMA0"),
+            ("ModemManager", "60-sonard.rules"),
+            ("sonard", "--daemon"),
+            ("minicom", "kill 7"),
+        ] {
+            let holder = Holder { pid: 7, command: program.into(), program: program.into() };
+            assert!(holder.advice(port).contains(remedy), "{program}");
+        }
+        assert_eq!(Holders::default().advice(port), None);
+        assert_eq!(Holders::default().describe("another program"), "another program");
+    }
+}
