@@ -20,6 +20,7 @@ mod requests;
 pub(crate) mod rig;
 mod schema;
 mod sensor;
+mod silence;
 mod simulate;
 mod soak;
 mod strangers;
