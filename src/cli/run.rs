@@ -160,9 +160,6 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
     let (journal, thread) = Journal::open(&log_folder, settings.rotation())?;
     let listeners =
         Listeners::open(&keys.server).map_err(|error| Failure::device(&error, error.help()))?;
-    for address in listeners.addresses().into_iter().flatten() {
-        tracing::info!("listening on http://{address}");
-    }
     let keys = keys.clone();
     let access = access(&settings, &listeners)?;
     let fleet = load::fleet(&keys.fleet)?;
@@ -207,7 +204,7 @@ fn access(settings: &Settings, listeners: &Listeners) -> Result<Access, Failure>
     if settings.keys.foxglove.enabled {
         access = access.with_viewers(&settings.keys.foxglove.origins);
     }
-    for address in listeners.addresses().into_iter().flatten() {
+    for address in listeners.addresses() {
         if !address.ip().is_loopback() && token.is_none() {
             return Err(Failure::input(
                 format!("server.listen {address} can be reached from other computers"),

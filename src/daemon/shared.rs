@@ -18,7 +18,8 @@ use crate::{
     api::{
         AirStatus, ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, LinkState,
         LogStatus, MqttReport, Pending, RosReport, ScanFit, ScanProgress, ScanTotals,
-        ScanningReport, SensorFigures, Setup, SimulationReport, Status, SubscriberReport,
+        ScanningReport, SensorFigures, ServerReport, Setup, SimulationReport, Status,
+        SubscriberReport,
     },
     array::RangerArray,
     compare::Explanation,
@@ -169,6 +170,7 @@ pub(super) struct Shared {
     beats: AtomicU64,
     beams_done: AtomicU32,
     scans: Mutex<Collector>,
+    server: Mutex<ServerReport>,
     ros: Mutex<Option<RosReport>>,
     mqtt: Mutex<Option<MqttReport>>,
 }
@@ -200,6 +202,7 @@ impl Shared {
             beats: AtomicU64::new(0),
             beams_done: AtomicU32::new(0),
             scans: Mutex::default(),
+            server: Mutex::default(),
             ros: Mutex::default(),
             mqtt: Mutex::default(),
         }
@@ -312,6 +315,7 @@ impl Shared {
             pending,
             log,
             subscribers,
+            server: held(&self.server).clone(),
             ros: held(&self.ros).clone(),
             mqtt: held(&self.mqtt).clone(),
             configuration: view.configuration,
@@ -332,6 +336,7 @@ impl Shared {
         if air.stale {
             reasons.push("the air temperature is stale".into());
         }
+        reasons.extend(held(&self.server).trouble.iter().cloned());
         let (fit, reading_lateness_s) = {
             let scans = self.scans();
             (scans.latest_fit.clone(), scans.lateness_s)
@@ -345,6 +350,11 @@ impl Shared {
             fit,
             reading_lateness_s,
         }
+    }
+
+    /// Takes in where clients reach the server.
+    pub(super) fn report_server(&self, report: ServerReport) {
+        *held(&self.server) = report;
     }
 
     /// How it goes with ROS 2.
