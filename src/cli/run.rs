@@ -1,13 +1,14 @@
 //! `sonard run`.
 
 mod broker;
+mod files;
 mod load;
 mod mock;
 mod ros;
 
 use std::{
     io::{self, IsTerminal as _},
-    path::{Path, PathBuf},
+    path::PathBuf,
 };
 
 use rustix::process::Signal;
@@ -23,9 +24,9 @@ use super::{
 use crate::{
     daemon::{self, Handle, Journal, Order, Resources, Settings},
     host_gpio, link,
-    server::{Access, Listeners, Server, read_token, token_help},
+    server::{Access, Listeners, Server},
 };
-use broker::Broker;
+use files::Files;
 use load::Loader;
 use mock::Mock;
 use ros::Ros;
@@ -118,8 +119,9 @@ pub(super) fn run(args: Args) -> Outcome {
     let (check, mock, virtual_time) = (args.check, args.mock, args.virtual_time);
     let world = args.world.clone();
     let mut loader = Loader::new(args);
-    let mut settings = loader.load()?;
+    let (mut settings, files) = loader.load()?;
     if check {
+        files::check_places(&settings.keys)?;
         return print(&load::in_force(&settings));
     }
     runtime::new()?.block_on(async move {
@@ -132,7 +134,7 @@ pub(super) fn run(args: Args) -> Outcome {
             loader.fix_port(mock.port());
             settings.keys.device.port = Some(mock.port());
         }
-        let outcome = serve(loader, settings, interrupts).await;
+        let outcome = serve(loader, settings, files, interrupts).await;
         if let Some(mock) = mock {
             mock.stop().await;
         }
@@ -141,7 +143,12 @@ pub(super) fn run(args: Args) -> Outcome {
 }
 
 /// Gets hold of everything, and lets daemon and server run until an interrupt.
-async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Outcome {
+async fn serve(
+    loader: Loader,
+    settings: Settings,
+    files: Files,
+    interrupts: Interrupts,
+) -> Outcome {
     // With a handler, a file that gets too large is an error of the write and not the end.
     let _too_large = signal(SignalKind::from_raw(Signal::XFSZ.as_raw()));
     // Whoever sees that it answers may send one: until there is a handler it would end the process,
@@ -155,14 +162,14 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
             host_gpio::open(&keys.gpio).map_err(|error| Failure::input(&error, error.help()))?,
         ),
     };
-    let mut broker = Broker::open(&settings)?;
-    let log_folder = PathBuf::from(&keys.log.folder);
-    let (journal, thread) = Journal::open(&log_folder, settings.rotation())?;
+    // Sockets first: they are removed when a later step fails, which a log is not.
     let listeners =
         Listeners::open(&keys.server).map_err(|error| Failure::device(&error, error.help()))?;
+    let Files { token, fleet, mut broker } = files;
+    let access = access(&settings, token.as_deref(), &listeners)?;
+    let log_folder = PathBuf::from(&keys.log.folder);
+    let (journal, thread) = Journal::open(&log_folder, settings.rotation())?;
     let keys = keys.clone();
-    let access = access(&settings, &listeners)?;
-    let fleet = load::fleet(&keys.fleet)?;
     let (daemon, handle) = match gpio {
         Some(gpio) => {
             let resources = Resources { open_port: Box::new(link::open), gpio, journal };
@@ -170,8 +177,15 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
         }
         None => daemon::prepare_simulated(journal, settings.clone()),
     };
-    let ros = Ros::start(&keys.ros, &handle)?;
-    broker.start(&settings, &handle, &log_folder)?;
+    let begun = Ros::start(&keys.ros, &handle)
+        .and_then(|ros| broker.start(&settings, &handle, &log_folder).map(|()| ros));
+    let ros = match begun {
+        Ok(ros) => ros,
+        Err(failure) => {
+            files::remove_empty_log(thread);
+            return Err(failure);
+        }
+    };
     let server = Server::new(handle.clone(), log_folder, access, &keys, fleet);
     let reloading = tokio::spawn(reload_on_hangup(loader, handle, hangups));
     let ended = CancellationToken::new();
@@ -191,24 +205,21 @@ async fn serve(loader: Loader, settings: Settings, interrupts: Interrupts) -> Ou
 }
 
 /// Who may write over TCP, and under which names the server is asked.
-fn access(settings: &Settings, listeners: &Listeners) -> Result<Access, Failure> {
-    let keys = &settings.keys.server;
-    let token = match &keys.token_file {
-        Some(file) => Some(read_token(Path::new(file)).map_err(|error| {
-            let help = token_help(&error, Path::new(file));
-            Failure::input(format!("server.token_file {file}: {error}"), help)
-        })?),
-        None => None,
-    };
-    let mut access = Access::new(&keys.hosts, token.as_deref());
+fn access(
+    settings: &Settings,
+    token: Option<&str>,
+    listeners: &Listeners,
+) -> Result<Access, Failure> {
+    let mut access = Access::new(&settings.keys.server.hosts, token);
     if settings.keys.foxglove.enabled {
         access = access.with_viewers(&settings.keys.foxglove.origins);
     }
     for address in listeners.addresses() {
+        // Checked with the configuration, except for sockets of systemd.
         if !address.ip().is_loopback() && token.is_none() {
             return Err(Failure::input(
-                format!("server.listen {address} can be reached from other computers"),
-                "listen on 127.0.0.1, or set server.token_file",
+                format!("the socket unit's {address} can be reached from other computers"),
+                "let it listen on 127.0.0.1, or set server.token_file",
             ));
         }
         access = access.with_address(address.ip());
@@ -220,13 +231,18 @@ fn access(settings: &Settings, listeners: &Listeners) -> Result<Access, Failure>
 async fn reload_on_hangup(mut loader: Loader, daemon: Handle, hangups: io::Result<Hangups>) {
     let Ok(mut hangups) = hangups else { return };
     while hangups.recv().await.is_some() {
-        let loaded = loader.load().map(Box::new).map_err(|failure| load::words(&failure));
+        let loaded = loader.load().map(|(settings, _)| Box::new(settings));
+        let loaded = loaded.map_err(|failure| load::words(&failure));
         match &loaded {
             Ok(_) => tracing::info!("the configuration was read again"),
             Err(error) => tracing::error!("the configuration stays as it was: {error}"),
         }
         // A daemon that is stopping needs no new configuration.
         drop(daemon.order(Order::Reload(loaded)).await);
+        let waiting = daemon.status().configuration.needs_restart;
+        if !waiting.is_empty() {
+            tracing::warn!("these changes take effect after a restart: {}", waiting.join(", "));
+        }
     }
 }
 

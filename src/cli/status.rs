@@ -108,6 +108,10 @@ fn screen(status: &Status, health: &Health) -> String {
     if let Some(error) = &status.configuration.error {
         lines.push(format!("  the last change of the configuration was refused: {error}"));
     }
+    let waiting = &status.configuration.needs_restart;
+    if !waiting.is_empty() {
+        lines.push(format!("  after a restart these changes take effect: {}", waiting.join(", ")));
+    }
     lines.join("\n")
 }
 

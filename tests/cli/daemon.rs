@@ -11,6 +11,7 @@ pub(crate) mod fleet;
 mod foxglove;
 mod gather;
 mod kill;
+mod listening;
 mod load;
 mod location;
 pub(crate) mod model;
