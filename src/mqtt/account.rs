@@ -98,6 +98,11 @@ impl Account {
         self.options.clone()
     }
 
+    /// The name that the broker knows this client by.
+    pub(super) fn client_id(&self) -> String {
+        self.options.client_id()
+    }
+
     /// The broker's place, as a person says it.
     pub(super) fn broker(&self) -> String {
         let scheme = if self.broker.tls { "mqtts" } else { "mqtt" };
