@@ -20,6 +20,7 @@ mod problem;
 mod ros;
 mod scans;
 mod sensor;
+mod server;
 mod setup;
 mod simulation;
 mod status;
@@ -40,6 +41,7 @@ pub use problem::Problem;
 pub use ros::RosReport;
 pub use scans::{ListedScan, ScanReport, WholeScan};
 pub use sensor::{SensorFigures, SensorOrder};
+pub use server::ServerReport;
 pub use setup::Setup;
 pub use simulation::{RangerReading, SimulationReport};
 pub use status::{

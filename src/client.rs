@@ -1,5 +1,6 @@
 //! A client of the daemon's API, over its unix socket or TCP.
 
+mod live;
 mod scans;
 
 use std::{io, path::PathBuf, time::Duration};
@@ -20,11 +21,12 @@ use tokio::{
     time::timeout,
 };
 
+pub use live::LiveLines;
 pub use scans::{RequestedScans, ScansError};
 
 use crate::api::{Accepted, Problem};
 
-/// How long a daemon may take for its answer to begin.
+/// How long a daemon may take for its answer to begin, and for each further piece of it.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Longest refusal that is read, bytes.
@@ -60,6 +62,12 @@ pub enum ClientError {
     /// It answers too slowly.
     #[error("the daemon did not answer within {} s", PATIENCE.as_secs())]
     TooSlow,
+    /// A live stream lacks even signs of life.
+    #[error(
+        "the daemon has sent nothing for {} s: it hangs, or can't be reached any more",
+        live::SILENCE.as_secs()
+    )]
+    Silent,
     /// It speaks something else, or broke off.
     #[error("the daemon's answer can't be read: {0}")]
     Http(#[from] hyper::Error),
@@ -96,7 +104,7 @@ impl ClientError {
             Self::NoDaemon { .. } => "start it with `sonard run` or `systemctl start sonard`; \
                  --socket or --address say where it is; the socket's group may use it"
                 .into(),
-            Self::TooSlow => "look at its messages (`journalctl -u sonard`)".into(),
+            Self::TooSlow | Self::Silent => "look at its messages (`journalctl -u sonard`)".into(),
             Self::Http(_) | Self::Strange(_) | Self::TooLong(_) => {
                 "make sure that it is a sonard of this version".into()
             }
@@ -140,8 +148,7 @@ impl Client {
     /// # Errors
     /// As [`Self::get`], or when it is something else.
     pub async fn get_json<T: DeserializeOwned>(&self, path: &str) -> Result<T, ClientError> {
-        let body = self.get(path).await?.into_body().collect().await?.to_bytes();
-        Ok(serde_json::from_slice(&body)?)
+        self.get_json_within(path, usize::MAX).await
     }
 
     /// The same of an answer that may have so many bytes; no more of one are taken.
@@ -192,7 +199,7 @@ impl Client {
     ) -> Result<T, ClientError> {
         let request = request.header(header::CONTENT_TYPE, "application/json");
         let answer = self.ask(request, serde_json::to_vec(body)?.into()).await?;
-        Ok(serde_json::from_slice(&answer.into_body().collect().await?.to_bytes())?)
+        Ok(serde_json::from_slice(&within(answer.into_body(), usize::MAX).await?)?)
     }
 
     async fn ask(&self, request: Builder, body: Bytes) -> Result<Response<Incoming>, ClientError> {
@@ -216,10 +223,12 @@ impl Client {
     }
 }
 
-/// A body's bytes, at most so many.
+/// A body's bytes, at most so many; none may be waited for longer than for the answer's beginning.
 async fn within(mut body: Incoming, most_bytes: usize) -> Result<Vec<u8>, ClientError> {
     let mut bytes = Vec::new();
-    while let Some(frame) = body.frame().await {
+    while let Some(frame) =
+        timeout(PATIENCE, body.frame()).await.map_err(|_| ClientError::TooSlow)?
+    {
         let frame = frame?;
         bytes.extend_from_slice(frame.data_ref().map_or(&[][..], |data| data));
         if bytes.len() > most_bytes {

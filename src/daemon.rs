@@ -57,7 +57,8 @@ pub use shared::NextScan;
 use crate::{
     api::{
         ClockReport, ConfigurationReport, Health, InForce, LinkState, MqttReport, RosReport,
-        ScanRequest, ScanTotals, Setup, SimulationReport, Started, Status, SubscriberReport,
+        ScanRequest, ScanTotals, ServerReport, Setup, SimulationReport, Started, Status,
+        SubscriberReport,
     },
     host_gpio::{HostGpio, NoGpio},
     scan::{Event, EventKind, Record, Session},
@@ -224,6 +225,11 @@ impl Handle {
         let record = Record::Event(Event { time: Timestamp::now(), kind, detail });
         self.journal.record(&record);
         self.hub.publish(&record);
+    }
+
+    /// Publishes where clients reach the server.
+    pub fn report_server(&self, report: ServerReport) {
+        self.shared.report_server(report);
     }
 
     /// Says how it goes with ROS 2.

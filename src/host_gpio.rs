@@ -63,6 +63,23 @@ impl HostGpioError {
     }
 }
 
+/// Checks that this program and this computer have pins if the configuration names some; no pin is touched.
+///
+/// # Errors
+/// When they have none.
+pub fn check(keys: &GpioKeys) -> Result<(), HostGpioError> {
+    if *keys == GpioKeys::default() {
+        return Ok(());
+    }
+    #[cfg(feature = "pi")]
+    return match rppal::system::DeviceInfo::new() {
+        Ok(_) => Ok(()),
+        Err(_) => Err(HostGpioError::Gpio(crate::pi::GpioError::NotAPi)),
+    };
+    #[cfg(not(feature = "pi"))]
+    Err(HostGpioError::NotBuilt)
+}
+
 /// The pins that the configuration names.
 ///
 /// # Errors

@@ -2,13 +2,15 @@
 //!
 //! They come from the log and not from the hub: what the broker has not acknowledged is in the log, whatever
 //! happens to daemon, broker or line. [`window`](Window) knows what is under way and which place of the log is to be
-//! remembered, and is pure; the courier owns the client.
+//! remembered, `diagnosis` which messages a broker does not take; both are pure. The courier owns the client.
 
 mod account;
 mod bookmark;
+mod certificate;
 mod commands;
 mod connection;
 mod courier;
+mod diagnosis;
 mod log_side;
 mod patience;
 mod status;
@@ -28,6 +30,7 @@ pub use window::{LogPosition, MOST_UNDER_WAY, Message, Read, Window};
 
 use crate::{api::MqttReport, config::MqttKeys, daemon::Handle, scan::EventKind, supervisor::Task};
 use courier::{Courier, Troubles};
+use diagnosis::Diagnosis;
 use log_side::LogSide;
 use tail::Tail;
 
@@ -67,6 +70,7 @@ impl Mqtt {
             waiting: 0,
             behind_bytes: tail.behind(tail.place())?,
             passed_over: 0,
+            left_out: 0,
             commands: 0,
             refused: 0,
         };
@@ -84,6 +88,7 @@ impl Mqtt {
             report,
             epoch: Instant::now(),
             troubles: Troubles::default(),
+            diagnosis: Diagnosis::default(),
         };
         let task = supervisor.spawn(Task::Mqtt, courier.run());
         Ok(Self { stop, task })

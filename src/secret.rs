@@ -68,22 +68,31 @@ pub struct Secret {
 /// Anything but a small regular file with text in it; nothing is waited for.
 pub fn read_secret(path: &Path, wanted: Secret) -> Result<String, SecretError> {
     let Secret { what, least, most_bytes } = wanted;
+    let (text, mode) = read_small_file(path, most_bytes)?;
+    if mode & 0o077 != 0 {
+        return Err(SecretError::Open { what, mode });
+    }
+    let secret = text.trim().to_owned();
+    if secret.len() < least { Err(SecretError::TooShort { what, least }) } else { Ok(secret) }
+}
+
+/// The text of a regular file of at most so many bytes, and the file's permissions.
+///
+/// # Errors
+/// When it is something else; nothing is waited for.
+pub fn read_small_file(path: &Path, most_bytes: u64) -> Result<(String, u32), SecretError> {
     // Opening a pipe would wait for whoever writes into it.
     let nonblocking = OFlags::NONBLOCK.bits().cast_signed();
     let file = OpenOptions::new().read(true).custom_flags(nonblocking).open(path)?;
     let metadata = file.metadata()?;
-    let mode = metadata.permissions().mode();
     if !metadata.is_file() {
         return Err(SecretError::NoFile);
-    }
-    if mode & 0o077 != 0 {
-        return Err(SecretError::Open { what, mode });
     }
     let mut bytes = Vec::new();
     file.take(most_bytes + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > most_bytes {
         return Err(SecretError::TooLarge(most_bytes));
     }
-    let secret = String::from_utf8(bytes).map_err(|_| SecretError::NoText)?.trim().to_owned();
-    if secret.len() < least { Err(SecretError::TooShort { what, least }) } else { Ok(secret) }
+    let text = String::from_utf8(bytes).map_err(|_| SecretError::NoText)?;
+    Ok((text, metadata.permissions().mode()))
 }

@@ -32,6 +32,8 @@ pub enum Task {
     Thermometer,
     /// Accept loop of a listening socket.
     Server,
+    /// Restoration of listening sockets.
+    Listeners,
     /// Conversion of records to viewers' messages.
     LiveMessages,
     /// Polling of the fleet's other daemons.
@@ -50,13 +52,14 @@ pub enum Task {
 
 impl Task {
     /// All tasks.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Device,
         Self::Log,
         Self::LogWatch,
         Self::Notifications,
         Self::Thermometer,
         Self::Server,
+        Self::Listeners,
         Self::LiveMessages,
         Self::Fleet,
         Self::Mqtt,
@@ -76,6 +79,7 @@ impl Task {
             Self::Notifications => "notifications",
             Self::Thermometer => "thermometer",
             Self::Server => "server",
+            Self::Listeners => "listeners",
             Self::LiveMessages => "live-messages",
             Self::Fleet => "fleet",
             Self::Mqtt => "mqtt",

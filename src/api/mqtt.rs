@@ -25,6 +25,9 @@ pub struct MqttReport {
     pub behind_bytes: u64,
     /// Lines of the log that were passed over because no record is on them.
     pub passed_over: u64,
+    /// Records that the broker does not take: they were left out, and are in the log.
+    #[serde(default)]
+    pub left_out: u64,
     /// Commands that were taken.
     pub commands: u64,
     /// Commands that were refused.

@@ -8,7 +8,7 @@ use uuid::Uuid;
 
 use super::{
     air::AirStatus, link::LinkReport, mqtt::MqttReport, ros::RosReport, sensor::SensorFigures,
-    setup::Setup, simulation::SimulationReport,
+    server::ServerReport, setup::Setup, simulation::SimulationReport,
 };
 use crate::{
     config::Mode,
@@ -53,6 +53,9 @@ pub struct Status {
     pub log: LogStatus,
     /// Clients of live streams.
     pub subscribers: SubscriberReport,
+    /// Places where the API is served.
+    #[serde(default)]
+    pub server: ServerReport,
     /// What is told to ROS 2, if anything is.
     #[serde(default)]
     pub ros: Option<RosReport>,

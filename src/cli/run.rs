@@ -1,13 +1,14 @@
 //! `sonard run`.
 
 mod broker;
+mod files;
 mod load;
 mod mock;
 mod ros;
 mod sandbox;
 
 use std::{
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::{Arc, OnceLock},
     time::Duration,
 };
@@ -28,10 +29,10 @@ use crate::{
     link::PortOpener,
     messages,
     scan::EventKind,
-    server::{Access, Listeners, Server, read_token, token_help},
+    server::{Access, Listeners, Server},
     supervisor::{Supervisor, Task},
 };
-use broker::Broker;
+use files::Files;
 use load::Loader;
 use mock::Mock;
 use ros::Ros;
@@ -130,8 +131,9 @@ pub(super) fn run(args: Args) -> Outcome {
     let (check, mock, virtual_time) = (args.check, args.mock, args.virtual_time);
     let world = args.world.clone();
     let mut loader = Loader::new(args);
-    let mut settings = loader.load()?;
+    let (mut settings, files) = loader.load()?;
     if check {
+        files::check_places(&settings.keys)?;
         return print(&load::in_force(&settings));
     }
     let hangup = Hangup::of_this_process();
@@ -149,7 +151,8 @@ pub(super) fn run(args: Args) -> Outcome {
             settings.keys.device.port = Some(mock.port());
         }
         let served = async {
-            let outcome = serve(loader, settings, &interrupts, hangup, supervisor.clone()).await;
+            let outcome =
+                serve(loader, settings, files, &interrupts, hangup, supervisor.clone()).await;
             supervisor.stopping().cancel();
             if let Some(mock) = mock {
                 mock.stop().await;
@@ -185,6 +188,7 @@ async fn overdue(stopping: &CancellationToken) {
 async fn serve(
     loader: Loader,
     settings: Settings,
+    files: Files,
     interrupts: &Interrupts,
     hangup: Hangup,
     supervisor: Supervisor,
@@ -201,21 +205,18 @@ async fn serve(
             host_gpio::open(&keys.gpio).map_err(|error| Failure::input(&error, error.help()))?,
         ),
     };
-    let mut broker = Broker::open(&settings)?;
+    // Sockets first: they are removed when a later step fails, which a log is not.
+    let listeners =
+        Listeners::open(&keys.server).map_err(|error| Failure::device(&error, error.help()))?;
+    let Files { token, fleet, mut broker } = files;
+    let access = access(&settings, token.as_deref(), &listeners)?;
     let log_folder = PathBuf::from(&keys.log.folder);
     let (journal, thread) = Journal::open(&log_folder, settings.rotation(), &supervisor)
         .map_err(|error| sandbox::log_failure(&log_folder, error))?;
     sandbox::warn_of_private_folder(&log_folder);
     // A start that is rejected below stops the log's thread.
     let _stopping = supervisor.stopping().clone().drop_guard();
-    let listeners =
-        Listeners::open(&keys.server).map_err(|error| Failure::device(&error, error.help()))?;
-    for address in listeners.addresses().into_iter().flatten() {
-        tracing::info!("listening on http://{address}");
-    }
     let keys = keys.clone();
-    let access = access(&settings, &listeners)?;
-    let fleet = load::fleet(&keys.fleet)?;
     let (daemon, handle) = match gpio {
         Some(gpio) => {
             let announced = Arc::new(OnceLock::<Handle>::new());
@@ -227,8 +228,15 @@ async fn serve(
         }
         None => daemon::prepare_simulated(journal, supervisor.clone(), settings.clone()),
     };
-    let ros = Ros::start(&keys.ros, &handle)?;
-    broker.start(&settings, &handle, &log_folder)?;
+    let begun = Ros::start(&keys.ros, &handle)
+        .and_then(|ros| broker.start(&settings, &handle, &log_folder).map(|()| ros));
+    let ros = match begun {
+        Ok(ros) => ros,
+        Err(failure) => {
+            files::remove_empty_log(thread);
+            return Err(failure);
+        }
+    };
     let server = Server::new(handle.clone(), log_folder, access, &keys, fleet);
     if let Some(Ok(hangups)) = hangups {
         drop(supervisor.spawn_finite(Task::Reload, reload_on_hangup(loader, handle, hangups)));
@@ -278,24 +286,21 @@ fn open_and_announce(daemon: Arc<OnceLock<Handle>>) -> OpenPort {
 }
 
 /// Who may write over TCP, and under which names the server is asked.
-fn access(settings: &Settings, listeners: &Listeners) -> Result<Access, Failure> {
-    let keys = &settings.keys.server;
-    let token = match &keys.token_file {
-        Some(file) => Some(read_token(Path::new(file)).map_err(|error| {
-            let help = token_help(&error, Path::new(file));
-            Failure::input(format!("server.token_file {file}: {error}"), help)
-        })?),
-        None => None,
-    };
-    let mut access = Access::new(&keys.hosts, token.as_deref());
+fn access(
+    settings: &Settings,
+    token: Option<&str>,
+    listeners: &Listeners,
+) -> Result<Access, Failure> {
+    let mut access = Access::new(&settings.keys.server.hosts, token);
     if settings.keys.foxglove.enabled {
         access = access.with_viewers(&settings.keys.foxglove.origins);
     }
-    for address in listeners.addresses().into_iter().flatten() {
+    for address in listeners.addresses() {
+        // Checked with the configuration, except for sockets of systemd.
         if !address.ip().is_loopback() && token.is_none() {
             return Err(Failure::input(
-                format!("server.listen {address} can be reached from other computers"),
-                "listen on 127.0.0.1, or set server.token_file",
+                format!("the socket unit's {address} can be reached from other computers"),
+                "let it listen on 127.0.0.1, or set server.token_file",
             ));
         }
         access = access.with_address(address.ip());
@@ -306,13 +311,18 @@ fn access(settings: &Settings, listeners: &Listeners) -> Result<Access, Failure>
 /// Reads the configuration again at each SIGHUP.
 async fn reload_on_hangup(mut loader: Loader, daemon: Handle, mut hangups: Hangups) {
     while hangups.recv().await.is_some() {
-        let loaded = loader.load().map(Box::new).map_err(|failure| load::words(&failure));
+        let loaded = loader.load().map(|(settings, _)| Box::new(settings));
+        let loaded = loaded.map_err(|failure| load::words(&failure));
         match &loaded {
             Ok(_) => tracing::info!("the configuration was read again"),
             Err(error) => tracing::error!("the configuration stays as it was: {error}"),
         }
         // A daemon that is stopping needs no new configuration.
         drop(daemon.order(Order::Reload(loaded)).await);
+        let waiting = daemon.status().configuration.needs_restart;
+        if !waiting.is_empty() {
+            tracing::warn!("these changes take effect after a restart: {}", waiting.join(", "));
+        }
     }
 }
 

@@ -247,7 +247,7 @@ pub(super) async fn meet(
 ) -> Result<Ranger<SerialStream>, Failure> {
     let line = ports.open(port).map_err(|error| Failure::device(&error, error.help()))?;
     if let Some(change) = ports.take_change() {
-        anstream::eprintln!("{change}");
+        notice!("{change}");
     }
     let config = HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, rand::random()) };
     tokio::select! {

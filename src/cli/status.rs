@@ -109,6 +109,10 @@ fn screen(status: &Status, health: &Health) -> String {
     if let Some(error) = &status.configuration.error {
         lines.push(format!("  the last change of the configuration was refused: {error}"));
     }
+    let waiting = &status.configuration.needs_restart;
+    if !waiting.is_empty() {
+        lines.push(format!("  after a restart these changes take effect: {}", waiting.join(", ")));
+    }
     lines.join("\n")
 }
 
@@ -129,12 +133,16 @@ fn ros(report: &RosReport) -> String {
 
 /// How it goes with the MQTT broker.
 fn broker(report: &MqttReport) -> String {
-    let MqttReport { broker, acknowledged, behind_bytes, .. } = report;
+    let MqttReport { broker, acknowledged, left_out, behind_bytes, .. } = report;
+    let left_out = match left_out {
+        0 => String::new(),
+        count => format!("{count} left out, "),
+    };
     let is_there = if report.connected { "is there" } else { "is not there" };
     let why = report.trouble.as_ref().map(|why| format!(" ({why})")).unwrap_or_default();
     let behind_kb = *behind_bytes as f64 / 1e3;
     format!(
-        "  mqtt     {broker} {is_there}{why}; {acknowledged} records acknowledged, {behind_kb:.0} kB behind"
+        "  mqtt     {broker} {is_there}{why}; {acknowledged} records acknowledged, {left_out}{behind_kb:.0} kB behind"
     )
 }
 

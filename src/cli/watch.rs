@@ -7,8 +7,6 @@ use std::{
     time::Duration,
 };
 
-use http_body_util::BodyExt as _;
-use hyper::body::Incoming;
 use tokio::time::sleep;
 
 use super::{
@@ -17,7 +15,7 @@ use super::{
     runtime,
 };
 use crate::{
-    client::Client,
+    client::{Client, ClientError, LiveLines},
     scan::{PingStatus, Provenance, Record, decode_line},
 };
 
@@ -89,32 +87,32 @@ enum Over {
 }
 
 async fn watch(args: &Args, client: Client, path: &str) -> Outcome {
-    let mut body = client.get(path).await.map_err(|error| refuse(&error))?.into_body();
+    let mut lines = client.live(path).await.map_err(|error| refuse(&error))?;
     loop {
-        let why = match follow(args, body).await {
+        let why = match follow(args, lines).await {
             Over::Reader(outcome) => return outcome,
             Over::Daemon(why) => why,
         };
         if !args.reconnect {
             return Err(Failure::device(
                 why,
-                "it was stopped, or this client was too slow for it; lines that came are whole. \
+                "it was stopped, hangs, or this client was too slow for it; lines that came are whole. \
                  --reconnect waits for it and goes on",
             ));
         }
         notice!("{why}: waiting for it");
-        body = again(&client, path).await?;
+        lines = again(&client, path).await?;
         notice!("the daemon answers again; its log has what was measured meanwhile");
     }
 }
 
 /// Asks until the daemon answers; only a refusal ends that.
-async fn again(client: &Client, path: &str) -> Result<Incoming, Failure> {
+async fn again(client: &Client, path: &str) -> Result<LiveLines, Failure> {
     let mut wait = RECONNECT_MIN;
     loop {
         sleep(wait).await;
-        match client.get(path).await {
-            Ok(response) => return Ok(response.into_body()),
+        match client.live(path).await {
+            Ok(lines) => return Ok(lines),
             Err(error) if error.is_final() => return Err(refuse(&error)),
             Err(_not_yet) => wait = (wait * 2).min(RECONNECT_MAX),
         }
@@ -122,29 +120,24 @@ async fn again(client: &Client, path: &str) -> Result<Incoming, Failure> {
 }
 
 /// Writes lines as they come, each only when it is whole.
-async fn follow(args: &Args, mut body: Incoming) -> Over {
-    let (mut rest, mut seen) = (Vec::new(), 0);
+async fn follow(args: &Args, mut lines: LiveLines) -> Over {
     loop {
-        let frame = match body.frame().await {
-            Some(Ok(frame)) => frame,
-            Some(Err(error)) => return Over::Daemon(format!("the daemon broke off: {error}")),
-            None => return Over::Daemon("the daemon ended the stream".into()),
-        };
-        rest.extend_from_slice(frame.data_ref().map_or(&[][..], |data| data));
-        // A scan may be a line of many megabytes: each byte of it is looked at once.
-        while let Some(end) = rest[seen..].iter().position(|&byte| byte == b'\n') {
-            let line: Vec<u8> = rest.drain(..=seen + end).collect();
-            seen = 0;
-            let text = match args.json || args.scans {
-                true => line,
-                false => words(&line).into_bytes(),
-            };
-            let mut out = io::stdout().lock();
-            if let Err(error) = out.write_all(&text).and_then(|()| out.flush()) {
-                return Over::Reader(Failure::from_write("to standard output", &error));
+        let line = match lines.next().await {
+            Ok(Some(line)) => line,
+            Ok(None) => return Over::Daemon("the daemon ended the stream".into()),
+            Err(ClientError::Http(error)) => {
+                return Over::Daemon(format!("the daemon broke off: {error}"));
             }
+            Err(error) => return Over::Daemon(error.to_string()),
+        };
+        let text = match args.json || args.scans {
+            true => line,
+            false => words(&line).into_bytes(),
+        };
+        let mut out = io::stdout().lock();
+        if let Err(error) = out.write_all(&text).and_then(|()| out.flush()) {
+            return Over::Reader(Failure::from_write("to standard output", &error));
         }
-        seen = rest.len();
     }
 }
 

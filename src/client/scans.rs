@@ -5,13 +5,11 @@ use std::{
     time::Duration,
 };
 
-use http_body_util::BodyExt as _;
-use hyper::body::Incoming;
 use thiserror::Error;
 use tokio::time::timeout;
 use uuid::Uuid;
 
-use super::{Client, ClientError};
+use super::{Client, ClientError, LiveLines};
 use crate::{
     api::{Accepted, CancelRequest, ScanReport, ScanRequest, Started, Status},
     scan::{EventKind, Ping, Record, ScanEnd, Session, decode_line},
@@ -28,9 +26,9 @@ const DROPPED: &[u8] = br#"{"type":"dropped""#;
 /// meanwhile is left out.
 pub struct RequestedScans {
     client: Client,
-    stream: Incoming,
-    /// Bytes of the stream that are not looked at yet.
-    rest: Vec<u8>,
+    stream: LiveLines,
+    /// The line that is being taken in.
+    line: Option<Vec<u8>>,
     request: Uuid,
     /// Records that nobody has taken yet.
     ready: VecDeque<Record>,
@@ -85,12 +83,12 @@ impl RequestedScans {
     /// When nobody answers, or the daemon refuses.
     pub async fn ask(client: Client, request: &ScanRequest) -> Result<Self, ClientError> {
         // Listening before asking: nothing is missed.
-        let stream = client.get("/v1/live/records").await?.into_body();
+        let stream = client.live("/v1/live/records").await?;
         let Started { request, .. } = client.post("/v1/start", request).await?;
         Ok(Self {
             client,
             stream,
-            rest: Vec::new(),
+            line: None,
             request,
             ready: VecDeque::new(),
             current: None,
@@ -112,15 +110,12 @@ impl RequestedScans {
             if let Some(record) = self.ready.pop_front() {
                 return Ok(record);
             }
-            if let Some(end) = self.rest.iter().position(|&byte| byte == b'\n') {
-                self.take_in(end).await?;
+            if self.line.is_some() {
+                self.take_in().await?;
                 continue;
             }
-            match timeout(QUIET, self.stream.frame()).await {
-                Ok(Some(frame)) => {
-                    let frame = frame.map_err(ClientError::from)?;
-                    self.rest.extend_from_slice(frame.data_ref().map_or(&[][..], |data| data));
-                }
+            match timeout(QUIET, self.stream.next()).await.map(Result::transpose) {
+                Ok(Some(line)) => self.line = Some(line?),
                 Ok(None) => return Err(ScansError::Ended),
                 Err(_quiet) if self.current.is_none() => self.doubt().await?,
                 Err(_quiet) => {}
@@ -157,10 +152,10 @@ impl RequestedScans {
         self.fetched_again
     }
 
-    /// Takes the line in that ends there. Whatever has to be waited for comes first: dropped
-    /// meanwhile, the line is still to be taken in.
-    async fn take_in(&mut self, end: usize) -> Result<(), ScansError> {
-        let line = &self.rest[..end];
+    /// Takes the line at hand in. Whatever has to be waited for comes first: dropped meanwhile, the
+    /// line is still to be taken in.
+    async fn take_in(&mut self) -> Result<(), ScansError> {
+        let line = self.line.as_deref().unwrap_or_default().trim_ascii_end();
         self.dropped |= line.starts_with(DROPPED);
         let (mut session, mut lost) = (None, Vec::new());
         // A kind of record that this version does not know is none of its scans'.
@@ -174,7 +169,7 @@ impl RequestedScans {
             }
             _ => {}
         }
-        self.rest.drain(..=end);
+        self.line = None;
         self.doubts = 0;
         if let Some(record) = record {
             self.learn(record, session, lost);

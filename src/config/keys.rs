@@ -231,12 +231,14 @@ pub struct SafetyKeys {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ServerKeys {
-    /// Unix socket (restart); empty for none. systemd's RUNTIME_DIRECTORY goes before the default.
+    /// Unix socket (restart); empty for none. systemd's RUNTIME_DIRECTORY goes before the default. A socket whose file is
+    /// removed is made again.
     #[schemars(extend("x-default-yields" = true))]
     pub socket: String,
     /// Who may use the socket: its permissions, three octal digits, as of chmod (restart).
     pub socket_mode: String,
-    /// TCP address of API and live page (restart). Off loopback, all data need a token.
+    /// TCP address of API and live page (restart). Off loopback, all data need a token. An address that this computer
+    /// does not have yet, or a port in use, is bound once it can be; scanning does not wait for it.
     #[schemars(example = "127.0.0.1:8765")]
     pub listen: Option<String>,
     /// File with the token that writes over TCP must show, readable by its owner alone (restart);

@@ -90,6 +90,8 @@ pub(super) enum Interrupt {
 /// What is in force, and the ends of everything that may change it.
 pub(super) struct Control {
     pub(super) settings: Settings,
+    /// Those of the start, which keys marked `(restart)` still have.
+    first_settings: Settings,
     /// The configuration's sensor, in whose place `settings` has one that a program wants.
     own_sensor: Sensor,
     /// What of them the configuration decides.
@@ -144,6 +146,7 @@ impl Control {
             journal,
             shared,
             pressed: false,
+            first_settings: settings.clone(),
             settings,
         }
     }
@@ -286,7 +289,7 @@ impl Control {
         self.journal.set_rotation(self.settings.rotation());
         self.configuration = ConfigurationReport {
             error: None,
-            needs_restart: self.settings.needs_restart(&before),
+            needs_restart: self.settings.needs_restart(&self.first_settings),
         };
         if keys.device == then.device { Interrupt::Agenda } else { Interrupt::PortChanged }
     }

@@ -1,6 +1,11 @@
 //! Everything the daemon works by, checked and loaded.
 
-use std::{net::SocketAddr, sync::Arc, time::Duration};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    net::{IpAddr, SocketAddr},
+    sync::Arc,
+    time::Duration,
+};
 
 use super::{forecast::listening, machine::BackOff};
 use crate::{
@@ -29,6 +34,8 @@ pub struct Settings {
     pub pose: Pose,
     /// What the model plays in place of a device, if it does.
     pub simulated: Option<Simulated>,
+    /// SHA-256 of the contents of files that are read only at the start, by the keys that name them.
+    pub files: BTreeMap<&'static str, [u8; 32]>,
 }
 
 /// An array that the model plays.
@@ -197,14 +204,25 @@ impl Settings {
                 help: "three octal digits: 0660 for the socket's group, 0600 for its owner".into(),
             });
         }
-        let listen = server.listen.as_deref().unwrap_or("127.0.0.1:0");
-        if listen.parse::<SocketAddr>().is_err() {
-            return Err(Mismatch {
-                section: "server",
-                key: "listen",
-                message: format!("server.listen is {listen}"),
-                help: "an address and a port, such as 127.0.0.1:8765 or [::1]:8765".into(),
-            });
+        let Some(listen) = &server.listen else { return Ok(()) };
+        let wrong = |message: String, help: &str| {
+            Err(Mismatch { section: "server", key: "listen", message, help: help.into() })
+        };
+        let Ok(address) = listen.parse::<SocketAddr>() else {
+            return wrong(
+                format!("server.listen is {listen}"),
+                "an address and a port, such as 127.0.0.1:8765 or [::1]:8765",
+            );
+        };
+        if let Some(why) = never_bound(&address) {
+            let message = format!("server.listen {listen} {why}");
+            return wrong(message, "give an address of this computer, such as 127.0.0.1:8765");
+        }
+        if !address.ip().is_loopback() && server.token_file.is_none() {
+            return wrong(
+                format!("server.listen {listen} can be reached from other computers"),
+                "listen on 127.0.0.1, or set server.token_file",
+            );
         }
         Ok(())
     }
@@ -222,32 +240,43 @@ impl Settings {
         })
     }
 
-    /// Keys marked `(restart)` that differ from those of `before`, as `section.key`.
+    /// What differs from `before` and takes effect only after a restart: keys marked `(restart)`, as their section or
+    /// `section.key`, and files that such keys name, as `contents of section.key`.
     #[must_use]
     pub fn needs_restart(&self, before: &Self) -> Vec<String> {
         let (now, then) = (&self.keys, &before.keys);
-        let mut keys = Vec::new();
-        if now.log.folder != then.log.folder {
-            keys.push("log.folder".to_owned());
-        }
-        if now.server != then.server {
-            keys.push("server".to_owned());
-        }
-        if now.fleet != then.fleet {
-            keys.push("fleet".to_owned());
-        }
-        if now.foxglove != then.foxglove {
-            keys.push("foxglove".to_owned());
-        }
-        if now.ros != then.ros {
-            keys.push("ros".to_owned());
-        }
-        if now.mqtt != then.mqtt {
-            keys.push("mqtt".to_owned());
-        }
-        if now.gpio != then.gpio {
-            keys.push("gpio".to_owned());
+        let changed = [
+            ("log.folder", now.log.folder != then.log.folder),
+            ("server", now.server != then.server),
+            ("fleet", now.fleet != then.fleet),
+            ("foxglove", now.foxglove != then.foxglove),
+            ("ros", now.ros != then.ros),
+            ("mqtt", now.mqtt != then.mqtt),
+            ("gpio", now.gpio != then.gpio),
+        ];
+        let keys = changed.into_iter().filter(|(_, changed)| *changed).map(|(key, _)| key);
+        let mut keys: Vec<String> = keys.map(str::to_owned).collect();
+        let files: BTreeSet<_> = self.files.keys().chain(before.files.keys()).copied().collect();
+        for key in files {
+            // Where the section differs, the file may be another one.
+            let is_named = keys.iter().any(|section| key.starts_with(&format!("{section}.")));
+            if !is_named && self.files.get(key) != before.files.get(key) {
+                keys.push(format!("contents of {key}"));
+            }
         }
         keys
+    }
+}
+
+/// Why no computer can ever listen on an address, if so.
+fn never_bound(address: &SocketAddr) -> Option<&'static str> {
+    match address.ip() {
+        ip if ip.is_multicast() => Some("is a multicast address"),
+        IpAddr::V4(ip) if ip.is_broadcast() => Some("is the broadcast address"),
+        IpAddr::V6(ip) if ip.is_unicast_link_local() => match address {
+            SocketAddr::V6(address) if address.scope_id() != 0 => None,
+            _ => Some("is valid only on one link: name its interface by number, as in [fe80::1%2]"),
+        },
+        _ => None,
     }
 }

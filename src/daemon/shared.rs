@@ -18,7 +18,8 @@ use crate::{
     api::{
         AirStatus, ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, LinkState,
         LogStatus, MqttReport, Pending, RosReport, ScanFit, ScanProgress, ScanTotals,
-        ScanningReport, SensorFigures, Setup, SimulationReport, Status, SubscriberReport,
+        ScanningReport, SensorFigures, ServerReport, Setup, SimulationReport, Status,
+        SubscriberReport,
     },
     array::RangerArray,
     compare::Explanation,
@@ -175,6 +176,7 @@ pub(super) struct Shared {
     beats: AtomicU64,
     beams_done: AtomicU32,
     scans: Mutex<Collector>,
+    server: Mutex<ServerReport>,
     ros: Mutex<Option<RosReport>>,
     mqtt: Mutex<Option<MqttReport>>,
 }
@@ -211,6 +213,7 @@ impl Shared {
             beats: AtomicU64::new(0),
             beams_done: AtomicU32::new(0),
             scans: Mutex::default(),
+            server: Mutex::default(),
             ros: Mutex::default(),
             mqtt: Mutex::default(),
         }
@@ -327,6 +330,7 @@ impl Shared {
             pending,
             log,
             subscribers,
+            server: held(&self.server).clone(),
             ros: held(&self.ros).clone(),
             mqtt: held(&self.mqtt).clone(),
             configuration: view.configuration,
@@ -354,6 +358,7 @@ impl Shared {
         if air.stale {
             reasons.push("the air temperature is stale".into());
         }
+        reasons.extend(held(&self.server).trouble.iter().cloned());
         let (fit, last_scan_age_s, reading_lateness_s) = {
             let scans = self.scans();
             let age_s = scans.ended.map(|ended| ended.elapsed().as_secs_f64());
@@ -369,6 +374,11 @@ impl Shared {
             last_scan_age_s,
             reading_lateness_s,
         }
+    }
+
+    /// Takes in where clients reach the server.
+    pub(super) fn report_server(&self, report: ServerReport) {
+        *held(&self.server) = report;
     }
 
     /// How it goes with ROS 2.

@@ -2,7 +2,10 @@
 
 use std::{fmt, path::Path};
 
-use rumqttc::{LastWill, MqttOptions, QoS, Transport};
+use rumqttc::{
+    LastWill, MqttOptions, QoS, Transport,
+    tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer, pem::PemObject as _},
+};
 use thiserror::Error;
 
 use super::{
@@ -12,7 +15,7 @@ use super::{
 use crate::{
     config::{Broker, MqttKeys},
     scan::MAX_LINE_BYTES,
-    secret::{Secret, SecretError, read_secret},
+    secret::{Secret, SecretError, read_secret, read_small_file},
 };
 
 /// The largest message from the broker that is read, bytes; commands are far smaller. Some dozens of them wait within the
@@ -26,8 +29,6 @@ const MOST_TAKEN: usize = MOST_UNDER_WAY + 32;
 const PASSWORD: Secret = Secret { what: "password", least: 1, most_bytes: 4096 };
 const KEY: Secret = Secret { what: "key", least: 1, most_bytes: MOST_CERTIFICATE_BYTES };
 const MOST_CERTIFICATE_BYTES: u64 = 1 << 20;
-/// How a certificate begins.
-const CERTIFICATE: &str = "-----BEGIN CERTIFICATE-----";
 
 /// An error in the settings of a broker.
 #[derive(Debug, Error)]
@@ -97,6 +98,11 @@ impl Account {
         self.options.clone()
     }
 
+    /// The name that the broker knows this client by.
+    pub(super) fn client_id(&self) -> String {
+        self.options.client_id()
+    }
+
     /// The broker's place, as a person says it.
     pub(super) fn broker(&self) -> String {
         let scheme = if self.broker.tls { "mqtts" } else { "mqtt" };
@@ -108,7 +114,14 @@ fn tls(keys: &MqttKeys) -> Result<Transport, AccountError> {
     let client = match (&keys.certificate_file, &keys.key_file) {
         (Some(certificate), Some(key)) => {
             let certificate = certificates("certificate_file", certificate)?;
-            Some((certificate, secret("key_file", key, KEY)?.into_bytes()))
+            let text = secret("key_file", key, KEY)?.into_bytes();
+            PrivateKeyDer::from_pem_slice(&text).map_err(|error| AccountError {
+                key: "key_file",
+                file: key.clone(),
+                message: format!("no private key can be read from it: {error}"),
+                help: "give the key in PEM: -----BEGIN PRIVATE KEY----- and what follows".into(),
+            })?;
+            Some((certificate, text))
         }
         _ => None,
     };
@@ -149,14 +162,37 @@ fn certificates(key: &'static str, file: &str) -> Result<Vec<u8>, AccountError> 
         help: "give a file of certificates in PEM: -----BEGIN CERTIFICATE----- and what follows"
             .into(),
     };
-    let length = std::fs::metadata(file).map_err(|error| fail(error.to_string()))?.len();
-    if length > MOST_CERTIFICATE_BYTES {
-        return Err(fail(format!("it is larger than {MOST_CERTIFICATE_BYTES} bytes")));
+    let read = read_small_file(Path::new(file), MOST_CERTIFICATE_BYTES);
+    let (text, _) = read.map_err(|error| fail(error.to_string()))?;
+    let certificates: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(text.as_bytes()).collect();
+    match certificates {
+        Ok(certificates) if certificates.is_empty() => Err(fail("no certificate is in it".into())),
+        Ok(_) => Ok(text.into_bytes()),
+        Err(error) => Err(fail(format!("a certificate in it is damaged: {error}"))),
     }
-    let text = std::fs::read_to_string(file).map_err(|error| fail(error.to_string()))?;
-    if text.contains(CERTIFICATE) {
-        Ok(text.into_bytes())
-    } else {
-        Err(fail("no certificate is in it".into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn certificates_are_read_before_they_are_needed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("ca.pem").display().to_string();
+        let read = |text: &str| {
+            std::fs::write(&file, text).expect("there is room");
+            certificates("ca_file", &file).map_err(|error| error.to_string())
+        };
+        let pem = |body: &str| {
+            format!("-----BEGIN CERTIFICATE-----\n{body}\n-----END CERTIFICATE-----\n")
+        };
+        assert!(read(&pem("MAA=")).is_ok());
+        assert!(read("").is_err_and(|error| error.contains("no certificate")));
+        assert!(read(&pem("=not base64=")).is_err_and(|error| error.contains("damaged")));
+        assert!(read("-----BEGIN CERTIFICATE-----\nMAA=\n").is_err());
+        for path in ["/dev/zero", "/", "/no/such/file"] {
+            assert!(certificates("ca_file", path).is_err(), "{path}");
+        }
     }
 }

@@ -4,6 +4,7 @@ use std::{future::Future, io, pin::Pin, time::Duration};
 
 use bytes::Bytes;
 use futures_util::{StreamExt as _, stream::FuturesUnordered};
+use jiff::Timestamp;
 use rumqttc::{
     AsyncClient, ClientError, ConnectReturnCode, ConnectionError, Event, EventLoop, Incoming,
     Publish, PublishOptions, QoS, StateError,
@@ -14,7 +15,7 @@ use tokio::{
     time::{Instant, timeout},
 };
 
-use super::{account::Account, topics::Kind};
+use super::{account::Account, certificate, diagnosis::Sending, topics::Kind};
 
 /// News that may wait to be taken in.
 const NEWS: usize = 16;
@@ -31,23 +32,29 @@ pub(super) enum News {
     /// A command.
     Published(Publish),
     /// It has what was sent.
-    Acknowledged(Sent),
-    /// The connection is over, for this reason.
-    Lost(String),
+    Acknowledged(Sending),
+    /// Whether commands will come.
+    Subscribed(bool),
+    /// The connection is over.
+    Lost(Loss),
 }
 
-/// What was sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Sent {
-    /// The record of this number.
-    Record(u64),
-    /// A message of this kind.
-    Message(Kind),
-    /// That commands are wanted; whether they will come.
-    Subscription(bool),
+/// The end of a connection.
+#[derive(Debug)]
+pub(super) struct Loss {
+    /// The reason, as far as it is known.
+    pub(super) why: String,
+    /// Whether the broker has closed it without a word.
+    pub(super) by_broker: bool,
 }
 
-type Acknowledgement = Pin<Box<dyn Future<Output = Option<Sent>> + Send>>;
+impl From<String> for Loss {
+    fn from(why: String) -> Self {
+        Self { why, by_broker: false }
+    }
+}
+
+type Acknowledgement = Pin<Box<dyn Future<Output = Option<News>> + Send>>;
 
 /// A connection, from the first try to reach the broker to its end.
 pub(super) struct Connection {
@@ -74,11 +81,11 @@ impl Connection {
     pub(super) fn send(
         &self,
         topic: String,
-        kind: Kind,
+        sending: Sending,
         payload: Bytes,
-        sent: Sent,
     ) -> Result<(), String> {
-        let options = PublishOptions::new(QoS::AtLeastOnce).retain(kind.is_retained());
+        let is_retained = sending.kind.is_some_and(Kind::is_retained);
+        let options = PublishOptions::new(QoS::AtLeastOnce).retain(is_retained);
         let notice = match self.client.try_publish_tracked(topic, payload, options) {
             Ok(notice) => notice,
             // Why it is over is among the news.
@@ -86,7 +93,9 @@ impl Connection {
             Err(error) => return Err(error.to_string()),
         };
         // Without an acknowledgement there is news of the connection's end.
-        self.under_way.push(Box::pin(async move { notice.wait_async().await.ok().map(|_| sent) }));
+        self.under_way.push(Box::pin(async move {
+            notice.wait_async().await.ok().map(|_| News::Acknowledged(sending))
+        }));
         Ok(())
     }
 
@@ -95,7 +104,7 @@ impl Connection {
         let notice = self.client.try_subscribe_tracked(filter, QoS::AtLeastOnce);
         let notice = notice.map_err(|error| error.to_string())?;
         self.under_way.push(Box::pin(async move {
-            Some(Sent::Subscription(notice.wait_completion_async().await.is_ok()))
+            Some(News::Subscribed(notice.wait_completion_async().await.is_ok()))
         }));
         Ok(())
     }
@@ -110,11 +119,12 @@ impl Connection {
         loop {
             tokio::select! {
                 news = self.news.recv() => {
-                    return news.unwrap_or_else(|| News::Lost("the connection is over".into()));
+                    let over = || News::Lost(Loss::from("the connection is over".to_owned()));
+                    return news.unwrap_or_else(over);
                 }
                 Some(done) = self.under_way.next() => {
-                    if let Some(sent) = done {
-                        return News::Acknowledged(sent);
+                    if let Some(news) = done {
+                        return news;
                     }
                 }
             }
@@ -148,15 +158,15 @@ async fn pump(mut events: EventLoop, news: mpsc::Sender<News>) {
                 }
                 came += 1;
                 match incoming {
-                    _ if came > MOST_A_SECOND => {
-                        News::Lost(format!("it sends more than {MOST_A_SECOND} messages a second"))
-                    }
+                    _ if came > MOST_A_SECOND => News::Lost(Loss::from(format!(
+                        "it sends more than {MOST_A_SECOND} messages a second"
+                    ))),
                     Incoming::ConnAck(_) => News::Connected,
                     Incoming::Publish(publish) => News::Published(publish),
                     _ => continue,
                 }
             }
-            Err(error) => News::Lost(words(&error)),
+            Err(error) => News::Lost(Loss { why: words(&error), by_broker: is_close(&error) }),
         };
         let is_over = matches!(told, News::Lost(_));
         if news.send(told).await.is_err() || is_over {
@@ -183,19 +193,35 @@ fn words(error: &ConnectionError) -> String {
         }
         ConnectionError::MqttState(StateError::AwaitPingResp) => "it shows no sign of life".into(),
         ConnectionError::MqttState(error) => format!("what it sends makes no sense: {error}"),
-        ConnectionError::Tls(error) => format!("TLS: {error}"),
+        ConnectionError::Tls(error) => certificate::words(error, Timestamp::now()),
         other => other.to_string(),
     }
 }
 
-fn words_of_io(error: &io::Error) -> String {
+/// Whether the broker has closed the connection without a word.
+fn is_close(error: &ConnectionError) -> bool {
+    match error {
+        ConnectionError::Io(error)
+        | ConnectionError::MqttState(
+            StateError::Io(error) | StateError::Deserialization(rumqttc::Error::Io(error)),
+        ) => is_close_of_io(error.kind()),
+        ConnectionError::MqttState(error) => matches!(error, StateError::ConnectionAborted),
+        _ => false,
+    }
+}
+
+const fn is_close_of_io(kind: io::ErrorKind) -> bool {
     use io::ErrorKind as Kind;
+    matches!(
+        kind,
+        Kind::UnexpectedEof | Kind::ConnectionReset | Kind::ConnectionAborted | Kind::BrokenPipe
+    )
+}
+
+fn words_of_io(error: &io::Error) -> String {
     match error.kind() {
-        Kind::ConnectionRefused => "nobody listens there".into(),
-        Kind::UnexpectedEof
-        | Kind::ConnectionReset
-        | Kind::ConnectionAborted
-        | Kind::BrokenPipe => "it closed the connection".into(),
+        io::ErrorKind::ConnectionRefused => "nobody listens there".into(),
+        kind if is_close_of_io(kind) => "it closed the connection".into(),
         _ => error.to_string(),
     }
 }

@@ -14,7 +14,8 @@ use tokio_util::sync::CancellationToken;
 use super::{
     account::Account,
     commands::{Asked, Clerk},
-    connection::{Connection, News, Sent},
+    connection::{Connection, Loss, News},
+    diagnosis::{Cause, Diagnosis, Finding, Sending},
     log_side::{Errand, LogSide, Outcome},
     patience::Patience,
     status::StatusNews,
@@ -29,12 +30,17 @@ const LOOK: Duration = Duration::from_millis(100);
 const TELL: Duration = Duration::from_secs(1);
 /// A broker that acknowledges nothing for so long does not do its part.
 const SILENCE: Duration = Duration::from_secs(30);
+/// A connection that lasts so long is not one that is ended again and again.
+const STEADY: Duration = Duration::from_secs(120);
 /// How long the end may take.
 const FAREWELL: Duration = Duration::from_secs(3);
 /// How long the broker may take to hear that it is.
 const GOODBYE: Duration = Duration::from_secs(1);
 /// How soon after a fault of the disk it is asked again.
 const DISK_AGAIN: Duration = Duration::from_secs(1);
+
+/// The request for commands.
+const SUBSCRIPTION: Sending = Sending { record: None, kind: None, bytes: 0 };
 
 /// What the task is made of.
 pub(super) struct Courier {
@@ -49,6 +55,7 @@ pub(super) struct Courier {
     pub(super) report: MqttReport,
     pub(super) epoch: Instant,
     pub(super) troubles: Troubles,
+    pub(super) diagnosis: Diagnosis,
 }
 
 /// What is wrong, the first thing first.
@@ -57,6 +64,8 @@ pub(super) struct Troubles {
     line: Option<String>,
     log: Option<String>,
     commands: Option<String>,
+    /// The cause of repeated losses; it may be wrong while a connection lasts.
+    cause: Option<String>,
 }
 
 /// What changes while a connection lasts.
@@ -75,6 +84,8 @@ struct Round {
     end: Option<Instant>,
     said_goodbye: bool,
     began: Instant,
+    /// Whether commands are still to be asked for.
+    subscribes: bool,
 }
 
 impl Courier {
@@ -82,13 +93,13 @@ impl Courier {
     pub(super) async fn run(mut self) {
         let mut patience = Patience::new();
         loop {
-            let why = self.attend(&mut patience).await;
+            let loss = self.attend(&mut patience).await;
             self.window.disconnect();
             if self.stop.is_cancelled() {
                 break;
             }
             let wait = patience.next(rand::random());
-            self.tell_lost(&why);
+            self.tell_lost(&loss.why);
             tokio::select! {
                 () = self.stop.cancelled() => break,
                 () = sleep(wait) => {}
@@ -102,21 +113,15 @@ impl Courier {
     }
 
     /// Uses a connection from its beginning to its end; says why it ended.
-    async fn attend(&mut self, patience: &mut Patience) -> String {
-        let mut connection = match Connection::open(&self.account) {
+    async fn attend(&mut self, patience: &mut Patience) -> Loss {
+        let connection = match self.connect().await {
             Ok(connection) => connection,
-            Err(why) => return why,
-        };
-        tokio::select! {
-            () = self.stop.cancelled() => return String::new(),
-            news = connection.next() => match news {
-                News::Connected => {}
-                News::Published(_) | News::Acknowledged(_) => {
-                    return "it sends before it is asked".into();
-                }
-                News::Lost(why) => return why,
+            Err(loss) => {
+                self.diagnosis.not_accepted();
+                self.troubles.cause = None;
+                return loss;
             }
-        }
+        };
         let now = Instant::now();
         let mut round = Round {
             connection,
@@ -130,24 +135,86 @@ impl Courier {
             end: None,
             said_goodbye: false,
             began: now,
+            subscribes: self.commands,
         };
-        let why = self.serve(&mut round, patience).await;
+        let served = self.serve(&mut round, patience).await;
         if let Some(errand) = round.errand.take() {
             self.come_back(errand.await, &mut round);
         }
-        let why = why.err().unwrap_or_default();
+        let loss = served.err().unwrap_or_else(|| Loss::from(String::new()));
         if self.stop.is_cancelled() {
             round.connection.close().await;
+        } else {
+            let finding = self.diagnosis.ended(loss.by_broker, round.began.elapsed());
+            self.act_on(finding, patience);
         }
-        why
+        loss
+    }
+
+    /// A connection that the broker has accepted.
+    async fn connect(&self) -> Result<Connection, Loss> {
+        let mut connection = Connection::open(&self.account)?;
+        tokio::select! {
+            () = self.stop.cancelled() => Err(Loss::from(String::new())),
+            news = connection.next() => match news {
+                News::Connected => Ok(connection),
+                News::Lost(loss) => Err(loss),
+                News::Published(_) | News::Acknowledged(_) | News::Subscribed(_) => {
+                    Err(Loss::from("it sends before it is asked".to_owned()))
+                }
+            }
+        }
+    }
+
+    /// Leaves out what the broker does not take, and reports the cause of a loss that repeats.
+    fn act_on(&mut self, finding: Finding, patience: &mut Patience) {
+        match finding {
+            Finding::Open => {}
+            Finding::Cause(cause) => self.tell_cause(self.words(cause, None)),
+            Finding::Refused(sending, cause) => {
+                self.leave_out(sending, cause);
+                patience.restore();
+            }
+        }
+    }
+
+    fn leave_out(&mut self, sending: Sending, cause: Cause) {
+        let told = self.words(cause, sending.kind);
+        if let Some(number) = sending.record {
+            let place = self.window.leave_out(number, self.epoch.elapsed());
+            // Of a whole kind, one event is enough.
+            let is_known =
+                matches!(cause, Cause::Kind(_)) && self.troubles.cause == Some(told.clone());
+            if let (Some(place), Some(kind), false) = (place, sending.kind, is_known) {
+                let (topic, bytes) = (self.topics.of(kind), sending.bytes);
+                let detail = format!(
+                    "mqtt: a record for {topic} is left out, {bytes} bytes before byte {} of {}: {told}",
+                    place.bytes, place.file
+                );
+                self.daemon.event(EventKind::Gap, detail);
+            }
+        }
+        self.tell_cause(told);
+    }
+
+    fn words(&self, cause: Cause, kind: Option<Kind>) -> String {
+        cause.words(kind, &self.topics, &self.account.client_id())
+    }
+
+    fn tell_cause(&mut self, cause: String) {
+        if self.troubles.cause.as_ref() != Some(&cause) {
+            tracing::warn!("mqtt: {}: {cause}", self.report.broker);
+            self.troubles.cause = Some(cause);
+        }
     }
 
     /// Sends and hears until the end, which is an error if it is not wanted.
-    async fn serve(&mut self, round: &mut Round, patience: &mut Patience) -> Result<(), String> {
+    async fn serve(&mut self, round: &mut Round, patience: &mut Patience) -> Result<(), Loss> {
         self.greet(round)?;
         let mut look = interval(LOOK);
         look.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
+            self.subscribe(round)?;
             self.give_out(&round.connection)?;
             self.send_errand(round);
             if self.is_over(round)? {
@@ -155,9 +222,10 @@ impl Courier {
             }
             tokio::select! {
                 news = round.connection.next() => match news {
-                    News::Lost(why) => return Err(why),
+                    News::Lost(loss) => return Err(loss),
                     News::Published(publish) if self.commands => self.command(&publish, round),
-                    News::Acknowledged(sent) => self.take_in(sent, round, patience),
+                    News::Acknowledged(sending) => self.take_in(sending, round),
+                    News::Subscribed(is_granted) => self.take_subscription(is_granted, round),
                     // A broker that sends what was not asked for is not answered.
                     News::Published(_) | News::Connected => {}
                 },
@@ -179,35 +247,69 @@ impl Courier {
         }
     }
 
-    /// Says that the daemon is there, and asks for commands if they are wanted.
+    /// Says that the daemon is there.
     fn greet(&mut self, round: &mut Round) -> Result<(), String> {
-        let online = Kind::Online;
-        let message = Sent::Message(online);
-        round.connection.send(
-            self.topics.of(online),
-            online,
-            Bytes::from_static(b"true"),
-            message,
-        )?;
-        if self.commands {
-            round.connection.subscribe(self.topics.commands())?;
-        }
+        self.send(&round.connection, Kind::Online, Bytes::from_static(b"true"))?;
         self.report.connections += 1;
         self.report.connected = true;
         self.report.since = Timestamp::now();
-        self.troubles = Troubles::default();
-        tracing::info!("mqtt: connected with {}", self.report.broker);
+        self.troubles = Troubles { cause: self.troubles.cause.take(), ..Troubles::default() };
+        if self.troubles.cause.is_none() {
+            tracing::info!("mqtt: connected with {}", self.report.broker);
+        }
         self.tell();
+        Ok(())
+    }
+
+    /// Asks for commands if they are wanted.
+    fn subscribe(&mut self, round: &mut Round) -> Result<(), String> {
+        if !round.subscribes || !self.may_send(&round.connection) {
+            return Ok(());
+        }
+        round.subscribes = false;
+        if self.diagnosis.refuses(None, 0).is_none() {
+            round.connection.subscribe(self.topics.commands())?;
+            self.diagnosis.sent(SUBSCRIPTION);
+        }
         Ok(())
     }
 
     /// Gives out what may be under way.
     fn give_out(&mut self, connection: &Connection) -> Result<(), String> {
-        while let Some((number, message)) = self.window.give() {
-            let topic = self.topics.of(message.kind);
-            connection.send(topic, message.kind, message.payload, Sent::Record(number))?;
+        while self.may_send(connection) {
+            let Some((number, message)) = self.window.give() else { break };
+            let (kind, bytes) = (Some(message.kind), message.payload.len());
+            let sending = Sending { record: Some(number), kind, bytes };
+            if let Some(cause) = self.diagnosis.refuses(kind, bytes) {
+                self.leave_out(sending, cause);
+                continue;
+            }
+            connection.send(self.topics.of(message.kind), sending, message.payload)?;
+            self.diagnosis.sent(sending);
         }
         Ok(())
+    }
+
+    /// Whether another message may be under way.
+    fn may_send(&self, connection: &Connection) -> bool {
+        self.diagnosis.allows_many() || !connection.is_waiting()
+    }
+
+    /// Sends a message that is no record, unless the broker does not take it; whether it is under way.
+    fn send(
+        &mut self,
+        connection: &Connection,
+        kind: Kind,
+        payload: Bytes,
+    ) -> Result<bool, String> {
+        let sending = Sending { record: None, kind: Some(kind), bytes: payload.len() };
+        if let Some(cause) = self.diagnosis.refuses(sending.kind, sending.bytes) {
+            self.leave_out(sending, cause);
+            return Ok(false);
+        }
+        connection.send(self.topics.of(kind), sending, payload)?;
+        self.diagnosis.sent(sending);
+        Ok(true)
     }
 
     /// Reads on, and remembers the place, when it is time.
@@ -291,31 +393,40 @@ impl Courier {
         }
     }
 
-    fn take_in(&mut self, sent: Sent, round: &mut Round, patience: &mut Patience) {
+    fn take_in(&mut self, sending: Sending, round: &mut Round) {
         round.heard = Instant::now();
-        match sent {
-            Sent::Record(number) => {
-                patience.restore();
+        self.diagnosis.acknowledged(sending);
+        match sending {
+            Sending { record: Some(number), .. } => {
                 self.window.acknowledge(number, self.epoch.elapsed());
             }
-            Sent::Message(Kind::Status) => round.status.acknowledged(),
-            Sent::Message(_) | Sent::Subscription(true) => {}
-            Sent::Subscription(false) => {
-                let why = "it gives this user no commands";
-                tracing::warn!("mqtt: {}: {why}", self.report.broker);
-                self.troubles.commands = Some(why.into());
-            }
+            Sending { kind: Some(Kind::Status), .. } => round.status.acknowledged(),
+            _ => {}
+        }
+    }
+
+    fn take_subscription(&mut self, is_granted: bool, round: &mut Round) {
+        round.heard = Instant::now();
+        self.diagnosis.acknowledged(SUBSCRIPTION);
+        if !is_granted {
+            let why = "it gives this user no commands";
+            tracing::warn!("mqtt: {}: {why}", self.report.broker);
+            self.troubles.commands = Some(why.into());
         }
     }
 
     /// What is done from time to time.
     fn look(&mut self, round: &mut Round, patience: &mut Patience) -> Result<(), String> {
         let now = Instant::now();
+        // Not at once: a connection that is ended again and again works in between.
+        if now > round.began + SILENCE {
+            patience.restore();
+        }
+        if now > round.began + STEADY && !self.diagnosis.leaves_out() {
+            self.troubles.cause = None;
+        }
         if !round.connection.is_waiting() {
             round.heard = now;
-            if now > round.began + SILENCE {
-                patience.restore();
-            }
         } else if now > round.heard + SILENCE {
             return Err(format!("it acknowledged nothing for {} s", SILENCE.as_secs()));
         }
@@ -324,9 +435,11 @@ impl Courier {
         }
         round.tell_at = now + TELL;
         self.tell();
-        if let Some(status) = round.status.due(&self.daemon.status(), self.epoch.elapsed()) {
-            let kind = Kind::Status;
-            round.connection.send(self.topics.of(kind), kind, status, Sent::Message(kind))?;
+        if self.may_send(&round.connection)
+            && let Some(status) = round.status.due(&self.daemon.status(), self.epoch.elapsed())
+            && !self.send(&round.connection, Kind::Status, status)?
+        {
+            round.status.acknowledged();
         }
         if round.errand.is_none() {
             let behind = Some(self.window.place().clone());
@@ -342,29 +455,24 @@ impl Courier {
             && round.read_at == Some(self.daemon.records_written())
             && self.window.waiting() == 0;
         if !round.said_goodbye && (is_done || Instant::now() > end) {
-            let online = Kind::Online;
-            let message = Sent::Message(online);
-            let payload = Bytes::from_static(b"false");
-            round.connection.send(self.topics.of(online), online, payload, message)?;
+            self.send(&round.connection, Kind::Online, Bytes::from_static(b"false"))?;
             round.said_goodbye = true;
         }
         let is_heard = round.said_goodbye && !round.connection.is_waiting();
         Ok(is_heard || Instant::now() > end + GOODBYE)
     }
 
-    fn answer(&self, round: &Round, answer: &serde_json::Value) {
-        let kind = Kind::Answer;
-        let payload = answer.to_string().into();
+    fn answer(&mut self, round: &Round, answer: &serde_json::Value) {
         // Where hundreds wait to be taken by the broker, nobody waits for this one.
-        if let Err(error) =
-            round.connection.send(self.topics.of(kind), kind, payload, Sent::Message(kind))
-        {
+        if let Err(error) = self.send(&round.connection, Kind::Answer, answer.to_string().into()) {
             tracing::warn!("mqtt: an answer is left out: {error}");
         }
     }
 
     fn tell_lost(&mut self, why: &str) {
-        if self.report.connected || self.troubles.line.as_deref() != Some(why) {
+        // A cause that is known explains all that follow.
+        let is_news = self.report.connected || self.troubles.line.as_deref() != Some(why);
+        if is_news && self.troubles.cause.is_none() {
             tracing::warn!("mqtt: {}: {why}", self.report.broker);
         }
         if std::mem::replace(&mut self.report.connected, false) {
@@ -378,8 +486,10 @@ impl Courier {
         self.report.acknowledged = self.window.acknowledged();
         self.report.passed_over = self.window.passed_over();
         self.report.waiting = self.window.waiting() as u64;
-        let Troubles { line, log, commands } = &self.troubles;
-        self.report.trouble = line.as_ref().or(log.as_ref()).or(commands.as_ref()).cloned();
+        self.report.left_out = self.window.left_out();
+        let Troubles { line, log, commands, cause } = &self.troubles;
+        let told = [cause, line, log, commands].into_iter().flatten().next();
+        self.report.trouble = told.cloned();
         self.daemon.report_mqtt(self.report.clone());
     }
 }

@@ -76,6 +76,12 @@ impl Topics {
         format!("{}{}", self.prefix, kind.level())
     }
 
+    /// A filter of everything that is published.
+    #[must_use]
+    pub fn all(&self) -> String {
+        format!("{}#", self.prefix)
+    }
+
     /// What commands are published under.
     #[must_use]
     pub fn commands(&self) -> String {

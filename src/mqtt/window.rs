@@ -60,6 +60,7 @@ pub struct Window {
     place: LogPosition,
     acknowledged: u64,
     passed_over: u64,
+    left_out: u64,
     /// What of it is to be remembered still, and since when.
     moved: bool,
     unremembered: u64,
@@ -92,6 +93,7 @@ impl Window {
             place,
             acknowledged: 0,
             passed_over: 0,
+            left_out: 0,
             moved: false,
             unremembered: 0,
             since: None,
@@ -142,6 +144,19 @@ impl Window {
         self.move_on();
     }
 
+    /// The broker does not take this one: it counts as done, and the place behind it is returned.
+    pub fn leave_out(&mut self, number: u64, now: Duration) -> Option<LogPosition> {
+        let at = usize::try_from(number.checked_sub(self.first)?).ok()?;
+        let entry = self.entries.get_mut(at).filter(|entry| !entry.is_done)?;
+        entry.is_done = true;
+        let after = entry.after.clone();
+        self.left_out += 1;
+        self.unremembered += 1;
+        self.since.get_or_insert(now);
+        self.move_on();
+        Some(after)
+    }
+
     /// The connection is over: what is not acknowledged is given out again.
     pub const fn disconnect(&mut self) {
         self.given = 0;
@@ -184,6 +199,12 @@ impl Window {
     #[must_use]
     pub const fn passed_over(&self) -> u64 {
         self.passed_over
+    }
+
+    /// Records that the broker does not take.
+    #[must_use]
+    pub const fn left_out(&self) -> u64 {
+        self.left_out
     }
 
     /// Records under way that are not acknowledged.

@@ -29,29 +29,26 @@ const BUFFER: usize = 32 * 1024;
 
 impl Server {
     /// Serves until `stop` is ready, then lets requests under way end.
-    pub async fn run(self, mut listeners: Listeners, stop: impl Future<Output = ()>) {
+    pub async fn run(self, listeners: Listeners, stop: impl Future<Output = ()>) {
         let shutdown = CancellationToken::new();
         let foxglove = self.foxglove.clone();
         let supervisor = self.daemon.supervisor().clone();
         let server = Arc::new(self);
         let mut accepting = Vec::new();
-        for listener in std::mem::take(&mut listeners.unix) {
+        let Listeners { unix, tcp, keeper } = listeners;
+        for kept in unix {
             let server = Arc::clone(&server);
-            let accept = server.accept(Peer::Unix, shutdown.clone(), async move || {
-                listener.accept().await.map(|(stream, _)| (stream, None))
-            });
+            let accept =
+                server.accept(Peer::Unix, shutdown.clone(), async move || kept.accept().await);
             accepting.push(supervisor.spawn(Task::Server, accept));
         }
-        for (listener, peer) in std::mem::take(&mut listeners.tcp) {
+        for (kept, peer) in tcp {
             let server = Arc::clone(&server);
-            let accept = server.accept(peer, shutdown.clone(), async move || {
-                let (stream, from) = listener.accept().await?;
-                // Each line goes out at once.
-                stream.set_nodelay(true)?;
-                Ok((stream, Some(from.ip())))
-            });
+            let accept = server.accept(peer, shutdown.clone(), async move || kept.accept().await);
             accepting.push(supervisor.spawn(Task::Server, accept));
         }
+        let keeping = keeper.run(server.daemon.clone(), shutdown.clone());
+        accepting.push(supervisor.spawn(Task::Listeners, keeping));
         stop.await;
         shutdown.cancel();
         for accept in accepting {
@@ -60,7 +57,6 @@ impl Server {
         if let Some(viewers) = foxglove {
             drop(timeout(LAST_CALL, viewers.is_empty()).await);
         }
-        listeners.remove_made();
     }
 
     /// Takes connections in until the end, and waits for them then.

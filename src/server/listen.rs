@@ -1,14 +1,11 @@
 //! Sockets: those that systemd hands over, or those that the configuration names.
 
-use std::{
-    fs, io,
-    net::SocketAddr,
-    os::unix::{
-        fs::{FileTypeExt as _, MetadataExt as _, PermissionsExt as _},
-        net::UnixStream,
-    },
-    path::{Path, PathBuf},
-};
+mod keeper;
+mod kept;
+mod tcp;
+mod unix;
+
+use std::{io, net::SocketAddr, path::Path};
 
 use listenfd::ListenFd;
 use thiserror::Error;
@@ -16,40 +13,21 @@ use tokio::net::{TcpListener, UnixListener};
 
 use super::Peer;
 use crate::config::ServerKeys;
+pub(super) use keeper::Keeper;
+pub(super) use kept::Kept;
+use tcp::TcpPlace;
+use unix::UnixPlace;
 
 const SOCKET: &str = "server.socket";
 const LISTEN: &str = "server.listen";
 
-/// Sockets that the server listens on.
+/// Places that the server listens at, now or as soon as they can be bound. Socket files that this process made are
+/// removed with it.
 #[derive(Debug, Default)]
 pub struct Listeners {
-    pub(super) unix: Vec<UnixListener>,
-    pub(super) tcp: Vec<(TcpListener, Peer)>,
-    /// Sockets to remove at the end.
-    made: Vec<Made>,
-}
-
-/// A socket that this process made: its path, device and inode.
-#[derive(Debug)]
-struct Made {
-    path: PathBuf,
-    id: (u64, u64),
-}
-
-impl Made {
-    fn at(path: PathBuf) -> io::Result<Self> {
-        let there = fs::symlink_metadata(&path)?;
-        Ok(Self { path, id: (there.dev(), there.ino()) })
-    }
-
-    /// Removes the socket, unless something else has taken its name.
-    fn remove(&self) {
-        let there = fs::symlink_metadata(&self.path);
-        if there.is_ok_and(|there| (there.dev(), there.ino()) == self.id) {
-            // Nothing more can be done about one that won't go.
-            drop(fs::remove_file(&self.path));
-        }
-    }
+    pub(super) unix: Vec<Kept<UnixListener>>,
+    pub(super) tcp: Vec<(Kept<TcpListener>, Peer)>,
+    pub(super) keeper: Keeper,
 }
 
 /// A socket that can't be opened.
@@ -80,13 +58,6 @@ impl ListenError {
                 "only a socket that a dead sonard left behind is replaced: give server.socket a name \
                  of its own"
             }
-            (Some(LISTEN), io::ErrorKind::AddrInUse) => {
-                "another program listens on that port: stop it, or give this one another \
-                 server.listen"
-            }
-            (Some(LISTEN), io::ErrorKind::AddrNotAvailable) => {
-                "give server.listen an address of this computer, such as 127.0.0.1:8765"
-            }
             (Some(LISTEN), io::ErrorKind::PermissionDenied) => {
                 "ports below 1024 are the system's: give server.listen a higher one"
             }
@@ -98,11 +69,11 @@ impl ListenError {
 }
 
 impl Listeners {
-    /// The sockets that systemd hands over, else those of the configuration. Must be called
-    /// within a tokio runtime.
+    /// The sockets that systemd hands over, else those of the configuration. An address that is not this computer's yet,
+    /// or a port that is in use, is bound later. Must be called within a tokio runtime.
     ///
     /// # Errors
-    /// When a socket can't be made, or another program listens there.
+    /// When a unix socket can't be made or another program listens there, or the address can never be bound.
     pub fn open(keys: &ServerKeys) -> Result<Self, ListenError> {
         let mut listeners = Self::default();
         let fail = |key, place: &str| {
@@ -111,12 +82,12 @@ impl Listeners {
         };
         listeners.take_inherited().map_err(fail(None, "the sockets of systemd"))?;
         if listeners.unix.is_empty() && !keys.socket.is_empty() {
-            let path = PathBuf::from(&keys.socket);
             // Checked with the configuration; nothing wider than meant comes of a wrong one.
             let mode = keys.socket_permissions().unwrap_or(0o600);
-            let bound = bind_unix(&path, mode).map_err(fail(Some(SOCKET), &keys.socket))?;
-            listeners.unix.push(bound);
-            listeners.made.push(Made::at(path).map_err(fail(Some(SOCKET), &keys.socket))?);
+            let bound = UnixPlace::bind(Path::new(&keys.socket), mode);
+            let (place, kept) = bound.map_err(fail(Some(SOCKET), &keys.socket))?;
+            listeners.unix.push(kept);
+            listeners.keeper.unix.push(place);
         }
         if let Some(address) = keys.listen.as_deref().filter(|_| listeners.tcp.is_empty()) {
             listeners.add_tcp(address).map_err(fail(Some(LISTEN), address))?;
@@ -124,17 +95,10 @@ impl Listeners {
         Ok(listeners)
     }
 
-    /// TCP addresses that are listened on.
-    ///
-    /// # Errors
-    /// As the system says.
-    pub fn addresses(&self) -> io::Result<Vec<SocketAddr>> {
-        self.tcp.iter().map(|(listener, _)| listener.local_addr()).collect()
-    }
-
-    /// Removes the sockets that were made.
-    pub(super) fn remove_made(&self) {
-        self.made.iter().for_each(Made::remove);
+    /// TCP addresses that are, or are to be, listened on.
+    #[must_use]
+    pub fn addresses(&self) -> Vec<SocketAddr> {
+        self.keeper.tcp.iter().map(TcpPlace::address).collect()
     }
 
     fn take_inherited(&mut self) -> io::Result<()> {
@@ -142,11 +106,13 @@ impl Listeners {
         for at in 0..handed.len() {
             if let Ok(Some(listener)) = handed.take_unix_listener(at) {
                 listener.set_nonblocking(true)?;
-                self.unix.push(UnixListener::from_std(listener)?);
+                let (place, kept) = UnixPlace::inherited(UnixListener::from_std(listener)?);
+                self.unix.push(kept);
+                self.keeper.unix.extend(place);
             } else if let Ok(Some(listener)) = handed.take_tcp_listener(at) {
                 listener.set_nonblocking(true)?;
-                let peer = peer(listener.local_addr()?);
-                self.tcp.push((TcpListener::from_std(listener)?, peer));
+                let (place, kept) = TcpPlace::inherited(TcpListener::from_std(listener)?)?;
+                self.add(place, kept);
             }
         }
         Ok(())
@@ -156,36 +122,20 @@ impl Listeners {
         let address: SocketAddr = address.parse().map_err(|_| {
             io::Error::new(io::ErrorKind::InvalidInput, "not an address such as 127.0.0.1:8765")
         })?;
-        let listener = std::net::TcpListener::bind(address)?;
-        listener.set_nonblocking(true)?;
-        self.tcp.push((TcpListener::from_std(listener)?, peer(address)));
+        let (place, kept, not_yet) = TcpPlace::open(address)?;
+        if let Some(error) = not_yet {
+            let name = format!("{LISTEN} {address}");
+            let why = format!("cannot be bound yet: {error}");
+            keeper::note(&mut self.keeper.troubles, name, why);
+        }
+        self.add(place, kept);
         Ok(())
     }
-}
 
-fn peer(address: SocketAddr) -> Peer {
-    if address.ip().is_loopback() { Peer::Loopback } else { Peer::Network }
-}
-
-/// Makes the socket; one that a dead process left behind is replaced, a living one is not, and
-/// nothing else is touched.
-fn bind_unix(path: &Path, mode: u32) -> io::Result<UnixListener> {
-    match fs::symlink_metadata(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-        Err(error) => return Err(error),
-        Ok(there) if !there.file_type().is_socket() => {
-            let error = "there is a file of that name, which is no socket";
-            return Err(io::Error::new(io::ErrorKind::AlreadyExists, error));
-        }
-        Ok(_) => match UnixStream::connect(path) {
-            Ok(_) => return Err(io::ErrorKind::AddrInUse.into()),
-            Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => {
-                fs::remove_file(path)?;
-            }
-            Err(error) => return Err(error),
-        },
+    fn add(&mut self, place: TcpPlace, kept: Kept<TcpListener>) {
+        place.announce();
+        let is_loopback = place.address().ip().is_loopback();
+        self.tcp.push((kept, if is_loopback { Peer::Loopback } else { Peer::Network }));
+        self.keeper.tcp.push(place);
     }
-    let listener = UnixListener::bind(path)?;
-    fs::set_permissions(path, fs::Permissions::from_mode(mode))?;
-    Ok(listener)
 }

@@ -6,6 +6,7 @@ use std::path::Path;
 use crate::mqtt::{Account, Mqtt};
 use crate::{
     cli::Failure,
+    config::Keys,
     daemon::{Handle, Settings},
 };
 
@@ -20,8 +21,8 @@ pub(super) struct Broker {
 #[cfg(feature = "mqtt")]
 impl Broker {
     /// Gets hold of what the configuration names.
-    pub(super) fn open(settings: &Settings) -> Result<Self, Failure> {
-        let account = Account::open(&settings.keys.mqtt, &settings.keys.fleet.robot);
+    pub(super) fn open(keys: &Keys) -> Result<Self, Failure> {
+        let account = Account::open(&keys.mqtt, &keys.fleet.robot);
         let account = account.map_err(|error| Failure::input(&error, error.help.clone()))?;
         Ok(Self { account, sending: None })
     }
@@ -61,7 +62,7 @@ impl Broker {
 #[cfg(not(feature = "mqtt"))]
 impl Broker {
     #[expect(clippy::unnecessary_wraps, reason = "with the feature it can fail")]
-    pub(super) const fn open(_: &Settings) -> Result<Self, Failure> {
+    pub(super) const fn open(_: &Keys) -> Result<Self, Failure> {
         Ok(Self {})
     }
 

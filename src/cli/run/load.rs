@@ -1,6 +1,7 @@
 //! From options, environment and file to settings; again at each reload.
 
 use std::{
+    collections::BTreeMap,
     env,
     ffi::OsString,
     fs, io,
@@ -8,18 +9,20 @@ use std::{
     sync::Arc,
 };
 
-use super::Args;
+use super::{
+    Args,
+    files::{Files, digests},
+};
 use crate::{
     cli::{
         Failure,
         array::{load_array, load_course},
-        daemon::asked,
         options::load_sensor,
         scene_file,
     },
-    config::{ConfigError, FleetKeys, Keys, Layers, Mode, robot_name_of_host},
+    config::{ConfigError, Keys, Layers, Mode, robot_name_of_host},
     daemon::{Mismatch, Settings, Simulated},
-    fleet::{Asked, members_of},
+    host_gpio,
     scene::{PoseError, parse_pose},
 };
 
@@ -41,11 +44,12 @@ impl Loader {
         self.port = Some(port);
     }
 
-    pub(super) fn load(&mut self) -> Result<Settings, Failure> {
+    /// Reads the configuration with every file that it names. Start, reload and `--check` have this check in common.
+    pub(super) fn load(&mut self) -> Result<(Settings, Files), Failure> {
         let layers = self.layers()?;
         let mut keys = layers.clone().keys().map_err(|error| refuse(&error))?;
         self.fill_in(&layers, &mut keys);
-        let settings = match self.args.simulate {
+        let mut settings = match self.args.simulate {
             true => simulated(keys, layers.origin("model", "sensor").is_some())?,
             false => settings(keys)?,
         };
@@ -56,8 +60,12 @@ impl Loader {
                 .map_or_else(|| format!("{section}.{key}"), ToString::to_string);
             Failure::input(format!("{origin}: {}", mismatch.message), &mismatch.help)
         })?;
-        // Who can't be asked is told now, not at the start.
-        fleet(&settings.keys.fleet)?;
+        let files = Files::read(&settings.keys)?;
+        settings.files = digests(&settings.keys, &files.fleet);
+        if !self.args.simulate {
+            host_gpio::check(&settings.keys.gpio)
+                .map_err(|error| Failure::input(&error, error.help()))?;
+        }
         if settings.keys.device.port.is_none() && !self.args.mock && !self.args.simulate {
             return Err(Failure::input(
                 "no device: device.port is not set",
@@ -71,7 +79,7 @@ impl Loader {
                 "give --scene, for instance --scene simple-room --pose fig9",
             ));
         }
-        Ok(settings)
+        Ok((settings, files))
     }
 
     fn layers(&self) -> Result<Layers, Failure> {
@@ -174,7 +182,7 @@ fn settings(keys: Keys) -> Result<Settings, Failure> {
         None => (None, parse_pose(&keys.place.pose).map_err(refuse_pose)?),
     };
     let sensor = load_sensor(&keys.model.sensor)?;
-    Ok(Settings { keys, scene, sensor, pose, simulated: None })
+    Ok(Settings { keys, scene, sensor, pose, simulated: None, files: BTreeMap::new() })
 }
 
 /// The same for an array that the model plays; its rangers are what it says, unless the sensor was
@@ -211,14 +219,14 @@ fn simulated(mut keys: Keys, sensor_chosen: bool) -> Result<Settings, Failure> {
     }
     let sensor = load_sensor(&keys.model.sensor)?;
     let simulated = Simulated { array: Arc::new(array), course: course.map(Arc::new) };
-    Ok(Settings { keys, scene: Some(Arc::new(scene)), sensor, pose, simulated: Some(simulated) })
-}
-
-/// The other daemons that are asked, with their tokens.
-pub(super) fn fleet(keys: &FleetKeys) -> Result<Vec<Asked>, Failure> {
-    let members = members_of(keys)
-        .map_err(|error| Failure::input(format!("[fleet]: {error}"), &error.help))?;
-    asked(members)
+    Ok(Settings {
+        keys,
+        scene: Some(Arc::new(scene)),
+        sensor,
+        pose,
+        simulated: Some(simulated),
+        files: BTreeMap::new(),
+    })
 }
 
 /// What is in force, as a file that would say the same.

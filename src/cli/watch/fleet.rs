@@ -1,28 +1,19 @@
 //! `sonard watch` of several daemons: lines of all, each with its robot.
 
-use std::{
-    io::{self, Write as _},
-    time::Duration,
-};
+use std::io::{self, Write as _};
 
-use http_body_util::BodyExt as _;
-use tokio::{
-    sync::mpsc,
-    task::JoinSet,
-    time::{sleep, timeout},
-};
+use tokio::{sync::mpsc, task::JoinSet, time::sleep};
 
 use super::{RECONNECT_MAX, RECONNECT_MIN, words};
 use crate::{
     api::FleetState,
     cli::{Failure, Outcome},
+    client::ClientError,
     fleet::{Asked, ask, judge, plain},
 };
 
 /// Longest line that is taken of a daemon, bytes: a whole scan is one.
 const MOST_LINE_BYTES: usize = 16 << 20;
-/// A stream shows a sign of life every 15 s.
-const SILENCE: Duration = Duration::from_secs(40);
 /// Lines that may wait to be written.
 const WAITING: usize = 64;
 
@@ -115,34 +106,23 @@ async fn tell(send: &mpsc::Sender<Line>, told: &mut String, news: String) -> boo
 
 /// Takes lines until the stream is over; why, or `None` if nobody wants more.
 async fn stream(one: &Asked, path: &str, robot: &str, send: &mpsc::Sender<Line>) -> Option<String> {
-    let mut body = match one.client.get(path).await {
-        Ok(response) => response.into_body(),
+    let lines = match one.client.live(path).await {
+        Ok(lines) => lines,
         Err(error) => return Some(plain(&error.to_string())),
     };
-    let mut rest = Vec::new();
+    let mut lines = lines.with_max_line_bytes(MOST_LINE_BYTES);
     loop {
-        let frame = match timeout(SILENCE, body.frame()).await {
-            Ok(Some(Ok(frame))) => frame,
-            Ok(Some(Err(error))) => return Some(plain(&format!("it broke off: {error}"))),
+        let line = match lines.next().await {
+            Ok(Some(line)) => line,
             Ok(None) => return Some("it ended the stream".into()),
-            Err(_) => return Some(format!("nothing came for {} s", SILENCE.as_secs())),
+            Err(ClientError::Http(error)) => return Some(plain(&format!("it broke off: {error}"))),
+            Err(error) => return Some(plain(&error.to_string())),
         };
-        let seen = rest.len();
-        rest.extend_from_slice(frame.data_ref().map_or(&[][..], |data| data));
-        let Some(end) = rest[seen..].iter().rposition(|&byte| byte == b'\n') else {
-            if rest.len() > MOST_LINE_BYTES {
-                return Some(format!("a line is longer than {MOST_LINE_BYTES} bytes"));
-            }
+        // A program that is no daemon could say anything, also to a terminal.
+        if serde_json::from_slice::<serde::de::IgnoredAny>(&line).is_err() {
             continue;
-        };
-        let whole: Vec<u8> = rest.drain(..=seen + end).collect();
-        for line in whole.split_inclusive(|&byte| byte == b'\n') {
-            // A program that is no daemon could say anything, also to a terminal.
-            if serde_json::from_slice::<serde::de::IgnoredAny>(line).is_err() {
-                continue;
-            }
-            send.send(Line::Record(robot.to_owned(), line.to_vec())).await.ok()?;
         }
+        send.send(Line::Record(robot.to_owned(), line)).await.ok()?;
     }
 }
 

@@ -33,7 +33,7 @@ const MOVED: &str = "Only readings whose range moved by more than this since it 
                      that direction, or whose status changed";
 const NDJSON: &str = "application/x-ndjson";
 const SSE: &str = "text/event-stream";
-/// How often an event stream without events shows that it is alive.
+/// How often a stream in which nothing happens shows that it is alive; clients wait longer than twice that.
 const SIGN_OF_LIFE: Duration = Duration::from_secs(15);
 
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
@@ -70,9 +70,11 @@ pub(super) fn endpoints() -> Vec<Endpoint> {
     let format = json!({"type": "string", "enum": ["ndjson", "sse"]});
     let format_about = "Lines of JSON or server-sent events; without it, as `Accept` says";
     let scans = "One scan a line, read from the log: a slow client costs no memory. A line \
-        {\"type\":\"dropped\",\"scans\":N} stands for scans that the log no longer has";
+        {\"type\":\"dropped\",\"scans\":N} stands for scans that the log no longer has. While none ends, an \
+        empty line every 15 s shows that the daemon is alive";
     let records = "One record a line, as in a log. A line {\"type\":\"dropped\",\"readings\":N} \
-        stands for readings that this client was too slow for";
+        stands for readings that this client was too slow for. While nothing happens, an empty line every \
+        15 s shows that the daemon is alive";
     vec![
         Endpoint::get("/v1/live/records", live_records, "Records as they are made")
             .parameter("query", "format", format.clone(), format_about)
@@ -179,16 +181,24 @@ impl Format {
             Self::Sse => [b"data: ", b"\n\n"],
         }
     }
+
+    /// What shows that a stream is alive: an empty line, or a comment.
+    const fn sign_of_life(self) -> Bytes {
+        Bytes::from_static(match self {
+            Self::Ndjson => b"\n",
+            Self::Sse => b":\n\n",
+        })
+    }
 }
 
 /// The next line of a stream; `None` at its end. Where nothing has to stand around it, it is everybody's.
 async fn next_line(subscription: &mut Subscription, format: Format) -> Option<Bytes> {
+    let Ok(line) = timeout(SIGN_OF_LIFE, subscription.next()).await else {
+        return Some(format.sign_of_life());
+    };
     match format {
-        Format::Ndjson => Some(Bytes::from_owner(subscription.next().await?)),
-        Format::Sse => match timeout(SIGN_OF_LIFE, subscription.next()).await {
-            Ok(line) => Some([b"data: ", &*line?, b"\n"].concat().into()),
-            Err(_nothing_yet) => Some(Bytes::from_static(b":\n\n")),
-        },
+        Format::Ndjson => Some(Bytes::from_owner(line?)),
+        Format::Sse => Some([b"data: ", &*line?, b"\n"].concat().into()),
     }
 }
 
@@ -225,14 +235,10 @@ impl Scans {
 
     /// Waits for the next scan.
     async fn begin(&mut self) -> io::Result<Begun> {
-        let next = match self.format {
-            Format::Ndjson => Ok(self.subscription.next().await),
-            Format::Sse => timeout(SIGN_OF_LIFE, self.subscription.next()).await,
-        };
-        let scan = match next {
+        let scan = match timeout(SIGN_OF_LIFE, self.subscription.next()).await {
             Ok(Some(scan)) => scan,
             Ok(None) => return Ok(Begun::Told(None)),
-            Err(_nothing_yet) => return Ok(Begun::Told(Some(Bytes::from_static(b":\n\n")))),
+            Err(_nothing_yet) => return Ok(Begun::Told(Some(self.format.sign_of_life()))),
         };
         let passage = written(&self.api, scan)
             .await

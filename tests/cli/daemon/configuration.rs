@@ -1,6 +1,6 @@
 //! File, environment and options, and taking changes in while running.
 
-use std::{fs, net::TcpListener, os::unix::fs::PermissionsExt as _};
+use std::{fs, os::unix::fs::PermissionsExt as _};
 
 use rustix::process::Signal;
 
@@ -177,19 +177,6 @@ fn a_token_that_others_may_read_or_that_is_no_file_is_refused_at_once() {
     // The same file in a client's hands.
     let status = ["status", "--address", "localhost:1", "--token-file", "/dev/zero"];
     assert_eq!(run(&status).status.code(), Some(2));
-}
-
-#[test]
-fn a_port_that_is_taken_blames_the_key_that_names_it() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
-    let listen = format!("server.listen={}", taken.local_addr().expect("an address"));
-    let path = |name: &str| folder.path().join(name).display().to_string();
-    let mock = ["run", "--mock", "--scene", "simple-room", "--pose", "fig9", "--set", &listen];
-    let output = run(&[&mock[..], &["--log", &path("log"), "--socket", &path("s")]].concat());
-    let said = stderr(&output).replace("\n  │ ", "").replace('\n', " ");
-    assert_eq!(output.status.code(), Some(3), "{said}");
-    assert!(said.contains("server.listen") && !said.contains("server.socket"), "{said}");
 }
 
 #[test]

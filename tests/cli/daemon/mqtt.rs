@@ -2,6 +2,7 @@
 
 mod broker;
 mod commands;
+mod refused;
 mod rogue;
 
 use std::{collections::BTreeMap, path::Path};

@@ -29,6 +29,12 @@ pub(super) enum Manner {
     Bulky,
     /// Refuses user and password.
     Refusing,
+    /// Closes a connection at a message whose payload is longer, bytes.
+    Limited(usize),
+    /// Closes a connection at a message to a topic of this ending.
+    Denying(&'static str),
+    /// Closes the connections of other clients when one connects: they have the same id.
+    Unique,
 }
 
 /// What was published.
@@ -126,7 +132,16 @@ fn serve(mut stream: TcpStream, manner: Manner, heard: &Mutex<Heard>) -> io::Res
     lock().introductions.push(introduction(&hello));
     let code = if manner == Manner::Refusing { 4 } else { 0 };
     send(&mut stream, 0x20, &[0, code])?;
-    lock().clients.push(stream.try_clone()?);
+    let own = stream.try_clone()?;
+    {
+        let mut heard = lock();
+        if manner == Manner::Unique {
+            for client in heard.clients.drain(..) {
+                drop(client.shutdown(Shutdown::Both));
+            }
+        }
+        heard.clients.push(own);
+    }
     match manner {
         Manner::Garbled => loop {
             stream.write_all(&[0xff; 1 << 16])?;
@@ -149,6 +164,14 @@ fn serve(mut stream: TcpStream, manner: Manner, heard: &Mutex<Heard>) -> io::Res
             3 => {
                 let (topic, rest) = take_string(&body);
                 let (number, payload) = rest.split_at(2);
+                let is_refused = match manner {
+                    Manner::Limited(bytes) => payload.len() > bytes,
+                    Manner::Denying(ending) => topic.ends_with(ending),
+                    _ => false,
+                };
+                if is_refused {
+                    return stream.shutdown(Shutdown::Both);
+                }
                 lock().published.push(Published {
                     topic,
                     payload: payload.into(),

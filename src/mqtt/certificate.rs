@@ -1,0 +1,82 @@
+//! Errors of TLS, in words; a certificate may be valid and the clock unset.
+
+use std::io;
+
+use jiff::Timestamp;
+use rumqttc::{
+    TlsError,
+    tokio_rustls::rustls::{CertificateError, Error},
+};
+
+/// No clock that is set reads an earlier time than this program was released, seconds since 1970: 2026-01-01.
+const RELEASED_S: i64 = 1_767_225_600;
+
+/// An error of TLS at this time of the computer's clock, in words that stay the same from try to try.
+pub(super) fn words(error: &TlsError, now: Timestamp) -> String {
+    let today = now.strftime("%Y-%m-%d");
+    match certificate_error(error) {
+        Some(CertificateError::NotValidYet | CertificateError::NotValidYetContext { .. }) => {
+            not_valid_yet(now)
+        }
+        Some(CertificateError::Expired | CertificateError::ExpiredContext { .. }) => format!(
+            "its certificate has expired by this computer's clock ({today}): renew it, or set the clock"
+        ),
+        _ => format!("TLS: {error}"),
+    }
+}
+
+fn not_valid_yet(now: Timestamp) -> String {
+    let today = now.strftime("%Y-%m-%d");
+    if now.as_second() < RELEASED_S {
+        return format!(
+            "its certificate is not valid yet because this computer's clock is not set ({today}): it is tried again until \
+             the clock is"
+        );
+    }
+    format!(
+        "its certificate is not valid yet by this computer's clock ({today}): compare the clocks"
+    )
+}
+
+/// What is wrong with the broker's certificate, if that is the error.
+fn certificate_error(error: &TlsError) -> Option<&CertificateError> {
+    let error = match error {
+        TlsError::TLS(error) => error,
+        TlsError::Io(error) => within(error)?,
+        _ => return None,
+    };
+    match error {
+        Error::InvalidCertificate(error) => Some(error),
+        _ => None,
+    }
+}
+
+fn within(error: &io::Error) -> Option<&Error> {
+    let inner = error.get_ref()?;
+    inner.downcast_ref().or_else(|| inner.source()?.downcast_ref())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(second: i64) -> Timestamp {
+        Timestamp::from_second(second).expect("a time")
+    }
+
+    #[test]
+    fn a_certificate_of_the_future_blames_a_clock_that_is_not_set() {
+        let not_yet = || Error::InvalidCertificate(CertificateError::NotValidYet);
+        let wrapped = TlsError::Io(io::Error::new(io::ErrorKind::InvalidData, not_yet()));
+        for error in [TlsError::TLS(not_yet()), wrapped] {
+            let unset = words(&error, at(3600));
+            assert!(unset.contains("clock is not set (1970-01-01)"), "{unset}");
+            let set = words(&error, at(RELEASED_S + 3600));
+            assert!(set.contains("compare the clocks") && !set.contains("not set"), "{set}");
+        }
+        let expired = TlsError::TLS(Error::InvalidCertificate(CertificateError::Expired));
+        assert!(words(&expired, at(RELEASED_S)).contains("expired"));
+        let other = TlsError::TLS(Error::InvalidCertificate(CertificateError::UnknownIssuer));
+        assert!(words(&other, at(0)).starts_with("TLS: "));
+    }
+}

@@ -1,0 +1,103 @@
+//! Messages that a broker answers by closing the connection, and connections that it closes for another client.
+
+use std::{thread, time::Duration};
+
+use serde_json::Value;
+
+use super::{
+    broker::{Broker, Manner},
+    clean_log, mqtt, records, start, take_scans, wait_for_trouble,
+};
+use crate::common::wait_until;
+
+/// Types of the records that the broker has.
+fn published(broker: &Broker) -> Vec<String> {
+    records(broker).values().map(|record| record["type"].as_str().expect("a type").into()).collect()
+}
+
+/// Details of the events that tell of records left out, as logged.
+fn gaps(folder: &std::path::Path) -> Vec<String> {
+    let log = clean_log(folder);
+    let gaps = log.of_type("event").filter(|event| event["kind"] == "gap");
+    gaps.map(|event| event["detail"].as_str().expect("text").to_owned()).collect()
+}
+
+#[test]
+fn a_record_above_the_broker_s_limit_is_left_out_with_an_event_and_the_others_are_published() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let broker = Broker::start(Manner::Limited(2000));
+    // A session for each file of the log, and one above the limit in each.
+    let daemon = start(folder.path(), &broker, &["--set", "log.rotate_mb=0.01"]);
+    daemon.wait_for("ready");
+    take_scans(&daemon, 3);
+    let scans = || published(&broker).iter().filter(|kind| *kind == "scan_end").count();
+    wait_until("the other records", || scans() == 3 && mqtt(&daemon)["waiting"] == 0);
+    wait_until("a connection", || mqtt(&daemon)["connected"] == true);
+    let report = mqtt(&daemon);
+    assert!(report["left_out"].as_u64() >= Some(2), "{report}");
+    // The first session costs three connections, and so does the status; those after them none.
+    assert!(report["connections"].as_u64() <= Some(8), "{report}");
+    wait_for_trouble(&daemon, "closes the connection at messages of");
+    wait_until("events", || gaps(folder.path()).len() as u64 == mqtt(&daemon)["left_out"]);
+    let gaps = gaps(folder.path());
+    assert!(gaps.iter().all(|gap| gap.contains("sonard/kiwi/session")), "{gaps:?}");
+    assert!(daemon.said().contains("max_packet_size"), "{}", daemon.said());
+    let missing: Vec<Value> = {
+        let had = records(&broker);
+        let log = super::logged(&clean_log(folder.path()));
+        log.into_iter().filter(|(name, _)| !had.contains_key(name)).map(|(_, one)| one).collect()
+    };
+    assert!(missing.iter().all(|record| record["type"] == "session"), "{missing:?}");
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn a_topic_without_permission_is_named_and_the_others_are_published() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let broker = Broker::start(Manner::Denying("/scan_start"));
+    let daemon = start(folder.path(), &broker, &[]);
+    daemon.wait_for("ready");
+    take_scans(&daemon, 2);
+    let scans = || published(&broker).iter().filter(|kind| *kind == "scan_end").count();
+    wait_until("the other records", || scans() == 2);
+    wait_for_trouble(&daemon, "sonard/kiwi/scan_start");
+    assert_eq!(mqtt(&daemon)["left_out"], 2);
+    assert_eq!(gaps(folder.path()).len(), 1, "of a whole topic one event is enough");
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn a_broker_that_takes_nothing_gets_everything_once_it_does() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let broker = Broker::start(Manner::Denying(""));
+    let daemon = start(folder.path(), &broker, &[]);
+    daemon.wait_for("ready");
+    take_scans(&daemon, 1);
+    wait_for_trouble(&daemon, "permit this client to publish to sonard/kiwi/#");
+    assert_eq!(mqtt(&daemon)["left_out"], 0);
+    broker.become_(Manner::Honest);
+    wait_until("all records", || {
+        records(&broker).len() == super::logged(&clean_log(folder.path())).len()
+    });
+    assert_eq!(daemon.stop(), Some(0));
+}
+
+#[test]
+fn two_daemons_of_one_name_are_told_of_the_other_and_back_off() {
+    let broker = Broker::start(Manner::Unique);
+    let folders = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
+    let daemons = folders.each_ref().map(|folder| start(folder.path(), &broker, &[]));
+    // Each ends the other's connection, less and less often.
+    thread::sleep(Duration::from_secs(10));
+    let early = broker.heard().introductions.len();
+    thread::sleep(Duration::from_secs(10));
+    let late = broker.heard().introductions.len() - early;
+    assert!(late < early && late <= 6, "{early} connections, then {late}");
+    for daemon in &daemons {
+        wait_for_trouble(daemon, "another client uses the id sonard-kiwi");
+        assert_eq!(mqtt(daemon)["left_out"], 0);
+    }
+    for daemon in daemons {
+        assert_eq!(daemon.stop(), Some(0));
+    }
+}
