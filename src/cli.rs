@@ -14,7 +14,6 @@ mod explore;
 mod export;
 mod failure;
 mod findings;
-mod gather;
 mod generate;
 mod groups;
 mod import;
@@ -40,7 +39,6 @@ mod predictor;
 mod preset;
 mod prior;
 mod progress;
-mod renamed;
 mod run;
 mod runtime;
 mod scan;
@@ -87,9 +85,6 @@ enum Verb {
     Status(status::Args),
     /// Show the records of a running daemon as they are made
     Watch(watch::Args),
-    /// Collect the logs of many daemons in one folder
-    #[command(long_about = gather::ABOUT)]
-    Gather(gather::Args),
     /// Run a mock ranger on a pty, with echoes from the model
     #[command(long_about = mock::ABOUT)]
     Mock(mock::Args),
@@ -190,11 +185,8 @@ fn command_line() -> Command {
 pub fn main() -> ExitCode {
     outlive_file_size_limit();
     let mut command = command_line();
-    let (arguments, hints) = renamed::translated(std::env::args_os());
-    for hint in hints {
-        anstream::eprintln!("{hint}");
-    }
-    let matches = command.try_get_matches_from_mut(arguments).unwrap_or_else(|error| error.exit());
+    let matches =
+        command.try_get_matches_from_mut(std::env::args_os()).unwrap_or_else(|error| error.exit());
     if let Err(failure) = output::guard(&command, &matches) {
         return failure::report(Err(failure));
     }
@@ -206,7 +198,6 @@ pub fn main() -> ExitCode {
         Verb::Run(args) => run::run(*args),
         Verb::Status(args) => status::run(&args),
         Verb::Watch(args) => watch::run(&args),
-        Verb::Gather(args) => gather::run(&args),
         Verb::Mock(args) => mock::run(&args),
         #[cfg(feature = "pi")]
         Verb::Board(args) => board::run(&args),

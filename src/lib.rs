@@ -66,8 +66,6 @@ pub mod daemon;
 pub mod dataset;
 #[cfg(feature = "daemon")]
 pub mod fleet;
-#[cfg(feature = "daemon")]
-pub mod gather;
 #[cfg(feature = "store")]
 pub mod grid_file;
 #[cfg(feature = "daemon")]

@@ -6,7 +6,7 @@ use clap::Command;
 
 /// What the verbs are for, in the order in which a person comes to them.
 pub(super) const GROUPS: [(&str, &[&str]); 8] = [
-    ("Measure", &["scan", "collect", "run", "status", "watch", "gather", "import"]),
+    ("Measure", &["scan", "collect", "run", "status", "watch", "import"]),
     ("Model", &["simulate", "paths", "trace", "predict", "generate"]),
     ("Look at scans", &["plot", "compare", "interpret", "log", "export"]),
     ("Explain", &["calibrate", "locate"]),

@@ -9,7 +9,6 @@ mod explained;
 mod faults;
 pub(crate) mod fleet;
 mod foxglove;
-mod gather;
 mod kill;
 mod load;
 mod location;

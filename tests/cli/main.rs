@@ -11,7 +11,6 @@ mod doctor;
 mod explore;
 mod export;
 mod faults;
-mod format_1;
 mod generate;
 mod hangup;
 mod import;

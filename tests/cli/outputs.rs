@@ -39,7 +39,7 @@ const fn case(
     Case { output, input, arguments }
 }
 
-const CASES: [Case; 39] = [
+const CASES: [Case; 38] = [
     case("plot --output", ("a.svg", LOG), "plot IN -o IN"),
     case("plot --output", ("a.png", LOG), "plot IN -o IN --force"),
     case("plot --output", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),
@@ -93,7 +93,6 @@ const CASES: [Case; 39] = [
     case("export --output", ("a.mcap", LOG), "export IN -o IN --force"),
     case("export --output", ("a.parquet", LOG), "export IN -o IN --force"),
     case("export --output", ("log.csv", LOG), "export IN --to csv -o IN --force"),
-    case("gather --out", ("a.json", FLEET), "gather --fleet IN --out IN"),
     case("generate --out", ("README.md", DATA_SET), "generate IN --out DIR"),
     case("calibrate --out", ("sensor.json", LOG), "calibrate IN --out DIR --force"),
     case("calibrate --out", ("scene.json", SCENE), "calibrate LOG --scene IN --out DIR --force"),
@@ -140,7 +139,6 @@ const MAP: &str = "image: map.pgm\nresolution: 0.5\norigin: [0.0, 0.0, 0.0]\nneg
                    occupied_thresh: 0.65\nfree_thresh: 0.196\n";
 const DATA_SET: &str = "[set]\nname = \"a\"\nshards = 1\nscenes = 1\nposes = 1\n[[scene]]\nshape = \"file\"\n\
                         file = \"simple-room\"\n";
-const FLEET: &str = "[[daemon]]\nsocket = \"/run/nobody/s\"\n";
 const PLAN: &str = "[collection]\nfolder = \"out\"\n[place]\nscene = \"simple-room\"\n\
                     poses = [\"fig9\"]\n";
 
