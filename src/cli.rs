@@ -2,7 +2,6 @@
 
 mod answer;
 mod array;
-mod benchmark;
 #[cfg(feature = "pi")]
 mod board;
 mod calibrate;
@@ -10,7 +9,6 @@ mod collect;
 mod compare;
 mod daemon;
 mod doctor;
-mod explore;
 mod export;
 mod failure;
 mod findings;
@@ -133,18 +131,12 @@ enum Verb {
     /// Make an occupancy grid from the scans of logs
     #[command(long_about = map::ABOUT)]
     Map(map::Args),
-    /// Let a simulated robot explore a scene and map it with lines
-    #[command(long_about = explore::ABOUT)]
-    Explore(explore::Args),
     /// Draw scans: floor plan, polar, residuals
     #[command(long_about = plot::ABOUT)]
     Plot(plot::Args),
     /// Check, repair or show a log
     #[command(subcommand)]
     Log(log::Verb),
-    /// Measure maps, interpretations and explorations with the metrics of the papers
-    #[command(subcommand)]
-    Benchmark(benchmark::Verb),
     /// Write manual pages and shell completions, for packages
     #[command(hide = true)]
     PackageFiles(package_files::Args),
@@ -213,11 +205,9 @@ pub fn main() -> ExitCode {
         Verb::Interpret(args) => interpret::run(&args),
         Verb::Lines(args) => lines::run(&args),
         Verb::Map(args) => map::run(&args),
-        Verb::Explore(args) => explore::run(&args),
         Verb::Trace(args) => trace::run(&args),
         Verb::Plot(args) => plot::run(&args),
         Verb::Log(verb) => log::run(verb),
-        Verb::Benchmark(verb) => benchmark::run(verb),
         Verb::Generate(args) => generate::run(&args),
         Verb::PackageFiles(args) => package_files::run(&args),
         Verb::Scene(verb) => scene::run(verb),

@@ -42,7 +42,7 @@ pub use sonard_export as export;
 #[cfg(feature = "generate")]
 pub use sonard_generate as generate;
 pub use sonard_import as import;
-pub use sonard_interpret::{compare, explore, interpret};
+pub use sonard_interpret::{compare, interpret};
 #[cfg(feature = "inverse")]
 pub use sonard_inverse as inverse;
 pub use sonard_model::{acoustics, array, geometry, model, motion, scene, viewpoint};

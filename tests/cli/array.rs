@@ -5,7 +5,10 @@ use std::{fs, path::Path};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{Log, run, stderr};
+use crate::{
+    common::{Log, run, stderr},
+    map::score_of,
+};
 
 /// Runs and returns standard output as a log.
 fn simulate(further: &[&str]) -> Log {
@@ -163,9 +166,8 @@ fn an_arrays_readings_are_drawn_mapped_and_fitted_with_lines() {
     assert!(map.status.success(), "{}", stderr(&map));
     let map: Value = serde_json::from_slice(&map.stdout).expect("one object");
     assert_eq!((&map["scans"], &map["readings"]), (&12.into(), &(6 * 20).into()));
-    let score = run(&["benchmark", "score", &out, "two-surface-room", "--json"]);
-    let score: Value = serde_json::from_slice(&score.stdout).expect("one object");
-    assert!(score["correlation_percent"].as_f64().is_some_and(|c| c > 20.0), "{score}");
+    let score = score_of(&out, "two-surface-room");
+    assert!(score.correlation_percent.is_some_and(|percent| percent > 20.0), "{score:?}");
 
     // Arcs of constant depth need one ranger that turns.
     let refused = run(&["interpret", &eight]);

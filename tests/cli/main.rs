@@ -8,7 +8,6 @@ mod course;
 mod daemon;
 mod degenerate;
 mod doctor;
-mod explore;
 mod export;
 mod faults;
 mod generate;

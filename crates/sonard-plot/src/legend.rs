@@ -7,14 +7,14 @@ use super::{
 
 /// One entry.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Entry {
-    pub(super) sample: Sample,
-    pub(super) text: String,
+pub struct Entry {
+    pub sample: Sample,
+    pub text: String,
 }
 
 /// What stands before the words.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Sample {
+pub enum Sample {
     Mark {
         shape: Shape,
         colour: &'static str,
@@ -38,7 +38,7 @@ pub(super) enum Sample {
 }
 
 impl Entry {
-    pub(super) fn new(sample: Sample, text: impl Into<String>) -> Self {
+    pub fn new(sample: Sample, text: impl Into<String>) -> Self {
         Self { sample, text: text.into() }
     }
 }
@@ -49,7 +49,7 @@ const GAP_PX: f64 = 20.0;
 
 /// Draws the entries from `at` (upper left) in rows of at most `width_px`; returns the layer
 /// and its height.
-pub(super) fn draw(entries: &[Entry], at: Px, width_px: f64) -> (Layer, f64) {
+pub fn draw(entries: &[Entry], at: Px, width_px: f64) -> (Layer, f64) {
     let mut layer = Layer::new("legend");
     let (mut x, mut row) = (0.0, 0.0);
     for entry in entries {

@@ -6,7 +6,7 @@ use super::{
     objects::Objects,
     robot::{Drive, Robot},
 };
-use crate::interpret::{
+use sonard_interpret::interpret::{
     Heard,
     lines::{LaserScan, LineKind, LineMap, MapLine},
 };

@@ -1,8 +1,8 @@
-//! `sonard explore`.
+//! `sonard-papers explore`.
 
 use std::{
     io::{self, Write},
-    path::Path,
+    path::{Path, PathBuf},
     sync::Arc,
 };
 
@@ -11,31 +11,33 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use serde::Serialize;
 
-use super::{
-    Failure, Outcome,
-    answer::answer,
-    lines::record,
-    options::{AirArgs, SensorArgs},
-    output::{OutPath, Overwrite, Product, make_folder},
-    place::PlaceArgs,
-    progress,
+use sonard_interpret::interpret::lines::{MapError, map_error};
+use sonard_model::{
+    geometry::Pose,
+    model::{Options, Simulator},
+    scene::Scene,
 };
-use crate::{
+use sonard_papers::{
     explore::{
         Exploration, ExploreSettings, Ranger, RobotSettings, Sensing, SimulatedRobot, Stop,
         explore_watched,
     },
-    geometry::Pose,
-    interpret::lines::{MapError, map_error},
-    model::{Options, Simulator},
-    plot::{PlotError, animate, draw_exploration},
-    scene::Scene,
+    pictures::draw_exploration,
+};
+use sonard_plot::{PlotError, animate};
+
+use super::{
+    Failure, Outcome,
+    answer::answer,
+    input::{AcousticArgs, PlaceArgs},
+    output::{Overwrite, line_record, make_folder},
+    progress,
 };
 
-/// Options of `sonard explore`.
+/// Options of `sonard-papers explore`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
-pub(super) struct Args {
+pub(crate) struct Args {
     #[command(flatten)]
     place: PlaceArgs,
     /// Sensors that the map is made with
@@ -48,22 +50,20 @@ pub(super) struct Args {
     seed: u64,
     /// Output folder; the map, what the laser saw, the stops and pictures
     #[arg(long, value_name = "DIR")]
-    out: Option<OutPath>,
+    out: Option<PathBuf>,
     /// JSON instead of text; one object
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     overwrite: Overwrite,
     #[command(flatten)]
-    sensor: SensorArgs,
-    #[command(flatten)]
-    air: AirArgs,
+    acoustics: AcousticArgs,
 }
 
 /// The robot and how it explores.
 #[derive(Debug, Clone, Copy, clap::Args)]
 #[command(next_help_heading = "Robot")]
-pub(super) struct RobotArgs {
+pub(crate) struct RobotArgs {
     /// Arrangement of its sonars
     #[arg(long, value_enum, default_value_t = RangerName::Ring)]
     ranger: RangerName,
@@ -78,7 +78,7 @@ pub(super) struct RobotArgs {
     logical: f64,
     /// Maximum range of the sonars, metres
     #[arg(long, value_name = "M", default_value_t = 8.0)]
-    pub(super) sonar_range: f64,
+    pub(crate) sonar_range: f64,
     /// Give up after so many stops
     #[arg(long, value_name = "N", default_value_t = ExploreSettings::default().most_stops)]
     most_stops: usize,
@@ -86,7 +86,7 @@ pub(super) struct RobotArgs {
 
 /// A [`Sensing`] on the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum SensingName {
+pub(crate) enum SensingName {
     /// Sonar only
     Sonar,
     /// Laser only: all around at each stop
@@ -103,7 +103,7 @@ enum RangerName {
     Stepper,
 }
 
-pub(super) const ABOUT: &str = "\
+pub(crate) const ABOUT: &str = "\
 Let a simulated robot explore a scene and map it with lines.
 
 After G. Dudek, P. Freedman and I. Rekleitis, \"Just-in-time sensing\" (ICRA 1996): the robot follows the \
@@ -114,9 +114,9 @@ it.";
 
 const HELP: &str = "\
 Examples:
-  sonard explore --scene two-surface-room --pose middle --out explored
-  sonard explore --scene mcgill-lab --pose fig4 --sensing sonar --json
-  sonard explore --scene my-room.json --pose 1,1,0 --odometry-noise 0.005
+  sonard-papers explore --scene two-surface-room --pose middle --out explored
+  sonard-papers explore --scene mcgill-lab --pose fig4 --sensing sonar --json
+  sonard-papers explore --scene my-room.json --pose 1,1,0 --odometry-noise 0.005
 
 --out receives lines.jsonl (as `sonard lines --json`), laser.jsonl (one shot or turn a line, for `sonard \
 lines --laser`), stops.jsonl, exploration.svg and .png, stage-1.png to stage-4.png and exploration.apng, \
@@ -129,7 +129,7 @@ the map error is the mean of the two.
 Exit codes: 0 done, 1 stopped before everything was explored, 2 wrong usage or input, 3 the disk gave \
 up.";
 
-pub(super) fn run(args: &Args) -> Outcome {
+pub(crate) fn run(args: &Args) -> Outcome {
     let (scene, pose) = args.place.load()?;
     if let Some(folder) = &args.out {
         check_all(folder, args.overwrite)?;
@@ -138,8 +138,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let (robot, settings) = args.robot.settings()?;
     let options = Options { max_range_m: Some(args.robot.sonar_range), ..Options::default() };
     let simulator =
-        Simulator::new(Arc::new(scene), args.sensor.sensor()?, args.air.air()?, options)
-            .map_err(|error| Failure::input(error, "see `sonard explore --help`"))?;
+        Simulator::new(Arc::new(scene), args.acoustics.sensor()?, args.acoustics.air()?, options)
+            .map_err(|error| Failure::input(error, "see `sonard-papers explore --help`"))?;
     let bar = progress::spinner("stops");
     let made = explored((&simulator, pose), sensing, robot, &settings, args.seed, &bar);
     bar.finish_and_clear();
@@ -153,14 +153,14 @@ pub(super) fn run(args: &Args) -> Outcome {
     if made.finished {
         return Ok(());
     }
-    Err(Failure::Found(Some(format!(
+    Err(Failure::Found(format!(
         "{} stops were not enough to explore everything: see --most-stops",
         made.stops.len()
-    ))))
+    )))
 }
 
 /// One exploration from a pose, counted in `bar`; the same seed gives the same.
-pub(super) fn explored(
+pub(crate) fn explored(
     (simulator, pose): (&Simulator, Pose),
     sensing: Sensing,
     robot: RobotSettings,
@@ -182,13 +182,13 @@ pub(super) fn explored(
         bar.set_message(format!("{:.0} m driven", so_far.travel_m));
     });
     match robot.refusal() {
-        Some(refusal) => Err(Failure::input(refusal, "see `sonard explore --help`")),
+        Some(refusal) => Err(Failure::input(refusal, "see `sonard-papers explore --help`")),
         None => Ok(made),
     }
 }
 
 impl SensingName {
-    pub(super) const fn sensing(self) -> Sensing {
+    pub(crate) const fn sensing(self) -> Sensing {
         match self {
             Self::Sonar => Sensing::Sonar,
             Self::Laser => Sensing::Laser,
@@ -199,7 +199,7 @@ impl SensingName {
 
 impl RobotArgs {
     /// Checked settings.
-    pub(super) fn settings(&self) -> Result<(RobotSettings, ExploreSettings), Failure> {
+    pub(crate) fn settings(&self) -> Result<(RobotSettings, ExploreSettings), Failure> {
         let checks = [
             ("odometry-noise", self.odometry_noise, 0.0, 1.0),
             ("standoff", self.standoff, 0.4, 3.0),
@@ -232,22 +232,22 @@ impl RobotArgs {
 
 /// What is printed.
 #[derive(Debug, Serialize)]
-pub(super) struct Summary {
-    pub(super) scene: String,
-    pub(super) sensing: Sensing,
-    pub(super) finished: bool,
-    pub(super) stops: usize,
-    pub(super) laser_shots: u32,
-    pub(super) sonar_readings: usize,
-    pub(super) travel_m: f64,
-    pub(super) bumps: u32,
-    pub(super) lines: usize,
+pub(crate) struct Summary {
+    pub(crate) scene: String,
+    pub(crate) sensing: Sensing,
+    pub(crate) finished: bool,
+    pub(crate) stops: usize,
+    pub(crate) laser_shots: u32,
+    pub(crate) sonar_readings: usize,
+    pub(crate) travel_m: f64,
+    pub(crate) bumps: u32,
+    pub(crate) lines: usize,
     #[serde(flatten)]
-    pub(super) error: MapError,
+    pub(crate) error: MapError,
 }
 
 impl Summary {
-    pub(super) fn of(scene: &Scene, sensing: Sensing, made: &Exploration) -> Self {
+    pub(crate) fn of(scene: &Scene, sensing: Sensing, made: &Exploration) -> Self {
         Self {
             scene: scene.name.clone(),
             sensing,
@@ -301,34 +301,22 @@ const FILES: [&str; 6] = [
     "exploration.apng",
 ];
 
-fn product(name: &str) -> Product {
-    match name {
-        "lines.jsonl" => {
-            Product::List(&["kind", "from_m", "to_m", "length_m", "confidence", "terminal"])
-        }
-        "laser.jsonl" => Product::List(&["pose", "returns"]),
-        "stops.jsonl" => Product::List(&["pose", "task", "target_m", "laser_shots", "lines"]),
-        "exploration.svg" => Product::Svg,
-        _ => Product::Png,
-    }
-}
-
 /// Checks that an exploration may be written into a folder.
 fn check_all(folder: &Path, overwrite: Overwrite) -> Outcome {
-    FILES.iter().try_for_each(|name| overwrite.check_in(folder, name, product(name)))
+    FILES.iter().try_for_each(|name| overwrite.check(&folder.join(name)))
 }
 
 /// Writes map, stops and pictures into a folder.
-pub(super) fn write_all(
+pub(crate) fn write_all(
     (folder, overwrite): (&Path, Overwrite),
     made: &Exploration,
     sensing: Sensing,
     scene: &Scene,
 ) -> Outcome {
     make_folder(folder)?;
-    let save = |name: &str, bytes: &[u8]| overwrite.save(&folder.join(name), product(name), bytes);
-    let refuse = |error: PlotError| Failure::device(error, "this scene can't be drawn");
-    save("lines.jsonl", &json_lines(made.lines().iter().map(record)))?;
+    let save = |name: &str, bytes: &[u8]| overwrite.save(&folder.join(name), bytes);
+    let refuse = |error: PlotError| Failure::input(error, "this scene can't be drawn");
+    save("lines.jsonl", &json_lines(made.lines().iter().map(line_record)))?;
     let laser = made.stops.iter().flat_map(|stop| &stop.laser).map(serde_json::to_value);
     save("laser.jsonl", &json_lines(laser.filter_map(Result::ok)))?;
     save("stops.jsonl", &json_lines(made.stops.iter().map(stop_record)))?;

@@ -3,7 +3,7 @@
 //! After G. Dudek, P. Freedman and I. Rekleitis, "Just-in-time sensing: efficiently combining sonar
 //! and laser range data for exploring unknown worlds", ICRA 1996. [`explore`] leads a [`Robot`]
 //! round the nearest object at about a metre and on to the next, and makes a map of lines
-//! ([`lines`](crate::interpret::lines)) of what it senses; it knows nothing else.
+//! ([`lines`](sonard_interpret::interpret::lines)) of what it senses; it knows nothing else.
 //! [`SimulatedRobot`] moves through a scene and hears it by the model.
 
 mod follow;
@@ -20,7 +20,7 @@ pub use robot::{Drive, Ranger, Robot, RobotSettings, SimulatedRobot};
 
 use serde::Serialize;
 
-use crate::interpret::{
+use sonard_interpret::interpret::{
     Sweep,
     lines::{FitSettings, LaserScan, LineMapSettings, MapLine, MergeSettings},
 };

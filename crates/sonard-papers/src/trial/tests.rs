@@ -5,10 +5,8 @@ use std::sync::Arc;
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
-use crate::interpret::{
-    grid::Trust,
-    trial::{Arrangement, Course, TrialSettings, random_room},
-};
+use super::{Arrangement, Course, TrialSettings, random_room};
+use sonard_interpret::interpret::grid::Trust;
 use sonard_model::{
     acoustics::{Air, Sensor},
     array::RangerArray,

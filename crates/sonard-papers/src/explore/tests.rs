@@ -7,10 +7,8 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 use super::*;
-use crate::interpret::{
-    lines::{MapError, map_error},
-    trial::gallery,
-};
+use crate::trial::gallery;
+use sonard_interpret::interpret::lines::{MapError, map_error};
 use sonard_model::{
     acoustics::{Air, Sensor},
     model::{Options, Simulator},
@@ -19,7 +17,7 @@ use sonard_model::{
 
 fn simulator(scene: Scene) -> Simulator {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-    // As the paper's, and by default those of `sonard explore`.
+    // As the paper's, and by default those of `sonard-papers explore`.
     let options = Options { max_range_m: Some(8.0), ..Options::default() };
     Simulator::new(Arc::new(scene), sensor, Air::default(), options).expect("figures")
 }
@@ -158,7 +156,7 @@ fn an_exploration_can_be_repeated() {
     assert_eq!(made, make());
 }
 
-/// The aims of issue and paper, on the ten rooms of `sonard benchmark explore`.
+/// The aims of issue and paper, on the ten rooms of `sonard-papers benchmark explore`.
 #[test]
 fn just_in_time_is_as_good_as_laser_only_with_a_quarter_of_its_shots() {
     let rooms: Vec<[(Exploration, MapError); 2]> = (0..10_u64)

@@ -1,26 +1,24 @@
-//! `sonard benchmark score`.
+//! `sonard-papers benchmark score`.
 
 use std::{
     io::{self, Write},
     path::{Path, PathBuf},
 };
 
-use crate::{
-    cli::{
-        Failure, Outcome,
-        answer::answer,
-        map_file,
-        output::{OutPath, Overwrite, make_folder},
-        scene_file,
-    },
-    geometry::{DVec2, Pose},
-    interpret::grid::{Grid, GridShape, MapScore, PathSettings, ideal, score},
+use sonard_interpret::interpret::grid::{Grid, GridShape, MapScore, PathSettings, ideal, score};
+use sonard_model::geometry::{DVec2, Pose};
+
+use super::{
+    Failure, Outcome,
+    answer::answer,
+    input::{load_scene, read_map},
+    output::{Overwrite, write_map},
 };
 
-/// Options of `sonard benchmark score`.
+/// Options of `sonard-papers benchmark score`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
-pub(in crate::cli) struct Args {
+pub(crate) struct Args {
     /// The map: its .yaml, or the folder that holds map.yaml
     #[arg(value_name = "MAP")]
     map: PathBuf,
@@ -32,7 +30,7 @@ pub(in crate::cli) struct Args {
     spacing: f64,
     /// Also write the ideal map drawn from the scene into this folder
     #[arg(long, value_name = "DIR")]
-    save_ideal: Option<OutPath>,
+    save_ideal: Option<PathBuf>,
     /// JSON instead of text; one object
     #[arg(long)]
     json: bool,
@@ -40,7 +38,7 @@ pub(in crate::cli) struct Args {
     overwrite: Overwrite,
 }
 
-pub(super) const ABOUT: &str = "\
+pub(crate) const ABOUT: &str = "\
 Compare a map with the ideal one.
 
 Four benchmarks, in percent. Correlation of the two maps' cells: more is better. Map score: the \
@@ -53,26 +51,25 @@ from the scene's poses is free, the rest is unknown.";
 
 const HELP: &str = "\
 Examples:
-  sonard benchmark score map simple-room
-  sonard benchmark score map/map.yaml ideal/map.yaml --json
+  sonard-papers benchmark score map simple-room
+  sonard-papers benchmark score map/map.yaml ideal/map.yaml --json
 Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
-pub(super) fn run(args: &Args) -> Outcome {
+pub(crate) fn run(args: &Args) -> Outcome {
     if !(args.spacing.is_finite() && args.spacing > 0.0) {
         return Err(Failure::input(
             format!("--spacing is {}", args.spacing),
             "give a length in metres, greater than 0",
         ));
     }
-    let map = map_file::read(&args.map)?;
+    let map = read_map(&args.map)?;
     let ideal = if is_map(Path::new(&args.ideal)) {
-        map_file::read(Path::new(&args.ideal))?
+        read_map(Path::new(&args.ideal))?
     } else {
         drawn(&args.ideal, *map.shape())?
     };
     if let Some(folder) = &args.save_ideal {
-        make_folder(folder)?;
-        map_file::write(folder, &ideal, args.overwrite)?;
+        write_map(folder, &ideal, args.overwrite)?;
     }
     let settings = PathSettings { spacing_m: args.spacing, ..PathSettings::default() };
     let found = score(&map, &ideal, &settings).map_err(|error| {
@@ -88,7 +85,7 @@ fn is_map(path: &Path) -> bool {
 }
 
 fn drawn(name: &str, shape: GridShape) -> Result<Grid, Failure> {
-    let scene = scene_file::load(name)?;
+    let scene = load_scene(Path::new(name))?;
     let places: Vec<DVec2> = scene.poses.values().map(Pose::position).collect();
     if places.is_empty() {
         return Err(Failure::input(

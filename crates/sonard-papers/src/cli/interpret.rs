@@ -1,26 +1,28 @@
-//! `sonard benchmark interpret`.
+//! `sonard-papers benchmark interpret`.
 
 use std::io::{self, Write};
 
 use comfy_table::{CellAlignment, Table};
 use serde::Serialize;
 
-use crate::{
-    cli::{
-        Outcome, answer::answer, compare::RULED, options::load_sensor, picture::PictureArgs,
-        progress,
-    },
-    interpret::{
-        Settings,
-        calibration::{Judged, Reliability, judge_room},
-    },
-    plot::draw_reliability,
+use sonard_interpret::interpret::Settings;
+use sonard_papers::{
+    calibration::{Judged, Reliability, judge_room},
+    pictures::draw_reliability,
 };
 
-/// Options of `sonard benchmark interpret`.
+use super::{
+    Outcome,
+    answer::{RULED, answer},
+    input::load_sensor,
+    output::PictureArgs,
+    progress,
+};
+
+/// Options of `sonard-papers benchmark interpret`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
-pub(in crate::cli) struct Args {
+pub(crate) struct Args {
     /// How many made-up rooms, each read from one or two places
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     trials: u64,
@@ -37,7 +39,7 @@ pub(in crate::cli) struct Args {
     picture: PictureArgs,
 }
 
-pub(super) const ABOUT: &str = "\
+pub(crate) const ABOUT: &str = "\
 Measure how often the probabilities of `sonard interpret` come true.
 
 The model reads made-up rooms with boxes and partitions, each from a random place and, where the \
@@ -47,8 +49,8 @@ each arc is of. For each arc there are four claims, of plane, corner, edge and s
 
 const HELP: &str = "\
 Examples:
-  sonard benchmark interpret -o reliability.png     1,000 rooms; the same seed gives the same table
-  sonard benchmark interpret --trials 100 --seed 2 --json
+  sonard-papers benchmark interpret -o reliability.png     1,000 rooms; the same seed gives the same table
+  sonard-papers benchmark interpret --trials 100 --seed 2 --json
 
 The expected calibration error is the mean distance of claim and share over all claims in ten bins; the \
 Brier score is the mean squared distance of a claim from what is.";
@@ -71,9 +73,9 @@ struct Row {
     came_true: f64,
 }
 
-pub(super) fn run(args: &Args) -> Outcome {
-    let targets = args.picture.targets()?;
+pub(crate) fn run(args: &Args) -> Outcome {
     let sensor = load_sensor(&args.sensor)?;
+    args.picture.check()?;
     let settings = Settings::default();
     let bar = progress::bar(args.trials, "rooms");
     let mut judged: Vec<Judged> = Vec::new();
@@ -87,7 +89,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     answer(args.json, [&found], |out| found.print(out))?;
     let lines = [found.in_words(), format!("{} with its whole receiver", sensor.name)];
     let picture = draw_reliability("Probabilities of planes, corners, edges", &lines, &reliability);
-    targets.iter().try_for_each(|target| target.write(&picture, args.picture.width))
+    args.picture.write(&picture)
 }
 
 impl Answer {

@@ -1,7 +1,8 @@
-//! `sonard benchmark explore`.
+//! `sonard-papers benchmark explore`.
 
 use std::{
     io::{self, Write},
+    path::PathBuf,
     sync::Arc,
 };
 
@@ -12,26 +13,28 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::{
+use sonard_model::{
     acoustics::{Air, Sensor},
-    cli::{
-        Failure, Outcome,
-        answer::answer,
-        compare::RULED,
-        explore::{RobotArgs, Summary, explored, write_all},
-        output::{OutPath, Overwrite, Product},
-        progress,
-    },
-    explore::{Exploration, Sensing},
-    interpret::trial::gallery,
     model::{Options, Simulator},
-    plot::draw_explorations,
+};
+use sonard_papers::{
+    explore::{Exploration, Sensing},
+    pictures::draw_explorations,
+    trial::gallery,
 };
 
-/// Options of `sonard benchmark explore`.
+use super::{
+    Failure, Outcome,
+    answer::{RULED, answer},
+    explore::{RobotArgs, Summary, explored, write_all},
+    output::Overwrite,
+    progress,
+};
+
+/// Options of `sonard-papers benchmark explore`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
-pub(in crate::cli) struct Args {
+pub(crate) struct Args {
     /// How many rooms, each explored three times
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     rooms: u32,
@@ -43,15 +46,15 @@ pub(in crate::cli) struct Args {
     /// JSON instead of text; one object for each exploration
     #[arg(long)]
     json: bool,
-    /// Output folder; what `sonard explore --out` writes, and a picture of each room's
+    /// Output folder; what `sonard-papers explore --out` writes, and a picture of each room's
     /// three maps
     #[arg(long, value_name = "DIR")]
-    out: Option<OutPath>,
+    out: Option<PathBuf>,
     #[command(flatten)]
     overwrite: Overwrite,
 }
 
-pub(super) const ABOUT: &str = "\
+pub(crate) const ABOUT: &str = "\
 Explore random rooms with sonar, laser, and laser just in time, and compare the maps.
 
 Each room is 6 to 8 m by 5 to 6.5 m with two or three objects in it, its walls at an odd angle. The \
@@ -59,10 +62,10 @@ three robots begin at the same place; the table has every room, and the means.";
 
 const HELP: &str = "\
 Examples:
-  sonard benchmark explore                       ten rooms; the same seed gives the same table
-  sonard benchmark explore --seed 2 --out rooms  others, with pictures
+  sonard-papers benchmark explore                       ten rooms; the same seed gives the same table
+  sonard-papers benchmark explore --seed 2 --out rooms  others, with pictures
 
-For how map errors are counted see `sonard explore --help`.";
+For how map errors are counted see `sonard-papers explore --help`.";
 
 /// An exploration of the table.
 #[derive(Debug, Serialize)]
@@ -72,7 +75,7 @@ struct Row {
     summary: Summary,
 }
 
-pub(super) fn run(args: &Args) -> Outcome {
+pub(crate) fn run(args: &Args) -> Outcome {
     let bar = progress::bar(u64::from(args.rooms), "rooms");
     let of_rooms: Result<Vec<Vec<Row>>, Failure> =
         (0..args.rooms).into_par_iter().map(|number| room(args, number, &bar)).collect();
@@ -84,7 +87,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 /// One room, explored in each way.
 fn room(args: &Args, number: u32, bar: &ProgressBar) -> Result<Vec<Row>, Failure> {
     let refuse = |error: &dyn std::fmt::Display| {
-        Failure::input(error.to_string(), "see `sonard benchmark explore --help`")
+        Failure::input(error.to_string(), "see `sonard-papers benchmark explore --help`")
     };
     let (robot, settings) = args.robot.settings()?;
     let seed = args.seed.wrapping_mul(1_000_003) ^ u64::from(number);
@@ -110,7 +113,7 @@ fn room(args: &Args, number: u32, bar: &ProgressBar) -> Result<Vec<Row>, Failure
         let all: Vec<(Sensing, &Exploration)> = made.iter().map(|(s, made)| (*s, made)).collect();
         let picture = draw_explorations(&all, Some(scene));
         let png = picture.to_png(1200).map_err(|error| refuse(&error))?;
-        args.overwrite.save(&folder.join("maps.png"), Product::Png, &png)?;
+        args.overwrite.save(&folder.join("maps.png"), &png)?;
     }
     bar.inc(1);
     let row = |(sensing, made): &(Sensing, Exploration)| Row {

@@ -1,19 +1,17 @@
 //! A robot's way through a scene and the map it makes.
 
-use super::{
+use crate::explore::{Exploration, Sensing, Stop};
+use sonard_interpret::interpret::lines::LaserScan;
+use sonard_model::{geometry::DVec2, scene::Scene};
+use sonard_plot::{
+    Picture,
     canvas::{Anchor, Layer, Px, Rect, Shape},
     caption,
     legend::{self, Entry, Sample},
     lines,
-    picture::Picture,
     plan::{Bounds, Plan},
     theme,
 };
-use sonard_interpret::{
-    explore::{Exploration, Sensing, Stop},
-    interpret::lines::LaserScan,
-};
-use sonard_model::{geometry::DVec2, scene::Scene};
 
 /// A laser's view is drawn as far as this, metres.
 const VIEW_M: f64 = 2.0;

@@ -3,7 +3,7 @@
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::interpret::lines::{LaserReturn, LaserScan};
+use sonard_interpret::interpret::lines::{LaserReturn, LaserScan};
 use sonard_model::{
     geometry::{DVec2, Pose},
     model::raycast::Reflectors,

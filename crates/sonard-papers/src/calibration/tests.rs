@@ -1,9 +1,7 @@
 //! How far the probabilities can be believed, on rooms with a real receiver.
 
-use crate::interpret::{
-    Probabilities, Settings,
-    calibration::{Judged, Reliability, Truth, judge_room},
-};
+use super::{Judged, Reliability, Truth, judge_room};
+use sonard_interpret::interpret::{Probabilities, Settings};
 use sonard_model::acoustics::Sensor;
 
 fn judged(seed: u64, rooms: u64) -> Vec<Judged> {

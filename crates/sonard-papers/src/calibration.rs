@@ -1,4 +1,4 @@
-//! How far the probabilities of [`interpret`] can be believed: of the arcs that it calls an edge with
+//! How far the probabilities of [`interpret`](sonard_interpret::interpret::interpret) can be believed: of the arcs that it calls an edge with
 //! a probability of 0.9, are nine in ten edges?
 //!
 //! Made-up rooms are read by the model with the sensor's whole receiver, from a random place, and from
@@ -20,7 +20,8 @@ use sonard_model::{
 use sonard_records::{PathKind, Ping, PingStatus, ScanPlan, ScanView};
 use uuid::Uuid;
 
-use super::{Extents, Feature, Probabilities, Settings, Sweep, interpret, trial::random_room};
+use crate::trial::random_room;
+use sonard_interpret::interpret::{Extents, Feature, Probabilities, Settings, Sweep, interpret};
 
 /// How many boxes and partitions the rooms have, one after the other.
 const ROOMS: [(usize, usize); 4] = [(0, 0), (3, 0), (0, 1), (2, 2)];
@@ -230,3 +231,6 @@ fn of_ping(ping: &Ping, scene: &Scene, from: DVec2) -> Truth {
         _ => Truth::Other,
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,13 +5,15 @@
 //! are scored against the ideal map.
 
 mod rooms;
+#[cfg(test)]
+mod tests;
 
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
 pub use rooms::{gallery, random_room};
 
-use super::{
+use sonard_interpret::interpret::{
     Beam, Extents, Heard, Sweep,
     grid::{
         BeamModel, GaussianBeam, Grid, GridShape, MapScore, PathSettings, ScoreError, Trust, ideal,

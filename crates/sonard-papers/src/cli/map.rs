@@ -1,46 +1,44 @@
-//! `sonard benchmark map`.
+//! `sonard-papers benchmark map`.
 
 use std::{
     io::{self, Write},
-    sync::{
-        Arc, Mutex,
-        atomic::{AtomicUsize, Ordering},
-    },
+    path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use comfy_table::{CellAlignment, Table};
-
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
+use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::{
+use sonard_interpret::interpret::{
+    Extents,
+    grid::{MapScore, Trust},
+    mapping::{MAX_RANGE_M, Mapping},
+};
+use sonard_model::{
     acoustics::{Air, Sensor},
     array::RangerArray,
-    cli::{
-        Failure, Outcome,
-        answer::answer,
-        compare::RULED,
-        output::{OutPath, Overwrite, Product, make_folder},
-        progress,
-    },
-    geometry::DVec2,
-    interpret::{
-        Extents,
-        grid::{MapScore, Trust},
-        mapping::{MAX_RANGE_M, Mapping},
-        trial::{Arrangement, Course, Trial, TrialSettings, random_room},
-    },
+    geometry::{DVec2, Pose},
     model::{Options, PathOptions, Simulator},
-    plot::{MapView, badge_of, draw_map},
-    scan::Provenance,
     scene::{Scene, shipped},
 };
+use sonard_papers::trial::{Arrangement, Course, Trial, TrialSettings, random_room};
+use sonard_plot::{MapView, badge_of, draw_map};
+use sonard_records::Provenance;
 
-/// Options of `sonard benchmark map`.
+use super::{
+    Failure, Outcome,
+    answer::{RULED, answer},
+    output::{Overwrite, make_folder},
+    progress,
+};
+
+/// Options of `sonard-papers benchmark map`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
-pub(in crate::cli) struct Args {
+pub(crate) struct Args {
     /// How many courses, each mapped without and with Feature Prediction
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     maps: u32,
@@ -76,12 +74,12 @@ pub(in crate::cli) struct Args {
     json: bool,
     /// Output folder; pictures of the maps: ideal, without, with
     #[arg(long, value_name = "DIR")]
-    out: Option<OutPath>,
+    out: Option<PathBuf>,
     #[command(flatten)]
     overwrite: Overwrite,
 }
 
-pub(super) const ABOUT: &str = "\
+pub(crate) const ABOUT: &str = "\
 Map simulated courses without and with Feature Prediction, and score the maps.
 
 A robot wanders through shipped scenes and rooms made up at random, reading with a ring of seven \
@@ -91,9 +89,9 @@ each scene.";
 
 const HELP: &str = "\
 Examples:
-  sonard benchmark map                         128 courses; the same seed gives the same table
-  sonard benchmark map --maps 16 --out maps    and pictures of the maps
-  sonard benchmark map --extend 0 --whole-readings --least-confidence 0     the paper's way, but for splits
+  sonard-papers benchmark map                         128 courses; the same seed gives the same table
+  sonard-papers benchmark map --maps 16 --out maps    and pictures of the maps
+  sonard-papers benchmark map --extend 0 --whole-readings --least-confidence 0     the paper's way, but for splits
 
 The benchmarks, in percent: correlation of the two maps (more is better); map score, the mean \
 squared difference of cells; the same of cells occupied in either map; and of the shortest ways \
@@ -124,7 +122,7 @@ struct Row {
     with: MapScore,
 }
 
-pub(super) fn run(args: &Args) -> Outcome {
+pub(crate) fn run(args: &Args) -> Outcome {
     if let Some(folder) = &args.out {
         make_folder(folder)?;
     }
@@ -134,48 +132,19 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 /// All courses, on as many threads as there are cores.
 fn trials(args: &Args) -> Result<Vec<Row>, Failure> {
-    let count = args.maps as usize;
-    let bar = progress::bar(count as u64, "courses");
-    let (next, rows) = (AtomicUsize::new(0), Mutex::new(Vec::with_capacity(count)));
-    let failure = Mutex::new(None);
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(|| {
-                loop {
-                    let course = next.fetch_add(1, Ordering::Relaxed);
-                    if course >= count {
-                        break;
-                    }
-                    match trial(args, course) {
-                        Ok(row) => lock(&rows).push(row),
-                        Err(error) => {
-                            lock(&failure).get_or_insert(error);
-                            next.store(count, Ordering::Relaxed);
-                        }
-                    }
-                    bar.inc(1);
-                }
-            });
-        }
-    });
+    let bar = progress::bar(u64::from(args.maps), "courses");
+    let rows = (0..args.maps as usize)
+        .into_par_iter()
+        .map(|course| trial(args, course).inspect(|_| bar.inc(1)))
+        .collect();
     bar.finish_and_clear();
-    if let Some(failure) = lock(&failure).take() {
-        return Err(failure);
-    }
-    let mut rows = std::mem::take(&mut *lock(&rows));
-    rows.sort_by_key(|row| row.course);
-    Ok(rows)
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    rows
 }
 
 /// One course: its scene, arrangement and random numbers follow from its number and the seed.
 fn trial(args: &Args, course: usize) -> Result<Row, Failure> {
     let refuse = |error: &dyn std::fmt::Display| {
-        Failure::input(error.to_string(), "see `sonard benchmark map --help`")
+        Failure::input(error.to_string(), "see `sonard-papers benchmark map --help`")
     };
     let mut rng = Pcg64::seed_from_u64(args.seed.wrapping_mul(1_000_003) ^ course as u64);
     let (name, scene, start) = scene(course % 8, &mut rng)?;
@@ -233,12 +202,12 @@ fn scene(number: usize, rng: &mut Pcg64) -> Result<(&'static str, Scene, DVec2),
     }
     let (name, boxes, partitions) = MADE_UP[number - SHIPPED.len()];
     let scene = random_room(name, boxes, partitions, rng);
-    let start = scene.poses.get("start").map_or(DVec2::ZERO, crate::geometry::Pose::position);
+    let start = scene.poses.get("start").map_or(DVec2::ZERO, Pose::position);
     Ok((name, scene, start))
 }
 
 fn save(
-    (folder, overwrite): (&std::path::Path, Overwrite),
+    (folder, overwrite): (&Path, Overwrite),
     stem: &str,
     scene: &Scene,
     course: &Course,
@@ -259,7 +228,7 @@ fn save(
         };
         let png = draw_map(&view)
             .map_err(|error| Failure::input(error, "choose a coarser --resolution"))?;
-        overwrite.save(&path, Product::Png, &png)?;
+        overwrite.save(&path, &png)?;
     }
     Ok(())
 }

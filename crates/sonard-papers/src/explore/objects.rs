@@ -1,6 +1,6 @@
 //! Lines that belong to one object, and the order in which objects are explored.
 
-use crate::interpret::lines::MapLine;
+use sonard_interpret::interpret::lines::MapLine;
 use sonard_model::geometry::DVec2;
 
 /// Lines closer than this are of one object, metres.

@@ -1,13 +1,13 @@
 //! Reliability diagrams: how often claims came true, against how probable they were said to be.
 
-use super::{
+use crate::calibration::{Bin, Reliability};
+use sonard_plot::{
+    Picture,
     canvas::{Anchor, Layer, Px, Rect, Shape},
     caption,
     legend::{self, Entry, Sample},
-    picture::Picture,
     theme, ticks,
 };
-use sonard_interpret::interpret::calibration::{Bin, Reliability};
 
 const SIDE_PX: f64 = 520.0;
 const COUNTS_PX: f64 = 110.0;

@@ -4,7 +4,8 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::laser::{Laser, side_by_side};
-use crate::interpret::{Beam, Heard, Sweep, lines::LaserScan, trial::hear};
+use crate::trial::hear;
+use sonard_interpret::interpret::{Beam, Heard, Sweep, lines::LaserScan};
 use sonard_model::{
     geometry::{DVec2, Pose, wrap_360, wrap_pi},
     model::{Simulator, TooCostly, raycast::Reflectors},

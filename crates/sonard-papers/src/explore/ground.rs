@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use pathfinding::prelude::{build_path, dijkstra_all};
 
-use crate::interpret::{grid::GridShape, lines::MapLine};
+use sonard_interpret::interpret::{grid::GridShape, lines::MapLine};
 use sonard_model::geometry::DVec2;
 
 /// Side of a cell, metres.
