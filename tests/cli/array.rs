@@ -88,7 +88,7 @@ fn rangers_that_fire_too_soon_or_at_once_hear_one_another() {
     }
     // What is predicted again is the same, and nobody hears anybody where that is left out.
     let again = folder.path().join("again.jsonl").to_str().expect("plain path").to_owned();
-    let predicted = run(&["predict", &hasty_log, "--scene", "mcgill-lab", "--out", &again]);
+    let predicted = run(&["predict", &hasty_log, "--scene", "mcgill-lab", "-o", &again]);
     assert!(predicted.status.success(), "{}", stderr(&predicted));
     for ping in Log::read(Path::new(&again)).pings() {
         assert_eq!(ping["sim"]["crosstalk"], ping["crosstalk"], "{ping}");

@@ -217,13 +217,15 @@ fn logs_of_other_formats_are_rejected() {
             vec!["log", "annotate", log],
             vec!["log", "show", log],
         ] {
-            let said = check(&arguments, 2);
+            // Lines of the message are wrapped.
+            let said = check(&arguments, 2).replace('\u{2502}', " ");
+            let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
             assert!(said.contains(&format!("log format {format} is not supported")), "{said}");
             assert!(said.contains("read the log with the version that wrote it"), "{said}");
         }
         let said = check(&["log", "verify", log], 1);
         assert!(said.contains(&format!("problem: format: log format {format} ")), "{said}");
-        check(&["log", "repair", log], 1);
+        check(&["log", "repair", log], 0);
         assert_eq!(fs::read_to_string(log).expect("readable"), text);
     }
 }

@@ -19,33 +19,43 @@ pub type Px = DVec2;
 /// A rectangle on the page.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rect {
+    /// Left edge, px.
     pub left: f64,
+    /// Upper edge, px.
     pub top: f64,
+    /// Right edge, px.
     pub right: f64,
+    /// Lower edge, px.
     pub bottom: f64,
 }
 
 impl Rect {
+    /// Rectangle of an upper left corner and a size, px.
     pub fn new(left: f64, top: f64, width: f64, height: f64) -> Self {
         Self { left, top, right: left + width, bottom: top + height }
     }
 
+    /// Width, px.
     pub fn width(&self) -> f64 {
         self.right - self.left
     }
 
+    /// Height, px.
     pub fn height(&self) -> f64 {
         self.bottom - self.top
     }
 
+    /// Centre, px.
     pub fn center(&self) -> Px {
         Px::new((self.left + self.right) / 2.0, (self.top + self.bottom) / 2.0)
     }
 
+    /// Returns `true` if a point is inside or on the edge.
     pub fn contains(&self, at: Px) -> bool {
         (self.left..=self.right).contains(&at.x) && (self.top..=self.bottom).contains(&at.y)
     }
 
+    /// Returns `true` if another rectangle is inside or on the edge.
     pub fn encloses(&self, other: &Self) -> bool {
         self.left <= other.left
             && self.top <= other.top
@@ -53,6 +63,7 @@ impl Rect {
             && other.bottom <= self.bottom
     }
 
+    /// Returns `true` if the interiors of both overlap.
     pub fn meets(&self, other: &Self) -> bool {
         self.left < other.right
             && other.left < self.right
@@ -64,18 +75,26 @@ impl Rect {
 /// Which part of a text stands at the point given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
+    /// Text begins at the point.
     Start,
+    /// Text is centred on the point.
     Middle,
+    /// Text ends at the point.
     End,
 }
 
 /// Shapes of marks; each kind of reading has its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Shape {
+    /// Filled circle.
     Dot,
+    /// Filled square.
     Square,
+    /// Filled triangle.
     Triangle,
+    /// Filled rhombus.
     Diamond,
+    /// Two crossed lines.
     Cross,
 }
 
@@ -110,16 +129,19 @@ impl Layer {
             .with("paint-order", "stroke")
     }
 
+    /// Appends a layer.
     pub fn add(&mut self, layer: Self) {
         self.node(layer.group);
     }
 
+    /// Appends layers in order.
     pub fn extend(&mut self, layers: impl IntoIterator<Item = Self>) {
         for layer in layers {
             self.add(layer);
         }
     }
 
+    /// SVG group of the layer.
     pub fn into_group(self) -> Group {
         self.group
     }
@@ -128,6 +150,7 @@ impl Layer {
         svg::node::Node::append(&mut self.group, node);
     }
 
+    /// Adds a straight line.
     pub fn line(&mut self, from: Px, to: Px) {
         let line = Line::new()
             .set("x1", tidy(from.x))
@@ -137,6 +160,7 @@ impl Layer {
         self.node(line);
     }
 
+    /// Adds a circle.
     pub fn circle(&mut self, center: Px, radius_px: f64) {
         let circle = Circle::new()
             .set("cx", tidy(center.x))
@@ -145,6 +169,7 @@ impl Layer {
         self.node(circle);
     }
 
+    /// Adds a rectangle with rounded corners.
     pub fn rect(&mut self, rect: Rect, radius_px: f64) {
         let rect = Rectangle::new()
             .set("x", tidy(rect.left))

@@ -8,36 +8,52 @@ use super::{
 /// One entry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
+    /// Drawn sample.
     pub sample: Sample,
+    /// Meaning of the sample.
     pub text: String,
 }
 
 /// What stands before the words.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Sample {
+    /// Mark of a reading.
     Mark {
+        /// Shape of the mark.
         shape: Shape,
+        /// Fill.
         colour: &'static str,
     },
+    /// Open circle.
     Ring {
+        /// Stroke.
         colour: &'static str,
     },
+    /// Line.
     Line {
+        /// Stroke.
         colour: &'static str,
+        /// Stroke width, px.
         width_px: f64,
+        /// SVG dash array, or `none`.
         dash: &'static str,
     },
+    /// Short radial stroke.
     Tick {
+        /// Stroke.
         colour: &'static str,
     },
     /// A framed area.
     Patch {
+        /// Fill.
         colour: &'static str,
     },
+    /// Arrow that points out of the view.
     Outward,
 }
 
 impl Entry {
+    /// Entry of a sample and its meaning.
     pub fn new(sample: Sample, text: impl Into<String>) -> Self {
         Self { sample, text: text.into() }
     }

@@ -2,10 +2,7 @@
 //! free of walls.
 
 use resvg::{tiny_skia::Pixmap, usvg::roxmltree};
-use sonard_interpret::interpret::{
-    calibration::{Bin, Reliability},
-    grid::{Grid, GridShape},
-};
+use sonard_interpret::interpret::grid::{Grid, GridShape};
 use sonard_model::geometry::DVec2;
 use sonard_records::Provenance;
 

@@ -14,7 +14,9 @@ use sonard_model::{
 /// A region of the floor, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
+    /// Lower left corner, metres.
     pub min: DVec2,
+    /// Upper right corner, metres.
     pub max: DVec2,
 }
 
@@ -43,14 +45,17 @@ impl Bounds {
         Self::around(ends.chain(discs))
     }
 
+    /// Smallest bounds that also contain the points.
     pub fn including(self, points: impl IntoIterator<Item = DVec2>) -> Self {
         Self::around(points.into_iter().chain([self.min, self.max])).unwrap_or(self)
     }
 
+    /// Width and height, metres.
     pub fn size(&self) -> DVec2 {
         self.max - self.min
     }
 
+    /// Bounds with a margin on each side, metres.
     pub fn grown(self, by_m: f64) -> Self {
         let by = DVec2::splat(by_m);
         Self { min: self.min - by, max: self.max + by }
@@ -83,6 +88,7 @@ impl Plan {
         (width_px * size.y / size.x).clamp(limits_px[0], limits_px[1]).round()
     }
 
+    /// Point of the page, px, of a point of the scene, metres.
     pub fn px(&self, at: DVec2) -> Px {
         let from_corner = (at - self.view.min) * self.px_per_m;
         Px::new(self.panel.left + from_corner.x, self.panel.bottom - from_corner.y)
@@ -94,6 +100,7 @@ impl Plan {
         self.view.min + from_corner / self.px_per_m
     }
 
+    /// Length on the page, px, of a length in the scene, metres.
     pub fn length_px(&self, length_m: f64) -> f64 {
         length_m * self.px_per_m
     }
@@ -148,7 +155,7 @@ impl Plan {
     }
 
     /// Room for texts in the panel, off the walls of a scene.
-    pub fn labels(&self, scene: Option<&Scene>) -> Labels {
+    pub(crate) fn labels(&self, scene: Option<&Scene>) -> Labels {
         let mut labels = Labels::new(self.panel);
         for wall in scene.iter().flat_map(|scene| &scene.walls) {
             labels.keep_off(self.px(wall.a), self.px(wall.b));
@@ -178,7 +185,7 @@ impl Plan {
     }
 
     /// Names of walls and cylinders, where there is room for them.
-    pub fn names(&self, scene: &Scene, labels: &mut Labels) -> Layer {
+    pub(crate) fn names(&self, scene: &Scene, labels: &mut Labels) -> Layer {
         let mut layer = Layer::new("names").with("fill", theme::QUIET).haloed();
         let middle = Bounds::of_scene(scene).map_or(DVec2::ZERO, |b| (b.min + b.max) / 2.0);
         let mut groups: Vec<(&str, Bounds)> = Vec::new();

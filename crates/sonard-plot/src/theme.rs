@@ -19,11 +19,17 @@ pub const WALL: &str = "#262626";
 /// The page.
 pub const PAPER: &str = "#ffffff";
 
+/// Blue.
 pub const BLUE: &str = "#0072b2";
+/// Light blue.
 pub const SKY: &str = "#56b4e9";
+/// Orange.
 pub const ORANGE: &str = "#e69f00";
+/// Red.
 pub const VERMILLION: &str = "#d55e00";
+/// Green.
 pub const GREEN: &str = "#009e73";
+/// Purple.
 pub const PURPLE: &str = "#b8578f";
 
 /// Names tried in this order; the first is the font that PNG files are made with.
@@ -42,7 +48,9 @@ pub const PAGE_PX: f64 = 1000.0;
 /// White space around everything, pixels.
 pub const MARGIN_PX: f64 = 18.0;
 
+/// Stroke width of walls, px.
 pub const WALL_PX: f64 = 2.2;
+/// Stroke width of grids, px.
 pub const HAIRLINE_PX: f64 = 0.7;
 
 /// Dash patterns for materials, most mirror-like first.

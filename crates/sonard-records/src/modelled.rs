@@ -122,15 +122,8 @@ impl From<Mechanism> for InteractionKind {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
-    use sonard_model::{
-        acoustics::Sensor,
-        geometry::DVec2,
-        model::{ConeOptions, EngineKind, EngineOptions, FanOptions, PathOptions},
-        scene::shipped,
-    };
+    use sonard_model::model::{ConeOptions, EngineKind, EngineOptions, FanOptions, PathOptions};
 
     #[test]
     fn air_survives_its_record() {

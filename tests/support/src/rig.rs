@@ -18,7 +18,7 @@ use sonard::{
 use tokio::{runtime::Runtime, sync::oneshot, task::JoinHandle};
 
 /// A stable name, and behind it whatever is plugged in: each time another device.
-pub(crate) struct Rig {
+pub struct Rig {
     link: PathBuf,
     runtime: Runtime,
     soundings: Soundings,
@@ -26,12 +26,12 @@ pub(crate) struct Rig {
     boots: u16,
     plugged: Option<(oneshot::Sender<()>, JoinHandle<std::io::Result<()>>)>,
     /// Faults that boards played.
-    pub(crate) played: Arc<AtomicU64>,
+    pub played: Arc<AtomicU64>,
 }
 
 impl Rig {
     /// With nothing plugged in. The stable name is `ranger` in `folder`.
-    pub(crate) fn new(folder: &Path, pace: Pace) -> Self {
+    pub fn new(folder: &Path, pace: Pace) -> Self {
         let text = shipped::text("simple-room").expect("a shipped scene");
         let scene = Scene::from_json(text).expect("it is right");
         let pose = scene.pose("fig9").expect("its pose");
@@ -51,7 +51,7 @@ impl Rig {
     }
 
     /// Options that let a daemon use this and try again soon.
-    pub(crate) fn options(&self) -> Vec<String> {
+    pub fn options(&self) -> Vec<String> {
         let port = self.link.display().to_string();
         let mut options: Vec<String> =
             ["--port", &port, "--scene", "simple-room", "--pose", "fig9"].map(str::to_owned).into();
@@ -68,7 +68,7 @@ impl Rig {
     }
 
     /// Plugs a board in, under a device name that was not there before.
-    pub(crate) fn plug(&mut self, faults: &str, seed: u64) {
+    pub fn plug(&mut self, faults: &str, seed: u64) {
         self.unplug();
         self.boots += 1;
         let faults: FaultPlan = faults.parse().expect("faults");
@@ -95,7 +95,7 @@ impl Rig {
     }
 
     /// Pulls it out: the line hangs up and the name is gone.
-    pub(crate) fn unplug(&mut self) {
+    pub fn unplug(&mut self) {
         if let Some((stop, playing)) = self.plugged.take() {
             let _ = stop.send(());
             drop(self.runtime.block_on(playing));
@@ -103,13 +103,13 @@ impl Rig {
     }
 
     /// Something that takes bytes and says nothing, as a board that hangs; until dropped.
-    pub(crate) fn plug_silent(&mut self) -> Pty {
+    pub fn plug_silent(&mut self) -> Pty {
         self.unplug();
         Pty::open(Some(&self.link)).expect("a pty")
     }
 
     /// A port that another program has open; until both are dropped.
-    pub(crate) fn plug_busy(&mut self) -> (Pty, tokio_serial::SerialStream, Unlink) {
+    pub fn plug_busy(&mut self) -> (Pty, tokio_serial::SerialStream, Unlink) {
         self.unplug();
         let pty = Pty::open(None).expect("a pty");
         let _context = self.runtime.enter();
@@ -118,13 +118,13 @@ impl Rig {
         (pty, taken, Unlink(self.link.clone()))
     }
 
-    pub(crate) fn played(&self) -> u64 {
+    pub fn played(&self) -> u64 {
         self.played.load(Ordering::Relaxed)
     }
 }
 
 /// Takes a name away when dropped.
-pub(crate) struct Unlink(PathBuf);
+pub struct Unlink(PathBuf);
 
 impl Drop for Unlink {
     fn drop(&mut self) {
@@ -133,7 +133,7 @@ impl Drop for Unlink {
 }
 
 /// Limits the size of files a process may write, as a full disk does; `None` lifts the limit.
-pub(crate) fn limit_files(process: u32, bytes: Option<u64>) {
+pub fn limit_files(process: u32, bytes: Option<u64>) {
     use rustix::process::{Pid, Resource, Rlimit, prlimit};
     let pid = Pid::from_raw(process.cast_signed());
     prlimit(pid, Resource::Fsize, Rlimit { current: bytes, maximum: None }).expect("it runs");

@@ -1,7 +1,7 @@
 //! Start and stop from the page, with and without a token.
 
 use super::{browser::Browser, browser::DESK, daemon, scanning};
-use crate::{common::wait_until, daemon::write_token};
+use sonard_test_support::{daemon::write_token, wait_until};
 
 #[test]
 fn without_a_token_the_page_says_why_nothing_is_started() {

@@ -8,9 +8,9 @@ use super::{
     browser::{Browser, DESK},
     show_log,
 };
-use crate::{
-    common::{run, stderr},
-    daemon::viewpoint::{start_ahead, start_array},
+use sonard_test_support::{
+    daemon::{start_ahead, start_array},
+    run, stderr,
 };
 
 /// Engines without envelopes: a range is half its path's length, without time walk.

@@ -5,10 +5,10 @@ use super::{
     assert_clean,
     browser::{Browser, DESK, DESK_DARK, PHONE, PHONE_DARK},
 };
-use crate::daemon::fleet::{Fleet, soon};
+use sonard_test_support::{fleet::Fleet, wait_until};
 
 #[test]
-fn each_robot_has_its_card_and_a_change_is_seen_within_five_seconds() {
+fn each_robot_has_its_card_and_a_change_is_seen_on_the_page() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut fleet = Fleet::start(folder.path());
     let address = fleet.asking.address();
@@ -29,15 +29,14 @@ fn each_robot_has_its_card_and_a_change_is_seen_within_five_seconds() {
     fleet.rig.unplug();
     let state = "document.querySelector('#robots li:nth-child(1) .state').textContent";
     let lamp = "document.querySelector('#robots li:nth-child(1)').dataset.lamp";
-    let unplugged_s = soon("the unplugged one on the page", || browser.eval(lamp) == "bad");
+    wait_until("the unplugged one on the page", || browser.eval(lamp) == "bad");
     let text = browser.eval(state);
     assert!(text.as_str().is_some_and(|text| text.contains("since")), "{text}");
     fleet.robots[1].take().expect("it runs").kill();
     let summary = "document.getElementById('summary').textContent";
-    let killed_s = soon("the killed one on the page", || {
+    wait_until("the killed one on the page", || {
         browser.eval(summary).as_str().is_some_and(|text| text.contains("silent: mango"))
     });
-    println!("on the page: unplugged after {unplugged_s:.1} s, killed after {killed_s:.1} s");
 
     for screen in [DESK, DESK_DARK, PHONE, PHONE_DARK] {
         browser.look_through(screen);

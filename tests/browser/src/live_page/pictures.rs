@@ -6,7 +6,7 @@ use super::{
     pointer::{drag, place},
     scan_once,
 };
-use crate::daemon::{Daemon, write_token};
+use sonard_test_support::daemon::{Daemon, write_token};
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 const WIDE: Screen = Screen { name: "wide", size: (1280, 1010), phone: false, dark: false };

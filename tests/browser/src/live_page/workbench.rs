@@ -12,9 +12,9 @@ use super::{
     pointer::{drag, place},
     scan_once,
 };
-use crate::{
-    common::wait_until,
-    daemon::{Daemon, model::write_scans, viewpoint::start_array, write_token},
+use sonard_test_support::{
+    daemon::{Daemon, start_array, write_scans, write_token},
+    wait_until,
 };
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";

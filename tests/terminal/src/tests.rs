@@ -1,4 +1,4 @@
-//! Prompts at a terminal with somebody at it.
+//! Prompts and progress bars at a terminal.
 
 use rexpect::{
     process::WaitStatus,
@@ -6,8 +6,7 @@ use rexpect::{
     session::{PtySession, spawn_with_options},
 };
 
-use super::Case;
-use crate::common::sonard;
+use sonard_test_support::{collection::Case, program, sonard};
 
 /// Somebody at a terminal of their own, in which a collection runs.
 struct Person(PtySession);
@@ -91,4 +90,23 @@ fn poses_typed_at_a_terminal_are_kept_over_an_interrupt() {
     person.answers("pose 3 (", "");
     assert_eq!(person.waits().1, 0);
     case.assert_each_scan_once(2, 1, 25);
+}
+
+#[test]
+fn an_exploration_shows_its_progress() {
+    let mut command = std::process::Command::new(program("sonard-papers"));
+    command.args([
+        "explore",
+        "--scene",
+        "corridor",
+        "--pose",
+        "beside-wall",
+        "--odometry-noise",
+        "0.005",
+    ]);
+    command.env("TERM", "xterm");
+    let options = Options::new().timeout_ms(Some(60_000)).strip_ansi_escape_codes(true);
+    let mut terminal = spawn_with_options(command, options).expect("a terminal");
+    terminal.exp_regex("[0-9]+ stops, [0-9]+ m driven").expect("progress");
+    terminal.exp_string("laser shots").expect("the result");
 }

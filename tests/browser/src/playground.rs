@@ -26,7 +26,7 @@ fn open_with(screen: Screen, fragment: &str) -> Browser {
     assert!(
         page.exists(),
         "{}: build it with web/build.sh, or leave it out with `PLAYGROUND=0 ./test.sh` or \
-         `cargo test -- --skip playground::`",
+         `cargo test -p sonard-browser-tests -- --skip playground::`",
         page.display()
     );
     let browser = Browser::open_at(&format!("file://{}{fragment}", page.display()), screen);

@@ -9,7 +9,7 @@ use super::{
     browser::{Browser, DESK, DESK_DARK, PHONE, PHONE_DARK},
     daemon, scan_once,
 };
-use crate::daemon::write_token;
+use sonard_test_support::daemon::write_token;
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 

@@ -1,10 +1,8 @@
 //! The playground as a daemon serves it.
 
 use super::{settled, told};
-use crate::{
-    daemon::Daemon,
-    live_page::browser::{Browser, DESK},
-};
+use crate::live_page::browser::{Browser, DESK};
+use sonard_test_support::daemon::Daemon;
 
 #[test]
 fn a_daemon_serves_the_playground_under_its_strict_policy() {

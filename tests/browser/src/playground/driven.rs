@@ -6,13 +6,11 @@ use fantoccini::key::Key;
 use serde_json::json;
 
 use super::{assert_clean, legend, open, open_with, set, settled, told};
-use crate::{
-    common::{run, stderr},
-    live_page::{
-        browser::{Browser, DESK, PHONE},
-        view::check_view,
-    },
+use crate::live_page::{
+    browser::{Browser, DESK, PHONE},
+    view::check_view,
 };
+use sonard_test_support::{run, stderr};
 
 /// The number after some words of the legend, 0 without them.
 fn counted(browser: &Browser, words: &str) -> u64 {
@@ -285,7 +283,7 @@ fn drop_file(browser: &Browser, name: &str, text: &str) {
 fn a_log_and_a_table_are_shown_in_their_scene() {
     let browser = open(DESK);
     let folder = tempfile::tempdir().expect("a folder");
-    let scan = crate::common::mock_scan("fig9", folder.path(), &["--step-deg", "7.2"]);
+    let scan = sonard_test_support::mock_scan("fig9", folder.path(), &["--step-deg", "7.2"]);
     assert!(scan.status.success(), "{}", stderr(&scan));
     let log = fs::read_to_string(folder.path().join("scan.jsonl")).expect("a log");
     drop_file(&browser, "scan.jsonl", &log);

@@ -11,9 +11,9 @@ use super::{
     browser::{Browser, DESK, DESK_DARK},
     daemon, scan_once, show_log,
 };
-use crate::daemon::Daemon;
+use sonard_test_support::daemon::Daemon;
 
-const LOG: &str = include_str!("../../fixtures/small.jsonl");
+const LOG: &str = include_str!("../../../fixtures/small.jsonl");
 
 /// Numbers of the legend by what they count.
 fn legend(browser: &Browser) -> BTreeMap<String, u64> {

@@ -9,9 +9,10 @@ use super::{
     browser::{Browser, DESK},
     count_points,
 };
-use crate::{
-    common::{run, wait_until},
-    daemon::{Daemon, rig::Rig, write_token},
+use sonard_test_support::{
+    daemon::{Daemon, write_token},
+    rig::Rig,
+    run, wait_until,
 };
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";

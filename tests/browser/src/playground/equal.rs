@@ -11,10 +11,8 @@ use sonard::{
 };
 
 use super::{open, told};
-use crate::{
-    common::{run, stderr},
-    live_page::browser::{Browser, DESK},
-};
+use crate::live_page::browser::{Browser, DESK};
+use sonard_test_support::{run, stderr};
 
 /// Poses tried in each scene: `SONARD_PLAYGROUND_POSES` for more.
 const POSES: usize = 6;

@@ -18,8 +18,8 @@ use std::path::Path;
 use fantoccini::key::Key;
 use serde_json::{Value, json};
 
-use crate::{common::wait_until, daemon::Daemon};
 use browser::{Browser, DESK};
+use sonard_test_support::{daemon::Daemon, wait_until};
 
 /// A full turn of a hundred beams, which takes some four seconds.
 const PLAN: [&str; 4] = ["--set", "plan.step_deg=3.6", "--set", "model.max_range_m=3"];
