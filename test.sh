@@ -1,38 +1,41 @@
 #!/usr/bin/env bash
-# Everything a change must pass. Installs what is missing where it may, else says what to install.
+# Tests of a change, in three tiers. Each installs what is missing where it may, else names it, and prints the time of its
+# steps.
 #
-#   ./test.sh            all of it
-#   ./test.sh quick      format, lints, unit tests: what to run while at work
-#   FUZZ_SECONDS=60 ./test.sh   fuzz each target for a minute (default 8 s, beside
-#                               other steps; 0 leaves fuzzing out)
-#   FIRMWARE=0 ./test.sh        leave firmware and emulator out, where they can't be built: they
-#                               need Debian's packages (firmware/test.sh)
-#   PAGE=0 ./test.sh            leave the live page out, where there is no Chromium to look at it
-#   PLAYGROUND=0 ./test.sh      leave the playground out, where there is no npm, node or WebAssembly target
-#   AXE=0 ./test.sh             leave axe-core out of that, where there is no npm to get it with
-#   SCHEMATHESIS=0 ./test.sh    leave the fuzzer of the API out, where there is no Python or PyPI
-#   PYTHON=0 ./test.sh          leave the package for Python out, where there is no Python or PyPI
-#   EXPORT_PEERS=0 ./test.sh    leave the other programs that read exports out, where there is no PyPI
-#   FOXGLOVE_PEER=0 ./test.sh   leave Foxglove's client library out, where there is no npm or node
-#   ROS_PEER=0 ./test.sh        leave Cyclone DDS out, where there is no PyPI, or no network of its own can be opened
-#   MQTT_PEER=0 ./test.sh       leave mosquitto out, where Debian's packages can't be had
-#   PROMTOOL=0 ./test.sh        leave promtool out, where Debian's prometheus can't be had
-#   FAKETIME=0 ./test.sh        leave the clock that is set out, where there is no libfaketime
-#   BOOT=0 ./test.sh            leave the units under a booted systemd out (systemd/boot-test.sh)
-#   PACKAGE=1 ./test.sh         make, install, upgrade and remove the Debian package, too, with the program that
-#                               the tests use in it; PACKAGE=release with the one that is shipped, which takes ten
-#                               minutes more; PACKAGE=all also cross-builds that for a Raspberry Pi and runs it in
-#                               an emulator
-#   PROPTEST_RNG_SEED=$RANDOM PROPTEST_CASES=5000 ./test.sh quick   other random cases than each time's
-#   SONARD_SOAK_FAULTS=1000 SONARD_KILLS=200 SONARD_COLLECT_KILLS=200 ./test.sh   longer runs of daemon
-#                               and collection among faults
+#   ./test.sh quick      format, Clippy, unit tests
+#   ./test.sh            the above, tests of the program, doctests, smoke tests of page, playground and Python
+#   ./test.sh all        the above, long tests, browser tests, firmware and emulator, other programs, API fuzzer, package,
+#                        booted units, fuzz targets, Python package, documentation: what CI runs
 #
-# Everything is built with --workspace and the same features, so that nothing is built twice
-# (workspace-hack). Steps that build something of their own, or wait more than they compute, run beside the others
-# (tests/steps.sh), and the tests by themselves at the end: by cargo-nextest where it is installed, else by cargo test.
+# Switches of the last two:
+#   PAGE=0               without the live page (Chromium)
+#   PLAYGROUND=0         without the playground (WebAssembly target; in `all` also npm and node)
+#   PYTHON=0             without the Python package (Python, PyPI)
+# Switches of `all`:
+#   FUZZ_SECONDS=60      time for each fuzz target (default 8; 0: none)
+#   FIRMWARE=0           without firmware and emulator (Debian packages: firmware/test.sh)
+#   AXE=0                without axe-core (npm)
+#   SCHEMATHESIS=0       without the API fuzzer (PyPI)
+#   EXPORT_PEERS=0       without other programs that read exports (PyPI)
+#   FOXGLOVE_PEER=0      without Foxglove's client library (npm, node)
+#   ROS_PEER=0           without Cyclone DDS (PyPI, a network namespace)
+#   MQTT_PEER=0          without mosquitto (Debian packages)
+#   PROMTOOL=0           without promtool (Debian package prometheus)
+#   FAKETIME=0           without the clock that is set (libfaketime)
+#   BOOT=0               without units under a booted systemd (systemd/boot-test.sh)
+#   PACKAGE=1            with the Debian package around the tests' program: build, installation, upgrade, removal;
+#                        PACKAGE=release with the release build, PACKAGE=all also for a Raspberry Pi
+#   SONARD_SOAK_FAULTS=1000 SONARD_KILLS=200 SONARD_COLLECT_KILLS=200   more faults and kills
+# Other random cases: PROPTEST_RNG_SEED=$RANDOM PROPTEST_CASES=5000 ./test.sh quick
+#
+# Cargo gets the same packages and features in every step of a tier, so that nothing is built twice. Steps that mostly wait
+# run beside others (tests/steps.sh), the tests by themselves at the end: by cargo-nextest if installed, else by cargo test.
 set -euo pipefail
 cd "$(dirname "$0")"
+root=$PWD
+tier=${1:-default}
 fuzz_seconds=${FUZZ_SECONDS:-8}
+if [ "$tier" != all ]; then fuzz_seconds=0; fi
 work=$(mktemp -d)
 trap 'end_lanes; rm -rf "$work"' EXIT
 
@@ -52,6 +55,11 @@ check_tools() {
       fail "$component is missing: rustup component add $component"
   done
   # Not installed here: to build it takes longer than it saves.
+  if [ "$tier" != quick ]; then
+    local needed=()
+    for program in curl rsync; do command -v "$program" >/dev/null || needed+=("$program"); done
+    if [ ${#needed[@]} != 0 ]; then tests/install.sh "" "${needed[@]}"; fi
+  fi
   case $runner in
   nextest) printf 'tests are run by cargo-nextest: %s\n' "$(cargo nextest --version | head -n 1)" ;;
   cargo) printf 'tests are run by cargo test; cargo-nextest, which is not installed, would run them side by side\n' ;;
@@ -69,9 +77,7 @@ check_text() {
   cargo fmt --manifest-path python/Cargo.toml -- --check
   cargo fmt --manifest-path web/wasm/Cargo.toml -- --check
   step "clippy, warnings denied"
-  cargo clippy --workspace --all-targets "${features[@]}" --quiet -- -D warnings
-  # As it is built by default: the workspace asks for the feature mqtt, too.
-  cargo clippy --package sonard --quiet -- -D warnings
+  cargo clippy "${selection[@]}" --all-targets --quiet -- -D warnings
 }
 
 check_pure_part() {
@@ -81,7 +87,7 @@ check_pure_part() {
 
 check_documentation() {
   step "documentation, warnings denied"
-  RUSTDOCFLAGS="-D warnings" gently cargo doc --workspace "${features[@]}" --no-deps --quiet
+  RUSTDOCFLAGS="-D warnings" gently cargo doc "${selection[@]}" --no-deps --quiet
 }
 
 fuzz() {
@@ -101,18 +107,18 @@ build_firmware() {
   fi
   step "firmware"
   firmware/test.sh build || fail "firmware: see above. Where it can't be built, FIRMWARE=0 leaves it and the emulator out"
-  features=(--features sonard-emulator/simavr)
+  selection[2]+=,sonard-emulator/simavr
 }
 
 build_tests() {
   step "build of the tests"
-  if [ "${FAKETIME:-1}" != 0 ] && ! ls /usr/lib/*/faketime/libfaketime.so.1 >/dev/null 2>&1; then
+  if [ "$tier" = all ] && [ "${FAKETIME:-1}" != 0 ] && ! ls /usr/lib/*/faketime/libfaketime.so.1 >/dev/null 2>&1; then
     tests/install.sh "leave the clock that is set out with FAKETIME=0" libfaketime
   fi
   if [ "$runner" = nextest ]; then
-    cargo nextest run --workspace "${tested[@]}" "${features[@]}" --no-run --cargo-quiet
+    cargo nextest run "${selection[@]}" "${tested[@]}" --no-run --cargo-quiet
   else
-    cargo test --workspace "${tested[@]}" "${features[@]}" --no-run --quiet
+    cargo test "${selection[@]}" "${tested[@]}" --no-run --quiet
   fi
 }
 
@@ -125,6 +131,7 @@ prepare_browser() {
   if ! command -v chromium >/dev/null || ! command -v chromedriver >/dev/null; then
     tests/install.sh "leave the page out with PAGE=0" chromium chromium-driver
   fi
+  if [ "$tier" != all ]; then return; fi
   if [ "${AXE:-1}" = 0 ]; then printf 'axe-core: LEFT OUT, because AXE=0\n'; else tests/axe.sh; fi
   chromium --version
 }
@@ -140,6 +147,33 @@ build_playground() {
   step "the playground"
   if ! command -v node >/dev/null; then tests/install.sh "leave the playground out with PLAYGROUND=0" nodejs npm; fi
   gently web/build.sh || fail "the playground: see above. Where it can't be built, PLAYGROUND=0 leaves it out"
+}
+
+smoke_page() {
+  if [ "${PAGE:-1}" = 0 ]; then return; fi
+  step "smoke test of the live page"
+  tests/page.sh "${CARGO_TARGET_DIR:-target}/debug/sonard"
+}
+
+smoke_playground() {
+  if [ "${PLAYGROUND:-1}" = 0 ]; then
+    step "smoke test of the playground: LEFT OUT, because PLAYGROUND=0"
+    return
+  fi
+  step "smoke test of the playground: types of its WebAssembly"
+  if command -v rustup >/dev/null; then
+    rustup --quiet target add wasm32-unknown-unknown || fail "no wasm32-unknown-unknown: PLAYGROUND=0 leaves the playground out"
+  fi
+  (cd web/wasm && CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$root/target}/wasm gently cargo check --locked --quiet)
+}
+
+smoke_python() {
+  if [ "${PYTHON:-1}" = 0 ]; then
+    step "smoke test of the Python package: LEFT OUT, because PYTHON=0"
+    return
+  fi
+  step "smoke test of the Python package"
+  gently python/test.sh smoke || fail "the Python package: see above. PYTHON=0 leaves it out"
 }
 
 check_units() {
@@ -182,12 +216,12 @@ check_package() {
 play_emulator() {
   if [ "${FIRMWARE:-1}" = 0 ]; then return; fi
   step "sonard on the emulated board"
-  firmware/test.sh play
+  FEATURES=${selection[2]} firmware/test.sh play
 }
 
 check_examples() {
   step "examples in the documentation"
-  gently cargo test --workspace "${features[@]}" --doc --quiet
+  gently cargo test "${selection[@]}" --doc --quiet
 }
 
 check_api() {
@@ -248,26 +282,43 @@ check_monitoring() {
   tests/monitoring.sh
 }
 
+# Tests of the program that take long, or whose subject is load: their modules and names. They run in `all` only.
+long=(
+  collect::interrupted daemon::clock daemon::foxglove::cost daemon::kill daemon::load daemon::mqtt::rogue daemon::soak
+  daemon::strangers inverse::
+)
+# Prints the parts of its arguments between bars, as in a regular expression.
+alternatives() { local IFS='|'; printf '%s' "$*"; }
+
 # run_tests [ARGUMENT...]: the closing lines are kept for the end.
 run_tests() {
   if [ $# = 0 ]; then set -- "${tested[@]}"; fi
+  local skipped=()
+  if [ "$tier" != all ]; then skipped+=("${long[@]}"); fi
+  if [ "$tier" = all ]; then
+    if [ "${PAGE:-1}" = 0 ]; then skipped+=(live_page:: playground::); fi
+    if ! has_playground; then skipped+=(playground::); fi
+  fi
   if [ "$runner" = nextest ]; then
-    local filter=(-E 'not test(/^(live_page|playground)::/)')
-    if has_playground; then filter=(); elif [ "${PAGE:-1}" != 0 ]; then filter=(-E 'not test(/^playground::/)'); fi
-    cargo nextest run --workspace "${features[@]}" "$@" "${filter[@]}" --cargo-quiet --no-fail-fast \
+    local filter=()
+    if [ ${#skipped[@]} != 0 ]; then filter=(-E "not test(/$(alternatives "${skipped[@]}")/)"); fi
+    cargo nextest run "${selection[@]}" "$@" "${filter[@]}" --cargo-quiet --no-fail-fast \
       --status-level slow --final-status-level fail 2>&1
   else
-    cargo test --workspace "${features[@]}" "$@" --no-fail-fast --quiet -- --skip live_page:: --skip playground:: 2>&1
+    local name skip=()
+    # A browser takes the processors that other tests want.
+    if [ "$tier" = all ]; then skipped+=(live_page:: playground::); fi
+    for name in "${skipped[@]}"; do skip+=(--skip "$name"); done
+    cargo test "${selection[@]}" "$@" --no-fail-fast --quiet -- "${skip[@]}" 2>&1
   fi | tee "$work/tests" | head -n "-$closing_lines"
 }
 
-# By itself: a browser takes the processors that tests of timing want. To nextest its configuration
-# says that.
+# To nextest its configuration says that browsers run by themselves.
 test_page() {
   if [ "${PAGE:-1}" = 0 ] || [ "$runner" = nextest ]; then return; fi
   step "the live page"
-  cargo test --workspace "${features[@]}" --test cli --quiet live_page::
-  if has_playground; then cargo test --workspace "${features[@]}" --test cli --quiet playground::; fi
+  cargo test "${selection[@]}" --test browser --quiet live_page::
+  if has_playground; then cargo test "${selection[@]}" --test browser --quiet playground::; fi
 }
 
 runner=cargo
@@ -276,7 +327,9 @@ if cargo nextest --version >/dev/null 2>&1; then runner=nextest; fi
 tested=(--lib --bins --tests)
 # What the runner says of all tests, with an empty line around it.
 closing_lines=3
-features=()
+# Packages and features: the default members with default features, or everything.
+selection=()
+if [ "$tier" = all ]; then selection=(--workspace --features sonard/mqtt,sonard/ros,sonard/sqlite); fi
 # A change is judged by the same random cases as the one before it.
 export PROPTEST_RNG_SEED=${PROPTEST_RNG_SEED:-2026}
 export SONARD_FIRMWARE=${SONARD_FIRMWARE:-$PWD/firmware/target/avr-none/release/sonard-firmware.elf}
@@ -288,14 +341,28 @@ finish() {
   exit "$code"
 }
 
-case ${1:-} in
+case $tier in
 quick)
   check_tools
   check_text
   step "unit tests"
   run_tests --lib || finish $?
   ;;
-"")
+default)
+  check_tools
+  lane "tools of others" prepare_browser
+  lane "apart from the workspace" smoke_playground smoke_python
+  check_text
+  check_pure_part
+  build_tests
+  join "tools of others"
+  smoke_page
+  check_examples
+  join "apart from the workspace"
+  step "tests"
+  run_tests || finish $?
+  ;;
+all)
   check_tools
   lane "tools of others" prepare_browser get_package_tools
   lane "apart from the workspace" build_playground fuzz build_python
@@ -316,6 +383,6 @@ quick)
   step "tests"
   run_tests || finish $?
   ;;
-*) fail "all (no argument) or quick, not $1" ;;
+*) fail "quick, all or no argument, not $tier" ;;
 esac
 finish 0

@@ -3,12 +3,16 @@
 # them.
 #
 #   docs/make-pictures.sh            all of them
-#   SONARD=path/to/sonard docs/make-pictures.sh    with a program that is built already
+#   SONARD=path/to/sonard SONARD_PAPERS=path/to/sonard-papers docs/make-pictures.sh    with built programs
 set -euo pipefail
 cd "$(dirname "$0")/.."
 if [ -z "${SONARD:-}" ]; then
   cargo build --release --quiet
   SONARD=target/release/sonard
+fi
+if [ -z "${SONARD_PAPERS:-}" ]; then
+  cargo build --release --quiet --package sonard-papers
+  SONARD_PAPERS=target/release/sonard-papers
 fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -46,7 +50,7 @@ done
 "$SONARD" plot "$work/fig9.jsonl" --azimuth-deg 270 -o "$pictures/simple-room-fig9-path.png"
 
 # One room explored in three ways.
-"$SONARD" benchmark explore --rooms 2 --out "$work/rooms" >/dev/null
+"$SONARD_PAPERS" benchmark explore --rooms 2 --out "$work/rooms" >/dev/null
 cp "$work/rooms/room-2/maps.png" "$pictures/explored.png"
 
 # Eight sonars of a Pioneer 3-DX.

@@ -19,6 +19,8 @@ step() { printf '\n== %s\n' "$*"; }
 fail() { printf 'firmware/test.sh: %s\n' "$*" >&2; exit 1; }
 
 elf=$PWD/firmware/target/avr-none/release/sonard-firmware.elf
+# Those of test.sh, so that nothing is built twice.
+features=${FEATURES:-sonard-emulator/simavr}
 
 get_tools() {
   step "firmware: tools"
@@ -51,14 +53,14 @@ build_firmware() {
 
 test_machine_code() {
   step "configuration, drawing, tests on the machine code"
-  SONARD_FIRMWARE=$elf timeout 2400 cargo test --workspace --features sonard-emulator/simavr --quiet \
+  SONARD_FIRMWARE=$elf timeout 2400 cargo test --workspace --features "$features" --quiet \
     --bin eeprom-image --bin wiring --test board -- --nocapture 2>&1 | grep -v '^Loaded '
 }
 
 play() {
   step "sonard on the emulated board"
   # Both programs as tests use them: built for those, they are not built once more.
-  timeout 1800 cargo test --workspace --features sonard-emulator/simavr --quiet --no-run --test cli --test board
+  timeout 1800 cargo build --workspace --features "$features" --quiet --bin sonard --bin sonard-emulator
   target=${CARGO_TARGET_DIR:-$PWD/target}
   folder=$(mktemp -d)
   trap 'rm -rf "$folder"; [ -z "${emulated:-}" ] || kill "$emulated" 2>/dev/null || true' EXIT

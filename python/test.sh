@@ -5,6 +5,7 @@
 #   python/test.sh                          with the python3 on the path
 #   python/test.sh build                    the wheel and lints alone, which needs no command `sonard`
 #   python/test.sh tests                    the rest, with the wheel that was built
+#   python/test.sh smoke                    an unoptimised build, and the tests of the model
 #   PYTHON_INTERPRETERS="python3.10 python3.13" python/test.sh   run the tests with each of these, too
 #
 # The command `sonard` that readings are compared with is taken from the repository's target/debug; if there is
@@ -33,7 +34,7 @@ install_wheel() {
 tool() { (cd "$work" && "$OLDPWD/target/venv/bin/$1" "${@:2}"); }
 
 run_tests() {
-  [ -x "$SONARD" ] || (cd .. && unset CARGO_TARGET_DIR && cargo build --workspace --quiet)
+  [ -x "$SONARD" ] || (cd .. && unset CARGO_TARGET_DIR && cargo build --quiet)
   install_wheel target/venv
   tool python -m mypy.stubtest --mypy-config-file "$PWD/pyproject.toml" sonard
   tool python -m mypy --config-file "$PWD/pyproject.toml" --cache-dir "$work/mypy" \
@@ -49,7 +50,13 @@ run_tests() {
   done
 }
 
-../tests/venv.sh target/venv PYTHON=0 "${needed[@]}"
+smoke() {
+  VIRTUAL_ENV=$PWD/target/venv-smoke target/venv-smoke/bin/maturin develop --locked --quiet
+  target/venv-smoke/bin/pytest --quiet tests/test_model.py
+}
+
+if [ "${1:-}" = smoke ]; then needed=(maturin numpy pytest hypothesis) venv=target/venv-smoke; else venv=target/venv; fi
+../tests/venv.sh "$venv" PYTHON=0 "${needed[@]}"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 case ${1:-} in
@@ -59,8 +66,9 @@ case ${1:-} in
   ;;
 build) build_wheel ;;
 tests) run_tests ;;
+smoke) smoke ;;
 *)
-  echo "python/test.sh: all (no argument), build or tests, not $1" >&2
+  echo "python/test.sh: all (no argument), build, tests or smoke, not $1" >&2
   exit 1
   ;;
 esac

@@ -17,7 +17,6 @@ macro_rules! print_line {
 
 mod answer;
 mod array;
-mod benchmark;
 #[cfg(feature = "pi")]
 mod board;
 mod calibrate;
@@ -25,11 +24,9 @@ mod collect;
 mod compare;
 mod daemon;
 mod doctor;
-mod explore;
 mod export;
 mod failure;
 mod findings;
-mod gather;
 mod generate;
 mod groups;
 mod import;
@@ -55,7 +52,6 @@ mod predictor;
 mod preset;
 mod prior;
 mod progress;
-mod renamed;
 mod run;
 mod runtime;
 mod scan;
@@ -105,9 +101,6 @@ enum Verb {
     Status(status::Args),
     /// Show the records of a running daemon as they are made
     Watch(watch::Args),
-    /// Collect the logs of many daemons in one folder
-    #[command(long_about = gather::ABOUT)]
-    Gather(gather::Args),
     /// Run a mock ranger on a pty, with echoes from the model
     #[command(long_about = mock::ABOUT)]
     Mock(mock::Args),
@@ -156,18 +149,12 @@ enum Verb {
     /// Make an occupancy grid from the scans of logs
     #[command(long_about = map::ABOUT)]
     Map(map::Args),
-    /// Let a simulated robot explore a scene and map it with lines
-    #[command(long_about = explore::ABOUT)]
-    Explore(explore::Args),
     /// Draw scans: floor plan, polar, residuals
     #[command(long_about = plot::ABOUT)]
     Plot(plot::Args),
     /// Check, repair or show a log
     #[command(subcommand)]
     Log(log::Verb),
-    /// Measure maps, interpretations and explorations with the metrics of the papers
-    #[command(subcommand)]
-    Benchmark(benchmark::Verb),
     /// Write manual pages and shell completions, for packages
     #[command(hide = true)]
     PackageFiles(package_files::Args),
@@ -208,11 +195,8 @@ fn command_line() -> Command {
 pub fn main() -> ExitCode {
     outlive_file_size_limit();
     let mut command = command_line();
-    let (arguments, hints) = renamed::translated(std::env::args_os());
-    for hint in hints {
-        notice!("{hint}");
-    }
-    let matches = command.try_get_matches_from_mut(arguments).unwrap_or_else(|error| error.exit());
+    let matches =
+        command.try_get_matches_from_mut(std::env::args_os()).unwrap_or_else(|error| error.exit());
     if let Err(failure) = output::guard(&command, &matches) {
         return failure::report(Err(failure));
     }
@@ -228,7 +212,6 @@ pub fn main() -> ExitCode {
         Verb::Run(args) => run::run(*args),
         Verb::Status(args) => status::run(&args),
         Verb::Watch(args) => watch::run(&args),
-        Verb::Gather(args) => gather::run(&args),
         Verb::Mock(args) => mock::run(&args),
         #[cfg(feature = "pi")]
         Verb::Board(args) => board::run(&args),
@@ -244,11 +227,9 @@ pub fn main() -> ExitCode {
         Verb::Interpret(args) => interpret::run(&args),
         Verb::Lines(args) => lines::run(&args),
         Verb::Map(args) => map::run(&args),
-        Verb::Explore(args) => explore::run(&args),
         Verb::Trace(args) => trace::run(&args),
         Verb::Plot(args) => plot::run(&args),
         Verb::Log(verb) => log::run(verb),
-        Verb::Benchmark(verb) => benchmark::run(verb),
         Verb::Generate(args) => generate::run(&args),
         Verb::PackageFiles(args) => package_files::run(&args),
         Verb::Scene(verb) => scene::run(verb),

@@ -129,20 +129,6 @@ impl Client {
         self.ask(Request::get(path), Bytes::new()).await
     }
 
-    /// Asks for a path's bytes from one on; the answer's status says whether it begins there (206) or at the first
-    /// (200).
-    ///
-    /// # Errors
-    /// As [`Self::get`].
-    pub async fn get_from(&self, path: &str, byte: u64) -> Result<Response<Incoming>, ClientError> {
-        let request = Request::get(path);
-        let request = match byte {
-            0 => request,
-            _ => request.header(header::RANGE, format!("bytes={byte}-")),
-        };
-        self.ask(request, Bytes::new()).await
-    }
-
     /// The whole of an answer, which is JSON of this type.
     ///
     /// # Errors

@@ -43,7 +43,7 @@ pub use sonard_export as export;
 #[cfg(feature = "generate")]
 pub use sonard_generate as generate;
 pub use sonard_import as import;
-pub use sonard_interpret::{compare, explore, interpret};
+pub use sonard_interpret::{compare, interpret};
 #[cfg(feature = "inverse")]
 pub use sonard_inverse as inverse;
 pub use sonard_model::{acoustics, array, geometry, model, motion, scene, viewpoint};
@@ -53,6 +53,8 @@ pub use sonard_records as scan;
 
 #[cfg(feature = "daemon")]
 pub mod api;
+#[cfg(feature = "daemon")]
+pub mod backoff;
 #[cfg(feature = "daemon")]
 pub mod cli;
 #[cfg(feature = "daemon")]
@@ -67,8 +69,6 @@ pub mod daemon;
 pub mod dataset;
 #[cfg(feature = "daemon")]
 pub mod fleet;
-#[cfg(feature = "daemon")]
-pub mod gather;
 #[cfg(feature = "store")]
 pub mod grid_file;
 #[cfg(feature = "daemon")]

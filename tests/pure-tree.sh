@@ -3,14 +3,21 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 pure=(sonard-model sonard-records sonard-export sonard-generate sonard-import sonard-interpret sonard-inverse sonard-plot)
-for crate in "${pure[@]}"; do
+# check CRATE BANNED...
+check() {
+  local crate=$1 tree banned
+  shift
   tree=$(cargo tree --package "$crate" --edges normal --prefix none --format '{p}' | cut -d' ' -f1 | sort -u)
-  for banned in tokio tokio-serial serialport axum rppal mio rustix clap sonard; do
+  for banned in "$@"; do
     if grep -qx "$banned" <<<"$tree"; then
       printf 'pure-tree: %s is in the dependency tree of %s:\n' "$banned" "$crate" >&2
       cargo tree --package "$crate" --edges normal --invert "$banned" >&2
       exit 1
     fi
   done
-done
-printf '%s: none depends on tokio, serialport, axum or rppal\n' "${pure[*]}"
+}
+shell=(tokio tokio-serial serialport axum rppal mio sonard)
+for crate in "${pure[@]}"; do check "$crate" "${shell[@]}" rustix clap; done
+# A program, with options and files.
+check sonard-papers "${shell[@]}"
+printf '%s: none depends on tokio, serialport, axum or rppal\n' "${pure[*]} sonard-papers"

@@ -10,7 +10,7 @@ target=${CARGO_TARGET_DIR:-target}
 tools=$target/tools/schemathesis
 tests/venv.sh "$tools" SCHEMATHESIS=0 schemathesis==4.32.5
 program=${1:-$target/debug/sonard}
-if [ $# = 0 ]; then cargo build --workspace --quiet; fi
+if [ $# = 0 ]; then cargo build --quiet; fi
 
 work=$(mktemp -d)
 daemon=

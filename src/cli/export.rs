@@ -15,17 +15,17 @@ use super::{
     output::{OutPath, Overwrite, Product, Stream},
 };
 use crate::{
+    collect::SCANS,
     export::{
         CsvExport, Export, ExportError, LogFile, McapExport, ParquetExport, Profile, Settings,
     },
-    gather::is_of_robot,
 };
 
 /// Options of `sonard export`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(super) struct Args {
-    /// Logs, folders of a daemon's logs, of `sonard gather`, of collections; - for standard input
+    /// Logs, folders of a daemon's logs (or one per robot), of collections; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// Format to write [default: as the ending of the output says]
@@ -80,7 +80,7 @@ pub(super) const ABOUT: &str = "\
 Write logs for other tools: recordings of ROS 2 (MCAP), tables (Parquet, CSV).
 
 All logs go into one output, scan by scan in their order. A folder stands for its logs in the order of their \
-names: of a collection those in `scans`, of gathered logs those of each robot.";
+names: a collection for those in `scans`, a folder of robots' folders for those of each robot.";
 
 const HELP: &str = "\
 Examples:
@@ -246,7 +246,7 @@ fn write(
     };
     let mut told = Told { logs: logs.len(), ..Told::default() };
     for log in logs {
-        let name = name_of(log);
+        let name = name_of(log, &args.logs);
         let mut refused = None;
         let read = for_each_scan(log, |scan| match export.scan(&name, &scan) {
             Ok(None) => {
@@ -293,9 +293,12 @@ fn attach(export: &mut dyn Export, log: &Path, name: &str) -> Result<(), Stop> {
     Ok(export.attach(&LogFile { name, bytes, written }, &mut file)?)
 }
 
-/// What a log is called in its export: with its robot, where logs of several were gathered.
-fn name_of(log: &Path) -> String {
+/// Name of a log in the export: its file name, preceded by the robot's folder if the log is from a folder of robots'
+/// folders, because logs of two robots may share their file name.
+fn name_of(log: &Path, given: &[PathBuf]) -> String {
     let name = log.file_name().unwrap_or(log.as_os_str()).to_string_lossy();
-    let robot = log.parent().filter(|folder| is_of_robot(folder)).and_then(Path::file_name);
+    let is_given = |folder: &&Path| given.iter().any(|path| path == folder);
+    let robot = log.parent().filter(|robot| robot.parent().as_ref().is_some_and(is_given));
+    let robot = robot.and_then(Path::file_name).filter(|robot| *robot != SCANS);
     robot.map_or_else(|| name.to_string(), |robot| format!("{}/{name}", robot.to_string_lossy()))
 }

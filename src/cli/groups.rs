@@ -5,15 +5,14 @@ use std::fmt::Write as _;
 use clap::Command;
 
 /// What the verbs are for, in the order in which a person comes to them.
-pub(super) const GROUPS: [(&str, &[&str]); 8] = [
-    ("Measure", &["scan", "collect", "run", "status", "watch", "gather", "import"]),
+pub(super) const GROUPS: [(&str, &[&str]); 7] = [
+    ("Measure", &["scan", "collect", "run", "status", "watch", "import"]),
     ("Model", &["simulate", "paths", "trace", "predict", "generate"]),
     ("Look at scans", &["plot", "compare", "interpret", "log", "export"]),
     ("Explain", &["calibrate", "locate"]),
-    ("Map", &["map", "lines", "explore"]),
+    ("Map", &["map", "lines"]),
     ("Device", &["doctor", "mock", "board"]),
     ("Scenes and presets", &["scene", "sensor", "array"]),
-    ("Benchmarks", &["benchmark"]),
 ];
 
 /// Widest name of a verb, and what stands between it and its meaning.

@@ -36,7 +36,7 @@ pub(super) struct Args {
     /// The file, or the folder of a recording; - for standard input
     file: PathBuf,
     /// File to write; the log goes to it instead of to standard output
-    #[arg(short, long, alias = "out", value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     output: Option<OutPath>,
     #[command(flatten)]
     overwrite: Overwrite,

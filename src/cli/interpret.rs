@@ -66,7 +66,7 @@ After O. Bozma and R. Kuc (IEEE PAMI 13, 1991): beams with the same range form a
 b(r), half way between what the sensor gives edges and what it gives planes and corners, is an edge. A plane is \
 seen in the same direction from a second position, a corner is not. Beyond the paper, an arc may have another \
 cause: reflections by several walls, multiple echoes between a wall and the ranger, a round body. That has a \
-probability too, which grows with the number of nearer arcs in front of it. `sonard benchmark interpret` \
+probability too, which grows with the number of nearer arcs in front of it. `sonard-papers benchmark interpret` \
 measures how often the claims are true. Repeats from one pose count as one scan. With one scan, planes and \
 corners stay `unresolved`, with the position for the next scan that decides most of them; give the log of that \
 scan too, and they are decided.";

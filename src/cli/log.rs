@@ -49,9 +49,9 @@ impl From<StoreError> for Failure {
     /// A path that can't be opened is wrong input; a lock or a disk that fails is not, wherever it is.
     fn from(error: StoreError) -> Self {
         match &error {
-            StoreError::Unreadable { .. } | StoreError::NoLog { .. } => {
-                Self::input(&error, error.help())
-            }
+            StoreError::Unreadable { .. }
+            | StoreError::NoLog { .. }
+            | StoreError::UnsupportedFormat { .. } => Self::input(&error, error.help()),
             StoreError::Open { source, .. } | StoreError::Write { source, .. }
                 if is_wrong_place(source) =>
             {

@@ -9,10 +9,10 @@ use std::{
 
 use super::{Failure, output::note_input, progress};
 use crate::{
+    collect::SCANS,
     compare::keep_every_second,
-    gather::is_of_robot,
     scan::{Record, ScanView},
-    store::{FileKind, LineError, StoreError, open_for_reading, read_log},
+    store::{FileKind, Line, LineError, StoreError, log_files, open_for_reading, read_log},
 };
 
 /// Lines that can't be read and are named; of more only the number is told.
@@ -44,8 +44,8 @@ impl Damage {
     }
 }
 
-/// The logs that are meant: a folder stands for those in it, one of a collection for its scans, one of `sonard gather`
-/// for those of all robots, in the order of their names. They are noted as read.
+/// Expands folders to their logs, ordered by name, and notes all of them as read: a collection to its scans, a folder
+/// without logs of its own to those of daemons in its subfolders (one per robot).
 ///
 /// # Errors
 /// A folder can't be read, or has no log in it.
@@ -56,7 +56,7 @@ pub(super) fn logs_in(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
             logs.push(path.clone());
             continue;
         }
-        let scans = path.join("scans");
+        let scans = path.join(SCANS);
         let folder = if scans.is_dir() { &scans } else { path };
         let found = logs_of(folder).and_then(|found| match found.is_empty() {
             true => logs_of_robots(folder),
@@ -89,14 +89,17 @@ fn logs_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(logs)
 }
 
-/// The logs of the robots that were gathered into a folder, robot by robot.
+/// Logs of daemons in the subfolders of `folder`, ordered by subfolder and name.
 fn logs_of_robots(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder)?.map(|entry| entry.map(|entry| entry.path()));
     let mut robots: Vec<_> = entries.collect::<io::Result<_>>()?;
-    robots.retain(|robot| is_of_robot(robot));
+    robots.retain(|robot| robot.is_dir());
     robots.sort();
-    let logs: Vec<_> = robots.iter().map(|robot| logs_of(robot)).collect::<io::Result<_>>()?;
-    Ok(logs.concat())
+    let mut logs = Vec::new();
+    for robot in robots {
+        logs.extend(log_files(&robot)?.into_iter().map(|log| robot.join(log.name)));
+    }
+    Ok(logs)
 }
 
 fn kind_of(reader: &mut impl std::io::BufRead) -> FileKind {
@@ -149,9 +152,23 @@ fn each_scan(
     let mut reader = progress::reading(log, open_for_reading(log)?);
     let kind = kind_of(&mut reader);
     let (mut damage, mut any, mut broken) = (Damage::default(), false, None);
+    let mut stop = |error: StoreError| -> Option<Option<Record>> {
+        broken = Some(error);
+        None
+    };
     let records = read_log(reader)
-        .map_while(|line| line.map_err(|source| broken = Some(source)).ok())
-        .filter_map(|line| line.record.map_err(|error| damage.note(log, &error)).ok())
+        .map_while(|line| match line {
+            Ok(Line { record: Ok(record), .. }) => Some(Some(record)),
+            Ok(Line { record: Err(error), .. }) => match error.reject_other_format(log) {
+                Ok(error) => {
+                    damage.note(log, &error);
+                    Some(None)
+                }
+                Err(error) => stop(error),
+            },
+            Err(source) => stop(StoreError::Read { path: log.into(), source }),
+        })
+        .flatten()
         .inspect(|record| {
             any = true;
             see(record);
@@ -163,7 +180,7 @@ fn each_scan(
     }
     damage.sum_up(log);
     match broken {
-        Some(source) => Err(StoreError::Read { path: log.into(), source }.into()),
+        Some(error) => Err(error.into()),
         None if any => Ok(()),
         None => Err(no_record(log, kind)),
     }

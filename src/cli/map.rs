@@ -114,7 +114,7 @@ Examples:
   sonard map run/*.jsonl --out map
   sonard map scan.jsonl --out map --feature-prediction off --resolution 0.02 --json
   sonard map today.jsonl --onto map --out map-today
-  sonard benchmark score map simple-room
+  sonard-papers benchmark score map simple-room
 
 A confidence is 0.5 for a reading that nothing contradicts, and less otherwise; clear_m is the \
 distance up to which the reading is right in any case.

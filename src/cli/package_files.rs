@@ -116,7 +116,7 @@ mod tests {
             }
         }
         for name in ["sonard.bash", "_sonard", "sonard.fish"] {
-            assert!(read(&format!("completions/{name}")).contains("benchmark"), "{name}");
+            assert!(read(&format!("completions/{name}")).contains("calibrate"), "{name}");
         }
     }
 }

@@ -28,7 +28,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "SCENE")]
     scene: Option<PathBuf>,
     /// File to write; the log with predictions goes to it instead of to standard output
-    #[arg(short, long, alias = "out", value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE")]
     output: Option<OutPath>,
     #[command(flatten)]
     overwrite: Overwrite,

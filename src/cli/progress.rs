@@ -12,11 +12,6 @@ pub(super) fn bar(of: u64, things: &str) -> ProgressBar {
     later(styled(of, &format!("{{bar:40}} {{pos}}/{{len}} {things}, {{eta}} left")))
 }
 
-/// Of bytes, of which more may be found on the way; drawn from the first second on.
-pub(super) fn bytes() -> ProgressBar {
-    later(styled(0, "{bar:40} {bytes}/{total_bytes}, {eta} left"))
-}
-
 /// Of `things` nobody knows how many of there will be, and a message; drawn from the first second on.
 pub(super) fn spinner(things: &str) -> ProgressBar {
     later(

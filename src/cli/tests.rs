@@ -159,16 +159,3 @@ fn every_verb_says_its_exit_codes_and_stands_in_one_group() {
         assert!(help.contains(&format!("\n{group}:\n")), "{group}: {help}");
     }
 }
-
-#[test]
-fn former_names_are_gone_and_their_successors_are_there() {
-    let options = by_name();
-    for (verb, old, new) in renamed::OPTIONS {
-        let path = format!("sonard {}", verb.join(" "));
-        let has = |name: &str| {
-            let of_name = options.get(name.trim_start_matches("--"));
-            of_name.is_some_and(|args| args.iter().any(|(of, _)| *of == path))
-        };
-        assert!(has(new) && !has(old), "{path} {old} {new}");
-    }
-}

@@ -15,13 +15,13 @@ use super::{
     runtime,
 };
 use crate::{
+    backoff::Backoff,
     client::{Client, ClientError, LiveLines},
     scan::{PingStatus, Provenance, Record, decode_line},
 };
 
-/// Wait before it is tried to reach the daemon again, and the longest one.
-const RECONNECT_MIN: Duration = Duration::from_millis(200);
-const RECONNECT_MAX: Duration = Duration::from_secs(5);
+/// Wait between attempts to reconnect.
+const RECONNECT: Backoff = Backoff::new(Duration::from_millis(200), Duration::from_secs(5));
 
 /// Options of `sonard watch`.
 #[derive(Debug, clap::Args)]
@@ -108,13 +108,13 @@ async fn watch(args: &Args, client: Client, path: &str) -> Outcome {
 
 /// Asks until the daemon answers; only a refusal ends that.
 async fn again(client: &Client, path: &str) -> Result<LiveLines, Failure> {
-    let mut wait = RECONNECT_MIN;
+    let mut backoff = RECONNECT;
     loop {
-        sleep(wait).await;
+        sleep(backoff.next_wait()).await;
         match client.live(path).await {
             Ok(lines) => return Ok(lines),
             Err(error) if error.is_final() => return Err(refuse(&error)),
-            Err(_not_yet) => wait = (wait * 2).min(RECONNECT_MAX),
+            Err(_not_yet) => {}
         }
     }
 }

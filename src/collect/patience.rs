@@ -4,36 +4,36 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
+use crate::backoff::Backoff;
+
 /// Waits between tries to get something of a ranger.
 #[derive(Debug)]
 pub struct Patience {
     until: Instant,
-    wait: Duration,
-    factor: u32,
-    max: Duration,
+    backoff: Backoff,
 }
 
 impl Patience {
     /// For finding a ranger that does not answer: a try costs nothing.
     #[must_use]
     pub fn with_absence(patience: Duration) -> Self {
-        Self::new(patience, Duration::from_millis(300), 2, Duration::from_secs(10))
+        Self::new(patience, Backoff::new(Duration::from_millis(300), Duration::from_secs(10)))
     }
 
     /// For a ranger that answers and loses one scan after the other: a try costs a scan.
     #[must_use]
     pub fn with_losses(patience: Duration) -> Self {
-        Self::new(patience, Duration::from_secs(1), 4, Duration::from_secs(300))
+        let backoff = Backoff::new(Duration::from_secs(1), Duration::from_secs(300));
+        Self::new(patience, backoff.with_factor(4))
     }
 
-    fn new(patience: Duration, wait: Duration, factor: u32, max: Duration) -> Self {
-        Self { until: Instant::now() + patience, wait, factor, max }
+    fn new(patience: Duration, backoff: Backoff) -> Self {
+        Self { until: Instant::now() + patience, backoff }
     }
 
     /// How long to wait before the next try; `None` when there is to be no other.
     pub fn next_wait(&mut self) -> Option<Duration> {
-        let wait = self.wait;
-        self.wait = (wait * self.factor).min(self.max);
+        let wait = self.backoff.next_wait();
         (Instant::now() + wait < self.until).then_some(wait)
     }
 }

@@ -15,8 +15,8 @@ use uuid::Uuid;
 use crate::{
     array::{MountedRanger, RangerArray},
     scan::{
-        Event, EventKind, FaultKind, LOG_FORMAT, Ping, PingStatus, Record, ScanEnd, ScanPlan,
-        ScanStart, Session,
+        Event, EventKind, FaultKind, Ping, PingStatus, Record, ScanEnd, ScanPlan, ScanStart,
+        Session,
     },
 };
 
@@ -73,9 +73,9 @@ impl Checker {
             Err(error) if error.fault.kind == FaultKind::Torn => {
                 self.problem(FindingKind::TornTail, error.fault.to_string());
             }
-            Err(error) if error.fault.kind == FaultKind::NewerFormat => {
+            Err(error) if error.fault.kind == FaultKind::UnsupportedFormat => {
                 self.session = true;
-                self.problem(FindingKind::NewerFormat, error.fault.to_string());
+                self.problem(FindingKind::UnsupportedFormat, error.fault.to_string());
             }
             Err(error) => self.problem(FindingKind::Damaged, error.fault.to_string()),
             Ok(record) => {
@@ -126,11 +126,6 @@ impl Checker {
         self.session = true;
         self.array.clone_from(&session.array);
         self.imported = session.imported.is_some();
-        if session.format > LOG_FORMAT {
-            let format = session.format;
-            let detail = format!("format {format}, and this program reads up to {LOG_FORMAT}");
-            self.problem(FindingKind::NewerFormat, detail);
-        }
         self.time(session.started);
     }
 

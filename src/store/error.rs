@@ -8,7 +8,7 @@ use std::{
 use rustix::{fs::statvfs, io::Errno};
 use thiserror::Error;
 
-use super::FileKind;
+use super::{FileKind, LineError};
 use crate::scan::{EncodeError, SinkError};
 
 /// A log that can't be opened, written, synced or repaired.
@@ -37,6 +37,14 @@ pub enum StoreError {
         path: PathBuf,
         /// What it is.
         kind: FileKind,
+    },
+    /// A session of a log format that this version does not read.
+    #[error("cannot read {}: {fault}", path.display())]
+    UnsupportedFormat {
+        /// Path of the log.
+        path: PathBuf,
+        /// Line and fault of the session.
+        fault: LineError,
     },
     /// Reading failed.
     #[error("cannot read {}: {source}", path.display())]
@@ -111,6 +119,9 @@ impl StoreError {
             Self::Open { source, path }
             | Self::Write { source, path }
             | Self::Sync { source, path, .. } => help_for(source, path),
+            Self::UnsupportedFormat { .. } => {
+                "`sonard log verify` lists the lines that this version reads".into()
+            }
             Self::NoLog { kind, .. } => kind.instead_of_a_log().into(),
             Self::Busy { .. } => "wait until it is done, stop it, or choose another file".into(),
             Self::Torn { source, path } => {

@@ -4,7 +4,7 @@ mod replacement;
 
 use std::{
     fs::{self, File},
-    io,
+    io::{self, BufReader},
     os::unix::fs::FileExt as _,
     path::{Path, PathBuf},
     time::{Duration, Instant},
@@ -12,7 +12,7 @@ use std::{
 
 use jiff::{Timestamp, tz::TimeZone};
 
-use super::{LogWriter, StoreError, sync::sync_folder_of};
+use super::{LogWriter, StoreError, read_log, sync::sync_folder_of};
 use crate::scan::{Event, EventKind, Record, ScanStart, Session};
 use replacement::Replacement;
 
@@ -104,7 +104,9 @@ impl LogFolder {
         let fail = |source| StoreError::Open { path: folder.into(), source };
         fs::create_dir_all(folder).map_err(fail)?;
         let newest = log_files(folder).map_err(fail)?.pop();
-        let path = folder.join(newest.map_or_else(|| file_name(folder, now), |file| file.name));
+        let continued =
+            newest.map(|file| file.name).filter(|name| !is_of_other_format(&folder.join(name)));
+        let path = folder.join(continued.unwrap_or_else(|| file_name(folder, now)));
         let day = path.file_name().map(|name| day_of(&name.to_string_lossy())).unwrap_or_default();
         let mut log = Self {
             folder: folder.into(),
@@ -328,6 +330,16 @@ impl LogFolder {
         // Costs nothing if it fails: the files are gone from the folder all the same.
         let _ = sync_folder_of(&self.path);
     }
+}
+
+/// Returns `true` if the first line of a log is a session of another format: readers reject the whole file, so nothing
+/// may be appended to it.
+fn is_of_other_format(log: &Path) -> bool {
+    let Ok(file) = File::open(log) else { return false };
+    let first = read_log(BufReader::new(file)).next().and_then(Result::ok);
+    first
+        .and_then(|line| line.record.err())
+        .is_some_and(|error| error.reject_other_format(log).is_err())
 }
 
 fn day(now: Timestamp) -> String {

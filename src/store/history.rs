@@ -15,7 +15,8 @@ use uuid::Uuid;
 
 use super::{log_files, read_log};
 use crate::scan::{
-    MAX_LINE_BYTES, Ping, Provenance, Record, ScanEnd, ScanStart, ScanView, SceneRef, decode_line,
+    FaultKind, MAX_LINE_BYTES, Ping, Provenance, Record, ScanEnd, ScanStart, ScanView, SceneRef,
+    decode_line,
 };
 
 /// Only so many of the newest logs are looked at: memory stays bounded after months.
@@ -201,6 +202,8 @@ impl Index {
                 let text_at = text.map(|(text_at, _)| *text_at).filter(|text_at| *text_at != at);
                 self.session = Some(Arc::new(SessionPlace { at, text_at, provenance, scene }));
             }
+            // Scans of another log format have no session of this program.
+            Some(Err(fault)) if fault.kind == FaultKind::UnsupportedFormat => self.session = None,
             Some(Ok(Record::ScanStart(start))) => {
                 let session = self.session.clone();
                 let (scan, to) = (start.scan, self.read_to);

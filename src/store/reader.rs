@@ -48,6 +48,21 @@ impl fmt::Display for LineError {
 
 impl std::error::Error for LineError {}
 
+impl LineError {
+    /// Passes damaged lines on, for the caller to report, but rejects a log of another format.
+    ///
+    /// # Errors
+    /// [`StoreError::UnsupportedFormat`] if the line is a session of another format.
+    pub fn reject_other_format(self, path: &Path) -> Result<Self, StoreError> {
+        match self.fault.kind {
+            FaultKind::UnsupportedFormat => {
+                Err(StoreError::UnsupportedFormat { path: path.into(), fault: self })
+            }
+            _ => Ok(self),
+        }
+    }
+}
+
 /// Every line of a log, damaged ones included, in order.
 ///
 /// Memory stays bounded whatever the file holds. An item is an error only when reading itself
@@ -160,14 +175,14 @@ pub struct Loaded {
 /// Damaged lines are not an error; whoever calls shows them.
 ///
 /// # Errors
-/// When the file can't be opened or read.
+/// When the file can't be opened or read, or has a session of another format.
 pub fn load(path: &Path) -> Result<Loaded, StoreError> {
     let reader = open_for_reading(path)?;
     let mut loaded = Loaded::default();
     for line in read_log(reader) {
         match line.map_err(|source| StoreError::Read { path: path.into(), source })?.record {
             Ok(record) => loaded.records.push(record),
-            Err(error) => loaded.damaged.push(error),
+            Err(error) => loaded.damaged.push(error.reject_other_format(path)?),
         }
     }
     Ok(loaded)

@@ -23,7 +23,7 @@ const FOLDER: &str = "scenes";
 /// The reason why a log's scene can't be read from the log.
 #[derive(Debug, Error)]
 pub enum SceneLost {
-    /// Logs of format 1 could leave it out, and a scene too long for a line needs its folder.
+    /// Absent from the record, and from the folder for scenes that are too long for a line.
     #[error("the log does not hold its scene `{}`", .0.name)]
     NotThere(SceneRef),
     /// The text is not the one that the model used.

@@ -5,7 +5,10 @@ use std::{fs, path::Path};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{Log, run, stderr};
+use crate::{
+    common::{Log, run, stderr},
+    map::score_of,
+};
 
 /// Runs and returns standard output as a log.
 fn simulate(further: &[&str]) -> Log {
@@ -85,7 +88,7 @@ fn rangers_that_fire_too_soon_or_at_once_hear_one_another() {
     }
     // What is predicted again is the same, and nobody hears anybody where that is left out.
     let again = folder.path().join("again.jsonl").to_str().expect("plain path").to_owned();
-    let predicted = run(&["predict", &hasty_log, "--scene", "mcgill-lab", "--out", &again]);
+    let predicted = run(&["predict", &hasty_log, "--scene", "mcgill-lab", "-o", &again]);
     assert!(predicted.status.success(), "{}", stderr(&predicted));
     for ping in Log::read(Path::new(&again)).pings() {
         assert_eq!(ping["sim"]["crosstalk"], ping["crosstalk"], "{ping}");
@@ -163,9 +166,8 @@ fn an_arrays_readings_are_drawn_mapped_and_fitted_with_lines() {
     assert!(map.status.success(), "{}", stderr(&map));
     let map: Value = serde_json::from_slice(&map.stdout).expect("one object");
     assert_eq!((&map["scans"], &map["readings"]), (&12.into(), &(6 * 20).into()));
-    let score = run(&["benchmark", "score", &out, "two-surface-room", "--json"]);
-    let score: Value = serde_json::from_slice(&score.stdout).expect("one object");
-    assert!(score["correlation_percent"].as_f64().is_some_and(|c| c > 20.0), "{score}");
+    let score = score_of(&out, "two-surface-room");
+    assert!(score.correlation_percent.is_some_and(|percent| percent > 20.0), "{score:?}");
 
     // Arcs of constant depth need one ranger that turns.
     let refused = run(&["interpret", &eight]);

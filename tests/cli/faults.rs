@@ -1,9 +1,6 @@
 //! What a scan does when the line or the device misbehaves.
 
-use std::{
-    process::Stdio,
-    time::{Duration, Instant},
-};
+use std::{process::Stdio, time::Duration};
 
 use crate::common::{Log, MockProcess, interrupt, mock_scan, run, sonard, stderr, wait_until};
 
@@ -118,7 +115,6 @@ fn a_killed_host_stops_the_firing_within_the_lease_and_leaves_the_port_usable() 
     });
     scan.kill().expect("it runs");
     scan.wait().expect("it ends");
-    let killed = Instant::now();
     // The lease is two seconds; a second scan finds a device that answers.
     std::thread::sleep(Duration::from_millis(2_500));
     let again = run(&[
@@ -136,7 +132,7 @@ fn a_killed_host_stops_the_firing_within_the_lease_and_leaves_the_port_usable() 
     ]);
     assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
     let (_, said) = mock.stop();
-    assert!(said.contains("coils released"), "after {:?}: {said}", killed.elapsed());
+    assert!(said.contains("coils released"), "{said}");
 }
 
 #[test]
@@ -164,10 +160,8 @@ fn what_a_killed_scan_left_behind_is_stopped_by_whoever_comes_next() {
         });
         scan.kill().expect("it runs");
         scan.wait().expect("it ends");
-        let killed = Instant::now();
         let next = run(arguments);
         assert_eq!(next.status.code(), Some(0), "{name} {number}: {}", stderr(&next));
-        assert!(killed.elapsed() < Duration::from_secs(15), "{name}: {:?}", killed.elapsed());
     }
     let (_, said) = mock.stop();
     assert!(!said.contains("coils released"), "no lease had to end: {said}");

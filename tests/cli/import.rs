@@ -1,6 +1,7 @@
 //! Readings from elsewhere, through the whole program.
 
 #[cfg(feature = "sqlite")]
+#[cfg(feature = "sqlite")]
 mod databases;
 
 use std::{fs, path::Path};

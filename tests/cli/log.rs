@@ -195,3 +195,37 @@ fn readings_of_a_robot_that_moved_are_predicted_from_where_they_were_taken() {
     assert_eq!((&compared["beams"], &compared["p90_abs_residual_m"]), (&40.into(), &0.0.into()));
     assert_eq!(compared["verdicts"]["unexplained"], 0, "{compared}");
 }
+
+#[test]
+fn logs_of_other_formats_are_rejected() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out").display().to_string();
+    let picture = folder.path().join("out.svg").display().to_string();
+    for format in ["0", "2"] {
+        let text = LOG.replacen("\"format\":1", &format!("\"format\":{format}"), 1);
+        let log = &log_of(folder.path(), &text);
+        for arguments in [
+            vec!["compare", log],
+            vec!["plot", log, "-o", &picture],
+            vec!["map", log, "--out", &out],
+            vec!["lines", log, "-o", &picture],
+            vec!["interpret", log],
+            vec!["export", log, "--to", "csv"],
+            vec!["predict", log, "--scene", "simple-room"],
+            vec!["calibrate", log, "--scene", "simple-room"],
+            vec!["locate", log, "--scene", "simple-room"],
+            vec!["log", "annotate", log],
+            vec!["log", "show", log],
+        ] {
+            // Lines of the message are wrapped.
+            let said = check(&arguments, 2).replace('\u{2502}', " ");
+            let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(said.contains(&format!("log format {format} is not supported")), "{said}");
+            assert!(said.contains("read the log with the version that wrote it"), "{said}");
+        }
+        let said = check(&["log", "verify", log], 1);
+        assert!(said.contains(&format!("problem: format: log format {format} ")), "{said}");
+        check(&["log", "repair", log], 0);
+        assert_eq!(fs::read_to_string(log).expect("readable"), text);
+    }
+}

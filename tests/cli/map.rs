@@ -1,11 +1,41 @@
-//! `sonard map`, `benchmark score`, `benchmark map` and `lines` as a user runs them.
+//! `sonard map` and `sonard lines`.
 
 use std::{fs, path::Path};
 
 use serde_json::Value;
+use sonard::{
+    geometry::{DVec2, Pose},
+    grid_file,
+    interpret::grid::{Grid, MapScore, MapYaml, PathSettings, ideal, score, to_pgm},
+    scene::{Scene, shipped},
+};
 use tempfile::TempDir;
 
 use crate::common::{run, stderr};
+
+/// Map in a folder, and the ideal map of a shipped scene on its cells.
+fn with_ideal(folder: &str, scene: &str) -> (Grid, Grid) {
+    let map = grid_file::read(folder.as_ref(), |_| {}).expect("a map");
+    let scene = Scene::from_json(shipped::text(scene).expect("shipped")).expect("a scene");
+    let places: Vec<DVec2> = scene.poses.values().map(Pose::position).collect();
+    let ideal = ideal(&scene, *map.shape(), &places);
+    (map, ideal)
+}
+
+/// Compares the map in a folder with a shipped scene.
+pub(crate) fn score_of(folder: &str, scene: &str) -> MapScore {
+    let (map, ideal) = with_ideal(folder, scene);
+    score(&map, &ideal, &PathSettings::default()).expect("maps of one region")
+}
+
+/// Writes the ideal map of a shipped scene on the cells of the map in `folder`.
+pub(crate) fn write_ideal(folder: &str, scene: &str, out: &str) {
+    let (_, ideal) = with_ideal(folder, scene);
+    fs::create_dir_all(out).expect("a folder");
+    fs::write(format!("{out}/map.pgm"), to_pgm(&ideal)).expect("written");
+    let yaml = MapYaml::of(ideal.shape(), "map.pgm").to_text();
+    fs::write(format!("{out}/map.yaml"), yaml).expect("written");
+}
 
 /// Simulated scans of a room from three places, as files.
 fn logs(folder: &Path) -> Vec<String> {
@@ -46,7 +76,7 @@ fn feature_prediction_makes_the_better_map() {
     let folder = TempDir::new().expect("a temporary folder");
     let logs = logs(folder.path());
     let path = |name: &str| folder.path().join(name).to_str().expect("plain path").to_owned();
-    let scores: Vec<Value> = ["on", "off"]
+    let scores: Vec<MapScore> = ["on", "off"]
         .iter()
         .map(|switch| {
             let out = path(switch);
@@ -68,16 +98,14 @@ fn feature_prediction_makes_the_better_map() {
                 let text = fs::read_to_string(&confidences).expect("written");
                 assert_eq!(text.lines().count(), 1200, "a confidence for every reading");
             }
-            object(&["benchmark", "score", &out, "two-surface-room", "--json"])
+            score_of(&out, "two-surface-room")
         })
         .collect();
-    let figure = |score: &Value, name: &str| score[name].as_f64().expect(name);
     let [on, off] = scores.as_slice() else { panic!("two maps") };
-    assert!(figure(on, "correlation_percent") > figure(off, "correlation_percent"));
-    for less in ["map_score_percent", "map_score_occupied_percent", "false_positive_paths_percent"]
-    {
-        assert!(figure(on, less) < figure(off, less), "{less}: {on} {off}");
-    }
+    assert!(on.correlation_percent > off.correlation_percent, "{on:?} {off:?}");
+    assert!(on.map_score_percent < off.map_score_percent, "{on:?} {off:?}");
+    assert!(on.map_score_occupied_percent < off.map_score_occupied_percent, "{on:?} {off:?}");
+    assert!(on.false_positive_paths_percent < off.false_positive_paths_percent, "{on:?} {off:?}");
 }
 
 #[test]
@@ -89,19 +117,10 @@ fn an_ideal_map_scores_full_marks_against_its_scene() {
     let further = ["--out", &map, "--region", "-0.5,-0.5,4.1,3.5", "--model", "physical", "--json"];
     let made = object(&with("map", &logs, &further));
     assert_eq!((made["width"].as_u64(), made["height"].as_u64()), (Some(92), Some(80)));
-    object(&["benchmark", "score", &map, "two-surface-room", "--save-ideal", &ideal, "--json"]);
-    let perfect = object(&["benchmark", "score", &ideal, "two-surface-room", "--json"]);
-    assert_eq!(perfect["false_positive_paths_percent"].as_f64(), Some(0.0));
-    assert!(perfect["correlation_percent"].as_f64().expect("it varies") > 99.9);
-}
-
-#[test]
-fn the_benchmark_gives_the_same_table_for_the_same_seed() {
-    let arguments = ["benchmark", "map", "--maps", "3", "--places", "8", "--seed", "7"];
-    let [one, two] = [run(&arguments), run(&arguments)];
-    assert!(one.status.success(), "{}", stderr(&one));
-    assert_eq!(one.stdout, two.stdout);
-    assert!(String::from_utf8_lossy(&one.stdout).contains("mcgill-lab"));
+    write_ideal(&map, "two-surface-room", &ideal);
+    let perfect = score_of(&ideal, "two-surface-room");
+    assert_eq!(perfect.false_positive_paths_percent, Some(0.0));
+    assert!(perfect.correlation_percent.expect("it varies") > 99.9);
 }
 
 #[test]
@@ -220,9 +239,6 @@ fn wrong_input_is_refused_with_what_would_be_right() {
         (with("map", &logs, &["--out", &out, "--region", "1,2,3"]), "X0,Y0,X1,Y1"),
         (with("map", &logs, &["--out", &out, "--region", "1,1,0,0"]), "no area"),
         (with("map", &logs, &["--out", &out, "--silent-beyond", "0"]), "greater than 0"),
-        (vec!["benchmark", "score", "nowhere", "simple-room"], "map.yaml beside map.pgm"),
-        (vec!["benchmark", "score", &out, "simple-rom"], "simple-room"),
-        (vec!["benchmark", "score", &out, "simple-room", "--spacing", "0"], "greater than 0"),
         (vec!["lines", &empty], "sonard scan"),
         (with("lines", &logs, &["--logical", "0"]), "greater than 0"),
     ] {

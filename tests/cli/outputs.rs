@@ -39,7 +39,7 @@ const fn case(
     Case { output, input, arguments }
 }
 
-const CASES: [Case; 39] = [
+const CASES: [Case; 36] = [
     case("plot --output", ("a.svg", LOG), "plot IN -o IN"),
     case("plot --output", ("a.png", LOG), "plot IN -o IN --force"),
     case("plot --output", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),
@@ -78,22 +78,11 @@ const CASES: [Case; 39] = [
     case("map --out", ("map.mcap", LOG), "map IN --out DIR --force"),
     case("map --out", ("map.png", SCENE), "map LOG --scene IN --out DIR --force"),
     case("map --confidences", ("c.jsonl", LOG), "map IN --out DIR/map --confidences IN --force"),
-    case(
-        "benchmark score --save-ideal",
-        ("map.yaml", MAP),
-        "benchmark score DIR DIR --save-ideal DIR --force",
-    ),
-    case(
-        "explore --out",
-        ("stops.jsonl", SCENE),
-        "explore --scene IN --pose fig9 --most-stops 1 --out DIR --force",
-    ),
     case("import --output", ("a", TABLE), "import IN -o IN --force"),
     case("export --output", ("a.csv", LOG), "export IN -o IN --force"),
     case("export --output", ("a.mcap", LOG), "export IN -o IN --force"),
     case("export --output", ("a.parquet", LOG), "export IN -o IN --force"),
     case("export --output", ("log.csv", LOG), "export IN --to csv -o IN --force"),
-    case("gather --out", ("a.json", FLEET), "gather --fleet IN --out IN"),
     case("generate --out", ("README.md", DATA_SET), "generate IN --out DIR"),
     case("calibrate --out", ("sensor.json", LOG), "calibrate IN --out DIR --force"),
     case("calibrate --out", ("scene.json", SCENE), "calibrate LOG --scene IN --out DIR --force"),
@@ -122,12 +111,7 @@ const CASES: [Case; 39] = [
 ];
 
 /// Outputs of verbs that read no file.
-const WITHOUT_INPUT: [&str; 4] = [
-    "benchmark map --out",
-    "benchmark explore --out",
-    "benchmark interpret --output",
-    "package-files DIR",
-];
+const WITHOUT_INPUT: [&str; 1] = ["package-files DIR"];
 
 const POSES: &str = "{\"x_m\":0.774,\"y_m\":0.085,\"heading_deg\":0.0}\n";
 const TABLE: &str = "azimuth_deg,range_m\n0,1\n";
@@ -140,7 +124,6 @@ const MAP: &str = "image: map.pgm\nresolution: 0.5\norigin: [0.0, 0.0, 0.0]\nneg
                    occupied_thresh: 0.65\nfree_thresh: 0.196\n";
 const DATA_SET: &str = "[set]\nname = \"a\"\nshards = 1\nscenes = 1\nposes = 1\n[[scene]]\nshape = \"file\"\n\
                         file = \"simple-room\"\n";
-const FLEET: &str = "[[daemon]]\nsocket = \"/run/nobody/s\"\n";
 const PLAN: &str = "[collection]\nfolder = \"out\"\n[place]\nscene = \"simple-room\"\n\
                     poses = [\"fig9\"]\n";
 
@@ -280,7 +263,7 @@ fn a_log_that_was_measured_or_simulated_is_not_replaced_unasked() {
 }
 
 #[test]
-fn map_and_explore_replace_their_own_files_only() {
+fn map_replaces_its_own_files_only() {
     let (folder, log) = folder_with(("scan.jsonl", LOG));
     let simulate = "simulate --scene simple-room --pose fig9 -o DIR/fig9.jsonl";
     assert!(run_case(simulate, &log, folder.path()).status.success());

@@ -7,7 +7,10 @@ use sonard::{
     scene::{Scene, Wall},
 };
 
-use crate::common::{run, stderr};
+use crate::{
+    common::{run, stderr},
+    map::write_ideal,
+};
 
 /// What a verb says of input that it can't use.
 fn refused(arguments: &[&str], part: &str) {
@@ -27,7 +30,6 @@ fn made(arguments: &[&str]) -> Scene {
 fn a_map_becomes_the_scene_that_it_was_made_of() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
-    // The map as it should be, which `benchmark score` draws.
     let log = path("log.jsonl");
     assert!(
         run(&[
@@ -46,8 +48,7 @@ fn a_map_becomes_the_scene_that_it_was_made_of() {
     );
     let maps = (path("map"), path("ideal"));
     assert!(run(&["map", &log, "--out", &maps.0]).status.success());
-    let scored = run(&["benchmark", "score", &maps.0, "two-surface-room", "--save-ideal", &maps.1]);
-    assert!(scored.status.success(), "{}", stderr(&scored));
+    write_ideal(&maps.0, "two-surface-room", &maps.1);
     let scene = made(&["scene", "from-grid", &maps.1]);
     let shipped =
         Scene::from_json(sonard::scene::shipped::text("two-surface-room").expect("shipped"))

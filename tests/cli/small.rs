@@ -2,8 +2,6 @@
 
 use std::{ffi::OsStr, fs, os::unix::ffi::OsStrExt as _};
 
-use rexpect::{reader::Options, session::spawn_with_options};
-
 use crate::{
     collect::{Case, said},
     common::{run, sonard, stderr},
@@ -101,9 +99,6 @@ fn a_path_that_is_no_text_is_a_path() {
 
 #[test]
 fn numbers_without_sense_are_refused_in_words() {
-    let none = run(&["benchmark", "map", "--places", "0"]);
-    assert_eq!(none.status.code(), Some(2));
-    assert!(said(&none).contains("1..=100000"), "{}", said(&none));
     let folder = tempfile::tempdir().expect("a folder");
     let log = folder.path().join("log.jsonl");
     let log = log.to_str().expect("plain path");
@@ -117,17 +112,6 @@ fn numbers_without_sense_are_refused_in_words() {
         assert_eq!(map.status.code(), Some(2), "{text}");
         assert!(text.contains("more than 10^12 cells are too many"), "{text}");
     }
-}
-
-#[test]
-fn an_exploration_shows_that_it_gets_on() {
-    let explore = ["explore", "--scene", "corridor", "--pose", "beside-wall"];
-    let mut command = sonard(&[&explore[..], &["--odometry-noise", "0.005"]].concat());
-    command.env("TERM", "xterm");
-    let options = Options::new().timeout_ms(Some(60_000)).strip_ansi_escape_codes(true);
-    let mut person = spawn_with_options(command, options).expect("a terminal");
-    person.exp_regex("[0-9]+ stops, [0-9]+ m driven").expect("a sign of life");
-    person.exp_string("laser shots").expect("what came of it");
 }
 
 #[test]

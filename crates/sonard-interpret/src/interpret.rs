@@ -12,7 +12,6 @@
 
 mod arc;
 mod belief;
-pub mod calibration;
 mod density;
 mod differentiate;
 mod extent;
@@ -26,7 +25,6 @@ mod region;
 mod sweep;
 #[cfg(test)]
 mod tests;
-pub mod trial;
 
 pub use density::UniformSum;
 pub use differentiate::interpret;

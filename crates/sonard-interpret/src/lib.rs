@@ -1,5 +1,5 @@
 //! Interpretation of scans: [`compare`] compares readings with predictions, [`interpret`] finds planes, corners and
-//! edges and makes maps, [`explore`] has a simulated robot map a scene.
+//! edges and makes maps.
 //!
 //! The crate uses no clock, file or socket; random numbers are passed in.
 
@@ -7,5 +7,4 @@
 #![warn(clippy::mod_module_files)]
 
 pub mod compare;
-pub mod explore;
 pub mod interpret;

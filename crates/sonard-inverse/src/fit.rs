@@ -65,8 +65,6 @@ pub struct Fit {
 #[serde(rename_all = "lowercase")]
 pub enum Search {
     /// A few places beside the likeliest one: four to ten times as fast
-    #[serde(alias = "usual")]
-    #[cfg_attr(feature = "clap", value(alias = "usual"))]
     Quick,
     /// Many places, and each to its end
     #[default]

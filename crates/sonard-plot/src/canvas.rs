@@ -14,46 +14,57 @@ use super::theme;
 use sonard_model::geometry::DVec2;
 
 /// A point on the page, pixels, y down.
-pub(super) type Px = DVec2;
+pub type Px = DVec2;
 
 /// A rectangle on the page.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Rect {
-    pub(super) left: f64,
-    pub(super) top: f64,
-    pub(super) right: f64,
-    pub(super) bottom: f64,
+pub struct Rect {
+    /// Left edge, px.
+    pub left: f64,
+    /// Upper edge, px.
+    pub top: f64,
+    /// Right edge, px.
+    pub right: f64,
+    /// Lower edge, px.
+    pub bottom: f64,
 }
 
 impl Rect {
-    pub(super) fn new(left: f64, top: f64, width: f64, height: f64) -> Self {
+    /// Rectangle of an upper left corner and a size, px.
+    pub fn new(left: f64, top: f64, width: f64, height: f64) -> Self {
         Self { left, top, right: left + width, bottom: top + height }
     }
 
-    pub(super) fn width(&self) -> f64 {
+    /// Width, px.
+    pub fn width(&self) -> f64 {
         self.right - self.left
     }
 
-    pub(super) fn height(&self) -> f64 {
+    /// Height, px.
+    pub fn height(&self) -> f64 {
         self.bottom - self.top
     }
 
-    pub(super) fn center(&self) -> Px {
+    /// Centre, px.
+    pub fn center(&self) -> Px {
         Px::new((self.left + self.right) / 2.0, (self.top + self.bottom) / 2.0)
     }
 
-    pub(super) fn contains(&self, at: Px) -> bool {
+    /// Returns `true` if a point is inside or on the edge.
+    pub fn contains(&self, at: Px) -> bool {
         (self.left..=self.right).contains(&at.x) && (self.top..=self.bottom).contains(&at.y)
     }
 
-    pub(super) fn encloses(&self, other: &Self) -> bool {
+    /// Returns `true` if another rectangle is inside or on the edge.
+    pub fn encloses(&self, other: &Self) -> bool {
         self.left <= other.left
             && self.top <= other.top
             && other.right <= self.right
             && other.bottom <= self.bottom
     }
 
-    pub(super) fn meets(&self, other: &Self) -> bool {
+    /// Returns `true` if the interiors of both overlap.
+    pub fn meets(&self, other: &Self) -> bool {
         self.left < other.right
             && other.left < self.right
             && self.top < other.bottom
@@ -63,64 +74,75 @@ impl Rect {
 
 /// Which part of a text stands at the point given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Anchor {
+pub enum Anchor {
+    /// Text begins at the point.
     Start,
+    /// Text is centred on the point.
     Middle,
+    /// Text ends at the point.
     End,
 }
 
 /// Shapes of marks; each kind of reading has its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) enum Shape {
+pub enum Shape {
+    /// Filled circle.
     Dot,
+    /// Filled square.
     Square,
+    /// Filled triangle.
     Triangle,
+    /// Filled rhombus.
     Diamond,
+    /// Two crossed lines.
     Cross,
 }
 
 /// A group of marks that share attributes.
 #[derive(Debug, Clone)]
-pub(super) struct Layer {
+pub struct Layer {
     group: Group,
 }
 
 impl Layer {
     /// A layer that can be found by its class.
-    pub(super) fn new(class: &str) -> Self {
+    pub fn new(class: &str) -> Self {
         Self { group: Group::new().set("class", class) }
     }
 
     /// Sets an attribute that its marks inherit.
-    pub(super) fn with(mut self, name: &str, value: impl Into<svg::node::Value>) -> Self {
+    pub fn with(mut self, name: &str, value: impl Into<svg::node::Value>) -> Self {
         self.group = self.group.set(name, value);
         self
     }
 
     /// Lines of this colour and width, no filling.
-    pub(super) fn stroked(self, colour: &str, width_px: f64) -> Self {
+    pub fn stroked(self, colour: &str, width_px: f64) -> Self {
         self.with("stroke", colour).with("stroke-width", width_px).with("fill", "none")
     }
 
     /// Texts with a white rim, to be read over marks and lines.
-    pub(super) fn haloed(self) -> Self {
+    pub fn haloed(self) -> Self {
         self.with("stroke", theme::PAPER)
             .with("stroke-width", 3.0)
             .with("stroke-linejoin", "round")
             .with("paint-order", "stroke")
     }
 
-    pub(super) fn add(&mut self, layer: Self) {
+    /// Appends a layer.
+    pub fn add(&mut self, layer: Self) {
         self.node(layer.group);
     }
 
-    pub(super) fn extend(&mut self, layers: impl IntoIterator<Item = Self>) {
+    /// Appends layers in order.
+    pub fn extend(&mut self, layers: impl IntoIterator<Item = Self>) {
         for layer in layers {
             self.add(layer);
         }
     }
 
-    pub(super) fn into_group(self) -> Group {
+    /// SVG group of the layer.
+    pub fn into_group(self) -> Group {
         self.group
     }
 
@@ -128,7 +150,8 @@ impl Layer {
         svg::node::Node::append(&mut self.group, node);
     }
 
-    pub(super) fn line(&mut self, from: Px, to: Px) {
+    /// Adds a straight line.
+    pub fn line(&mut self, from: Px, to: Px) {
         let line = Line::new()
             .set("x1", tidy(from.x))
             .set("y1", tidy(from.y))
@@ -137,7 +160,8 @@ impl Layer {
         self.node(line);
     }
 
-    pub(super) fn circle(&mut self, center: Px, radius_px: f64) {
+    /// Adds a circle.
+    pub fn circle(&mut self, center: Px, radius_px: f64) {
         let circle = Circle::new()
             .set("cx", tidy(center.x))
             .set("cy", tidy(center.y))
@@ -145,7 +169,8 @@ impl Layer {
         self.node(circle);
     }
 
-    pub(super) fn rect(&mut self, rect: Rect, radius_px: f64) {
+    /// Adds a rectangle with rounded corners.
+    pub fn rect(&mut self, rect: Rect, radius_px: f64) {
         let rect = Rectangle::new()
             .set("x", tidy(rect.left))
             .set("y", tidy(rect.top))
@@ -156,7 +181,7 @@ impl Layer {
     }
 
     /// Open lines through the points of each run, as one path; runs of one point are left out.
-    pub(super) fn runs<R: AsRef<[Px]>>(&mut self, runs: impl IntoIterator<Item = R>) {
+    pub fn runs<R: AsRef<[Px]>>(&mut self, runs: impl IntoIterator<Item = R>) {
         let mut data = String::new();
         for run in runs {
             let run = run.as_ref();
@@ -170,17 +195,17 @@ impl Layer {
     }
 
     /// A closed shape.
-    pub(super) fn polygon(&mut self, points: &[Px]) {
+    pub fn polygon(&mut self, points: &[Px]) {
         self.node(closed(points));
     }
 
     /// A closed shape with a text that a viewer shows when it is pointed at.
-    pub(super) fn polygon_with_hint(&mut self, points: &[Px], hint: &str) {
+    pub fn polygon_with_hint(&mut self, points: &[Px], hint: &str) {
         self.node(with_hint(closed(points).into(), hint));
     }
 
     /// A mark of about this radius, with a text that a viewer shows when it is pointed at.
-    pub(super) fn mark(&mut self, shape: Shape, at: Px, radius_px: f64, hint: Option<&str>) {
+    pub fn mark(&mut self, shape: Shape, at: Px, radius_px: f64, hint: Option<&str>) {
         let node = mark(shape, at, radius_px);
         self.node(match hint {
             Some(hint) => with_hint(node, hint),
@@ -189,12 +214,12 @@ impl Layer {
     }
 
     /// A line of text; `at` is on its base line.
-    pub(super) fn text(&mut self, at: Px, anchor: Anchor, size_px: f64, text: &str) {
+    pub fn text(&mut self, at: Px, anchor: Anchor, size_px: f64, text: &str) {
         self.node(text_element(at, anchor, size_px, text));
     }
 
     /// A line of text turned about `at` by so many degrees clockwise.
-    pub(super) fn turned_text(&mut self, at: Px, turn_deg: f64, size_px: f64, text: &str) {
+    pub fn turned_text(&mut self, at: Px, turn_deg: f64, size_px: f64, text: &str) {
         let mut element = text_element(at, Anchor::Middle, size_px, text);
         let turn = format!("rotate({} {} {})", tidy(turn_deg), tidy(at.x), tidy(at.y));
         element.get_attributes_mut().insert("transform".into(), turn.into());
@@ -202,7 +227,7 @@ impl Layer {
     }
 
     /// Shows only what lies inside `rect` of everything in this layer.
-    pub(super) fn clipped(mut self, id: &str, rect: Rect) -> Self {
+    pub fn clipped(mut self, id: &str, rect: Rect) -> Self {
         let window = Rectangle::new()
             .set("x", tidy(rect.left))
             .set("y", tidy(rect.top))
@@ -306,12 +331,12 @@ fn printable(text: &str) -> String {
 }
 
 /// About how wide a text is. Viewers choose the font, so this errs to the wide side.
-pub(super) fn text_width_px(text: &str, size_px: f64) -> f64 {
+pub fn text_width_px(text: &str, size_px: f64) -> f64 {
     textwrap::core::display_width(text) as f64 * size_px * 0.52
 }
 
 /// The text in lines that fit the width.
-pub(super) fn wrap(text: &str, size_px: f64, width_px: f64) -> Vec<String> {
+pub fn wrap(text: &str, size_px: f64, width_px: f64) -> Vec<String> {
     let columns = (width_px / (size_px * 0.52)).max(8.0) as usize;
     textwrap::wrap(text, columns).into_iter().map(std::borrow::Cow::into_owned).collect()
 }

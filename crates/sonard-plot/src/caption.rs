@@ -7,7 +7,7 @@ use super::{
 
 /// Draws a title, a badge at its right and the lines under it, each wrapped to the page; returns
 /// the layer and the y coordinate below them.
-pub(super) fn draw(title: &str, badge: Option<&str>, lines: &[String]) -> (Layer, f64) {
+pub fn draw(title: &str, badge: Option<&str>, lines: &[String]) -> (Layer, f64) {
     let width_px = theme::PAGE_PX - 2.0 * theme::MARGIN_PX;
     let badge_px = badge.map_or(0.0, |text| text_width_px(text, theme::TEXT_PX) + 40.0);
     let mut layer = Layer::new("caption");

@@ -13,8 +13,8 @@ use sonard_model::{
 };
 use sonard_records::{
     InteractionKind, InteractionRecord, LOG_FORMAT, ModelRecord, PathKind, PathRecord, Ping,
-    PingStatus, Provenance, Record, ScanEnd, ScanPlan, ScanStart, ScanView, SceneRef, Session,
-    SimRecord,
+    PingStatus, Point, Provenance, Record, ScanEnd, ScanPlan, ScanStart, ScanView, SceneRef,
+    Session, SimRecord,
 };
 
 const WIDTH_M: f64 = 0.928;
@@ -192,10 +192,19 @@ fn predict(pose: &Pose, azimuth_deg: f64) -> SimRecord {
             order: *order,
             interactions: (0..*order)
                 .map(|i| ["south", "north"][i as usize % 2])
-                .map(|id| InteractionRecord::unplaced(InteractionKind::Reflection, id))
+                .map(reflection)
                 .collect(),
             length_m: *length_m,
         }),
+    }
+}
+
+/// Reflection at the origin.
+pub(crate) fn reflection(id: impl Into<String>) -> InteractionRecord {
+    InteractionRecord {
+        kind: InteractionKind::Reflection,
+        id: id.into(),
+        point: Point::Plan([0.0; 2]),
     }
 }
 

@@ -7,38 +7,54 @@ use super::{
 
 /// One entry.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Entry {
-    pub(super) sample: Sample,
-    pub(super) text: String,
+pub struct Entry {
+    /// Drawn sample.
+    pub sample: Sample,
+    /// Meaning of the sample.
+    pub text: String,
 }
 
 /// What stands before the words.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Sample {
+pub enum Sample {
+    /// Mark of a reading.
     Mark {
+        /// Shape of the mark.
         shape: Shape,
+        /// Fill.
         colour: &'static str,
     },
+    /// Open circle.
     Ring {
+        /// Stroke.
         colour: &'static str,
     },
+    /// Line.
     Line {
+        /// Stroke.
         colour: &'static str,
+        /// Stroke width, px.
         width_px: f64,
+        /// SVG dash array, or `none`.
         dash: &'static str,
     },
+    /// Short radial stroke.
     Tick {
+        /// Stroke.
         colour: &'static str,
     },
     /// A framed area.
     Patch {
+        /// Fill.
         colour: &'static str,
     },
+    /// Arrow that points out of the view.
     Outward,
 }
 
 impl Entry {
-    pub(super) fn new(sample: Sample, text: impl Into<String>) -> Self {
+    /// Entry of a sample and its meaning.
+    pub fn new(sample: Sample, text: impl Into<String>) -> Self {
         Self { sample, text: text.into() }
     }
 }
@@ -49,7 +65,7 @@ const GAP_PX: f64 = 20.0;
 
 /// Draws the entries from `at` (upper left) in rows of at most `width_px`; returns the layer
 /// and its height.
-pub(super) fn draw(entries: &[Entry], at: Px, width_px: f64) -> (Layer, f64) {
+pub fn draw(entries: &[Entry], at: Px, width_px: f64) -> (Layer, f64) {
     let mut layer = Layer::new("legend");
     let (mut x, mut row) = (0.0, 0.0);
     for entry in entries {

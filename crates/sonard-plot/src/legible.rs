@@ -2,10 +2,7 @@
 //! free of walls.
 
 use resvg::{tiny_skia::Pixmap, usvg::roxmltree};
-use sonard_interpret::interpret::{
-    calibration::{Bin, Reliability},
-    grid::{Grid, GridShape},
-};
+use sonard_interpret::interpret::grid::{Grid, GridShape};
 use sonard_model::geometry::DVec2;
 use sonard_records::Provenance;
 
@@ -119,14 +116,4 @@ fn a_residual_axis_says_where_it_is_logarithmic() {
     let svg = draw_residuals(&[close], None).to_svg();
     assert!(texts(&svg).contains(&"measured \u{2212} model, mm".to_owned()));
     assert!(!svg.contains("class=\"band\""), "a band over everything says nothing");
-}
-
-#[test]
-fn a_reliability_diagram_has_a_mark_for_every_bin_with_claims() {
-    let mut bins = [Bin::default(); 10];
-    bins[0] = Bin { count: 90, claimed: 0.02, came_true: 0.03 };
-    bins[9] = Bin { count: 10, claimed: 0.97, came_true: 0.9 };
-    let reliability = Reliability { bins, expected_error: 0.016, brier: 0.03 };
-    let svg = draw_reliability("claims", &[], &reliability).to_svg();
-    assert_eq!(svg.matches("claims of 0.").count(), 2, "{svg}");
 }

@@ -37,7 +37,7 @@ pub fn draw_lines(scans: &[ScanView], scene: Option<&Scene>, lines: &[MapLine]) 
 }
 
 /// A legend's entry for each kind of line that there is.
-pub(super) fn entries<'a>(lines: impl IntoIterator<Item = &'a MapLine>) -> Vec<Entry> {
+pub fn entries<'a>(lines: impl IntoIterator<Item = &'a MapLine>) -> Vec<Entry> {
     let present: Vec<LineKind> = lines.into_iter().map(|line| line.kind).collect();
     let kinds = KINDS.iter().filter(|(kind, ..)| present.contains(kind));
     let sample = |colour| Sample::Line { colour, width_px: 2.6, dash: "none" };
@@ -45,7 +45,7 @@ pub(super) fn entries<'a>(lines: impl IntoIterator<Item = &'a MapLine>) -> Vec<E
 }
 
 /// One line and its confirmed ends.
-pub(super) fn layer(plan: &Plan, line: &MapLine) -> Layer {
+pub fn layer(plan: &Plan, line: &MapLine) -> Layer {
     let colour = KINDS
         .iter()
         .find(|(kind, ..)| *kind == line.kind)

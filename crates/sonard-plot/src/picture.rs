@@ -43,7 +43,7 @@ pub enum PlotError {
 
 impl Picture {
     /// A page of this height with the layer on it.
-    pub(super) fn new(width_px: f64, height_px: f64, content: Layer) -> Self {
+    pub fn new(width_px: f64, height_px: f64, content: Layer) -> Self {
         let page = svg::node::element::Rectangle::new()
             .set("width", width_px)
             .set("height", height_px)

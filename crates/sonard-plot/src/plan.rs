@@ -13,9 +13,11 @@ use sonard_model::{
 
 /// A region of the floor, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Bounds {
-    pub(super) min: DVec2,
-    pub(super) max: DVec2,
+pub struct Bounds {
+    /// Lower left corner, metres.
+    pub min: DVec2,
+    /// Upper right corner, metres.
+    pub max: DVec2,
 }
 
 /// What is farther from the origin than this is no place on any floor, metres; regions are reckoned with
@@ -24,7 +26,7 @@ const FARTHEST_M: f64 = 1e100;
 
 impl Bounds {
     /// The smallest region around the points that are places at all; `None` without any.
-    pub(super) fn around(points: impl IntoIterator<Item = DVec2>) -> Option<Self> {
+    pub fn around(points: impl IntoIterator<Item = DVec2>) -> Option<Self> {
         let is_place = |point: &DVec2| point.is_finite() && point.abs().max_element() < FARTHEST_M;
         points
             .into_iter()
@@ -34,7 +36,7 @@ impl Bounds {
     }
 
     /// Walls and cylinders of a scene.
-    pub(super) fn of_scene(scene: &Scene) -> Option<Self> {
+    pub fn of_scene(scene: &Scene) -> Option<Self> {
         let ends = scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
         let discs = scene.cylinders.iter().flat_map(|cylinder| {
             let reach = DVec2::splat(cylinder.radius_m);
@@ -43,15 +45,18 @@ impl Bounds {
         Self::around(ends.chain(discs))
     }
 
-    pub(super) fn including(self, points: impl IntoIterator<Item = DVec2>) -> Self {
+    /// Smallest bounds that also contain the points.
+    pub fn including(self, points: impl IntoIterator<Item = DVec2>) -> Self {
         Self::around(points.into_iter().chain([self.min, self.max])).unwrap_or(self)
     }
 
-    pub(super) fn size(&self) -> DVec2 {
+    /// Width and height, metres.
+    pub fn size(&self) -> DVec2 {
         self.max - self.min
     }
 
-    pub(super) fn grown(self, by_m: f64) -> Self {
+    /// Bounds with a margin on each side, metres.
+    pub fn grown(self, by_m: f64) -> Self {
         let by = DVec2::splat(by_m);
         Self { min: self.min - by, max: self.max + by }
     }
@@ -59,17 +64,17 @@ impl Bounds {
 
 /// A floor plan's place on the page.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Plan {
+pub struct Plan {
     /// The panel, pixels.
-    pub(super) panel: Rect,
+    pub panel: Rect,
     /// What is seen in it, metres.
-    pub(super) view: Bounds,
+    pub view: Bounds,
     px_per_m: f64,
 }
 
 impl Plan {
     /// Fits a region into a panel; what is left over at the sides is shown as well.
-    pub(super) fn fit(region: Bounds, panel: Rect) -> Self {
+    pub fn fit(region: Bounds, panel: Rect) -> Self {
         let size = region.size().max(DVec2::splat(1e-3));
         let px_per_m = (panel.width() / size.x).min(panel.height() / size.y);
         let middle = (region.min + region.max) / 2.0;
@@ -78,28 +83,30 @@ impl Plan {
     }
 
     /// Height of a panel so wide that shows the region without spare sides, within limits.
-    pub(super) fn height_for(region: &Bounds, width_px: f64, limits_px: [f64; 2]) -> f64 {
+    pub fn height_for(region: &Bounds, width_px: f64, limits_px: [f64; 2]) -> f64 {
         let size = region.size().max(DVec2::splat(1e-3));
         (width_px * size.y / size.x).clamp(limits_px[0], limits_px[1]).round()
     }
 
-    pub(super) fn px(&self, at: DVec2) -> Px {
+    /// Point of the page, px, of a point of the scene, metres.
+    pub fn px(&self, at: DVec2) -> Px {
         let from_corner = (at - self.view.min) * self.px_per_m;
         Px::new(self.panel.left + from_corner.x, self.panel.bottom - from_corner.y)
     }
 
     /// The place on the floor that a point of the page shows, metres.
-    pub(super) fn place(&self, at: Px) -> DVec2 {
+    pub fn place(&self, at: Px) -> DVec2 {
         let from_corner = Px::new(at.x - self.panel.left, self.panel.bottom - at.y);
         self.view.min + from_corner / self.px_per_m
     }
 
-    pub(super) fn length_px(&self, length_m: f64) -> f64 {
+    /// Length on the page, px, of a length in the scene, metres.
+    pub fn length_px(&self, length_m: f64) -> f64 {
         length_m * self.px_per_m
     }
 
     /// Frame, grid and the coordinates along the left and lower side.
-    pub(super) fn frame(&self) -> Layer {
+    pub fn frame(&self) -> Layer {
         let mut layer = Layer::new("frame");
         let step = ticks::nice_step(self.panel.width() / self.px_per_m, self.panel.width() / 100.0);
         let xs: Vec<f64> = ticks::multiples(self.view.min.x, self.view.max.x, step).collect();
@@ -127,7 +134,7 @@ impl Plan {
     }
 
     /// Walls and cylinders, their line style by material.
-    pub(super) fn walls(&self, scene: &Scene) -> Layer {
+    pub fn walls(&self, scene: &Scene) -> Layer {
         let materials = super::materials::Materials::of(scene);
         let mut layer = Layer::new("walls")
             .stroked(theme::WALL, theme::WALL_PX)
@@ -148,7 +155,7 @@ impl Plan {
     }
 
     /// Room for texts in the panel, off the walls of a scene.
-    pub(super) fn labels(&self, scene: Option<&Scene>) -> Labels {
+    pub(crate) fn labels(&self, scene: Option<&Scene>) -> Labels {
         let mut labels = Labels::new(self.panel);
         for wall in scene.iter().flat_map(|scene| &scene.walls) {
             labels.keep_off(self.px(wall.a), self.px(wall.b));
@@ -165,7 +172,7 @@ impl Plan {
     }
 
     /// The robot's body, if the scene has one, where it is with the ranger at `pose`.
-    pub(super) fn body(&self, scene: &Scene, pose: &Pose) -> Layer {
+    pub fn body(&self, scene: &Scene, pose: &Pose) -> Layer {
         let mut layer = Layer::new("robot").stroked(theme::FRAME, 1.6);
         let whole = scene.with_robot_at(pose);
         for side in whole.walls.iter().skip(scene.walls.len()) {
@@ -178,7 +185,7 @@ impl Plan {
     }
 
     /// Names of walls and cylinders, where there is room for them.
-    pub(super) fn names(&self, scene: &Scene, labels: &mut Labels) -> Layer {
+    pub(crate) fn names(&self, scene: &Scene, labels: &mut Labels) -> Layer {
         let mut layer = Layer::new("names").with("fill", theme::QUIET).haloed();
         let middle = Bounds::of_scene(scene).map_or(DVec2::ZERO, |b| (b.min + b.max) / 2.0);
         let mut groups: Vec<(&str, Bounds)> = Vec::new();
@@ -235,7 +242,7 @@ impl Plan {
     }
 
     /// The ranger's place and heading.
-    pub(super) fn pose(&self, pose: &Pose) -> Layer {
+    pub fn pose(&self, pose: &Pose) -> Layer {
         let mut layer = Layer::new("pose").stroked(theme::INK, 1.6);
         let at = self.px(pose.position());
         let heading = pose.direction_rad(0.0);
@@ -252,7 +259,7 @@ impl Plan {
     }
 
     /// A bar of a round length, above the panel's right end where it covers nothing.
-    pub(super) fn scale_bar(&self) -> Layer {
+    pub fn scale_bar(&self) -> Layer {
         let length_m = ticks::nice_step(self.panel.width() / self.px_per_m, 9.0);
         let end = Px::new(self.panel.right, self.panel.top - 6.0);
         let start = end - Px::new(self.length_px(length_m), 0.0);

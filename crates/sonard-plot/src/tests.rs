@@ -9,7 +9,7 @@ use uuid::Uuid;
 
 use super::{
     MAX_WIDTH_PX, Picture, PlotError,
-    fixtures::{furnished_room, room, scan_of_room, session, simulated},
+    fixtures::{furnished_room, reflection, room, scan_of_room, session, simulated},
     *,
 };
 use sonard_model::{
@@ -17,8 +17,8 @@ use sonard_model::{
     scene::{Robot, RobotShape, Scene},
 };
 use sonard_records::{
-    Event, EventKind, InteractionKind, InteractionRecord, PathKind, PathRecord, Ping, PingStatus,
-    ScanPlan, ScanStart, ScanView, SimRecord,
+    Event, EventKind, PathKind, PathRecord, Ping, PingStatus, ScanPlan, ScanStart, ScanView,
+    SimRecord,
 };
 
 /// Every kind of picture of these scans.
@@ -184,8 +184,7 @@ fn names_are_escaped_wherever_they_stand() {
     });
     for ping in &mut scan.pings {
         if let Some(path) = ping.sim.as_mut().and_then(|sim| sim.path.as_mut()) {
-            path.interactions =
-                vec![InteractionRecord::unplaced(InteractionKind::Reflection, hostile)];
+            path.interactions = vec![reflection(hostile)];
         }
     }
     let mut all = pictures(&[scan], Some(&scene));
@@ -286,7 +285,7 @@ prop_compose! {
         let path = PathRecord {
             kind,
             order,
-            interactions: vec![InteractionRecord::unplaced(InteractionKind::Reflection, "south")],
+            interactions: vec![reflection("south")],
             length_m,
         };
         SimRecord {

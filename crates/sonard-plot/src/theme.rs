@@ -5,45 +5,53 @@
 //! picture depends on colour.
 
 /// Text and pose markers.
-pub(super) const INK: &str = "#1a1a1a";
+pub const INK: &str = "#1a1a1a";
 /// Secondary text: axis labels, sources.
-pub(super) const QUIET: &str = "#404040";
+pub const QUIET: &str = "#404040";
 /// Frames of the panels.
-pub(super) const FRAME: &str = "#8c8c8c";
+pub const FRAME: &str = "#8c8c8c";
 /// Grid lines.
-pub(super) const GRID: &str = "#e8e8e8";
+pub const GRID: &str = "#e8e8e8";
 /// Silent beams.
-pub(super) const SILENT: &str = "#8c8c8c";
+pub const SILENT: &str = "#8c8c8c";
 /// Walls.
-pub(super) const WALL: &str = "#262626";
+pub const WALL: &str = "#262626";
 /// The page.
-pub(super) const PAPER: &str = "#ffffff";
+pub const PAPER: &str = "#ffffff";
 
-pub(super) const BLUE: &str = "#0072b2";
-pub(super) const SKY: &str = "#56b4e9";
-pub(super) const ORANGE: &str = "#e69f00";
-pub(super) const VERMILLION: &str = "#d55e00";
-pub(super) const GREEN: &str = "#009e73";
-pub(super) const PURPLE: &str = "#b8578f";
+/// Blue.
+pub const BLUE: &str = "#0072b2";
+/// Light blue.
+pub const SKY: &str = "#56b4e9";
+/// Orange.
+pub const ORANGE: &str = "#e69f00";
+/// Red.
+pub const VERMILLION: &str = "#d55e00";
+/// Green.
+pub const GREEN: &str = "#009e73";
+/// Purple.
+pub const PURPLE: &str = "#b8578f";
 
 /// Names tried in this order; the first is the font that PNG files are made with.
-pub(super) const FONT_FAMILY: &str =
+pub const FONT_FAMILY: &str =
     "Ubuntu, 'Ubuntu Light', 'Helvetica Neue', Helvetica, Arial, sans-serif";
 
 /// The picture's title, pixels.
-pub(super) const TITLE_PX: f64 = 20.0;
+pub const TITLE_PX: f64 = 20.0;
 /// Lines under the title, legend entries, axis titles, pixels.
-pub(super) const TEXT_PX: f64 = 14.0;
+pub const TEXT_PX: f64 = 14.0;
 /// Tick labels and names of walls, pixels.
-pub(super) const SMALL_PX: f64 = 12.5;
+pub const SMALL_PX: f64 = 12.5;
 
 /// Width of every picture before scaling, pixels.
-pub(super) const PAGE_PX: f64 = 1000.0;
+pub const PAGE_PX: f64 = 1000.0;
 /// White space around everything, pixels.
-pub(super) const MARGIN_PX: f64 = 18.0;
+pub const MARGIN_PX: f64 = 18.0;
 
-pub(super) const WALL_PX: f64 = 2.2;
-pub(super) const HAIRLINE_PX: f64 = 0.7;
+/// Stroke width of walls, px.
+pub const WALL_PX: f64 = 2.2;
+/// Stroke width of grids, px.
+pub const HAIRLINE_PX: f64 = 0.7;
 
 /// Dash patterns for materials, most mirror-like first.
-pub(super) const WALL_DASHES: [&str; 5] = ["none", "9 3", "3 2.5", "12 3 3 3", "1.5 3"];
+pub const WALL_DASHES: [&str; 5] = ["none", "9 3", "3 2.5", "12 3 3 3", "1.5 3"];

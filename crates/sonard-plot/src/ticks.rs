@@ -2,7 +2,7 @@
 
 /// 1, 2 or 5 times a power of ten: the smallest such step that cuts `span` into at most
 /// `parts`. 1 when there is no span.
-pub(super) fn nice_step(span: f64, parts: f64) -> f64 {
+pub fn nice_step(span: f64, parts: f64) -> f64 {
     let raw = span / parts;
     if !raw.is_normal() || raw < 0.0 {
         return 1.0;
@@ -17,7 +17,7 @@ pub(super) fn nice_step(span: f64, parts: f64) -> f64 {
 }
 
 /// Multiples of `step` in `[from, to]`, at most a hundred.
-pub(super) fn multiples(from: f64, to: f64, step: f64) -> impl Iterator<Item = f64> {
+pub fn multiples(from: f64, to: f64, step: f64) -> impl Iterator<Item = f64> {
     let first = (from / step - 1e-9).ceil();
     (0..100)
         .map(move |i| (first + f64::from(i)) * step)
@@ -25,7 +25,7 @@ pub(super) fn multiples(from: f64, to: f64, step: f64) -> impl Iterator<Item = f
 }
 
 /// A multiple of `step` with as many decimals as the step needs.
-pub(super) fn label(value: f64, step: f64) -> String {
+pub fn label(value: f64, step: f64) -> String {
     let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
     // Adding zero makes -0 plain.
     let text = format!("{:.decimals$}", value + 0.0);

@@ -5,7 +5,7 @@ use std::{borrow::Cow, fmt};
 use serde::{Deserialize, de::DeserializeOwned};
 use thiserror::Error;
 
-use super::{LOG_FORMAT, PathRecord, Point, Record, Session};
+use super::{LOG_FORMAT, PathRecord, Point, Record};
 
 /// Longest line that is written or read, bytes. A record of 65535 echo times would fit.
 pub const MAX_LINE_BYTES: usize = 1 << 20;
@@ -27,8 +27,8 @@ pub enum FaultKind {
     UnknownType,
     /// A record with a field missing or of the wrong kind.
     BadField,
-    /// A session of a log format later than this program knows.
-    NewerFormat,
+    /// A session of a log format other than [`LOG_FORMAT`].
+    UnsupportedFormat,
     /// The last line, cut off in the middle of the record.
     Torn,
 }
@@ -64,7 +64,7 @@ impl RecordError {
     #[must_use]
     pub fn is_whole_record(&self) -> bool {
         use FaultKind as Kind;
-        matches!(self.kind, Kind::UnknownType | Kind::BadField | Kind::NewerFormat)
+        matches!(self.kind, Kind::UnknownType | Kind::BadField | Kind::UnsupportedFormat)
     }
 }
 
@@ -97,15 +97,7 @@ pub fn encode_line(record: &Record, line: &mut Vec<u8>) -> Result<(), EncodeErro
         return Err(EncodeError::NotFinite { field, value });
     }
     let before = line.len();
-    let result = match record {
-        // What was read from an earlier format is written in this one.
-        Record::Session(session) if session.format < LOG_FORMAT => {
-            let session = Session { format: LOG_FORMAT, ..(**session).clone() };
-            serde_json::to_writer(&mut *line, &Record::Session(Box::new(session)))
-        }
-        _ => serde_json::to_writer(&mut *line, record),
-    };
-    let result = result.map_err(EncodeError::from);
+    let result = serde_json::to_writer(&mut *line, record).map_err(EncodeError::from);
     let length = line.len() - before;
     let result = match result {
         Ok(()) if length > MAX_LINE_BYTES => Err(EncodeError::TooLong(length)),
@@ -194,26 +186,30 @@ fn tag_fault(text: &str, error: &serde_json::Error) -> RecordError {
     RecordError { kind: FaultKind::NotJson, column: Some(error.column()), field: None, message }
 }
 
-/// A session of a later format is named as such, whatever fields it has.
+/// Decodes a session. Its format is checked first, because fields of another format may differ.
 fn decode_session(text: &str) -> Result<Record, RecordError> {
     #[derive(Deserialize)]
-    struct Format {
-        format: u32,
+    struct Version {
+        format: u64,
+        #[serde(default)]
+        sonard: String,
     }
-    fields_of(text).map(Record::Session).map_err(|error| {
-        match serde_json::from_str::<Format>(text) {
-            Ok(Format { format }) if format > LOG_FORMAT => RecordError {
-                kind: FaultKind::NewerFormat,
+    match serde_json::from_str(text) {
+        Ok(Version { format, sonard }) if format != u64::from(LOG_FORMAT) => {
+            let writer =
+                if sonard.is_empty() { "its writer".into() } else { format!("sonard {sonard}") };
+            Err(RecordError {
+                kind: FaultKind::UnsupportedFormat,
+                column: None,
                 field: Some("format".into()),
                 message: format!(
-                    "the log is of format {format} and this program reads up to {LOG_FORMAT}: \
-                     use a newer sonard"
+                    "log format {format} is not supported, only format {LOG_FORMAT}: read the log with the version that \
+                     wrote it, {writer}"
                 ),
-                ..error
-            },
-            _ => error,
+            })
         }
-    })
+        _ => fields_of(text).map(Record::Session),
+    }
 }
 
 /// Reads a record's fields; only when that fails, again with an eye on the path.
@@ -268,7 +264,7 @@ fn first_not_finite(record: &Record) -> Option<(&'static str, f64)> {
             let length = |path: Option<&PathRecord>| path.map_or(0.0, |path| path.length_m);
             let place = |path: Option<&PathRecord>| {
                 let met = path.into_iter().flat_map(|path| &path.interactions);
-                let known = met.filter_map(|met| met.point).all(Point::is_finite);
+                let known = met.map(|met| met.point).all(Point::is_finite);
                 if known { 0.0 } else { f64::NAN }
             };
             let path = ping.path.as_ref();

@@ -3,10 +3,7 @@
 use serde_json::Value;
 use sonard_model::{
     acoustics::{Air, AirError},
-    model::{
-        Arrival, Interaction, Mechanism, ObservationPoint, OptionKeys, Options, Path, Prediction,
-        Simulator,
-    },
+    model::{Interaction, Mechanism, OptionKeys, Options, Path, Prediction, Simulator},
     scene::Scene,
 };
 
@@ -101,7 +98,7 @@ impl PathRecord {
         let interaction = |met: &Interaction| InteractionRecord {
             kind: met.mechanism.into(),
             id: met.mechanism.name(scene),
-            point: Some(Point::rounded(met.point, met.z_m)),
+            point: Point::rounded(met.point, met.z_m),
         };
         Self {
             kind: path.kind(),
@@ -110,22 +107,7 @@ impl PathRecord {
             length_m,
         }
     }
-
-    /// The arrival that is this path, among those that a firing in a world direction brings, radians: the
-    /// model finds again where a path of a log of format 1 ran. `None` if it finds none of that kind and
-    /// length, or there are too many paths.
-    #[must_use]
-    pub fn arrival(&self, point: &ObservationPoint<'_>, direction_rad: f64) -> Option<Arrival> {
-        let off_m = |arrival: &Arrival| (arrival.length_m - self.length_m).abs();
-        let mut arrivals = point.arrivals(direction_rad).ok()?;
-        arrivals
-            .retain(|arrival| arrival.path.kind() == self.kind && off_m(arrival) < SAME_LENGTH_M);
-        arrivals.into_iter().min_by(|one, other| off_m(one).total_cmp(&off_m(other)))
-    }
 }
-
-/// Paths of a log and of the model are one if their lengths differ by less, metres: a log may round.
-const SAME_LENGTH_M: f64 = 1e-3;
 
 impl From<Mechanism> for InteractionKind {
     fn from(mechanism: Mechanism) -> Self {
@@ -140,15 +122,8 @@ impl From<Mechanism> for InteractionKind {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
-    use sonard_model::{
-        acoustics::Sensor,
-        geometry::DVec2,
-        model::{ConeOptions, EngineKind, EngineOptions, FanOptions, PathOptions},
-        scene::shipped,
-    };
+    use sonard_model::model::{ConeOptions, EngineKind, EngineOptions, FanOptions, PathOptions};
 
     #[test]
     fn air_survives_its_record() {
@@ -181,31 +156,6 @@ mod tests {
         let mut unknown = record;
         unknown.settings.insert("bounces".into(), 3.into());
         assert_eq!(unknown.options(), None);
-    }
-
-    /// Each path is found among the arrivals by its kind and length, to a millimetre.
-    #[test]
-    fn a_path_is_found_again_by_kind_and_length() {
-        let text = shipped::text("two-surface-room").expect("shipped");
-        let scene = Arc::new(Scene::from_json(text).expect("a scene"));
-        let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-        let options = Options::default();
-        let simulator = Simulator::new(scene.clone(), sensor, Air::default(), options);
-        let simulator = simulator.expect("a model");
-        let point = simulator.at(DVec2::new(1.2, 0.9));
-        let arrivals = point.arrivals(0.3).expect("few paths");
-        assert!(arrivals.len() > 5, "{}", arrivals.len());
-        for arrival in &arrivals {
-            let path = PathRecord::of(&scene, &arrival.path, arrival.length_m);
-            let off_m = |found: Option<Arrival>| {
-                found.map(|found| (found.length_m - arrival.length_m).abs())
-            };
-            assert_eq!(off_m(path.arrival(&point, 0.3)), Some(0.0));
-            let rounded = PathRecord { length_m: arrival.length_m + 4e-7, ..path.clone() };
-            assert!(off_m(rounded.arrival(&point, 0.3)).is_some_and(|m| m < 1e-6));
-            let odd = PathRecord { length_m: 1e-3 + arrivals[arrivals.len() - 1].length_m, ..path };
-            assert_eq!(odd.arrival(&point, 0.3), None);
-        }
     }
 
     #[test]

@@ -56,7 +56,7 @@ impl PeakLine {
         let line = |peak: &EnvelopePeak| {
             let arrival = point.arrival(direction_rad, &peak.arrival)?;
             let path = PathRecord::of(simulator.scene(), &arrival.path, arrival.length_m);
-            let polyline = path.polyline(ends).into_iter().flatten().map(PlanPoint::from);
+            let polyline = path.polyline(ends).into_iter().map(PlanPoint::from);
             Ok(Self {
                 tof_us: peak.tof_us,
                 range_m: arrival.length_m / 2.0,

@@ -14,9 +14,8 @@ use sonard_model::{
     scene::Scene,
 };
 
-/// Version of the record format, written into every session. Format 1, in which paths had `walls` in place
-/// of `interactions`, is read as well.
-pub const LOG_FORMAT: u32 = 2;
+/// Version of the record format, written into every session. Sessions of other formats are rejected.
+pub const LOG_FORMAT: u32 = 1;
 
 /// Where the readings of a session come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -39,7 +38,7 @@ pub enum Provenance {
 /// The record that opens a log, and again follows each reconnection to a different device.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Session {
-    /// Record format: [`LOG_FORMAT`], or of a log that was read an earlier one.
+    /// Record format: [`LOG_FORMAT`].
     pub format: u32,
     /// Wall clock at the start.
     pub started: Timestamp,

@@ -73,7 +73,7 @@ fn read(args: &Args) -> Result<Summary, Failure> {
         let line = line.map_err(|source| StoreError::Read { path: args.log.clone(), source })?;
         match line.record {
             Ok(record) => summary.add(record),
-            Err(error) => summary.damaged(&error),
+            Err(error) => summary.damaged(&error.reject_other_format(&args.log)?),
         }
     }
     Ok(summary.finished())

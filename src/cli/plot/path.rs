@@ -50,21 +50,12 @@ pub(super) fn draw(
             "choose a beam with an echo; `sonard log show --pings` lists them",
         )
     })?;
-    let viewpoint = view.viewpoint(ping).ok_or_else(|| {
+    let viewpoint = view.viewpoint(ping).zip(view.polyline(ping, record));
+    let (viewpoint, points) = viewpoint.ok_or_else(|| {
         let ranger = ping.ranger.as_deref().unwrap_or_default();
         Failure::input(
             format!("beam {index} is of ranger {ranger:?}, which the log's array does not have"),
             "correct the session's record",
-        )
-    })?;
-    let points = view.polyline(ping, record, scene).ok_or_else(|| {
-        Failure::input(
-            format!(
-                "beam {index}: its log is of format 1, without points, and the model finds no path over {} in \
-                 this scene",
-                record.in_words()
-            ),
-            "give the scene that the log's model used with --scene",
         )
     })?;
     Ok(draw_path(&PathView {

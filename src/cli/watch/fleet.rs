@@ -4,7 +4,7 @@ use std::io::{self, Write as _};
 
 use tokio::{sync::mpsc, task::JoinSet, time::sleep};
 
-use super::{RECONNECT_MAX, RECONNECT_MIN, words};
+use super::{RECONNECT, words};
 use crate::{
     api::FleetState,
     cli::{Failure, Outcome},
@@ -68,7 +68,7 @@ fn for_people(robot: &str, record: &[u8]) -> String {
 async fn follow(one: Asked, path: String, send: mpsc::Sender<Line>) {
     let mut expected = one.member.robot.clone();
     let mut told = String::new();
-    let mut wait = RECONNECT_MIN;
+    let mut backoff = RECONNECT;
     loop {
         let address = one.member.address();
         let seen = judge(expected.as_deref(), ask(&one.client).await);
@@ -79,7 +79,7 @@ async fn follow(one: Asked, path: String, send: mpsc::Sender<Line>) {
                 if !tell(&send, &mut told, came).await {
                     return;
                 }
-                wait = RECONNECT_MIN;
+                backoff.reset();
                 match stream(&one, &path, &robot, &send).await {
                     Some(why) => format!("{robot}: {why}"),
                     None => return,
@@ -90,8 +90,7 @@ async fn follow(one: Asked, path: String, send: mpsc::Sender<Line>) {
         if !tell(&send, &mut told, format!("{why}: waiting for it")).await {
             return;
         }
-        sleep(wait).await;
-        wait = (wait * 2).min(RECONNECT_MAX);
+        sleep(backoff.next_wait()).await;
     }
 }
 

@@ -25,11 +25,7 @@ pub(super) fn look(view: &ScanView, ping: Ping, scene: Option<&Scene>) -> Beam {
         Ok((peaks, trace)) => (Some(peaks), Some(trace), None),
         Err(lacks) => (None, None, Some(lacks)),
     };
-    // A log of format 1 does not say where the sound went; the model does, in the scan's own scene.
-    let polyline = ping.sound_path().and_then(|path| match scene {
-        Some(scene) if lacks.is_none() => view.polyline(&ping, path, scene),
-        _ => path.polyline(view.ends(&ping, path)?),
-    });
+    let polyline = ping.sound_path().and_then(|path| view.polyline(&ping, path));
     let polyline = polyline.map(|points| points.into_iter().map(PlanPoint::from).collect());
     Beam { reading: JudgedPing::of(ping, view), echoes, polyline, peaks, trace, lacks }
 }

@@ -26,8 +26,8 @@ pub enum FindingKind {
     NoNewline,
     /// A line that is not a record.
     Damaged,
-    /// The log is of a later format than this program knows.
-    NewerFormat,
+    /// A session of another log format.
+    UnsupportedFormat,
     /// A scan before any session.
     NoSession,
     /// A ping, or an end, of a scan that was not begun or is over.

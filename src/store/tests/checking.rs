@@ -56,7 +56,7 @@ fn each_problem_is_found_on_its_line() {
             with_line(4, |_| Some("{}".into())),
             vec![(4, Damaged), (10, WrongCount), (10, WrongCount)],
         ),
-        (replaced(1, "\"format\":2", "\"format\":3"), vec![(1, NewerFormat)]),
+        (replaced(1, "\"format\":1", "\"format\":2"), vec![(1, UnsupportedFormat)]),
         (with_line(1, |_| None), vec![(1, NoSession)]),
         (with_line(2, |_| None), vec![(2, OutsideScan)]),
         (

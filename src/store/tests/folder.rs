@@ -154,3 +154,21 @@ fn the_oldest_go_when_there_is_a_limit() {
     let newest = files.last().map(|file| folder.path().join(&file.name));
     assert_eq!(newest.as_deref(), Some(log.path()));
 }
+
+#[test]
+fn a_log_of_another_format_is_not_continued() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let now = time("2026-03-01T10:00:00Z");
+    let other = LOG.replacen("\"format\":1", "\"format\":2", 1);
+    fs::write(folder.path().join("sonard-20260301T100000Z.jsonl"), &other).expect("written");
+    let mut log = LogFolder::open(folder.path(), rotation(1 << 20), now).expect("opens");
+    put(&mut log, &scan(1), now);
+    log.close().expect("syncs");
+    let [first, second] = &names(folder.path())[..] else { panic!("two logs") };
+    assert_eq!(fs::read_to_string(folder.path().join(first)).expect("readable"), other);
+    let findings = crate::store::check(
+        &fs::read(folder.path().join(second)).expect("readable")[..],
+        |finding| panic!("{finding}"),
+    );
+    assert_eq!(findings.expect("readable").scans, 1);
+}

@@ -61,7 +61,7 @@ fn the_original_takes_the_next_free_name() {
 fn what_another_version_may_read_is_not_thinned_out() {
     let (_folder, log) = folder();
     let other = LOG
-        .replace("\"format\":2", "\"format\":3")
+        .replace("\"format\":1", "\"format\":2")
         .replace("\"started\"", "\"begun\"")
         .replace("\"type\":\"scan_end\"", "\"type\":\"scan_over\"")
         .replace("\"index\":4,", "");

@@ -146,13 +146,12 @@ fn a_sweep_that_a_killed_collection_left_behind_costs_the_next_one_nothing() {
 fn a_ranger_that_measures_nothing_is_tried_ever_more_seldom_and_leaves_no_scans_aside() {
     let plan = "[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 20\npatience_s = 8\n";
     let case = Case::new(plan);
-    let began = std::time::Instant::now();
     let output = case.collect(&["--faults", "reset=1"]);
     let text = said(&output);
     assert_eq!(output.status.code(), Some(3), "{text}");
     assert!(text.contains("supply"), "{text}");
     let tries = text.matches("the ranger was lost").count();
-    assert!((2..=4).contains(&tries), "{tries} tries in {:?}: {text}", began.elapsed());
+    assert!((2..=4).contains(&tries), "{tries} tries: {text}");
     assert_eq!(case.files("set-aside"), Vec::<String>::new());
     assert_eq!(case.manifest()["counts"]["given_up"], 0, "its pose is not to blame");
     // With another ranger it goes on.

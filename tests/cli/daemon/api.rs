@@ -21,7 +21,7 @@ use sonard::{
     scan::{ScanPlan, Session},
 };
 
-use super::{Daemon, clean_log, schema::misfits};
+use super::{Daemon, clean_log, logs, schema::misfits};
 use crate::common::{run, stderr, wait_until};
 
 /// A scan of a quarter turn that takes a second.
@@ -279,6 +279,38 @@ fn past_scans_and_their_beams_are_read_from_the_logs() {
     let scene = daemon.get("/v1/scene").json();
     assert_eq!(scene["sha256"], whole["session"]["scene"]["sha256"]);
     assert_eq!(scene["walls"].as_array().map(Vec::len), Some(4));
+}
+
+#[test]
+fn log_byte_ranges() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    daemon.wait_for("ready");
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+    daemon.wait_for_scans(1);
+    wait_until("the log", || {
+        let log = daemon.status()["log"].clone();
+        log["synced"].as_u64() >= log["written"].as_u64()
+    });
+    let log = logs(folder.path()).remove(0);
+    let path = format!("/v1/logs/{}", log.file_name().expect("a name").to_string_lossy());
+    let whole = fs::read(&log).expect("readable");
+    let get = |range: &str| {
+        let headers = [("Host", "localhost"), ("Range", range)];
+        super::ask(daemon.connect().expect("it listens"), "GET", &path, &headers, "")
+    };
+    let reply = get("bytes=100-");
+    assert_eq!((reply.status, &reply.body[..]), (206, &whole[100..]));
+    let range = format!("content-range: bytes 100-{}/{}", whole.len() - 1, whole.len());
+    assert!(reply.head.contains(&range), "{}", reply.head);
+    // What need not be understood is answered with the whole.
+    for other in
+        ["bytes=-5", "bytes=0-1,3-4", "lines=1-", "bytes=x-", "bytes=99999999999999999999-"]
+    {
+        let reply = get(other);
+        assert_eq!((reply.status, reply.body.len()), (200, whole.len()), "{other}");
+    }
+    assert_eq!(get(&format!("bytes={}-", whole.len())).status, 416);
 }
 
 /// Between two points of a floor plan, metres.

@@ -1,17 +1,11 @@
 //! What the API makes of scans: echo traces, previews, and maps, lines and features.
 
-use std::{fs, path::Path};
+use std::fs;
 
-use jiff::Timestamp;
 use serde_json::{Value, json};
-use sonard::{
-    api::{Findings, WholeScan},
-    geometry::Pose,
-    scan::{Ping, Record, ScanEnd, ScanPlan, ScanStart, decode_line, encode_line},
-};
-use uuid::Uuid;
+use sonard::api::{Findings, WholeScan};
 
-use super::{Daemon, viewpoint::start_array};
+use super::{Daemon, start_array, write_scans};
 use crate::common::{run, stderr};
 
 /// A full turn of a hundred beams.
@@ -154,46 +148,4 @@ fn arrays_have_no_features_and_long_scans_cost_nothing() {
     let long = findings(scans.last().expect("the long one"));
     assert_eq!(long.status, 409, "{}", long.json());
     assert!(long.json()["error"].as_str().is_some_and(|error| error.contains("4000")));
-}
-
-/// A log of so many scans, ten seconds apart, each of so many beams.
-pub(crate) fn write_scans(folder: &Path, scans: u32, beams: u32) {
-    fs::create_dir_all(folder).expect("there is room");
-    let few = ["simulate", "--scene", "simple-room", "--pose", "fig9", "--step-deg", "36"];
-    let made = run(&[&few[..], &["--max-range", "2"]].concat());
-    assert!(made.status.success(), "{}", stderr(&made));
-    let record = |line: &[u8]| decode_line(line).expect("a record");
-    let records: Vec<Record> =
-        made.stdout.trim_ascii_end().split(|b| *b == b'\n').map(record).collect();
-    let mut log = Vec::new();
-    let mut put = |record: &Record| encode_line(record, &mut log).expect("a line");
-    put(&records[0]);
-    let step_deg = 360.0 / f64::from(beams);
-    let plan = ScanPlan {
-        from_deg: 0.0,
-        to_deg: step_deg * f64::from(beams),
-        step_deg,
-        pings_per_stop: 1,
-    };
-    let pings = records.iter().filter_map(|record| match record {
-        Record::Ping(ping) => Some(&**ping),
-        _ => None,
-    });
-    let pings: Vec<&Ping> = pings.collect();
-    for number in 0..scans {
-        let scan = Uuid::from_u128(u128::from(number) + 1);
-        let time = Timestamp::from_second(1_780_000_000 + 10 * i64::from(number)).expect("a time");
-        let pose = Pose { x_m: 0.774, y_m: 0.085, heading_deg: 0.0 };
-        put(&Record::ScanStart(ScanStart::new(scan, time, pose, plan)));
-        for index in 0..beams {
-            // As the model reads in the direction nearest to it.
-            let like = pings[(u64::from(index) * pings.len() as u64 / u64::from(beams)) as usize];
-            let azimuth_deg = step_deg * f64::from(index);
-            let ping = Ping { scan, index, step: index.cast_signed(), azimuth_deg, ..like.clone() };
-            put(&Record::Ping(Box::new(ping)));
-        }
-        let Some(Record::ScanEnd(end)) = records.last() else { panic!("a log ends with its scan") };
-        put(&Record::ScanEnd(ScanEnd { scan, time, beams, ..end.clone() }));
-    }
-    fs::write(folder.join("sonard-20260601T000000Z.jsonl"), log).expect("there is room");
 }

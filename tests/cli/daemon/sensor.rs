@@ -5,7 +5,7 @@ use std::fs;
 use rustix::process::Signal;
 use serde_json::{Value, json};
 
-use super::{Daemon, clean_log, viewpoint::start_array};
+use super::{Daemon, clean_log, start_array};
 use crate::common::wait_until;
 
 const TURN: [&str; 4] = ["--set", "plan.step_deg=3.6", "--set", "model.max_range_m=3"];

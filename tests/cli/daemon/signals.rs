@@ -120,8 +120,7 @@ fn closed_terminal_ends_the_daemon_in_order() {
         sonard(&["run", "--mock", "--scene", "simple-room", "--pose", "fig9", "--log"]);
     command.arg(folder.path().join("log")).arg("--socket").arg(folder.path().join("s")).args(FAST);
     let (child, terminal) = with_terminal(command);
-    let mut daemon = Daemon { child, folder: folder.path().into(), said: Default::default() };
-    wait_until("the API", || daemon.connect().is_ok());
+    let mut daemon = Daemon::from_child(child, folder.path());
     wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(2));
     drop(terminal);
     assert_eq!(daemon.child.wait().expect("it ends").code(), Some(0));

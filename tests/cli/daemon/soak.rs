@@ -12,13 +12,10 @@ use rand::{RngExt as _, SeedableRng as _};
 use sonard::mock::Pace;
 
 use super::{
-    Daemon, clean_log, logs, resident_kb,
+    Daemon, clean_log, logs,
     rig::{Rig, limit_files},
 };
 use crate::common::{Log, wait_until};
-
-/// Memory may grow by this much over the first readings: buffers find their size.
-const GROWTH_KB: u64 = 4_000;
 
 #[test]
 fn every_fault_is_recovered_from_and_every_beam_is_logged_once() {
@@ -37,7 +34,7 @@ fn every_fault_is_recovered_from_and_every_beam_is_logged_once() {
     daemon.wait_for_scans(3);
     let mut random = rand_pcg::Pcg32::seed_from_u64(6500);
     let mut tally: BTreeMap<&str, u64> = BTreeMap::new();
-    let (mut early_kb, began) = (None, Instant::now());
+    let began = Instant::now();
     let mut dead_subscribers = Vec::new();
     let mut injected = 0;
     while injected + rig.played() < wanted {
@@ -49,25 +46,17 @@ fn every_fault_is_recovered_from_and_every_beam_is_logged_once() {
         injected += 1;
         let before = daemon.health()["scans"]["completed"].as_u64().expect("a count");
         wait_until("recovery", || daemon.health()["scans"]["completed"].as_u64() > Some(before));
-        if injected > 12 && early_kb.is_none() {
-            early_kb = Some(resident_kb(daemon.id()));
-        }
     }
     rig.plug("", 7);
     daemon.wait_for_scans(1);
     dead_subscribers.clear();
-    let (early_kb, late_kb) = (early_kb.unwrap_or(u64::MAX), resident_kb(daemon.id()));
     let health = daemon.health();
     println!(
-        "{} faults in {:.0} s, all recovered: {tally:?}, {} played by boards; {}; resident {early_kb} kB, then {late_kb} kB",
+        "{} faults in {:.0} s, all recovered: {tally:?}, {} played by boards; {}",
         injected + rig.played(),
         began.elapsed().as_secs_f64(),
         rig.played(),
         health["scans"],
-    );
-    assert!(
-        late_kb <= early_kb.saturating_add(GROWTH_KB),
-        "memory grew from {early_kb} to {late_kb} kB"
     );
     assert_eq!(daemon.stop(), Some(0));
     check(&clean_log(folder.path()), health["scans"]["completed"].as_u64().expect("a count"));

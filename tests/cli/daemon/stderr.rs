@@ -27,9 +27,7 @@ fn start(rig: &Rig, folder: &Path) -> (Daemon, PipeReader) {
         .stderr(Stdio::from(writer))
         .spawn()
         .expect("the program starts");
-    let daemon = Daemon { child, folder: folder.into(), said: Default::default() };
-    wait_until("the API", || daemon.connect().is_ok());
-    (daemon, reader)
+    (Daemon::from_child(child, folder), reader)
 }
 
 /// Unplugs and plugs the ranger, which the daemon reports each time, and waits until it measures again.

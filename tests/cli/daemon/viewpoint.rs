@@ -1,34 +1,11 @@
 //! Where each reading was taken, as the API tells it: of an array, and of a transducer beside its axis.
 
-use std::{
-    fs,
-    io::{BufRead as _, BufReader, Write as _},
-    path::Path,
-};
+use std::io::{BufRead as _, BufReader, Write as _};
 
 use serde_json::Value;
 
-use super::Daemon;
-use crate::common::{run, wait_until};
-
-/// A mock without noise whose transducer is 0.1 m ahead of the rotation axis, in a room where it can turn.
-pub(crate) fn start_ahead(folder: &Path, further: &[&str]) -> Daemon {
-    let shown = run(&["sensor", "show", "senscomp-6500"]);
-    let mut sensor: Value = serde_json::from_slice(&shown.stdout).expect("a sensor");
-    sensor["mounting"]["ahead_m"] = 0.1.into();
-    let file = folder.join("ahead.json");
-    fs::write(&file, sensor.to_string()).expect("there is room");
-    let sensor = format!("model.sensor={}", file.display());
-    let mock = ["--mock", "--scene", "two-surface-room", "--pose", "middle", "--set", &sensor];
-    let quiet = ["--noise-mm", "0"];
-    Daemon::start(folder, &[&mock, &quiet[..], further].concat())
-}
-
-/// Eight sonars of the model in the laboratory, standing.
-pub(crate) fn start_array(folder: &Path, further: &[&str]) -> Daemon {
-    let array = ["--simulate", "--array", "pioneer-8", "--scene", "mcgill-lab", "--pose", "fig4"];
-    Daemon::start(folder, &[&array, further].concat())
-}
+use super::{Daemon, start_ahead, start_array};
+use crate::common::wait_until;
 
 /// The newest scan that is over.
 fn newest(daemon: &Daemon) -> Value {

@@ -57,7 +57,6 @@ fn a_place_that_can_not_be_written_to_is_wrong_input_in_every_verb() {
         "export DIR/fig9.jsonl -o DIR/none/a.csv",
         "map DIR/fig9.jsonl --out DIR/fig9.jsonl/map",
         "scan --mock --scene IN --pose fig9 --to-deg 9 --out DIR/fig9.jsonl/scan",
-        "explore --scene IN --pose fig9 --most-stops 1 --out DIR/fig9.jsonl/explored",
         "run --mock --scene IN --pose fig9 --log DIR/fig9.jsonl/log --socket DIR/s",
         "generate DIR/fig9.jsonl/generated",
     ] {

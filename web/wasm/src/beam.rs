@@ -45,7 +45,7 @@ impl Beam {
         let (peaks, trace) = sweep.look(ping, listen)?.transpose()?.unwrap_or_default();
         let viewpoint = reading.beside.viewpoint;
         let line = reading.ping.sound_path().zip(viewpoint);
-        let line = line.and_then(|(path, viewpoint)| path.polyline(viewpoint.ends()));
+        let line = line.map(|(path, viewpoint)| path.polyline(viewpoint.ends()));
         let polyline = line.map(|points| points.into_iter().map(PlanPoint::from).collect());
         Ok(Self { reading, polyline, peaks, trace })
     }

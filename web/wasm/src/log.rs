@@ -10,7 +10,7 @@ use sonard_model::{
     geometry::Pose,
 };
 use sonard_records::{
-    AirRecord, ModelRecord, Provenance, Record, ScanPlan, ScanView, Session, decode_line,
+    AirRecord, FaultKind, ModelRecord, Provenance, Record, ScanPlan, ScanView, Session, decode_line,
 };
 
 use crate::Refusal;
@@ -62,8 +62,13 @@ impl<'a> Found<'a> {
 /// The scans of a file: JSON Lines of this program, or what `sonard import` reads without being told more.
 pub(crate) fn scans(text: &str, pose: Pose) -> Result<Vec<ScanView>, Refusal> {
     let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
-    let records =
-        if decode_line(first.as_bytes()).is_ok() { own(text)? } else { foreign(text, pose)? };
+    let records = match decode_line(first.as_bytes()) {
+        Ok(_) => own(text)?,
+        Err(fault) if fault.kind == FaultKind::UnsupportedFormat => {
+            return Err(Refusal::new(&fault.to_string(), "drop a log of this version"));
+        }
+        Err(_) => foreign(text, pose)?,
+    };
     let scans: Vec<_> =
         ScanView::from_records(records).into_iter().filter(|scan| !scan.pings.is_empty()).collect();
     if scans.is_empty() {

@@ -253,6 +253,6 @@ fn path_of(scan: &ScanView, ping: &Ping, kind: PathKind) -> Option<Vec<[f64; 3]>
         Point::Space(at) => at,
     };
     let [transmitter, receiver] = scan.ends(ping, path)?.map(|end| [end.x, end.y, z_m]);
-    let met = path.interactions.iter().map(|met| met.point.map(corner));
-    [Some(transmitter)].into_iter().chain(met).chain([Some(receiver)]).collect()
+    let met = path.interactions.iter().map(|met| corner(met.point));
+    Some([transmitter].into_iter().chain(met).chain([receiver]).collect())
 }

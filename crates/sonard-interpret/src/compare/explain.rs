@@ -102,11 +102,11 @@ impl Explainer {
         (self.seen - 1).is_multiple_of(self.stride)
     }
 
-    /// `None` of a reading without a predicted path that says its points, and of another firing's sound.
+    /// `None` of a reading without a predicted path, and of another firing's sound.
     fn pair(&mut self, scan: &ScanView, ping: &Ping, residual_m: Option<f64>) -> Option<Pair> {
         let sim = ping.sim.as_ref().filter(|sim| sim.crosstalk.is_none())?;
         let path = sim.path.as_ref()?;
-        let points = path.polyline(scan.viewpoint(ping)?.ends())?;
+        let points = path.polyline(scan.viewpoint(ping)?.ends());
         let is_level = path.interactions.iter().all(|met| met.id != "floor" && met.id != "ceiling");
         if !is_level {
             // What the ends' heights are is the model's to know.

@@ -8,7 +8,7 @@
 //! one of them, so its arc is crossed by the plane of a nearer arc. Priors and shares below
 //! are counts over 200 made-up rooms (boxes and partitions in rectangular rooms, one scan in each from
 //! a random place, `senscomp-6500` with its whole receiver, 2,275 whole arcs, the truth from the
-//! model's paths). `sonard benchmark interpret` measures on other rooms how far they can be believed.
+//! model's paths). `sonard-papers benchmark interpret` measures on other rooms how far they can be believed.
 
 use super::{Probabilities, UniformSum};
 

@@ -1,12 +1,10 @@
 //! Interpretation against the paper's figures, its densities, and random worlds.
 
-mod calibration;
 mod degenerate;
 mod densities;
 mod mapping;
 mod paper;
 mod probabilities;
-mod rooms;
 mod sweep;
 mod worlds;
 

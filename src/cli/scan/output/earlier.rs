@@ -38,7 +38,8 @@ impl Earlier {
                     earlier.scans += 1;
                     earlier.start = Some(start);
                 }
-                _ => {}
+                Ok(_) => {}
+                Err(error) => drop(error.reject_other_format(path)?),
             }
         }
         if lines > 0 && earlier.session.is_none() && earlier.scans == 0 {

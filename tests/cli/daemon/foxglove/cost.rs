@@ -40,25 +40,19 @@ fn a_viewer_that_slept_is_told_how_much_it_missed_and_goes_on() {
 }
 
 #[test]
-fn viewers_that_never_wake_cost_little_and_are_cut_off_while_others_are_told() {
+fn viewers_that_never_wake_are_cut_off_while_others_are_told() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = busy(folder.path(), &["--set", "server.stall_s=3"]);
     let mut awake = viewer(&daemon);
     // Until as much waits as may.
     drop(awake.for_a_while(Duration::from_secs(8)));
-    let before_kb = own_kb(daemon.id());
     let asleep: Vec<_> = (0..7).map(|_| viewer(&daemon)).collect();
     let cut_off = || daemon.status()["subscribers"]["cut_off"].as_u64();
-    let mut most_kb = 0;
     let until = Instant::now() + Duration::from_secs(40);
     while cut_off() != Some(7) && Instant::now() < until {
         assert!(awake.for_a_while(Duration::from_millis(300)).of("/tf").count() > 0);
-        most_kb = most_kb.max(own_kb(daemon.id()));
     }
     assert_eq!(cut_off(), Some(7));
-    println!("{before_kb} kB with one viewer, at most {most_kb} kB with seven asleep beside it");
-    // Each one's message on its way, and its connection.
-    assert!(most_kb < before_kb + 7000, "{before_kb} kB before, {most_kb} kB at most");
     assert_eq!(daemon.health()["scans"]["stopped"], 0);
     drop(asleep);
     assert_eq!(daemon.stop(), Some(0));

@@ -65,7 +65,7 @@ fn sound_between_wall_and_face_gains_by_each_way() {
     let met = |kind, id: &str, at: DVec2| InteractionRecord {
         kind,
         id: id.into(),
-        point: Some(Point::Plan(at.to_array())),
+        point: Point::Plan(at.to_array()),
     };
     for meetings in 1..=3_usize {
         let at_wall = || met(InteractionKind::Reflection, "w", from + wall_m * DVec2::X);

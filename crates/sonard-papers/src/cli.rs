@@ -1,0 +1,48 @@
+//! Command line of `sonard-papers`.
+
+mod answer;
+mod benchmark;
+mod explore;
+mod failure;
+mod input;
+mod interpret;
+mod map;
+mod output;
+mod progress;
+mod rooms;
+mod score;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+pub(crate) use failure::{Failure, Outcome};
+
+/// Repeats the experiments of the papers on simulated rooms
+#[derive(Debug, Parser)]
+#[command(version, about, max_term_width = 100, after_help = EXIT_CODES)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 done, 1 stopped before everything was explored, 2 wrong usage or input, 3 write error.";
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Measure maps, interpretations and explorations with the metrics of the papers
+    #[command(subcommand)]
+    Benchmark(benchmark::Verb),
+    /// Let a simulated robot explore a scene and map it with lines
+    #[command(long_about = explore::ABOUT)]
+    Explore(explore::Args),
+}
+
+/// Runs the command line of this process.
+pub(crate) fn main() -> ExitCode {
+    let outcome = match Cli::parse().verb {
+        Verb::Benchmark(verb) => benchmark::run(verb),
+        Verb::Explore(args) => explore::run(&args),
+    };
+    failure::report(outcome)
+}

@@ -1,0 +1,29 @@
+//! `sonard-papers benchmark`.
+
+use super::{Outcome, interpret, map, rooms, score};
+
+/// Verbs of `sonard-papers benchmark`.
+#[derive(Debug, clap::Subcommand)]
+pub(crate) enum Verb {
+    /// Map simulated courses without and with Feature Prediction, and score the maps
+    #[command(long_about = map::ABOUT)]
+    Map(map::Args),
+    /// Compare a map with the ideal one
+    #[command(long_about = score::ABOUT)]
+    Score(score::Args),
+    /// Explore random rooms with sonar, laser, and laser just in time, and compare the maps
+    #[command(long_about = rooms::ABOUT)]
+    Explore(rooms::Args),
+    /// Measure on random rooms how often the claims of `interpret` are true
+    #[command(long_about = interpret::ABOUT)]
+    Interpret(interpret::Args),
+}
+
+pub(crate) fn run(verb: Verb) -> Outcome {
+    match verb {
+        Verb::Map(args) => map::run(&args),
+        Verb::Score(args) => score::run(&args),
+        Verb::Explore(args) => rooms::run(&args),
+        Verb::Interpret(args) => interpret::run(&args),
+    }
+}

@@ -1,0 +1,196 @@
+//! Explorations of scenes, and what a robot can and can't do.
+
+use std::sync::Arc;
+
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+use super::*;
+use crate::trial::gallery;
+use sonard_interpret::interpret::lines::{MapError, map_error};
+use sonard_model::{
+    acoustics::{Air, Sensor},
+    model::{Options, Simulator},
+    scene::Scene,
+};
+
+fn simulator(scene: Scene) -> Simulator {
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    // As the paper's, and by default those of `sonard-papers explore`.
+    let options = Options { max_range_m: Some(8.0), ..Options::default() };
+    Simulator::new(Arc::new(scene), sensor, Air::default(), options).expect("figures")
+}
+
+fn rng(seed: u64) -> Pcg64 {
+    Pcg64::seed_from_u64(seed)
+}
+
+fn scene(walls: &str) -> Scene {
+    let text = format!(
+        r#"{{"name":"test","materials":{{"m":{{"reflectance":0.95}}}},"walls":[{walls}]}}"#
+    );
+    Scene::from_json(&text).expect("a scene")
+}
+
+/// A room of 4 m by 3 m.
+const ROOM: &str =
+    r#"{"id":"room","polyline":[[0,0],[4,0],[4,3],[0,3]],"closed":true,"material":"m"}"#;
+
+const MIDDLE: Pose = Pose { x_m: 2.0, y_m: 1.5, heading_deg: 30.0 };
+
+#[test]
+fn a_laser_sees_its_field_with_noise_that_grows_with_the_square_of_the_distance() {
+    let simulator = simulator(scene(ROOM));
+    let laser = Laser { usable: 1.0, ..Laser::default() };
+    let settings = RobotSettings { laser, ..RobotSettings::default() };
+    let mut robot = SimulatedRobot::new(&simulator, MIDDLE, settings, rng(1));
+    for (direction_rad, distance_m) in [(0.0, 2.0), (std::f64::consts::FRAC_PI_2, 1.5)] {
+        let mut squares = Vec::new();
+        for _ in 0..40 {
+            let shot = robot.laser(direction_rad);
+            let [first, last] = [shot.returns[0], shot.returns[511]].map(|one| one.azimuth_deg);
+            assert_eq!((shot.returns.len(), first, last), (512, -12.5, 12.5));
+            squares.extend(shot.returns.iter().map(|one| {
+                let true_m = distance_m / one.azimuth_deg.to_radians().cos();
+                ((one.range_m.expect("a wall") - true_m) / (true_m * true_m)).powi(2)
+            }));
+        }
+        let sigma = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        // 20480 readings: the estimate's own deviation is half a percent.
+        assert!((sigma / laser.sigma_at_1_m - 1.0).abs() < 0.02, "{distance_m} m: {sigma}");
+    }
+}
+
+#[test]
+fn a_full_turn_of_the_laser_is_one_round_of_rising_azimuths() {
+    let simulator = simulator(scene(ROOM));
+    let mut robot = SimulatedRobot::new(&simulator, MIDDLE, RobotSettings::default(), rng(2));
+    let (turn, shots) = robot.laser_turn();
+    assert_eq!(shots, 16);
+    assert!(turn.returns.windows(2).all(|pair| pair[0].azimuth_deg < pair[1].azimuth_deg));
+    let span_deg = turn.returns[turn.returns.len() - 1].azimuth_deg - turn.returns[0].azimuth_deg;
+    assert!((359.0..360.0).contains(&span_deg), "{span_deg}");
+}
+
+#[test]
+fn walls_stop_a_robot_at_its_radius() {
+    let simulator = simulator(scene(ROOM));
+    let settings = RobotSettings::default();
+    let mut robot = SimulatedRobot::new(&simulator, MIDDLE, settings, rng(3));
+    assert_eq!(robot.drive(DVec2::new(3.0, 1.0)), Drive::There);
+    assert!(robot.pose().position().distance(DVec2::new(3.0, 1.0)) < 1e-9);
+    assert_eq!(robot.drive(DVec2::new(9.0, 1.0)), Drive::Bumped);
+    let clearance_m = simulator.scene().clearance_m(robot.truth().position());
+    assert!((settings.radius_m..settings.radius_m + 0.06).contains(&clearance_m), "{clearance_m}");
+    // It can leave the wall, and go along it, but not through it.
+    assert_eq!(robot.drive(robot.pose().position() + DVec2::new(0.0, 0.5)), Drive::There);
+    for _ in 0..5 {
+        robot.drive(robot.pose().position() + DVec2::new(0.5, 0.2));
+    }
+    assert!(simulator.scene().clearance_m(robot.truth().position()) >= settings.radius_m - 2e-3);
+    assert!(robot.truth().x_m < 4.0);
+}
+
+#[test]
+fn odometry_noise_is_what_the_robot_does_not_know() {
+    let simulator = simulator(scene(ROOM));
+    let settings = RobotSettings { odometry_noise: 0.05, ..RobotSettings::default() };
+    let mut robot = SimulatedRobot::new(&simulator, MIDDLE, settings, rng(4));
+    for at in [[3.0, 1.5], [3.0, 1.0], [1.0, 1.0], [2.0, 1.5]] {
+        robot.drive(at.into());
+    }
+    assert!(robot.pose().position().distance(MIDDLE.position()) < 1e-9, "as it believes");
+    let off_m = robot.truth().position().distance(MIDDLE.position());
+    assert!((0.005..0.8).contains(&off_m), "{off_m}");
+}
+
+/// A robot whose sensors see nothing.
+struct Blind(Pose);
+
+impl Robot for Blind {
+    fn pose(&self) -> Pose {
+        self.0
+    }
+    fn sonar(&mut self) -> Sweep {
+        Sweep { pose: self.0, step_deg: 2.0, beams: Vec::new(), closed: true }
+    }
+    fn laser(&mut self, _: f64) -> LaserScan {
+        LaserScan { pose: self.0, returns: Vec::new() }
+    }
+    fn laser_turn(&mut self) -> (LaserScan, u32) {
+        (LaserScan { pose: self.0, returns: Vec::new() }, 16)
+    }
+    fn drive(&mut self, _: DVec2) -> Drive {
+        panic!("there is nothing to drive to")
+    }
+}
+
+#[test]
+fn who_sees_nothing_has_nothing_to_explore() {
+    for sensing in Sensing::ALL {
+        let made = explore(&mut Blind(MIDDLE), sensing, &ExploreSettings::default());
+        assert_eq!((made.stops.len(), made.lines().len(), made.finished), (1, 0, true));
+    }
+}
+
+fn explored(
+    simulator: &Simulator,
+    pose: Pose,
+    sensing: Sensing,
+    seed: u64,
+) -> (Exploration, MapError) {
+    let settings = RobotSettings::default();
+    let mut robot = SimulatedRobot::new(simulator, pose, settings, rng(seed));
+    let made = explore(&mut robot, sensing, &ExploreSettings::default());
+    let error = map_error(made.lines(), simulator.scene());
+    (made, error)
+}
+
+#[test]
+fn an_exploration_can_be_repeated() {
+    let simulator = simulator(scene(ROOM));
+    let make = || explored(&simulator, MIDDLE, Sensing::JustInTime, 7).0;
+    let made = make();
+    assert!(made.finished && made.bumps == 0, "{} stops", made.stops.len());
+    assert_eq!(made, make());
+}
+
+/// The aims of issue and paper, on the ten rooms of `sonard-papers benchmark explore`.
+#[test]
+fn just_in_time_is_as_good_as_laser_only_with_a_quarter_of_its_shots() {
+    let rooms: Vec<[(Exploration, MapError); 2]> = (0..10_u64)
+        .into_par_iter()
+        .map(|room| {
+            let seed = 1_000_003 ^ room;
+            let scene = gallery("gallery", &mut rng(seed));
+            let pose = scene.poses["start"];
+            let simulator = simulator(scene);
+            [Sensing::Laser, Sensing::JustInTime]
+                .map(|sensing| explored(&simulator, pose, sensing, seed))
+        })
+        .collect();
+    for (number, [laser, just_in_time]) in (1..).zip(&rooms) {
+        let shots = [laser.0.laser_shots, just_in_time.0.laser_shots];
+        assert!(4 * shots[1] <= shots[0], "room {number}: {shots:?} shots");
+        assert!(laser.0.finished && just_in_time.0.finished, "room {number}");
+        assert_eq!((laser.0.bumps, just_in_time.0.bumps), (0, 0), "room {number}");
+    }
+    let mean = |kind: usize| {
+        rooms.iter().map(|room| room[kind].1.map_error_m).sum::<f64>() / rooms.len() as f64
+    };
+    let (laser_m, just_in_time_m) = (mean(0), mean(1));
+    assert!(just_in_time_m <= 1.2 * laser_m, "{just_in_time_m} m against {laser_m} m");
+}
+
+#[test]
+fn sonar_only_is_much_worse() {
+    let seed = 1_000_003 ^ 2;
+    let scene = gallery("gallery", &mut rng(seed));
+    let pose = scene.poses["start"];
+    let simulator = simulator(scene);
+    let (_, sonar) = explored(&simulator, pose, Sensing::Sonar, seed);
+    let (_, just_in_time) = explored(&simulator, pose, Sensing::JustInTime, seed);
+    assert!(sonar.line_error_m > 5.0 * just_in_time.line_error_m, "{sonar:?} {just_in_time:?}");
+    assert!(sonar.endpoint_error_m > 5.0 * just_in_time.endpoint_error_m);
+}

@@ -1,0 +1,110 @@
+//! Reliability diagrams: how often claims came true, against how probable they were said to be.
+
+use crate::calibration::{Bin, Reliability};
+use sonard_plot::{
+    Picture,
+    canvas::{Anchor, Layer, Px, Rect, Shape},
+    caption,
+    legend::{self, Entry, Sample},
+    theme, ticks,
+};
+
+const SIDE_PX: f64 = 520.0;
+const COUNTS_PX: f64 = 110.0;
+
+/// Draws the share of claims that came true over their mean probability, with the counts below it. On
+/// the dashed line they come true as often as they say; below it too much is claimed.
+#[must_use]
+pub fn draw_reliability(title: &str, lines: &[String], reliability: &Reliability) -> Picture {
+    let (heading, top) = caption::draw(title, Some("SIMULATED, nothing measured"), lines);
+    let left = (theme::PAGE_PX - SIDE_PX) / 2.0;
+    let panel = Rect::new(left, top + 24.0, SIDE_PX, SIDE_PX);
+    let counts = Rect::new(left, panel.bottom + 34.0, SIDE_PX, COUNTS_PX);
+    let mut page = Layer::new("reliability");
+    page.add(heading);
+    page.add(frame(panel));
+    page.add(points(panel, &reliability.bins));
+    page.add(bars(counts, &reliability.bins));
+    let below = Px::new(left, counts.bottom + 50.0);
+    let entries = [
+        Entry::new(Sample::Mark { shape: Shape::Dot, colour: theme::BLUE }, "claims of a tenth"),
+        Entry::new(
+            Sample::Line { colour: theme::QUIET, width_px: 1.2, dash: "6 4" },
+            "as often as said",
+        ),
+    ];
+    let (key, height) = legend::draw(&entries, below, SIDE_PX);
+    page.add(key);
+    Picture::new(theme::PAGE_PX, below.y + height + theme::MARGIN_PX / 2.0, page)
+}
+
+fn at(panel: Rect, x: f64, y: f64) -> Px {
+    Px::new(panel.left + x * panel.width(), panel.bottom - y * panel.height())
+}
+
+fn frame(panel: Rect) -> Layer {
+    let mut layer = Layer::new("frame");
+    let mut grid = Layer::new("grid").stroked(theme::GRID, theme::HAIRLINE_PX);
+    let mut numbers = Layer::new("numbers").with("fill", theme::QUIET);
+    for part in ticks::multiples(0.0, 1.0, 0.2) {
+        grid.line(at(panel, part, 0.0), at(panel, part, 1.0));
+        grid.line(at(panel, 0.0, part), at(panel, 1.0, part));
+        let beside = at(panel, 0.0, part) + Px::new(-6.0, 4.0);
+        numbers.text(beside, Anchor::End, theme::SMALL_PX, &ticks::label(part, 0.1));
+    }
+    let mut ideal = Layer::new("ideal").stroked(theme::QUIET, 1.2).with("stroke-dasharray", "6 4");
+    ideal.line(at(panel, 0.0, 0.0), at(panel, 1.0, 1.0));
+    let mut border = Layer::new("border").stroked(theme::FRAME, 1.0);
+    border.rect(panel, 0.0);
+    layer.extend([grid, numbers, ideal, border]);
+    let above = Px::new(panel.left, panel.top - 6.0);
+    layer.text(above, Anchor::Start, theme::TEXT_PX, "share of claims that came true");
+    layer
+}
+
+/// Each bin at its mean claim, joined.
+fn points(panel: Rect, bins: &[Bin]) -> Layer {
+    let seen: Vec<&Bin> = bins.iter().filter(|bin| bin.count > 0).collect();
+    let mut line = Layer::new("line").stroked(theme::BLUE, 1.4);
+    line.runs([seen.iter().map(|b| at(panel, b.claimed, b.came_true)).collect::<Vec<_>>()]);
+    let mut marks = Layer::new("bins").with("fill", theme::BLUE);
+    for bin in seen {
+        let hint = format!(
+            "{} claims of {:.3} on the mean: {:.3} came true",
+            bin.count, bin.claimed, bin.came_true
+        );
+        marks.mark(Shape::Dot, at(panel, bin.claimed, bin.came_true), 5.0, Some(&hint));
+    }
+    let mut layer = Layer::new("points");
+    layer.extend([line, marks]);
+    layer
+}
+
+/// How many claims each bin has, on a logarithmic scale because most claims are near 0 or 1.
+fn bars(panel: Rect, bins: &[Bin]) -> Layer {
+    let most = bins.iter().map(|bin| bin.count).max().unwrap_or(1).max(10) as f64;
+    let height = |count: f64| (1.0 + count).log10() / (1.0 + most).log10();
+    let mut layer = Layer::new("counts");
+    let mut fill = Layer::new("bars").with("fill", theme::SKY);
+    let mut numbers = Layer::new("numbers").with("fill", theme::QUIET);
+    for (index, bin) in bins.iter().enumerate() {
+        let part = |i: usize| i as f64 / bins.len() as f64;
+        let low = at(panel, part(index), 0.0);
+        let high = at(panel, part(index + 1), 0.82 * height(bin.count as f64));
+        fill.rect(Rect { left: low.x + 1.0, top: high.y, right: high.x - 1.0, bottom: low.y }, 0.0);
+        let above = Px::new((low.x + high.x) / 2.0, high.y - 3.0);
+        numbers.text(above, Anchor::Middle, theme::SMALL_PX, &bin.count.to_string());
+    }
+    for part in ticks::multiples(0.0, 1.0, 0.2) {
+        let below = at(panel, part, 0.0) + Px::new(0.0, 15.0);
+        numbers.text(below, Anchor::Middle, theme::SMALL_PX, &ticks::label(part, 0.1));
+    }
+    let middle = at(panel, 0.5, 0.0) + Px::new(0.0, 32.0);
+    numbers.text(middle, Anchor::Middle, theme::SMALL_PX, "probability claimed");
+    let mut border = Layer::new("border").stroked(theme::FRAME, 1.0);
+    border.rect(panel, 0.0);
+    layer.extend([fill, numbers, border]);
+    let above = Px::new(panel.left, panel.top - 6.0);
+    layer.text(above, Anchor::Start, theme::TEXT_PX, "number of claims (height logarithmic)");
+    layer
+}

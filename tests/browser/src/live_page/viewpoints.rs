@@ -1,0 +1,192 @@
+//! Each reading on the floor plan is drawn from where it was taken.
+
+use std::{fs, path::Path};
+
+use serde_json::{Value, json};
+
+use super::{
+    browser::{Browser, DESK},
+    show_log,
+};
+use sonard_test_support::{
+    daemon::{start_ahead, start_array},
+    run, stderr,
+};
+
+/// Engines without envelopes: a range is half its path's length, without time walk.
+const FAN: [&str; 4] = ["--set", "model.engine=fan", "--set", "server.listen=127.0.0.1:0"];
+const CONE: [&str; 4] = ["--set", "model.engine=cone", "--set", "server.listen=127.0.0.1:0"];
+
+type Point = [f64; 2];
+
+fn point(of: &Value) -> Point {
+    [0, 1].map(|axis| of[axis].as_f64().expect("a coordinate"))
+}
+
+fn distance([x, y]: Point, [u, v]: Point) -> f64 {
+    (x - u).hypot(y - v)
+}
+
+/// Where a reading was taken.
+fn place(reading: &Value) -> Point {
+    ["x_m", "y_m"].map(|axis| reading["viewpoint"][axis].as_f64().expect("a figure"))
+}
+
+/// Where a reading's range ends, by what the API says.
+fn end(reading: &Value) -> Option<Point> {
+    let range_m = reading["range_m"].as_f64()?;
+    let direction_deg = reading["viewpoint"]["direction_deg"].as_f64().expect("a direction");
+    let (sin, cos) = direction_deg.to_radians().sin_cos();
+    let [x_m, y_m] = place(reading);
+    Some([x_m + range_m * cos, y_m + range_m * sin])
+}
+
+/// An expression of the page's plan.
+fn of_plan(browser: &Browser, expression: &str) -> Value {
+    browser.eval(&format!("import('/page/main.js').then(({{plan}}) => {expression})"))
+}
+
+/// Where points of the floor are on the stage, pixels.
+fn pixels(browser: &Browser, points: &[Point]) -> Vec<Point> {
+    let asked = of_plan(browser, &format!("{}.map((at) => plan.view.px(at))", json!(points)));
+    asked.as_array().expect("points").iter().map(point).collect()
+}
+
+/// Whether there is paint on a layer within two pixels of each point of the floor; those beyond the view
+/// count as painted.
+fn painted(browser: &Browser, layer: &str, points: &[Point]) -> Vec<bool> {
+    let answer = of_plan(
+        browser,
+        &format!(
+            "(() => {{ const c = document.getElementById('{layer}'); \
+             const copy = new OffscreenCanvas(c.width, c.height); \
+             const look = copy.getContext('2d', {{willReadFrequently: true}}); \
+             look.drawImage(c, 0, 0); \
+             return {}.map((at) => {{ const px = plan.view.px(at); \
+               if (plan.view.isBeyond(px)) return true; \
+               const [x, y] = px.map((v) => Math.round(v * devicePixelRatio) - 2); \
+               return look.getImageData(x, y, 5, 5).data.some((v, i) => i % 4 === 3 && v > 128); \
+             }}); }})()",
+            json!(points)
+        ),
+    );
+    answer.as_array().expect("a list").iter().map(|one| one == true).collect()
+}
+
+/// That every reading has its mark where it was heard, and that a click on it selects it.
+fn check_marks(browser: &Browser, whole: &Value) {
+    let readings = whole["pings"].as_array().expect("readings");
+    let heard: Vec<(&Value, Point)> =
+        readings.iter().filter_map(|reading| Some((reading, end(reading)?))).collect();
+    assert!(heard.len() > 5, "{} readings", heard.len());
+    let ends: Vec<Point> = heard.iter().map(|(_, at)| *at).collect();
+    for ((reading, _), drawn) in heard.iter().zip(painted(browser, "marks", &ends)) {
+        assert!(drawn, "nothing is drawn at the end of {reading}");
+    }
+    let size = browser.eval("[document.getElementById('stage').clientWidth, document.getElementById('stage').clientHeight]");
+    let [width, height] = point(&size);
+    // One that no other reading is drawn beside.
+    let at = pixels(browser, &ends);
+    let alone = |i: &usize| {
+        let inside = at[*i][0] > 30.0 && at[*i][1] > 30.0 && at[*i][0] < width - 30.0;
+        inside && (0..at.len()).all(|j| j == *i || distance(at[*i], at[j]) > 30.0)
+    };
+    let chosen = (0..at.len()).rev().find(alone).expect("one that stands alone");
+    browser.click_at("#over", at[chosen][0] / width, at[chosen][1] / height);
+    let now = browser.text("#beam-now");
+    let beam = format!("beam {}", heard[chosen].0["index"]);
+    assert!(now.starts_with(&format!("{beam},")), "{now} and not {beam}");
+}
+
+/// That the path of a beam's sound is drawn from its transducer and back, and is as long as was heard.
+fn check_path(browser: &Browser, reading: &Value) {
+    browser.eval(&format!(
+        "(() => {{ const s = document.getElementById('beam'); s.value = {}; \
+         s.dispatchEvent(new Event('input')); }})()",
+        reading["index"]
+    ));
+    browser.until("document.querySelectorAll('.peaks [aria-pressed=true]').length === 1");
+    let path: Vec<Point> =
+        of_plan(browser, "plan.path").as_array().expect("a path").iter().map(point).collect();
+    for side in [path[0], path[path.len() - 1]] {
+        assert!(distance(side, place(reading)) < 1e-9, "{side:?} is not where {reading} was taken");
+    }
+    let length_m: f64 = path.windows(2).map(|leg| distance(leg[0], leg[1])).sum();
+    let late_m = reading["range_m"].as_f64().expect("a range") - length_m / 2.0;
+    assert!(late_m.abs() < 1e-3, "{reading}: {late_m} m beyond its path");
+    let along: Vec<Point> = path
+        .windows(2)
+        .map(|leg| [0, 1].map(|axis| 0.7 * leg[0][axis] + 0.3 * leg[1][axis]))
+        .collect();
+    assert!(painted(browser, "over", &along).into_iter().all(|drawn| drawn), "{path:?}");
+    // So is the ray, from the transducer on.
+    let [x_m, y_m] = place(reading);
+    let direction_deg = reading["viewpoint"]["direction_deg"].as_f64().expect("a direction");
+    let (sin, cos) = direction_deg.to_radians().sin_cos();
+    let scale = of_plan(browser, "plan.view.scale").as_f64().expect("pixels a metre");
+    let on_ray = |pixels: f64| [x_m + pixels / scale * cos, y_m + pixels / scale * sin];
+    // Of a dashed line, one of two points is drawn.
+    let drawn = painted(browser, "over", &[on_ray(40.0), on_ray(44.0), on_ray(48.0)]);
+    assert!(drawn.contains(&true), "no ray from {x_m}, {y_m}");
+}
+
+fn heard(whole: &Value) -> impl Iterator<Item = &Value> {
+    whole["pings"].as_array().expect("readings").iter().filter(|ping| ping["range_m"].is_f64())
+}
+
+#[test]
+fn each_sonar_of_an_array_has_its_readings_its_face_and_its_paths() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = start_array(folder.path(), &FAN);
+    daemon.wait_for_scans(1);
+    let browser = Browser::open(&daemon.address(), DESK);
+    let whole = show_log(&daemon, &browser, "");
+    check_marks(&browser, &whole);
+    let places: Vec<Point> =
+        whole["pings"].as_array().expect("readings").iter().map(place).collect();
+    assert!(painted(&browser, "marks", &places).into_iter().all(|drawn| drawn), "eight faces");
+    for reading in heard(&whole).take(4) {
+        check_path(&browser, reading);
+    }
+    assert!(browser.text("#beam-now").contains(", s"), "the sonar is named");
+}
+
+#[test]
+fn a_transducer_ahead_of_its_axis_has_its_readings_and_its_paths() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plan = ["--set", "plan.step_deg=18", "--set", "model.max_range_m=4"];
+    let daemon = start_ahead(folder.path(), &[&plan[..], &CONE].concat());
+    daemon.wait_for("ready");
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+    daemon.wait_for_scans(1);
+    let browser = Browser::open(&daemon.address(), DESK);
+    let whole = show_log(&daemon, &browser, "");
+    check_marks(&browser, &whole);
+    for reading in heard(&whole).take(4) {
+        check_path(&browser, reading);
+    }
+}
+
+#[test]
+fn readings_of_a_robot_that_moved_are_drawn_from_where_it_was() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_turned_ring(folder.path());
+    let daemon = start_array(folder.path(), &FAN);
+    daemon.wait_for_scans(1);
+    let browser = Browser::open(&daemon.address(), DESK);
+    let whole = show_log(&daemon, &browser, "20260101");
+    let moved = whole["pings"].as_array().expect("readings").iter();
+    assert_eq!(moved.filter(|ping| ping["pose"].is_object()).count(), 24, "two rounds of three");
+    check_marks(&browser, &whole);
+}
+
+/// A ring of twelve that is turned in place and fired three times, in the log folder.
+fn write_turned_ring(folder: &Path) {
+    let log = folder.join("log");
+    fs::create_dir_all(&log).expect("there is room");
+    let log = log.join("sonard-20260101T000000Z.jsonl");
+    let ring = ["simulate", "--array", "ring-12", "--rounds", "3", "--scene", "two-surface-room"];
+    let further = ["--pose", "1.2,1,30", "--max-range", "4", "--out", log.to_str().expect("plain")];
+    let made = run(&[&ring[..], &further].concat());
+    assert!(made.status.success(), "{}", stderr(&made));
+}

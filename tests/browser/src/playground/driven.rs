@@ -1,0 +1,365 @@
+//! Everything that can be done on the page, done: with mouse, finger and keys.
+
+use std::fs;
+
+use fantoccini::key::Key;
+use serde_json::json;
+
+use super::{assert_clean, legend, open, open_with, set, settled, told};
+use crate::live_page::{
+    browser::{Browser, DESK, PHONE},
+    view::check_view,
+};
+use sonard_test_support::{run, stderr};
+
+/// The number after some words of the legend, 0 without them.
+fn counted(browser: &Browser, words: &str) -> u64 {
+    let legend = legend(browser);
+    let after = legend.split(&format!("{words} (")).nth(1).and_then(|rest| rest.split(')').next());
+    after.and_then(|number| number.parse().ok()).unwrap_or(0)
+}
+
+fn to_step(browser: &Browser, title: &str) {
+    while browser.text("#tour-title") != title {
+        browser.click("#tour-next");
+        settled(browser);
+    }
+}
+
+fn beam_now(browser: &Browser) -> String {
+    browser.text("#beam-now")
+}
+
+fn pose(browser: &Browser) -> [f64; 3] {
+    let pose = told(browser, "playground.state().pose");
+    ["x_m", "y_m", "heading_deg"].map(|key| pose[key].as_f64().expect("a number"))
+}
+
+#[test]
+fn the_tour_says_what_is_to_be_seen() {
+    let browser = open(DESK);
+    let steps = [
+        ("A room, as a ranger hears it", "beam 200, azimuth 180.0°, direct echo, 1.20"),
+        ("The false wall", "beam 300, azimuth 270.0°, multiple reflection, 0.828"),
+        ("Walls and corners are arcs", "beam 244, azimuth 219.6°, multiple reflection, 1.0"),
+        ("Walls that vanish", "beam 161, azimuth 144.9°, silent"),
+        ("Edges", "beam 352, azimuth 316.8°, edge, 0.97"),
+        ("The nearest range", "beam 0, azimuth 0.0°, minimum range, 0.409"),
+        ("What simpler models miss", "beam 300, azimuth 270.0°, multiple reflection, 0.828"),
+    ];
+    for (title, beam) in steps {
+        to_step(&browser, title);
+        let now = beam_now(&browser);
+        assert!(now.starts_with(beam), "{title}: {now}");
+    }
+    let misses = "[...document.querySelectorAll('.misses')].map((e) => e.textContent)";
+    let misses = told(&browser, misses);
+    let cone = misses[0].as_str().expect("words");
+    assert!(cone.contains("Misses") && cone.contains("multiple reflections"), "{cone}");
+    assert_eq!(misses[2], "Hears something in 400 of 400 beams.");
+    // What the reader is asked to try comes out as promised.
+    browser.click("#tour-back");
+    settled(&browser);
+    browser.click("#tour-back");
+    settled(&browser);
+    assert_eq!(counted(&browser, "edge"), 1);
+    set(&browser, "threshold", "-10");
+    assert!(counted(&browser, "edge") > 3, "{}", legend(&browser));
+    browser.click("#tour-back");
+    settled(&browser);
+    let silent = counted(&browser, "silent");
+    set(&browser, "roughness", "0.3");
+    assert!(counted(&browser, "silent") < silent - 50, "{}", legend(&browser));
+    to_step(&browser, "Edges");
+    browser.click("#tour-back");
+    browser.click("#tour-back");
+    browser.click("#tour-back");
+    settled(&browser);
+    assert_eq!(browser.text("#tour-title"), "The false wall");
+    // Up, until the near wall is heard where it is.
+    browser.eval("playground.change({pose: {x_m: 0.774, y_m: 0.5, heading_deg: 0}})");
+    settled(&browser);
+    assert!(beam_now(&browser).contains("direct echo, 0.50"), "{}", beam_now(&browser));
+    assert_clean(&browser);
+}
+
+#[test]
+fn the_ranger_is_dragged_and_turned_with_mouse_finger_and_keys() {
+    let browser = open(DESK);
+    let before = pose(&browser);
+    let [x, y] = middle(&browser, ".ranger");
+    for (kind, dx) in
+        [("mousePressed", 0.0), ("mouseMoved", 30.0), ("mouseMoved", 60.0), ("mouseReleased", 60.0)]
+    {
+        mouse(&browser, kind, x + dx, y);
+    }
+    settled(&browser);
+    let after = pose(&browser);
+    assert!(after[0] > before[0] + 0.1 && (after[1] - before[1]).abs() < 0.01, "{after:?}");
+    let [x, y] = middle(&browser, ".nose");
+    for (kind, dx, dy) in
+        [("mousePressed", 0.0, 0.0), ("mouseMoved", -52.0, -52.0), ("mouseReleased", -52.0, -52.0)]
+    {
+        mouse(&browser, kind, x + dx, y + dy);
+    }
+    settled(&browser);
+    assert!((pose(&browser)[2] - 90.0).abs() < 3.0, "{:?}", pose(&browser));
+    browser.look_through(PHONE);
+    browser.eval("document.querySelector('.ranger').scrollIntoView({block: 'center'})");
+    browser.until("new Promise((done) => setTimeout(() => done(true), 300))");
+    let before = pose(&browser);
+    let [x, y] = middle(&browser, ".ranger");
+    let touches = [("touchStart", 0.0), ("touchMove", 15.0), ("touchMove", 40.0)];
+    for (kind, dx) in touches {
+        let points = json!([{"x": x + dx, "y": y}]);
+        browser.devtools("Input.dispatchTouchEvent", &json!({"type": kind, "touchPoints": points}));
+    }
+    browser.devtools("Input.dispatchTouchEvent", &json!({"type": "touchEnd", "touchPoints": []}));
+    settled(&browser);
+    let after = pose(&browser);
+    assert!(after[0] > before[0] + 0.1, "{before:?} {after:?}");
+    browser.look_through(DESK);
+    browser.eval("document.querySelector('.ranger').focus()");
+    browser.press(Key::Left.into());
+    browser.press(Key::Down.into());
+    browser.press(Key::PageUp.into());
+    settled(&browser);
+    let moved = pose(&browser);
+    let by = [0, 1, 2].map(|i| moved[i] - after[i]);
+    assert!((by[0] + 0.01).abs() < 1e-3 && (by[1] + 0.01).abs() < 1e-3, "{by:?}");
+    assert!((by[2] - 0.9).abs() < 0.01, "{by:?}");
+    // Where no ranger can stand, that is said, and nothing is claimed.
+    browser.eval("playground.change({pose: {x_m: -3, y_m: 0, heading_deg: 0}})");
+    browser.until("!document.getElementById('trouble').hidden");
+    assert!(browser.text("#trouble").contains("outside"), "{}", browser.text("#trouble"));
+    assert_eq!(told(&browser, "playground.scan().beams.size"), 0);
+    assert_clean(&browser);
+}
+
+fn mouse(browser: &Browser, kind: &str, x: f64, y: f64) {
+    let event =
+        json!({"type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1});
+    browser.devtools("Input.dispatchMouseEvent", &event);
+}
+
+fn middle(browser: &Browser, selector: &str) -> [f64; 2] {
+    let at = told(
+        browser,
+        &format!(
+            "(() => {{ const e = document.querySelector('{selector}'); e.scrollIntoView({{block: 'center'}}); \
+             const r = e.getBoundingClientRect(); \
+             return [r.left + r.width / 2, r.top + r.height / 2]; }})()"
+        ),
+    );
+    [0, 1].map(|i| at[i].as_f64().expect("a number"))
+}
+
+#[test]
+fn the_plan_is_moved_zoomed_and_measured_as_on_the_daemons_page() {
+    let browser = open(DESK);
+    check_view(&browser, "Promise.resolve(playground.plan)");
+    // The handles go along, and stay of use.
+    let before = middle(&browser, ".ranger");
+    browser.click(".tools [aria-label=\"Zoom in\"]");
+    browser.until_drawn();
+    let [x, y] = middle(&browser, ".ranger");
+    assert!((x - before[0]).hypot(y - before[1]) > 5.0, "{before:?} {x} {y}");
+    let stood = pose(&browser);
+    for (kind, dx) in [("mousePressed", 0.0), ("mouseMoved", 30.0), ("mouseReleased", 30.0)] {
+        mouse(&browser, kind, x + dx, y);
+    }
+    settled(&browser);
+    assert!(pose(&browser)[0] > stood[0], "{stood:?} {:?}", pose(&browser));
+    set(&browser, "arcs", "true");
+    assert!(legend(&browser).contains("arc of a reading"), "{}", legend(&browser));
+    assert_clean(&browser);
+}
+
+#[test]
+fn each_setting_changes_what_is_read() {
+    let browser = open(DESK);
+    let ranges =
+        || told(&browser, "[...playground.scan().beams.values()].map((ping) => ping.range_m)");
+    for (id, value) in [
+        ("temperature", "40"),
+        ("humidity", "10"),
+        ("reflectance", "0.5"),
+        ("roughness", "0.4"),
+        ("gain", "air"),
+        ("threshold", "20"),
+        ("reach", "1.5"),
+        ("step", "1.8"),
+        ("sensor", "hc-sr04"),
+        ("engine", "fan"),
+        ("engine", "cone"),
+        ("in-space", "true"),
+        ("ceiling", "0.6"),
+        ("height", "0.25"),
+    ] {
+        // Each from where the page began, but for the heights, which build on each other.
+        if !["ceiling", "height"].contains(&id) {
+            browser.eval("playground.change(globalThis.first ??= {...playground.state()})");
+            settled(&browser);
+        }
+        let before = ranges();
+        set(&browser, id, value);
+        assert!(
+            browser.eval("document.getElementById('trouble').hidden") == true,
+            "{id}: {}",
+            browser.text("#trouble")
+        );
+        assert_ne!(before, ranges(), "{id} = {value} changes nothing");
+    }
+    assert_clean(&browser);
+}
+
+#[test]
+fn a_room_is_drawn_saved_and_taken_by_the_program() {
+    let browser = open(DESK);
+    browser.click("#edit");
+    browser.click("#new-room");
+    settled(&browser);
+    assert_eq!(told(&browser, "document.querySelectorAll('.corner').length"), 4);
+    browser.click("#add-pillar");
+    settled(&browser);
+    assert_eq!(told(&browser, "document.querySelectorAll('.pillar').length"), 1);
+    // A wall by two clicks.
+    browser.click("#add-wall");
+    browser.click_at("#over", 0.6, 0.3);
+    browser.click_at("#over", 0.7, 0.4);
+    settled(&browser);
+    browser.click("#add-wall");
+    assert_eq!(told(&browser, "playground.state().scene.walls.length"), 5);
+    assert_eq!(told(&browser, "document.querySelectorAll('.corner').length"), 6);
+    // Moved by keys, taken away, and back.
+    browser.eval("document.querySelectorAll('.corner')[5].focus()");
+    let corner = "playground.state().scene.walls[4].to";
+    let before = told(&browser, corner);
+    browser.press(Key::Right.into());
+    settled(&browser);
+    let off = told(&browser, corner)[0].as_f64().zip(before[0].as_f64()).map(|(a, b)| a - b);
+    assert!(off.is_some_and(|off| (off - 0.01).abs() < 1e-9), "{off:?}");
+    browser.press(Key::Delete.into());
+    settled(&browser);
+    assert_eq!(told(&browser, "playground.state().scene.walls.length"), 4);
+    browser.click("#undo");
+    settled(&browser);
+    assert_eq!(told(&browser, "playground.state().scene.walls.length"), 5);
+    // The file is one of the program's scenes, with the ranger where it stood.
+    browser.eval(
+        "(() => { const make = URL.createObjectURL; \
+         URL.createObjectURL = (blob) => { globalThis.saved = blob.text(); return make(blob); }; })()",
+    );
+    browser.click("#save");
+    let saved = told(&browser, "globalThis.saved");
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("drawn.json");
+    fs::write(&file, saved.as_str().expect("a text")).expect("there is room");
+    let name = file.display().to_string();
+    let checked = run(&["scene", "check", &name]);
+    assert!(checked.status.success(), "{}", stderr(&checked));
+    assert!(
+        run(&["simulate", "--scene", &name, "--pose", "here", "--max-range", "3"]).status.success()
+    );
+    // And back again, dropped on the page.
+    set(&browser, "scene", "corridor");
+    drop_file(&browser, "drawn.json", saved.as_str().expect("a text"));
+    browser.until("playground.state().scene.name === 'my-room'");
+    settled(&browser);
+    assert_eq!(told(&browser, "playground.state().scene.walls.length"), 5);
+    assert_clean(&browser);
+}
+
+/// Drops a file on the page.
+fn drop_file(browser: &Browser, name: &str, text: &str) {
+    let text = json!(text);
+    browser.eval(&format!(
+        "(() => {{ const data = new DataTransfer(); data.items.add(new File([{text}], {name:?})); \
+         dispatchEvent(new DragEvent('drop', {{dataTransfer: data, cancelable: true}})); }})()"
+    ));
+}
+
+#[test]
+fn a_log_and_a_table_are_shown_in_their_scene() {
+    let browser = open(DESK);
+    let folder = tempfile::tempdir().expect("a folder");
+    let scan = sonard_test_support::mock_scan("fig9", folder.path(), &["--step-deg", "7.2"]);
+    assert!(scan.status.success(), "{}", stderr(&scan));
+    let log = fs::read_to_string(folder.path().join("scan.jsonl")).expect("a log");
+    drop_file(&browser, "scan.jsonl", &log);
+    browser.until("!document.getElementById('logged').hidden");
+    settled(&browser);
+    assert_eq!(browser.text("#floor-title"), "Floor plan: simple-room");
+    assert_eq!(told(&browser, "playground.scan().beams.size"), 50);
+    let residuals =
+        told(&browser, "playground.scan().residuals().map((ping) => Math.abs(ping.residual_m))");
+    let most = residuals
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(serde_json::Value::as_f64)
+        .fold(0.0, f64::max);
+    assert!(residuals.as_array().is_some_and(|list| list.len() > 30), "{residuals}");
+    assert!(most < 0.02, "{most}");
+    assert!(browser.eval("document.getElementById('residuals').hidden") == false);
+    // Elsewhere the model reads something else, and the log is what it was.
+    browser.eval("playground.change({pose: {x_m: 0.4, y_m: 0.3, heading_deg: 0}})");
+    settled(&browser);
+    assert!(counted(&browser, "unexplained") > 10, "{}", legend(&browser));
+    drop_file(&browser, "sweep.csv", "angle_deg,distance_cm\n0,52.8\n90,44.2\n180,40\n270,\n");
+    browser.until("playground.scan()?.beams.size === 4");
+    settled(&browser);
+    assert_eq!(told(&browser, "playground.scan().beams.get(0).range_m"), json!(0.528));
+    browser.click("#close-log");
+    settled(&browser);
+    assert_eq!(told(&browser, "playground.scan().beams.size"), 400);
+    drop_file(&browser, "notes.txt", "nothing of this kind\n");
+    browser.until("!document.getElementById('trouble').hidden");
+    assert_clean(&browser);
+}
+
+#[test]
+fn a_link_has_all_of_a_view() {
+    let browser = open(DESK);
+    set(&browser, "scene", "corridor");
+    set(&browser, "temperature", "31");
+    browser.eval("playground.change({pose: {x_m: 5, y_m: 0.9, heading_deg: 12.5}})");
+    browser.eval("playground.select(33)");
+    settled(&browser);
+    let (now, state) = (beam_now(&browser), told(&browser, "playground.state()"));
+    browser.click("#share");
+    browser.until("document.getElementById('shared').open");
+    let link = browser.eval("document.getElementById('address').value");
+    let (_, fragment) = link.as_str().and_then(|link| link.split_once('#')).expect("a fragment");
+    let fragment = fragment.to_owned();
+    drop(browser);
+    let browser = open_with(DESK, &format!("#{fragment}"));
+    assert_eq!(told(&browser, "playground.state()"), state);
+    assert_eq!(beam_now(&browser), now);
+    assert_clean(&browser);
+    drop(browser);
+    // One that was cut off says so, and the page works all the same.
+    let browser = open_with(DESK, &format!("#{}", &fragment[..fragment.len() / 2]));
+    assert_eq!(told(&browser, "playground.scan().beams.size"), 400);
+    assert!(browser.text("#tour-text").contains("cut off"), "{}", browser.text("#tour-text"));
+}
+
+#[test]
+fn a_slow_scene_does_not_block_the_page() {
+    let browser = open(DESK);
+    let gap_ms = told(
+        &browser,
+        "(async () => { const {change, idle} = playground; let [most, last, on] = [0, performance.now(), true]; \
+         const frame = (now) => { most = Math.max(most, now - last); last = now; if (on) requestAnimationFrame(frame); }; \
+         requestAnimationFrame(frame); \
+         const lab = [...document.getElementById('scene').options].find((o) => o.value === 'mcgill-lab'); \
+         document.getElementById('scene').value = lab.value; \
+         document.getElementById('scene').dispatchEvent(new Event('change')); \
+         change({step_deg: 0.45, reach_m: 10.5, engine: 'fan'}); \
+         do { await new Promise((done) => setTimeout(done, 20)); } while (!idle()); \
+         on = false; return most; })()",
+    );
+    println!("the longest gap between frames while 800 beams of a fan come in: {gap_ms} ms");
+    assert!(gap_ms.as_f64().is_some_and(|gap_ms| gap_ms < 250.0), "{gap_ms} ms");
+    assert_clean(&browser);
+}

@@ -1,0 +1,140 @@
+//! A ranger that can be plugged in, pulled out, and made to misbehave while a daemon uses it.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+};
+
+use sonard::{
+    acoustics::{Air, Sensor, TofNoise},
+    link::{self, Pty},
+    mock::{BoardSettings, FaultPlan, MockBoard, MockPort, Note, Pace, Soundings, World},
+    model::{Options, Simulator},
+    scene::{Scene, shipped},
+};
+use tokio::{runtime::Runtime, sync::oneshot, task::JoinHandle};
+
+/// A stable name, and behind it whatever is plugged in: each time another device.
+pub struct Rig {
+    link: PathBuf,
+    runtime: Runtime,
+    soundings: Soundings,
+    pace: Pace,
+    boots: u16,
+    plugged: Option<(oneshot::Sender<()>, JoinHandle<std::io::Result<()>>)>,
+    /// Faults that boards played.
+    pub played: Arc<AtomicU64>,
+}
+
+impl Rig {
+    /// With nothing plugged in. The stable name is `ranger` in `folder`.
+    pub fn new(folder: &Path, pace: Pace) -> Self {
+        let text = shipped::text("simple-room").expect("a shipped scene");
+        let scene = Scene::from_json(text).expect("it is right");
+        let pose = scene.pose("fig9").expect("its pose");
+        let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+        let simulator = Simulator::new(Arc::new(scene), sensor, Air::default(), Options::default());
+        let soundings =
+            Soundings::of(&simulator.expect("it is right"), &pose, 400, 0.0).expect("few paths");
+        Self {
+            link: folder.join("ranger"),
+            runtime: Runtime::new().expect("threads"),
+            soundings,
+            pace,
+            boots: 0,
+            plugged: None,
+            played: Arc::default(),
+        }
+    }
+
+    /// Options that let a daemon use this and try again soon.
+    pub fn options(&self) -> Vec<String> {
+        let port = self.link.display().to_string();
+        let mut options: Vec<String> =
+            ["--port", &port, "--scene", "simple-room", "--pose", "fig9"].map(str::to_owned).into();
+        for setting in [
+            "model.max_range_m=3",
+            "link.attempts=3",
+            "link.retry_min_s=0.05",
+            "link.retry_max_s=0.4",
+            "link.check_s=0.3",
+        ] {
+            options.extend(["--set".to_owned(), setting.to_owned()]);
+        }
+        options
+    }
+
+    /// Plugs a board in, under a device name that was not there before.
+    pub fn plug(&mut self, faults: &str, seed: u64) {
+        self.unplug();
+        self.boots += 1;
+        let faults: FaultPlan = faults.parse().expect("faults");
+        let settings = BoardSettings {
+            boot: self.boots,
+            clock: 0,
+            steps_per_revolution: 400,
+            faults,
+            seed,
+            pace: self.pace,
+        };
+        let world = World::new(self.soundings.clone(), TofNoise::NONE, 0.0, seed);
+        let _context = self.runtime.enter();
+        let port = MockPort::open(MockBoard::new(settings, world), Some(&self.link));
+        let (stop, stopped) = oneshot::channel::<()>();
+        let played = Arc::clone(&self.played);
+        let note = move |note: Note| {
+            if matches!(note, Note::Fault(_)) {
+                played.fetch_add(1, Ordering::Relaxed);
+            }
+        };
+        let playing = port.expect("a pty").run(async move { drop(stopped.await) }, note);
+        self.plugged = Some((stop, self.runtime.spawn(playing)));
+    }
+
+    /// Pulls it out: the line hangs up and the name is gone.
+    pub fn unplug(&mut self) {
+        if let Some((stop, playing)) = self.plugged.take() {
+            let _ = stop.send(());
+            drop(self.runtime.block_on(playing));
+        }
+    }
+
+    /// Something that takes bytes and says nothing, as a board that hangs; until dropped.
+    pub fn plug_silent(&mut self) -> Pty {
+        self.unplug();
+        Pty::open(Some(&self.link)).expect("a pty")
+    }
+
+    /// A port that another program has open; until both are dropped.
+    pub fn plug_busy(&mut self) -> (Pty, tokio_serial::SerialStream, Unlink) {
+        self.unplug();
+        let pty = Pty::open(None).expect("a pty");
+        let _context = self.runtime.enter();
+        let taken = link::open(pty.path().to_str().expect("plain path")).expect("it is free");
+        std::os::unix::fs::symlink(pty.path(), &self.link).expect("the name is free");
+        (pty, taken, Unlink(self.link.clone()))
+    }
+
+    pub fn played(&self) -> u64 {
+        self.played.load(Ordering::Relaxed)
+    }
+}
+
+/// Takes a name away when dropped.
+pub struct Unlink(PathBuf);
+
+impl Drop for Unlink {
+    fn drop(&mut self) {
+        drop(std::fs::remove_file(&self.0));
+    }
+}
+
+/// Limits the size of files a process may write, as a full disk does; `None` lifts the limit.
+pub fn limit_files(process: u32, bytes: Option<u64>) {
+    use rustix::process::{Pid, Resource, Rlimit, prlimit};
+    let pid = Pid::from_raw(process.cast_signed());
+    prlimit(pid, Resource::Fsize, Rlimit { current: bytes, maximum: None }).expect("it runs");
+}

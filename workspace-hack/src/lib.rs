@@ -1,1 +1,0 @@
-//! Nothing. What counts is in `Cargo.toml`.
