@@ -19,6 +19,7 @@ fn taken() -> Taken {
         array: None,
         sensor: "hc-sr04".to_owned(),
         longest_m: 4.0,
+        least_m: 0.02,
         air: Air::default(),
         started: Timestamp::UNIX_EPOCH,
         as_said: false,

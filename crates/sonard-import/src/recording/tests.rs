@@ -120,6 +120,7 @@ fn taken() -> Taken {
         array: None,
         sensor: "hc-sr04".to_owned(),
         longest_m: 4.0,
+        least_m: 0.02,
         air: Air::default(),
         started: "2026-01-01T00:00:00Z".parse().expect("a time"),
         as_said: false,
