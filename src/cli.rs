@@ -189,6 +189,7 @@ fn command_line() -> Command {
 #[must_use]
 pub fn main() -> ExitCode {
     outlive_file_size_limit();
+    failure::print_whole_lines();
     let mut command = command_line();
     let (arguments, hints) = renamed::translated(std::env::args_os());
     for hint in hints {

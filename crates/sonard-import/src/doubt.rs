@@ -56,14 +56,14 @@ impl Ways<'_> {
         fields.map(|field| self.mapping.columns_option_with(field, self.names)).collect()
     }
 
-    /// The name of the unit that ranges were taken in.
+    /// The unit that ranges were taken in, by its field or its name.
     fn unit(&self) -> String {
         let by_format = || {
             let unit = self.mapping.range_unit.unwrap_or(RangeUnit::M);
             let name = RangeUnit::ALL.into_iter().find(|(_, known)| *known == unit);
-            name.map_or("m", |(name, _)| name).to_owned()
+            format!("in {}", name.map_or("m", |(name, _)| name))
         };
-        self.field().map_or_else(by_format, |field| field.to_string())
+        self.field().map_or_else(by_format, |field| format!("by {field}"))
     }
 }
 
@@ -161,14 +161,14 @@ impl Ranges {
         let unit = ways.unit();
         Err(if constant.is_cluster {
             ImportError::Doubtful {
-                what: format!("{count} of {of} ranges are {value} or more by {unit}: {}", constant.why),
+                what: format!("{count} of {of} ranges are {value} or more {unit}: {}", constant.why),
                 help: format!(
                     "if they stand for no echo: --none-from={value}; if they are distances: --as-said"
                 ),
             }
         } else {
             ImportError::Doubtful {
-                what: format!("{count} of {of} ranges are {value} by {unit}{first}: {}", constant.why),
+                what: format!("{count} of {of} ranges are {value} {unit}{first}: {}", constant.why),
                 help: format!(
                     "if that stands for no echo: {}; if it is a distance: --as-said",
                     ways.mapping.none_option(&[value])
@@ -183,7 +183,7 @@ impl Ranges {
         let all = if far == echoes { "all".to_owned() } else { far.to_string() };
         let what = format!(
             "{all} of {echoes} ranges are beyond {:.1} m, twice the longest range of the sensor {} (first at {place}: \
-             {range_m:.2} m by {})",
+             {range_m:.2} m {})",
             FAR * taken.longest_m,
             taken.sensor,
             ways.unit(),
@@ -212,7 +212,7 @@ impl Ranges {
         }
         let near_m = taken.least_m.max(MIN_NEAR_M);
         let what = format!(
-            "{} of {} ranges are below {:.0} mm by {}, nearer than the sensor {} measures",
+            "{} of {} ranges are below {:.0} mm {}, nearer than the sensor {} measures",
             self.near,
             self.echoes,
             1e3 * near_m,
@@ -222,7 +222,7 @@ impl Ranges {
         let middle = self.silence.quantile(0.5).unwrap_or(0.0);
         let units = ways.units(middle, [near_m, taken.longest_m]);
         let help = match units.is_empty() {
-            true => "is the sensor right? --sensor NAME; --as-said takes them as they are".to_owned(),
+            true => "is the unit right, and the sensor? --sensor NAME; --as-said takes them as they are".to_owned(),
             false => format!("is the unit right? {}; --as-said takes it as it is", units.join(" | ")),
         };
         Err(ImportError::Doubtful { what, help })

@@ -54,6 +54,13 @@ impl Quantity {
     }
 }
 
+impl Quantity {
+    /// Whether a reading has it: a direction, a range or a time of flight.
+    pub(crate) const fn is_of_reading(self) -> bool {
+        matches!(self, Self::Azimuth | Self::Bearing | Self::Range | Self::Tof)
+    }
+}
+
 const DEG: f64 = 180.0 / std::f64::consts::PI;
 
 /// Names of fields, the quantity, and what turns a number into degrees, metres, microseconds, seconds or

@@ -6,6 +6,7 @@ use crate::{
     mapping::Decimal,
     number::{self, Shows},
     table::{comment, is_comment, split},
+    words::{self, Name},
 };
 
 /// Separator of the values of a line.
@@ -104,7 +105,13 @@ impl Header {
         let names = ways.into_iter().find_map(|between| {
             let names = split(between, comment).ok()?;
             let are_names = names.iter().all(|name| !name.is_empty() && !is_number(name));
-            (names.len() == self.cells.len() && names.len() > 1 && are_names).then_some(names)
+            let is_known = names.iter().any(|name| match words::meaning(name) {
+                Name::Field(field) => field.quantity().is_of_reading(),
+                Name::Quantity(quantity) => quantity.is_of_reading(),
+                _ => false,
+            });
+            (names.len() == self.cells.len() && names.len() > 1 && are_names && is_known)
+                .then_some(names)
         });
         if let Some(names) = names {
             self.notes.push(format!("names of columns are taken from the comment `{comment}`"));
@@ -269,12 +276,12 @@ mod tests {
 
     #[test]
     fn names_are_taken_from_the_comment_above_that_has_as_many() {
-        for text in ["% angle_deg distance_cm\n0 100\n", "# angle_deg, distance_cm\n0,100\n", "%a\n% b c\n\n0 100\n"] {
+        for text in ["% angle_deg distance_cm\n0 100\n", "# angle_deg, distance_cm\n0,100\n", "%a\n% angle_deg range_cm\n\n0 100\n"] {
             let found = header(text);
             assert!(found.has_names && found.is_comment && found.cells.len() == 2, "{text}");
         }
-        for text in ["# by hand today\n0 100\n", "# rows: 3\n0 100\n"] {
-            assert!(!header(text).is_comment || header(text).cells[0] == "rows:", "{text}");
+        for text in ["# by hand today\n0 100\n", "# first sweep\n0 100 5\n", "# by hand\n0 100\n"] {
+            assert!(!header(text).has_names, "{text}");
         }
     }
 

@@ -10,8 +10,8 @@ use crate::Location;
 
 /// The greatest values that are counted one by one.
 const MAX_VALUES: usize = 64;
-/// A wall at one distance fills one arc, no wider than this, degrees: a sonar's beam at most.
-const MAX_ARC_DEG: usize = 90;
+/// A wall at one distance fills its arc; a constant that is interleaved with ranges does not.
+const MIN_FILL: f64 = 0.93;
 /// Full registers and round numbers of drivers, in the unit of the file.
 const CODES: [f64; 19] = [
     255.0, 511.0, 999.0, 1023.0, 2047.0, 4095.0, 8190.0, 8191.0, 9999.0, 16_383.0, 32_767.0, 32_768.0, 38_000.0,
@@ -161,8 +161,7 @@ impl Silence {
             let below = falling.get(rank + 1).map(|(below, _)| *below);
             let is_apart = below.is_some_and(|below| value - below > 0.05 * value);
             let share = seen.count as f64 / of as f64;
-            let arcs = self.arcs(&seen.directions);
-            let many = self.is_scattered(&arcs);
+            let many = self.is_scattered(&seen.directions);
             let is_frequent = seen.count >= 6 && share >= 0.05 && seen.count >= 5 * most_of_others;
             let is_at_longest = value >= AT_LONGEST * longest;
             let is_code = CODES.contains(&value);
@@ -206,7 +205,7 @@ impl Silence {
         }
         // Narrower than 10 %, and 10 % from what is below.
         let is_narrow = top - last < 10 && gap.is_some_and(|gap| gap > 10);
-        let many = self.is_scattered(&self.arcs(&directions));
+        let many = self.is_scattered(&directions);
         let share = count as f64 / self.count as f64;
         let is_far = least >= 0.95 * longest;
         let distinct = self.values.range(least.to_bits()..).count();
@@ -220,43 +219,31 @@ impl Silence {
         })
     }
 
-    /// Widths of the arcs in which something occurred, degrees; of an array, rangers. A direction in between that was
-    /// never measured, or one in which something else came back, does not end an arc.
-    fn arcs(&self, directions: &Directions) -> Vec<usize> {
+    /// Whether no wall at one distance occurs in these directions: it fills one arc of those that were measured.
+    fn is_scattered(&self, directions: &Directions) -> bool {
         let has = |directions: &Directions, at: usize| directions[at / 64] >> (at % 64) & 1 == 1;
         let visited: Vec<usize> = (0..360).filter(|at| has(&self.visited, *at)).collect();
-        let hits: Vec<usize> =
-            (0..visited.len()).filter(|place| has(directions, visited[*place])).collect();
+        let is_hit: Vec<bool> = visited.iter().map(|at| has(directions, *at)).collect();
+        let hits = is_hit.iter().filter(|is_hit| **is_hit).count();
         if self.across == Across::Rangers {
-            return vec![1; hits.len()];
+            return hits > 1;
         }
-        let Some(&first) = hits.first() else { return Vec::new() };
-        let mut arcs: Vec<(usize, usize)> = vec![(first, first)];
-        for &hit in &hits[1..] {
-            match arcs.last_mut() {
-                Some(last) if hit - last.1 <= 2 => last.1 = hit,
-                _ => arcs.push((hit, hit)),
+        // The longest row of measured directions without a hit, round the circle, is what is outside the arc; two
+        // neighbours may lack it within.
+        let count = visited.len();
+        let Some(first) = is_hit.iter().position(|is_hit| *is_hit) else { return false };
+        let (mut gap, mut longest, mut gaps) = (0, 0, 0);
+        for step in 1..=count {
+            if !is_hit[(first + step) % count] {
+                gap += 1;
+                continue;
             }
+            longest = longest.max(gap);
+            gaps += usize::from(gap > 2);
+            gap = 0;
         }
-        let mut widths: Vec<usize> =
-            arcs.iter().map(|(from, to)| visited[*to] - visited[*from] + 1).collect();
-        // Round the circle the last may be joined to the first.
-        if let [(from, _), .., (_, to)] = arcs[..]
-            && from + visited.len() - to <= 2
-            && visited[from] + 360 - visited[to] < 30
-        {
-            let last = widths.pop().unwrap_or_default();
-            widths[0] += last + visited[from] + 360 - visited[to] - 1;
-        }
-        widths
-    }
-
-    /// Whether no wall at one distance occurs in these arcs.
-    fn is_scattered(&self, arcs: &[usize]) -> bool {
-        match self.across {
-            Across::Rangers => arcs.len() > 1,
-            Across::Angles => arcs.len() > 1 || arcs.iter().any(|width| *width > MAX_ARC_DEG),
-        }
+        let arc = count - longest;
+        gaps > 1 || (hits as f64) < MIN_FILL * arc as f64
     }
 }
 
@@ -313,8 +300,10 @@ mod tests {
         assert_eq!(sweep(400.0, |at| if !(9..=111).contains(&at) { 243.0 } else { wall(at) }), None);
         // Whole centimetres repeat, also the greatest.
         assert_eq!(sweep(400.0, |at| (300.0 + 20.0 * (at as f64 * 0.7).sin()).round()), None);
-        // A round tank.
+        // A round tank, half of one, and one arc with a gap in it.
         assert_eq!(sweep(400.0, |_| 150.0), None);
+        assert_eq!(sweep(400.0, |at| if at < 60 { 300.0 } else { 100.0 }), None);
+        assert_eq!(sweep(400.0, |at| if (30..70).contains(&at) && at != 50 { 300.0 } else { wall(at) }), None);
     }
 
     #[test]

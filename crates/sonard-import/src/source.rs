@@ -127,6 +127,10 @@ impl Source<'_> {
         survey: &Survey,
         mapping: &Mapping,
     ) -> Result<(&'static Encoding, String), ImportError> {
+        let is_recording = Format::detect(&survey.head, "") == Format::Mcap;
+        if is_recording || mapping.format == Some(Format::Mcap) {
+            return Ok((UTF_8, String::new()));
+        }
         if let Some(label) = &mapping.encoding {
             let encoding = Encoding::for_label(label.as_bytes()).ok_or_else(|| {
                 ImportError::mapping(
@@ -137,9 +141,6 @@ impl Source<'_> {
             return Ok((encoding, text::head(survey, encoding)));
         }
         let Some(encoding) = survey.encoding() else {
-            if mapping.format == Some(Format::Mcap) || Format::detect(&survey.head, "") == Format::Mcap {
-                return Ok((UTF_8, String::new()));
-            }
             return Err(format::foreign(&survey.head, "").unwrap_or_else(|| {
                 ImportError::mapping(
                     "it is no text: it has bytes that no text has",
@@ -148,8 +149,7 @@ impl Source<'_> {
             }));
         };
         let head = text::head(survey, encoding);
-        let is_known = mapping.format.is_some() || Format::detect(&survey.head, &head) == Format::Mcap;
-        match format::foreign(&survey.head, &head).filter(|_| !is_known) {
+        match format::foreign(&survey.head, &head).filter(|_| mapping.format.is_none()) {
             Some(error) => Err(error),
             None => Ok((encoding, head)),
         }

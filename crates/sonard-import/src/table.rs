@@ -68,8 +68,9 @@ impl<R: Read> Rows<R> {
         }
         let lacks = self.places.iter().flatten().any(|place| *place >= cells.len());
         // A capture of a stream may begin within a record, too.
-        let is_cut = !line.is_ended || (self.header.ends == Ends::Stops && line.number == 1);
-        if lacks && is_cut {
+        let is_first = self.header.ends == Ends::Stops && line.number == 1;
+        let is_without = cells.first().is_some_and(String::is_empty);
+        if (lacks && (!line.is_ended || is_first)) || (is_without && is_first) {
             self.raggedness.cut = Some(place);
             return Ok(None);
         }

@@ -1,7 +1,12 @@
 //! Files as people have them.
 
+mod headers;
 mod messages;
+mod no_echo;
+mod ros_text;
 mod tables;
+mod texts;
+mod units;
 
 use std::io::{self, Cursor, Read};
 

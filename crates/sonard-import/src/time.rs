@@ -81,26 +81,25 @@ impl<'a> Times<'a> {
             return Ok(self.plain_number(number));
         }
         let cell = with_point(cell);
-        if let Ok(time) = cell.parse::<civil::Time>() {
-            return self.of_day(time).map(Some);
-        }
         let civil = cell.parse::<civil::DateTime>().ok();
         let civil = civil.or_else(|| {
             CIVIL.iter().find_map(|format| civil::DateTime::strptime(format, &cell).ok())
         });
-        match civil {
-            Some(civil) => self.local(civil).map(Some),
-            None => Err((format!("`{}` is no time", cell.chars().take(40).collect::<String>()), advice(&cell))),
+        match (civil, cell.parse::<civil::Time>()) {
+            (Some(civil), _) => self.local(civil).map(Some),
+            (None, Ok(time)) => self.of_day(time).map(Some),
+            (None, Err(_)) => Err((format!("`{}` is no time", cell.chars().take(40).collect::<String>()), advice(&cell))),
         }
     }
 
     /// A number of a unit; `seconds` is the number in seconds.
     pub(crate) fn number(&mut self, field: Option<Field>, seconds: f64) -> Result<Timestamp, Refusal> {
         let nanoseconds = if seconds.abs() >= MIN_CLOCK_S {
-            (seconds * 1e9).round() as i128
+            // As many digits as a number of this size has.
+            1000 * (seconds * 1e6).round() as i128
         } else {
             let since_s = self.since_start(field, seconds);
-            self.started.as_nanosecond().saturating_add((since_s * 1e9).round() as i128)
+            self.started.as_nanosecond().saturating_add(1000 * (since_s * 1e6).round() as i128)
         };
         Timestamp::from_nanosecond(nanoseconds)
             .map_err(|error| (error.to_string(), "times count from 1970: is the unit right?".to_owned()))
@@ -178,7 +177,6 @@ impl<'a> Times<'a> {
             civil = civil.checked_add(SignedDuration::from_hours(24)).unwrap_or(civil);
         }
         self.last_clock = Some(civil);
-        self.assumed.without_zone -= 1.min(self.assumed.without_zone);
         self.local(civil)
     }
 
@@ -207,7 +205,7 @@ impl<'a> Times<'a> {
                 count => format!("; it restarts {count} times, and the time between is not known"),
             };
             notes.push(format!(
-                "times count from the start of the board, not from 1970: the first is taken as {} ({source}){wraps}{restarts}; \
+                "times count from the start of the board (or a simulation), not from 1970: the first is taken as {} ({source}){wraps}{restarts}; \
                  --started TIME gives another",
                 self.started
             ));
