@@ -56,7 +56,9 @@ impl GridFileError {
             GridFileFault::IsImage => {
                 "give its description: a text beside it with `image: NAME`, `resolution: 0.05` and `origin: [0, 0, 0]`"
             }
-            _ => "give a map as `sonard map` or map_saver writes it: map.yaml beside map.pgm (or a PNG)",
+            _ => {
+                "give a map as `sonard map` or map_saver writes it: map.yaml beside map.pgm (or a PNG)"
+            }
         }
     }
 }

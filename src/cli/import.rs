@@ -121,7 +121,8 @@ pub(super) fn run(args: &Args) -> Outcome {
         None => args.sensor.sensor()?,
     };
     let air = args.air.air()?;
-    let picture = args.picture.as_deref().map(|path| Target::of(path, args.overwrite)).transpose()?;
+    let picture =
+        args.picture.as_deref().map(|path| Target::of(path, args.overwrite)).transpose()?;
     let taken = taken(args, scene.as_ref(), array, &sensor, &air)?;
     let bytes = if args.file.as_os_str() == "-" { Some(standard_input()?) } else { None };
     let files = if args.file.is_dir() { bag::files(&args.file)? } else { vec![args.file.clone()] };
@@ -145,7 +146,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     if args.dry_run {
         let source = open().map_err(|error| refuse(error.into()))?;
         let scans = found.scans(source).map_err(refuse)?;
-        let scans = scans.map(|scan| scan.map(|_| 1_u64)).sum::<Result<u64, _>>().map_err(refuse)?;
+        let scans =
+            scans.map(|scan| scan.map(|_| 1_u64)).sum::<Result<u64, _>>().map_err(refuse)?;
         tell(args, &found, scans);
         return Ok(());
     }

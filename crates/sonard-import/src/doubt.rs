@@ -44,9 +44,15 @@ impl Ways<'_> {
         }
     }
 
-    /// The options for other units, by which a value is from `least_m` to `most_m`.
-    fn units(&self, value: f64, [least_m, most_m]: [f64; 2]) -> Vec<String> {
-        let fits = |metres: f64| (least_m..=most_m).contains(&(value * metres));
+    /// The options for other units, by which a usual range is one that the sensor measures, and a great one may be.
+    fn units(&self, ranges: &Ranges, taken: &Taken) -> Vec<String> {
+        let [middle, great] =
+            [0.5, 0.98].map(|share| ranges.silence.quantile(share).unwrap_or(0.0));
+        let near_m = taken.least_m.max(MIN_NEAR_M);
+        let fits = |metres: f64| {
+            (near_m..=taken.longest_m).contains(&(middle * metres))
+                && great * metres <= FAR * taken.longest_m
+        };
         if !self.has_columns {
             let units = RangeUnit::ALL.into_iter().filter(|(_, unit)| fits(unit.metres()));
             return units.map(|(name, _)| format!("--range-unit {name}")).collect();
@@ -161,7 +167,10 @@ impl Ranges {
         let unit = ways.unit();
         Err(if constant.is_cluster {
             ImportError::Doubtful {
-                what: format!("{count} of {of} ranges are {value} or more {unit}: {}", constant.why),
+                what: format!(
+                    "{count} of {of} ranges are {value} or more {unit}: {}",
+                    constant.why
+                ),
                 help: format!(
                     "if they stand for no echo: --none-from={value}; if they are distances: --as-said"
                 ),
@@ -189,15 +198,13 @@ impl Ranges {
             ways.unit(),
         );
         let metres = ways.metres(taken.air.sound_speed_m_s());
-        let units = self.silence.quantile(0.98).map(|most| {
-            ways.units(most, [taken.least_m.max(MIN_NEAR_M), 1.05 * taken.longest_m])
-        });
-        let units = units.unwrap_or_default();
+        let units = ways.units(self, taken);
         let none_from = 2.0 * taken.longest_m / metres;
         let help = if 2 * far >= echoes && !units.is_empty() {
             format!("is the unit right? {}; --as-said takes it as it is", units.join(" | "))
         } else if 2 * far >= echoes {
-            "is the unit right, and the sensor? --sensor NAME; --as-said takes them as they are".to_owned()
+            "is the unit right, and the sensor? --sensor NAME; --as-said takes them as they are"
+                .to_owned()
         } else {
             format!(
                 "mixed units? If they stand for no echo: --none-from={none_from:.3}; --as-said takes them as they are"
@@ -219,11 +226,15 @@ impl Ranges {
             ways.unit(),
             taken.sensor,
         );
-        let middle = self.silence.quantile(0.5).unwrap_or(0.0);
-        let units = ways.units(middle, [near_m, taken.longest_m]);
+        let units = ways.units(self, taken);
         let help = match units.is_empty() {
-            true => "is the unit right, and the sensor? --sensor NAME; --as-said takes them as they are".to_owned(),
-            false => format!("is the unit right? {}; --as-said takes it as it is", units.join(" | ")),
+            true => {
+                "is the unit right, and the sensor? --sensor NAME; --as-said takes them as they are"
+                    .to_owned()
+            }
+            false => {
+                format!("is the unit right? {}; --as-said takes it as it is", units.join(" | "))
+            }
         };
         Err(ImportError::Doubtful { what, help })
     }
@@ -253,7 +264,13 @@ impl Doubts {
 
     pub(crate) fn add(&mut self, reading: &Reading, ways: (&Ways, &Taken)) {
         let direction = reading.raw.direction;
-        self.ranges.add(reading.place, reading.direction_deg, reading.raw.range, reading.range_m, ways);
+        self.ranges.add(
+            reading.place,
+            reading.direction_deg,
+            reading.raw.range,
+            reading.range_m,
+            ways,
+        );
         self.low = self.low.min(direction);
         self.high = self.high.max(direction);
         self.are_whole &= (direction - direction.round()).abs() < 1e-9;
@@ -265,7 +282,10 @@ impl Doubts {
     /// What speaks against the mapping; else what was taken for no echo.
     pub(crate) fn check(&self, ways: &Ways, taken: &Taken) -> Result<Vec<String>, ImportError> {
         if self.ranges.readings == 0 {
-            return Err(ImportError::mapping("there is no reading in it", "give a file with readings"));
+            return Err(ImportError::mapping(
+                "there is no reading in it",
+                "give a file with readings",
+            ));
         }
         if !taken.as_said {
             self.check_angles(ways)?;
@@ -288,7 +308,10 @@ impl Doubts {
             .unwrap_or_default();
         if field.is_radians() && most > 4.0 * std::f64::consts::TAU {
             return Err(ImportError::Doubtful {
-                what: format!("{field} goes from {low:.1} to {high:.1} rad, {:.0} turns", most / std::f64::consts::TAU),
+                what: format!(
+                    "{field} goes from {low:.1} to {high:.1} rad, {:.0} turns",
+                    most / std::f64::consts::TAU
+                ),
                 help: format!("if these are degrees: {option}; --as-said takes them as they are"),
             });
         }
@@ -317,7 +340,10 @@ impl Doubts {
             .map(ToString::to_string)
             .collect();
         Err(ImportError::Doubtful {
-            what: format!("{} follow direction and range: the echo's place, not the robot's", named.join(" and ")),
+            what: format!(
+                "{} follow direction and range: the echo's place, not the robot's",
+                named.join(" and ")
+            ),
             help: format!(
                 "leave them out: {}; --as-said takes them as the robot's",
                 crate::mapping::columns_option(columns, ways.names)

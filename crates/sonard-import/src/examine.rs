@@ -142,8 +142,16 @@ impl Source<'_> {
         for row in found.rows((self.open)()?)? {
             let (round, raw) = reader.round(&row?)?;
             if raw.len() != count {
-                let what = format!("{} ranges, and the array {} has {count} rangers", raw.len(), array.name);
-                return Err(ImportError::at(round.place, what, "give the array that the file is of"));
+                let what = format!(
+                    "{} ranges, and the array {} has {count} rangers",
+                    raw.len(),
+                    array.name
+                );
+                return Err(ImportError::at(
+                    round.place,
+                    what,
+                    "give the array that the file is of",
+                ));
             }
             has_poses |= round.pose.is_some();
             for (place, (raw, range_m)) in raw.iter().zip(&round.ranges_m).enumerate() {
@@ -151,7 +159,10 @@ impl Source<'_> {
             }
         }
         if ranges.readings == 0 {
-            return Err(ImportError::mapping("there is no reading in it", "give a file with readings"));
+            return Err(ImportError::mapping(
+                "there is no reading in it",
+                "give a file with readings",
+            ));
         }
         let notes = ranges.check(&ways, &found.taken)?;
         let times = reader.times.notes();
@@ -165,12 +176,8 @@ impl Source<'_> {
         found.guessed = false;
         let mut doubts = Doubts::new();
         let mut reader = ros_text::Reader::new(&found.mapping);
-        let ways = Ways {
-            mapping: &found.mapping,
-            names: &[],
-            has_columns: false,
-            zero_is_no_echo: true,
-        };
+        let ways =
+            Ways { mapping: &found.mapping, names: &[], has_columns: false, zero_is_no_echo: true };
         let source = found.decoded((self.open)()?);
         let mut has_fixed = false;
         for message in ros_text::messages(source, found.is_json)? {
@@ -185,12 +192,18 @@ impl Source<'_> {
         found.notes.extend(reader.notes.lines());
         found.notes.extend(notes);
         if reader.others > 0 {
-            found.notes.push(format!("left out: {} messages that are no LaserScan or Range", reader.others));
+            found.notes.push(format!(
+                "left out: {} messages that are no LaserScan or Range",
+                reader.others
+            ));
         }
-        found.notes.push("frames are not in it: the scanner is taken to stand upright and look ahead".to_owned());
+        found.notes.push(
+            "frames are not in it: the scanner is taken to stand upright and look ahead".to_owned(),
+        );
         if has_fixed && found.mapping.azimuth_deg.is_none() {
             found.notes.push(
-                "Range messages have no direction: taken as ahead; --azimuth-deg DEG gives another".to_owned(),
+                "Range messages have no direction: taken as ahead; --azimuth-deg DEG gives another"
+                    .to_owned(),
             );
         }
         (found.readings, found.echoes) = (doubts.ranges.readings, doubts.ranges.echoes);
@@ -212,12 +225,8 @@ impl Source<'_> {
         found.chosen = chosen;
         let mut rounds = Rounds::new(&found.mapping, &found.chosen, found.taken.started)?;
         let mut ranges = Ranges::new(Across::Rangers);
-        let ways = Ways {
-            mapping: &found.mapping,
-            names: &[],
-            has_columns: false,
-            zero_is_no_echo: true,
-        };
+        let ways =
+            Ways { mapping: &found.mapping, names: &[], has_columns: false, zero_is_no_echo: true };
         let mut has_poses = false;
         for message in messages(read, found.decoded((self.open)()?)) {
             let (place, message) = message?;
@@ -236,7 +245,10 @@ impl Source<'_> {
         let (array, note) = match (&rounds.geometry, &found.taken.array) {
             (Some(geometry), given) => {
                 let note = given.as_ref().map(|given| {
-                    format!("the log says where its rangers are: the array {} is not used", given.name)
+                    format!(
+                        "the log says where its rangers are: the array {} is not used",
+                        given.name
+                    )
                 });
                 (rounds::array(geometry, &found.taken.sensor), note)
             }
@@ -288,7 +300,9 @@ pub(crate) fn check_beyond(
 
 /// A file that is one line of many values has lost its line ends.
 fn check_one_row(found: &Imported, readings: u64) -> Result<(), ImportError> {
-    let Some(header) = found.header.as_ref().filter(|header| !header.has_names) else { return Ok(()) };
+    let Some(header) = found.header.as_ref().filter(|header| !header.has_names) else {
+        return Ok(());
+    };
     let (values, columns) = (header.cells.len(), found.mapping.columns.len());
     if readings != 1 || values < 2 * columns.max(2) || found.taken.as_said {
         return Ok(());
@@ -303,10 +317,14 @@ fn check_one_row(found: &Imported, readings: u64) -> Result<(), ImportError> {
 fn ask_unit_of_array(found: &Imported, rangers: usize) -> ImportError {
     let name = found.taken.array.as_ref().map_or("", |array| &array.name);
     let column = Column::Several((1..=rangers).collect());
-    let options = Field::of_quantity(Quantity::Range).take(3).map(|field| columns_option([(field, column.clone())], &[]));
+    let options = Field::of_quantity(Quantity::Range)
+        .take(3)
+        .map(|field| columns_option([(field, column.clone())], &[]));
     let options: Vec<String> = options.collect();
     ImportError::mapping(
-        format!("each row has {rangers} values, as many as the array {name} has rangers, and no names"),
+        format!(
+            "each row has {rangers} values, as many as the array {name} has rangers, and no names"
+        ),
         format!("say their unit: {}", options.join(" | ")),
     )
 }
@@ -342,7 +360,9 @@ impl Imported {
         } else if self.header.as_ref().is_some_and(|header| header.ends == Ends::Lines)
             && !survey.has_last_end()
         {
-            self.notes.push("the last line has no end: it may have been cut within its last value".to_owned());
+            self.notes.push(
+                "the last line has no end: it may have been cut within its last value".to_owned(),
+            );
         }
         if raggedness.short > 0 {
             self.notes.push(format!(
@@ -423,9 +443,9 @@ impl Imported {
     ) -> Result<Box<dyn Iterator<Item = Scan> + 'a>, ImportError> {
         let mut reader = Reader::new(&self.mapping, &self.taken, self.decimal())?;
         let rounds = self.rows(source)?.map(move |row| reader.round(&row?).map(|(round, _)| round));
-        Ok(Box::new((1..).zip(rounds).map(|(number, round)| {
-            Ok(scans::round(&self.taken, number, &round?))
-        })))
+        Ok(Box::new(
+            (1..).zip(rounds).map(|(number, round)| Ok(scans::round(&self.taken, number, &round?))),
+        ))
     }
 
     pub(crate) fn rounds_of_lines<'a>(
@@ -438,9 +458,9 @@ impl Imported {
             let round = message.and_then(|(place, message)| rounds.take(place, message));
             round.map(|round| round.map(|(round, _)| round)).transpose()
         });
-        Ok(Box::new((1..).zip(found).map(|(number, round)| {
-            Ok(scans::round(&self.taken, number, &round?))
-        })))
+        Ok(Box::new(
+            (1..).zip(found).map(|(number, round)| Ok(scans::round(&self.taken, number, &round?))),
+        ))
     }
 }
 

@@ -204,7 +204,8 @@ const FOREIGN: &[Foreign] = &[
         is: |bytes, _| {
             let is_zip = bytes.starts_with(b"PK\x03\x04");
             let has = |name: &[u8]| bytes.windows(name.len()).any(|part| part == name);
-            is_zip && (has(b"[Content_Types].xml") || has(b"xl/") || has(b"opendocument.spreadsheet"))
+            is_zip
+                && (has(b"[Content_Types].xml") || has(b"xl/") || has(b"opendocument.spreadsheet"))
                 || bytes.starts_with(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")
         },
     },
@@ -212,7 +213,8 @@ const FOREIGN: &[Foreign] = &[
         what: "an archive of NumPy arrays (npz)",
         help: "write an array of it as text: np.savetxt('FILE.csv', np.load('FILE.npz')['NAME'], delimiter=',')",
         is: |bytes, _| {
-            bytes.starts_with(b"PK\x03\x04") && bytes.windows(4).take(200).any(|part| part == b".npy")
+            bytes.starts_with(b"PK\x03\x04")
+                && bytes.windows(4).take(200).any(|part| part == b".npy")
         },
     },
     Foreign {
@@ -289,14 +291,17 @@ const FOREIGN: &[Foreign] = &[
             let text = text.trim_start();
             let has = |name: &str| text.contains(&format!("\"{name}\""));
             text.starts_with('{')
-                && ((has("walls") && has("materials")) || (has("blanking_us") && has("frequency_hz")))
+                && ((has("walls") && has("materials"))
+                    || (has("blanking_us") && has("frequency_hz")))
                 && !has("type")
         },
     },
     Foreign {
         what: "already a log of this program",
         help: "use it as it is: `sonard log show FILE`",
-        is: |_, text| text.starts_with("{\"type\":\"session\"") || text.starts_with("{\"type\": \"session\""),
+        is: |_, text| {
+            text.starts_with("{\"type\":\"session\"") || text.starts_with("{\"type\": \"session\"")
+        },
     },
 ];
 
@@ -305,7 +310,8 @@ fn is_xml(text: &str, root: &str) -> bool {
     let tags = text.split('<').skip(1).find(|tag| !tag.starts_with(['?', '!']));
     text.starts_with('<')
         && tags.is_some_and(|tag| {
-            tag.strip_prefix(root).is_some_and(|rest| rest.starts_with([' ', '>', '\n', '\r', '\t', '/']))
+            tag.strip_prefix(root)
+                .is_some_and(|rest| rest.starts_with([' ', '>', '\n', '\r', '\t', '/']))
         })
 }
 
@@ -317,7 +323,8 @@ fn is_stage_world(text: &str) -> bool {
         let words: Vec<&str> = line.split_whitespace().take(2).collect();
         let first = words.first().copied().unwrap_or_default();
         let name = first.strip_suffix('(').unwrap_or(first);
-        (MODELS.contains(&name) && (first.ends_with('(') || words.get(1).is_none_or(|word| *word == "(")))
+        (MODELS.contains(&name)
+            && (first.ends_with('(') || words.get(1).is_none_or(|word| *word == "(")))
             || (first == "define" && words.len() == 2)
     };
     let has_bracket = text.split_whitespace().any(|word| word == "(" || word.ends_with("( "));
@@ -354,8 +361,14 @@ mod tests {
             ("## Player version 3.0.2\n", Format::Player),
             ("10 h 6665 ranger 00 001 001 0\n", Format::Player),
             ("{\"angle_min\": 0, \"angle_increment\": 1, \"ranges\": []}", Format::RosText),
-            ("header:\n  seq: 1\nangle_min: 0\nangle_increment: 1\nranges: []\n---\n", Format::RosText),
-            ("radiation_type: 0\nfield_of_view: 0.1\nmin_range: 0.0\nmax_range: 1\nrange: 1\n", Format::RosText),
+            (
+                "header:\n  seq: 1\nangle_min: 0\nangle_increment: 1\nranges: []\n---\n",
+                Format::RosText,
+            ),
+            (
+                "radiation_type: 0\nfield_of_view: 0.1\nmin_range: 0.0\nmax_range: 1\nrange: 1\n",
+                Format::RosText,
+            ),
             ("{\"angle\": 0, \"ranges\": [1]}", Format::Json),
         ] {
             assert_eq!(Format::detect(text.as_bytes(), text), format, "{text}");
@@ -377,7 +390,11 @@ mod tests {
             (b"SQLite format 3\0", "SQLite", "by its name"),
             (b"<?xml version='1.0'?>\n<!-- w --><sdf version='1.6'>", "Gazebo", "from-sdf"),
             (b"<svg xmlns='x'>", "SVG", "from-svg"),
-            (b"window\n(\n size [ 600 600 ]\n)\nfloorplan\n(\n bitmap \"a.png\"\n)\n", "Stage", "Player"),
+            (
+                b"window\n(\n size [ 600 600 ]\n)\nfloorplan\n(\n bitmap \"a.png\"\n)\n",
+                "Stage",
+                "Player",
+            ),
             (b"define pioneer position\n(\n)\nposition ( pose [1 2 0 0] )\n", "Stage", "Player"),
             (b"image: a.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n", "map", "from-grid"),
             (b"  0\nSECTION\n  2\nHEADER\n", "DXF", "from-dxf"),

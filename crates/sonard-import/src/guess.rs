@@ -93,11 +93,14 @@ impl Guess {
             let columns = columns_option([(field, Column::Several(places.clone()))], names);
             return Err(ImportError::mapping(
                 format!("{} columns are ranges: one a ranger of an array?", places.len()),
-                format!("say where the rangers are: --array NAME {columns}, with an array of `sonard array list` or a file"),
+                format!(
+                    "say where the rangers are: --array NAME {columns}, with an array of `sonard array list` or a file"
+                ),
             ));
         }
         for (at, (field, name)) in self.found.iter().enumerate() {
-            let twin = self.found[..at].iter().find(|(other, _)| other.quantity() == field.quantity());
+            let twin =
+                self.found[..at].iter().find(|(other, _)| other.quantity() == field.quantity());
             if let Some((other, twin)) = twin {
                 let [one, two] = [(*other, twin.as_str()), (*field, name.as_str())]
                     .map(|choice| self.option(&[choice], names));
@@ -123,7 +126,8 @@ impl Guess {
         };
         let with_unit: Vec<_> = with_unit.collect();
         let mut offers: Vec<(Field, &str)> = with_unit.iter().filter_map(names).collect();
-        let without = self.without_unit.iter().filter(|(quantity, _)| quantities.contains(quantity));
+        let without =
+            self.without_unit.iter().filter(|(quantity, _)| quantities.contains(quantity));
         for (quantity, name) in without {
             offers.extend(Field::of_quantity(*quantity).map(|field| (field, name.as_str())));
         }
@@ -201,7 +205,8 @@ impl Mapping {
     /// Takes the ranges of an array's rangers, and what else the names say, if there is a column for each of them.
     pub(crate) fn guess_array(&mut self, names: &[String], rangers: usize) -> bool {
         let mut guess = Guess::of(names);
-        let Some((field, places)) = guess.of_array(names).filter(|(_, places)| places.len() == rangers)
+        let Some((field, places)) =
+            guess.of_array(names).filter(|(_, places)| places.len() == rangers)
         else {
             return false;
         };
@@ -226,9 +231,10 @@ impl Mapping {
         guess.check_twins(names)?;
         guess.check_missing(self, names)?;
         let mut notes = Vec::new();
-        let yaw = guess.found.iter().find(|(field, name)| {
-            field.quantity() == Quantity::Azimuth && words::is_yaw(name)
-        });
+        let yaw = guess
+            .found
+            .iter()
+            .find(|(field, name)| field.quantity() == Quantity::Azimuth && words::is_yaw(name));
         if let Some((_, name)) = yaw {
             notes.push(format!("`{name}` is taken as the azimuth: no other column is a direction"));
         }

@@ -49,7 +49,10 @@ pub(crate) fn objects<'a>(
         text.push('\n');
         if text.len() > MAX_DOCUMENT_BYTES {
             return Err(ImportError::mapping(
-                format!("a JSON document of more than {} MB is held in memory as a whole", MAX_DOCUMENT_BYTES >> 20),
+                format!(
+                    "a JSON document of more than {} MB is held in memory as a whole",
+                    MAX_DOCUMENT_BYTES >> 20
+                ),
                 "write an object a line: `jq -c '.[]' FILE > LINES`",
             ));
         }
@@ -60,7 +63,8 @@ pub(crate) fn objects<'a>(
             && read(&line).is_ok_and(|value| value.is_object() || is_pair(&value));
         if is_whole {
             let first = std::iter::once(parse(1, &text));
-            let rest = lines.filter(|line| !line.as_ref().is_ok_and(|line| line.text.trim().is_empty()));
+            let rest =
+                lines.filter(|line| !line.as_ref().is_ok_and(|line| line.text.trim().is_empty()));
             return Ok(Box::new(first.chain(rest.map(|line| {
                 let line = line?;
                 parse(line.number, &line.text)

@@ -55,19 +55,28 @@ impl Header {
         let mut notes = Vec::new();
         let ends = if is_stream(head) { Ends::Stops } else { Ends::Lines };
         if ends == Ends::Stops {
-            notes.push("records end with a full stop, not with the line: angle,distance.".to_owned());
+            notes.push(
+                "records end with a full stop, not with the line: angle,distance.".to_owned(),
+            );
         }
         let is_end = |c: char| matches!(c, '\n' | '\r') || (ends == Ends::Stops && c == '.');
         let lines: Vec<&str> = head.split(is_end).collect();
-        let mut rows = lines.iter().copied().enumerate().filter(|(_, line)| !is_comment(line)).peekable();
+        let mut rows =
+            lines.iter().copied().enumerate().filter(|(_, line)| !is_comment(line)).peekable();
         let said = rows.peek().and_then(|(_, line)| separator_line(line));
         if let Some(separator) = said {
             rows.next();
-            notes.push(format!("the line `sep={}` is taken as the separator", char::from(separator)));
+            notes.push(format!(
+                "the line `sep={}` is taken as the separator",
+                char::from(separator)
+            ));
         }
         let rows: Vec<(usize, &str)> = rows.take(LOOKED_AT).collect();
         let Some(&(first_at, first)) = rows.first() else {
-            return Err(ImportError::mapping("the file holds no line of values", "give a table of readings"));
+            return Err(ImportError::mapping(
+                "the file holds no line of values",
+                "give a table of readings",
+            ));
         };
         let texts: Vec<&str> = rows.iter().map(|(_, line)| *line).collect();
         let between = said.map_or_else(|| separator(&texts), Between::Byte);
@@ -93,7 +102,8 @@ impl Header {
         } else if !has_names {
             header.take_names(lines[..first_at].iter().rev().find_map(|line| comment(line)));
         }
-        let named = header.cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
+        let named =
+            header.cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1);
         header.cells.truncate(named.max(1));
         Ok(header)
     }
@@ -155,7 +165,10 @@ fn is_number(cell: &str) -> bool {
 /// The separator that Excel's first line states.
 fn separator_line(line: &str) -> Option<u8> {
     let line = line.trim().trim_matches('"');
-    let separator = line.get(..4).filter(|start| start.eq_ignore_ascii_case("sep=")).map(|_| &line.as_bytes()[4..])?;
+    let separator = line
+        .get(..4)
+        .filter(|start| start.eq_ignore_ascii_case("sep="))
+        .map(|_| &line.as_bytes()[4..])?;
     match separator {
         [] => Some(b'\t'),
         [one] if one.is_ascii() => Some(*one),
@@ -170,7 +183,8 @@ fn separator(rows: &[&str]) -> Between {
         let rows = values.iter().map(|row| split(*between, row).unwrap_or_default());
         let rows: Vec<Vec<String>> = rows.collect();
         let least = rows.iter().map(Vec::len).min().unwrap_or(0);
-        let is_split = least > 1 || split(*between, rows_first(values)).is_ok_and(|row| row.len() > 1);
+        let is_split =
+            least > 1 || split(*between, rows_first(values)).is_ok_and(|row| row.len() > 1);
         let cells = || rows.iter().flatten().filter(|cell| !cell.is_empty());
         let numbers = cells().filter(|cell| is_number(cell)).count();
         let share = numbers as f64 / cells().count().max(1) as f64;
@@ -186,7 +200,9 @@ fn separator(rows: &[&str]) -> Between {
     }
     let by_first = || {
         let first = rows_first(rows);
-        SEPARATORS.into_iter().find(|between| matches!(between, Between::Byte(byte) if first.as_bytes().contains(byte)))
+        SEPARATORS.into_iter().find(
+            |between| matches!(between, Between::Byte(byte) if first.as_bytes().contains(byte)),
+        )
     };
     best.map(|(between, _)| between).or_else(by_first).unwrap_or(Between::Blanks)
 }
@@ -223,13 +239,18 @@ fn decimal(rows: &[&str], between: Between, mapping: &Mapping) -> Result<Decimal
 /// Whether a text is a stream of `angle,distance.` without line ends, as the "radar" sketches send it. Its beginning and
 /// its end may be cut.
 fn is_stream(head: &str) -> bool {
-    let text = head.trim_end_matches(['\r', '\n']);
-    let is_whole = |word: &str| !word.is_empty() && word.len() < 8 && word.bytes().all(|byte| byte.is_ascii_digit());
-    let records: Vec<&str> = text.split('.').collect();
-    let is_record = |record: &&str| record.split_once(',').is_some_and(|(a, b)| is_whole(a) && is_whole(b));
-    !text.contains(['\n', '\r'])
-        && records.len() > 4
-        && records[1..records.len() - 1].iter().all(|record| is_record(&record))
+    let is_whole =
+        |word: &str| (1..8).contains(&word.len()) && word.bytes().all(|byte| byte.is_ascii_digit());
+    let records: Vec<&str> = head.split('.').collect();
+    let [_, whole @ .., _] = &records[..] else { return false };
+    let angles = whole.iter().map(|record| match record.split_once(',') {
+        Some((angle, distance)) if is_whole(angle) && is_whole(distance) => Some(angle),
+        _ => None,
+    });
+    let Some(angles) = angles.collect::<Option<Vec<&str>>>() else { return false };
+    // Numbers with a digit behind their points look so, too; of these the first would be the same.
+    let is_turning = angles.windows(2).any(|pair| pair[0] != pair[1]);
+    angles.len() > 2 && is_turning
 }
 
 #[cfg(test)]
@@ -265,7 +286,9 @@ mod tests {
     fn commas_that_may_mean_two_things_are_asked_about() {
         let text = "a;b\n10;1,500\n20;1,750\n";
         let error = Header::of(text, &Mapping::default()).expect_err("either");
-        assert!(error.to_string().contains("decimal comma") && error.help().contains("--decimal comma"));
+        assert!(
+            error.to_string().contains("decimal comma") && error.help().contains("--decimal comma")
+        );
         for decimal in [Decimal::Comma, Decimal::Point] {
             let mapping = Mapping { decimal: Some(decimal), ..Mapping::default() };
             assert_eq!(Header::of(text, &mapping).expect("said").decimal, decimal);
@@ -276,7 +299,11 @@ mod tests {
 
     #[test]
     fn names_are_taken_from_the_comment_above_that_has_as_many() {
-        for text in ["% angle_deg distance_cm\n0 100\n", "# angle_deg, distance_cm\n0,100\n", "%a\n% angle_deg range_cm\n\n0 100\n"] {
+        for text in [
+            "% angle_deg distance_cm\n0 100\n",
+            "# angle_deg, distance_cm\n0,100\n",
+            "%a\n% angle_deg range_cm\n\n0 100\n",
+        ] {
             let found = header(text);
             assert!(found.has_names && found.is_comment && found.cells.len() == 2, "{text}");
         }
@@ -288,7 +315,11 @@ mod tests {
     #[test]
     fn the_line_of_excel_and_streams_without_line_ends_are_known() {
         let found = header("sep=;\na;b\n1;2\n");
-        assert!(found.has_separator_line && found.cells == ["a", "b"] && found.notes[0].contains("sep=;"));
+        assert!(
+            found.has_separator_line
+                && found.cells == ["a", "b"]
+                && found.notes[0].contains("sep=;")
+        );
         let stream = "5,31.16,36.17,34.18,32.19,37.20,3";
         assert_eq!(header(stream).ends, Ends::Stops);
         assert_eq!(header("15.5,31.5,16.5,32.5\n").ends, Ends::Lines);

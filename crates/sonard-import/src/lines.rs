@@ -126,7 +126,8 @@ mod tests {
     #[test]
     fn a_return_and_feed_split_between_reads_is_one_end() {
         let source = "a\r".as_bytes().chain("\nb".as_bytes());
-        let lines: Vec<_> = Lines::of(source, Ends::Lines).map(|line| line.expect("short")).collect();
+        let lines: Vec<_> =
+            Lines::of(source, Ends::Lines).map(|line| line.expect("short")).collect();
         assert_eq!(lines.len(), 2, "{lines:?}");
     }
 }

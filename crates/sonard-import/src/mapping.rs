@@ -25,7 +25,11 @@ impl Column {
     fn of(text: &str) -> Result<Self, String> {
         let text = text.trim();
         if let Ok(number) = text.parse() {
-            return if number == 0 { Err("there is no column 0".to_owned()) } else { Ok(Self::Number(number)) };
+            return if number == 0 {
+                Err("there is no column 0".to_owned())
+            } else {
+                Ok(Self::Number(number))
+            };
         }
         let span = text.split_once('-').and_then(|(first, last)| {
             Some((first.parse::<usize>().ok()?, last.parse::<usize>().ok()?))
@@ -295,5 +299,9 @@ pub(crate) fn columns_option(
 /// A word as one types it in a shell.
 pub(crate) fn typed(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "_=,.-/%+@:".contains(c);
-    if word.chars().all(is_plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+    if word.chars().all(is_plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
+    }
 }

@@ -61,9 +61,10 @@ fn old_start(words: &[&str]) -> usize {
     let is_time = number(BEFORE_IN_OLD).is_some_and(|time| {
         time >= 1e6 || (!is_signed(BEFORE_IN_OLD) && is_signed(BEFORE_IN_OLD + 1))
     });
-    let is_count = number(BEFORE_IN_OLD).is_some_and(|count| count.fract() == 0.0 && count <= 256.0);
-    let is_sonar = words.get(3) == Some(&"sonar");
-    BEFORE_IN_OLD + usize::from(is_time && !(is_sonar && is_count))
+    // A count has no point.
+    let has_point = words.get(BEFORE_IN_OLD).is_some_and(|word| word.contains('.'));
+    let is_time = if words.get(3) == Some(&"sonar") { has_point } else { is_time };
+    BEFORE_IN_OLD + usize::from(is_time)
 }
 
 fn sonar(
@@ -81,7 +82,8 @@ fn sonar(
             let count = count(place, words, from)?;
             // Later versions have six numbers of each: places and turns in space.
             let each = if (words.len() - from - 1) / count >= 6 { 6 } else { 3 };
-            places(place, words, from + 1, count, each).map(|places| Some(Content::Geometry(places)))
+            places(place, words, from + 1, count, each)
+                .map(|places| Some(Content::Geometry(places)))
         }
         Some(_) => Ok(None),
         None => {

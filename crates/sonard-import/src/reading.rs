@@ -96,7 +96,11 @@ impl<'a> Reader<'a> {
         cells.first()?.as_deref().map(|cell| (field, cell))
     }
 
-    fn number_of(&self, row: &Row, quantity: Quantity) -> Result<Option<(Field, f64)>, ImportError> {
+    fn number_of(
+        &self,
+        row: &Row,
+        quantity: Quantity,
+    ) -> Result<Option<(Field, f64)>, ImportError> {
         let Some((field, cell)) = self.cell(row, quantity) else { return Ok(None) };
         Ok(self.number(row.place, field, cell)?.map(|number| (field, number)))
     }
@@ -136,7 +140,8 @@ impl<'a> Reader<'a> {
         };
         let is_without = status.is_some_and(|status| status != PingStatus::Echo);
         let measured = measured.filter(|_| !is_without);
-        let tof_us = measured.and_then(|(field, number)| self.tof_us(field, number, sound_speed_m_s));
+        let tof_us =
+            measured.and_then(|(field, number)| self.tof_us(field, number, sound_speed_m_s));
         let range_m = tof_us.map(|tof_us| tof_us * 1e-6 * sound_speed_m_s / 2.0);
         let [x, y] = [self.scaled(row, Quantity::X)?, self.scaled(row, Quantity::Y)?];
         Ok(Reading {

@@ -226,8 +226,9 @@ impl Bag {
             while ready.is_empty() && !is_over {
                 match messages.next() {
                     Some(message) => {
-                        let scans = message
-                            .and_then(|message| self.take(&message, mapping, &mut limits, &mut gathered));
+                        let scans = message.and_then(|message| {
+                            self.take(&message, mapping, &mut limits, &mut gathered)
+                        });
                         match scans {
                             Ok(scans) => ready.extend(scans),
                             Err(error) => return Some(Err(error)),
@@ -302,7 +303,8 @@ impl Bag {
             }
             Ok(())
         };
-        let limits = |[least, most]: [f32; 2]| Limits { least: as_written(least), most: as_written(most) };
+        let limits =
+            |[least, most]: [f32; 2]| Limits { least: as_written(least), most: as_written(most) };
         if !source.is_scan {
             let mut range = decode(message, Range::decode)?;
             self.clock.stamp(&mut range.header, message);
@@ -322,7 +324,11 @@ impl Bag {
     }
 
     /// Place of a ranger in its robot, and the robot's pose.
-    fn placed(&self, source: &Source, time_ns: i64) -> Result<(Placed, Option<Pose>), TransformError> {
+    fn placed(
+        &self,
+        source: &Source,
+        time_ns: i64,
+    ) -> Result<(Placed, Option<Pose>), TransformError> {
         let in_robot = self.transforms.place(&source.placed_as, &source.robot, time_ns)?;
         let pose = match source.world == source.robot {
             true => None,
@@ -352,7 +358,9 @@ impl Clock {
     fn stamp(&self, header: &mut Header, message: &Message) {
         if header.stamp_ns == 0 {
             header.stamp_ns = i64::try_from(message.recorded_ns).unwrap_or(i64::MAX);
-        } else if let Some(of_board_ns) = self.of_board_ns.filter(|_| header.stamp_ns < MIN_CLOCK_NS) {
+        } else if let Some(of_board_ns) =
+            self.of_board_ns.filter(|_| header.stamp_ns < MIN_CLOCK_NS)
+        {
             header.stamp_ns = header.stamp_ns.saturating_add(of_board_ns);
         }
     }

@@ -11,7 +11,7 @@ use sonard_model::reading::PingStatus;
 
 use crate::{
     ImportError, Location, Mapping, Reading, json,
-    limits::{Limits, LimitNotes, Told},
+    limits::{LimitNotes, Limits, Told},
     lines::{Ends, Lines},
     reading::Raw,
 };
@@ -83,10 +83,25 @@ fn yaml(number: u64, first_line: u64, text: &str) -> Result<Value, ImportError> 
             "print whole lists: `ros2 topic echo --full-length TOPIC`",
         ));
     }
-    serde_saphyr::from_str::<Value>(text).map_err(|error| {
+    serde_saphyr::from_str::<Value>(&with_words(text)).map_err(|error| {
         let what = format!("no YAML from line {first_line} on: {error}");
         ImportError::at(place, what, "messages are separated by lines `---`")
     })
+}
+
+/// YAML's infinities and NaN as texts, which JSON can hold.
+fn with_words(text: &str) -> String {
+    let is_end = |c: char| c.is_whitespace() || matches!(c, ',' | '[' | ']');
+    let word = |piece: &str| {
+        let plain = piece.trim_end_matches(is_end);
+        match plain.to_lowercase().as_str() {
+            ".inf" | "+.inf" | "-.inf" | ".nan" => {
+                format!("\"{}\"{}", plain.replace('.', ""), &piece[plain.len()..])
+            }
+            _ => piece.to_owned(),
+        }
+    };
+    text.split_inclusive(is_end).map(word).collect()
 }
 
 /// Reads the readings of messages, in their order.
@@ -120,7 +135,11 @@ impl<'a> Reader<'a> {
         };
         let time = time(message);
         let topic_scan = self.count.to_string();
-        let mut one = |number: Option<u64>, direction_deg: f64, range: f64, later_s: f64, scan: Option<&str>| {
+        let mut one = |number: Option<u64>,
+                       direction_deg: f64,
+                       range: f64,
+                       later_s: f64,
+                       scan: Option<&str>| {
             let told = limits.tell(range, self.mapping, &mut self.notes);
             let (status, range) = match told {
                 Told::Nothing => return None,
@@ -149,7 +168,11 @@ impl<'a> Reader<'a> {
         if let Some(ranges) = message.get("ranges").and_then(Value::as_array) {
             let need = |name: &str| {
                 number(&[name]).filter(|number| number.is_finite()).ok_or_else(|| {
-                    ImportError::at(place, format!("`{name}` is no number"), "give a whole LaserScan")
+                    ImportError::at(
+                        place,
+                        format!("`{name}` is no number"),
+                        "give a whole LaserScan",
+                    )
                 })
             };
             let (first_rad, step_rad) = (need("angle_min")?, need("angle_increment")?);
@@ -158,7 +181,13 @@ impl<'a> Reader<'a> {
                 let beam_at = f64::from(beam);
                 let direction_deg = plain_deg(first_rad + beam_at * step_rad);
                 let range = float(range).unwrap_or(f64::NAN);
-                one(Some(u64::from(beam) + 1), direction_deg, range, beam_at * apart_s, Some(&topic_scan))
+                one(
+                    Some(u64::from(beam) + 1),
+                    direction_deg,
+                    range,
+                    beam_at * apart_s,
+                    Some(&topic_scan),
+                )
             });
             return Ok(readings.collect());
         }

@@ -82,12 +82,18 @@ impl Devices {
     pub(crate) fn add(&mut self, message: &Message) {
         let device = &message.device;
         match message.content {
-            Content::Ranges { .. } => match self.ranges.iter().position(|(known, _)| known == device) {
-                Some(place) => self.ranges[place].1 += 1,
-                None if self.ranges.len() < MAX_RANGERS => self.ranges.push((device.clone(), 1)),
-                None => {}
-            },
-            Content::Pose { .. } if self.poses.len() < MAX_RANGERS || self.poses.contains_key(device) => {
+            Content::Ranges { .. } => {
+                match self.ranges.iter().position(|(known, _)| known == device) {
+                    Some(place) => self.ranges[place].1 += 1,
+                    None if self.ranges.len() < MAX_RANGERS => {
+                        self.ranges.push((device.clone(), 1))
+                    }
+                    None => {}
+                }
+            }
+            Content::Pose { .. }
+                if self.poses.len() < MAX_RANGERS || self.poses.contains_key(device) =>
+            {
                 *self.poses.entry(device.clone()).or_default() += 1;
             }
             _ => {}
@@ -98,11 +104,15 @@ impl Devices {
     ///
     /// # Errors
     /// The device that is asked for is not in the log.
-    pub(crate) fn choose(&self, wanted: Option<&str>) -> Result<(Chosen, Vec<String>), ImportError> {
+    pub(crate) fn choose(
+        &self,
+        wanted: Option<&str>,
+    ) -> Result<(Chosen, Vec<String>), ImportError> {
         let is_wanted = |device: &Device| wanted.is_none_or(|wanted| device.is_meant(wanted));
         let ranges = self.ranges.iter().map(|(device, _)| device).find(|device| is_wanted(device));
         if let (Some(wanted), None) = (wanted, ranges) {
-            let known: Vec<String> = self.ranges.iter().map(|(device, _)| device.to_string()).collect();
+            let known: Vec<String> =
+                self.ranges.iter().map(|(device, _)| device.to_string()).collect();
             return Err(ImportError::mapping(
                 format!("there is no device {wanted} of ranges"),
                 format!("those in the log are: {}", known.join(", ")),
@@ -154,7 +164,15 @@ impl<'a> Rounds<'a> {
         started: Timestamp,
     ) -> Result<Self, ImportError> {
         let times = Times::new(mapping, started)?;
-        Ok(Self { mapping, chosen, geometry: None, pose: None, has_true: false, rangers: None, times })
+        Ok(Self {
+            mapping,
+            chosen,
+            geometry: None,
+            pose: None,
+            has_true: false,
+            rangers: None,
+            times,
+        })
     }
 
     /// Takes a message in; the round that it is, with its ranges as the log has them.
@@ -205,7 +223,8 @@ impl<'a> Rounds<'a> {
                     .map_err(|(what, _)| ImportError::at(place, what, "correct that time"))?;
                 let metres = self.mapping.metres();
                 let range_m = |range: &f64| {
-                    let is_echo = range.is_finite() && *range > 0.0 && !self.mapping.is_no_echo(*range);
+                    let is_echo =
+                        range.is_finite() && *range > 0.0 && !self.mapping.is_no_echo(*range);
                     is_echo.then_some(range * metres)
                 };
                 let ranges_m = ranges.iter().map(range_m).collect();

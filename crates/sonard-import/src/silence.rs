@@ -14,8 +14,25 @@ const MAX_VALUES: usize = 64;
 const MIN_FILL: f64 = 0.93;
 /// Full registers and round numbers of drivers, in the unit of the file.
 const CODES: [f64; 19] = [
-    255.0, 511.0, 999.0, 1023.0, 2047.0, 4095.0, 8190.0, 8191.0, 9999.0, 16_383.0, 32_767.0, 32_768.0, 38_000.0,
-    65_533.0, 65_534.0, 65_535.0, 99_999.0, 2_147_483_647.0, 4_294_967_295.0,
+    255.0,
+    511.0,
+    999.0,
+    1023.0,
+    2047.0,
+    4095.0,
+    8190.0,
+    8191.0,
+    9999.0,
+    16_383.0,
+    32_767.0,
+    32_768.0,
+    38_000.0,
+    65_533.0,
+    65_534.0,
+    65_535.0,
+    99_999.0,
+    2_147_483_647.0,
+    4_294_967_295.0,
 ];
 /// Share of the sensor's longest range from which a value is the longest range, as written.
 const AT_LONGEST: f64 = 0.9965;
@@ -73,6 +90,15 @@ pub(crate) struct Constant {
     pub(crate) first: Option<Location>,
     /// What speaks for it.
     pub(crate) why: &'static str,
+}
+
+/// The usual step between values other than this one: with few digits they are apart, too.
+fn usual_gap(falling: &[(f64, &Seen)], value: f64) -> f64 {
+    let others: Vec<f64> =
+        falling.iter().map(|(other, _)| *other).filter(|other| *other != value).collect();
+    let mut gaps: Vec<f64> = others.windows(2).map(|pair| pair[0] - pair[1]).collect();
+    gaps.sort_by(f64::total_cmp);
+    gaps.get(gaps.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// A value that is no distance: zero or less.
@@ -159,24 +185,32 @@ impl Silence {
             let others = falling.iter().filter(|(other, _)| *other != value);
             let most_of_others = others.map(|(_, seen)| seen.count).max().unwrap_or(0);
             let below = falling.get(rank + 1).map(|(below, _)| *below);
-            let is_apart = below.is_some_and(|below| value - below > 0.05 * value);
+            let is_apart = below.is_some_and(|below| {
+                let gap = value - below;
+                gap > 0.05 * value && gap > 4.0 * usual_gap(&falling, value)
+            });
             let share = seen.count as f64 / of as f64;
             let many = self.is_scattered(&seen.directions);
             let is_frequent = seen.count >= 6 && share >= 0.05 && seen.count >= 5 * most_of_others;
             let is_at_longest = value >= AT_LONGEST * longest;
             let is_code = CODES.contains(&value);
             let is_top = rank == 0;
-            let why = if is_at_longest && seen.count >= 3 && share >= 0.01 && (is_top || is_frequent) {
-                Some("at or beyond the sensor's longest range")
-            } else if is_code && seen.count >= 3 && is_top && (many || (value >= 1023.0 && is_apart)) {
-                Some("a number that drivers write for no echo")
-            } else if is_top && is_apart && many && seen.count >= 3 && share >= 0.03 {
-                Some("the greatest, apart from the rest and in many directions")
-            } else if many && is_frequent && most_of_others > 0 && (is_top || share >= 0.1) {
-                Some("far more frequent than any other, and in many directions")
-            } else {
-                None
-            };
+            let why =
+                if is_at_longest && seen.count >= 3 && share >= 0.01 && (is_top || is_frequent) {
+                    Some("at or beyond the sensor's longest range")
+                } else if is_code
+                    && seen.count >= 3
+                    && is_top
+                    && (many || (value >= 1023.0 && is_apart))
+                {
+                    Some("a number that drivers write for no echo")
+                } else if is_top && is_apart && many && seen.count >= 3 && share >= 0.03 {
+                    Some("the greatest, apart from the rest and in many directions")
+                } else if many && is_frequent && most_of_others > 0 && (is_top || share >= 0.1) {
+                    Some("far more frequent than any other, and in many directions")
+                } else {
+                    None
+                };
             if let Some(why) = why {
                 let (count, first) = (seen.count, Some(seen.first));
                 return Some(Constant { value, is_cluster: false, count, of, first, why });
@@ -268,7 +302,9 @@ mod tests {
 
     #[test]
     fn constants_in_many_directions_are_no_echo_whatever_their_value() {
-        for constant in [130.0, 255.0, 400.0, 797.0, 4000.0, 65_535.0, 29.99 * 100.0, 500.0, 38_000.0] {
+        for constant in
+            [130.0, 255.0, 400.0, 797.0, 4000.0, 65_535.0, 29.99 * 100.0, 500.0, 38_000.0]
+        {
             for every in [2, 3, 5, 20] {
                 let found = sweep(400.0, |at| if at % every == 0 { constant } else { wall(at) });
                 let found = found.unwrap_or_else(|| panic!("{constant} every {every}"));
@@ -297,19 +333,26 @@ mod tests {
         // One arc at the same distance, to the centimetre.
         assert_eq!(sweep(400.0, |at| if (40..58).contains(&at) { 243.0 } else { wall(at) }), None);
         // Across zero degrees.
-        assert_eq!(sweep(400.0, |at| if !(9..=111).contains(&at) { 243.0 } else { wall(at) }), None);
+        assert_eq!(
+            sweep(400.0, |at| if !(9..=111).contains(&at) { 243.0 } else { wall(at) }),
+            None
+        );
         // Whole centimetres repeat, also the greatest.
         assert_eq!(sweep(400.0, |at| (300.0 + 20.0 * (at as f64 * 0.7).sin()).round()), None);
         // A round tank, half of one, and one arc with a gap in it.
         assert_eq!(sweep(400.0, |_| 150.0), None);
         assert_eq!(sweep(400.0, |at| if at < 60 { 300.0 } else { 100.0 }), None);
-        assert_eq!(sweep(400.0, |at| if (30..70).contains(&at) && at != 50 { 300.0 } else { wall(at) }), None);
+        assert_eq!(
+            sweep(400.0, |at| if (30..70).contains(&at) && at != 50 { 300.0 } else { wall(at) }),
+            None
+        );
     }
 
     #[test]
     fn noise_about_the_longest_range_is_a_cluster() {
         let noisy = |at: usize| 395.0 + (at * 7919 % 97) as f64 / 10.0;
-        let found = sweep(400.0, |at| if at % 3 == 0 { noisy(at) } else { wall(at) }).expect("found");
+        let found =
+            sweep(400.0, |at| if at % 3 == 0 { noisy(at) } else { wall(at) }).expect("found");
         assert!(found.is_cluster && found.value >= 395.0 && found.count == 40, "{found:?}");
     }
 
@@ -323,7 +366,11 @@ mod tests {
                 let value = if (1..7).contains(&ranger) { 5.0 } else { own };
                 silence.add(Location::Line(round), value, f64::from(ranger));
                 // One ranger beside a wall that it drives along.
-                alone.add(Location::Line(round), if ranger == 3 { 5.0 } else { own }, f64::from(ranger));
+                alone.add(
+                    Location::Line(round),
+                    if ranger == 3 { 5.0 } else { own },
+                    f64::from(ranger),
+                );
             }
         }
         assert_eq!(silence.constant(10.7).expect("found").count, 48);
@@ -336,7 +383,8 @@ mod tests {
         for (at, value) in [-1.0, 0.0, -1.0, 5.0, f64::NAN].into_iter().enumerate() {
             silence.add(Location::Line(at as u64 + 1), value, 0.0);
         }
-        let below: Vec<_> = silence.below().iter().map(|below| (below.value, below.count)).collect();
+        let below: Vec<_> =
+            silence.below().iter().map(|below| (below.value, below.count)).collect();
         assert_eq!(below, [(-1.0, 2), (0.0, 1)]);
     }
 

@@ -172,12 +172,8 @@ impl Source<'_> {
             })?;
         }
         let across = if found.taken.array.is_some() { Across::Rangers } else { Across::Angles };
-        let ways = Ways {
-            mapping: &found.mapping,
-            names: &[],
-            has_columns: false,
-            zero_is_no_echo: true,
-        };
+        let ways =
+            Ways { mapping: &found.mapping, names: &[], has_columns: false, zero_is_no_echo: true };
         let mut ranges = Ranges::new(across);
         let notes = bag.examine(self.open, (&ways, &found.taken), &mut ranges)?;
         found.notes.extend(notes);

@@ -88,12 +88,19 @@ impl<'a> Times<'a> {
         match (civil, cell.parse::<civil::Time>()) {
             (Some(civil), _) => self.local(civil).map(Some),
             (None, Ok(time)) => self.of_day(time).map(Some),
-            (None, Err(_)) => Err((format!("`{}` is no time", cell.chars().take(40).collect::<String>()), advice(&cell))),
+            (None, Err(_)) => Err((
+                format!("`{}` is no time", cell.chars().take(40).collect::<String>()),
+                advice(&cell),
+            )),
         }
     }
 
     /// A number of a unit; `seconds` is the number in seconds.
-    pub(crate) fn number(&mut self, field: Option<Field>, seconds: f64) -> Result<Timestamp, Refusal> {
+    pub(crate) fn number(
+        &mut self,
+        field: Option<Field>,
+        seconds: f64,
+    ) -> Result<Timestamp, Refusal> {
         let nanoseconds = if seconds.abs() >= MIN_CLOCK_S {
             // As many digits as a number of this size has.
             1000 * (seconds * 1e6).round() as i128
@@ -101,8 +108,9 @@ impl<'a> Times<'a> {
             let since_s = self.since_start(field, seconds);
             self.started.as_nanosecond().saturating_add(1000 * (since_s * 1e6).round() as i128)
         };
-        Timestamp::from_nanosecond(nanoseconds)
-            .map_err(|error| (error.to_string(), "times count from 1970: is the unit right?".to_owned()))
+        Timestamp::from_nanosecond(nanoseconds).map_err(|error| {
+            (error.to_string(), "times count from 1970: is the unit right?".to_owned())
+        })
     }
 
     /// Seconds since the first reading of a counter that begins with a board.
@@ -131,7 +139,8 @@ impl<'a> Times<'a> {
 
     /// A number whose size alone shows its unit, if it does: of the years 2001 to 2286.
     fn plain_number(&mut self, number: f64) -> Option<Timestamp> {
-        let unit_s = [1.0, 1e-3, 1e-6, 1e-9].into_iter().find(|unit| (1e9..1e10).contains(&(number * unit)));
+        let unit_s =
+            [1.0, 1e-3, 1e-6, 1e-9].into_iter().find(|unit| (1e9..1e10).contains(&(number * unit)));
         let time = unit_s.and_then(|unit_s| {
             let nanoseconds = if unit_s < 1e-8 { number } else { number * unit_s * 1e9 };
             Timestamp::from_nanosecond(nanoseconds as i128).ok()
@@ -142,7 +151,10 @@ impl<'a> Times<'a> {
 
     fn by_format(&mut self, format: &str, cell: &str) -> Result<Timestamp, Refusal> {
         let refuse = |error: jiff::Error| {
-            (error.to_string(), "--time-format has the signs of strftime: '%d/%m/%Y %H:%M:%S%.f'".to_owned())
+            (
+                error.to_string(),
+                "--time-format has the signs of strftime: '%d/%m/%Y %H:%M:%S%.f'".to_owned(),
+            )
         };
         let read = strtime::parse(format, cell).map_err(refuse)?;
         if read.offset().is_some()
@@ -160,7 +172,9 @@ impl<'a> Times<'a> {
     fn local(&mut self, civil: civil::DateTime) -> Result<Timestamp, Refusal> {
         self.assumed.without_zone += 1;
         let zoned = civil.to_zoned(self.zone.clone());
-        zoned.map(|zoned| zoned.timestamp()).map_err(|error| (error.to_string(), "correct that time".to_owned()))
+        zoned
+            .map(|zoned| zoned.timestamp())
+            .map_err(|error| (error.to_string(), "correct that time".to_owned()))
     }
 
     /// A time of day, on the day of the start or later.
@@ -182,20 +196,28 @@ impl<'a> Times<'a> {
 
     /// What was assumed, a line each.
     pub(crate) fn notes(&self) -> Vec<String> {
-        let Assumed { without_zone, without_date, from_start, wraps, restarts, without_unit } = self.assumed;
+        let Assumed { without_zone, without_date, from_start, wraps, restarts, without_unit } =
+            self.assumed;
         let mut notes = Vec::new();
         if without_date > 0 {
             let day = self.started.to_zoned(self.zone.clone()).date();
-            let source = if self.mapping.started.is_some() { "as --started says" } else { "the file's date" };
+            let source = if self.mapping.started.is_some() {
+                "as --started says"
+            } else {
+                "the file's date"
+            };
             notes.push(format!(
                 "times have no date: the first is of {day}, {source}; --started TIME gives another"
             ));
         }
         if without_zone > 0 && self.mapping.utc_offset.is_none() {
-            notes.push("times have no zone: taken as UTC; --utc-offset +01:00 gives another".to_owned());
+            notes.push(
+                "times have no zone: taken as UTC; --utc-offset +01:00 gives another".to_owned(),
+            );
         }
         if from_start > 0 {
-            let source = if self.mapping.started.is_some() { "--started" } else { "the file's date" };
+            let source =
+                if self.mapping.started.is_some() { "--started" } else { "the file's date" };
             let wraps = match wraps {
                 0 => String::new(),
                 count => format!("; the counter wraps at 2^32 {count} times"),
@@ -260,7 +282,11 @@ fn advice(cell: &str) -> String {
             (false, 1) => " %H:%M",
             (false, _) => "",
         };
-        let year = if cell.split(['/', ' ']).nth(2).is_some_and(|year| year.len() == 4) { "%Y" } else { "%y" };
+        let year = if cell.split(['/', ' ']).nth(2).is_some_and(|year| year.len() == 4) {
+            "%Y"
+        } else {
+            "%y"
+        };
         return format!(
             "say which is first: --time-format '%d/%m/{year}{clock}' for the day, --time-format '%m/%d/{year}{clock}' for \
              the month"
@@ -292,7 +318,8 @@ fn offset(text: &str) -> Result<Offset, ImportError> {
         return Err(refuse());
     }
     let number: i32 = digits.parse().map_err(|_| refuse())?;
-    let (hours, minutes) = if digits.len() > 2 { (number / 100, number % 100) } else { (number, 0) };
+    let (hours, minutes) =
+        if digits.len() > 2 { (number / 100, number % 100) } else { (number, 0) };
     Offset::from_seconds(sign * (hours * 3600 + minutes * 60)).map_err(|_| refuse())
 }
 
@@ -343,7 +370,12 @@ mod tests {
         let (read, notes) = read(&Mapping::default(), &["23:59:58.5", "23:59:59", "00:00:01"]);
         let expected = ["2026-11-27T23:59:58.5Z", "2026-11-27T23:59:59Z", "2026-11-28T00:00:01Z"];
         assert_eq!(read, expected);
-        assert!(notes.contains("no date") && notes.contains("2026-11-27") && notes.contains("--started"), "{notes}");
+        assert!(
+            notes.contains("no date")
+                && notes.contains("2026-11-27")
+                && notes.contains("--started"),
+            "{notes}"
+        );
     }
 
     #[test]
@@ -356,7 +388,10 @@ mod tests {
             let (said, _) = read(&Mapping::default(), &[cell]);
             let formats: Vec<&str> = said[0].split('\'').skip(1).step_by(2).collect();
             let [first, second] = formats[..] else { panic!("{said:?}") };
-            let by = |format: &str| Mapping { time_format: Some(format.to_owned()), ..Mapping::default() };
+            let by = |format: &str| Mapping {
+                time_format: Some(format.to_owned()),
+                ..Mapping::default()
+            };
             assert_eq!(read(&by(first), &[cell]).0, [day_first], "{cell}");
             assert_ne!(read(&by(second), &[cell]).0, [day_first], "{cell}");
         }
@@ -368,12 +403,16 @@ mod tests {
         let mut times = Times::new(&mapping, STARTED.parse().expect("a time")).expect("an offset");
         let field = Field::named("time_ms");
         let read = [4_294_967_000.0, 4_294_967_200.0, 104.0, 304.0, 100_304.0, 4.0, 1004.0];
-        let read = read.map(|ms| times.number(field, ms * 1e-3).expect("in range").as_millisecond());
+        let read =
+            read.map(|ms| times.number(field, ms * 1e-3).expect("in range").as_millisecond());
         let since: Vec<i64> = read.iter().map(|ms| ms - read[0]).collect();
         assert_eq!(since, [0, 200, 400, 600, 100_600, 100_600, 101_600]);
         assert_eq!((times.assumed.wraps, times.assumed.restarts), (1, 1));
         let notes = times.notes().join("\n");
-        assert!(notes.contains("from the start of the board") && notes.contains("wraps"), "{notes}");
+        assert!(
+            notes.contains("from the start of the board") && notes.contains("wraps"),
+            "{notes}"
+        );
     }
 
     #[test]

@@ -170,9 +170,40 @@ const UNITS: &[(&str, &str)] = &[
 
 /// Words of columns that are no reading: limits, steps, spreads, and angles about level axes.
 const OTHERS: [&str; 34] = [
-    "min", "minimum", "max", "maximum", "limit", "least", "greatest", "increment", "inc", "step", "std", "stddev",
-    "sigma", "error", "err", "variance", "var", "accuracy", "confidence", "quality", "intensity", "amplitude", "tilt",
-    "pitch", "roll", "elevation", "inclination", "neigung", "fov", "view", "width", "resolution", "seq", "covariance",
+    "min",
+    "minimum",
+    "max",
+    "maximum",
+    "limit",
+    "least",
+    "greatest",
+    "increment",
+    "inc",
+    "step",
+    "std",
+    "stddev",
+    "sigma",
+    "error",
+    "err",
+    "variance",
+    "var",
+    "accuracy",
+    "confidence",
+    "quality",
+    "intensity",
+    "amplitude",
+    "tilt",
+    "pitch",
+    "roll",
+    "elevation",
+    "inclination",
+    "neigung",
+    "fov",
+    "view",
+    "width",
+    "resolution",
+    "seq",
+    "covariance",
 ];
 
 /// Words of an echo's place, which is not the robot's.
@@ -187,14 +218,18 @@ fn words(name: &str) -> Vec<String> {
     let mut parted = String::new();
     let mut last = ' ';
     for c in name.chars() {
-        if (last.is_lowercase() && c.is_uppercase()) || (last.is_numeric() && c.is_alphabetic()) {
+        if (last.is_lowercase() && c.is_uppercase()) || last.is_numeric() != c.is_numeric() {
             parted.push(' ');
         }
         parted.push(c);
         last = c;
     }
     let lower = parted.to_lowercase();
-    lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_owned).collect()
+    lower
+        .split(|c: char| !c.is_alphanumeric())
+        .filter(|word| !word.is_empty())
+        .map(str::to_owned)
+        .collect()
 }
 
 pub(crate) fn is_yaw(name: &str) -> bool {
@@ -288,8 +323,19 @@ mod tests {
     #[test]
     fn limits_tilts_and_places_of_echoes_are_no_readings() {
         for name in [
-            "min_range_m", "max_range", "rangeMax_m", "field.min_range", "angle_increment", "tilt_deg", "pitch_rad",
-            "elevation_deg", "echo_x_cm", "target_y_m", "range_std_m", "foo", "class",
+            "min_range_m",
+            "max_range",
+            "rangeMax_m",
+            "field.min_range",
+            "angle_increment",
+            "tilt_deg",
+            "pitch_rad",
+            "elevation_deg",
+            "echo_x_cm",
+            "target_y_m",
+            "range_std_m",
+            "foo",
+            "class",
         ] {
             assert_eq!(meaning(name), Name::Nothing, "{name}");
         }

@@ -83,7 +83,8 @@ fn format() -> ValueParser {
 
 fn one_of<T: Copy + Send + Sync + 'static>(values: &'static [(&'static str, T)]) -> ValueParser {
     let parser = PossibleValuesParser::new(values.iter().map(|(name, _)| *name));
-    let find = |name: String| values.iter().find(|(known, _)| *known == name).map(|(_, value)| *value);
+    let find =
+        |name: String| values.iter().find(|(known, _)| *known == name).map(|(_, value)| *value);
     parser.try_map(move |name| find(name).ok_or("no such value")).into()
 }
 

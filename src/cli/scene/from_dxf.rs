@@ -83,10 +83,14 @@ fn implausible(args: &FromDxfArgs, drawing: &Drawing, unit_m: f64, size_m: f64) 
     );
     let fits = |unit: &&f64| (2.0..=200.0).contains(&(size_m / unit_m * **unit));
     let options = [1.0, 0.01, 0.001, 0.0254, 0.3048];
-    let options: Vec<String> = options.iter().filter(fits).map(|unit| format!("--unit-m {unit}")).collect();
+    let options: Vec<String> =
+        options.iter().filter(fits).map(|unit| format!("--unit-m {unit}")).collect();
     let help = match options.is_empty() {
         true => format!("say how long a unit is: --unit-m {unit_m} takes it as it is"),
-        false => format!("say how long a unit is: {}; --unit-m {unit_m} takes it as it is", options.join(" or ")),
+        false => format!(
+            "say how long a unit is: {}; --unit-m {unit_m} takes it as it is",
+            options.join(" or ")
+        ),
     };
     refuse(&args.drawing, &what, &help)
 }

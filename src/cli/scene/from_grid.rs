@@ -55,7 +55,8 @@ pub(super) fn run(args: &FromGridArgs) -> Outcome {
     };
     let [x_m, y_m, yaw_rad] = yaml.origin;
     let (origin, turn) = (DVec2::new(x_m, y_m), DVec2::from_angle(yaw_rad));
-    let turned = |corner: DVec2| if yaw_rad == 0.0 { corner } else { origin + turn.rotate(corner - origin) };
+    let turned =
+        |corner: DVec2| if yaw_rad == 0.0 { corner } else { origin + turn.rotate(corner - origin) };
     let mut found = Surfaces::default();
     for WallLine { corners, is_closed } in trace(&grid, &settings) {
         found.walls("wall", corners.into_iter().map(turned).collect(), is_closed);

@@ -57,8 +57,13 @@ pub(super) fn run(args: &FromSdfArgs) -> Outcome {
         let what = format!("the outermost element is {}, not sdf", root.tag_name().name());
         return Err(refuse(&args.world, &what, help));
     }
-    let mut world =
-        World { args, found: Surfaces::default(), notes: Vec::new(), file: args.world.clone(), depth: 0 };
+    let mut world = World {
+        args,
+        found: Surfaces::default(),
+        notes: Vec::new(),
+        file: args.world.clone(),
+        depth: 0,
+    };
     world.add_worlds(root)?;
     let help = "give a world with boxes, cylinders or outlines that the height of --cut-z-m meets";
     args.made.write(&args.world, &world.found, &world.notes, help)
@@ -118,7 +123,12 @@ impl World<'_> {
         Ok(())
     }
 
-    fn add_model<'n>(&mut self, model: Node<'n, 'n>, scope: &Scope<'_, 'n>, state: &State<'_, 'n>) -> Outcome {
+    fn add_model<'n>(
+        &mut self,
+        model: Node<'n, 'n>,
+        scope: &Scope<'_, 'n>,
+        state: &State<'_, 'n>,
+    ) -> Outcome {
         let name = model.attribute("name").unwrap_or("body");
         if state.is_deleted(name) {
             return Ok(());
@@ -139,7 +149,9 @@ impl World<'_> {
         state: &State<'_, 'n>,
     ) -> Result<Option<DAffine3>, Failure> {
         if model.attribute("placement_frame").is_some_and(|frame| !frame.is_empty()) {
-            self.notes.push(format!("left out: model `{name}`, which is placed by one of its frames (placement_frame)"));
+            self.notes.push(format!(
+                "left out: model `{name}`, which is placed by one of its frames (placement_frame)"
+            ));
             return Ok(None);
         }
         match state.of_model(name).pose(self)? {
@@ -148,14 +160,20 @@ impl World<'_> {
         }
     }
 
-    fn add_link<'n>(&mut self, link: Node<'n, 'n>, scope: &Scope<'_, 'n>, state: &State<'_, 'n>) -> Outcome {
+    fn add_link<'n>(
+        &mut self,
+        link: Node<'n, 'n>,
+        scope: &Scope<'_, 'n>,
+        state: &State<'_, 'n>,
+    ) -> Outcome {
         let own = link.attribute("name").unwrap_or_default();
         let frame = match state.of_link(own, self)? {
             Some(frame) => Some(frame),
             None => self.placed(link, scope, scope.name)?,
         };
         let Some(frame) = frame else { return Ok(()) };
-        let of_link = Scope { element: link, frame, scale: scope.scale, name: own, outer: Some(scope) };
+        let of_link =
+            Scope { element: link, frame, scale: scope.scale, name: own, outer: Some(scope) };
         for collision in link.children().filter(|child| child.has_tag_name("collision")) {
             let Some(frame) = self.placed(collision, &of_link, scope.name)? else { continue };
             let body = Body { name: scope.name, scale: scope.scale };

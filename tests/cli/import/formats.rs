@@ -13,8 +13,14 @@ fn help_and_documentation_list_every_format() {
         assert!(page.contains(&row), "docs/import.md lacks {row}");
         assert!(help.contains(&format!("- {}:", entry.name)), "{}: {help}", entry.name);
     }
-    let rows = page.lines().filter(|line| line.starts_with("| `") && !line.contains("--") && !line.contains("scene "));
-    assert_eq!(rows.count(), FORMATS.len(), "docs/import.md has rows of formats that there are not");
+    let rows = page
+        .lines()
+        .filter(|line| line.starts_with("| `") && !line.contains("--") && !line.contains("scene "));
+    assert_eq!(
+        rows.count(),
+        FORMATS.len(),
+        "docs/import.md has rows of formats that there are not"
+    );
     assert!(refused(&["import", "/dev/null", "--format", "excel"]).contains("ros_text"));
 }
 
@@ -27,7 +33,12 @@ fn files_of_other_kinds_are_named_with_the_way_in() {
         ("a.xlsx", b"PK\x03\x04\x14\0[Content_Types].xml\0", "spreadsheet", "CSV"),
         ("a.world", b"window\n(\n  size [ 1 1 ]\n)\nfloorplan\n(\n)\n", "Stage", "Player"),
         ("a.sdf", b"<sdf version='1.9'><world/></sdf>", "Gazebo", "scene from-sdf"),
-        ("a.yaml", b"image: a.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n", "map", "scene from-grid"),
+        (
+            "a.yaml",
+            b"image: a.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n",
+            "map",
+            "scene from-grid",
+        ),
     ] {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).expect("writes");

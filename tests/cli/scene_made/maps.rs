@@ -39,7 +39,11 @@ fn walls_stay_where_the_cells_are() {
         _ => room(column, row),
     };
     let scene = made(&["scene", "from-grid", &map(folder.path(), ORIGIN, shade)]);
-    assert!(scene.walls.iter().all(|wall| wall.a.x == wall.b.x || wall.a.y == wall.b.y), "{:?}", scene.walls);
+    assert!(
+        scene.walls.iter().all(|wall| wall.a.x == wall.b.x || wall.a.y == wall.b.y),
+        "{:?}",
+        scene.walls
+    );
     let has = |x: f64, y: f64| scene.walls.iter().any(|wall| wall.a.distance((x, y).into()) < 1e-3);
     for (x, y) in [(1.5, 2.15), (1.5, 1.2), (1.55, 1.2), (1.55, 2.15), (1.0, 0.3), (1.05, 0.3)] {
         assert!(has(x, y), "{x}, {y}: {:?}", scene.walls);
@@ -56,7 +60,10 @@ fn a_turned_map_is_turned_about_its_origin() {
     let origin = DVec2::new(1.0, 2.0);
     assert_eq!(straight.walls.len(), 4);
     for (one, other) in straight.walls.iter().zip(&turned.walls) {
-        assert!((origin + turn.rotate(one.a - origin)).distance(other.a) < 2e-4, "{one:?} {other:?}");
+        assert!(
+            (origin + turn.rotate(one.a - origin)).distance(other.a) < 2e-4,
+            "{one:?} {other:?}"
+        );
     }
     let refused = run(&["benchmark", "score", &path, "simple-room"]);
     assert!(stderr(&refused).contains("turned"), "{}", stderr(&refused));
@@ -69,17 +76,26 @@ fn shades_are_what_the_file_says() {
         ("as map_saver writes it", "negate: 0", room as fn(usize, usize) -> u8),
         ("by nav2", "free_thresh: 0.25\nmode: trinary", room),
         ("negated", "negate: 1", |column, row| 255 - room(column, row)),
-        ("grey walls", "occupied_thresh: 0.3\nfree_thresh: 0.1", |column, row| room(column, row).max(150)),
-        ("a stray shade", "negate: 0", |column, row| if (column, row) == (0, 0) { 180 } else { room(column, row) }),
+        ("grey walls", "occupied_thresh: 0.3\nfree_thresh: 0.1", |column, row| {
+            room(column, row).max(150)
+        }),
+        ("a stray shade", "negate: 0", |column, row| {
+            if (column, row) == (0, 0) { 180 } else { room(column, row) }
+        }),
         ("raw", "mode: raw", |column, row| match room(column, row) {
             0 => 100,
             254 => 0,
             _ => 255,
         }),
     ] {
-        let scene = made(&["scene", "from-grid", &map(folder.path(), &format!("{ORIGIN}\n{yaml}"), shade)]);
+        let scene =
+            made(&["scene", "from-grid", &map(folder.path(), &format!("{ORIGIN}\n{yaml}"), shade)]);
         assert_eq!(scene.walls.len(), 4, "{name}: {:?}", scene.walls);
-        assert!(scene.walls.iter().all(|wall| [0.35, 2.65].contains(&wall.a.x)), "{name}: {:?}", scene.walls);
+        assert!(
+            scene.walls.iter().all(|wall| [0.35, 2.65].contains(&wall.a.x)),
+            "{name}: {:?}",
+            scene.walls
+        );
     }
 }
 
@@ -87,7 +103,10 @@ fn shades_are_what_the_file_says() {
 fn missing_images_and_images_for_descriptions_are_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = map(folder.path(), ORIGIN, room);
-    refused(&["scene", "from-grid", folder.path().join("map.pgm").to_str().expect("a plain path")], "an image");
+    refused(
+        &["scene", "from-grid", folder.path().join("map.pgm").to_str().expect("a plain path")],
+        "an image",
+    );
     fs::remove_file(folder.path().join("map.pgm")).expect("writable");
     refused(&["scene", "from-grid", &path], "`image:` names");
 }

@@ -25,7 +25,8 @@ fn extents(text: &str) -> (Vec<[f64; 4]>, String) {
     let output = run(&["scene", "from-sdf", path.to_str().expect("a plain path")]);
     let said = stderr(&output);
     assert!(output.status.success(), "{said}");
-    let scene = Scene::from_json(&String::from_utf8(output.stdout).expect("text")).expect("a scene");
+    let scene =
+        Scene::from_json(&String::from_utf8(output.stdout).expect("text")).expect("a scene");
     let mut found: Vec<(String, [f64; 4])> = Vec::new();
     for wall in &scene.walls {
         let id = wall.id.split('.').next().unwrap_or_default().to_owned();
@@ -55,7 +56,8 @@ fn a_saved_state_overrides_poses_and_scales_and_deletes() {
     let (found, _) = extents(&world(&format!("{a}{b}{c}{state}")));
     assert_eq!(found, [[2.9, -1.0, 3.1, 3.0], [-1.0, -1.5, 1.0, -0.5], [4.5, 4.5, 5.5, 5.5]]);
     // The pose of a link alone, in a model within a model.
-    let nested = format!("<model name='o'><pose>1 0 0 0 0 0</pose>{}</model>", block("i", "", "1 1 1"));
+    let nested =
+        format!("<model name='o'><pose>1 0 0 0 0 0</pose>{}</model>", block("i", "", "1 1 1"));
     let state = "<state><model name='o'><model name='i'><link name='l'><pose>7 7 0.5 0 0 0</pose></link></model></model></state>";
     let (found, _) = extents(&world(&format!("{nested}{state}")));
     assert_eq!(found, [[6.5, 6.5, 7.5, 7.5]]);
@@ -96,7 +98,11 @@ fn poses_relative_to_other_frames_are_followed() {
     let path = folder.path().join("a.sdf");
     // Frames that are relative to each other end.
     let ring = "<frame name='f'><pose relative_to='g'>0 0 0 0 0 0</pose></frame><frame name='g'><pose relative_to='f'>0 0 0 0 0 0</pose></frame>";
-    fs::write(&path, world(&format!("{ring}{}", box_at("<pose relative_to='f'>0 0 0 0 0 0</pose>")))).expect("writable");
+    fs::write(
+        &path,
+        world(&format!("{ring}{}", box_at("<pose relative_to='f'>0 0 0 0 0 0</pose>"))),
+    )
+    .expect("writable");
     refused(&["scene", "from-sdf", path.to_str().expect("a plain path")], "no wall");
 }
 
@@ -125,13 +131,21 @@ fn what_is_left_out_is_named() {
 fn models_beside_the_world_are_included() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::create_dir(folder.path().join("shelf")).expect("writable");
-    let model = format!("<sdf version='1.6'>{}</sdf>", block("shelf", "<pose>9 9 0.5 0 0 0</pose>", "1 1 1"));
+    let model = format!(
+        "<sdf version='1.6'>{}</sdf>",
+        block("shelf", "<pose>9 9 0.5 0 0 0</pose>", "1 1 1")
+    );
     fs::write(folder.path().join("shelf/model.sdf"), model).expect("writable");
     let path = folder.path().join("a.world");
-    let include = "<include><uri>model://shelf</uri><name>s</name><pose>2 3 0.5 0 0 0</pose></include>";
+    let include =
+        "<include><uri>model://shelf</uri><name>s</name><pose>2 3 0.5 0 0 0</pose></include>";
     fs::write(&path, world(include)).expect("writable");
     let scene = made(&["scene", "from-sdf", path.to_str().expect("a plain path")]);
-    assert!(scene.walls.iter().all(|wall| wall.id.starts_with("s-1") && (wall.a.x - 2.0).abs() < 0.6), "{:?}", scene.walls);
+    assert!(
+        scene.walls.iter().all(|wall| wall.id.starts_with("s-1") && (wall.a.x - 2.0).abs() < 0.6),
+        "{:?}",
+        scene.walls
+    );
     // Not what is outside its folder.
     let outside = include.replace("model://shelf", "../shelf");
     fs::create_dir(folder.path().join("worlds")).expect("writable");

@@ -8,7 +8,8 @@ use std::{
 use sonard_model::geometry::wrap_180;
 
 use super::{
-    Bag, Clock, LASER_SCAN, MESSAGE_TYPES, MIN_CLOCK_NS, READINGS, STILL_DEG, Source, TRANSFORMS, decode,
+    Bag, Clock, LASER_SCAN, MESSAGE_TYPES, MIN_CLOCK_NS, READINGS, STILL_DEG, Source, TRANSFORMS,
+    decode,
     mcap::{Message, Messages},
     message::{Header, LaserScan, Range, Transform, moment},
     misplaced,
@@ -117,13 +118,17 @@ impl Bag {
             stated_most: 0.0,
         };
         let (mut first_ns, mut last_ns) = (i64::MAX, i64::MIN);
+        let mut without_place = None;
         for message in Messages::of(open()?, &READINGS) {
             let message = message?;
             if let Some(is_scan) = topics.get(&message.channel.topic) {
-                let stamp_ns = bag.know(&message, *is_scan)?;
+                let stamp_ns = bag.know(&message, *is_scan, &mut without_place)?;
                 bag.is_in_order &= stamp_ns >= last_ns;
                 (first_ns, last_ns) = (first_ns.min(stamp_ns), last_ns.max(stamp_ns));
             }
+        }
+        if let Some(error) = without_place.filter(|_| bag.topics.is_empty()) {
+            return Err(error);
         }
         bag.turns |= bag.topics.values().any(|source| source.is_scan);
         if bag.turns && bag.topics.len() > 1 {
@@ -137,8 +142,12 @@ impl Bag {
             bag.check_tilts()?;
         }
         bag.note_clock(&outline, mapping, first_ns);
-        let left: Vec<&str> =
-            outline.kinds.keys().filter(|topic| !topics.contains_key(*topic)).map(String::as_str).collect();
+        let left: Vec<&str> = outline
+            .kinds
+            .keys()
+            .filter(|topic| !topics.contains_key(*topic))
+            .map(String::as_str)
+            .collect();
         if !left.is_empty() {
             bag.notes.push(format!("topics left out: {}; --topic chooses", left.join(", ")));
         }
@@ -170,7 +179,12 @@ impl Bag {
     }
 
     /// Where a topic's ranger is, by its first message, and whether it turns; the message's time.
-    fn know(&mut self, message: &Message, is_scan: bool) -> Result<i64, ImportError> {
+    fn know(
+        &mut self,
+        message: &Message,
+        is_scan: bool,
+        without_place: &mut Option<ImportError>,
+    ) -> Result<i64, ImportError> {
         let channel = &message.channel;
         let mut header = decode(message, Header::decode)?;
         self.clock.stamp(&mut header, message);
@@ -191,7 +205,9 @@ impl Bag {
                     self.topics.insert(channel.topic.clone(), source);
                 }
                 // A later message may have a place.
-                Err(TransformError::Lacks { .. } | TransformError::Gap { .. }) => {}
+                Err(error @ (TransformError::Lacks { .. } | TransformError::Gap { .. })) => {
+                    without_place.get_or_insert(misplaced(error));
+                }
                 Err(error) => return Err(misplaced(error)),
             }
             return Ok(stamp_ns);

@@ -249,7 +249,9 @@ fn readings_without_a_place_are_left_out_and_topic_frame_and_time_named() {
     let found = examine(&late, Mapping::default()).expect("the rest is read");
     assert_eq!(found.readings, 3);
     let told = found.notes.join("\n");
-    for part in ["/front/range: 1 of 4", "`base_link` in `map`", "1970-01-01T00:00:03.5Z", "00:00:02Z"] {
+    for part in
+        ["/front/range: 1 of 4", "`base_link` in `map`", "1970-01-01T00:00:03.5Z", "00:00:02Z"]
+    {
         assert!(told.contains(part), "{part}: {told}");
     }
     let never = Bag::new(Order::Little).moves(9.0, [0.0; 3]).range("/range", 1.0, "base_link", 1.0);

@@ -37,7 +37,9 @@ pub(crate) enum TransformError {
         "there is no transform of the frame `{child}` in `{parent}` at {time}: they go from {from} to {to}"
     )]
     Lacks { child: String, parent: String, time: String, from: String, to: String },
-    #[error("the transforms of the frame `{child}` in `{parent}` have a gap from {from} to {to}, and it moved")]
+    #[error(
+        "the transforms of the frame `{child}` in `{parent}` have a gap from {from} to {to}, and it moved"
+    )]
     Gap { child: String, parent: String, from: String, to: String },
     #[error("the frame `{0}` is its own parent")]
     Loop(String),

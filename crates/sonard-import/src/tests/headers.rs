@@ -18,23 +18,34 @@ fn columns_are_taken_from_names_that_are_clear() {
         ("angle_deg,min_range_m,max_range_m,range_m", "azimuth_deg=`angle_deg` range_m=`range_m`"),
         ("pan_deg,tilt_deg,distance_cm", "azimuth_deg=`pan_deg` range_cm=`distance_cm`"),
         ("yaw_deg,pitch_deg,distance_cm", "azimuth_deg=`yaw_deg` range_cm=`distance_cm`"),
-        ("angle_deg,distance_cm,echo_x_cm,echo_y_cm", "azimuth_deg=`angle_deg` range_cm=`distance_cm`"),
+        (
+            "angle_deg,distance_cm,echo_x_cm,echo_y_cm",
+            "azimuth_deg=`angle_deg` range_cm=`distance_cm`",
+        ),
         ("Winkel_deg,Entfernung_cm,Kommentar", "azimuth_deg=`Winkel_deg` range_cm=`Entfernung_cm`"),
     ] {
         let row = vec!["1"; header.split(',').count()].join(",");
         assert_eq!(fields(&mapped(header, &row).expect(header)), expected);
     }
     let found = mapped("heading_deg,angle_cw_deg,distance_cm", "0,10,100").expect("clear");
-    assert!(found.mapping.clockwise && found.notes.join(" ").contains("clockwise"), "{:?}", found.notes);
+    assert!(
+        found.mapping.clockwise && found.notes.join(" ").contains("clockwise"),
+        "{:?}",
+        found.notes
+    );
 }
 
 /// What is offered is complete, in the file's own names, and right when it is followed.
 #[test]
 fn what_is_offered_is_accepted_as_it_stands() {
     for (header, row, offered) in [
-        ("angle_deg,min_range,max_range,range", "1,0.02,4.0,1.5", "azimuth_deg=angle_deg,range_m=range"),
+        (
+            "angle_deg,min_range,max_range,range",
+            "1,0.02,4.0,1.5",
+            "azimuth_deg=angle_deg,range_m=range",
+        ),
         ("Lage [deg],Messwert [cm]", "1,150", "azimuth_deg=Lage [deg],range_cm=Messwert [cm]"),
-        ("a, \"b (cm, raw)\",angle_deg", "1,150,2", "azimuth_deg=angle_deg,range_cm=2"),
+        ("a,\"b (cm, raw)\",angle_deg", "1,150,2", "azimuth_deg=angle_deg,range_cm=2"),
     ] {
         let told = said(mapped(header, row));
         let typed = if offered.contains(' ') { format!("'{offered}'") } else { offered.to_owned() };
@@ -43,8 +54,16 @@ fn what_is_offered_is_accepted_as_it_stands() {
         let found = import(&text, columns(offered)).expect(header);
         assert_eq!(pings(&found)[0].range_m.map(|range_m| (range_m * 1e3).round()), Some(1500.0));
     }
-    let told = said(mapped("%time,field.min_range,field.max_range,field.range", "1462946345463606605,0.02,4.0,0.8"));
-    assert!(told.contains("range_m=field.range") && told.contains("--azimuth-deg") && !told.contains("=field.min"), "{told}");
+    let told = said(mapped(
+        "%time,field.min_range,field.max_range,field.range",
+        "1462946345463606605,0.02,4.0,0.8",
+    ));
+    assert!(
+        told.contains("range_m=field.range")
+            && told.contains("--azimuth-deg")
+            && !told.contains("=field.min"),
+        "{told}"
+    );
 }
 
 #[test]
@@ -63,13 +82,20 @@ fn a_fixed_ranger_has_no_column_for_its_direction() {
 #[test]
 fn rows_of_an_array_are_rounds() {
     let array = sonard_model::array::RangerArray::preset("pioneer-8").expect("shipped");
-    let of_array = || Taken { array: Some(array.clone()), sensor: "pioneer".to_owned(), longest_m: 6.8, ..taken() };
+    let of_array = || Taken {
+        array: Some(array.clone()),
+        sensor: "pioneer".to_owned(),
+        longest_m: 6.8,
+        ..taken()
+    };
     let rows = "1.50\t2.50\t4.10\t4.20\t4.30\t4.40\t2.00\t1.00\n1.51\t2.49\t4.10\t4.20\t4.30\t4.40\t2.00\t1.01\n";
     let told = said(examine(rows.as_bytes(), Mapping::default(), of_array()));
     assert!(told.contains("8 values") && told.contains("--columns range_m=1-8"), "{told}");
     let names: Vec<String> = (0..8).map(|at| format!("sonar_{at}_m")).collect();
     let named = format!("{}\n{rows}", names.join("\t"));
-    for (text, mapping) in [(rows.to_owned(), columns("range_m=1-8")), (named.clone(), Mapping::default())] {
+    for (text, mapping) in
+        [(rows.to_owned(), columns("range_m=1-8")), (named.clone(), Mapping::default())]
+    {
         let found = examine(text.as_bytes(), mapping, of_array()).expect("rounds");
         assert_eq!((found.readings, found.echoes), (16, 16));
         let scans: Result<Vec<_>, _> = found.scans(text.as_bytes()).expect("as before").collect();
@@ -80,7 +106,11 @@ fn rows_of_an_array_are_rounds() {
         assert!((first.range_m.expect("an echo") - 1.5).abs() < 1e-12);
     }
     let told = said(examine(named.as_bytes(), Mapping::default(), taken()));
-    assert!(told.contains("8 columns are ranges") && told.contains("--array NAME --columns range_m=1-8"), "{told}");
+    assert!(
+        told.contains("8 columns are ranges")
+            && told.contains("--array NAME --columns range_m=1-8"),
+        "{told}"
+    );
     let told = said(examine(rows.as_bytes(), columns("range_m=1-7"), of_array()));
     assert!(told.contains("7 ranges") && told.contains("8 rangers"), "{told}");
 }

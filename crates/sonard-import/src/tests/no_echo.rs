@@ -57,7 +57,11 @@ fn constants_are_asked_about_in_every_format_and_the_answer_gives_right_readings
                 // What these drivers write for nothing: taken so, and noted.
                 let found = examine(text.as_bytes(), mapping, taken()).expect("right");
                 assert_eq!((found.readings, found.echoes), (36, 24));
-                assert!(found.notes.join(" ").contains("12 of 36 ranges are 0"), "{:?}", found.notes);
+                assert!(
+                    found.notes.join(" ").contains("12 of 36 ranges are 0"),
+                    "{:?}",
+                    found.notes
+                );
                 continue;
             }
             let told = said(examine(text.as_bytes(), mapping.clone(), taken()));
@@ -73,13 +77,16 @@ fn constants_are_asked_about_in_every_format_and_the_answer_gives_right_readings
 #[test]
 fn noise_about_a_constant_is_asked_about() {
     let noisy = |at: usize| 396.0 + (at * 7919 % 83) as f64 / 10.0;
-    let ranges: Vec<f64> = (0..120).map(|at| if at % 3 == 0 { noisy(at) } else { 120.0 + (at % 7) as f64 }).collect();
-    let rows: String = ranges.iter().enumerate().map(|(at, range)| format!("{},{range}\n", 3 * at)).collect();
+    let ranges: Vec<f64> =
+        (0..120).map(|at| if at % 3 == 0 { noisy(at) } else { 120.0 + (at % 7) as f64 }).collect();
+    let rows: String =
+        ranges.iter().enumerate().map(|(at, range)| format!("{},{range}\n", 3 * at)).collect();
     let mapping = columns("azimuth_deg=1,range_cm=2");
     let told = said(examine(rows.as_bytes(), mapping.clone(), taken()));
     let (_, rest) = told.split_once("--none-from=").unwrap_or_else(|| panic!("{told}"));
     let from = rest.split(';').next().and_then(|value| value.parse().ok());
-    let found = examine(rows.as_bytes(), Mapping { none_from: from, ..mapping }, taken()).expect("answered");
+    let found = examine(rows.as_bytes(), Mapping { none_from: from, ..mapping }, taken())
+        .expect("answered");
     assert_eq!((found.readings, found.echoes), (120, 80));
 }
 
@@ -94,9 +101,13 @@ fn walls_at_one_distance_are_read() {
         ("half a turn", ranges(|at| at < 18)),
         ("everywhere", vec![150.0; 36]),
         ("a real greatest value", (0..36).map(|at| 200.0 + f64::from(at * 5 % 9)).collect()),
-        ("twice the greatest", (0..36).map(|at| if at % 18 == 0 { 300.0 } else { 250.0 + f64::from(at) }).collect()),
+        (
+            "twice the greatest",
+            (0..36).map(|at| if at % 18 == 0 { 300.0 } else { 250.0 + f64::from(at) }).collect(),
+        ),
     ] {
-        let found = examine(table(&ranges).as_bytes(), columns("azimuth_deg=1,range_cm=2"), taken());
+        let found =
+            examine(table(&ranges).as_bytes(), columns("azimuth_deg=1,range_cm=2"), taken());
         assert_eq!(found.expect(name).echoes, 36, "{name}");
     }
     // One ranger of an array beside a wall.
@@ -104,7 +115,10 @@ fn walls_at_one_distance_are_read() {
     for (at, range) in beside.iter_mut().enumerate() {
         *range = if at % 6 == 2 { 255.0 } else { 100.0 + 3.0 * at as f64 };
     }
-    assert_eq!(examine(carmen(&beside).as_bytes(), Mapping::default(), taken()).expect("a wall").echoes, 36);
+    assert_eq!(
+        examine(carmen(&beside).as_bytes(), Mapping::default(), taken()).expect("a wall").echoes,
+        36
+    );
 }
 
 /// A value that is no distance is never one, whatever is said.

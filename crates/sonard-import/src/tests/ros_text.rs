@@ -8,7 +8,8 @@ const SCAN: &str = "{\"header\": {\"stamp\": {\"sec\": 1760000000, \"nanosec\": 
     \"ranges\": [1.0, 1.1, null, 0.0, 5.0]}";
 
 fn read(text: &str) -> Vec<(f64, Option<f64>)> {
-    let records = import(text, Mapping::default()).unwrap_or_else(|error| panic!("{text}: {error}"));
+    let records =
+        import(text, Mapping::default()).unwrap_or_else(|error| panic!("{text}: {error}"));
     let round = |number: f64| (number * 1e3).round() / 1e3;
     pings(&records).iter().map(|ping| (round(ping.azimuth_deg), ping.range_m.map(round))).collect()
 }
@@ -55,8 +56,10 @@ fn what_rostopic_echo_prints_is_read() {
 #[test]
 fn range_messages_are_of_a_fixed_ranger() {
     let message = |range: &str| {
-        format!("header:\n  stamp:\n    secs: 1760000000\n    nsecs: 0\n  frame_id: sonar\nradiation_type: 0\nfield_of_view: 0.26\n\
-                 min_range: 0.02\nmax_range: 4.0\nrange: {range}\n---\n")
+        format!(
+            "header:\n  stamp:\n    secs: 1760000000\n    nsecs: 0\n  frame_id: sonar\nradiation_type: 0\nfield_of_view: 0.26\n\
+                 min_range: 0.02\nmax_range: 4.0\nrange: {range}\n---\n"
+        )
     };
     let text = [message("1.25"), message("4.0"), message("nan")].concat();
     let found = examine(text.as_bytes(), Mapping::default(), taken()).expect("ranges");
@@ -72,7 +75,8 @@ fn lists_of_pairs_are_read_by_their_places() {
         let told = said(import(text, Mapping::default()));
         assert!(told.contains("lists") && told.contains("--columns azimuth_deg=1"), "{told}");
         let records = import(text, columns("azimuth_deg=1,range_m=2")).expect("pairs");
-        let read: Vec<_> = pings(&records).iter().map(|ping| (ping.azimuth_deg, ping.range_m.is_some())).collect();
+        let read: Vec<_> =
+            pings(&records).iter().map(|ping| (ping.azimuth_deg, ping.range_m.is_some())).collect();
         assert_eq!(read, [(0.0, true), (10.0, true), (20.0, false)], "{text}");
     }
 }

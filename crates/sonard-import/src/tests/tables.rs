@@ -138,7 +138,10 @@ fn a_header_is_understood_or_asked_about() {
     let unit = said(guess("angle_deg,distance"));
     assert!(unit.contains("does not say its unit") && unit.contains("range_mm=distance"), "{unit}");
     let nothing = said(guess("foo,bar"));
-    assert!(nothing.contains("no column is named as a direction") && nothing.contains("foo"), "{nothing}");
+    assert!(
+        nothing.contains("no column is named as a direction") && nothing.contains("foo"),
+        "{nothing}"
+    );
     let numbers = said(examine(b"1,2\n", Mapping::default(), taken()));
     assert!(numbers.contains("the first line of 2 values has no names"), "{numbers}");
 }
@@ -150,7 +153,11 @@ fn what_is_wrong_is_named() {
     for (text, mapping, words) in [
         ("1,2\n2,abc\n", mapping(), "line 2, range_cm (column 2): `abc` is no number"),
         ("1,2\n,3\n", mapping(), "line 2: there is no azimuth"),
-        ("1,2\n3,-1\n", mapping(), "line 2, range_cm (column 2): a range of -1 is no distance (1 of 2 are)"),
+        (
+            "1,2\n3,-1\n",
+            mapping(),
+            "line 2, range_cm (column 2): a range of -1 is no distance (1 of 2 are)",
+        ),
         ("1,2\n3,0\n", mapping(), "--none=0"),
         (
             "1,2\n",
@@ -215,7 +222,7 @@ fn other_units_than_said_are_found_out() {
             "if these are degrees",
         ),
         (table(|deg| deg, |m| 100.0 * m), columns("azimuth_deg=1,range_m=2"), "is the unit right?"),
-        (table(|deg| deg, |m| 0.01 * m), columns("azimuth_deg=1,range_m=2"), "is the unit right?"),
+        (table(|deg| deg, |m| 0.01 * m), columns("azimuth_deg=1,range_m=2"), "is the unit right"),
         (
             table(|deg| deg, |m| if m > 1.4 { 2.55 } else { m }),
             columns("azimuth_deg=1,range_ft=2"),
@@ -224,7 +231,7 @@ fn other_units_than_said_are_found_out() {
         (
             table(|deg| deg, |m| if m > 1.4 { 255.0 } else { m }),
             columns("azimuth_deg=1,range_m=2"),
-            "9 of 120 ranges are 255 by range_m",
+            "10 of 120 ranges are 255 by range_m",
         ),
     ] {
         let found = import(&text, mapping.clone());

@@ -20,17 +20,28 @@ fn texts_are_read_in_every_encoding_and_with_every_line_end() {
         ("both", ROWS.replace('\n', "\r\n").into_bytes()),
         ("doubled returns", ROWS.replace('\n', "\r\r\n").into_bytes()),
         ("Latin-1", [&b"angle_deg [\xb0],distance_cm\n"[..], &ROWS.as_bytes()[22..]].concat()),
-        ("semicolons and a line for Excel", format!("sep=;\r\n{}", ROWS.replace(',', ";")).into_bytes()),
+        (
+            "semicolons and a line for Excel",
+            format!("sep=;\r\n{}", ROWS.replace(',', ";")).into_bytes(),
+        ),
         ("tabs", ROWS.replace(',', "\t").into_bytes()),
         ("bars", ROWS.replace(',', "|").into_bytes()),
-        ("MATLAB comments", format!("% by hand\n{}% the end\n", ROWS.replace("16,32", "16,32 % doubtful")).into_bytes()),
+        (
+            "MATLAB comments",
+            format!("% by hand\n{}% the end\n", ROWS.replace("16,32", "16,32 % doubtful"))
+                .into_bytes(),
+        ),
         ("names in a comment", format!("% {ROWS}").into_bytes()),
     ] {
         let found = examine(&bytes, Mapping::default(), taken());
         let found = found.unwrap_or_else(|error| panic!("{name}: {error}; {}", error.help()));
-        let scans = found.scans(&bytes[..]).expect("as before").map(|scan| scan.expect("as before"));
+        let scans =
+            found.scans(&bytes[..]).expect("as before").map(|scan| scan.expect("as before"));
         let records: Vec<Record> = scans.flatten().collect();
-        let read: Vec<_> = pings(&records).iter().map(|ping| (ping.azimuth_deg, ping.range_m.map(|m| (m * 100.0).round()))).collect();
+        let read: Vec<_> = pings(&records)
+            .iter()
+            .map(|ping| (ping.azimuth_deg, ping.range_m.map(|m| (m * 100.0).round())))
+            .collect();
         assert_eq!(read, [(15.0, Some(31.0)), (16.0, Some(32.0)), (17.0, Some(33.0))], "{name}");
         let is_other = name.starts_with("UTF-16") || name == "Latin-1";
         assert_eq!(found.notes.iter().any(|note| note.contains("the text is")), is_other, "{name}");
@@ -47,7 +58,10 @@ fn decimal_commas_are_read_where_they_are_certain_and_asked_about_elsewhere() {
         "Winkel [Grad];Abstand [cm]\n15,5;31,5\n16,5;32,5\n",
     ] {
         let records = import(text, Mapping::default()).expect(text);
-        let read: Vec<_> = pings(&records).iter().map(|ping| (ping.azimuth_deg, ping.range_m.map(|m| (m * 1000.0).round() / 10.0))).collect();
+        let read: Vec<_> = pings(&records)
+            .iter()
+            .map(|ping| (ping.azimuth_deg, ping.range_m.map(|m| (m * 1000.0).round() / 10.0)))
+            .collect();
         assert_eq!(read, expected, "{text}");
     }
     let told = said(import("angle_deg,distance_cm\n15,5,31,5\n", Mapping::default()));
@@ -61,15 +75,24 @@ fn decimal_commas_are_read_where_they_are_certain_and_asked_about_elsewhere() {
 
 #[test]
 fn rows_that_are_too_long_or_too_short_are_named() {
-    let long = said(import("angle_deg,distance_cm\n0,100\n5,101,10,102,15,103\n", Mapping::default()));
+    let long =
+        said(import("angle_deg,distance_cm\n0,100\n5,101,10,102,15,103\n", Mapping::default()));
     assert!(long.contains("line 3: 6 values, and the table has 2 columns"), "{long}");
     let short = said(import("angle_deg,distance_cm\n0,100\n10\n20,100\n", Mapping::default()));
     assert!(short.contains("line 3: 1 values"), "{short}");
-    let found = examine(b"angle_deg,distance_cm\n0,100\n5,\n10,102,\n", Mapping::default(), taken()).expect("whole");
+    let found =
+        examine(b"angle_deg,distance_cm\n0,100\n5,\n10,102,\n", Mapping::default(), taken())
+            .expect("whole");
     assert_eq!((found.readings, found.echoes), (3, 2));
-    let whole = examine(b"angle_deg,distance_cm\n0,100\n5,18", Mapping::default(), taken()).expect("maybe cut");
-    assert!(whole.readings == 2 && whole.notes.join(" ").contains("the last line has no end"), "{:?}", whole.notes);
-    let cut = examine(b"angle_deg,distance_cm\n0,100\n5,120\n10", Mapping::default(), taken()).expect("cut");
+    let whole = examine(b"angle_deg,distance_cm\n0,100\n5,18", Mapping::default(), taken())
+        .expect("maybe cut");
+    assert!(
+        whole.readings == 2 && whole.notes.join(" ").contains("the last line has no end"),
+        "{:?}",
+        whole.notes
+    );
+    let cut = examine(b"angle_deg,distance_cm\n0,100\n5,120\n10", Mapping::default(), taken())
+        .expect("cut");
     assert!(cut.readings == 2 && cut.notes.join(" ").contains("line 4 was cut"), "{:?}", cut.notes);
     let row = said(import("1,2,3,4,5,6,7,8\n", columns("azimuth_deg=1,range_cm=2")));
     assert!(row.contains("one row of 8 values"), "{row}");
@@ -78,8 +101,13 @@ fn rows_that_are_too_long_or_too_short_are_named() {
 #[test]
 fn streams_without_line_ends_are_read_record_by_record() {
     let stream: String = (15..45).map(|angle| format!("{angle},{}.", 31 + angle % 7)).collect();
-    for (text, count) in [(stream.clone(), 30), (stream[2..].to_owned(), 29), (stream[..stream.len() - 4].to_owned(), 29)] {
-        let found = examine(text.as_bytes(), columns("azimuth_deg=1,range_cm=2"), taken()).expect("a stream");
+    for (text, count) in [
+        (stream.clone(), 30),
+        (stream[2..].to_owned(), 29),
+        (stream[..stream.len() - 4].to_owned(), 29),
+    ] {
+        let found = examine(text.as_bytes(), columns("azimuth_deg=1,range_cm=2"), taken())
+            .expect("a stream");
         assert_eq!(found.readings, count, "{text}");
         assert!(found.notes[0].contains("full stop"), "{:?}", found.notes);
     }
@@ -94,9 +122,11 @@ fn times_without_date_zone_or_start_are_read_and_what_is_assumed_is_noted() {
         ("time_ms", ["1350", "1400"], "2026-11-27T08:00:00Z", "start of the board"),
         ("time_s", ["1700000000.5", "1700000001"], "2023-11-14T22:13:20.5Z", ""),
     ] {
-        let text = format!("{column},angle_deg,distance_cm\n{},0,100\n{},5,101\n", cells[0], cells[1]);
+        let text =
+            format!("{column},angle_deg,distance_cm\n{},0,100\n{},5,101\n", cells[0], cells[1]);
         let found = examine(text.as_bytes(), Mapping::default(), started.clone()).expect(column);
-        let scans = found.scans(text.as_bytes()).expect("as before").map(|scan| scan.expect("as before"));
+        let scans =
+            found.scans(text.as_bytes()).expect("as before").map(|scan| scan.expect("as before"));
         let records: Vec<Record> = scans.flatten().collect();
         assert_eq!(pings(&records)[0].time.map(|time| time.to_string()).as_deref(), Some(first));
         let notes = found.notes.join("\n");
@@ -106,6 +136,7 @@ fn times_without_date_zone_or_start_are_read_and_what_is_assumed_is_noted() {
     let given = Mapping { started: "2020-01-01T00:00:00Z".parse().ok(), ..Mapping::default() };
     let text = "time_ms,angle_deg,distance_cm\n4294967200,0,100\n104,5,101\n";
     let records = import(text, given).expect("given");
-    let times: Vec<_> = pings(&records).iter().filter_map(|ping| ping.time).map(|time| time.to_string()).collect();
+    let times: Vec<_> =
+        pings(&records).iter().filter_map(|ping| ping.time).map(|time| time.to_string()).collect();
     assert_eq!(times, ["2020-01-01T00:00:00Z", "2020-01-01T00:00:00.2Z"]);
 }

@@ -20,12 +20,19 @@ fn radians_in_a_column_of_degrees_are_found_over_any_span() {
         ("sixteen", rows(16, |part| TAU * part)),
     ] {
         let told = said(examine(text.as_bytes(), mapping(), taken()));
-        assert!(told.contains("as radians would") && told.contains("--columns azimuth_rad=1,range_cm=2"), "{name}: {told}");
+        assert!(
+            told.contains("as radians would")
+                && told.contains("--columns azimuth_rad=1,range_cm=2"),
+            "{name}: {told}"
+        );
         let radians = columns("azimuth_rad=1,range_cm=2");
         examine(text.as_bytes(), radians, taken()).expect(name);
     }
     for (name, text) in [
-        ("whole degrees of a small sector", "0,150\n1,151\n2,150\n3,150\n4,151\n5,150\n6,150\n".to_owned()),
+        (
+            "whole degrees of a small sector",
+            "0,150\n1,151\n2,150\n3,150\n4,151\n5,150\n6,150\n".to_owned(),
+        ),
         ("tenths of degrees", rows(36, |part| 360.0 * part)),
         ("beyond", rows(36, |part| 6.5 * part)),
     ] {
@@ -36,7 +43,9 @@ fn radians_in_a_column_of_degrees_are_found_over_any_span() {
 #[test]
 fn metres_in_a_column_of_centimetres_are_found_either_way() {
     let table = |scale: f64| -> String {
-        (0..36).map(|at| format!("{},{:.3}\n", 10 * at, scale * (1.2 + 0.01 * f64::from(at)))).collect()
+        (0..36)
+            .map(|at| format!("{},{:.3}\n", 10 * at, scale * (1.2 + 0.01 * f64::from(at))))
+            .collect()
     };
     for (scale, given, right) in [
         (1.0, "range_cm=2", "range_m=2"),
@@ -53,7 +62,8 @@ fn metres_in_a_column_of_centimetres_are_found_either_way() {
     }
     // What stands near is near.
     let near: String = (0..36).map(|at| format!("{},{}\n", 10 * at, 6 + at % 4)).collect();
-    examine(near.as_bytes(), columns("azimuth_deg=1,range_cm=2"), taken()).expect("a few centimetres");
+    examine(near.as_bytes(), columns("azimuth_deg=1,range_cm=2"), taken())
+        .expect("a few centimetres");
 }
 
 #[test]
@@ -76,7 +86,8 @@ fn the_place_of_an_echo_is_not_the_robots() {
         assert!(!examine(text.as_bytes(), mapping, taken()).expect("answered").has_poses);
     }
     // A robot that drives.
-    let driven: String = (0..18).map(|at| format!("{},{},{},{}\n", 20 * at, 120 + at, 5 * at, 2 * at)).collect();
+    let driven: String =
+        (0..18).map(|at| format!("{},{},{},{}\n", 20 * at, 120 + at, 5 * at, 2 * at)).collect();
     let mapping = columns("azimuth_deg=1,range_cm=2,x_cm=3,y_cm=4");
     assert!(examine(driven.as_bytes(), mapping, taken()).expect("a course").has_poses);
 }

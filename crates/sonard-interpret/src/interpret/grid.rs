@@ -9,9 +9,9 @@ mod beam_model;
 mod ideal;
 mod image;
 mod polar;
+mod rows;
 mod score;
 mod tiles;
-mod rows;
 mod trace;
 
 #[cfg(test)]

@@ -31,7 +31,8 @@ impl Layers {
             let help = format!("these have something: {}", names.join(", "));
             return Err((format!("nothing is on layer `{wanted}`"), help));
         }
-        let off = drawing.layers().filter(|layer| !layer.is_layer_on).map(|layer| same(&layer.name));
+        let off =
+            drawing.layers().filter(|layer| !layer.is_layer_on).map(|layer| same(&layer.name));
         let hidden: BTreeSet<String> = off.chain(frozen(bytes)).collect();
         let all = used.iter().map(|name| same(name));
         let shown = match wanted.is_empty() {
@@ -54,7 +55,10 @@ impl Layers {
             notes.push(format!("layers left out, switched off or frozen: {}", hidden.join(", ")));
         }
         if wanted.is_empty() && self.is_binary {
-            notes.push("frozen layers can't be told from others in a binary DXF; --layer chooses".to_owned());
+            notes.push(
+                "frozen layers can't be told from others in a binary DXF; --layer chooses"
+                    .to_owned(),
+            );
         }
         notes
     }
@@ -89,7 +93,8 @@ mod tests {
 
     #[test]
     fn frozen_layers_are_found_whatever_other_flags_they_have() {
-        let layer = |name: &str, flags: i32| format!("  0\nLAYER\n  2\n{name}\n 70\n{flags}\n 62\n7\n");
+        let layer =
+            |name: &str, flags: i32| format!("  0\nLAYER\n  2\n{name}\n 70\n{flags}\n 62\n7\n");
         let text = [("walls", 0), ("Furn", 1), ("locked", 4), ("both", 5), ("in new viewports", 2)];
         let text: String = text.iter().map(|(name, flags)| layer(name, *flags)).collect();
         let text = format!("  0\nTABLE\n  2\nLAYER\n 70\n5\n{text}  0\nENDTAB\n");

@@ -87,9 +87,13 @@ impl<'a> Plan<'a> {
         let mut notes: Vec<String> =
             self.left_out.iter().map(|(what, count)| format!("left out: {count} {what}")).collect();
         if self.filled > 0 {
-            notes.push(format!("{} filled areas (SOLID, TRACE) are taken as their outlines", self.filled));
+            notes.push(format!(
+                "{} filled areas (SOLID, TRACE) are taken as their outlines",
+                self.filled
+            ));
         }
-        let far = self.bounds().filter(|(low, high)| low.abs().max(high.abs()).max_element() > FAR_M);
+        let far =
+            self.bounds().filter(|(low, high)| low.abs().max(high.abs()).max_element() > FAR_M);
         let shift = far.map_or(DVec2::ZERO, |(low, _)| low.floor());
         if shift != DVec2::ZERO {
             notes.push(format!(
@@ -143,11 +147,23 @@ impl<'a> Plan<'a> {
             EntityType::Arc(arc) => self.arc(layer, arc),
             EntityType::Insert(insert) => self.insert(layer, insert),
             EntityType::Solid(solid) => {
-                let Solid { first_corner: a, second_corner: b, third_corner: c, fourth_corner: d, .. } = solid;
+                let Solid {
+                    first_corner: a,
+                    second_corner: b,
+                    third_corner: c,
+                    fourth_corner: d,
+                    ..
+                } = solid;
                 self.filled(layer, [a, b, d, c], &solid.extrusion_direction);
             }
             EntityType::Trace(trace) => {
-                let Trace { first_corner: a, second_corner: b, third_corner: c, fourth_corner: d, .. } = trace;
+                let Trace {
+                    first_corner: a,
+                    second_corner: b,
+                    third_corner: c,
+                    fourth_corner: d,
+                    ..
+                } = trace;
                 self.filled(layer, [a, b, d, c], &trace.extrusion_direction);
             }
             EntityType::Seqend(_) | EntityType::Vertex(_) => {}
@@ -183,10 +199,12 @@ impl<'a> Plan<'a> {
         let base = DAffine2::from_translation(-DVec2::new(block.base_point.x, block.base_point.y));
         let at = DAffine2::from_translation(DVec2::new(insert.location.x, insert.location.y));
         let seen = DAffine2::from_scale(DVec2::new(side, 1.0));
-        for (column, row) in (0..columns).flat_map(|column| (0..rows).map(move |row| (column, row))) {
+        for (column, row) in (0..columns).flat_map(|column| (0..rows).map(move |row| (column, row)))
+        {
             let [column, row] = [column, row].map(f64::from);
             let aside = DVec2::new(column * insert.column_spacing, row * insert.row_spacing);
-            self.frame = outer.0 * seen * at * turn * DAffine2::from_translation(aside) * scale * base;
+            self.frame =
+                outer.0 * seen * at * turn * DAffine2::from_translation(aside) * scale * base;
             for entity in &block.entities {
                 self.add(entity);
             }
@@ -306,11 +324,14 @@ impl<'a> Plan<'a> {
 /// The kind of an entity that makes no wall.
 const fn kind(entity: &EntityType) -> &'static str {
     match entity {
-        EntityType::Spline(_) | EntityType::Ellipse(_) | EntityType::Helix(_) => "splines and ellipses",
-        EntityType::MLine(_) => "multiple lines (MLINE)",
-        EntityType::Face3D(_) | EntityType::Solid3D(_) | EntityType::Body(_) | EntityType::Region(_) => {
-            "faces, regions and solids (3DFACE, REGION, 3DSOLID)"
+        EntityType::Spline(_) | EntityType::Ellipse(_) | EntityType::Helix(_) => {
+            "splines and ellipses"
         }
+        EntityType::MLine(_) => "multiple lines (MLINE)",
+        EntityType::Face3D(_)
+        | EntityType::Solid3D(_)
+        | EntityType::Body(_)
+        | EntityType::Region(_) => "faces, regions and solids (3DFACE, REGION, 3DSOLID)",
         EntityType::Text(_)
         | EntityType::MText(_)
         | EntityType::RText(_)

@@ -77,7 +77,8 @@ impl World<'_> {
             }
             _ => {}
         }
-        let (first, rest) = name.split_once("::").map_or((name, None), |(first, rest)| (first, Some(rest)));
+        let (first, rest) =
+            name.split_once("::").map_or((name, None), |(first, rest)| (first, Some(rest)));
         let mut around = Some(scope);
         while let Some(scope) = around {
             let is_named = |node: &Node| {
@@ -87,8 +88,13 @@ impl World<'_> {
             if let Some(element) = scope.element.children().find(is_named) {
                 let frame = self.frame(element, scope, depth + 1)?;
                 let (Some(rest), Ok(frame)) = (rest, &frame) else { return Ok(frame) };
-                let inner =
-                    Scope { element, frame: *frame, scale: scope.scale, name: "", outer: Some(scope) };
+                let inner = Scope {
+                    element,
+                    frame: *frame,
+                    scale: scope.scale,
+                    name: "",
+                    outer: Some(scope),
+                };
                 return self.named(rest, &inner, depth + 1);
             }
             if scope.element.attribute("name") == Some(first) && rest.is_none() {

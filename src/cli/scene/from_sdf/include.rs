@@ -81,7 +81,8 @@ impl World<'_> {
         }
         let within = |path: &Path| {
             let (path, folder) = (path.canonicalize().ok()?, folder.canonicalize().ok()?);
-            let is_short = fs::metadata(&path).is_ok_and(|file| file.is_file() && file.len() <= MAX_BYTES);
+            let is_short =
+                fs::metadata(&path).is_ok_and(|file| file.is_file() && file.len() <= MAX_BYTES);
             (path.starts_with(folder) && is_short).then_some(path)
         };
         let places = [folder.join(name), folder.join("models").join(name)];

@@ -22,7 +22,9 @@ impl World<'_> {
                     let [radius_m] = self.numbers_of(shape, "radius")?;
                     let [length_m] = self.numbers_of(shape, "length")?;
                     if (scale.x - scale.y).abs() > 1e-6 * scale.x.abs() {
-                        self.notes.push(format!("left out: a cylinder of `{name}` that is scaled to an oval"));
+                        self.notes.push(format!(
+                            "left out: a cylinder of `{name}` that is scaled to an oval"
+                        ));
                         continue;
                     }
                     self.cylinder(name, frame, scale.x * radius_m, scale.z * length_m);
@@ -104,7 +106,11 @@ impl World<'_> {
     }
 
     /// The numbers of an element's child.
-    pub(super) fn numbers_of<const N: usize>(&self, element: Node, name: &str) -> Result<[f64; N], Failure> {
+    pub(super) fn numbers_of<const N: usize>(
+        &self,
+        element: Node,
+        name: &str,
+    ) -> Result<[f64; N], Failure> {
         match child(element, name) {
             Some(child) => self.numbers(child),
             None => {

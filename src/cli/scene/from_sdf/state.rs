@@ -20,7 +20,8 @@ impl<'s, 'n> State<'s, 'n> {
     /// The state of the model of that name in this one.
     pub(super) fn of_model(&self, name: &str) -> Self {
         let models = self.elements.iter().flat_map(|element| element.children());
-        let is_of = |node: &Node| node.has_tag_name("model") && node.attribute("name") == Some(name);
+        let is_of =
+            |node: &Node| node.has_tag_name("model") && node.attribute("name") == Some(name);
         Self { elements: models.filter(is_of).collect() }
     }
 
@@ -54,7 +55,8 @@ impl<'s, 'n> State<'s, 'n> {
     /// The pose in the world of a link of the model, if the state has one.
     pub(super) fn of_link(&self, name: &str, world: &World) -> Result<Option<DAffine3>, Failure> {
         let links = self.elements.iter().rev().flat_map(|element| element.children());
-        let mut links = links.filter(|node| node.has_tag_name("link") && node.attribute("name") == Some(name));
+        let mut links =
+            links.filter(|node| node.has_tag_name("link") && node.attribute("name") == Some(name));
         let pose = links.find_map(|link| child(link, "pose"));
         pose.map(|pose| world.pose(pose)).transpose()
     }

@@ -54,7 +54,9 @@ impl Window {
         for (from, to) in ends {
             let Some((from, to)) = self.seen(from, to) else { continue };
             match parts.last_mut() {
-                Some((part, _)) if part.last().is_some_and(|last| last.distance(from) < 1e-9) => part.push(to),
+                Some((part, _)) if part.last().is_some_and(|last| last.distance(from) < 1e-9) => {
+                    part.push(to)
+                }
                 _ => parts.push((vec![from, to], false)),
             }
         }
@@ -123,8 +125,10 @@ fn of_children(root: &Group, frame: Transform) -> Option<Window> {
 fn of_corners(corners: &[[f64; 2]]) -> Option<Window> {
     let [a, b, c, d] = corners else { return None };
     let near = |one: f64, other: f64| (one - other).abs() < 1e-3;
-    let is_side = |one: &[f64; 2], other: &[f64; 2]| near(one[0], other[0]) != near(one[1], other[1]);
-    let is_upright = [(a, b), (b, c), (c, d), (d, a)].iter().all(|(one, other)| is_side(one, other));
+    let is_side =
+        |one: &[f64; 2], other: &[f64; 2]| near(one[0], other[0]) != near(one[1], other[1]);
+    let is_upright =
+        [(a, b), (b, c), (c, d), (d, a)].iter().all(|(one, other)| is_side(one, other));
     let of = |pick: fn(f64, f64) -> f64, axis: usize| {
         corners.iter().map(|corner| corner[axis]).reduce(pick).unwrap_or_default()
     };
@@ -141,7 +145,8 @@ mod tests {
     #[test]
     fn lines_are_cut_at_the_edges_of_a_window() {
         let window = Window { low: [4.0, 0.0], high: [6.0, 8.0] };
-        let line = |ends: &[(f64, f64)]| ends.iter().map(|&(x, y)| DVec2::new(x, y)).collect::<Vec<_>>();
+        let line =
+            |ends: &[(f64, f64)]| ends.iter().map(|&(x, y)| DVec2::new(x, y)).collect::<Vec<_>>();
         let cut = window.cut(line(&[(0.0, 4.0), (10.0, 4.0)]), false);
         assert_eq!(cut, [(line(&[(4.0, 4.0), (6.0, 4.0)]), false)]);
         // A ring that leaves the window is open; one inside stays closed.

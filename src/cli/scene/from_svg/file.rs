@@ -62,7 +62,10 @@ mod tests {
     fn markers_are_blanked_and_lines_stay() {
         let svg = "<svg viewBox='0 0 1 1'><defs>\n<marker id='a'><path d='M 0 0 L 1 1'/>\n</marker></defs>\n<path d='M 0 0 L 1 0'/></svg>";
         let Drawing { text, notes } = text(svg.as_bytes().to_vec()).expect("a drawing");
-        assert!(!text.contains("marker") && text.contains("L 1 0") && !text.contains("L 1 1"), "{text}");
+        assert!(
+            !text.contains("marker") && text.contains("L 1 0") && !text.contains("L 1 1"),
+            "{text}"
+        );
         assert_eq!((text.lines().count(), text.len(), notes.len()), (4, svg.len(), 0));
     }
 }

@@ -152,7 +152,10 @@ fn pixels(bytes: &[u8]) -> Result<([usize; 2], Vec<Option<u8>>), ImageError> {
     let refuse = |at, what| Err(ImageError::Image { at, what });
     let is_plain = bytes.starts_with(b"P2");
     if !is_plain && !bytes.starts_with(b"P5") {
-        return refuse(0, "a map's image must be a PGM, which begins with P5 or P2, or a PNG; convert others: `convert IMAGE map.pgm`");
+        return refuse(
+            0,
+            "a map's image must be a PGM, which begins with P5 or P2, or a PNG; convert others: `convert IMAGE map.pgm`",
+        );
     }
     let mut at = 2;
     let mut next = || number(bytes, &mut at);

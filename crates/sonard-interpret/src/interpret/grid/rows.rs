@@ -108,7 +108,9 @@ fn split_at_walls(stairs: &[Run]) -> Vec<&[Run]> {
     let mut parts = Vec::new();
     let mut begin = 0;
     for at in (0..stairs.len()).filter(|at| is_wall(*at)) {
-        parts.extend([&stairs[begin..at], &stairs[at..=at]].into_iter().filter(|part| !part.is_empty()));
+        parts.extend(
+            [&stairs[begin..at], &stairs[at..=at]].into_iter().filter(|part| !part.is_empty()),
+        );
         begin = at + 1;
     }
     parts.extend(Some(&stairs[begin..]).filter(|part| !part.is_empty()));

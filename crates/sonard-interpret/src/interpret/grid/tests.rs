@@ -182,7 +182,10 @@ fn row(yaml: &MapYaml, shades: &[u8]) -> Vec<f64> {
 fn cells_are_what_the_files_own_thresholds_make_of_them() {
     let near = |yaml: &str, shades: &[u8], expected: &[f64]| {
         let found = row(&described(yaml), shades);
-        assert!(found.iter().zip(expected).all(|(is, should)| (is - should).abs() < 5e-3), "{yaml}: {found:?}");
+        assert!(
+            found.iter().zip(expected).all(|(is, should)| (is - should).abs() < 5e-3),
+            "{yaml}: {found:?}"
+        );
     };
     // 205 is 0.19608, not below 0.196; one other shade changes nothing elsewhere.
     near("", &[0, 205, 254, 150], &[1.0, 0.5, 0.0, 0.5]);
@@ -205,7 +208,11 @@ fn descriptions_are_yaml_in_any_style() {
         "\u{feff}# by hand\r\nimage: \"a.pgm\"  # beside\r\nresolution: 5e-2\r\norigin: [ 1., 2., 0.5 ]\r\n",
     ] {
         let read = MapYaml::from_text(text).expect(text);
-        assert_eq!((read.image.as_str(), read.resolution, read.origin), ("a.pgm", 0.05, [1.0, 2.0, 0.5]), "{text}");
+        assert_eq!(
+            (read.image.as_str(), read.resolution, read.origin),
+            ("a.pgm", 0.05, [1.0, 2.0, 0.5]),
+            "{text}"
+        );
         assert!(!read.is_graded);
     }
 }
@@ -222,9 +229,16 @@ fn plain_images_and_other_greatest_values_are_the_same_map() {
     ] {
         let found: Vec<f64> = from_pgm(image, &yaml).expect("a map").probabilities().collect();
         assert_eq!(found.len(), 3);
-        assert!(found.iter().zip(&expected).all(|(is, should)| (is - should).abs() < 5e-3), "{found:?}");
+        assert!(
+            found.iter().zip(&expected).all(|(is, should)| (is - should).abs() < 5e-3),
+            "{found:?}"
+        );
     }
-    for (image, part) in [(&b"P6\n1 1\n255\n"[..], "convert"), (b"P2 3 1 255 0 1", "last pixel"), (b"P2 3 1 0 0 1 2", "greatest")] {
+    for (image, part) in [
+        (&b"P6\n1 1\n255\n"[..], "convert"),
+        (b"P2 3 1 255 0 1", "last pixel"),
+        (b"P2 3 1 0 0 1 2", "greatest"),
+    ] {
         let error = from_pgm(image, &yaml).expect_err(part).to_string();
         assert!(error.contains(part), "{error}");
     }
