@@ -140,11 +140,11 @@ impl Source<'_> {
             Ways { mapping: &found.mapping, names, has_columns: true, zero_is_no_echo: false };
         let mut has_poses = false;
         for row in found.rows((self.open)()?)? {
-            let (round, raw) = reader.round(&row?)?;
-            if raw.len() != count {
+            let round = reader.round(&row?)?;
+            if round.raw.len() != count {
                 let what = format!(
                     "{} ranges, and the array {} has {count} rangers",
-                    raw.len(),
+                    round.raw.len(),
                     array.name
                 );
                 return Err(ImportError::at(
@@ -154,7 +154,7 @@ impl Source<'_> {
                 ));
             }
             has_poses |= round.pose.is_some();
-            for (place, (raw, range_m)) in raw.iter().zip(&round.ranges_m).enumerate() {
+            for (place, (raw, range_m)) in round.raw.iter().zip(&round.ranges_m).enumerate() {
                 ranges.add(round.place, place as f64, *raw, *range_m, (&ways, &found.taken));
             }
         }
@@ -230,9 +230,9 @@ impl Source<'_> {
         let mut has_poses = false;
         for message in messages(read, found.decoded((self.open)()?)) {
             let (place, message) = message?;
-            let Some((round, raw)) = rounds.take(place, message)? else { continue };
+            let Some(round) = rounds.take(place, message)? else { continue };
             has_poses |= round.pose.is_some();
-            for (ranger, (raw, range_m)) in raw.iter().zip(&round.ranges_m).enumerate() {
+            for (ranger, (raw, range_m)) in round.raw.iter().zip(&round.ranges_m).enumerate() {
                 ranges.add(place, ranger as f64, *raw, *range_m, (&ways, &found.taken));
             }
         }
@@ -442,7 +442,7 @@ impl Imported {
         source: impl Read + 'a,
     ) -> Result<Box<dyn Iterator<Item = Scan> + 'a>, ImportError> {
         let mut reader = Reader::new(&self.mapping, &self.taken, self.decimal())?;
-        let rounds = self.rows(source)?.map(move |row| reader.round(&row?).map(|(round, _)| round));
+        let rounds = self.rows(source)?.map(move |row| reader.round(&row?));
         Ok(Box::new(
             (1..).zip(rounds).map(|(number, round)| Ok(scans::round(&self.taken, number, &round?))),
         ))
@@ -456,7 +456,7 @@ impl Imported {
         let mut rounds = Rounds::new(&self.mapping, &self.chosen, self.taken.started)?;
         let found = messages(read, self.decoded(source)).filter_map(move |message| {
             let round = message.and_then(|(place, message)| rounds.take(place, message));
-            round.map(|round| round.map(|(round, _)| round)).transpose()
+            round.transpose()
         });
         Ok(Box::new(
             (1..).zip(found).map(|(number, round)| Ok(scans::round(&self.taken, number, &round?))),

@@ -164,11 +164,11 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// The round of a row that has a range of each ranger, and these as the file has them.
+    /// The round of a row that has a range of each ranger.
     ///
     /// # Errors
     /// A value that is none, with its field and column.
-    pub(crate) fn round(&mut self, row: &Row) -> Result<(Round, Vec<Option<f64>>), ImportError> {
+    pub(crate) fn round(&mut self, row: &Row) -> Result<Round, ImportError> {
         let found = self.cells(row, Quantity::Range).or_else(|| self.cells(row, Quantity::Tof));
         let Some((field, cells)) = found else {
             return Err(ImportError::mapping("no column has a range", "name one with --columns"));
@@ -192,7 +192,7 @@ impl<'a> Reader<'a> {
             y_m: y.unwrap_or(otherwise.y_m),
             heading_deg: heading_deg.unwrap_or(otherwise.heading_deg),
         });
-        Ok((Round { place: row.place, time: self.time(row)?, pose, ranges_m }, raw))
+        Ok(Round { place: row.place, time: self.time(row)?, pose, ranges_m, raw })
     }
 
     fn air(&self, place: Location, temperature_c: f64) -> Result<Air, ImportError> {

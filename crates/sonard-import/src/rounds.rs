@@ -19,6 +19,8 @@ pub(crate) struct Round {
     pub(crate) pose: Option<Pose>,
     /// `None` of a ranger without an echo.
     pub(crate) ranges_m: Vec<Option<f64>>,
+    /// The same as the file has them, those that stand for no echo among them.
+    pub(crate) raw: Vec<Option<f64>>,
 }
 
 /// What a message of a robot's log holds.
@@ -86,7 +88,7 @@ impl Devices {
                 match self.ranges.iter().position(|(known, _)| known == device) {
                     Some(place) => self.ranges[place].1 += 1,
                     None if self.ranges.len() < MAX_RANGERS => {
-                        self.ranges.push((device.clone(), 1))
+                        self.ranges.push((device.clone(), 1));
                     }
                     None => {}
                 }
@@ -175,7 +177,7 @@ impl<'a> Rounds<'a> {
         })
     }
 
-    /// Takes a message in; the round that it is, with its ranges as the log has them.
+    /// Takes a message in; the round that it is.
     ///
     /// # Errors
     /// The rangers are others than before.
@@ -183,7 +185,7 @@ impl<'a> Rounds<'a> {
         &mut self,
         place: Location,
         message: Message,
-    ) -> Result<Option<(Round, Vec<Option<f64>>)>, ImportError> {
+    ) -> Result<Option<Round>, ImportError> {
         let Message { device, content } = message;
         let is_of = |chosen: &Option<Device>| chosen.as_ref() == Some(&device);
         match content {
@@ -229,7 +231,8 @@ impl<'a> Rounds<'a> {
                 };
                 let ranges_m = ranges.iter().map(range_m).collect();
                 let raw = ranges.iter().map(|range| Some(*range).filter(|range| range.is_finite()));
-                Ok(Some((Round { place, time, pose: self.pose, ranges_m }, raw.collect())))
+                let raw = raw.collect();
+                Ok(Some(Round { place, time, pose: self.pose, ranges_m, raw }))
             }
         }
     }

@@ -109,7 +109,7 @@ fn a_mount_that_no_transform_tells_is_noted_and_the_robots_pose_kept() {
 
 #[test]
 fn messages_count_by_their_stamps_in_whatever_order() {
-    let messages = |order: &dyn Fn(&mut Vec<(f64, bool)>)| {
+    let messages = |order: fn(&mut Vec<(f64, bool)>)| {
         let mut times: Vec<(f64, bool)> = (0..10)
             .flat_map(|at| [(1.0 + 0.1 * f64::from(at), false), (1.05 + 0.1 * f64::from(at), true)])
             .collect();
@@ -134,11 +134,11 @@ fn messages_count_by_their_stamps_in_whatever_order() {
             })
             .collect::<Vec<_>>()
     };
-    let expected = told(&messages(&|_| {}));
+    let expected = told(&messages(|_| {}));
     assert_eq!(expected.len(), 10);
-    let by_topic = messages(&|times| times.sort_by_key(|(_, is_second)| *is_second));
+    let by_topic = messages(|times| times.sort_by_key(|(_, is_second)| *is_second));
     let shuffled =
-        messages(&|times| times.sort_by_key(|(time_s, _)| (time_s * 1e3) as u64 * 7919 % 101));
+        messages(|times| times.sort_by_key(|(time_s, _)| (time_s * 1e3) as u64 * 7919 % 101));
     assert_eq!(told(&by_topic), expected);
     assert_eq!(told(&shuffled), expected);
     let found = examine(&by_topic, Mapping::default()).expect("a recording");
